@@ -1,0 +1,64 @@
+//! The one error enum, and the exit code that each kind of error ends the process with.
+
+use std::path::{Path, PathBuf};
+
+/// What can go wrong, as a person is told.
+///
+/// Messages name the place, the field, what was expected and what was found.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The command line or a description says something that cannot be: exit code 2.
+    ///
+    /// The message holds every fault found, one a line, each `file:line:column: field: …`
+    /// as far as the place is known.
+    #[error("{0}")]
+    Config(String),
+
+    /// A file that was named is missing, unreadable or not what it should be: exit code 3.
+    #[error("{}: {message}", path.display())]
+    Input {
+        /// The file.
+        path: PathBuf,
+        /// What was expected and what was found.
+        message: String,
+    },
+
+    /// A result could not be written: exit code 1.
+    #[error("{}: cannot write: {message}", path.display())]
+    Output {
+        /// The file or directory.
+        path: PathBuf,
+        /// Why, as the system says it.
+        message: String,
+    },
+
+    /// The render ran but its samples cannot be trusted: exit code 4.
+    #[error("{0}")]
+    Render(String),
+}
+
+/// `std::result::Result` with Abbe's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// The exit code of a process that ends with this error.
+    #[must_use]
+    pub fn exit_code(&self) -> i32 {
+        match self {
+            Error::Output { .. } => 1,
+            Error::Config(_) => 2,
+            Error::Input { .. } => 3,
+            Error::Render(_) => 4,
+        }
+    }
+
+    /// An [`Error::Input`] about `path`.
+    pub fn input(path: &Path, message: impl Into<String>) -> Error {
+        Error::Input { path: path.to_path_buf(), message: message.into() }
+    }
+
+    /// An [`Error::Output`] about `path`.
+    pub fn output(path: &Path, message: impl ToString) -> Error {
+        Error::Output { path: path.to_path_buf(), message: message.to_string() }
+    }
+}

@@ -1,0 +1,16 @@
+//! Abbe, a spectral batch renderer.
+//!
+//! Rooms, from the ground up; a room may use rooms below its own, never beside or above
+//! (`tests/layers.rs` holds the picture):
+//!
+//! ```text
+//!  main.rs  cli/                 process edge: arguments in, exit code and messages out
+//!  batch/                        jobs, work units, threads, report
+//!  transport/                    which effects, which paths, how much light
+//!  scene/                        compiled, immutable, Send + Sync; what rays meet
+//!  optics/  film/  description/  light at one point | samples to files | what a person wrote
+//!  spectrum/                     wavelengths, spectra, observer, refractive indices
+//!  math/  error.rs               frames, rays, warps, statistics | the one error enum
+//! ```
+pub mod error;
+pub mod math;

@@ -1,0 +1,3 @@
+//! The `abbe` command.
+
+fn main() {}

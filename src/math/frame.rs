@@ -1,0 +1,74 @@
+//! Orthonormal frames.
+
+use glam::DVec3;
+
+/// A right-handed orthonormal frame; local z is `n`.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    /// Local x in world space.
+    pub s: DVec3,
+    /// Local y in world space.
+    pub t: DVec3,
+    /// Local z in world space.
+    pub n: DVec3,
+}
+
+impl Frame {
+    /// A frame about the unit vector `n`.
+    ///
+    /// Duff et al. 2017, "Building an Orthonormal Basis, Revisited", listing 3.
+    #[must_use]
+    pub fn from_normal(n: DVec3) -> Frame {
+        let sign = 1.0f64.copysign(n.z);
+        let a = -1.0 / (sign + n.z);
+        let b = n.x * n.y * a;
+        Frame {
+            s: DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+            t: DVec3::new(b, sign + n.y * n.y * a, -n.y),
+            n,
+        }
+    }
+
+    /// A frame about the unit vector `n` whose `s` lies as near to `tangent` as it can.
+    /// Falls back to [`Frame::from_normal`] where `tangent` is parallel to `n` or zero.
+    #[must_use]
+    pub fn from_normal_and_tangent(n: DVec3, tangent: DVec3) -> Frame {
+        match (tangent - n * n.dot(tangent)).try_normalize() {
+            Some(s) => Frame { s, t: n.cross(s), n },
+            None => Frame::from_normal(n),
+        }
+    }
+
+    /// World to local.
+    #[must_use]
+    pub fn to_local(&self, v: DVec3) -> DVec3 {
+        DVec3::new(v.dot(self.s), v.dot(self.t), v.dot(self.n))
+    }
+
+    /// Local to world.
+    #[must_use]
+    pub fn to_world(&self, v: DVec3) -> DVec3 {
+        self.s * v.x + self.t * v.y + self.n * v.z
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_orthonormal_and_right_handed_for_every_normal() {
+        for i in 0..2000u32 {
+            let z = 1.0 - 2.0 * f64::from(i) / 1999.0;
+            let phi = 2.399_963 * f64::from(i);
+            let r = (1.0 - z * z).max(0.0).sqrt();
+            let n = DVec3::new(r * phi.cos(), r * phi.sin(), z).normalize();
+            let f = Frame::from_normal(n);
+            // Each entry is a handful of roundings of numbers of size one.
+            let tolerance = 8.0 * f64::EPSILON;
+            assert!(f.s.dot(f.t).abs() <= tolerance && f.s.dot(n).abs() <= tolerance);
+            assert!((f.s.length() - 1.0).abs() <= tolerance && (f.t.length() - 1.0).abs() <= tolerance);
+            assert!((f.s.cross(f.t) - n).length() <= tolerance);
+        }
+    }
+}
