@@ -14,3 +14,4 @@
 //! ```
 pub mod error;
 pub mod math;
+pub mod spectrum;

@@ -1,0 +1,448 @@
+//! Which wavelengths a path carries.
+//!
+//! A path draws one number u and carries the eight wavelengths P⁻¹(frac(u + k/8)): a rotated
+//! lattice, which integrates smooth spectra almost without noise (Wilkie et al. 2014, "Hero
+//! Wavelength Spectral Sampling"). P⁻¹ is linear between 2049 knots, and `inv_pdf` is exactly its
+//! slope, so every estimate is unbiased whatever the density is; the density only decides how
+//! much colour noise is left.
+//!
+//! Three densities are compared for a scene: `vis` follows the eye, `em` follows the emitters, `mix`
+//! is half of each. Smooth lights are best with `vis`, whose smoothness keeps the lattice accurate;
+//! line lights with `em`, which puts samples on the lines.
+
+use crate::spectrum::colour::ColourSpace;
+use crate::spectrum::observer::{Y_INTEGRAL, matching};
+use crate::spectrum::{BAND_NM, LANES, Lanes, Spectrum};
+
+/// The eight wavelengths of a path, in nm, and one over the density each was drawn with, in nm.
+///
+/// Lane 0 is the hero: the wavelength that decides where the path goes when only one can.
+/// An integral over the band is estimated by the mean over the lanes of f · `inv_pdf`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampledWavelengths {
+    /// Wavelengths in nm.
+    pub nm: Lanes,
+    /// 1 / p(λ), nm.
+    pub inv_pdf: Lanes,
+}
+
+/// Intervals of P⁻¹: a multiple of [`LANES`], so that all lanes sit at the same place of theirs.
+const KNOTS: usize = 2048;
+/// Intervals between one lane and the next.
+const ROWS: usize = KNOTS / LANES;
+
+/// How wavelengths are drawn: see the module's words.
+#[derive(Clone)]
+pub struct WavelengthDistribution {
+    /// For each row r, twice the sequence over k of the knot r + k · ROWS: a lattice that starts in any
+    /// lane is 8 neighbours.
+    rows: Vec<Row>,
+    /// Always these wavelengths, whatever u.
+    fixed: Option<SampledWavelengths>,
+    description: String,
+}
+
+#[derive(Clone, Copy)]
+struct Row {
+    /// The wavelength where an interval begins, nm.
+    nm: [f32; 2 * LANES],
+    /// The width of the interval, nm.
+    width: [f32; 2 * LANES],
+}
+
+impl std::fmt::Debug for WavelengthDistribution {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "WavelengthDistribution({})", self.description)
+    }
+}
+
+impl WavelengthDistribution {
+    /// Every wavelength of the band alike.
+    #[must_use]
+    pub fn uniform() -> WavelengthDistribution {
+        Density::uniform().distribution("uniform: every wavelength of 360 to 830 nm alike".into())
+    }
+
+    /// By the eye: 0.003939804 / cosh²(0.0072 (λ − 538)) per nm, normalised over the band (Radziszewski
+    /// et al. 2009, "An Improved Technique for Full Spectral Rendering").
+    #[must_use]
+    pub fn visible() -> WavelengthDistribution {
+        Density::visible().distribution("vis: by the eye, 1 / cosh²(0.0072 (λ − 538))".into())
+    }
+
+    /// Always the same eight wavelengths, each standing for an eighth of the band: for probes and
+    /// comparisons. An integral is then a fixed quadrature, which is biased.
+    ///
+    /// # Errors
+    /// In words, if a wavelength is outside 360 to 830 nm.
+    pub fn fixed(nm: [f64; LANES]) -> Result<WavelengthDistribution, String> {
+        if let Some(bad) = nm.iter().find(|nm| !(BAND_NM[0]..=BAND_NM[1]).contains(*nm)) {
+            return Err(format!("expected wavelengths of 360 to 830 nm, found {bad}"));
+        }
+        let sample = SampledWavelengths {
+            nm: Lanes::new(nm.map(|x| x as f32)),
+            inv_pdf: Lanes::splat((BAND_NM[1] - BAND_NM[0]) as f32),
+        };
+        Ok(WavelengthDistribution { rows: Vec::new(), fixed: Some(sample), description: format!("fixed: {nm:?} nm") })
+    }
+
+    /// The density that leaves the least colour noise in a scene with these emitters (each with the
+    /// share of the light it stands for; its own scale does not count) and reflectances.
+    ///
+    /// For `vis`, `mix` and `em`, and for every emitter times 1 and times each reflectance, the
+    /// standard deviation over u of the linear Rec.709 estimate of one path is computed on the
+    /// lattice itself; the density with the least mean, weighted by emitter, is taken. At most the 64
+    /// strongest emitters and 64 reflectances, evenly spaced through the list, are looked at.
+    #[must_use]
+    pub fn for_scene(emitters: &[(f64, Spectrum)], reflectances: &[Spectrum]) -> WavelengthDistribution {
+        const MOST: usize = 64;
+        let mut shares: Vec<(f64, &Spectrum, Density)> = Vec::new();
+        for (weight, spectrum) in emitters {
+            let density = Density::of_emission(spectrum);
+            if *weight > 0.0 && weight.is_finite() && density.total > 0.0 {
+                shares.push((*weight, spectrum, density));
+            }
+        }
+        // A stable sort: equal weights stay in the order given.
+        shares.sort_by(|a, b| b.0.total_cmp(&a.0));
+        shares.truncate(MOST);
+        if shares.is_empty() {
+            let mut distribution = WavelengthDistribution::visible();
+            distribution.description.push_str("; no emitter to choose by");
+            return distribution;
+        }
+        let step = reflectances.len().div_ceil(MOST).max(1);
+        let chosen: Vec<&Spectrum> = reflectances.iter().step_by(step).filter(|r| !r.is_constant()).collect();
+
+        let emission = Density::mixture(shares.iter().map(|(weight, _, density)| (*weight, density)));
+        let visible = Density::visible();
+        let candidates = [
+            ("vis", visible.clone()),
+            ("mix", Density::mixture([(0.5, &visible), (0.5, &emission)])),
+            ("em", Density::mixture([(0.1, &visible), (0.9, &emission)])),
+        ]
+        .map(|(name, density)| (name, density.distribution(String::new())));
+        let noise = candidates.each_ref().map(|(_, distribution)| {
+            let lattice = Lattice::of(distribution);
+            let factors: Vec<Vec<Lanes>> = chosen.iter().map(|r| lattice.values(r)).collect();
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for (weight, spectrum, _) in &shares {
+                let light = lattice.values(spectrum);
+                sum += weight * lattice.noise(&light, None);
+                weights += weight;
+                for factor in &factors {
+                    sum += weight * lattice.noise(&light, Some(factor));
+                    weights += weight;
+                }
+            }
+            sum / weights
+        });
+        let best = (1..3).fold(0, |best, i| if noise[i] < noise[best] { i } else { best });
+        let what =
+            ["by the eye", "half by the eye, half by the emitters", "a tenth by the eye, the rest by the emitters"];
+        let figure = |i: usize| format!("{} {:.2} %", candidates[i].0, 100.0 * noise[i]);
+        let others: Vec<String> = (0..3).filter(|i| *i != best).map(figure).collect();
+        let description = format!(
+            "{}: {}; colour noise of a path {:.2} % ({})",
+            candidates[best].0,
+            what[best],
+            100.0 * noise[best],
+            others.join(", ")
+        );
+        WavelengthDistribution { description, ..candidates[best].1.clone() }
+    }
+
+    /// The wavelengths of `u` in [0, 1): all of them within the band.
+    #[must_use]
+    #[inline]
+    pub fn sample(&self, u: f64) -> SampledWavelengths {
+        if let Some(fixed) = self.fixed {
+            return fixed;
+        }
+        // The lanes are whole rows apart, so they share the place within their intervals. The product
+        // with a power of two is exact.
+        let at = u * KNOTS as f64;
+        let knot = (at as usize).min(KNOTS - 1);
+        let place = Lanes::splat((at - knot as f64) as f32);
+        let row = &self.rows[knot % ROWS];
+        let first = knot / ROWS;
+        let eight = |x: &[f32; 2 * LANES]| Lanes::new(std::array::from_fn(|k| x[first + k]));
+        let width = eight(&row.width);
+        // nm + width is the next knot exactly (`distribution`), and rounding is monotonic: never beyond.
+        SampledWavelengths { nm: place.mul_add(width, eight(&row.nm)), inv_pdf: width * Lanes::splat(KNOTS as f32) }
+    }
+
+    /// Which density this is, and for a scene's own the figures it was chosen by.
+    #[must_use]
+    pub fn describe(&self) -> &str {
+        &self.description
+    }
+
+    /// The colour noise that one path has by its choice of wavelengths alone: the standard
+    /// deviation over u of the linear Rec.709 vector of `emitter` · `reflectance`, relative to its mean.
+    #[must_use]
+    pub fn colour_noise(&self, emitter: &Spectrum, reflectance: &Spectrum) -> f64 {
+        let lattice = Lattice::of(self);
+        lattice.noise(&lattice.values(emitter), Some(&lattice.values(reflectance)))
+    }
+}
+
+/// A density over the band: constant in each cell between sorted edges.
+#[derive(Clone)]
+struct Density {
+    /// Edges, nm, from 360 to 830.
+    edges: Vec<f64>,
+    /// Integral over each cell.
+    mass: Vec<f64>,
+    /// Sum of `mass`.
+    total: f64,
+}
+
+impl Density {
+    fn new(breakpoints: &[f64], density: impl Fn(f64) -> f64) -> Density {
+        // Quarter nanometres, and where the emitters jump.
+        let mut edges: Vec<f64> = (0..=1880).map(|i| 360.0 + 0.25 * f64::from(i)).collect();
+        edges.extend(breakpoints.iter().copied().filter(|nm| *nm > BAND_NM[0] && *nm < BAND_NM[1]));
+        edges.sort_by(f64::total_cmp);
+        edges.dedup();
+        let mass: Vec<f64> = edges.windows(2).map(|e| density(0.5 * (e[0] + e[1])) * (e[1] - e[0])).collect();
+        let total = mass.iter().sum();
+        Density { edges, mass, total }
+    }
+
+    fn uniform() -> Density {
+        Density::new(&[], |_| 1.0)
+    }
+
+    fn visible() -> Density {
+        Density::new(&[], |nm| {
+            let cosh = libm::cosh(0.0072 * (nm - 538.0));
+            0.003_939_804 / (cosh * cosh)
+        })
+    }
+
+    /// Emission times the length of the linear Rec.709 vector of its wavelength.
+    fn of_emission(spectrum: &Spectrum) -> Density {
+        Density::new(&spectrum.breakpoints(), |nm| {
+            let rgb = rec709(matching(nm));
+            spectrum.at(nm) * (rgb[0] * rgb[0] + rgb[1] * rgb[1] + rgb[2] * rgb[2]).sqrt()
+        })
+    }
+
+    /// The density of `nm`, normalised.
+    fn at(&self, nm: f64) -> f64 {
+        let i = self.edges.partition_point(|e| *e <= nm).clamp(1, self.mass.len()) - 1;
+        self.mass[i] / (self.edges[i + 1] - self.edges[i]) / self.total
+    }
+
+    /// The sum of normalised densities times their weights.
+    fn mixture<'a>(parts: impl IntoIterator<Item = (f64, &'a Density)>) -> Density {
+        let parts: Vec<_> = parts.into_iter().collect();
+        let edges: Vec<f64> = parts.iter().flat_map(|(_, d)| d.edges.iter().copied()).collect();
+        Density::new(&edges, |nm| parts.iter().map(|(weight, d)| weight * d.at(nm)).sum())
+    }
+
+    /// The distribution with this density: the knots of P⁻¹ at equal steps of the cumulated mass.
+    fn distribution(&self, description: String) -> WavelengthDistribution {
+        let mut knots = Vec::with_capacity(KNOTS + 1);
+        let (mut cell, mut below) = (0, 0.0);
+        for j in 0..=KNOTS {
+            let wanted = self.total * j as f64 / KNOTS as f64;
+            while cell + 1 < self.mass.len() && below + self.mass[cell] < wanted {
+                below += self.mass[cell];
+                cell += 1;
+            }
+            let share = if self.mass[cell] > 0.0 { ((wanted - below) / self.mass[cell]).clamp(0.0, 1.0) } else { 0.0 };
+            knots.push((self.edges[cell] + share * (self.edges[cell + 1] - self.edges[cell])) as f32);
+        }
+        knots[0] = BAND_NM[0] as f32;
+        knots[KNOTS] = BAND_NM[1] as f32;
+        // Neighbours lie well within a factor of two of each other (a 2048th of a density that is at least a
+        // tenth of `vis` spans 21 nm at most), so their difference is exact in f32 (Sterbenz).
+        let rows = (0..ROWS)
+            .map(|r| {
+                let knot = |k: usize| r + k % LANES * ROWS;
+                Row {
+                    nm: std::array::from_fn(|k| knots[knot(k)]),
+                    width: std::array::from_fn(|k| knots[knot(k) + 1] - knots[knot(k)]),
+                }
+            })
+            .collect();
+        WavelengthDistribution { rows, fixed: None, description }
+    }
+}
+
+/// Linear Rec.709 of XYZ.
+fn rec709(xyz: [f64; 3]) -> [f64; 3] {
+    ColourSpace::Rec709.matrix_from_xyz().map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
+}
+
+/// All the samples that a distribution can give, four to an interval: what its noise is computed on.
+struct Lattice {
+    samples: Vec<SampledWavelengths>,
+    /// The weights of the lanes in red, green and blue.
+    weights: Vec<[Lanes; 3]>,
+}
+
+impl Lattice {
+    fn of(distribution: &WavelengthDistribution) -> Lattice {
+        // u up to 1/8 is enough: further on the same wavelengths come in other lanes.
+        let count = 4 * ROWS;
+        let samples: Vec<SampledWavelengths> =
+            (0..count).map(|i| distribution.sample((i as f64 + 0.5) / (count * LANES) as f64)).collect();
+        let weights = samples
+            .iter()
+            .map(|s| {
+                let (nm, inv_pdf) = (s.nm.to_array(), s.inv_pdf.to_array());
+                let rgb: [[f64; 3]; LANES] = std::array::from_fn(|k| {
+                    rec709(matching(f64::from(nm[k]))).map(|v| v * f64::from(inv_pdf[k]) / (LANES as f64 * Y_INTEGRAL))
+                });
+                std::array::from_fn(|c| Lanes::new(std::array::from_fn(|k| rgb[k][c] as f32)))
+            })
+            .collect();
+        Lattice { samples, weights }
+    }
+
+    fn values(&self, spectrum: &Spectrum) -> Vec<Lanes> {
+        self.samples.iter().map(|s| spectrum.eval(s.nm)).collect()
+    }
+
+    /// Standard deviation of the estimate over its mean; 0 for black.
+    fn noise(&self, light: &[Lanes], reflectance: Option<&Vec<Lanes>>) -> f64 {
+        let mut sum = [0.0; 3];
+        let mut square = 0.0;
+        for (i, weights) in self.weights.iter().enumerate() {
+            let value = reflectance.map_or(light[i], |r| light[i] * r[i]);
+            for c in 0..3 {
+                let estimate = f64::from((value * weights[c]).reduce_add());
+                sum[c] += estimate;
+                square += estimate * estimate;
+            }
+        }
+        let n = self.weights.len() as f64;
+        let mean: f64 = sum.iter().map(|s| (s / n) * (s / n)).sum();
+        if mean > 0.0 { ((square / n - mean).max(0.0) / mean).sqrt() } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spectrum::observer::{tristimulus, xyz};
+    use crate::spectrum::{illuminant::d65, upsample::reflectance};
+
+    fn lines() -> Spectrum {
+        let line = |nm, power| (nm, power, 1.0);
+        Spectrum::lines(&[line(436.0, 1.0), line(487.0, 0.4), line(544.0, 2.0), line(588.0, 0.5), line(611.0, 2.0)])
+            .unwrap()
+    }
+
+    fn all() -> Vec<WavelengthDistribution> {
+        vec![
+            WavelengthDistribution::uniform(),
+            WavelengthDistribution::visible(),
+            WavelengthDistribution::for_scene(&[(1.0, d65())], &[]),
+            WavelengthDistribution::for_scene(&[(1.0, lines())], &[reflectance([0.6, 0.2, 0.1]).unwrap()]),
+        ]
+    }
+
+    #[test]
+    fn wavelengths_of_the_first_and_last_u_stay_in_the_band() {
+        for distribution in all() {
+            let last_f64 = 1.0 - f64::EPSILON / 2.0;
+            for u in [0.0, f64::MIN_POSITIVE, 0.125, 0.875, 1.0 - f64::from(f32::EPSILON) / 2.0, last_f64] {
+                let s = distribution.sample(u);
+                for (nm, inv_pdf) in s.nm.to_array().into_iter().zip(s.inv_pdf.to_array()) {
+                    assert!((360.0..=830.0).contains(&nm) && inv_pdf > 0.0 && inv_pdf.is_finite(), "{u} {s:?}");
+                }
+            }
+            assert_eq!(distribution.sample(0.0).nm.to_array()[0], 360.0);
+        }
+    }
+
+    /// `inv_pdf` is the slope of the map: λ(u₂) − λ(u₁) = inv_pdf · (u₂ − u₁) within an interval, to the
+    /// rounding of λ (3e-5 nm each); and lane k of u is the hero of u + k/8.
+    #[test]
+    fn inverse_density_is_the_slope_of_the_map() {
+        for distribution in all() {
+            for i in 0..2048u32 {
+                let u = |f: f64| (f64::from(i) + f) / 2048.0;
+                let (a, b) = (distribution.sample(u(0.1)), distribution.sample(u(0.9)));
+                let rise = f64::from(b.nm.to_array()[0] - a.nm.to_array()[0]);
+                let slope = f64::from(a.inv_pdf.to_array()[0]);
+                assert!((rise - slope * 0.8 / 2048.0).abs() < 1.3e-4, "{i}: {rise} {slope}");
+                let shifted = distribution.sample((u(0.1) + 3.0 / 8.0).fract());
+                assert_eq!(
+                    (a.nm.to_array()[3], a.inv_pdf.to_array()[3]),
+                    (shifted.nm.to_array()[0], shifted.inv_pdf.to_array()[0])
+                );
+            }
+        }
+    }
+
+    /// ∫ dλ = 470 nm and the XYZ of a light come out of any density: the mean of the estimate over u
+    /// below 1/8 (beyond, the same wavelengths come in other lanes). 2¹⁴ u are 2¹⁷ wavelengths: a line
+    /// 1 nm wide holds 279 of uniform ones, give or take one, and one more where f32 rounds a wavelength
+    /// onto an edge: 280 / 278.9 is 4e-3 too many. Smooth lights come out to the rounding of f32.
+    #[test]
+    fn estimates_are_unbiased_for_every_density() {
+        for distribution in all() {
+            for (light, tolerance) in [(Spectrum::constant(1.0), 1e-5), (d65(), 1e-5), (lines(), 5e-3)] {
+                let n = 1 << 14;
+                let (mut sum, mut width) = ([0.0; 3], 0.0);
+                for i in 0..n {
+                    let s = distribution.sample((f64::from(i) + 0.5) / f64::from(8 * n));
+                    let found = xyz(light.eval(s.nm), &s);
+                    (0..3).for_each(|c| sum[c] += f64::from(found[c]) / f64::from(n));
+                    width += f64::from(s.inv_pdf.reduce_add()) / f64::from(8 * n);
+                }
+                assert!((width - 470.0).abs() < 1e-3, "{width}");
+                let expected = tristimulus(&light);
+                for c in 0..3 {
+                    assert!((sum[c] / expected[c] - 1.0).abs() < tolerance, "{distribution:?} {sum:?} {expected:?}");
+                }
+            }
+        }
+    }
+
+    /// Sampling by the eye leaves 4 to 5 % for D65 on grey, and far more for lines; sampling by the emitter
+    /// tames the lines.
+    #[test]
+    fn the_density_with_the_least_noise_is_taken() {
+        let grey = Spectrum::constant(1.0);
+        let visible = WavelengthDistribution::visible();
+        let noise = visible.colour_noise(&d65(), &grey);
+        assert!((0.03..0.06).contains(&noise), "{noise}");
+        let day = WavelengthDistribution::for_scene(&[(1.0, d65())], &[]);
+        let night = WavelengthDistribution::for_scene(&[(1.0, lines())], &[]);
+        assert!(night.describe().starts_with("em:"), "{}", night.describe());
+        assert!(
+            night.colour_noise(&lines(), &grey) < 0.2 * visible.colour_noise(&lines(), &grey),
+            "{}",
+            night.describe()
+        );
+        assert!(day.colour_noise(&d65(), &grey) <= noise * 1.000_001, "{}", day.describe());
+        println!("{} | {}", day.describe(), night.describe());
+        // The scale of a spectrum does not count, and nothing depends on chance.
+        let again = WavelengthDistribution::for_scene(&[(1.0, lines().scaled(1e6))], &[]);
+        assert_eq!(again.describe(), night.describe());
+        assert_eq!(again.sample(0.3), night.sample(0.3));
+    }
+
+    #[test]
+    fn without_light_the_eye_decides() {
+        for emitters in [vec![], vec![(1.0, Spectrum::constant(0.0))], vec![(0.0, d65())]] {
+            let d = WavelengthDistribution::for_scene(&emitters, &[]);
+            assert!(d.describe().starts_with("vis") && d.describe().contains("no emitter"), "{}", d.describe());
+        }
+    }
+
+    #[test]
+    fn fixed_wavelengths_are_always_the_same() {
+        let nm = [400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 700.0, 750.0];
+        let d = WavelengthDistribution::fixed(nm).unwrap();
+        assert_eq!(d.sample(0.9), d.sample(0.1));
+        assert_eq!(d.sample(0.5).nm.to_array()[2], 500.0);
+        assert!(WavelengthDistribution::fixed([300.0; 8]).unwrap_err().contains("300"));
+    }
+}
