@@ -14,4 +14,5 @@
 //! ```
 pub mod error;
 pub mod math;
+pub mod optics;
 pub mod spectrum;

@@ -1,0 +1,233 @@
+//! The closed set of surface scattering functions, evaluated at one point for eight wavelengths.
+
+use super::dielectric::{Dielectric, RoughDielectric};
+use super::fresnel::{self, Model};
+use super::mean;
+use super::microfacet::Microfacets;
+use super::plastic::{Plastic, RoughPlastic};
+use crate::math::warp;
+use crate::spectrum::Lanes;
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+
+/// What a surface does with light, with its parameters at one point.
+#[derive(Clone, Debug)]
+pub enum Bsdf {
+    /// Lambert: f = ρ/π on the side of the normal.
+    Diffuse {
+        /// Albedo ρ.
+        reflectance: Lanes,
+    },
+    /// A perfect mirror with a spectral reflectance.
+    Mirror {
+        /// Reflectance at every angle.
+        reflectance: Lanes,
+    },
+    /// A smooth metal.
+    Conductor(Metal),
+    /// A rough metal: microfacets that are metal mirrors.
+    RoughConductor(Metal, Microfacets),
+    /// A smooth interface between two transparent media.
+    Dielectric(Dielectric),
+    /// A rough interface between two transparent media.
+    RoughDielectric(RoughDielectric),
+    /// A thin pane: two smooth interfaces that the path crosses as one, without bending.
+    Thin {
+        /// Index of the pane over the index around it, at the hero's wavelength.
+        eta: f64,
+    },
+    /// A diffuse base under a smooth dielectric coat.
+    Plastic(Plastic),
+    /// A diffuse base under a rough dielectric coat.
+    RoughPlastic(RoughPlastic),
+    /// No interface: the boundary of a medium only.
+    Null,
+}
+
+/// Index, absorption and tint of a metal.
+#[derive(Clone, Copy, Debug)]
+pub struct Metal {
+    /// Real part of the index relative to the medium outside.
+    pub eta: Lanes,
+    /// Imaginary part.
+    pub k: Lanes,
+    /// A factor on the reflectance; one for a physical metal.
+    pub tint: Lanes,
+    /// Which Fresnel formula.
+    pub fresnel: Model,
+}
+
+impl Metal {
+    fn reflectance(&self, cos: f64) -> Lanes {
+        fresnel::conductor(self.fresnel, cos, self.eta, self.k) * self.tint
+    }
+}
+
+/// f and the densities of sampling, for a pair of directions.
+#[derive(Clone, Copy, Debug)]
+pub struct Evaluation {
+    /// f in sr⁻¹, without the cosine.
+    pub f: Lanes,
+    /// Density of [`Bsdf::sample`] in sr⁻¹ had that lane led the way.
+    pub pdf: Lanes,
+}
+
+impl Evaluation {
+    /// No light, never sampled.
+    pub const NONE: Evaluation = Evaluation { f: Lanes::ZERO, pdf: Lanes::ZERO };
+}
+
+/// How a sampled direction was chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Chosen {
+    /// From a density over directions; lane 0's, in sr⁻¹.
+    Density(f64),
+    /// One of finitely many directions: no other technique can find it.
+    Discrete,
+}
+
+/// A sampled direction.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfSample {
+    /// Where the path goes on.
+    pub wi: DVec3,
+    /// f · |cos θ| / (density or probability of the hero): the factor on the throughput.
+    pub weight: Lanes,
+    /// Density of each lane over the hero's. One where sampling does not depend on wavelength.
+    pub ratio: Lanes,
+    /// The hero's density.
+    pub chosen: Chosen,
+    /// True where the path crosses the surface.
+    pub transmitted: bool,
+    /// Square of the index ratio gathered by crossing, for Russian roulette: radiance scales by
+    /// 1/η² on the way in and regains it on the way out. One for reflection.
+    pub eta2: f64,
+}
+
+impl BsdfSample {
+    /// A reflection or achromatic event in a single direction.
+    pub(super) fn discrete(wi: DVec3, weight: Lanes) -> BsdfSample {
+        BsdfSample { wi, weight, ratio: Lanes::ONE, chosen: Chosen::Discrete, transmitted: false, eta2: 1.0 }
+    }
+}
+
+/// `wo` reflected about the local normal.
+pub(super) fn mirror(wo: DVec3) -> DVec3 {
+    DVec3::new(-wo.x, -wo.y, wo.z)
+}
+
+impl Bsdf {
+    /// True where every direction is one of finitely many: next-event estimation is pointless.
+    #[must_use]
+    pub fn is_discrete(&self) -> bool {
+        match self {
+            Bsdf::Mirror { .. } | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::Thin { .. } | Bsdf::Null => true,
+            Bsdf::Diffuse { .. }
+            | Bsdf::RoughConductor(..)
+            | Bsdf::RoughDielectric(_)
+            | Bsdf::Plastic(_)
+            | Bsdf::RoughPlastic(_) => false,
+        }
+    }
+
+    /// f and pdf for a pair of directions; discrete parts excluded.
+    #[must_use]
+    pub fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
+        match self {
+            Bsdf::Diffuse { reflectance } => {
+                if wo.z <= 0.0 || wi.z <= 0.0 {
+                    return Evaluation::NONE;
+                }
+                Evaluation { f: *reflectance * (1.0 / PI) as f32, pdf: Lanes::splat((wi.z / PI) as f32) }
+            }
+            Bsdf::RoughConductor(metal, facets) => rough_conductor(metal, facets, wo, wi),
+            Bsdf::RoughDielectric(glass) => glass.eval(wo, wi),
+            Bsdf::Plastic(plastic) => plastic.eval(wo, wi),
+            Bsdf::RoughPlastic(plastic) => plastic.eval(wo, wi),
+            Bsdf::Mirror { .. } | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::Thin { .. } | Bsdf::Null => {
+                Evaluation::NONE
+            }
+        }
+    }
+
+    /// A direction for the path to go on in; `None` ends it. `u_lobe` chooses among lobes.
+    #[must_use]
+    pub fn sample(&self, wo: DVec3, u_lobe: f64, u: DVec2) -> Option<BsdfSample> {
+        match self {
+            Bsdf::Diffuse { reflectance } => {
+                if wo.z <= 0.0 {
+                    return None;
+                }
+                let wi = warp::cosine_hemisphere(u);
+                let pdf = wi.z / PI;
+                (pdf > 0.0).then_some(BsdfSample {
+                    wi,
+                    weight: *reflectance,
+                    ratio: Lanes::ONE,
+                    chosen: Chosen::Density(pdf),
+                    transmitted: false,
+                    eta2: 1.0,
+                })
+            }
+            Bsdf::Mirror { reflectance } => (wo.z > 0.0).then(|| BsdfSample::discrete(mirror(wo), *reflectance)),
+            Bsdf::Conductor(metal) => (wo.z > 0.0).then(|| BsdfSample::discrete(mirror(wo), metal.reflectance(wo.z))),
+            Bsdf::RoughConductor(metal, facets) => {
+                if wo.z <= 0.0 {
+                    return None;
+                }
+                let m = facets.sample(wo, u);
+                let wi = m * (2.0 * wo.dot(m)) - wo;
+                from_evaluation(wi, wi.z, rough_conductor(metal, facets, wo, wi), false, 1.0)
+            }
+            Bsdf::Dielectric(glass) => glass.sample(wo, u_lobe),
+            Bsdf::RoughDielectric(glass) => glass.sample(wo, u_lobe, u),
+            Bsdf::Thin { eta } => {
+                let single = fresnel::dielectric(Model::Exact, wo.z.abs(), *eta);
+                // The infinite series of reflections inside: R + T²R + T²R³ + … = 2R/(1 + R).
+                let reflected = 2.0 * single.reflected / (1.0 + single.reflected);
+                Some(if u_lobe < reflected {
+                    BsdfSample::discrete(mirror(wo), Lanes::ONE)
+                } else {
+                    BsdfSample { transmitted: true, ..BsdfSample::discrete(-wo, Lanes::ONE) }
+                })
+            }
+            Bsdf::Plastic(plastic) => plastic.sample(wo, u_lobe, u),
+            Bsdf::RoughPlastic(plastic) => plastic.sample(wo, u_lobe, u),
+            Bsdf::Null => Some(BsdfSample { transmitted: true, ..BsdfSample::discrete(-wo, Lanes::ONE) }),
+        }
+    }
+}
+
+/// Reflection by facets of metal: Walter et al. 2007, eq. 20.
+fn rough_conductor(metal: &Metal, facets: &Microfacets, wo: DVec3, wi: DVec3) -> Evaluation {
+    if wo.z <= 0.0 || wi.z <= 0.0 {
+        return Evaluation::NONE;
+    }
+    let m = (wo + wi).normalize();
+    let cos = wo.dot(m);
+    let f = facets.density(m) * facets.masking(wo, m) * facets.masking(wi, m) / (4.0 * wo.z * wi.z);
+    Evaluation { f: metal.reflectance(cos) * f as f32, pdf: Lanes::splat((facets.pdf(wo, m) / (4.0 * cos)) as f32) }
+}
+
+/// The sample record of a direction drawn from a density that `eval` states; `cos` is |cos θ_i|.
+pub(super) fn from_evaluation(wi: DVec3, cos: f64, e: Evaluation, transmitted: bool, eta2: f64) -> Option<BsdfSample> {
+    let hero = e.pdf.to_array()[0];
+    if !(hero > 0.0 && cos > 0.0) {
+        return None;
+    }
+    Some(BsdfSample {
+        wi,
+        weight: e.f * (cos / f64::from(hero)) as f32,
+        ratio: e.pdf / hero,
+        chosen: Chosen::Density(f64::from(hero)),
+        transmitted,
+        eta2,
+    })
+}
+
+/// The probability of the coat's lobe for a coat that reflects `f` over a base of `albedo`:
+/// proportional to what each sends back, and the same for every wavelength.
+pub(super) fn coat_probability(f: f64, albedo: Lanes) -> f64 {
+    let base = (1.0 - f) * mean(albedo);
+    if f + base > 0.0 { f / (f + base) } else { 1.0 }
+}

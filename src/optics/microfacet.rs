@@ -1,0 +1,181 @@
+//! Microfacet distributions: which way the tiny mirrors of a rough surface face.
+//!
+//! Local frame, z = mean normal. Isotropic with width `alpha`; no squaring of a "roughness".
+//! Walter et al. 2007 (D, Smith's G, rough dielectrics); Heitz 2018 and Dupuy and Benyoub 2023
+//! (sampling visible GGX normals). Shadowing and masking are separable, G₁(o) G₁(i), as in
+//! Mitsuba 3, so that the two can be compared pixel by pixel.
+
+use crate::math::trig::sin_cos_turn;
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+
+/// The family of the distribution.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Distribution {
+    /// Trowbridge and Reitz 1975: long tails.
+    #[default]
+    Ggx,
+    /// Beckmann and Spizzichino 1963: Gaussian slopes.
+    Beckmann,
+}
+
+/// A rough surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Microfacets {
+    /// The family.
+    pub distribution: Distribution,
+    /// Width; the root mean square slope is of this order.
+    pub alpha: f64,
+}
+
+impl Microfacets {
+    /// D(m) in sr⁻¹, by the vector rather than by its angle: cos² forms lose 12 % at α = 1e-3
+    /// because 1 − cos² cancels.
+    #[must_use]
+    pub fn density(&self, m: DVec3) -> f64 {
+        if m.z <= 0.0 {
+            return 0.0;
+        }
+        let a2 = self.alpha * self.alpha;
+        let slope2 = (m.x * m.x + m.y * m.y) / a2;
+        let z2 = m.z * m.z;
+        match self.distribution {
+            Distribution::Ggx => {
+                let d = slope2 + z2;
+                1.0 / (PI * a2 * d * d)
+            }
+            Distribution::Beckmann => libm::exp(-slope2 / z2) / (PI * a2 * z2 * z2),
+        }
+    }
+
+    /// G₁(v): the share of facets facing `m` that `v` sees.
+    #[must_use]
+    pub fn masking(&self, v: DVec3, m: DVec3) -> f64 {
+        // A facet seen from its back contributes nothing (Walter et al. 2007, eq. 23).
+        if v.dot(m) * v.z <= 0.0 {
+            return 0.0;
+        }
+        let tan2_alpha = (v.x * v.x + v.y * v.y) / (v.z * v.z) * (self.alpha * self.alpha);
+        if tan2_alpha == 0.0 {
+            return 1.0;
+        }
+        match self.distribution {
+            Distribution::Ggx => 2.0 / (1.0 + (1.0 + tan2_alpha).sqrt()),
+            Distribution::Beckmann => {
+                // Rational fit of Walter et al. 2007, eq. 27, with a = 1 / (α tan θ).
+                let a = 1.0 / tan2_alpha.sqrt();
+                if a >= 1.6 { 1.0 } else { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) }
+            }
+        }
+    }
+
+    /// A facet normal for light leaving along `wo` (z > 0): for GGX one that `wo` sees, for
+    /// Beckmann one drawn from D(m) cos θ.
+    #[must_use]
+    pub fn sample(&self, wo: DVec3, u: DVec2) -> DVec3 {
+        match self.distribution {
+            Distribution::Ggx => {
+                // Dupuy and Benyoub 2023, listing 3: a spherical cap in the stretched frame.
+                let v = DVec3::new(wo.x * self.alpha, wo.y * self.alpha, wo.z).normalize();
+                let (sin, cos) = sin_cos_turn(u.x);
+                let z = (1.0 - u.y).mul_add(1.0 + v.z, -v.z);
+                let r = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
+                let h = DVec3::new(r * cos, r * sin, z) + v;
+                DVec3::new(h.x * self.alpha, h.y * self.alpha, h.z.max(0.0)).normalize()
+            }
+            Distribution::Beckmann => {
+                // tan²θ = −α² ln(1 − u)
+                let tan = (-self.alpha * self.alpha * libm::log1p(-u.y)).sqrt();
+                let (sin, cos) = sin_cos_turn(u.x);
+                DVec3::new(tan * cos, tan * sin, 1.0).normalize()
+            }
+        }
+    }
+
+    /// Density of [`Microfacets::sample`] at `m`, in sr⁻¹ about the facet normal.
+    #[must_use]
+    pub fn pdf(&self, wo: DVec3, m: DVec3) -> f64 {
+        match self.distribution {
+            // Heitz 2018, eq. 3.
+            Distribution::Ggx => self.density(m) * self.masking(wo, m) * wo.dot(m).abs() / wo.z.abs(),
+            Distribution::Beckmann => self.density(m) * m.z,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::warp;
+
+    const FAMILIES: [Distribution; 2] = [Distribution::Ggx, Distribution::Beckmann];
+
+    fn grid(n: u32) -> impl Iterator<Item = DVec2> {
+        (0..n * n).map(move |i| DVec2::new(f64::from(i % n) + 0.5, f64::from(i / n) + 0.5) / f64::from(n))
+    }
+
+    /// ∫ D(m) cos θ dm = 1 (Walter et al. 2007, eq. 4). With m drawn with density cos θ/π the
+    /// mean of π D is one; 1024² midpoints of a function of width α = 0.3 leave 1e-3.
+    #[test]
+    fn facets_cover_the_mean_surface_once() {
+        for distribution in FAMILIES {
+            let m = Microfacets { distribution, alpha: 0.3 };
+            let mean = grid(1024).map(|u| m.density(warp::cosine_hemisphere(u)) * PI).sum::<f64>() / 1_048_576.0;
+            assert!((mean - 1.0).abs() < 1e-3, "{distribution:?} {mean}");
+        }
+    }
+
+    /// E[g(m)/pdf(m)] over sampled m is ∫g for any g; with g = D cos that is one, and D/pdf stays
+    /// bounded, so 512² midpoints suffice for 5e-3.
+    #[test]
+    fn sampled_normals_have_the_stated_density() {
+        for distribution in FAMILIES {
+            for (alpha, z) in [(0.5, 0.9), (0.1, 0.4), (1.0, 0.2)] {
+                let m = Microfacets { distribution, alpha };
+                let wo = DVec3::new((1.0f64 - z * z).sqrt(), 0.0, z);
+                // g = the distribution of visible normals itself integrates to one only for GGX's
+                // exact Smith term; Beckmann's fit errs by 0.35 % (Walter et al. 2007).
+                let mean = grid(512)
+                    .map(|u| m.sample(wo, u))
+                    .map(|h| {
+                        let g = m.density(h) * m.masking(wo, h) * wo.dot(h).max(0.0) / wo.z;
+                        if g == 0.0 { 0.0 } else { g / m.pdf(wo, h) }
+                    })
+                    .sum::<f64>()
+                    / 262_144.0;
+                assert!((mean - 1.0).abs() < 8e-3, "{distribution:?} {alpha} {z}: {mean}");
+            }
+        }
+    }
+
+    /// D at θ = α for α = 1e-4: 1 / (π α² (sin²/α² + cos²)²), with 30 digits 7957747.18…
+    #[test]
+    fn density_of_a_nearly_smooth_surface_keeps_its_digits() {
+        let alpha = 1e-4f64;
+        let m = Microfacets { distribution: Distribution::Ggx, alpha };
+        let s = alpha - alpha.powi(3) / 6.0;
+        let h = DVec3::new(s, 0.0, (1.0 - s * s).sqrt());
+        let x = 1.0 - alpha * alpha / 3.0;
+        let expected = 1.0 / (PI * alpha * alpha * (x + 1.0 - alpha * alpha).powi(2));
+        assert!(((m.density(h) - expected) / expected).abs() < 1e-7);
+    }
+
+    #[test]
+    fn no_nan_down_to_grazing_and_to_the_smoothest() {
+        for distribution in FAMILIES {
+            for alpha in [1e-4, 1e-2, 1.0] {
+                for z in [1e-7, 1e-4, 0.5, 1.0] {
+                    let m = Microfacets { distribution, alpha };
+                    let wo = DVec3::new((1.0f64 - z * z).sqrt(), 0.0, z);
+                    for u in grid(32).chain([DVec2::ZERO, DVec2::new(0.0, 1.0 - 2f64.powi(-32))]) {
+                        let h = m.sample(wo, u);
+                        assert!(
+                            h.is_finite() && m.pdf(wo, h).is_finite() && m.pdf(wo, h) >= 0.0,
+                            "{alpha} {z} {u} {h}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

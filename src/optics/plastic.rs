@@ -1,0 +1,205 @@
+//! Plastic: a diffuse base under a clear dielectric coat, smooth or rough.
+//!
+//! Light enters through the coat, is scattered by the base, partly reflected back down by the
+//! inside of the coat any number of times, and leaves. With T the transmission of the coat, F_int its
+//! diffuse reflectance from inside and ρ the base's albedo,
+//! f_base = ρ/π · T(o) T(i) / (η² (1 − F_int ρ')), ρ' = ρ with colour shift ("nonlinear") or 1
+//! without. Conventions of Mitsuba 3's `plastic` and `roughplastic`.
+
+use super::bsdf::{BsdfSample, Evaluation, coat_probability, from_evaluation, mirror};
+use super::dielectric::refract;
+use super::fresnel::{self, Model};
+use super::microfacet::Microfacets;
+use crate::math::warp;
+use crate::spectrum::Lanes;
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// The base under a coat, shared by both kinds.
+#[derive(Clone, Copy, Debug)]
+pub struct Base {
+    /// Albedo of the diffuse base.
+    pub reflectance: Lanes,
+    /// Index of the coat over the index outside.
+    pub eta: f64,
+    /// Diffuse reflectance of the coat from inside.
+    pub internal: f64,
+    /// True where light that bounces under the coat takes up the base's colour each time.
+    pub nonlinear: bool,
+}
+
+impl Base {
+    /// f of the base without the two transmissions, times π.
+    fn albedo(&self) -> Lanes {
+        let shifted = if self.nonlinear { self.reflectance } else { Lanes::ONE };
+        let inside = Lanes::ONE - shifted * self.internal as f32;
+        self.reflectance / inside * (1.0 / (self.eta * self.eta)) as f32
+    }
+
+    /// The reflectance of base and coat seen from inside and out, for choosing lobes.
+    fn for_choice(&self) -> Lanes {
+        self.reflectance
+    }
+}
+
+/// A diffuse base under a smooth coat.
+#[derive(Clone, Copy, Debug)]
+pub struct Plastic {
+    /// What lies under the coat.
+    pub base: Base,
+}
+
+impl Plastic {
+    fn coat(&self, cos: f64) -> f64 {
+        fresnel::dielectric(Model::Exact, cos, self.base.eta).reflected
+    }
+
+    pub(super) fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return Evaluation::NONE;
+        }
+        let (fo, fi) = (self.coat(wo.z), self.coat(wi.z));
+        let p = coat_probability(fo, self.base.for_choice());
+        Evaluation {
+            f: self.base.albedo() * ((1.0 - fo) * (1.0 - fi) / PI) as f32,
+            pdf: Lanes::splat(((1.0 - p) * wi.z / PI) as f32),
+        }
+    }
+
+    pub(super) fn sample(&self, wo: DVec3, u_lobe: f64, u: DVec2) -> Option<BsdfSample> {
+        if wo.z <= 0.0 {
+            return None;
+        }
+        let fo = self.coat(wo.z);
+        let p = coat_probability(fo, self.base.for_choice());
+        if u_lobe < p {
+            return Some(BsdfSample::discrete(mirror(wo), Lanes::splat((fo / p) as f32)));
+        }
+        let wi = warp::cosine_hemisphere(u);
+        from_evaluation(wi, wi.z, self.eval(wo, wi), false, 1.0)
+    }
+}
+
+/// Transmission of a rough coat against the cosine, and its diffuse reflectance from inside:
+/// computed once a material.
+#[derive(Clone, Debug)]
+pub struct CoatTable {
+    /// T at cos = i / (len − 1).
+    transmission: Vec<f32>,
+    /// Diffuse reflectance from inside.
+    pub internal: f64,
+}
+
+/// Entries of a [`CoatTable`].
+const COAT_ENTRIES: u32 = 64;
+
+impl CoatTable {
+    /// Integrates the coat of index ratio `eta` with `facets`.
+    ///
+    /// T(o) is the mean over the facets that o sees of (1 − F) G₁ of the refracted direction, R(o)
+    /// that of F G₁ of the reflected one, by 64² midpoints on the square that samples facets; light
+    /// that other facets block counts in neither, as in Mitsuba 3. The diffuse mean from inside,
+    /// 2 ∫ R(c) c dc, is taken by the midpoint rule over the table's cosines.
+    #[must_use]
+    pub fn new(eta: f64, facets: &Microfacets) -> CoatTable {
+        let cosine = |i: u32| f64::from(i) / f64::from(COAT_ENTRIES - 1);
+        let transmission = (0..COAT_ENTRIES)
+            .map(|i| {
+                let share = mean_over_facets(facets, cosine(i), |wo, m| {
+                    let split = fresnel::dielectric(Model::Exact, wo.dot(m), eta);
+                    let wt = refract(wo, m, eta, split.cos_transmitted);
+                    if wt.z < 0.0 { split.transmitted * facets.masking(wt, m) } else { 0.0 }
+                });
+                share as f32
+            })
+            .collect();
+        let internal = (0..COAT_ENTRIES)
+            .map(|i| {
+                let cos = (f64::from(i) + 0.5) / f64::from(COAT_ENTRIES);
+                let reflected = mean_over_facets(facets, cos, |wo, m| {
+                    let wi = m * (2.0 * wo.dot(m)) - wo;
+                    let f = fresnel::dielectric(Model::Exact, wo.dot(m), 1.0 / eta).reflected;
+                    if wi.z > 0.0 { f * facets.masking(wi, m) } else { 0.0 }
+                });
+                2.0 * cos * reflected / f64::from(COAT_ENTRIES)
+            })
+            .sum();
+        CoatTable { transmission, internal }
+    }
+
+    fn at(&self, cos: f64) -> f64 {
+        let x = cos.clamp(0.0, 1.0) * f64::from(COAT_ENTRIES - 1);
+        let i = (x as usize).min(COAT_ENTRIES as usize - 2);
+        let w = x - i as f64;
+        f64::from(self.transmission[i]) * (1.0 - w) + f64::from(self.transmission[i + 1]) * w
+    }
+}
+
+/// The mean of `f(wo, m)` over the facets m that a direction of cosine `cos` sees.
+fn mean_over_facets(facets: &Microfacets, cos: f64, f: impl Fn(DVec3, DVec3) -> f64) -> f64 {
+    const N: u32 = 64;
+    let cos = cos.max(1e-3); // the limit at grazing; the table is interpolated from there
+    let wo = DVec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+    let sum: f64 = (0..N * N)
+        .map(|i| {
+            let u = DVec2::new(f64::from(i % N) + 0.5, f64::from(i / N) + 0.5) / f64::from(N);
+            let m = facets.sample(wo, u);
+            let pdf = facets.pdf(wo, m);
+            if wo.dot(m) <= 0.0 || pdf <= 0.0 {
+                return 0.0;
+            }
+            // Heitz 2018, eq. 3: the density of visible facets.
+            let visible = facets.density(m) * facets.masking(wo, m) * wo.dot(m) / wo.z;
+            f(wo, m) * visible / pdf
+        })
+        .sum();
+    sum / f64::from(N * N)
+}
+
+/// A diffuse base under a rough coat.
+#[derive(Clone, Debug)]
+pub struct RoughPlastic {
+    /// What lies under the coat.
+    pub base: Base,
+    /// The coat's facets.
+    pub facets: Microfacets,
+    /// Its transmission.
+    pub table: Arc<CoatTable>,
+}
+
+impl RoughPlastic {
+    fn coat_share(&self, wo: DVec3) -> f64 {
+        coat_probability(1.0 - self.table.at(wo.z), self.base.for_choice())
+    }
+
+    pub(super) fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return Evaluation::NONE;
+        }
+        let m = (wo + wi).normalize();
+        let cos = wo.dot(m);
+        let reflected = fresnel::dielectric(Model::Exact, cos, self.base.eta).reflected;
+        let coat = reflected * self.facets.density(m) * self.facets.masking(wo, m) * self.facets.masking(wi, m)
+            / (4.0 * wo.z * wi.z);
+        let p = self.coat_share(wo);
+        let through = self.table.at(wo.z) * self.table.at(wi.z) / PI;
+        Evaluation {
+            f: self.base.albedo() * through as f32 + Lanes::splat(coat as f32),
+            pdf: Lanes::splat((p * self.facets.pdf(wo, m) / (4.0 * cos) + (1.0 - p) * wi.z / PI) as f32),
+        }
+    }
+
+    pub(super) fn sample(&self, wo: DVec3, u_lobe: f64, u: DVec2) -> Option<BsdfSample> {
+        if wo.z <= 0.0 {
+            return None;
+        }
+        let wi = if u_lobe < self.coat_share(wo) {
+            let m = self.facets.sample(wo, u);
+            m * (2.0 * wo.dot(m)) - wo
+        } else {
+            warp::cosine_hemisphere(u)
+        };
+        from_evaluation(wi, wi.z, self.eval(wo, wi), false, 1.0)
+    }
+}
