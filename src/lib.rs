@@ -13,6 +13,7 @@
 //!  math/  error.rs               frames, rays, warps, statistics | the one error enum
 //! ```
 pub mod error;
+pub mod film;
 pub mod math;
 pub mod optics;
 pub mod spectrum;

@@ -1,0 +1,660 @@
+//! Whether two pictures show the same scene: figures for people, tests for the verdict.
+//!
+//! Figures (error measures) hardly move for a bias of a per cent that hides in noise. Tests ask whether
+//! the difference is more than the noise explains:
+//!
+//! - **global**: per channel, the sum of all differences over its standard error, by Student's t with Welch's degrees
+//!   of freedom; the smallest p times the number of channels (Bonferroni), since the channels of a picture share
+//!   their paths. Sees a bias of 1 % that the next test misses.
+//! - **per pixel**: the test of Mitsuba 3 (`src/render/tests/test_renders.py`): each pixel at a level that the Šidák
+//!   correction derives from [`PIXEL_ALPHA`], passed by [`ACCEPT_FRACTION`] of all. Sees local faults.
+//!
+//! The noise is known from `stderr.*` channels (standard errors of the means, from four replicates: three degrees of
+//! freedom a pixel), from a file of variances per sample (as Mitsuba's references come with), or else from the
+//! differences themselves: where both pictures are right, E(Σd²) = Σvar(d), so Σd/√Σd² is a standard score. That
+//! form tests the mean only. A picture in half floats carries the variance of its rounding besides.
+//!
+//! Both tests want pixels that are independent: a box filter, or filters by importance sampling.
+
+mod noise;
+
+use crate::film::Window;
+use crate::film::exr::{ChannelData, Compression, ExrFile, ExrImage, ExrPart};
+use noise::Pair;
+use std::fmt::Write as _;
+
+/// The global test calls a picture different below this p: one comparison of equals in a thousand.
+pub const GLOBAL_ALPHA: f64 = 1e-3;
+/// The family level of the per-pixel test.
+pub const PIXEL_ALPHA: f64 = 0.01;
+/// The share of pixel values that must pass the per-pixel test.
+pub const ACCEPT_FRACTION: f64 = 0.9975;
+/// Mitsuba's floor for the variance of a sample.
+pub const VARIANCE_FLOOR: f64 = 1e-4;
+
+/// What is known besides the two pictures.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CompareOptions<'a> {
+    /// Variances of one sample of each value, in the channels of the pictures, and the samples a pixel of A. B is then
+    /// the reference and taken as exact, and the per-pixel test is Mitsuba's own: in XYZ, with its floor.
+    pub sample_variance: Option<(&'a ExrFile, u32)>,
+    /// A relative difference of the means that is no fault: 0.004 where a reference has noise of its own that
+    /// nobody wrote down, else 0.
+    pub mean_tolerance: f64,
+    /// What to do where the windows have one size and different places.
+    pub origin: Origin,
+}
+
+/// Whether the place of a window matters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Origin {
+    /// Windows must agree.
+    #[default]
+    MustAgree,
+    /// Only their sizes must: Mitsuba writes crops without their offset.
+    Ignore,
+}
+
+/// What the comparison comes to; the exit code of `abbe compare` is 0, 1, 2 in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// No test sees a difference.
+    Same,
+    /// A test does, or there are values that are not finite.
+    Different,
+    /// The pictures are of different things.
+    CannotCompare,
+}
+
+impl Verdict {
+    /// 0, 1 or 2.
+    #[must_use]
+    pub fn exit_code(self) -> i32 {
+        match self {
+            Verdict::Same => 0,
+            Verdict::Different => 1,
+            Verdict::CannotCompare => 2,
+        }
+    }
+}
+
+/// Where the noise is known from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseSource {
+    /// `stderr.*` channels of both pictures.
+    StandardErrors,
+    /// `stderr.*` channels of one picture; the other is taken as exact.
+    OneStandardError,
+    /// A file of variances per sample.
+    SampleVariance,
+    /// The differences themselves.
+    Differences,
+}
+
+/// The figures of one channel; B is the reference. Figures are of the pixels that are finite in both pictures.
+/// In JSON a figure that is not finite becomes `null`.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct ChannelFigures {
+    /// Its name.
+    pub name: String,
+    /// Mean of A.
+    pub mean_a: f64,
+    /// Mean of B.
+    pub mean_b: f64,
+    /// Mean of A over mean of B.
+    pub mean_ratio: f64,
+    /// Standard error of the ratio (first order).
+    pub mean_ratio_error: f64,
+    /// Σ(a − b) in standard errors.
+    pub global_z: f64,
+    /// Degrees of freedom of that standard error; infinite where its source is taken as exact.
+    pub global_dof: f64,
+    /// Two-sided p of it.
+    pub global_p: f64,
+    /// √ mean (a − b)².
+    pub rmse: f64,
+    /// Mean of (a − b)² / (b² + 0.01·m²), m the mean of B over the compared channels.
+    pub rel_mse: f64,
+    /// Mean of |a − b| / (|a| + |b| + 0.01·|m|).
+    pub smape: f64,
+    /// Largest |a − b|.
+    pub max_difference: f64,
+    /// Values of A that are NaN.
+    pub nan_a: usize,
+    /// Values of A that are infinite.
+    pub infinite_a: usize,
+    /// Values of B that are NaN.
+    pub nan_b: usize,
+    /// Values of B that are infinite.
+    pub infinite_b: usize,
+}
+
+/// The per-pixel test.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct PixelTest {
+    /// Level of one pixel.
+    pub alpha: f64,
+    /// Share of values that pass.
+    pub accepted: f64,
+    /// Pixels in which a value fails.
+    pub pixels_rejected: usize,
+    /// Mean of the scores: near 0 if nothing is biased.
+    pub score_mean: f64,
+    /// Standard deviation of the scores: 1 for normal ones; with 3 + 3 degrees of freedom about √(6/4) = 1.2.
+    pub score_deviation: f64,
+}
+
+/// All that is known about the difference of two pictures.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Comparison {
+    /// The outcome.
+    pub verdict: Verdict,
+    /// One sentence that says why.
+    pub reason: String,
+    /// Whether all compared values are equal bit for bit.
+    pub identical: bool,
+    /// Where the noise is known from; none where nothing could be compared.
+    pub noise: Option<NoiseSource>,
+    /// The figures of each compared channel.
+    pub channels: Vec<ChannelFigures>,
+    /// The smallest global p times the number of channels, at most 1.
+    pub global_p: f64,
+    /// The per-pixel test, where variances are known.
+    pub pixel_test: Option<PixelTest>,
+    /// Pixels that were compared: those finite in every channel of both pictures.
+    pub pixels: usize,
+}
+
+/// Compares the first parts of two files; `b` is the reference.
+///
+/// Compared are the spectral bands (`S0.…nm`, `T.…nm`) if both files have the same, else R, G, B, else X, Y, Z, else Y,
+/// else all channels that both have, without alpha and `stderr.*`.
+#[must_use]
+pub fn compare(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Comparison {
+    let pairs = match pairs(a, b, options) {
+        Ok(pairs) => pairs,
+        Err(reason) => return cannot_compare(reason),
+    };
+    let count = a.parts[0].window.pixels();
+    let finite: Vec<bool> = (0..count).map(|i| pairs.iter().all(|pair| pair.is_finite(i))).collect();
+    let pixels = finite.iter().filter(|&&f| f).count();
+    let values = (pixels * pairs.len()).max(1) as f64;
+    let reference_mean = pairs.iter().flat_map(|pair| kept(pair.b, &finite)).sum::<f64>() / values;
+    let channels: Vec<ChannelFigures> = pairs.iter().map(|pair| pair.figures(&finite, reference_mean)).collect();
+    let smallest = channels.iter().map(|c| c.global_p).fold(1.0, f64::min);
+    let global_p = (smallest * channels.len() as f64).min(1.0);
+    let source = pairs[0].noise.source();
+    let pixel_test = noise::pixel_test(&pairs, &finite);
+    let identical = pairs.iter().all(|pair| pair.is_identical());
+
+    let mut comparison = Comparison {
+        verdict: Verdict::Same,
+        reason: String::new(),
+        identical,
+        noise: Some(source),
+        channels,
+        global_p,
+        pixel_test,
+        pixels,
+    };
+    (comparison.verdict, comparison.reason) = judge(&comparison, count, options);
+    comparison
+}
+
+fn judge(c: &Comparison, count: usize, options: &CompareOptions) -> (Verdict, String) {
+    if c.pixels < count {
+        let bad = count - c.pixels;
+        return (Verdict::Different, format!("{bad} of {count} pixels hold values that are not finite"));
+    }
+    if c.identical {
+        return (Verdict::Same, "all compared values are identical".to_string());
+    }
+    let level = GLOBAL_ALPHA / c.channels.len() as f64;
+    let biased = c.channels.iter().find(|channel| {
+        // A ratio that is not a number (reference black) is beyond any tolerance.
+        let within = (channel.mean_ratio - 1.0).abs() <= options.mean_tolerance;
+        channel.global_p < level && !within
+    });
+    if let Some(channel) = biased {
+        let reason = format!(
+            "the mean of {} differs: ratio {:.5} ± {:.5}, {:.1} standard errors",
+            channel.name, channel.mean_ratio, channel.mean_ratio_error, channel.global_z
+        );
+        return (Verdict::Different, reason);
+    }
+    match &c.pixel_test {
+        Some(test) if test.accepted < ACCEPT_FRACTION => {
+            let share = 100.0 * test.accepted;
+            (Verdict::Different, format!("only {share:.2} % of the pixel values agree within their noise"))
+        }
+        Some(_) => (Verdict::Same, "means and pixels agree within their noise".to_string()),
+        None => (Verdict::Same, "means agree within the noise (no variances: single pixels not tested)".to_string()),
+    }
+}
+
+fn cannot_compare(reason: String) -> Comparison {
+    Comparison {
+        verdict: Verdict::CannotCompare,
+        reason,
+        identical: false,
+        noise: None,
+        channels: Vec::new(),
+        global_p: f64::NAN,
+        pixel_test: None,
+        pixels: 0,
+    }
+}
+
+/// The values of the pixels that are kept.
+fn kept<'a>(values: &'a [f32], finite: &'a [bool]) -> impl Iterator<Item = f64> + 'a {
+    values.iter().zip(finite).filter(|(_, keep)| **keep).map(|(v, _)| f64::from(*v))
+}
+
+/// What is to be compared, or why nothing can be.
+fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions<'a>) -> Result<Vec<Pair<'a>>, String> {
+    let (part_a, part_b) = (&a.parts[0], &b.parts[0]);
+    same_window("data windows", part_a.window, part_b.window, options.origin)?;
+    same_window("display windows", a.display, b.display, options.origin)?;
+    same_colours(a, b)?;
+    let names = compared_names(part_a, part_b)?;
+    let variance = match options.sample_variance {
+        None => None,
+        Some((_, 0)) => return Err("a variance per sample needs the number of samples a pixel".to_string()),
+        Some((file, samples)) => {
+            let part = &file.parts[0];
+            same_window("windows of picture and variance", part_a.window, part.window, Origin::Ignore)?;
+            Some((part, samples))
+        }
+    };
+    let mut pairs = Vec::new();
+    for name in names {
+        let find = |part: &'a ExrPart, name: &str| part.channel(name);
+        let (Some(values_a), Some(values_b)) = (find(part_a, &name), find(part_b, &name)) else { continue };
+        let variance = match variance {
+            None => None,
+            Some((part, samples)) => {
+                let plane = find(part, &name).ok_or(format!("the variance file has no channel {name}"))?;
+                Some((plane, samples))
+            }
+        };
+        let error = format!("stderr.{name}");
+        let errors = [find(part_a, &error), find(part_b, &error)];
+        pairs.push(Pair::new(name, values_a, values_b, errors, variance));
+    }
+    Ok(pairs)
+}
+
+fn same_window(what: &str, a: Window, b: Window, origin: Origin) -> Result<(), String> {
+    let sizes_agree = a.width == b.width && a.height == b.height;
+    if a == b || (sizes_agree && origin == Origin::Ignore) {
+        return Ok(());
+    }
+    Err(format!("the {what} differ: {a} against {b}"))
+}
+
+/// Files without chromaticities are Rec.709 (OpenEXR's default). Primaries that differ by less than 0.001 are the same to
+/// the digits that standards print.
+fn same_colours(a: &ExrFile, b: &ExrFile) -> Result<(), String> {
+    const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
+    let (of_a, of_b) = (a.chromaticities.unwrap_or(REC709), b.chromaticities.unwrap_or(REC709));
+    let differ = of_a.iter().flatten().zip(of_b.iter().flatten()).any(|(x, y)| (x - y).abs() > 1e-3);
+    if differ { Err(format!("the colour primaries differ: {of_a:?} against {of_b:?}")) } else { Ok(()) }
+}
+
+fn compared_names(a: &ExrPart, b: &ExrPart) -> Result<Vec<String>, String> {
+    let is_band = |name: &&str| (name.starts_with("S0.") || name.starts_with("T.")) && name.ends_with("nm");
+    let names = |part: &'_ ExrPart| part.channels.iter().map(|(name, _)| name.clone()).collect::<Vec<String>>();
+    let (of_a, of_b) = (names(a), names(b));
+    let bands = |all: &[String]| all.iter().filter(|n| is_band(&n.as_str())).cloned().collect::<Vec<String>>();
+    let (bands_a, bands_b) = (bands(&of_a), bands(&of_b));
+    if !bands_a.is_empty() && bands_a == bands_b {
+        return Ok(bands_a);
+    }
+    let both = |name: &str| of_a.iter().any(|n| n == name) && of_b.iter().any(|n| n == name);
+    for group in [&["R", "G", "B"][..], &["X", "Y", "Z"], &["Y"]] {
+        if group.iter().all(|name| both(name)) {
+            return Ok(group.iter().map(ToString::to_string).collect());
+        }
+    }
+    let common: Vec<String> =
+        of_a.iter().filter(|n| both(n) && n.as_str() != "A" && !n.starts_with("stderr.")).cloned().collect();
+    if common.is_empty() {
+        let (of_a, of_b) = (of_a.join(", "), of_b.join(", "));
+        return Err(format!("the files have no channel in common: {of_a} against {of_b}"));
+    }
+    Ok(common)
+}
+
+impl Comparison {
+    /// The comparison as a table for people.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut out = String::new();
+        // Writing to a string cannot fail.
+        let mut line = |text: String| {
+            let _ = writeln!(out, "{}", text.trim_end());
+        };
+        if let Some(noise) = self.noise {
+            line(format!(
+                "{:<14}{:>10} ± {:<9}{:>9}{:>10}{:>11}{:>11}{:>11}{:>11}",
+                "channel", "ratio", "s.e.", "z", "p", "RMSE", "relMSE", "SMAPE", "max |d|"
+            ));
+            for c in &self.channels {
+                line(format!(
+                    "{:<14}{:>10.6} ± {:<9.6}{:>9.2}{:>10.2e}{:>11.3e}{:>11.3e}{:>11.3e}{:>11.3e}",
+                    c.name,
+                    c.mean_ratio,
+                    c.mean_ratio_error,
+                    c.global_z,
+                    c.global_p,
+                    c.rmse,
+                    c.rel_mse,
+                    c.smape,
+                    c.max_difference
+                ));
+            }
+            line(format!("global p, all channels   {:.3e} (different below {GLOBAL_ALPHA:.0e})", self.global_p));
+            if let Some(test) = &self.pixel_test {
+                line(format!(
+                    "pixel values that agree  {:.3} % (different below {} %), {} pixels rejected at {:.1e}",
+                    100.0 * test.accepted,
+                    100.0 * ACCEPT_FRACTION,
+                    test.pixels_rejected,
+                    test.alpha
+                ));
+                let (mean, deviation) = (test.score_mean, test.score_deviation);
+                line(format!("pixel scores             mean {mean:.3}, deviation {deviation:.3}"));
+            }
+            let sum = |f: fn(&ChannelFigures) -> usize| self.channels.iter().map(f).sum::<usize>();
+            line(format!(
+                "not finite               A: {} NaN, {} inf; B: {} NaN, {} inf",
+                sum(|c| c.nan_a),
+                sum(|c| c.infinite_a),
+                sum(|c| c.nan_b),
+                sum(|c| c.infinite_b)
+            ));
+            line(format!(
+                "noise known from         {}",
+                match noise {
+                    NoiseSource::StandardErrors => "the standard errors of both",
+                    NoiseSource::OneStandardError => "the standard errors of one; the other is taken as exact",
+                    NoiseSource::SampleVariance => "the variance file; B is taken as exact",
+                    NoiseSource::Differences => "the differences themselves",
+                }
+            ));
+        }
+        let verdict = match self.verdict {
+            Verdict::Same => "same",
+            Verdict::Different => "different",
+            Verdict::CannotCompare => "cannot compare",
+        };
+        line(format!("verdict: {verdict}: {}", self.reason));
+        out
+    }
+}
+
+/// The map of the comparison: `difference.*` = a − b, and `score.*` = (a − b) in standard errors where those are known.
+///
+/// # Errors
+/// Why the files cannot be compared.
+pub fn difference_map(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Result<ExrImage, String> {
+    let pairs = pairs(a, b, options)?;
+    let mut channels = Vec::new();
+    for pair in &pairs {
+        let indices = 0..pair.a.len();
+        let difference = indices.clone().map(|i| (f64::from(pair.a[i]) - f64::from(pair.b[i])) as f32).collect();
+        channels.push((format!("difference.{}", pair.name), ChannelData::F32(difference)));
+        if pair.noise.source() != NoiseSource::Differences {
+            let score = indices.map(|i| pair.score(i).map_or(f32::NAN, |(score, _)| score as f32)).collect();
+            channels.push((format!("score.{}", pair.name), ChannelData::F32(score)));
+        }
+    }
+    // The reader's windows may start anywhere; a frame here starts at the origin and holds at least the window's end.
+    let end = |start: i32, size: u32| u32::try_from(i64::from(start) + i64::from(size)).unwrap_or(size).max(1);
+    Ok(ExrImage {
+        frame: [end(a.display.x, a.display.width), end(a.display.y, a.display.height)],
+        window: a.parts[0].window,
+        channels,
+        colour: None,
+        attributes: Vec::new(),
+        compression: Compression::Zip,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::sampler::mix64;
+    use crate::math::statistics::Moments;
+
+    const SIDE: u32 = 64;
+    const PIXELS: usize = 64 * 64;
+
+    /// Standard normal numbers by the sum of twelve uniforms less six (kurtosis −0.1: no heavy tails).
+    fn normal(seed: u64, i: usize) -> f64 {
+        let uniform = |k: u64| (mix64(mix64(seed) ^ mix64(i as u64 * 16 + k)) >> 11) as f64 / 9_007_199_254_740_992.0;
+        (0..12).map(uniform).sum::<f64>() - 6.0
+    }
+
+    fn file(channels: Vec<(String, Vec<f32>)>) -> ExrFile {
+        let window = Window::full(SIDE, SIDE);
+        ExrFile {
+            display: window,
+            chromaticities: None,
+            parts: vec![ExrPart { name: None, window, channels, texts: Vec::new() }],
+        }
+    }
+
+    /// A picture of R, G, B near `mean`·(1 … 2), as four replicates of deviation `sigma` would make it, times `gain`.
+    fn render(seed: u64, mean: f64, sigma: f64, gain: f64) -> ExrFile {
+        let mut channels = Vec::new();
+        for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
+            let (mut values, mut errors) = (Vec::new(), Vec::new());
+            for i in 0..PIXELS {
+                let truth = mean * (1.0 + i as f64 / PIXELS as f64);
+                let replicates: Moments =
+                    (0..4).map(|r| gain * (truth + sigma * normal(seed, (i * 3 + c) * 4 + r))).collect();
+                values.push(replicates.mean as f32);
+                errors.push(replicates.standard_error() as f32);
+            }
+            channels.push((name.to_string(), values));
+            channels.push((format!("stderr.{name}"), errors));
+        }
+        file(channels)
+    }
+
+    fn without_errors(mut file: ExrFile) -> ExrFile {
+        file.parts[0].channels.retain(|(name, _)| !name.starts_with("stderr."));
+        file
+    }
+
+    /// Each run of equals is called different with probability 1e-3 (Bonferroni keeps it at that or below); of
+    /// 20 runs none at these seeds, which happens with probability 0.98.
+    #[test]
+    fn two_seeds_of_one_scene_are_the_same() {
+        for seed in 0..20 {
+            let (a, b) = (render(2 * seed, 1.0, 0.3, 1.0), render(2 * seed + 1, 1.0, 0.3, 1.0));
+            let c = compare(&a, &b, &CompareOptions::default());
+            assert_eq!(c.verdict, Verdict::Same, "{}", c.table());
+            assert_eq!(c.noise, Some(NoiseSource::StandardErrors));
+            // Σ over 4096 pixels of two images with 3 dof each: Welch's dof is near 2·3·4096/(1 + 2/3) = 14746.
+            assert!((c.channels[0].global_dof / 14_746.0 - 1.0).abs() < 0.1, "{}", c.channels[0].global_dof);
+            let plain = compare(&without_errors(a), &without_errors(b), &CompareOptions::default());
+            assert_eq!((plain.verdict, plain.noise), (Verdict::Same, Some(NoiseSource::Differences)));
+        }
+    }
+
+    /// A picture 1 % brighter: the mean 1.5 differs by 0.015; its standard error is 0.15·√2/64 = 0.0033, so z = 4.5 a
+    /// channel, p = 2e-5 after Bonferroni. One pixel's difference is 0.07 standard errors: the per-pixel test is blind.
+    #[test]
+    fn one_per_cent_of_bias_is_seen_by_the_global_test_alone() {
+        let (a, b) = (render(1, 1.0, 0.3, 1.01), render(2, 1.0, 0.3, 1.0));
+        for (a, b) in [(a.clone(), b.clone()), (without_errors(a), without_errors(b))] {
+            let c = compare(&a, &b, &CompareOptions::default());
+            assert_eq!(c.verdict, Verdict::Different, "{}", c.table());
+            assert!(c.reason.contains("the mean of"), "{}", c.reason);
+            assert!(c.pixel_test.is_none_or(|test| test.accepted >= ACCEPT_FRACTION));
+            // Four standard errors of the ratio about 1.01.
+            let r = &c.channels[0];
+            assert!((r.mean_ratio - 1.01).abs() < 4.0 * r.mean_ratio_error, "{}", c.table());
+            let tolerant = compare(&a, &b, &CompareOptions { mean_tolerance: 0.03, ..CompareOptions::default() });
+            assert_eq!(tolerant.verdict, Verdict::Same);
+        }
+    }
+
+    /// The ratio's standard error against theory: √2 · 0.15/64 / 1.5 = 0.0022 (B as noisy as A).
+    #[test]
+    fn the_error_of_the_ratio_is_that_of_the_noise() {
+        let (a, b) = (render(3, 1.0, 0.3, 1.0), render(4, 1.0, 0.3, 1.0));
+        let expected = 2f64.sqrt() * 0.15 / 64.0 / 1.5;
+        for (a, b) in [(a.clone(), b.clone()), (without_errors(a), without_errors(b))] {
+            for c in compare(&a, &b, &CompareOptions::default()).channels {
+                // 4 · √(2/14746)/2 for the standard error; the differences have 4096 dof: 4·√(2/4096)/2 = 4.4 %.
+                assert!((c.mean_ratio_error / expected - 1.0).abs() < 0.045, "{} {}", c.name, c.mean_ratio_error);
+            }
+        }
+    }
+
+    /// A variance per sample of 0.25 and 4 samples: A is off by N(0, 0.25/4). 40 wrong pixels of 4096 (1 %) by 10 standard
+    /// errors each, in pairs of opposite sign: means agree, yet only 99.0 % of the pixels do.
+    #[test]
+    fn mitsubas_test_sees_local_faults_that_cancel_in_the_mean() {
+        let flat = |value: f32| file(["R", "G", "B"].map(|n| (n.to_string(), vec![value; PIXELS])).to_vec());
+        let (reference, variance) = (flat(1.0), flat(0.25));
+        let mut a = flat(1.0);
+        for (c, (_, values)) in a.parts[0].channels.iter_mut().enumerate() {
+            for (i, v) in values.iter_mut().enumerate() {
+                *v += (0.25 * normal(9, 3 * i + c)) as f32;
+            }
+        }
+        let options = CompareOptions { sample_variance: Some((&variance, 4)), ..CompareOptions::default() };
+        let good = compare(&a, &reference, &options);
+        assert_eq!(good.verdict, Verdict::Same, "{}", good.table());
+        let test = good.pixel_test.unwrap();
+        // Šidák: 1 − 0.99^(1/4096) = 2.4537e-6.
+        assert!((test.alpha - 2.4537e-6).abs() < 1e-10, "{}", test.alpha);
+        // The three noises are independent, so in XYZ (rows of positive numbers below one) var Σ(m·d) = Σm²v is less than
+        // Mitsuba's Σmv: the scores deviate by less than one.
+        assert!(test.score_deviation < 1.0 && test.accepted == 1.0);
+        for (_, values) in &mut a.parts[0].channels {
+            for (k, v) in values.iter_mut().step_by(100).take(40).enumerate() {
+                *v = if k % 2 == 0 { 1.0 + 2.5 } else { 1.0 - 2.5 };
+            }
+        }
+        let bad = compare(&a, &reference, &options);
+        assert_eq!(bad.verdict, Verdict::Different);
+        assert!(bad.reason.contains("pixel values agree"), "{}", bad.table());
+        assert_eq!(bad.pixel_test.unwrap().pixels_rejected, 40);
+    }
+
+    #[test]
+    fn a_picture_is_the_same_as_itself_and_as_its_half() {
+        let a = render(5, 1.0, 0.3, 1.0);
+        let same = compare(&a, &a, &CompareOptions::default());
+        assert!(same.identical && same.verdict == Verdict::Same && same.global_p == 1.0);
+        // Without noise, rounding to half is all that differs: known, so still the same.
+        let mut exact = a.clone();
+        for (name, values) in &mut exact.parts[0].channels {
+            if name.starts_with("stderr.") {
+                values.fill(0.0);
+            }
+        }
+        let mut half = exact.clone();
+        for (_, values) in &mut half.parts[0].channels {
+            values.iter_mut().for_each(|v| *v = half::f16::from_f32(*v).to_f32());
+        }
+        let c = compare(&half, &exact, &CompareOptions::default());
+        assert!(!c.identical && c.verdict == Verdict::Same, "{}", c.table());
+        // And a pixel that is off by more than rounding is not.
+        half.parts[0].channels[0].1[77] *= 1.25;
+        let c = compare(&half, &exact, &CompareOptions::default());
+        assert_eq!(c.verdict, Verdict::Different, "{}", c.table());
+    }
+
+    #[test]
+    fn values_that_are_not_finite_are_counted_and_make_a_difference() {
+        let b = render(6, 1.0, 0.3, 1.0);
+        let mut a = b.clone();
+        a.parts[0].channels[0].1[3] = f32::NAN;
+        a.parts[0].channels[2].1[3] = f32::INFINITY;
+        let c = compare(&a, &b, &CompareOptions::default());
+        assert_eq!((c.verdict, c.pixels), (Verdict::Different, PIXELS - 1));
+        assert_eq!(c.reason, "1 of 4096 pixels hold values that are not finite");
+        assert_eq!((c.channels[0].nan_a, c.channels[1].infinite_a, c.channels[0].nan_b), (1, 1, 0));
+        // Even against itself.
+        assert_eq!(compare(&a, &a, &CompareOptions::default()).verdict, Verdict::Different);
+    }
+
+    #[test]
+    fn pictures_of_different_things_cannot_be_compared() {
+        let a = render(7, 1.0, 0.3, 1.0);
+        let reason = |b: &ExrFile| {
+            let c = compare(&a, b, &CompareOptions::default());
+            assert_eq!((c.verdict, c.verdict.exit_code(), c.noise), (Verdict::CannotCompare, 2, None));
+            assert!(c.table().starts_with("verdict: cannot compare: "));
+            c.reason
+        };
+        let mut moved = a.clone();
+        moved.parts[0].window.x = 5;
+        assert_eq!(reason(&moved), "the data windows differ: 64x64 at (0, 0) against 64x64 at (5, 0)");
+        let ignore = CompareOptions { origin: Origin::Ignore, ..CompareOptions::default() };
+        assert_eq!(compare(&a, &moved, &ignore).verdict, Verdict::Same);
+        let mut wide = a.clone();
+        wide.chromaticities = Some([[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]]);
+        assert!(reason(&wide).starts_with("the colour primaries differ"));
+        let mut other = a.clone();
+        other.parts[0].channels.iter_mut().for_each(|(name, _)| name.push('x'));
+        assert!(reason(&other).starts_with("the files have no channel in common"));
+    }
+
+    #[test]
+    fn spectral_files_are_compared_band_by_band() {
+        let spectral = |seed| {
+            let mut f = without_errors(render(seed, 1.0, 0.3, 1.0));
+            let red = f.parts[0].channels[0].1.clone();
+            for band in ["S0.450,0nm", "S0.550,0nm"] {
+                f.parts[0].channels.push((band.to_string(), red.clone()));
+            }
+            f
+        };
+        let c = compare(&spectral(1), &spectral(2), &CompareOptions::default());
+        assert_eq!(c.channels.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["S0.450,0nm", "S0.550,0nm"]);
+    }
+
+    /// Figures by hand: a = (1, 3), b = (1, 2) in one channel, twice; m = 1.5.
+    #[test]
+    fn figures_equal_their_definitions() {
+        let y = |pair: [f32; 2]| file(vec![("Y".into(), pair.repeat(PIXELS / 2))]);
+        let c = compare(&y([1.0, 3.0]), &y([1.0, 2.0]), &CompareOptions::default());
+        let f = &c.channels[0];
+        assert_eq!((f.mean_a, f.mean_b, f.max_difference), (2.0, 1.5, 1.0));
+        let close = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
+        close(f.rmse, 0.5f64.sqrt());
+        close(f.rel_mse, 0.5 / (4.0 + 0.0225));
+        close(f.smape, 0.5 / (5.0 + 0.015));
+        // Σd/√Σd² with 2048 differences of 1.
+        close(f.global_z, 2048f64.sqrt());
+    }
+
+    #[test]
+    fn the_map_holds_differences_and_scores() {
+        let (a, b) = (render(1, 1.0, 0.3, 1.0), render(2, 1.0, 0.3, 1.0));
+        let map = difference_map(&a, &b, &CompareOptions::default()).unwrap();
+        let names: Vec<&str> = map.channels.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names[..2], ["difference.R", "score.R"]);
+        let ChannelData::F32(difference) = &map.channels[0].1 else { panic!("float channels") };
+        assert_eq!(difference[5], a.parts[0].channels[0].1[5] - b.parts[0].channels[0].1[5]);
+        assert!(crate::film::exr::encode_exr(&map).is_ok());
+    }
+
+    #[test]
+    fn the_report_is_json() {
+        let c = compare(&render(1, 1.0, 0.3, 1.0), &render(2, 1.0, 0.3, 1.0), &CompareOptions::default());
+        let json = serde_json::to_value(&c).unwrap();
+        assert_eq!(json["verdict"], "same");
+        assert_eq!(json["noise"], "standard_errors");
+        assert!(json["channels"][2]["global_p"].is_number());
+    }
+}

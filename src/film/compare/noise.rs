@@ -1,0 +1,269 @@
+//! What the noise of two pictures explains.
+
+use super::{ChannelFigures, NoiseSource, PIXEL_ALPHA, PixelTest, VARIANCE_FLOOR, kept};
+use crate::math::statistics::{Moments, normal_two_sided_p, sidak, student_t_two_sided_p};
+use half::f16;
+
+/// Linear Rec.709 to XYZ with the digits that Mitsuba 3 and its references use.
+pub(super) const XYZ_FROM_RGB: [[f64; 3]; 3] =
+    [[0.412_453, 0.357_580, 0.180_423], [0.212_671, 0.715_160, 0.072_169], [0.019_334, 0.119_193, 0.950_227]];
+
+/// Degrees of freedom of a standard error that stems from four replicates.
+const REPLICATE_DOF: f64 = 3.0;
+
+/// A channel of both pictures with what is known of its noise.
+pub(super) struct Pair<'a> {
+    pub name: String,
+    pub a: &'a [f32],
+    pub b: &'a [f32],
+    pub noise: Noise<'a>,
+    /// Whether the values of A and of B are half floats.
+    half: [bool; 2],
+}
+
+pub(super) enum Noise<'a> {
+    /// Standard errors of A and B.
+    Errors(&'a [f32], &'a [f32]),
+    /// Standard errors of one of them.
+    OneError(&'a [f32]),
+    /// Variance of a sample of A, and the samples a pixel.
+    Sample(&'a [f32], f64),
+    Unknown,
+}
+
+impl Noise<'_> {
+    pub fn source(&self) -> NoiseSource {
+        match self {
+            Noise::Errors(..) => NoiseSource::StandardErrors,
+            Noise::OneError(_) => NoiseSource::OneStandardError,
+            Noise::Sample(..) => NoiseSource::SampleVariance,
+            Noise::Unknown => NoiseSource::Differences,
+        }
+    }
+}
+
+/// The variance of the difference of a pixel.
+#[derive(Clone, Copy)]
+struct Variance {
+    /// Of A and B, each with [`REPLICATE_DOF`] degrees of freedom.
+    estimated: [f64; 2],
+    /// Known without estimation: the rounding to half floats, or the whole of a variance file.
+    known: f64,
+}
+
+impl Variance {
+    fn total(&self) -> f64 {
+        self.estimated[0] + self.estimated[1] + self.known
+    }
+
+    /// Welch's degrees of freedom (Satterthwaite 1946): (Σv)² / Σ(v²/ν).
+    fn dof(&self) -> f64 {
+        let squares: f64 = self.estimated.iter().map(|v| v * v).sum();
+        self.total() * self.total() * REPLICATE_DOF / squares
+    }
+}
+
+impl<'a> Pair<'a> {
+    pub fn new(
+        name: String,
+        a: &'a [f32],
+        b: &'a [f32],
+        errors: [Option<&'a [f32]>; 2],
+        variance: Option<(&'a [f32], u32)>,
+    ) -> Pair<'a> {
+        // Standard errors of which none is finite (one replicate) say nothing.
+        let errors = errors.map(|plane| plane.filter(|errors| errors.iter().any(|e| e.is_finite())));
+        let noise = match (variance, errors) {
+            (Some((plane, samples)), _) => Noise::Sample(plane, f64::from(samples)),
+            (None, [Some(a), Some(b)]) => Noise::Errors(a, b),
+            (None, [Some(one), None] | [None, Some(one)]) => Noise::OneError(one),
+            (None, [None, None]) => Noise::Unknown,
+        };
+        let is_half = |values: &[f32]| values.iter().all(|&v| v.is_nan() || f16::from_f32(v).to_f32() == v);
+        let half = [is_half(a), is_half(b)];
+        Pair { name, a, b, noise, half }
+    }
+
+    pub fn is_finite(&self, i: usize) -> bool {
+        self.a[i].is_finite() && self.b[i].is_finite()
+    }
+
+    pub fn is_identical(&self) -> bool {
+        self.a.iter().zip(self.b).all(|(x, y)| x.to_bits() == y.to_bits())
+    }
+
+    fn difference(&self, i: usize) -> f64 {
+        f64::from(self.a[i]) - f64::from(self.b[i])
+    }
+
+    /// The variance of a pixel's difference, if it is known.
+    fn variance(&self, i: usize) -> Option<Variance> {
+        let square = |e: f32| f64::from(e) * f64::from(e);
+        // A half float of exponent e was rounded to a multiple of 2^(e − 10): a uniform error of variance step²/12.
+        // If both pictures were rounded alike and agree, there is no difference to explain.
+        let rounding: f64 = [(self.a[i], self.half[0]), (self.b[i], self.half[1])]
+            .iter()
+            .map(|&(v, half)| if half { half_step(v) * half_step(v) / 12.0 } else { 0.0 })
+            .sum();
+        let variance = match self.noise {
+            Noise::Errors(a, b) => Variance { estimated: [square(a[i]), square(b[i])], known: rounding },
+            Noise::OneError(one) => Variance { estimated: [square(one[i]), 0.0], known: rounding },
+            Noise::Sample(plane, samples) => {
+                let per_sample = f64::from(plane[i]).max(VARIANCE_FLOOR);
+                Variance { estimated: [0.0; 2], known: per_sample / samples }
+            }
+            Noise::Unknown => return None,
+        };
+        variance.total().is_finite().then_some(variance)
+    }
+
+    /// The difference of a pixel in standard errors, and their degrees of freedom.
+    pub fn score(&self, i: usize) -> Option<(f64, f64)> {
+        let variance = self.variance(i)?;
+        Some((score(self.difference(i), variance.total()), variance.dof()))
+    }
+
+    pub fn figures(&self, finite: &[bool], reference_mean: f64) -> ChannelFigures {
+        let n = finite.iter().filter(|&&f| f).count().max(1) as f64;
+        let sum_a: f64 = kept(self.a, finite).sum();
+        let sum_b: f64 = kept(self.b, finite).sum();
+        let ratio = sum_a / sum_b;
+        let floor = 0.01 * reference_mean * reference_mean;
+        let (mut squares, mut relative, mut symmetric, mut largest) = (0.0, 0.0, 0.0, 0.0f64);
+        // Of the difference: sum, variance, and Σv²/ν; of A − ratio·B: variance.
+        let (mut difference, mut variance, mut spread, mut ratio_variance) = (0.0, 0.0, 0.0, 0.0);
+        for i in (0..finite.len()).filter(|&i| finite[i]) {
+            let (a, b, d) = (f64::from(self.a[i]), f64::from(self.b[i]), self.difference(i));
+            if d != 0.0 {
+                squares += d * d;
+                relative += d * d / (b * b + floor);
+                symmetric += d.abs() / (a.abs() + b.abs() + 0.01 * reference_mean.abs());
+                largest = largest.max(d.abs());
+            }
+            match (&self.noise, self.variance(i)) {
+                (Noise::Unknown, _) => {
+                    difference += d;
+                    variance += d * d;
+                    ratio_variance += (a - ratio * b) * (a - ratio * b);
+                }
+                (_, Some(v)) => {
+                    difference += d;
+                    variance += v.total();
+                    spread += v.estimated.iter().map(|v| v * v).sum::<f64>() / REPLICATE_DOF;
+                    // What is known without estimation belongs to A: a variance file, or rounding.
+                    ratio_variance += v.estimated[0] + v.known + ratio * ratio * v.estimated[1];
+                }
+                // A pixel without an estimate (too few replicates) has no say.
+                (_, None) => {}
+            }
+        }
+        let z = score(difference, variance);
+        let dof = if spread > 0.0 { variance * variance / spread } else { f64::INFINITY };
+        let count = |values: &[f32], is: fn(f32) -> bool| values.iter().filter(|&&v| is(v)).count();
+        ChannelFigures {
+            name: self.name.clone(),
+            mean_a: sum_a / n,
+            mean_b: sum_b / n,
+            mean_ratio: ratio,
+            mean_ratio_error: ratio_variance.sqrt() / sum_b.abs(),
+            global_z: z,
+            global_dof: dof,
+            global_p: student_t_two_sided_p(z, dof),
+            rmse: (squares / n).sqrt(),
+            rel_mse: relative / n,
+            smape: symmetric / n,
+            max_difference: largest,
+            nan_a: count(self.a, f32::is_nan),
+            infinite_a: count(self.a, f32::is_infinite),
+            nan_b: count(self.b, f32::is_nan),
+            infinite_b: count(self.b, f32::is_infinite),
+        }
+    }
+}
+
+/// `difference` / √`variance`; no difference is no deviation even where there is no noise.
+fn score(difference: f64, variance: f64) -> f64 {
+    if difference == 0.0 { 0.0 } else { difference / variance.sqrt() }
+}
+
+/// The distance of half floats at `v`: 2^(e − 10), 2⁻²⁴ for subnormals.
+fn half_step(v: f32) -> f64 {
+    let exponent = (v.to_bits() >> 23 & 0xff) as i32 - 127;
+    libm::ldexp(1.0, exponent.max(-14) - 10)
+}
+
+/// Mitsuba's test over all pixels, where variances are known.
+///
+/// With a variance file the scores are those of Mitsuba: in XYZ if the channels are R, G, B, the variances taken through
+/// the same matrix (they are stored so), clamped at [`VARIANCE_FLOOR`]. With standard errors they are Welch's t of
+/// each channel, whose tails with 3 + 3 degrees of freedom are long: a single pixel must be far off.
+pub(super) fn pixel_test(pairs: &[Pair], finite: &[bool]) -> Option<PixelTest> {
+    let pixels = finite.iter().filter(|&&f| f).count();
+    let alpha = sidak(PIXEL_ALPHA, pixels);
+    let (mut tested, mut accepted, mut rejected) = (0usize, 0usize, 0usize);
+    let mut scores = Moments::default();
+    for i in (0..finite.len()).filter(|&i| finite[i]) {
+        let mut pixel_fails = false;
+        let mut judge = |score: f64, dof: f64| {
+            // Student's tail is the longer one, so what the normal accepts needs no beta function.
+            let p = normal_two_sided_p(score);
+            let p = if p > alpha || dof.is_infinite() || dof.is_nan() { p } else { student_t_two_sided_p(score, dof) };
+            tested += 1;
+            accepted += usize::from(p > alpha);
+            pixel_fails |= p <= alpha;
+            if score.is_finite() {
+                scores.push(score);
+            }
+        };
+        match xyz_scores(pairs, i) {
+            Some(xyz) => xyz.into_iter().for_each(|score| judge(score, f64::INFINITY)),
+            None => pairs.iter().filter_map(|pair| pair.score(i)).for_each(|(score, dof)| judge(score, dof)),
+        }
+        rejected += usize::from(pixel_fails);
+    }
+    (tested > 0).then(|| PixelTest {
+        alpha,
+        accepted: accepted as f64 / tested as f64,
+        pixels_rejected: rejected,
+        score_mean: scores.mean,
+        score_deviation: scores.variance().sqrt(),
+    })
+}
+
+/// The scores of Mitsuba's test at a pixel, if there are R, G, B and a variance file.
+fn xyz_scores(pairs: &[Pair], i: usize) -> Option<[f64; 3]> {
+    let [r, g, b] = pairs else { return None };
+    if [&r.name, &g.name, &b.name] != ["R", "G", "B"] {
+        return None;
+    }
+    let (Noise::Sample(vr, samples), Noise::Sample(vg, _), Noise::Sample(vb, _)) = (&r.noise, &g.noise, &b.noise)
+    else {
+        return None;
+    };
+    let difference = [r.difference(i), g.difference(i), b.difference(i)];
+    let variance = [vr[i], vg[i], vb[i]].map(f64::from);
+    let dot = |row: [f64; 3], v: [f64; 3]| row[0] * v[0] + row[1] * v[1] + row[2] * v[2];
+    Some(XYZ_FROM_RGB.map(|row| score(dot(row, difference), dot(row, variance).max(VARIANCE_FLOOR) / samples)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Halves near 1 are 2⁻¹⁰ apart, near 65504 they are 32 apart, and subnormals 2⁻²⁴.
+    #[test]
+    fn the_step_of_half_floats_is_the_distance_to_the_next() {
+        for bits in (0..0x7bffu16).step_by(37) {
+            let (v, next) = (f16::from_bits(bits).to_f32(), f16::from_bits(bits + 1).to_f32());
+            assert_eq!(half_step(v), f64::from(next) - f64::from(v), "{v}");
+        }
+    }
+
+    /// Welch: equal variances give ν₁ + ν₂ = 6, one vanishing gives 3, known variance adds certainty.
+    #[test]
+    fn welch_degrees_of_freedom_at_their_limits() {
+        let dof = |a, b, known| Variance { estimated: [a, b], known }.dof();
+        assert_eq!((dof(2.0, 2.0, 0.0), dof(2.0, 0.0, 0.0), dof(1.0, 0.0, 1.0)), (6.0, 3.0, 12.0));
+        assert!(dof(0.0, 0.0, 1.0).is_infinite());
+    }
+}

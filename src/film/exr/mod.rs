@@ -1,0 +1,253 @@
+//! OpenEXR files: one part of named channels, written atomically with reproducible bytes; any flat
+//! file read back.
+//!
+//! Conventions: channels R, G, B, A in upper case, premultiplied; the display window is the frame and the data window
+//! the crop; colour is declared twice, by `chromaticities` and by `colorInteropID` (OpenEXR 3.4). Text is UTF-8.
+//!
+//! The header is written here, attributes sorted by name, and pixels are compressed by the `exr` crate, whose own
+//! writer puts custom attributes in hash order: the same picture would give other bytes in every run.
+//!
+//! Source: "OpenEXR File Layout", openexr.com (technical documentation), and its list of standard attributes.
+
+mod read;
+mod write;
+
+pub use read::{ExrFile, ExrPart, read_exr};
+pub use write::{encode_exr, write_exr};
+
+use crate::film::Window;
+use crate::film::resolve::Image;
+use half::f16;
+
+/// How pixels are packed; all lossless.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Compression {
+    /// Not at all.
+    None,
+    /// Deflate of single rows: quick to read by rows, as compositing does.
+    #[default]
+    Zips,
+    /// Deflate of 16 rows.
+    Zip,
+    /// Wavelets and Huffman codes of 32 rows: good for noise.
+    Piz,
+}
+
+/// The samples of a channel, in raster order of the data window.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ChannelData {
+    /// 16-bit floats.
+    F16(Vec<f16>),
+    /// 32-bit floats.
+    F32(Vec<f32>),
+    /// 32-bit counts or ids.
+    U32(Vec<u32>),
+}
+
+impl ChannelData {
+    /// How many samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            ChannelData::F16(samples) => samples.len(),
+            ChannelData::F32(samples) => samples.len(),
+            ChannelData::U32(samples) => samples.len(),
+        }
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// What the numbers of a colour file mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ColourEncoding {
+    /// CIE 1931 x, y of red, green, blue and white.
+    pub primaries: [[f64; 2]; 4],
+    /// Name of the encoding in the Color Interop Forum's list, such as `lin_rec709_scene`; none if the list has none.
+    pub interop_id: Option<String>,
+}
+
+/// The value of a header attribute.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Attribute {
+    /// `string`, UTF-8.
+    Text(String),
+    /// `int`.
+    Int(i32),
+    /// `float`.
+    Float(f32),
+    /// `double`.
+    Double(f64),
+    /// `rational`: numerator and denominator.
+    Rational(i32, u32),
+    /// `v2f`.
+    Vec2([f32; 2]),
+    /// `m44f`, row by row for row vectors (v·M), as Imath holds it: `(matrix for column vectors).to_cols_array()`.
+    Matrix4([f32; 16]),
+}
+
+/// A picture to be written: one part, scan lines.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExrImage {
+    /// Width and height of the frame: the display window.
+    pub frame: [u32; 2],
+    /// The pixels that the file holds: the data window.
+    pub window: Window,
+    /// Channels by name, in any order; `layer.R` belongs to a layer.
+    pub channels: Vec<(String, ChannelData)>,
+    /// What R, G and B mean; none for a file of data (`colorInteropID` is then `data`).
+    pub colour: Option<ColourEncoding>,
+    /// Further attributes by name: `owner`, `comments`, `software`, `capDate`, `worldToCamera`, `worldToNDC`, … and one's own.
+    pub attributes: Vec<(String, Attribute)>,
+    /// How pixels are packed.
+    pub compression: Compression,
+}
+
+/// How many bits a beauty file spends on a number.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// 16-bit floats, where they can hold the picture.
+    #[default]
+    Half,
+    /// 32-bit floats.
+    Float,
+}
+
+/// Whether a beauty file says how noisy it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StandardError {
+    /// Channels R, G, B, A only.
+    #[default]
+    Leave,
+    /// And `stderr.R`, `stderr.G`, `stderr.B` in 32-bit floats: standard errors of the means, for `abbe compare`.
+    Write,
+}
+
+/// A beauty file, and why it is wider than was asked for, if it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Beauty {
+    /// What to write.
+    pub exr: ExrImage,
+    /// A sentence for the log and the report, if half was asked for and would have lost something.
+    pub note: Option<String>,
+}
+
+/// The file of a resolved picture: R, G, B, A.
+///
+/// Half holds 11 significant bits between 2⁻¹⁴ and 65504. A picture with a finite value that would round to infinity,
+/// or so dim that the step of subnormal halves (2⁻²⁴) exceeds half's own relative precision at the mean
+/// (mean of |value| below 2⁻¹⁴), is written as float instead, and the note says so. Nothing is clamped.
+#[must_use]
+pub fn beauty(
+    image: &Image,
+    colour: ColourEncoding,
+    precision: Precision,
+    error: StandardError,
+    compression: Compression,
+) -> Beauty {
+    let planes = [("R", &image.rgb[0]), ("G", &image.rgb[1]), ("B", &image.rgb[2]), ("A", &image.alpha)];
+    let note = match precision {
+        Precision::Float => None,
+        Precision::Half => half_loses(&image.rgb),
+    };
+    let wide = precision == Precision::Float || note.is_some();
+    let mut channels: Vec<(String, ChannelData)> = planes
+        .into_iter()
+        .map(|(name, plane)| {
+            let data = if wide {
+                ChannelData::F32(plane.clone())
+            } else {
+                ChannelData::F16(plane.iter().map(|&v| f16::from_f32(v)).collect())
+            };
+            (name.to_string(), data)
+        })
+        .collect();
+    if error == StandardError::Write {
+        for (name, plane) in ["stderr.R", "stderr.G", "stderr.B"].into_iter().zip(&image.standard_error) {
+            channels.push((name.to_string(), ChannelData::F32(plane.clone())));
+        }
+    }
+    let exr = ExrImage {
+        frame: image.frame,
+        window: image.window,
+        channels,
+        colour: Some(colour),
+        attributes: Vec::new(),
+        compression,
+    };
+    Beauty { exr, note }
+}
+
+/// Why 16-bit floats cannot hold the planes, if they cannot.
+fn half_loses(planes: &[Vec<f32>; 3]) -> Option<String> {
+    let values = planes.iter().flatten();
+    let too_large = values.clone().filter(|v| v.is_finite() && f16::from_f32(**v).is_infinite()).count();
+    if too_large > 0 {
+        let peak = values.filter(|v| v.is_finite()).fold(0.0f32, |peak, v| peak.max(v.abs()));
+        return Some(format!(
+            "{too_large} values exceed what half floats hold (65504; the peak is {peak:e}): written as 32-bit float"
+        ));
+    }
+    let finite = values.filter(|v| v.is_finite() && **v != 0.0);
+    let (count, sum) = finite.fold((0u64, 0.0f64), |(n, sum), v| (n + 1, sum + f64::from(v.abs())));
+    let mean = sum / count.max(1) as f64;
+    let smallest_normal = f64::from(f16::MIN_POSITIVE);
+    (count > 0 && mean < smallest_normal).then(|| {
+        format!("the mean value {mean:.1e} is below the normal range of half floats (6.1e-5): written as 32-bit float")
+    })
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// Rec. ITU-R BT.709-6, table 1: primaries and D65.
+    pub fn rec709() -> ColourEncoding {
+        ColourEncoding {
+            primaries: [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]],
+            interop_id: Some("lin_rec709_scene".to_string()),
+        }
+    }
+
+    pub fn image(value: f32) -> Image {
+        let plane = |k: f32| (0..6).map(|i| value * (1.0 + k * i as f32)).collect::<Vec<f32>>();
+        Image {
+            frame: [5, 4],
+            window: Window { x: 1, y: 2, width: 3, height: 2 },
+            rgb: [plane(0.0), plane(1.0), plane(-1.0)],
+            alpha: vec![1.0; 6],
+            standard_error: [plane(0.1), plane(0.2), plane(0.3)],
+        }
+    }
+
+    fn precision_of(value: f32) -> (bool, Option<String>) {
+        let b = beauty(&image(value), rec709(), Precision::Half, StandardError::Leave, Compression::Zips);
+        (matches!(b.exr.channels[0].1, ChannelData::F16(_)), b.note)
+    }
+
+    #[test]
+    fn a_picture_beyond_half_is_written_as_float_and_says_so() {
+        assert_eq!(precision_of(1.0), (true, None));
+        // 65504 · 6 in the green channel of the last pixel.
+        let (half, note) = precision_of(65_504.0);
+        assert!(!half && note.unwrap().contains("exceed what half floats hold"));
+        // 65519 still rounds to 65504.
+        assert!(half_loses(&[vec![65_519.0], vec![], vec![]]).is_none());
+        assert!(half_loses(&[vec![65_520.0], vec![], vec![]]).is_some());
+        // Infinity is infinity in half too.
+        assert!(half_loses(&[vec![f32::INFINITY, f32::NAN, 1.0], vec![], vec![]]).is_none());
+    }
+
+    #[test]
+    fn a_very_dim_picture_is_written_as_float_and_says_so() {
+        let (half, note) = precision_of(1e-6);
+        assert!(!half && note.unwrap().contains("below the normal range"));
+        assert_eq!(precision_of(0.0), (true, None));
+    }
+}

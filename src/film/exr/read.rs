@@ -1,0 +1,198 @@
+//! Reads any flat OpenEXR file that the `exr` crate can decode.
+
+use crate::error::{Error, Result};
+use crate::film::Window;
+use ::exr::image::FlatSamples;
+use ::exr::meta::MetaData;
+use ::exr::meta::attribute::{AttributeValue, IntegerBounds, Text};
+use ::exr::prelude::{ReadChannels, ReadLayers, read};
+use std::path::Path;
+
+/// Files with more samples than this (8 GiB as f32) are refused rather than risked.
+const SAMPLES_LIMIT: u64 = 1 << 31;
+
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExrFile {
+    /// The display window: the frame.
+    pub display: Window,
+    /// CIE x, y of red, green, blue and white, if the file says.
+    pub chromaticities: Option<[[f32; 2]; 4]>,
+    /// The parts, at least one.
+    pub parts: Vec<ExrPart>,
+}
+
+/// One part of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExrPart {
+    /// Its name, if it has one.
+    pub name: Option<String>,
+    /// The data window.
+    pub window: Window,
+    /// Channels by name; samples in raster order. Integers are rounded to 24 bits.
+    pub channels: Vec<(String, Vec<f32>)>,
+    /// Text attributes, sorted by name.
+    pub texts: Vec<(String, String)>,
+}
+
+impl ExrPart {
+    /// The samples of the channel `name`.
+    #[must_use]
+    pub fn channel(&self, name: &str) -> Option<&[f32]> {
+        self.channels.iter().find(|(n, _)| n == name).map(|(_, samples)| samples.as_slice())
+    }
+
+    /// The text attribute `name`.
+    #[must_use]
+    pub fn text(&self, name: &str) -> Option<&str> {
+        self.texts.iter().find(|(n, _)| n == name).map(|(_, text)| text.as_str())
+    }
+}
+
+/// Reads `path`: all parts, the largest level of each.
+///
+/// # Errors
+/// [`Error::Input`]: the file is missing, is no OpenEXR file, is damaged, or holds what cannot be read (deep data,
+/// subsampled channels, an unknown compression).
+pub fn read_exr(path: &Path) -> Result<ExrFile> {
+    let fail = |e: ::exr::error::Error| Error::input(path, words(e));
+    let file = std::fs::File::open(path).map_err(|e| {
+        let missing = e.kind() == std::io::ErrorKind::NotFound;
+        Error::input(path, if missing { "there is no such file".to_string() } else { e.to_string() })
+    })?;
+    let mut reader = std::io::BufReader::new(file);
+    let meta = MetaData::read_from_buffered(&mut reader, false).map_err(fail)?;
+    check_size(path, &meta)?;
+    std::io::Seek::rewind(&mut reader).map_err(|e| Error::input(path, e.to_string()))?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_buffered(reader)
+        .map_err(fail)?;
+
+    let shared = &image.attributes;
+    let mut parts = Vec::new();
+    for layer in image.layer_data {
+        let own = &layer.attributes;
+        let size = [layer.size.width() as u32, layer.size.height() as u32];
+        let window = Window { x: own.layer_position.x(), y: own.layer_position.y(), width: size[0], height: size[1] };
+        let mut channels = Vec::new();
+        for channel in layer.channel_data.list {
+            let name = text(&channel.name);
+            if channel.sampling.x() != 1 || channel.sampling.y() != 1 {
+                return Err(Error::input(path, format!("channel `{name}` is subsampled, which is not supported")));
+            }
+            let samples = match channel.sample_data {
+                FlatSamples::F16(samples) => samples.into_iter().map(half::f16::to_f32).collect(),
+                FlatSamples::F32(samples) => samples,
+                FlatSamples::U32(samples) => samples.into_iter().map(|v| v as f32).collect(),
+            };
+            channels.push((name, samples));
+        }
+        let known = [
+            ("capDate", &own.capture_date),
+            ("comments", &own.comments),
+            ("lookModTransform", &own.look_modification_transform_name),
+            ("owner", &own.owner),
+            ("renderingTransform", &own.rendering_transform_name),
+            ("software", &own.software_name),
+            ("view", &own.view_name),
+            ("wrapmodes", &own.wrap_mode_name),
+        ];
+        let known = known.iter().filter_map(|(name, value)| Some(((*name).to_string(), text(value.as_ref()?))));
+        let custom = own.other.iter().chain(&shared.other).filter_map(|(name, value)| match value {
+            AttributeValue::Text(value) => Some((text(name), text(value))),
+            _ => None,
+        });
+        let mut texts: Vec<(String, String)> = known.chain(custom).collect();
+        texts.sort();
+        parts.push(ExrPart { name: own.layer_name.as_ref().map(text), window, channels, texts });
+    }
+    if parts.is_empty() {
+        return Err(Error::input(path, "the file has no part with pixels"));
+    }
+    let chromaticities = shared.chromaticities.map(|c| [c.red, c.green, c.blue, c.white].map(|p| [p.x(), p.y()]));
+    Ok(ExrFile { display: window(shared.display_window), chromaticities, parts })
+}
+
+fn window(bounds: IntegerBounds) -> Window {
+    let IntegerBounds { position, size } = bounds;
+    Window { x: position.x(), y: position.y(), width: size.width() as u32, height: size.height() as u32 }
+}
+
+/// Text as UTF-8, which the specification asks for; other bytes become replacement characters.
+fn text(text: &Text) -> String {
+    String::from_utf8_lossy(text.as_slice()).into_owned()
+}
+
+fn check_size(path: &Path, meta: &MetaData) -> Result<()> {
+    let mut samples = 0u64;
+    for header in &meta.headers {
+        let pixels = (header.layer_size.width() as u64).saturating_mul(header.layer_size.height() as u64);
+        samples = samples.saturating_add(pixels.saturating_mul(header.channels.list.len() as u64));
+    }
+    if samples > SAMPLES_LIMIT {
+        return Err(Error::input(path, format!("the header announces {samples} samples, more than can be held")));
+    }
+    Ok(())
+}
+
+fn words(e: ::exr::error::Error) -> String {
+    match e {
+        ::exr::error::Error::NotSupported(what) => format!("not supported: {what}"),
+        ::exr::error::Error::Invalid(what) => format!("not a valid OpenEXR file: {what}"),
+        ::exr::error::Error::Io(e) => e.to_string(),
+        ::exr::error::Error::Aborted => "reading was stopped".to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{image, rec709};
+    use super::super::{Compression, Precision, StandardError, beauty, encode_exr};
+    use super::*;
+
+    fn file(bytes: &[u8]) -> (tempfile::TempDir, std::path::PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.exr");
+        std::fs::write(&path, bytes).unwrap();
+        (dir, path)
+    }
+
+    #[test]
+    fn a_missing_or_foreign_file_is_told_in_words() {
+        let e = read_exr(Path::new("/nowhere/a.exr")).unwrap_err().to_string();
+        assert_eq!(e, "/nowhere/a.exr: there is no such file");
+        let (_dir, path) = file(b"no picture at all");
+        let e = read_exr(&path).unwrap_err();
+        assert!(matches!(e, Error::Input { .. }) && e.to_string().contains("not a valid OpenEXR file"), "{e}");
+    }
+
+    /// Every prefix of a file is an error and no panic.
+    #[test]
+    fn a_truncated_file_is_an_error() {
+        let beauty = beauty(&image(0.5), rec709(), Precision::Half, StandardError::Leave, Compression::Zips);
+        let bytes = encode_exr(&beauty.exr).unwrap();
+        for length in (0..bytes.len()).step_by(7) {
+            let (_dir, path) = file(&bytes[..length]);
+            assert!(read_exr(&path).is_err(), "{length} of {} bytes", bytes.len());
+        }
+    }
+
+    /// A data window of 2²⁹ × 2²⁹ pixels in a file of a few hundred bytes.
+    #[test]
+    fn a_header_that_announces_too_much_is_refused() {
+        let beauty = beauty(&image(0.5), rec709(), Precision::Half, StandardError::Leave, Compression::Zips);
+        let mut bytes = encode_exr(&beauty.exr).unwrap();
+        let name = b"dataWindow\0box2i\0";
+        let at = bytes.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4 + 8;
+        for place in [at, at + 4] {
+            bytes[place..place + 4].copy_from_slice(&(1i32 << 29).to_le_bytes());
+        }
+        let (_dir, path) = file(&bytes);
+        assert!(read_exr(&path).unwrap_err().to_string().contains("more than can be held"));
+    }
+}

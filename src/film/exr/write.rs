@@ -1,0 +1,335 @@
+//! Writes the header; the `exr` crate packs the rows.
+
+use super::{Attribute, ChannelData, ColourEncoding, Compression, ExrImage};
+use crate::error::{Error, Result};
+use crate::film::Window;
+use crate::film::output::write_atomically;
+use ::exr::block::{BlockIndex, UncompressedBlock, enumerate_ordered_header_block_indices};
+use ::exr::math::Vec2;
+use ::exr::meta::BlockDescription;
+use ::exr::meta::attribute::{ChannelDescription, IntegerBounds, LineOrder, SampleType, Text};
+use ::exr::meta::header::Header;
+use ::exr::prelude::SmallVec;
+use half::f16;
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Writes `image` to `path`: the same picture gives the same bytes, and the file is whole or not there.
+///
+/// # Errors
+/// [`Error::Output`]: what in the picture cannot be written, or what is wrong with the place.
+pub fn write_exr(path: &Path, image: &ExrImage) -> Result<()> {
+    let bytes = encode_exr(image).map_err(|message| Error::output(path, message))?;
+    write_atomically(path, &bytes)
+}
+
+/// The bytes of the file.
+///
+/// Rows are packed on the current rayon pool, and the packed rows are held in memory (they are less than
+/// the picture) because the table of their places stands before them.
+///
+/// # Errors
+/// What in the picture cannot be written.
+pub fn encode_exr(image: &ExrImage) -> std::result::Result<Vec<u8>, String> {
+    let channels = sorted_channels(image)?;
+    let header = compressor_header(image, &channels);
+    let headers = [header];
+    let blocks: Vec<(usize, BlockIndex)> = enumerate_ordered_header_block_indices(&headers).collect();
+    let packed = blocks
+        .par_iter()
+        .map(|&(_, index)| {
+            let block = UncompressedBlock::from_lines(&headers[0].channels, index, |line| {
+                let place = line.location;
+                let start = place.position.y() * image.window.width as usize + place.position.x();
+                let range = start..start + place.sample_count;
+                // The line has the length and type that the header gave it, so this cannot fail.
+                let written = match channels[place.channel].1 {
+                    ChannelData::F16(samples) => line.write_samples_from_slice::<f16>(&samples[range]),
+                    ChannelData::F32(samples) => line.write_samples_from_slice::<f32>(&samples[range]),
+                    ChannelData::U32(samples) => line.write_samples_from_slice::<u32>(&samples[range]),
+                };
+                debug_assert!(written.is_ok());
+            });
+            let mut bytes = Vec::new();
+            block.compress_to_chunk(&headers)?.write(&mut bytes, 1)?;
+            Ok(bytes)
+        })
+        .collect::<::exr::error::Result<Vec<Vec<u8>>>>()
+        .map_err(|e| format!("packing the pixels failed: {e}"))?;
+
+    let mut file = header_bytes(image, &channels)?;
+    let mut place = (file.len() + 8 * packed.len()) as u64;
+    for chunk in &packed {
+        file.extend_from_slice(&place.to_le_bytes());
+        place += chunk.len() as u64;
+    }
+    for chunk in &packed {
+        file.extend_from_slice(chunk);
+    }
+    Ok(file)
+}
+
+type Channel<'a> = (&'a str, &'a ChannelData);
+
+/// The channels in the order that the format asks for, by the bytes of their names.
+fn sorted_channels(image: &ExrImage) -> std::result::Result<Vec<Channel<'_>>, String> {
+    let pixels = image.window.pixels();
+    // OpenEXR refuses windows that reach beyond half the range of i32.
+    let limit = i64::from(i32::MAX / 2);
+    let fits = |start: i32, size: u32| i64::from(start).abs() < limit && i64::from(start) + i64::from(size) < limit;
+    let frame_fits = fits(0, image.frame[0]) && fits(0, image.frame[1]);
+    if pixels == 0 || image.frame.contains(&0) {
+        return Err(format!("the picture holds no pixel: window {}, frame {:?}", image.window, image.frame));
+    }
+    if !frame_fits || !fits(image.window.x, image.window.width) || !fits(image.window.y, image.window.height) {
+        return Err(format!("the window {} is beyond what OpenEXR can address", image.window));
+    }
+    if image.channels.is_empty() {
+        return Err("the picture has no channel".to_string());
+    }
+    let mut channels: Vec<Channel> = image.channels.iter().map(|(name, data)| (name.as_str(), data)).collect();
+    channels.sort_by_key(|channel| channel.0);
+    for pair in channels.windows(2) {
+        if pair[0].0 == pair[1].0 {
+            return Err(format!("the channel `{}` is there twice", pair[0].0));
+        }
+    }
+    for (name, data) in &channels {
+        check_name("channel", name)?;
+        if data.len() != pixels {
+            return Err(format!("channel `{name}`: expected {pixels} samples, found {}", data.len()));
+        }
+    }
+    Ok(channels)
+}
+
+fn check_name(what: &str, name: &str) -> std::result::Result<(), String> {
+    if name.is_empty() || name.len() > 255 || name.contains('\0') {
+        return Err(format!("{what} name {name:?}: expected 1 to 255 bytes without a zero byte"));
+    }
+    Ok(())
+}
+
+/// What the packer has to know. This header is not the one that is written.
+fn compressor_header(image: &ExrImage, channels: &[Channel]) -> Header {
+    let list: SmallVec<[ChannelDescription; 5]> = channels
+        .iter()
+        .map(|(name, data)| {
+            let kind = match data {
+                ChannelData::F16(_) => SampleType::F16,
+                ChannelData::F32(_) => SampleType::F32,
+                ChannelData::U32(_) => SampleType::U32,
+            };
+            ChannelDescription::new(Text::from_slice_unchecked(name.as_bytes()), kind, false)
+        })
+        .collect();
+    let compression = match image.compression {
+        Compression::None => ::exr::compression::Compression::Uncompressed,
+        Compression::Zips => ::exr::compression::Compression::ZIP1,
+        Compression::Zip => ::exr::compression::Compression::ZIP16,
+        Compression::Piz => ::exr::compression::Compression::PIZ,
+    };
+    let size = Vec2(image.window.width as usize, image.window.height as usize);
+    let frame = Vec2(image.frame[0] as usize, image.frame[1] as usize);
+    Header::new(Text::from_slice_unchecked(b"beauty"), size, list)
+        .with_position(Vec2(image.window.x, image.window.y))
+        .with_display_window(IntegerBounds::new(Vec2(0, 0), frame))
+        .with_encoding(compression, BlockDescription::ScanLines, LineOrder::Increasing)
+}
+
+/// Magic number, version, and attributes sorted by name.
+fn header_bytes(image: &ExrImage, channels: &[Channel]) -> std::result::Result<Vec<u8>, String> {
+    // (name, type, value)
+    let mut attributes: Vec<(&str, &str, Vec<u8>)> = vec![
+        ("channels", "chlist", channel_list(channels)),
+        ("compression", "compression", vec![compression_code(image.compression)]),
+        ("dataWindow", "box2i", window_bytes(image.window)),
+        ("displayWindow", "box2i", window_bytes(Window::full(image.frame[0], image.frame[1]))),
+        ("lineOrder", "lineOrder", vec![0]),
+        ("pixelAspectRatio", "float", 1f32.to_le_bytes().to_vec()),
+        ("screenWindowCenter", "v2f", vec![0; 8]),
+        ("screenWindowWidth", "float", 1f32.to_le_bytes().to_vec()),
+    ];
+    match &image.colour {
+        Some(ColourEncoding { primaries, interop_id }) => {
+            attributes.push((
+                "chromaticities",
+                "chromaticities",
+                floats(primaries.iter().flatten().map(|&v| v as f32)),
+            ));
+            if let Some(id) = interop_id {
+                attributes.push(("colorInteropID", "string", id.as_bytes().to_vec()));
+            }
+        }
+        None => attributes.push(("colorInteropID", "string", b"data".to_vec())),
+    }
+    for (name, value) in &image.attributes {
+        check_name("attribute", name)?;
+        // Names that say how the file is built; another value would make it unreadable.
+        const STRUCTURE: [&str; 6] = ["tiles", "type", "version", "chunkCount", "maxSamplesPerPixel", "name"];
+        if STRUCTURE.contains(&name.as_str()) || attributes.iter().any(|(other, ..)| other == name) {
+            return Err(format!("the attribute `{name}` is there twice or belongs to the file format"));
+        }
+        let (kind, bytes) = attribute_bytes(value);
+        attributes.push((name, kind, bytes));
+    }
+    attributes.sort_by_key(|attribute| attribute.0);
+
+    let long = |name: &str| name.len() > 31;
+    let long_names = attributes.iter().any(|a| long(a.0)) || channels.iter().any(|c| long(c.0));
+    let mut out = vec![0x76, 0x2f, 0x31, 0x01];
+    out.extend_from_slice(&(2u32 | u32::from(long_names) << 10).to_le_bytes());
+    for (name, kind, value) in attributes {
+        let size = i32::try_from(value.len()).map_err(|_| format!("the attribute `{name}` exceeds 2 GiB"))?;
+        for text in [name, kind] {
+            out.extend_from_slice(text.as_bytes());
+            out.push(0);
+        }
+        out.extend_from_slice(&size.to_le_bytes());
+        out.extend_from_slice(&value);
+    }
+    out.push(0);
+    Ok(out)
+}
+
+fn compression_code(compression: Compression) -> u8 {
+    match compression {
+        Compression::None => 0,
+        Compression::Zips => 2,
+        Compression::Zip => 3,
+        Compression::Piz => 4,
+    }
+}
+
+fn channel_list(channels: &[Channel]) -> Vec<u8> {
+    let mut out = Vec::new();
+    for (name, data) in channels {
+        let kind: i32 = match data {
+            ChannelData::U32(_) => 0,
+            ChannelData::F16(_) => 1,
+            ChannelData::F32(_) => 2,
+        };
+        out.extend_from_slice(name.as_bytes());
+        out.push(0);
+        out.extend_from_slice(&kind.to_le_bytes());
+        // pLinear and three reserved bytes, then the subsampling of x and y.
+        out.extend_from_slice(&[0; 4]);
+        out.extend_from_slice(&1i32.to_le_bytes());
+        out.extend_from_slice(&1i32.to_le_bytes());
+    }
+    out.push(0);
+    out
+}
+
+/// The corners of a window, both inclusive. The sizes were checked to fit.
+fn window_bytes(window: Window) -> Vec<u8> {
+    let last = |start: i32, size: u32| (i64::from(start) + i64::from(size) - 1) as i32;
+    [window.x, window.y, last(window.x, window.width), last(window.y, window.height)]
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .collect()
+}
+
+fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
+    values.into_iter().flat_map(f32::to_le_bytes).collect()
+}
+
+/// Type name and bytes of a value.
+fn attribute_bytes(value: &Attribute) -> (&'static str, Vec<u8>) {
+    match value {
+        Attribute::Text(text) => ("string", text.as_bytes().to_vec()),
+        Attribute::Int(v) => ("int", v.to_le_bytes().to_vec()),
+        Attribute::Float(v) => ("float", v.to_le_bytes().to_vec()),
+        Attribute::Double(v) => ("double", v.to_le_bytes().to_vec()),
+        Attribute::Rational(n, d) => ("rational", [n.to_le_bytes(), d.to_le_bytes()].concat()),
+        Attribute::Vec2(v) => ("v2f", floats(*v)),
+        Attribute::Matrix4(m) => ("m44f", floats(*m)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{image, rec709};
+    use super::super::{Precision, StandardError, beauty, read_exr};
+    use super::*;
+
+    fn mixed(compression: Compression) -> ExrImage {
+        let f = [1.5, -0.0, f32::NAN, f32::INFINITY, 1e-40, -3e38];
+        let mut exr = beauty(&image(0.25), rec709(), Precision::Half, StandardError::Write, compression).exr;
+        exr.channels.push(("Z".to_string(), ChannelData::F32(f.to_vec())));
+        exr.channels.push(("sampleCount".to_string(), ChannelData::U32(vec![0, 1, 2, 3, 1 << 20, 7])));
+        exr.attributes = vec![
+            ("owner".to_string(), Attribute::Text("Ærøskøbing 日本".to_string())),
+            ("abbe:seed".to_string(), Attribute::Text("18446744073709551615".to_string())),
+            ("framesPerSecond".to_string(), Attribute::Rational(24_000, 1001)),
+            ("worldToCamera".to_string(), Attribute::Matrix4(std::array::from_fn(|i| i as f32))),
+            ("an attribute with more than thirty-one bytes".to_string(), Attribute::Double(0.125)),
+        ];
+        exr
+    }
+
+    #[test]
+    fn every_compression_reads_back_exactly() {
+        for compression in [Compression::None, Compression::Zips, Compression::Zip, Compression::Piz] {
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("a.exr");
+            let written = mixed(compression);
+            write_exr(&path, &written).unwrap();
+            let file = read_exr(&path).unwrap();
+            assert_eq!(file.display, Window::full(5, 4));
+            let part = &file.parts[0];
+            assert_eq!(part.window, written.window);
+            assert_eq!(part.channels.len(), written.channels.len());
+            for (name, data) in &written.channels {
+                let expected: Vec<u32> = match data {
+                    ChannelData::F16(v) => v.iter().map(|x| x.to_f32().to_bits()).collect(),
+                    ChannelData::F32(v) => v.iter().map(|x| x.to_bits()).collect(),
+                    ChannelData::U32(v) => v.iter().map(|x| (*x as f32).to_bits()).collect(),
+                };
+                let found: Vec<u32> = part.channel(name).unwrap().iter().map(|x| x.to_bits()).collect();
+                assert_eq!(found, expected, "{compression:?} {name}");
+            }
+            assert_eq!(part.text("owner"), Some("Ærøskøbing 日本"));
+            assert_eq!(part.text("colorInteropID"), Some("lin_rec709_scene"));
+            assert_eq!(part.text("abbe:seed"), Some("18446744073709551615"));
+        }
+    }
+
+    #[test]
+    fn the_same_picture_gives_the_same_bytes() {
+        let mut other = mixed(Compression::Zips);
+        other.attributes.reverse();
+        other.channels.reverse();
+        assert_eq!(encode_exr(&mixed(Compression::Zips)), encode_exr(&other));
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_named() {
+        let error = |change: &dyn Fn(&mut ExrImage)| {
+            let mut exr = mixed(Compression::None);
+            change(&mut exr);
+            encode_exr(&exr).unwrap_err()
+        };
+        assert_eq!(
+            error(&|e| e.channels.push(("x".into(), ChannelData::F32(vec![1.0])))),
+            "channel `x`: expected 6 samples, found 1"
+        );
+        assert_eq!(
+            error(&|e| e.channels.push(("R".into(), ChannelData::F32(vec![1.0; 6])))),
+            "the channel `R` is there twice"
+        );
+        assert!(error(&|e| e.attributes.push(("dataWindow".into(), Attribute::Int(1)))).contains("`dataWindow`"));
+        assert!(error(&|e| e.attributes.push(("a\0b".into(), Attribute::Int(1)))).contains("zero byte"));
+        assert!(error(&|e| e.channels.clear()).contains("no channel"));
+        assert!(error(&|e| e.frame = [0, 4]).contains("no pixel"));
+        assert!(error(&|e| e.window.x = i32::MAX - 1).contains("beyond"));
+    }
+
+    #[test]
+    fn a_missing_directory_leaves_no_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let e = write_exr(&dir.path().join("no/a.exr"), &mixed(Compression::None)).unwrap_err();
+        assert!(matches!(e, Error::Output { .. }) && e.to_string().contains("does not exist"), "{e}");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    }
+}
