@@ -1,0 +1,401 @@
+//! Batches: many scenes, one after the other, with what differs between them.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+use super::decode::decode;
+use super::edit::{self, Setting};
+use super::fault::Checker;
+use super::node::{Entry, Node, Place, Sources, Value, quote};
+use super::path::At;
+use super::scene::SceneDescription;
+use super::settings::{Output, Render};
+use super::spectrum::FilePath;
+use crate::error::{Error, Result};
+
+/// A file that was named on the command line.
+#[derive(Clone, Debug)]
+pub enum Document {
+    /// One scene.
+    Scene(BatchEntry),
+    /// A list of scenes.
+    Batch(Batch),
+}
+
+impl Document {
+    /// The scenes to render, in order.
+    #[must_use]
+    pub fn entries(&self) -> &[BatchEntry] {
+        match self {
+            Document::Scene(entry) => std::slice::from_ref(entry),
+            Document::Batch(batch) => &batch.entries,
+        }
+    }
+
+    /// Loads every scene, and forgets them: do all descriptions hold?
+    ///
+    /// # Errors
+    /// The faults of all scenes, each once. [`Error::Config`] if any scene has one; otherwise
+    /// [`Error::Input`] for the first file that cannot be read.
+    pub fn check(&self, overrides: &[(String, String)]) -> Result<()> {
+        let mut lines: Vec<String> = Vec::new();
+        let mut unreadable = None;
+        let mut faulty = false;
+        for entry in self.entries() {
+            let Err(error) = entry.scene(overrides) else { continue };
+            // Entries that share a scene share its faults.
+            for line in error.to_string().lines() {
+                if !lines.iter().any(|told| told == line) {
+                    lines.push(line.to_owned());
+                }
+            }
+            match error {
+                Error::Input { .. } => unreadable = unreadable.or(Some(error)),
+                _ => faulty = true,
+            }
+        }
+        match unreadable {
+            _ if faulty => Err(Error::Config(lines.join("\n"))),
+            Some(error) => Err(error),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Scenes to render one after the other.
+#[derive(Clone, Debug)]
+pub struct Batch {
+    /// In the order of the text; names are distinct.
+    pub entries: Vec<BatchEntry>,
+}
+
+/// One picture to make: a scene's file and what is changed in it.
+#[derive(Clone, Debug)]
+pub struct BatchEntry {
+    /// Name of the output, without extension.
+    pub name: String,
+    /// The scene's file, relative to the working directory.
+    pub path: PathBuf,
+    /// Where the batch names the file; `None` for a scene on its own.
+    place: Option<Place>,
+    /// The batch's `output` and `render`, laid over the scene's.
+    layers: Vec<(&'static str, Node)>,
+    settings: Vec<Setting>,
+    /// What the places of the above refer to.
+    sources: Sources,
+}
+
+/// Reads a batch, or a scene, which is a batch of one.
+///
+/// The scenes of a batch are not read yet: [`BatchEntry::scene`] does.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be read, [`Error::Config`] if it is not YAML or not a batch.
+pub fn load(path: &Path) -> Result<Document> {
+    let mut sources = Sources::default();
+    let root = edit::read_file(path, &mut sources)?;
+    if root.get("scenes").is_some() {
+        return Ok(Document::Batch(Batch::of_tree(&root, &sources)?));
+    }
+    let name = stem(path).ok_or_else(|| Error::Config(format!("{}: expected a file name", path.display())))?;
+    Ok(Document::Scene(BatchEntry {
+        name,
+        path: path.to_path_buf(),
+        place: None,
+        layers: Vec::new(),
+        settings: Vec::new(),
+        sources: Sources::default(),
+    }))
+}
+
+fn stem(path: &Path) -> Option<String> {
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned())
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenBatch {
+    #[serde(default)]
+    output: Output,
+    #[serde(default)]
+    render: Render,
+    scenes: Vec<WrittenEntry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenEntry {
+    file: FilePath,
+    name: Option<String>,
+    /// Only that it is a map: the values are taken from the tree.
+    #[serde(rename = "set")]
+    _set: Option<BTreeMap<String, IgnoredAny>>,
+}
+
+impl Batch {
+    fn of_tree(root: &Node, sources: &Sources) -> Result<Batch> {
+        let written: WrittenBatch = decode(root, sources).map_err(|fault| fault.into_error(sources))?;
+        let mut checker = Checker::new(root);
+        written.output.check(At::ROOT.key("output"), &mut checker);
+        written.render.check(At::ROOT.key("render"), &mut checker);
+        checker.require(!written.scenes.is_empty(), At::ROOT.key("scenes"), "at least one scene", "none");
+
+        let nodes = match root.get("scenes").map(|node| &node.value) {
+            Some(Value::List(nodes)) => nodes.as_slice(),
+            _ => &[],
+        };
+        let layers: Vec<(&'static str, Node)> =
+            ["output", "render"].into_iter().filter_map(|key| Some((key, root.get(key)?.clone()))).collect();
+        let mut entries = Vec::with_capacity(nodes.len());
+        let mut names: HashMap<String, Place> = HashMap::new();
+        for (i, (entry, node)) in written.scenes.into_iter().zip(nodes).enumerate() {
+            let list = At::ROOT.key("scenes");
+            let at = list.index(i);
+            let name = entry.name.or_else(|| stem(&entry.file)).unwrap_or_default();
+            let name_node = node.get("name").or(node.get("file")).unwrap_or(node);
+            let name_at = if node.get("name").is_some() { at.key("name") } else { at.key("file") };
+            check_name(&name, name_at, &mut checker);
+            if let Some(first) = names.insert(name.clone(), name_node.place) {
+                let (name, first) = (quote(&name), sources.describe(first));
+                checker.fault(
+                    name_at,
+                    format!("expected each output name once, found {name} again; it is first at {first}"),
+                );
+            }
+            let mut settings = Vec::new();
+            if let Some(Value::Map(set)) = node.get("set").map(|set| &set.value) {
+                for change in set {
+                    match Setting::new(&change.key, change.key_place, change.node.clone()) {
+                        Ok(setting) => settings.push(setting),
+                        Err(fault) => checker.fault(at.key("set").key(&change.key), fault.to_string()),
+                    }
+                }
+            }
+            entries.push(BatchEntry {
+                name,
+                path: entry.file.0,
+                place: node.get("file").map(|file| file.place),
+                layers: layers.clone(),
+                settings,
+                sources: sources.clone(),
+            });
+        }
+        checker.finish(sources)?;
+        Ok(Batch { entries })
+    }
+}
+
+/// A name becomes part of file names.
+fn check_name(name: &str, at: At<'_>, checker: &mut Checker<'_>) {
+    let usable = !name.is_empty()
+        && name != "."
+        && name != ".."
+        && !name.contains(|c: char| c.is_control() || "/\\:*?\"<>|".contains(c));
+    checker.require(usable, at, "a name that can be a file name", quote(name));
+}
+
+impl BatchEntry {
+    /// Reads the scene, with what the batch and then the command line change in it.
+    ///
+    /// `overrides` are the key and value of each `--set KEY=VALUE`; the value is YAML.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the scene's file or one that it includes cannot be read;
+    /// [`Error::Config`] with every fault of the description.
+    pub fn scene(&self, overrides: &[(String, String)]) -> Result<SceneDescription> {
+        let mut sources = self.sources.clone();
+        let mut root = edit::read_file(&self.path, &mut sources).map_err(|error| match (error, self.place) {
+            (Error::Input { path, message }, Some(place)) => {
+                Error::Input { path, message: format!("{message}; it is named at {}", sources.describe(place)) }
+            }
+            (error, _) => error,
+        })?;
+        edit::include(&mut root, &self.path, &mut sources)?;
+
+        // Over what is no map nothing can be laid; the decoder says so.
+        if let Value::Map(_) = root.value {
+            for (key, over) in &self.layers {
+                edit::overlay(&mut root, &wrap(key, over));
+            }
+            for setting in &self.settings {
+                setting.apply(&mut root).map_err(|fault| fault.into_error(&sources))?;
+            }
+            for (key, value) in overrides {
+                let setting =
+                    Setting::of_argument(key, value, &mut sources).map_err(|fault| fault.into_error(&sources))?;
+                setting.apply(&mut root).map_err(|fault| fault.into_error(&sources))?;
+            }
+        }
+        SceneDescription::of_tree(root, &self.path, sources)
+    }
+}
+
+/// `{key: node}`
+fn wrap(key: &str, node: &Node) -> Node {
+    let entry = Entry { key: key.to_owned(), key_place: node.place, node: node.clone() };
+    Node::new(node.place, Value::Map(vec![entry]))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::super::testing::CAMERA;
+    use super::*;
+
+    /// Writes files and hands the directory to `test`.
+    fn with<T>(files: &[(&str, &str)], test: impl FnOnce(&Path) -> T) -> T {
+        let directory = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            let path = directory.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        test(directory.path())
+    }
+
+    fn in_words(error: &Error, directory: &Path) -> String {
+        error.to_string().replace(directory.to_str().unwrap(), "DIR")
+    }
+
+    /// The fault of loading a batch.
+    fn refusal(batch: &str) -> String {
+        with(&[("batch.yaml", batch)], |directory| {
+            in_words(&load(&directory.join("batch.yaml")).unwrap_err(), directory)
+        })
+    }
+
+    #[test]
+    fn a_batch_lays_its_changes_over_its_scenes() {
+        let scene = format!(
+            "{CAMERA}render: {{samples: 1, seed: 7, tile: 8}}\nfog: {{colour: 1, density: 1}}\noutput: {{png: {{exposure: 1}}}}\n"
+        );
+        let batch = "output: {dir: pictures, png: {tonemap: agx}}\n\
+                     render: {samples: 2, tile: 16, seed: null}\n\
+                     scenes:\n\
+                     - file: scenes/a.yaml\n\
+                     - {file: scenes/a.yaml, name: a-nofog, set: {fog: null, render.samples: 3}}\n";
+        with(&[("batch.yaml", batch), ("scenes/a.yaml", &scene)], |directory| {
+            let Document::Batch(batch) = load(&directory.join("batch.yaml")).unwrap() else { panic!("a batch") };
+            let names: Vec<&str> = batch.entries.iter().map(|entry| entry.name.as_str()).collect();
+            assert_eq!(names, ["a", "a-nofog"]);
+            assert_eq!(batch.entries[0].path, directory.join("scenes/a.yaml"));
+
+            let first = batch.entries[0].scene(&[]).unwrap();
+            // The batch over the scene over the default.
+            assert_eq!((first.render.samples, first.render.tile, first.render.seed), (2, 16, 7));
+            assert_eq!(first.output.dir, PathBuf::from("pictures"));
+            assert_eq!((first.output.png.exposure, first.output.png.tonemap), (1.0, super::super::Tonemap::Agx));
+            assert!(first.fog.is_some());
+
+            // The entry over the batch; the command line over all.
+            let second = batch.entries[1].scene(&[]).unwrap();
+            assert_eq!((second.render.samples, second.fog), (3, None));
+            let overrides = [("render.samples".to_owned(), "4".to_owned())];
+            assert_eq!(batch.entries[1].scene(&overrides).unwrap().render.samples, 4);
+        });
+    }
+
+    #[test]
+    fn a_scene_is_a_batch_of_one() {
+        with(&[("lone.yaml", CAMERA)], |directory| {
+            let document = load(&directory.join("lone.yaml")).unwrap();
+            assert!(matches!(document, Document::Scene(_)));
+            assert_eq!(document.entries()[0].name, "lone");
+            document.check(&[]).unwrap();
+        });
+    }
+
+    #[test]
+    fn one_bad_scene_does_not_stop_the_others() {
+        let files = [
+            (
+                "batch.yaml",
+                "scenes: [{file: bad.yaml}, {file: good.yaml}, {file: none.yaml}, {file: bad.yaml, name: again}]",
+            ),
+            ("bad.yaml", "camera: 3"),
+            ("good.yaml", CAMERA),
+        ];
+        with(&files, |directory| {
+            let document = load(&directory.join("batch.yaml")).unwrap();
+            let results: Vec<bool> = document.entries().iter().map(|entry| entry.scene(&[]).is_ok()).collect();
+            assert_eq!(results, [false, true, false, false]);
+            let error = document.check(&[]).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            assert_eq!(
+                in_words(&error, directory),
+                "DIR/bad.yaml:1:9: camera: expected a map with fields among origin, target, up, fov_deg, fov_axis, \
+                 orthographic_height, lens, found 3\n\
+                 DIR/none.yaml: cannot be read: No such file or directory (os error 2); it is named at DIR/batch.yaml:1:54"
+            );
+        });
+    }
+
+    #[test]
+    fn a_missing_scene_is_an_input_error() {
+        with(&[("batch.yaml", "scenes: [{file: none.yaml}]")], |directory| {
+            let error = load(&directory.join("batch.yaml")).unwrap().check(&[]).unwrap_err();
+            assert_eq!(error.exit_code(), 3);
+        });
+    }
+
+    #[test]
+    fn a_setting_of_a_batch_is_told_at_its_own_line() {
+        let batch = "scenes:\n- file: a.yaml\n  set:\n    render.smaples: 3\n- file: a.yaml\n  name: b\n  set:\n    render.samples: 0\n";
+        with(&[("batch.yaml", batch), ("a.yaml", CAMERA)], |directory| {
+            assert_eq!(
+                in_words(&load(&directory.join("batch.yaml")).unwrap().check(&[]).unwrap_err(), directory),
+                "DIR/batch.yaml:4:5: render.smaples: expected one of samples, seed, effects, tile, wavelengths, \
+                 found \"smaples\"; did you mean \"samples\"?\n\
+                 DIR/batch.yaml:8:21: render.samples: expected a whole number of 1 or more, found 0"
+            );
+        });
+    }
+
+    #[test]
+    fn output_names_are_distinct_and_can_be_file_names() {
+        assert_eq!(
+            refusal(
+                "scenes:\n- file: x/a.yaml\n- file: y/a.yaml\n- {file: a.yaml, name: b/c}\n- {file: a.yaml, name: ..}\n"
+            ),
+            "DIR/batch.yaml:3:9: scenes[1].file: expected each output name once, found \"a\" again; \
+             it is first at DIR/batch.yaml:2:9\n\
+             DIR/batch.yaml:4:24: scenes[2].name: expected a name that can be a file name, found \"b/c\"\n\
+             DIR/batch.yaml:5:24: scenes[3].name: expected a name that can be a file name, found \"..\""
+        );
+    }
+
+    #[test]
+    fn a_batch_is_checked_before_its_scenes() {
+        assert_eq!(
+            refusal("scenes: []\nrender: {samples: 0}"),
+            "DIR/batch.yaml:1:9: scenes: expected at least one scene, found none\n\
+             DIR/batch.yaml:2:19: render.samples: expected a whole number of 1 or more, found 0"
+        );
+        assert_eq!(
+            refusal("scenes: [{fil: a.yaml}]"),
+            "DIR/batch.yaml:1:11: scenes[0].fil: expected one of file, name, set, found \"fil\"; did you mean \"file\"?"
+        );
+        assert_eq!(
+            refusal("scenes: [{file: a.yaml, set: {'shapes[x]': 1}}]"),
+            "DIR/batch.yaml:1:44: scenes[0].set.\"shapes[x]\": \
+             expected a whole number in the brackets of \"shapes[x]\", found \"x\""
+        );
+        assert_eq!(
+            refusal("scens: []\nscenes: []"),
+            "DIR/batch.yaml:1:1: scens: expected one of output, render, scenes, found \"scens\"; did you mean \"scenes\"?"
+        );
+    }
+
+    #[test]
+    fn the_reference_batch_is_a_batch() {
+        with(&[("batch.yaml", &super::super::testing::reference("batch"))], |directory| {
+            let document = load(&directory.join("batch.yaml")).unwrap();
+            assert_eq!(document.entries().len(), 2);
+            assert_eq!(document.entries()[1].settings.len(), 4);
+        });
+    }
+}

@@ -1,0 +1,357 @@
+//! The camera and the picture it takes, as they are written.
+
+use serde::Deserialize;
+
+use super::fault::Checker;
+use super::material::given_fields;
+use super::path::At;
+use super::shape::parallel;
+use super::spectrum::Vec3;
+
+/// `camera: {origin: [0, 3.2, 12], target: [0, 1.1, 0], fov_deg: 38}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "WrittenCamera")]
+pub struct Camera {
+    /// Where it stands, metres.
+    pub origin: Vec3,
+    /// What it looks at, metres.
+    pub target: Vec3,
+    /// What is up in the picture; default `[0, 1, 0]`.
+    pub up: Vec3,
+    /// How the scene falls on the picture.
+    pub projection: Projection,
+    /// Depth of field; default none.
+    pub lens: Option<Lens>,
+}
+
+/// How the scene falls on the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// `fov_deg: 38, fov_axis: x`
+    Perspective {
+        /// Full angle of view along the axis, degrees, between 0 and 180.
+        fov_deg: f64,
+        /// The axis; default `x`.
+        fov_axis: FovAxis,
+    },
+    /// `orthographic_height: 4`
+    Orthographic {
+        /// What the height of the picture shows, metres.
+        height: f64,
+    },
+}
+
+/// The side of the picture along which the angle of view is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FovAxis {
+    /// Its width.
+    #[default]
+    X,
+    /// Its height.
+    Y,
+    /// The shorter side.
+    Smaller,
+    /// The longer side.
+    Larger,
+    /// Corner to corner.
+    Diagonal,
+}
+
+/// A thin lens.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lens {
+    /// Of the aperture, metres; 0 is a pinhole.
+    pub radius: f64,
+    /// From the camera to the plane in focus, along the line of sight, metres.
+    pub focus_distance: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenCamera {
+    origin: Vec3,
+    target: Vec3,
+    #[serde(default = "up")]
+    up: Vec3,
+    fov_deg: Option<f64>,
+    fov_axis: Option<FovAxis>,
+    orthographic_height: Option<f64>,
+    lens: Option<Lens>,
+}
+
+fn up() -> Vec3 {
+    [0.0, 1.0, 0.0]
+}
+
+impl TryFrom<WrittenCamera> for Camera {
+    type Error = String;
+
+    fn try_from(written: WrittenCamera) -> Result<Camera, String> {
+        let WrittenCamera { origin, target, up, fov_deg, fov_axis, orthographic_height, lens } = written;
+        let projection = match (fov_deg, fov_axis, orthographic_height) {
+            (Some(fov_deg), fov_axis, None) => {
+                Projection::Perspective { fov_deg, fov_axis: fov_axis.unwrap_or_default() }
+            }
+            (None, None, Some(height)) => Projection::Orthographic { height },
+            (fov_deg, fov_axis, height) => {
+                let given = [
+                    ("fov_deg", fov_deg.is_some()),
+                    ("fov_axis", fov_axis.is_some()),
+                    ("orthographic_height", height.is_some()),
+                ];
+                return Err(format!("expected either fov_deg or orthographic_height, found {}", given_fields(&given)));
+            }
+        };
+        Ok(Camera { origin, target, up, projection, lens })
+    }
+}
+
+/// `image: {width: 600, height: 600}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Image {
+    /// Pixels, 1 to 65536; default 600.
+    #[serde(default = "side")]
+    pub width: u32,
+    /// Pixels, 1 to 65536; default 600.
+    #[serde(default = "side")]
+    pub height: u32,
+    /// Reconstruction filter; default `box`.
+    #[serde(default)]
+    pub filter: Filter,
+    /// The part that is rendered; default all.
+    pub crop: Option<Crop>,
+}
+
+fn side() -> u32 {
+    600
+}
+
+impl Default for Image {
+    fn default() -> Image {
+        Image { width: side(), height: side(), filter: Filter::default(), crop: None }
+    }
+}
+
+/// How samples become pixels. Lengths are in pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Filter {
+    /// The mean over the pixel.
+    #[default]
+    Box,
+    /// Falls linearly to 0.
+    Tent {
+        /// Default 1.
+        #[serde(default = "tent_radius")]
+        radius: f64,
+    },
+    /// A bell.
+    Gaussian {
+        /// Default 0.5.
+        #[serde(default = "gaussian_stddev")]
+        stddev: f64,
+    },
+    /// Mitchell and Netravali's cubic, B = C = 1/3.
+    Mitchell {},
+    /// The cubic that passes through its samples.
+    CatmullRom,
+    /// The sinc, windowed by its own main lobe.
+    Lanczos {
+        /// Default 3.
+        #[serde(default = "lanczos_radius")]
+        radius: f64,
+    },
+}
+
+fn tent_radius() -> f64 {
+    1.0
+}
+
+fn gaussian_stddev() -> f64 {
+    0.5
+}
+
+fn lanczos_radius() -> f64 {
+    3.0
+}
+
+/// A part of the picture, pixels from its upper left corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Crop {
+    /// First column; default 0.
+    #[serde(default)]
+    pub x: u32,
+    /// First row; default 0.
+    #[serde(default)]
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// The longest side of a picture, pixels.
+pub const MAX_SIDE: u32 = 65536;
+
+impl Camera {
+    pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
+        let along = [0, 1, 2].map(|i| self.target[i] - self.origin[i]);
+        checker.direction(at.key("up"), self.up);
+        if self.target == self.origin {
+            let found = format_args!("{:?}", self.target);
+            checker.require(false, at.key("target"), "a point other than the origin", found);
+        } else if self.up != [0.0; 3] && parallel(along, self.up) {
+            checker.require(
+                false,
+                at.key("up"),
+                "a direction across the line of sight",
+                format_args!("{:?}, which is parallel to it", self.up),
+            );
+        }
+        match self.projection {
+            Projection::Perspective { fov_deg, fov_axis: _ } => {
+                let within = fov_deg > 0.0 && fov_deg < 180.0;
+                checker.require(within, at.key("fov_deg"), "an angle between 0 and 180 degrees", fov_deg);
+            }
+            Projection::Orthographic { height } => checker.positive(at.key("orthographic_height"), height),
+        }
+        if let Some(lens) = self.lens {
+            let at = at.key("lens");
+            checker.not_negative(at.key("radius"), lens.radius);
+            checker.positive(at.key("focus_distance"), lens.focus_distance);
+        }
+    }
+}
+
+impl Image {
+    pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
+        checker.whole_between(at.key("width"), self.width, 1, MAX_SIDE);
+        checker.whole_between(at.key("height"), self.height, 1, MAX_SIDE);
+        let filter = at.key("filter");
+        match self.filter {
+            Filter::Box | Filter::Mitchell {} | Filter::CatmullRom => {}
+            Filter::Tent { radius } => checker.positive(filter.key("tent").key("radius"), radius),
+            Filter::Gaussian { stddev } => checker.positive(filter.key("gaussian").key("stddev"), stddev),
+            Filter::Lanczos { radius } => checker.positive(filter.key("lanczos").key("radius"), radius),
+        }
+        if let Some(crop) = self.crop {
+            let at = at.key("crop");
+            let fits = |start: u32, length: u32, whole: u32| u64::from(start) + u64::from(length) <= u64::from(whole);
+            checker.at_least_one(at.key("width"), crop.width);
+            checker.at_least_one(at.key("height"), crop.height);
+            let Crop { x, y, width, height } = crop;
+            let inside = fits(x, width, self.width) && fits(y, height, self.height);
+            checker.require(
+                inside,
+                at,
+                &format!("a part of the {} × {} image", self.width, self.height),
+                format_args!("{width} × {height} from ({x}, {y})"),
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{faults, parse, scene};
+    use super::*;
+
+    fn camera(fields: &str) -> String {
+        parse(&format!("camera: {{{fields}}}")).map_or_else(|error| error.to_string(), |_| "none".to_owned())
+    }
+
+    #[test]
+    fn a_camera_that_sees_nothing_is_refused() {
+        assert_eq!(
+            camera("origin: [1, 2, 3], target: [1, 2, 3], fov_deg: 40"),
+            "dir/s.yaml:1:37: camera.target: expected a point other than the origin, found [1.0, 2.0, 3.0]"
+        );
+        // (1, 2, 3)/10 and (3, 6, 9)/7 are parallel up to rounding only.
+        assert_eq!(
+            camera("origin: [0, 0, 0], target: [0.1, 0.2, 0.3], up: [3, 6, 9], fov_deg: 40"),
+            "dir/s.yaml:1:58: camera.up: expected a direction across the line of sight, \
+             found [3.0, 6.0, 9.0], which is parallel to it"
+        );
+        assert_eq!(
+            camera("origin: [0, 0, 0], target: [0, 0, 1], up: [0, 0, 0], fov_deg: 40"),
+            "dir/s.yaml:1:52: camera.up: expected a vector with a direction, found [0, 0, 0]"
+        );
+        // A millionth of a degree off is not parallel.
+        assert_eq!(camera("origin: [0, 0, 0], target: [0, 1, 1e-8], up: [0, 1, 0], fov_deg: 40"), "none");
+    }
+
+    #[test]
+    fn the_angle_of_view_lies_between_0_and_180() {
+        for fov in ["0", "180", "-3"] {
+            assert_eq!(
+                camera(&format!("origin: [0, 0, 5], target: [0, 0, 0], fov_deg: {fov}")),
+                format!("dir/s.yaml:1:57: camera.fov_deg: expected an angle between 0 and 180 degrees, found {fov}")
+            );
+        }
+    }
+
+    #[test]
+    fn a_camera_has_one_projection() {
+        let start = "origin: [0, 0, 5], target: [0, 0, 0]";
+        assert_eq!(
+            camera(start),
+            "dir/s.yaml:1:9: camera: expected either fov_deg or orthographic_height, found neither"
+        );
+        assert_eq!(
+            camera(&format!("{start}, fov_deg: 3, orthographic_height: 1")),
+            "dir/s.yaml:1:9: camera: expected either fov_deg or orthographic_height, \
+             found fov_deg and orthographic_height"
+        );
+        let scene = parse(&format!("camera: {{{start}, orthographic_height: 4}}")).unwrap();
+        assert_eq!(scene.camera.projection, Projection::Orthographic { height: 4.0 });
+    }
+
+    #[test]
+    fn a_lens_has_a_focus() {
+        assert_eq!(
+            camera("origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 9, lens: {radius: -1, focus_distance: 0}"),
+            "dir/s.yaml:1:75: camera.lens.radius: expected a number of 0 or more, found -1\n\
+             dir/s.yaml:1:95: camera.lens.focus_distance: expected a number greater than 0, found 0"
+        );
+    }
+
+    #[test]
+    fn an_image_has_pixels_and_the_crop_lies_in_it() {
+        assert_eq!(
+            faults("image: {width: 0, height: 65537}"),
+            "dir/s.yaml:2:16: image.width: expected a whole number from 1 to 65536, found 0\n\
+             dir/s.yaml:2:27: image.height: expected a whole number from 1 to 65536, found 65537"
+        );
+        assert_eq!(
+            faults("image: {width: 20, height: 10, crop: {x: 11, y: 0, width: 10, height: 10}}"),
+            "dir/s.yaml:2:38: image.crop: expected a part of the 20 × 10 image, found 10 × 10 from (11, 0)"
+        );
+        // The end is computed without overflow.
+        assert_eq!(
+            faults("image: {crop: {x: 4294967295, width: 4294967295, height: 1}}"),
+            "dir/s.yaml:2:15: image.crop: expected a part of the 600 × 600 image, \
+             found 4294967295 × 1 from (4294967295, 0)"
+        );
+        assert_eq!(
+            scene("image: {width: 20, height: 10, crop: {x: 10, width: 10, height: 10}}").image.crop,
+            Some(Crop { x: 10, y: 0, width: 10, height: 10 })
+        );
+    }
+
+    #[test]
+    fn filters_have_a_width() {
+        for (kind, field) in [("tent", "radius"), ("gaussian", "stddev"), ("lanczos", "radius")] {
+            let column = 21 + kind.len() + field.len() + 2;
+            assert_eq!(
+                faults(&format!("image: {{filter: {{{kind}: {{{field}: 0}}}}}}")),
+                format!(
+                    "dir/s.yaml:2:{column}: image.filter.{kind}.{field}: expected a number greater than 0, found 0"
+                )
+            );
+        }
+    }
+}

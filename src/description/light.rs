@@ -1,0 +1,456 @@
+//! Lights, media and fog as they are written.
+
+use serde::Deserialize;
+
+use super::fault::Checker;
+use super::material::given_fields;
+use super::path::At;
+use super::spectrum::{FilePath, Role, Spectrum, Vec3, one};
+
+/// A light that is not a surface. Surfaces emit by their field `emission`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Light {
+    /// From a point in all directions.
+    Point(PointLight),
+    /// From a point into a cone.
+    Spot(SpotLight),
+    /// From infinity in one direction.
+    Directional(DirectionalLight),
+    /// From all directions alike.
+    Constant(ConstantLight),
+    /// From all directions, by an image.
+    Environment(EnvironmentLight),
+}
+
+/// `point: {position: [0, 3, 0], intensity: 10}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointLight {
+    /// For messages; default none.
+    pub name: Option<String>,
+    /// Metres.
+    pub position: Vec3,
+    /// W·sr⁻¹·nm⁻¹.
+    pub intensity: Spectrum,
+}
+
+/// `spot: {position: [0, 3, 0], target: [0, 0, 0], intensity: 10}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "WrittenSpot")]
+pub struct SpotLight {
+    /// For messages; default none.
+    pub name: Option<String>,
+    /// Metres.
+    pub position: Vec3,
+    /// Where the axis points.
+    pub aim: Aim,
+    /// Angle between the axis and the edge of the light; default 20, at most 90.
+    pub cutoff_deg: f64,
+    /// Angle between the axis and the edge of the full intensity; default 3/4 of the cutoff.
+    pub beam_deg: f64,
+    /// On the axis, W·sr⁻¹·nm⁻¹.
+    pub intensity: Spectrum,
+}
+
+/// Where a spot light points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Aim {
+    /// At a point, metres.
+    Target(Vec3),
+    /// Along a vector of any length.
+    Direction(Vec3),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenSpot {
+    name: Option<String>,
+    position: Vec3,
+    target: Option<Vec3>,
+    direction: Option<Vec3>,
+    #[serde(default = "cutoff_deg")]
+    cutoff_deg: f64,
+    beam_deg: Option<f64>,
+    intensity: Spectrum,
+}
+
+fn cutoff_deg() -> f64 {
+    20.0
+}
+
+impl TryFrom<WrittenSpot> for SpotLight {
+    type Error = String;
+
+    fn try_from(written: WrittenSpot) -> Result<SpotLight, String> {
+        let aim = match (written.target, written.direction) {
+            (Some(target), None) => Aim::Target(target),
+            (None, Some(direction)) => Aim::Direction(direction),
+            (target, direction) => {
+                let given = [("target", target.is_some()), ("direction", direction.is_some())];
+                return Err(format!("expected either target or direction, found {}", given_fields(&given)));
+            }
+        };
+        Ok(SpotLight {
+            name: written.name,
+            position: written.position,
+            aim,
+            cutoff_deg: written.cutoff_deg,
+            beam_deg: written.beam_deg.unwrap_or(0.75 * written.cutoff_deg),
+            intensity: written.intensity,
+        })
+    }
+}
+
+/// `directional: {direction: [0, -1, 0], irradiance: 3}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DirectionalLight {
+    /// For messages; default none.
+    pub name: Option<String>,
+    /// In which the light travels; any length.
+    pub direction: Vec3,
+    /// On a surface that faces it, W·m⁻²·nm⁻¹.
+    pub irradiance: Spectrum,
+}
+
+/// `constant: {radiance: 1}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConstantLight {
+    /// For messages; default none.
+    pub name: Option<String>,
+    /// W·m⁻²·sr⁻¹·nm⁻¹.
+    pub radiance: Spectrum,
+}
+
+/// `environment: {file: sky.exr}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EnvironmentLight {
+    /// For messages; default none.
+    pub name: Option<String>,
+    /// An image in latitude and longitude, linear (EXR or HDR) or sRGB (PNG or JPEG).
+    pub file: FilePath,
+    /// Factor; default 1.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Turn about y, degrees; default 0.
+    #[serde(default)]
+    pub rotate_deg: f64,
+}
+
+/// What fills a space.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Medium {
+    /// The same everywhere.
+    Homogeneous(HomogeneousMedium),
+}
+
+/// `homogeneous: {absorption: 0.1, scattering: 0.5, phase: {hg: 0.5}}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HomogeneousMedium {
+    /// σₐ, m⁻¹; default 0.
+    #[serde(default = "nothing")]
+    pub absorption: Spectrum,
+    /// σₛ, m⁻¹; default 0.
+    #[serde(default = "nothing")]
+    pub scattering: Spectrum,
+    /// Directions of scattered light; default `isotropic`.
+    #[serde(default)]
+    pub phase: Phase,
+}
+
+pub(crate) fn nothing() -> Spectrum {
+    Spectrum::Number(0.0)
+}
+
+/// A phase function.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Phase {
+    /// All directions alike.
+    #[default]
+    Isotropic,
+    /// Rayleigh's, ∝ 1 + cos²θ.
+    Rayleigh,
+    /// Henyey and Greenstein's, with mean cosine g between −1 and 1.
+    Hg(f64),
+}
+
+/// Fog by depth: what the picture shows fades to a colour.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "WrittenFog")]
+pub struct Fog {
+    /// Radiance of the fog, W·m⁻²·sr⁻¹·nm⁻¹.
+    pub colour: Spectrum,
+    /// How it thickens.
+    pub law: FogLaw,
+}
+
+/// How fog thickens with the distance z from the camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FogLaw {
+    /// From nothing at `start` to everything at `end`, metres.
+    Linear {
+        /// Metres.
+        start: f64,
+        /// Metres.
+        end: f64,
+    },
+    /// By the exponential of density × z, or of its square.
+    Exponential {
+        /// m⁻¹.
+        density: f64,
+        /// Which; default `exp`.
+        falloff: Falloff,
+    },
+}
+
+/// The exponent of exponential fog.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Falloff {
+    /// exp(−density z).
+    #[default]
+    Exp,
+    /// exp(−(density z)²).
+    Exp2,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenFog {
+    colour: Spectrum,
+    start: Option<f64>,
+    end: Option<f64>,
+    density: Option<f64>,
+    falloff: Option<Falloff>,
+}
+
+impl TryFrom<WrittenFog> for Fog {
+    type Error = String;
+
+    fn try_from(written: WrittenFog) -> Result<Fog, String> {
+        let WrittenFog { colour, start, end, density, falloff } = written;
+        let law = match (start, end, density, falloff) {
+            (Some(start), Some(end), None, None) => FogLaw::Linear { start, end },
+            (None, None, Some(density), falloff) => {
+                FogLaw::Exponential { density, falloff: falloff.unwrap_or_default() }
+            }
+            (start, end, density, falloff) => {
+                let given = [
+                    ("start", start.is_some()),
+                    ("end", end.is_some()),
+                    ("density", density.is_some()),
+                    ("falloff", falloff.is_some()),
+                ];
+                return Err(format!("expected either start and end, or density, found {}", given_fields(&given)));
+            }
+        };
+        Ok(Fog { colour, law })
+    }
+}
+
+impl Light {
+    /// The key under which the light is written.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Light::Point(_) => "point",
+            Light::Spot(_) => "spot",
+            Light::Directional(_) => "directional",
+            Light::Constant(_) => "constant",
+            Light::Environment(_) => "environment",
+        }
+    }
+
+    pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
+        let at = at.key(self.kind());
+        match self {
+            Light::Point(point) => point.intensity.check(Role::Emission, at.key("intensity"), checker),
+            Light::Spot(spot) => {
+                match spot.aim {
+                    Aim::Target(target) => checker.require(
+                        target != spot.position,
+                        at.key("target"),
+                        "a point other than the position",
+                        format_args!("{target:?}"),
+                    ),
+                    Aim::Direction(direction) => checker.direction(at.key("direction"), direction),
+                }
+                let cutoff = spot.cutoff_deg;
+                checker.require(
+                    cutoff > 0.0 && cutoff <= 90.0,
+                    at.key("cutoff_deg"),
+                    "an angle above 0 and up to 90 degrees",
+                    cutoff,
+                );
+                if cutoff > 0.0 {
+                    checker.require(
+                        (0.0..=cutoff).contains(&spot.beam_deg),
+                        at.key("beam_deg"),
+                        &format!("an angle from 0 to cutoff_deg, {cutoff} degrees"),
+                        spot.beam_deg,
+                    );
+                }
+                spot.intensity.check(Role::Emission, at.key("intensity"), checker);
+            }
+            Light::Directional(directional) => {
+                checker.direction(at.key("direction"), directional.direction);
+                directional.irradiance.check(Role::Emission, at.key("irradiance"), checker);
+            }
+            Light::Constant(constant) => constant.radiance.check(Role::Emission, at.key("radiance"), checker),
+            Light::Environment(environment) => checker.not_negative(at.key("scale"), environment.scale),
+        }
+    }
+}
+
+impl Medium {
+    pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
+        match self {
+            Medium::Homogeneous(medium) => {
+                let at = at.key("homogeneous");
+                medium.absorption.check(Role::Coefficient, at.key("absorption"), checker);
+                medium.scattering.check(Role::Coefficient, at.key("scattering"), checker);
+                if let Phase::Hg(g) = medium.phase {
+                    let within = g.abs() < 1.0;
+                    checker.require(within, at.key("phase").key("hg"), "a number between -1 and 1", g);
+                }
+            }
+        }
+    }
+}
+
+impl Fog {
+    pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
+        self.colour.check(Role::Emission, at.key("colour"), checker);
+        match self.law {
+            FogLaw::Linear { start, end } => {
+                checker.not_negative(at.key("start"), start);
+                checker.require(end > start, at.key("end"), &format!("a distance beyond start, {start} m"), end);
+            }
+            FogLaw::Exponential { density, .. } => checker.not_negative(at.key("density"), density),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{faults, scene};
+    use super::*;
+
+    /// Faults of a light whose kind starts at 3:3.
+    fn light(written: &str) -> String {
+        faults(&format!("lights:\n- {written}"))
+    }
+
+    #[test]
+    fn a_spot_has_one_aim() {
+        let spot = |fields: &str| light(&format!("spot: {{position: [0, 1, 0], intensity: 1{fields}}}"));
+        let place = "dir/s.yaml:3:9: lights[0].spot: expected either target or direction, found ";
+        assert_eq!(spot(""), format!("{place}neither"));
+        assert_eq!(spot(", target: [0, 0, 0], direction: [0, 1, 0]"), format!("{place}target and direction"));
+        assert_eq!(
+            spot(", target: [0, 1, 0]"),
+            "dir/s.yaml:3:53: lights[0].spot.target: expected a point other than the position, found [0.0, 1.0, 0.0]"
+        );
+        assert_eq!(
+            spot(", direction: [0, 0, 0]"),
+            "dir/s.yaml:3:56: lights[0].spot.direction: expected a vector with a direction, found [0, 0, 0]"
+        );
+    }
+
+    #[test]
+    fn the_beam_lies_within_the_cutoff_and_that_within_90_degrees() {
+        let spot =
+            |fields: &str| light(&format!("spot: {{position: [0, 1, 0], target: [0, 0, 0], intensity: 1, {fields}}}"));
+        for cutoff in ["0", "90.5"] {
+            assert_eq!(
+                spot(&format!("cutoff_deg: {cutoff}")),
+                format!(
+                    "dir/s.yaml:3:76: lights[0].spot.cutoff_deg: expected an angle above 0 and up to 90 degrees, found {cutoff}"
+                )
+            );
+        }
+        assert_eq!(
+            spot("cutoff_deg: 30, beam_deg: 31"),
+            "dir/s.yaml:3:90: lights[0].spot.beam_deg: expected an angle from 0 to cutoff_deg, 30 degrees, found 31"
+        );
+        assert_eq!(spot("cutoff_deg: 90, beam_deg: 90"), "none");
+    }
+
+    #[test]
+    fn lights_give_and_do_not_take() {
+        assert_eq!(
+            light("point: {position: [0, 0, 0], intensity: -1}"),
+            "dir/s.yaml:3:43: lights[0].point.intensity: expected a number of 0 or more, found -1"
+        );
+        assert_eq!(
+            light("directional: {direction: [0, 0, 0], irradiance: -1}"),
+            "dir/s.yaml:3:28: lights[0].directional.direction: expected a vector with a direction, found [0, 0, 0]\n\
+             dir/s.yaml:3:51: lights[0].directional.irradiance: expected a number of 0 or more, found -1"
+        );
+        assert_eq!(
+            light("environment: {file: sky.exr, scale: -1}"),
+            "dir/s.yaml:3:39: lights[0].environment.scale: expected a number of 0 or more, found -1"
+        );
+    }
+
+    #[test]
+    fn a_medium_takes_and_does_not_give() {
+        let medium = |fields: &str| faults(&format!("media:\n  m: {{homogeneous: {{{fields}}}}}"));
+        assert_eq!(
+            medium("absorption: -1, scattering: {rgb: [0, 0, -1]}"),
+            "dir/s.yaml:3:33: media.m.homogeneous.absorption: expected a number of 0 or more, found -1\n\
+             dir/s.yaml:3:62: media.m.homogeneous.scattering.rgb[2]: expected a number of 0 or more, found -1"
+        );
+        for g in ["1", "-1", "1.5"] {
+            assert_eq!(
+                medium(&format!("phase: {{hg: {g}}}")),
+                format!("dir/s.yaml:3:33: media.m.homogeneous.phase.hg: expected a number between -1 and 1, found {g}")
+            );
+        }
+        let Medium::Homogeneous(bare) = &scene("media: {m: {homogeneous: {phase: rayleigh}}}").media["m"];
+        assert_eq!((&bare.absorption, &bare.scattering, bare.phase), (&nothing(), &nothing(), Phase::Rayleigh));
+    }
+
+    #[test]
+    fn media_go_by_name() {
+        assert_eq!(
+            faults(
+                "media: {smoke: {homogeneous: {}}}\nmedium: smok\nshapes:\n- sphere: {radius: 1, inside: smoke, outside: x}"
+            ),
+            "dir/s.yaml:3:9: medium: unknown medium \"smok\"; did you mean \"smoke\"?\n\
+             dir/s.yaml:5:47: shapes[0].sphere.outside: unknown medium \"x\"; known: smoke"
+        );
+    }
+
+    #[test]
+    fn fog_has_one_law() {
+        let place = "dir/s.yaml:2:6: fog: expected either start and end, or density, found ";
+        assert_eq!(faults("fog: {colour: 1}"), format!("{place}neither"));
+        assert_eq!(faults("fog: {colour: 1, start: 1}"), format!("{place}start"));
+        assert_eq!(
+            faults("fog: {colour: 1, start: 1, end: 2, density: 3}"),
+            format!("{place}start and end and density")
+        );
+        assert_eq!(
+            faults("fog: {colour: -1, start: 5, end: 5}"),
+            "dir/s.yaml:2:15: fog.colour: expected a number of 0 or more, found -1\n\
+             dir/s.yaml:2:34: fog.end: expected a distance beyond start, 5 m, found 5"
+        );
+        assert_eq!(
+            faults("fog: {colour: 1, density: -1}"),
+            "dir/s.yaml:2:27: fog.density: expected a number of 0 or more, found -1"
+        );
+        let law = |fields: &str| scene(&format!("fog: {{colour: 1, {fields}}}")).fog.map(|fog| fog.law);
+        assert_eq!(law("density: 2"), Some(FogLaw::Exponential { density: 2.0, falloff: Falloff::Exp }));
+        assert_eq!(
+            law("density: 2, falloff: exp2"),
+            Some(FogLaw::Exponential { density: 2.0, falloff: Falloff::Exp2 })
+        );
+    }
+}

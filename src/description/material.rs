@@ -1,0 +1,563 @@
+//! Materials and textures as they are written.
+
+use serde::Deserialize;
+
+use super::fault::Checker;
+use super::path::At;
+use super::spectrum::{FilePath, Index, Role, Spectrum, SpectrumOrTexture, yes};
+
+/// The material of a shape: the name of one, or one written in place.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MaterialRef {
+    /// A name under `materials`.
+    Name(String),
+    /// A material of its own.
+    Inline(Material),
+}
+
+impl Default for MaterialRef {
+    fn default() -> MaterialRef {
+        MaterialRef::Inline(Material::default())
+    }
+}
+
+/// How a surface scatters light.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Material {
+    /// Lambert's law.
+    Diffuse(Diffuse),
+    /// A metal.
+    Conductor(Conductor),
+    /// An ideal mirror without Fresnel effects.
+    Mirror(Mirror),
+    /// The boundary between two transparent media: glass, water.
+    Dielectric(Dielectric),
+    /// A sheet of glass without thickness: reflects and transmits, does not bend.
+    ThinDielectric(ThinDielectric),
+    /// A diffuse base under a dielectric coat.
+    Plastic(Plastic),
+    /// Invisible; only bounds a medium.
+    Boundary(Boundary),
+}
+
+impl Default for Material {
+    /// Diffuse, reflectance 0.5.
+    fn default() -> Material {
+        Material::Diffuse(Diffuse { reflectance: half(), highlight: None, two_sided: true })
+    }
+}
+
+/// `diffuse: {reflectance: SPECTRUM_OR_TEXTURE, highlight: {…}, two_sided: true}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Diffuse {
+    /// Albedo, 0 to 1; default 0.5.
+    #[serde(default = "half")]
+    pub reflectance: SpectrumOrTexture,
+    /// Highlight of the `whitted` integrator; default none.
+    pub highlight: Option<Highlight>,
+    /// Whether the back reflects like the front; default true.
+    #[serde(default = "yes")]
+    pub two_sided: bool,
+}
+
+/// `conductor: {metal: gold}` or `conductor: {eta: SPECTRUM, k: SPECTRUM}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "WrittenConductor")]
+pub struct Conductor {
+    /// The complex index of refraction η + ik.
+    pub index: ConductorIndex,
+    /// Factor on the reflection; default 1.
+    pub tint: Spectrum,
+    /// Microfacet roughness α; 0, the default, is a perfect mirror.
+    pub roughness: f64,
+    /// Distribution of the microfacet normals; default `ggx`.
+    pub distribution: Distribution,
+    /// Fresnel's equations or Schlick's approximation; default `exact`.
+    pub fresnel: Fresnel,
+    /// Highlight of the `whitted` integrator; default none.
+    pub highlight: Option<Highlight>,
+    /// Whether the back reflects like the front; default true.
+    pub two_sided: bool,
+}
+
+/// The complex index of refraction of a metal.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ConductorIndex {
+    /// Measured, by name: `gold`.
+    Metal(String),
+    /// Written out.
+    Written {
+        /// Real part η, relative to vacuum.
+        eta: Spectrum,
+        /// Imaginary part k.
+        k: Spectrum,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenConductor {
+    metal: Option<String>,
+    eta: Option<Spectrum>,
+    k: Option<Spectrum>,
+    #[serde(default = "unit")]
+    tint: Spectrum,
+    #[serde(default)]
+    roughness: f64,
+    #[serde(default)]
+    distribution: Distribution,
+    #[serde(default)]
+    fresnel: Fresnel,
+    highlight: Option<Highlight>,
+    #[serde(default = "yes")]
+    two_sided: bool,
+}
+
+impl TryFrom<WrittenConductor> for Conductor {
+    type Error = String;
+
+    fn try_from(written: WrittenConductor) -> Result<Conductor, String> {
+        let index = match (written.metal, written.eta, written.k) {
+            (Some(metal), None, None) => ConductorIndex::Metal(metal),
+            (None, Some(eta), Some(k)) => ConductorIndex::Written { eta, k },
+            (metal, eta, k) => {
+                let given = [("metal", metal.is_some()), ("eta", eta.is_some()), ("k", k.is_some())];
+                return Err(format!("expected either metal, or eta and k, found {}", given_fields(&given)));
+            }
+        };
+        Ok(Conductor {
+            index,
+            tint: written.tint,
+            roughness: written.roughness,
+            distribution: written.distribution,
+            fresnel: written.fresnel,
+            highlight: written.highlight,
+            two_sided: written.two_sided,
+        })
+    }
+}
+
+/// The names of the fields that are given, joined by "and"; "neither" without any.
+pub(crate) fn given_fields(fields: &[(&str, bool)]) -> String {
+    let given: Vec<&str> = fields.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect();
+    if given.is_empty() { "neither".to_owned() } else { given.join(" and ") }
+}
+
+/// `mirror: {reflectance: 0.9}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mirror {
+    /// 0 to 1; default 0.9.
+    #[serde(default = "nine_tenths")]
+    pub reflectance: Spectrum,
+    /// Highlight of the `whitted` integrator; default none.
+    pub highlight: Option<Highlight>,
+}
+
+/// `dielectric: {ior: INDEX}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Dielectric {
+    /// Index inside.
+    pub ior: Index,
+    /// Index outside; default 1.
+    #[serde(default = "vacuum")]
+    pub exterior_ior: Index,
+    /// Microfacet roughness α; 0, the default, is smooth.
+    #[serde(default)]
+    pub roughness: f64,
+    /// Distribution of the microfacet normals; default `ggx`.
+    #[serde(default)]
+    pub distribution: Distribution,
+    /// Fresnel's equations or Schlick's approximation; default `exact`.
+    #[serde(default)]
+    pub fresnel: Fresnel,
+    /// Highlight of the `whitted` integrator; default none.
+    pub highlight: Option<Highlight>,
+}
+
+/// `thin_dielectric: {ior: INDEX}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThinDielectric {
+    /// Index of the sheet.
+    pub ior: Index,
+    /// Index around it; default 1.
+    #[serde(default = "vacuum")]
+    pub exterior_ior: Index,
+}
+
+/// `plastic: {reflectance: SPECTRUM_OR_TEXTURE}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plastic {
+    /// Albedo of the base, 0 to 1; default 0.5.
+    #[serde(default = "half")]
+    pub reflectance: SpectrumOrTexture,
+    /// Index of the coat; default 1.5.
+    #[serde(default = "coat")]
+    pub ior: Index,
+    /// Microfacet roughness α of the coat; 0, the default, is smooth.
+    #[serde(default)]
+    pub roughness: f64,
+    /// Whether light that bounces between coat and base takes on more colour each time; default
+    /// false.
+    #[serde(default)]
+    pub nonlinear: bool,
+    /// Distribution of the microfacet normals; default `ggx`.
+    #[serde(default)]
+    pub distribution: Distribution,
+    /// Highlight of the `whitted` integrator; default none.
+    pub highlight: Option<Highlight>,
+    /// Whether the back reflects like the front; default true.
+    #[serde(default = "yes")]
+    pub two_sided: bool,
+}
+
+/// `boundary: {}`
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Boundary {}
+
+/// A highlight that the `whitted` integrator adds; other integrators ignore it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Highlight {
+    /// Factor on the light's spectrum; default 0.5.
+    #[serde(default = "highlight_strength")]
+    pub strength: f64,
+    /// Exponent of the cosine; default 50.
+    #[serde(default = "highlight_exponent")]
+    pub exponent: f64,
+    /// Which cosine; default `blinn`.
+    #[serde(default)]
+    pub model: HighlightModel,
+}
+
+/// The cosine of a highlight.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HighlightModel {
+    /// Between the normal and the half vector.
+    #[default]
+    Blinn,
+    /// Between the viewer and the reflected light.
+    Phong,
+}
+
+/// Distribution of microfacet normals.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Distribution {
+    /// Trowbridge–Reitz.
+    #[default]
+    Ggx,
+    /// Beckmann.
+    Beckmann,
+}
+
+/// How reflection depends on the angle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fresnel {
+    /// Fresnel's equations.
+    #[default]
+    Exact,
+    /// Schlick's approximation.
+    Schlick,
+}
+
+/// A pattern over the surface parameters (u, v).
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Texture {
+    /// From a file.
+    Image(ImageTexture),
+    /// Two spectra in turn.
+    Checkerboard(Checkerboard),
+}
+
+/// `image: {file: earth.jpg}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImageTexture {
+    /// PNG, JPEG, HDR or EXR.
+    pub file: FilePath,
+    /// What lies beyond the edges; default `repeat`.
+    #[serde(default)]
+    pub wrap: Wrap,
+    /// What lies above and below, where it is not the same: a map of a globe repeats around and is clamped at the
+    /// poles; default `wrap`.
+    pub wrap_v: Option<Wrap>,
+    /// Between the texels; default `bilinear`.
+    #[serde(default)]
+    pub filter: TextureFilter,
+    /// Repetitions in u and v; default `[1, 1]`.
+    #[serde(default = "unscaled")]
+    pub scale: [f64; 2],
+    /// Added to u and v after scaling; default `[0, 0]`.
+    #[serde(default)]
+    pub offset: [f64; 2],
+    /// Whether the values are data, not sRGB colour; default false.
+    #[serde(default)]
+    pub raw: bool,
+}
+
+/// What lies beyond the edges of an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Wrap {
+    /// The image again.
+    #[default]
+    Repeat,
+    /// The image reversed.
+    Mirror,
+    /// The outermost texels.
+    Clamp,
+}
+
+/// What lies between the texels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TextureFilter {
+    /// A mean of the four around.
+    #[default]
+    Bilinear,
+    /// The texel in which the point lies.
+    Nearest,
+}
+
+/// `checkerboard: {a: SPECTRUM, b: SPECTRUM, scale: [12, 12]}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Checkerboard {
+    /// Where ⌊2u⌋ + ⌊2v⌋ of the scaled coordinates is even.
+    pub a: Spectrum,
+    /// Where it is odd.
+    pub b: Spectrum,
+    /// Periods, of two squares each, in u and v; default `[1, 1]`.
+    #[serde(default = "unscaled")]
+    pub scale: [f64; 2],
+}
+
+fn half() -> SpectrumOrTexture {
+    SpectrumOrTexture::Spectrum(Spectrum::Number(0.5))
+}
+
+fn unit() -> Spectrum {
+    Spectrum::Number(1.0)
+}
+
+fn nine_tenths() -> Spectrum {
+    Spectrum::Number(0.9)
+}
+
+fn vacuum() -> Index {
+    Index::Number(1.0)
+}
+
+fn coat() -> Index {
+    Index::Number(1.5)
+}
+
+fn highlight_strength() -> f64 {
+    0.5
+}
+
+fn highlight_exponent() -> f64 {
+    50.0
+}
+
+fn unscaled() -> [f64; 2] {
+    [1.0; 2]
+}
+
+impl MaterialRef {
+    pub(crate) fn check<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
+        match self {
+            MaterialRef::Name(name) => checker.material(at, name),
+            MaterialRef::Inline(material) => material.check(at, checker),
+        }
+    }
+}
+
+impl Material {
+    /// Names of the kinds.
+    pub(crate) const KINDS: [&'static str; 7] =
+        ["diffuse", "conductor", "mirror", "dielectric", "thin_dielectric", "plastic", "boundary"];
+
+    /// The key under which the material is written.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Material::Diffuse(_) => "diffuse",
+            Material::Conductor(_) => "conductor",
+            Material::Mirror(_) => "mirror",
+            Material::Dielectric(_) => "dielectric",
+            Material::ThinDielectric(_) => "thin_dielectric",
+            Material::Plastic(_) => "plastic",
+            Material::Boundary(_) => "boundary",
+        }
+    }
+
+    pub(crate) fn check<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
+        let at = at.key(self.kind());
+        match self {
+            Material::Diffuse(diffuse) => {
+                diffuse.reflectance.check(Role::Reflectance, at.key("reflectance"), checker);
+                check_highlight(diffuse.highlight, at, checker);
+            }
+            Material::Conductor(conductor) => {
+                if let ConductorIndex::Written { eta, k } = &conductor.index {
+                    eta.check(Role::Coefficient, at.key("eta"), checker);
+                    k.check(Role::Coefficient, at.key("k"), checker);
+                }
+                conductor.tint.check(Role::Reflectance, at.key("tint"), checker);
+                checker.not_negative(at.key("roughness"), conductor.roughness);
+                check_highlight(conductor.highlight, at, checker);
+            }
+            Material::Mirror(mirror) => {
+                mirror.reflectance.check(Role::Reflectance, at.key("reflectance"), checker);
+                check_highlight(mirror.highlight, at, checker);
+            }
+            Material::Dielectric(dielectric) => {
+                dielectric.ior.check(at.key("ior"), checker);
+                dielectric.exterior_ior.check(at.key("exterior_ior"), checker);
+                checker.not_negative(at.key("roughness"), dielectric.roughness);
+                check_highlight(dielectric.highlight, at, checker);
+            }
+            Material::ThinDielectric(sheet) => {
+                sheet.ior.check(at.key("ior"), checker);
+                sheet.exterior_ior.check(at.key("exterior_ior"), checker);
+            }
+            Material::Plastic(plastic) => {
+                plastic.reflectance.check(Role::Reflectance, at.key("reflectance"), checker);
+                plastic.ior.check(at.key("ior"), checker);
+                checker.not_negative(at.key("roughness"), plastic.roughness);
+                check_highlight(plastic.highlight, at, checker);
+            }
+            Material::Boundary(Boundary {}) => {}
+        }
+    }
+}
+
+fn check_highlight(highlight: Option<Highlight>, at: At<'_>, checker: &mut Checker<'_>) {
+    if let Some(highlight) = highlight {
+        let at = at.key("highlight");
+        checker.not_negative(at.key("strength"), highlight.strength);
+        checker.not_negative(at.key("exponent"), highlight.exponent);
+    }
+}
+
+impl Texture {
+    /// Checks a texture; `role` is how the scene uses it.
+    pub(crate) fn check(&self, role: Role, at: At<'_>, checker: &mut Checker<'_>) {
+        match self {
+            Texture::Image(_) => {}
+            Texture::Checkerboard(board) => {
+                let at = at.key("checkerboard");
+                board.a.check(role, at.key("a"), checker);
+                board.b.check(role, at.key("b"), checker);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{faults, scene};
+    use super::*;
+
+    #[test]
+    fn a_conductor_is_a_metal_or_eta_and_k() {
+        let conductor = |fields: &str| faults(&format!("materials:\n  a: {{conductor: {{{fields}}}}}"));
+        let place = "dir/s.yaml:3:18: materials.a.conductor: expected either metal, or eta and k, found ";
+        assert_eq!(conductor(""), format!("{place}neither"));
+        assert_eq!(conductor("eta: 1"), format!("{place}eta"));
+        assert_eq!(conductor("metal: gold, k: 1"), format!("{place}metal and k"));
+        assert_eq!(conductor("eta: 1, k: 2"), "none");
+        assert_eq!(
+            conductor("eta: -1, k: -2, tint: 3, roughness: -1"),
+            "dir/s.yaml:3:24: materials.a.conductor.eta: expected a number of 0 or more, found -1\n\
+             dir/s.yaml:3:31: materials.a.conductor.k: expected a number of 0 or more, found -2\n\
+             dir/s.yaml:3:41: materials.a.conductor.tint: expected a number from 0 to 1, found 3\n\
+             dir/s.yaml:3:55: materials.a.conductor.roughness: expected a number of 0 or more, found -1"
+        );
+    }
+
+    #[test]
+    fn every_kind_is_checked() {
+        let a = |kind: &str| faults(&format!("materials:\n  a: {{{kind}}}"));
+        assert_eq!(
+            a("diffuse: {reflectance: 2}"),
+            "dir/s.yaml:3:30: materials.a.diffuse.reflectance: expected a number from 0 to 1, found 2"
+        );
+        assert_eq!(
+            a("diffuse: {highlight: {strength: -1, exponent: -2}}"),
+            "dir/s.yaml:3:39: materials.a.diffuse.highlight.strength: expected a number of 0 or more, found -1\n\
+             dir/s.yaml:3:53: materials.a.diffuse.highlight.exponent: expected a number of 0 or more, found -2"
+        );
+        assert_eq!(
+            a("thin_dielectric: {ior: 1, exterior_ior: 0}"),
+            "dir/s.yaml:3:47: materials.a.thin_dielectric.exterior_ior: expected a number greater than 0, found 0"
+        );
+        assert_eq!(
+            a("plastic: {reflectance: 2, ior: 0, roughness: -1}"),
+            "dir/s.yaml:3:30: materials.a.plastic.reflectance: expected a number from 0 to 1, found 2\n\
+             dir/s.yaml:3:38: materials.a.plastic.ior: expected a number greater than 0, found 0\n\
+             dir/s.yaml:3:52: materials.a.plastic.roughness: expected a number of 0 or more, found -1"
+        );
+    }
+
+    #[test]
+    fn an_unknown_name_is_told_with_its_near_miss() {
+        assert_eq!(
+            faults(
+                "textures: {floor: {checkerboard: {a: 0, b: 1}}}\nmaterials:\n  a: {diffuse: {reflectance: {texture: flor}}}"
+            ),
+            "dir/s.yaml:4:40: materials.a.diffuse.reflectance.texture: unknown texture \"flor\"; did you mean \"floor\"?"
+        );
+        assert_eq!(
+            faults("materials: {clay: {diffuse: {}}}\nshapes:\n- sphere: {radius: 1, material: gold}"),
+            "dir/s.yaml:4:33: shapes[0].sphere.material: unknown material \"gold\"; known: clay"
+        );
+        assert_eq!(
+            faults("shapes:\n- sphere: {radius: 1, material: boundary}"),
+            "dir/s.yaml:3:33: shapes[0].sphere.material: unknown material \"boundary\"; \
+             the kind is written {boundary: {…}}"
+        );
+        // A name that needs quotes in a path gets them.
+        assert_eq!(
+            faults("materials:\n  dark.red: {mirror: {reflectance: 2}}"),
+            "dir/s.yaml:3:36: materials.\"dark.red\".mirror.reflectance: expected a number from 0 to 1, found 2"
+        );
+    }
+
+    #[test]
+    fn a_checkerboard_that_reflects_is_at_most_one() {
+        let board = "textures:\n  a: {checkerboard: {a: 2, b: 1}}\n";
+        let reflecting = "materials: {m: {plastic: {reflectance: {texture: a}}}}\n";
+        let emitting = "shapes:\n- sphere: {radius: 1, emission: {texture: a}}\n";
+        assert_eq!(faults(&format!("{board}{emitting}")), "none");
+        assert_eq!(
+            faults(&format!("{board}{emitting}{reflecting}")),
+            "dir/s.yaml:3:25: textures.a.checkerboard.a: expected a number from 0 to 1, found 2"
+        );
+    }
+
+    #[test]
+    fn the_names_of_kinds_are_those_of_the_grammar() {
+        for kind in Material::KINDS {
+            let fields = match kind {
+                "conductor" => "metal: gold",
+                "dielectric" | "thin_dielectric" => "ior: 1.5",
+                _ => "",
+            };
+            let scene = scene(&format!("materials: {{a: {{{kind}: {{{fields}}}}}}}"));
+            assert_eq!(scene.materials["a"].kind(), kind);
+        }
+    }
+}

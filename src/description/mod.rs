@@ -1,0 +1,292 @@
+//! What a person wrote: YAML scenes and batches, read, checked, and not yet compiled.
+//!
+//! Names stay names, degrees stay degrees, files stay closed. [`load`] reads a batch or a scene;
+//! [`BatchEntry::scene`] gives a [`SceneDescription`] that has passed validation.
+//!
+//! # Conventions
+//! y is up, lengths are metres, frames are right-handed, angles are degrees. Colours are linear
+//! Rec. 709, spectra are functions of wavelength in nm. A *kind* is a map with one key,
+//! `sphere: {radius: 1}`; a kind that needs no fields may stand alone, `filter: mitchell`. A field
+//! without value, `fog:` or `fog: null`, is not written. Anchors, aliases and `<<` work; tags do
+//! not. A path of a file starts from the file in which it is written, on the command line from
+//! the working directory.
+//!
+//! # A scene, with every field
+//! Only `camera` is required, and of each kind the fields that are not said to have a default.
+//!
+//! ```yaml
+//! # scene
+//! include: []                       # files that hold materials, textures, media; each is read once
+//! camera:
+//!   origin: [0, 3.2, 12]
+//!   target: [0, 1.1, 0]
+//!   up: [0, 1, 0]                   # default
+//!   fov_deg: 38                     # either this, between 0 and 180, or orthographic_height: 4 (m)
+//!   fov_axis: x                     # x (default), y, smaller, larger, diagonal
+//!   lens: {radius: 0.05, focus_distance: 10}    # default none
+//! image:
+//!   width: 600                      # default; 1 to 65536
+//!   height: 600                     # default
+//!   filter: box                     # default; or one of
+//!                                   #   {tent: {radius: 1}}, {gaussian: {stddev: 0.5}}, mitchell,
+//!                                   #   catmull_rom, {lanczos: {radius: 3}}
+//!   crop: {x: 0, y: 0, width: 10, height: 10}   # default all; x and y default 0
+//! integrator: path                  # default; or, with their defaults,
+//!                                   #   {path: {max_depth: null, roulette_depth: 5}},
+//!                                   #   {whitted: {max_depth: 10, grid: 2, ambient: 0,
+//!                                   #              transparent_shadows: false}}
+//!                                   # max_depth of a path counts segments: 1 emission, 2 direct light
+//! render:                           # these are the defaults
+//!   samples: 64                     # paths per pixel
+//!   seed: 0
+//!   effects: auto                   # auto, all: the same picture
+//!   tile: 32                        # pixels
+//!   wavelengths: auto               # auto, visible, uniform
+//! output:                           # these are the defaults
+//!   dir: out                        # from the working directory
+//!   exr: {precision: half, compression: zips, stderr: false}   # half, float; none, zips, zip, piz
+//!   png: {exposure: 0, tonemap: aces}           # stops; aces, agx, reinhard, none
+//!   colour: rec709                  # rec709, acescg, aces2065-1, rec2020, p3, xyz
+//! textures:
+//!   earth: {image: {file: earth.jpg, wrap: repeat, filter: bilinear, scale: [1, 1], offset: [0, 0], raw: false}}
+//!                                   # repeat, mirror, clamp, and wrap_v where it differs; bilinear, nearest; all but
+//!                                   # file default
+//!   floor: {checkerboard: {a: 0.1, b: {rgb: [0.9, 0.8, 0.7]}, scale: [12, 12]}}   # scale default [1, 1]
+//! materials:                        # ~ marks defaults
+//!   clay:
+//!     diffuse:
+//!       reflectance: {texture: floor}            # spectrum or texture, 0 to 1; ~ 0.5
+//!       highlight: {strength: 0.5, exponent: 50, model: blinn}   # whitted only; blinn, phong; ~ none
+//!       two_sided: true                          # ~
+//!   ring:
+//!     conductor:
+//!       metal: gold                              # either this, or eta: SPECTRUM and k: SPECTRUM
+//!       tint: 1                                  # ~
+//!       roughness: 0                             # ~ microfacet α, 0 is smooth
+//!       distribution: ggx                        # ~ ggx, beckmann
+//!       fresnel: exact                           # ~ exact, schlick
+//!                                                # and highlight, two_sided
+//!   silvered: {mirror: {reflectance: 0.9}}       # ~ and highlight
+//!   flint:
+//!     dielectric:
+//!       ior: {glass: N-SF11}                     # an index, see below
+//!       exterior_ior: 1                          # ~ and roughness, distribution, fresnel, highlight
+//!   pane: {thin_dielectric: {ior: 1.5, exterior_ior: 1}}
+//!   lacquer: {plastic: {reflectance: 0.5, ior: 1.5, roughness: 0, nonlinear: false}}
+//!                                                # ~ and distribution, highlight, two_sided
+//!   edge: {boundary: {}}                         # only bounds a medium
+//! media:
+//!   smoke:
+//!     homogeneous: {absorption: 0.1, scattering: {rgb: [0.2, 0.3, 0.4]}, phase: {hg: 0.5}}
+//!                                                # m⁻¹, ~ 0; ~ isotropic, rayleigh, |g| < 1
+//! medium: smoke                     # what the camera is in; default none
+//! fog: {colour: 0.8, start: 5, end: 40}
+//!                                   # or {colour, density: 0.1, falloff: exp}: exp (default), exp2
+//! shapes:
+//! - sphere:
+//!     center: [0, 1, 0]             # ~ origin
+//!     radius: 1
+//!                                   # every shape may have, besides its own fields:
+//!     name: ball                    # ~ none
+//!     material: clay                # a name, or a kind written in place; ~ diffuse 0.5
+//!     emission: {blackbody: {kelvin: 5000}}      # spectrum or texture, W·m⁻²·sr⁻¹·nm⁻¹; ~ none
+//!     inside: smoke                 # media on the two sides; ~ inside a closed shape nothing, outside what the
+//!                                   # camera is in
+//!     outside: smoke
+//!     transform:                    # applied in this order; ~ none
+//!     - translate: [1, 0, 0]
+//!     - rotate: {axis: [0, 1, 0], deg: 30}
+//!     - scale: 2                    # or [2, 1, 1]
+//!     - matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]    # rows
+//! - plane: {point: [0, 0, 0], normal: [0, 1, 0], tangent: [1, 0, 0]}   # ~ point origin, any tangent
+//! - disk: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1}            # ~ center origin
+//! - rectangle: {corner: [0, 0, 0], edge_u: [1, 0, 0], edge_v: [0, 0, -1]}   # normal edge_u × edge_v
+//! - cube: {center: [0, 0, 0], size: [1, 2, 3]}                         # ~ center origin; or size: 2
+//! - cylinder: {base: [0, 0, 0], top: [0, 1, 0], radius: 0.5, caps: both}    # ~ both, none, base, top
+//! - cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 0.5, cap: true}   # ~ cap
+//! - mesh: {file: knot.ply, normals: file}                              # ~ file, smooth, face
+//! lights:                           # each may have a name
+//! - point: {position: [0, 5, 0], intensity: 10}                        # W·sr⁻¹·nm⁻¹
+//! - spot:
+//!     position: [0, 5, 0]
+//!     target: [0, 0, 0]             # either this or direction: [0, -1, 0]
+//!     cutoff_deg: 20                # ~ between axis and edge, up to 90
+//!     beam_deg: 15                  # ~ 3/4 cutoff_deg: full intensity within
+//!     intensity: {scaled: {by: 2, of: {illuminant: D65}}}
+//! - directional: {direction: [0, -1, 0], irradiance: 3}                # W·m⁻²·nm⁻¹
+//! - constant: {radiance: 0.1}                                          # W·m⁻²·sr⁻¹·nm⁻¹
+//! - environment: {file: sky.exr, scale: 1, rotate_deg: 0}              # ~ scale, rotate_deg about y
+//! ```
+//!
+//! A sphere, cylinder or cone takes only transforms that keep it one: moves, turns and even
+//! scaling.
+//!
+//! # Spectra
+//! ```yaml
+//! # spectra
+//! - 0.5                             # the same at every wavelength
+//! - {rgb: [0.8, 0.1, 0.1]}          # linear Rec. 709
+//! - {table: [[400, 0.1], [700, 0.9]]}                     # nm and value; nm increases
+//! - {file: paint.csv}               # the same, two columns
+//! - {blackbody: {kelvin: 5000, scale: 1, normalised: true}}            # defaults but kelvin
+//! - {illuminant: D65}               # a CIE illuminant
+//! - {illuminant: {name: D65, scale: 3}}
+//! - {lines: [{nm: 589, power: 1, width_nm: 1}]}           # defaults but nm
+//! - {scaled: {by: 2, of: {illuminant: D65}}}
+//! ```
+//! A reflectance lies in 0 to 1; an emission and a coefficient (η, k, absorption, scattering) is 0 or
+//! more. `blackbody`, `illuminant` and `lines` are emissions only. Where a texture is allowed it is
+//! written `{texture: name}`.
+//!
+//! # Refractive indices
+//! ```yaml
+//! # indices
+//! - 1.5                             # without dispersion
+//! - {glass: N-SF11}                 # by catalogue name
+//! - {sellmeier: {b: [1.03961212, 0.231792344, 1.01046945], c: [0.00600069867, 0.0200179144, 103.560653]}}
+//! - {cauchy: [1.5046, 0.0042]}      # µm²; a third number, µm⁴, may follow
+//! - {abbe: {nd: 1.5, vd: 30}}
+//! - {table: [[400, 1.53], [700, 1.51]]}
+//! ```
+//! (The Sellmeier coefficients, c in µm², are those that Schott publishes for N-BK7.)
+//!
+//! # A batch
+//! ```yaml
+//! # batch
+//! output: {dir: out}                # laid over the scenes' own, field by field
+//! render: {samples: 256}
+//! scenes:
+//! - file: scenes/a.yaml             # the output's name is the file's, `a`, if there is no name
+//! - file: scenes/a.yaml
+//!   name: a-nofog
+//!   set: {fog: null, render.samples: 16, "shapes[2].sphere.radius": 2, materials.flint.dielectric.ior: 1.7}
+//! ```
+//! A setting names a field by its path and gives it a new value, whole; null takes it away. The path
+//! may lead to a field that is not written yet, as long as the grammar has it. Later wins: default,
+//! scene, batch, `set` of the entry, `--set KEY=VALUE` of the command line.
+//!
+//! # Faults
+//! Each is one line, `file:line:column: field: expected …, found …; did you mean "…"?`. Text that
+//! cannot be read, or does not follow the grammar, stops at the first fault; numbers out of range
+//! and unknown names are told all at once. Limits: 64 MiB of text, 64 levels, 4 million values
+//! with aliases written out.
+
+mod batch;
+mod camera;
+mod decode;
+mod edit;
+mod fault;
+mod light;
+mod material;
+mod node;
+mod path;
+mod scene;
+mod settings;
+mod shape;
+mod spectrum;
+mod yaml;
+
+pub use batch::{Batch, BatchEntry, Document, load};
+pub use camera::{Camera, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Projection};
+pub use light::{
+    Aim, ConstantLight, DirectionalLight, EnvironmentLight, Falloff, Fog, FogLaw, HomogeneousMedium, Light, Medium,
+    Phase, PointLight, SpotLight,
+};
+pub use material::{
+    Boundary, Checkerboard, Conductor, ConductorIndex, Dielectric, Diffuse, Distribution, Fresnel, Highlight,
+    HighlightModel, ImageTexture, Material, MaterialRef, Mirror, Plastic, Texture, TextureFilter, ThinDielectric, Wrap,
+};
+pub use scene::{Locator, SceneDescription};
+pub use settings::{
+    Colour, Compression, Effects, Exr, Integrator, Output, PathIntegrator, Png, Precision, Render, Tonemap,
+    Wavelengths, WhittedIntegrator,
+};
+pub use shape::{
+    Caps, Cone, Cube, Cylinder, Disk, Extent, Geometry, Mesh, Normals, Plane, Rectangle, Rotation, Shape, Sphere,
+    TransformStep,
+};
+pub use spectrum::{
+    Abbe, Blackbody, Cauchy, FilePath, Illuminant, Index, Line, Scaled, Sellmeier, Spectrum, SpectrumOrTexture, Vec3,
+};
+
+#[cfg(test)]
+pub(crate) mod testing {
+    use std::path::Path;
+
+    use super::SceneDescription;
+
+    /// The smallest scene: one line.
+    pub(crate) const CAMERA: &str = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n";
+
+    /// Reads `text` as `dir/s.yaml`.
+    pub(crate) fn parse(text: &str) -> crate::error::Result<SceneDescription> {
+        SceneDescription::parse(text, Path::new("dir/s.yaml"))
+    }
+
+    /// The scene of [`CAMERA`] and, from line 2, `text`.
+    pub(crate) fn scene(text: &str) -> SceneDescription {
+        parse(&format!("{CAMERA}{text}")).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// The faults of [`CAMERA`] and, from line 2, `text`.
+    pub(crate) fn faults(text: &str) -> String {
+        match parse(&format!("{CAMERA}{text}")) {
+            Ok(_) => "none".to_owned(),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    /// The blocks of YAML in the page of this module, by their first comment.
+    pub(crate) fn reference(title: &str) -> String {
+        let page = include_str!("mod.rs").lines().filter_map(|line| line.strip_prefix("//!"));
+        let start = format!(" # {title}");
+        let block = page.skip_while(|line| *line != start).take_while(|line| line.trim() != "```");
+        block.map(|line| line.strip_prefix(' ').unwrap_or(line)).collect::<Vec<_>>().join("\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::{faults, parse, reference, scene};
+    use super::*;
+
+    #[test]
+    fn the_reference_scene_is_a_scene() {
+        let scene = parse(&reference("scene")).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(scene.shapes.len(), 8);
+        assert_eq!(scene.lights.len(), 5);
+        assert_eq!(scene.materials.len(), Material::KINDS.len());
+        // What the page calls a default is one.
+        let bare = testing::scene("");
+        assert_eq!(scene.render, bare.render);
+        assert_eq!(scene.output, bare.output);
+        assert_eq!(scene.integrator, bare.integrator);
+        assert_eq!(Image { crop: None, ..scene.image }, bare.image);
+    }
+
+    #[test]
+    fn the_reference_spectra_are_spectra() {
+        for line in reference("spectra").lines().skip(1) {
+            let spectrum = line.strip_prefix("- ").unwrap();
+            scene(&format!("lights:\n- constant:\n    radiance: {spectrum}\n"));
+        }
+    }
+
+    #[test]
+    fn the_reference_indices_are_indices() {
+        for line in reference("indices").lines().skip(1) {
+            let index = line.strip_prefix("- ").unwrap();
+            scene(&format!("materials:\n  glass:\n    dielectric:\n      ior: {index}\n"));
+        }
+    }
+
+    #[test]
+    fn a_field_of_the_batch_in_a_scene_is_pointed_out() {
+        assert_eq!(
+            parse("scens: []").unwrap_err().to_string(),
+            "dir/s.yaml:1:1: scens: expected one of include, camera, image, integrator, render, output, textures, \
+             materials, media, shapes, lights, medium, fog, scenes, found \"scens\"; did you mean \"scenes\"?"
+        );
+        assert_eq!(faults("scens: []").matches("scenes").count(), 0);
+    }
+}

@@ -1,0 +1,404 @@
+//! A scene as it is written, and the way back from a field to its line.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::Deserialize;
+
+use super::camera::{Camera, Image};
+use super::decode::decode;
+use super::edit;
+use super::fault::{Checker, Fault};
+use super::light::{Fog, Light, Medium};
+use super::material::{Material, Texture};
+use super::node::{Node, Sources};
+use super::path::{self, At};
+use super::settings::{Integrator, Output, Render};
+use super::shape::Shape;
+use super::spectrum::{FilePath, Role};
+use crate::error::Result;
+
+/// Everything that one picture is made of.
+///
+/// It has passed validation: numbers are finite and in range, names refer to something. What only
+/// the compiler can know (files, names of glasses and metals) is still open; it reports with
+/// [`SceneDescription::fault`].
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneDescription {
+    /// Files whose materials, textures and media are part of this scene already.
+    #[serde(default)]
+    pub include: Vec<FilePath>,
+    /// Where the picture is taken from.
+    pub camera: Camera,
+    /// The raster; default 600 × 600.
+    #[serde(default)]
+    pub image: Image,
+    /// Default `path`.
+    #[serde(default)]
+    pub integrator: Integrator,
+    /// How to render.
+    #[serde(default)]
+    pub render: Render,
+    /// What to write.
+    #[serde(default)]
+    pub output: Output,
+    /// By name.
+    #[serde(default)]
+    pub textures: BTreeMap<String, Texture>,
+    /// By name.
+    #[serde(default)]
+    pub materials: BTreeMap<String, Material>,
+    /// By name.
+    #[serde(default)]
+    pub media: BTreeMap<String, Medium>,
+    /// In the order of the text.
+    #[serde(default)]
+    pub shapes: Vec<Shape>,
+    /// In the order of the text.
+    #[serde(default)]
+    pub lights: Vec<Light>,
+    /// Name of the medium that the camera is in; default none.
+    pub medium: Option<String>,
+    /// Depth fog; default none.
+    pub fog: Option<Fog>,
+    /// The directory of the scene's file, relative to the working directory. Paths in the
+    /// description are joined to it already.
+    #[serde(skip)]
+    pub directory: PathBuf,
+    /// Where each field is written.
+    #[serde(skip)]
+    pub locator: Locator,
+}
+
+/// Finds the file, line and column of a field.
+#[derive(Clone, Debug, Default)]
+pub struct Locator {
+    text: Option<Arc<(Node, Sources)>>,
+}
+
+impl Locator {
+    /// `file:line:column: field: message`, where `field` is a path such as
+    /// `shapes[3].mesh.file`. A field that is not written has the place of the nearest one around
+    /// it that is.
+    #[must_use]
+    pub fn fault(&self, field: &str, message: &str) -> String {
+        let Some((root, sources)) = self.text.as_deref() else {
+            return format!("{field}: {message}");
+        };
+        let place = path::parse(field).map_or(root.place, |path| root.locate(&path));
+        format!("{}: {field}: {message}", sources.describe(place))
+    }
+}
+
+impl SceneDescription {
+    /// Reads a scene from text, as if it stood in the file `path`.
+    ///
+    /// # Errors
+    /// [`Error::Config`](crate::error::Error::Config) with every fault; [`Error::Input`](crate::error::Error::Input) if an included file cannot be read.
+    pub fn parse(text: &str, path: &Path) -> Result<SceneDescription> {
+        let mut sources = Sources::default();
+        let mut root = edit::read_bytes_as(text.as_bytes(), path, &mut sources)?;
+        edit::include(&mut root, path, &mut sources)?;
+        SceneDescription::of_tree(root, path, sources)
+    }
+
+    /// Decodes and validates a complete tree.
+    pub(crate) fn of_tree(root: Node, path: &Path, sources: Sources) -> Result<SceneDescription> {
+        let decoded: std::result::Result<SceneDescription, Fault> = decode(&root, &sources);
+        let mut scene = decoded.map_err(|fault| {
+            // Without a camera it may have been meant for a batch.
+            let fault = if root.get("camera").is_none() { fault.or_one_of(["scenes"]) } else { fault };
+            fault.into_error(&sources)
+        })?;
+        scene.check(&root, &sources)?;
+        scene.directory = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        scene.locator = Locator { text: Some(Arc::new((root, sources))) };
+        Ok(scene)
+    }
+
+    /// A message about a field, with its place: see [`Locator::fault`].
+    #[must_use]
+    pub fn fault(&self, field: &str, message: &str) -> String {
+        self.locator.fault(field, message)
+    }
+
+    fn check(&self, root: &Node, sources: &Sources) -> Result<()> {
+        let mut checker = Checker::new(root);
+        checker.materials = self.materials.keys().map(String::as_str).collect();
+        checker.textures = self.textures.keys().map(String::as_str).collect();
+        checker.media = self.media.keys().map(String::as_str).collect();
+        let at = At::ROOT;
+
+        self.camera.check(at.key("camera"), &mut checker);
+        self.image.check(at.key("image"), &mut checker);
+        self.integrator.check(at.key("integrator"), &mut checker);
+        self.render.check(at.key("render"), &mut checker);
+        self.output.check(at.key("output"), &mut checker);
+        for (name, material) in &self.materials {
+            material.check(at.key("materials").key(name), &mut checker);
+        }
+        for (i, shape) in self.shapes.iter().enumerate() {
+            shape.check(at.key("shapes").index(i), &mut checker);
+        }
+        for (i, light) in self.lights.iter().enumerate() {
+            light.check(at.key("lights").index(i), &mut checker);
+        }
+        for (name, medium) in &self.media {
+            medium.check(at.key("media").key(name), &mut checker);
+        }
+        if let Some(medium) = &self.medium {
+            checker.medium(at.key("medium"), medium);
+        }
+        if let Some(fog) = &self.fog {
+            fog.check(at.key("fog"), &mut checker);
+        }
+        // Last, for what a texture may hold depends on where it was used.
+        for (name, texture) in &self.textures {
+            let reflects = checker.reflecting_textures.contains(name.as_str());
+            let role = if reflects { Role::Reflectance } else { Role::Emission };
+            texture.check(role, at.key("textures").key(name), &mut checker);
+        }
+        checker.finish(sources)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::testing::{CAMERA, faults, parse, reference, scene};
+    use super::super::*;
+    use crate::error::Error;
+
+    #[test]
+    fn a_scene_with_everything_becomes_the_structs() {
+        let scene = parse(&reference("scene")).unwrap();
+        let number = Spectrum::Number;
+        let text = str::to_owned;
+        assert_eq!(
+            scene.camera,
+            Camera {
+                origin: [0.0, 3.2, 12.0],
+                target: [0.0, 1.1, 0.0],
+                up: [0.0, 1.0, 0.0],
+                projection: Projection::Perspective { fov_deg: 38.0, fov_axis: FovAxis::X },
+                lens: Some(Lens { radius: 0.05, focus_distance: 10.0 }),
+            }
+        );
+        assert_eq!(scene.image.crop, Some(Crop { x: 0, y: 0, width: 10, height: 10 }));
+        let Texture::Image(earth) = &scene.textures["earth"] else { panic!("an image") };
+        assert_eq!(*earth.file, *std::path::Path::new("dir/earth.jpg"));
+        assert_eq!(
+            scene.textures["floor"],
+            Texture::Checkerboard(Checkerboard {
+                a: number(0.1),
+                b: Spectrum::Rgb([0.9, 0.8, 0.7]),
+                scale: [12.0, 12.0]
+            })
+        );
+        assert_eq!(
+            scene.materials["clay"],
+            Material::Diffuse(Diffuse {
+                reflectance: SpectrumOrTexture::Texture(text("floor")),
+                highlight: Some(Highlight { strength: 0.5, exponent: 50.0, model: HighlightModel::Blinn }),
+                two_sided: true,
+            })
+        );
+        assert_eq!(
+            scene.materials["ring"],
+            Material::Conductor(Conductor {
+                index: ConductorIndex::Metal(text("gold")),
+                tint: number(1.0),
+                roughness: 0.0,
+                distribution: Distribution::Ggx,
+                fresnel: Fresnel::Exact,
+                highlight: None,
+                two_sided: true,
+            })
+        );
+        assert_eq!(scene.materials["silvered"], Material::Mirror(Mirror { reflectance: number(0.9), highlight: None }));
+        assert_eq!(
+            scene.materials["flint"],
+            Material::Dielectric(Dielectric {
+                ior: Index::Glass(text("N-SF11")),
+                exterior_ior: Index::Number(1.0),
+                roughness: 0.0,
+                distribution: Distribution::Ggx,
+                fresnel: Fresnel::Exact,
+                highlight: None,
+            })
+        );
+        assert_eq!(
+            scene.materials["pane"],
+            Material::ThinDielectric(ThinDielectric { ior: Index::Number(1.5), exterior_ior: Index::Number(1.0) })
+        );
+        assert_eq!(
+            scene.materials["lacquer"],
+            Material::Plastic(Plastic {
+                reflectance: SpectrumOrTexture::Spectrum(number(0.5)),
+                ior: Index::Number(1.5),
+                roughness: 0.0,
+                nonlinear: false,
+                distribution: Distribution::Ggx,
+                highlight: None,
+                two_sided: true,
+            })
+        );
+        assert_eq!(scene.materials["edge"], Material::Boundary(Boundary {}));
+        assert_eq!(
+            scene.media["smoke"],
+            Medium::Homogeneous(HomogeneousMedium {
+                absorption: number(0.1),
+                scattering: Spectrum::Rgb([0.2, 0.3, 0.4]),
+                phase: Phase::Hg(0.5),
+            })
+        );
+        assert_eq!(scene.medium.as_deref(), Some("smoke"));
+        assert_eq!(scene.fog, Some(Fog { colour: number(0.8), law: FogLaw::Linear { start: 5.0, end: 40.0 } }));
+        let ball = &scene.shapes[0];
+        assert_eq!(
+            *ball,
+            Shape {
+                name: Some(text("ball")),
+                material: MaterialRef::Name(text("clay")),
+                emission: Some(SpectrumOrTexture::Spectrum(Spectrum::Blackbody(Blackbody {
+                    kelvin: 5000.0,
+                    scale: 1.0,
+                    normalised: true
+                }))),
+                inside: Some(text("smoke")),
+                outside: Some(text("smoke")),
+                transform: ball.transform.clone(),
+                geometry: Geometry::Sphere(Sphere { center: [0.0, 1.0, 0.0], radius: 1.0 }),
+            }
+        );
+        assert_eq!(ball.transform.len(), 4);
+        let kinds: Vec<&str> = scene.shapes.iter().map(|shape| shape.geometry.kind()).collect();
+        assert_eq!(kinds, ["sphere", "plane", "disk", "rectangle", "cube", "cylinder", "cone", "mesh"]);
+        assert_eq!(scene.shapes[1].material, MaterialRef::default());
+        assert_eq!(
+            scene.lights[1],
+            Light::Spot(SpotLight {
+                name: None,
+                position: [0.0, 5.0, 0.0],
+                aim: Aim::Target([0.0; 3]),
+                cutoff_deg: 20.0,
+                beam_deg: 15.0,
+                intensity: Spectrum::Scaled(Scaled {
+                    by: 2.0,
+                    of: Box::new(Spectrum::Illuminant(Illuminant { name: text("D65"), scale: 1.0 })),
+                }),
+            })
+        );
+        assert_eq!(scene.directory, std::path::Path::new("dir"));
+    }
+
+    #[test]
+    fn the_page_states_the_default_beam_of_a_spot() {
+        let scene = scene("lights:\n- spot: {position: [0, 1, 0], target: [0, 0, 0], intensity: 1}\n");
+        let Light::Spot(spot) = &scene.lights[0] else { panic!("a spot") };
+        assert_eq!((spot.cutoff_deg, spot.beam_deg), (20.0, 15.0));
+    }
+
+    #[test]
+    fn validation_tells_all_faults_at_once_in_the_order_of_the_text() {
+        assert_eq!(
+            faults(
+                "shapes:\n- sphere: {radius: -1, material: flnt}\nmedium: fogg\nmaterials:\n  flint: {mirror: {reflectance: 2}}\n"
+            ),
+            "dir/s.yaml:3:20: shapes[0].sphere.radius: expected a number greater than 0, found -1\n\
+             dir/s.yaml:3:34: shapes[0].sphere.material: unknown material \"flnt\"; did you mean \"flint\"?\n\
+             dir/s.yaml:4:9: medium: unknown medium \"fogg\"; the scene defines none\n\
+             dir/s.yaml:6:33: materials.flint.mirror.reflectance: expected a number from 0 to 1, found 2"
+        );
+    }
+
+    #[test]
+    fn a_hundred_faults_are_enough() {
+        let many = faults(&format!("shapes:\n{}", "- sphere: {radius: 0, material: red}\n".repeat(60)));
+        assert_eq!(many.lines().count(), 101);
+        assert_eq!(many.lines().last(), Some("and 20 more"));
+    }
+
+    #[test]
+    fn the_compiler_can_point_at_a_field() {
+        let scene = scene("shapes:\n- mesh: {file: a.ply}\n");
+        assert_eq!(
+            scene.fault("shapes[0].mesh.file", "cannot be read"),
+            "dir/s.yaml:3:16: shapes[0].mesh.file: cannot be read"
+        );
+        // A default stands where the map around it does.
+        assert_eq!(scene.fault("shapes[0].mesh.normals", "none"), "dir/s.yaml:3:9: shapes[0].mesh.normals: none");
+        assert_eq!(scene.fault("", "empty"), "dir/s.yaml:1:1: : empty");
+    }
+
+    #[test]
+    fn a_missing_camera_is_said() {
+        assert_eq!(
+            parse("image: {}").unwrap_err().to_string(),
+            "dir/s.yaml:1:1: expected the field \"camera\", found none"
+        );
+        assert!(parse("").unwrap_err().to_string().starts_with("dir/s.yaml:1:1: expected a map with fields among "));
+    }
+
+    /// Every line of a fault has a place.
+    fn is_well_formed(error: &Error) -> bool {
+        let placed = |line: &str| {
+            let Some(rest) = line.strip_prefix("dir/s.yaml:") else { return line.starts_with("and ") };
+            let mut parts = rest.splitn(3, ':');
+            let number = |part: Option<&str>| part.is_some_and(|part| part.parse::<u32>().is_ok_and(|n| n > 0));
+            number(parts.next()) && number(parts.next()) && parts.next().is_some()
+        };
+        match error {
+            Error::Config(text) => text.lines().all(placed),
+            Error::Input { .. } => true,
+            Error::Output { .. } | Error::Render(_) => false,
+        }
+    }
+
+    /// Pieces that break documents.
+    const SHARDS: [&str; 24] = [
+        "\t", "\n", "  ", "- ", ": ", "{", "}", "[", "]", "&a ", "*a", "<<: ", "!t ", "\"", "'", "#", "|\n", "? ",
+        "---\n", "null", "1e999", ".nan", "-1", "\u{feff}",
+    ];
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+
+        #[test]
+        fn a_damaged_scene_is_read_or_refused_with_a_place(
+            damage in prop::collection::vec((any::<prop::sample::Index>(), 0usize..6, 0..SHARDS.len()), 1..6)
+        ) {
+            let mut text: Vec<char> = reference("scene").chars().collect();
+            for (at, cut, shard) in damage {
+                let at = at.index(text.len());
+                let end = (at + cut).min(text.len());
+                text.splice(at..end, SHARDS[shard].chars());
+            }
+            let text: String = text.into_iter().collect();
+            if let Err(error) = parse(&text) {
+                prop_assert!(is_well_formed(&error), "{}", error);
+            }
+        }
+
+        #[test]
+        fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+            let mut sources = super::Sources::default();
+            let path = std::path::Path::new("dir/s.yaml");
+            if let Err(error) = super::edit::read_bytes_as(&bytes, path, &mut sources) {
+                prop_assert!(is_well_formed(&error), "{}", error);
+            }
+        }
+
+        #[test]
+        fn any_value_of_a_field_is_read_or_refused(value in "[-+.0-9eE\\[\\]{}, a-z:\"]{0,20}") {
+            for field in ["image", "integrator", "render", "shapes", "lights", "materials", "fog", "textures"] {
+                if let Err(error) = parse(&format!("{CAMERA}{field}: {value}\n")) {
+                    prop_assert!(is_well_formed(&error), "{}", error);
+                }
+            }
+        }
+    }
+}

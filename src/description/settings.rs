@@ -1,0 +1,362 @@
+//! How to render and what to write, as they are written.
+
+use std::path::PathBuf;
+
+use serde::Deserialize;
+
+use super::fault::Checker;
+use super::light::nothing;
+use super::path::At;
+use super::spectrum::{Role, Spectrum};
+
+/// `integrator: path` or `integrator: {path: {max_depth: 8}}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Integrator {
+    /// The path tracer.
+    Path(PathIntegrator),
+    /// The deterministic recursive tracer.
+    Whitted(WhittedIntegrator),
+}
+
+impl Default for Integrator {
+    fn default() -> Integrator {
+        Integrator::Path(PathIntegrator { max_depth: None, roulette_depth: roulette_depth() })
+    }
+}
+
+/// `path: {max_depth: null, roulette_depth: 5}`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PathIntegrator {
+    /// Most segments of a path: 1 shows emission, 2 direct light; default no limit.
+    pub max_depth: Option<u32>,
+    /// Segments after which a path may end by chance; default 5.
+    #[serde(default = "roulette_depth")]
+    pub roulette_depth: u32,
+}
+
+fn roulette_depth() -> u32 {
+    5
+}
+
+/// `whitted: {max_depth: 10, grid: 2, ambient: 0.2}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WhittedIntegrator {
+    /// Most reflections and refractions in a row; default 10.
+    #[serde(default = "whitted_depth")]
+    pub max_depth: u32,
+    /// Rays per pixel and side, on a regular grid; default 2.
+    #[serde(default = "whitted_grid")]
+    pub grid: u32,
+    /// Radiance that reaches every surface, times its reflectance; default 0.
+    #[serde(default = "nothing")]
+    pub ambient: Spectrum,
+    /// Whether light passes through transparent shapes to cast a lighter shadow; default false.
+    #[serde(default)]
+    pub transparent_shadows: bool,
+}
+
+fn whitted_depth() -> u32 {
+    10
+}
+
+fn whitted_grid() -> u32 {
+    2
+}
+
+/// `render: {samples: 64, seed: 0}`
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Render {
+    /// Paths per pixel; default 64.
+    #[serde(default = "samples")]
+    pub samples: u32,
+    /// Of the random numbers; default 0.
+    #[serde(default)]
+    pub seed: u64,
+    /// Which effects are simulated; default `auto`.
+    #[serde(default)]
+    pub effects: Effects,
+    /// Side of a tile of work, pixels, 1 to 65536; default 32.
+    #[serde(default = "tile")]
+    pub tile: u32,
+    /// How wavelengths are drawn; default `auto`.
+    #[serde(default)]
+    pub wavelengths: Wavelengths,
+}
+
+fn samples() -> u32 {
+    64
+}
+
+fn tile() -> u32 {
+    32
+}
+
+impl Default for Render {
+    fn default() -> Render {
+        Render {
+            samples: samples(),
+            seed: 0,
+            effects: Effects::default(),
+            tile: tile(),
+            wavelengths: Wavelengths::default(),
+        }
+    }
+}
+
+/// Which effects are simulated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Effects {
+    /// Those that the scene calls for.
+    #[default]
+    Auto,
+    /// All; the picture is the same.
+    All,
+}
+
+/// How wavelengths are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Wavelengths {
+    /// By the scene's own spectra.
+    #[default]
+    Auto,
+    /// By the sensitivity of the eye.
+    Visible,
+    /// All alike.
+    Uniform,
+}
+
+/// `output: {dir: out, colour: rec709}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Output {
+    /// Directory, relative to the working directory; default `out`.
+    #[serde(default = "dir")]
+    pub dir: PathBuf,
+    /// The OpenEXR file.
+    #[serde(default)]
+    pub exr: Exr,
+    /// The PNG file.
+    #[serde(default)]
+    pub png: Png,
+    /// Colour space of the OpenEXR file; default `rec709`.
+    #[serde(default)]
+    pub colour: Colour,
+}
+
+fn dir() -> PathBuf {
+    PathBuf::from("out")
+}
+
+impl Default for Output {
+    fn default() -> Output {
+        Output { dir: dir(), exr: Exr::default(), png: Png::default(), colour: Colour::default() }
+    }
+}
+
+/// `exr: {precision: half, compression: zips}`
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Exr {
+    /// Of the colour channels; default `half`.
+    #[serde(default)]
+    pub precision: Precision,
+    /// Default `zips`.
+    #[serde(default)]
+    pub compression: Compression,
+    /// Also write the standard error of each pixel, `stderr.R`, `stderr.G`, `stderr.B`; default false.
+    #[serde(default)]
+    pub stderr: bool,
+}
+
+/// Number format of the colour channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// 16 bits.
+    #[default]
+    Half,
+    /// 32 bits.
+    Float,
+}
+
+/// Compression of an OpenEXR file; all are lossless.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Compression {
+    /// None.
+    None,
+    /// Deflate, each line alone.
+    #[default]
+    Zips,
+    /// Deflate, sixteen lines together.
+    Zip,
+    /// Wavelets.
+    Piz,
+}
+
+/// `png: {exposure: 0, tonemap: aces}`
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Png {
+    /// Stops; default 0.
+    #[serde(default)]
+    pub exposure: f64,
+    /// Default `aces`.
+    #[serde(default)]
+    pub tonemap: Tonemap,
+}
+
+/// How radiance becomes display values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tonemap {
+    /// The ACES curve.
+    #[default]
+    Aces,
+    /// AgX.
+    Agx,
+    /// Reinhard's.
+    Reinhard,
+    /// Cut at 1.
+    None,
+}
+
+/// Colour space of the OpenEXR file; all are linear.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+pub enum Colour {
+    /// `rec709`
+    #[default]
+    #[serde(rename = "rec709")]
+    Rec709,
+    /// `acescg`
+    #[serde(rename = "acescg")]
+    AcesCg,
+    /// `aces2065-1`
+    #[serde(rename = "aces2065-1")]
+    Aces2065,
+    /// `rec2020`
+    #[serde(rename = "rec2020")]
+    Rec2020,
+    /// `p3`
+    #[serde(rename = "p3")]
+    P3,
+    /// `xyz`: CIE 1931.
+    #[serde(rename = "xyz")]
+    Xyz,
+}
+
+/// The most rays per pixel and side of the `whitted` integrator: 2²⁰ a pixel.
+const MAX_GRID: u32 = 1024;
+
+impl Integrator {
+    pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
+        match self {
+            Integrator::Path(path) => {
+                let at = at.key("path");
+                checker.at_least_one(at.key("max_depth"), path.max_depth.unwrap_or(u32::MAX));
+                checker.at_least_one(at.key("roulette_depth"), path.roulette_depth);
+            }
+            Integrator::Whitted(whitted) => {
+                let at = at.key("whitted");
+                checker.at_least_one(at.key("max_depth"), whitted.max_depth);
+                checker.whole_between(at.key("grid"), whitted.grid, 1, MAX_GRID);
+                whitted.ambient.check(Role::Emission, at.key("ambient"), checker);
+            }
+        }
+    }
+}
+
+impl Render {
+    pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
+        checker.at_least_one(at.key("samples"), self.samples);
+        checker.whole_between(at.key("tile"), self.tile, 1, super::camera::MAX_SIDE);
+    }
+}
+
+impl Output {
+    pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
+        let named = !self.dir.as_os_str().is_empty();
+        checker.require(named, at.key("dir"), "the path of a directory", "empty text");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{faults, scene};
+    use super::*;
+
+    #[test]
+    fn counts_are_one_or_more() {
+        assert_eq!(
+            faults("render: {samples: 0, tile: 0}"),
+            "dir/s.yaml:2:19: render.samples: expected a whole number of 1 or more, found 0\n\
+             dir/s.yaml:2:28: render.tile: expected a whole number from 1 to 65536, found 0"
+        );
+        assert_eq!(
+            faults("integrator: {path: {max_depth: 0, roulette_depth: 0}}"),
+            "dir/s.yaml:2:32: integrator.path.max_depth: expected a whole number of 1 or more, found 0\n\
+             dir/s.yaml:2:51: integrator.path.roulette_depth: expected a whole number of 1 or more, found 0"
+        );
+        assert_eq!(
+            faults("integrator: {whitted: {max_depth: 0, grid: 2000, ambient: -1}}"),
+            "dir/s.yaml:2:35: integrator.whitted.max_depth: expected a whole number of 1 or more, found 0\n\
+             dir/s.yaml:2:44: integrator.whitted.grid: expected a whole number from 1 to 1024, found 2000\n\
+             dir/s.yaml:2:59: integrator.whitted.ambient: expected a number of 0 or more, found -1"
+        );
+    }
+
+    #[test]
+    fn the_directory_of_the_output_has_a_name() {
+        assert_eq!(
+            faults("output: {dir: ''}"),
+            "dir/s.yaml:2:15: output.dir: expected the path of a directory, found empty text"
+        );
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_page() {
+        let scene = scene("");
+        assert_eq!(
+            scene.render,
+            Render { samples: 64, seed: 0, effects: Effects::Auto, tile: 32, wavelengths: Wavelengths::Auto }
+        );
+        assert_eq!(scene.integrator, Integrator::Path(PathIntegrator { max_depth: None, roulette_depth: 5 }));
+        assert_eq!(scene.output.dir, PathBuf::from("out"));
+        assert_eq!(scene.output.exr, Exr { precision: Precision::Half, compression: Compression::Zips, stderr: false });
+        assert_eq!(scene.output.png, Png { exposure: 0.0, tonemap: Tonemap::Aces });
+        assert_eq!(scene.output.colour, Colour::Rec709);
+    }
+
+    #[test]
+    fn colour_spaces_go_by_their_names() {
+        let all = [
+            ("rec709", Colour::Rec709),
+            ("acescg", Colour::AcesCg),
+            ("aces2065-1", Colour::Aces2065),
+            ("rec2020", Colour::Rec2020),
+            ("p3", Colour::P3),
+            ("xyz", Colour::Xyz),
+        ];
+        for (name, colour) in all {
+            assert_eq!(scene(&format!("output: {{colour: {name}}}")).output.colour, colour);
+        }
+        assert_eq!(
+            faults("output: {colour: rec708}"),
+            "dir/s.yaml:2:18: output.colour: expected one of rec709, acescg, aces2065-1, rec2020, p3, xyz, \
+             found \"rec708\"; did you mean \"rec709\"?"
+        );
+    }
+
+    #[test]
+    fn an_integrator_alone_has_its_defaults() {
+        let Integrator::Whitted(whitted) = scene("integrator: whitted").integrator else { panic!("whitted") };
+        assert_eq!((whitted.max_depth, whitted.grid, whitted.transparent_shadows), (10, 2, false));
+        assert_eq!(whitted.ambient, Spectrum::Number(0.0));
+    }
+}
