@@ -17,4 +17,5 @@ pub mod error;
 pub mod film;
 pub mod math;
 pub mod optics;
+pub mod scene;
 pub mod spectrum;

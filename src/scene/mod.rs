@@ -1,0 +1,3 @@
+//! What rays meet: compiled, immutable, `Send + Sync`.
+
+pub mod shape;

@@ -1,0 +1,245 @@
+//! Cubes, boxes and parallelepipeds.
+
+use super::exact::{along, dot};
+use super::span::{Exit, Span};
+use super::{AreaSample, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest};
+use crate::math::Ray;
+use glam::{DVec2, DVec3};
+
+/// A parallelepiped: centre + x·e₀ + y·e₁ + z·e₂ with |x|, |y|, |z| ≤ 1.
+///
+/// Face 2i is coordinate i at −1, face 2i + 1 at +1.
+#[derive(Clone, Debug)]
+pub struct Cube {
+    center: DVec3,
+    half_edges: [DVec3; 3],
+    /// Dual vectors: coordinate i = dualᵢ · (p − centre). They point along the outward normals.
+    duals: [DVec3; 3],
+    normals: [DVec3; 3],
+    /// Areas of the faces of each pair.
+    areas: [f64; 3],
+    scale: f64,
+}
+
+const SLAB: (f64, f64) = (-1.0, 1.0);
+const ALL_FACES: u8 = 0b11_1111;
+
+/// −1 for the face where its coordinate is −1, else +1.
+#[inline]
+fn side(face: u8) -> f64 {
+    f64::from(face & 1) * 2.0 - 1.0
+}
+
+/// Picture axes of a face: (index of the half edge, sign) for right and for up.
+struct Picture {
+    right: (usize, f64),
+    up: (usize, f64),
+}
+
+/// Right × up points outward; up is +y on the four sides.
+const PICTURES: [Picture; 6] = [
+    Picture { right: (2, 1.0), up: (1, 1.0) },
+    Picture { right: (2, -1.0), up: (1, 1.0) },
+    Picture { right: (0, 1.0), up: (2, 1.0) },
+    Picture { right: (0, 1.0), up: (2, -1.0) },
+    Picture { right: (0, -1.0), up: (1, 1.0) },
+    Picture { right: (0, 1.0), up: (1, 1.0) },
+];
+
+impl Cube {
+    /// A cube from its centre and the three vectors from there to the middles of faces +x, +y, +z.
+    ///
+    /// # Errors
+    /// In words: numbers not finite, an edge of length zero, edges in one plane.
+    pub fn new(center: DVec3, half_edges: [DVec3; 3]) -> Result<Cube, String> {
+        check_point("center", center)?;
+        let [e0, e1, e2] = half_edges;
+        let mut lengths = 1.0;
+        for (i, e) in half_edges.into_iter().enumerate() {
+            lengths *= check_direction(&format!("edge {i}"), e)?;
+        }
+        let crosses = [(e1, e2), (e2, e0), (e0, e1)].map(|(a, b)| super::exact::cross(a, b));
+        let volume = e0.dot(crosses[0]);
+        // The edges are rounded themselves: a volume below 8 ε of a box's is none. Also NaN.
+        if volume.abs().partial_cmp(&(8.0 * f64::EPSILON * lengths)) != Some(std::cmp::Ordering::Greater) {
+            return Err(format!("edges: expected three vectors that are not in one plane, found {e0}, {e1}, {e2}"));
+        }
+        check_length("edges' volume's root", libm::cbrt(volume.abs()))?;
+        let duals = crosses.map(|c| c / volume);
+        Ok(Cube {
+            center,
+            half_edges,
+            duals,
+            normals: duals.map(DVec3::normalize),
+            areas: crosses.map(|c| 4.0 * c.length()),
+            scale: largest(center).max(largest(e0.abs() + e1.abs() + e2.abs())),
+        })
+    }
+
+    #[inline]
+    fn coordinates(&self, v: DVec3) -> [f64; 3] {
+        self.duals.map(|dual| dot(dual, v))
+    }
+
+    #[inline]
+    pub(super) fn intersect(&self, ray: &Ray, t_max: f64, departing: Option<u8>) -> Option<ShapeHit> {
+        let oc = ray.origin - self.center;
+        let d = self.coordinates(ray.direction);
+        if let Some(face) = departing {
+            return self.leave(self.coordinates(oc), d, t_max, face);
+        }
+        // Move along the ray to near the cube, each coordinate rounded once.
+        let shift = -dot(oc, ray.direction);
+        let o = self.coordinates(along(oc, ray.direction, shift));
+        let mut span = Span::LINE;
+        for i in 0..3 {
+            let face = 2 * i as u8;
+            if !span.clip_slab(o[i], d[i], SLAB, (face, face + 1)) {
+                return None;
+            }
+        }
+        span.first(ALL_FACES, shift, t_max)
+    }
+
+    /// The exit of a ray that starts on `face` and goes in.
+    #[inline]
+    fn leave(&self, o: [f64; 3], d: [f64; 3], t_max: f64, face: u8) -> Option<ShapeHit> {
+        let across = d[usize::from(face / 2) % 3];
+        if across * side(face) >= 0.0 {
+            return None;
+        }
+        let mut exit = Exit::NEVER;
+        for i in 0..3 {
+            let face = 2 * i as u8;
+            exit.clip_slab(o[i], d[i], SLAB, (face, face + 1));
+        }
+        exit.hit(ALL_FACES, t_max)
+    }
+
+    pub(super) fn surface(&self, point: DVec3, face: u8) -> SurfacePoint {
+        let mut at = self.coordinates(point - self.center);
+        let axis = usize::from(face / 2) % 3;
+        let side = side(face);
+        // A hit at an edge may round to either side of it.
+        at = at.map(|x| x.clamp(-1.0, 1.0));
+        at[axis] = side;
+        let [e0, e1, e2] = self.half_edges;
+        let normal = self.normals[axis] * side;
+        let Picture { right, up } = &PICTURES[usize::from(face) % 6];
+        SurfacePoint {
+            point: self.center + (e0 * at[0] + e1 * at[1] + e2 * at[2]),
+            scale: self.scale,
+            normal,
+            shading_normal: normal,
+            uv: DVec2::new(0.5 + 0.5 * right.1 * at[right.0], 0.5 + 0.5 * up.1 * at[up.0]),
+            tangent: self.half_edges[right.0] * right.1,
+        }
+    }
+
+    pub(super) fn bounds(&self) -> (DVec3, DVec3) {
+        let [e0, e1, e2] = self.half_edges;
+        let half = e0.abs() + e1.abs() + e2.abs();
+        (self.center - half, self.center + half)
+    }
+
+    pub(super) fn area(&self) -> f64 {
+        2.0 * self.areas.iter().sum::<f64>()
+    }
+
+    fn sample(&self, u: DVec2, areas: [f64; 6]) -> AreaSample {
+        let (face, x) = choose(u.x, &areas);
+        let axis = face / 2;
+        let mut at = [0.0; 3];
+        at[axis] = side(face as u8);
+        at[(axis + 1) % 3] = 2.0 * x - 1.0;
+        at[(axis + 2) % 3] = 2.0 * u.y - 1.0;
+        let [e0, e1, e2] = self.half_edges;
+        AreaSample {
+            point: self.center + (e0 * at[0] + e1 * at[1] + e2 * at[2]),
+            normal: self.normals[axis] * at[axis],
+            face: face as u8,
+            scale: self.scale,
+            pdf_area: 1.0 / areas.iter().sum::<f64>(),
+        }
+    }
+
+    fn face_areas(&self) -> [f64; 6] {
+        [0, 0, 1, 1, 2, 2].map(|i| self.areas[i])
+    }
+
+    pub(super) fn sample_area(&self, u: DVec2) -> AreaSample {
+        self.sample(u, self.face_areas())
+    }
+
+    /// The areas of the faces that face `from`; of all faces from inside.
+    fn visible(&self, from: DVec3) -> [f64; 6] {
+        let at = self.coordinates(from - self.center);
+        let mut areas = [0.0; 6];
+        for i in 0..3 {
+            if at[i] < -1.0 {
+                areas[2 * i] = self.areas[i];
+            } else if at[i] > 1.0 {
+                areas[2 * i + 1] = self.areas[i];
+            }
+        }
+        if areas == [0.0; 6] { self.face_areas() } else { areas }
+    }
+
+    pub(super) fn visible_area(&self, from: DVec3) -> f64 {
+        self.visible(from).iter().sum()
+    }
+
+    pub(super) fn sample_visible(&self, from: DVec3, u: DVec2) -> AreaSample {
+        self.sample(u, self.visible(from))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FAR: f64 = f64::INFINITY;
+
+    fn unit() -> Cube {
+        Cube::new(DVec3::ZERO, [DVec3::X, DVec3::Y, DVec3::Z]).unwrap()
+    }
+
+    /// Case O09: origin on a face plane, direction along it: inside the slab by definition, so the ray
+    /// meets the cube where it meets the other slabs.
+    #[test]
+    fn a_ray_along_a_face_plane_is_consistent() {
+        for zero in [0.0, -0.0] {
+            let ray = Ray::new(DVec3::new(-3.0, 1.0, 0.0), DVec3::new(1.0, zero, zero));
+            assert_eq!(unit().intersect(&ray, FAR, None), Some(ShapeHit { t: 2.0, face: 0 }));
+            let beside = Ray::new(DVec3::new(-3.0, 1.0f64.next_up(), 0.0), DVec3::new(1.0, zero, zero));
+            assert_eq!(unit().intersect(&beside, FAR, None), None);
+        }
+    }
+
+    #[test]
+    fn faces_are_numbered_and_normals_point_outward() {
+        for face in 0..6u8 {
+            let mut n = [0.0; 3];
+            n[usize::from(face / 2)] = side(face);
+            let n = DVec3::from_array(n);
+            let ray = Ray::new(n * 4.0, -n);
+            assert_eq!(unit().intersect(&ray, FAR, None), Some(ShapeHit { t: 3.0, face }));
+            let s = unit().surface(n, face);
+            assert_eq!((s.normal, s.point, s.uv), (n, n, DVec2::splat(0.5)));
+            // From inside it is the far face, with the same outward normal.
+            let inside = Ray::new(-n * 0.5, n);
+            assert_eq!(unit().intersect(&inside, FAR, None), Some(ShapeHit { t: 1.5, face }));
+        }
+    }
+
+    /// Right × up = outward on each face: pictures are not mirrored.
+    #[test]
+    fn pictures_on_faces_are_not_mirrored() {
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+        for (face, Picture { right, up }) in PICTURES.iter().enumerate() {
+            let outward = (axes[right.0] * right.1).cross(axes[up.0] * up.1);
+            let expected = axes[face / 2] * side(face as u8);
+            assert_eq!(outward, expected, "face {face}");
+        }
+    }
+}

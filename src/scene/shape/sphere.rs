@@ -1,0 +1,188 @@
+//! Spheres.
+//!
+//! # Texture coordinates
+//! (x, y, z) = outward normal in the object frame, pole +y:
+//!
+//! u = ½ + atan2(x, z) / 2π, v = ½ + asin(y) / π, both in [0, 1).
+//!
+//! The middle of the picture faces +z, u grows to the right as seen from outside with +y up, v
+//! grows upward from the south pole (v = 0, bottom of the picture) to the north pole. The seam is
+//! at −z. A texture whose first row is the top of the picture is read at row (1 − v)·height.
+//!
+//! [`Z_POLE`] turns this into the other usual convention (u' = φ/2π with φ = atan2(y, x), v' = θ/π
+//! from the +z pole): with it u = u' and v = 1 − v'.
+
+use super::exact::{cross, dot};
+use super::{
+    AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, TowardSample, check_length, check_point, largest,
+    solid_angle_density, toward_by_area,
+};
+use crate::math::warp::{uniform_cone, uniform_sphere};
+use crate::math::{Frame, Ray};
+use glam::{DMat3, DVec2, DVec3};
+use std::f64::consts::{PI, TAU};
+
+/// The frame in which texture coordinates have their pole at +z and u = φ/2π with φ from +x
+/// towards +y: x, y, z of the object frame are −y, z, −x.
+pub const Z_POLE: DMat3 = DMat3::from_cols(DVec3::NEG_Y, DVec3::Z, DVec3::NEG_X);
+
+/// How far from orthonormal a given frame may be: a rotation written with six digits.
+const FRAME_TOLERANCE: f64 = 4e-6;
+
+/// A sphere.
+#[derive(Clone, Debug)]
+pub struct Sphere {
+    center: DVec3,
+    radius: f64,
+    radius_squared: f64,
+    /// Rotation of the object frame, for texture coordinates only.
+    world_from_object: DMat3,
+}
+
+impl Sphere {
+    /// A sphere; `world_from_object` turns its texture (see the module page).
+    ///
+    /// # Errors
+    /// In words: centre not finite, radius not positive, frame not a rotation.
+    pub fn new(center: DVec3, radius: f64, world_from_object: DMat3) -> Result<Sphere, String> {
+        check_point("center", center)?;
+        check_length("radius", radius)?;
+        let error = world_from_object.transpose() * world_from_object - DMat3::IDENTITY;
+        // A comparison with NaN is false, so a frame of NaN fails.
+        if !error.to_cols_array().iter().all(|e| e.abs() <= FRAME_TOLERANCE) {
+            return Err(format!("frame: expected a rotation, found {world_from_object}"));
+        }
+        Ok(Sphere { center, radius, radius_squared: radius * radius, world_from_object })
+    }
+
+    /// Moment form: with m = oc × d the discriminant is r²d² − m², where m is exact to 1.5 ulp, so
+    /// hit and miss do not depend on how far away the origin is.
+    #[inline]
+    pub(super) fn intersect(&self, ray: &Ray, t_max: f64, departing: Option<u8>) -> Option<ShapeHit> {
+        let d = ray.direction;
+        let oc = ray.origin - self.center;
+        let a = dot(d, d);
+        let b = dot(oc, d);
+        let t = if departing.is_some() {
+            // The root at the origin is known to be zero; the other is −2B/A.
+            -2.0 * b / a
+        } else {
+            let m = cross(oc, d);
+            let discriminant = self.radius_squared.mul_add(a, -dot(m, m));
+            if discriminant < 0.0 {
+                return None;
+            }
+            let half = discriminant.sqrt();
+            let near = -b - half;
+            (if near > 0.0 { near } else { half - b }) / a
+        };
+        (t > 0.0 && t < t_max).then_some(ShapeHit { t, face: 0 })
+    }
+
+    fn at_normal(&self, normal: DVec3) -> DVec3 {
+        self.center + normal * self.radius
+    }
+
+    /// Largest number that goes into a point of the surface.
+    fn scale(&self) -> f64 {
+        largest(self.center).max(self.radius)
+    }
+
+    pub(super) fn surface(&self, point: DVec3, detail: Detail) -> SurfacePoint {
+        let normal = (point - self.center).normalize_or(DVec3::Y);
+        let n = self.world_from_object.transpose() * normal;
+        let uv = || {
+            let u = 0.5 + libm::atan2(n.x, n.z) / TAU;
+            // asin(y) by its tangent: asin itself loses half the digits at the poles.
+            let v = 0.5 + libm::atan2(n.y, (n.x * n.x + n.z * n.z).sqrt()) / PI;
+            DVec2::new(if u >= 1.0 { 0.0 } else { u.min(BELOW_ONE) }, v.clamp(0.0, BELOW_ONE))
+        };
+        // East; at the poles every direction is, take the object frame's x.
+        let east = DVec3::new(n.z, 0.0, -n.x);
+        let east = if east == DVec3::ZERO { DVec3::X } else { east };
+        SurfacePoint {
+            point: self.at_normal(normal),
+            scale: self.scale(),
+            normal,
+            shading_normal: normal,
+            uv: detail.uv(uv),
+            tangent: self.world_from_object * east,
+        }
+    }
+
+    pub(super) fn bounds(&self) -> (DVec3, DVec3) {
+        (self.center - self.radius, self.center + self.radius)
+    }
+
+    pub(super) fn area(&self) -> f64 {
+        4.0 * PI * self.radius_squared
+    }
+
+    pub(super) fn sample_area(&self, u: DVec2) -> AreaSample {
+        let normal = uniform_sphere(u);
+        AreaSample { point: self.at_normal(normal), normal, face: 0, scale: self.scale(), pdf_area: 1.0 / self.area() }
+    }
+
+    /// The cone of directions from `from` to the sphere; `None` from inside or on it.
+    fn cone(&self, from: DVec3) -> Option<Cap> {
+        let to_center = self.center - from;
+        let distance = to_center.length();
+        if distance <= self.radius {
+            return None;
+        }
+        let s = self.radius / distance;
+        let power = (distance - self.radius) * (distance + self.radius);
+        // 1 − cos θ_max = s² / (1 + cos θ_max): no cancellation for any s.
+        let one_minus_cos = s * s / (1.0 + power.sqrt() / distance);
+        Some(Cap { axis: to_center / distance, distance, power, one_minus_cos })
+    }
+
+    /// Unit direction to the middle of the sphere, distance to the point nearest to `from`, and solid
+    /// angle in sr; `None` from inside or on it.
+    #[must_use]
+    pub fn toward_middle(&self, from: DVec3) -> Option<(DVec3, f64, f64)> {
+        let cap = self.cone(from)?;
+        Some((cap.axis, cap.power / (cap.distance + self.radius), TAU * cap.one_minus_cos))
+    }
+
+    /// Uniform in solid angle from outside, uniform on the area from inside.
+    pub(super) fn sample_toward(&self, from: DVec3, u: DVec2) -> Option<TowardSample> {
+        let Some(cap) = self.cone(from) else {
+            return toward_by_area(from, self.sample_area(u));
+        };
+        let local = uniform_cone(u, cap.one_minus_cos);
+        let direction = Frame::from_normal(cap.axis).to_world(local);
+        // Near root of t² − 2 t d cos θ + (d² − r²) = 0 in the form without cancellation.
+        let foot = cap.distance * local.z;
+        let side = cap.distance * (local.x * local.x + local.y * local.y).sqrt();
+        let half = ((self.radius - side) * (self.radius + side)).max(0.0).sqrt();
+        let distance = cap.power / (foot + half);
+        let normal = (from + direction * distance - self.center).normalize_or(-cap.axis);
+        Some(TowardSample {
+            direction,
+            distance,
+            point: self.at_normal(normal),
+            normal,
+            face: 0,
+            scale: self.scale(),
+            pdf_solid_angle: 1.0 / (TAU * cap.one_minus_cos),
+        })
+    }
+
+    pub(super) fn pdf_toward(&self, from: DVec3, direction: DVec3, hit_t: f64, hit_normal: DVec3) -> f64 {
+        match self.cone(from) {
+            Some(cap) => 1.0 / (TAU * cap.one_minus_cos),
+            None => solid_angle_density(1.0 / self.area(), hit_t, direction.dot(hit_normal)),
+        }
+    }
+}
+
+/// What a sphere covers of the sky of a point outside it.
+struct Cap {
+    axis: DVec3,
+    /// To the centre.
+    distance: f64,
+    /// Power of the point: d² − r².
+    power: f64,
+    one_minus_cos: f64,
+}
