@@ -1,0 +1,498 @@
+//! A bounding volume hierarchy over any primitives, eight children a node.
+//!
+//! **Coordinates.** The tree keeps f32 boxes in coordinates of its own: the centre of all
+//! boxes is subtracted in f64 and the rest multiplied by a power of two, so that the largest
+//! coordinate lies in [1, 2). A box is then rounded outward. Scenes of 1e30 or 1e-30 metres, or
+//! far from the origin, lose nothing but the 2⁻²⁴ of their own size that f32 has.
+//!
+//! **No false misses.** A ray that meets a primitive's f64 box, in exact arithmetic, always
+//! reaches that primitive. The ray is moved in f64 to where it enters the whole tree, so its
+//! origin is never far away, and then tested against planes x = b in f32. With u = 2⁻²⁴:
+//! - The origin is known to within `pad` = 2⁻⁴⁰ + 2⁻⁵¹·|o|, where |o| is its coordinate before
+//!   the move: 2⁻⁵³·|o| from the subtraction of the centre, 2⁻⁵³·(2·|o| + 4) from the move, and
+//!   2⁻⁵²·2 for the rounding of the box in f64. The near plane uses the end of that interval
+//!   that brings it closer and the far plane the other end; both ends are moved outward by 2u
+//!   of their size and then rounded to nearest, which moves them by u.
+//! - (b − o)·(1/d) then has three roundings, of 1/d, difference and product: a factor in
+//!   1 ± (3u + 3u² + u³), and one of 2⁻⁵³. The reciprocal of the near planes is made smaller by
+//!   4u and that of the far planes larger by 4u before it is rounded, which outweighs them.
+//!   A negative near distance counts as zero, so that rounding it wrongly does not matter.
+//! - |1/d| is cut at 2¹²⁰, which serves d = ±0 as well. Within the slab, far plane and origin
+//!   differ by at least `pad`, so that the far distance is at least 2⁻⁴⁰·2¹²⁰ tree sizes: never
+//!   less than a distance that matters; the near distance is not positive. Without infinities
+//!   there is no 0·∞.
+//!
+//! Compare Ize 2013, "Robust BVH Ray Traversal", which has f32 rays and needs no pad.
+//!
+//! **Unbounded primitives** (a box that is not finite) are kept beside the tree and always
+//! visited.
+
+mod build;
+
+use crate::math::Ray;
+use build::{Builder, DEPTH, LeafSize, MAX_POSITIONS, Primitive};
+use glam::DVec3;
+use std::mem::MaybeUninit;
+use std::ops::Range;
+use wide::{f32x8, f64x4};
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Smallest coordinates.
+    pub min: DVec3,
+    /// Largest coordinates.
+    pub max: DVec3,
+}
+
+impl Aabb {
+    /// The box of nothing: the neutral element of [`Aabb::union`].
+    pub const EMPTY: Aabb = Aabb { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+
+    /// The smallest box around `points`.
+    pub fn from_points(points: impl IntoIterator<Item = DVec3>) -> Aabb {
+        points.into_iter().fold(Aabb::EMPTY, |b, p| Aabb { min: b.min.min(p), max: b.max.max(p) })
+    }
+
+    /// The smallest box around both.
+    #[must_use]
+    pub fn union(&self, other: &Aabb) -> Aabb {
+        Aabb { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    fn is_finite(&self) -> bool {
+        self.min.is_finite() && self.max.is_finite()
+    }
+}
+
+/// Bit of a child word that marks a leaf.
+const LEAF: u32 = 1 << 31;
+/// Three bits of a leaf hold its count − 1, the rest the position of its first primitive.
+const LEAF_COUNT_SHIFT: u32 = 28;
+const POSITION: u32 = (1 << LEAF_COUNT_SHIFT) - 1;
+/// Fills the order up to where the next leaf of a tree of blocks starts.
+pub const NO_PRIMITIVE: u32 = u32::MAX;
+/// A slot without child. Its box is inside out, so no ray gets there.
+const EMPTY_CHILD: u32 = u32::MAX;
+
+/// Eight boxes and where they lead: 224 bytes.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct Node {
+    /// Low x, high x, low y, high y, low z, high z of the eight children.
+    planes: [f32x8; 6],
+    /// An index of a node, or [`LEAF`] | count − 1 | first primitive.
+    children: [u32; 8],
+}
+
+impl Node {
+    const EMPTY: Node = {
+        let (lo, hi) = (f32x8::new([f32::INFINITY; 8]), f32x8::new([f32::NEG_INFINITY; 8]));
+        Node { planes: [lo, hi, lo, hi, lo, hi], children: [EMPTY_CHILD; 8] }
+    };
+
+    fn set(&mut self, slot: usize, lo: [f32; 3], hi: [f32; 3], child: u32) {
+        for axis in 0..3 {
+            self.planes[2 * axis].as_mut_array()[slot] = lo[axis];
+            self.planes[2 * axis + 1].as_mut_array()[slot] = hi[axis];
+        }
+        self.children[slot] = child;
+    }
+}
+
+/// The hierarchy. Built once, then read by any number of threads.
+#[derive(Clone, Debug)]
+pub struct Bvh {
+    nodes: Vec<Node>,
+    /// Leaf order to original index; the unbounded primitives come last.
+    order: Vec<u32>,
+    /// How many positions of `order` belong to the tree.
+    bounded: u32,
+    /// Tree coordinates are (world − `centre`) · `scale`; `scale` is a power of two.
+    centre: DVec3,
+    scale: f64,
+    /// Least and largest coordinates of the root, in tree coordinates.
+    root: [f64x4; 2],
+    bounds: Aabb,
+}
+
+/// What a visit makes of the search.
+enum Next {
+    Go,
+    Shorten(f64),
+    Stop,
+}
+
+/// A node or leaf still to be visited, and where the ray enters it.
+#[derive(Clone, Copy)]
+struct Entry {
+    near: f32,
+    child: u32,
+}
+
+/// Each node on the way down leaves at most seven siblings behind, the last one eight children.
+const STACK: usize = 7 * DEPTH + 8;
+
+impl Bvh {
+    /// A tree over `boxes`, one or two a leaf. Same boxes, same tree.
+    ///
+    /// # Panics
+    /// Over more than 2²⁸ boxes (13 GB of them).
+    #[must_use]
+    pub fn build(boxes: &[Aabb]) -> Bvh {
+        Bvh::build_leaves(boxes, LeafSize { block: 1, max: 2 })
+    }
+
+    /// A tree for primitives that are tested `block` at a time, as a SIMD kernel does; see
+    /// [`Bvh::closest_leaf`]. A leaf holds up to eight and starts at a multiple of `block`; the
+    /// positions that it leaves over hold [`NO_PRIMITIVE`] in [`Bvh::order`].
+    ///
+    /// # Panics
+    /// Over more than 2²⁸ / `block` boxes, or where `block` is not 1, 2, 4 or 8.
+    #[must_use]
+    pub fn build_blocks(boxes: &[Aabb], block: usize) -> Bvh {
+        assert!([1, 2, 4, 8].contains(&block), "blocks of 1, 2, 4 or 8 primitives");
+        Bvh::build_leaves(boxes, LeafSize { block, max: 8 })
+    }
+
+    fn build_leaves(boxes: &[Aabb], leaf: LeafSize) -> Bvh {
+        assert!(boxes.len() <= MAX_POSITIONS / leaf.block, "more primitives than one tree can address");
+        let finite = || boxes.iter().filter(|b| b.is_finite());
+        let all = finite().fold(Aabb::EMPTY, |a, b| a.union(b));
+        let bounds = boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b));
+
+        // Halve before adding: no overflow up to the largest f64.
+        let centre = if all.is_finite() { 0.5 * all.min + 0.5 * all.max } else { DVec3::ZERO };
+        let half_size = if all.is_finite() { (all.max - centre).max(centre - all.min).max_element() } else { 1.0 };
+        let exponent = (half_size.to_bits() >> 52 & 0x7ff) as i64 - 1023;
+        let scale = f64::from_bits(((1023 - exponent.clamp(-1022, 1022)) as u64) << 52);
+
+        let mut primitives = Vec::with_capacity(boxes.len());
+        let mut unbounded = Vec::new();
+        for (index, b) in boxes.iter().enumerate() {
+            let index = index as u32;
+            if b.is_finite() {
+                let lo = ((b.min - centre) * scale).to_array().map(plane_below);
+                let hi = ((b.max - centre) * scale).to_array().map(|x| -plane_below(-x));
+                primitives.push(Primitive { lo, hi, index });
+            } else {
+                unbounded.push(index);
+            }
+        }
+
+        let mut builder = Builder { primitives: &mut primitives, leaf, nodes: Vec::new(), order: Vec::new() };
+        builder.run();
+        let Builder { nodes, mut order, .. } = builder;
+        let bounded = order.len() as u32;
+        order.extend(unbounded);
+        let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for p in &primitives {
+            for a in 0..3 {
+                lo[a] = lo[a].min(p.lo[a]);
+                hi[a] = hi[a].max(p.hi[a]);
+            }
+        }
+        let root = [lo, hi].map(|c| f64x4::new([c[0].into(), c[1].into(), c[2].into(), 0.0]));
+        Bvh { nodes, order, bounded, centre, scale, root, bounds }
+    }
+
+    /// The original indices in leaf order. A caller who keeps primitives in this order reads
+    /// them in runs.
+    #[must_use]
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// The box around all boxes; [`Aabb::EMPTY`] where there are none.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Memory of the tree.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of::<Bvh>() + self.nodes.capacity() * size_of::<Node>() + self.order.capacity() * size_of::<u32>()
+    }
+
+    /// Shows `visit` every primitive whose box the ray meets within `t_max`, roughly front to
+    /// back, by its original index and with the distance that still counts. `visit` keeps its
+    /// own record of the hit and returns the new distance where it found a nearer one.
+    pub fn closest<F>(&self, ray: &Ray, t_max: f64, mut visit: F)
+    where
+        F: FnMut(u32, f64) -> Option<f64>,
+    {
+        self.closest_leaf(ray, t_max, |leaf, t_max| {
+            let mut nearest = None;
+            for &index in &self.order[leaf.start as usize..leaf.end as usize] {
+                nearest = visit(index, nearest.unwrap_or(t_max)).or(nearest);
+            }
+            nearest
+        });
+    }
+
+    /// Whether `visit` says yes to any primitive whose box the ray meets within `t_max`; it is
+    /// not asked again after that. It gets original indices.
+    pub fn any<F>(&self, ray: &Ray, t_max: f64, mut visit: F) -> bool
+    where
+        F: FnMut(u32) -> bool,
+    {
+        self.any_leaf(ray, t_max, |leaf| {
+            self.order[leaf.start as usize..leaf.end as usize].iter().any(|&index| visit(index))
+        })
+    }
+
+    /// [`Bvh::closest`] with whole leaves: `visit` gets a range of positions in [`Bvh::order`].
+    pub fn closest_leaf<F>(&self, ray: &Ray, t_max: f64, mut visit: F)
+    where
+        F: FnMut(Range<u32>, f64) -> Option<f64>,
+    {
+        self.walk::<true>(ray, t_max, |_| {}, |leaf, t_max| visit(leaf, t_max).map_or(Next::Go, Next::Shorten));
+    }
+
+    /// [`Bvh::any`] with whole leaves: `visit` gets a range of positions in [`Bvh::order`].
+    pub fn any_leaf<F>(&self, ray: &Ray, t_max: f64, mut visit: F) -> bool
+    where
+        F: FnMut(Range<u32>) -> bool,
+    {
+        self.walk::<false>(ray, t_max, |_| {}, |leaf, _| if visit(leaf) { Next::Stop } else { Next::Go })
+    }
+
+    /// [`Bvh::closest_leaf`] that calls `soon` with the first position of a leaf when it becomes
+    /// likely that the leaf is visited: time to fetch its primitives into the cache.
+    pub(in crate::scene) fn closest_block<F>(&self, ray: &Ray, t_max: f64, soon: impl Fn(u32), mut visit: F)
+    where
+        F: FnMut(Range<u32>, f64) -> Option<f64>,
+    {
+        self.walk::<true>(ray, t_max, soon, |leaf, t_max| visit(leaf, t_max).map_or(Next::Go, Next::Shorten));
+    }
+
+    /// [`Bvh::any_leaf`] with `soon` as in [`Bvh::closest_block`].
+    pub(in crate::scene) fn any_block<F>(&self, ray: &Ray, t_max: f64, soon: impl Fn(u32), mut visit: F) -> bool
+    where
+        F: FnMut(Range<u32>) -> bool,
+    {
+        self.walk::<false>(ray, t_max, soon, |leaf, _| if visit(leaf) { Next::Stop } else { Next::Go })
+    }
+
+    /// Visits the leaves, nearest first where `SORTED`. True if a visit said stop.
+    fn walk<const SORTED: bool>(
+        &self,
+        ray: &Ray,
+        mut t_max: f64,
+        soon: impl Fn(u32),
+        mut visit: impl FnMut(Range<u32>, f64) -> Next,
+    ) -> bool {
+        // A tree this small costs more than it saves.
+        const FEW: u32 = 2;
+        let all = self.order.len() as u32;
+        let outside = if self.bounded <= FEW { 0..all } else { self.bounded..all };
+        if !outside.is_empty() {
+            match visit(outside, t_max) {
+                Next::Go => {}
+                Next::Shorten(t) => t_max = t_max.min(t),
+                Next::Stop => return true,
+            }
+        }
+        if self.bounded <= FEW {
+            return false;
+        }
+        let Some(ray) = TreeRay::new(self, ray) else {
+            return false;
+        };
+        let mut limit = ray.limit(t_max);
+        if limit < 0.0 || limit.is_nan() {
+            return false;
+        }
+
+        let mut stack = [const { MaybeUninit::<Entry>::uninit() }; STACK];
+        let mut depth = 0;
+        let mut node = 0u32;
+        loop {
+            // Push the children that the ray meets, the nearest last, and have them fetched.
+            let current = &self.nodes[node as usize];
+            let (mut mask, near) = ray.meets(current, limit);
+            let near = near.as_array();
+            let bottom = depth;
+            while mask != 0 {
+                let slot = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                let entry = Entry { near: near[slot & 7], child: current.children[slot & 7] };
+                if entry.child & LEAF == 0 {
+                    prefetch(&self.nodes, entry.child as usize);
+                } else {
+                    soon(entry.child & POSITION);
+                }
+                let mut at = depth;
+                if SORTED {
+                    while at > bottom {
+                        // SAFETY: entries below `depth` have been written.
+                        let below = unsafe { stack[at - 1].assume_init() };
+                        if below.near >= entry.near {
+                            break;
+                        }
+                        stack[at].write(below);
+                        at -= 1;
+                    }
+                }
+                stack[at].write(entry);
+                depth += 1;
+            }
+            // Take the nearest: leaves are visited here, a node goes round the loop.
+            loop {
+                if depth == 0 {
+                    return false;
+                }
+                depth -= 1;
+                // SAFETY: entries below the old `depth` have been written.
+                let entry = unsafe { stack[depth].assume_init() };
+                if SORTED && entry.near > limit {
+                    continue;
+                }
+                if entry.child & LEAF == 0 {
+                    node = entry.child;
+                    break;
+                }
+                let first = entry.child & POSITION;
+                let count = (entry.child >> LEAF_COUNT_SHIFT & 7) + 1;
+                match visit(first..first + count, t_max) {
+                    Next::Go => {}
+                    Next::Shorten(t) => {
+                        t_max = t_max.min(t);
+                        limit = ray.limit(t_max);
+                    }
+                    Next::Stop => return true,
+                }
+            }
+        }
+    }
+}
+
+/// Asks for the cache lines of `items[index]`, which will be read soon.
+#[inline(always)]
+pub(in crate::scene) fn prefetch<T>(items: &[T], index: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let start = items.as_ptr().wrapping_add(index).cast::<i8>();
+        for line in (0..size_of::<T>()).step_by(64) {
+            // SAFETY: a prefetch of any address is allowed and changes nothing but the cache.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(line)) };
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (items, index);
+}
+
+/// The largest f32 that is not above `x`; away from zero by at least 2⁻¹⁰⁰, so that nothing
+/// becomes subnormal and slow.
+fn plane_below(x: f64) -> f32 {
+    const FLOOR: f32 = f32::from_bits((127 - 100) << 23);
+    let x = round_down(x);
+    if x.abs() < FLOOR { -FLOOR } else { x }
+}
+
+fn round_down(x: f64) -> f32 {
+    let nearest = x as f32;
+    if f64::from(nearest) > x { nearest.next_down() } else { nearest }
+}
+
+/// Half an ulp of f32 at 1.
+const U: f64 = 1.0 / (1u64 << 24) as f64;
+/// The least uncertainty of a ray's origin, in tree coordinates.
+const PAD: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// A ray in tree coordinates, ready for f32 planes; see the module for the bounds.
+struct TreeRay {
+    near_origin: [f32; 3],
+    far_origin: [f32; 3],
+    near_inverse: [f32; 3],
+    far_inverse: [f32; 3],
+    /// Index into [`Node::planes`].
+    near_plane: [usize; 3],
+    /// Distance from the origin to where the ray enters the tree, and world to tree.
+    skipped: f64,
+    scale: f64,
+}
+
+impl TreeRay {
+    /// None where the ray misses the root.
+    fn new(tree: &Bvh, ray: &Ray) -> Option<TreeRay> {
+        /// Cut of |1/d|: 2¹²⁰.
+        const STEEPEST: f64 = f64::from_bits((1023 + 120) << 52);
+        /// 4u of f64.
+        const SLACK_F64: f64 = 1.0 / (1u64 << 51) as f64;
+        /// Where the pad of a ray dwarfs the tree: such a ray meets every box.
+        const FAR_AWAY: f64 = 1e30;
+
+        let lanes = |v: DVec3| f64x4::new([v.x, v.y, v.z, 0.0]);
+        let splat = f64x4::splat;
+        let direction = lanes(ray.direction);
+        let origin = lanes((ray.origin - tree.centre) * tree.scale);
+        let pad = origin.abs().mul_add(splat(SLACK_F64), splat(PAD));
+        let inverse = (splat(1.0) / direction).fast_max(splat(-STEEPEST)).fast_min(splat(STEEPEST));
+        let backward = inverse.simd_lt(f64x4::ZERO);
+
+        // The root, in f64.
+        let (lo, hi) = (tree.root[0] - pad, tree.root[1] + pad);
+        let near = (backward.select(hi, lo) - origin) * (inverse * splat(1.0 - SLACK_F64));
+        let far = (backward.select(lo, hi) - origin) * (inverse * splat(1.0 + SLACK_F64));
+        let [n, f] = [near.to_array(), far.to_array()];
+        let skipped = n[0].max(n[1]).max(n[2]).max(0.0);
+        if skipped > f[0].min(f[1]).min(f[2]) {
+            return None;
+        }
+        let moved = direction.mul_add(splat(skipped), origin);
+        // A ray that is not made of numbers misses.
+        if !moved.to_array()[..3].iter().all(|x| x.is_finite()) {
+            return None;
+        }
+
+        // Both ends of the interval that holds the origin. 2u more than it needs, so that
+        // rounding to nearest stays outside.
+        let wide = (moved.abs() + pad).mul_add(splat(2.0 * U), pad);
+        let narrow = |v: f64x4| {
+            let v = v.to_array();
+            [v[0] as f32, v[1] as f32, v[2] as f32]
+        };
+        // Where the pad dwarfs the tree, the ray meets every box.
+        let lost = wide.simd_gt(splat(FAR_AWAY));
+        let above = lost.select(splat(FAR_AWAY), moved + wide);
+        let below = lost.select(splat(-FAR_AWAY), moved - wide);
+        let back = backward.to_bitmask() as usize;
+        Some(TreeRay {
+            near_origin: narrow(backward.select(below, above)),
+            far_origin: narrow(backward.select(above, below)),
+            near_inverse: narrow(inverse * splat(1.0 - 4.0 * U)),
+            far_inverse: narrow(inverse * splat(1.0 + 4.0 * U)),
+            near_plane: [back & 1, 2 + (back >> 1 & 1), 4 + (back >> 2 & 1)],
+            skipped,
+            scale: tree.scale,
+        })
+    }
+
+    /// `t_max` in tree distance from the entry, rounded up; negative where it is not reached.
+    ///
+    /// The product is exact and the difference rounds by 2⁻⁵³ of itself: one ulp of f32 and the
+    /// pad cover it, and the 2⁻⁵³ of `skipped` by which intersectors may round t.
+    fn limit(&self, t_max: f64) -> f32 {
+        let t = t_max.mul_add(self.scale, PAD - self.skipped * (1.0 - PAD));
+        (t + t.abs() * (2.0 * U)) as f32
+    }
+
+    /// Which children the ray meets no farther than `limit`, and where it enters them.
+    #[inline(always)]
+    fn meets(&self, node: &Node, limit: f32) -> (u32, f32x8) {
+        let splat = f32x8::splat;
+        let near =
+            |a: usize| (node.planes[self.near_plane[a]] - splat(self.near_origin[a])) * splat(self.near_inverse[a]);
+        let far =
+            |a: usize| (node.planes[self.near_plane[a] ^ 1] - splat(self.far_origin[a])) * splat(self.far_inverse[a]);
+        let enter = near(0).fast_max(near(1)).fast_max(near(2)).fast_max(f32x8::ZERO);
+        let leave = far(0).fast_min(far(1)).fast_min(far(2)).fast_min(f32x8::splat(limit));
+        (enter.simd_le(leave).to_bitmask(), enter)
+    }
+}
+
+#[cfg(test)]
+mod tests;

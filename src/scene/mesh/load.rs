@@ -1,0 +1,162 @@
+//! Mesh files by their extension.
+
+use super::{MeshSource, obj, ply};
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// Reads a Wavefront OBJ (`.obj`) or a PLY (`.ply`; text or binary of either byte order).
+/// Polygons become fans of triangles about their first corner.
+///
+/// # Errors
+/// [`Error::Input`] with what is wrong: missing or truncated file, unknown extension, no
+/// triangles, index out of range, number that is not finite.
+pub fn load(path: &Path) -> Result<MeshSource> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let read = match extension.as_str() {
+        "obj" => obj::read,
+        "ply" => ply::read,
+        other => {
+            return Err(Error::input(path, format!("expected a mesh (.obj or .ply), found extension \"{other}\"")));
+        }
+    };
+    let bytes = std::fs::read(path).map_err(|e| Error::input(path, format!("cannot read: {e}")))?;
+    let source = read(&bytes).map_err(|message| Error::input(path, message))?;
+    source.check().map_err(|message| Error::input(path, message))?;
+    Ok(source)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DVec2, DVec3};
+
+    fn read(name: &str, bytes: &[u8]) -> Result<MeshSource> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        load(&path)
+    }
+
+    /// The message, without the path that stands before it.
+    fn fault(name: &str, bytes: &[u8]) -> String {
+        match read(name, bytes) {
+            Err(Error::Input { message, .. }) => message,
+            other => panic!("expected an input error, found {other:?}"),
+        }
+    }
+
+    const QUAD_OBJ: &str = "# a quad and a triangle\nmtllib none.mtl\nv 0 0 0\nv 1 0 0 0.5 0.5 0.5\nv 1 1 0\nv 0 1e-3 0.1\n\
+        vt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 2\no thing\nusemtl any\nf 1/1/1 2/2/1 \\\n 3/3/1 4/1/1\ns off\nf -4//1 -3//1 -2//1\n";
+
+    /// The corners 1/1, 2/2, 3/3, 4/1 and, without texture coordinates, 1, 2, 3: seven vertices.
+    #[test]
+    fn obj_quads_relative_indices_and_separate_lists_are_read() {
+        let mesh = read("a.OBJ", QUAD_OBJ.as_bytes()).unwrap();
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [4, 5, 6]]);
+        assert_eq!(mesh.positions[3], DVec3::new(0.0, 1e-3, 0.1));
+        assert_eq!(mesh.positions[5], DVec3::X);
+        assert_eq!(mesh.uvs[..4], [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::ZERO]);
+        assert_eq!(mesh.normals, [2.0 * DVec3::Z; 7]);
+    }
+
+    #[test]
+    fn obj_faults_name_the_line() {
+        let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+        for (tail, expected) in [
+            ("f 1 2 4\n", "line 4: face names vertex 4, but the file has 3"),
+            ("f 1 2 0\n", "line 4: expected a corner like 1, 1/2, 1//3 or 1/2/3, found \"0\""),
+            ("f 1 2 -4\n", "line 4: expected a corner like 1, 1/2, 1//3 or 1/2/3, found \"-4\""),
+            ("f 1/1 2/1 3/1\n", "line 4: face names texture coordinate 1, but the file has 0"),
+            ("f 1 2\n", "line 4: expected a face of 3 or more corners, found 2"),
+            ("f 1 2 x\n", "line 4: expected a corner like 1, 1/2, 1//3 or 1/2/3, found \"x\""),
+            (
+                "f 1 2 99999999999999999999\n",
+                "line 4: expected a corner like 1, 1/2, 1//3 or 1/2/3, found \"99999999999999999999\"",
+            ),
+            ("v nan 0 0\n", "line 4: expected a finite number, found \"nan\""),
+            ("v 1 2\n", "line 4: expected 3 numbers, found 2"),
+            ("", "the mesh has no triangles"),
+        ] {
+            assert_eq!(fault("a.obj", format!("{vertices}{tail}").as_bytes()), expected);
+        }
+    }
+
+    const HEADER: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty double s\n\
+        property uchar t\nelement edge 1\nproperty int a\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+
+    /// The same quad in the three encodings.
+    fn quad(format: &str) -> Vec<u8> {
+        let mut out = format!("ply\nformat {format} 1.0\ncomment a quad\n{HEADER}").into_bytes();
+        if format == "ascii" {
+            out.extend(b"0 0 0 0.1 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0.5 0 1\n7\n4 0 1 2 3\n");
+            return out;
+        }
+        let big = format == "binary_big_endian";
+        let mut put = |bytes: &[u8]| if big { out.extend(bytes) } else { out.extend(bytes.iter().rev()) };
+        for (p, s, t) in [
+            ([0f32, 0.0, 0.0], 0.1, 0u8),
+            ([1.0, 0.0, 0.0], 1.0, 0),
+            ([1.0, 1.0, 0.0], 1.0, 1),
+            ([0.0, 1.0, 0.5], 0.0, 1),
+        ] {
+            p.iter().for_each(|x| put(&x.to_be_bytes()));
+            put(&f64::to_be_bytes(s));
+            put(&[t]);
+        }
+        put(&7i32.to_be_bytes());
+        put(&[4]);
+        (0..4i32).for_each(|i| put(&i.to_be_bytes()));
+        out
+    }
+
+    #[test]
+    fn ply_is_read_in_all_three_encodings() {
+        let expected = MeshSource {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::new(0.0, 1.0, 0.5)],
+            normals: Vec::new(),
+            uvs: vec![DVec2::new(0.1, 0.0), DVec2::X, DVec2::ONE, DVec2::Y],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+            assert_eq!(read("a.ply", &quad(format)).unwrap(), expected, "{format}");
+        }
+    }
+
+    #[test]
+    fn every_truncation_of_a_ply_is_an_error() {
+        for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+            let whole = quad(format);
+            // The last byte of the text is a line break, which may be absent.
+            for len in 0..whole.len() - 1 {
+                let message = fault("a.ply", &whole[..len]);
+                assert!(!message.contains('\n'), "{message}");
+            }
+        }
+    }
+
+    #[test]
+    fn ply_faults_are_told() {
+        let text = String::from_utf8(quad("ascii")).unwrap();
+        for (from, to, expected) in [
+            ("4 0 1 2 3", "4 0 1 2 9", "triangle 1 names vertex 9, but there are only 4 (counted from 0)"),
+            ("4 0 1 2 3", "4 0 1 2 -1", "names vertex 4294967295"),
+            ("4 0 1 2 3", "2 0 1", "face 0: expected 3 or more vertices, found 2"),
+            ("1 1 0 1 1", "1 1e99 0 1 1", "vertex 2 is at [1, inf, 0]: expected finite numbers"),
+            ("float x", "float q", "expected vertices with x, y and z"),
+            ("edge 1", "edge 9999999999999", "truncated: expected 9999999999999 of element edge"),
+            ("ply\n", "plx\n", "not a valid PLY file"),
+            ("face 1", "face 0", "the mesh has no triangles"),
+        ] {
+            let message = fault("a.ply", text.replacen(from, to, 1).as_bytes());
+            assert!(message.contains(expected), "expected \"{expected}\", found \"{message}\"");
+        }
+    }
+
+    #[test]
+    fn missing_files_and_other_formats_are_told() {
+        let missing = load(Path::new("no/such.obj")).unwrap_err();
+        assert_eq!(missing.exit_code(), 3);
+        assert!(missing.to_string().starts_with("no/such.obj: cannot read: "), "{missing}");
+        assert_eq!(fault("a.stl", b""), "expected a mesh (.obj or .ply), found extension \"stl\"");
+    }
+}

@@ -1,0 +1,314 @@
+//! Triangle meshes.
+//!
+//! A [`MeshSource`] is what a file says, in f64 and object space. [`Mesh::new`] places it in the
+//! world: each vertex is transformed in f64 and rounded once, to f32 relative to the mesh's
+//! origin, so triangles that share a vertex share it bit for bit and the mesh stays watertight.
+//!
+//! The origin is the world's, or, for a mesh far from there, a multiple of a power of two near
+//! the mesh. Coordinates that were f32 in the file and are not transformed are therefore kept
+//! exactly, and neighbouring meshes with equal vertices in the file still fit together.
+//!
+//! Triangles are wound counterclockwise seen from outside. A transform that mirrors reverses the
+//! winding, so that outside stays outside.
+
+mod load;
+mod obj;
+mod ply;
+mod tree;
+mod triangle;
+
+pub use load::load;
+pub use tree::{MAX_TRIANGLES, MeshHit, MeshTree};
+pub use triangle::{TriangleHit, TriangleRay};
+
+use crate::math::{Frame, warp};
+use crate::scene::bvh::Aabb;
+use crate::scene::shape::SurfacePoint;
+use glam::{DAffine3, DMat3, DVec2, DVec3};
+use std::collections::HashMap;
+use triangle::area_vector;
+
+/// Where shading normals come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NormalMode {
+    /// The triangle's own normal: faceted.
+    Face,
+    /// The mean of the adjacent triangles' normals, weighted by their angle at the vertex.
+    /// Vertices at the same place count as one, so seams of a texture do not show.
+    Smooth,
+    /// The file's; [`NormalMode::Smooth`] where it has none.
+    File,
+}
+
+/// What a mesh file says: f64, object space, triangles only.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeshSource {
+    /// Vertices.
+    pub positions: Vec<DVec3>,
+    /// One a vertex, or none at all. A zero vector stands for a vertex without.
+    pub normals: Vec<DVec3>,
+    /// One a vertex, or none at all.
+    pub uvs: Vec<DVec2>,
+    /// Indices of vertices, counterclockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl MeshSource {
+    /// What is wrong, if anything: no triangles, an index out of range, a number that is not
+    /// finite, or lists of different lengths. [`load`] has checked already.
+    ///
+    /// # Errors
+    /// The first fault in words.
+    pub fn check(&self) -> Result<(), String> {
+        let n = self.positions.len();
+        if self.triangles.is_empty() {
+            return Err("the mesh has no triangles".into());
+        }
+        if self.triangles.len() > MAX_TRIANGLES {
+            return Err(format!("expected at most {MAX_TRIANGLES} triangles, found {}", self.triangles.len()));
+        }
+        if let Some((i, p)) = self.positions.iter().enumerate().find(|(_, p)| !p.is_finite()) {
+            return Err(format!("vertex {i} is at {p}: expected finite numbers"));
+        }
+        for (what, len) in [("normals", self.normals.len()), ("texture coordinates", self.uvs.len())] {
+            if len != 0 && len != n {
+                return Err(format!("expected {n} {what}, one a vertex, or none; found {len}"));
+            }
+        }
+        if let Some((i, v)) = self.normals.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+            return Err(format!("the normal of vertex {i} is {v}: expected finite numbers"));
+        }
+        if let Some((i, v)) = self.uvs.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+            return Err(format!("the texture coordinates of vertex {i} are {v}: expected finite numbers"));
+        }
+        for (i, t) in self.triangles.iter().enumerate() {
+            if let Some(v) = t.iter().find(|&&v| v as usize >= n) {
+                return Err(format!("triangle {i} names vertex {v}, but there are only {n} (counted from 0)"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A mesh in the world.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// In world space; all positions are relative to it.
+    pub origin: DVec3,
+    /// Vertices.
+    pub positions: Vec<[f32; 3]>,
+    /// Shading normals, one a vertex, of unit length or zero (the triangle's own normal stands
+    /// in); empty where the mesh is faceted.
+    pub normals: Vec<[f32; 3]>,
+    /// Texture coordinates, one a vertex, or empty.
+    pub uvs: Vec<[f32; 2]>,
+    /// Indices of vertices, counterclockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Triangles without area. They are kept, so that indices are the file's, but no ray hits
+    /// and no sampler chooses them.
+    pub flat_triangles: usize,
+}
+
+impl Mesh {
+    /// Places `source` in the world.
+    ///
+    /// # Errors
+    /// What [`MeshSource::check`] finds, or that the transform takes a vertex out of the range
+    /// of f32.
+    pub fn new(source: &MeshSource, world_from_object: &DAffine3, mode: NormalMode) -> Result<Mesh, String> {
+        source.check()?;
+        let world: Vec<DVec3> = source.positions.iter().map(|&p| world_from_object.transform_point3(p)).collect();
+        let origin = choose_origin(&Aabb::from_points(world.iter().copied()));
+        let positions: Vec<[f32; 3]> = world.iter().map(|&p| (p - origin).as_vec3().to_array()).collect();
+        if let Some(i) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            return Err(format!("vertex {i} lies at {} in the world, outside the range of f32", world[i]));
+        }
+
+        let linear = world_from_object.matrix3;
+        let mirrored = linear.determinant() < 0.0;
+        let triangles: Vec<[u32; 3]> =
+            source.triangles.iter().map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] }).collect();
+        let uvs = source.uvs.iter().map(|uv| uv.as_vec2().to_array()).collect();
+        let mut mesh = Mesh { origin, positions, normals: Vec::new(), uvs, triangles, flat_triangles: 0 };
+        mesh.flat_triangles = (0..mesh.triangles.len()).filter(|&i| mesh.area(i as u32) == 0.0).count();
+        mesh.normals = match mode {
+            NormalMode::Face => Vec::new(),
+            NormalMode::File if !source.normals.is_empty() => {
+                let to_world = normal_transform(&linear);
+                source.normals.iter().map(|&n| unit_or_zero(to_world * n).as_vec3().to_array()).collect()
+            }
+            NormalMode::File | NormalMode::Smooth => smooth_normals(&mesh),
+        };
+        Ok(mesh)
+    }
+
+    /// The corners of triangle `i`, relative to [`Mesh::origin`].
+    #[must_use]
+    pub fn vertices(&self, i: u32) -> [DVec3; 3] {
+        self.triangles[i as usize].map(|v| DVec3::from(self.positions[v as usize].map(f64::from)))
+    }
+
+    /// The box of triangle `i` in world space.
+    #[must_use]
+    pub fn triangle_bounds(&self, i: u32) -> Aabb {
+        Aabb::from_points(self.vertices(i).map(|v| v + self.origin))
+    }
+
+    /// The box of the mesh in world space.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        Aabb::from_points(self.positions.iter().map(|p| DVec3::from(p.map(f64::from)) + self.origin))
+    }
+
+    /// The area of triangle `i`, m². Zero exactly for triangles that are never hit.
+    #[must_use]
+    pub fn area(&self, i: u32) -> f64 {
+        0.5 * area_vector(self.vertices(i)).length()
+    }
+
+    /// The surface of triangle `i` at barycentric coordinates `b1` (of its second corner) and
+    /// `b2` (of its third). The triangle must have an area.
+    #[must_use]
+    pub fn surface(&self, i: u32, b1: f64, b2: f64) -> SurfacePoint {
+        let [a, b, c] = self.vertices(i);
+        let (e1, e2) = (b - a, c - a);
+        let b0 = 1.0 - b1 - b2;
+        let point = a + e1 * b1 + e2 * b2 + self.origin;
+        let scale = a.abs().max(b.abs()).max(c.abs()).max(self.origin.abs()).max_element();
+        let normal = area_vector([a, b, c]).normalize();
+
+        let corners = self.triangles[i as usize].map(|v| v as usize);
+        let shading_normal = if self.normals.is_empty() {
+            normal
+        } else {
+            let [n0, n1, n2] = corners.map(|v| DVec3::from(self.normals[v].map(f64::from)));
+            (n0 * b0 + n1 * b1 + n2 * b2).try_normalize().unwrap_or(normal)
+        };
+
+        let (uv, tangent) = if self.uvs.is_empty() {
+            (DVec2::new(b1, b2), e1)
+        } else {
+            let [t0, t1, t2] = corners.map(|v| DVec2::from(self.uvs[v].map(f64::from)));
+            let (d1, d2) = (t1 - t0, t2 - t0);
+            // e1 = d1.x ∂p/∂u + d1.y ∂p/∂v and likewise e2, solved for ∂p/∂u.
+            let tangent = (e1 * d2.y - e2 * d1.y) / d1.perp_dot(d2);
+            let usable = tangent.is_finite() && tangent != DVec3::ZERO;
+            (t0 * b0 + t1 * b1 + t2 * b2, if usable { tangent } else { Frame::from_normal(normal).s })
+        };
+        SurfacePoint { point, scale, normal, shading_normal, uv, tangent }
+    }
+
+    /// A point uniform over triangle `i`, for `u` in the unit square; its density is
+    /// 1 / [`Mesh::area`].
+    #[must_use]
+    pub fn sample_area(&self, i: u32, u: DVec2) -> SurfacePoint {
+        let b = warp::triangle(u);
+        self.surface(i, b.x, b.y)
+    }
+
+    /// Memory of the lists.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of::<Mesh>() + 12 * (self.positions.len() + self.normals.len() + self.triangles.len()) + 8 * self.uvs.len()
+    }
+}
+
+/// Chooses triangles of a mesh in proportion to their area.
+#[derive(Clone, Debug)]
+pub struct AreaTable {
+    /// Sum of the areas of all triangles up to and with each, m².
+    cumulative: Vec<f64>,
+}
+
+impl AreaTable {
+    /// The table of all of `mesh`.
+    #[must_use]
+    pub fn new(mesh: &Mesh) -> AreaTable {
+        let mut sum = 0.0;
+        let add = |i| {
+            sum += mesh.area(i as u32);
+            sum
+        };
+        AreaTable { cumulative: (0..mesh.triangles.len()).map(add).collect() }
+    }
+
+    /// The area of the mesh, m². The density of [`AreaTable::sample`] followed by
+    /// [`Mesh::sample_area`] is one over it.
+    #[must_use]
+    pub fn total(&self) -> f64 {
+        self.cumulative.last().copied().unwrap_or(0.0)
+    }
+
+    /// A triangle, for `u` in [0, 1): never one without area; and where in its share of [0, 1) `u`
+    /// lies, to be used again. None where the mesh has no area.
+    #[must_use]
+    pub fn sample(&self, u: f64) -> Option<(u32, f64)> {
+        let total = self.total();
+        // u · total can round up to the total.
+        let x = (u * total).min(total.next_down());
+        if total <= 0.0 {
+            return None;
+        }
+        let i = self.cumulative.partition_point(|&c| c <= x);
+        let low = if i == 0 { 0.0 } else { self.cumulative[i - 1] };
+        Some((i as u32, ((x - low) / (self.cumulative[i] - low)).min(1.0f64.next_down())))
+    }
+}
+
+/// Zero near the world's origin; else a point of a grid no finer than the mesh, near its centre.
+fn choose_origin(bounds: &Aabb) -> DVec3 {
+    let centre = 0.5 * bounds.min + 0.5 * bounds.max;
+    let size = (bounds.max - bounds.min).max_element();
+    // From here on the distance costs f32 more than three bits.
+    if centre.abs().max_element() <= 4.0 * size || !centre.is_finite() {
+        return DVec3::ZERO;
+    }
+    // The power of two that is not below the size: round the mantissa up to the next exponent.
+    const MANTISSA: u64 = (1 << 52) - 1;
+    let cell = f64::from_bits((size.max(f64::MIN_POSITIVE).to_bits() + MANTISSA) & !MANTISSA);
+    let snapped = (centre / cell).round() * cell;
+    if snapped.is_finite() { snapped } else { DVec3::ZERO }
+}
+
+/// The inverse transpose of `linear` times |its determinant|: the cofactor matrix, with the sign
+/// that keeps outward normals outward. It exists for singular transforms too.
+fn normal_transform(linear: &DMat3) -> DMat3 {
+    let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
+    let cofactor = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+    if linear.determinant() < 0.0 { cofactor * -1.0 } else { cofactor }
+}
+
+/// Scales first, as squares of small or large vectors leave the range of f64.
+fn unit_or_zero(v: DVec3) -> DVec3 {
+    let largest = v.abs().max_element();
+    if largest > 0.0 && largest.is_finite() { (v / largest).normalize() } else { DVec3::ZERO }
+}
+
+/// Angle-weighted vertex normals: Thürmer and Wüthrich 1998, "Computing Vertex Normals from
+/// Polygonal Facets".
+fn smooth_normals(mesh: &Mesh) -> Vec<[f32; 3]> {
+    // Vertices at the same place, −0 and 0 alike, share a sum.
+    let mut place_of = HashMap::with_capacity(mesh.positions.len());
+    let places: Vec<usize> = mesh
+        .positions
+        .iter()
+        .map(|p| {
+            let next = place_of.len();
+            *place_of.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(next)
+        })
+        .collect();
+    let mut sums = vec![DVec3::ZERO; place_of.len()];
+    for (i, corners) in mesh.triangles.iter().enumerate() {
+        let v = mesh.vertices(i as u32);
+        let normal = unit_or_zero(area_vector(v));
+        for k in 0..3 {
+            let (to_next, to_last) = (unit_or_zero(v[(k + 1) % 3] - v[k]), unit_or_zero(v[(k + 2) % 3] - v[k]));
+            let angle = libm::atan2(to_next.cross(to_last).length(), to_next.dot(to_last));
+            sums[places[corners[k] as usize]] += normal * angle;
+        }
+    }
+    places.iter().map(|&place| unit_or_zero(sums[place]).as_vec3().to_array()).collect()
+}
+
+#[cfg(test)]
+mod tests;
