@@ -1,5 +1,294 @@
 //! What rays meet: compiled, immutable, `Send + Sync`.
+//!
+//! Objects are what a person wrote: a sphere, a mesh. A ray that leaves an object carries its index
+//! and that of the face or triangle, so that nothing is met again by rounding; see
+//! [`crate::math::Departure`].
 
 pub mod bvh;
+pub mod camera;
+pub mod census;
+pub mod compile;
+pub mod environment;
+pub mod light;
+pub mod load;
+pub mod material;
 pub mod mesh;
 pub mod shape;
+pub mod texture;
+
+use crate::math::{Departure, Ray};
+use crate::optics::medium::{MediumLanes, Phase};
+use crate::spectrum::{Lanes, Spectrum, WavelengthDistribution};
+use bvh::Bvh;
+use camera::Camera;
+use glam::DVec3;
+use light::Light;
+use material::Material;
+use mesh::{AreaTable, Mesh, MeshTree};
+use shape::Detail;
+use shape::Shape;
+pub use shape::SurfacePoint;
+use std::path::PathBuf;
+
+/// A scene, ready to be rendered.
+#[derive(Debug)]
+pub struct Scene {
+    /// Its name.
+    pub name: String,
+    /// The camera.
+    pub camera: Camera,
+    /// What was written.
+    pub objects: Vec<Object>,
+    /// Over all objects.
+    pub bvh: Bvh,
+    /// Materials, by index.
+    pub materials: Vec<Material>,
+    /// Media, by index.
+    pub media: Vec<Medium>,
+    /// What the camera is in.
+    pub camera_medium: Option<u32>,
+    /// Lights.
+    pub lights: Vec<Light>,
+    /// How lights are chosen: running sums of probabilities.
+    pub light_cdf: Vec<f64>,
+    /// Indices of lights from infinity.
+    pub backgrounds: Vec<u32>,
+    /// Depth fog of the picture.
+    pub fog: Option<DepthFog>,
+    /// From which wavelengths are drawn.
+    pub wavelengths: WavelengthDistribution,
+    /// Centre of the bounded part of the scene.
+    pub center: DVec3,
+    /// Its radius, metres.
+    pub radius: f64,
+    /// True where some object is only the boundary of a medium.
+    pub has_boundaries: bool,
+    /// Files that were read.
+    pub files: Vec<PathBuf>,
+}
+
+/// What a person wrote.
+#[derive(Debug)]
+pub struct Object {
+    /// Its name, given or made from kind and number.
+    pub name: String,
+    /// Its form.
+    pub geometry: Geometry,
+    /// Its material.
+    pub material: u32,
+    /// The light that it is, if it shines.
+    pub light: Option<u32>,
+    /// Whether anything on it varies over the surface.
+    pub detail: Detail,
+    /// Medium on the side away from the normal.
+    pub inside: Option<u32>,
+    /// Medium on the side of the normal.
+    pub outside: Option<u32>,
+}
+
+/// The form of an object. Shapes lie in place: a pointer would cost each ray a cache line.
+#[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "see above")]
+pub enum Geometry {
+    /// An analytic shape.
+    Shape(Shape),
+    /// Triangles.
+    Mesh(Box<TriangleMesh>),
+}
+
+/// A mesh with what finds its triangles.
+#[derive(Debug)]
+pub struct TriangleMesh {
+    /// The triangles.
+    pub mesh: Mesh,
+    /// For rays.
+    pub tree: MeshTree,
+    /// For light.
+    pub areas: AreaTable,
+}
+
+/// A medium at all wavelengths.
+#[derive(Clone, Debug)]
+pub struct Medium {
+    /// σ_a, 1/m.
+    pub absorption: Spectrum,
+    /// σ_s, 1/m.
+    pub scattering: Spectrum,
+    /// Which way it scatters.
+    pub phase: Phase,
+}
+
+impl Medium {
+    /// The medium at the wavelengths `nm`.
+    #[must_use]
+    pub fn lanes(&self, nm: Lanes) -> MediumLanes {
+        let scattering = self.scattering.eval(nm);
+        MediumLanes { extinction: self.absorption.eval(nm) + scattering, scattering, phase: self.phase }
+    }
+}
+
+/// Fog that thickens with the distance from the picture plane: what a compositor does with a
+/// depth channel, not a simulation of a medium. The first surface a camera ray meets is faded.
+#[derive(Clone, Debug)]
+pub struct DepthFog {
+    /// Radiance of the fog.
+    pub colour: Spectrum,
+    /// How much of it.
+    pub falloff: FogFalloff,
+}
+
+/// How depth fog grows with depth.
+#[derive(Clone, Copy, Debug)]
+pub enum FogFalloff {
+    /// (z − start) / (end − start), clamped to [0, 1].
+    Linear {
+        /// Depth where it begins, metres.
+        start: f64,
+        /// Depth where it hides everything, metres.
+        end: f64,
+    },
+    /// 1 − exp(−density z).
+    Exponential {
+        /// 1/m.
+        density: f64,
+    },
+    /// 1 − exp(−(density z)²).
+    ExponentialSquared {
+        /// 1/m.
+        density: f64,
+    },
+}
+
+impl FogFalloff {
+    /// The share of fog at depth `z` metres, in [0, 1]; one at infinity.
+    #[must_use]
+    pub fn amount(&self, z: f64) -> f64 {
+        match *self {
+            FogFalloff::Linear { start, end } => ((z - start) / (end - start)).clamp(0.0, 1.0),
+            FogFalloff::Exponential { density } => -libm::expm1(-density * z.max(0.0)),
+            FogFalloff::ExponentialSquared { density } => -libm::expm1(-(density * z.max(0.0)).powi(2)),
+        }
+    }
+}
+
+/// Where a ray meets an object.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Distance along the ray, metres.
+    pub t: f64,
+    /// The object.
+    pub object: u32,
+    /// Its face or triangle.
+    pub part: u32,
+    /// For triangles the barycentric coordinates of the second and third vertex.
+    pub barycentric: [f64; 2],
+}
+
+impl Hit {
+    /// True where the hit is on the face or triangle `target`.
+    #[must_use]
+    pub fn is_on(&self, target: Option<Departure>) -> bool {
+        target.is_some_and(|t| t.object == self.object && t.part == self.part)
+    }
+}
+
+impl Scene {
+    /// Where `ray` meets `object` before `t_max`.
+    #[inline]
+    fn meet(&self, ray: &Ray, object: u32, t_max: f64) -> Option<Hit> {
+        let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
+        match &self.objects[object as usize].geometry {
+            Geometry::Shape(shape) => shape.intersect(ray, t_max, departing.map(|face| face as u8)).map(|h| Hit {
+                t: h.t,
+                object,
+                part: u32::from(h.face),
+                barycentric: [0.0; 2],
+            }),
+            Geometry::Mesh(mesh) => mesh.tree.closest(ray, t_max, departing).map(|h| Hit {
+                t: h.hit.t,
+                object,
+                part: h.triangle,
+                barycentric: [h.hit.b1, h.hit.b2],
+            }),
+        }
+    }
+
+    /// The nearest thing that `ray` meets closer than `t_max`.
+    #[must_use]
+    pub fn closest(&self, ray: &Ray, t_max: f64) -> Option<Hit> {
+        let mut best: Option<Hit> = None;
+        self.bvh.closest(ray, t_max, |object, t_max| {
+            let hit = self.meet(ray, object, t_max)?;
+            best = Some(hit);
+            Some(hit.t)
+        });
+        best
+    }
+
+    /// True where anything stands between the ray's origin and `distance`. `target` is the face or
+    /// triangle that lies at the far end, facing the ray. Every shape is convex, so it cannot stand in
+    /// its own way, and skipping it needs no tolerance.
+    #[must_use]
+    pub fn occluded(&self, ray: &Ray, distance: f64, target: Option<Departure>) -> bool {
+        self.bvh.any(ray, distance, |object| {
+            let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
+            let target = target.filter(|t| t.object == object).map(|t| t.part);
+            match &self.objects[object as usize].geometry {
+                Geometry::Shape(shape) => {
+                    target.is_none() && shape.intersect(ray, distance, departing.map(|face| face as u8)).is_some()
+                }
+                Geometry::Mesh(mesh) => mesh.tree.any(ray, distance, [departing, target]),
+            }
+        })
+    }
+
+    /// The surface at a hit.
+    #[must_use]
+    pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let object = &self.objects[hit.object as usize];
+        match &object.geometry {
+            Geometry::Shape(shape) => shape.surface_with(ray.at(hit.t), hit.part as u8, object.detail),
+            Geometry::Mesh(mesh) => mesh.mesh.surface(hit.part, hit.barycentric[0], hit.barycentric[1]),
+        }
+    }
+
+    /// The ray that leaves a surface in `direction`.
+    #[must_use]
+    pub fn leave(&self, surface: &SurfacePoint, hit: &Hit, direction: DVec3) -> Ray {
+        let departure = Departure { object: hit.object, part: hit.part };
+        Ray::leaving(surface.point, surface.scale, surface.normal, direction, departure)
+    }
+
+    /// A light chosen by `u` in [0, 1) and its probability.
+    #[must_use]
+    pub fn choose_light(&self, u: f64) -> Option<(usize, f64)> {
+        let i = self.light_cdf.partition_point(|&c| c <= u);
+        (i < self.lights.len()).then(|| (i, self.light_probability(i)))
+    }
+
+    /// The probability of [`Scene::choose_light`] for light `i`.
+    #[must_use]
+    pub fn light_probability(&self, i: usize) -> f64 {
+        self.light_cdf[i] - if i == 0 { 0.0 } else { self.light_cdf[i - 1] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The formula of depth fog at three distances, start and end exact, and far beyond.
+    #[test]
+    fn fog_is_the_closed_form_at_every_depth() {
+        let linear = FogFalloff::Linear { start: 2.0, end: 10.0 };
+        assert_eq!([0.0, 2.0, 6.0, 10.0, 1e30].map(|z| linear.amount(z)), [0.0, 0.0, 0.5, 1.0, 1.0]);
+        let exponential = FogFalloff::Exponential { density: 0.1 };
+        assert!((exponential.amount(1e-9) - 1e-10).abs() < 1e-19);
+        assert!((exponential.amount(10.0) - (1.0 - (-1f64).exp())).abs() < 1e-15);
+        let squared = FogFalloff::ExponentialSquared { density: 0.1 };
+        assert!((squared.amount(20.0) - (1.0 - (-4f64).exp())).abs() < 1e-15);
+        for f in [linear, exponential, squared] {
+            assert_eq!(f.amount(f64::INFINITY), 1.0);
+        }
+    }
+}

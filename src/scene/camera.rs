@@ -1,0 +1,215 @@
+//! Cameras. Camera space: +x right on the picture, +y up, +z the way it looks.
+
+use crate::math::{Ray, warp};
+use glam::{DAffine3, DMat4, DVec2, DVec3, DVec4};
+
+/// A camera.
+#[derive(Clone, Debug)]
+pub struct Camera {
+    /// Camera space to world; a rotation and a translation. A picture is not mirrored: world x to
+    /// the right of a viewer at +z looking along −z.
+    pub world_from_camera: DAffine3,
+    /// How directions come about.
+    pub projection: Projection,
+    /// The full picture, in pixels.
+    pub resolution: [u32; 2],
+    /// A lens of this radius focused at this distance; `None` for a pinhole.
+    pub lens: Option<Lens>,
+}
+
+/// A thin lens.
+#[derive(Clone, Copy, Debug)]
+pub struct Lens {
+    /// Radius in metres.
+    pub radius: f64,
+    /// Distance of the plane of focus along the axis, metres.
+    pub focus_distance: f64,
+}
+
+/// How a point on the picture becomes a direction.
+#[derive(Clone, Copy, Debug)]
+pub enum Projection {
+    /// From one point; half the width of the picture at distance one.
+    Perspective {
+        /// tan of half the horizontal field of view.
+        half_width: f64,
+    },
+    /// Parallel; half the width of the picture in metres.
+    Orthographic {
+        /// Metres.
+        half_width: f64,
+    },
+}
+
+/// Which extent of the picture an angle of view spans.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FovAxis {
+    /// The width.
+    #[default]
+    X,
+    /// The height.
+    Y,
+    /// The smaller of both.
+    Smaller,
+    /// The larger of both.
+    Larger,
+    /// The diagonal.
+    Diagonal,
+}
+
+impl Projection {
+    /// A perspective of `fov` radians along `axis` for a picture of `resolution`.
+    #[must_use]
+    pub fn perspective(fov: f64, axis: FovAxis, resolution: [u32; 2]) -> Projection {
+        let (w, h) = (f64::from(resolution[0]), f64::from(resolution[1]));
+        let extent = match axis {
+            FovAxis::X => w,
+            FovAxis::Y => h,
+            FovAxis::Smaller => w.min(h),
+            FovAxis::Larger => w.max(h),
+            FovAxis::Diagonal => (w * w + h * h).sqrt(),
+        };
+        Projection::Perspective { half_width: libm::tan(0.5 * fov) * w / extent }
+    }
+}
+
+impl Camera {
+    /// Where the camera stands and looks; `None` where `target` is `origin` or `up` is along the view.
+    #[must_use]
+    pub fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> Option<DAffine3> {
+        let z = (target - origin).try_normalize()?;
+        let x = z.cross(up).try_normalize()?;
+        let y = x.cross(z);
+        // Three columns of a rotation whose x points right: (x, y, z) is left-handed.
+        Some(DAffine3::from_cols(x, y, z, origin))
+    }
+
+    /// The ray through `pixel` (continuous; (0, 0) is the corner of the top left one) and the point
+    /// `lens` of the unit square.
+    #[must_use]
+    pub fn ray(&self, pixel: DVec2, lens: impl FnOnce() -> DVec2) -> Ray {
+        let (w, h) = (f64::from(self.resolution[0]), f64::from(self.resolution[1]));
+        // −1…1 across the width, the same scale down the height.
+        let plane = DVec2::new(2.0 * pixel.x - w, h - 2.0 * pixel.y) / w;
+        let (mut origin, mut direction) = match self.projection {
+            Projection::Perspective { half_width } => {
+                (DVec3::ZERO, DVec3::new(plane.x * half_width, plane.y * half_width, 1.0))
+            }
+            Projection::Orthographic { half_width } => ((plane * half_width).extend(0.0), DVec3::Z),
+        };
+        if let Some(Lens { radius, focus_distance }) = self.lens {
+            // Every ray of a pixel meets in the plane of focus.
+            let focus = origin + direction * focus_distance;
+            origin += (warp::concentric_disk(lens()) * radius).extend(0.0);
+            direction = focus - origin;
+        }
+        Ray::new(
+            self.world_from_camera.transform_point3(origin),
+            self.world_from_camera.transform_vector3(direction).normalize(),
+        )
+    }
+
+    /// World to camera for row vectors, row by row, as EXR files and RenderMan have it: +x right, +y up,
+    /// +z forward.
+    #[must_use]
+    pub fn camera_from_world(&self) -> [f32; 16] {
+        DMat4::from(self.world_from_camera.inverse()).to_cols_array().map(|x| x as f32)
+    }
+
+    /// World to the picture for row vectors: x and y from (0, 0) at the top left to (1, 1).
+    #[must_use]
+    pub fn ndc_from_world(&self) -> [f32; 16] {
+        let aspect = f64::from(self.resolution[0]) / f64::from(self.resolution[1]);
+        let ndc_from_camera = match self.projection {
+            // x/z from −half_width…half_width to 0…1; y/z likewise, downward.
+            Projection::Perspective { half_width } => {
+                let s = 0.5 / half_width;
+                DMat4::from_cols(
+                    DVec4::new(s, 0.0, 0.0, 0.0),
+                    DVec4::new(0.0, -s * aspect, 0.0, 0.0),
+                    DVec4::new(0.5, 0.5, 1.0, 1.0),
+                    DVec4::ZERO,
+                )
+            }
+            Projection::Orthographic { half_width } => {
+                let s = 0.5 / half_width;
+                DMat4::from_cols(
+                    DVec4::new(s, 0.0, 0.0, 0.0),
+                    DVec4::new(0.0, -s * aspect, 0.0, 0.0),
+                    DVec4::new(0.0, 0.0, 1.0, 0.0),
+                    DVec4::new(0.5, 0.5, 0.0, 1.0),
+                )
+            }
+        };
+        (ndc_from_camera * DMat4::from(self.world_from_camera.inverse())).to_cols_array().map(|x| x as f32)
+    }
+
+    /// Distance of `point` along the axis.
+    #[must_use]
+    pub fn depth(&self, point: DVec3) -> f64 {
+        (point - self.world_from_camera.translation).dot(self.world_from_camera.matrix3.z_axis)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(lens: Option<Lens>) -> Camera {
+        let resolution = [200, 100];
+        Camera {
+            world_from_camera: Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y).unwrap(),
+            projection: Projection::perspective(90f64.to_radians(), FovAxis::X, resolution),
+            resolution,
+            lens,
+        }
+    }
+
+    /// 90° across 200 pixels, looking along −z: the left edge is at x = −z, the top at y = z/2.
+    #[test]
+    fn corners_of_the_picture_look_where_they_should() {
+        let corner = |x, y| camera(None).ray(DVec2::new(x, y), || unreachable!()).direction;
+        let top_left = DVec3::new(-1.0, 0.5, -1.0).normalize();
+        assert!((corner(0.0, 0.0) - top_left).length() < 4.0 * f64::EPSILON);
+        assert!((corner(200.0, 100.0) - top_left * DVec3::new(-1.0, -1.0, 1.0)).length() < 4.0 * f64::EPSILON);
+        assert!((corner(100.0, 50.0) + DVec3::Z).length() < 4.0 * f64::EPSILON);
+    }
+
+    #[test]
+    fn all_rays_of_a_lens_meet_in_the_plane_of_focus() {
+        let camera = camera(Some(Lens { radius: 0.5, focus_distance: 4.0 }));
+        let pixel = DVec2::new(30.0, 80.0);
+        let focus = DVec3::new(-0.7, -0.3, -1.0) * 4.0;
+        for u in [[0.0, 0.0], [0.9, 0.1], [0.5, 0.99]] {
+            let ray = camera.ray(pixel, || DVec2::from(u));
+            let t = (focus - ray.origin).dot(ray.direction);
+            assert!((ray.at(t) - focus).length() < 16.0 * f64::EPSILON);
+            assert!(ray.origin.length() <= 0.5 && ray.origin.z == 0.0);
+        }
+    }
+
+    #[test]
+    fn looking_along_up_or_nowhere_is_refused() {
+        assert!(Camera::look_at(DVec3::ZERO, DVec3::Y, DVec3::Y).is_none());
+        assert!(Camera::look_at(DVec3::X, DVec3::X, DVec3::Y).is_none());
+    }
+
+    /// A point on the ray through a pixel falls on that pixel's share of the picture.
+    #[test]
+    fn the_matrix_to_the_picture_agrees_with_the_rays() {
+        let camera = camera(None);
+        let pixel = DVec2::new(30.0, 80.0);
+        let p = camera.ray(pixel, || unreachable!()).at(7.0);
+        let m = camera.ndc_from_world().map(f64::from);
+        // Row vectors: (p, 1) · M, row by row.
+        let row = |j: usize| p.x * m[j] + p.y * m[4 + j] + p.z * m[8 + j] + m[12 + j];
+        let ndc = DVec2::new(row(0), row(1)) / row(3);
+        // Sixteen f32 roundings of numbers of size one.
+        assert!((ndc - DVec2::new(0.15, 0.8)).length() < 16.0 * f64::from(f32::EPSILON), "{ndc}");
+    }
+
+    #[test]
+    fn depth_is_measured_along_the_axis() {
+        assert_eq!(camera(None).depth(DVec3::new(3.0, 9.0, -5.0)), 5.0);
+    }
+}

@@ -1,0 +1,94 @@
+//! Facts about a scene that decide what has to be simulated.
+
+use super::material::Kind;
+use super::{Geometry, Scene};
+use crate::scene::light::Light;
+
+/// Counts of what a scene holds.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Census {
+    /// Analytic shapes.
+    pub shapes: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Materials in use whose index depends on wavelength, smooth.
+    pub dispersive: Vec<String>,
+    /// The same, rough.
+    pub rough_dispersive: Vec<String>,
+    /// Transparent objects.
+    pub refractive: Vec<String>,
+    /// Objects with a texture that varies.
+    pub textured: Vec<String>,
+    /// Objects with a mirror-like or metal surface.
+    pub reflective: Vec<String>,
+    /// Objects that shine.
+    pub area_lights: Vec<String>,
+    /// Lights without extent.
+    pub delta_lights: usize,
+    /// Lights from infinity.
+    pub backgrounds: usize,
+    /// Media that rays can be in.
+    pub media: usize,
+    /// Of those, media that scatter and whose extinction depends on wavelength.
+    pub chromatic_media: usize,
+    /// A lens with a radius above zero.
+    pub lens: bool,
+    /// Depth fog.
+    pub fog: bool,
+}
+
+impl Census {
+    /// Takes the census of `scene`.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Census {
+        let mut census = Census { fog: scene.fog.is_some(), backgrounds: scene.backgrounds.len(), ..Census::default() };
+        census.lens = scene.camera.lens.is_some_and(|l| l.radius > 0.0);
+        for object in &scene.objects {
+            match &object.geometry {
+                Geometry::Shape(_) => census.shapes += 1,
+                Geometry::Mesh(mesh) => census.triangles += mesh.mesh.triangles.len(),
+            }
+            let name = || object.name.clone();
+            match &scene.materials[object.material as usize].kind {
+                Kind::Diffuse { reflectance } | Kind::Plastic { reflectance, .. } if reflectance.varies() => {
+                    census.textured.push(name());
+                }
+                Kind::Dielectric { interior, exterior, facets, .. } => {
+                    census.refractive.push(name());
+                    if interior.is_dispersive() || exterior.is_dispersive() {
+                        if facets.is_some() { &mut census.rough_dispersive } else { &mut census.dispersive }
+                            .push(name());
+                    }
+                }
+                Kind::Thin { .. } => census.refractive.push(name()),
+                Kind::Mirror { .. } | Kind::Conductor { .. } => census.reflective.push(name()),
+                Kind::Diffuse { .. } | Kind::Plastic { .. } | Kind::Boundary => {}
+            }
+        }
+        for light in &scene.lights {
+            match light {
+                Light::Area { object, radiance, .. } => {
+                    let name = scene.objects[*object as usize].name.clone();
+                    if radiance.varies() {
+                        census.textured.push(name.clone());
+                    }
+                    census.area_lights.push(name);
+                }
+                Light::Point { .. } | Light::Spot { .. } | Light::Directional { .. } => census.delta_lights += 1,
+                Light::Constant { .. } | Light::Environment(_) => {}
+            }
+        }
+        let used = |i: usize| {
+            let i = Some(i as u32);
+            scene.camera_medium == i || scene.objects.iter().any(|o| o.inside == i || o.outside == i)
+        };
+        for (_, medium) in scene.media.iter().enumerate().filter(|(i, _)| used(*i)) {
+            census.media += 1;
+            let chromatic = !(medium.absorption.is_constant() && medium.scattering.is_constant());
+            if chromatic && medium.scattering.max() > 0.0 {
+                census.chromatic_media += 1;
+            }
+        }
+        census
+    }
+}

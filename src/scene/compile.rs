@@ -1,0 +1,681 @@
+//! From what a person wrote to what rays meet: names become indices, degrees radians, files arrays.
+//!
+//! Faults that only show here (an unknown glass, a missing picture) are collected and come all at
+//! once, each with its place in the file.
+
+use super::bvh::{Aabb, Bvh};
+use super::camera::{self, Camera};
+use super::environment::Environment;
+use super::light::Light;
+use super::load;
+use super::material::{Highlight, HighlightModel, Kind, Material};
+use super::mesh::{AreaTable, Mesh, MeshTree, NormalMode};
+use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Plane, Rectangle, Shape, Sphere};
+use super::texture::{Interpolation, Texture, Wrap};
+use super::{DepthFog, FogFalloff, Geometry, Medium, Object, Scene, TriangleMesh};
+use crate::description::{self as written, SceneDescription};
+use crate::error::{Error, Result};
+use crate::optics::fresnel::Model;
+use crate::optics::medium::Phase;
+use crate::optics::microfacet::{Distribution, Microfacets};
+use crate::spectrum::{Outside, RefractiveIndex, Spectrum, WavelengthDistribution, catalogue, illuminant, upsample};
+use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3};
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+/// Roughness below which a surface is computed as smooth: the lobe is then narrower than f32 can
+/// tell directions apart (2⁻²⁴ · 16), and D(m) leaves the range of f32.
+const SMOOTHEST: f64 = 1e-6;
+
+struct Compiler<'a> {
+    description: &'a SceneDescription,
+    faults: Vec<String>,
+    /// The first curve that could not be read.
+    unread: Option<Error>,
+    files: Vec<PathBuf>,
+    textures: HashMap<&'a str, Texture>,
+    material_ids: HashMap<&'a str, u32>,
+    medium_ids: HashMap<&'a str, u32>,
+    materials: Vec<Material>,
+}
+
+/// The spectrum of the ambient light of `whitted`.
+///
+/// # Errors
+/// [`Error::Config`] with every fault found.
+pub fn ambient(description: &SceneDescription, ambient: &written::Spectrum) -> Result<Spectrum> {
+    let mut c = Compiler::new(description);
+    let spectrum = c.light_spectrum("integrator.whitted.ambient", ambient);
+    c.finish(Ok(spectrum))
+}
+
+/// Compiles a scene.
+///
+/// # Errors
+/// [`Error::Config`] with every fault found; [`Error::Input`] where a file is missing or broken.
+pub fn compile(description: &SceneDescription, name: &str) -> Result<Scene> {
+    let mut c = Compiler::new(description);
+    let scene = c.scene(name);
+    c.finish(scene)
+}
+
+fn vec3(v: [f64; 3]) -> DVec3 {
+    DVec3::from_array(v)
+}
+
+impl<'a> Compiler<'a> {
+    fn new(description: &'a SceneDescription) -> Compiler<'a> {
+        Compiler {
+            description,
+            faults: Vec::new(),
+            unread: None,
+            files: Vec::new(),
+            textures: HashMap::new(),
+            material_ids: HashMap::new(),
+            medium_ids: HashMap::new(),
+            materials: Vec::new(),
+        }
+    }
+
+    fn fault(&mut self, at: &str, message: impl AsRef<str>) {
+        self.faults.push(self.description.fault(at, message.as_ref()));
+    }
+
+    /// An error about a file that the field `at` names: the message says so.
+    fn asked(&self, at: &str, error: Error) -> Error {
+        match error {
+            Error::Input { path, message } => {
+                let place = self.description.fault(at, "");
+                let place = place.trim_end_matches([':', ' ']);
+                Error::Input { path, message: format!("{message}; it is named at {place}") }
+            }
+            other => other,
+        }
+    }
+
+    /// What was made, unless something was wrong: all faults of the description, else the first file that
+    /// could not be read.
+    fn finish<T>(self, made: Result<T>) -> Result<T> {
+        if !self.faults.is_empty() {
+            return Err(Error::Config(self.faults.join("\n")));
+        }
+        match self.unread {
+            Some(error) => Err(error),
+            None => made,
+        }
+    }
+
+    /// The value, or a fault and a stand-in.
+    fn or<T>(&mut self, at: &str, result: std::result::Result<T, String>, stand_in: T) -> T {
+        result.unwrap_or_else(|message| {
+            self.fault(at, message);
+            stand_in
+        })
+    }
+
+    fn scene(&mut self, name: &str) -> Result<Scene> {
+        let d = self.description;
+        for (name, texture) in &d.textures {
+            let at = format!("textures.{name}");
+            let compiled = self.texture(&at, texture)?;
+            self.textures.insert(name, compiled);
+        }
+        for (name, material) in &d.materials {
+            let at = format!("materials.{name}");
+            let id = self.material(&at, material);
+            self.material_ids.insert(name, id);
+        }
+        let mut media = Vec::new();
+        for (name, medium) in &d.media {
+            self.medium_ids.insert(name, media.len() as u32);
+            let at = format!("media.{name}");
+            media.push(self.medium(&at, medium));
+        }
+        let camera_medium = d.medium.as_ref().map(|name| self.medium_ids[name.as_str()]);
+
+        let mut objects: Vec<Object> = Vec::new();
+        let mut lights: Vec<Light> = Vec::new();
+        for (i, shape) in d.shapes.iter().enumerate() {
+            let at = format!("shapes[{i}].{}", shape.geometry.kind());
+            let Some(geometry) = self.geometry(&at, shape)? else { continue };
+            let material = match &shape.material {
+                written::MaterialRef::Name(name) => self.material_ids[name.as_str()],
+                written::MaterialRef::Inline(material) => self.material(&format!("{at}.material"), material),
+            };
+            let object = objects.len() as u32;
+            let light = shape.emission.as_ref().map(|emission| {
+                let radiance = self.emission_texture(&format!("{at}.emission"), emission);
+                lights.push(Light::Area { object, radiance });
+                lights.len() as u32 - 1
+            });
+            if light.is_some() && matches!(geometry, Geometry::Shape(Shape::Plane(_))) {
+                self.fault(
+                    &format!("{at}.emission"),
+                    "expected a shape with an end, found a plane: its light is infinite",
+                );
+            }
+            let textured = self.materials[material as usize].varies()
+                || light
+                    .is_some_and(|l| matches!(&lights[l as usize], Light::Area { radiance, .. } if radiance.varies()));
+            let detail =
+                if textured || d.render.effects == written::Effects::All { Detail::Texture } else { Detail::Geometry };
+            // A closed body without a word about its inside is empty; an open one has the same
+            // medium on both sides; outside is what the camera is in.
+            let closed = match &geometry {
+                Geometry::Shape(shape) => shape.is_closed(),
+                Geometry::Mesh(_) => true,
+            };
+            let medium = |name: &Option<String>| name.as_ref().map(|n| self.medium_ids[n.as_str()]);
+            objects.push(Object {
+                name: shape.name.clone().unwrap_or_else(|| format!("{}{i}", shape.geometry.kind())),
+                geometry,
+                material,
+                light,
+                detail,
+                inside: medium(&shape.inside).or(if closed { None } else { camera_medium }),
+                outside: medium(&shape.outside).or(camera_medium),
+            });
+        }
+        for (i, light) in d.lights.iter().enumerate() {
+            let at = format!("lights[{i}].{}", light.kind());
+            if let Some(light) = self.light(&at, light)? {
+                lights.push(light);
+            }
+        }
+        let camera = self.camera();
+        if !self.faults.is_empty() || self.unread.is_some() {
+            // What is wrong is told by `finish`.
+            return Err(Error::Config(String::new()));
+        }
+
+        let boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
+        let bvh = Bvh::build(&boxes);
+        let (center, radius) = extent(&boxes, &camera);
+        let light_cdf = light_cdf(&lights, &objects, radius);
+        let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
+        let wavelengths = match d.render.wavelengths {
+            written::Wavelengths::Auto => self.wavelengths(&lights, &objects, radius),
+            written::Wavelengths::Visible => WavelengthDistribution::visible(),
+            written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
+        };
+        let fog = d.fog.as_ref().map(|fog| DepthFog {
+            colour: self.spectrum("fog.colour", &fog.colour, Outside::Zero, Role::Light),
+            falloff: match fog.law {
+                written::FogLaw::Linear { start, end } => FogFalloff::Linear { start, end },
+                written::FogLaw::Exponential { density, falloff: written::Falloff::Exp } => {
+                    FogFalloff::Exponential { density }
+                }
+                written::FogLaw::Exponential { density, falloff: written::Falloff::Exp2 } => {
+                    FogFalloff::ExponentialSquared { density }
+                }
+            },
+        });
+        let has_boundaries = objects.iter().any(|o| matches!(self.materials[o.material as usize].kind, Kind::Boundary));
+        Ok(Scene {
+            name: name.to_owned(),
+            camera,
+            objects,
+            bvh,
+            materials: std::mem::take(&mut self.materials),
+            media,
+            camera_medium,
+            lights,
+            light_cdf,
+            backgrounds,
+            fog,
+            wavelengths,
+            center,
+            radius,
+            has_boundaries,
+            files: std::mem::take(&mut self.files),
+        })
+    }
+
+    fn camera(&mut self) -> Camera {
+        let d = &self.description.camera;
+        let resolution = [self.description.image.width, self.description.image.height];
+        let world_from_camera = Camera::look_at(vec3(d.origin), vec3(d.target), vec3(d.up));
+        let world_from_camera = world_from_camera.unwrap_or_else(|| {
+            self.fault("camera.up", "expected a direction that is not along the line of sight");
+            DAffine3::IDENTITY
+        });
+        let projection = match d.projection {
+            written::Projection::Perspective { fov_deg, fov_axis } => {
+                let axis = match fov_axis {
+                    written::FovAxis::X => camera::FovAxis::X,
+                    written::FovAxis::Y => camera::FovAxis::Y,
+                    written::FovAxis::Smaller => camera::FovAxis::Smaller,
+                    written::FovAxis::Larger => camera::FovAxis::Larger,
+                    written::FovAxis::Diagonal => camera::FovAxis::Diagonal,
+                };
+                camera::Projection::perspective(fov_deg.to_radians(), axis, resolution)
+            }
+            written::Projection::Orthographic { height } => camera::Projection::Orthographic {
+                half_width: 0.5 * height * f64::from(resolution[0]) / f64::from(resolution[1]),
+            },
+        };
+        let lens = d.lens.as_ref().map(|l| camera::Lens { radius: l.radius, focus_distance: l.focus_distance });
+        Camera { world_from_camera, projection, resolution, lens }
+    }
+
+    /// Wavelengths by the scene's own lights and surfaces.
+    fn wavelengths(&self, lights: &[Light], objects: &[Object], radius: f64) -> WavelengthDistribution {
+        let mut emitters: Vec<(f64, Spectrum)> = Vec::new();
+        for light in lights {
+            let spectra = light.spectra();
+            let weight = light.power(objects, radius) / spectra.len() as f64;
+            emitters.extend(spectra.into_iter().map(|s| (weight, s)));
+        }
+        let mut reflectances = Vec::new();
+        for object in objects {
+            match &self.materials[object.material as usize].kind {
+                Kind::Diffuse { reflectance } | Kind::Plastic { reflectance, .. } => {
+                    reflectances.extend(reflectance.representatives());
+                }
+                Kind::Mirror { reflectance } => reflectances.push(reflectance.clone()),
+                Kind::Conductor { .. } | Kind::Dielectric { .. } | Kind::Thin { .. } | Kind::Boundary => {}
+            }
+        }
+        WavelengthDistribution::for_scene(&emitters, &reflectances)
+    }
+
+    fn spectrum(&mut self, at: &str, s: &written::Spectrum, outside: Outside, role: Role) -> Spectrum {
+        let black = Spectrum::Constant(0.0);
+        match s {
+            written::Spectrum::Number(x) => Spectrum::constant(*x),
+            written::Spectrum::Rgb(rgb) => match role {
+                Role::Reflectance => self.or(at, upsample::reflectance(*rgb), black),
+                Role::Light => self.or(at, upsample::emission(*rgb), black),
+                Role::Coefficient => self.or(at, upsample::unbounded(*rgb), black),
+            },
+            written::Spectrum::Table(samples) => {
+                let samples: Vec<(f64, f64)> = samples.iter().map(|s| (s[0], s[1])).collect();
+                self.or(at, Spectrum::from_samples(&samples, outside), black)
+            }
+            written::Spectrum::File(path) => {
+                self.files.push(path.to_path_buf());
+                let samples = load::samples(path);
+                let spectrum = samples.and_then(|samples| Spectrum::from_samples(&samples, outside));
+                spectrum.unwrap_or_else(|message| {
+                    let error = self.asked(at, Error::input(path, message));
+                    self.unread.get_or_insert(error);
+                    black
+                })
+            }
+            written::Spectrum::Blackbody(b) => {
+                let spectrum = if b.normalised {
+                    illuminant::blackbody_normalised(b.kelvin)
+                } else {
+                    illuminant::blackbody(b.kelvin)
+                };
+                self.or(at, spectrum, black).scaled(b.scale)
+            }
+            written::Spectrum::Illuminant(i) => self.or(at, illuminant::illuminant(&i.name), black).scaled(i.scale),
+            written::Spectrum::Lines(lines) => {
+                let lines: Vec<(f64, f64, f64)> = lines.iter().map(|l| (l.nm, l.power, l.width_nm)).collect();
+                self.or(at, Spectrum::lines(&lines), black)
+            }
+            written::Spectrum::Scaled(s) => {
+                self.spectrum(&format!("{at}.scaled.of"), &s.of, outside, role).scaled(s.by)
+            }
+        }
+    }
+
+    fn reflectance(&mut self, at: &str, s: &written::Spectrum) -> Spectrum {
+        self.spectrum(at, s, Outside::Hold, Role::Reflectance)
+    }
+
+    fn light_spectrum(&mut self, at: &str, s: &written::Spectrum) -> Spectrum {
+        self.spectrum(at, s, Outside::Zero, Role::Light)
+    }
+
+    fn reflectance_texture(&mut self, at: &str, s: &written::SpectrumOrTexture) -> Texture {
+        match s {
+            written::SpectrumOrTexture::Texture(name) => self.textures[name.as_str()].clone(),
+            written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.reflectance(at, s)),
+        }
+    }
+
+    /// A texture as light: a picture's colours are lit by D65.
+    fn emission_texture(&mut self, at: &str, s: &written::SpectrumOrTexture) -> Texture {
+        match s {
+            written::SpectrumOrTexture::Texture(name) => {
+                let mut texture = self.textures[name.as_str()].clone();
+                if let Texture::Image(image) = &mut texture {
+                    image.illuminant = Some(illuminant::d65());
+                }
+                texture
+            }
+            written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.light_spectrum(at, s)),
+        }
+    }
+
+    fn texture(&mut self, at: &str, texture: &written::Texture) -> Result<Texture> {
+        Ok(match texture {
+            written::Texture::Image(image) => {
+                self.files.push(image.file.to_path_buf());
+                let loaded = load::image_texture(&image.file, image.raw);
+                let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
+                let wrap = |w: written::Wrap| match w {
+                    written::Wrap::Repeat => Wrap::Repeat,
+                    written::Wrap::Mirror => Wrap::Mirror,
+                    written::Wrap::Clamp => Wrap::Clamp,
+                };
+                loaded.wrap = [wrap(image.wrap), wrap(image.wrap_v.unwrap_or(image.wrap))];
+                loaded.interpolation = match image.filter {
+                    written::TextureFilter::Bilinear => Interpolation::Bilinear,
+                    written::TextureFilter::Nearest => Interpolation::Nearest,
+                };
+                loaded.scale = DVec2::from(image.scale);
+                loaded.offset = DVec2::from(image.offset);
+                Texture::Image(loaded)
+            }
+            written::Texture::Checkerboard(board) => Texture::Checkerboard {
+                a: Box::new(Texture::Uniform(self.reflectance(&format!("{at}.checkerboard.a"), &board.a))),
+                b: Box::new(Texture::Uniform(self.reflectance(&format!("{at}.checkerboard.b"), &board.b))),
+                scale: DVec2::from(board.scale),
+            },
+        })
+    }
+
+    fn index(&mut self, at: &str, index: &written::Index) -> RefractiveIndex {
+        let made = match index {
+            written::Index::Number(n) => Ok(RefractiveIndex::Constant(*n)),
+            written::Index::Glass(name) => catalogue::glass(name),
+            written::Index::Sellmeier(s) => Ok(RefractiveIndex::Sellmeier { b: s.b, c: s.c }),
+            written::Index::Cauchy(c) => Ok(RefractiveIndex::Cauchy { a: vec![c.a, c.b, c.c] }),
+            written::Index::Abbe(a) => RefractiveIndex::from_abbe(a.nd, a.vd),
+            written::Index::Table(samples) => Ok(RefractiveIndex::Table { samples: samples.clone() }),
+        };
+        let checked = made.and_then(|index| index.check_band().map(|()| index));
+        self.or(at, checked, RefractiveIndex::Constant(1.0))
+    }
+
+    fn material(&mut self, at: &str, material: &written::Material) -> u32 {
+        let at = format!("{at}.{}", material.kind());
+        let at = |field: &str| format!("{at}.{field}");
+        let (kind, two_sided, highlight) = match material {
+            written::Material::Diffuse(m) => (
+                Kind::Diffuse { reflectance: self.reflectance_texture(&at("reflectance"), &m.reflectance) },
+                m.two_sided,
+                m.highlight,
+            ),
+            written::Material::Mirror(m) => {
+                (Kind::Mirror { reflectance: self.reflectance(&at("reflectance"), &m.reflectance) }, true, m.highlight)
+            }
+            written::Material::Conductor(m) => {
+                let (eta, k) = match &m.index {
+                    written::ConductorIndex::Metal(name) => {
+                        let none = (Spectrum::Constant(1.0), Spectrum::Constant(0.0));
+                        self.or(&at("metal"), catalogue::metal(name), none)
+                    }
+                    written::ConductorIndex::Written { eta, k } => (
+                        self.spectrum(&at("eta"), eta, Outside::Hold, Role::Coefficient),
+                        self.spectrum(&at("k"), k, Outside::Hold, Role::Coefficient),
+                    ),
+                };
+                let tint = self.reflectance(&at("tint"), &m.tint);
+                let facets = facets(m.roughness, m.distribution);
+                (Kind::Conductor { eta, k, tint, fresnel: model(m.fresnel), facets }, m.two_sided, m.highlight)
+            }
+            written::Material::Dielectric(m) => {
+                let interior = self.index(&at("ior"), &m.ior);
+                let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
+                let facets = facets(m.roughness, m.distribution);
+                if facets.is_some() && m.fresnel == written::Fresnel::Schlick {
+                    self.fault(&at("fresnel"), "expected exact on rough glass, found schlick");
+                }
+                // Without a difference of index there is no interface, however rough: light goes on, and
+                // casts no shadow.
+                match (&interior, &exterior) {
+                    (RefractiveIndex::Constant(a), RefractiveIndex::Constant(b)) if a == b => {
+                        (Kind::Boundary, false, None)
+                    }
+                    _ => {
+                        let kind = Kind::Dielectric { interior, exterior, fresnel: model(m.fresnel), facets };
+                        (kind, false, m.highlight)
+                    }
+                }
+            }
+            written::Material::ThinDielectric(m) => {
+                let interior = self.index(&at("ior"), &m.ior);
+                let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
+                if interior.is_dispersive() || exterior.is_dispersive() {
+                    self.fault(
+                        &at("ior"),
+                        "expected one number for a thin pane, found an index that depends on wavelength",
+                    );
+                }
+                (Kind::Thin { interior, exterior }, false, None)
+            }
+            written::Material::Plastic(m) => {
+                let reflectance = self.reflectance_texture(&at("reflectance"), &m.reflectance);
+                let eta = match self.index(&at("ior"), &m.ior) {
+                    RefractiveIndex::Constant(n) => n,
+                    _ => {
+                        self.fault(
+                            &at("ior"),
+                            "expected one number for a coat, found an index that depends on wavelength",
+                        );
+                        1.5
+                    }
+                };
+                let facets = facets(m.roughness, m.distribution);
+                (Kind::plastic(reflectance, eta, m.nonlinear, facets), m.two_sided, m.highlight)
+            }
+            written::Material::Boundary(_) => (Kind::Boundary, false, None),
+        };
+        let highlight = highlight.map(|h| Highlight {
+            strength: h.strength as f32,
+            exponent: h.exponent,
+            model: match h.model {
+                written::HighlightModel::Blinn => HighlightModel::Blinn,
+                written::HighlightModel::Phong => HighlightModel::Phong,
+            },
+        });
+        self.materials.push(Material { kind, two_sided, highlight });
+        self.materials.len() as u32 - 1
+    }
+
+    fn medium(&mut self, at: &str, medium: &written::Medium) -> Medium {
+        let written::Medium::Homogeneous(m) = medium;
+        let mut coefficient = |field: &str, s: &written::Spectrum| {
+            self.spectrum(&format!("{at}.homogeneous.{field}"), s, Outside::Hold, Role::Coefficient)
+        };
+        Medium {
+            absorption: coefficient("absorption", &m.absorption),
+            scattering: coefficient("scattering", &m.scattering),
+            phase: match m.phase {
+                written::Phase::Isotropic => Phase::Isotropic,
+                written::Phase::Rayleigh => Phase::Rayleigh,
+                written::Phase::Hg(g) => Phase::HenyeyGreenstein(g),
+            },
+        }
+    }
+
+    fn light(&mut self, at: &str, light: &written::Light) -> Result<Option<Light>> {
+        Ok(Some(match light {
+            written::Light::Point(l) => Light::Point {
+                position: vec3(l.position),
+                intensity: self.light_spectrum(&format!("{at}.intensity"), &l.intensity),
+            },
+            written::Light::Spot(l) => {
+                let position = vec3(l.position);
+                let axis = match l.aim {
+                    written::Aim::Target(target) => vec3(target) - position,
+                    written::Aim::Direction(direction) => vec3(direction),
+                };
+                let Some(axis) = axis.try_normalize() else {
+                    self.fault(at, "expected a direction, found one of length zero");
+                    return Ok(None);
+                };
+                Light::Spot {
+                    position,
+                    axis,
+                    beam: l.beam_deg.to_radians(),
+                    cutoff: l.cutoff_deg.to_radians(),
+                    intensity: self.light_spectrum(&format!("{at}.intensity"), &l.intensity),
+                }
+            }
+            written::Light::Directional(l) => {
+                let Some(direction) = vec3(l.direction).try_normalize() else {
+                    self.fault(&format!("{at}.direction"), "expected a direction, found one of length zero");
+                    return Ok(None);
+                };
+                let irradiance = self.light_spectrum(&format!("{at}.irradiance"), &l.irradiance);
+                Light::Directional { direction, irradiance }
+            }
+            written::Light::Constant(l) => {
+                Light::Constant { radiance: self.light_spectrum(&format!("{at}.radiance"), &l.radiance) }
+            }
+            written::Light::Environment(l) => {
+                self.files.push(l.file.to_path_buf());
+                let picture = load::picture(&l.file).map_err(|e| self.asked(&format!("{at}.file"), e))?;
+                let rotation = DMat3::from_rotation_y(l.rotate_deg.to_radians());
+                let map = Environment::new(&picture.pixels, picture.width, picture.height, l.scale, rotation);
+                Light::Environment(Box::new(map))
+            }
+        }))
+    }
+
+    fn geometry(&mut self, at: &str, shape: &written::Shape) -> Result<Option<Geometry>> {
+        let m = shape.world_from_object();
+        let point = |p: [f64; 3]| m.transform_point3(vec3(p));
+        let vector = |v: [f64; 3]| m.transform_vector3(vec3(v));
+        // Uniform by the checks of the description for shapes that need it.
+        let scale = libm::cbrt(DMat3::from_mat4(m).determinant().abs());
+        let made: std::result::Result<Shape, String> = match &shape.geometry {
+            written::Geometry::Sphere(s) => {
+                let rotation = DMat3::from_mat4(m) * (1.0 / scale);
+                Sphere::new(point(s.center), s.radius * scale, rotation).map(Shape::Sphere)
+            }
+            written::Geometry::Plane(p) => {
+                let tangent = p.tangent.map_or(DVec3::ZERO, vector);
+                Plane::new(point(p.point), normal_transform(m, vec3(p.normal)), tangent).map(Shape::Plane)
+            }
+            written::Geometry::Disk(d) => {
+                let frame = match vec3(d.normal).try_normalize() {
+                    Some(n) => crate::math::Frame::from_normal(n),
+                    None => {
+                        self.fault(&format!("{at}.normal"), "expected a direction, found one of length zero");
+                        return Ok(None);
+                    }
+                };
+                let (u, v) = (vector((frame.s * d.radius).into()), vector((frame.t * d.radius).into()));
+                Disk::new(point(d.center), u, v).map(Shape::Disk)
+            }
+            written::Geometry::Rectangle(r) => {
+                Rectangle::new(point(r.corner), vector(r.edge_u), vector(r.edge_v)).map(Shape::Rectangle)
+            }
+            written::Geometry::Cube(c) => {
+                let [x, y, z] = c.size.xyz();
+                let half = [[0.5 * x, 0.0, 0.0], [0.0, 0.5 * y, 0.0], [0.0, 0.0, 0.5 * z]].map(vector);
+                Cube::new(point(c.center), half).map(Shape::Cube)
+            }
+            written::Geometry::Cylinder(c) => {
+                let (base, top) = match c.caps {
+                    written::Caps::Both => (true, true),
+                    written::Caps::None => (false, false),
+                    written::Caps::Base => (true, false),
+                    written::Caps::Top => (false, true),
+                };
+                Cylinder::new(point(c.base), point(c.top), c.radius * scale, base, top).map(Shape::Cylinder)
+            }
+            written::Geometry::Cone(c) => {
+                Cone::new(point(c.base), point(c.apex), c.radius * scale, c.cap).map(Shape::Cone)
+            }
+            written::Geometry::Mesh(mesh) => {
+                self.files.push(mesh.file.to_path_buf());
+                let asked = |e| self.asked(&format!("{at}.file"), e);
+                let source = super::mesh::load(&mesh.file).map_err(asked)?;
+                let mode = match mesh.normals {
+                    written::Normals::File => NormalMode::File,
+                    written::Normals::Smooth => NormalMode::Smooth,
+                    written::Normals::Face => NormalMode::Face,
+                };
+                let made = Mesh::new(&source, &DAffine3::from_mat4(m), mode)
+                    .map_err(|message| asked(Error::input(&mesh.file, message)))?;
+                let (tree, areas) = (MeshTree::build(&made), AreaTable::new(&made));
+                return Ok(Some(Geometry::Mesh(Box::new(TriangleMesh { mesh: made, tree, areas }))));
+            }
+        };
+        Ok(match made {
+            Ok(shape) => Some(Geometry::Shape(shape)),
+            Err(message) => {
+                self.fault(at, message);
+                None
+            }
+        })
+    }
+}
+
+/// What a spectrum stands for, which decides how a colour becomes one.
+#[derive(Clone, Copy)]
+enum Role {
+    Reflectance,
+    Light,
+    Coefficient,
+}
+
+fn normal_transform(m: DMat4, n: DVec3) -> DVec3 {
+    DMat3::from_mat4(m).inverse().transpose() * n
+}
+
+fn model(fresnel: written::Fresnel) -> Model {
+    match fresnel {
+        written::Fresnel::Exact => Model::Exact,
+        written::Fresnel::Schlick => Model::Schlick,
+    }
+}
+
+fn facets(alpha: f64, distribution: written::Distribution) -> Option<Microfacets> {
+    let distribution = match distribution {
+        written::Distribution::Ggx => Distribution::Ggx,
+        written::Distribution::Beckmann => Distribution::Beckmann,
+    };
+    (alpha >= SMOOTHEST).then_some(Microfacets { distribution, alpha })
+}
+
+impl Object {
+    /// The object's box; without end for a plane.
+    fn bounds(&self) -> Aabb {
+        match &self.geometry {
+            Geometry::Shape(shape) => match shape.bounds() {
+                Some((min, max)) => Aabb { min, max },
+                None => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
+            },
+            Geometry::Mesh(mesh) => mesh.tree.bounds(),
+        }
+    }
+}
+
+/// Centre and radius of all that has an end; about the camera where nothing has.
+fn extent(boxes: &[Aabb], camera: &Camera) -> (DVec3, f64) {
+    let finite = boxes.iter().filter(|b| b.min.is_finite() && b.max.is_finite());
+    match finite.copied().reduce(|a, b| a.union(&b)) {
+        Some(b) => (b.min * 0.5 + b.max * 0.5, 0.5 * (b.max - b.min).length()),
+        None => (camera.world_from_camera.translation, 1.0),
+    }
+}
+
+/// Running sums of the probabilities with which lights are chosen: half by power, half evenly, so
+/// that no light is forgotten.
+fn light_cdf(lights: &[Light], objects: &[Object], radius: f64) -> Vec<f64> {
+    let powers: Vec<f64> = lights.iter().map(|l| l.power(objects, radius)).collect();
+    let total: f64 = powers.iter().sum();
+    let n = lights.len() as f64;
+    let mut sum = 0.0;
+    let mut cdf: Vec<f64> = powers
+        .iter()
+        .map(|p| {
+            let share = if total > 0.0 && total.is_finite() { p / total } else { 1.0 / n };
+            sum += 0.5 * share + 0.5 / n;
+            sum
+        })
+        .collect();
+    // Rounding may leave the last sum short of one.
+    if let Some(last) = cdf.last_mut() {
+        *last = 1.0;
+    }
+    cdf
+}

@@ -1,0 +1,320 @@
+//! What shines, and how a path finds it.
+
+use super::environment::Environment;
+use super::texture::Texture;
+use super::{Geometry, Hit, Object, SurfacePoint};
+use crate::math::Departure;
+use crate::math::frame::Frame;
+use crate::math::warp;
+use crate::spectrum::{Lanes, Spectrum};
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+
+/// A light.
+#[derive(Clone, Debug)]
+pub enum Light {
+    /// A surface that emits on the side of its normal.
+    Area {
+        /// The object that shines.
+        object: u32,
+        /// Radiance, W·m⁻²·sr⁻¹·nm⁻¹.
+        radiance: Texture,
+    },
+    /// A point that shines equally in all directions.
+    Point {
+        /// Where.
+        position: DVec3,
+        /// W·sr⁻¹·nm⁻¹.
+        intensity: Spectrum,
+    },
+    /// A point that shines in a cone, full within `cos_beam` and falling linearly in the angle to
+    /// nothing at `cutoff`.
+    Spot {
+        /// Where.
+        position: DVec3,
+        /// Whither, unit.
+        axis: DVec3,
+        /// Half angle of full intensity, radians.
+        beam: f64,
+        /// Half angle of no intensity, radians.
+        cutoff: f64,
+        /// W·sr⁻¹·nm⁻¹ on the axis.
+        intensity: Spectrum,
+    },
+    /// Parallel light.
+    Directional {
+        /// The way the light goes, unit.
+        direction: DVec3,
+        /// On a surface across the light, W·m⁻²·nm⁻¹.
+        irradiance: Spectrum,
+    },
+    /// The same radiance from everywhere.
+    Constant {
+        /// W·m⁻²·sr⁻¹·nm⁻¹.
+        radiance: Spectrum,
+    },
+    /// An image on the sphere at infinity.
+    Environment(Box<Environment>),
+}
+
+/// Light that arrives at a point, before anything stands in its way.
+#[derive(Clone, Copy, Debug)]
+pub struct Arriving {
+    /// Toward the light, unit.
+    pub wi: DVec3,
+    /// Distance to the light; infinite for light from infinity.
+    pub distance: f64,
+    /// Radiance; for lights without extent the irradiance across `wi` (then `density` is `None`).
+    pub radiance: Lanes,
+    /// sr⁻¹; `None` for lights without extent, which no scattering finds by chance.
+    pub density: Option<f64>,
+    /// The face or triangle that shines, where there is one.
+    pub target: Option<Departure>,
+}
+
+/// How spot light falls off between beam and cutoff, as a factor in [0, 1].
+#[must_use]
+pub fn spot_falloff(cos: f64, beam: f64, cutoff: f64) -> f64 {
+    let angle = libm::acos(cos.clamp(-1.0, 1.0));
+    if angle <= beam {
+        1.0
+    } else if angle >= cutoff {
+        0.0
+    } else {
+        (cutoff - angle) / (cutoff - beam)
+    }
+}
+
+impl Light {
+    /// True where scattering can find the light by chance.
+    #[must_use]
+    pub fn has_extent(&self) -> bool {
+        matches!(self, Light::Area { .. } | Light::Constant { .. } | Light::Environment(_))
+    }
+
+    /// True for light from infinity that a ray which meets nothing sees.
+    #[must_use]
+    pub fn is_environment(&self) -> bool {
+        matches!(self, Light::Constant { .. } | Light::Environment(_))
+    }
+
+    /// Radiance seen along `direction` by a ray that meets nothing.
+    #[must_use]
+    pub fn background(&self, direction: DVec3, nm: Lanes) -> Lanes {
+        match self {
+            Light::Constant { radiance } => radiance.eval(nm),
+            Light::Environment(map) => map.radiance(direction, nm),
+            Light::Area { .. } | Light::Point { .. } | Light::Spot { .. } | Light::Directional { .. } => Lanes::ZERO,
+        }
+    }
+
+    /// Density of [`Light::arriving`] toward the background along `direction`, sr⁻¹. `normal` is the
+    /// shading normal that the sample was asked with.
+    #[must_use]
+    pub fn background_pdf(&self, direction: DVec3, normal: Option<DVec3>) -> f64 {
+        match self {
+            Light::Constant { .. } => match normal {
+                Some(n) => n.dot(direction).max(0.0) / PI,
+                None => 0.25 / PI,
+            },
+            Light::Environment(map) => map.pdf(direction),
+            Light::Area { .. } | Light::Point { .. } | Light::Spot { .. } | Light::Directional { .. } => 0.0,
+        }
+    }
+
+    /// Radiance that a point of the object's surface sends toward `wo`.
+    #[must_use]
+    pub fn emitted(&self, surface: &SurfacePoint, wo: DVec3, nm: Lanes) -> Lanes {
+        match self {
+            Light::Area { radiance, .. } if wo.dot(surface.normal) > 0.0 => radiance.eval(surface.uv, nm),
+            _ => Lanes::ZERO,
+        }
+    }
+
+    /// Density with which [`Light::arriving`] at `from` picks the point of the light that the ray in
+    /// `direction` met at `hit`; sr⁻¹.
+    #[must_use]
+    pub fn area_pdf(&self, objects: &[Object], from: DVec3, direction: DVec3, hit: &Hit, normal: DVec3) -> f64 {
+        let Light::Area { object, .. } = self else { return 0.0 };
+        match &objects[*object as usize].geometry {
+            Geometry::Shape(shape) => shape.pdf_toward(from, direction, hit.t, normal),
+            Geometry::Mesh(mesh) => hit.t * hit.t / (mesh.areas.total() * normal.dot(direction).abs()),
+        }
+    }
+
+    /// Light arriving at `from` from a point of the light chosen by `u`; `None` where there is none.
+    /// With `normal` the light is wanted on that side of a surface only (light from everywhere is
+    /// then drawn by the cosine).
+    #[must_use]
+    pub fn arriving(
+        &self,
+        objects: &[Object],
+        from: DVec3,
+        normal: Option<DVec3>,
+        u: DVec2,
+        nm: Lanes,
+    ) -> Option<Arriving> {
+        match self {
+            Light::Area { object, radiance } => {
+                let target = |part: u32| Some(Departure { object: *object, part });
+                match &objects[*object as usize].geometry {
+                    Geometry::Shape(shape) => {
+                        let s = shape.sample_toward(from, u)?;
+                        if s.direction.dot(s.normal) >= 0.0 {
+                            return None;
+                        }
+                        let radiance = match radiance {
+                            Texture::Uniform(spectrum) => spectrum.eval(nm),
+                            varying => varying.eval(shape.surface(s.point, s.face).uv, nm),
+                        };
+                        Some(Arriving {
+                            wi: s.direction,
+                            distance: s.distance,
+                            radiance,
+                            density: Some(s.pdf_solid_angle),
+                            target: target(u32::from(s.face)),
+                        })
+                    }
+                    Geometry::Mesh(mesh) => {
+                        let (i, u_x) = mesh.areas.sample(u.x)?;
+                        let surface = mesh.mesh.sample_area(i, DVec2::new(u_x, u.y));
+                        let offset = surface.point - from;
+                        let distance = offset.length();
+                        let wi = offset / distance;
+                        let cos = -wi.dot(surface.normal);
+                        (cos > 0.0 && distance > 0.0).then(|| Arriving {
+                            wi,
+                            distance,
+                            radiance: radiance.eval(surface.uv, nm),
+                            density: Some(distance * distance / (mesh.areas.total() * cos)),
+                            target: target(i),
+                        })
+                    }
+                }
+            }
+            Light::Point { position, intensity } => {
+                arriving_from_point(*position, from, |_| 1.0).map(|(wi, distance, factor)| Arriving {
+                    wi,
+                    distance,
+                    radiance: intensity.eval(nm) * factor,
+                    density: None,
+                    target: None,
+                })
+            }
+            Light::Spot { position, axis, beam, cutoff, intensity } => {
+                let falloff = |wi: DVec3| spot_falloff(-wi.dot(*axis), *beam, *cutoff);
+                arriving_from_point(*position, from, falloff).map(|(wi, distance, factor)| Arriving {
+                    wi,
+                    distance,
+                    radiance: intensity.eval(nm) * factor,
+                    density: None,
+                    target: None,
+                })
+            }
+            Light::Directional { direction, irradiance } => Some(Arriving {
+                wi: -*direction,
+                distance: f64::INFINITY,
+                radiance: irradiance.eval(nm),
+                density: None,
+                target: None,
+            }),
+            Light::Constant { radiance } => {
+                let wi = match normal {
+                    Some(n) => Frame::from_normal(n).to_world(warp::cosine_hemisphere(u)),
+                    None => warp::uniform_sphere(u),
+                };
+                let density = self.background_pdf(wi, normal);
+                (density > 0.0).then(|| Arriving {
+                    wi,
+                    distance: f64::INFINITY,
+                    radiance: radiance.eval(nm),
+                    density: Some(density),
+                    target: None,
+                })
+            }
+            Light::Environment(map) => {
+                let s = map.sample(u)?;
+                Some(Arriving {
+                    wi: s.direction,
+                    distance: f64::INFINITY,
+                    radiance: map.radiance(s.direction, nm),
+                    density: Some(s.pdf_solid_angle),
+                    target: None,
+                })
+            }
+        }
+    }
+
+    /// Luminous power, in film units times m²: by which lights are chosen. `radius` is that of the
+    /// scene.
+    #[must_use]
+    pub fn power(&self, objects: &[Object], radius: f64) -> f64 {
+        let mean = |t: &Texture| {
+            let all = t.representatives();
+            all.iter().map(Spectrum::luminance).sum::<f64>() / all.len() as f64
+        };
+        match self {
+            Light::Area { object, radiance, .. } => {
+                let area = match &objects[*object as usize].geometry {
+                    Geometry::Shape(shape) => shape.area(),
+                    Geometry::Mesh(mesh) => mesh.areas.total(),
+                };
+                PI * area * mean(radiance)
+            }
+            Light::Point { intensity, .. } => 4.0 * PI * intensity.luminance(),
+            Light::Spot { intensity, beam, cutoff, .. } => {
+                2.0 * PI * (1.0 - libm::cos(0.5 * (beam + cutoff))) * intensity.luminance()
+            }
+            Light::Directional { irradiance, .. } => PI * radius * radius * irradiance.luminance(),
+            Light::Constant { radiance } => 4.0 * PI * PI * radius * radius * radiance.luminance(),
+            Light::Environment(map) => 4.0 * PI * PI * radius * radius * map.mean_luminance(),
+        }
+    }
+
+    /// Spectra that the light sends out, for the choice of wavelengths.
+    #[must_use]
+    pub fn spectra(&self) -> Vec<Spectrum> {
+        match self {
+            Light::Area { radiance, .. } => radiance.representatives(),
+            Light::Point { intensity: s, .. }
+            | Light::Spot { intensity: s, .. }
+            | Light::Directional { irradiance: s, .. }
+            | Light::Constant { radiance: s } => vec![s.clone()],
+            Light::Environment(map) => map.representatives(),
+        }
+    }
+}
+
+/// Direction, distance and 1/d² times `falloff`.
+fn arriving_from_point(position: DVec3, from: DVec3, falloff: impl FnOnce(DVec3) -> f64) -> Option<(DVec3, f64, f32)> {
+    let offset = position - from;
+    let d2 = offset.length_squared();
+    if d2 == 0.0 {
+        return None;
+    }
+    let distance = d2.sqrt();
+    let wi = offset / distance;
+    let factor = falloff(wi) / d2;
+    (factor > 0.0).then_some((wi, distance, factor as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spots_are_full_in_the_beam_linear_to_the_cutoff_and_dark_beyond() {
+        let at = |deg: f64| spot_falloff(deg.to_radians().cos(), 15f64.to_radians(), 20f64.to_radians());
+        assert_eq!([at(0.0), at(14.9), at(20.1), at(180.0)], [1.0, 1.0, 0.0, 0.0]);
+        // Linear in the angle; acos near 17.5° is good to a few ulp of the cosine over its sine.
+        assert!((at(17.5) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn point_light_falls_off_with_the_square_of_the_distance() {
+        let light = Light::Point { position: DVec3::new(0.0, 3.0, 4.0), intensity: Spectrum::Constant(50.0) };
+        let a = light.arriving(&[], DVec3::ZERO, None, DVec2::ZERO, Lanes::splat(550.0)).unwrap();
+        assert_eq!((a.distance, a.radiance.to_array()[0], a.density), (5.0, 2.0, None));
+        assert!(light.arriving(&[], DVec3::new(0.0, 3.0, 4.0), None, DVec2::ZERO, Lanes::splat(550.0)).is_none());
+    }
+}

@@ -1,0 +1,177 @@
+//! Pictures and tables from files.
+
+use super::texture::{ImageTexture, Interpolation, Texel, Wrap};
+use crate::error::{Error, Result};
+use crate::film::exr;
+use crate::spectrum::{colour, upsample};
+use glam::DVec2;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A picture in linear Rec. 709, row 0 at the top.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// Pixels, row by row.
+    pub pixels: Vec<[f32; 3]>,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+/// The most bytes a decoded picture may take: 2 GiB.
+const LARGEST: u64 = 1 << 31;
+
+fn decode(path: &Path) -> Result<image::DynamicImage> {
+    let open = image::ImageReader::open(path).map_err(|e| Error::input(path, words(&e)))?;
+    let mut reader = open.with_guessed_format().map_err(|e| Error::input(path, words(&e)))?;
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(LARGEST);
+    reader.limits(limits);
+    reader.decode().map_err(|e| Error::input(path, format!("expected a PNG, JPEG, HDR or EXR picture: {e}")))
+}
+
+fn words(e: &std::io::Error) -> String {
+    match e.kind() {
+        std::io::ErrorKind::NotFound => "expected a file, found none".into(),
+        std::io::ErrorKind::PermissionDenied => "no permission to read the file".into(),
+        _ => e.to_string(),
+    }
+}
+
+/// Reads a picture of light: EXR and HDR as they are, 8- and 16-bit files decoded from sRGB.
+///
+/// # Errors
+/// [`Error::Input`] where there is no such file or it is no picture, or a pixel is not finite.
+pub fn picture(path: &Path) -> Result<Picture> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let picture = if extension == "exr" {
+        let file = exr::read_exr(path)?;
+        let part = &file.parts[0];
+        let channel = |name: &str| {
+            part.channel(name).ok_or_else(|| Error::input(path, format!("expected channels R, G, B; found no {name}")))
+        };
+        let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
+        let pixels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+        Picture { pixels, width: part.window.width as usize, height: part.window.height as usize }
+    } else {
+        let decoded = decode(path)?;
+        let linear = matches!(decoded, image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_));
+        let rgb = decoded.into_rgb32f();
+        let (width, height) = (rgb.width() as usize, rgb.height() as usize);
+        let decode = |x: f32| if linear { x } else { colour::srgb_decode(x) };
+        Picture { pixels: rgb.pixels().map(|p| p.0.map(decode)).collect(), width, height }
+    };
+    if let Some(i) = picture.pixels.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        let (x, y) = (i % picture.width, i / picture.width);
+        return Err(Error::input(path, format!("expected finite pixels, found {:?} at ({x}, {y})", picture.pixels[i])));
+    }
+    // Light cannot be negative; a colour outside Rec. 709 can. It is moved to the nearest one inside.
+    let pixels = picture.pixels.into_iter().map(|p| p.map(|x| x.max(0.0))).collect();
+    Ok(Picture { pixels, ..picture })
+}
+
+/// Reads a picture of reflectances, upsampled texel by texel; `raw` takes 8- and 16-bit values as
+/// linear.
+///
+/// # Errors
+/// As [`picture`]; values above one are refused.
+pub fn image_texture(path: &Path, raw: bool) -> Result<ImageTexture> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let make = |texels: Vec<Texel>, width: usize, height: usize| ImageTexture {
+        texels: Arc::new(texels),
+        width,
+        height,
+        wrap: [Wrap::Repeat; 2],
+        interpolation: Interpolation::Bilinear,
+        scale: DVec2::ONE,
+        offset: DVec2::ZERO,
+        illuminant: None,
+    };
+    if extension == "exr" || extension == "hdr" {
+        let picture = picture(path)?;
+        if let Some(i) = picture.pixels.iter().position(|p| p.iter().any(|&x| x > 1.0)) {
+            let (x, y) = (i % picture.width, i / picture.width);
+            let found = picture.pixels[i];
+            return Err(Error::input(
+                path,
+                format!("expected reflectances from 0 to 1, found {found:?} at ({x}, {y})"),
+            ));
+        }
+        let texel = |&rgb: &[f32; 3]| Texel { coefficients: upsample::coefficients(rgb), scale: 1.0 };
+        return Ok(make(picture.pixels.iter().map(texel).collect(), picture.width, picture.height));
+    }
+    let rgb = decode(path)?.into_rgb16();
+    let decode = |x: u16| {
+        let x = f32::from(x) / 65535.0;
+        if raw { x } else { colour::srgb_decode(x) }
+    };
+    // Many texels share a colour: each colour is upsampled once.
+    let mut known: HashMap<[u16; 3], u32> = HashMap::new();
+    let mut colours: Vec<[u16; 3]> = Vec::new();
+    let indices: Vec<u32> = rgb
+        .pixels()
+        .map(|p| {
+            *known.entry(p.0).or_insert_with(|| {
+                colours.push(p.0);
+                colours.len() as u32 - 1
+            })
+        })
+        .collect();
+    let upsampled: Vec<[f32; 3]> = colours.par_iter().map(|c| upsample::coefficients(c.map(decode))).collect();
+    let texels = indices.iter().map(|&i| Texel { coefficients: upsampled[i as usize], scale: 1.0 }).collect();
+    Ok(make(texels, rgb.width() as usize, rgb.height() as usize))
+}
+
+/// Reads a curve: two columns, wavelength in nm and value, separated by commas, semicolons or
+/// blanks; lines that start with `#` and a heading are passed over.
+///
+/// # Errors
+/// In words, with the line.
+pub fn samples(path: &Path) -> std::result::Result<Vec<(f64, f64)>, String> {
+    let text = std::fs::read_to_string(path).map_err(|e| words(&e))?;
+    let mut samples = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let fields: Vec<&str> =
+            line.split(|c: char| c == ',' || c == ';' || c.is_whitespace()).filter(|f| !f.is_empty()).collect();
+        let numbers: Vec<Option<f64>> = fields.iter().map(|f| f.parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        match numbers.as_slice() {
+            [Some(nm), Some(value)] => samples.push((*nm, *value)),
+            // A heading may stand before the first numbers.
+            _ if samples.is_empty() && numbers.first().is_none_or(Option::is_none) => {}
+            _ => return Err(format!("line {}: expected a wavelength and a value, found \"{line}\"", i + 1)),
+        }
+    }
+    if samples.is_empty() { Err("expected lines of wavelength and value, found none".into()) } else { Ok(samples) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_are_read_with_headings_comments_and_any_separator() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("curve.csv");
+        std::fs::write(&path, "# source\nnm,value\n400, 0.1\n500;0.2\n\n600\t3e-1\n").unwrap();
+        assert_eq!(samples(&path).unwrap(), [(400.0, 0.1), (500.0, 0.2), (600.0, 0.3)]);
+        std::fs::write(&path, "400 0.1\n500 zwei\n").unwrap();
+        assert_eq!(samples(&path).unwrap_err(), "line 2: expected a wavelength and a value, found \"500 zwei\"");
+        assert_eq!(samples(&dir.path().join("none")).unwrap_err(), "expected a file, found none");
+    }
+
+    #[test]
+    fn a_text_file_is_no_picture() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("earth.jpg");
+        std::fs::write(&path, "not a picture").unwrap();
+        let e = image_texture(&path, false).unwrap_err();
+        assert!(e.exit_code() == 3 && e.to_string().contains("expected a PNG, JPEG, HDR or EXR picture"), "{e}");
+    }
+}
