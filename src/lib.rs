@@ -19,3 +19,4 @@ pub mod math;
 pub mod optics;
 pub mod scene;
 pub mod spectrum;
+pub mod transport;

@@ -1,0 +1,482 @@
+//! Path tracing: next-event estimation at every vertex, combined with scattering by multiple
+//! importance sampling; media; eight wavelengths a path.
+//!
+//! Where sampling depends on wavelength, lane 0 leads and the estimator divides by the sum over
+//! lanes of the densities with which each could have led (hero wavelengths, Wilkie et al. 2014).
+//! The path carries β, the throughput over the hero's density, and ρ_k = p(path | λ_k) / p(path |
+//! λ_0). A contribution is Σ_k β_k L_k / Σ_j ρ_j; with ρ = 1 that is the plain mean of the lanes.
+//!
+//! For light found both ways, with q the density of the light sample, A = q Σ ρ_j and B = Σ ρ_j p_j
+//! are the densities of the two techniques, each already summed over the lanes that could lead;
+//! they are combined by the power heuristic (Veach 1997, eq. 9.13).
+
+use super::Incoming;
+use super::plan::{EffectPlan, PathSettings};
+use crate::math::Frame;
+use crate::math::Ray;
+use crate::math::sampler::{Sampler, Set, pairs};
+use crate::optics::bsdf::{Bsdf, Chosen};
+use crate::optics::medium::MediumLanes;
+use crate::scene::light::Arriving;
+use crate::scene::material::{Kind, Material};
+use crate::scene::{Scene, SurfacePoint};
+use crate::spectrum::{LANES, Lanes, SampledWavelengths};
+use glam::{DVec2, DVec3};
+
+/// Vertices up to which a path that has lost nothing goes on for sure: clear glass then shows what
+/// is behind it without the noise of roulette, in every sample.
+const FOR_SURE: u32 = 256;
+
+/// Longest survival of a path beyond that: one in a thousand is ended at each vertex, so that light
+/// trapped between perfect mirrors costs some thousand vertices, not for ever.
+const SURVIVAL: f64 = 0.999;
+
+/// Boundaries of media that a shadow ray crosses at the most: beyond it the light counts as hidden.
+/// A bound on time, far above any scene's nesting.
+const MAX_BOUNDARIES: u32 = 256;
+
+/// Light that arrives along a camera ray.
+#[must_use]
+pub fn radiance(
+    scene: &Scene,
+    plan: &EffectPlan,
+    settings: &PathSettings,
+    sampler: &Sampler,
+    wavelengths: &SampledWavelengths,
+    ray: &Ray,
+) -> Incoming {
+    let tracer = Tracer { scene, plan, settings, sampler, nm: wavelengths.nm };
+    // The plan chooses the kernel: what a scene lacks is not in the code that runs.
+    match (plan.chromatic, plan.media) {
+        (false, false) => tracer.trace::<false, false>(ray),
+        (true, false) => tracer.trace::<true, false>(ray),
+        (false, true) => tracer.trace::<false, true>(ray),
+        (true, true) => tracer.trace::<true, true>(ray),
+    }
+}
+
+struct Tracer<'a> {
+    scene: &'a Scene,
+    plan: &'a EffectPlan,
+    settings: &'a PathSettings,
+    sampler: &'a Sampler,
+    nm: Lanes,
+}
+
+/// The last vertex that light could also have been found from by next-event estimation.
+#[derive(Clone, Copy)]
+struct Previous {
+    point: DVec3,
+    /// Shading normal, where the light sample was asked with one.
+    normal: Option<DVec3>,
+    /// Σ ρ before scattering.
+    rho: f64,
+    /// The hero's density of the direction taken, sr⁻¹, times that of the flight since.
+    density: f64,
+    /// Distance flown since (across boundaries of media).
+    distance: f64,
+}
+
+/// The state of a path between two vertices.
+struct Path {
+    ray: Ray,
+    beta: Lanes,
+    rho: Lanes,
+    /// Product of η² over crossings: β shrinks by it in glass and regains it, and roulette must not
+    /// take that for a loss.
+    eta2: f64,
+    medium: Option<u32>,
+    /// `None` where only scattering could find light: at the camera and after mirrors.
+    previous: Option<Previous>,
+    radiance: Lanes,
+    /// Scattering events so far.
+    vertices: u32,
+}
+
+impl Path {
+    fn rho_sum<const CHROMATIC: bool>(&self) -> f64 {
+        if CHROMATIC { f64::from(self.rho.reduce_add()) } else { LANES as f64 }
+    }
+
+    /// Adds light `l` found with weight `w` in the estimator Σ β l / Σ ρ; the film's mean over lanes
+    /// divides by 8.
+    fn add<const CHROMATIC: bool>(&mut self, l: Lanes, w: f64) {
+        let share = if CHROMATIC { w * LANES as f64 / self.rho_sum::<true>() } else { w };
+        self.radiance += self.beta * l * share as f32;
+    }
+}
+
+/// The power heuristic for densities `a` and `b`, safe for any finite and infinite values.
+fn power_heuristic(a: f64, b: f64) -> f64 {
+    if a <= 0.0 {
+        return 0.0;
+    }
+    let r = b / a;
+    1.0 / r.mul_add(r, 1.0)
+}
+
+/// What scatters at a vertex.
+enum Scatterer<'a> {
+    Surface { bsdf: &'a Bsdf, frame: &'a Frame, surface: &'a SurfacePoint, flip: bool },
+    Medium(&'a MediumLanes),
+}
+
+impl Scatterer<'_> {
+    /// f · |cos| and densities toward `wi` (world), given `wo` (local for surfaces, world for media).
+    fn eval(&self, wo: DVec3, wi_world: DVec3) -> (Lanes, Lanes) {
+        match self {
+            Scatterer::Surface { bsdf, frame, surface, flip } => {
+                let wi = frame.to_local(wi_world);
+                let geometric = wi_world.dot(surface.normal) * if *flip { -1.0 } else { 1.0 };
+                // Light that the shading normal sees and the true one does not would leak through.
+                if geometric * wi.z <= 0.0 {
+                    return (Lanes::ZERO, Lanes::ZERO);
+                }
+                let e = bsdf.eval(wo, wi);
+                (e.f * wi.z.abs() as f32, e.pdf)
+            }
+            Scatterer::Medium(medium) => {
+                let p = Lanes::splat(medium.phase.eval(wo, wi_world) as f32);
+                (p, p)
+            }
+        }
+    }
+}
+
+impl Tracer<'_> {
+    fn trace<const CHROMATIC: bool, const MEDIA: bool>(&self, ray: &Ray) -> Incoming {
+        let scene = self.scene;
+        let mut path = Path {
+            ray: *ray,
+            beta: Lanes::ONE,
+            rho: Lanes::ONE,
+            eta2: 1.0,
+            medium: if MEDIA { scene.camera_medium } else { None },
+            previous: None,
+            radiance: Lanes::ZERO,
+            vertices: 0,
+        };
+        let mut alpha = 0.0;
+        let mut depth = f64::INFINITY;
+        let mut first = true;
+        // Crossings of boundaries have numbers of their own, so that every vertex of the path keeps
+        // the same ones whether or not boundaries lie on the way.
+        let mut crossings = 0u32;
+
+        loop {
+            let hit = scene.closest(&path.ray, f64::INFINITY);
+            let distance = hit.map_or(f64::INFINITY, |h| h.t);
+            let choice = self.sampler.set(Set::Choice(path.vertices));
+
+            // The medium between here and the next surface may scatter the path first.
+            if MEDIA && let Some(medium) = path.medium {
+                let lanes = scene.media[medium as usize].lanes(self.nm);
+                let u = if crossings == 0 {
+                    choice[3]
+                } else {
+                    self.sampler.set(Set::Extra(path.vertices.wrapping_add(crossings << 16)))[0]
+                };
+                let flight = lanes.fly(distance, u);
+                path.beta *= flight.weight;
+                if CHROMATIC {
+                    path.rho *= flight.ratio;
+                }
+                if let Some(previous) = &mut path.previous {
+                    previous.density *= flight.density;
+                }
+                if let Some(t) = flight.scattered_at {
+                    let point = path.ray.at(t);
+                    if first {
+                        // A medium counts as coverage: what is behind it is dimmed.
+                        alpha = 1.0;
+                        depth = scene.camera.depth(point);
+                        first = false;
+                    }
+                    if !self.scatter_in_medium::<CHROMATIC, MEDIA>(&mut path, point, &lanes, choice) {
+                        break;
+                    }
+                    crossings = 0;
+                    continue;
+                }
+            }
+
+            let Some(hit) = hit else {
+                self.add_background::<CHROMATIC>(&mut path);
+                break;
+            };
+            let surface = scene.surface(&path.ray, &hit);
+            let object = &scene.objects[hit.object as usize];
+            let material = &scene.materials[object.material as usize];
+            let boundary = matches!(material.kind, Kind::Boundary);
+            if first && !boundary {
+                alpha = 1.0;
+                depth = scene.camera.depth(surface.point);
+                first = false;
+            }
+            let wo_world = -path.ray.direction;
+
+            // Light that the surface itself sends out.
+            if let Some(light) = object.light {
+                let emitted = scene.lights[light as usize].emitted(&surface, wo_world, self.nm);
+                let weight = match &path.previous {
+                    None => 1.0,
+                    Some(p) => {
+                        let total = crate::scene::Hit { t: p.distance + hit.t, ..hit };
+                        let q = scene.light_probability(light as usize)
+                            * scene.lights[light as usize].area_pdf(
+                                &scene.objects,
+                                p.point,
+                                path.ray.direction,
+                                &total,
+                                surface.normal,
+                            );
+                        power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho)
+                    }
+                };
+                path.add::<CHROMATIC>(emitted, weight);
+            }
+
+            if boundary {
+                crossings += 1;
+                if crossings > MAX_BOUNDARIES {
+                    break;
+                }
+                path.medium = self.beyond(object, &surface, path.ray.direction);
+                if let Some(p) = &mut path.previous {
+                    p.distance += hit.t;
+                }
+                path.ray = scene.leave(&surface, &hit, path.ray.direction);
+                continue;
+            }
+            if self.settings.max_depth.is_some_and(|d| path.vertices + 1 >= d) {
+                break;
+            }
+
+            // The local frame: z is the shading normal; two-sided materials turn it to the viewer.
+            let flip = material.two_sided && wo_world.dot(surface.normal) < 0.0;
+            let mut normal = surface.shading_normal;
+            if normal.dot(wo_world) * surface.normal.dot(wo_world) <= 0.0 {
+                // The viewer sees the true surface from one side and the shading normal's from the
+                // other: take the true one.
+                normal = surface.normal;
+            }
+            let frame = Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent);
+            let wo = frame.to_local(wo_world);
+            let bsdf = material.bsdf(surface.uv, self.nm, self.plan.all_dispersive);
+
+            let scatter = self.sampler.set(Set::Scatter(path.vertices));
+            let (u_light, u_direction) = pairs(scatter);
+            let sided = sided_normal(material, &frame);
+            if !bsdf.is_discrete() {
+                let scatterer = Scatterer::Surface { bsdf: &bsdf, frame: &frame, surface: &surface, flip };
+                self.add_light::<CHROMATIC, MEDIA>(
+                    &mut path,
+                    &scatterer,
+                    surface.point,
+                    wo,
+                    sided,
+                    u_light,
+                    choice[0],
+                    |wi| scene.leave(&surface, &hit, wi),
+                );
+            }
+
+            // On along a direction of the material's choice.
+            let Some(sample) = bsdf.sample(wo, choice[1], u_direction) else { break };
+            let wi = frame.to_world(sample.wi);
+            let side = wi.dot(surface.normal) * wo_world.dot(surface.normal);
+            if (side > 0.0) == sample.transmitted || side == 0.0 {
+                break;
+            }
+            path.previous = match sample.chosen {
+                Chosen::Discrete => None,
+                Chosen::Density(density) => Some(Previous {
+                    point: surface.point,
+                    normal: sided,
+                    rho: path.rho_sum::<CHROMATIC>(),
+                    density,
+                    distance: 0.0,
+                }),
+            };
+            path.beta *= sample.weight;
+            if CHROMATIC {
+                path.rho *= sample.ratio;
+            }
+            path.eta2 *= sample.eta2;
+            if MEDIA && sample.transmitted {
+                path.medium = self.beyond(object, &surface, wi);
+            }
+            path.ray = scene.leave(&surface, &hit, wi);
+            path.vertices += 1;
+            crossings = 0;
+            if !self.survives::<CHROMATIC>(&mut path, choice[2]) {
+                break;
+            }
+        }
+        Incoming { radiance: path.radiance, alpha, depth }
+    }
+
+    /// The medium that a ray in `direction` is in after it has crossed the surface of `object`.
+    fn beyond(&self, object: &crate::scene::Object, surface: &SurfacePoint, direction: DVec3) -> Option<u32> {
+        if direction.dot(surface.normal) < 0.0 { object.inside } else { object.outside }
+    }
+
+    /// One event of scattering inside a medium; false where the path ends.
+    fn scatter_in_medium<const CHROMATIC: bool, const MEDIA: bool>(
+        &self,
+        path: &mut Path,
+        point: DVec3,
+        medium: &MediumLanes,
+        choice: [f64; 4],
+    ) -> bool {
+        if self.settings.max_depth.is_some_and(|d| path.vertices + 1 >= d) {
+            return false;
+        }
+        let wo = -path.ray.direction;
+        let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
+        self.add_light::<CHROMATIC, MEDIA>(
+            path,
+            &Scatterer::Medium(medium),
+            point,
+            wo,
+            None,
+            u_light,
+            choice[0],
+            |wi| Ray::new(point, wi),
+        );
+        let wi = medium.phase.sample(wo, u_direction);
+        path.previous = Some(Previous {
+            point,
+            normal: None,
+            rho: path.rho_sum::<CHROMATIC>(),
+            density: medium.phase.eval(wo, wi),
+            distance: 0.0,
+        });
+        path.ray = Ray::new(point, wi);
+        path.vertices += 1;
+        self.survives::<CHROMATIC>(path, choice[2])
+    }
+
+    /// Russian roulette on the largest lane; false where the path ends.
+    fn survives<const CHROMATIC: bool>(&self, path: &mut Path, u: f64) -> bool {
+        let beta = path.beta.to_array().into_iter().fold(0.0f32, f32::max);
+        if beta.is_nan() || beta <= 0.0 {
+            return false;
+        }
+        if path.vertices + 1 < self.settings.roulette_depth {
+            return true;
+        }
+        let carried = f64::from(beta) * LANES as f64 / path.rho_sum::<CHROMATIC>() * path.eta2;
+        let q = carried.min(if path.vertices < FOR_SURE { 1.0 } else { SURVIVAL });
+        if u >= q {
+            return false;
+        }
+        path.beta *= (1.0 / q) as f32;
+        true
+    }
+
+    /// Light from infinity along a ray that met nothing.
+    fn add_background<const CHROMATIC: bool>(&self, path: &mut Path) {
+        for &i in &self.scene.backgrounds {
+            let light = &self.scene.lights[i as usize];
+            let l = light.background(path.ray.direction, self.nm);
+            let weight = match &path.previous {
+                None => 1.0,
+                Some(p) => {
+                    let q =
+                        self.scene.light_probability(i as usize) * light.background_pdf(path.ray.direction, p.normal);
+                    power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho)
+                }
+            };
+            path.add::<CHROMATIC>(l, weight);
+        }
+    }
+
+    /// Next-event estimation: light from one point of one light.
+    #[expect(clippy::too_many_arguments, reason = "the state of a vertex, split by borrow")]
+    fn add_light<const CHROMATIC: bool, const MEDIA: bool>(
+        &self,
+        path: &mut Path,
+        scatterer: &Scatterer,
+        point: DVec3,
+        wo: DVec3,
+        normal: Option<DVec3>,
+        u: DVec2,
+        u_light: f64,
+        leave: impl FnOnce(DVec3) -> Ray,
+    ) {
+        let scene = self.scene;
+        let Some((i, probability)) = scene.choose_light(u_light) else { return };
+        let Some(light) = scene.lights[i].arriving(&scene.objects, point, normal, u, self.nm) else { return };
+        let (f, pdf) = scatterer.eval(wo, light.wi);
+        if f.simd_eq(Lanes::ZERO).all() {
+            return;
+        }
+        let Some((through, passing)) = self.visible::<MEDIA>(path.medium, &leave(light.wi), &light) else { return };
+        let value = f * light.radiance * through;
+        match light.density {
+            None => path.add::<CHROMATIC>(value, 1.0 / probability),
+            Some(density) => {
+                let q = density * probability;
+                // B: what scattering, led by any lane, would have found this light with.
+                let led = if CHROMATIC { path.rho * pdf * passing } else { pdf * passing };
+                let scattering = f64::from(led.reduce_add());
+                let weight = power_heuristic(q * path.rho_sum::<CHROMATIC>(), scattering);
+                path.add::<CHROMATIC>(value, weight / q);
+            }
+        }
+    }
+
+    /// Transmittance to a light, and for each lane the probability that a path would have come
+    /// through without scattering; `None` where something opaque stands between.
+    fn visible<const MEDIA: bool>(
+        &self,
+        mut medium: Option<u32>,
+        ray: &Ray,
+        light: &Arriving,
+    ) -> Option<(Lanes, Lanes)> {
+        let scene = self.scene;
+        let target = light.target;
+        let (mut through, mut passing) = (Lanes::ONE, Lanes::ONE);
+        let mut attenuate = |medium: Option<u32>, distance: f64| {
+            if MEDIA && let Some(m) = medium {
+                let lanes = scene.media[m as usize].lanes(self.nm);
+                let t = lanes.transmittance(distance);
+                through *= t;
+                if lanes.scatters() {
+                    passing *= t;
+                }
+            }
+        };
+        if !scene.has_boundaries {
+            if scene.occluded(ray, light.distance, target) {
+                return None;
+            }
+            attenuate(medium, light.distance);
+            return Some((through, passing));
+        }
+        // Walk from boundary to boundary.
+        let (mut ray, mut left) = (*ray, light.distance);
+        for _ in 0..MAX_BOUNDARIES {
+            let Some(hit) = scene.closest(&ray, left).filter(|h| !h.is_on(target)) else {
+                attenuate(medium, left);
+                return Some((through, passing));
+            };
+            let object = &scene.objects[hit.object as usize];
+            if !matches!(scene.materials[object.material as usize].kind, Kind::Boundary) {
+                return None;
+            }
+            attenuate(medium, hit.t);
+            let surface = scene.surface(&ray, &hit);
+            medium = self.beyond(object, &surface, ray.direction);
+            ray = scene.leave(&surface, &hit, ray.direction);
+            left -= hit.t;
+        }
+        None
+    }
+}
+
+/// The side on which light is wanted: the shading normal for surfaces that only reflect.
+fn sided_normal(material: &Material, frame: &Frame) -> Option<DVec3> {
+    (!material.transmits()).then_some(frame.n)
+}

@@ -1,0 +1,261 @@
+//! What a scene calls for: each effect on or off, with its reason.
+//!
+//! An *effect* is something that is simulated (dispersion, a medium, a texture). A scene that lacks
+//! it does not pay for it, and leaving it out never changes a bit: `effects: all` turns everything
+//! on and is the proof. A *technique* is how an effect is computed; it changes noise and time,
+//! never the mean.
+
+use crate::scene::census::Census;
+use crate::spectrum::Spectrum;
+use serde::Serialize;
+
+/// Which light transport is simulated.
+#[derive(Clone, Debug)]
+pub enum Integrator {
+    /// Path tracing with next-event estimation.
+    Path(PathSettings),
+    /// The deterministic recursive tracer.
+    Whitted(WhittedSettings),
+}
+
+/// Settings of the path tracer.
+#[derive(Clone, Copy, Debug)]
+pub struct PathSettings {
+    /// Longest path, in segments: 1 sees lights only, 2 adds direct light. `None`: no limit.
+    pub max_depth: Option<u32>,
+    /// Segments after which Russian roulette may end a path.
+    pub roulette_depth: u32,
+}
+
+/// Settings of the recursive tracer.
+#[derive(Clone, Debug)]
+pub struct WhittedSettings {
+    /// Deepest recursion: with 1 a mirror shows what is before it, but no mirror in a mirror.
+    pub max_depth: u32,
+    /// Points of a pixel along each side.
+    pub grid: u32,
+    /// Radiance that surfaces get from everywhere, times their reflectance.
+    pub ambient: Spectrum,
+    /// True where transparent objects let light through in a straight line, dimmed and tinted by
+    /// their surfaces, instead of casting a full shadow.
+    pub transparent_shadows: bool,
+}
+
+impl WhittedSettings {
+    /// Samples of a pixel: one a point of the grid, and at least four, because the wavelengths of
+    /// fewer would not do. The 32 of four sets integrate a colour to 0.5 %, the 8 of one set only to
+    /// 10 %; with one point it is traced four times.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        (self.grid * self.grid).max(4)
+    }
+}
+
+/// Whether effects that the scene lacks are left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EffectMode {
+    /// Left out.
+    #[default]
+    Auto,
+    /// All kept in force, to prove that nothing changes and to measure what leaving out saves.
+    All,
+}
+
+/// One effect or technique.
+#[derive(Clone, Debug, Serialize)]
+pub struct Effect {
+    /// Its name.
+    pub name: &'static str,
+    /// Whether it is simulated, or used.
+    pub on: bool,
+    /// Why.
+    pub reason: String,
+}
+
+/// What is simulated, and how.
+#[derive(Clone, Debug)]
+pub struct EffectPlan {
+    /// Which light transport.
+    pub integrator: Integrator,
+    /// Indices that depend on wavelength.
+    pub dispersion: bool,
+    /// Sampling decisions that depend on wavelength: densities are kept for each lane.
+    pub chromatic: bool,
+    /// Media.
+    pub media: bool,
+    /// Depth fog.
+    pub depth_fog: bool,
+    /// Every glass is computed as if it were dispersive.
+    pub all_dispersive: bool,
+    /// What is simulated, for people.
+    pub effects: Vec<Effect>,
+    /// How it is computed, for people.
+    pub techniques: Vec<Effect>,
+}
+
+/// At most three names, then how many more.
+fn some_of(names: &[String]) -> String {
+    let shown = names.iter().take(3).map(String::as_str).collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(3) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
+}
+
+/// The techniques of the path tracer for this scene.
+fn path_techniques(census: &Census, chromatic: bool) -> Vec<Effect> {
+    let extended = census.area_lights.len() + census.backgrounds;
+    let lights = extended + census.delta_lights;
+    let technique =
+        |name, on, here: String, absent: &str| Effect { name, on, reason: if on { here } else { absent.to_owned() } };
+    vec![
+        technique(
+            "next-event estimation",
+            lights > 0,
+            format!("of {lights} lights, chosen by power"),
+            "there is no light",
+        ),
+        technique(
+            "multiple importance sampling",
+            extended > 0,
+            format!("{extended} lights can also be met by chance"),
+            "no light can be met by chance",
+        ),
+        technique(
+            "hero wavelengths",
+            chromatic,
+            "wavelengths part on the way: one of the eight leads each path".into(),
+            "all eight wavelengths share every path",
+        ),
+        technique("Russian roulette", true, "faint paths end early, without bias".into(), ""),
+    ]
+}
+
+impl EffectPlan {
+    /// Decides from the census of a scene.
+    #[must_use]
+    pub fn of(census: &Census, integrator: Integrator, mode: EffectMode) -> EffectPlan {
+        let path = matches!(integrator, Integrator::Path(_));
+        let mut effects: Vec<Effect> = Vec::new();
+        // An effect of the scene: on if the scene has it, or if everything is forced on.
+        let mut effect = |name, present: bool, here: String, absent: &str| {
+            let on = present || mode == EffectMode::All;
+            let reason = match (present, mode) {
+                (true, _) => here,
+                (false, EffectMode::Auto) => absent.to_owned(),
+                (false, EffectMode::All) => format!("forced by effects: all ({absent})"),
+            };
+            effects.push(Effect { name, on, reason });
+            on
+        };
+        let count = |n: usize, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
+
+        let dispersive: Vec<String> = census.dispersive.iter().chain(&census.rough_dispersive).cloned().collect();
+        let dispersion = effect(
+            "dispersion",
+            !dispersive.is_empty(),
+            format!("index depends on wavelength: {}", some_of(&dispersive)),
+            "no index depends on wavelength",
+        );
+        effect(
+            "refraction",
+            !census.refractive.is_empty(),
+            format!("transparent: {}", some_of(&census.refractive)),
+            "nothing is transparent",
+        );
+        effect(
+            "specular reflection",
+            !census.reflective.is_empty(),
+            format!("mirrors and metals: {}", some_of(&census.reflective)),
+            "no mirrors and no metals",
+        );
+        effect(
+            "textures",
+            !census.textured.is_empty(),
+            format!("varying over the surface: {}", some_of(&census.textured)),
+            "every surface has one spectrum",
+        );
+        effect(
+            "area lights",
+            !census.area_lights.is_empty(),
+            format!("shining: {}", some_of(&census.area_lights)),
+            "no surface shines",
+        );
+        effect(
+            "lights without extent",
+            census.delta_lights > 0,
+            count(census.delta_lights, "point, spot or directional light", "point, spot or directional lights"),
+            "no point, spot or directional light",
+        );
+        effect(
+            "environment",
+            census.backgrounds > 0,
+            count(census.backgrounds, "light from infinity", "lights from infinity"),
+            "no light from infinity",
+        );
+        let media = effect(
+            "media",
+            path && census.media > 0,
+            count(census.media, "medium that light crosses", "media that light crosses"),
+            if path { "all space is empty" } else { "whitted does not simulate media" },
+        );
+        let depth_fog = effect("depth fog", census.fog, "the scene asks for it".into(), "the scene has none");
+        effect(
+            "depth of field",
+            path && census.lens,
+            "the lens has a radius".into(),
+            if path { "the camera is a pinhole" } else { "whitted uses a pinhole" },
+        );
+        effect(
+            "indirect light",
+            path,
+            "path follows light over every surface".into(),
+            "whitted knows light of mirrors and glass only, and an ambient term",
+        );
+        // Not an effect but a consequence; forced on with the effects that call for it.
+        let chromatic = dispersion || census.chromatic_media > 0 || mode == EffectMode::All;
+        let techniques = if path { path_techniques(census, chromatic) } else { Vec::new() };
+        EffectPlan {
+            integrator,
+            dispersion,
+            chromatic,
+            media: media && path,
+            depth_fog,
+            all_dispersive: mode == EffectMode::All,
+            effects,
+            techniques,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn path() -> Integrator {
+        Integrator::Path(PathSettings { max_depth: None, roulette_depth: 5 })
+    }
+
+    #[test]
+    fn an_empty_scene_calls_for_nothing_but_light_over_surfaces() {
+        let plan = EffectPlan::of(&Census::default(), path(), EffectMode::Auto);
+        let on: Vec<_> = plan.effects.iter().filter(|e| e.on).map(|e| e.name).collect();
+        assert_eq!(on, ["indirect light"]);
+        assert!(!plan.chromatic && !plan.media && !plan.depth_fog);
+    }
+
+    #[test]
+    fn a_prism_calls_for_dispersion_by_name() {
+        let census = Census { dispersive: vec!["prism".into()], ..Census::default() };
+        let plan = EffectPlan::of(&census, path(), EffectMode::Auto);
+        let dispersion = plan.effects.iter().find(|e| e.name == "dispersion").unwrap();
+        assert!(dispersion.on && dispersion.reason.contains("prism") && plan.chromatic);
+    }
+
+    #[test]
+    fn everything_can_be_forced_on_and_says_so() {
+        let plan = EffectPlan::of(&Census::default(), path(), EffectMode::All);
+        assert!(plan.effects.iter().all(|e| e.on));
+        assert!(plan.effects[0].reason.contains("effects: all"));
+    }
+}

@@ -1,0 +1,318 @@
+//! The deterministic recursive tracer of Whitted 1980, "An Improved Illumination Model for Shaded
+//! Display": an ambient term, for each light a hard shadow and a highlight, mirrors and glass by
+//! recursion. No random numbers; spectral like the rest.
+//!
+//! Lights with area shine from the middle of their surface; light from infinity is seen, and reaches
+//! surfaces through the ambient term only. Glass reflects and refracts by Fresnel's shares; where its
+//! index depends on the wavelength, each wavelength goes on alone after the first refraction.
+
+use super::Incoming;
+use super::plan::{EffectPlan, WhittedSettings};
+use crate::math::{Departure, Frame, Ray};
+use crate::optics::dielectric::{RelativeIndex, refract};
+use crate::optics::fresnel::{self, Model};
+use crate::scene::light::Light;
+use crate::scene::material::{Highlight, HighlightModel, Kind, Material};
+use crate::scene::shape::Shape;
+use crate::scene::texture::Texture;
+use crate::scene::{Geometry, Scene, SurfacePoint};
+use crate::spectrum::{LANES, Lanes, SampledWavelengths};
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+
+/// Least share of a ray's light that is followed. Glass doubles the rays at each level, so the
+/// recursion must end by light as well as by depth; what is lost is at most this share of the
+/// brightest radiance in the scene for each branch that is cut.
+const FAINTEST: f32 = 1.0 / 65_536.0;
+
+/// Transparent surfaces that a shadow ray crosses at the most.
+const MAX_PANES: u32 = 64;
+
+/// Light that arrives along a camera ray.
+#[must_use]
+pub fn radiance(
+    scene: &Scene,
+    plan: &EffectPlan,
+    settings: &WhittedSettings,
+    wavelengths: &SampledWavelengths,
+    ray: &Ray,
+) -> Incoming {
+    let tracer = Tracer { scene, plan, settings, nm: wavelengths.nm };
+    let (radiance, first) = tracer.trace(ray, Lanes::ONE, 0);
+    Incoming {
+        radiance,
+        alpha: if first.is_some() { 1.0 } else { 0.0 },
+        depth: first.map_or(f64::INFINITY, |point| scene.camera.depth(point)),
+    }
+}
+
+struct Tracer<'a> {
+    scene: &'a Scene,
+    plan: &'a EffectPlan,
+    settings: &'a WhittedSettings,
+    nm: Lanes,
+}
+
+impl Tracer<'_> {
+    /// Light along `ray` for the lanes in which `weight`, the share that reaches the eye, is not zero;
+    /// and the first point met.
+    fn trace(&self, ray: &Ray, weight: Lanes, depth: u32) -> (Lanes, Option<DVec3>) {
+        let scene = self.scene;
+        let Some(hit) = scene.closest(ray, f64::INFINITY) else {
+            let all = &scene.backgrounds;
+            let sky = all.iter().map(|&i| scene.lights[i as usize].background(ray.direction, self.nm));
+            return (sky.fold(Lanes::ZERO, |a, b| a + b), None);
+        };
+        let surface = scene.surface(ray, &hit);
+        let object = &scene.objects[hit.object as usize];
+        let material = &scene.materials[object.material as usize];
+        let wo = -ray.direction;
+        if matches!(material.kind, Kind::Boundary) {
+            let (light, first) = self.trace(&scene.leave(&surface, &hit, ray.direction), weight, depth);
+            return (light, first);
+        }
+
+        let outside = wo.dot(surface.normal) > 0.0;
+        let turned = !outside && material.two_sided;
+        let mut normal = surface.shading_normal;
+        if (normal.dot(wo) > 0.0) != outside {
+            normal = surface.normal;
+        }
+        let normal = if turned { -normal } else { normal };
+        let emitted = object.light.map_or(Lanes::ZERO, |l| scene.lights[l as usize].emitted(&surface, wo, self.nm));
+        if !outside && !material.two_sided && !material.transmits() {
+            return (emitted, Some(surface.point));
+        }
+
+        let leave = |direction: DVec3| scene.leave(&surface, &hit, direction);
+        let mut light = emitted + self.shade(material, &surface, normal, wo, &leave);
+        if depth < self.settings.max_depth {
+            light += self.specular(material, normal, surface.normal, wo, weight, depth, &leave);
+        }
+        (light, Some(surface.point))
+    }
+
+    /// Ambient light, and from each light the diffuse part and the highlight.
+    fn shade(
+        &self,
+        material: &Material,
+        surface: &SurfacePoint,
+        normal: DVec3,
+        wo: DVec3,
+        leave: &impl Fn(DVec3) -> Ray,
+    ) -> Lanes {
+        let base = match &material.kind {
+            Kind::Diffuse { reflectance } => reflectance.eval(surface.uv, self.nm),
+            Kind::Plastic { reflectance, eta, internal, nonlinear, .. } => {
+                // The base under its coat, for light along the normal both ways.
+                let rho = reflectance.eval(surface.uv, self.nm);
+                let shifted = if *nonlinear { rho } else { Lanes::ONE };
+                let t = 1.0 - fresnel::dielectric(Model::Exact, 1.0, *eta).reflected;
+                rho / (Lanes::ONE - shifted * *internal as f32) * (t * t / (eta * eta)) as f32
+            }
+            Kind::Mirror { .. }
+            | Kind::Conductor { .. }
+            | Kind::Dielectric { .. }
+            | Kind::Thin { .. }
+            | Kind::Boundary => Lanes::ZERO,
+        };
+        let diffuse = base.simd_gt(Lanes::ZERO).any();
+        let mut light = base * self.settings.ambient.eval(self.nm);
+        if !diffuse && material.highlight.is_none() {
+            return light;
+        }
+        for source in &self.scene.lights {
+            let Some((wi, irradiance, distance, target)) = self.toward(source, surface.point) else { continue };
+            let cos = wi.dot(normal);
+            if cos <= 0.0 || wi.dot(surface.normal) * wo.dot(surface.normal) <= 0.0 {
+                continue;
+            }
+            let through = self.unshadowed(&leave(wi), distance, target);
+            if !through.simd_gt(Lanes::ZERO).any() {
+                continue;
+            }
+            let mut reflected = base * (cos / PI) as f32;
+            if let Some(h) = &material.highlight {
+                reflected += Lanes::splat(highlight(h, normal, wo, wi) as f32);
+            }
+            light += reflected * irradiance * through;
+        }
+        light
+    }
+
+    /// Direction, irradiance across it, distance and primitive of a light, as a single point.
+    fn toward(&self, light: &Light, from: DVec3) -> Option<(DVec3, Lanes, f64, Option<Departure>)> {
+        if light.is_environment() {
+            return None;
+        }
+        // The middle of a sphere, which is the point nearest to the receiver, needs no sampling.
+        if let Light::Area { object, radiance: Texture::Uniform(radiance) } = light
+            && let Geometry::Shape(Shape::Sphere(sphere)) = &self.scene.objects[*object as usize].geometry
+        {
+            let (wi, distance, solid_angle) = sphere.toward_middle(from)?;
+            let target = Some(Departure { object: *object, part: 0 });
+            return Some((wi, radiance.eval(self.nm) * solid_angle as f32, distance, target));
+        }
+        let a = light.arriving(&self.scene.objects, from, None, DVec2::splat(0.5), self.nm)?;
+        let irradiance = match a.density {
+            None => a.radiance,
+            Some(density) => a.radiance * (1.0 / density) as f32,
+        };
+        Some((a.wi, irradiance, a.distance, a.target))
+    }
+
+    /// One where nothing stands between; the tint of transparent surfaces where the scene asks for it.
+    fn unshadowed(&self, ray: &Ray, distance: f64, target: Option<Departure>) -> Lanes {
+        let scene = self.scene;
+        if !self.settings.transparent_shadows && !scene.has_boundaries {
+            return if scene.occluded(ray, distance, target) { Lanes::ZERO } else { Lanes::ONE };
+        }
+        let (mut ray, mut left, mut through) = (*ray, distance, Lanes::ONE);
+        for _ in 0..MAX_PANES {
+            let Some(hit) = scene.closest(&ray, left).filter(|h| !h.is_on(target)) else {
+                return through;
+            };
+            let surface = scene.surface(&ray, &hit);
+            let material = &scene.materials[scene.objects[hit.object as usize].material as usize];
+            let cos = ray.direction.dot(surface.normal);
+            match &material.kind {
+                Kind::Boundary => {}
+                Kind::Dielectric { interior, exterior, fresnel: model, .. } if self.settings.transparent_shadows => {
+                    let (i, e) = (interior.lanes(self.nm), exterior.lanes(self.nm));
+                    let t: [f32; LANES] = std::array::from_fn(|k| {
+                        let eta = if cos < 0.0 { i[k] / e[k] } else { e[k] / i[k] };
+                        fresnel::dielectric(*model, cos.abs(), eta).transmitted as f32
+                    });
+                    through *= Lanes::new(t);
+                }
+                Kind::Thin { interior, exterior } if self.settings.transparent_shadows => {
+                    let (i, e) = (interior.lanes(self.nm), exterior.lanes(self.nm));
+                    let t: [f32; LANES] = std::array::from_fn(|k| {
+                        let r = fresnel::dielectric(Model::Exact, cos.abs(), i[k] / e[k]).reflected;
+                        ((1.0 - r) / (1.0 + r)) as f32
+                    });
+                    through *= Lanes::new(t);
+                }
+                _ => return Lanes::ZERO,
+            }
+            ray = scene.leave(&surface, &hit, ray.direction);
+            left -= hit.t;
+        }
+        Lanes::ZERO
+    }
+
+    /// Light from mirrors and through glass.
+    #[expect(clippy::too_many_arguments, reason = "the state of a vertex, split by borrow")]
+    fn specular(
+        &self,
+        material: &Material,
+        normal: DVec3,
+        geometric: DVec3,
+        wo: DVec3,
+        weight: Lanes,
+        depth: u32,
+        leave: &impl Fn(DVec3) -> Ray,
+    ) -> Lanes {
+        let frame = Frame::from_normal(normal);
+        let local = frame.to_local(wo);
+        let cos = local.z.abs();
+        let follow = |share: Lanes, wi: DVec3| -> Lanes {
+            let onward = weight * share;
+            if onward.simd_gt(Lanes::splat(FAINTEST)).any() {
+                self.trace(&leave(wi), onward, depth + 1).0 * share
+            } else {
+                Lanes::ZERO
+            }
+        };
+        // A shading normal that leans may send light to the wrong side of the true surface, where it
+        // would see through it: that light is lost, as in `path`.
+        let sides = |wi: DVec3| wi.dot(geometric) * wo.dot(geometric);
+        let reflect = |share: Lanes| -> Lanes {
+            let wi = frame.to_world(DVec3::new(-local.x, -local.y, local.z));
+            if sides(wi) > 0.0 { follow(share, wi) } else { Lanes::ZERO }
+        };
+        let cross = |share: Lanes, wi: DVec3| if sides(wi) < 0.0 { follow(share, wi) } else { Lanes::ZERO };
+        match &material.kind {
+            Kind::Diffuse { .. } | Kind::Boundary => Lanes::ZERO,
+            Kind::Mirror { reflectance } => reflect(reflectance.eval(self.nm)),
+            // Rough metal and rough glass are shown smooth: a single ray knows one direction.
+            Kind::Conductor { eta, k, tint, fresnel: model, .. } => {
+                let r = fresnel::conductor(*model, cos, eta.eval(self.nm), k.eval(self.nm));
+                reflect(r * tint.eval(self.nm))
+            }
+            Kind::Plastic { eta, .. } => {
+                let r = fresnel::dielectric(Model::Exact, cos, *eta).reflected;
+                reflect(Lanes::splat(r as f32))
+            }
+            Kind::Thin { interior, exterior } => {
+                let eta = interior.at(587.5618) / exterior.at(587.5618);
+                let r = fresnel::dielectric(Model::Exact, cos, eta).reflected;
+                let r = 2.0 * r / (1.0 + r);
+                reflect(Lanes::splat(r as f32)) + cross(Lanes::splat((1.0 - r) as f32), -wo)
+            }
+            Kind::Dielectric { fresnel: model, .. } => {
+                let index = material.relative_index(self.nm, self.plan.all_dispersive);
+                let m = DVec3::Z * local.z.signum();
+                let toward = |eta: f64| if local.z > 0.0 { eta } else { 1.0 / eta };
+                // Radiance that crosses scales by 1/η².
+                let bent = |eta: f64| {
+                    let split = fresnel::dielectric(*model, cos, eta);
+                    let wi = frame.to_world(refract(local, m, eta, split.cos_transmitted));
+                    (split.reflected as f32, (split.transmitted / (eta * eta)) as f32, wi)
+                };
+                match index {
+                    RelativeIndex::Constant(eta) => {
+                        let (r, t, wi) = bent(toward(eta));
+                        reflect(Lanes::splat(r)) + cross(Lanes::splat(t), wi)
+                    }
+                    RelativeIndex::Dispersive(all) => {
+                        let lanes = all.map(|e| bent(toward(e)));
+                        let mut light = reflect(Lanes::new(lanes.map(|l| l.0)));
+                        // Lanes with the very same index stay together; others part.
+                        let mut done = [false; LANES];
+                        for k in 0..LANES {
+                            if done[k] {
+                                continue;
+                            }
+                            let share: [f32; LANES] = std::array::from_fn(|j| {
+                                let together = !done[j] && all[j] == all[k];
+                                done[j] |= together;
+                                if together { lanes[j].1 } else { 0.0 }
+                            });
+                            light += cross(Lanes::new(share), lanes[k].2);
+                        }
+                        light
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// strength · cosⁿ, zero on the far side.
+fn highlight(h: &Highlight, normal: DVec3, wo: DVec3, wi: DVec3) -> f64 {
+    let cos = match h.model {
+        HighlightModel::Blinn => (wo + wi).try_normalize().map_or(0.0, |half| half.dot(normal)),
+        HighlightModel::Phong => (normal * (2.0 * wo.dot(normal)) - wo).dot(wi),
+    };
+    if cos > 0.0 { f64::from(h.strength) * libm::pow(cos, h.exponent) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Normal up, viewer and light 30° to either side: Phong's mirrored viewer meets the light and
+    /// Blinn's half vector the normal; with the light 20° higher Phong sees cos 20°, Blinn cos 10°.
+    #[test]
+    fn highlights_are_powers_of_the_right_cosines() {
+        let at = |deg: f64| DVec3::new(deg.to_radians().sin(), deg.to_radians().cos(), 0.0);
+        for (model, off) in [(HighlightModel::Phong, 20.0f64), (HighlightModel::Blinn, 10.0)] {
+            let h = Highlight { strength: 0.5, exponent: 20.0, model };
+            assert!((highlight(&h, DVec3::Y, at(-30.0), at(30.0)) - 0.5).abs() < 1e-14);
+            let expected = 0.5 * off.to_radians().cos().powi(20);
+            assert!((highlight(&h, DVec3::Y, at(-30.0), at(10.0)) - expected).abs() < 1e-14, "{model:?}");
+            assert_eq!(highlight(&h, DVec3::Y, at(-30.0), -at(30.0)), 0.0);
+        }
+    }
+}
