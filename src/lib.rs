@@ -12,6 +12,7 @@
 //!  spectrum/                     wavelengths, spectra, observer, refractive indices
 //!  math/  error.rs               frames, rays, warps, statistics | the one error enum
 //! ```
+pub mod batch;
 pub mod description;
 pub mod error;
 pub mod film;

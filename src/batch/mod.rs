@@ -1,0 +1,388 @@
+//! Jobs: from a file that a person names to pictures, report and exit code.
+//!
+//! A batch goes on with the other scenes after one fails; what failed is told at the end.
+
+pub mod frame;
+pub mod report;
+
+use crate::description::{self, BatchEntry, SceneDescription};
+use crate::error::{Error, Result};
+use crate::film::Window;
+use crate::film::exr::{self, Attribute, ColourEncoding};
+use crate::film::filter::{Filter, FilterSampler};
+use crate::film::output;
+use crate::film::png::{self, PngSettings};
+use crate::film::resolve::{self, Image};
+use crate::scene::Scene;
+use crate::scene::census::Census;
+use crate::scene::compile;
+use crate::spectrum::ColourSpace;
+use crate::transport::plan::{EffectMode, EffectPlan, Integrator, PathSettings, WhittedSettings};
+use frame::{Frame, FrameJob, Progress};
+use report::{Report, SceneReport, Status};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+/// What the command line says over the files.
+#[derive(Clone, Debug, Default)]
+pub struct Overrides {
+    /// `--set KEY=VALUE`, in order.
+    pub set: Vec<(String, String)>,
+    /// Where pictures go: a directory, or for a single scene a file name that ends in `.exr`.
+    pub output: Option<PathBuf>,
+    /// Only the scenes with these names; all where empty.
+    pub scenes: Vec<String>,
+}
+
+/// What a batch tells while it runs. All methods may be called from any thread.
+pub trait Watcher: Sync {
+    /// A scene begins: its number from 0, how many there are, its name.
+    fn scene_begins(&self, index: usize, count: usize, name: &str);
+    /// Samples were done.
+    fn progress(&self, progress: Progress);
+    /// A scene ended.
+    fn scene_ends(&self, report: &SceneReport);
+}
+
+/// A scene made ready: compiled and planned.
+#[derive(Debug)]
+pub struct Prepared {
+    /// What was written.
+    pub description: SceneDescription,
+    /// What rays meet.
+    pub scene: Scene,
+    /// What is simulated.
+    pub plan: EffectPlan,
+    /// Samples of a pixel.
+    pub samples: u32,
+    /// Hash of the description and of the files it names.
+    pub hash: String,
+}
+
+/// The entries of `path`, filtered by name.
+///
+/// # Errors
+/// [`Error::Config`] for a batch that cannot be read or a name that no scene has; [`Error::Input`] for
+/// a missing file.
+pub fn entries(path: &Path, overrides: &Overrides) -> Result<Vec<BatchEntry>> {
+    let document = description::load(path)?;
+    let all = document.entries();
+    for wanted in &overrides.scenes {
+        if !all.iter().any(|e| &e.name == wanted) {
+            let nearest = all
+                .iter()
+                .map(|e| (strsim::damerau_levenshtein(&e.name, wanted), &e.name))
+                .min()
+                .filter(|(distance, _)| *distance <= 3)
+                .map_or(String::new(), |(_, name)| format!("; did you mean \"{name}\"?"));
+            return Err(Error::Config(format!("{}: no scene is named \"{wanted}\"{nearest}", path.display())));
+        }
+    }
+    let wanted = |e: &&BatchEntry| overrides.scenes.is_empty() || overrides.scenes.contains(&e.name);
+    Ok(all.iter().filter(wanted).cloned().collect())
+}
+
+/// Reads, compiles and plans a scene.
+///
+/// # Errors
+/// [`Error::Config`] and [`Error::Input`], as [`compile::compile`].
+pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
+    let description = entry.scene(&overrides.set)?;
+    let scene = compile::compile(&description, &entry.name)?;
+    let integrator = match &description.integrator {
+        description::Integrator::Path(p) => {
+            Integrator::Path(PathSettings { max_depth: p.max_depth, roulette_depth: p.roulette_depth })
+        }
+        description::Integrator::Whitted(w) => Integrator::Whitted(WhittedSettings {
+            max_depth: w.max_depth,
+            grid: w.grid,
+            ambient: compile::ambient(&description, &w.ambient)?,
+            transparent_shadows: w.transparent_shadows,
+        }),
+    };
+    let samples = match &integrator {
+        Integrator::Path(_) => description.render.samples,
+        Integrator::Whitted(w) => w.samples(),
+    };
+    let mode = match description.render.effects {
+        description::Effects::Auto => EffectMode::Auto,
+        description::Effects::All => EffectMode::All,
+    };
+    let plan = EffectPlan::of(&Census::of(&scene), integrator, mode);
+    let hash = hash(&description, &scene.files);
+    Ok(Prepared { description, scene, plan, samples, hash })
+}
+
+/// 128 bits of BLAKE3 over what was written, with every default, and over the files that it names.
+fn hash(description: &SceneDescription, files: &[PathBuf]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    // Where the scene lies, and where its pictures go, does not change them.
+    let mut content = description.clone();
+    content.locator = description::Locator::default();
+    content.directory = PathBuf::new();
+    content.output = description::Output::default();
+    let mut text = format!("{content:?}");
+    if description.directory != Path::new("") {
+        text = text.replace(&format!("{}/", description.directory.display()), "");
+    }
+    hasher.update(text.as_bytes());
+    for file in files {
+        if let Ok(bytes) = std::fs::read(file) {
+            hasher.update(&bytes);
+        }
+    }
+    hasher.finalize().to_hex()[..32].to_owned()
+}
+
+/// 128 bits of BLAKE3 over the numbers of a picture.
+fn pixel_hash(image: &Image) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for plane in image.rgb.iter().chain([&image.alpha]) {
+        for x in plane {
+            hasher.update(&x.to_le_bytes());
+        }
+    }
+    hasher.finalize().to_hex()[..32].to_owned()
+}
+
+fn filter(filter: &description::Filter) -> Filter {
+    match *filter {
+        description::Filter::Box => Filter::Box,
+        description::Filter::Tent { radius } => Filter::Tent { radius },
+        description::Filter::Gaussian { stddev } => Filter::Gaussian { stddev },
+        description::Filter::Mitchell {} => Filter::Mitchell { b: 1.0 / 3.0, c: 1.0 / 3.0 },
+        description::Filter::CatmullRom => Filter::CatmullRom,
+        description::Filter::Lanczos { radius } => Filter::Lanczos { radius },
+    }
+}
+
+fn colour_space(colour: description::Colour) -> ColourSpace {
+    match colour {
+        description::Colour::Rec709 => ColourSpace::Rec709,
+        description::Colour::AcesCg => ColourSpace::AcesCg,
+        description::Colour::Aces2065 => ColourSpace::Aces2065_1,
+        description::Colour::Rec2020 => ColourSpace::Rec2020,
+        description::Colour::P3 => ColourSpace::P3D65,
+        description::Colour::Xyz => ColourSpace::Xyz,
+    }
+}
+
+/// Where a scene's pictures go: `-o FILE.exr`, `-o DIR`, or the directory of the description.
+#[must_use]
+pub fn output_path(prepared: &Prepared, overrides: &Overrides) -> PathBuf {
+    match &overrides.output {
+        Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) => path.clone(),
+        Some(dir) => dir.join(format!("{}.exr", prepared.scene.name)),
+        None => prepared.description.output.dir.join(format!("{}.exr", prepared.scene.name)),
+    }
+}
+
+/// The data window: the crop or the whole frame.
+#[must_use]
+pub fn window(description: &SceneDescription) -> Window {
+    match &description.image.crop {
+        Some(c) => Window { x: c.x as i32, y: c.y as i32, width: c.width, height: c.height },
+        None => Window::full(description.image.width, description.image.height),
+    }
+}
+
+/// Renders a prepared scene and writes its pictures.
+///
+/// # Errors
+/// [`Error::Render`] for invalid samples (the pictures are written all the same) or a stop,
+/// [`Error::Output`] where a file cannot be written.
+pub fn render_scene(
+    prepared: &Prepared,
+    overrides: &Overrides,
+    loading: std::time::Duration,
+    watcher: &dyn Watcher,
+    stop: &AtomicBool,
+) -> (SceneReport, Result<()>) {
+    let mut report = SceneReport::new(&prepared.scene.name);
+    report.describe(prepared, loading);
+    let result = render_and_write(prepared, overrides, watcher, stop, &mut report);
+    if let Err(e) = &result {
+        report.fail(e);
+    }
+    (report, result)
+}
+
+fn render_and_write(
+    prepared: &Prepared,
+    overrides: &Overrides,
+    watcher: &dyn Watcher,
+    stop: &AtomicBool,
+    report: &mut SceneReport,
+) -> Result<()> {
+    let description = &prepared.description;
+    let exr_path = output_path(prepared, overrides);
+    // A place that cannot be written to is told before the work, not after.
+    output::prepare_place(&exr_path)?;
+    output::prepare_place(&exr_path.with_extension("png"))?;
+    let job = FrameJob {
+        scene: &prepared.scene,
+        plan: &prepared.plan,
+        filter: &FilterSampler::new(filter(&description.image.filter))?,
+        window: window(description),
+        samples: prepared.samples,
+        seed: description.render.seed,
+        tile: description.render.tile,
+    };
+    let frame = frame::render(&job, &|p| watcher.progress(p), stop)?;
+    report.measure(prepared, &frame);
+
+    let space = colour_space(description.output.colour);
+    let image = resolve::resolve(&frame.film, None, &space.matrix_from_xyz());
+    report.pixel_hash = pixel_hash(&image);
+    let written = Instant::now();
+    write_exr(&exr_path, prepared, &frame, &image, space, report)?;
+    let png_path = exr_path.with_extension("png");
+    let settings = PngSettings {
+        exposure_stops: description.output.png.exposure,
+        tonemap: match description.output.png.tonemap {
+            description::Tonemap::Aces => png::Tonemap::Aces,
+            description::Tonemap::Agx => png::Tonemap::Agx,
+            description::Tonemap::Reinhard => png::Tonemap::Reinhard,
+            description::Tonemap::None => png::Tonemap::None,
+        },
+        rec709_from_rgb: space.to_rec709(),
+        ..PngSettings::default()
+    };
+    png::write_png(&png_path, &image, &settings)?;
+    report.files = vec![exr_path, png_path];
+    report.seconds.writing = written.elapsed().as_secs_f64();
+
+    let samples = job.window.pixels() as u64 * u64::from(job.samples);
+    frame::check_invalid(&frame.film.invalid, samples)
+}
+
+fn write_exr(
+    path: &Path,
+    prepared: &Prepared,
+    frame: &Frame,
+    image: &Image,
+    space: ColourSpace,
+    report: &mut SceneReport,
+) -> Result<()> {
+    let output = &prepared.description.output;
+    let colour = ColourEncoding { primaries: space.chromaticities(), interop_id: Some(space.interop_id().to_owned()) };
+    let precision = match output.exr.precision {
+        description::Precision::Half => exr::Precision::Half,
+        description::Precision::Float => exr::Precision::Float,
+    };
+    let compression = match output.exr.compression {
+        description::Compression::None => exr::Compression::None,
+        description::Compression::Zips => exr::Compression::Zips,
+        description::Compression::Zip => exr::Compression::Zip,
+        description::Compression::Piz => exr::Compression::Piz,
+    };
+    let error = if output.exr.stderr { exr::StandardError::Write } else { exr::StandardError::Leave };
+    let mut beauty = exr::beauty(image, colour, precision, error, compression);
+    report.notes.extend(beauty.note.take());
+    beauty.exr.attributes = attributes(prepared, frame, report);
+    exr::write_exr(path, &beauty.exr)
+}
+
+/// The header of a picture: what is needed to make it again, and how good it is.
+fn attributes(prepared: &Prepared, frame: &Frame, report: &SceneReport) -> Vec<(String, Attribute)> {
+    let text = |s: &str| Attribute::Text(s.to_owned());
+    let camera = &prepared.scene.camera;
+    let mut all = vec![
+        ("software".to_owned(), text(concat!("Abbe ", env!("CARGO_PKG_VERSION")))),
+        ("comments".to_owned(), text(&prepared.scene.name)),
+        ("worldToCamera".to_owned(), Attribute::Matrix4(camera.camera_from_world())),
+        ("worldToNDC".to_owned(), Attribute::Matrix4(camera.ndc_from_world())),
+        ("abbe/version".to_owned(), text(env!("CARGO_PKG_VERSION"))),
+        ("abbe/sceneHash".to_owned(), text(&prepared.hash)),
+        ("abbe/pixelHash".to_owned(), text(&report.pixel_hash)),
+        ("abbe/seed".to_owned(), text(&prepared.description.render.seed.to_string())),
+        ("abbe/samples".to_owned(), Attribute::Int(prepared.samples as i32)),
+        ("abbe/wavelengths".to_owned(), text(prepared.scene.wavelengths.describe())),
+        ("abbe/integrator".to_owned(), text(report.integrator)),
+        ("abbe/effects".to_owned(), text(&report.effects_in_force().join(", "))),
+        ("abbe/renderSeconds".to_owned(), Attribute::Double(frame.elapsed.as_secs_f64())),
+        ("abbe/invalidSamples".to_owned(), text(&frame.film.invalid.total().to_string())),
+    ];
+    if let Some(e) = &report.error {
+        all.push(("abbe/relativeError".to_owned(), Attribute::Double(e.rel_rmse)));
+        all.push(("abbe/relativeErrorInterval95".to_owned(), text(&format!("{:.3e} {:.3e}", e.low, e.high))));
+    }
+    if let Some(seconds) = report.halving_seconds {
+        all.push(("abbe/secondsToHalveError".to_owned(), Attribute::Double(seconds)));
+    }
+    all
+}
+
+/// Renders all scenes of `path` that are asked for; a scene that fails does not stop the others.
+///
+/// # Errors
+/// What keeps the batch from beginning. What goes wrong in a scene is in the report.
+pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, stop: &AtomicBool) -> Result<Report> {
+    let entries = entries(path, overrides)?;
+    let to_file = overrides.output.as_ref().filter(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")));
+    if let (Some(file), true) = (to_file, entries.len() > 1) {
+        return Err(Error::Config(format!(
+            "-o {}: expected a directory for {} scenes, found the name of one file",
+            file.display(),
+            entries.len()
+        )));
+    }
+    let start = Instant::now();
+    let mut scenes = Vec::new();
+    let mut report_dir: Option<PathBuf> = None;
+    for (i, entry) in entries.iter().enumerate() {
+        watcher.scene_begins(i, entries.len(), &entry.name);
+        let loading = Instant::now();
+        let report = match prepare(entry, overrides) {
+            Ok(prepared) => {
+                let dir = output_path(&prepared, overrides);
+                report_dir.get_or_insert_with(|| dir.parent().unwrap_or(Path::new(".")).to_path_buf());
+                render_scene(&prepared, overrides, loading.elapsed(), watcher, stop).0
+            }
+            Err(e) => {
+                let mut report = SceneReport::new(&entry.name);
+                report.fail(&e);
+                report
+            }
+        };
+        watcher.scene_ends(&report);
+        let stopped = stop.load(std::sync::atomic::Ordering::Relaxed);
+        scenes.push(report);
+        if stopped {
+            break;
+        }
+    }
+    let mut report = Report::new(path, scenes, start.elapsed());
+    // Where not even a directory could be made, the scenes have said so.
+    if let Some(file) = report_dir.map(|dir| dir.join("report.json")).filter(|f| output::directory_of(f).is_dir()) {
+        let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::output(&file, e))?;
+        match output::write_atomically(&file, &json) {
+            Ok(()) => report.file = Some(file),
+            // The pictures are there; a report that cannot be written is a failure of its own.
+            Err(e) => report.unwritten = Some(e),
+        }
+    }
+    Ok(report)
+}
+
+impl Report {
+    /// The exit code of the batch: that of the worst scene, or of the lost report.
+    #[must_use]
+    pub fn exit_code(&self) -> i32 {
+        let codes = self.scenes.iter().filter_map(|s| match &s.status {
+            Status::Done => None,
+            Status::Failed { exit_code, .. } => Some(*exit_code),
+        });
+        let codes = codes.chain(self.unwritten.as_ref().map(Error::exit_code));
+        // A fault of the description outranks a missing file, which outranks what went wrong later.
+        codes
+            .min_by_key(|code| match code {
+                2 => 0,
+                3 => 1,
+                4 => 2,
+                _ => 3,
+            })
+            .unwrap_or(0)
+    }
+}

@@ -1,0 +1,252 @@
+//! What a render cost and how good it is: for `report.json`, the terminal and the EXR header.
+
+use super::Prepared;
+use super::frame::{Frame, Milestone};
+use crate::error::Error;
+use crate::film::accumulate::InvalidCounts;
+use crate::film::resolve::ErrorEstimate;
+use crate::transport::plan::{Effect, Integrator};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// A batch.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// Version of Abbe.
+    pub version: &'static str,
+    /// The batch or scene file.
+    pub source: PathBuf,
+    /// Wall time of everything.
+    pub seconds: f64,
+    /// Threads that rendered.
+    pub threads: usize,
+    /// Each scene.
+    pub scenes: Vec<SceneReport>,
+    /// Where this report is written.
+    #[serde(skip)]
+    pub file: Option<PathBuf>,
+    /// Why it is not written, where it could not be.
+    #[serde(skip)]
+    pub unwritten: Option<Error>,
+}
+
+/// How a scene ended.
+#[derive(Debug, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// All files are written.
+    Done,
+    /// It went wrong.
+    Failed {
+        /// The exit code that it calls for.
+        exit_code: i32,
+        /// What went wrong.
+        message: String,
+    },
+}
+
+/// Wall times in seconds.
+#[derive(Debug, Default, Serialize)]
+pub struct Seconds {
+    /// Reading and compiling the scene.
+    pub loading: f64,
+    /// Rendering.
+    pub rendering: f64,
+    /// Writing files.
+    pub writing: f64,
+}
+
+/// The error after a number of samples.
+#[derive(Debug, Serialize)]
+pub struct ConvergencePoint {
+    /// Samples of a pixel.
+    pub samples: u32,
+    /// Seconds since rendering began.
+    pub seconds: f64,
+    /// Relative RMSE.
+    pub relative_error: f64,
+}
+
+/// One scene.
+#[derive(Debug, Serialize)]
+pub struct SceneReport {
+    /// Its name.
+    pub name: String,
+    /// How it ended.
+    pub status: Status,
+    /// `path` or `whitted`.
+    pub integrator: &'static str,
+    /// Width and height in pixels.
+    pub resolution: [u32; 2],
+    /// Samples of a pixel.
+    pub samples: u32,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Hash of the scene: what was written and the files it names.
+    pub scene_hash: String,
+    /// Hash of the resolved picture before rounding to the file's precision: equal for equal pixels.
+    pub pixel_hash: String,
+    /// Wall times.
+    pub seconds: Seconds,
+    /// Million samples a second.
+    pub msamples_per_second: f64,
+    /// Relative RMSE of the picture with its 95 % interval; none for `whitted`, which has no noise.
+    pub error: Option<ErrorEstimate>,
+    /// Further seconds of rendering that would halve the error.
+    pub halving_seconds: Option<f64>,
+    /// How the error fell.
+    pub convergence: Vec<ConvergencePoint>,
+    /// Samples that were dropped, by cause.
+    pub invalid: InvalidCounts,
+    /// Each effect, on or off, with its reason.
+    pub effects: Vec<Effect>,
+    /// How they were computed.
+    pub techniques: Vec<Effect>,
+    /// From which wavelengths samples were drawn.
+    pub wavelengths: String,
+    /// What a person should know.
+    pub notes: Vec<String>,
+    /// Files written.
+    pub files: Vec<PathBuf>,
+}
+
+impl Report {
+    /// Gathers the scenes.
+    #[must_use]
+    pub fn new(source: &Path, scenes: Vec<SceneReport>, elapsed: Duration) -> Report {
+        Report {
+            version: env!("CARGO_PKG_VERSION"),
+            source: source.to_path_buf(),
+            seconds: elapsed.as_secs_f64(),
+            threads: rayon::current_num_threads(),
+            scenes,
+            file: None,
+            unwritten: None,
+        }
+    }
+}
+
+/// The exponent b of variance ∝ samples^−b, from the last two milestones a doubling apart, kept to
+/// what sampling can do: 1 for independent samples, at most 2 here.
+fn convergence_exponent(milestones: &[Milestone]) -> f64 {
+    let last_two: Vec<(f64, f64)> = milestones
+        .iter()
+        .rev()
+        .filter_map(|m| m.error.as_ref().map(|e| (f64::from(m.samples), e.rel_rmse)))
+        .take(2)
+        .collect();
+    match last_two.as_slice() {
+        [(n1, e1), (n0, e0)] if *e1 > 0.0 && *e0 > 0.0 && n1 > n0 => {
+            (2.0 * (e0 / e1).ln() / (n1 / n0).ln()).clamp(1.0, 2.0)
+        }
+        _ => 1.0,
+    }
+}
+
+/// Factor on the samples that halves the error: 2^(2/b).
+fn halving_factor(exponent: f64) -> f64 {
+    libm::exp2(2.0 / exponent)
+}
+
+impl SceneReport {
+    /// A scene that has not been rendered.
+    #[must_use]
+    pub fn new(name: &str) -> SceneReport {
+        SceneReport {
+            name: name.to_owned(),
+            status: Status::Done,
+            integrator: "",
+            resolution: [0, 0],
+            samples: 0,
+            seed: 0,
+            scene_hash: String::new(),
+            pixel_hash: String::new(),
+            seconds: Seconds::default(),
+            msamples_per_second: 0.0,
+            error: None,
+            halving_seconds: None,
+            convergence: Vec::new(),
+            invalid: InvalidCounts::default(),
+            effects: Vec::new(),
+            techniques: Vec::new(),
+            wavelengths: String::new(),
+            notes: Vec::new(),
+            files: Vec::new(),
+        }
+    }
+
+    /// Notes what is to be rendered.
+    pub fn describe(&mut self, prepared: &Prepared, loading: Duration) {
+        self.integrator = match prepared.plan.integrator {
+            Integrator::Path(_) => "path",
+            Integrator::Whitted(_) => "whitted",
+        };
+        self.resolution = prepared.scene.camera.resolution;
+        self.samples = prepared.samples;
+        self.seed = prepared.description.render.seed;
+        self.scene_hash.clone_from(&prepared.hash);
+        self.effects.clone_from(&prepared.plan.effects);
+        self.techniques.clone_from(&prepared.plan.techniques);
+        self.wavelengths = prepared.scene.wavelengths.describe().to_owned();
+        self.seconds.loading = loading.as_secs_f64();
+    }
+
+    /// Notes what rendering gave.
+    pub fn measure(&mut self, prepared: &Prepared, frame: &Frame) {
+        let seconds = frame.elapsed.as_secs_f64();
+        let (counted, dropped) = frame.film.samples();
+        self.seconds.rendering = seconds;
+        self.msamples_per_second = (counted + dropped) as f64 / seconds.max(1e-9) * 1e-6;
+        self.invalid = frame.film.invalid;
+        self.error = frame.milestones.last().and_then(|m| m.error);
+        if self.error.is_some() {
+            let factor = halving_factor(convergence_exponent(&frame.milestones));
+            self.halving_seconds = Some(seconds * (factor - 1.0));
+        }
+        self.convergence = frame
+            .milestones
+            .iter()
+            .filter_map(|m| {
+                let e = m.error.as_ref()?;
+                let seconds = m.elapsed.as_secs_f64();
+                Some(ConvergencePoint { samples: m.samples, seconds, relative_error: e.rel_rmse })
+            })
+            .collect();
+        if self.error.is_none() && matches!(prepared.plan.integrator, Integrator::Path(_)) {
+            self.notes.push("too few samples, or a black picture: the error cannot be estimated".into());
+        }
+    }
+
+    /// Notes an error.
+    pub fn fail(&mut self, e: &Error) {
+        self.status = Status::Failed { exit_code: e.exit_code(), message: e.to_string() };
+    }
+
+    /// Names of the effects that are on.
+    #[must_use]
+    pub fn effects_in_force(&self) -> Vec<&'static str> {
+        self.effects.iter().filter(|e| e.on).map(|e| e.name).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn milestone(samples: u32, rel_rmse: f64) -> Milestone {
+        let error = ErrorEstimate { rel_rmse, low: 0.0, high: 1.0, pixels: 100, valid: true };
+        Milestone { samples, elapsed: Duration::ZERO, error: Some(error) }
+    }
+
+    /// Independent samples: error ∝ N^−½, so four times the samples; stratified ones at N^−1: twice.
+    #[test]
+    fn halving_costs_what_the_convergence_says() {
+        let independent = [milestone(64, 0.1), milestone(256, 0.05)];
+        assert!((halving_factor(convergence_exponent(&independent)) - 4.0).abs() < 1e-12);
+        let stratified = [milestone(64, 0.1), milestone(128, 0.05)];
+        assert!((halving_factor(convergence_exponent(&stratified)) - 2.0).abs() < 1e-12);
+        // Noise in the estimate cannot make samples worse than independent.
+        assert_eq!(convergence_exponent(&[milestone(64, 0.1), milestone(128, 0.12)]), 1.0);
+    }
+}
