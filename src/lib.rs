@@ -13,6 +13,7 @@
 //!  math/  error.rs               frames, rays, warps, statistics | the one error enum
 //! ```
 pub mod batch;
+pub mod cli;
 pub mod description;
 pub mod error;
 pub mod film;

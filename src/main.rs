@@ -1,3 +1,5 @@
 //! The `abbe` command.
 
-fn main() {}
+fn main() {
+    std::process::exit(abbe::cli::run());
+}

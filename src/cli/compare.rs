@@ -1,0 +1,25 @@
+//! `abbe compare`.
+
+use super::CompareArguments;
+use crate::error::{Error, Result};
+use crate::film::compare::{self, CompareOptions, Verdict};
+use crate::film::exr::read_exr;
+use crate::film::output::write_atomically;
+
+/// Prints figures and a verdict.
+pub fn run(arguments: &CompareArguments) -> Result<i32> {
+    let a = read_exr(&arguments.a)?;
+    let b = read_exr(&arguments.b)?;
+    let options = CompareOptions { mean_tolerance: arguments.mean_tolerance, ..CompareOptions::default() };
+    let comparison = compare::compare(&a, &b, &options);
+    super::say(&comparison.table());
+    if let Some(file) = &arguments.json {
+        let json = serde_json::to_vec_pretty(&comparison).map_err(|e| Error::output(file, e))?;
+        write_atomically(file, &json)?;
+    }
+    Ok(match comparison.verdict {
+        Verdict::Same => 0,
+        Verdict::Different => 1,
+        Verdict::CannotCompare => 2,
+    })
+}

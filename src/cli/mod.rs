@@ -1,0 +1,214 @@
+//! The edge of the process: arguments in, exit code and messages out.
+//!
+//! Exit codes: 0 done, 1 internal or output error, 2 usage or description, 3 missing or broken input,
+//! 4 invalid samples, 130 interrupted.
+
+mod compare;
+mod plan;
+mod progress;
+mod render;
+
+use crate::error::{Error, Result};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::io::Write;
+use std::path::PathBuf;
+
+/// A spectral batch renderer: wavelengths, dispersion, an error bar on every image.
+#[derive(Debug, Parser)]
+#[command(name = "abbe", version, max_term_width = 100, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Render a batch or a scene to EXR and PNG
+    #[command(
+        after_help = "Examples:\n  abbe render configs/gallery.yaml\n  abbe render configs/scenes/prism.yaml -o prism.exr --spp 1024\n  abbe render configs/gallery.yaml --scene diamond --set camera.fov_deg=25"
+    )]
+    Render(RenderArguments),
+    /// Print what a scene calls for, each effect with its reason, and render nothing
+    #[command(after_help = "Example:\n  abbe plan configs/gallery.yaml --scene prism --format json")]
+    Plan(PlanArguments),
+    /// Say whether two EXR files show the same picture, within their noise (exit 0 same, 1 different, 2 cannot compare)
+    #[command(after_help = "Example:\n  abbe compare ours.exr theirs.exr --json figures.json")]
+    Compare(CompareArguments),
+}
+
+/// What both `render` and `plan` take.
+#[derive(Debug, Args)]
+struct SceneArguments {
+    /// Batch or scene, YAML
+    file: PathBuf,
+    /// Only the scene of this name (may be repeated)
+    #[arg(long = "scene", value_name = "NAME")]
+    scenes: Vec<String>,
+    /// Set a field of each scene, as in `--set render.seed=3` (may be repeated)
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
+    set: Vec<(String, String)>,
+    /// Samples a pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+#[derive(Debug, Args)]
+struct RenderArguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Directory for the pictures; for one scene also a file name that ends in .exr
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+    /// Threads; 0 takes every core that the process may use
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Write the report here as well
+    #[arg(long, value_name = "FILE.json")]
+    report: Option<PathBuf>,
+    /// How to tell of progress
+    #[arg(long, value_enum, default_value_t = ProgressStyle::Auto)]
+    progress: ProgressStyle,
+    /// Print nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+#[derive(Debug, Args)]
+struct PlanArguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// How to print it
+    #[arg(long, value_enum, default_value_t = PlanFormat::Text)]
+    format: PlanFormat,
+}
+
+#[derive(Debug, Args)]
+struct CompareArguments {
+    /// The one picture
+    a: PathBuf,
+    /// The other, which counts as the reference where one is needed
+    b: PathBuf,
+    /// A relative difference of the means that is no fault, as 0.003 for 0.3 %
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    mean_tolerance: f64,
+    /// Write the figures here as well
+    #[arg(long, value_name = "FILE.json")]
+    json: Option<PathBuf>,
+}
+
+/// How progress is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ProgressStyle {
+    /// Bars on a terminal, lines elsewhere
+    Auto,
+    /// Lines such as "Progress: 42.0%"
+    Plain,
+    /// One JSON object a line
+    Json,
+    /// Nothing
+    None,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum PlanFormat {
+    /// A table
+    Text,
+    /// JSON
+    Json,
+}
+
+fn share(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if (0.0..1.0).contains(&x) => Ok(x),
+        _ => Err("expected a number from 0 up to 1, as 0.003".into()),
+    }
+}
+
+fn key_value(text: &str) -> std::result::Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.to_owned())),
+        _ => Err("expected KEY=VALUE, for example camera.fov_deg=25".into()),
+    }
+}
+
+impl SceneArguments {
+    fn overrides(&self, output: Option<PathBuf>) -> crate::batch::Overrides {
+        let mut set = self.set.clone();
+        if let Some(spp) = self.spp {
+            set.push(("render.samples".into(), spp.to_string()));
+        }
+        if let Some(seed) = self.seed {
+            set.push(("render.seed".into(), seed.to_string()));
+        }
+        crate::batch::Overrides { set, output, scenes: self.scenes.clone() }
+    }
+}
+
+/// An error where the processor lacks what the binary was compiled for: better a sentence than an
+/// illegal instruction.
+fn check_cpu() -> Result<()> {
+    #[cfg(all(target_arch = "x86_64", target_feature = "avx2"))]
+    {
+        let missing: Vec<&str> = [
+            ("AVX2", std::arch::is_x86_feature_detected!("avx2")),
+            ("FMA", std::arch::is_x86_feature_detected!("fma")),
+            ("BMI2", std::arch::is_x86_feature_detected!("bmi2")),
+        ]
+        .into_iter()
+        .filter_map(|(name, there)| (!there).then_some(name))
+        .collect();
+        if !missing.is_empty() {
+            return Err(Error::Config(format!(
+                "this build of abbe needs a processor with {}; compile it with RUSTFLAGS=\"-C target-cpu=x86-64\" for \
+                 this machine",
+                missing.join(", ")
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Runs the command and gives its exit code.
+#[must_use]
+pub fn run() -> i32 {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(e) => {
+            // Help and version go to the standard output and are no error.
+            let code = if e.use_stderr() { 2 } else { 0 };
+            let _ = e.print();
+            return code;
+        }
+    };
+    let result = check_cpu().and_then(|()| match &arguments.verb {
+        Verb::Render(a) => render::run(a),
+        Verb::Plan(a) => plan::run(a),
+        Verb::Compare(a) => compare::run(a),
+    });
+    match result {
+        Ok(code) => code,
+        Err(e) => {
+            complain(&prefixed(&e));
+            e.exit_code()
+        }
+    }
+}
+
+/// Writes to the standard output. A reader that went away, as in `abbe plan … | head`, is no fault.
+fn say(text: &str) {
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+}
+
+/// Writes a line to the standard error, if anyone listens.
+fn complain(line: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
+}
+
+/// Each line of the message with `error: ` before it.
+fn prefixed(e: &Error) -> String {
+    e.to_string().lines().map(|line| format!("error: {line}")).collect::<Vec<_>>().join("\n")
+}

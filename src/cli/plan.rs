@@ -1,0 +1,54 @@
+//! `abbe plan`.
+
+use super::{PlanArguments, PlanFormat};
+use crate::batch;
+use crate::error::Result;
+use serde_json::json;
+use std::fmt::Write;
+
+/// Prints the effects of each scene.
+pub fn run(arguments: &PlanArguments) -> Result<i32> {
+    let overrides = arguments.scene.overrides(None);
+    let mut all = Vec::new();
+    let mut code = 0;
+    for entry in batch::entries(&arguments.scene.file, &overrides)? {
+        let prepared = match batch::prepare(&entry, &overrides) {
+            Ok(prepared) => prepared,
+            Err(e) => {
+                super::complain(&super::prefixed(&e));
+                code = e.exit_code();
+                continue;
+            }
+        };
+        match arguments.format {
+            PlanFormat::Text => {
+                let mut text = format!("{}\n", prepared.scene.name);
+                for (heading, list) in [("effects", &prepared.plan.effects), ("techniques", &prepared.plan.techniques)]
+                {
+                    if !list.is_empty() {
+                        let _ = writeln!(text, "  {heading}:");
+                    }
+                    let width = list.iter().map(|e| e.name.len()).max().unwrap_or(0);
+                    for effect in list {
+                        let state = if effect.on { "on " } else { "off" };
+                        let _ = writeln!(text, "    {state}  {:width$}  {}", effect.name, effect.reason);
+                    }
+                }
+                let _ = writeln!(text, "  wavelengths: {}\n", prepared.scene.wavelengths.describe());
+                super::say(&text);
+            }
+            PlanFormat::Json => all.push(json!({
+                "scene": prepared.scene.name,
+                "scene_hash": prepared.hash,
+                "samples": prepared.samples,
+                "effects": prepared.plan.effects,
+                "techniques": prepared.plan.techniques,
+                "wavelengths": prepared.scene.wavelengths.describe(),
+            })),
+        }
+    }
+    if arguments.format == PlanFormat::Json {
+        super::say(&format!("{:#}\n", json!(all)));
+    }
+    Ok(code)
+}

@@ -1,0 +1,152 @@
+//! How a render tells of its progress: bars, lines, JSON, nothing.
+
+use super::ProgressStyle;
+use super::render::seconds;
+use super::{complain, say};
+use crate::batch::Watcher;
+use crate::batch::frame::Progress;
+use crate::batch::report::{SceneReport, Status};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
+use serde_json::json;
+use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// Least time between two lines for one scene.
+const LINE_EVERY: Duration = Duration::from_secs(5);
+
+enum Style {
+    Bars { all: MultiProgress, batch: ProgressBar, scene: ProgressBar },
+    Plain,
+    Json,
+    Quiet,
+}
+
+/// Tells of progress: people on the standard error, programs (JSON) on the standard output.
+pub struct Teller {
+    style: Style,
+    state: Mutex<State>,
+}
+
+struct State {
+    scene: String,
+    last_line: Instant,
+}
+
+impl Teller {
+    /// Bars on a terminal, lines elsewhere, unless a style is named.
+    pub fn new(style: ProgressStyle) -> Teller {
+        let terminal = std::io::stderr().is_terminal();
+        let style = match style {
+            ProgressStyle::Auto if terminal => {
+                let all = MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(10));
+                let batch = all.add(ProgressBar::new(0));
+                let scene = all.add(ProgressBar::new(0));
+                // The templates are constants: that they parse is tested.
+                batch.set_style(bar("{prefix:>20} [{bar:40}] {pos}/{len} scenes  {elapsed} elapsed"));
+                scene.set_style(bar("{prefix:>20} [{bar:40}] {percent:>3} %  {msg}"));
+                batch.set_prefix("batch");
+                Style::Bars { all, batch, scene }
+            }
+            ProgressStyle::Auto | ProgressStyle::Plain => Style::Plain,
+            ProgressStyle::Json => Style::Json,
+            ProgressStyle::None => Style::Quiet,
+        };
+        Teller { style, state: Mutex::new(State { scene: String::new(), last_line: Instant::now() }) }
+    }
+
+    /// Takes the bars away.
+    pub fn finish(&self) {
+        if let Style::Bars { all, .. } = &self.style {
+            let _ = all.clear();
+        }
+    }
+}
+
+fn bar(template: &str) -> BarStyle {
+    BarStyle::with_template(template).unwrap_or_else(|_| BarStyle::default_bar()).progress_chars("=> ")
+}
+
+/// Rate, error so far and time left.
+fn words(p: &Progress) -> String {
+    let elapsed = p.elapsed.as_secs_f64().max(1e-9);
+    let rate = p.done as f64 / elapsed;
+    let left = (p.total - p.done) as f64 / rate;
+    let error = p.error.map_or(String::new(), |e| format!(", error {:.2} %", e.rel_rmse * 100.0));
+    format!("{:.2} Msamples/s{error}, {} left", rate * 1e-6, seconds(left))
+}
+
+impl Watcher for Teller {
+    fn scene_begins(&self, index: usize, count: usize, name: &str) {
+        let mut state = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        name.clone_into(&mut state.scene);
+        state.last_line = Instant::now();
+        match &self.style {
+            Style::Bars { batch, scene, .. } => {
+                batch.set_length(count as u64);
+                batch.set_position(index as u64);
+                scene.set_prefix(name.to_owned());
+                scene.set_position(0);
+                scene.set_message("loading");
+            }
+            Style::Plain => complain(&format!("[{}/{count}] {name}", index + 1)),
+            Style::Json => line(&json!({"event": "scene", "scene": name, "index": index, "count": count})),
+            Style::Quiet => {}
+        }
+    }
+
+    fn progress(&self, p: Progress) {
+        match &self.style {
+            Style::Bars { scene, .. } => {
+                scene.set_length(p.total);
+                scene.set_position(p.done);
+                scene.set_message(words(&p));
+            }
+            Style::Plain | Style::Json => {
+                let mut state = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                if state.last_line.elapsed() < LINE_EVERY {
+                    return;
+                }
+                state.last_line = Instant::now();
+                let share = p.done as f64 / p.total as f64;
+                if matches!(self.style, Style::Plain) {
+                    complain(&format!("Progress: {:.1}%  {}: {}", share * 100.0, state.scene, words(&p)));
+                } else {
+                    let error = p.error.map(|e| e.rel_rmse);
+                    line(&json!({"event": "progress", "scene": state.scene, "done": share, "error": error}));
+                }
+            }
+            Style::Quiet => {}
+        }
+    }
+
+    fn scene_ends(&self, report: &SceneReport) {
+        match &self.style {
+            Style::Bars { batch, .. } => batch.inc(1),
+            Style::Plain => match &report.status {
+                Status::Done => {
+                    let error = report.error.map_or(String::new(), |e| format!(", error {:.2} %", e.rel_rmse * 100.0));
+                    complain(&format!("  done in {}{error}", seconds(report.seconds.rendering)));
+                }
+                Status::Failed { .. } => complain("  failed"),
+            },
+            Style::Json => line(&json!({"event": "done", "report": report})),
+            Style::Quiet => {}
+        }
+    }
+}
+
+fn line(value: &serde_json::Value) {
+    say(&format!("{value}\n"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_follows_from_the_rate() {
+        let p = Progress { done: 300_000, total: 1_200_000, elapsed: Duration::from_secs(10), error: None };
+        assert_eq!(words(&p), "0.03 Msamples/s, 30.0 s left");
+    }
+}

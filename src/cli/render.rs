@@ -1,0 +1,144 @@
+//! `abbe render`.
+
+use super::progress::Teller;
+use super::{ProgressStyle, RenderArguments};
+use crate::batch;
+use crate::batch::report::{Report, SceneReport, Status};
+use crate::error::{Error, Result};
+use crate::film::output::{prepare_place, write_atomically};
+use std::fmt::Write;
+use std::sync::atomic::AtomicBool;
+
+/// Threads to use: those asked for, else what the farm grants, else every core of the cpuset.
+fn threads(asked: usize) -> usize {
+    if asked > 0 {
+        return asked;
+    }
+    let granted = ["SLURM_CPUS_PER_TASK", "CUE_THREADS", "OMP_NUM_THREADS"];
+    let granted = granted.iter().find_map(|v| std::env::var(v).ok()?.parse::<usize>().ok().filter(|&n| n > 0));
+    granted.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
+
+/// Renders, and prints a table at the end.
+pub fn run(arguments: &RenderArguments) -> Result<i32> {
+    // Renders do not block, so the pool may be the global one; a second call in one process keeps it.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads(arguments.threads)).build_global();
+    let style = if arguments.quiet { ProgressStyle::None } else { arguments.progress };
+    let teller = Teller::new(style);
+    let overrides = arguments.scene.overrides(arguments.output.clone());
+    if let Some(file) = &arguments.report {
+        prepare_place(file)?;
+    }
+    let report = batch::render_batch(&arguments.scene.file, &overrides, &teller, &AtomicBool::new(false))?;
+    teller.finish();
+    if let Some(file) = &arguments.report {
+        let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::output(file, e))?;
+        write_atomically(file, &json)?;
+    }
+    if !arguments.quiet && style != ProgressStyle::Json {
+        super::say(&table(&report));
+    }
+    for scene in &report.scenes {
+        if let Status::Failed { message, .. } = &scene.status {
+            for line in message.lines() {
+                super::complain(&format!("error: {}: {line}", scene.name));
+            }
+        }
+    }
+    let failed = report.scenes.iter().filter(|s| matches!(s.status, Status::Failed { .. })).count();
+    let all = report.scenes.len();
+    if failed > 0 && all > 1 {
+        let rest = if failed < all { "; the others are written" } else { "" };
+        super::complain(&format!("error: {failed} of {all} scenes failed{rest}"));
+    }
+    if let Some(e) = &report.unwritten {
+        super::complain(&super::prefixed(e));
+    }
+    Ok(report.exit_code())
+}
+
+/// A duration as a person says it.
+pub fn seconds(s: f64) -> String {
+    if s < 0.1 {
+        format!("{:.0} ms", s * 1e3)
+    } else if s < 100.0 {
+        format!("{s:.1} s")
+    } else if s < 6000.0 {
+        format!("{:.1} min", s / 60.0)
+    } else {
+        format!("{:.1} h", s / 3600.0)
+    }
+}
+
+fn per_cent(x: f64) -> String {
+    if x < 0.1 { format!("{:.2} %", x * 100.0) } else { format!("{:.1} %", x * 100.0) }
+}
+
+/// The columns of the table, in order.
+const HEADINGS: [&str; 7] = ["scene", "samples", "time", "Msamples/s", "error (95 %)", "half the error", "invalid"];
+
+fn row(s: &SceneReport) -> [String; 7] {
+    let error = match (&s.error, s.integrator) {
+        (Some(e), _) => {
+            format!("{} ({}-{})", per_cent(e.rel_rmse), per_cent(e.low).replace(" %", ""), per_cent(e.high))
+        }
+        (None, "whitted") => "no noise".into(),
+        (None, _) => "unknown".into(),
+    };
+    let half = s.halving_seconds.map_or("-".into(), |t| format!("+{}", seconds(t)));
+    [
+        s.name.clone(),
+        s.samples.to_string(),
+        seconds(s.seconds.rendering),
+        format!("{:.2}", s.msamples_per_second),
+        error,
+        half,
+        s.invalid.total().to_string(),
+    ]
+}
+
+/// The table at the end: what was rendered, what it cost, how good it is, where it is.
+pub fn table(report: &Report) -> String {
+    let done: Vec<&SceneReport> = report.scenes.iter().filter(|s| matches!(s.status, Status::Done)).collect();
+    let mut out = String::new();
+    if done.is_empty() {
+        return out;
+    }
+    let mut rows = vec![HEADINGS.map(String::from)];
+    rows.extend(done.iter().map(|s| row(s)));
+    let widths: [usize; 7] = std::array::from_fn(|c| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0));
+    for r in &rows {
+        let cells: Vec<String> = r
+            .iter()
+            .enumerate()
+            .map(|(c, text)| {
+                let pad = " ".repeat(widths[c] - text.chars().count());
+                if c == 0 { format!("{text}{pad}") } else { format!("{pad}{text}") }
+            })
+            .collect();
+        let _ = writeln!(out, "{}", cells.join("  ").trim_end());
+    }
+    for s in &done {
+        for note in &s.notes {
+            let _ = writeln!(out, "note: {}: {note}", s.name);
+        }
+    }
+    let _ = writeln!(out, "\neffects in force:");
+    for s in &done {
+        let _ = writeln!(out, "  {}: {}", s.name, s.effects_in_force().join(", "));
+    }
+    let mut dirs: Vec<String> =
+        done.iter().flat_map(|s| &s.files).filter_map(|f| f.parent()).map(|d| d.display().to_string()).collect();
+    dirs.dedup();
+    dirs.iter_mut().filter(|d| d.is_empty()).for_each(|d| *d = ".".into());
+    let pictures: usize = done.iter().map(|s| s.files.len()).sum();
+    let _ = writeln!(
+        out,
+        "\n{pictures} pictures in {}/ after {} on {} threads{}",
+        dirs.join("/, "),
+        seconds(report.seconds),
+        report.threads,
+        report.file.as_ref().map_or(String::new(), |f| format!("; figures in {}", f.display()))
+    );
+    out
+}
