@@ -1,0 +1,71 @@
+//! Depth fog: (1 − a) L + a C with a of the depth along the camera's axis, in both integrators.
+
+use super::LAMP;
+use super::common::{bench, v};
+use glam::DVec3;
+
+/// A shining wall across the view, 2, 6, 10 or 40 metres from the eye, for each law. The camera is at
+/// z = 5 and looks along −z; a corner pixel's ray is longer, its depth is not.
+#[test]
+fn fog_fades_a_wall_by_its_depth() {
+    type Law = (&'static str, fn(f64) -> f64);
+    let laws: [Law; 3] = [
+        ("start: 2, end: 10", |z| ((z - 2.0) / 8.0).clamp(0.0, 1.0)),
+        ("density: 0.1", |z| 1.0 - (-0.1 * z).exp()),
+        ("density: 0.1, falloff: exp2", |z| 1.0 - (-(0.1 * z).powi(2)).exp()),
+    ];
+    for integrator in ["path", "{whitted: {grid: 1}}"] {
+        for (law, amount) in laws {
+            for depth in [1.0, 2.0, 6.0, 10.0, 40.0] {
+                let scene = bench(&format!(
+                    "integrator: {integrator}\nfog: {{colour: 0.3, {law}}}\nshapes:\n\
+                     - rectangle: {{corner: [-99, -99, {}], edge_u: [198, 0, 0], edge_v: [0, 198, 0], {LAMP}}}\n",
+                    5.0 - depth
+                ))
+                .grey();
+                let a = amount(depth);
+                for pixel in [[0, 0], [4, 3], [7, 7]] {
+                    let found = f64::from(scene.sample(pixel, 0).radiance.to_array()[0]);
+                    let expected = 1.0 - a + 0.3 * a;
+                    assert!((found - expected).abs() < 1e-6, "{integrator} {law} {depth}: {expected}, found {found}");
+                }
+            }
+        }
+    }
+}
+
+/// What is infinitely far is all fog; without fog it is all background.
+#[test]
+fn fog_hides_the_background() {
+    for integrator in ["path", "{whitted: {grid: 1}}"] {
+        for (fog, expected) in [("fog: {colour: 0.3, density: 0.01}\n", 0.3), ("", 0.8)] {
+            let scene = bench(&format!("integrator: {integrator}\nlights: [{{constant: {{radiance: 0.8}}}}]\n{fog}"));
+            scene.grey().picture().assert_all(expected, 1e-6);
+        }
+    }
+}
+
+/// A tilted floor: each pixel has its own depth, and the fog is that of its ray's first hit.
+#[test]
+fn fog_follows_the_depth_of_each_pixel() {
+    let text = |fog: &str| {
+        format!(
+            "camera: {{origin: [0, 1, 0], target: [0, 0, -4], fov_deg: 40}}\nintegrator: {{whitted: {{grid: 1}}}}\n\
+             image: {{width: 8, height: 8}}\n{fog}lights: [{{directional: {{direction: [0, -1, -1], irradiance: 2}}}}]\n\
+             shapes: [{{plane: {{normal: [0, 1, 0]}}}}]\n"
+        )
+    };
+    let clear = super::common::bench_with(&text(""), &[]).grey().picture();
+    let fogged = super::common::bench_with(&text("fog: {colour: 0.5, density: 0.2}\n"), &[]).grey();
+    let picture = fogged.picture();
+    let axis = v(0.0, -1.0, -4.0).normalize();
+    for (x, y) in [(0, 2), (3, 3), (7, 5), (2, 7)] {
+        let ray = fogged.camera_ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let hit: DVec3 = ray.at(-ray.origin.y / ray.direction.y);
+        let depth = (hit - ray.origin).dot(axis);
+        assert!(depth > 0.0);
+        let a = 1.0 - (-0.2 * depth).exp();
+        let expected = clear.at(x, y) * (1.0 - a) + 0.5 * a;
+        assert!((picture.at(x, y) - expected).abs() < 2e-6, "({x}, {y}): {expected}, {}", picture.at(x, y));
+    }
+}

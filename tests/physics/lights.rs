@@ -1,0 +1,231 @@
+//! Light on a floor, from every kind of lamp, against the closed form.
+
+use super::LAMP;
+use super::common::{Bench, assert_close, bench, ray, v};
+use std::f64::consts::PI;
+
+/// A floor y = 0 of albedo 0.6 under `lights` and before further `shapes` (lines of a list).
+fn floor(integrator: &str, lights: &str, shapes: &str) -> Bench {
+    bench(&format!(
+        "integrator: {integrator}\nlights: {lights}\nshapes:\n\
+         - plane: {{normal: [0, 1, 0], material: {{diffuse: {{reflectance: 0.6}}}}}}\n{shapes}\n"
+    ))
+}
+
+const INTEGRATORS: [&str; 2] = ["path", "{whitted: {}}"];
+
+/// E = I cos θ / d²: at (0, 3, 4) the lamp is 5 away and cos θ = 3/5.
+#[test]
+fn a_point_lights_a_floor_by_the_inverse_square() {
+    for integrator in INTEGRATORS {
+        let scene = floor(integrator, "[{point: {position: [0, 3, 4], intensity: 50}}]", "");
+        let expected = 0.6 / PI * 50.0 * 0.6 / 25.0;
+        assert_close(scene.look(v(1.0, 1.0, 1.0), v(0.0, 0.0, 0.0)), expected, 1e-6);
+    }
+}
+
+/// Full within the beam, linear in the angle to the cutoff, nothing beyond. The lamp is 2 above the
+/// floor and points down, so the angle at distance x is atan(x/2) and d² = 4 + x², cos θ = 2/d.
+#[test]
+fn a_spot_lights_a_floor_by_its_cone() {
+    for integrator in INTEGRATORS {
+        let lamp = "[{spot: {position: [0, 2, 0], direction: [0, -1, 0], beam_deg: 20, cutoff_deg: 30, intensity: 7}}]";
+        let scene = floor(integrator, lamp, "");
+        for (deg, factor) in [(0.0f64, 1.0), (19.0, 1.0), (25.0, 0.5), (29.0, 0.1), (31.0, 0.0), (60.0, 0.0)] {
+            let x = 2.0 * deg.to_radians().tan();
+            let d = (4.0 + x * x).sqrt();
+            let expected = 0.6 / PI * 7.0 * factor / (d * d) * 2.0 / d;
+            let found = scene.look(v(x, 1.0, 3.0), v(x, 0.0, 0.0));
+            // Near the cutoff the factor is a difference of angles good to 1e-15, a tenth of a beam wide.
+            assert!((found - expected).abs() < 1e-6 * (expected + 0.01), "{deg}°: expected {expected}, found {found}");
+        }
+    }
+}
+
+/// E = E⊥ cos θ.
+#[test]
+fn the_sun_lights_a_floor_by_the_cosine() {
+    for integrator in INTEGRATORS {
+        for deg in [0.0f64, 60.0, 89.0, 89.99] {
+            let (sin, cos) = deg.to_radians().sin_cos();
+            let sun = format!("[{{directional: {{direction: [{sin}, -{cos}, 0], irradiance: 3}}}}]");
+            let scene = floor(integrator, &sun, "");
+            let found = scene.look(v(0.5, 1.0, 3.0), v(0.0, 0.0, 0.0));
+            // The direction is normalised in f64; cos 89.99° = 1.7e-4 keeps 12 digits.
+            assert_close(found, 0.6 / PI * 3.0 * cos, 2e-6);
+        }
+        // From below, nothing.
+        let scene = floor(integrator, "[{directional: {direction: [0, 1, 0], irradiance: 3}}]", "");
+        assert_eq!(scene.look(v(0.5, 1.0, 3.0), v(0.0, 0.0, 0.0)), 0.0);
+    }
+}
+
+/// Open case O17 in the small: a floor of many triangles under a sun 0.01° above the horizon has no
+/// dark or bright pixel, E = cos 89.99° everywhere.
+#[test]
+fn a_flat_mesh_under_a_low_sun_is_even() {
+    let n = 40;
+    let mut obj = String::new();
+    for i in 0..=n {
+        for j in 0..=n {
+            obj += &format!("v {} 0 {}\n", 0.1 * f64::from(i) - 2.0, 0.1 * f64::from(j) - 2.0);
+        }
+    }
+    for i in 0..n {
+        for j in 0..n {
+            let a = i * (n + 1) + j + 1;
+            obj += &format!("f {a} {} {}\nf {} {} {}\n", a + 1, a + n + 2, a, a + n + 2, a + n + 1);
+        }
+    }
+    let (sin, cos) = 89.99f64.to_radians().sin_cos();
+    let text = format!(
+        "camera: {{origin: [0, 3, 0.1], target: [0, 0, 0], fov_deg: 50}}\nimage: {{width: 24, height: 24}}\n\
+         render: {{samples: 4}}\nlights: [{{directional: {{direction: [{sin}, -{cos}, 0.0], irradiance: 1000}}}}]\n\
+         shapes: [{{mesh: {{file: floor.obj, material: {{diffuse: {{reflectance: 1}}}}}}}}]\n"
+    );
+    let scene = super::common::bench_with(&text, &[("floor.obj", obj.as_bytes())]).grey();
+    let expected = 1000.0 * cos / PI;
+    scene.picture().assert_all(expected, 1e-5 * expected);
+}
+
+/// The share of what leaves a point's hemisphere (by the cosine) that meets a parallel rectangle with one
+/// corner straight above: sides a and b, height c, A = a/c, B = b/c (Siegel and Howell, configuration
+/// C-11): F = (A/√(1+A²) atan(B/√(1+A²)) + B/√(1+B²) atan(A/√(1+B²))) / 2π.
+fn corner_form_factor(a: f64, b: f64, c: f64) -> f64 {
+    let (a, b) = (a / c, b / c);
+    let (ra, rb) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+    (a / ra * (b / ra).atan() + b / rb * (a / rb).atan()) / (2.0 * PI)
+}
+
+/// L = ρ F · 1 under a lamp of radiance 1; a lamp that reaches over the point is four corners, one beside
+/// it a difference of two.
+#[test]
+fn a_rectangle_lights_a_floor_by_its_form_factor() {
+    let lamp = format!("- rectangle: {{corner: [-1, 2, -1], edge_u: [3, 0, 0], edge_v: [0, 0, 2], {LAMP}}}");
+    let scene = floor("path", "[]", &lamp);
+    let above = [(1.0, 1.0), (1.0, 1.0), (2.0, 1.0), (2.0, 1.0)];
+    let f: f64 = above.iter().map(|&(a, b)| corner_form_factor(a, b, 2.0)).sum();
+    scene.estimate(&ray(v(3.0, 1.0, 4.0), v(0.0, 0.0, 0.0)), 8192).assert_is(0.6 * f, 2e-3);
+    // From x = 3 the lamp lies from 1 to 4 aside.
+    let f = 2.0 * (corner_form_factor(4.0, 1.0, 2.0) - corner_form_factor(1.0, 1.0, 2.0));
+    scene.estimate(&ray(v(3.0, 1.0, 4.0), v(3.0, 0.0, 0.0)), 8192).assert_is(0.6 * f, 2e-3);
+}
+
+/// A disc of radius r at height h straight above: F = r²/(r² + h²).
+#[test]
+fn a_disc_lights_a_floor_by_its_form_factor() {
+    for (r, h) in [(1.0, 1.0), (0.1, 1.0), (5.0, 0.5)] {
+        let lamp = format!("- disk: {{center: [0, {h}, 0], normal: [0, -1, 0], radius: {r}, {LAMP}}}");
+        let scene = floor("path", "[]", &lamp);
+        let from = v(0.0, 0.2 * h, 0.3 * h);
+        scene.estimate(&ray(from, v(0.0, 0.0, 0.0)), 8192).assert_is(0.6 * r * r / (r * r + h * h), 2e-3);
+    }
+}
+
+/// A sphere wholly above the horizon, at any distance: F = (r/d)² cos θ (its cone's projected solid angle
+/// over π). Numerics table, O26: down to r/d = 10⁻⁴, where 1 − cos has no digits left in f32.
+#[test]
+fn a_sphere_lights_a_floor_at_every_distance() {
+    for s in [0.9, 0.5, 0.1, 1e-2, 1e-3, 1e-4, 1e-6] {
+        // At s = 0.9 the lamp stands straight above, else 60° from the normal.
+        let (x, y) = if s > 0.4 { (0.0, 1.0) } else { (0.75f64.sqrt(), 0.5) };
+        let lamp = format!("- sphere: {{center: [{x}, {y}, 0], radius: {s}, {LAMP}}}");
+        let scene = floor("path", "[]", &lamp);
+        let found = scene.estimate(&ray(v(0.0, 0.05, 0.3), v(0.0, 0.0, 0.0)), 8192);
+        found.assert_is(0.6 * s * s * y, 2e-3);
+    }
+}
+
+/// The recursive tracer has one ray a lamp: a small lamp is right, and shadows are hard.
+#[test]
+fn whitted_lights_by_the_solid_angle_of_a_small_lamp() {
+    let s = 1e-3;
+    let lamp = format!("- sphere: {{center: [0, 1, 0], radius: {s}, {LAMP}}}");
+    let found = floor("{whitted: {}}", "[]", &lamp).look(v(0.0, 0.05, 0.3), v(0.0, 0.0, 0.0));
+    // Light from the middle of the cone stands for all of it: off by s²/4 of itself.
+    assert_close(found, 0.6 * s * s, 2e-6);
+}
+
+/// From far away a lamp of radiance 1 is a point whose intensity is its projected area, whatever its form:
+/// a wrong area, density or choice of faces shows.
+#[test]
+fn every_shape_lights_a_far_floor_by_its_projected_area() {
+    let far = 1000.0;
+    let lamps = [
+        // Seen from straight below.
+        (format!("cylinder: {{base: [0, {far}, 0], top: [0, {}, 0], radius: 0.5, {LAMP}}}", far + 1.0), PI * 0.25),
+        (format!("cylinder: {{base: [-1, {far}, 0], top: [1, {far}, 0], radius: 0.5, {LAMP}}}"), 2.0),
+        (format!("cone: {{base: [0, {far}, 0], apex: [0, {}, 0], radius: 0.5, {LAMP}}}", far + 1.0), PI * 0.25),
+        (format!("cone: {{base: [0, {}, 0], apex: [0, {far}, 0], radius: 0.5, {LAMP}}}", far + 1.0), PI * 0.25),
+        (format!("cube: {{center: [0, {far}, 0], size: [1, 2, 3], {LAMP}}}"), 3.0),
+        (
+            format!(
+                "cube: {{size: 1, {LAMP}, transform: [{{rotate: {{axis: [0, 0, 1], deg: 45}}}}, {{translate: [0, {far}, 0]}}]}}"
+            ),
+            2f64.sqrt(),
+        ),
+    ];
+    for (lamp, area) in lamps {
+        let scene = floor("path", "[]", &format!("- {lamp}"));
+        // Corrections are of the order of size over distance.
+        let found = scene.estimate(&ray(v(0.0, 1.0, 1.0), v(0.0, 0.0, 0.0)), 4096);
+        let expected = 0.6 / PI * area / (far * far);
+        assert!(
+            (found.mean / expected - 1.0).abs() < 4.0 * found.error / expected + 3e-3,
+            "{lamp}: {expected} {found:?}"
+        );
+        assert!(found.error < 0.02 * expected, "{lamp}: {found:?}");
+    }
+}
+
+/// A lamp of triangles is the same lamp: the disc above, as a fan.
+#[test]
+fn a_mesh_lights_a_floor_as_its_form_does() {
+    let n = 64;
+    let mut obj = String::from("v 0 1 0\n");
+    for i in 0..n {
+        let phi = 2.0 * PI * f64::from(i) / f64::from(n);
+        obj += &format!("v {} 1 {}\n", phi.cos(), phi.sin());
+    }
+    for i in 0..n {
+        // Facing down.
+        obj += &format!("f 1 {} {}\n", i + 2, (i + 1) % n + 2);
+    }
+    let text = format!(
+        "{}shapes:\n- plane: {{normal: [0, 1, 0], material: {{diffuse: {{reflectance: 0.6}}}}}}\n\
+         - mesh: {{file: disc.obj, {LAMP}}}\n",
+        super::common::CAMERA
+    );
+    let scene = super::common::bench_with(&text, &[("disc.obj", obj.as_bytes())]);
+    // A regular polygon: n triangles between the middle and an edge at distance a = cos(π/n), each with
+    // F = (a/√(a²+h²)) atan(tan(π/n) a / √(a²+h²)) / π.
+    let a = (PI / f64::from(n)).cos();
+    let root = (a * a + 1.0).sqrt();
+    let f = f64::from(n) / PI * a / root * ((PI / f64::from(n)).tan() * a / root).atan();
+    scene.estimate(&ray(v(0.0, 0.2, 0.3), v(0.0, 0.0, 0.0)), 8192).assert_is(0.6 * f, 2e-3);
+}
+
+/// Two lamps add, and a lamp behind a wall does not.
+#[test]
+fn lights_add_and_walls_hide_them() {
+    for integrator in INTEGRATORS {
+        let two = "[{point: {position: [0, 2, 0], intensity: 4}}, {point: {position: [0, 1, 0], intensity: 3}}]";
+        let scene = floor(integrator, two, "");
+        let (from, to) = (v(1.0, 1.0, 1.0), v(0.0, 0.0, 0.0));
+        let expected = 0.6 / PI * (1.0 + 3.0);
+        if integrator == "path" {
+            scene.estimate(&ray(from, to), 4096).assert_is(expected, 5e-3);
+        } else {
+            assert_close(scene.look(from, to), expected, 1e-6);
+        }
+        let wall =
+            "- disk: {center: [0, 1.5, 0], normal: [0, 1, 0], radius: 0.2, material: {diffuse: {reflectance: 0}}}";
+        let scene = floor(integrator, two, wall);
+        let expected = 0.6 / PI * 3.0;
+        if integrator == "path" {
+            scene.estimate(&ray(from, to), 4096).assert_is(expected, 2e-2);
+        } else {
+            assert_close(scene.look(from, to), expected, 1e-6);
+        }
+    }
+}
