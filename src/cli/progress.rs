@@ -57,7 +57,10 @@ impl Teller {
 
     /// Takes the bars away.
     pub fn finish(&self) {
-        if let Style::Bars { all, .. } = &self.style {
+        if let Style::Bars { all, batch, scene } = &self.style {
+            // A bar that is not finished draws itself once more when it is dropped.
+            scene.finish_and_clear();
+            batch.finish_and_clear();
             let _ = all.clear();
         }
     }
