@@ -386,14 +386,6 @@ impl Film {
             }
         }
     }
-
-    /// Puts a cell in place of pixel number `index` (raster order) and `replicate`: for reading parts back.
-    ///
-    /// # Panics
-    /// If there is no such pixel or replicate.
-    pub fn set_cell(&mut self, index: usize, replicate: usize, cell: Cell) {
-        self.cells[index][replicate] = cell;
-    }
 }
 
 #[cfg(test)]

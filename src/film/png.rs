@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::film::output::write_atomically;
 use crate::film::resolve::Image;
 use crate::math::sampler::mix64;
+use crate::spectrum::colour::srgb_curve;
 use image::ImageEncoder;
 use rayon::prelude::*;
 use std::path::Path;
@@ -120,13 +121,7 @@ pub fn develop(image: &Image, settings: &PngSettings) -> Vec<u8> {
 /// The sRGB transfer function (IEC 61966-2-1), of a value cut to [0, 1]; NaN is black.
 #[must_use]
 pub fn srgb_encode(linear: f64) -> f64 {
-    if linear.is_nan() || linear <= 0.0 {
-        0.0
-    } else if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * libm::pow(linear.min(1.0), 1.0 / 2.4) - 0.055
-    }
+    if linear.is_nan() || linear <= 0.0 { 0.0 } else { srgb_curve(linear.min(1.0)) }
 }
 
 /// A level such that its mean over the dither is the value: v lies between two levels and takes the upper one with

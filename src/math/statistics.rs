@@ -69,13 +69,6 @@ pub fn student_t_two_sided_p(t: f64, dof: f64) -> f64 {
     regularised_beta(x, y, 0.5 * dof, 0.5)
 }
 
-/// P(T ≤ `t`) for Student's T with `dof` degrees of freedom.
-#[must_use]
-pub fn student_t_cdf(t: f64, dof: f64) -> f64 {
-    let tail = 0.5 * student_t_two_sided_p(t, dof);
-    if t < 0.0 { tail } else { 1.0 - tail }
-}
-
 /// The t with P(|T| ≤ t) = `confidence`: half the width of an interval in standard errors.
 ///
 /// Bisection of the tail between neighbouring floats. NaN where `confidence` is not in (0, 1).

@@ -31,7 +31,7 @@ impl RelativeIndex {
     }
 
     /// `f` of each lane's index; once where all are the same.
-    fn lanes(&self, f: impl Fn(f64) -> f64) -> Lanes {
+    pub fn lanes(&self, f: impl Fn(f64) -> f64) -> Lanes {
         match self {
             RelativeIndex::Constant(eta) => Lanes::splat(f(*eta) as f32),
             RelativeIndex::Dispersive(eta) => Lanes::new(eta.map(|e| f(e) as f32)),

@@ -30,16 +30,12 @@ pub struct Base {
 }
 
 impl Base {
-    /// f of the base without the two transmissions, times π.
-    fn albedo(&self) -> Lanes {
+    /// f of the base without the two transmissions of the coat, times π.
+    #[must_use]
+    pub fn albedo(&self) -> Lanes {
         let shifted = if self.nonlinear { self.reflectance } else { Lanes::ONE };
         let inside = Lanes::ONE - shifted * self.internal as f32;
         self.reflectance / inside * (1.0 / (self.eta * self.eta)) as f32
-    }
-
-    /// The reflectance of base and coat seen from inside and out, for choosing lobes.
-    fn for_choice(&self) -> Lanes {
-        self.reflectance
     }
 }
 
@@ -60,7 +56,7 @@ impl Plastic {
             return Evaluation::NONE;
         }
         let (fo, fi) = (self.coat(wo.z), self.coat(wi.z));
-        let p = coat_probability(fo, self.base.for_choice());
+        let p = coat_probability(fo, self.base.reflectance);
         Evaluation {
             f: self.base.albedo() * ((1.0 - fo) * (1.0 - fi) / PI) as f32,
             pdf: Lanes::splat(((1.0 - p) * wi.z / PI) as f32),
@@ -72,7 +68,7 @@ impl Plastic {
             return None;
         }
         let fo = self.coat(wo.z);
-        let p = coat_probability(fo, self.base.for_choice());
+        let p = coat_probability(fo, self.base.reflectance);
         if u_lobe < p {
             return Some(BsdfSample::discrete(mirror(wo), Lanes::splat((fo / p) as f32)));
         }
@@ -170,7 +166,7 @@ pub struct RoughPlastic {
 
 impl RoughPlastic {
     fn coat_share(&self, wo: DVec3) -> f64 {
-        coat_probability(1.0 - self.table.at(wo.z), self.base.for_choice())
+        coat_probability(1.0 - self.table.at(wo.z), self.base.reflectance)
     }
 
     pub(super) fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {

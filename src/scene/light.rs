@@ -86,12 +86,6 @@ pub fn spot_falloff(cos: f64, beam: f64, cutoff: f64) -> f64 {
 }
 
 impl Light {
-    /// True where scattering can find the light by chance.
-    #[must_use]
-    pub fn has_extent(&self) -> bool {
-        matches!(self, Light::Area { .. } | Light::Constant { .. } | Light::Environment(_))
-    }
-
     /// True for light from infinity that a ray which meets nothing sees.
     #[must_use]
     pub fn is_environment(&self) -> bool {

@@ -117,7 +117,8 @@ impl Kind {
 }
 
 /// η inside over η outside, for each lane.
-fn relative(
+#[must_use]
+pub fn relative_index(
     interior: &RefractiveIndex,
     exterior: &RefractiveIndex,
     nm: Lanes,
@@ -150,13 +151,15 @@ impl Material {
                 }
             }
             Kind::Dielectric { interior, exterior, fresnel, facets } => {
-                let eta = relative(interior, exterior, nm, all_dispersive);
+                let eta = relative_index(interior, exterior, nm, all_dispersive);
                 match facets {
                     Some(facets) => Bsdf::RoughDielectric(RoughDielectric { eta, facets: *facets }),
                     None => Bsdf::Dielectric(Dielectric { eta, fresnel: *fresnel }),
                 }
             }
-            Kind::Thin { interior, exterior } => Bsdf::Thin { eta: relative(interior, exterior, nm, false).hero() },
+            Kind::Thin { interior, exterior } => {
+                Bsdf::Thin { eta: relative_index(interior, exterior, nm, false).hero() }
+            }
             Kind::Plastic { reflectance, eta, internal, nonlinear, rough } => {
                 let base = Base {
                     reflectance: reflectance.eval(uv, nm),
@@ -172,15 +175,6 @@ impl Material {
                 }
             }
             Kind::Boundary => Bsdf::Null,
-        }
-    }
-
-    /// The relative index of a dielectric for each lane; one for every other material.
-    #[must_use]
-    pub fn relative_index(&self, nm: Lanes, all_dispersive: bool) -> RelativeIndex {
-        match &self.kind {
-            Kind::Dielectric { interior, exterior, .. } => relative(interior, exterior, nm, all_dispersive),
-            _ => RelativeIndex::Constant(1.0),
         }
     }
 

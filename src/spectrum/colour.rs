@@ -193,8 +193,13 @@ const fn from_xyz_matrices() -> [Matrix; 6] {
 #[must_use]
 pub fn srgb_encode(linear: f32) -> f32 {
     let x = f64::from(linear.abs());
-    let y = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * libm::pow(x, 1.0 / 2.4) - 0.055 };
-    (y as f32).copysign(linear)
+    (srgb_curve(x) as f32).copysign(linear)
+}
+
+/// The curve of sRGB for `linear` ≥ 0, IEC 61966-2-1.
+#[must_use]
+pub fn srgb_curve(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 }
 }
 
 /// The inverse of [`srgb_encode`]: a coded value to linear light.

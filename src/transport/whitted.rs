@@ -11,8 +11,9 @@ use super::plan::{EffectPlan, WhittedSettings};
 use crate::math::{Departure, Frame, Ray};
 use crate::optics::dielectric::{RelativeIndex, refract};
 use crate::optics::fresnel::{self, Model};
+use crate::optics::plastic::Base;
 use crate::scene::light::Light;
-use crate::scene::material::{Highlight, HighlightModel, Kind, Material};
+use crate::scene::material::{Highlight, HighlightModel, Kind, Material, relative_index};
 use crate::scene::shape::Shape;
 use crate::scene::texture::Texture;
 use crate::scene::{Geometry, Scene, SurfacePoint};
@@ -105,10 +106,10 @@ impl Tracer<'_> {
             Kind::Diffuse { reflectance } => reflectance.eval(surface.uv, self.nm),
             Kind::Plastic { reflectance, eta, internal, nonlinear, .. } => {
                 // The base under its coat, for light along the normal both ways.
-                let rho = reflectance.eval(surface.uv, self.nm);
-                let shifted = if *nonlinear { rho } else { Lanes::ONE };
+                let reflectance = reflectance.eval(surface.uv, self.nm);
+                let base = Base { reflectance, eta: *eta, internal: *internal, nonlinear: *nonlinear };
                 let t = 1.0 - fresnel::dielectric(Model::Exact, 1.0, *eta).reflected;
-                rho / (Lanes::ONE - shifted * *internal as f32) * (t * t / (eta * eta)) as f32
+                base.albedo() * (t * t) as f32
             }
             Kind::Mirror { .. }
             | Kind::Conductor { .. }
@@ -178,20 +179,18 @@ impl Tracer<'_> {
             match &material.kind {
                 Kind::Boundary => {}
                 Kind::Dielectric { interior, exterior, fresnel: model, .. } if self.settings.transparent_shadows => {
-                    let (i, e) = (interior.lanes(self.nm), exterior.lanes(self.nm));
-                    let t: [f32; LANES] = std::array::from_fn(|k| {
-                        let eta = if cos < 0.0 { i[k] / e[k] } else { e[k] / i[k] };
-                        fresnel::dielectric(*model, cos.abs(), eta).transmitted as f32
+                    let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive);
+                    through *= index.lanes(|eta| {
+                        let eta = if cos < 0.0 { eta } else { 1.0 / eta };
+                        fresnel::dielectric(*model, cos.abs(), eta).transmitted
                     });
-                    through *= Lanes::new(t);
                 }
                 Kind::Thin { interior, exterior } if self.settings.transparent_shadows => {
-                    let (i, e) = (interior.lanes(self.nm), exterior.lanes(self.nm));
-                    let t: [f32; LANES] = std::array::from_fn(|k| {
-                        let r = fresnel::dielectric(Model::Exact, cos.abs(), i[k] / e[k]).reflected;
-                        ((1.0 - r) / (1.0 + r)) as f32
+                    let index = relative_index(interior, exterior, self.nm, false);
+                    through *= index.lanes(|eta| {
+                        let r = fresnel::dielectric(Model::Exact, cos.abs(), eta).reflected;
+                        (1.0 - r) / (1.0 + r)
                     });
-                    through *= Lanes::new(t);
                 }
                 _ => return Lanes::ZERO,
             }
@@ -245,13 +244,13 @@ impl Tracer<'_> {
                 reflect(Lanes::splat(r as f32))
             }
             Kind::Thin { interior, exterior } => {
-                let eta = interior.at(587.5618) / exterior.at(587.5618);
+                let eta = relative_index(interior, exterior, self.nm, false).hero();
                 let r = fresnel::dielectric(Model::Exact, cos, eta).reflected;
                 let r = 2.0 * r / (1.0 + r);
                 reflect(Lanes::splat(r as f32)) + cross(Lanes::splat((1.0 - r) as f32), -wo)
             }
-            Kind::Dielectric { fresnel: model, .. } => {
-                let index = material.relative_index(self.nm, self.plan.all_dispersive);
+            Kind::Dielectric { interior, exterior, fresnel: model, .. } => {
+                let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive);
                 let m = DVec3::Z * local.z.signum();
                 let toward = |eta: f64| if local.z > 0.0 { eta } else { 1.0 / eta };
                 // Radiance that crosses scales by 1/η².

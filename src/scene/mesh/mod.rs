@@ -148,12 +148,6 @@ impl Mesh {
         self.triangles[i as usize].map(|v| DVec3::from(self.positions[v as usize].map(f64::from)))
     }
 
-    /// The box of triangle `i` in world space.
-    #[must_use]
-    pub fn triangle_bounds(&self, i: u32) -> Aabb {
-        Aabb::from_points(self.vertices(i).map(|v| v + self.origin))
-    }
-
     /// The box of the mesh in world space.
     #[must_use]
     pub fn bounds(&self) -> Aabb {

@@ -1,7 +1,7 @@
 //! Cones, closed or open.
 
 use super::cylinder::{BASE, Part, UNIT, WALL, cap_surface, disk_extent};
-use super::exact::{along, cone_form, cross, dot};
+use super::exact::{along, cone_form, cross, dot, rows_times};
 use super::span::{Exit, Faces, Span};
 use super::{
     AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest,
@@ -58,8 +58,7 @@ impl Cone {
 
     #[inline]
     fn to_unit(&self, v: DVec3) -> DVec3 {
-        let [x, y, z] = self.rows;
-        DVec3::new(dot(x, v), dot(y, v), dot(z, v))
+        rows_times(&self.rows, v)
     }
 
     #[inline]

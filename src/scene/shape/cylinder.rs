@@ -1,6 +1,6 @@
 //! Cylinders, closed or open at either end.
 
-use super::exact::{along, difference_of_products, dot};
+use super::exact::{along, difference_of_products, dot, rows_times};
 use super::span::{Exit, Faces, Span};
 use super::{
     AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest,
@@ -60,8 +60,7 @@ impl Cylinder {
 
     #[inline]
     fn to_unit(&self, v: DVec3) -> DVec3 {
-        let [x, y, z] = self.rows;
-        DVec3::new(dot(x, v), dot(y, v), dot(z, v))
+        rows_times(&self.rows, v)
     }
 
     #[inline]

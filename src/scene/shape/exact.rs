@@ -36,6 +36,13 @@ pub fn dot(a: DVec3, b: DVec3) -> f64 {
     a.x.mul_add(b.x, a.y.mul_add(b.y, a.z * b.z))
 }
 
+/// The product of a matrix, given by its rows, and `v`.
+#[inline]
+#[must_use]
+pub fn rows_times(rows: &[DVec3; 3], v: DVec3) -> DVec3 {
+    DVec3::new(dot(rows[0], v), dot(rows[1], v), dot(rows[2], v))
+}
+
 /// The point origin + t·direction, each component rounded once.
 #[inline]
 #[must_use]
