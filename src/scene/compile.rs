@@ -19,7 +19,7 @@ use crate::optics::fresnel::Model;
 use crate::optics::medium::Phase;
 use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::spectrum::{Outside, RefractiveIndex, Spectrum, WavelengthDistribution, catalogue, illuminant, upsample};
-use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3};
+use glam::{DAffine2, DAffine3, DMat2, DMat3, DMat4, DVec2, DVec3};
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -361,19 +361,19 @@ impl<'a> Compiler<'a> {
                     written::Wrap::Mirror => Wrap::Mirror,
                     written::Wrap::Clamp => Wrap::Clamp,
                 };
-                loaded.wrap = [wrap(image.wrap), wrap(image.wrap_v.unwrap_or(image.wrap))];
-                loaded.interpolation = match image.filter {
+                loaded.grid.wrap = [wrap(image.wrap), wrap(image.wrap_v.unwrap_or(image.wrap))];
+                loaded.grid.interpolation = match image.filter {
                     written::TextureFilter::Bilinear => Interpolation::Bilinear,
                     written::TextureFilter::Nearest => Interpolation::Nearest,
                 };
-                loaded.scale = DVec2::from(image.scale);
-                loaded.offset = DVec2::from(image.offset);
+                let scale = DMat2::from_diagonal(DVec2::from(image.scale));
+                loaded.grid.uv = DAffine2::from_mat2_translation(scale, DVec2::from(image.offset));
                 Texture::Image(loaded)
             }
             written::Texture::Checkerboard(board) => Texture::Checkerboard {
                 a: Box::new(Texture::Uniform(self.reflectance(&format!("{at}.checkerboard.a"), &board.a))),
                 b: Box::new(Texture::Uniform(self.reflectance(&format!("{at}.checkerboard.b"), &board.b))),
-                scale: DVec2::from(board.scale),
+                uv: DAffine2::from_scale(DVec2::from(board.scale)),
             },
         })
     }

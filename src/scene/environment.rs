@@ -3,7 +3,7 @@
 //! Equirectangular. In the frame of the map +y is up; the middle column looks along −z and
 //! columns to the right turn toward +x, so a map and a camera that looks along −z agree.
 
-use super::texture::{ImageTexture, Interpolation, Texel, Wrap};
+use super::texture::{Grid, ImageTexture, Texel, Wrap};
 use crate::spectrum::{Lanes, Spectrum, illuminant, upsample};
 use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::PI;
@@ -63,12 +63,7 @@ impl Environment {
         }
         let image = ImageTexture {
             texels: Arc::new(texels),
-            width,
-            height,
-            wrap: [Wrap::Repeat, Wrap::Clamp],
-            interpolation: Interpolation::Bilinear,
-            scale: DVec2::ONE,
-            offset: DVec2::ZERO,
+            grid: Grid { wrap: [Wrap::Repeat, Wrap::Clamp], ..Grid::new(width, height) },
             illuminant: Some(illuminant::d65()),
         };
         Environment { image, world_from_map, table: PiecewiseConstant2d::new(&weights, width, height) }
@@ -115,9 +110,9 @@ impl Environment {
     pub fn mean_luminance(&self) -> f64 {
         let white = illuminant::d65().luminance();
         let (mut sum, mut weight) = (0.0, 0.0);
-        for y in 0..self.image.height {
-            let sin = libm::sin(PI * (y as f64 + 0.5) / self.image.height as f64);
-            for t in &self.image.texels[y * self.image.width..(y + 1) * self.image.width] {
+        for y in 0..self.image.grid.height {
+            let sin = libm::sin(PI * (y as f64 + 0.5) / self.image.grid.height as f64);
+            for t in &self.image.texels[y * self.image.grid.width..(y + 1) * self.image.grid.width] {
                 // The factor is twice the largest channel; for choosing lights half of it will do.
                 sum += 0.5 * f64::from(t.scale) * white * sin;
                 weight += sin;

@@ -1,7 +1,7 @@
 //! What shines, and how a path finds it.
 
 use super::environment::Environment;
-use super::texture::Texture;
+use super::texture::{Texture, TexturePoint};
 use super::{Geometry, Hit, Object, SurfacePoint};
 use crate::math::Departure;
 use crate::math::frame::Frame;
@@ -116,11 +116,13 @@ impl Light {
         }
     }
 
-    /// Radiance that a point of the object's surface sends toward `wo`.
+    /// Radiance that the point `surface`, which a ray met at `hit`, sends toward `wo`.
     #[must_use]
-    pub fn emitted(&self, surface: &SurfacePoint, wo: DVec3, nm: Lanes) -> Lanes {
+    pub fn emitted(&self, surface: &SurfacePoint, hit: &Hit, wo: DVec3, nm: Lanes) -> Lanes {
         match self {
-            Light::Area { radiance, .. } if wo.dot(surface.normal) > 0.0 => radiance.eval(surface.uv, nm),
+            Light::Area { radiance, .. } if wo.dot(surface.normal) > 0.0 => {
+                radiance.eval(&TexturePoint::new(surface, hit.part, hit.barycentric), nm)
+            }
             _ => Lanes::ZERO,
         }
     }
@@ -159,7 +161,10 @@ impl Light {
                         }
                         let radiance = match radiance {
                             Texture::Uniform(spectrum) => spectrum.eval(nm),
-                            varying => varying.eval(shape.surface(s.point, s.face).uv, nm),
+                            varying => {
+                                let surface = shape.surface(s.point, s.face);
+                                varying.eval(&TexturePoint::new(&surface, u32::from(s.face), [0.0; 2]), nm)
+                            }
                         };
                         Some(Arriving {
                             wi: s.direction,
@@ -171,7 +176,8 @@ impl Light {
                     }
                     Geometry::Mesh(mesh) => {
                         let (i, u_x) = mesh.areas.sample(u.x)?;
-                        let surface = mesh.mesh.sample_area(i, DVec2::new(u_x, u.y));
+                        let b = warp::triangle(DVec2::new(u_x, u.y));
+                        let surface = mesh.mesh.surface(i, b.x, b.y);
                         let offset = surface.point - from;
                         let distance = offset.length();
                         let wi = offset / distance;
@@ -179,7 +185,7 @@ impl Light {
                         (cos > 0.0 && distance > 0.0).then(|| Arriving {
                             wi,
                             distance,
-                            radiance: radiance.eval(surface.uv, nm),
+                            radiance: radiance.eval(&TexturePoint::new(&surface, i, b.into()), nm),
                             density: Some(distance * distance / (mesh.areas.total() * cos)),
                             target: target(i),
                         })

@@ -1,10 +1,9 @@
 //! Pictures and tables from files.
 
-use super::texture::{ImageTexture, Interpolation, Texel, Wrap};
+use super::texture::{Grid, ImageTexture, Texel};
 use crate::error::{Error, Result};
 use crate::film::exr;
 use crate::spectrum::{colour, upsample};
-use glam::DVec2;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::Path;
@@ -82,12 +81,7 @@ pub fn image_texture(path: &Path, raw: bool) -> Result<ImageTexture> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let make = |texels: Vec<Texel>, width: usize, height: usize| ImageTexture {
         texels: Arc::new(texels),
-        width,
-        height,
-        wrap: [Wrap::Repeat; 2],
-        interpolation: Interpolation::Bilinear,
-        scale: DVec2::ONE,
-        offset: DVec2::ZERO,
+        grid: Grid::new(width, height),
         illuminant: None,
     };
     if extension == "exr" || extension == "hdr" {

@@ -1,13 +1,12 @@
 //! Materials: the scattering function of a surface, for every point and wavelength.
 
-use super::texture::Texture;
+use super::texture::{Texture, TexturePoint};
 use crate::optics::bsdf::{Bsdf, Metal};
 use crate::optics::dielectric::{Dielectric, RelativeIndex, RoughDielectric};
 use crate::optics::fresnel::{self, Model};
 use crate::optics::microfacet::Microfacets;
 use crate::optics::plastic::{Base, CoatTable, Plastic, RoughPlastic};
 use crate::spectrum::{Lanes, RefractiveIndex, Spectrum};
-use glam::DVec2;
 use std::sync::Arc;
 
 /// A material.
@@ -136,12 +135,12 @@ pub fn relative_index(
 }
 
 impl Material {
-    /// The scattering function at `uv` for the wavelengths `nm`. `all_dispersive` treats every
+    /// The scattering function at a point for the wavelengths `nm`. `all_dispersive` treats every
     /// glass as if its index depended on wavelength (`effects: all`).
     #[must_use]
-    pub fn bsdf(&self, uv: DVec2, nm: Lanes, all_dispersive: bool) -> Bsdf {
+    pub fn bsdf(&self, at: &TexturePoint, nm: Lanes, all_dispersive: bool) -> Bsdf {
         match &self.kind {
-            Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: reflectance.eval(uv, nm) },
+            Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: reflectance.eval(at, nm) },
             Kind::Mirror { reflectance } => Bsdf::Mirror { reflectance: reflectance.eval(nm) },
             Kind::Conductor { eta, k, tint, fresnel, facets } => {
                 let metal = Metal { eta: eta.eval(nm), k: k.eval(nm), tint: tint.eval(nm), fresnel: *fresnel };
@@ -162,7 +161,7 @@ impl Material {
             }
             Kind::Plastic { reflectance, eta, internal, nonlinear, rough } => {
                 let base = Base {
-                    reflectance: reflectance.eval(uv, nm),
+                    reflectance: reflectance.eval(at, nm),
                     eta: *eta,
                     internal: *internal,
                     nonlinear: *nonlinear,

@@ -29,6 +29,7 @@ use shape::Detail;
 use shape::Shape;
 pub use shape::SurfacePoint;
 use std::path::PathBuf;
+use texture::TexturePoint;
 
 /// A scene, ready to be rendered.
 #[derive(Debug)]
@@ -185,6 +186,12 @@ pub struct Hit {
 }
 
 impl Hit {
+    /// The hit on `surface`, as textures see it.
+    #[must_use]
+    pub fn texture_point(&self, surface: &SurfacePoint) -> TexturePoint {
+        TexturePoint::new(surface, self.part, self.barycentric)
+    }
+
     /// True where the hit is on the face or triangle `target`.
     #[must_use]
     pub fn is_on(&self, target: Option<Departure>) -> bool {

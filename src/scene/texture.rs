@@ -1,8 +1,31 @@
 //! Spectra that vary over a surface.
 
+use super::SurfacePoint;
 use crate::spectrum::{Lanes, Spectrum, upsample};
-use glam::DVec2;
+use glam::{DAffine2, DVec2, DVec3};
+use std::ops::{Add, Mul};
 use std::sync::Arc;
+
+/// A point of a surface, as textures see it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TexturePoint {
+    /// Texture coordinates.
+    pub uv: DVec2,
+    /// In the world, metres.
+    pub point: DVec3,
+    /// The face of a shape or the triangle of a mesh.
+    pub part: u32,
+    /// On triangles the barycentric coordinates of the second and third corner.
+    pub barycentric: [f64; 2],
+}
+
+impl TexturePoint {
+    /// `surface`, which lies on the face or triangle `part`.
+    #[must_use]
+    pub fn new(surface: &SurfacePoint, part: u32, barycentric: [f64; 2]) -> TexturePoint {
+        TexturePoint { uv: surface.uv, point: surface.point, part, barycentric }
+    }
+}
 
 /// A spectrum at every point of a surface.
 #[derive(Clone, Debug)]
@@ -17,8 +40,8 @@ pub enum Texture {
         a: Box<Texture>,
         /// Where they differ.
         b: Box<Texture>,
-        /// Periods per unit of u and v.
-        scale: DVec2,
+        /// From u, v to periods.
+        uv: DAffine2,
     },
 }
 
@@ -53,25 +76,19 @@ pub struct Texel {
     pub scale: f32,
 }
 
-/// A picture whose texels are spectra. v = 0 is the bottom row's edge, v = 1 the top's.
-#[derive(Clone, Debug)]
-pub struct ImageTexture {
-    /// Row 0 is the top, as in the file.
-    pub texels: Arc<Vec<Texel>>,
+/// The lattice of a picture's texels over u, v. v = 0 is the bottom row's edge, v = 1 the top's.
+#[derive(Clone, Copy, Debug)]
+pub struct Grid {
     /// Columns.
     pub width: usize,
-    /// Rows.
+    /// Rows; row 0 is the top, as in the file.
     pub height: usize,
     /// Beyond the edge, in u and in v.
     pub wrap: [Wrap; 2],
     /// Between texels.
     pub interpolation: Interpolation,
-    /// Factor on u, v.
-    pub scale: DVec2,
-    /// Added to u, v after the factor.
-    pub offset: DVec2,
-    /// A spectrum that multiplies every texel: one for reflectances, D65 for light.
-    pub illuminant: Option<Spectrum>,
+    /// From the surface's u, v to the picture's.
+    pub uv: DAffine2,
 }
 
 /// Index of the texel at `i` of `n` under `wrap`.
@@ -89,35 +106,164 @@ fn wrapped(i: f64, n: usize, wrap: Wrap) -> usize {
     (folded as usize).min(n - 1)
 }
 
-impl ImageTexture {
-    fn texel(&self, x: f64, y: f64, nm: Lanes) -> Lanes {
-        let texel =
-            &self.texels[wrapped(y, self.height, self.wrap[1]) * self.width + wrapped(x, self.width, self.wrap[0])];
-        upsample::eval_sigmoid(texel.coefficients, nm) * texel.scale
+impl Grid {
+    /// A picture of `width` × `height` texels that repeats, once over the unit square.
+    #[must_use]
+    pub fn new(width: usize, height: usize) -> Grid {
+        let (wrap, interpolation) = ([Wrap::Repeat; 2], Interpolation::Bilinear);
+        Grid { width, height, wrap, interpolation, uv: DAffine2::IDENTITY }
     }
 
-    /// The spectrum at `uv`.
+    /// Index of the texel in column `x` of row `y`, counted from the top.
+    fn index(&self, x: f64, y: f64) -> usize {
+        wrapped(y, self.height, self.wrap[1]) * self.width + wrapped(x, self.width, self.wrap[0])
+    }
+
+    /// Column and row of the texel above and to the left of `uv`, and how far beyond its centre that lies.
+    fn corner(&self, uv: DVec2) -> (DVec2, DVec2) {
+        // Texel centres lie at half-integers.
+        let uv = self.uv.transform_point2(uv);
+        let at = DVec2::new(uv.x * self.width as f64 - 0.5, self.height as f64 - uv.y * self.height as f64 - 0.5);
+        (at.floor(), at - at.floor())
+    }
+
+    /// The value at `uv`, of the values that `texel` gives by index.
+    fn value<T: Copy + Add<Output = T> + Mul<f32, Output = T>>(&self, uv: DVec2, texel: impl Fn(usize) -> T) -> T {
+        match self.interpolation {
+            // Rows are counted from the bottom, so that v = 0 is in the last one, not in the first again.
+            Interpolation::Nearest => {
+                let uv = self.uv.transform_point2(uv);
+                let (x, up) = (uv.x * self.width as f64, uv.y * self.height as f64);
+                texel(self.index(x.floor(), self.height as f64 - 1.0 - up.floor()))
+            }
+            Interpolation::Bilinear => {
+                let (corner, weight) = self.corner(uv);
+                let (wx, wy) = (weight.x as f32, weight.y as f32);
+                let row =
+                    |y: f64| texel(self.index(corner.x, y)) * (1.0 - wx) + texel(self.index(corner.x + 1.0, y)) * wx;
+                row(corner.y) * (1.0 - wy) + row(corner.y + 1.0) * wy
+            }
+        }
+    }
+}
+
+/// A picture whose texels are spectra.
+#[derive(Clone, Debug)]
+pub struct ImageTexture {
+    /// Row by row.
+    pub texels: Arc<Vec<Texel>>,
+    /// Where they lie.
+    pub grid: Grid,
+    /// A spectrum that multiplies every texel: one for reflectances, D65 for light.
+    pub illuminant: Option<Spectrum>,
+}
+
+impl ImageTexture {
+    /// The spectrum at `uv`. Spectra are mixed, not coefficients.
     #[must_use]
     pub fn eval(&self, uv: DVec2, nm: Lanes) -> Lanes {
-        let uv = uv * self.scale + self.offset;
-        let (x, up) = (uv.x * self.width as f64, uv.y * self.height as f64);
-        let value = match self.interpolation {
-            // Rows are counted from the bottom, so that v = 0 is in the last one, not in the first again.
-            Interpolation::Nearest => self.texel(x.floor(), self.height as f64 - 1.0 - up.floor(), nm),
-            Interpolation::Bilinear => {
-                // Texel centres lie at half-integers. Spectra are mixed, not coefficients.
-                let (x, y) = (x - 0.5, self.height as f64 - up - 0.5);
-                let (x0, y0) = (x.floor(), y.floor());
-                let (wx, wy) = ((x - x0) as f32, (y - y0) as f32);
-                let row = |y: f64| self.texel(x0, y, nm) * (1.0 - wx) + self.texel(x0 + 1.0, y, nm) * wx;
-                row(y0) * (1.0 - wy) + row(y0 + 1.0) * wy
-            }
-        };
+        let value = self.grid.value(uv, |i| {
+            let texel = &self.texels[i];
+            upsample::eval_sigmoid(texel.coefficients, nm) * texel.scale
+        });
         match &self.illuminant {
             Some(spectrum) => value * spectrum.eval(nm),
             None => value,
         }
     }
+}
+
+/// A number at every point of a surface, or three: data such as roughness, weight, height, normal.
+#[derive(Clone, Debug)]
+pub enum Scalar {
+    /// The same everywhere.
+    Uniform(f64),
+    /// A picture of numbers.
+    Image(DataImage),
+    /// As in [`Texture`].
+    Checkerboard {
+        /// Where the cells' parities agree.
+        a: Box<Scalar>,
+        /// Where they differ.
+        b: Box<Scalar>,
+        /// From u, v to periods.
+        uv: DAffine2,
+    },
+}
+
+/// A picture whose texels are numbers.
+#[derive(Clone, Debug)]
+pub struct DataImage {
+    /// Row by row; all three are the same in a picture of one channel.
+    pub texels: Arc<Vec<[f32; 3]>>,
+    /// Where they lie.
+    pub grid: Grid,
+}
+
+/// True where the cells of a checkerboard that `uv` maps to have the same parity in u and v.
+fn same_cell(uv: &DAffine2, at: &TexturePoint) -> bool {
+    let p = uv.transform_point2(at.uv);
+    let cell = |x: f64| x - x.floor() >= 0.5;
+    cell(p.x) == cell(p.y)
+}
+
+impl Scalar {
+    /// The number at a point; of three their mean by luminance (Rec. 709).
+    #[must_use]
+    pub fn eval(&self, at: &TexturePoint) -> f64 {
+        match self {
+            Scalar::Uniform(x) => *x,
+            Scalar::Image(image) => f64::from(image.grid.value(at.uv, |i| luminance(image.texels[i]))),
+            Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).eval(at),
+        }
+    }
+
+    /// The three numbers at a point.
+    #[must_use]
+    pub fn triple(&self, at: &TexturePoint) -> DVec3 {
+        match self {
+            Scalar::Uniform(x) => DVec3::splat(*x),
+            Scalar::Image(image) => {
+                DVec3::from([0, 1, 2].map(|k| f64::from(image.grid.value(at.uv, |i| image.texels[i][k]))))
+            }
+            Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).triple(at),
+        }
+    }
+
+    /// Its derivatives by u and v at a point; zero across the steps between cells and texels.
+    #[must_use]
+    pub fn gradient(&self, at: &TexturePoint) -> DVec2 {
+        match self {
+            Scalar::Uniform(_) => DVec2::ZERO,
+            Scalar::Image(DataImage { grid, .. }) if grid.interpolation == Interpolation::Nearest => DVec2::ZERO,
+            Scalar::Image(image) => {
+                let grid = &image.grid;
+                let (corner, w) = grid.corner(at.uv);
+                let height =
+                    |x: f64, y: f64| f64::from(luminance(image.texels[grid.index(corner.x + x, corner.y + y)]));
+                let (h00, h10, h01, h11) = (height(0.0, 0.0), height(1.0, 0.0), height(0.0, 1.0), height(1.0, 1.0));
+                // Of the bilinear form, by columns and by rows; rows count downward.
+                let by_x = (h10 - h00) * (1.0 - w.y) + (h11 - h01) * w.y;
+                let by_y = (h01 - h00) * (1.0 - w.x) + (h11 - h10) * w.x;
+                let picture = DVec2::new(by_x * grid.width as f64, -by_y * grid.height as f64);
+                grid.uv.matrix2.transpose() * picture
+            }
+            Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).gradient(at),
+        }
+    }
+
+    /// True for anything but one number.
+    #[must_use]
+    pub fn varies(&self) -> bool {
+        !matches!(self, Scalar::Uniform(_))
+    }
+}
+
+fn luminance(rgb: [f32; 3]) -> f32 {
+    if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
+        return rgb[0];
+    }
+    0.212_671 * rgb[0] + 0.715_160 * rgb[1] + 0.072_169 * rgb[2]
 }
 
 impl Texture {
@@ -127,17 +273,13 @@ impl Texture {
         Texture::Uniform(Spectrum::Constant(1.0))
     }
 
-    /// The spectrum at `uv`.
+    /// The spectrum at a point.
     #[must_use]
-    pub fn eval(&self, uv: DVec2, nm: Lanes) -> Lanes {
+    pub fn eval(&self, at: &TexturePoint, nm: Lanes) -> Lanes {
         match self {
             Texture::Uniform(spectrum) => spectrum.eval(nm),
-            Texture::Image(image) => image.eval(uv, nm),
-            Texture::Checkerboard { a, b, scale } => {
-                let cell = |x: f64| x - x.floor() >= 0.5;
-                let same = cell(uv.x * scale.x) == cell(uv.y * scale.y);
-                (if same { a } else { b }).eval(uv, nm)
-            }
+            Texture::Image(image) => image.eval(at.uv, nm),
+            Texture::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).eval(at, nm),
         }
     }
 
@@ -182,12 +324,7 @@ mod tests {
         let texel = |v: f64| Texel { coefficients: grey(v), scale: 1.0 };
         ImageTexture {
             texels: Arc::new(vec![texel(0.2), texel(0.8), texel(0.8), texel(0.2)]),
-            width: 2,
-            height: 2,
-            wrap: [wrap; 2],
-            interpolation,
-            scale: DVec2::ONE,
-            offset: DVec2::ZERO,
+            grid: Grid { wrap: [wrap; 2], interpolation, ..Grid::new(2, 2) },
             illuminant: None,
         }
     }
@@ -232,7 +369,7 @@ mod tests {
     fn a_globe_wraps_around_and_is_clamped_at_its_poles() {
         let mut image = board(Wrap::Repeat, Interpolation::Bilinear);
         assert!((at(&image, 0.25, 1.0) - 0.5).abs() < TABLE);
-        image.wrap[1] = Wrap::Clamp;
+        image.grid.wrap[1] = Wrap::Clamp;
         assert!((at(&image, 0.25, 1.0) - 0.2).abs() < TABLE && (at(&image, 0.25, 0.0) - 0.8).abs() < TABLE);
         assert!((at(&image, 0.0, 1.0) - 0.5).abs() < TABLE);
     }
@@ -242,9 +379,50 @@ mod tests {
         let board = Texture::Checkerboard {
             a: Box::new(Texture::Uniform(Spectrum::Constant(1.0))),
             b: Box::new(Texture::Uniform(Spectrum::Constant(0.0))),
-            scale: DVec2::new(2.0, 2.0),
+            uv: DAffine2::from_scale(DVec2::new(2.0, 2.0)),
         };
-        let at = |u, v| board.eval(DVec2::new(u, v), Lanes::splat(500.0)).to_array()[0];
+        let at = |u, v| {
+            board
+                .eval(&TexturePoint { uv: DVec2::new(u, v), ..TexturePoint::default() }, Lanes::splat(500.0))
+                .to_array()[0]
+        };
         assert_eq!([at(0.1, 0.1), at(0.3, 0.1), at(0.3, 0.3), at(0.6, 0.1), at(-0.1, 0.1)], [1.0, 0.0, 1.0, 1.0, 0.0]);
+    }
+
+    fn numbers(interpolation: Interpolation, uv: DAffine2) -> Scalar {
+        let grid = Grid { wrap: [Wrap::Clamp; 2], interpolation, uv, ..Grid::new(2, 2) };
+        Scalar::Image(DataImage { texels: Arc::new([0.1, 0.5, 0.3, 0.9].map(|x| [x; 3]).to_vec()), grid })
+    }
+
+    fn point(u: f64, v: f64) -> TexturePoint {
+        TexturePoint { uv: DVec2::new(u, v), ..TexturePoint::default() }
+    }
+
+    /// Data are numbers as they stand in the file: 2^-24 of each is f32's rounding.
+    #[test]
+    fn a_picture_of_numbers_keeps_them() {
+        let nearest = numbers(Interpolation::Nearest, DAffine2::IDENTITY);
+        for (u, v, expected) in [(0.2, 0.8, 0.1), (0.8, 0.8, 0.5), (0.2, 0.2, 0.3), (0.8, 0.2, 0.9)] {
+            assert!((nearest.eval(&point(u, v)) - expected).abs() < 1e-7);
+        }
+        let middle = numbers(Interpolation::Bilinear, DAffine2::IDENTITY).eval(&point(0.5, 0.5));
+        assert!((middle - 0.45).abs() < 1e-6);
+        // Half a turn about the middle.
+        let turned = DAffine2::from_cols(-DVec2::X, -DVec2::Y, DVec2::ONE);
+        assert!((numbers(Interpolation::Nearest, turned).eval(&point(0.2, 0.8)) - 0.9).abs() < 1e-7);
+    }
+
+    /// The bilinear form is quadratic, so that central differences are its derivatives but for rounding
+    /// (f32 values over a step of 1e-2: 1e-5).
+    #[test]
+    fn gradients_are_those_of_the_values() {
+        let uv = DAffine2::from_cols(DVec2::new(0.5, 0.2), DVec2::new(-0.3, 0.4), DVec2::new(0.35, 0.25));
+        let heights = numbers(Interpolation::Bilinear, uv);
+        let h = 1e-2;
+        let by_u = (heights.eval(&point(0.4 + h, 0.5)) - heights.eval(&point(0.4 - h, 0.5))) / (2.0 * h);
+        let by_v = (heights.eval(&point(0.4, 0.5 + h)) - heights.eval(&point(0.4, 0.5 - h))) / (2.0 * h);
+        let found = heights.gradient(&point(0.4, 0.5));
+        assert!((found - DVec2::new(by_u, by_v)).length() < 1e-4, "{found} {by_u} {by_v}");
+        assert!(found.length() > 0.1);
     }
 }

@@ -217,7 +217,7 @@ impl Tracer<'_> {
 
             // Light that the surface itself sends out.
             if let Some(light) = object.light {
-                let emitted = scene.lights[light as usize].emitted(&surface, wo_world, self.nm);
+                let emitted = scene.lights[light as usize].emitted(&surface, &hit, wo_world, self.nm);
                 let weight = match &path.previous {
                     None => 1.0,
                     Some(p) => {
@@ -262,7 +262,7 @@ impl Tracer<'_> {
             }
             let frame = Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent);
             let wo = frame.to_local(wo_world);
-            let bsdf = material.bsdf(surface.uv, self.nm, self.plan.all_dispersive);
+            let bsdf = material.bsdf(&hit.texture_point(&surface), self.nm, self.plan.all_dispersive);
 
             let scatter = self.sampler.set(Set::Scatter(path.vertices));
             let (u_light, u_direction) = pairs(scatter);

@@ -15,7 +15,7 @@ use crate::optics::plastic::Base;
 use crate::scene::light::Light;
 use crate::scene::material::{Highlight, HighlightModel, Kind, Material, relative_index};
 use crate::scene::shape::Shape;
-use crate::scene::texture::Texture;
+use crate::scene::texture::{Texture, TexturePoint};
 use crate::scene::{Geometry, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
@@ -80,13 +80,14 @@ impl Tracer<'_> {
             normal = surface.normal;
         }
         let normal = if turned { -normal } else { normal };
-        let emitted = object.light.map_or(Lanes::ZERO, |l| scene.lights[l as usize].emitted(&surface, wo, self.nm));
+        let emitted =
+            object.light.map_or(Lanes::ZERO, |l| scene.lights[l as usize].emitted(&surface, &hit, wo, self.nm));
         if !outside && !material.two_sided && !material.transmits() {
             return (emitted, Some(surface.point));
         }
 
         let leave = |direction: DVec3| scene.leave(&surface, &hit, direction);
-        let mut light = emitted + self.shade(material, &surface, normal, wo, &leave);
+        let mut light = emitted + self.shade(material, &surface, &hit.texture_point(&surface), normal, wo, &leave);
         if depth < self.settings.max_depth {
             light += self.specular(material, normal, surface.normal, wo, weight, depth, &leave);
         }
@@ -98,15 +99,16 @@ impl Tracer<'_> {
         &self,
         material: &Material,
         surface: &SurfacePoint,
+        at: &TexturePoint,
         normal: DVec3,
         wo: DVec3,
         leave: &impl Fn(DVec3) -> Ray,
     ) -> Lanes {
         let base = match &material.kind {
-            Kind::Diffuse { reflectance } => reflectance.eval(surface.uv, self.nm),
+            Kind::Diffuse { reflectance } => reflectance.eval(at, self.nm),
             Kind::Plastic { reflectance, eta, internal, nonlinear, .. } => {
                 // The base under its coat, for light along the normal both ways.
-                let reflectance = reflectance.eval(surface.uv, self.nm);
+                let reflectance = reflectance.eval(at, self.nm);
                 let base = Base { reflectance, eta: *eta, internal: *internal, nonlinear: *nonlinear };
                 let t = 1.0 - fresnel::dielectric(Model::Exact, 1.0, *eta).reflected;
                 base.albedo() * (t * t) as f32

@@ -4,8 +4,9 @@ use super::common::{Bench, assert_close, bench, bench_with, mean, ray, v};
 use super::in_even_light;
 use abbe::optics::fresnel::{self, Model};
 use abbe::scene::material::Kind;
+use abbe::scene::texture::TexturePoint;
 use abbe::spectrum::Lanes;
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use std::f64::consts::PI;
 
 /// A closed room from −1 to 1 with inward normals.
@@ -93,7 +94,7 @@ fn an_integrating_sphere_multiplies_its_lamp_by_one_over_one_minus_albedo() {
 /// grid moves the value by less than 1e-5.
 fn albedo_by_quadrature(scene: &Bench, cos: f64) -> [f64; 2] {
     let material = &scene.prepared.scene.materials[0];
-    let bsdf = material.bsdf(DVec2::ZERO, Lanes::splat(550.0), false);
+    let bsdf = material.bsdf(&TexturePoint::default(), Lanes::splat(550.0), false);
     let wo = DVec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
     const STEPS: u32 = 400;
     let mut sums = [0.0; 2];

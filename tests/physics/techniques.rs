@@ -30,7 +30,7 @@ fn vertex(bench: &Bench, ray: &Ray) -> Vertex {
     let surface = scene.surface(ray, &hit);
     let frame = Frame::from_normal_and_tangent(surface.shading_normal, surface.tangent);
     let material = &scene.materials[scene.objects[hit.object as usize].material as usize];
-    let bsdf = material.bsdf(surface.uv, Lanes::splat(550.0), false);
+    let bsdf = material.bsdf(&hit.texture_point(&surface), Lanes::splat(550.0), false);
     Vertex { hit, surface, wo: frame.to_local(-ray.direction), frame, bsdf }
 }
 
@@ -71,7 +71,7 @@ fn by_material(bench: &Bench, x: &Vertex, n: u64) -> Estimate {
                 Some(hit) => match scene.objects[hit.object as usize].light {
                     Some(l) => {
                         let surface = scene.surface(&onward, &hit);
-                        scene.lights[l as usize].emitted(&surface, -onward.direction, nm)
+                        scene.lights[l as usize].emitted(&surface, &hit, -onward.direction, nm)
                     }
                     None => Lanes::ZERO,
                 },
