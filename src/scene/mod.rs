@@ -9,6 +9,7 @@ pub mod camera;
 pub mod census;
 pub mod compile;
 pub mod environment;
+pub mod grid;
 pub mod light;
 pub mod load;
 pub mod material;
