@@ -5,6 +5,7 @@ use super::fresnel::{self, Model};
 use super::mean;
 use super::microfacet::Microfacets;
 use super::plastic::{Plastic, RoughPlastic};
+use super::principled::{Principled, PrincipledThin};
 use crate::math::warp;
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
@@ -40,6 +41,10 @@ pub enum Bsdf {
     Plastic(Plastic),
     /// A diffuse base under a rough dielectric coat.
     RoughPlastic(RoughPlastic),
+    /// Burley's surface of a solid.
+    Principled(Principled),
+    /// Burley's surface of a sheet.
+    PrincipledThin(PrincipledThin),
     /// No interface: the boundary of a medium only.
     Null,
 }
@@ -126,7 +131,9 @@ impl Bsdf {
             | Bsdf::RoughConductor(..)
             | Bsdf::RoughDielectric(_)
             | Bsdf::Plastic(_)
-            | Bsdf::RoughPlastic(_) => false,
+            | Bsdf::RoughPlastic(_)
+            | Bsdf::Principled(_)
+            | Bsdf::PrincipledThin(_) => false,
         }
     }
 
@@ -144,6 +151,8 @@ impl Bsdf {
             Bsdf::RoughDielectric(glass) => glass.eval(wo, wi),
             Bsdf::Plastic(plastic) => plastic.eval(wo, wi),
             Bsdf::RoughPlastic(plastic) => plastic.eval(wo, wi),
+            Bsdf::Principled(surface) => surface.eval(wo, wi),
+            Bsdf::PrincipledThin(sheet) => sheet.eval(wo, wi),
             Bsdf::Mirror { .. } | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::Thin { .. } | Bsdf::Null => {
                 Evaluation::NONE
             }
@@ -193,6 +202,8 @@ impl Bsdf {
             }
             Bsdf::Plastic(plastic) => plastic.sample(wo, u_lobe, u),
             Bsdf::RoughPlastic(plastic) => plastic.sample(wo, u_lobe, u),
+            Bsdf::Principled(surface) => surface.sample(wo, u_lobe, u),
+            Bsdf::PrincipledThin(sheet) => sheet.sample(wo, u_lobe, u),
             Bsdf::Null => Some(BsdfSample { transmitted: true, ..BsdfSample::discrete(-wo, Lanes::ONE) }),
         }
     }

@@ -15,6 +15,7 @@ pub mod fresnel;
 pub mod medium;
 pub mod microfacet;
 pub mod plastic;
+pub mod principled;
 
 pub use bsdf::{Bsdf, BsdfSample, Evaluation};
 

@@ -1,0 +1,247 @@
+//! The boundary of a solid.
+
+use super::lobes::{self, CoatFacets, Facets};
+use crate::math::warp;
+use crate::optics::bsdf::{BsdfSample, Evaluation, from_evaluation};
+use crate::optics::dielectric::refract;
+use crate::optics::fresnel::{self, Model, Split};
+use crate::spectrum::Lanes;
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+
+/// A principled surface at one point.
+///
+/// Light that comes from the front meets all lobes; from the back only the microfacets, and nothing at all
+/// where nothing is transmitted.
+#[derive(Clone, Copy, Debug)]
+pub struct Principled {
+    /// The base colour, 0 to 1.
+    pub base: Lanes,
+    /// The base colour over its luminance: the hue of the tints.
+    pub hue: Lanes,
+    /// Index inside over outside.
+    pub eta: f32,
+    /// √α.
+    pub roughness: f32,
+    /// How much longer highlights are along x than along y.
+    pub anisotropic: f32,
+    /// From dielectric to metal.
+    pub metallic: f32,
+    /// From diffuse to clear.
+    pub transmission: f32,
+    /// Tint of the dielectric reflection.
+    pub specular_tint: f32,
+    /// Strength of the sheen at grazing angles.
+    pub sheen: f32,
+    /// Its tint.
+    pub sheen_tint: f32,
+    /// From diffuse to the shape of subsurface scattering.
+    pub flatness: f32,
+    /// Strength of the clear coat.
+    pub clearcoat: f32,
+    /// Its gloss.
+    pub clearcoat_gloss: f32,
+    /// How often each lobe is sampled.
+    pub rates: Rates,
+}
+
+/// Factors on how often each lobe is sampled; they change noise, not the mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rates {
+    /// The main microfacets, reflected and refracted.
+    pub specular: f32,
+    /// The clear coat.
+    pub clearcoat: f32,
+    /// The diffuse lobe.
+    pub diffuse: f32,
+}
+
+impl Default for Rates {
+    fn default() -> Rates {
+        Rates { specular: 1.0, clearcoat: 1.0, diffuse: 1.0 }
+    }
+}
+
+/// The probabilities of the lobes for light leaving on one side.
+struct Choice {
+    diffuse: f64,
+    clearcoat: f64,
+    /// Refraction and reflection by facets that reflect the share `F`.
+    refraction: f64,
+    reflection: f64,
+}
+
+impl Principled {
+    /// Weight of the lobes that transmit.
+    fn clear(&self) -> f64 {
+        (1.0 - f64::from(self.metallic)) * f64::from(self.transmission)
+    }
+
+    /// Weight of the diffuse lobe.
+    fn matte(&self) -> f64 {
+        (1.0 - f64::from(self.metallic)) * (1.0 - f64::from(self.transmission))
+    }
+
+    fn facets(&self) -> Facets {
+        Facets { widths: lobes::widths(f64::from(self.roughness), f64::from(self.anisotropic)) }
+    }
+
+    fn coat(&self) -> CoatFacets {
+        CoatFacets::of_gloss(f64::from(self.clearcoat_gloss))
+    }
+
+    /// The dielectric interface of a facet met at the cosine `cos` > 0 from the front or the back.
+    fn interface(&self, cos: f64, front: bool) -> Split {
+        let eta = f64::from(self.eta);
+        fresnel::dielectric(Model::Exact, cos, if front { eta } else { 1.0 / eta })
+    }
+
+    /// `None` where nothing is sampled: all rates zero.
+    fn choice(&self, front: bool, split: &Split) -> Option<Choice> {
+        if !front {
+            return Some(Choice {
+                diffuse: 0.0,
+                clearcoat: 0.0,
+                refraction: split.transmitted,
+                reflection: split.reflected,
+            });
+        }
+        let specular = f64::from(self.rates.specular);
+        // The coat reflects about a quarter of what the main lobe does.
+        let clearcoat = 0.25 * f64::from(self.clearcoat) * f64::from(self.rates.clearcoat);
+        let diffuse = self.matte() * f64::from(self.rates.diffuse);
+        let total = specular + clearcoat + diffuse;
+        let refraction = specular * self.clear() * split.transmitted;
+        (total > 0.0).then(|| Choice {
+            diffuse: diffuse / total,
+            clearcoat: clearcoat / total,
+            refraction: refraction / total,
+            reflection: (specular - refraction) / total,
+        })
+    }
+
+    /// Reflectance of the main facets, met at the cosine `cos` from the front: Fresnel's equations for the
+    /// dielectric, Schlick's approximation for its tinted part and for the metal.
+    fn reflectance(&self, cos: f64, dielectric: f64) -> Lanes {
+        let eta = f64::from(self.eta);
+        let (metal, tint) = (self.metallic, self.specular_tint);
+        let mut sum = Lanes::splat((1.0 - metal) * (1.0 - tint) * dielectric as f32);
+        if metal == 0.0 && tint == 0.0 {
+            return sum;
+        }
+        let weight = lobes::schlick_outside(cos, eta);
+        sum += lobes::toward_one(self.base, weight) * metal;
+        if tint > 0.0 {
+            let r0 = self.hue * lobes::r0(eta) as f32;
+            sum += lobes::toward_one(r0, weight) * ((1.0 - metal) * tint);
+        }
+        sum
+    }
+
+    pub(crate) fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
+        let front = wo.z > 0.0;
+        if wo.z == 0.0 || wi.z == 0.0 || !(front || self.clear() > 0.0) {
+            return Evaluation::NONE;
+        }
+        let side = wo.z.signum();
+        let reflect = wi.z * side > 0.0;
+        let eta = if front { f64::from(self.eta) } else { 1.0 / f64::from(self.eta) };
+        // The half vector, of the directions scaled by their indices for refraction (Walter et al.
+        // 2007, eq. 16), on the side of the normal; and its cosines on the side of `wo`.
+        let Some(m) = (if reflect { wo + wi } else { wo + wi * eta }).try_normalize() else {
+            return Evaluation::NONE;
+        };
+        let m = m * m.z.signum();
+        let (cos_o, cos_i) = (wo.dot(m) * side, wi.dot(m) * side);
+        let facing = cos_o > 0.0 && (cos_i > 0.0) == reflect;
+        let split = self.interface(cos_o.max(0.0), front);
+        let Some(choice) = self.choice(front, &split) else { return Evaluation::NONE };
+
+        let mut f = Lanes::ZERO;
+        let mut pdf = 0.0;
+        if facing {
+            let facets = self.facets();
+            let up = wo * side;
+            let seen = facets.density(m) * facets.masking(up, m);
+            let pdf_m = seen * cos_o / up.z;
+            if reflect {
+                // Torrance and Sparrow 1967. Where the interface has no contrast, metal too is invisible.
+                if split.reflected > 0.0 {
+                    let geometry = seen * facets.masking(wi, m) / (4.0 * wo.z * wi.z);
+                    f += if front {
+                        self.reflectance(cos_o, split.reflected) * geometry as f32
+                    } else {
+                        Lanes::splat((self.clear() * split.reflected * geometry) as f32)
+                    };
+                }
+                pdf += choice.reflection * pdf_m / (4.0 * cos_i);
+            } else {
+                // Walter et al. 2007, eqs. 17 and 21; radiance scales by 1/η² on crossing. The base
+                // colour is that of a way in and out, so each crossing takes its root.
+                let jacobian = cos_i.abs() / (cos_o + eta * cos_i).powi(2);
+                let geometry = seen * facets.masking(wi, m) * cos_o * jacobian / (wo.z * wi.z).abs();
+                f += self.base.sqrt() * (self.clear() * split.transmitted * geometry) as f32;
+                pdf += choice.refraction * pdf_m * eta * eta * jacobian;
+            }
+        }
+        if reflect && front {
+            if facing && self.clearcoat > 0.0 {
+                let coat = self.coat();
+                let density = coat.density(m);
+                let fresnel = 0.04 + 0.96 * lobes::schlick_outside(cos_o, f64::from(self.eta));
+                let masking = CoatFacets::masking(wo, m) * CoatFacets::masking(wi, m);
+                // Without the 1/(4 cos cos) of a microfacet lobe: Burley 2012 scales the coat by 1/4.
+                f += Lanes::splat((0.25 * f64::from(self.clearcoat) * fresnel * density * masking) as f32);
+                pdf += choice.clearcoat * density * m.z / (4.0 * cos_i);
+            }
+            let matte = self.matte();
+            if matte > 0.0 {
+                let (roughness, flatness) = (f64::from(self.roughness), f64::from(self.flatness));
+                f += self.base * (matte / PI * lobes::diffusion(roughness, flatness, wo.z, wi.z, cos_i)) as f32;
+            }
+            if self.sheen > 0.0 {
+                let strength = (1.0 - self.metallic) * self.sheen * lobes::schlick_weight(cos_i.abs()) as f32;
+                f += (Lanes::ONE + (self.hue - Lanes::ONE) * self.sheen_tint) * strength;
+            }
+            pdf += choice.diffuse * wi.z / PI;
+        }
+        Evaluation { f, pdf: Lanes::splat(pdf as f32) }
+    }
+
+    pub(crate) fn sample(&self, wo: DVec3, u_lobe: f64, u: DVec2) -> Option<BsdfSample> {
+        let front = wo.z > 0.0;
+        if wo.z == 0.0 || !(front || self.clear() > 0.0) {
+            return None;
+        }
+        let side = wo.z.signum();
+        let up = wo * side;
+        // The facet of the main lobe is drawn first: what it reflects decides between its two ways.
+        let m = self.facets().sample(up, u);
+        let cos = up.dot(m);
+        let split = self.interface(cos.max(0.0), front);
+        let choice = self.choice(front, &split)?;
+        let eta = if front { f64::from(self.eta) } else { 1.0 / f64::from(self.eta) };
+        let mut left = u_lobe - choice.diffuse;
+        if left < 0.0 {
+            let wi = warp::cosine_hemisphere(u);
+            return from_evaluation(wi, wi.z, self.eval(wo, wi), false, 1.0);
+        }
+        left -= choice.clearcoat;
+        if left < 0.0 {
+            let m = self.coat().sample(u);
+            let wi = m * (2.0 * wo.dot(m)) - wo;
+            return (wi.z > 0.0).then(|| from_evaluation(wi, wi.z, self.eval(wo, wi), false, 1.0))?;
+        }
+        if cos <= 0.0 {
+            return None;
+        }
+        let transmitted = left < choice.refraction;
+        let wi_up = if transmitted { refract(up, m, eta, split.cos_transmitted) } else { m * (2.0 * cos) - up };
+        if (wi_up.z > 0.0) == transmitted {
+            return None;
+        }
+        let eta2 = if transmitted { eta * eta } else { 1.0 };
+        let wi = wi_up * side;
+        from_evaluation(wi, wi.z.abs(), self.eval(wo, wi), transmitted, eta2)
+    }
+}
