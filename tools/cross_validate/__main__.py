@@ -2,10 +2,13 @@
 
     python tools/cross_validate [--binary PATH] [--only NAME] [--nightly] [--seed N] [--out DIR]
 
+Two kinds of cases: scenes in Abbe's grammar, written for Mitsuba (`scenes.py`), and Mitsuba's own scene files, read
+by both (`mitsuba/*.xml`, `scene_files.py`). Of the files a dozen are drawn by the seed, all with --nightly or --all.
+
 For each case: the ratio of the means (R, G, B), the standard error of that ratio, blocks and pixels that
 fit (see `judge.py`). A case that fails is rendered once more with four times the samples and other
 seeds, and the second verdict counts: noise fails one in hundreds, and rarely twice. The scenes, as YAML
-and as XML, and the pictures stay in the output directory.
+and as XML, and the pictures stay in the output directory; `index.html` there shows them all.
 
 Exit code 0 if every case agrees, 1 if one does not, 2 if the comparison could not be made.
 """
@@ -21,11 +24,17 @@ from pathlib import Path
 
 import numpy as np
 
+import page
+import renderers
+import scene_files
 from judge import Picture, judge
-from renderers import Mitsuba, RenderError, choose_variant, compare
+from renderers import Mitsuba, RenderError, choose_variant
 from scenes import BANDS, Case, all_cases
 
 ROOT = Path(__file__).resolve().parents[2]
+
+# Files of Mitsuba's that a run takes without --all.
+DRAWN = 12
 
 
 def arguments() -> argparse.Namespace:
@@ -38,19 +47,32 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=int(os.environ.get("ABBE_SEED", today)), help="default: the date")
     parser.add_argument("--out", type=Path, default=ROOT / "target" / "cross_validate", help="where files are left")
     parser.add_argument("--variant", help="of Mitsuba; default: the fastest that works here")
+    parser.add_argument("--all", action="store_true", help="every file of Mitsuba's, not a dozen drawn by the seed")
+    parser.add_argument("--files", action="store_true", help="only Mitsuba's files")
     parser.add_argument("--list", action="store_true", help="print the cases and render nothing")
     return parser.parse_args()
 
 
-def one_case(case: Case, attempt: int, a: argparse.Namespace, mitsuba: Mitsuba):
+def chosen_cases(a: argparse.Namespace) -> list:
+    """Those that --only names, from all; else ours and a draw of Mitsuba's files."""
+    files = scene_files.all_files()
+    if not (a.all or a.nightly or a.only or a.list or a.files) and len(files) > DRAWN:
+        drawn = np.random.default_rng(a.seed).choice(len(files), DRAWN, replace=False)
+        files = [files[i] for i in sorted(drawn)]
+    cases = files if a.files else [*all_cases(), *files]
+    return [c for c in cases if not a.only or any(part in c.name for part in a.only)]
+
+
+def one_case(case: Case | scene_files.SceneFile, attempt: int, a: argparse.Namespace, mitsuba: Mitsuba):
     """A verdict, with the pictures it rests on."""
     rng = np.random.default_rng([a.seed, zlib.crc32(case.name.encode()), attempt])
     effort = (8 if a.nightly else 1) * 4**attempt
+    compare = scene_files.compare if isinstance(case, scene_files.SceneFile) else renderers.compare
     return compare(case, a.binary, mitsuba, a.out / case.name, effort, rng)
 
 
 HEADLINE = (
-    f"{'case':18} {'':6} {'ratio of means R, G, B':>26} {'s.e. %':>7} {'worst z':>8} "
+    f"{'case':28} {'':6} {'ratio of means R, G, B':>26} {'s.e. %':>7} {'worst z':>8} "
     f"{'blocks':>8} {'pixels %':>9} {'s':>6}"
 )
 
@@ -61,7 +83,7 @@ def row(name: str, verdict: dict) -> str:
     blocks = f"{verdict['blocks'] - verdict['blocks_rejected']}/{verdict['blocks']}"
     word = "agree" if verdict["passed"] else "DIFFER"
     return (
-        f"{name:18} {word:6} {ratio:>26} {100 * max(verdict['standard_error']):7.3f} {worst:8.2f} {blocks:>8} "
+        f"{name:28} {word:6} {ratio:>26} {100 * max(verdict['standard_error']):7.3f} {worst:8.2f} {blocks:>8} "
         f"{100 * verdict['pixels_accepted']:9.3f} {verdict['seconds']:6.1f}"
         + (f"  {verdict['reason']}" if verdict["reason"] else "")
     )
@@ -85,10 +107,10 @@ def neighbours_differ(pictures: dict) -> list:
 
 def main() -> int:
     a = arguments()
-    cases = [c for c in all_cases() if not a.only or any(part in c.name for part in a.only)]
+    cases = chosen_cases(a)
     if a.list:
         for case in cases:
-            print(f"{case.name:18} {case.about}")
+            print(f"{case.name:28} {case.about}")
         return 0
     if not cases:
         print(f"cross_validate: no case is named like {', '.join(a.only)}; --list shows them", file=sys.stderr)
@@ -116,7 +138,7 @@ def main() -> int:
                 result = {"passed": False, "reason": f"{type(error).__name__}: {error}"}
             result["seconds"] = round(time.monotonic() - before, 2)
             attempts.append(result)
-            text = row(case.name, result) if "ratio" in result else f"{case.name:18} FAILED {result['reason']}"
+            text = row(case.name, result) if "ratio" in result else f"{case.name:28} FAILED {result['reason']}"
             again = not result["passed"] and attempt == 0 and "ratio" in result
             print(text + ("  once more with 4 times the samples:" if again else ""), flush=True)
             if not again:
@@ -138,9 +160,9 @@ def main() -> int:
         )
     report.update(controls=controls, passed=passed, failed=failed, seconds=round(time.monotonic() - started, 1))
     a.out.mkdir(parents=True, exist_ok=True)
-    path = a.out / "report.json"
-    path.write_text(json.dumps(report, indent=1))
-    print(f"report: {path}")
+    (a.out / "report.json").write_text(json.dumps(report, indent=1))
+    page.write(a.out / "index.html", report, pictures)
+    print(f"report: {a.out / 'index.html'}, {a.out / 'report.json'}")
     print(f"{passed} passed, {failed} failed")
     return 0 if failed == 0 else 1
 
