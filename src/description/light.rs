@@ -1,11 +1,14 @@
 //! Lights, media and fog as they are written.
 
+use glam::DVec3;
 use serde::Deserialize;
 
+use super::emitter::{EnvironmentLight, ProjectorLight, check_weight};
 use super::fault::Checker;
 use super::material::given_fields;
 use super::path::At;
-use super::spectrum::{FilePath, Role, Spectrum, Vec3, one};
+use super::shape::parallel;
+use super::spectrum::{Role, Spectrum, Vec3, one};
 
 /// A light that is not a surface. Surfaces emit by their field `emission`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -21,6 +24,8 @@ pub enum Light {
     Constant(ConstantLight),
     /// From all directions, by an image.
     Environment(EnvironmentLight),
+    /// A picture thrown from a point.
+    Projector(ProjectorLight),
 }
 
 /// `point: {position: [0, 3, 0], intensity: 10}`
@@ -33,6 +38,10 @@ pub struct PointLight {
     pub position: Vec3,
     /// W·sr⁻¹·nm⁻¹.
     pub intensity: Spectrum,
+    /// How often the light is chosen, relative to its power; default 1. At 0 it is only seen, and lights what
+    /// scattering happens to find it from.
+    #[serde(default = "one")]
+    pub sampling_weight: f64,
 }
 
 /// `spot: {position: [0, 3, 0], target: [0, 0, 0], intensity: 10}`
@@ -51,6 +60,13 @@ pub struct SpotLight {
     pub beam_deg: f64,
     /// On the axis, W·sr⁻¹·nm⁻¹.
     pub intensity: Spectrum,
+    /// Name of a texture that the intensity is multiplied with; default none. It fills the square around the edge
+    /// of the light, upright.
+    pub texture: Option<String>,
+    /// What is up in that texture; default `[0, 1, 0]`.
+    pub up: Option<Vec3>,
+    /// See [`PointLight::sampling_weight`].
+    pub sampling_weight: f64,
 }
 
 /// Where a spot light points.
@@ -73,6 +89,10 @@ struct WrittenSpot {
     cutoff_deg: f64,
     beam_deg: Option<f64>,
     intensity: Spectrum,
+    texture: Option<String>,
+    up: Option<Vec3>,
+    #[serde(default = "one")]
+    sampling_weight: f64,
 }
 
 fn cutoff_deg() -> f64 {
@@ -98,7 +118,21 @@ impl TryFrom<WrittenSpot> for SpotLight {
             cutoff_deg: written.cutoff_deg,
             beam_deg: written.beam_deg.unwrap_or(0.75 * written.cutoff_deg),
             intensity: written.intensity,
+            texture: written.texture,
+            up: written.up,
+            sampling_weight: written.sampling_weight,
         })
+    }
+}
+
+impl SpotLight {
+    /// The way the axis points, of any length.
+    #[must_use]
+    pub fn axis(&self) -> DVec3 {
+        match self.aim {
+            Aim::Target(target) => DVec3::from(target) - DVec3::from(self.position),
+            Aim::Direction(direction) => direction.into(),
+        }
     }
 }
 
@@ -112,6 +146,10 @@ pub struct DirectionalLight {
     pub direction: Vec3,
     /// On a surface that faces it, W·m⁻²·nm⁻¹.
     pub irradiance: Spectrum,
+    /// How often the light is chosen, relative to its power; default 1. At 0 it is only seen, and lights what
+    /// scattering happens to find it from.
+    #[serde(default = "one")]
+    pub sampling_weight: f64,
 }
 
 /// `constant: {radiance: 1}`
@@ -122,22 +160,10 @@ pub struct ConstantLight {
     pub name: Option<String>,
     /// W·m⁻²·sr⁻¹·nm⁻¹.
     pub radiance: Spectrum,
-}
-
-/// `environment: {file: sky.exr}`
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct EnvironmentLight {
-    /// For messages; default none.
-    pub name: Option<String>,
-    /// An image in latitude and longitude, linear (EXR or HDR) or sRGB (PNG or JPEG).
-    pub file: FilePath,
-    /// Factor; default 1.
+    /// How often the light is chosen, relative to its power; default 1. At 0 it is only seen, and lights what
+    /// scattering happens to find it from.
     #[serde(default = "one")]
-    pub scale: f64,
-    /// Turn about y, degrees; default 0.
-    #[serde(default)]
-    pub rotate_deg: f64,
+    pub sampling_weight: f64,
 }
 
 /// What fills a space.
@@ -264,11 +290,26 @@ impl Light {
             Light::Directional(_) => "directional",
             Light::Constant(_) => "constant",
             Light::Environment(_) => "environment",
+            Light::Projector(_) => "projector",
+        }
+    }
+
+    /// How often the light is chosen, relative to its power.
+    #[must_use]
+    pub fn sampling_weight(&self) -> f64 {
+        match self {
+            Light::Point(l) => l.sampling_weight,
+            Light::Spot(l) => l.sampling_weight,
+            Light::Directional(l) => l.sampling_weight,
+            Light::Constant(l) => l.sampling_weight,
+            Light::Environment(l) => l.sampling_weight,
+            Light::Projector(l) => l.sampling_weight,
         }
     }
 
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         let at = at.key(self.kind());
+        check_weight(self.sampling_weight(), at, checker);
         match self {
             Light::Point(point) => point.intensity.check(Role::Emission, at.key("intensity"), checker),
             Light::Spot(spot) => {
@@ -297,13 +338,20 @@ impl Light {
                     );
                 }
                 spot.intensity.check(Role::Emission, at.key("intensity"), checker);
+                if let Some(texture) = &spot.texture {
+                    checker.texture(at.key("texture"), texture);
+                    let upright = !parallel(spot.axis().into(), spot.up.unwrap_or([0.0, 1.0, 0.0]));
+                    let found = format_args!("one along it");
+                    checker.require(upright, at.key("up"), "a direction that is not along the axis", found);
+                }
             }
             Light::Directional(directional) => {
                 checker.direction(at.key("direction"), directional.direction);
                 directional.irradiance.check(Role::Emission, at.key("irradiance"), checker);
             }
             Light::Constant(constant) => constant.radiance.check(Role::Emission, at.key("radiance"), checker),
-            Light::Environment(environment) => checker.not_negative(at.key("scale"), environment.scale),
+            Light::Environment(environment) => environment.check(at, checker),
+            Light::Projector(projector) => projector.check(at, checker),
         }
     }
 }

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::fault::Checker;
 use super::path::At;
-use super::spectrum::{FilePath, Index, Role, Spectrum, SpectrumOrTexture, yes};
+use super::spectrum::{FilePath, Illuminant, Index, Role, Spectrum, SpectrumOrTexture, yes};
 
 /// The material of a shape: the name of one, or one written in place.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -304,6 +304,8 @@ pub struct ImageTexture {
     /// Whether the values are data, not sRGB colour; default false.
     #[serde(default)]
     pub raw: bool,
+    /// What multiplies the colours where the image shines; default D65 of luminance 1.
+    pub illuminant: Option<Illuminant>,
 }
 
 /// What lies beyond the edges of an image.

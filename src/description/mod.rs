@@ -90,6 +90,9 @@
 //!     name: ball                    # ~ none
 //!     material: clay                # a name, or a kind written in place; ~ diffuse 0.5
 //!     emission: {blackbody: {kelvin: 5000}}      # spectrum or texture, W·m⁻²·sr⁻¹·nm⁻¹; ~ none
+//!     emission_direction: all       # ~ all: the same radiance all over the side of the normal; normal: all light
+//!                                   # along the normal, emission in W·m⁻²·nm⁻¹
+//!     sampling_weight: 1            # ~ how often light is looked for here, relative to its power; also of lights
 //!     inside: smoke                 # media on the two sides; ~ inside a closed shape nothing, outside what the
 //!                                   # camera is in
 //!     outside: smoke
@@ -113,9 +116,21 @@
 //!     cutoff_deg: 20                # ~ between axis and edge, up to 90
 //!     beam_deg: 15                  # ~ 3/4 cutoff_deg: full intensity within
 //!     intensity: {scaled: {by: 2, of: {illuminant: D65}}}
+//!     texture: earth                # ~ none; multiplies the intensity, over the square around the edge of the light
+//!     up: [0, 0, 1]                 # ~ [0, 1, 0]: of the texture
 //! - directional: {direction: [0, -1, 0], irradiance: 3}                # W·m⁻²·nm⁻¹
 //! - constant: {radiance: 0.1}                                          # W·m⁻²·sr⁻¹·nm⁻¹
-//! - environment: {file: sky.exr, scale: 1, rotate_deg: 0}              # ~ scale, rotate_deg about y
+//! - environment: {file: sky.exr, scale: 1, rotate_deg: 0, mapping: texels, transform: [{scale: [-1, 1, 1]}]}
+//!                                   # ~ all but file; rotate_deg is about y; mapping: texels, mitsuba: where rows and
+//!                                   # columns lie; transform as of shapes: turns and mirrors
+//! - projector:
+//!     origin: [0, 2, 0]
+//!     target: [0, 2, -1]
+//!     up: [0, 1, 0]                 # ~
+//!     fov_deg: 40
+//!     fov_axis: x                   # ~ as of the camera, along the sides of the image
+//!     irradiance: {texture: earth}  # ~ white; over π on a screen at a distance of 1 m, W·m⁻²·nm⁻¹
+//!     scale: 1                      # ~
 //! ```
 //!
 //! A sphere, cylinder or cone takes only transforms that keep it one: moves, turns and even
@@ -175,6 +190,7 @@ mod batch;
 mod camera;
 mod decode;
 mod edit;
+mod emitter;
 mod fault;
 mod light;
 mod material;
@@ -188,9 +204,10 @@ mod yaml;
 
 pub use batch::{Batch, BatchEntry, Document, load};
 pub use camera::{Camera, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Projection};
+pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, ProjectorLight};
 pub use light::{
-    Aim, ConstantLight, DirectionalLight, EnvironmentLight, Falloff, Fog, FogLaw, HomogeneousMedium, Light, Medium,
-    Phase, PointLight, SpotLight,
+    Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, HomogeneousMedium, Light, Medium, Phase, PointLight,
+    SpotLight,
 };
 pub use material::{
     Boundary, Checkerboard, Conductor, ConductorIndex, Dielectric, Diffuse, Distribution, Fresnel, Highlight,
@@ -254,7 +271,7 @@ mod tests {
     fn the_reference_scene_is_a_scene() {
         let scene = parse(&reference("scene")).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(scene.shapes.len(), 8);
-        assert_eq!(scene.lights.len(), 5);
+        assert_eq!(scene.lights.len(), 6);
         assert_eq!(scene.materials.len(), Material::KINDS.len());
         // What the page calls a default is one.
         let bare = testing::scene("");

@@ -268,6 +268,8 @@ mod tests {
                     scale: 1.0,
                     normalised: true
                 }))),
+                emission_direction: Some(EmissionDirection::All),
+                sampling_weight: Some(1.0),
                 inside: Some(text("smoke")),
                 outside: Some(text("smoke")),
                 transform: ball.transform.clone(),
@@ -290,6 +292,9 @@ mod tests {
                     by: 2.0,
                     of: Box::new(Spectrum::Illuminant(Illuminant { name: text("D65"), scale: 1.0 })),
                 }),
+                texture: Some(text("earth")),
+                up: Some([0.0, 0.0, 1.0]),
+                sampling_weight: 1.0,
             })
         );
         assert_eq!(scene.directory, std::path::Path::new("dir"));

@@ -3,6 +3,7 @@
 use glam::{DMat3, DMat4, DVec3, DVec4};
 use serde::Deserialize;
 
+use super::emitter::{EmissionDirection, check_weight};
 use super::fault::Checker;
 use super::material::MaterialRef;
 use super::path::At;
@@ -18,6 +19,10 @@ pub struct Shape {
     pub material: MaterialRef,
     /// Emitted radiance, W·m⁻²·sr⁻¹·nm⁻¹; default none.
     pub emission: Option<SpectrumOrTexture>,
+    /// Which way the emission goes; default all.
+    pub emission_direction: Option<EmissionDirection>,
+    /// How often the shape is chosen as a light, relative to its power; default 1.
+    pub sampling_weight: Option<f64>,
     /// Name of the medium behind the surface, where the normal does not point; default none.
     pub inside: Option<String>,
     /// Name of the medium before the surface; default none.
@@ -74,6 +79,8 @@ macro_rules! forms {
                     #[serde(default)]
                     material: MaterialRef,
                     emission: Option<SpectrumOrTexture>,
+                    emission_direction: Option<EmissionDirection>,
+                    sampling_weight: Option<f64>,
                     inside: Option<String>,
                     outside: Option<String>,
                     #[serde(default)]
@@ -94,6 +101,8 @@ macro_rules! forms {
                             name: written.name,
                             material: written.material,
                             emission: written.emission,
+                            emission_direction: written.emission_direction,
+                            sampling_weight: written.sampling_weight,
                             inside: written.inside,
                             outside: written.outside,
                             transform: written.transform,
@@ -265,6 +274,11 @@ pub struct Rotation {
 }
 
 impl TransformStep {
+    /// Checks a step of a list, of which `at` is the element.
+    pub(crate) fn check_in_list(&self, at: At<'_>, checker: &mut Checker<'_>) {
+        self.check(at.key(self.key()), checker);
+    }
+
     fn key(&self) -> &'static str {
         match self {
             TransformStep::Translate(_) => "translate",
@@ -330,7 +344,7 @@ fn is_invertible(linear: DMat3) -> bool {
 const SIMILARITY_TOLERANCE: f64 = 3e-6;
 
 /// Whether AᵀA = s² I, so that a ball stays a ball.
-fn is_similarity(linear: DMat3) -> bool {
+pub(crate) fn is_similarity(linear: DMat3) -> bool {
     // Divided by the greatest entry, so that squares neither overflow nor vanish.
     let greatest = [linear.x_axis, linear.y_axis, linear.z_axis]
         .into_iter()
@@ -357,6 +371,15 @@ impl Shape {
         self.material.check(at.key("material"), checker);
         if let Some(emission) = &self.emission {
             emission.check(Role::Emission, at.key("emission"), checker);
+            check_weight(self.sampling_weight.unwrap_or(1.0), at, checker);
+        } else {
+            let given = [
+                ("emission_direction", self.emission_direction.is_some()),
+                ("sampling_weight", self.sampling_weight.is_some()),
+            ];
+            if let Some((key, _)) = given.into_iter().find(|(_, given)| *given) {
+                checker.fault(at.key(key), "expected emission, found none");
+            }
         }
         for (key, medium) in [("inside", &self.inside), ("outside", &self.outside)] {
             if let Some(medium) = medium {
@@ -370,7 +393,7 @@ impl Shape {
         let before = checker.count();
         for (i, step) in self.transform.iter().enumerate() {
             let at = at.index(i);
-            step.check(at.key(step.key()), checker);
+            step.check_in_list(at, checker);
         }
         if checker.count() > before {
             return;

@@ -67,14 +67,16 @@ impl Census {
         }
         for light in &scene.lights {
             match light {
-                Light::Area { object, radiance, .. } => {
+                Light::Area { object, radiance } | Light::AlongNormal { object, exitance: radiance } => {
                     let name = scene.objects[*object as usize].name.clone();
                     if radiance.varies() {
                         census.textured.push(name.clone());
                     }
                     census.area_lights.push(name);
                 }
-                Light::Point { .. } | Light::Spot { .. } | Light::Directional { .. } => census.delta_lights += 1,
+                Light::Point { .. } | Light::Spot { .. } | Light::Directional { .. } | Light::Projector(_) => {
+                    census.delta_lights += 1;
+                }
                 Light::Constant { .. } | Light::Environment(_) => {}
             }
         }

@@ -3,9 +3,10 @@
 //! Faults that only show here (an unknown glass, a missing picture) are collected and come all at
 //! once, each with its place in the file.
 
+mod lights;
+
 use super::bvh::{Aabb, Bvh};
 use super::camera::{self, Camera};
-use super::environment::Environment;
 use super::light::Light;
 use super::load;
 use super::material::{Highlight, HighlightModel, Kind, Material};
@@ -135,6 +136,7 @@ impl<'a> Compiler<'a> {
 
         let mut objects: Vec<Object> = Vec::new();
         let mut lights: Vec<Light> = Vec::new();
+        let mut weights: Vec<f64> = Vec::new();
         for (i, shape) in d.shapes.iter().enumerate() {
             let at = format!("shapes[{i}].{}", shape.geometry.kind());
             let Some(geometry) = self.geometry(&at, shape)? else { continue };
@@ -144,8 +146,8 @@ impl<'a> Compiler<'a> {
             };
             let object = objects.len() as u32;
             let light = shape.emission.as_ref().map(|emission| {
-                let radiance = self.emission_texture(&format!("{at}.emission"), emission);
-                lights.push(Light::Area { object, radiance });
+                lights.push(self.shining(&at, shape, emission, object, &geometry));
+                weights.push(shape.sampling_weight.unwrap_or(1.0));
                 lights.len() as u32 - 1
             });
             if light.is_some() && matches!(geometry, Geometry::Shape(Shape::Plane(_))) {
@@ -178,8 +180,10 @@ impl<'a> Compiler<'a> {
         }
         for (i, light) in d.lights.iter().enumerate() {
             let at = format!("lights[{i}].{}", light.kind());
+            let weight = light.sampling_weight();
             if let Some(light) = self.light(&at, light)? {
                 lights.push(light);
+                weights.push(weight);
             }
         }
         let camera = self.camera();
@@ -191,7 +195,7 @@ impl<'a> Compiler<'a> {
         let boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
         let bvh = Bvh::build(&boxes);
         let (center, radius) = extent(&boxes, &camera);
-        let light_cdf = light_cdf(&lights, &objects, radius);
+        let light_cdf = lights::light_cdf(&lights, &weights, &objects, radius);
         let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
         let wavelengths = match d.render.wavelengths {
             written::Wavelengths::Auto => self.wavelengths(&lights, &objects, radius),
@@ -241,14 +245,7 @@ impl<'a> Compiler<'a> {
         });
         let projection = match d.projection {
             written::Projection::Perspective { fov_deg, fov_axis } => {
-                let axis = match fov_axis {
-                    written::FovAxis::X => camera::FovAxis::X,
-                    written::FovAxis::Y => camera::FovAxis::Y,
-                    written::FovAxis::Smaller => camera::FovAxis::Smaller,
-                    written::FovAxis::Larger => camera::FovAxis::Larger,
-                    written::FovAxis::Diagonal => camera::FovAxis::Diagonal,
-                };
-                camera::Projection::perspective(fov_deg.to_radians(), axis, resolution)
+                camera::Projection::perspective(fov_deg.to_radians(), self::fov_axis(fov_axis), resolution)
             }
             written::Projection::Orthographic { height } => camera::Projection::Orthographic {
                 half_width: 0.5 * height * f64::from(resolution[0]) / f64::from(resolution[1]),
@@ -333,20 +330,6 @@ impl<'a> Compiler<'a> {
         match s {
             written::SpectrumOrTexture::Texture(name) => self.textures[name.as_str()].clone(),
             written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.reflectance(at, s)),
-        }
-    }
-
-    /// A texture as light: a picture's colours are lit by D65.
-    fn emission_texture(&mut self, at: &str, s: &written::SpectrumOrTexture) -> Texture {
-        match s {
-            written::SpectrumOrTexture::Texture(name) => {
-                let mut texture = self.textures[name.as_str()].clone();
-                if let Texture::Image(image) = &mut texture {
-                    image.illuminant = Some(illuminant::d65());
-                }
-                texture
-            }
-            written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.light_spectrum(at, s)),
         }
     }
 
@@ -493,51 +476,6 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    fn light(&mut self, at: &str, light: &written::Light) -> Result<Option<Light>> {
-        Ok(Some(match light {
-            written::Light::Point(l) => Light::Point {
-                position: vec3(l.position),
-                intensity: self.light_spectrum(&format!("{at}.intensity"), &l.intensity),
-            },
-            written::Light::Spot(l) => {
-                let position = vec3(l.position);
-                let axis = match l.aim {
-                    written::Aim::Target(target) => vec3(target) - position,
-                    written::Aim::Direction(direction) => vec3(direction),
-                };
-                let Some(axis) = axis.try_normalize() else {
-                    self.fault(at, "expected a direction, found one of length zero");
-                    return Ok(None);
-                };
-                Light::Spot {
-                    position,
-                    axis,
-                    beam: l.beam_deg.to_radians(),
-                    cutoff: l.cutoff_deg.to_radians(),
-                    intensity: self.light_spectrum(&format!("{at}.intensity"), &l.intensity),
-                }
-            }
-            written::Light::Directional(l) => {
-                let Some(direction) = vec3(l.direction).try_normalize() else {
-                    self.fault(&format!("{at}.direction"), "expected a direction, found one of length zero");
-                    return Ok(None);
-                };
-                let irradiance = self.light_spectrum(&format!("{at}.irradiance"), &l.irradiance);
-                Light::Directional { direction, irradiance }
-            }
-            written::Light::Constant(l) => {
-                Light::Constant { radiance: self.light_spectrum(&format!("{at}.radiance"), &l.radiance) }
-            }
-            written::Light::Environment(l) => {
-                self.files.push(l.file.to_path_buf());
-                let picture = load::picture(&l.file).map_err(|e| self.asked(&format!("{at}.file"), e))?;
-                let rotation = DMat3::from_rotation_y(l.rotate_deg.to_radians());
-                let map = Environment::new(&picture.pixels, picture.width, picture.height, l.scale, rotation);
-                Light::Environment(Box::new(map))
-            }
-        }))
-    }
-
     fn geometry(&mut self, at: &str, shape: &written::Shape) -> Result<Option<Geometry>> {
         let m = shape.world_from_object();
         let point = |p: [f64; 3]| m.transform_point3(vec3(p));
@@ -621,6 +559,16 @@ fn normal_transform(m: DMat4, n: DVec3) -> DVec3 {
     DMat3::from_mat4(m).inverse().transpose() * n
 }
 
+fn fov_axis(axis: written::FovAxis) -> camera::FovAxis {
+    match axis {
+        written::FovAxis::X => camera::FovAxis::X,
+        written::FovAxis::Y => camera::FovAxis::Y,
+        written::FovAxis::Smaller => camera::FovAxis::Smaller,
+        written::FovAxis::Larger => camera::FovAxis::Larger,
+        written::FovAxis::Diagonal => camera::FovAxis::Diagonal,
+    }
+}
+
 fn model(fresnel: written::Fresnel) -> Model {
     match fresnel {
         written::Fresnel::Exact => Model::Exact,
@@ -656,26 +604,4 @@ fn extent(boxes: &[Aabb], camera: &Camera) -> (DVec3, f64) {
         Some(b) => (b.min * 0.5 + b.max * 0.5, 0.5 * (b.max - b.min).length()),
         None => (camera.world_from_camera.translation, 1.0),
     }
-}
-
-/// Running sums of the probabilities with which lights are chosen: half by power, half evenly, so
-/// that no light is forgotten.
-fn light_cdf(lights: &[Light], objects: &[Object], radius: f64) -> Vec<f64> {
-    let powers: Vec<f64> = lights.iter().map(|l| l.power(objects, radius)).collect();
-    let total: f64 = powers.iter().sum();
-    let n = lights.len() as f64;
-    let mut sum = 0.0;
-    let mut cdf: Vec<f64> = powers
-        .iter()
-        .map(|p| {
-            let share = if total > 0.0 && total.is_finite() { p / total } else { 1.0 / n };
-            sum += 0.5 * share + 0.5 / n;
-            sum
-        })
-        .collect();
-    // Rounding may leave the last sum short of one.
-    if let Some(last) = cdf.last_mut() {
-        *last = 1.0;
-    }
-    cdf
 }

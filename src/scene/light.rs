@@ -1,13 +1,15 @@
 //! What shines, and how a path finds it.
 
+use super::along_normal;
 use super::environment::Environment;
+use super::projector::Projector;
 use super::texture::{Texture, TexturePoint};
 use super::{Geometry, Hit, Object, SurfacePoint};
 use crate::math::Departure;
 use crate::math::frame::Frame;
 use crate::math::warp;
 use crate::spectrum::{Lanes, Spectrum};
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::PI;
 
 /// A light.
@@ -19,6 +21,13 @@ pub enum Light {
         object: u32,
         /// Radiance, W·m⁻²·sr⁻¹·nm⁻¹.
         radiance: Texture,
+    },
+    /// A surface whose points each send their light along the normal.
+    AlongNormal {
+        /// The object that shines.
+        object: u32,
+        /// Power by area, W·m⁻²·nm⁻¹.
+        exitance: Texture,
     },
     /// A point that shines equally in all directions.
     Point {
@@ -40,6 +49,8 @@ pub enum Light {
         cutoff: f64,
         /// W·sr⁻¹·nm⁻¹ on the axis.
         intensity: Spectrum,
+        /// What multiplies the intensity.
+        slide: Option<Box<Slide>>,
     },
     /// Parallel light.
     Directional {
@@ -55,6 +66,28 @@ pub enum Light {
     },
     /// An image on the sphere at infinity.
     Environment(Box<Environment>),
+    /// A picture thrown from a point.
+    Projector(Box<Projector>),
+}
+
+/// A picture in front of a spot light, which fills the square around its cone.
+#[derive(Clone, Debug)]
+pub struct Slide {
+    /// The picture.
+    pub texture: Texture,
+    /// Columns: right on the picture, up, the axis.
+    pub axes: DMat3,
+    /// Half its side at distance one: the tangent of the cutoff.
+    pub half: f64,
+}
+
+impl Slide {
+    /// The value in the direction `wi` toward the light.
+    fn eval(&self, wi: DVec3, nm: Lanes) -> Lanes {
+        let d = self.axes.transpose() * -wi;
+        let uv = 0.5 + 0.5 * d.truncate() / (d.z * self.half);
+        self.texture.eval(&TexturePoint { uv, ..TexturePoint::default() }, nm)
+    }
 }
 
 /// Light that arrives at a point, before anything stands in its way.
@@ -98,7 +131,7 @@ impl Light {
         match self {
             Light::Constant { radiance } => radiance.eval(nm),
             Light::Environment(map) => map.radiance(direction, nm),
-            Light::Area { .. } | Light::Point { .. } | Light::Spot { .. } | Light::Directional { .. } => Lanes::ZERO,
+            _ => Lanes::ZERO,
         }
     }
 
@@ -112,7 +145,7 @@ impl Light {
                 None => 0.25 / PI,
             },
             Light::Environment(map) => map.pdf(direction),
-            Light::Area { .. } | Light::Point { .. } | Light::Spot { .. } | Light::Directional { .. } => 0.0,
+            _ => 0.0,
         }
     }
 
@@ -201,16 +234,20 @@ impl Light {
                     target: None,
                 })
             }
-            Light::Spot { position, axis, beam, cutoff, intensity } => {
+            Light::Spot { position, axis, beam, cutoff, intensity, slide } => {
                 let falloff = |wi: DVec3| spot_falloff(-wi.dot(*axis), *beam, *cutoff);
-                arriving_from_point(*position, from, falloff).map(|(wi, distance, factor)| Arriving {
-                    wi,
-                    distance,
-                    radiance: intensity.eval(nm) * factor,
-                    density: None,
-                    target: None,
+                arriving_from_point(*position, from, falloff).map(|(wi, distance, factor)| {
+                    let intensity = match slide {
+                        Some(slide) => intensity.eval(nm) * slide.eval(wi, nm),
+                        None => intensity.eval(nm),
+                    };
+                    Arriving { wi, distance, radiance: intensity * factor, density: None, target: None }
                 })
             }
+            Light::AlongNormal { object, exitance } => {
+                along_normal::arriving(&objects[*object as usize].geometry, *object, exitance, from, u, nm)
+            }
+            Light::Projector(projector) => projector.arriving(from, nm),
             Light::Directional { direction, irradiance } => Some(Arriving {
                 wi: -*direction,
                 distance: f64::INFINITY,
@@ -254,20 +291,20 @@ impl Light {
             all.iter().map(Spectrum::luminance).sum::<f64>() / all.len() as f64
         };
         match self {
-            Light::Area { object, radiance, .. } => {
-                let area = match &objects[*object as usize].geometry {
-                    Geometry::Shape(shape) => shape.area(),
-                    Geometry::Mesh(mesh) => mesh.areas.total(),
-                };
-                PI * area * mean(radiance)
-            }
+            Light::Area { object, radiance, .. } => PI * objects[*object as usize].geometry.area() * mean(radiance),
+            Light::AlongNormal { object, exitance } => objects[*object as usize].geometry.area() * mean(exitance),
             Light::Point { intensity, .. } => 4.0 * PI * intensity.luminance(),
-            Light::Spot { intensity, beam, cutoff, .. } => {
-                2.0 * PI * (1.0 - libm::cos(0.5 * (beam + cutoff))) * intensity.luminance()
+            Light::Spot { intensity, beam, cutoff, slide, .. } => {
+                let slide = slide.as_ref().map_or(1.0, |slide| {
+                    let all = slide.texture.representatives();
+                    all.iter().map(Spectrum::luminance).sum::<f64>() / all.len() as f64
+                });
+                2.0 * PI * (1.0 - libm::cos(0.5 * (beam + cutoff))) * intensity.luminance() * slide
             }
             Light::Directional { irradiance, .. } => PI * radius * radius * irradiance.luminance(),
             Light::Constant { radiance } => 4.0 * PI * PI * radius * radius * radiance.luminance(),
             Light::Environment(map) => 4.0 * PI * PI * radius * radius * map.mean_luminance(),
+            Light::Projector(projector) => projector.power(),
         }
     }
 
@@ -275,12 +312,16 @@ impl Light {
     #[must_use]
     pub fn spectra(&self) -> Vec<Spectrum> {
         match self {
-            Light::Area { radiance, .. } => radiance.representatives(),
+            Light::Area { radiance: t, .. } | Light::AlongNormal { exitance: t, .. } => t.representatives(),
+            Light::Spot { intensity, slide: Some(slide), .. } => {
+                slide.texture.representatives().iter().map(|s| s.times(intensity)).collect()
+            }
             Light::Point { intensity: s, .. }
             | Light::Spot { intensity: s, .. }
             | Light::Directional { irradiance: s, .. }
             | Light::Constant { radiance: s } => vec![s.clone()],
             Light::Environment(map) => map.representatives(),
+            Light::Projector(projector) => projector.spectra(),
         }
     }
 }

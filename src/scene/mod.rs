@@ -4,6 +4,7 @@
 //! and that of the face or triangle, so that nothing is met again by rounding; see
 //! [`crate::math::Departure`].
 
+pub mod along_normal;
 pub mod bvh;
 pub mod camera;
 pub mod census;
@@ -14,6 +15,7 @@ pub mod light;
 pub mod load;
 pub mod material;
 pub mod mesh;
+pub mod projector;
 pub mod shape;
 pub mod texture;
 
@@ -96,6 +98,17 @@ pub enum Geometry {
     Shape(Shape),
     /// Triangles.
     Mesh(Box<TriangleMesh>),
+}
+
+impl Geometry {
+    /// Its area, m².
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        match self {
+            Geometry::Shape(shape) => shape.area(),
+            Geometry::Mesh(mesh) => mesh.areas.total(),
+        }
+    }
 }
 
 /// A mesh with what finds its triangles.

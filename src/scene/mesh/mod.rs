@@ -192,6 +192,20 @@ impl Mesh {
         SurfacePoint { point, scale, normal, shading_normal, uv, tangent }
     }
 
+    /// Whether the shading normals are the triangles' own, to the rounding of f32 in the files that meshes come from.
+    #[must_use]
+    pub fn is_faceted(&self) -> bool {
+        const APART: f64 = 16.0 * f32::EPSILON as f64;
+        self.normals.is_empty()
+            || (0..self.triangles.len() as u32).filter(|&i| self.area(i) > 0.0).all(|i| {
+                let normal = area_vector(self.vertices(i)).normalize();
+                self.triangles[i as usize].iter().all(|&v| {
+                    let n = DVec3::from(self.normals[v as usize].map(f64::from));
+                    n == DVec3::ZERO || (n - normal).length() <= APART
+                })
+            })
+    }
+
     /// A point uniform over triangle `i`, for `u` in the unit square; its density is
     /// 1 / [`Mesh::area`].
     #[must_use]

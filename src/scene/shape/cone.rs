@@ -147,6 +147,12 @@ impl Cone {
         }
     }
 
+    /// Along a generator none; across it cos α / ρ, with the half angle α at the apex and the distance
+    /// ρ from the axis (Meusnier), which is h / r over the distance from the apex.
+    pub(super) fn curvatures(&self, point: DVec3, face: u8) -> [f64; 2] {
+        if face == WALL { [self.height / (self.radius * (point - self.apex).length()), 0.0] } else { [0.0; 2] }
+    }
+
     pub(super) fn bounds(&self) -> (DVec3, DVec3) {
         let half = disk_extent(&self.frame, self.radius);
         (self.apex.min(self.base - half), self.apex.max(self.base + half))

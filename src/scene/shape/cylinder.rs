@@ -141,6 +141,10 @@ impl Cylinder {
         }
     }
 
+    pub(super) fn curvatures(&self, face: u8) -> [f64; 2] {
+        if face == WALL { [1.0 / self.radius, 0.0] } else { [0.0; 2] }
+    }
+
     pub(super) fn bounds(&self) -> (DVec3, DVec3) {
         let top = self.base + self.frame.n * self.length;
         let half = disk_extent(&self.frame, self.radius);

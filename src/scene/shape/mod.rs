@@ -259,6 +259,17 @@ impl Shape {
         }
     }
 
+    /// The principal curvatures of `face` at `point`, m⁻¹: positive where the surface bends away from its normal.
+    #[must_use]
+    pub fn curvatures(&self, point: DVec3, face: u8) -> [f64; 2] {
+        match self {
+            Shape::Sphere(s) => s.curvatures(),
+            Shape::Cylinder(s) => s.curvatures(face),
+            Shape::Cone(s) => s.curvatures(point, face),
+            Shape::Plane(_) | Shape::Disk(_) | Shape::Rectangle(_) | Shape::Cube(_) => [0.0; 2],
+        }
+    }
+
     /// The density in sr⁻¹ with which [`Shape::sample_toward`] makes the unit `direction` by the
     /// point that a ray from `from` meets at distance `hit_t`, where the normal is `hit_normal`
     /// (on either side). 0 edge-on, where `sample_toward` gives nothing.

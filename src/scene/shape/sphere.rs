@@ -110,6 +110,10 @@ impl Sphere {
         }
     }
 
+    pub(super) fn curvatures(&self) -> [f64; 2] {
+        [1.0 / self.radius; 2]
+    }
+
     pub(super) fn bounds(&self) -> (DVec3, DVec3) {
         (self.center - self.radius, self.center + self.radius)
     }

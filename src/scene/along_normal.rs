@@ -1,0 +1,167 @@
+//! Surfaces whose points each send their light along the normal, as a collimated lamp does.
+//!
+//! Light reaches a point from where a normal of the surface passes through it. Every shape is convex, so
+//! from outside that is the nearest point, if any. The beam that leaves a small area spreads with the
+//! curvature of the surface: at a distance h its area has grown by (1 + h κ₁)(1 + h κ₂), and the
+//! irradiance across it has shrunk by that.
+
+use super::Geometry;
+use super::light::Arriving;
+use super::shape::Shape;
+use super::texture::{Texture, TexturePoint};
+use crate::math::{Departure, Ray};
+use crate::spectrum::Lanes;
+use glam::{DVec2, DVec3};
+
+/// The most faces of a shape.
+const FACES: u8 = 6;
+
+/// How far the normal may miss the point, relative to the lengths that it was computed from: points of a
+/// surface and their normals are good to some eight roundings each.
+const MISS: f64 = 32.0 * f64::EPSILON;
+
+/// Light at `from`. A mesh is asked at one triangle, which `u` chooses by area.
+#[must_use]
+pub fn arriving(
+    geometry: &Geometry,
+    object: u32,
+    exitance: &Texture,
+    from: DVec3,
+    u: DVec2,
+    nm: Lanes,
+) -> Option<Arriving> {
+    match geometry {
+        Geometry::Shape(shape) => {
+            let foot = foot(shape, from)?;
+            let surface = shape.surface(foot.point, foot.face);
+            let at = TexturePoint::new(&surface, u32::from(foot.face), [0.0; 2]);
+            Some(Arriving {
+                wi: foot.direction,
+                distance: foot.distance,
+                radiance: exitance.eval(&at, nm) * foot.spread as f32,
+                density: None,
+                target: Some(Departure { object, part: u32::from(foot.face) }),
+            })
+        }
+        Geometry::Mesh(mesh) => {
+            let (triangle, _) = mesh.areas.sample(u.x)?;
+            let [a, b, c] = mesh.mesh.vertices(triangle);
+            let (e1, e2, p) = (b - a, c - a, from - mesh.mesh.origin - a);
+            let normal = e1.cross(e2);
+            let twice = normal.length_squared();
+            let (b1, b2) = (p.cross(e2).dot(normal) / twice, e1.cross(p).dot(normal) / twice);
+            let height = p.dot(normal) / twice.sqrt();
+            if !(b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && height > 0.0) {
+                return None;
+            }
+            let surface = mesh.mesh.surface(triangle, b1, b2);
+            let probability = 0.5 * twice.sqrt() / mesh.areas.total();
+            let at = TexturePoint::new(&surface, triangle, [b1, b2]);
+            Some(Arriving {
+                wi: -surface.normal,
+                distance: height,
+                radiance: exitance.eval(&at, nm) * (1.0 / probability) as f32,
+                density: None,
+                target: Some(Departure { object, part: triangle }),
+            })
+        }
+    }
+}
+
+/// Where the normal of a surface passes through a point.
+struct Foot {
+    /// From the point to `point`, unit.
+    direction: DVec3,
+    distance: f64,
+    point: DVec3,
+    face: u8,
+    /// The area of the beam at the surface over that at the point.
+    spread: f64,
+}
+
+fn foot(shape: &Shape, from: DVec3) -> Option<Foot> {
+    (0..FACES).find_map(|face| {
+        let normal = shape.surface_with(from, face, super::shape::Detail::Geometry).normal;
+        let hit = shape.intersect(&Ray::new(from, -normal), f64::INFINITY, None).filter(|hit| hit.face == face)?;
+        let surface = shape.surface_with(from - normal * hit.t, face, super::shape::Detail::Geometry);
+        // The foot of another face's normal, or light that comes from the inside.
+        let miss = from - surface.point - surface.normal * hit.t;
+        let largest = surface.scale.max(from.abs().max_element());
+        if surface.normal.dot(normal) <= 0.0 || miss.length() > MISS * largest {
+            return None;
+        }
+        let [k1, k2] = shape.curvatures(surface.point, face);
+        let spread = 1.0 / (hit.t.mul_add(k1, 1.0) * hit.t.mul_add(k2, 1.0));
+        Some(Foot { direction: -surface.normal, distance: hit.t, point: surface.point, face, spread })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::shape::{Cone, Cube, Cylinder, Disk, Sphere};
+    use crate::scene::{TriangleMesh, mesh};
+    use glam::{DAffine3, DMat3};
+
+    fn light(geometry: &Geometry, from: DVec3, u: DVec2) -> Option<Arriving> {
+        arriving(geometry, 0, &Texture::one(), from, u, Lanes::splat(550.0))
+    }
+
+    fn of_shape(shape: impl Into<Shape>, from: DVec3) -> Option<(DVec3, f64, f64)> {
+        let a = light(&Geometry::Shape(shape.into()), from, DVec2::splat(0.5))?;
+        Some((a.wi, a.distance, f64::from(a.radiance.to_array()[0])))
+    }
+
+    /// Power is kept: what leaves an area r² dω of a sphere passes d² dω; what leaves r dφ of a cylinder
+    /// passes ρ dφ; of a cone likewise, on the circle through the foot; of a plane all of it, above it.
+    #[test]
+    fn irradiance_is_the_closed_form() {
+        let close = |found: Option<(DVec3, f64, f64)>, direction: DVec3, distance: f64, irradiance: f64| {
+            let (wi, t, e) = found.expect("light");
+            assert!((wi - direction).length() < 1e-14 && (t - distance).abs() < 1e-14, "{wi} {t}");
+            // One rounding to f32.
+            assert!((e / irradiance - 1.0).abs() < 2e-7, "{e} {irradiance}");
+        };
+        let sphere = Sphere::new(DVec3::X, 0.5, DMat3::IDENTITY).unwrap();
+        close(of_shape(Shape::Sphere(sphere), DVec3::new(1.0, 2.0, 0.0)), -DVec3::Y, 1.5, 0.0625);
+        let disk = || Shape::Disk(Disk::new(DVec3::ZERO, DVec3::X, DVec3::Y).unwrap());
+        close(of_shape(disk(), DVec3::new(0.3, -0.4, 7.0)), -DVec3::Z, 7.0, 1.0);
+        let pipe = || Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Y * 2.0, 0.5, true, true).unwrap());
+        close(of_shape(pipe(), DVec3::new(0.0, 0.7, 2.0)), -DVec3::Z, 1.5, 0.25);
+        close(of_shape(pipe(), DVec3::new(0.1, 5.0, 0.2)), -DVec3::Y, 3.0, 1.0);
+        let cube = || Shape::Cube(Cube::new(DVec3::ZERO, [DVec3::X, DVec3::Y, DVec3::Z]).unwrap());
+        close(of_shape(cube(), DVec3::new(-3.0, 0.5, 0.9)), DVec3::X, 2.0, 1.0);
+        // Height and radius 1: at the foot (½, ½, 0), and √2 further along (1, 1, 0) / √2 at a distance of 3/2.
+        let cone = Cone::new(DVec3::ZERO, DVec3::Y, 1.0, true).unwrap();
+        let slope = DVec3::new(1.0, 1.0, 0.0) / 2f64.sqrt();
+        close(of_shape(Shape::Cone(cone), DVec3::new(1.5, 1.5, 0.0)), -slope, 2f64.sqrt(), 1.0 / 3.0);
+
+        // Beside the beam, behind it and inside there is none.
+        assert!(of_shape(disk(), DVec3::new(0.9, -0.9, 1.0)).is_none());
+        assert!(of_shape(disk(), DVec3::new(0.1, 0.1, -1.0)).is_none());
+        assert!(of_shape(pipe(), DVec3::new(0.1, 1.0, 0.1)).is_none());
+        assert!(of_shape(pipe(), DVec3::new(2.0, 5.0, 0.1)).is_none());
+        assert!(of_shape(cube(), DVec3::new(2.0, 2.0, 0.1)).is_none());
+    }
+
+    /// Two triangles of areas 1 and 3: the mean over u of what one of them gives is the exitance.
+    #[test]
+    fn triangles_of_a_mesh_give_the_exitance_in_the_mean() {
+        let source = mesh::MeshSource {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::new(0.0, 2.0, 0.0), DVec3::new(-3.0, 0.0, 0.0)],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..mesh::MeshSource::default()
+        };
+        let made = mesh::Mesh::new(&source, &DAffine3::IDENTITY, mesh::NormalMode::Face).unwrap();
+        let (tree, areas) = (mesh::MeshTree::build(&made), mesh::AreaTable::new(&made));
+        let geometry = Geometry::Mesh(Box::new(TriangleMesh { mesh: made, tree, areas }));
+        for from in [DVec3::new(0.2, 0.4, 1.0), DVec3::new(-0.2, 0.4, 2.0)] {
+            let at = |i: u32| light(&geometry, from, DVec2::new((f64::from(i) + 0.5) / 64.0, 0.5));
+            let mean = (0..64).filter_map(at).map(|a| f64::from(a.radiance.to_array()[0])).sum::<f64>() / 64.0;
+            assert!((mean - 1.0).abs() < 1e-6, "{mean}");
+        }
+        assert!(
+            (0..64).all(|i| light(&geometry, DVec3::new(0.9, 1.9, 1.0), DVec2::splat(f64::from(i) / 64.0)).is_none())
+        );
+    }
+}

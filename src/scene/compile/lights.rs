@@ -1,0 +1,188 @@
+//! Lights, and how often each is looked for.
+
+use super::super::environment::{Environment, Mapping};
+use super::super::light::{Light, Slide};
+use super::super::projector::Projector;
+use super::super::texture::Texture;
+use super::super::{Geometry, Object, load};
+use super::{Compiler, vec3};
+use crate::description as written;
+use crate::error::Result;
+use crate::scene::camera::{self, Camera};
+use crate::spectrum::illuminant;
+use glam::DVec2;
+
+impl Compiler<'_> {
+    /// A texture as light: the colours of a picture are lit by D65 or what it names.
+    pub(super) fn emission_texture(&mut self, at: &str, s: &written::SpectrumOrTexture) -> Texture {
+        match s {
+            written::SpectrumOrTexture::Texture(name) => {
+                let mut texture = self.textures[name.as_str()].clone();
+                if let Texture::Image(image) = &mut texture {
+                    let named = match &self.description.textures[name.as_str()] {
+                        written::Texture::Image(written) => written.illuminant.clone(),
+                        _ => None,
+                    };
+                    let lit = named.map_or_else(illuminant::d65, |i| {
+                        let at = format!("textures.{name}.image.illuminant");
+                        self.light_spectrum(&at, &written::Spectrum::Illuminant(i))
+                    });
+                    image.illuminant = (!lit.is_constant() || lit.max() != 1.0).then_some(lit);
+                }
+                texture
+            }
+            written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.light_spectrum(at, s)),
+        }
+    }
+
+    /// The light that a shape is.
+    pub(super) fn shining(
+        &mut self,
+        at: &str,
+        shape: &written::Shape,
+        emission: &written::SpectrumOrTexture,
+        object: u32,
+        geometry: &Geometry,
+    ) -> Light {
+        let radiance = self.emission_texture(&format!("{at}.emission"), emission);
+        match shape.emission_direction.unwrap_or_default() {
+            written::EmissionDirection::All => Light::Area { object, radiance },
+            written::EmissionDirection::Normal => {
+                if let Geometry::Mesh(mesh) = geometry
+                    && !mesh.mesh.is_faceted()
+                {
+                    self.fault(
+                        &format!("{at}.emission_direction"),
+                        "expected all for a mesh with smooth normals: along them light is found on flat triangles only",
+                    );
+                }
+                Light::AlongNormal { object, exitance: radiance }
+            }
+        }
+    }
+
+    /// A light that is no surface.
+    pub(super) fn light(&mut self, at: &str, light: &written::Light) -> Result<Option<Light>> {
+        Ok(Some(match light {
+            written::Light::Point(l) => Light::Point {
+                position: vec3(l.position),
+                intensity: self.light_spectrum(&format!("{at}.intensity"), &l.intensity),
+            },
+            written::Light::Spot(l) => return Ok(self.spot(at, l)),
+            written::Light::Directional(l) => {
+                let Some(direction) = vec3(l.direction).try_normalize() else {
+                    self.fault(&format!("{at}.direction"), "expected a direction, found one of length zero");
+                    return Ok(None);
+                };
+                let irradiance = self.light_spectrum(&format!("{at}.irradiance"), &l.irradiance);
+                Light::Directional { direction, irradiance }
+            }
+            written::Light::Constant(l) => {
+                Light::Constant { radiance: self.light_spectrum(&format!("{at}.radiance"), &l.radiance) }
+            }
+            written::Light::Environment(l) => {
+                self.files.push(l.file.to_path_buf());
+                let picture = load::picture(&l.file).map_err(|e| self.asked(&format!("{at}.file"), e))?;
+                let mapping = match l.mapping {
+                    written::EnvironmentMapping::Texels => Mapping::Texels,
+                    written::EnvironmentMapping::Mitsuba => Mapping::Poles,
+                };
+                let load::Picture { pixels, width, height } = &picture;
+                let map = Environment::new(pixels, *width, *height, l.scale, mapping, l.world_from_map());
+                Light::Environment(Box::new(map))
+            }
+            written::Light::Projector(l) => return Ok(self.projector(at, l)),
+        }))
+    }
+
+    fn spot(&mut self, at: &str, l: &written::SpotLight) -> Option<Light> {
+        let Some(axis) = l.axis().try_normalize() else {
+            self.fault(at, "expected a direction, found one of length zero");
+            return None;
+        };
+        let position = vec3(l.position);
+        let cutoff = l.cutoff_deg.to_radians();
+        let slide = match &l.texture {
+            None => None,
+            Some(name) => {
+                let up = vec3(l.up.unwrap_or([0.0, 1.0, 0.0]));
+                let Some(world_from_spot) = Camera::look_at(position, position + axis, up) else {
+                    self.fault(&format!("{at}.up"), "expected a direction that is not along the axis");
+                    return None;
+                };
+                let texture = self.textures[name.as_str()].clone();
+                Some(Box::new(Slide { texture, axes: world_from_spot.matrix3, half: libm::tan(cutoff) }))
+            }
+        };
+        let intensity = self.light_spectrum(&format!("{at}.intensity"), &l.intensity);
+        Some(Light::Spot { position, axis, beam: l.beam_deg.to_radians(), cutoff, intensity, slide })
+    }
+
+    fn projector(&mut self, at: &str, l: &written::ProjectorLight) -> Option<Light> {
+        let Some(world_from_projector) = Camera::look_at(vec3(l.origin), vec3(l.target), vec3(l.up)) else {
+            self.fault(&format!("{at}.up"), "expected a direction that is not along the beam");
+            return None;
+        };
+        let irradiance = self.emission_texture(&format!("{at}.irradiance"), &l.irradiance);
+        let resolution = match &irradiance {
+            Texture::Image(image) => [image.grid.width as u32, image.grid.height as u32],
+            _ => [1, 1],
+        };
+        let camera::Projection::Perspective { half_width } =
+            camera::Projection::perspective(l.fov_deg.to_radians(), super::fov_axis(l.fov_axis), resolution)
+        else {
+            return None;
+        };
+        let half = DVec2::new(half_width, half_width * f64::from(resolution[1]) / f64::from(resolution[0]));
+        Some(Light::Projector(Box::new(Projector::new(world_from_projector, half, irradiance, l.scale))))
+    }
+}
+
+/// Running sums of the probabilities with which lights are chosen: half by power, half evenly, so
+/// that no light is forgotten; both times the lights' weights.
+pub(super) fn light_cdf(lights: &[Light], weights: &[f64], objects: &[Object], radius: f64) -> Vec<f64> {
+    let powers: Vec<f64> = lights.iter().zip(weights).map(|(l, w)| w * l.power(objects, radius)).collect();
+    let total: f64 = powers.iter().sum();
+    let n: f64 = weights.iter().sum();
+    if n == 0.0 {
+        // None is ever chosen: all sums are 0, below every random number.
+        return vec![0.0; lights.len()];
+    }
+    let mut sum = 0.0;
+    let mut cdf: Vec<f64> = powers
+        .iter()
+        .zip(weights)
+        .map(|(p, w)| {
+            let share = if total > 0.0 && total.is_finite() { p / total } else { w / n };
+            sum += 0.5 * share + 0.5 * w / n;
+            sum
+        })
+        .collect();
+    // Rounding may leave the last sum short of one; what follows the last light with a weight has none.
+    if let Some(last) = weights.iter().rposition(|&w| w > 0.0) {
+        cdf[last..].fill(1.0);
+    }
+    cdf
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spectrum::Spectrum;
+    use glam::DVec3;
+
+    fn point(intensity: f32) -> Light {
+        Light::Point { position: DVec3::ZERO, intensity: Spectrum::Constant(intensity) }
+    }
+
+    /// Lights of power 1 and 3: half of ¼, ¾ and half of ½, ½. With weights 1 and 0 only the first.
+    #[test]
+    fn lights_are_chosen_by_power_and_weight() {
+        let lights = [point(1.0), point(3.0)];
+        let cdf = light_cdf(&lights, &[1.0, 1.0], &[], 1.0);
+        assert!((cdf[0] - 0.375).abs() < 1e-12 && cdf[1] == 1.0);
+        assert_eq!(light_cdf(&lights, &[1.0, 0.0], &[], 1.0), [1.0, 1.0]);
+        assert_eq!(light_cdf(&lights, &[0.0, 2.0], &[], 1.0), [0.0, 1.0]);
+        assert_eq!(light_cdf(&lights, &[0.0, 0.0], &[], 1.0), [0.0, 0.0]);
+    }
+}

@@ -1,0 +1,134 @@
+//! A picture thrown from a point, as if by a pinhole camera run backward.
+
+use super::light::Arriving;
+use super::texture::{Texture, TexturePoint};
+use crate::spectrum::{Lanes, Spectrum};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
+use std::f64::consts::PI;
+
+/// A projector.
+#[derive(Clone, Debug)]
+pub struct Projector {
+    /// Where it stands.
+    position: DVec3,
+    /// Columns: right on the picture, up, the way it shines. Unit, at right angles.
+    axes: DMat3,
+    /// Half the width and height of the picture at distance one.
+    half: DVec2,
+    /// Irradiance over π of a screen across the axis at a distance of one metre, as it varies over the
+    /// picture.
+    irradiance: Texture,
+    scale: f32,
+}
+
+impl Projector {
+    /// A projector that throws a picture `half` wide and high, to each side, at distance one.
+    #[must_use]
+    pub fn new(world_from_projector: DAffine3, half: DVec2, irradiance: Texture, scale: f64) -> Projector {
+        let (axes, position) = (world_from_projector.matrix3, world_from_projector.translation);
+        Projector { position, axes, half, irradiance, scale: scale as f32 }
+    }
+
+    /// Light at `from`.
+    ///
+    /// An angle θ off the axis the screen one metre away is at a distance of 1 / cos θ and inclined by
+    /// θ: E = π T there is an intensity of π T / cos³θ. At depth z, distance z / cos θ, that makes an
+    /// irradiance across the light of π T / (z² cos θ).
+    #[must_use]
+    pub fn arriving(&self, from: DVec3, nm: Lanes) -> Option<Arriving> {
+        let offset = from - self.position;
+        let local = self.axes.transpose() * offset;
+        if local.z <= 0.0 {
+            return None;
+        }
+        let uv = 0.5 + 0.5 * local.truncate() / (local.z * self.half);
+        let inside = uv.cmpge(DVec2::ZERO).all() && uv.cmple(DVec2::ONE).all();
+        if !inside {
+            return None;
+        }
+        let distance = offset.length();
+        let factor = PI * distance / (local.z * local.z * local.z);
+        let at = TexturePoint { uv, point: from, ..TexturePoint::default() };
+        Some(Arriving {
+            wi: -offset / distance,
+            distance,
+            radiance: self.irradiance.eval(&at, nm) * (self.scale * factor as f32),
+            density: None,
+            target: None,
+        })
+    }
+
+    /// Luminous power, film units times m²: that which falls on the screen.
+    #[must_use]
+    pub fn power(&self) -> f64 {
+        let all = self.irradiance.representatives();
+        let mean = all.iter().map(Spectrum::luminance).sum::<f64>() / all.len() as f64;
+        4.0 * self.half.x * self.half.y * PI * f64::from(self.scale) * mean
+    }
+
+    /// Spectra of its light.
+    #[must_use]
+    pub fn spectra(&self) -> Vec<Spectrum> {
+        self.irradiance.representatives()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::camera::Camera;
+    use glam::DAffine2;
+
+    /// Black to the left, 1 on the right half.
+    fn slide() -> Texture {
+        let cell = |v| Box::new(Texture::Uniform(Spectrum::Constant(v)));
+        // One period is two cells wide and two high; the second coordinate stays in its first cell.
+        let uv = DAffine2::from_cols(DVec2::new(1.0, 0.0), DVec2::ZERO, DVec2::new(0.0, 0.25));
+        Texture::Checkerboard { a: cell(0.0), b: cell(1.0), uv }
+    }
+
+    fn projector(irradiance: Texture) -> Projector {
+        let place = Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 0.0), DVec3::Y).unwrap();
+        Projector::new(place, DVec2::new(2.0, 1.0), irradiance, 3.0)
+    }
+
+    /// A uniform slide lights a screen across the axis evenly: E = π · scale / z², wherever on it.
+    #[test]
+    fn a_screen_across_the_beam_is_lit_evenly_and_by_the_square_of_its_distance() {
+        let projector = projector(Texture::one());
+        for z in [0.5, 1.0, 4.0] {
+            for (x, y) in [(0.0, 0.0), (1.9, 0.9), (-1.9, 0.5), (0.3, -0.99)] {
+                let screen = DVec3::new(1.0 + x * z, 2.0 + y * z, 3.0 - z);
+                let light = projector.arriving(screen, Lanes::splat(550.0)).unwrap();
+                let found = f64::from(light.radiance.to_array()[0]) * light.wi.z;
+                // A handful of f32 roundings.
+                assert!((found / (3.0 * PI / (z * z)) - 1.0).abs() < 1e-6, "{found}");
+                assert!((light.distance - (screen - projector.position).length()).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn there_is_no_light_behind_and_beside_the_beam() {
+        let projector = projector(Texture::one());
+        for from in [DVec3::new(1.0, 2.0, 4.0), DVec3::new(3.01, 2.0, 2.0), DVec3::new(1.0, 0.99, 2.0), DVec3::NAN] {
+            assert!(projector.arriving(from, Lanes::splat(550.0)).is_none(), "{from}");
+        }
+    }
+
+    /// Seen from the projector, which looks along −z with y up, x grows to the right.
+    #[test]
+    fn the_picture_is_not_mirrored() {
+        let projector = projector(slide());
+        let at =
+            |x: f64| projector.arriving(DVec3::new(x, 2.0, 2.0), Lanes::splat(550.0)).unwrap().radiance.to_array()[0];
+        assert!(at(1.5) > 0.0 && at(0.5) == 0.0);
+    }
+
+    /// All light that the beam sends out falls on the screen: ∫ E over it, here π · 3 · mean of the slide (½)
+    /// times 4 · 2 · 1 m².
+    #[test]
+    fn power_is_what_falls_on_the_screen() {
+        assert!((projector(slide()).power() - 3.0 * PI * 0.5 * 8.0).abs() < 1e-6);
+    }
+}
