@@ -116,6 +116,8 @@ pub fn passes(samples: u32) -> Vec<Range<u32>> {
 /// Renders one work unit into `tile`.
 pub fn render_unit(job: &FrameJob, samples: Range<u32>, tile: &mut TileBuffer) {
     let window = tile.window();
+    let layers = tile.layers.channels() > 0;
+    let mut values = Vec::new();
     for y in window.y..window.y + window.height as i32 {
         for x in window.x..window.x + window.width as i32 {
             // Overscan makes negative coordinates; as addresses they wrap.
@@ -123,8 +125,17 @@ pub fn render_unit(job: &FrameJob, samples: Range<u32>, tile: &mut TileBuffer) {
             for s in samples.clone() {
                 let replicate = s % REPLICATES as u32;
                 let index = s / REPLICATES as u32;
-                let sample = transport::sample(job.scene, job.plan, job.filter, job.seed, pixel, replicate, index);
-                record(tile, [x, y], replicate, &sample);
+                let FrameJob { scene, plan, filter, seed, .. } = *job;
+                if layers {
+                    let sample =
+                        transport::sample_with_layers(scene, plan, filter, seed, pixel, replicate, index, &mut values);
+                    let at = ((y - window.y) * window.width as i32 + (x - window.x)) as usize;
+                    tile.layers.add(at, sample.weight, &values);
+                    record(tile, [x, y], replicate, &sample);
+                } else {
+                    let sample = transport::sample(scene, plan, filter, seed, pixel, replicate, index);
+                    record(tile, [x, y], replicate, &sample);
+                }
             }
         }
     }
@@ -164,12 +175,13 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
         static TILE: RefCell<Option<TileBuffer>> = const { RefCell::new(None) };
     }
     let start = Instant::now();
-    let film = Mutex::new(Film::new(job.scene.camera.resolution, job.window)?);
+    let layers = job.plan.layers.channels().len();
+    let film = Mutex::new(Film::new(job.scene.camera.resolution, job.window)?.with_layers(layers));
     let total = job.window.pixels() as u64 * u64::from(job.samples);
     let done = AtomicU64::new(0);
     let mut milestones: Vec<Milestone> = Vec::new();
     let tiles = tiles(job.window, job.tile);
-    let random = matches!(job.plan.integrator, Integrator::Path(_));
+    let random = !matches!(job.plan.integrator, Integrator::Whitted(_));
 
     for pass in passes(job.samples) {
         let latest = milestones.last().and_then(|m| m.error);
@@ -179,7 +191,7 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
             }
             TILE.with_borrow_mut(|slot| {
                 let tile = slot.get_or_insert_with(|| TileBuffer::new(window));
-                tile.reset(window);
+                tile.reset(window, layers);
                 render_unit(job, pass.clone(), tile);
                 film.lock().unwrap_or_else(std::sync::PoisonError::into_inner).merge_tile(tile);
             });

@@ -5,10 +5,10 @@
 pub mod frame;
 pub mod report;
 
-use crate::description::{self, BatchEntry, SceneDescription};
+use crate::description::{self, BatchEntry, LayerContent, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
-use crate::film::exr::{self, Attribute, ColourEncoding};
+use crate::film::exr::{self, Attribute, ColourEncoding, LayerPlane};
 use crate::film::filter::{Filter, FilterSampler};
 use crate::film::output;
 use crate::film::png::{self, PngSettings};
@@ -17,7 +17,8 @@ use crate::scene::Scene;
 use crate::scene::census::Census;
 use crate::scene::compile;
 use crate::spectrum::ColourSpace;
-use crate::transport::plan::{EffectMode, EffectPlan, Integrator, PathSettings, WhittedSettings};
+use crate::transport::layers::{Form, Layer, LayerPlan, Quantity, Source};
+use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
 use frame::{Frame, FrameJob, Progress};
 use report::{Report, SceneReport, Status};
 use std::path::{Path, PathBuf};
@@ -90,28 +91,112 @@ pub fn entries(path: &Path, overrides: &Overrides) -> Result<Vec<BatchEntry>> {
 pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
     let description = entry.scene(&overrides.set)?;
     let scene = compile::compile(&description, &entry.name)?;
-    let integrator = match &description.integrator {
-        description::Integrator::Path(p) => {
-            Integrator::Path(PathSettings { max_depth: p.max_depth, roulette_depth: p.roulette_depth })
-        }
-        description::Integrator::Whitted(w) => Integrator::Whitted(WhittedSettings {
-            max_depth: w.max_depth,
-            grid: w.grid,
-            ambient: compile::ambient(&description, &w.ambient)?,
-            transparent_shadows: w.transparent_shadows,
-        }),
-    };
+    let integrator = integrator(&description, &description.integrator)?;
     let samples = match &integrator {
-        Integrator::Path(_) => description.render.samples,
         Integrator::Whitted(w) => w.samples(),
+        Integrator::Path(_) | Integrator::Depth | Integrator::Light(_) | Integrator::Nothing => {
+            description.render.samples
+        }
     };
     let mode = match description.render.effects {
         description::Effects::Auto => EffectMode::Auto,
         description::Effects::All => EffectMode::All,
     };
-    let plan = EffectPlan::of(&Census::of(&scene), integrator, mode);
+    let mut plan = EffectPlan::of(&Census::of(&scene), integrator, mode);
+    plan.layers = layer_plan(&description, &scene, samples)?;
     let hash = hash(&description, &scene.files);
     Ok(Prepared { description, scene, plan, samples, hash })
+}
+
+/// What computes the light.
+fn integrator(description: &SceneDescription, written: &description::Integrator) -> Result<Integrator> {
+    Ok(match written {
+        description::Integrator::Path(p) => Integrator::Path(PathSettings {
+            max_depth: p.max_depth,
+            roulette_depth: p.roulette_depth,
+            hide_emitters: p.hide_emitters,
+            light_samples: p.light_samples,
+            scatter_samples: p.scatter_samples,
+        }),
+        description::Integrator::Whitted(w) => Integrator::Whitted(WhittedSettings {
+            max_depth: w.max_depth,
+            grid: w.grid,
+            ambient: compile::ambient(description, &w.ambient)?,
+            transparent_shadows: w.transparent_shadows,
+        }),
+        description::Integrator::Depth(_) => Integrator::Depth,
+        description::Integrator::LightTracer(l) => Integrator::Light(LightSettings {
+            max_depth: l.max_depth,
+            roulette_depth: l.roulette_depth,
+            hide_emitters: l.hide_emitters,
+        }),
+        description::Integrator::None(_) => Integrator::Nothing,
+    })
+}
+
+/// The further channels of the picture.
+fn layer_plan(description: &SceneDescription, scene: &Scene, samples: u32) -> Result<LayerPlan> {
+    let mut plan = LayerPlan {
+        rgb_from_xyz: colour_space(description.output.colour).matrix_from_xyz(),
+        sample_distance: 1.0 / f64::from(samples).sqrt(),
+        ..LayerPlan::default()
+    };
+    for (i, band) in scene.bands.iter().enumerate() {
+        plan.layers.push(Layer { name: band.name.clone(), source: Source::Band(i), squares: false });
+    }
+    for layer in &description.layers {
+        let source = match &layer.content {
+            LayerContent::Surface(quantity) => Source::Surface(self::quantity(*quantity)),
+            LayerContent::Light { of, form } => {
+                let form = match form {
+                    description::LightForm::Rgba => Form::Rgba,
+                    description::LightForm::Xyz => Form::Xyz,
+                };
+                let of = match of {
+                    Some(other) if *other != description.integrator => {
+                        plan.integrators.push(integrator(description, other)?);
+                        Some(plan.integrators.len() - 1)
+                    }
+                    Some(_) | None => None,
+                };
+                Source::Light(of, form)
+            }
+        };
+        plan.layers.push(Layer { name: layer.name.clone(), source, squares: layer.squares });
+    }
+    Ok(plan)
+}
+
+/// What a pixel of the file holds: bands replace colour.
+fn base(description: &SceneDescription) -> exr::Base {
+    if !description.image.bands.is_empty() {
+        return exr::Base::Nothing;
+    }
+    match description.output.exr.channels {
+        description::Channels::Rgba => exr::Base::Rgba,
+        description::Channels::Rgb => exr::Base::Rgb,
+        description::Channels::Xyza => exr::Base::Xyza,
+        description::Channels::Xyz => exr::Base::Xyz,
+        description::Channels::LuminanceAlpha => exr::Base::LuminanceAlpha,
+        description::Channels::Luminance => exr::Base::Luminance,
+    }
+}
+
+fn quantity(quantity: description::Quantity) -> Quantity {
+    match quantity {
+        description::Quantity::Depth => Quantity::Depth,
+        description::Quantity::Position => Quantity::Position,
+        description::Quantity::Uv => Quantity::Uv,
+        description::Quantity::GeometricNormal => Quantity::GeometricNormal,
+        description::Quantity::ShadingNormal => Quantity::ShadingNormal,
+        description::Quantity::DpDu => Quantity::DpDu,
+        description::Quantity::DpDv => Quantity::DpDv,
+        description::Quantity::DuvDx => Quantity::DuvDx,
+        description::Quantity::DuvDy => Quantity::DuvDy,
+        description::Quantity::Albedo => Quantity::Albedo,
+        description::Quantity::Primitive => Quantity::Primitive,
+        description::Quantity::Shape => Quantity::Shape,
+    }
 }
 
 /// 128 bits of BLAKE3 over what was written, with every default, and over the files that it names.
@@ -151,7 +236,7 @@ fn filter(filter: &description::Filter) -> Filter {
         description::Filter::Box => Filter::Box,
         description::Filter::Tent { radius } => Filter::Tent { radius },
         description::Filter::Gaussian { stddev } => Filter::Gaussian { stddev },
-        description::Filter::Mitchell {} => Filter::Mitchell { b: 1.0 / 3.0, c: 1.0 / 3.0 },
+        description::Filter::Mitchell { b, c } => Filter::Mitchell { b, c },
         description::Filter::CatmullRom => Filter::CatmullRom,
         description::Filter::Lanczos { radius } => Filter::Lanczos { radius },
     }
@@ -232,11 +317,12 @@ fn render_and_write(
     let frame = frame::render(&job, &|p| watcher.progress(p), stop)?;
     report.measure(prepared, &frame);
 
-    let space = colour_space(description.output.colour);
+    let base = base(description);
+    let space = if base.is_xyz() { ColourSpace::Xyz } else { colour_space(description.output.colour) };
     let image = resolve::resolve(&frame.film, None, &space.matrix_from_xyz());
     report.pixel_hash = pixel_hash(&image);
     let written = Instant::now();
-    write_exr(&exr_path, prepared, &frame, &image, space, report)?;
+    write_exr(&exr_path, prepared, &frame, &image, base, space, report)?;
     let png_path = exr_path.with_extension("png");
     let settings = PngSettings {
         exposure_stops: description.output.png.exposure,
@@ -262,6 +348,7 @@ fn write_exr(
     prepared: &Prepared,
     frame: &Frame,
     image: &Image,
+    base: exr::Base,
     space: ColourSpace,
     report: &mut SceneReport,
 ) -> Result<()> {
@@ -278,7 +365,16 @@ fn write_exr(
         description::Compression::Piz => exr::Compression::Piz,
     };
     let error = if output.exr.stderr { exr::StandardError::Write } else { exr::StandardError::Leave };
-    let mut beauty = exr::beauty(image, colour, precision, error, compression);
+    let channels = prepared.plan.layers.channels();
+    let layers = channels
+        .into_iter()
+        .enumerate()
+        .map(|(i, channel)| LayerPlane { name: channel.name, plane: frame.film.layers.plane(i), light: channel.light })
+        .collect();
+    let mut beauty = exr::beauty(image, base, layers, colour, precision, error, compression);
+    if frame.film.layers.invalid.total() > 0 {
+        report.notes.push(format!("{} samples of layers could not be added", frame.film.layers.invalid.total()));
+    }
     report.notes.extend(beauty.note.take());
     beauty.exr.attributes = attributes(prepared, frame, report);
     exr::write_exr(path, &beauty.exr)

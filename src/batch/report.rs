@@ -181,6 +181,9 @@ impl SceneReport {
         self.integrator = match prepared.plan.integrator {
             Integrator::Path(_) => "path",
             Integrator::Whitted(_) => "whitted",
+            Integrator::Depth => "depth",
+            Integrator::Light(_) => "light_tracer",
+            Integrator::Nothing => "none",
         };
         self.resolution = prepared.scene.camera.resolution;
         self.samples = prepared.samples;

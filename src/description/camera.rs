@@ -6,7 +6,7 @@ use super::fault::Checker;
 use super::material::given_fields;
 use super::path::At;
 use super::shape::parallel;
-use super::spectrum::Vec3;
+use super::spectrum::{Role, Spectrum, Vec3};
 
 /// `camera: {origin: [0, 3.2, 12], target: [0, 1.1, 0], fov_deg: 38}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -22,6 +22,33 @@ pub struct Camera {
     pub projection: Projection,
     /// Depth of field; default none.
     pub lens: Option<Lens>,
+    /// What lies nearer or farther is not seen; default all is.
+    pub clip: Clip,
+    /// Where the line of sight meets the picture, from its middle to the right and down, in widths and heights;
+    /// default `[0, 0]`.
+    pub principal_point: [f64; 2],
+}
+
+/// Distances along the line of sight between which the camera sees, metres.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Clip {
+    /// Default 0.
+    #[serde(default)]
+    pub near: f64,
+    /// Default no end.
+    #[serde(default = "endless")]
+    pub far: f64,
+}
+
+impl Default for Clip {
+    fn default() -> Clip {
+        Clip { near: 0.0, far: endless() }
+    }
+}
+
+fn endless() -> f64 {
+    f64::INFINITY
 }
 
 /// How the scene falls on the picture.
@@ -79,6 +106,10 @@ struct WrittenCamera {
     fov_axis: Option<FovAxis>,
     orthographic_height: Option<f64>,
     lens: Option<Lens>,
+    #[serde(default)]
+    clip: Clip,
+    #[serde(default)]
+    principal_point: [f64; 2],
 }
 
 fn up() -> Vec3 {
@@ -89,7 +120,8 @@ impl TryFrom<WrittenCamera> for Camera {
     type Error = String;
 
     fn try_from(written: WrittenCamera) -> Result<Camera, String> {
-        let WrittenCamera { origin, target, up, fov_deg, fov_axis, orthographic_height, lens } = written;
+        let WrittenCamera { origin, target, up, fov_deg, fov_axis, orthographic_height, lens, clip, principal_point } =
+            written;
         let projection = match (fov_deg, fov_axis, orthographic_height) {
             (Some(fov_deg), fov_axis, None) => {
                 Projection::Perspective { fov_deg, fov_axis: fov_axis.unwrap_or_default() }
@@ -104,7 +136,7 @@ impl TryFrom<WrittenCamera> for Camera {
                 return Err(format!("expected either fov_deg or orthographic_height, found {}", given_fields(&given)));
             }
         };
-        Ok(Camera { origin, target, up, projection, lens })
+        Ok(Camera { origin, target, up, projection, lens, clip, principal_point })
     }
 }
 
@@ -123,6 +155,19 @@ pub struct Image {
     pub filter: Filter,
     /// The part that is rendered; default all.
     pub crop: Option<Crop>,
+    /// Spectral bands that the OpenEXR file holds instead of colour; default none.
+    #[serde(default)]
+    pub bands: Vec<Band>,
+}
+
+/// `{name: s00_380_405, response: {table: [[380, 1], [405, 1]]}}`: a channel of the picture, ∫ radiance · response dλ.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Band {
+    /// Of the channel.
+    pub name: String,
+    /// How much each wavelength counts; a table is 0 beyond its ends.
+    pub response: Spectrum,
 }
 
 fn side() -> u32 {
@@ -131,7 +176,7 @@ fn side() -> u32 {
 
 impl Default for Image {
     fn default() -> Image {
-        Image { width: side(), height: side(), filter: Filter::default(), crop: None }
+        Image { width: side(), height: side(), filter: Filter::default(), crop: None, bands: Vec::new() }
     }
 }
 
@@ -154,8 +199,15 @@ pub enum Filter {
         #[serde(default = "gaussian_stddev")]
         stddev: f64,
     },
-    /// Mitchell and Netravali's cubic, B = C = 1/3.
-    Mitchell {},
+    /// Mitchell and Netravali's cubic.
+    Mitchell {
+        /// Default 1/3.
+        #[serde(default = "third")]
+        b: f64,
+        /// Default 1/3.
+        #[serde(default = "third")]
+        c: f64,
+    },
     /// The cubic that passes through its samples.
     CatmullRom,
     /// The sinc, windowed by its own main lobe.
@@ -172,6 +224,10 @@ fn tent_radius() -> f64 {
 
 fn gaussian_stddev() -> f64 {
     0.5
+}
+
+fn third() -> f64 {
+    1.0 / 3.0
 }
 
 fn lanczos_radius() -> f64 {
@@ -224,6 +280,9 @@ impl Camera {
             checker.not_negative(at.key("radius"), lens.radius);
             checker.positive(at.key("focus_distance"), lens.focus_distance);
         }
+        let clip = at.key("clip");
+        checker.not_negative(clip.key("near"), self.clip.near);
+        checker.require(self.clip.far > self.clip.near, clip.key("far"), "more than near", self.clip.far);
     }
 }
 
@@ -233,10 +292,16 @@ impl Image {
         checker.whole_between(at.key("height"), self.height, 1, MAX_SIDE);
         let filter = at.key("filter");
         match self.filter {
-            Filter::Box | Filter::Mitchell {} | Filter::CatmullRom => {}
+            Filter::Box | Filter::Mitchell { .. } | Filter::CatmullRom => {}
             Filter::Tent { radius } => checker.positive(filter.key("tent").key("radius"), radius),
             Filter::Gaussian { stddev } => checker.positive(filter.key("gaussian").key("stddev"), stddev),
             Filter::Lanczos { radius } => checker.positive(filter.key("lanczos").key("radius"), radius),
+        }
+        for (i, band) in self.bands.iter().enumerate() {
+            let bands = at.key("bands");
+            let at = bands.index(i);
+            check_channel(&band.name, self.bands[..i].iter().any(|b| b.name == band.name), at.key("name"), checker);
+            band.response.check(Role::Emission, at.key("response"), checker);
         }
         if let Some(crop) = self.crop {
             let at = at.key("crop");
@@ -254,6 +319,16 @@ impl Image {
         }
     }
 }
+
+/// The name of a channel: not empty, short enough for the file, and not taken.
+pub(crate) fn check_channel(name: &str, taken: bool, at: At<'_>, checker: &mut Checker<'_>) {
+    let fits = !name.is_empty() && name.len() <= MAX_CHANNEL_NAME && !name.contains('\0');
+    checker.require(fits, at, "the name of a channel, 1 to 200 bytes", format_args!("{name:?}"));
+    checker.require(!taken, at, "a name of its own", format_args!("{name:?} again"));
+}
+
+/// OpenEXR takes 255 bytes; a layer appends the name of its component.
+const MAX_CHANNEL_NAME: usize = 200;
 
 #[cfg(test)]
 mod tests {

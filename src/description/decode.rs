@@ -400,7 +400,7 @@ mod tests {
     fn an_unknown_field_is_told_with_its_near_miss() {
         assert_eq!(
             faults("image: {widht: 3}"),
-            "dir/s.yaml:2:9: image.widht: expected one of width, height, filter, crop, found \"widht\"; did you mean \"width\"?"
+            "dir/s.yaml:2:9: image.widht: expected one of width, height, filter, crop, bands, found \"widht\"; did you mean \"width\"?"
         );
         assert_eq!(
             faults("materials:\n  a: {boundary: {thick: 1}}"),
@@ -417,7 +417,7 @@ mod tests {
         );
         assert_eq!(
             faults("integrator: pth"),
-            "dir/s.yaml:2:13: integrator: expected one of path, whitted, found \"pth\"; did you mean \"path\"?"
+            "dir/s.yaml:2:13: integrator: expected one of path, whitted, depth, light_tracer, none, found \"pth\"; did you mean \"path\"?"
         );
         assert_eq!(
             faults("shapes:\n- sphere: {radius: 1, emission: {textur: a}}"),
@@ -429,7 +429,7 @@ mod tests {
     #[test]
     fn a_wrong_type_is_told_in_plain_words() {
         let cases = [
-            ("image: 3", "2:8: image: expected a map with fields among width, height, filter, crop, found 3"),
+            ("image: 3", "2:8: image: expected a map with fields among width, height, filter, crop, bands, found 3"),
             (
                 "image: {width: abc}",
                 "2:16: image.width: expected a whole number from 0 to 4294967295, found the text \"abc\"",

@@ -24,18 +24,36 @@
 //!   fov_deg: 38                     # either this, between 0 and 180, or orthographic_height: 4 (m)
 //!   fov_axis: x                     # x (default), y, smaller, larger, diagonal
 //!   lens: {radius: 0.05, focus_distance: 10}    # default none
+//!   clip: {near: 0}                 # ~ near 0, far without end; along the line of sight, m; rays begin at near
+//!   principal_point: [0, 0]         # default; where the line of sight meets the picture, from its middle to the
+//!                                   # right and down, in widths and heights
 //! image:
 //!   width: 600                      # default; 1 to 65536
 //!   height: 600                     # default
 //!   filter: box                     # default; or one of
-//!                                   #   {tent: {radius: 1}}, {gaussian: {stddev: 0.5}}, mitchell,
-//!                                   #   catmull_rom, {lanczos: {radius: 3}}
+//!                                   #   {tent: {radius: 1}}, {gaussian: {stddev: 0.5}}, mitchell (b and c
+//!                                   #   default 1/3), catmull_rom, {lanczos: {radius: 3}}
 //!   crop: {x: 0, y: 0, width: 10, height: 10}   # default all; x and y default 0
+//!   bands: []                       # ~ the OpenEXR file holds bands of the spectrum instead of colour:
+//!                                   #   {name: blue, response: SPECTRUM}: ∫ radiance · response dλ, nm
 //! integrator: path                  # default; or, with their defaults,
-//!                                   #   {path: {max_depth: null, roulette_depth: 5}},
+//!                                   #   {path: {max_depth: null, roulette_depth: 5, hide_emitters: false,
+//!                                   #           light_samples: 1, scatter_samples: 1}},
+//!                                   #   {light_tracer: {max_depth: null, roulette_depth: 5,
+//!                                   #                   hide_emitters: false}}: from the lights to the camera
 //!                                   #   {whitted: {max_depth: 10, grid: 2, ambient: 0,
-//!                                   #              transparent_shadows: false}}
-//!                                   # max_depth of a path counts segments: 1 emission, 2 direct light
+//!                                   #              transparent_shadows: false}},
+//!                                   #   depth: the distance to the first surface, m; none: black
+//!                                   # max_depth of a path counts segments: 1 emission, 2 direct light;
+//!                                   # hide_emitters: lights that the camera sees itself are left out;
+//!                                   # light_samples, scatter_samples: rays at the first surface, 0 for none at all
+//! layers:                           # further channels of the OpenEXR file, each name.COMPONENT; default none
+//! - {name: nn, surface: shading_normal}         # of the first surface: depth (T), position (X, Y, Z), uv (U, V),
+//!                                   # geometric_normal, shading_normal, dp_du, dp_dv (X, Y, Z), duv_dx, duv_dy (U, V),
+//!                                   # albedo (R, G, B), primitive, shape (I)
+//! - {name: direct, light: {path: {max_depth: 2}}, form: rgba, squares: false}
+//!                                   # light: ~ of the picture, path or depth; ~ form rgba, xyz; ~ squares: the mean
+//!                                   # of squares as m2_direct.R, …
 //! render:                           # these are the defaults
 //!   samples: 64                     # paths per pixel
 //!   seed: 0
@@ -44,7 +62,8 @@
 //!   wavelengths: auto               # auto, visible, uniform
 //! output:                           # these are the defaults
 //!   dir: out                        # from the working directory
-//!   exr: {precision: half, compression: zips, stderr: false}   # half, float; none, zips, zip, piz
+//!   exr: {precision: half, compression: zips, stderr: false, channels: rgba}   # half, float; none, zips, zip, piz;
+//!                                   # rgba, rgb, xyza, xyz, luminance_alpha, luminance
 //!   png: {exposure: 0, tonemap: aces}           # stops; aces, agx, reinhard, none
 //!   colour: rec709                  # rec709, acescg, aces2065-1, rec2020, p3, xyz
 //! textures:
@@ -192,6 +211,7 @@ mod decode;
 mod edit;
 mod emitter;
 mod fault;
+mod layer;
 mod light;
 mod material;
 mod node;
@@ -203,8 +223,9 @@ mod spectrum;
 mod yaml;
 
 pub use batch::{Batch, BatchEntry, Document, load};
-pub use camera::{Camera, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Projection};
+pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Projection};
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, ProjectorLight};
+pub use layer::{Layer, LayerContent, LightForm, Quantity};
 pub use light::{
     Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, HomogeneousMedium, Light, Medium, Phase, PointLight,
     SpotLight,
@@ -215,8 +236,8 @@ pub use material::{
 };
 pub use scene::{Locator, SceneDescription};
 pub use settings::{
-    Colour, Compression, Effects, Exr, Integrator, Output, PathIntegrator, Png, Precision, Render, Tonemap,
-    Wavelengths, WhittedIntegrator,
+    Channels, Colour, Compression, DepthIntegrator, Effects, Exr, Integrator, LightTracerIntegrator, NoIntegrator,
+    Output, PathIntegrator, Png, Precision, Render, Tonemap, Wavelengths, WhittedIntegrator,
 };
 pub use shape::{
     Caps, Cone, Cube, Cylinder, Disk, Extent, Geometry, Mesh, Normals, Plane, Rectangle, Rotation, Shape, Sphere,
@@ -301,7 +322,7 @@ mod tests {
     fn a_field_of_the_batch_in_a_scene_is_pointed_out() {
         assert_eq!(
             parse("scens: []").unwrap_err().to_string(),
-            "dir/s.yaml:1:1: scens: expected one of include, camera, image, integrator, render, output, textures, \
+            "dir/s.yaml:1:1: scens: expected one of include, camera, image, integrator, layers, render, output, textures, \
              materials, media, shapes, lights, medium, fog, scenes, found \"scens\"; did you mean \"scenes\"?"
         );
         assert_eq!(faults("scens: []").matches("scenes").count(), 0);

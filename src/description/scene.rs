@@ -10,6 +10,7 @@ use super::camera::{Camera, Image};
 use super::decode::decode;
 use super::edit;
 use super::fault::{Checker, Fault};
+use super::layer::Layer;
 use super::light::{Fog, Light, Medium};
 use super::material::{Material, Texture};
 use super::node::{Node, Sources};
@@ -38,6 +39,9 @@ pub struct SceneDescription {
     /// Default `path`.
     #[serde(default)]
     pub integrator: Integrator,
+    /// Further channels of the picture; default none.
+    #[serde(default)]
+    pub layers: Vec<Layer>,
     /// How to render.
     #[serde(default)]
     pub render: Render,
@@ -134,6 +138,10 @@ impl SceneDescription {
         self.camera.check(at.key("camera"), &mut checker);
         self.image.check(at.key("image"), &mut checker);
         self.integrator.check(at.key("integrator"), &mut checker);
+        for (i, layer) in self.layers.iter().enumerate() {
+            let taken = self.layers[..i].iter().any(|other| other.name == layer.name);
+            layer.check(taken, at.key("layers").index(i), &mut checker);
+        }
         self.render.check(at.key("render"), &mut checker);
         self.output.check(at.key("output"), &mut checker);
         for (name, material) in &self.materials {
@@ -185,6 +193,8 @@ mod tests {
                 up: [0.0, 1.0, 0.0],
                 projection: Projection::Perspective { fov_deg: 38.0, fov_axis: FovAxis::X },
                 lens: Some(Lens { radius: 0.05, focus_distance: 10.0 }),
+                clip: Clip::default(),
+                principal_point: [0.0, 0.0],
             }
         );
         assert_eq!(scene.image.crop, Some(Crop { x: 0, y: 0, width: 10, height: 10 }));

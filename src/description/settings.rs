@@ -17,11 +17,17 @@ pub enum Integrator {
     Path(PathIntegrator),
     /// The deterministic recursive tracer.
     Whitted(WhittedIntegrator),
+    /// The distance to the first surface.
+    Depth(DepthIntegrator),
+    /// Paths from the lights to the camera.
+    LightTracer(LightTracerIntegrator),
+    /// No light, for a picture of layers alone.
+    None(NoIntegrator),
 }
 
 impl Default for Integrator {
     fn default() -> Integrator {
-        Integrator::Path(PathIntegrator { max_depth: None, roulette_depth: roulette_depth() })
+        Integrator::Path(PathIntegrator::default())
     }
 }
 
@@ -34,10 +40,63 @@ pub struct PathIntegrator {
     /// Segments after which a path may end by chance; default 5.
     #[serde(default = "roulette_depth")]
     pub roulette_depth: u32,
+    /// Whether lights that the camera sees itself are left out: shining shapes as if they were not there, light
+    /// from infinity as nothing; default false.
+    #[serde(default)]
+    pub hide_emitters: bool,
+    /// Shadow rays at the first surface; with 0 lights are only met by chance, and those without extent never;
+    /// default 1.
+    #[serde(default = "one")]
+    pub light_samples: u32,
+    /// Scattered rays at the first surface; with 0 light arrives by shadow rays only, and mirrors are black;
+    /// default 1.
+    #[serde(default = "one")]
+    pub scatter_samples: u32,
+}
+
+impl Default for PathIntegrator {
+    fn default() -> PathIntegrator {
+        PathIntegrator {
+            max_depth: None,
+            roulette_depth: roulette_depth(),
+            hide_emitters: false,
+            light_samples: one(),
+            scatter_samples: one(),
+        }
+    }
 }
 
 fn roulette_depth() -> u32 {
     5
+}
+
+fn one() -> u32 {
+    1
+}
+
+/// `depth`: the distance from where the camera ray begins to the first surface, in metres, 0 where there is none, as
+/// a spectrum that is the same at every wavelength.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DepthIntegrator {}
+
+/// `none`
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoIntegrator {}
+
+/// `light_tracer: {max_depth: null, roulette_depth: 5}`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightTracerIntegrator {
+    /// Most segments of a path, counted as for `path`; default no limit.
+    pub max_depth: Option<u32>,
+    /// Segments after which a path may end by chance; default 5.
+    #[serde(default = "roulette_depth")]
+    pub roulette_depth: u32,
+    /// Whether lights that the camera sees itself are left out; default false.
+    #[serde(default)]
+    pub hide_emitters: bool,
 }
 
 /// `whitted: {max_depth: 10, grid: 2, ambient: 0.2}`
@@ -172,6 +231,28 @@ pub struct Exr {
     /// Also write the standard error of each pixel, `stderr.R`, `stderr.G`, `stderr.B`; default false.
     #[serde(default)]
     pub stderr: bool,
+    /// What a pixel holds; default `rgba`.
+    #[serde(default)]
+    pub channels: Channels,
+}
+
+/// What a pixel of the OpenEXR file holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Channels {
+    /// R, G, B and coverage A.
+    #[default]
+    Rgba,
+    /// R, G, B.
+    Rgb,
+    /// CIE X, Y, Z and A.
+    Xyza,
+    /// CIE X, Y, Z.
+    Xyz,
+    /// Luminance Y and A.
+    LuminanceAlpha,
+    /// Luminance Y.
+    Luminance,
 }
 
 /// Number format of the colour channels.
@@ -254,6 +335,9 @@ pub enum Colour {
 /// The most rays per pixel and side of the `whitted` integrator: 2²⁰ a pixel.
 const MAX_GRID: u32 = 1024;
 
+/// The most shadow rays and scattered rays at the first surface.
+const MAX_SPLIT: u32 = 65_536;
+
 impl Integrator {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         match self {
@@ -261,6 +345,17 @@ impl Integrator {
                 let at = at.key("path");
                 checker.at_least_one(at.key("max_depth"), path.max_depth.unwrap_or(u32::MAX));
                 checker.at_least_one(at.key("roulette_depth"), path.roulette_depth);
+                checker.whole_between(at.key("light_samples"), path.light_samples, 0, MAX_SPLIT);
+                checker.whole_between(at.key("scatter_samples"), path.scatter_samples, 0, MAX_SPLIT);
+                if path.light_samples + path.scatter_samples == 0 {
+                    checker.at_least_one(at.key("scatter_samples"), 0);
+                }
+            }
+            Integrator::Depth(DepthIntegrator {}) | Integrator::None(NoIntegrator {}) => {}
+            Integrator::LightTracer(light) => {
+                let at = at.key("light_tracer");
+                checker.at_least_one(at.key("max_depth"), light.max_depth.unwrap_or(u32::MAX));
+                checker.at_least_one(at.key("roulette_depth"), light.roulette_depth);
             }
             Integrator::Whitted(whitted) => {
                 let at = at.key("whitted");
@@ -326,9 +421,12 @@ mod tests {
             scene.render,
             Render { samples: 64, seed: 0, effects: Effects::Auto, tile: 32, wavelengths: Wavelengths::Auto }
         );
-        assert_eq!(scene.integrator, Integrator::Path(PathIntegrator { max_depth: None, roulette_depth: 5 }));
+        assert_eq!(scene.integrator, Integrator::Path(PathIntegrator::default()));
         assert_eq!(scene.output.dir, PathBuf::from("out"));
-        assert_eq!(scene.output.exr, Exr { precision: Precision::Half, compression: Compression::Zips, stderr: false });
+        assert_eq!(
+            scene.output.exr,
+            Exr { precision: Precision::Half, compression: Compression::Zips, stderr: false, channels: Channels::Rgba }
+        );
         assert_eq!(scene.output.png, Png { exposure: 0.0, tonemap: Tonemap::Aces });
         assert_eq!(scene.output.colour, Colour::Rec709);
     }

@@ -17,6 +17,7 @@
 
 use crate::error::{Error, Result};
 use crate::film::Window;
+use crate::film::layers::LayerSums;
 
 /// Independently scrambled sample sets of each pixel; their spread is the error bar.
 pub const REPLICATES: usize = 4;
@@ -228,13 +229,20 @@ pub struct TileBuffer {
     cells: Vec<PixelCells>,
     /// Samples that were dropped; the renderer adds [`Invalid::Negative`] itself.
     pub invalid: InvalidCounts,
+    /// Further channels.
+    pub layers: LayerSums,
 }
 
 impl TileBuffer {
     /// An empty buffer for the pixels of `window`.
     #[must_use]
     pub fn new(window: Window) -> TileBuffer {
-        TileBuffer { window, cells: vec![PixelCells::default(); window.pixels()], invalid: InvalidCounts::default() }
+        TileBuffer {
+            window,
+            cells: vec![PixelCells::default(); window.pixels()],
+            invalid: InvalidCounts::default(),
+            layers: LayerSums::default(),
+        }
     }
 
     /// The pixels that the buffer covers, in the full frame.
@@ -243,12 +251,13 @@ impl TileBuffer {
         self.window
     }
 
-    /// Empties the buffer and moves it to `window`, keeping its memory.
-    pub fn reset(&mut self, window: Window) {
+    /// Empties the buffer and moves it to `window`, keeping its memory; `layers` further channels.
+    pub fn reset(&mut self, window: Window, layers: usize) {
         self.window = window;
         self.cells.clear();
         self.cells.resize(window.pixels(), PixelCells::default());
         self.invalid = InvalidCounts::default();
+        self.layers.reset(layers, window.pixels());
     }
 
     /// Counts a sample of `replicate` of `pixel` that the renderer found invalid itself.
@@ -283,6 +292,8 @@ pub struct Film {
     cells: Vec<PixelCells>,
     /// Samples that were dropped.
     pub invalid: InvalidCounts,
+    /// Further channels.
+    pub layers: LayerSums,
 }
 
 impl Film {
@@ -300,7 +311,14 @@ impl Film {
             return Err(Error::Render(format!("film: {window} needs {megabytes} MB, more than there is")));
         }
         cells.resize(window.pixels(), PixelCells::default());
-        Ok(Film { frame, window, cells, invalid: InvalidCounts::default() })
+        Ok(Film { frame, window, cells, invalid: InvalidCounts::default(), layers: LayerSums::default() })
+    }
+
+    /// The film with `channels` empty layers.
+    #[must_use]
+    pub fn with_layers(mut self, channels: usize) -> Film {
+        self.layers = LayerSums::new(channels, self.window.pixels());
+        self
     }
 
     /// The memory that a film of `window` takes.
@@ -353,6 +371,7 @@ impl Film {
     pub fn merge_tile(&mut self, tile: &TileBuffer) {
         assert!(self.window.contains(&tile.window), "tile {} lies in the film {}", tile.window, self.window);
         self.merge_cells(tile.window, &tile.cells, tile.invalid);
+        self.layers.merge(self.window, &tile.layers, tile.window);
     }
 
     /// Adds another film of the same frame: a crop, a range of samples, a checkpoint.
@@ -368,6 +387,7 @@ impl Film {
             return Err(Error::Config(format!("film: the part {} reaches beyond {}", other.window, self.window)));
         }
         self.merge_cells(other.window, &other.cells, other.invalid);
+        self.layers.merge(self.window, &other.layers, other.window);
         Ok(())
     }
 

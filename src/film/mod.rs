@@ -11,6 +11,7 @@ pub mod accumulate;
 pub mod compare;
 pub mod exr;
 pub mod filter;
+pub mod layers;
 pub mod output;
 pub mod png;
 pub mod resolve;

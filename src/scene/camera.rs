@@ -15,6 +15,11 @@ pub struct Camera {
     pub resolution: [u32; 2],
     /// A lens of this radius focused at this distance; `None` for a pinhole.
     pub lens: Option<Lens>,
+    /// Distances along the axis between which the camera sees, metres: 0 and infinity where nothing is cut away.
+    /// Rays begin at the first.
+    pub clip: [f64; 2],
+    /// Where the axis meets the picture, from its middle to the right and down, in widths and heights.
+    pub principal_point: DVec2,
 }
 
 /// A thin lens.
@@ -90,6 +95,7 @@ impl Camera {
     pub fn ray(&self, pixel: DVec2, lens: impl FnOnce() -> DVec2) -> Ray {
         let (w, h) = (f64::from(self.resolution[0]), f64::from(self.resolution[1]));
         // −1…1 across the width, the same scale down the height.
+        let pixel = pixel - self.principal_point * DVec2::new(w, h);
         let plane = DVec2::new(2.0 * pixel.x - w, h - 2.0 * pixel.y) / w;
         let (mut origin, mut direction) = match self.projection {
             Projection::Perspective { half_width } => {
@@ -103,10 +109,20 @@ impl Camera {
             origin += (warp::concentric_disk(lens()) * radius).extend(0.0);
             direction = focus - origin;
         }
+        origin += direction * (self.clip[0] / direction.z);
         Ray::new(
             self.world_from_camera.transform_point3(origin),
             self.world_from_camera.transform_vector3(direction).normalize(),
         )
+    }
+
+    /// How far along one of the camera's rays it sees, metres.
+    #[must_use]
+    pub fn reach(&self, ray: &Ray) -> f64 {
+        if self.clip[1] == f64::INFINITY {
+            return f64::INFINITY;
+        }
+        (self.clip[1] - self.clip[0]) / ray.direction.dot(self.world_from_camera.matrix3.z_axis)
     }
 
     /// World to camera for row vectors, row by row, as EXR files and RenderMan have it: +x right, +y up,
@@ -120,6 +136,7 @@ impl Camera {
     #[must_use]
     pub fn ndc_from_world(&self) -> [f32; 16] {
         let aspect = f64::from(self.resolution[0]) / f64::from(self.resolution[1]);
+        let middle = DVec2::splat(0.5) + self.principal_point;
         let ndc_from_camera = match self.projection {
             // x/z from −half_width…half_width to 0…1; y/z likewise, downward.
             Projection::Perspective { half_width } => {
@@ -127,7 +144,7 @@ impl Camera {
                 DMat4::from_cols(
                     DVec4::new(s, 0.0, 0.0, 0.0),
                     DVec4::new(0.0, -s * aspect, 0.0, 0.0),
-                    DVec4::new(0.5, 0.5, 1.0, 1.0),
+                    DVec4::new(middle.x, middle.y, 1.0, 1.0),
                     DVec4::ZERO,
                 )
             }
@@ -137,7 +154,7 @@ impl Camera {
                     DVec4::new(s, 0.0, 0.0, 0.0),
                     DVec4::new(0.0, -s * aspect, 0.0, 0.0),
                     DVec4::new(0.0, 0.0, 1.0, 0.0),
-                    DVec4::new(0.5, 0.5, 0.0, 1.0),
+                    DVec4::new(middle.x, middle.y, 0.0, 1.0),
                 )
             }
         };
@@ -162,6 +179,8 @@ mod tests {
             projection: Projection::perspective(90f64.to_radians(), FovAxis::X, resolution),
             resolution,
             lens,
+            clip: [0.0, f64::INFINITY],
+            principal_point: DVec2::ZERO,
         }
     }
 

@@ -13,7 +13,7 @@ use super::material::{Highlight, HighlightModel, Kind, Material};
 use super::mesh::{AreaTable, Mesh, MeshTree, NormalMode};
 use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Plane, Rectangle, Shape, Sphere};
 use super::texture::{Interpolation, Texture, Wrap};
-use super::{DepthFog, FogFalloff, Geometry, Medium, Object, Scene, TriangleMesh};
+use super::{Band, DepthFog, FogFalloff, Geometry, Medium, Object, Scene, TriangleMesh};
 use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
 use crate::optics::fresnel::Model;
@@ -197,8 +197,9 @@ impl<'a> Compiler<'a> {
         let (center, radius) = extent(&boxes, &camera);
         let light_cdf = lights::light_cdf(&lights, &weights, &objects, radius);
         let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
+        let bands = self.bands();
         let wavelengths = match d.render.wavelengths {
-            written::Wavelengths::Auto => self.wavelengths(&lights, &objects, radius),
+            written::Wavelengths::Auto => self.wavelengths(&lights, &objects, radius, &bands),
             written::Wavelengths::Visible => WavelengthDistribution::visible(),
             written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
         };
@@ -228,6 +229,7 @@ impl<'a> Compiler<'a> {
             backgrounds,
             fog,
             wavelengths,
+            bands,
             center,
             radius,
             has_boundaries,
@@ -252,16 +254,36 @@ impl<'a> Compiler<'a> {
             },
         };
         let lens = d.lens.as_ref().map(|l| camera::Lens { radius: l.radius, focus_distance: l.focus_distance });
-        Camera { world_from_camera, projection, resolution, lens }
+        let clip = [d.clip.near, d.clip.far];
+        let principal_point = DVec2::from(d.principal_point);
+        Camera { world_from_camera, projection, resolution, lens, clip, principal_point }
+    }
+
+    /// Bands of the spectrum; a response must lie in what is rendered.
+    fn bands(&mut self) -> Vec<Band> {
+        let mut all = Vec::new();
+        for (i, band) in self.description.image.bands.iter().enumerate() {
+            let at = format!("image.bands[{i}].response");
+            let response = self.spectrum(&at, &band.response, Outside::Zero, Role::Coefficient);
+            if response.is_black() {
+                self.fault(&at, "expected a response within 360 to 830 nm, found none");
+            }
+            all.push(Band { name: band.name.clone(), response });
+        }
+        all
     }
 
     /// Wavelengths by the scene's own lights and surfaces.
-    fn wavelengths(&self, lights: &[Light], objects: &[Object], radius: f64) -> WavelengthDistribution {
+    fn wavelengths(&self, lights: &[Light], objects: &[Object], radius: f64, bands: &[Band]) -> WavelengthDistribution {
         let mut emitters: Vec<(f64, Spectrum)> = Vec::new();
         for light in lights {
             let spectra = light.spectra();
             let weight = light.power(objects, radius) / spectra.len() as f64;
             emitters.extend(spectra.into_iter().map(|s| (weight, s)));
+        }
+        if !bands.is_empty() {
+            let responses: Vec<&Spectrum> = bands.iter().map(|b| &b.response).collect();
+            return WavelengthDistribution::for_bands(&responses, &emitters);
         }
         let mut reflectances = Vec::new();
         for object in objects {

@@ -15,6 +15,7 @@ pub mod light;
 pub mod load;
 pub mod material;
 pub mod mesh;
+pub mod partials;
 pub mod projector;
 pub mod shape;
 pub mod texture;
@@ -61,6 +62,8 @@ pub struct Scene {
     pub fog: Option<DepthFog>,
     /// From which wavelengths are drawn.
     pub wavelengths: WavelengthDistribution,
+    /// Bands of the spectrum that the picture holds instead of colour.
+    pub bands: Vec<Band>,
     /// Centre of the bounded part of the scene.
     pub center: DVec3,
     /// Its radius, metres.
@@ -69,6 +72,15 @@ pub struct Scene {
     pub has_boundaries: bool,
     /// Files that were read.
     pub files: Vec<PathBuf>,
+}
+
+/// A band of the spectrum.
+#[derive(Clone, Debug)]
+pub struct Band {
+    /// Of the channel.
+    pub name: String,
+    /// How much each wavelength counts.
+    pub response: Spectrum,
 }
 
 /// What a person wrote.

@@ -152,6 +152,31 @@ impl WavelengthDistribution {
         WavelengthDistribution { description, ..candidates[best].1.clone() }
     }
 
+    /// For a picture of bands, with these emitters and the shares of the light they stand for: nine parts in twenty by
+    /// the sum of the responses, as many by that sum times the emission, and a tenth by the eye, for the colours of the
+    /// preview.
+    ///
+    /// Every band of a sum of bands of equal area gets at least its share of nine twentieths of the samples, however
+    /// dim it is; where all of the light comes in lines, half of them lie on lines.
+    #[must_use]
+    pub fn for_bands(responses: &[&Spectrum], emitters: &[(f64, Spectrum)]) -> WavelengthDistribution {
+        let mut breakpoints: Vec<f64> = responses.iter().flat_map(|r| r.breakpoints()).collect();
+        breakpoints.extend(emitters.iter().flat_map(|(_, e)| e.breakpoints()));
+        // Each by its own largest value: units of radiance do not count.
+        let emitters: Vec<(f64, &Spectrum)> =
+            emitters.iter().filter(|(w, s)| *w > 0.0 && s.max() > 0.0).map(|(w, s)| (w / s.max(), s)).collect();
+        let sensitivity = |nm: f64| responses.iter().map(|r| r.at(nm)).sum::<f64>();
+        let light = |nm: f64| emitters.iter().map(|(w, s)| w * s.at(nm)).sum::<f64>();
+        let by_response = Density::new(&breakpoints, sensitivity);
+        let by_both = Density::new(&breakpoints, |nm| sensitivity(nm) * light(nm));
+        let visible = Density::visible();
+        let mut parts = vec![(0.45, &by_response), (0.1, &visible)];
+        parts.push((0.45, if by_both.total > 0.0 { &by_both } else { &by_response }));
+        Density::mixture(parts).distribution(
+            "bands: 45 % by the responses, 45 % by the responses and the emitters, 10 % by the eye".into(),
+        )
+    }
+
     /// The wavelengths of `u` in [0, 1): all of them within the band.
     #[must_use]
     #[inline]

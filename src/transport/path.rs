@@ -162,9 +162,12 @@ impl Tracer<'_> {
         // Crossings of boundaries have numbers of their own, so that every vertex of the path keeps
         // the same ones whether or not boundaries lie on the way.
         let mut crossings = 0u32;
+        // The camera does not see beyond its clipping plane; what it sees lies in everything's light.
+        let mut reach = scene.camera.reach(ray);
 
         loop {
-            let hit = scene.closest(&path.ray, f64::INFINITY);
+            let hit = scene.closest(&path.ray, reach);
+            reach = f64::INFINITY;
             let distance = hit.map_or(f64::INFINITY, |h| h.t);
             let choice = self.sampler.set(Set::Choice(path.vertices));
 
@@ -206,6 +209,15 @@ impl Tracer<'_> {
             };
             let surface = scene.surface(&path.ray, &hit);
             let object = &scene.objects[hit.object as usize];
+            if self.settings.hide_emitters && path.vertices == 0 && object.light.is_some() {
+                // A lamp that the camera would see itself is not there.
+                crossings += 1;
+                if crossings > MAX_BOUNDARIES {
+                    break;
+                }
+                path.ray = scene.leave(&surface, &hit, path.ray.direction);
+                continue;
+            }
             let material = &scene.materials[object.material as usize];
             let boundary = matches!(material.kind, Kind::Boundary);
             if first && !boundary {
@@ -216,7 +228,7 @@ impl Tracer<'_> {
             let wo_world = -path.ray.direction;
 
             // Light that the surface itself sends out.
-            if let Some(light) = object.light {
+            if let Some(light) = object.light.filter(|_| self.meets_lights(&path)) {
                 let emitted = scene.lights[light as usize].emitted(&surface, &hit, wo_world, self.nm);
                 let weight = match &path.previous {
                     None => 1.0,
@@ -267,7 +279,7 @@ impl Tracer<'_> {
             let scatter = self.sampler.set(Set::Scatter(path.vertices));
             let (u_light, u_direction) = pairs(scatter);
             let sided = sided_normal(material, &frame);
-            if !bsdf.is_discrete() {
+            if !bsdf.is_discrete() && self.settings.light_samples > 0 {
                 let scatterer = Scatterer::Surface { bsdf: &bsdf, frame: &frame, surface: &surface, flip };
                 self.add_light::<CHROMATIC, MEDIA>(
                     &mut path,
@@ -289,14 +301,14 @@ impl Tracer<'_> {
                 break;
             }
             path.previous = match sample.chosen {
-                Chosen::Discrete => None,
-                Chosen::Density(density) => Some(Previous {
+                Chosen::Density(density) if self.settings.light_samples > 0 => Some(Previous {
                     point: surface.point,
                     normal: sided,
                     rho: path.rho_sum::<CHROMATIC>(),
                     density,
                     distance: 0.0,
                 }),
+                Chosen::Density(_) | Chosen::Discrete => None,
             };
             path.beta *= sample.weight;
             if CHROMATIC {
@@ -334,18 +346,21 @@ impl Tracer<'_> {
         }
         let wo = -path.ray.direction;
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
-        self.add_light::<CHROMATIC, MEDIA>(
-            path,
-            &Scatterer::Medium(medium),
-            point,
-            wo,
-            None,
-            u_light,
-            choice[0],
-            |wi| Ray::new(point, wi),
-        );
+        let next_event = self.settings.light_samples > 0;
+        if next_event {
+            self.add_light::<CHROMATIC, MEDIA>(
+                path,
+                &Scatterer::Medium(medium),
+                point,
+                wo,
+                None,
+                u_light,
+                choice[0],
+                |wi| Ray::new(point, wi),
+            );
+        }
         let wi = medium.phase.sample(wo, u_direction);
-        path.previous = Some(Previous {
+        path.previous = next_event.then(|| Previous {
             point,
             normal: None,
             rho: path.rho_sum::<CHROMATIC>(),
@@ -375,8 +390,16 @@ impl Tracer<'_> {
         true
     }
 
+    /// Whether light that the path meets counts: always for the camera, else where scattering is a technique.
+    fn meets_lights(&self, path: &Path) -> bool {
+        self.settings.scatter_samples > 0 || path.vertices == 0
+    }
+
     /// Light from infinity along a ray that met nothing.
     fn add_background<const CHROMATIC: bool>(&self, path: &mut Path) {
+        if !self.meets_lights(path) || self.settings.hide_emitters && path.vertices == 0 {
+            return;
+        }
         for &i in &self.scene.backgrounds {
             let light = &self.scene.lights[i as usize];
             let l = light.background(path.ray.direction, self.nm);
@@ -420,7 +443,7 @@ impl Tracer<'_> {
                 let q = density * probability;
                 // B: what scattering, led by any lane, would have found this light with.
                 let led = if CHROMATIC { path.rho * pdf * passing } else { pdf * passing };
-                let scattering = f64::from(led.reduce_add());
+                let scattering = if self.settings.scatter_samples > 0 { f64::from(led.reduce_add()) } else { 0.0 };
                 let weight = power_heuristic(q * path.rho_sum::<CHROMATIC>(), scattering);
                 path.add::<CHROMATIC>(value, weight / q);
             }

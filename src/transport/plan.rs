@@ -5,6 +5,7 @@
 //! on and is the proof. A *technique* is how an effect is computed; it changes noise and time,
 //! never the mean.
 
+use super::layers::LayerPlan;
 use crate::scene::census::Census;
 use crate::spectrum::Spectrum;
 use serde::Serialize;
@@ -16,15 +17,44 @@ pub enum Integrator {
     Path(PathSettings),
     /// The deterministic recursive tracer.
     Whitted(WhittedSettings),
+    /// The distance to the first surface, as light.
+    Depth,
+    /// Paths from the lights to the camera.
+    Light(LightSettings),
+    /// No light: a picture of layers alone.
+    Nothing,
+}
+
+/// Settings of the light tracer.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSettings {
+    /// Longest path, in segments from the light to the camera. `None`: no limit.
+    pub max_depth: Option<u32>,
+    /// Segments after which Russian roulette may end a path.
+    pub roulette_depth: u32,
+    /// Whether lights that the camera sees itself are left out.
+    pub hide_emitters: bool,
 }
 
 /// Settings of the path tracer.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PathSettings {
     /// Longest path, in segments: 1 sees lights only, 2 adds direct light. `None`: no limit.
     pub max_depth: Option<u32>,
     /// Segments after which Russian roulette may end a path.
     pub roulette_depth: u32,
+    /// Whether lights that the camera sees itself are left out.
+    pub hide_emitters: bool,
+    /// Shadow rays at the first surface; 0 leaves next-event estimation out everywhere.
+    pub light_samples: u32,
+    /// Scattered rays at the first surface; 0 leaves light met by scattering out everywhere.
+    pub scatter_samples: u32,
+}
+
+impl Default for PathSettings {
+    fn default() -> PathSettings {
+        PathSettings { max_depth: None, roulette_depth: 5, hide_emitters: false, light_samples: 1, scatter_samples: 1 }
+    }
 }
 
 /// Settings of the recursive tracer.
@@ -87,6 +117,8 @@ pub struct EffectPlan {
     pub depth_fog: bool,
     /// Every glass is computed as if it were dispersive.
     pub all_dispersive: bool,
+    /// Further channels of the picture.
+    pub layers: LayerPlan,
     /// What is simulated, for people.
     pub effects: Vec<Effect>,
     /// How it is computed, for people.
@@ -135,7 +167,7 @@ impl EffectPlan {
     /// Decides from the census of a scene.
     #[must_use]
     pub fn of(census: &Census, integrator: Integrator, mode: EffectMode) -> EffectPlan {
-        let path = matches!(integrator, Integrator::Path(_));
+        let path = !matches!(integrator, Integrator::Whitted(_));
         let mut effects: Vec<Effect> = Vec::new();
         // An effect of the scene: on if the scene has it, or if everything is forced on.
         let mut effect = |name, present: bool, here: String, absent: &str| {
@@ -222,6 +254,7 @@ impl EffectPlan {
             media: media && path,
             depth_fog,
             all_dispersive: mode == EffectMode::All,
+            layers: LayerPlan::default(),
             effects,
             techniques,
         }
@@ -233,7 +266,7 @@ mod tests {
     use super::*;
 
     fn path() -> Integrator {
-        Integrator::Path(PathSettings { max_depth: None, roulette_depth: 5 })
+        Integrator::Path(PathSettings::default())
     }
 
     #[test]

@@ -111,6 +111,7 @@ impl Bench {
         match &plan.integrator {
             Integrator::Path(settings) => path::radiance(scene, plan, settings, sampler, wavelengths, ray),
             Integrator::Whitted(settings) => whitted::radiance(scene, plan, settings, wavelengths, ray),
+            other => panic!("{other:?} has no light along a ray"),
         }
     }
 

@@ -119,6 +119,62 @@ pub enum Precision {
     Float,
 }
 
+/// What a pixel of a beauty file holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Base {
+    /// R, G, B, A.
+    #[default]
+    Rgba,
+    /// R, G, B.
+    Rgb,
+    /// X, Y, Z, A of a picture in XYZ.
+    Xyza,
+    /// X, Y, Z of a picture in XYZ.
+    Xyz,
+    /// Y and A of a picture in XYZ.
+    LuminanceAlpha,
+    /// Y of a picture in XYZ.
+    Luminance,
+    /// Nothing: layers only.
+    Nothing,
+}
+
+impl Base {
+    /// Whether the picture is to be resolved to XYZ.
+    #[must_use]
+    pub fn is_xyz(self) -> bool {
+        match self {
+            Base::Rgba | Base::Rgb | Base::Nothing => false,
+            Base::Xyza | Base::Xyz | Base::LuminanceAlpha | Base::Luminance => true,
+        }
+    }
+
+    /// Names of the colour channels and which planes they are.
+    fn colours(self) -> &'static [(&'static str, usize)] {
+        match self {
+            Base::Rgba | Base::Rgb => &[("R", 0), ("G", 1), ("B", 2)],
+            Base::Xyza | Base::Xyz => &[("X", 0), ("Y", 1), ("Z", 2)],
+            Base::LuminanceAlpha | Base::Luminance => &[("Y", 1)],
+            Base::Nothing => &[],
+        }
+    }
+
+    fn has_alpha(self) -> bool {
+        matches!(self, Base::Rgba | Base::Xyza | Base::LuminanceAlpha)
+    }
+}
+
+/// A further channel of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayerPlane {
+    /// With the layer, `nn.X`.
+    pub name: String,
+    /// The samples.
+    pub plane: Vec<f32>,
+    /// True for light, which follows the precision of the file; data are 32-bit floats.
+    pub light: bool,
+}
+
 /// Whether a beauty file says how noisy it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StandardError {
@@ -138,7 +194,7 @@ pub struct Beauty {
     pub note: Option<String>,
 }
 
-/// The file of a resolved picture: R, G, B, A.
+/// The file of a resolved picture, with `layers`.
 ///
 /// Half holds 11 significant bits between 2⁻¹⁴ and 65504. A picture with a finite value that would round to infinity,
 /// or so dim that the step of subnormal halves (2⁻²⁴) exceeds half's own relative precision at the mean
@@ -146,38 +202,46 @@ pub struct Beauty {
 #[must_use]
 pub fn beauty(
     image: &Image,
+    base: Base,
+    layers: Vec<LayerPlane>,
     colour: ColourEncoding,
     precision: Precision,
     error: StandardError,
     compression: Compression,
 ) -> Beauty {
-    let planes = [("R", &image.rgb[0]), ("G", &image.rgb[1]), ("B", &image.rgb[2]), ("A", &image.alpha)];
+    let colours: Vec<(&str, &Vec<f32>)> = base.colours().iter().map(|&(name, i)| (name, &image.rgb[i])).collect();
+    let light = layers.iter().filter(|layer| layer.light).map(|layer| &layer.plane);
     let note = match precision {
         Precision::Float => None,
-        Precision::Half => half_loses(&image.rgb),
+        Precision::Half => half_loses(colours.iter().map(|(_, plane)| *plane).chain(light)),
     };
     let wide = precision == Precision::Float || note.is_some();
-    let mut channels: Vec<(String, ChannelData)> = planes
-        .into_iter()
-        .map(|(name, plane)| {
-            let data = if wide {
-                ChannelData::F32(plane.clone())
-            } else {
-                ChannelData::F16(plane.iter().map(|&v| f16::from_f32(v)).collect())
-            };
-            (name.to_string(), data)
-        })
-        .collect();
-    if error == StandardError::Write {
-        for (name, plane) in ["stderr.R", "stderr.G", "stderr.B"].into_iter().zip(&image.standard_error) {
-            channels.push((name.to_string(), ChannelData::F32(plane.clone())));
+    let data = |plane: &[f32]| {
+        if wide {
+            ChannelData::F32(plane.to_vec())
+        } else {
+            ChannelData::F16(plane.iter().map(|&v| f16::from_f32(v)).collect())
         }
+    };
+    let mut channels: Vec<(String, ChannelData)> =
+        colours.iter().map(|&(name, plane)| (name.to_string(), data(plane))).collect();
+    if base.has_alpha() {
+        channels.push(("A".to_string(), data(&image.alpha)));
+    }
+    if error == StandardError::Write {
+        for &(name, i) in base.colours() {
+            channels.push((format!("stderr.{name}"), ChannelData::F32(image.standard_error[i].clone())));
+        }
+    }
+    for layer in layers {
+        let samples = if layer.light { data(&layer.plane) } else { ChannelData::F32(layer.plane) };
+        channels.push((layer.name, samples));
     }
     let exr = ExrImage {
         frame: image.frame,
         window: image.window,
         channels,
-        colour: Some(colour),
+        colour: (base != Base::Nothing).then_some(colour),
         attributes: Vec::new(),
         compression,
     };
@@ -185,8 +249,9 @@ pub fn beauty(
 }
 
 /// Why 16-bit floats cannot hold the planes, if they cannot.
-fn half_loses(planes: &[Vec<f32>; 3]) -> Option<String> {
-    let values = planes.iter().flatten();
+fn half_loses<'a>(planes: impl IntoIterator<Item = &'a Vec<f32>>) -> Option<String> {
+    let planes: Vec<&Vec<f32>> = planes.into_iter().collect();
+    let values = planes.into_iter().flatten();
     let too_large = values.clone().filter(|v| v.is_finite() && f16::from_f32(**v).is_infinite()).count();
     if too_large > 0 {
         let peak = values.filter(|v| v.is_finite()).fold(0.0f32, |peak, v| peak.max(v.abs()));
@@ -227,7 +292,15 @@ pub(super) mod tests {
     }
 
     fn precision_of(value: f32) -> (bool, Option<String>) {
-        let b = beauty(&image(value), rec709(), Precision::Half, StandardError::Leave, Compression::Zips);
+        let b = beauty(
+            &image(value),
+            Base::Rgba,
+            Vec::new(),
+            rec709(),
+            Precision::Half,
+            StandardError::Leave,
+            Compression::Zips,
+        );
         (matches!(b.exr.channels[0].1, ChannelData::F16(_)), b.note)
     }
 

@@ -152,7 +152,7 @@ fn words(e: ::exr::error::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{image, rec709};
-    use super::super::{Compression, Precision, StandardError, beauty, encode_exr};
+    use super::super::{Base, Compression, Precision, StandardError, beauty, encode_exr};
     use super::*;
 
     fn file(bytes: &[u8]) -> (tempfile::TempDir, std::path::PathBuf) {
@@ -174,7 +174,15 @@ mod tests {
     /// Every prefix of a file is an error and no panic.
     #[test]
     fn a_truncated_file_is_an_error() {
-        let beauty = beauty(&image(0.5), rec709(), Precision::Half, StandardError::Leave, Compression::Zips);
+        let beauty = beauty(
+            &image(0.5),
+            Base::Rgba,
+            Vec::new(),
+            rec709(),
+            Precision::Half,
+            StandardError::Leave,
+            Compression::Zips,
+        );
         let bytes = encode_exr(&beauty.exr).unwrap();
         for length in (0..bytes.len()).step_by(7) {
             let (_dir, path) = file(&bytes[..length]);
@@ -185,7 +193,15 @@ mod tests {
     /// A data window of 2²⁹ × 2²⁹ pixels in a file of a few hundred bytes.
     #[test]
     fn a_header_that_announces_too_much_is_refused() {
-        let beauty = beauty(&image(0.5), rec709(), Precision::Half, StandardError::Leave, Compression::Zips);
+        let beauty = beauty(
+            &image(0.5),
+            Base::Rgba,
+            Vec::new(),
+            rec709(),
+            Precision::Half,
+            StandardError::Leave,
+            Compression::Zips,
+        );
         let mut bytes = encode_exr(&beauty.exr).unwrap();
         let name = b"dataWindow\0box2i\0";
         let at = bytes.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4 + 8;

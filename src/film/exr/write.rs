@@ -250,12 +250,14 @@ fn attribute_bytes(value: &Attribute) -> (&'static str, Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{image, rec709};
-    use super::super::{Precision, StandardError, beauty, read_exr};
+    use super::super::{Base, Precision, StandardError, beauty, read_exr};
     use super::*;
 
     fn mixed(compression: Compression) -> ExrImage {
         let f = [1.5, -0.0, f32::NAN, f32::INFINITY, 1e-40, -3e38];
-        let mut exr = beauty(&image(0.25), rec709(), Precision::Half, StandardError::Write, compression).exr;
+        let mut exr =
+            beauty(&image(0.25), Base::Rgba, Vec::new(), rec709(), Precision::Half, StandardError::Write, compression)
+                .exr;
         exr.channels.push(("Z".to_string(), ChannelData::F32(f.to_vec())));
         exr.channels.push(("sampleCount".to_string(), ChannelData::U32(vec![0, 1, 2, 3, 1 << 20, 7])));
         exr.attributes = vec![

@@ -1,0 +1,86 @@
+//! How texture coordinates run over a surface.
+
+use super::shape::{Detail, SurfacePoint};
+use super::{Geometry, Hit, Scene};
+use crate::math::Ray;
+use glam::{DMat2, DVec2, DVec3};
+
+/// A frame of the tangent plane, and the derivatives of (u, v) along its axes, 1/m.
+#[derive(Clone, Copy, Debug)]
+pub struct UvGradient {
+    /// First axis, unit.
+    pub s: DVec3,
+    /// Second axis, unit; s × t is the normal.
+    pub t: DVec3,
+    /// Columns: ∂(u, v)/∂s and ∂(u, v)/∂t.
+    pub gradient: DMat2,
+}
+
+impl UvGradient {
+    /// ∂p/∂u and ∂p/∂v in metres; the axes themselves where u and v do not tell points apart (a pole, a mesh
+    /// without texture coordinates of its own).
+    #[must_use]
+    pub fn partials(&self) -> [DVec3; 2] {
+        let inverse = self.gradient.inverse();
+        if !inverse.is_finite() {
+            return [self.s, self.t];
+        }
+        [inverse.x_axis, inverse.y_axis].map(|d| self.s * d.x + self.t * d.y)
+    }
+
+    /// How much (u, v) changes over `offset` in the tangent plane.
+    #[must_use]
+    pub fn change(&self, offset: DVec3) -> DVec2 {
+        self.gradient * DVec2::new(offset.dot(self.s), offset.dot(self.t))
+    }
+}
+
+impl Scene {
+    /// The surface at a hit with its texture coordinates, whether or not anything on it varies.
+    #[must_use]
+    pub fn surface_with_texture(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        match &self.objects[hit.object as usize].geometry {
+            Geometry::Shape(shape) => shape.surface_with(ray.at(hit.t), hit.part as u8, Detail::Texture),
+            Geometry::Mesh(_) => self.surface(ray, hit),
+        }
+    }
+
+    /// How (u, v) runs over the surface at a hit.
+    ///
+    /// On shapes by central differences over 2⁻¹³ of their size: off by the square of that, 1e-8, for the curvature of
+    /// u and v, and by 1e-12 for their rounding. On triangles exactly.
+    #[must_use]
+    pub fn uv_gradient(&self, hit: &Hit, surface: &SurfacePoint) -> UvGradient {
+        let tangent = surface.tangent - surface.normal * surface.tangent.dot(surface.normal);
+        let s = tangent.normalize();
+        let t = surface.normal.cross(s);
+        let gradient = match &self.objects[hit.object as usize].geometry {
+            Geometry::Shape(shape) => {
+                let size = shape.bounds().map_or(surface.scale, |(low, high)| (high - low).max_element());
+                let step = size.max(f64::MIN_POSITIVE) / 8192.0;
+                let uv = |p: DVec3| shape.surface(p, hit.part as u8).uv;
+                let slope = |axis: DVec3| {
+                    let d = uv(surface.point + axis * step) - uv(surface.point - axis * step);
+                    // An angle may pass from one turn to none in between.
+                    let wrapped = DVec2::new(nearest_turn(d.x), nearest_turn(d.y));
+                    let d = if shape.is_closed() || d.abs().max_element() > 0.5 { wrapped } else { d };
+                    d / (2.0 * step)
+                };
+                DMat2::from_cols(slope(s), slope(t))
+            }
+            Geometry::Mesh(mesh) => {
+                let corner = |b1, b2| mesh.mesh.surface(hit.part, b1, b2);
+                let (a, b, c) = (corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0));
+                let flat = |d: DVec3| DVec2::new(d.dot(s), d.dot(t));
+                let edges = DMat2::from_cols(flat(b.point - a.point), flat(c.point - a.point));
+                DMat2::from_cols(b.uv - a.uv, c.uv - a.uv) * edges.inverse()
+            }
+        };
+        UvGradient { s, t, gradient }
+    }
+}
+
+/// `d` less the nearest whole number.
+fn nearest_turn(d: f64) -> f64 {
+    d - d.round()
+}

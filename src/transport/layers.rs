@@ -1,0 +1,297 @@
+//! What the further channels of a picture hold, sample by sample.
+//!
+//! Names of channels are those of OpenEXR layers: `name.R`, `name.X`, …; components of colour are linear in the
+//! primaries of the file.
+
+use super::plan::{EffectPlan, Integrator};
+use crate::math::Ray;
+use crate::optics::bsdf::Bsdf;
+use crate::scene::{Hit, Scene, SurfacePoint};
+use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+
+/// Something that the camera sees of the first surface that its ray meets; zero where there is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Distance along the ray, metres.
+    Depth,
+    /// Point, metres.
+    Position,
+    /// Texture coordinates.
+    Uv,
+    /// True normal, outward.
+    GeometricNormal,
+    /// Interpolated normal.
+    ShadingNormal,
+    /// ∂p/∂u, metres.
+    DpDu,
+    /// ∂p/∂v, metres.
+    DpDv,
+    /// ∂(u, v)/∂x: how much the texture coordinates change from this sample to the next to the right, where
+    /// samples stand 1/√n pixels apart.
+    DuvDx,
+    /// The same downward.
+    DuvDy,
+    /// What the material sends back of diffuse light, in the colour space of the file.
+    Albedo,
+    /// Number of the triangle or face, from 0.
+    Primitive,
+    /// Number of the shape, from 1.
+    Shape,
+}
+
+impl Quantity {
+    /// Names of its components, as OpenEXR layers have them.
+    #[must_use]
+    pub fn components(self) -> &'static [&'static str] {
+        match self {
+            Quantity::Depth => &["T"],
+            Quantity::Uv | Quantity::DuvDx | Quantity::DuvDy => &["U", "V"],
+            Quantity::Primitive | Quantity::Shape => &["I"],
+            Quantity::Albedo => &["R", "G", "B"],
+            Quantity::Position
+            | Quantity::GeometricNormal
+            | Quantity::ShadingNormal
+            | Quantity::DpDu
+            | Quantity::DpDv => &["X", "Y", "Z"],
+        }
+    }
+}
+
+/// How light is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Red, green, blue in the primaries of the file, and coverage.
+    Rgba,
+    /// CIE X, Y, Z.
+    Xyz,
+}
+
+/// Where the numbers of a group of channels come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The first surface.
+    Surface(Quantity),
+    /// The light of an integrator: that of the picture for `None`, else one of [`LayerPlan::integrators`].
+    Light(Option<usize>, Form),
+    /// A band of the scene.
+    Band(usize),
+}
+
+/// A group of channels.
+#[derive(Clone, Debug)]
+pub struct Layer {
+    /// Before the dot.
+    pub name: String,
+    /// Its numbers.
+    pub source: Source,
+    /// Whether the squares of the numbers are channels too, in a layer called `m2_` and the name.
+    pub squares: bool,
+}
+
+/// All further channels of a picture.
+#[derive(Clone, Debug)]
+pub struct LayerPlan {
+    /// In the order of the sums.
+    pub layers: Vec<Layer>,
+    /// Integrators besides the picture's own.
+    pub integrators: Vec<Integrator>,
+    /// From XYZ to the primaries of the file.
+    pub rgb_from_xyz: [[f64; 3]; 3],
+    /// How far apart samples of a pixel stand, in pixels: 1/√n.
+    pub sample_distance: f64,
+}
+
+impl Default for LayerPlan {
+    fn default() -> LayerPlan {
+        LayerPlan {
+            layers: Vec::new(),
+            integrators: Vec::new(),
+            rgb_from_xyz: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            sample_distance: 1.0,
+        }
+    }
+}
+
+/// A channel and what kind of number it holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// With the component, `nn.X`.
+    pub name: String,
+    /// True for light, false for data.
+    pub light: bool,
+}
+
+impl LayerPlan {
+    /// The channels in the order of the sums.
+    #[must_use]
+    pub fn channels(&self) -> Vec<Channel> {
+        let mut all = Vec::new();
+        for layer in &self.layers {
+            let squares: &[&str] = if layer.squares { &["", "m2_"] } else { &[""] };
+            for prefix in squares {
+                let name = format!("{prefix}{}", layer.name);
+                let light = prefix.is_empty();
+                match layer.source {
+                    Source::Surface(quantity) => {
+                        let names = quantity.components().iter().map(|c| format!("{name}.{c}"));
+                        let light = light && quantity == Quantity::Albedo;
+                        all.extend(names.map(|name| Channel { name, light }));
+                    }
+                    Source::Light(_, form) => {
+                        let components: &[&str] = match form {
+                            Form::Rgba => &["R", "G", "B", "A"],
+                            Form::Xyz => &["X", "Y", "Z"],
+                        };
+                        all.extend(components.iter().map(|c| Channel { name: format!("{name}.{c}"), light }));
+                    }
+                    Source::Band(_) => all.push(Channel { name, light }),
+                }
+            }
+        }
+        all
+    }
+}
+
+/// One sample of light, for layers.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// Radiance.
+    pub radiance: Lanes,
+    /// Coverage.
+    pub alpha: f32,
+}
+
+/// The numbers of one sample, appended to `values`. `light` gives the light of an integrator, by number.
+#[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
+pub fn append(
+    scene: &Scene,
+    plan: &EffectPlan,
+    wavelengths: &SampledWavelengths,
+    ray: &Ray,
+    neighbours: impl Fn(DVec2) -> Ray,
+    own: Seen,
+    light: impl Fn(&Integrator) -> Seen,
+    values: &mut Vec<f32>,
+) {
+    let layers = &plan.layers;
+    let others: Vec<Seen> = layers.integrators.iter().map(light).collect();
+    let looks = layers.layers.iter().any(|layer| matches!(layer.source, Source::Surface(_)));
+    let first = if looks { First::met(scene, ray) } else { None };
+    for layer in &layers.layers {
+        let start = values.len();
+        match layer.source {
+            Source::Surface(quantity) => match &first {
+                Some(first) => first.append(scene, plan, wavelengths, ray, &neighbours, quantity, values),
+                None => values.extend(quantity.components().iter().map(|_| 0.0)),
+            },
+            Source::Light(of, form) => {
+                let seen = of.map_or(own, |i| others[i]);
+                let xyz = observer::xyz(seen.radiance, wavelengths);
+                match form {
+                    Form::Xyz => values.extend(xyz),
+                    Form::Rgba => {
+                        values.extend(rgb(&layers.rgb_from_xyz, xyz));
+                        values.push(seen.alpha);
+                    }
+                }
+            }
+            Source::Band(i) => {
+                let counted = own.radiance * wavelengths.inv_pdf * scene.bands[i].response.eval(wavelengths.nm);
+                values.push(counted.reduce_add() / LANES as f32);
+            }
+        }
+        if layer.squares {
+            for i in start..values.len() {
+                values.push(values[i] * values[i]);
+            }
+        }
+    }
+}
+
+fn rgb(matrix: &[[f64; 3]; 3], xyz: [f32; 3]) -> [f32; 3] {
+    let xyz = xyz.map(f64::from);
+    matrix.map(|row| (row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2]) as f32)
+}
+
+/// The first surface that a camera ray meets.
+struct First {
+    hit: Hit,
+    surface: SurfacePoint,
+}
+
+impl First {
+    fn met(scene: &Scene, ray: &Ray) -> Option<First> {
+        let hit = scene.closest(ray, scene.camera.reach(ray))?;
+        Some(First { hit, surface: scene.surface_with_texture(ray, &hit) })
+    }
+
+    fn append(
+        &self,
+        scene: &Scene,
+        plan: &EffectPlan,
+        wavelengths: &SampledWavelengths,
+        ray: &Ray,
+        neighbours: &impl Fn(DVec2) -> Ray,
+        quantity: Quantity,
+        values: &mut Vec<f32>,
+    ) {
+        let surface = &self.surface;
+        let three = |v: DVec3| v.to_array().map(|x| x as f32);
+        match quantity {
+            Quantity::Depth => values.push(self.hit.t as f32),
+            Quantity::Position => values.extend(three(surface.point)),
+            Quantity::Uv => values.extend(surface.uv.to_array().map(|x| x as f32)),
+            Quantity::GeometricNormal => values.extend(three(surface.normal)),
+            Quantity::ShadingNormal => values.extend(three(surface.shading_normal)),
+            Quantity::DpDu | Quantity::DpDv => {
+                let [du, dv] = scene.uv_gradient(&self.hit, surface).partials();
+                values.extend(three(if quantity == Quantity::DpDu { du } else { dv }));
+            }
+            Quantity::DuvDx | Quantity::DuvDy => {
+                let step = if quantity == Quantity::DuvDx { DVec2::X } else { DVec2::Y };
+                let other = neighbours(step * plan.layers.sample_distance);
+                let change = self.uv_change(scene, &other);
+                values.extend(change.to_array().map(|x| x as f32));
+            }
+            Quantity::Albedo => {
+                let albedo = self.albedo(scene, plan, wavelengths.nm, ray);
+                let xyz = observer::xyz(albedo, wavelengths);
+                values.extend(rgb(&plan.layers.rgb_from_xyz, xyz));
+            }
+            Quantity::Primitive => values.push(self.hit.part as f32),
+            Quantity::Shape => values.push((self.hit.object + 1) as f32),
+        }
+    }
+
+    /// How much u and v change from this point to where another ray meets the tangent plane.
+    fn uv_change(&self, scene: &Scene, other: &Ray) -> DVec2 {
+        let n = self.surface.normal;
+        let distance = (self.surface.point - other.origin).dot(n) / other.direction.dot(n);
+        let change = scene.uv_gradient(&self.hit, &self.surface).change(other.at(distance) - self.surface.point);
+        if change.is_finite() { change } else { DVec2::ZERO }
+    }
+
+    /// The part of light from all around that comes back diffusely.
+    fn albedo(&self, scene: &Scene, plan: &EffectPlan, nm: Lanes, ray: &Ray) -> Lanes {
+        let surface = &self.surface;
+        let object = &scene.objects[self.hit.object as usize];
+        let material = &scene.materials[object.material as usize];
+        let bsdf = material.bsdf(&self.hit.texture_point(surface), nm, plan.all_dispersive);
+        match &bsdf {
+            Bsdf::Diffuse { reflectance } => *reflectance,
+            Bsdf::Plastic(plastic) => plastic.base.reflectance,
+            Bsdf::RoughPlastic(plastic) => plastic.base.reflectance,
+            other => {
+                // As if the light came along the normal.
+                let frame = crate::math::Frame::from_normal(surface.shading_normal);
+                let mut wo = frame.to_local(-ray.direction);
+                if material.two_sided {
+                    wo.z = wo.z.abs();
+                }
+                other.eval(wo, DVec3::Z).f * PI as f32
+            }
+        }
+    }
+}
