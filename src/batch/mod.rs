@@ -30,6 +30,8 @@ use std::time::Instant;
 pub struct Overrides {
     /// `--set KEY=VALUE`, in order.
     pub set: Vec<(String, String)>,
+    /// `-D NAME=VALUE`: parameters of Mitsuba scenes.
+    pub define: Vec<(String, String)>,
     /// Where pictures go: a directory, or for a single scene a file name that ends in `.exr`.
     pub output: Option<PathBuf>,
     /// Only the scenes with these names; all where empty.
@@ -81,7 +83,11 @@ pub fn entries(path: &Path, overrides: &Overrides) -> Result<Vec<BatchEntry>> {
         }
     }
     let wanted = |e: &&BatchEntry| overrides.scenes.is_empty() || overrides.scenes.contains(&e.name);
-    Ok(all.iter().filter(wanted).cloned().collect())
+    let mut entries: Vec<BatchEntry> = all.iter().filter(wanted).cloned().collect();
+    for entry in &mut entries {
+        entry.define(&overrides.define)?;
+    }
+    Ok(entries)
 }
 
 /// Reads, compiles and plans a scene.
@@ -319,7 +325,8 @@ fn render_and_write(
 
     let base = base(description);
     let space = if base.is_xyz() { ColourSpace::Xyz } else { colour_space(description.output.colour) };
-    let image = resolve::resolve(&frame.film, None, &space.matrix_from_xyz());
+    let sensitivity = description.image.sensitivity;
+    let image = resolve::resolve(&frame.film, None, &space.matrix_from_xyz().map(|row| row.map(|x| x * sensitivity)));
     report.pixel_hash = pixel_hash(&image);
     let written = Instant::now();
     write_exr(&exr_path, prepared, &frame, &image, base, space, report)?;

@@ -39,7 +39,7 @@ enum Verb {
 /// What both `render` and `plan` take.
 #[derive(Debug, Args)]
 struct SceneArguments {
-    /// Batch or scene, YAML
+    /// Batch or scene, YAML, or a Mitsuba scene, XML
     file: PathBuf,
     /// Only the scene of this name (may be repeated)
     #[arg(long = "scene", value_name = "NAME")]
@@ -47,6 +47,9 @@ struct SceneArguments {
     /// Set a field of each scene, as in `--set render.seed=3` (may be repeated)
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
+    /// Give a parameter of a Mitsuba scene a value, as in `-D res=256` (may be repeated)
+    #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = name_value)]
+    define: Vec<(String, String)>,
     /// Samples a pixel
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
@@ -134,6 +137,13 @@ fn key_value(text: &str) -> std::result::Result<(String, String), String> {
     }
 }
 
+fn name_value(text: &str) -> std::result::Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() => Ok((name.trim().to_owned(), value.to_owned())),
+        _ => Err("expected NAME=VALUE, for example res=256".into()),
+    }
+}
+
 impl SceneArguments {
     fn overrides(&self, output: Option<PathBuf>) -> crate::batch::Overrides {
         let mut set = self.set.clone();
@@ -143,7 +153,7 @@ impl SceneArguments {
         if let Some(seed) = self.seed {
             set.push(("render.seed".into(), seed.to_string()));
         }
-        crate::batch::Overrides { set, output, scenes: self.scenes.clone() }
+        crate::batch::Overrides { set, define: self.define.clone(), output, scenes: self.scenes.clone() }
     }
 }
 

@@ -9,6 +9,7 @@ use serde::de::IgnoredAny;
 use super::decode::decode;
 use super::edit::{self, Setting};
 use super::fault::Checker;
+use super::mitsuba;
 use super::node::{Entry, Node, Place, Sources, Value, quote};
 use super::path::At;
 use super::scene::SceneDescription;
@@ -84,6 +85,8 @@ pub struct BatchEntry {
     /// The batch's `output` and `render`, laid over the scene's.
     layers: Vec<(&'static str, Node)>,
     settings: Vec<Setting>,
+    /// Parameters of a Mitsuba scene, by name.
+    defines: Vec<(String, String)>,
     /// What the places of the above refer to.
     sources: Sources,
 }
@@ -96,19 +99,14 @@ pub struct BatchEntry {
 /// [`Error::Input`] if the file cannot be read, [`Error::Config`] if it is not YAML or not a batch.
 pub fn load(path: &Path) -> Result<Document> {
     let mut sources = Sources::default();
+    if mitsuba::is_xml(path) {
+        return Ok(Document::Scene(BatchEntry::alone(path)?));
+    }
     let root = edit::read_file(path, &mut sources)?;
     if root.get("scenes").is_some() {
         return Ok(Document::Batch(Batch::of_tree(&root, &sources)?));
     }
-    let name = stem(path).ok_or_else(|| Error::Config(format!("{}: expected a file name", path.display())))?;
-    Ok(Document::Scene(BatchEntry {
-        name,
-        path: path.to_path_buf(),
-        place: None,
-        layers: Vec::new(),
-        settings: Vec::new(),
-        sources: Sources::default(),
-    }))
+    Ok(Document::Scene(BatchEntry::alone(path)?))
 }
 
 fn stem(path: &Path) -> Option<String> {
@@ -133,6 +131,25 @@ struct WrittenEntry {
     /// Only that it is a map: the values are taken from the tree.
     #[serde(rename = "set")]
     _set: Option<BTreeMap<String, IgnoredAny>>,
+    #[serde(default)]
+    define: BTreeMap<String, Define>,
+}
+
+/// The value of a parameter, as it would stand in XML.
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Define {
+    Number(f64),
+    Name(String),
+}
+
+impl Define {
+    fn text(self) -> String {
+        match self {
+            Define::Number(value) => value.to_string(),
+            Define::Name(text) => text,
+        }
+    }
 }
 
 impl Batch {
@@ -174,8 +191,16 @@ impl Batch {
                     }
                 }
             }
+            let xml = mitsuba::is_xml(&entry.file);
+            checker.require(
+                xml || entry.define.is_empty(),
+                at.key("define"),
+                "parameters only where the file is a Mitsuba scene (.xml)",
+                entry.file.display(),
+            );
             entries.push(BatchEntry {
                 name,
+                defines: entry.define.into_iter().map(|(name, value)| (name, value.text())).collect(),
                 path: entry.file.0,
                 place: node.get("file").map(|file| file.place),
                 layers: layers.clone(),
@@ -198,6 +223,37 @@ fn check_name(name: &str, at: At<'_>, checker: &mut Checker<'_>) {
 }
 
 impl BatchEntry {
+    /// A scene that no batch names.
+    fn alone(path: &Path) -> Result<BatchEntry> {
+        let name = stem(path).ok_or_else(|| Error::Config(format!("{}: expected a file name", path.display())))?;
+        Ok(BatchEntry {
+            name,
+            path: path.to_path_buf(),
+            place: None,
+            layers: Vec::new(),
+            settings: Vec::new(),
+            defines: Vec::new(),
+            sources: Sources::default(),
+        })
+    }
+
+    /// Gives values to parameters of the scene, the `-D NAME=VALUE` of the command line; they win over those of a
+    /// batch.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where the scene is YAML, which has no parameters.
+    pub fn define(&mut self, defines: &[(String, String)]) -> Result<()> {
+        if let (Some((name, value)), false) = (defines.first(), mitsuba::is_xml(&self.path)) {
+            let path = self.path.display();
+            return Err(Error::Config(format!(
+                "-D {name}={value}: expected a Mitsuba scene (.xml), found {path}; --set changes fields of YAML"
+            )));
+        }
+        self.defines.retain(|(name, _)| !defines.iter().any(|(other, _)| other == name));
+        self.defines.extend(defines.iter().cloned());
+        Ok(())
+    }
+
     /// Reads the scene, with what the batch and then the command line change in it.
     ///
     /// `overrides` are the key and value of each `--set KEY=VALUE`; the value is YAML.
@@ -207,7 +263,11 @@ impl BatchEntry {
     /// [`Error::Config`] with every fault of the description.
     pub fn scene(&self, overrides: &[(String, String)]) -> Result<SceneDescription> {
         let mut sources = self.sources.clone();
-        let mut root = edit::read_file(&self.path, &mut sources).map_err(|error| match (error, self.place) {
+        let read = match mitsuba::is_xml(&self.path) {
+            true => mitsuba::read(&self.path, &self.defines, &mut sources),
+            false => edit::read_file(&self.path, &mut sources),
+        };
+        let mut root = read.map_err(|error| match (error, self.place) {
             (Error::Input { path, message }, Some(place)) => {
                 Error::Input { path, message: format!("{message}; it is named at {}", sources.describe(place)) }
             }
@@ -327,7 +387,7 @@ mod tests {
             assert_eq!(error.exit_code(), 2);
             assert_eq!(
                 in_words(&error, directory),
-                "DIR/bad.yaml:1:9: camera: expected a map with fields among origin, target, up, fov_deg, fov_axis, \
+                "DIR/bad.yaml:1:9: camera: expected a map with fields among origin, target, up, to_world, fov_deg, fov_axis, \
                  orthographic_height, lens, clip, principal_point, found 3\n\
                  DIR/none.yaml: cannot be read: No such file or directory (os error 2); it is named at DIR/batch.yaml:1:54"
             );
@@ -377,7 +437,7 @@ mod tests {
         );
         assert_eq!(
             refusal("scenes: [{fil: a.yaml}]"),
-            "DIR/batch.yaml:1:11: scenes[0].fil: expected one of file, name, set, found \"fil\"; did you mean \"file\"?"
+            "DIR/batch.yaml:1:11: scenes[0].fil: expected one of file, name, set, define, found \"fil\"; did you mean \"file\"?"
         );
         assert_eq!(
             refusal("scenes: [{file: a.yaml, set: {'shapes[x]': 1}}]"),
@@ -394,8 +454,10 @@ mod tests {
     fn the_reference_batch_is_a_batch() {
         with(&[("batch.yaml", &super::super::testing::reference("batch"))], |directory| {
             let document = load(&directory.join("batch.yaml")).unwrap();
-            assert_eq!(document.entries().len(), 2);
+            assert_eq!(document.entries().len(), 3);
             assert_eq!(document.entries()[1].settings.len(), 4);
+            let defines = [("integrator", "path"), ("res", "64")].map(|(name, value)| (name.into(), value.into()));
+            assert_eq!(document.entries()[2].defines, defines);
         });
     }
 }

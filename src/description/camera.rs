@@ -1,23 +1,20 @@
 //! The camera and the picture it takes, as they are written.
 
+use glam::DMat3;
 use serde::Deserialize;
 
 use super::fault::Checker;
 use super::material::given_fields;
 use super::path::At;
-use super::shape::parallel;
-use super::spectrum::{Role, Spectrum, Vec3};
+use super::shape::{TransformStep, is_similarity, parallel};
+use super::spectrum::{Role, Spectrum, Vec3, one};
 
 /// `camera: {origin: [0, 3.2, 12], target: [0, 1.1, 0], fov_deg: 38}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "WrittenCamera")]
 pub struct Camera {
-    /// Where it stands, metres.
-    pub origin: Vec3,
-    /// What it looks at, metres.
-    pub target: Vec3,
-    /// What is up in the picture; default `[0, 1, 0]`.
-    pub up: Vec3,
+    /// Where it stands and how it is turned.
+    pub pose: Pose,
     /// How the scene falls on the picture.
     pub projection: Projection,
     /// Depth of field; default none.
@@ -49,6 +46,24 @@ impl Default for Clip {
 
 fn endless() -> f64 {
     f64::INFINITY
+}
+
+/// Where a camera stands and how it is turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pose {
+    /// `origin: [0, 3.2, 12], target: [0, 1.1, 0], up: [0, 1, 0]`
+    LookAt {
+        /// Where it stands, metres.
+        origin: Vec3,
+        /// What it looks at, metres.
+        target: Vec3,
+        /// What is up in the picture; default `[0, 1, 0]`.
+        up: Vec3,
+    },
+    /// `to_world: [[…4], …4]`: rows of the matrix on column vectors from the camera, which looks along
+    /// +z with +x to the right and +y up, to the world. It may mirror; an orthographic camera's may also
+    /// stretch the picture.
+    ToWorld([[f64; 4]; 4]),
 }
 
 /// How the scene falls on the picture.
@@ -98,10 +113,10 @@ pub struct Lens {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct WrittenCamera {
-    origin: Vec3,
-    target: Vec3,
-    #[serde(default = "up")]
-    up: Vec3,
+    origin: Option<Vec3>,
+    target: Option<Vec3>,
+    up: Option<Vec3>,
+    to_world: Option<[[f64; 4]; 4]>,
     fov_deg: Option<f64>,
     fov_axis: Option<FovAxis>,
     orthographic_height: Option<f64>,
@@ -112,16 +127,35 @@ struct WrittenCamera {
     principal_point: [f64; 2],
 }
 
-fn up() -> Vec3 {
-    [0.0, 1.0, 0.0]
-}
-
 impl TryFrom<WrittenCamera> for Camera {
     type Error = String;
 
     fn try_from(written: WrittenCamera) -> Result<Camera, String> {
-        let WrittenCamera { origin, target, up, fov_deg, fov_axis, orthographic_height, lens, clip, principal_point } =
-            written;
+        let WrittenCamera {
+            origin,
+            target,
+            up,
+            to_world,
+            fov_deg,
+            fov_axis,
+            orthographic_height,
+            lens,
+            clip,
+            principal_point,
+        } = written;
+        let pose = match (origin, target, to_world) {
+            (Some(origin), Some(target), None) => Pose::LookAt { origin, target, up: up.unwrap_or([0.0, 1.0, 0.0]) },
+            (None, None, Some(to_world)) if up.is_none() => Pose::ToWorld(to_world),
+            (origin, target, to_world) => {
+                let given = [
+                    ("origin", origin.is_some()),
+                    ("target", target.is_some()),
+                    ("up", up.is_some()),
+                    ("to_world", to_world.is_some()),
+                ];
+                return Err(format!("expected either origin and target, or to_world, found {}", given_fields(&given)));
+            }
+        };
         let projection = match (fov_deg, fov_axis, orthographic_height) {
             (Some(fov_deg), fov_axis, None) => {
                 Projection::Perspective { fov_deg, fov_axis: fov_axis.unwrap_or_default() }
@@ -136,7 +170,7 @@ impl TryFrom<WrittenCamera> for Camera {
                 return Err(format!("expected either fov_deg or orthographic_height, found {}", given_fields(&given)));
             }
         };
-        Ok(Camera { origin, target, up, projection, lens, clip, principal_point })
+        Ok(Camera { pose, projection, lens, clip, principal_point })
     }
 }
 
@@ -155,6 +189,9 @@ pub struct Image {
     pub filter: Filter,
     /// The part that is rendered; default all.
     pub crop: Option<Crop>,
+    /// Factor on the picture; default 1.
+    #[serde(default = "one")]
+    pub sensitivity: f64,
     /// Spectral bands that the OpenEXR file holds instead of colour; default none.
     #[serde(default)]
     pub bands: Vec<Band>,
@@ -176,7 +213,14 @@ fn side() -> u32 {
 
 impl Default for Image {
     fn default() -> Image {
-        Image { width: side(), height: side(), filter: Filter::default(), crop: None, bands: Vec::new() }
+        Image {
+            width: side(),
+            height: side(),
+            filter: Filter::default(),
+            crop: None,
+            sensitivity: 1.0,
+            bands: Vec::new(),
+        }
     }
 }
 
@@ -253,21 +297,45 @@ pub struct Crop {
 /// The longest side of a picture, pixels.
 pub const MAX_SIDE: u32 = 65536;
 
+impl Pose {
+    fn check(self, projection: Projection, at: At<'_>, checker: &mut Checker<'_>) {
+        match self {
+            Pose::LookAt { origin, target, up } => {
+                let along = [0, 1, 2].map(|i| target[i] - origin[i]);
+                checker.direction(at.key("up"), up);
+                if target == origin {
+                    let found = format_args!("{target:?}");
+                    checker.require(false, at.key("target"), "a point other than the origin", found);
+                } else if up != [0.0; 3] && parallel(along, up) {
+                    checker.require(
+                        false,
+                        at.key("up"),
+                        "a direction across the line of sight",
+                        format_args!("{up:?}, which is parallel to it"),
+                    );
+                }
+            }
+            Pose::ToWorld(rows) => {
+                let at = at.key("to_world");
+                let before = checker.count();
+                TransformStep::Matrix(rows).check(at, checker);
+                let linear = DMat3::from_mat4(TransformStep::Matrix(rows).matrix());
+                if let (Projection::Perspective { .. }, true) = (projection, checker.count() == before) {
+                    let rigid = is_similarity(linear) && (linear.determinant().abs() - 1.0).abs() < RIGID_TOLERANCE;
+                    let found = "a matrix that scales or shears";
+                    checker.require(rigid, at, "moves, turns and mirrors for a perspective", found);
+                }
+            }
+        }
+    }
+}
+
+/// What the volume of a rigid motion, written with four significant digits, may be off by.
+const RIGID_TOLERANCE: f64 = 3e-3;
+
 impl Camera {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
-        let along = [0, 1, 2].map(|i| self.target[i] - self.origin[i]);
-        checker.direction(at.key("up"), self.up);
-        if self.target == self.origin {
-            let found = format_args!("{:?}", self.target);
-            checker.require(false, at.key("target"), "a point other than the origin", found);
-        } else if self.up != [0.0; 3] && parallel(along, self.up) {
-            checker.require(
-                false,
-                at.key("up"),
-                "a direction across the line of sight",
-                format_args!("{:?}, which is parallel to it", self.up),
-            );
-        }
+        self.pose.check(self.projection, at, checker);
         match self.projection {
             Projection::Perspective { fov_deg, fov_axis: _ } => {
                 let within = fov_deg > 0.0 && fov_deg < 180.0;
@@ -290,6 +358,7 @@ impl Image {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         checker.whole_between(at.key("width"), self.width, 1, MAX_SIDE);
         checker.whole_between(at.key("height"), self.height, 1, MAX_SIDE);
+        checker.positive(at.key("sensitivity"), self.sensitivity);
         let filter = at.key("filter");
         match self.filter {
             Filter::Box | Filter::Mitchell { .. } | Filter::CatmullRom => {}

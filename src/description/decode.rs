@@ -400,7 +400,7 @@ mod tests {
     fn an_unknown_field_is_told_with_its_near_miss() {
         assert_eq!(
             faults("image: {widht: 3}"),
-            "dir/s.yaml:2:9: image.widht: expected one of width, height, filter, crop, bands, found \"widht\"; did you mean \"width\"?"
+            "dir/s.yaml:2:9: image.widht: expected one of width, height, filter, crop, sensitivity, bands, found \"widht\"; did you mean \"width\"?"
         );
         assert_eq!(
             faults("materials:\n  a: {boundary: {thick: 1}}"),
@@ -422,14 +422,17 @@ mod tests {
         assert_eq!(
             faults("shapes:\n- sphere: {radius: 1, emission: {textur: a}}"),
             "dir/s.yaml:3:34: shapes[0].sphere.emission.textur: expected one of a number, rgb, table, file, blackbody, \
-             illuminant, lines, scaled, texture, found \"textur\"; did you mean \"texture\"?"
+             illuminant, lines, scaled, zero_outside, texture, found \"textur\"; did you mean \"texture\"?"
         );
     }
 
     #[test]
     fn a_wrong_type_is_told_in_plain_words() {
         let cases = [
-            ("image: 3", "2:8: image: expected a map with fields among width, height, filter, crop, bands, found 3"),
+            (
+                "image: 3",
+                "2:8: image: expected a map with fields among width, height, filter, crop, sensitivity, bands, found 3",
+            ),
             (
                 "image: {width: abc}",
                 "2:16: image.width: expected a whole number from 0 to 4294967295, found the text \"abc\"",
@@ -477,7 +480,7 @@ mod tests {
         assert_eq!(
             sphere("radius: 1, emission: true"),
             "dir/s.yaml:3:33: shapes[0].sphere.emission: expected one of a number, rgb, table, file, blackbody, \
-             illuminant, lines, scaled, texture, found true"
+             illuminant, lines, scaled, zero_outside, texture, found true"
         );
     }
 

@@ -36,7 +36,7 @@ pub(crate) fn read_bytes_as(bytes: &[u8], path: &Path, sources: &mut Sources) ->
 }
 
 /// At most one byte more than may be read.
-fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+pub(crate) fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes)?;
     Ok(bytes)

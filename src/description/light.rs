@@ -176,17 +176,74 @@ pub enum Medium {
 
 /// `homogeneous: {absorption: 0.1, scattering: 0.5, phase: {hg: 0.5}}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "WrittenHomogeneous")]
 pub struct HomogeneousMedium {
-    /// σₐ, m⁻¹; default 0.
-    #[serde(default = "nothing")]
-    pub absorption: Spectrum,
-    /// σₛ, m⁻¹; default 0.
-    #[serde(default = "nothing")]
-    pub scattering: Spectrum,
+    /// What it does to light.
+    pub coefficients: Coefficients,
+    /// Factor on all coefficients; default 1.
+    pub scale: f64,
     /// Directions of scattered light; default `isotropic`.
-    #[serde(default)]
     pub phase: Phase,
+}
+
+/// The coefficients of a medium.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Coefficients {
+    /// `absorption: 0.1, scattering: 0.5`
+    Parts {
+        /// σₐ, m⁻¹; default 0.
+        absorption: Spectrum,
+        /// σₛ, m⁻¹; default 0.
+        scattering: Spectrum,
+    },
+    /// `extinction: 0.6, albedo: 0.8`
+    Whole {
+        /// σₜ, m⁻¹.
+        extinction: Spectrum,
+        /// σₛ / σₜ, 0 to 1.
+        albedo: Spectrum,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenHomogeneous {
+    absorption: Option<Spectrum>,
+    scattering: Option<Spectrum>,
+    extinction: Option<Spectrum>,
+    albedo: Option<Spectrum>,
+    #[serde(default = "one")]
+    scale: f64,
+    #[serde(default)]
+    phase: Phase,
+}
+
+impl TryFrom<WrittenHomogeneous> for HomogeneousMedium {
+    type Error = String;
+
+    fn try_from(written: WrittenHomogeneous) -> Result<HomogeneousMedium, String> {
+        let WrittenHomogeneous { absorption, scattering, extinction, albedo, scale, phase } = written;
+        let coefficients = match (absorption, scattering, extinction, albedo) {
+            (None, None, Some(extinction), Some(albedo)) => Coefficients::Whole { extinction, albedo },
+            (absorption, scattering, None, None) => Coefficients::Parts {
+                absorption: absorption.unwrap_or_else(nothing),
+                scattering: scattering.unwrap_or_else(nothing),
+            },
+            (absorption, scattering, extinction, albedo) => {
+                let given = [
+                    ("absorption", absorption.is_some()),
+                    ("scattering", scattering.is_some()),
+                    ("extinction", extinction.is_some()),
+                    ("albedo", albedo.is_some()),
+                ];
+                return Err(format!(
+                    "expected either absorption and scattering, or extinction and albedo, found {}",
+                    given_fields(&given)
+                ));
+            }
+        };
+        Ok(HomogeneousMedium { coefficients, scale, phase })
+    }
 }
 
 pub(crate) fn nothing() -> Spectrum {
@@ -361,8 +418,17 @@ impl Medium {
         match self {
             Medium::Homogeneous(medium) => {
                 let at = at.key("homogeneous");
-                medium.absorption.check(Role::Coefficient, at.key("absorption"), checker);
-                medium.scattering.check(Role::Coefficient, at.key("scattering"), checker);
+                match &medium.coefficients {
+                    Coefficients::Parts { absorption, scattering } => {
+                        absorption.check(Role::Coefficient, at.key("absorption"), checker);
+                        scattering.check(Role::Coefficient, at.key("scattering"), checker);
+                    }
+                    Coefficients::Whole { extinction, albedo } => {
+                        extinction.check(Role::Coefficient, at.key("extinction"), checker);
+                        albedo.check(Role::Reflectance, at.key("albedo"), checker);
+                    }
+                }
+                checker.not_negative(at.key("scale"), medium.scale);
                 if let Phase::Hg(g) = medium.phase {
                     let within = g.abs() < 1.0;
                     checker.require(within, at.key("phase").key("hg"), "a number between -1 and 1", g);
@@ -462,7 +528,8 @@ mod tests {
             );
         }
         let Medium::Homogeneous(bare) = &scene("media: {m: {homogeneous: {phase: rayleigh}}}").media["m"];
-        assert_eq!((&bare.absorption, &bare.scattering, bare.phase), (&nothing(), &nothing(), Phase::Rayleigh));
+        let none = Coefficients::Parts { absorption: nothing(), scattering: nothing() };
+        assert_eq!((&bare.coefficients, bare.scale, bare.phase), (&none, 1.0, Phase::Rayleigh));
     }
 
     #[test]

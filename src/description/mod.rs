@@ -21,6 +21,8 @@
 //!   origin: [0, 3.2, 12]
 //!   target: [0, 1.1, 0]
 //!   up: [0, 1, 0]                   # default
+//!                                   # or, for the three, to_world: four rows of a matrix: the camera looks along +z,
+//!                                   # +x is right and +y up in the picture
 //!   fov_deg: 38                     # either this, between 0 and 180, or orthographic_height: 4 (m)
 //!   fov_axis: x                     # x (default), y, smaller, larger, diagonal
 //!   lens: {radius: 0.05, focus_distance: 10}    # default none
@@ -36,6 +38,7 @@
 //!   crop: {x: 0, y: 0, width: 10, height: 10}   # default all; x and y default 0
 //!   bands: []                       # ~ the OpenEXR file holds bands of the spectrum instead of colour:
 //!                                   #   {name: blue, response: SPECTRUM}: ∫ radiance · response dλ, nm
+//!   sensitivity: 1                  # default; factor on the picture
 //! integrator: path                  # default; or, with their defaults,
 //!                                   #   {path: {max_depth: null, roulette_depth: 5, hide_emitters: false,
 //!                                   #           light_samples: 1, scatter_samples: 1}},
@@ -98,6 +101,9 @@
 //!   smoke:
 //!     homogeneous: {absorption: 0.1, scattering: {rgb: [0.2, 0.3, 0.4]}, phase: {hg: 0.5}}
 //!                                                # m⁻¹, ~ 0; ~ isotropic, rayleigh, |g| < 1
+//!   mist: {homogeneous: {extinction: 2, albedo: 0.9, scale: 1}}
+//!                                                # m⁻¹ and scattering / extinction, in place of the former two;
+//!                                                # ~ scale, a factor on all coefficients, and phase
 //! medium: smoke                     # what the camera is in; default none
 //! fog: {colour: 0.8, start: 5, end: 40}
 //!                                   # or {colour, density: 0.1, falloff: exp}: exp (default), exp2
@@ -167,9 +173,11 @@
 //! - {illuminant: {name: D65, scale: 3}}
 //! - {lines: [{nm: 589, power: 1, width_nm: 1}]}           # defaults but nm
 //! - {scaled: {by: 2, of: {illuminant: D65}}}
+//! - {zero_outside: {table: [[400, 0.1], [700, 0.9]]}}     # or file
 //! ```
 //! A reflectance lies in 0 to 1; an emission and a coefficient (η, k, absorption, scattering) is 0 or
-//! more. `blackbody`, `illuminant` and `lines` are emissions only. Where a texture is allowed it is
+//! more. Beyond its ends a table or file of emission is 0; a reflectance or coefficient keeps its last value, unless
+//! `zero_outside`. `blackbody`, `illuminant` and `lines` are emissions only. Where a texture is allowed it is
 //! written `{texture: name}`.
 //!
 //! # Refractive indices
@@ -194,10 +202,16 @@
 //! - file: scenes/a.yaml
 //!   name: a-nofog
 //!   set: {fog: null, render.samples: 16, "shapes[2].sphere.radius": 2, materials.flint.dielectric.ior: 1.7}
+//! - file: scenes/c.xml            # a Mitsuba scene
+//!   define: {res: 64, integrator: path}         # its parameters, as -D on the command line
 //! ```
 //! A setting names a field by its path and gives it a new value, whole; null takes it away. The path
 //! may lead to a field that is not written yet, as long as the grammar has it. Later wins: default,
 //! scene, batch, `set` of the entry, `--set KEY=VALUE` of the command line.
+//!
+//! # Mitsuba scenes
+//! A file whose name ends in `.xml` is a scene of Mitsuba 3 and is translated into this grammar: `mitsuba`. All that
+//! follows, `--set` too, is the same.
 //!
 //! # Faults
 //! Each is one line, `file:line:column: field: expected …, found …; did you mean "…"?`. Text that
@@ -214,6 +228,7 @@ mod fault;
 mod layer;
 mod light;
 mod material;
+mod mitsuba;
 mod node;
 mod path;
 mod scene;
@@ -223,12 +238,12 @@ mod spectrum;
 mod yaml;
 
 pub use batch::{Batch, BatchEntry, Document, load};
-pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Projection};
+pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection};
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, ProjectorLight};
 pub use layer::{Layer, LayerContent, LightForm, Quantity};
 pub use light::{
-    Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, HomogeneousMedium, Light, Medium, Phase, PointLight,
-    SpotLight,
+    Aim, Coefficients, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, HomogeneousMedium, Light, Medium, Phase,
+    PointLight, SpotLight,
 };
 pub use material::{
     Boundary, Checkerboard, Conductor, ConductorIndex, Dielectric, Diffuse, Distribution, Fresnel, Highlight,

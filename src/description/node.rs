@@ -35,6 +35,12 @@ impl Sources {
         self.add(path.display().to_string(), path.parent().unwrap_or(Path::new("")).to_path_buf())
     }
 
+    /// Adds a file whose reader has found the files that it names already: relative paths in its
+    /// nodes start from the working directory.
+    pub(crate) fn add_resolved_file(&mut self, path: &Path) -> u32 {
+        self.add(path.display().to_string(), PathBuf::new())
+    }
+
     /// Adds an argument of the command line; relative paths in it start from the working directory.
     pub(crate) fn add_argument(&mut self, argument: String) -> u32 {
         self.add(argument, PathBuf::new())

@@ -188,9 +188,7 @@ mod tests {
         assert_eq!(
             scene.camera,
             Camera {
-                origin: [0.0, 3.2, 12.0],
-                target: [0.0, 1.1, 0.0],
-                up: [0.0, 1.0, 0.0],
+                pose: Pose::LookAt { origin: [0.0, 3.2, 12.0], target: [0.0, 1.1, 0.0], up: [0.0, 1.0, 0.0] },
                 projection: Projection::Perspective { fov_deg: 38.0, fov_axis: FovAxis::X },
                 lens: Some(Lens { radius: 0.05, focus_distance: 10.0 }),
                 clip: Clip::default(),
@@ -260,8 +258,11 @@ mod tests {
         assert_eq!(
             scene.media["smoke"],
             Medium::Homogeneous(HomogeneousMedium {
-                absorption: number(0.1),
-                scattering: Spectrum::Rgb([0.2, 0.3, 0.4]),
+                coefficients: Coefficients::Parts {
+                    absorption: number(0.1),
+                    scattering: Spectrum::Rgb([0.2, 0.3, 0.4])
+                },
+                scale: 1.0,
                 phase: Phase::Hg(0.5),
             })
         );

@@ -288,7 +288,7 @@ impl TransformStep {
         }
     }
 
-    fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
+    pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         match self {
             TransformStep::Translate(_) => {}
             TransformStep::Rotate(rotation) => checker.direction(at.key("axis"), rotation.axis),
@@ -317,7 +317,7 @@ impl TransformStep {
 }
 
 /// Rodrigues' formula, R v = cos θ v + sin θ a × v + (1 − cos θ) (a · v) a. Quarter turns are exact.
-fn rotation(axis: DVec3, deg: f64) -> DMat4 {
+pub(crate) fn rotation(axis: DVec3, deg: f64) -> DMat4 {
     // Dividing by the greatest component first keeps the length within range.
     let a = (axis / axis.abs().max_element()).normalize();
     let (sin, cos) = match deg.rem_euclid(360.0) {

@@ -86,6 +86,8 @@ pub enum Spectrum {
     Lines(Vec<Line>),
     /// `{scaled: {by: 2, of: SPECTRUM}}`.
     Scaled(Scaled),
+    /// `{zero_outside: SPECTRUM}`: a table or file, 0 beyond its ends.
+    ZeroOutside(Box<Spectrum>),
 }
 
 /// Planck's law.
@@ -302,6 +304,12 @@ impl Spectrum {
                     checker.not_negative(at.key("power"), line.power);
                     checker.positive(at.key("width_nm"), line.width_nm);
                 }
+            }
+            Spectrum::ZeroOutside(inner) => {
+                let at = at.key("zero_outside");
+                let ends = matches!(**inner, Spectrum::Table(_) | Spectrum::File(_));
+                checker.require(ends, at, "a table or a file", "a spectrum without ends");
+                inner.check_times(by, role, at, checker);
             }
             Spectrum::Scaled(scaled) => {
                 let at = at.key("scaled");

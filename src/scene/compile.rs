@@ -240,7 +240,10 @@ impl<'a> Compiler<'a> {
     fn camera(&mut self) -> Camera {
         let d = &self.description.camera;
         let resolution = [self.description.image.width, self.description.image.height];
-        let world_from_camera = Camera::look_at(vec3(d.origin), vec3(d.target), vec3(d.up));
+        let world_from_camera = match d.pose {
+            written::Pose::LookAt { origin, target, up } => Camera::look_at(vec3(origin), vec3(target), vec3(up)),
+            written::Pose::ToWorld(rows) => Some(DAffine3::from_mat4(written::TransformStep::Matrix(rows).matrix())),
+        };
         let world_from_camera = world_from_camera.unwrap_or_else(|| {
             self.fault("camera.up", "expected a direction that is not along the line of sight");
             DAffine3::IDENTITY
@@ -334,6 +337,7 @@ impl<'a> Compiler<'a> {
                 let lines: Vec<(f64, f64, f64)> = lines.iter().map(|l| (l.nm, l.power, l.width_nm)).collect();
                 self.or(at, Spectrum::lines(&lines), black)
             }
+            written::Spectrum::ZeroOutside(s) => self.spectrum(&format!("{at}.zero_outside"), s, Outside::Zero, role),
             written::Spectrum::Scaled(s) => {
                 self.spectrum(&format!("{at}.scaled.of"), &s.of, outside, role).scaled(s.by)
             }
@@ -487,9 +491,20 @@ impl<'a> Compiler<'a> {
         let mut coefficient = |field: &str, s: &written::Spectrum| {
             self.spectrum(&format!("{at}.homogeneous.{field}"), s, Outside::Hold, Role::Coefficient)
         };
+        let (absorption, scattering) = match &m.coefficients {
+            written::Coefficients::Parts { absorption, scattering } => {
+                (coefficient("absorption", absorption), coefficient("scattering", scattering))
+            }
+            written::Coefficients::Whole { extinction, albedo } => {
+                let extinction = coefficient("extinction", extinction);
+                let at = format!("{at}.homogeneous.albedo");
+                let albedo = self.spectrum(&at, albedo, Outside::Hold, Role::Reflectance);
+                (extinction.times(&albedo.complement()), extinction.times(&albedo))
+            }
+        };
         Medium {
-            absorption: coefficient("absorption", &m.absorption),
-            scattering: coefficient("scattering", &m.scattering),
+            absorption: absorption.scaled(m.scale),
+            scattering: scattering.scaled(m.scale),
             phase: match m.phase {
                 written::Phase::Isotropic => Phase::Isotropic,
                 written::Phase::Rayleigh => Phase::Rayleigh,

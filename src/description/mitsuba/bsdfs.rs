@@ -1,0 +1,151 @@
+//! Materials.
+
+use super::super::fault::Fault;
+use super::super::node::{Node, Place};
+use super::object::{Bag, Family};
+use super::spectra::Role;
+use super::{Fields, Import, boolean, number, text};
+
+const BSDFS: [&str; 11] = [
+    "diffuse",
+    "dielectric",
+    "thindielectric",
+    "roughdielectric",
+    "dispersivedielectric",
+    "conductor",
+    "roughconductor",
+    "plastic",
+    "roughplastic",
+    "null",
+    "twosided",
+];
+
+/// On which sides a surface reflects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Sides {
+    /// Only where its normal points.
+    Front,
+    /// Inside a `twosided`.
+    Both,
+}
+
+impl Import<'_> {
+    /// A material as it stands at a shape: the name of an entry of `materials`, or, where it has
+    /// no id, written in place.
+    pub(crate) fn material(&mut self, index: usize) -> Result<Node, Fault> {
+        let object = &self.document.objects[index];
+        if let Some(name) = self.names.get(&index) {
+            return Ok(text(object.place, name));
+        }
+        let node = self.bsdf(index, Sides::Front)?;
+        if object.id.is_none() {
+            return Ok(node);
+        }
+        let name = self.name_for(index);
+        self.materials.push(self.entry(index, &name, node));
+        Ok(text(object.place, name))
+    }
+
+    /// A diffuse surface, the same everywhere, one-sided: what a shape without a `<bsdf>` has.
+    pub(crate) fn plain_diffuse(&self, place: Place, reflectance: f64) -> Node {
+        let mut fields = Fields::new(place);
+        fields.add("reflectance", number(place, reflectance));
+        fields.add("two_sided", boolean(place, false));
+        fields.kind("diffuse")
+    }
+
+    fn bsdf(&mut self, index: usize, sides: Sides) -> Result<Node, Fault> {
+        let bag = self.bag(index);
+        let place = bag.object.place;
+        let mut fields = Fields::new(place);
+        let two_sided = boolean(place, sides == Sides::Both);
+        let kind = match bag.object.plugin.as_str() {
+            "diffuse" => {
+                fields.maybe("reflectance", self.spectrum_or_texture(&bag, "reflectance", Role::Reflectance)?);
+                fields.add("two_sided", two_sided);
+                "diffuse"
+            }
+            "dielectric" | "dispersivedielectric" | "roughdielectric" => {
+                fields.add("ior", self.index(&bag, "int_ior", "bk7")?.node);
+                fields.add("exterior_ior", self.index(&bag, "ext_ior", "air")?.node);
+                if bag.object.plugin == "roughdielectric" {
+                    roughness(&bag, &mut fields)?;
+                }
+                transparent(&bag, sides)?;
+                "dielectric"
+            }
+            "thindielectric" => {
+                fields.add("ior", self.index(&bag, "int_ior", "bk7")?.node);
+                fields.add("exterior_ior", self.index(&bag, "ext_ior", "air")?.node);
+                transparent(&bag, sides)?;
+                "thin_dielectric"
+            }
+            "conductor" | "roughconductor" => {
+                let metal = bag.text("material")?.unwrap_or("none");
+                if bag.has("eta") || bag.has("k") || metal == "none" {
+                    let (eta, k) =
+                        (self.spectrum(&bag, "eta", Role::Coefficient)?, self.spectrum(&bag, "k", Role::Coefficient)?);
+                    fields.add("eta", eta.unwrap_or_else(|| number(place, 0.0)));
+                    fields.add("k", k.unwrap_or_else(|| number(place, 1.0)));
+                } else {
+                    fields.add("metal", text(bag.place("material"), metal));
+                }
+                fields.maybe("tint", self.spectrum(&bag, "specular_reflectance", Role::Reflectance)?);
+                if bag.object.plugin == "roughconductor" {
+                    roughness(&bag, &mut fields)?;
+                }
+                fields.add("two_sided", two_sided);
+                "conductor"
+            }
+            "plastic" | "roughplastic" => {
+                let reflectance = self.spectrum_or_texture(&bag, "diffuse_reflectance", Role::Reflectance)?;
+                fields.maybe("reflectance", reflectance);
+                let (inside, outside) =
+                    (self.index(&bag, "int_ior", "polypropylene")?, self.index(&bag, "ext_ior", "air")?);
+                // Ours is given relative to what surrounds it.
+                let ior = match (inside.number, outside.number) {
+                    (Some(inside), Some(outside)) => number(bag.place("int_ior"), inside / outside),
+                    _ => inside.node,
+                };
+                fields.add("ior", ior);
+                fields.maybe("nonlinear", bag.boolean("nonlinear")?.map(|on| boolean(bag.place("nonlinear"), on)));
+                if bag.object.plugin == "roughplastic" {
+                    roughness(&bag, &mut fields)?;
+                }
+                fields.add("two_sided", two_sided);
+                "plastic"
+            }
+            "null" => "boundary",
+            "twosided" => return self.twosided(&bag),
+            _ => return Err(bag.unknown(BSDFS)),
+        };
+        bag.finish()?;
+        Ok(fields.kind(kind))
+    }
+
+    fn twosided(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
+        let inner = bag.only(Family::Bsdf)?.ok_or_else(|| bag.fault("expected a <bsdf> inside, found none"))?;
+        bag.boolean("allow_transmission")?;
+        bag.finish()?;
+        self.bsdf(inner, Sides::Both)
+    }
+}
+
+/// Glass has two sides of its own.
+fn transparent(bag: &Bag<'_>, sides: Sides) -> Result<(), Fault> {
+    match sides {
+        Sides::Front => Ok(()),
+        Sides::Both => Err(bag.fault("expected a surface that lets no light through inside <twosided>")),
+    }
+}
+
+/// `alpha` and `distribution`.
+fn roughness(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
+    let alpha = bag.float("alpha")?.unwrap_or(0.1);
+    fields.add("roughness", number(bag.place("alpha"), alpha));
+    let distribution = bag.choice("distribution", &["beckmann", "ggx"])?.unwrap_or("beckmann");
+    fields.add("distribution", text(bag.place("distribution"), distribution));
+    // How directions are drawn, not which there are.
+    bag.boolean("sample_visible")?;
+    Ok(())
+}

@@ -1,0 +1,371 @@
+//! Mitsuba 3's XML scenes, translated into the grammar of this room.
+//!
+//! Text becomes elements ([`xml`]), elements become objects ([`parse`]), and the files named after
+//! families turn objects into the [`Node`]s that a person would have written in YAML; each node
+//! keeps its place in the XML. From there on nothing knows where a scene came from: the decoder,
+//! its checks and `--set` are the same.
+//!
+//! # Conventions that are translated
+//! - Mitsuba's cameras look along +z with +x to the left; ours have +x to the right.
+//! - Its film divides by 106.7502593994 where ours divides by the integral of ȳ, 106.8569: the
+//!   picture is multiplied by the ratio, [`FILM`], and what is defined by its colour under D65 is
+//!   divided by it.
+//! - `<rgb>` and `<float>` of a light are colours under D65; `<spectrum>` is radiance as it stands.
+//!   Outside its wavelengths a `<spectrum>` is zero, also a reflectance.
+//! - Surfaces reflect on the side of their normal only, unless `twosided`; shapes shine on it only.
+//!
+//! A plugin or parameter that is not translated is a fault with its place, never passed over.
+
+mod bsdfs;
+mod emitters;
+mod integrators;
+mod media;
+mod object;
+mod parse;
+mod sensors;
+mod shapes;
+mod spectra;
+mod textures;
+mod xml;
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::DMat4;
+
+use super::fault::Fault;
+use super::node::{Entry, Node, Place, Sources, Value};
+use crate::error::Result;
+use object::{Bag, Document, Family};
+
+/// Ratio of the integral of ȳ (5 nm steps of the CIE 1931 table) to the constant by which
+/// Mitsuba's film divides: 106.856895 / 106.7502593994.
+const FILM: f64 = 1.000_998_93;
+
+/// Whether a file holds a Mitsuba scene: by its name.
+pub(crate) fn is_xml(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xml"))
+}
+
+/// Reads a scene as a tree of the grammar. `defines` are the `-D name=value`.
+///
+/// # Errors
+/// [`Error::Config`](crate::error::Error::Config) with the first fault;
+/// [`Error::Input`](crate::error::Error::Input) for a file that cannot be read.
+pub(crate) fn read(path: &Path, defines: &[(String, String)], sources: &mut Sources) -> Result<Node> {
+    let document = parse::read(path, defines, sources)?;
+    Import::new(&document).scene().map_err(|fault| fault.into_error(sources))
+}
+
+/// A translation under way.
+struct Import<'a> {
+    document: &'a Document,
+    textures: Vec<Entry>,
+    materials: Vec<Entry>,
+    media: Vec<Entry>,
+    shapes: Vec<Node>,
+    lights: Vec<Node>,
+    /// Under which name an object stands in one of the maps.
+    names: HashMap<usize, String>,
+}
+
+impl<'a> Import<'a> {
+    fn new(document: &'a Document) -> Import<'a> {
+        Import {
+            document,
+            textures: Vec::new(),
+            materials: Vec::new(),
+            media: Vec::new(),
+            shapes: Vec::new(),
+            lights: Vec::new(),
+            names: HashMap::new(),
+        }
+    }
+
+    fn bag(&self, index: usize) -> Bag<'a> {
+        Bag::new(self.document, index)
+    }
+
+    fn scene(mut self) -> std::result::Result<Node, Fault> {
+        let root = self.bag(0);
+        let place = root.object.place;
+        let integrator = match root.only(Family::Integrator)? {
+            Some(index) => Some(self.integrator(index)?),
+            None => None,
+        };
+        let mut camera = None;
+        for sensor in root.objects(Family::Sensor) {
+            // The first one takes the picture; the others have to hold all the same.
+            let parts = self.sensor(sensor)?;
+            camera.get_or_insert(parts);
+        }
+        let camera = camera.ok_or_else(|| root.fault("expected a <sensor>, found none"))?;
+        for texture in root.objects(Family::Texture) {
+            self.declare_texture(texture)?;
+        }
+        for bsdf in root.objects(Family::Bsdf) {
+            self.material(bsdf)?;
+        }
+        for medium in root.objects(Family::Medium) {
+            self.medium(medium)?;
+        }
+        for shape in root.objects(Family::Shape) {
+            self.shape(shape)?;
+        }
+        for emitter in root.objects(Family::Emitter) {
+            self.emitter(emitter)?;
+        }
+        root.finish()?;
+
+        let mut fields = Fields::new(place);
+        fields.extend(camera);
+        if let Some(integrator) = integrator {
+            fields.add("integrator", integrator);
+        }
+        fields.add("textures", Node::new(place, Value::Map(self.textures)));
+        fields.add("materials", Node::new(place, Value::Map(self.materials)));
+        fields.add("media", Node::new(place, Value::Map(self.media)));
+        fields.add("shapes", Node::new(place, Value::List(self.shapes)));
+        fields.add("lights", Node::new(place, Value::List(self.lights)));
+        Ok(fields.map())
+    }
+
+    /// A name for an object in one of the maps: its id, or one made from its place.
+    fn name_for(&mut self, index: usize) -> String {
+        let object = &self.document.objects[index];
+        let name = object.id.clone().unwrap_or_else(|| format!("{} {index}", object.plugin));
+        self.names.insert(index, name.clone());
+        name
+    }
+
+    fn entry(&self, index: usize, key: &str, node: Node) -> Entry {
+        Entry { key: key.to_owned(), key_place: self.document.objects[index].place, node }
+    }
+}
+
+/// A map under construction whose fields stand at one place, unless they know a better one.
+struct Fields {
+    place: Place,
+    entries: Vec<Entry>,
+}
+
+impl Fields {
+    fn new(place: Place) -> Fields {
+        Fields { place, entries: Vec::new() }
+    }
+
+    fn add(&mut self, key: &str, node: Node) {
+        self.entries.push(Entry { key: key.to_owned(), key_place: node.place, node });
+    }
+
+    /// Adds a field if there is something to say.
+    fn maybe(&mut self, key: &str, node: Option<Node>) {
+        if let Some(node) = node {
+            self.add(key, node);
+        }
+    }
+
+    fn extend(&mut self, other: Fields) {
+        self.entries.extend(other.entries);
+    }
+
+    fn map(self) -> Node {
+        Node::new(self.place, Value::Map(self.entries))
+    }
+
+    /// `{kind: {…}}`
+    fn kind(self, kind: &str) -> Node {
+        let place = self.place;
+        entry(place, kind, self.map())
+    }
+}
+
+/// `{key: node}`
+fn entry(place: Place, key: &str, node: Node) -> Node {
+    Node::new(place, Value::Map(vec![Entry { key: key.to_owned(), key_place: place, node }]))
+}
+
+fn number(place: Place, value: f64) -> Node {
+    Node::new(place, Value::Float(value))
+}
+
+fn whole(place: Place, value: i64) -> Node {
+    Node::new(place, u64::try_from(value).map_or(Value::Signed(value), Value::Unsigned))
+}
+
+fn boolean(place: Place, value: bool) -> Node {
+    Node::new(place, Value::Bool(value))
+}
+
+fn text(place: Place, value: impl Into<String>) -> Node {
+    Node::new(place, Value::Text(value.into()))
+}
+
+fn list(place: Place, values: impl IntoIterator<Item = Node>) -> Node {
+    Node::new(place, Value::List(values.into_iter().collect()))
+}
+
+fn numbers(place: Place, values: &[f64]) -> Node {
+    list(place, values.iter().map(|value| number(place, *value)))
+}
+
+/// The rows of a matrix on column vectors.
+fn matrix(place: Place, matrix: DMat4) -> Node {
+    let rows = matrix.transpose().to_cols_array_2d();
+    list(place, rows.iter().map(|row| numbers(place, row)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Material, SceneDescription, TransformStep};
+    use super::*;
+
+    const HEAD: &str =
+        "<scene version=\"3.0.0\">\n<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/></sensor>\n";
+
+    /// Reads the scene of [`HEAD`] and, from line 3, `text`.
+    fn scene(text: &str, defines: &[(&str, &str)]) -> Result<SceneDescription> {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("s.xml");
+        std::fs::write(&path, format!("{HEAD}{text}\n</scene>\n")).unwrap();
+        let defines: Vec<(String, String)> = defines.iter().map(|(n, v)| ((*n).to_owned(), (*v).to_owned())).collect();
+        let mut sources = Sources::default();
+        let root = read(&path, &defines, &mut sources)?;
+        SceneDescription::of_tree(root, &path, sources)
+    }
+
+    /// The faults of a scene, without the directory.
+    fn fault(text: &str, defines: &[(&str, &str)]) -> String {
+        match scene(text, defines) {
+            Ok(_) => "none".to_owned(),
+            Err(error) => {
+                let text = error.to_string();
+                text.lines()
+                    .map(|line| line.find("s.xml").map_or(line, |at| &line[at..]))
+                    .collect::<Vec<_>>()
+                    .join("\n")
+            }
+        }
+    }
+
+    fn good(text: &str) -> SceneDescription {
+        scene(text, &[]).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    #[test]
+    fn parameters_are_filled_in_anywhere_in_a_value() {
+        let text = "<default name=\"r\" value=\"2\"/><default name=\"radius\" value=\"7\"/>\
+                    <shape type=\"sphere\"><float name=\"radius\" value=\"1$r.5\"/></shape>\
+                    <shape type=\"sphere\"><float name=\"radius\" value=\"$radius\"/></shape>";
+        let radii = |defines: &[(&str, &str)]| -> Vec<f64> {
+            let scene = scene(text, defines).unwrap();
+            let radius = |shape: &super::super::Shape| match &shape.geometry {
+                super::super::Geometry::Sphere(sphere) => sphere.radius,
+                other => panic!("{other:?}"),
+            };
+            scene.shapes.iter().map(radius).collect()
+        };
+        assert_eq!(radii(&[]), [12.5, 7.0]);
+        assert_eq!(radii(&[("r", "3")]), [13.5, 7.0]);
+        let unused = fault(text, &[("raduis", "3")]);
+        assert_eq!(unused, "s.xml uses, found none named \"raduis\"; did you mean \"radius\"?");
+        assert_eq!(
+            fault("<shape type=\"sphere\"><float name=\"radius\" value=\"$rad\"/></shape>", &[]),
+            "s.xml:3:50: expected a parameter with a <default> or -D rad=…, found $rad without either"
+        );
+    }
+
+    #[test]
+    fn transforms_act_in_the_order_of_the_text() {
+        let scene = good(
+            "<shape type=\"rectangle\"><transform name=\"to_world\"><translate x=\"1\"/><scale value=\"2\"/>\
+             <rotate z=\"1\" angle=\"90\"/><matrix value=\"1 0 0 0 1 0 0 0 1\"/></transform></shape>",
+        );
+        let [TransformStep::Matrix(rows)] = scene.shapes[0].transform[..] else { panic!("one matrix") };
+        // (0, 0, 0) → (1, 0, 0) → (2, 0, 0) → (0, 2, 0).
+        assert_eq!([rows[0][3], rows[1][3], rows[2][3]], [0.0, 2.0, 0.0]);
+    }
+
+    #[test]
+    fn names_before_version_2_are_in_camel_case() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("s.xml");
+        let text = "<scene version=\"0.6.0\"><sensor type=\"perspective\"><transform name=\"toWorld\"><translate z=\"1\"/>\
+                    </transform></sensor><shape type=\"sphere\"><bsdf type=\"dielectric\">\
+                    <float name=\"intIOR\" value=\"1.7\"/></bsdf></shape></scene>";
+        std::fs::write(&path, text).unwrap();
+        let mut sources = Sources::default();
+        let root = read(&path, &[], &mut sources).unwrap_or_else(|error| panic!("{error}"));
+        let scene = SceneDescription::of_tree(root, &path, sources).unwrap();
+        let super::super::MaterialRef::Inline(Material::Dielectric(glass)) = &scene.shapes[0].material else {
+            panic!("{:?}", scene.shapes[0].material)
+        };
+        assert_eq!(glass.ior, super::super::Index::Number(1.7));
+    }
+
+    #[test]
+    fn an_unknown_plugin_or_parameter_is_one_fault_with_a_near_miss() {
+        assert_eq!(
+            fault("<shape type=\"spere\"/>", &[]),
+            "s.xml:3:14: expected a shape that Abbe has (sphere, cylinder, disk, rectangle, cube, obj, ply), found \
+             \"spere\"; did you mean \"sphere\"?"
+        );
+        assert_eq!(
+            fault("<shape type=\"sphere\"><float name=\"raduis\" value=\"1\"/></shape>", &[]),
+            "s.xml:3:22: shape \"sphere\": expected parameters among center, exterior, flip_normals, interior, radius, \
+             silhouette_sampling_weight, to_world, found \"raduis\"; did you mean \"radius\"?"
+        );
+        assert_eq!(
+            fault("<shape type=\"sphere\"><string name=\"radius\" value=\"1\"/></shape>", &[]),
+            "s.xml:3:22: shape \"sphere\": radius: expected a float, found the string \"1\""
+        );
+        assert_eq!(
+            fault("<shape type=\"sphere\"><float name=\"radius\" value=\"1\"/><float name=\"radius\" value=\"1\"/></shape>", &[])
+                .split("; it is").next().unwrap(),
+            "s.xml:3:55: expected each parameter once, found \"radius\" again"
+        );
+        assert_eq!(
+            fault("<shap type=\"sphere\"/>", &[]),
+            "s.xml:3:1: expected an element of a scene, found <shap>; did you mean \"shape\"?"
+        );
+        assert_eq!(
+            fault("<shape typ=\"sphere\"/>", &[]),
+            "s.xml:3:13: expected attributes among type, id, name in <shape>, found \"typ\"; did you mean \"type\"?"
+        );
+    }
+
+    #[test]
+    fn references_are_checked() {
+        assert_eq!(
+            fault("<bsdf type=\"diffuse\" id=\"grey\"/>\n<shape type=\"sphere\"><ref id=\"gray\"/></shape>", &[]),
+            "s.xml:4:22: expected the id of an object, found \"gray\"; did you mean \"grey\"?"
+        );
+        assert!(
+            fault("<bsdf type=\"diffuse\" id=\"a\"/>\n<bsdf type=\"diffuse\" id=\"a\"/>", &[])
+                .starts_with("s.xml:4:1: expected each id once, found \"a\" again; it is first at ")
+        );
+        assert_eq!(
+            fault(
+                "<bsdf type=\"twosided\" id=\"a\"><ref id=\"b\"/></bsdf>\n<bsdf type=\"twosided\" id=\"b\"><ref id=\"a\"/></bsdf>",
+                &[]
+            ),
+            "s.xml:4:31: expected an object that does not hold itself, found a circle of references"
+        );
+        let scene = good(
+            "<bsdf type=\"diffuse\" id=\"a\"/><alias id=\"a\" as=\"b\"/><shape type=\"sphere\"><ref id=\"b\"/></shape>\
+             <shape type=\"sphere\"><ref id=\"a\" name=\"bsdf\"/></shape>",
+        );
+        assert_eq!(scene.materials.len(), 1);
+        assert_eq!(scene.shapes[0].material, scene.shapes[1].material);
+    }
+
+    /// A chain of references is as deep as nested elements, and has its limit.
+    #[test]
+    fn a_long_chain_of_references_is_one_fault() {
+        let mut text = String::from("<bsdf type=\"diffuse\" id=\"b0\"/>");
+        for i in 1..10_000 {
+            text.push_str(&format!("<bsdf type=\"twosided\" id=\"b{i}\"><ref id=\"b{}\"/></bsdf>", i - 1));
+        }
+        assert!(fault(&text, &[]).ends_with("expected at most 64 objects within one another, found more"));
+    }
+}

@@ -1,0 +1,775 @@
+//! Elements to objects: parameters, includes, references, transforms.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DMat4, DVec3};
+
+use super::super::edit::read_bytes;
+use super::super::fault::Fault;
+use super::super::node::{Place, Sources, did_you_mean, quote};
+use super::super::shape::rotation;
+use super::super::yaml::MAX_NODES;
+use super::object::{Document, Family, Object, Property, SpectrumValue, Value};
+use super::xml::{self, Attribute, Element, MAX_DEPTH};
+use crate::error::{Error, Result};
+
+/// The deepest nesting of includes, as in Mitsuba.
+const MAX_INCLUDES: usize = 15;
+
+/// Reads a scene with `defines`, the `-D name=value` of the command line.
+///
+/// # Errors
+/// [`Error::Config`] with the first fault; [`Error::Input`] for a file that cannot be read.
+pub(crate) fn read(path: &Path, defines: &[(String, String)], sources: &mut Sources) -> Result<Document> {
+    let mut parser = Parser {
+        sources,
+        budget: MAX_NODES,
+        parameters: Vec::new(),
+        document: Document::default(),
+        ids: HashMap::new(),
+        names: HashMap::new(),
+        references: Vec::new(),
+        reading: Vec::new(),
+        unreadable: None,
+    };
+    for (name, value) in defines {
+        if parser.parameters.iter().any(|parameter| parameter.name == *name) {
+            return Err(Error::Config(format!("-D {name}={value}: expected each name once, found {name:?} again")));
+        }
+        parser.parameters.push(Parameter { name: name.clone(), value: value.clone(), defined: true, used: false });
+    }
+    let home = path.parent().unwrap_or(Path::new("")).to_path_buf();
+    parser.document.search = vec![home, PathBuf::new()];
+    let outcome = parser.file(path, None, None).and_then(|()| parser.resolve());
+    if let Some(error) = parser.unreadable.take() {
+        return Err(error);
+    }
+    outcome.map_err(|fault| fault.into_error(parser.sources))?;
+    if let Some(unused) = parser.parameters.iter().find(|parameter| parameter.defined && !parameter.used) {
+        let known: Vec<&str> = parser.parameters.iter().filter(|p| !p.defined).map(|p| p.name.as_str()).collect();
+        let hint = did_you_mean(&unused.name, known.iter().copied());
+        return Err(Error::Config(format!(
+            "-D {}={}: expected a parameter that {} uses, found none named {}{hint}",
+            unused.name,
+            unused.value,
+            path.display(),
+            quote(&unused.name)
+        )));
+    }
+    Ok(parser.document)
+}
+
+/// `$name`
+struct Parameter {
+    name: String,
+    value: String,
+    /// On the command line rather than by `<default>`.
+    defined: bool,
+    used: bool,
+}
+
+/// A `<ref>` whose object may come later.
+struct Reference {
+    object: usize,
+    property: usize,
+    id: String,
+    place: Place,
+}
+
+struct Parser<'a> {
+    sources: &'a mut Sources,
+    budget: usize,
+    parameters: Vec<Parameter>,
+    document: Document,
+    ids: HashMap<String, usize>,
+    /// Where each named property of each object is written.
+    names: HashMap<(usize, String), Place>,
+    references: Vec<Reference>,
+    /// The files that are being read, outermost first.
+    reading: Vec<PathBuf>,
+    /// A file that could not be read: it ends the reading with an error of its own.
+    unreadable: Option<Error>,
+}
+
+/// What holds for all elements of one file.
+#[derive(Clone, Copy)]
+struct InFile {
+    source: u32,
+    /// Major version below 2: names in camelCase.
+    old: bool,
+}
+
+impl Parser<'_> {
+    /// Reads a file; its objects go into `parent`, or make the root.
+    fn file(
+        &mut self,
+        path: &Path,
+        parent: Option<usize>,
+        include: Option<&Element>,
+    ) -> std::result::Result<(), Fault> {
+        let here = include.map_or(Place::default(), |element| element.place);
+        let canonical = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+        if self.reading.contains(&canonical) {
+            let message = format!("expected a file that does not include itself, found {}", path.display());
+            return Err(Fault::at_place(here, message));
+        }
+        if self.reading.len() > MAX_INCLUDES {
+            let message = format!("expected at most {MAX_INCLUDES} files that include each other, found more");
+            return Err(Fault::at_place(here, message));
+        }
+        let bytes = match read_bytes(path) {
+            Ok(bytes) => bytes,
+            Err(error) => {
+                let named = match include {
+                    Some(element) => format!("; it is included at {}", self.sources.describe(element.place)),
+                    None => String::new(),
+                };
+                self.unreadable = Some(Error::input(path, format!("cannot be read: {error}{named}")));
+                return Err(Fault::at_place(here, "cannot be read"));
+            }
+        };
+        let source = self.sources.add_resolved_file(path);
+        self.document.directories.insert(source, path.parent().unwrap_or(Path::new("")).to_path_buf());
+        let root = xml::read(&bytes, source, &mut self.budget)?;
+        let version = root
+            .attribute("version")
+            .ok_or_else(|| Fault::at_place(root.place, format!("expected a version in <{}>, found none", root.tag)))?;
+        let in_file = InFile { source, old: major_version(version)? < 2 };
+
+        self.reading.push(canonical);
+        let result = match parent {
+            None if root.tag != "scene" => {
+                let found = quote(&root.tag);
+                Err(Fault::at_place(root.place, format!("expected the element <scene>, found {found}")))
+            }
+            None => self.object(&root, Family::Scene, in_file).map(|_| ()),
+            Some(parent) if root.tag == "scene" => {
+                check_attributes(&root, &["version"], &["id", "type", "name"])?;
+                root.children.iter().try_for_each(|child| self.child(child, parent, in_file))
+            }
+            // A file may also hold a single object, which goes where the <include> stands.
+            Some(parent) => {
+                let mut root = root;
+                root.attributes.retain(|attribute| attribute.name != "version");
+                if let Some(name) = include.and_then(|include| include.attribute("name")) {
+                    root.attributes.retain(|attribute| attribute.name != "name");
+                    root.attributes.push(name.clone());
+                }
+                self.child(&root, parent, in_file)
+            }
+        };
+        self.reading.pop();
+        result
+    }
+
+    /// Makes an object of an element and gives its index.
+    fn object(&mut self, element: &Element, family: Family, in_file: InFile) -> std::result::Result<usize, Fault> {
+        match family {
+            Family::Scene => check_attributes(element, &["version"], &["id", "type", "name"])?,
+            _ => check_attributes(element, &["type"], &["id", "name"])?,
+        }
+        let kind = element.attribute("type");
+        let plugin = kind.map_or(Ok("scene".to_owned()), |kind| self.text(kind))?;
+        let id = element.attribute("id").map(|id| self.text(id)).transpose()?.filter(|id| !id.is_empty());
+        let index = self.document.objects.len();
+        if let Some(id) = &id {
+            self.name(id, index, element.place)?;
+        }
+        self.document.objects.push(Object {
+            family,
+            plugin,
+            plugin_place: kind.map_or(element.place, |kind| kind.place),
+            id,
+            place: element.place,
+            source: in_file.source,
+            properties: Vec::new(),
+        });
+        for child in &element.children {
+            self.child(child, index, in_file)?;
+        }
+        if in_file.old {
+            self.upgrade(index)?;
+        }
+        Ok(index)
+    }
+
+    fn name(&mut self, id: &str, index: usize, place: Place) -> std::result::Result<(), Fault> {
+        if let Some(first) = self.ids.insert(id.to_owned(), index) {
+            let first = self.sources.describe(self.document.objects[first].place);
+            let message = format!("expected each id once, found {} again; it is first at {first}", quote(id));
+            return Err(Fault::at_place(place, message));
+        }
+        Ok(())
+    }
+
+    /// Reads an element inside an object.
+    fn child(&mut self, element: &Element, parent: usize, in_file: InFile) -> std::result::Result<(), Fault> {
+        let tag = element.tag.as_str();
+        let family = match tag {
+            "spectrum" if element.attribute("type").is_some() => Some(Family::Texture),
+            "scene" => None,
+            tag => Family::TAGS.iter().find(|(known, _)| *known == tag).map(|(_, family)| *family),
+        };
+        if let Some(family) = family {
+            let name = self.name_of(element, in_file)?;
+            let index = self.object(element, family, in_file)?;
+            return self.set(parent, name, element.place, Value::Object(index));
+        }
+        if tag != "transform"
+            && let Some(inner) = element.children.first()
+        {
+            let message = format!("expected nothing inside <{tag}>, found <{}>", inner.tag);
+            return Err(Fault::at_place(inner.place, message));
+        }
+        let value = match tag {
+            "float" => {
+                check_attributes(element, &["name", "value"], &[])?;
+                Value::Float(self.number(attribute(element, "value")?)?)
+            }
+            "integer" => {
+                check_attributes(element, &["name", "value"], &[])?;
+                let written = attribute(element, "value")?;
+                let text = self.text(written)?;
+                let whole = text.trim().parse().map_err(|_| {
+                    Fault::at_place(written.place, format!("expected a whole number, found {}", quote(&text)))
+                })?;
+                Value::Integer(whole)
+            }
+            "boolean" => {
+                check_attributes(element, &["name", "value"], &[])?;
+                let written = attribute(element, "value")?;
+                let text = self.text(written)?;
+                match text.to_ascii_lowercase().as_str() {
+                    "true" => Value::Boolean(true),
+                    "false" => Value::Boolean(false),
+                    _ => {
+                        let message = format!("expected true or false, found {}", quote(&text));
+                        return Err(Fault::at_place(written.place, message));
+                    }
+                }
+            }
+            "string" => {
+                check_attributes(element, &["name", "value"], &[])?;
+                Value::Text(self.text(attribute(element, "value")?)?)
+            }
+            "point" | "vector" => {
+                check_attributes(element, &["name"], &["value", "x", "y", "z"])?;
+                if element.attribute("value").is_none() {
+                    check_attributes(element, &["name", "x", "y", "z"], &[])?;
+                }
+                Value::Vector(self.vector(element, 0.0)?)
+            }
+            "rgb" => {
+                check_attributes(element, &["name", "value"], &[])?;
+                let written = attribute(element, "value")?;
+                match self.numbers(written)?[..] {
+                    [grey] => Value::Rgb([grey; 3]),
+                    [r, g, b] => Value::Rgb([r, g, b]),
+                    ref other => {
+                        let message = format!("expected 1 or 3 numbers, found {}", other.len());
+                        return Err(Fault::at_place(written.place, message));
+                    }
+                }
+            }
+            "spectrum" => self.spectrum(element, in_file)?,
+            "transform" => {
+                check_attributes(element, &["name"], &[])?;
+                Value::Transform(self.transform(element)?)
+            }
+            "ref" => {
+                check_attributes(element, &["id"], &["name"])?;
+                let name = self.name_of(element, in_file)?;
+                let id = self.text(attribute(element, "id")?)?;
+                // The index is filled in by `resolve`.
+                self.set(parent, name, element.place, Value::Object(usize::MAX))?;
+                let property = self.document.objects[parent].properties.len() - 1;
+                self.references.push(Reference { object: parent, property, id, place: element.place });
+                return Ok(());
+            }
+            "alias" => {
+                check_attributes(element, &["id", "as"], &[])?;
+                let id = self.text(attribute(element, "id")?)?;
+                let Some(&index) = self.ids.get(&id) else {
+                    let hint = did_you_mean(&id, self.ids.keys().map(String::as_str));
+                    let message = format!("expected the id of an object above, found {}{hint}", quote(&id));
+                    return Err(Fault::at_place(element.place, message));
+                };
+                let new = self.text(attribute(element, "as")?)?;
+                return self.name(&new, index, element.place);
+            }
+            "default" => {
+                check_attributes(element, &["name", "value"], &[])?;
+                let written = attribute(element, "name")?;
+                let name = self.text(written)?;
+                if name.is_empty() {
+                    return Err(Fault::at_place(written.place, "expected a name, found empty text"));
+                }
+                let value = self.text(attribute(element, "value")?)?;
+                if !self.parameters.iter().any(|parameter| parameter.name == name) {
+                    self.parameters.push(Parameter { name, value, defined: false, used: false });
+                }
+                return Ok(());
+            }
+            "include" => {
+                check_attributes(element, &["filename"], &["name"])?;
+                let file = self.text(attribute(element, "filename")?)?;
+                let path = self.find_from(&file, in_file.source);
+                return self.file(&path, Some(parent), Some(element));
+            }
+            "path" => {
+                check_attributes(element, &["value"], &[])?;
+                if self.document.objects[parent].family != Family::Scene {
+                    return Err(Fault::at_place(
+                        element.place,
+                        "expected <path> directly inside <scene>, found it deeper",
+                    ));
+                }
+                let written = attribute(element, "value")?;
+                let text = self.text(written)?;
+                let path = self.find_from(&text, in_file.source);
+                if !path.is_dir() {
+                    let message = format!("expected a directory, found none at {}", path.display());
+                    return Err(Fault::at_place(written.place, message));
+                }
+                self.document.search.insert(0, path);
+                return Ok(());
+            }
+            "translate" | "rotate" | "scale" | "lookat" | "matrix" => {
+                let message = format!("expected <{tag}> inside <transform>, found it outside");
+                return Err(Fault::at_place(element.place, message));
+            }
+            _ => {
+                let known = Family::TAGS.iter().map(|(tag, _)| *tag).chain(PROPERTY_TAGS);
+                let hint = did_you_mean(tag, known);
+                let message = format!("expected an element of a scene, found <{tag}>{hint}");
+                return Err(Fault::at_place(element.place, message));
+            }
+        };
+        let name = self.name_of(element, in_file)?;
+        self.set(parent, name, element.place, value)
+    }
+
+    fn name_of(&self, element: &Element, in_file: InFile) -> std::result::Result<String, Fault> {
+        let name = match element.attribute("name") {
+            Some(name) => self.peek(name)?,
+            None => String::new(),
+        };
+        Ok(if in_file.old { underscored(&name) } else { name })
+    }
+
+    fn set(&mut self, parent: usize, name: String, place: Place, value: Value) -> std::result::Result<(), Fault> {
+        if !name.is_empty()
+            && let Some(first) = self.names.insert((parent, name.clone()), place)
+        {
+            let first = self.sources.describe(first);
+            let message = format!("expected each parameter once, found {} again; it is first at {first}", quote(&name));
+            return Err(Fault::at_place(place, message));
+        }
+        self.document.objects[parent].properties.push(Property { name, place, value });
+        Ok(())
+    }
+
+    // ---------------------------------------------------------------------------------------------
+    // Values.
+
+    /// The value of an attribute with its parameters filled in.
+    fn text(&mut self, attribute: &Attribute) -> std::result::Result<String, Fault> {
+        let (text, used) = self.substituted(attribute)?;
+        for index in used {
+            self.parameters[index].used = true;
+        }
+        Ok(text)
+    }
+
+    fn peek(&self, attribute: &Attribute) -> std::result::Result<String, Fault> {
+        self.substituted(attribute).map(|(text, _)| text)
+    }
+
+    /// `$name` stands for the parameter with the longest name that fits; `\$` for a dollar.
+    fn substituted(&self, attribute: &Attribute) -> std::result::Result<(String, Vec<usize>), Fault> {
+        let mut text = String::new();
+        let mut used = Vec::new();
+        let mut rest = attribute.value.as_str();
+        while let Some(at) = rest.find('$') {
+            let (before, after) = (&rest[..at], &rest[at + 1..]);
+            if let Some(before) = before.strip_suffix('\\') {
+                text.push_str(before);
+                text.push('$');
+                rest = after;
+                continue;
+            }
+            text.push_str(before);
+            let fits = |(_, parameter): &(usize, &Parameter)| after.starts_with(&parameter.name);
+            let longest = self.parameters.iter().enumerate().filter(fits).max_by_key(|(_, p)| p.name.len());
+            let Some((index, parameter)) = longest else {
+                let end = after.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(after.len());
+                let name = &after[..end];
+                let hint = did_you_mean(name, self.parameters.iter().map(|parameter| parameter.name.as_str()));
+                let message =
+                    format!("expected a parameter with a <default> or -D {name}=…, found ${name} without either{hint}");
+                return Err(Fault::at_place(attribute.place, message));
+            };
+            text.push_str(&parameter.value);
+            used.push(index);
+            rest = &after[parameter.name.len()..];
+        }
+        text.push_str(rest);
+        Ok((text, used))
+    }
+
+    fn number(&mut self, attribute: &Attribute) -> std::result::Result<f64, Fault> {
+        let text = self.text(attribute)?;
+        number(&text, attribute.place)
+    }
+
+    /// Numbers between blanks and commas.
+    fn numbers(&mut self, attribute: &Attribute) -> std::result::Result<Vec<f64>, Fault> {
+        let text = self.text(attribute)?;
+        tokens(&text).map(|token| number(token, attribute.place)).collect()
+    }
+
+    /// `value="1 2 3"`, `value="1"` or `x y z`, of which those that are not written are `default`.
+    fn vector(&mut self, element: &Element, default: f64) -> std::result::Result<[f64; 3], Fault> {
+        if let Some(value) = element.attribute("value") {
+            if let Some(other) = ["x", "y", "z"].iter().find_map(|key| element.attribute(key)) {
+                let message = format!("expected either value or x, y, z, found value and {}", other.name);
+                return Err(Fault::at_place(other.place, message));
+            }
+            return match self.numbers(value)?[..] {
+                [all] => Ok([all; 3]),
+                [x, y, z] => Ok([x, y, z]),
+                ref other => {
+                    Err(Fault::at_place(value.place, format!("expected 1 or 3 numbers, found {}", other.len())))
+                }
+            };
+        }
+        let mut vector = [default; 3];
+        for (number, key) in vector.iter_mut().zip(["x", "y", "z"]) {
+            if let Some(attribute) = element.attribute(key) {
+                *number = self.number(attribute)?;
+            }
+        }
+        Ok(vector)
+    }
+
+    /// `<spectrum name="…" value="…"/>` or with `filename`.
+    fn spectrum(&mut self, element: &Element, in_file: InFile) -> std::result::Result<Value, Fault> {
+        check_attributes(element, &["name"], &["value", "filename"])?;
+        let value = match (element.attribute("value"), element.attribute("filename")) {
+            (Some(value), None) => {
+                let text = self.text(value)?;
+                return spectrum_value(&text, value.place).map(Value::Spectrum);
+            }
+            (None, Some(file)) => file,
+            _ => {
+                let message = "expected either value or filename in <spectrum>, found neither or both";
+                return Err(Fault::at_place(element.place, message));
+            }
+        };
+        let name = self.text(value)?;
+        Ok(Value::Spectrum(SpectrumValue::File(self.document.find(&name, in_file.source))))
+    }
+
+    /// The product of the steps inside, the first step nearest to the object.
+    fn transform(&mut self, element: &Element) -> std::result::Result<DMat4, Fault> {
+        let mut matrix = DMat4::IDENTITY;
+        for step in &element.children {
+            let at = |message: String| Fault::at_place(step.place, message);
+            let then = match step.tag.as_str() {
+                "translate" => {
+                    check_attributes(step, &[], &["value", "x", "y", "z"])?;
+                    DMat4::from_translation(self.vector(step, 0.0)?.into())
+                }
+                "scale" => {
+                    check_attributes(step, &[], &["value", "x", "y", "z"])?;
+                    DMat4::from_scale(self.vector(step, 1.0)?.into())
+                }
+                "rotate" => {
+                    check_attributes(step, &["angle"], &["value", "x", "y", "z"])?;
+                    let axis = DVec3::from(self.vector(step, 0.0)?);
+                    if axis == DVec3::ZERO {
+                        return Err(at("expected an axis other than 0, 0, 0 in <rotate>".to_owned()));
+                    }
+                    rotation(axis, self.number(attribute(step, "angle")?)?)
+                }
+                "matrix" => {
+                    check_attributes(step, &["value"], &[])?;
+                    let written = attribute(step, "value")?;
+                    match self.numbers(written)?[..] {
+                        [a, b, c, d, e, f, g, h, i] => {
+                            DMat4::from_cols_array(&[a, d, g, 0.0, b, e, h, 0.0, c, f, i, 0.0, 0.0, 0.0, 0.0, 1.0])
+                        }
+                        ref m if m.len() == 16 => DMat4::from_cols_slice(m).transpose(),
+                        ref m => {
+                            let message = format!("expected 9 or 16 numbers, found {}", m.len());
+                            return Err(Fault::at_place(written.place, message));
+                        }
+                    }
+                }
+                "lookat" => {
+                    check_attributes(step, &["origin", "target"], &["up"])?;
+                    let origin = self.triple(attribute(step, "origin")?)?;
+                    let target = self.triple(attribute(step, "target")?)?;
+                    let up = step.attribute("up").map_or(Ok(DVec3::ZERO), |up| self.triple(up))?;
+                    look_at(origin, target, up).ok_or_else(|| {
+                        at("expected a target other than the origin and an up across the line of sight".to_owned())
+                    })?
+                }
+                tag => {
+                    let known = ["translate", "scale", "rotate", "matrix", "lookat"];
+                    let hint = did_you_mean(tag, known);
+                    return Err(at(format!(
+                        "expected one of {} in <transform>, found <{tag}>{hint}",
+                        known.join(", ")
+                    )));
+                }
+            };
+            matrix = then * matrix;
+        }
+        match matrix.is_finite() {
+            true => Ok(matrix),
+            false => Err(Fault::at_place(element.place, "expected finite numbers in the transform, found others")),
+        }
+    }
+
+    fn triple(&mut self, attribute: &Attribute) -> std::result::Result<DVec3, Fault> {
+        match self.numbers(attribute)?[..] {
+            [x, y, z] => Ok(DVec3::new(x, y, z)),
+            ref other => Err(Fault::at_place(attribute.place, format!("expected 3 numbers, found {}", other.len()))),
+        }
+    }
+
+    // ---------------------------------------------------------------------------------------------
+    // Files and old spellings.
+
+    /// A file or directory that an element of `source` names: first beside that file, then where all
+    /// files are looked for.
+    fn find_from(&self, name: &str, source: u32) -> PathBuf {
+        let own = self.document.directories.get(&source).cloned().unwrap_or_default();
+        let first = own.join(name);
+        if first.exists() {
+            return first;
+        }
+        let found = self.document.search.iter().map(|directory| directory.join(name)).find(|path| path.exists());
+        found.unwrap_or(first)
+    }
+
+    /// What was spelt otherwise before version 2, beside camelCase.
+    fn upgrade(&mut self, index: usize) -> std::result::Result<(), Fault> {
+        let object = &mut self.document.objects[index];
+        if object.plugin == "diffuse" && !object.properties.iter().any(|p| p.name == "reflectance") {
+            for property in &mut object.properties {
+                if property.name == "diffuse_reflectance" {
+                    property.name = "reflectance".to_owned();
+                }
+            }
+        }
+        // uoffset, voffset, uscale, vscale: to_uv = scale · translate.
+        let keys = ["uoffset", "voffset", "uscale", "vscale"];
+        let mut values = [0.0, 0.0, 1.0, 1.0];
+        let mut place = None;
+        for (key, value) in keys.iter().zip(&mut values) {
+            let Some(at) = object.properties.iter().position(|property| property.name == *key) else { continue };
+            let property = object.properties.remove(at);
+            *value = match property.value {
+                Value::Float(value) => value,
+                Value::Integer(value) => value as f64,
+                _ => return Err(Fault::at_place(property.place, format!("{key}: expected a float"))),
+            };
+            place = Some(property.place);
+            // References know their property by its number.
+            for reference in &mut self.references {
+                if reference.object == index && reference.property > at {
+                    reference.property -= 1;
+                }
+            }
+        }
+        if let Some(place) = place {
+            let [u, v, scale_u, scale_v] = values;
+            let to_uv =
+                DMat4::from_scale(DVec3::new(scale_u, scale_v, 1.0)) * DMat4::from_translation(DVec3::new(u, v, 0.0));
+            self.set(index, "to_uv".to_owned(), place, Value::Transform(to_uv))?;
+        }
+        Ok(())
+    }
+
+    // ---------------------------------------------------------------------------------------------
+    // References.
+
+    /// Fills in what references name, and checks that nothing holds itself.
+    fn resolve(&mut self) -> std::result::Result<(), Fault> {
+        for reference in &self.references {
+            let Some(&index) = self.ids.get(&reference.id) else {
+                let hint = did_you_mean(&reference.id, self.ids.keys().map(String::as_str));
+                let message = format!("expected the id of an object, found {}{hint}", quote(&reference.id));
+                return Err(Fault::at_place(reference.place, message));
+            };
+            self.document.objects[reference.object].properties[reference.property].value = Value::Object(index);
+        }
+
+        // How deep each object reaches, by a walk that does not recurse.
+        struct Visit {
+            object: usize,
+            next: usize,
+            depth: usize,
+        }
+        #[derive(Clone, Copy)]
+        enum State {
+            New,
+            Open,
+            Done(usize),
+        }
+        let objects = &self.document.objects;
+        let mut states = vec![State::New; objects.len()];
+        let mut stack = vec![Visit { object: 0, next: 0, depth: 0 }];
+        while let Some(visit) = stack.last_mut() {
+            let object = &objects[visit.object];
+            states[visit.object] = State::Open;
+            let Some(property) = object.properties.get(visit.next) else {
+                if visit.depth > MAX_DEPTH {
+                    let message = format!("expected at most {MAX_DEPTH} objects within one another, found more");
+                    return Err(Fault::at_place(object.place, message));
+                }
+                states[visit.object] = State::Done(visit.depth);
+                stack.pop();
+                continue;
+            };
+            match property.value {
+                Value::Object(inner) => match states[inner] {
+                    State::Done(below) => visit.depth = visit.depth.max(below + 1),
+                    State::Open => {
+                        let message = "expected an object that does not hold itself, found a circle of references";
+                        return Err(Fault::at_place(property.place, message));
+                    }
+                    State::New => {
+                        stack.push(Visit { object: inner, next: 0, depth: 0 });
+                        continue;
+                    }
+                },
+                _ => {}
+            }
+            visit.next += 1;
+        }
+        Ok(())
+    }
+}
+
+/// Tags that are properties or say how to read the rest.
+const PROPERTY_TAGS: [&str; 14] = [
+    "float",
+    "integer",
+    "boolean",
+    "string",
+    "point",
+    "vector",
+    "rgb",
+    "spectrum",
+    "transform",
+    "ref",
+    "alias",
+    "default",
+    "include",
+    "path",
+];
+
+fn attribute<'a>(element: &'a Element, name: &str) -> std::result::Result<&'a Attribute, Fault> {
+    element.attribute(name).ok_or_else(|| missing(element, name))
+}
+
+fn missing(element: &Element, name: &str) -> Fault {
+    Fault::at_place(element.place, format!("expected the attribute {name:?} in <{}>, found none", element.tag))
+}
+
+fn check_attributes(element: &Element, required: &[&str], optional: &[&str]) -> std::result::Result<(), Fault> {
+    let known = || required.iter().chain(optional).copied();
+    if let Some(unknown) = element.attributes.iter().find(|attribute| !known().any(|name| name == attribute.name)) {
+        let hint = did_you_mean(&unknown.name, known());
+        let expected = known().collect::<Vec<_>>().join(", ");
+        let message =
+            format!("expected attributes among {expected} in <{}>, found {}{hint}", element.tag, quote(&unknown.name));
+        return Err(Fault::at_place(unknown.place, message));
+    }
+    match required.iter().find(|name| element.attribute(name).is_none()) {
+        Some(name) => Err(missing(element, name)),
+        None => Ok(()),
+    }
+}
+
+/// What stands between blanks and commas.
+pub(crate) fn tokens(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| c == ',' || c.is_whitespace()).filter(|token| !token.is_empty())
+}
+
+pub(crate) fn number(text: &str, place: Place) -> std::result::Result<f64, Fault> {
+    match text.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err(Fault::at_place(place, format!("expected a finite number, found {}", quote(text)))),
+    }
+}
+
+/// One number, or `nm:value` pairs.
+fn spectrum_value(text: &str, place: Place) -> std::result::Result<SpectrumValue, Fault> {
+    let tokens: Vec<&str> = tokens(text).collect();
+    if let [only] = tokens[..]
+        && !only.contains(':')
+    {
+        return number(only, place).map(SpectrumValue::Uniform);
+    }
+    let mut table: Vec<[f64; 2]> = Vec::with_capacity(tokens.len());
+    for token in &tokens {
+        let Some((nm, value)) = token.split_once(':') else {
+            let message = format!("expected pairs such as 400:0.5, found {}", quote(token));
+            return Err(Fault::at_place(place, message));
+        };
+        let nm = number(nm, place)?;
+        if let Some(&[last, _]) = table.last()
+            && nm <= last
+        {
+            let message = format!("expected wavelengths that increase, found {nm} nm after {last} nm");
+            return Err(Fault::at_place(place, message));
+        }
+        table.push([nm, number(value, place)?]);
+    }
+    match table.len() {
+        0 => Err(Fault::at_place(place, "expected a number or pairs such as 400:0.5, found none")),
+        _ => Ok(SpectrumValue::Table(table)),
+    }
+}
+
+fn major_version(attribute: &Attribute) -> std::result::Result<u32, Fault> {
+    let parts: Option<Vec<u32>> = attribute.value.split('.').map(|part| part.trim().parse().ok()).collect();
+    match parts.as_deref() {
+        Some([major, _, _]) => Ok(*major),
+        _ => {
+            let message = format!("expected a version such as 3.0.0, found {}", quote(&attribute.value));
+            Err(Fault::at_place(attribute.place, message))
+        }
+    }
+}
+
+/// `toWorld` to `to_world`, `intIOR` to `int_ior`.
+fn underscored(name: &str) -> String {
+    let mut text = String::with_capacity(name.len() + 4);
+    let mut before: Option<char> = None;
+    let mut inside_capitals = false;
+    for c in name.chars() {
+        let begins = c.is_ascii_uppercase() && before.is_some_and(|before| before.is_ascii_lowercase());
+        if begins {
+            text.push('_');
+        }
+        inside_capitals = begins || (inside_capitals && c.is_ascii_uppercase());
+        text.push(if inside_capitals { c.to_ascii_lowercase() } else { c });
+        before = Some(c);
+    }
+    text
+}
+
+/// +x to the left, +y up, +z to the target. Without an `up`, any.
+fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> Option<DMat4> {
+    let z = (target - origin).try_normalize()?;
+    let up = if up == DVec3::ZERO { crate::math::Frame::from_normal(z).s } else { up };
+    let x = up.cross(z).try_normalize()?;
+    let y = z.cross(x);
+    Some(DMat4::from_cols(x.extend(0.0), y.extend(0.0), z.extend(0.0), origin.extend(1.0)))
+}

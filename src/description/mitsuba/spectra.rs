@@ -1,0 +1,272 @@
+//! Spectra and refractive indices.
+
+use super::super::fault::Fault;
+use super::super::node::{Node, Place, did_you_mean, quote};
+use super::object::{Bag, Family, SpectrumValue, Value};
+use super::parse;
+use super::{FILM, Fields, Import, entry, list, number, numbers, text};
+
+/// What a spectrum stands for, which decides what a colour or a bare number means.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Role {
+    /// From 0 to 1.
+    Reflectance,
+    /// Radiance, intensity, irradiance: colours are seen under D65.
+    Emission,
+    /// σ, η, k: any number of 0 or more.
+    Coefficient,
+}
+
+/// Indices of refraction by the names that Mitsuba gives them.
+///
+/// Values at the sodium D line and standard conditions as tables of physics print them; "bk7" and
+/// "air" are the defaults of dielectrics.
+const INDICES: [(&str, f64); 23] = [
+    ("vacuum", 1.0),
+    ("helium", 1.000_036),
+    ("hydrogen", 1.000_132),
+    ("air", 1.000_277),
+    ("carbon dioxide", 1.000_45),
+    ("water", 1.333),
+    ("acetone", 1.36),
+    ("ethanol", 1.361),
+    ("carbon tetrachloride", 1.461),
+    ("glycerol", 1.4729),
+    ("benzene", 1.501),
+    ("silicone oil", 1.52045),
+    ("bromine", 1.661),
+    ("water ice", 1.31),
+    ("fused quartz", 1.458),
+    ("pyrex", 1.47),
+    ("acrylic glass", 1.49),
+    ("polypropylene", 1.49),
+    ("bk7", 1.5046),
+    ("sodium chloride", 1.544),
+    ("amber", 1.55),
+    ("pet", 1.575),
+    ("diamond", 2.419),
+];
+
+impl Import<'_> {
+    /// The spectrum of a property; `None` where it is not written. Textures are refused.
+    pub(crate) fn spectrum(&mut self, bag: &Bag<'_>, name: &'static str, role: Role) -> Result<Option<Node>, Fault> {
+        let Some(value) = bag.value(name) else { return Ok(None) };
+        let place = bag.place(name);
+        match value {
+            Value::Float(value) => Ok(Some(grey(place, *value, role))),
+            Value::Integer(value) => Ok(Some(grey(place, *value as f64, role))),
+            Value::Rgb(rgb) => Ok(Some(colour(place, *rgb, role))),
+            Value::Spectrum(SpectrumValue::Uniform(value)) => Ok(Some(number(place, *value))),
+            Value::Spectrum(SpectrumValue::Table(pairs)) => {
+                let node = if let [[_, value]] = pairs[..] { number(place, value) } else { table(place, pairs) };
+                Ok(Some(node))
+            }
+            Value::Spectrum(SpectrumValue::File(path)) => {
+                let file = entry(place, "file", text(place, path.as_str()));
+                Ok(Some(entry(place, "zero_outside", file)))
+            }
+            Value::Object(index) if bag.document.objects[*index].family == Family::Texture => {
+                match self.spectrum_plugin(*index)? {
+                    Some(node) => Ok(Some(node)),
+                    None => {
+                        let found = value.kind(bag.document);
+                        Err(bag.fault_of(name, format!("expected the same spectrum everywhere, found {found}")))
+                    }
+                }
+            }
+            other => {
+                let found = other.kind(bag.document);
+                Err(bag.fault_of(name, format!("expected a spectrum, a colour or a float, found {found}")))
+            }
+        }
+    }
+
+    /// The spectrum or `{texture: name}` of a property.
+    pub(crate) fn spectrum_or_texture(
+        &mut self,
+        bag: &Bag<'_>,
+        name: &'static str,
+        role: Role,
+    ) -> Result<Option<Node>, Fault> {
+        if let Some(Value::Object(index)) = bag.value(name)
+            && bag.document.objects[*index].family == Family::Texture
+            && !SPECTRA.contains(&bag.document.objects[*index].plugin.as_str())
+        {
+            let place = bag.place(name);
+            let texture = self.declare_texture(*index)?;
+            return Ok(Some(entry(place, "texture", text(place, texture))));
+        }
+        self.spectrum(bag, name, role)
+    }
+
+    /// A `<spectrum type="…">`; `None` where the plugin varies over the surface.
+    fn spectrum_plugin(&mut self, index: usize) -> Result<Option<Node>, Fault> {
+        let bag = self.bag(index);
+        let place = bag.object.place;
+        let node = match bag.object.plugin.as_str() {
+            "uniform" => {
+                let value = bag.float("value")?.unwrap_or(1.0);
+                // The range is read and, as in Mitsuba, does not cut the spectrum.
+                bag.float("wavelength_min")?;
+                bag.float("wavelength_max")?;
+                number(place, value)
+            }
+            "d65" => {
+                let scale = bag.float("scale")?.unwrap_or(1.0);
+                let colour = match bag.value("color") {
+                    None => None,
+                    Some(Value::Rgb(rgb)) => Some(*rgb),
+                    Some(other) => {
+                        let found = other.kind(bag.document);
+                        return Err(bag.fault_of("color", format!("expected an rgb colour, found {found}")));
+                    }
+                };
+                match colour {
+                    None => d65(place, scale),
+                    Some(rgb) => self::colour(place, rgb.map(|x| x * scale), Role::Emission),
+                }
+            }
+            "srgb" => {
+                let rgb = match bag.value("color") {
+                    Some(Value::Rgb(rgb)) => *rgb,
+                    Some(other) => {
+                        let found = other.kind(bag.document);
+                        return Err(bag.fault_of("color", format!("expected an rgb colour, found {found}")));
+                    }
+                    None => return Err(bag.fault("expected the parameter \"color\", found none")),
+                };
+                bag.boolean("unbounded")?;
+                entry(place, "rgb", numbers(place, &rgb))
+            }
+            "regular" => {
+                let least = bag.required("wavelength_min", bag.float("wavelength_min"))?;
+                let most = bag.required("wavelength_max", bag.float("wavelength_max"))?;
+                let values = floats(&bag, "values")?;
+                let step = (most - least) / (values.len().max(2) - 1) as f64;
+                let pairs: Vec<[f64; 2]> =
+                    values.iter().enumerate().map(|(i, value)| [least + step * i as f64, *value]).collect();
+                table(place, &pairs)
+            }
+            "irregular" => {
+                let (nm, values) = (floats(&bag, "wavelengths")?, floats(&bag, "values")?);
+                if nm.len() != values.len() {
+                    let message = format!("expected {} numbers, one a wavelength, found {}", nm.len(), values.len());
+                    return Err(bag.fault_of("values", message));
+                }
+                let pairs: Vec<[f64; 2]> = nm.iter().zip(&values).map(|(nm, value)| [*nm, *value]).collect();
+                table(place, &pairs)
+            }
+            "blackbody" => {
+                let kelvin = bag.required("temperature", bag.float("temperature"))?;
+                bag.float("wavelength_min")?;
+                bag.float("wavelength_max")?;
+                let mut fields = Fields::new(place);
+                fields.add("kelvin", number(place, kelvin));
+                fields.add("normalised", super::boolean(place, false));
+                fields.kind("blackbody")
+            }
+            _ => return Ok(None),
+        };
+        bag.finish()?;
+        Ok(Some(node))
+    }
+
+    /// The index of refraction of `int_ior` or `ext_ior`: a number, a name, or (which Mitsuba does not
+    /// have) a spectrum.
+    pub(crate) fn index(&mut self, bag: &Bag<'_>, name: &'static str, default: &str) -> Result<Index, Fault> {
+        let place = bag.place(name);
+        let by_name = |name: &str| {
+            let folded = name.to_lowercase();
+            INDICES.iter().find(|(known, _)| *known == folded).map(|(_, index)| *index)
+        };
+        match bag.value(name) {
+            None => Ok(Index { node: number(place, by_name(default).unwrap_or(1.0)), number: by_name(default) }),
+            Some(Value::Float(value)) => Ok(Index { node: number(place, *value), number: Some(*value) }),
+            Some(Value::Integer(value)) => {
+                let value = *value as f64;
+                Ok(Index { node: number(place, value), number: Some(value) })
+            }
+            Some(Value::Text(text)) => match by_name(text) {
+                Some(value) => Ok(Index { node: number(place, value), number: Some(value) }),
+                None => {
+                    let known = || INDICES.iter().map(|(known, _)| *known);
+                    let hint = did_you_mean(text, known());
+                    let message = format!(
+                        "expected one of {}, found {}{hint}",
+                        known().collect::<Vec<_>>().join(", "),
+                        quote(text)
+                    );
+                    Err(bag.fault_of(name, message))
+                }
+            },
+            Some(Value::Spectrum(SpectrumValue::Uniform(value))) => {
+                Ok(Index { node: number(place, *value), number: Some(*value) })
+            }
+            Some(Value::Spectrum(SpectrumValue::Table(pairs))) => {
+                Ok(Index { node: entry(place, "table", pairs_node(place, pairs)), number: None })
+            }
+            Some(other) => {
+                let found = other.kind(bag.document);
+                Err(bag
+                    .fault_of(name, format!("expected a float, the name of a substance or a spectrum, found {found}")))
+            }
+        }
+    }
+}
+
+/// An index of refraction.
+pub(crate) struct Index {
+    /// As it stands in the grammar.
+    pub(crate) node: Node,
+    /// Where it does not depend on wavelength.
+    pub(crate) number: Option<f64>,
+}
+
+/// Plugins that are a spectrum, the same everywhere.
+const SPECTRA: [&str; 6] = ["uniform", "d65", "srgb", "regular", "irregular", "blackbody"];
+
+/// The numbers of a string such as `"1, 2, 3"`.
+fn floats(bag: &Bag<'_>, name: &'static str) -> Result<Vec<f64>, Fault> {
+    let text = bag.required(name, bag.text(name))?;
+    parse::tokens(text).map(|token| parse::number(token, bag.place(name))).collect()
+}
+
+fn grey(place: Place, value: f64, role: Role) -> Node {
+    match role {
+        Role::Emission => d65(place, value),
+        Role::Reflectance | Role::Coefficient => number(place, value),
+    }
+}
+
+fn colour(place: Place, rgb: [f64; 3], role: Role) -> Node {
+    match role {
+        Role::Emission => scaled(place, 1.0 / FILM, entry(place, "rgb", numbers(place, &rgb))),
+        Role::Reflectance | Role::Coefficient => entry(place, "rgb", numbers(place, &rgb)),
+    }
+}
+
+/// CIE D65, of luminance `scale` on Mitsuba's film.
+pub(crate) fn d65(place: Place, scale: f64) -> Node {
+    let mut fields = Fields::new(place);
+    fields.add("name", text(place, "D65"));
+    fields.add("scale", number(place, scale / FILM));
+    fields.kind("illuminant")
+}
+
+pub(crate) fn scaled(place: Place, by: f64, of: Node) -> Node {
+    let mut fields = Fields::new(place);
+    fields.add("by", number(place, by));
+    fields.add("of", of);
+    fields.kind("scaled")
+}
+
+fn pairs_node(place: Place, pairs: &[[f64; 2]]) -> Node {
+    list(place, pairs.iter().map(|pair| numbers(place, pair)))
+}
+
+/// Linear between the pairs, zero outside.
+fn table(place: Place, pairs: &[[f64; 2]]) -> Node {
+    let table = entry(place, "table", pairs_node(place, pairs));
+    let covers = pairs.first().is_some_and(|p| p[0] <= 360.0) && pairs.last().is_some_and(|p| p[0] >= 830.0);
+    if covers { table } else { entry(place, "zero_outside", table) }
+}

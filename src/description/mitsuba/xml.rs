@@ -1,0 +1,276 @@
+//! XML text to elements with places: the one file that names an XML crate.
+//!
+//! `quick-xml` is a pull parser without recursion and without external entities, whose events
+//! borrow from the text, so that the offset of each name and value is known. Nesting is limited
+//! here, before anything deep is built. A document type is refused, and with it every entity but
+//! the five of XML and character references: there is nothing to expand without end.
+
+use quick_xml::Reader;
+use quick_xml::escape::unescape;
+use quick_xml::events::{BytesStart, Event};
+
+use super::super::fault::Fault;
+use super::super::node::{Place, quote};
+use super::super::yaml::{MAX_BYTES, MAX_NODES};
+
+/// The deepest nesting of elements. A scene needs about ten levels.
+pub(crate) const MAX_DEPTH: usize = 64;
+
+/// An element and all inside it; text between elements says nothing in a scene and is passed over.
+#[derive(Clone, Debug)]
+pub(crate) struct Element {
+    /// Its name.
+    pub(crate) tag: String,
+    /// Of its `<`.
+    pub(crate) place: Place,
+    /// In the order of the text; names are distinct.
+    pub(crate) attributes: Vec<Attribute>,
+    /// Elements, in the order of the text.
+    pub(crate) children: Vec<Element>,
+}
+
+/// `name="value"`
+#[derive(Clone, Debug)]
+pub(crate) struct Attribute {
+    /// As written.
+    pub(crate) name: String,
+    /// With character references resolved.
+    pub(crate) value: String,
+    /// Of the first character of the value.
+    pub(crate) place: Place,
+}
+
+impl Element {
+    /// The attribute of this name.
+    pub(crate) fn attribute(&self, name: &str) -> Option<&Attribute> {
+        self.attributes.iter().find(|attribute| attribute.name == name)
+    }
+}
+
+/// Reads one document. Each element and attribute takes one from `budget`.
+///
+/// # Errors
+/// The first fault, with its place.
+pub(crate) fn read(bytes: &[u8], source: u32, budget: &mut usize) -> Result<Element, Fault> {
+    let start = Place { source, line: 1, column: 1 };
+    if bytes.len() > MAX_BYTES {
+        let (limit, found) = (MAX_BYTES >> 20, bytes.len());
+        return Err(Fault::at_place(start, format!("expected at most {limit} MiB of text, found {found} bytes")));
+    }
+    let text = str::from_utf8(bytes).map_err(|error| {
+        let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
+        let mut cursor = Cursor::new(&before, source);
+        let place = cursor.place(before.len());
+        Fault::at_place(place, format!("expected text in UTF-8, found the byte 0x{:02x}", bytes[error.valid_up_to()]))
+    })?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    Builder { text, source, cursor: Cursor::new(text, source), open: Vec::new(), root: None, budget }.build()
+}
+
+/// Counts lines and columns up to offsets that mostly grow.
+struct Cursor<'a> {
+    text: &'a str,
+    offset: usize,
+    place: Place,
+}
+
+impl<'a> Cursor<'a> {
+    fn new(text: &'a str, source: u32) -> Cursor<'a> {
+        Cursor { text, offset: 0, place: Place { source, line: 1, column: 1 } }
+    }
+
+    /// The place of the character at `offset`.
+    fn place(&mut self, offset: usize) -> Place {
+        if offset < self.offset {
+            *self = Cursor::new(self.text, self.place.source);
+        }
+        let end = self.text.len().min(offset);
+        for c in self.text.get(self.offset..end).unwrap_or("").chars() {
+            if c == '\n' {
+                self.place.line += 1;
+                self.place.column = 1;
+            } else {
+                self.place.column += 1;
+            }
+        }
+        self.offset = self.offset.max(end);
+        self.place
+    }
+}
+
+struct Builder<'a, 'b> {
+    text: &'a str,
+    source: u32,
+    cursor: Cursor<'a>,
+    /// Elements that are not closed yet, outermost first.
+    open: Vec<Element>,
+    root: Option<Element>,
+    budget: &'b mut usize,
+}
+
+impl<'a> Builder<'a, '_> {
+    fn build(mut self) -> Result<Element, Fault> {
+        let mut reader = Reader::from_str(self.text);
+        loop {
+            match reader.read_event() {
+                Ok(Event::Start(tag)) => self.start(&tag, Closing::Later)?,
+                Ok(Event::Empty(tag)) => self.start(&tag, Closing::Now)?,
+                Ok(Event::End(_)) => self.end(),
+                Ok(Event::DocType(kind)) => {
+                    let at = self.offset_of(&kind);
+                    let message = "expected no document type, found <!DOCTYPE …>: entities are not expanded";
+                    return Err(self.fault(at, message));
+                }
+                Ok(Event::Eof) => break,
+                Ok(Event::Text(text)) if self.open.is_empty() && !blank(&text) => {
+                    let at = self.offset_of(&text);
+                    return Err(self.fault(at, "expected an element, found text outside of one"));
+                }
+                // What stands between elements means nothing to a scene.
+                Ok(_) => {}
+                Err(error) => {
+                    let at = usize::try_from(reader.error_position()).unwrap_or(usize::MAX);
+                    return Err(self.fault(at, format!("expected XML, found a fault of syntax: {error}")));
+                }
+            }
+        }
+        if let Some(element) = self.open.last() {
+            let message = format!("expected </{}>, found the end of the text", element.tag);
+            return Err(Fault::at_place(element.place, message));
+        }
+        let start = Place { source: self.source, line: 1, column: 1 };
+        self.root.ok_or_else(|| Fault::at_place(start, "expected the element <scene>, found none"))
+    }
+
+    /// Where `slice`, a part of the text, begins.
+    fn offset_of(&self, slice: &str) -> usize {
+        (slice.as_ptr() as usize).saturating_sub(self.text.as_ptr() as usize).min(self.text.len())
+    }
+
+    fn fault(&mut self, offset: usize, message: impl Into<String>) -> Fault {
+        Fault::at_place(self.cursor.place(offset), message)
+    }
+
+    fn charge(&mut self, at: usize) -> Result<(), Fault> {
+        match self.budget.checked_sub(1) {
+            Some(rest) => {
+                *self.budget = rest;
+                Ok(())
+            }
+            None => {
+                Err(self.fault(at, format!("expected at most {MAX_NODES} elements and attributes in all, found more")))
+            }
+        }
+    }
+
+    fn start(&mut self, tag: &BytesStart<'a>, closing: Closing) -> Result<(), Fault> {
+        let at = self.offset_of(tag).saturating_sub(1);
+        let place = self.cursor.place(at);
+        self.charge(at)?;
+        if self.root.is_some() {
+            return Err(Fault::at_place(place, "expected one element around all others, found a second"));
+        }
+        if self.open.len() >= MAX_DEPTH {
+            return Err(Fault::at_place(place, format!("expected at most {MAX_DEPTH} levels of nesting, found more")));
+        }
+        let name = tag.name().into_inner().to_owned();
+        let mut attributes = Vec::new();
+        for attribute in tag.attributes() {
+            let attribute = attribute.map_err(|error| {
+                Fault::at_place(
+                    place,
+                    format!("expected attributes of the form name=\"value\" in <{name}>, found: {error}"),
+                )
+            })?;
+            let raw: &str = &attribute.value;
+            let at = self.offset_of(raw);
+            self.charge(at)?;
+            let place = self.cursor.place(at);
+            let value = unescape(raw).map_err(|_| {
+                Fault::at_place(place, format!("expected no entities but those of XML, found {}", quote(raw)))
+            })?;
+            let name = attribute.key.into_inner().to_owned();
+            // A line end within an attribute is a blank.
+            attributes.push(Attribute { name, value: value.replace(['\n', '\r', '\t'], " "), place });
+        }
+        self.open.push(Element { tag: name, place, attributes, children: Vec::new() });
+        if let Closing::Now = closing {
+            self.end();
+        }
+        Ok(())
+    }
+
+    fn end(&mut self) {
+        // The reader has checked that it closes what was opened.
+        let Some(element) = self.open.pop() else { return };
+        match self.open.last_mut() {
+            Some(parent) => parent.children.push(element),
+            None => self.root = Some(element),
+        }
+    }
+}
+
+enum Closing {
+    /// `<a>`
+    Later,
+    /// `<a/>`
+    Now,
+}
+
+fn blank(text: &str) -> bool {
+    text.bytes().all(|byte| byte.is_ascii_whitespace())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::node::Sources;
+    use super::*;
+    use std::path::Path;
+
+    fn fault(text: &str) -> String {
+        let mut sources = Sources::default();
+        let source = sources.add_file(Path::new("s.xml"));
+        match read(text.as_bytes(), source, &mut { MAX_NODES }) {
+            Ok(_) => "none".to_owned(),
+            Err(fault) => fault.write(&sources),
+        }
+    }
+
+    #[test]
+    fn elements_and_attributes_know_their_places() {
+        let text = "<?xml version='1.0'?>\n<!-- é --><scene version=\"3.0.0\">\n  <float name='a&lt;b' value=\"&#50;\"/>\n</scene>\n";
+        let root = read(text.as_bytes(), 0, &mut { MAX_NODES }).unwrap();
+        assert_eq!((root.place.line, root.place.column), (2, 11));
+        let float = &root.children[0];
+        assert_eq!((float.tag.as_str(), float.place.line, float.place.column), ("float", 3, 3));
+        assert_eq!(float.attribute("name").unwrap().value, "a<b");
+        let value = float.attribute("value").unwrap();
+        assert_eq!((value.value.as_str(), value.place.line, value.place.column), ("2", 3, 31));
+    }
+
+    #[test]
+    fn what_is_not_xml_is_one_fault_at_its_place() {
+        assert_eq!(fault("<scene>\n  <shape>\n"), "s.xml:2:3: expected </shape>, found the end of the text");
+        assert!(fault("<scene>\n  <shape").starts_with("s.xml:2:3: expected XML, found a fault of syntax: "));
+        assert!(fault("<scene>\n</shape>").starts_with("s.xml:2:1: expected XML, found a fault of syntax: "));
+        assert_eq!(fault(""), "s.xml:1:1: expected the element <scene>, found none");
+        assert_eq!(fault("<a/>\n<b/>"), "s.xml:2:1: expected one element around all others, found a second");
+        assert_eq!(fault("a: 1"), "s.xml:1:1: expected an element, found text outside of one");
+        assert_eq!(fault("<a>\n <b c='&d;'/></a>"), "s.xml:2:8: expected no entities but those of XML, found \"&d;\"");
+        assert!(
+            fault("<a b='1' b='2'/>").starts_with("s.xml:1:1: expected attributes of the form name=\"value\" in <a>")
+        );
+    }
+
+    #[test]
+    fn entities_are_not_expanded() {
+        let bomb = "<!DOCTYPE a [<!ENTITY b \"bbbbbbbb\"><!ENTITY c \"&b;&b;&b;&b;\">]>\n<a d='&c;'/>";
+        assert_eq!(fault(bomb), "s.xml:1:11: expected no document type, found <!DOCTYPE …>: entities are not expanded");
+    }
+
+    #[test]
+    fn a_million_nested_elements_are_one_fault() {
+        let text = "<a>".repeat(1_000_000);
+        assert_eq!(fault(&text), "s.xml:1:193: expected at most 64 levels of nesting, found more");
+    }
+}
