@@ -73,6 +73,38 @@ impl Sampler {
     }
 }
 
+/// Independent numbers for a walk whose length nobody knows beforehand: the tentative collisions of
+/// a flight through a medium. Addressed like a set, then counted: SplitMix64 (Steele et al. 2014).
+#[derive(Clone, Copy, Debug)]
+pub struct Walk {
+    state: u64,
+}
+
+impl Sampler {
+    /// The walk that belongs to `set`; its numbers have nothing in common with those of the set.
+    #[must_use]
+    pub fn walk(&self, set: Set) -> Walk {
+        let place = mix64(u64::from(self.stream) << 32 | u64::from(self.index));
+        // The set's own key is not mixed with the index: no two arguments of the hash are alike.
+        Walk { state: mix64(place ^ mix64(u64::from(set.index())).rotate_left(32)) }
+    }
+}
+
+impl Walk {
+    /// The next number in [0, 1): a multiple of 2⁻⁵³.
+    #[inline]
+    pub fn draw(&mut self) -> f64 {
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        (mix64(self.state) >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
+    }
+
+    /// The next number of the exponential distribution with mean one.
+    #[inline]
+    pub fn exponential(&mut self) -> f64 {
+        -libm::log1p(-self.draw())
+    }
+}
+
 /// Tell the dimensions of a set apart: the first 32-bit words of the fractional parts of the square
 /// roots of 2, 3, 5 and 7 (the initial words of SHA-256, FIPS 180-4).
 const DIMENSION_KEYS: [u32; 4] = [0x6a09_e667, 0xbb67_ae85, 0x3c6e_f372, 0xa54f_f53a];
@@ -246,6 +278,30 @@ mod tests {
             let r: f64 = (0..n).map(product).sum::<f64>() * 12.0 / f64::from(n);
             assert!(r.abs() < 4.5 / f64::from(n).sqrt(), "{name}: {r}");
         }
+    }
+
+    /// Steps of one walk, and the same step of walks of neighbouring sets and samples, are uncorrelated: bounds
+    /// as in `streams_are_uncorrelated`. The exponential numbers have mean and variance one: over n numbers the
+    /// mean has standard deviation 1/√n.
+    #[test]
+    fn walks_are_independent() {
+        let n = 4096;
+        let walk = |i: u32, vertex| Sampler::new(3, [5, 8], 1, i).walk(Set::Extra(vertex));
+        let variants: [(&str, fn(u32) -> (u32, u32, u32)); 3] =
+            [("step", |i| (i, 0, 1)), ("set", |i| (i, 1, 0)), ("sample", |i| (i + 1, 0, 0))];
+        for (name, other) in variants {
+            let product = |i| {
+                let (index, vertex, skip) = other(i);
+                let mut second = walk(index, vertex);
+                (0..skip).for_each(|_| _ = second.draw());
+                (walk(i, 0).draw() - 0.5) * (second.draw() - 0.5)
+            };
+            let r: f64 = (0..n).map(product).sum::<f64>() * 12.0 / f64::from(n);
+            assert!(r.abs() < 4.5 / f64::from(n).sqrt(), "{name}: {r}");
+        }
+        let mut one = walk(0, 0);
+        let mean = (0..n).map(|_| one.exponential()).sum::<f64>() / f64::from(n);
+        assert!((mean - 1.0).abs() < 4.5 / f64::from(n).sqrt(), "{mean}");
     }
 
     #[test]
