@@ -123,6 +123,7 @@ fn integrator(description: &SceneDescription, written: &description::Integrator)
             hide_emitters: p.hide_emitters,
             light_samples: p.light_samples,
             scatter_samples: p.scatter_samples,
+            count_crossings: p.count_crossings,
         }),
         description::Integrator::Whitted(w) => Integrator::Whitted(WhittedSettings {
             max_depth: w.max_depth,

@@ -14,7 +14,7 @@ use super::yaml::{self, MAX_BYTES, MAX_DEPTH};
 use crate::error::{Error, Result};
 
 /// The maps that an included file may hold.
-const SHARED: [&str; 3] = ["materials", "textures", "media"];
+const SHARED: [&str; 4] = ["materials", "textures", "volumes", "media"];
 const INCLUDE: &str = "include";
 
 /// Reads a file to a tree.
@@ -101,7 +101,9 @@ fn graft(root: &mut Node, tree: Node, names: &mut Names, sources: &Sources) -> s
     let maps = match tree.value {
         Value::Map(maps) => maps,
         Value::Null => return Ok(()),
-        _ => return Err(Fault::expected(&tree, "a map with fields among include, materials, textures, media")),
+        _ => {
+            return Err(Fault::expected(&tree, "a map with fields among include, materials, textures, volumes, media"));
+        }
     };
     for Entry { key, key_place, node } in maps {
         if key == INCLUDE || matches!(node.value, Value::Null) && SHARED.contains(&key.as_str()) {
@@ -326,16 +328,16 @@ mod tests {
     fn an_included_file_holds_only_names() {
         assert_eq!(
             including("include: [a.yaml]", &[("a.yaml", "materials: {}\nshaps: []\n")]).unwrap_err(),
-            "DIR/a.yaml:2:1: shaps: expected one of include, materials, textures, media, found \"shaps\""
+            "DIR/a.yaml:2:1: shaps: expected one of include, materials, textures, volumes, media, found \"shaps\""
         );
         assert_eq!(
             including("include: [a.yaml]", &[("a.yaml", "material: {}\n")]).unwrap_err(),
-            "DIR/a.yaml:1:1: material: expected one of include, materials, textures, media, found \"material\"; \
+            "DIR/a.yaml:1:1: material: expected one of include, materials, textures, volumes, media, found \"material\"; \
              did you mean \"materials\"?"
         );
         assert_eq!(
             including("include: [a.yaml]", &[("a.yaml", "[1]")]).unwrap_err(),
-            "DIR/a.yaml:1:1: expected a map with fields among include, materials, textures, media, found a list of 1"
+            "DIR/a.yaml:1:1: expected a map with fields among include, materials, textures, volumes, media, found a list of 1"
         );
         assert_eq!(
             including("include: [a.yaml]\nmaterials: 3", &[("a.yaml", "materials: {a: {mirror: {}}}")]).unwrap_err(),

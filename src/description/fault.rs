@@ -180,6 +180,10 @@ pub(crate) struct Checker<'a> {
     pub(crate) textures: BTreeSet<&'a str>,
     /// Names under `media`.
     pub(crate) media: BTreeSet<&'a str>,
+    /// Names under `volumes`.
+    pub(crate) volumes: BTreeSet<&'a str>,
+    /// Volumes that were seen in the place of a reflectance.
+    pub(crate) reflecting_volumes: BTreeSet<&'a str>,
     /// Textures that were seen in the place of a reflectance.
     pub(crate) reflecting_textures: BTreeSet<&'a str>,
 }
@@ -194,6 +198,8 @@ impl<'a> Checker<'a> {
             textures: BTreeSet::new(),
             media: BTreeSet::new(),
             reflecting_textures: BTreeSet::new(),
+            volumes: BTreeSet::new(),
+            reflecting_volumes: BTreeSet::new(),
         }
     }
 
@@ -260,6 +266,13 @@ impl<'a> Checker<'a> {
     pub(crate) fn texture(&mut self, at: At<'_>, name: &str) {
         if let Some(hint) = unknown(name, &self.textures, self.untold) {
             self.fault(at, format!("unknown texture {}{hint}", quote(name)));
+        }
+    }
+
+    /// `name` is among the volumes.
+    pub(crate) fn volume(&mut self, at: At<'_>, name: &str) {
+        if let Some(hint) = unknown(name, &self.volumes, self.untold) {
+            self.fault(at, format!("unknown volume {}{hint}", quote(name)));
         }
     }
 

@@ -1,4 +1,4 @@
-//! Lights, media and fog as they are written.
+//! Lights and fog as they are written.
 
 use glam::DVec3;
 use serde::Deserialize;
@@ -166,101 +166,8 @@ pub struct ConstantLight {
     pub sampling_weight: f64,
 }
 
-/// What fills a space.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Medium {
-    /// The same everywhere.
-    Homogeneous(HomogeneousMedium),
-}
-
-/// `homogeneous: {absorption: 0.1, scattering: 0.5, phase: {hg: 0.5}}`
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(try_from = "WrittenHomogeneous")]
-pub struct HomogeneousMedium {
-    /// What it does to light.
-    pub coefficients: Coefficients,
-    /// Factor on all coefficients; default 1.
-    pub scale: f64,
-    /// Directions of scattered light; default `isotropic`.
-    pub phase: Phase,
-}
-
-/// The coefficients of a medium.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Coefficients {
-    /// `absorption: 0.1, scattering: 0.5`
-    Parts {
-        /// σₐ, m⁻¹; default 0.
-        absorption: Spectrum,
-        /// σₛ, m⁻¹; default 0.
-        scattering: Spectrum,
-    },
-    /// `extinction: 0.6, albedo: 0.8`
-    Whole {
-        /// σₜ, m⁻¹.
-        extinction: Spectrum,
-        /// σₛ / σₜ, 0 to 1.
-        albedo: Spectrum,
-    },
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct WrittenHomogeneous {
-    absorption: Option<Spectrum>,
-    scattering: Option<Spectrum>,
-    extinction: Option<Spectrum>,
-    albedo: Option<Spectrum>,
-    #[serde(default = "one")]
-    scale: f64,
-    #[serde(default)]
-    phase: Phase,
-}
-
-impl TryFrom<WrittenHomogeneous> for HomogeneousMedium {
-    type Error = String;
-
-    fn try_from(written: WrittenHomogeneous) -> Result<HomogeneousMedium, String> {
-        let WrittenHomogeneous { absorption, scattering, extinction, albedo, scale, phase } = written;
-        let coefficients = match (absorption, scattering, extinction, albedo) {
-            (None, None, Some(extinction), Some(albedo)) => Coefficients::Whole { extinction, albedo },
-            (absorption, scattering, None, None) => Coefficients::Parts {
-                absorption: absorption.unwrap_or_else(nothing),
-                scattering: scattering.unwrap_or_else(nothing),
-            },
-            (absorption, scattering, extinction, albedo) => {
-                let given = [
-                    ("absorption", absorption.is_some()),
-                    ("scattering", scattering.is_some()),
-                    ("extinction", extinction.is_some()),
-                    ("albedo", albedo.is_some()),
-                ];
-                return Err(format!(
-                    "expected either absorption and scattering, or extinction and albedo, found {}",
-                    given_fields(&given)
-                ));
-            }
-        };
-        Ok(HomogeneousMedium { coefficients, scale, phase })
-    }
-}
-
 pub(crate) fn nothing() -> Spectrum {
     Spectrum::Number(0.0)
-}
-
-/// A phase function.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Phase {
-    /// All directions alike.
-    #[default]
-    Isotropic,
-    /// Rayleigh's, ∝ 1 + cos²θ.
-    Rayleigh,
-    /// Henyey and Greenstein's, with mean cosine g between −1 and 1.
-    Hg(f64),
 }
 
 /// Fog by depth: what the picture shows fades to a colour.
@@ -413,31 +320,6 @@ impl Light {
     }
 }
 
-impl Medium {
-    pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
-        match self {
-            Medium::Homogeneous(medium) => {
-                let at = at.key("homogeneous");
-                match &medium.coefficients {
-                    Coefficients::Parts { absorption, scattering } => {
-                        absorption.check(Role::Coefficient, at.key("absorption"), checker);
-                        scattering.check(Role::Coefficient, at.key("scattering"), checker);
-                    }
-                    Coefficients::Whole { extinction, albedo } => {
-                        extinction.check(Role::Coefficient, at.key("extinction"), checker);
-                        albedo.check(Role::Reflectance, at.key("albedo"), checker);
-                    }
-                }
-                checker.not_negative(at.key("scale"), medium.scale);
-                if let Phase::Hg(g) = medium.phase {
-                    let within = g.abs() < 1.0;
-                    checker.require(within, at.key("phase").key("hg"), "a number between -1 and 1", g);
-                }
-            }
-        }
-    }
-}
-
 impl Fog {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         self.colour.check(Role::Emission, at.key("colour"), checker);
@@ -510,36 +392,6 @@ mod tests {
         assert_eq!(
             light("environment: {file: sky.exr, scale: -1}"),
             "dir/s.yaml:3:39: lights[0].environment.scale: expected a number of 0 or more, found -1"
-        );
-    }
-
-    #[test]
-    fn a_medium_takes_and_does_not_give() {
-        let medium = |fields: &str| faults(&format!("media:\n  m: {{homogeneous: {{{fields}}}}}"));
-        assert_eq!(
-            medium("absorption: -1, scattering: {rgb: [0, 0, -1]}"),
-            "dir/s.yaml:3:33: media.m.homogeneous.absorption: expected a number of 0 or more, found -1\n\
-             dir/s.yaml:3:62: media.m.homogeneous.scattering.rgb[2]: expected a number of 0 or more, found -1"
-        );
-        for g in ["1", "-1", "1.5"] {
-            assert_eq!(
-                medium(&format!("phase: {{hg: {g}}}")),
-                format!("dir/s.yaml:3:33: media.m.homogeneous.phase.hg: expected a number between -1 and 1, found {g}")
-            );
-        }
-        let Medium::Homogeneous(bare) = &scene("media: {m: {homogeneous: {phase: rayleigh}}}").media["m"];
-        let none = Coefficients::Parts { absorption: nothing(), scattering: nothing() };
-        assert_eq!((&bare.coefficients, bare.scale, bare.phase), (&none, 1.0, Phase::Rayleigh));
-    }
-
-    #[test]
-    fn media_go_by_name() {
-        assert_eq!(
-            faults(
-                "media: {smoke: {homogeneous: {}}}\nmedium: smok\nshapes:\n- sphere: {radius: 1, inside: smoke, outside: x}"
-            ),
-            "dir/s.yaml:3:9: medium: unknown medium \"smok\"; did you mean \"smoke\"?\n\
-             dir/s.yaml:5:47: shapes[0].sphere.outside: unknown medium \"x\"; known: smoke"
         );
     }
 

@@ -278,6 +278,8 @@ pub enum Texture {
     Image(ImageTexture),
     /// Two spectra in turn.
     Checkerboard(Checkerboard),
+    /// `volume: haze`: a volume, by name, at the points of the surface.
+    Volume(String),
 }
 
 /// `image: {file: earth.jpg}`
@@ -456,8 +458,14 @@ fn check_highlight(highlight: Option<Highlight>, at: At<'_>, checker: &mut Check
 
 impl Texture {
     /// Checks a texture; `role` is how the scene uses it.
-    pub(crate) fn check(&self, role: Role, at: At<'_>, checker: &mut Checker<'_>) {
+    pub(crate) fn check<'a>(&'a self, role: Role, at: At<'_>, checker: &mut Checker<'a>) {
         match self {
+            Texture::Volume(name) => {
+                checker.volume(at.key("volume"), name);
+                if role == Role::Reflectance {
+                    checker.reflecting_volumes.insert(name);
+                }
+            }
             Texture::Image(_) => {}
             Texture::Checkerboard(board) => {
                 let at = at.key("checkerboard");

@@ -41,7 +41,7 @@
 //!   sensitivity: 1                  # default; factor on the picture
 //! integrator: path                  # default; or, with their defaults,
 //!                                   #   {path: {max_depth: null, roulette_depth: 5, hide_emitters: false,
-//!                                   #           light_samples: 1, scatter_samples: 1}},
+//!                                   #           light_samples: 1, scatter_samples: 1, count_crossings: false}},
 //!                                   #   {light_tracer: {max_depth: null, roulette_depth: 5,
 //!                                   #                   hide_emitters: false}}: from the lights to the camera
 //!                                   #   {whitted: {max_depth: 10, grid: 2, ambient: 0,
@@ -73,7 +73,13 @@
 //!   earth: {image: {file: earth.jpg, wrap: repeat, filter: bilinear, scale: [1, 1], offset: [0, 0], raw: false}}
 //!                                   # repeat, mirror, clamp, and wrap_v where it differs; bilinear, nearest; all but
 //!                                   # file default
+//!   marble: {volume: haze}          # a volume where it is cut by the surface
 //!   floor: {checkerboard: {a: 0.1, b: {rgb: [0.9, 0.8, 0.7]}, scale: [12, 12]}}   # scale default [1, 1]
+//! volumes:
+//!   haze: {constant: {value: 0.5, transform: [{scale: 2}]}}
+//!                                   # transform as of shapes, from the unit cube; default none
+//!   # plume: {grid: {file: plume.vol, filter: trilinear, wrap: clamp, raw: false, file_box: false}}
+//!                                   # and transform; all but file default; trilinear, nearest; wrap as of textures
 //! materials:                        # ~ marks defaults
 //!   clay:
 //!     diffuse:
@@ -100,10 +106,11 @@
 //! media:
 //!   smoke:
 //!     homogeneous: {absorption: 0.1, scattering: {rgb: [0.2, 0.3, 0.4]}, phase: {hg: 0.5}}
-//!                                                # m⁻¹, ~ 0; ~ isotropic, rayleigh, |g| < 1
-//!   mist: {homogeneous: {extinction: 2, albedo: 0.9, scale: 1}}
-//!                                                # m⁻¹ and scattering / extinction, in place of the former two;
-//!                                                # ~ scale, a factor on all coefficients, and phase
+//!                                                # m⁻¹, ~ 0; phase: ~ isotropic, rayleigh, {hg: g}, |g| < 1,
+//!                                                #   {table: [1, 2, 4]} over cos θ from -1 to 1,
+//!                                                #   {blend: {weight: 0.3, of: [isotropic, {hg: 0.8}]}}
+//!   milk: {homogeneous: {extinction: 5, albedo: 0.99, scale: 1, shadow_rays: true}}    # ~ scale, shadow_rays
+//!   cloud: {heterogeneous: {extinction: {volume: haze}, albedo: 0.9, scale: 1}}        # and phase, shadow_rays
 //! medium: smoke                     # what the camera is in; default none
 //! fog: {colour: 0.8, start: 5, end: 40}
 //!                                   # or {colour, density: 0.1, falloff: exp}: exp (default), exp2
@@ -119,7 +126,7 @@
 //!                                   # along the normal, emission in W·m⁻²·nm⁻¹
 //!     sampling_weight: 1            # ~ how often light is looked for here, relative to its power; also of lights
 //!     inside: smoke                 # media on the two sides; ~ inside a closed shape nothing, outside what the
-//!                                   # camera is in
+//!                                   # camera is in; or vacuum, or both sides unchanged
 //!     outside: smoke
 //!     transform:                    # applied in this order; ~ none
 //!     - translate: [1, 0, 0]
@@ -228,6 +235,7 @@ mod fault;
 mod layer;
 mod light;
 mod material;
+mod medium;
 mod mitsuba;
 mod node;
 mod path;
@@ -235,20 +243,20 @@ mod scene;
 mod settings;
 mod shape;
 mod spectrum;
+mod volume;
 mod yaml;
 
 pub use batch::{Batch, BatchEntry, Document, load};
 pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection};
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, ProjectorLight};
 pub use layer::{Layer, LayerContent, LightForm, Quantity};
-pub use light::{
-    Aim, Coefficients, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, HomogeneousMedium, Light, Medium, Phase,
-    PointLight, SpotLight,
-};
+pub use light::{Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, Light, PointLight, SpotLight};
 pub use material::{
     Boundary, Checkerboard, Conductor, ConductorIndex, Dielectric, Diffuse, Distribution, Fresnel, Highlight,
     HighlightModel, ImageTexture, Material, MaterialRef, Mirror, Plastic, Texture, TextureFilter, ThinDielectric, Wrap,
 };
+pub use medium::{Coefficients, HeterogeneousMedium, HomogeneousMedium, Medium, Phase, PhaseBlend};
+pub(crate) use medium::{UNCHANGED, VACUUM};
 pub use scene::{Locator, SceneDescription};
 pub use settings::{
     Channels, Colour, Compression, DepthIntegrator, Effects, Exr, Integrator, LightTracerIntegrator, NoIntegrator,
@@ -261,6 +269,7 @@ pub use shape::{
 pub use spectrum::{
     Abbe, Blackbody, Cauchy, FilePath, Illuminant, Index, Line, Scaled, Sellmeier, Spectrum, SpectrumOrTexture, Vec3,
 };
+pub use volume::{ConstantVolume, GridVolume, NumberOrVolume, SpectrumOrVolume, Volume, VolumeFilter};
 
 #[cfg(test)]
 pub(crate) mod testing {
@@ -338,7 +347,7 @@ mod tests {
         assert_eq!(
             parse("scens: []").unwrap_err().to_string(),
             "dir/s.yaml:1:1: scens: expected one of include, camera, image, integrator, layers, render, output, textures, \
-             materials, media, shapes, lights, medium, fog, scenes, found \"scens\"; did you mean \"scenes\"?"
+             volumes, materials, media, shapes, lights, medium, fog, scenes, found \"scens\"; did you mean \"scenes\"?"
         );
         assert_eq!(faults("scens: []").matches("scenes").count(), 0);
     }

@@ -11,13 +11,15 @@ use super::decode::decode;
 use super::edit;
 use super::fault::{Checker, Fault};
 use super::layer::Layer;
-use super::light::{Fog, Light, Medium};
+use super::light::{Fog, Light};
 use super::material::{Material, Texture};
+use super::medium::{Medium, UNCHANGED, VACUUM};
 use super::node::{Node, Sources};
 use super::path::{self, At};
 use super::settings::{Integrator, Output, Render};
 use super::shape::Shape;
 use super::spectrum::{FilePath, Role};
+use super::volume::Volume;
 use crate::error::Result;
 
 /// Everything that one picture is made of.
@@ -51,6 +53,9 @@ pub struct SceneDescription {
     /// By name.
     #[serde(default)]
     pub textures: BTreeMap<String, Texture>,
+    /// By name.
+    #[serde(default)]
+    pub volumes: BTreeMap<String, Volume>,
     /// By name.
     #[serde(default)]
     pub materials: BTreeMap<String, Material>,
@@ -132,6 +137,7 @@ impl SceneDescription {
         let mut checker = Checker::new(root);
         checker.materials = self.materials.keys().map(String::as_str).collect();
         checker.textures = self.textures.keys().map(String::as_str).collect();
+        checker.volumes = self.volumes.keys().map(String::as_str).collect();
         checker.media = self.media.keys().map(String::as_str).collect();
         let at = At::ROOT;
 
@@ -154,7 +160,14 @@ impl SceneDescription {
             light.check(at.key("lights").index(i), &mut checker);
         }
         for (name, medium) in &self.media {
-            medium.check(at.key("media").key(name), &mut checker);
+            let media = at.key("media");
+            let at = media.key(name);
+            for (reserved, what) in [(VACUUM, "empty space"), (UNCHANGED, "the medium on the other side")] {
+                if name == reserved {
+                    checker.fault(at, format!("expected another name: this one means {what}"));
+                }
+            }
+            medium.check(at, &mut checker);
         }
         if let Some(medium) = &self.medium {
             checker.medium(at.key("medium"), medium);
@@ -167,6 +180,11 @@ impl SceneDescription {
             let reflects = checker.reflecting_textures.contains(name.as_str());
             let role = if reflects { Role::Reflectance } else { Role::Emission };
             texture.check(role, at.key("textures").key(name), &mut checker);
+        }
+        for (name, volume) in &self.volumes {
+            let reflects = checker.reflecting_volumes.contains(name.as_str());
+            let role = if reflects { Role::Reflectance } else { Role::Coefficient };
+            volume.check(role, at.key("volumes").key(name), &mut checker);
         }
         checker.finish(sources)
     }
@@ -260,10 +278,10 @@ mod tests {
             Medium::Homogeneous(HomogeneousMedium {
                 coefficients: Coefficients::Parts {
                     absorption: number(0.1),
-                    scattering: Spectrum::Rgb([0.2, 0.3, 0.4])
+                    scattering: Spectrum::Rgb([0.2, 0.3, 0.4]),
                 },
-                scale: 1.0,
                 phase: Phase::Hg(0.5),
+                shadow_rays: true,
             })
         );
         assert_eq!(scene.medium.as_deref(), Some("smoke"));

@@ -52,6 +52,10 @@ pub struct PathIntegrator {
     /// default 1.
     #[serde(default = "one")]
     pub scatter_samples: u32,
+    /// Whether going straight through a thin pane or the boundary of a medium ends a segment for `max_depth`;
+    /// default false.
+    #[serde(default)]
+    pub count_crossings: bool,
 }
 
 impl Default for PathIntegrator {
@@ -62,6 +66,7 @@ impl Default for PathIntegrator {
             hide_emitters: false,
             light_samples: one(),
             scatter_samples: one(),
+            count_crossings: false,
         }
     }
 }

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use super::emitter::{EmissionDirection, check_weight};
 use super::fault::Checker;
 use super::material::MaterialRef;
+use super::medium::check_sides;
 use super::path::At;
 use super::spectrum::{FilePath, Role, SpectrumOrTexture, Vec3, yes};
 
@@ -23,7 +24,8 @@ pub struct Shape {
     pub emission_direction: Option<EmissionDirection>,
     /// How often the shape is chosen as a light, relative to its power; default 1.
     pub sampling_weight: Option<f64>,
-    /// Name of the medium behind the surface, where the normal does not point; default none.
+    /// Name of the medium behind the surface, where the normal does not point; `vacuum`; or, as on the other side,
+    /// `unchanged`: what it was before. Default none.
     pub inside: Option<String>,
     /// Name of the medium before the surface; default none.
     pub outside: Option<String>,
@@ -358,11 +360,37 @@ pub(crate) fn is_similarity(linear: DMat3) -> bool {
         .all(|axis| axis.abs().max_element() <= SIMILARITY_TOLERANCE * squared)
 }
 
+/// The steps of a transform as one matrix: the first step acts first.
+pub(crate) fn matrix_of(steps: &[TransformStep]) -> DMat4 {
+    steps.iter().fold(DMat4::IDENTITY, |before, step| step.matrix() * before)
+}
+
+/// Checks a transform; its linear part, unless there was a fault.
+pub(crate) fn check_steps(steps: &[TransformStep], at: At<'_>, checker: &mut Checker<'_>) -> Option<DMat3> {
+    let before = checker.count();
+    for (i, step) in steps.iter().enumerate() {
+        let at = at.index(i);
+        step.check(at.key(step.key()), checker);
+    }
+    if checker.count() > before {
+        return None;
+    }
+    // The product may overflow or vanish although each step is sound.
+    let matrix = matrix_of(steps);
+    let linear = DMat3::from_mat4(matrix);
+    if !matrix.is_finite() || !is_invertible(linear) {
+        let determinant = linear.determinant();
+        checker.fault(at, format!("expected a transform that can be inverted, found determinant {determinant}"));
+        return None;
+    }
+    Some(linear)
+}
+
 impl Shape {
     /// The steps of the transform as one matrix: the first step acts first.
     #[must_use]
     pub fn world_from_object(&self) -> DMat4 {
-        self.transform.iter().fold(DMat4::IDENTITY, |before, step| step.matrix() * before)
+        matrix_of(&self.transform)
     }
 
     pub(crate) fn check<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
@@ -381,32 +409,12 @@ impl Shape {
                 checker.fault(at.key(key), "expected emission, found none");
             }
         }
-        for (key, medium) in [("inside", &self.inside), ("outside", &self.outside)] {
-            if let Some(medium) = medium {
-                checker.medium(at.key(key), medium);
-            }
-        }
+        check_sides([("inside", &self.inside), ("outside", &self.outside)], at, checker);
         self.check_transform(at.key("transform"), checker);
     }
 
     fn check_transform(&self, at: At<'_>, checker: &mut Checker<'_>) {
-        let before = checker.count();
-        for (i, step) in self.transform.iter().enumerate() {
-            let at = at.index(i);
-            step.check_in_list(at, checker);
-        }
-        if checker.count() > before {
-            return;
-        }
-
-        // The product may overflow or vanish although each step is sound.
-        let matrix = self.world_from_object();
-        let linear = DMat3::from_mat4(matrix);
-        if !matrix.is_finite() || !is_invertible(linear) {
-            let determinant = linear.determinant();
-            checker.fault(at, format!("expected a transform that can be inverted, found determinant {determinant}"));
-            return;
-        }
+        let Some(linear) = check_steps(&self.transform, at, checker) else { return };
         let round = match self.geometry {
             Geometry::Sphere(_) | Geometry::Cylinder(_) | Geometry::Cone(_) => true,
             Geometry::Plane(_) | Geometry::Disk(_) | Geometry::Rectangle(_) | Geometry::Cube(_) | Geometry::Mesh(_) => {

@@ -116,6 +116,13 @@ impl BsdfSample {
     }
 }
 
+/// What a thin pane reflects in all: the series of reflections inside, R + T²R + T²R³ + … = 2R/(1 + R).
+#[must_use]
+pub fn pane_reflectance(cos: f64, eta: f64) -> f64 {
+    let single = fresnel::dielectric(Model::Exact, cos, eta).reflected;
+    2.0 * single / (1.0 + single)
+}
+
 /// `wo` reflected about the local normal.
 pub(super) fn mirror(wo: DVec3) -> DVec3 {
     DVec3::new(-wo.x, -wo.y, wo.z)
@@ -191,9 +198,7 @@ impl Bsdf {
             Bsdf::Dielectric(glass) => glass.sample(wo, u_lobe),
             Bsdf::RoughDielectric(glass) => glass.sample(wo, u_lobe, u),
             Bsdf::Thin { eta } => {
-                let single = fresnel::dielectric(Model::Exact, wo.z.abs(), *eta);
-                // The infinite series of reflections inside: R + T²R + T²R³ + … = 2R/(1 + R).
-                let reflected = 2.0 * single.reflected / (1.0 + single.reflected);
+                let reflected = pane_reflectance(wo.z.abs(), *eta);
                 Some(if u_lobe < reflected {
                     BsdfSample::discrete(mirror(wo), Lanes::ONE)
                 } else {

@@ -14,6 +14,7 @@ pub mod dielectric;
 pub mod fresnel;
 pub mod medium;
 pub mod microfacet;
+pub mod phase;
 pub mod plastic;
 pub mod principled;
 

@@ -86,8 +86,7 @@ impl Census {
         };
         for (_, medium) in scene.media.iter().enumerate().filter(|(i, _)| used(*i)) {
             census.media += 1;
-            let chromatic = !(medium.absorption.is_constant() && medium.scattering.is_constant());
-            if chromatic && medium.scattering.max() > 0.0 {
+            if medium.is_chromatic() {
                 census.chromatic_media += 1;
             }
         }

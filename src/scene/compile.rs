@@ -4,6 +4,7 @@
 //! once, each with its place in the file.
 
 mod lights;
+mod media;
 
 use super::bvh::{Aabb, Bvh};
 use super::camera::{self, Camera};
@@ -13,11 +14,11 @@ use super::material::{Highlight, HighlightModel, Kind, Material};
 use super::mesh::{AreaTable, Mesh, MeshTree, NormalMode};
 use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Plane, Rectangle, Shape, Sphere};
 use super::texture::{Interpolation, Texture, Wrap};
-use super::{Band, DepthFog, FogFalloff, Geometry, Medium, Object, Scene, TriangleMesh};
+use super::volume::Volume;
+use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene, TriangleMesh};
 use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
 use crate::optics::fresnel::Model;
-use crate::optics::medium::Phase;
 use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::spectrum::{Outside, RefractiveIndex, Spectrum, WavelengthDistribution, catalogue, illuminant, upsample};
 use glam::{DAffine2, DAffine3, DMat2, DMat3, DMat4, DVec2, DVec3};
@@ -35,6 +36,7 @@ struct Compiler<'a> {
     unread: Option<Error>,
     files: Vec<PathBuf>,
     textures: HashMap<&'a str, Texture>,
+    volumes: HashMap<&'a str, Volume>,
     material_ids: HashMap<&'a str, u32>,
     medium_ids: HashMap<&'a str, u32>,
     materials: Vec<Material>,
@@ -72,6 +74,7 @@ impl<'a> Compiler<'a> {
             unread: None,
             files: Vec::new(),
             textures: HashMap::new(),
+            volumes: HashMap::new(),
             material_ids: HashMap::new(),
             medium_ids: HashMap::new(),
             materials: Vec::new(),
@@ -116,6 +119,10 @@ impl<'a> Compiler<'a> {
 
     fn scene(&mut self, name: &str) -> Result<Scene> {
         let d = self.description;
+        for (name, volume) in &d.volumes {
+            let compiled = self.volume(&format!("volumes.{name}"), volume)?;
+            self.volumes.insert(name, compiled);
+        }
         for (name, texture) in &d.textures {
             let at = format!("textures.{name}");
             let compiled = self.texture(&at, texture)?;
@@ -167,15 +174,21 @@ impl<'a> Compiler<'a> {
                 Geometry::Shape(shape) => shape.is_closed(),
                 Geometry::Mesh(_) => true,
             };
-            let medium = |name: &Option<String>| name.as_ref().map(|n| self.medium_ids[n.as_str()]);
+            let unchanged = |side: &Option<String>| side.as_deref() == Some(written::UNCHANGED);
+            let medium = |side: &Option<String>, otherwise: Option<u32>| match side.as_deref() {
+                None => otherwise,
+                Some(written::VACUUM | written::UNCHANGED) => None,
+                Some(name) => Some(self.medium_ids[name]),
+            };
             objects.push(Object {
                 name: shape.name.clone().unwrap_or_else(|| format!("{}{i}", shape.geometry.kind())),
                 geometry,
                 material,
                 light,
                 detail,
-                inside: medium(&shape.inside).or(if closed { None } else { camera_medium }),
-                outside: medium(&shape.outside).or(camera_medium),
+                inside: medium(&shape.inside, if closed { None } else { camera_medium }),
+                outside: medium(&shape.outside, camera_medium),
+                keeps_medium: unchanged(&shape.inside) && unchanged(&shape.outside),
             });
         }
         for (i, light) in d.lights.iter().enumerate() {
@@ -215,7 +228,7 @@ impl<'a> Compiler<'a> {
                 }
             },
         });
-        let has_boundaries = objects.iter().any(|o| matches!(self.materials[o.material as usize].kind, Kind::Boundary));
+        let has_boundaries = objects.iter().any(|o| self.materials[o.material as usize].lets_through());
         Ok(Scene {
             name: name.to_owned(),
             camera,
@@ -379,6 +392,7 @@ impl<'a> Compiler<'a> {
                 loaded.grid.uv = DAffine2::from_mat2_translation(scale, DVec2::from(image.offset));
                 Texture::Image(loaded)
             }
+            written::Texture::Volume(name) => Texture::Volume(self.volume_texture(&format!("{at}.volume"), name)),
             written::Texture::Checkerboard(board) => Texture::Checkerboard {
                 a: Box::new(Texture::Uniform(self.reflectance(&format!("{at}.checkerboard.a"), &board.a))),
                 b: Box::new(Texture::Uniform(self.reflectance(&format!("{at}.checkerboard.b"), &board.b))),
@@ -484,33 +498,6 @@ impl<'a> Compiler<'a> {
         });
         self.materials.push(Material { kind, two_sided, highlight });
         self.materials.len() as u32 - 1
-    }
-
-    fn medium(&mut self, at: &str, medium: &written::Medium) -> Medium {
-        let written::Medium::Homogeneous(m) = medium;
-        let mut coefficient = |field: &str, s: &written::Spectrum| {
-            self.spectrum(&format!("{at}.homogeneous.{field}"), s, Outside::Hold, Role::Coefficient)
-        };
-        let (absorption, scattering) = match &m.coefficients {
-            written::Coefficients::Parts { absorption, scattering } => {
-                (coefficient("absorption", absorption), coefficient("scattering", scattering))
-            }
-            written::Coefficients::Whole { extinction, albedo } => {
-                let extinction = coefficient("extinction", extinction);
-                let at = format!("{at}.homogeneous.albedo");
-                let albedo = self.spectrum(&at, albedo, Outside::Hold, Role::Reflectance);
-                (extinction.times(&albedo.complement()), extinction.times(&albedo))
-            }
-        };
-        Medium {
-            absorption: absorption.scaled(m.scale),
-            scattering: scattering.scaled(m.scale),
-            phase: match m.phase {
-                written::Phase::Isotropic => Phase::Isotropic,
-                written::Phase::Rayleigh => Phase::Rayleigh,
-                written::Phase::Hg(g) => Phase::HenyeyGreenstein(g),
-            },
-        }
     }
 
     fn geometry(&mut self, at: &str, shape: &written::Shape) -> Result<Option<Geometry>> {

@@ -1,12 +1,14 @@
 //! Materials: the scattering function of a surface, for every point and wavelength.
 
+use super::SurfacePoint;
 use super::texture::{Texture, TexturePoint};
-use crate::optics::bsdf::{Bsdf, Metal};
+use crate::optics::bsdf::{Bsdf, Metal, pane_reflectance};
 use crate::optics::dielectric::{Dielectric, RelativeIndex, RoughDielectric};
 use crate::optics::fresnel::{self, Model};
 use crate::optics::microfacet::Microfacets;
 use crate::optics::plastic::{Base, CoatTable, Plastic, RoughPlastic};
 use crate::spectrum::{Lanes, RefractiveIndex, Spectrum};
+use glam::DVec3;
 use std::sync::Arc;
 
 /// A material.
@@ -134,7 +136,43 @@ pub fn relative_index(
     }
 }
 
+/// What goes straight through a surface as if it were not there.
+#[derive(Clone, Copy, Debug)]
+pub struct Straight {
+    /// The share of paths that do.
+    pub share: f64,
+    /// Their factor.
+    pub weight: Lanes,
+}
+
 impl Material {
+    /// True where light may go straight through, so that a lamp behind is looked for.
+    #[must_use]
+    pub fn lets_through(&self) -> bool {
+        matches!(self.kind, Kind::Boundary | Kind::Thin { .. })
+    }
+
+    /// What goes straight through at `surface` in `direction`; `None` where nothing can.
+    #[must_use]
+    #[inline]
+    pub fn straight(
+        &self,
+        surface: &SurfacePoint,
+        direction: DVec3,
+        _at: impl FnOnce() -> TexturePoint,
+        nm: Lanes,
+    ) -> Option<Straight> {
+        match &self.kind {
+            Kind::Boundary => Some(Straight { share: 1.0, weight: Lanes::ONE }),
+            Kind::Thin { interior, exterior } => {
+                let eta = relative_index(interior, exterior, nm, false).hero();
+                let cos = direction.dot(surface.shading_normal).abs();
+                Some(Straight { share: 1.0 - pane_reflectance(cos, eta), weight: Lanes::ONE })
+            }
+            _ => None,
+        }
+    }
+
     /// The scattering function at a point for the wavelengths `nm`. `all_dispersive` treats every
     /// glass as if its index depended on wavelength (`effects: all`).
     #[must_use]

@@ -14,20 +14,22 @@ pub mod grid;
 pub mod light;
 pub mod load;
 pub mod material;
+pub mod medium;
 pub mod mesh;
 pub mod partials;
 pub mod projector;
 pub mod shape;
 pub mod texture;
+pub mod volume;
 
 use crate::math::{Departure, Ray};
-use crate::optics::medium::{MediumLanes, Phase};
-use crate::spectrum::{Lanes, Spectrum, WavelengthDistribution};
+use crate::spectrum::{Spectrum, WavelengthDistribution};
 use bvh::Bvh;
 use camera::Camera;
 use glam::DVec3;
 use light::Light;
 use material::Material;
+pub use medium::Medium;
 use mesh::{AreaTable, Mesh, MeshTree};
 use shape::Detail;
 use shape::Shape;
@@ -68,7 +70,7 @@ pub struct Scene {
     pub center: DVec3,
     /// Its radius, metres.
     pub radius: f64,
-    /// True where some object is only the boundary of a medium.
+    /// True where light may go straight through some object: the boundary of a medium, a pane.
     pub has_boundaries: bool,
     /// Files that were read.
     pub files: Vec<PathBuf>,
@@ -100,6 +102,8 @@ pub struct Object {
     pub inside: Option<u32>,
     /// Medium on the side of the normal.
     pub outside: Option<u32>,
+    /// True where a path that crosses stays in the medium that it was in, whatever the two above say.
+    pub keeps_medium: bool,
 }
 
 /// The form of an object. Shapes lie in place: a pointer would cost each ray a cache line.
@@ -132,26 +136,6 @@ pub struct TriangleMesh {
     pub tree: MeshTree,
     /// For light.
     pub areas: AreaTable,
-}
-
-/// A medium at all wavelengths.
-#[derive(Clone, Debug)]
-pub struct Medium {
-    /// σ_a, 1/m.
-    pub absorption: Spectrum,
-    /// σ_s, 1/m.
-    pub scattering: Spectrum,
-    /// Which way it scatters.
-    pub phase: Phase,
-}
-
-impl Medium {
-    /// The medium at the wavelengths `nm`.
-    #[must_use]
-    pub fn lanes(&self, nm: Lanes) -> MediumLanes {
-        let scattering = self.scattering.eval(nm);
-        MediumLanes { extinction: self.absorption.eval(nm) + scattering, scattering, phase: self.phase }
-    }
 }
 
 /// Fog that thickens with the distance from the picture plane: what a compositor does with a

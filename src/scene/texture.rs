@@ -1,6 +1,7 @@
 //! Spectra that vary over a surface.
 
 use super::SurfacePoint;
+use super::volume::Volume;
 use crate::spectrum::{Lanes, Spectrum, upsample};
 use glam::{DAffine2, DVec2, DVec3};
 use std::ops::{Add, Mul};
@@ -43,6 +44,8 @@ pub enum Texture {
         /// From u, v to periods.
         uv: DAffine2,
     },
+    /// What fills space, where the surface cuts it.
+    Volume(Volume),
 }
 
 /// What lies beyond the edge of a picture.
@@ -92,7 +95,7 @@ pub struct Grid {
 }
 
 /// Index of the texel at `i` of `n` under `wrap`.
-fn wrapped(i: f64, n: usize, wrap: Wrap) -> usize {
+pub(super) fn wrapped(i: f64, n: usize, wrap: Wrap) -> usize {
     let n_f = n as f64;
     let folded = match wrap {
         Wrap::Clamp => i.clamp(0.0, n_f - 1.0),
@@ -280,6 +283,7 @@ impl Texture {
             Texture::Uniform(spectrum) => spectrum.eval(nm),
             Texture::Image(image) => image.eval(at.uv, nm),
             Texture::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).eval(at, nm),
+            Texture::Volume(volume) => volume.eval(at.point, nm),
         }
     }
 
@@ -305,6 +309,7 @@ impl Texture {
                     })
                     .collect()
             }
+            Texture::Volume(volume) => volume.representatives(),
             Texture::Checkerboard { a, b, .. } => {
                 let mut all = a.representatives();
                 all.extend(b.representatives());

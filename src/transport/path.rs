@@ -16,10 +16,10 @@ use crate::math::Frame;
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::optics::bsdf::{Bsdf, Chosen};
-use crate::optics::medium::MediumLanes;
 use crate::scene::light::Arriving;
 use crate::scene::material::{Kind, Material};
-use crate::scene::{Scene, SurfacePoint};
+use crate::scene::medium::{Dimmed, Medium};
+use crate::scene::{Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
 
@@ -34,6 +34,10 @@ const SURVIVAL: f64 = 0.999;
 /// Boundaries of media that a shadow ray crosses at the most: beyond it the light counts as hidden.
 /// A bound on time, far above any scene's nesting.
 const MAX_BOUNDARIES: u32 = 256;
+
+/// Sets the numbers of shadow rays apart from those of the path: 2²⁸ is above any vertex plus 2¹⁶ times any count of
+/// boundaries.
+const SHADOW: u32 = 1 << 28;
 
 /// Light that arrives along a camera ray.
 #[must_use]
@@ -91,6 +95,8 @@ struct Path {
     radiance: Lanes,
     /// Scattering events so far.
     vertices: u32,
+    /// Surfaces so far that it went straight through.
+    crossings: u32,
 }
 
 impl Path {
@@ -115,17 +121,28 @@ fn power_heuristic(a: f64, b: f64) -> f64 {
     1.0 / r.mul_add(r, 1.0)
 }
 
+/// Where a shadow ray starts.
+#[derive(Clone, Copy)]
+struct Shadow {
+    /// Events of the path before.
+    vertex: u32,
+    /// What it starts in.
+    medium: Option<u32>,
+    /// Surfaces that it may go straight through.
+    panes: u32,
+}
+
 /// What scatters at a vertex.
 enum Scatterer<'a> {
-    Surface { bsdf: &'a Bsdf, frame: &'a Frame, surface: &'a SurfacePoint, flip: bool },
-    Medium(&'a MediumLanes),
+    Surface { bsdf: &'a Bsdf, frame: &'a Frame, surface: &'a SurfacePoint, object: &'a Object, flip: bool },
+    Medium { medium: &'a Medium, point: DVec3 },
 }
 
 impl Scatterer<'_> {
     /// f · |cos| and densities toward `wi` (world), given `wo` (local for surfaces, world for media).
     fn eval(&self, wo: DVec3, wi_world: DVec3) -> (Lanes, Lanes) {
         match self {
-            Scatterer::Surface { bsdf, frame, surface, flip } => {
+            Scatterer::Surface { bsdf, frame, surface, flip, .. } => {
                 let wi = frame.to_local(wi_world);
                 let geometric = wi_world.dot(surface.normal) * if *flip { -1.0 } else { 1.0 };
                 // Light that the shading normal sees and the true one does not would leak through.
@@ -135,8 +152,8 @@ impl Scatterer<'_> {
                 let e = bsdf.eval(wo, wi);
                 (e.f * wi.z.abs() as f32, e.pdf)
             }
-            Scatterer::Medium(medium) => {
-                let p = Lanes::splat(medium.phase.eval(wo, wi_world) as f32);
+            Scatterer::Medium { medium, point } => {
+                let p = Lanes::splat(medium.phase.eval(*point, wo, wi_world) as f32);
                 (p, p)
             }
         }
@@ -155,6 +172,7 @@ impl Tracer<'_> {
             previous: None,
             radiance: Lanes::ZERO,
             vertices: 0,
+            crossings: 0,
         };
         let mut alpha = 0.0;
         let mut depth = f64::INFINITY;
@@ -173,13 +191,10 @@ impl Tracer<'_> {
 
             // The medium between here and the next surface may scatter the path first.
             if MEDIA && let Some(medium) = path.medium {
-                let lanes = scene.media[medium as usize].lanes(self.nm);
-                let u = if crossings == 0 {
-                    choice[3]
-                } else {
-                    self.sampler.set(Set::Extra(path.vertices.wrapping_add(crossings << 16)))[0]
-                };
-                let flight = lanes.fly(distance, u);
+                let medium = &scene.media[medium as usize];
+                let set = Set::Extra(path.vertices.wrapping_add(crossings << 16));
+                let u = if crossings == 0 { choice[3] } else { self.sampler.set(set)[0] };
+                let flight = medium.fly(&path.ray, distance, self.nm, u, || self.sampler.walk(set));
                 path.beta *= flight.weight;
                 if CHROMATIC {
                     path.rho *= flight.ratio;
@@ -195,7 +210,7 @@ impl Tracer<'_> {
                         depth = scene.camera.depth(point);
                         first = false;
                     }
-                    if !self.scatter_in_medium::<CHROMATIC, MEDIA>(&mut path, point, &lanes, choice) {
+                    if !self.scatter_in_medium::<CHROMATIC, MEDIA>(&mut path, point, medium, choice) {
                         break;
                     }
                     crossings = 0;
@@ -220,6 +235,7 @@ impl Tracer<'_> {
             }
             let material = &scene.materials[object.material as usize];
             let boundary = matches!(material.kind, Kind::Boundary);
+            let straight = material.straight(&surface, path.ray.direction, || hit.texture_point(&surface), self.nm);
             if first && !boundary {
                 alpha = 1.0;
                 depth = scene.camera.depth(surface.point);
@@ -248,19 +264,31 @@ impl Tracer<'_> {
                 path.add::<CHROMATIC>(emitted, weight);
             }
 
-            if boundary {
+            // What goes straight on has no vertex there: a lamp behind is also found from the vertex before.
+            if let Some(straight) = &straight
+                && (boundary
+                    || self.sampler.set(Set::Extra(path.vertices.wrapping_add(crossings << 16)))[1] < straight.share)
+            {
+                if self.settings.count_crossings && self.is_last(&path) {
+                    break;
+                }
                 crossings += 1;
+                path.crossings += 1;
                 if crossings > MAX_BOUNDARIES {
                     break;
                 }
-                path.medium = self.beyond(object, &surface, path.ray.direction);
+                path.beta *= straight.weight;
+                if let Some(p) = &mut path.previous {
+                    p.density *= straight.share;
+                }
+                path.medium = self.beyond(object, &surface, path.ray.direction, path.medium);
                 if let Some(p) = &mut path.previous {
                     p.distance += hit.t;
                 }
                 path.ray = scene.leave(&surface, &hit, path.ray.direction);
                 continue;
             }
-            if self.settings.max_depth.is_some_and(|d| path.vertices + 1 >= d) {
+            if self.is_last(&path) {
                 break;
             }
 
@@ -280,7 +308,7 @@ impl Tracer<'_> {
             let (u_light, u_direction) = pairs(scatter);
             let sided = sided_normal(material, &frame);
             if !bsdf.is_discrete() && self.settings.light_samples > 0 {
-                let scatterer = Scatterer::Surface { bsdf: &bsdf, frame: &frame, surface: &surface, flip };
+                let scatterer = Scatterer::Surface { bsdf: &bsdf, frame: &frame, surface: &surface, object, flip };
                 self.add_light::<CHROMATIC, MEDIA>(
                     &mut path,
                     &scatterer,
@@ -294,7 +322,9 @@ impl Tracer<'_> {
             }
 
             // On along a direction of the material's choice.
-            let Some(sample) = bsdf.sample(wo, choice[1], u_direction) else { break };
+            // A pane that did not let the path straight through reflects it.
+            let u_lobe = if straight.is_some() { 0.0 } else { choice[1] };
+            let Some(sample) = bsdf.sample(wo, u_lobe, u_direction) else { break };
             let wi = frame.to_world(sample.wi);
             let side = wi.dot(surface.normal) * wo_world.dot(surface.normal);
             if (side > 0.0) == sample.transmitted || side == 0.0 {
@@ -316,7 +346,7 @@ impl Tracer<'_> {
             }
             path.eta2 *= sample.eta2;
             if MEDIA && sample.transmitted {
-                path.medium = self.beyond(object, &surface, wi);
+                path.medium = self.beyond(object, &surface, wi, path.medium);
             }
             path.ray = scene.leave(&surface, &hit, wi);
             path.vertices += 1;
@@ -328,9 +358,34 @@ impl Tracer<'_> {
         Incoming { radiance: path.radiance, alpha, depth }
     }
 
-    /// The medium that a ray in `direction` is in after it has crossed the surface of `object`.
-    fn beyond(&self, object: &crate::scene::Object, surface: &SurfacePoint, direction: DVec3) -> Option<u32> {
-        if direction.dot(surface.normal) < 0.0 { object.inside } else { object.outside }
+    /// Segments so far, less one: events that count for `max_depth`.
+    fn events(&self, path: &Path) -> u32 {
+        path.vertices + if self.settings.count_crossings { path.crossings } else { 0 }
+    }
+
+    /// Whether the path may not go on from where it is.
+    fn is_last(&self, path: &Path) -> bool {
+        self.settings.max_depth.is_some_and(|d| self.events(path) + 1 >= d)
+    }
+
+    /// Surfaces that a shadow ray from where the path is may go straight through.
+    fn panes(&self, path: &Path) -> u32 {
+        match self.settings.max_depth {
+            Some(d) if self.settings.count_crossings => d.saturating_sub(self.events(path) + 2).min(MAX_BOUNDARIES),
+            _ => MAX_BOUNDARIES,
+        }
+    }
+
+    /// The medium that a ray in `direction`, which was in `before`, is in after it has crossed the surface of
+    /// `object`.
+    fn beyond(&self, object: &Object, surface: &SurfacePoint, direction: DVec3, before: Option<u32>) -> Option<u32> {
+        if object.keeps_medium {
+            before
+        } else if direction.dot(surface.normal) < 0.0 {
+            object.inside
+        } else {
+            object.outside
+        }
     }
 
     /// One event of scattering inside a medium; false where the path ends.
@@ -338,19 +393,19 @@ impl Tracer<'_> {
         &self,
         path: &mut Path,
         point: DVec3,
-        medium: &MediumLanes,
+        medium: &Medium,
         choice: [f64; 4],
     ) -> bool {
-        if self.settings.max_depth.is_some_and(|d| path.vertices + 1 >= d) {
+        if self.is_last(path) {
             return false;
         }
         let wo = -path.ray.direction;
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
-        let next_event = self.settings.light_samples > 0;
+        let next_event = self.settings.light_samples > 0 && medium.shadow_rays;
         if next_event {
             self.add_light::<CHROMATIC, MEDIA>(
                 path,
-                &Scatterer::Medium(medium),
+                &Scatterer::Medium { medium, point },
                 point,
                 wo,
                 None,
@@ -359,12 +414,12 @@ impl Tracer<'_> {
                 |wi| Ray::new(point, wi),
             );
         }
-        let wi = medium.phase.sample(wo, u_direction);
+        let wi = medium.phase.sample(point, wo, u_direction);
         path.previous = next_event.then(|| Previous {
             point,
             normal: None,
             rho: path.rho_sum::<CHROMATIC>(),
-            density: medium.phase.eval(wo, wi),
+            density: medium.phase.eval(point, wo, wi),
             distance: 0.0,
         });
         path.ray = Ray::new(point, wi);
@@ -435,7 +490,17 @@ impl Tracer<'_> {
         if f.simd_eq(Lanes::ZERO).all() {
             return;
         }
-        let Some((through, passing)) = self.visible::<MEDIA>(path.medium, &leave(light.wi), &light) else { return };
+        let medium = match scatterer {
+            // Light from the other side comes through what is there.
+            Scatterer::Surface { surface, object, .. }
+                if MEDIA && light.wi.dot(surface.normal) * path.ray.direction.dot(surface.normal) > 0.0 =>
+            {
+                self.beyond(object, surface, light.wi, path.medium)
+            }
+            _ => path.medium,
+        };
+        let shadow = Shadow { vertex: path.vertices, medium, panes: self.panes(path) };
+        let Some((through, passing)) = self.visible::<MEDIA>(shadow, &leave(light.wi), &light) else { return };
         let value = f * light.radiance * through;
         match light.density {
             None => path.add::<CHROMATIC>(value, 1.0 / probability),
@@ -452,46 +517,44 @@ impl Tracer<'_> {
 
     /// Transmittance to a light, and for each lane the probability that a path would have come
     /// through without scattering; `None` where something opaque stands between.
-    fn visible<const MEDIA: bool>(
-        &self,
-        mut medium: Option<u32>,
-        ray: &Ray,
-        light: &Arriving,
-    ) -> Option<(Lanes, Lanes)> {
+    fn visible<const MEDIA: bool>(&self, shadow: Shadow, ray: &Ray, light: &Arriving) -> Option<(Lanes, Lanes)> {
         let scene = self.scene;
         let target = light.target;
-        let (mut through, mut passing) = (Lanes::ONE, Lanes::ONE);
-        let mut attenuate = |medium: Option<u32>, distance: f64| {
-            if MEDIA && let Some(m) = medium {
-                let lanes = scene.media[m as usize].lanes(self.nm);
-                let t = lanes.transmittance(distance);
-                through *= t;
-                if lanes.scatters() {
-                    passing *= t;
-                }
+        let Shadow { vertex, mut medium, panes } = shadow;
+        let dim = |medium: Option<u32>, ray: &Ray, distance: f64, crossings: u32| match medium {
+            Some(m) if MEDIA => {
+                // Shadow rays walk by numbers of their own.
+                let set = Set::Extra(vertex.wrapping_add(crossings << 16).wrapping_add(SHADOW));
+                scene.media[m as usize].dim(ray, distance, self.nm, || self.sampler.walk(set))
             }
+            _ => Dimmed { through: Lanes::ONE, passing: Lanes::ONE },
         };
         if !scene.has_boundaries {
             if scene.occluded(ray, light.distance, target) {
                 return None;
             }
-            attenuate(medium, light.distance);
+            let Dimmed { through, passing } = dim(medium, ray, light.distance, 0);
             return Some((through, passing));
         }
-        // Walk from boundary to boundary.
+        // Walk from one surface that lets light straight through to the next.
+        let (mut through, mut passing) = (Lanes::ONE, Lanes::ONE);
         let (mut ray, mut left) = (*ray, light.distance);
-        for _ in 0..MAX_BOUNDARIES {
-            let Some(hit) = scene.closest(&ray, left).filter(|h| !h.is_on(target)) else {
-                attenuate(medium, left);
-                return Some((through, passing));
-            };
+        for crossings in 0..=panes {
+            let hit = scene.closest(&ray, left).filter(|h| !h.is_on(target));
+            let dimmed = dim(medium, &ray, hit.map_or(left, |h| h.t), crossings);
+            through *= dimmed.through;
+            passing *= dimmed.passing;
+            let Some(hit) = hit else { return Some((through, passing)) };
             let object = &scene.objects[hit.object as usize];
-            if !matches!(scene.materials[object.material as usize].kind, Kind::Boundary) {
+            let material = &scene.materials[object.material as usize];
+            if !material.lets_through() {
                 return None;
             }
-            attenuate(medium, hit.t);
             let surface = scene.surface(&ray, &hit);
-            medium = self.beyond(object, &surface, ray.direction);
+            let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), self.nm)?;
+            through *= straight.weight * straight.share as f32;
+            passing *= straight.share as f32;
+            medium = self.beyond(object, &surface, ray.direction, medium);
             ray = scene.leave(&surface, &hit, ray.direction);
             left -= hit.t;
         }

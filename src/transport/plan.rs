@@ -49,11 +49,20 @@ pub struct PathSettings {
     pub light_samples: u32,
     /// Scattered rays at the first surface; 0 leaves light met by scattering out everywhere.
     pub scatter_samples: u32,
+    /// Whether going straight through a pane or a boundary ends a segment for `max_depth`.
+    pub count_crossings: bool,
 }
 
 impl Default for PathSettings {
     fn default() -> PathSettings {
-        PathSettings { max_depth: None, roulette_depth: 5, hide_emitters: false, light_samples: 1, scatter_samples: 1 }
+        PathSettings {
+            max_depth: None,
+            roulette_depth: 5,
+            hide_emitters: false,
+            light_samples: 1,
+            scatter_samples: 1,
+            count_crossings: false,
+        }
     }
 }
 

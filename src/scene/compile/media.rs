@@ -1,0 +1,182 @@
+//! Volumes, media and phase functions.
+
+use super::{Compiler, Role};
+use crate::description as written;
+use crate::error::{Error, Result};
+use crate::optics::phase::{Phase, PhaseTable};
+use crate::scene::grid::Grid;
+use crate::scene::medium::{Filling, Medium, PhaseBlend, PhaseFunction, Varying};
+use crate::scene::texture::Wrap;
+use crate::scene::volume::{Between, GridVolume, Volume, Voxels};
+use crate::spectrum::{Outside, Spectrum};
+use glam::{DAffine3, DVec3};
+use std::path::Path;
+use std::sync::Arc;
+
+/// What a volume is asked for.
+#[derive(Clone, Copy, PartialEq)]
+enum Use {
+    Spectrum,
+    Number,
+}
+
+impl Compiler<'_> {
+    pub(super) fn volume(&mut self, at: &str, volume: &written::Volume) -> Result<Volume> {
+        let world_from_local = DAffine3::from_mat4(volume.world_from_local());
+        match volume {
+            written::Volume::Constant(constant) => Ok(Volume::Constant {
+                value: self.coefficient(&format!("{at}.constant.value"), &constant.value),
+                local_from_world: world_from_local.inverse(),
+            }),
+            written::Volume::Grid(grid) => {
+                self.files.push(grid.file.to_path_buf());
+                let loaded = grid_volume(grid, world_from_local);
+                Ok(Volume::Grid(Arc::new(loaded.map_err(|e| self.asked(&format!("{at}.grid.file"), e))?)))
+            }
+        }
+    }
+
+    /// A spectrum that is 0 or more. A colour within [0, 1] is upsampled as a reflectance, one beyond with a
+    /// factor (the convention of Mitsuba 3, which refuses the latter).
+    fn coefficient(&mut self, at: &str, s: &written::Spectrum) -> Spectrum {
+        let role = match s {
+            written::Spectrum::Rgb(rgb) if rgb.iter().all(|v| *v <= 1.0) => Role::Reflectance,
+            _ => Role::Coefficient,
+        };
+        self.spectrum(at, s, Outside::Hold, role)
+    }
+
+    /// A volume by its name, if it can be what it is asked for.
+    fn named_volume(&mut self, at: &str, name: &str, asked: Use) -> Volume {
+        let volume = self.volumes[name].clone();
+        if let Volume::Grid(grid) = &volume {
+            let fault = match (&grid.values, asked) {
+                (Voxels::Raw(_), Use::Spectrum) => Some("expected a volume of spectra, found one of raw numbers"),
+                (Voxels::Coloured(_), Use::Number) => {
+                    Some("expected a volume of numbers (one channel, or raw), found one of colours")
+                }
+                _ => None,
+            };
+            if let Some(fault) = fault {
+                self.fault(at, fault);
+            }
+        }
+        volume
+    }
+
+    pub(super) fn volume_texture(&mut self, at: &str, name: &str) -> Volume {
+        self.named_volume(at, name, Use::Spectrum)
+    }
+
+    fn spectrum_or_volume(&mut self, at: &str, s: &written::SpectrumOrVolume) -> Volume {
+        match s {
+            written::SpectrumOrVolume::Volume(name) => self.named_volume(&format!("{at}.volume"), name, Use::Spectrum),
+            written::SpectrumOrVolume::Spectrum(s) => {
+                Volume::Constant { value: self.coefficient(at, s), local_from_world: DAffine3::IDENTITY }
+            }
+        }
+    }
+
+    pub(super) fn medium(&mut self, at: &str, medium: &written::Medium) -> Medium {
+        let at = |field: &str| format!("{at}.{}.{field}", medium.kind());
+        match medium {
+            written::Medium::Homogeneous(m) => {
+                let filling = match &m.coefficients {
+                    written::Coefficients::Parts { absorption, scattering } => Filling::Even {
+                        absorption: self.spectrum(&at("absorption"), absorption, Outside::Hold, Role::Coefficient),
+                        scattering: self.spectrum(&at("scattering"), scattering, Outside::Hold, Role::Coefficient),
+                    },
+                    written::Coefficients::Sum { extinction, albedo, scale } => {
+                        let albedo = self.spectrum_or_volume(&at("albedo"), albedo);
+                        Filling::EvenExtinction {
+                            extinction: self.coefficient(&at("extinction"), extinction).scaled(*scale),
+                            scatters: albedo.max() > 0.0,
+                            albedo,
+                        }
+                    }
+                };
+                Medium { filling, phase: self.phase(&at("phase"), &m.phase), shadow_rays: m.shadow_rays }
+            }
+            written::Medium::Heterogeneous(m) => {
+                let extinction = self.spectrum_or_volume(&at("extinction"), &m.extinction);
+                let albedo = self.spectrum_or_volume(&at("albedo"), &m.albedo);
+                Medium {
+                    filling: Filling::Varying(Box::new(Varying::new(extinction, m.scale, albedo))),
+                    phase: self.phase(&at("phase"), &m.phase),
+                    shadow_rays: m.shadow_rays,
+                }
+            }
+        }
+    }
+
+    fn phase(&mut self, at: &str, phase: &written::Phase) -> PhaseFunction {
+        PhaseFunction::One(match phase {
+            written::Phase::Isotropic => Phase::Isotropic,
+            written::Phase::Rayleigh => Phase::Rayleigh,
+            written::Phase::Hg(g) => Phase::HenyeyGreenstein(*g),
+            written::Phase::Table(values) => {
+                let table = PhaseTable::new(values).map(|table| Phase::Table(Arc::new(table)));
+                self.or(&format!("{at}.table"), table, Phase::Isotropic)
+            }
+            written::Phase::Blend(blend) => {
+                let at = format!("{at}.blend");
+                let weight = match &blend.weight {
+                    written::NumberOrVolume::Number(weight) => {
+                        Volume::Constant { value: Spectrum::constant(*weight), local_from_world: DAffine3::IDENTITY }
+                    }
+                    written::NumberOrVolume::Volume(name) => {
+                        self.named_volume(&format!("{at}.weight.volume"), name, Use::Number)
+                    }
+                };
+                let parts = [0, 1].map(|i| self.phase(&format!("{at}.of[{i}]"), &blend.of[i]));
+                return PhaseFunction::Blend(Box::new(PhaseBlend { weight, parts }));
+            }
+        })
+    }
+}
+
+/// Reads the grid of a volume.
+///
+/// # Errors
+/// [`Error::Input`] where the file is missing or broken, holds numbers below zero, or has neither one channel
+/// nor three.
+fn grid_volume(written: &written::GridVolume, world_from_local: DAffine3) -> Result<GridVolume> {
+    let path: &Path = &written.file;
+    let grid = Grid::load(path)?;
+    if let Some(i) = grid.values.iter().position(|v| *v < 0.0) {
+        let found = grid.values[i];
+        return Err(Error::input(path, format!("expected numbers of 0 or more, found {found} as value {i}")));
+    }
+    let triples = || grid.values.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect::<Vec<_>>();
+    let values = match (grid.channels, written.raw) {
+        (1, _) => Voxels::Grey(grid.values),
+        (3, true) => Voxels::Raw(triples()),
+        (3, false) => Voxels::upsampled(&triples()),
+        (n, _) => return Err(Error::input(path, format!("expected 1 channel or 3, found {n}"))),
+    };
+    let mut local_from_world = world_from_local.inverse();
+    if written.file_box {
+        let extent = grid.max - grid.min;
+        if !(extent.min_element() > 0.0) {
+            let (min, max) = (grid.min, grid.max);
+            return Err(Error::input(path, format!("expected a box with a volume, found {min} to {max}")));
+        }
+        // Mitsuba's order: from the world by the transform, then from the file's box to the unit cube.
+        local_from_world =
+            DAffine3::from_scale(DVec3::ONE / extent) * DAffine3::from_translation(-grid.min) * local_from_world;
+    }
+    Ok(GridVolume {
+        size: grid.size,
+        values,
+        local_from_world,
+        between: match written.filter {
+            written::VolumeFilter::Trilinear => Between::Trilinear,
+            written::VolumeFilter::Nearest => Between::Nearest,
+        },
+        wrap: match written.wrap {
+            written::Wrap::Repeat => Wrap::Repeat,
+            written::Wrap::Mirror => Wrap::Mirror,
+            written::Wrap::Clamp => Wrap::Clamp,
+        },
+    })
+}
