@@ -8,11 +8,13 @@ use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, TileBuffer};
 use crate::film::filter::FilterSampler;
-use crate::film::resolve::{self, ErrorEstimate};
+use crate::film::resolve::{self, ErrorEstimate, Image, Splats};
 use crate::scene::Scene;
-use crate::spectrum::{ColourSpace, Lanes, observer};
-use crate::transport::plan::{EffectPlan, Integrator};
+use crate::spectrum::{ColourSpace, LANES, Lanes, SampledWavelengths, observer};
+use crate::transport::light::{Bounds, Splat};
+use crate::transport::plan::{EffectPlan, Integrator, LightSettings};
 use crate::transport::{self, PixelSample};
+use glam::DVec2;
 use rayon::prelude::*;
 use std::cell::RefCell;
 use std::ops::Range;
@@ -50,11 +52,22 @@ pub struct Milestone {
     pub error: Option<ErrorEstimate>,
 }
 
+/// Light that came from the lights to the camera.
+#[derive(Debug)]
+pub struct SplatFilm {
+    /// The sums, and of the bands of the spectrum.
+    pub film: Film,
+    /// Paths that began in each replicate.
+    pub paths: [u64; REPLICATES],
+}
+
 /// A rendered picture.
 #[derive(Debug)]
 pub struct Frame {
     /// The sums.
     pub film: Film,
+    /// What paths from the lights added.
+    pub splats: Option<SplatFilm>,
     /// Wall time of rendering alone.
     pub elapsed: Duration,
     /// The error after each pass.
@@ -72,6 +85,38 @@ pub struct Progress {
     pub elapsed: Duration,
     /// The latest milestone's error.
     pub error: Option<ErrorEstimate>,
+}
+
+impl Frame {
+    /// The picture in the colour space of `rgb_from_xyz`.
+    #[must_use]
+    pub fn resolve(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> Image {
+        let splats = self.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
+        resolve::resolve(&self.film, splats, rgb_from_xyz)
+    }
+
+    /// The further channel `channel`; bands come first.
+    #[must_use]
+    pub fn layer(&self, channel: usize) -> Vec<f32> {
+        let mut plane = self.film.layers.plane(channel);
+        if let Some(splats) = self.splats.as_ref().filter(|s| channel < s.film.layers.channels()) {
+            let paths: u64 = splats.paths.iter().sum();
+            for (x, sum) in plane.iter_mut().zip(splats.film.layers.sums_of(channel)) {
+                *x += (sum / paths.max(1) as f64) as f32;
+            }
+        }
+        plane
+    }
+
+    /// Samples that were dropped.
+    #[must_use]
+    pub fn invalid(&self) -> InvalidCounts {
+        let mut all = self.film.invalid;
+        if let Some(splats) = &self.splats {
+            all += splats.film.invalid;
+        }
+        all
+    }
 }
 
 /// Share of samples that may be invalid before the picture is refused: one in a million.
@@ -177,6 +222,13 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
     let start = Instant::now();
     let layers = job.plan.layers.channels().len();
     let film = Mutex::new(Film::new(job.scene.camera.resolution, job.window)?.with_layers(layers));
+    let splats = match &job.plan.integrator {
+        Integrator::Light(settings) => {
+            let film = Film::new(job.scene.camera.resolution, job.window)?.with_layers(job.scene.bands.len());
+            Some((settings, Mutex::new(SplatFilm { film, paths: [0; REPLICATES] })))
+        }
+        Integrator::Path(_) | Integrator::Whitted(_) | Integrator::Depth | Integrator::Nothing => None,
+    };
     let total = job.window.pixels() as u64 * u64::from(job.samples);
     let done = AtomicU64::new(0);
     let mut milestones: Vec<Milestone> = Vec::new();
@@ -199,19 +251,117 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
             let done = done.fetch_add(unit, Ordering::Relaxed) + unit;
             watch(Progress { done, total, elapsed: start.elapsed(), error: latest });
         });
+        if let Some((settings, splats)) = &splats {
+            from_lights(job, settings, pass.clone(), splats, stop);
+        }
         if stop.load(Ordering::Relaxed) {
             return Err(Error::Render("stopped before the picture was finished; nothing was written".into()));
         }
         let film = film.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let error = if random {
-            resolve::resolve(&film, None, &ColourSpace::Rec709.matrix_from_xyz()).relative_error().ok()
+            let photons = splats.as_ref().map(|(_, s)| s.lock().unwrap_or_else(std::sync::PoisonError::into_inner));
+            let photons = photons.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
+            resolve::resolve(&film, photons, &ColourSpace::Rec709.matrix_from_xyz()).relative_error().ok()
         } else {
             None
         };
         milestones.push(Milestone { samples: pass.end, elapsed: start.elapsed(), error });
     }
     let film = film.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    Ok(Frame { film, elapsed: start.elapsed(), milestones })
+    let splats = splats.map(|(_, s)| s.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner));
+    Ok(Frame { film, splats, elapsed: start.elapsed(), milestones })
+}
+
+/// Paths of one work unit from the lights.
+const PATHS_OF_A_UNIT: u64 = 1 << 14;
+
+/// Follows as many paths from the lights as the frame has pixels, for each sample of `samples`. A sample's replicate
+/// and number address its paths as they do for the camera, so the sums do not depend on units or passes.
+fn from_lights(
+    job: &FrameJob,
+    settings: &LightSettings,
+    samples: Range<u32>,
+    splats: &Mutex<SplatFilm>,
+    stop: &AtomicBool,
+) {
+    let FrameJob { scene, plan, filter, window, seed, .. } = *job;
+    let [width, height] = scene.camera.resolution.map(u64::from);
+    let paths = width * height;
+    let radius = filter.radius() + 0.5;
+    let corner = DVec2::new(f64::from(window.x), f64::from(window.y));
+    let bounds = Bounds {
+        low: corner - radius,
+        high: corner + DVec2::new(f64::from(window.width), f64::from(window.height)) + radius,
+    };
+    let units: Vec<(u32, Range<u64>)> = samples
+        .flat_map(|s| {
+            (0..paths).step_by(PATHS_OF_A_UNIT as usize).map(move |j| (s, j..(j + PATHS_OF_A_UNIT).min(paths)))
+        })
+        .collect();
+    units.into_par_iter().for_each(|(sample, unit)| {
+        if stop.load(Ordering::Relaxed) {
+            return;
+        }
+        let replicate = sample % REPLICATES as u32;
+        let base = u64::from(sample / REPLICATES as u32) * paths;
+        let mut landed = Landed::default();
+        let count = unit.end - unit.start;
+        for j in unit {
+            transport::light::trace(scene, plan, settings, seed, replicate, base + j, bounds, |wavelengths, splat| {
+                landed.add(scene, filter, window, wavelengths, &splat);
+            });
+        }
+        landed.add_to(&mut splats.lock().unwrap_or_else(std::sync::PoisonError::into_inner), replicate, count);
+    });
+}
+
+/// What the paths of one unit left on the picture.
+#[derive(Default)]
+struct Landed {
+    pixels: Vec<([i32; 2], [f32; 3])>,
+    /// The bands of each.
+    bands: Vec<f32>,
+    invalid: InvalidCounts,
+}
+
+impl Landed {
+    fn add(
+        &mut self,
+        scene: &Scene,
+        filter: &FilterSampler,
+        window: Window,
+        wavelengths: &SampledWavelengths,
+        splat: &Splat,
+    ) {
+        let light = splat.light.simd_ge(Lanes::ZERO) & splat.light.simd_le(Lanes::splat(f32::MAX));
+        if !light.all() {
+            self.invalid.record(cause(splat.light));
+            return;
+        }
+        let xyz = observer::xyz(splat.light, wavelengths);
+        filter.deal(splat.place, |pixel, share| {
+            if window.index(pixel).is_some() {
+                self.pixels.push((pixel, xyz.map(|x| x * share)));
+                for band in &scene.bands {
+                    let counted = splat.light * wavelengths.inv_pdf * band.response.eval(wavelengths.nm);
+                    self.bands.push(counted.reduce_add() / LANES as f32 * share);
+                }
+            }
+        });
+    }
+
+    fn add_to(&self, splats: &mut SplatFilm, replicate: u32, paths: u64) {
+        splats.paths[replicate as usize] += paths;
+        splats.film.invalid += self.invalid;
+        let channels = splats.film.layers.channels();
+        let window = splats.film.window();
+        for (i, &(pixel, xyz)) in self.pixels.iter().enumerate() {
+            splats.film.add(pixel, replicate as usize, xyz, 0.0);
+            if let (Some(index), true) = (window.index(pixel), channels > 0) {
+                splats.film.layers.add(index, 1.0, &self.bands[i * channels..(i + 1) * channels]);
+            }
+        }
+    }
 }
 
 /// An error where too many samples were invalid to trust the picture.

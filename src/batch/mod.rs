@@ -12,7 +12,7 @@ use crate::film::exr::{self, Attribute, ColourEncoding, LayerPlane};
 use crate::film::filter::{Filter, FilterSampler};
 use crate::film::output;
 use crate::film::png::{self, PngSettings};
-use crate::film::resolve::{self, Image};
+use crate::film::resolve::Image;
 use crate::scene::Scene;
 use crate::scene::census::Census;
 use crate::scene::compile;
@@ -145,6 +145,7 @@ fn integrator(description: &SceneDescription, written: &description::Integrator)
 fn layer_plan(description: &SceneDescription, scene: &Scene, samples: u32) -> Result<LayerPlan> {
     let mut plan = LayerPlan {
         rgb_from_xyz: colour_space(description.output.colour).matrix_from_xyz(),
+        sensitivity: description.image.sensitivity,
         sample_distance: 1.0 / f64::from(samples).sqrt(),
         ..LayerPlan::default()
     };
@@ -327,7 +328,7 @@ fn render_and_write(
     let base = base(description);
     let space = if base.is_xyz() { ColourSpace::Xyz } else { colour_space(description.output.colour) };
     let sensitivity = description.image.sensitivity;
-    let image = resolve::resolve(&frame.film, None, &space.matrix_from_xyz().map(|row| row.map(|x| x * sensitivity)));
+    let image = frame.resolve(&space.matrix_from_xyz().map(|row| row.map(|x| x * sensitivity)));
     report.pixel_hash = pixel_hash(&image);
     let written = Instant::now();
     write_exr(&exr_path, prepared, &frame, &image, base, space, report)?;
@@ -348,7 +349,7 @@ fn render_and_write(
     report.seconds.writing = written.elapsed().as_secs_f64();
 
     let samples = job.window.pixels() as u64 * u64::from(job.samples);
-    frame::check_invalid(&frame.film.invalid, samples)
+    frame::check_invalid(&frame.invalid(), samples)
 }
 
 fn write_exr(
@@ -377,7 +378,7 @@ fn write_exr(
     let layers = channels
         .into_iter()
         .enumerate()
-        .map(|(i, channel)| LayerPlane { name: channel.name, plane: frame.film.layers.plane(i), light: channel.light })
+        .map(|(i, channel)| LayerPlane { name: channel.name, plane: frame.layer(i), light: channel.light })
         .collect();
     let mut beauty = exr::beauty(image, base, layers, colour, precision, error, compression);
     if frame.film.layers.invalid.total() > 0 {
@@ -406,7 +407,7 @@ fn attributes(prepared: &Prepared, frame: &Frame, report: &SceneReport) -> Vec<(
         ("abbe/integrator".to_owned(), text(report.integrator)),
         ("abbe/effects".to_owned(), text(&report.effects_in_force().join(", "))),
         ("abbe/renderSeconds".to_owned(), Attribute::Double(frame.elapsed.as_secs_f64())),
-        ("abbe/invalidSamples".to_owned(), text(&frame.film.invalid.total().to_string())),
+        ("abbe/invalidSamples".to_owned(), text(&frame.invalid().total().to_string())),
     ];
     if let Some(e) = &report.error {
         all.push(("abbe/relativeError".to_owned(), Attribute::Double(e.rel_rmse)));

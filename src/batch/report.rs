@@ -201,7 +201,7 @@ impl SceneReport {
         let (counted, dropped) = frame.film.samples();
         self.seconds.rendering = seconds;
         self.msamples_per_second = (counted + dropped) as f64 / seconds.max(1e-9) * 1e-6;
-        self.invalid = frame.film.invalid;
+        self.invalid = frame.invalid();
         self.error = frame.milestones.last().and_then(|m| m.error);
         if self.error.is_some() {
             let factor = halving_factor(convergence_exponent(&frame.milestones));

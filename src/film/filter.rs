@@ -167,6 +167,39 @@ impl FilterSampler {
         self.filter
     }
 
+    /// How far from the centre of a pixel, along an axis, light still counts for it, in pixels.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.filter.radius()
+    }
+
+    /// Deals light that falls on `place` (continuous, in pixels) to the pixels whose filters hold it; the shares
+    /// add up to one.
+    pub fn deal(&self, place: DVec2, mut give: impl FnMut([i32; 2], f32)) {
+        if let Axis::Box = self.axis {
+            let pixel = place.floor();
+            give([pixel.x as i32, pixel.y as i32], 1.0);
+            return;
+        }
+        // Centres of pixels lie at halves.
+        let radius = self.radius();
+        let range = |x: f64| ((x - 0.5 - radius).ceil() as i32, (x - 0.5 + radius).floor() as i32);
+        let ((left, right), (upper, lower)) = (range(place.x), range(place.y));
+        let at = |x: f64, i: i32| self.filter.eval(x - 0.5 - f64::from(i));
+        let sum_x: f64 = (left..=right).map(|i| at(place.x, i)).sum();
+        let sum_y: f64 = (upper..=lower).map(|i| at(place.y, i)).sum();
+        let whole = sum_x * sum_y;
+        if whole == 0.0 {
+            return;
+        }
+        for j in upper..=lower {
+            let row = at(place.y, j) / whole;
+            for i in left..=right {
+                give([i, j], (at(place.x, i) * row) as f32);
+            }
+        }
+    }
+
     /// The sample at `u` in [0, 1)². Increases with `u` along each axis, so stratified numbers stay stratified.
     #[must_use]
     pub fn sample(&self, u: DVec2) -> FilterSample {

@@ -102,6 +102,11 @@ impl LayerSums {
         }
     }
 
+    /// The sums of one channel, pixel by pixel.
+    pub fn sums_of(&self, channel: usize) -> impl Iterator<Item = f64> {
+        self.sums.iter().skip(channel).step_by(self.channels.max(1)).map(|sum| sum.value())
+    }
+
     /// The means of one channel, pixel by pixel; 0 where there is no sample.
     #[must_use]
     pub fn plane(&self, channel: usize) -> Vec<f32> {

@@ -46,6 +46,19 @@ pub enum Projection {
     },
 }
 
+/// A way into the camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// Where the light falls on the picture; (0, 0) is the corner of the top left pixel. May lie outside.
+    pub pixel: DVec2,
+    /// From the point toward the camera, unit.
+    pub direction: DVec3,
+    /// From the point to where the camera's rays begin, metres.
+    pub distance: f64,
+    /// Pixels per m² across `direction` at the point.
+    pub density: f64,
+}
+
 /// Which extent of the picture an angle of view spans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FovAxis {
@@ -122,7 +135,57 @@ impl Camera {
         if self.clip[1] == f64::INFINITY {
             return f64::INFINITY;
         }
-        (self.clip[1] - self.clip[0]) / ray.direction.dot(self.world_from_camera.matrix3.z_axis)
+        let axis = self.world_from_camera.matrix3.z_axis;
+        (self.clip[1] - self.clip[0]) * axis.length() / ray.direction.dot(axis)
+    }
+
+    /// How light from `point` enters the camera through the point `lens` of the unit square of its lens; `None` where
+    /// the camera does not look.
+    ///
+    /// A pixel is the mean of L over its filter h, I = ∫ L h dx with x in pixels. Seen from one point of the lens,
+    /// x moves over the plane at distance one as directions do: dx = dω / (s² cos³θ), with s the side of a pixel
+    /// there (Veach 1997, 8.2). Parallel rays through an area dA across them pass dx = dA / s².
+    #[must_use]
+    pub fn entry(&self, point: DVec3, lens: impl FnOnce() -> DVec2) -> Option<Entry> {
+        let (w, h) = (f64::from(self.resolution[0]), f64::from(self.resolution[1]));
+        let local = self.world_from_camera.inverse().transform_point3(point);
+        if !(local.z > 0.0 && local.z >= self.clip[0] && local.z <= self.clip[1]) {
+            return None;
+        }
+        let (aperture, focus) = match self.lens {
+            Some(Lens { radius, focus_distance }) => (warp::concentric_disk(lens()) * radius, focus_distance),
+            None => (DVec2::ZERO, 1.0),
+        };
+        let (half_width, plane, origin, density) = match self.projection {
+            Projection::Perspective { half_width } => {
+                // The ray meets the plane of focus where the ray of a pinhole does.
+                let slope = (local.truncate() - aperture) / local.z;
+                let secant2 = 1.0 + slope.length_squared();
+                let distance2 = local.z * local.z * secant2;
+                let side = 2.0 * half_width / w;
+                (half_width, slope + aperture / focus, aperture, secant2 * secant2.sqrt() / (side * side * distance2))
+            }
+            Projection::Orthographic { half_width } => {
+                // From one point of the lens all rays are parallel.
+                let slope = -aperture / focus;
+                let place = local.truncate() - aperture - slope * local.z;
+                let side = 2.0 * half_width / w;
+                let m = self.world_from_camera.matrix3;
+                // Area across the rays in the world, of a unit of area of the picture: a matrix may stretch.
+                let toward = m * slope.extend(1.0);
+                let stretch = m.determinant().abs() / toward.length();
+                (half_width, place, place + aperture, 1.0 / (side * side * stretch))
+            }
+        };
+        let pixel = (DVec2::new(plane.x, -plane.y) * w / half_width + DVec2::new(w, h)) * 0.5
+            + self.principal_point * DVec2::new(w, h);
+        // Rays begin at the near clipping plane.
+        let start = origin.extend(0.0);
+        let begin = start + (local - start) * (self.clip[0] / local.z);
+        let offset = self.world_from_camera.transform_point3(begin) - point;
+        let whole = self.world_from_camera.transform_point3(start) - point;
+        let wi = whole.try_normalize()?;
+        Some(Entry { pixel, direction: wi, distance: offset.length(), density })
     }
 
     /// World to camera for row vectors, row by row, as EXR files and RenderMan have it: +x right, +y up,

@@ -83,7 +83,7 @@ pub struct Slide {
 
 impl Slide {
     /// The value in the direction `wi` toward the light.
-    fn eval(&self, wi: DVec3, nm: Lanes) -> Lanes {
+    pub(super) fn eval(&self, wi: DVec3, nm: Lanes) -> Lanes {
         let d = self.axes.transpose() * -wi;
         let uv = 0.5 + 0.5 * d.truncate() / (d.z * self.half);
         self.texture.eval(&TexturePoint { uv, ..TexturePoint::default() }, nm)

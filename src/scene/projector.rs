@@ -2,6 +2,7 @@
 
 use super::light::Arriving;
 use super::texture::{Texture, TexturePoint};
+use crate::math::Ray;
 use crate::spectrum::{Lanes, Spectrum};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use std::f64::consts::PI;
@@ -56,6 +57,19 @@ impl Projector {
             density: None,
             target: None,
         })
+    }
+
+    /// A ray through a point of the picture that `u` chooses, and its power over its density, W·nm⁻¹.
+    ///
+    /// The intensity π T / cos³θ over the density by solid angle of a point uniform on the screen at distance one,
+    /// 1 / (area cos³θ).
+    #[must_use]
+    pub fn emit(&self, u: DVec2, nm: Lanes) -> (Ray, Lanes) {
+        let place = (2.0 * u - 1.0) * self.half;
+        let direction = (self.axes * place.extend(1.0)).normalize();
+        let at = TexturePoint { uv: u, point: self.position + direction, ..TexturePoint::default() };
+        let factor = PI * 4.0 * self.half.x * self.half.y;
+        (Ray::new(self.position, direction), self.irradiance.eval(&at, nm) * (self.scale * factor as f32))
     }
 
     /// Luminous power, film units times m²: that which falls on the screen.

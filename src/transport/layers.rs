@@ -99,6 +99,8 @@ pub struct LayerPlan {
     pub integrators: Vec<Integrator>,
     /// From XYZ to the primaries of the file.
     pub rgb_from_xyz: [[f64; 3]; 3],
+    /// Factor on colours, as on the picture's own.
+    pub sensitivity: f64,
     /// How far apart samples of a pixel stand, in pixels: 1/√n.
     pub sample_distance: f64,
 }
@@ -109,6 +111,7 @@ impl Default for LayerPlan {
             layers: Vec::new(),
             integrators: Vec::new(),
             rgb_from_xyz: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            sensitivity: 1.0,
             sample_distance: 1.0,
         }
     }
@@ -176,6 +179,7 @@ pub fn append(
     values: &mut Vec<f32>,
 ) {
     let layers = &plan.layers;
+    let sensitivity = layers.sensitivity as f32;
     let others: Vec<Seen> = layers.integrators.iter().map(light).collect();
     let looks = layers.layers.iter().any(|layer| matches!(layer.source, Source::Surface(_)));
     let first = if looks { First::met(scene, ray) } else { None };
@@ -188,7 +192,7 @@ pub fn append(
             },
             Source::Light(of, form) => {
                 let seen = of.map_or(own, |i| others[i]);
-                let xyz = observer::xyz(seen.radiance, wavelengths);
+                let xyz = observer::xyz(seen.radiance * sensitivity, wavelengths);
                 match form {
                     Form::Xyz => values.extend(xyz),
                     Form::Rgba => {
@@ -257,7 +261,7 @@ impl First {
             }
             Quantity::Albedo => {
                 let albedo = self.albedo(scene, plan, wavelengths.nm, ray);
-                let xyz = observer::xyz(albedo, wavelengths);
+                let xyz = observer::xyz(albedo * plan.layers.sensitivity as f32, wavelengths);
                 values.extend(rgb(&plan.layers.rgb_from_xyz, xyz));
             }
             Quantity::Primitive => values.push(self.hit.part as f32),

@@ -5,6 +5,7 @@
 //! pixel.
 
 pub mod layers;
+pub mod light;
 pub mod path;
 pub mod plan;
 pub mod whitted;
@@ -16,7 +17,7 @@ use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::Scene;
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::DVec2;
-use plan::{EffectPlan, Integrator};
+use plan::{EffectPlan, Integrator, PathSettings};
 
 /// Light that a camera ray brings, before fog.
 #[derive(Clone, Copy, Debug)]
@@ -122,10 +123,16 @@ impl Begun {
                     depth: hit.map_or(f64::INFINITY, |h| scene.camera.depth(ray.at(h.t))),
                 }
             }
-            // The light tracer's light comes by itself.
-            Integrator::Light(_) | Integrator::Nothing => {
-                Incoming { radiance: Lanes::ZERO, alpha: 0.0, depth: f64::INFINITY }
+            // Lights that the camera sees itself; the rest comes by itself.
+            Integrator::Light(settings) => {
+                let direct = PathSettings {
+                    max_depth: Some(1),
+                    hide_emitters: settings.hide_emitters,
+                    ..PathSettings::default()
+                };
+                path::radiance(scene, plan, &direct, sampler, wavelengths, ray)
             }
+            Integrator::Nothing => Incoming { radiance: Lanes::ZERO, alpha: 0.0, depth: f64::INFINITY },
         }
     }
 

@@ -177,6 +177,7 @@ impl EffectPlan {
     #[must_use]
     pub fn of(census: &Census, integrator: Integrator, mode: EffectMode) -> EffectPlan {
         let path = !matches!(integrator, Integrator::Whitted(_));
+        let from_camera = !matches!(integrator, Integrator::Light(_));
         let mut effects: Vec<Effect> = Vec::new();
         // An effect of the scene: on if the scene has it, or if everything is forced on.
         let mut effect = |name, present: bool, here: String, absent: &str| {
@@ -236,9 +237,13 @@ impl EffectPlan {
         );
         let media = effect(
             "media",
-            path && census.media > 0,
+            path && from_camera && census.media > 0,
             count(census.media, "medium that light crosses", "media that light crosses"),
-            if path { "all space is empty" } else { "whitted does not simulate media" },
+            match (path, from_camera) {
+                (true, true) => "all space is empty",
+                (true, false) => "light_tracer does not simulate media",
+                (false, _) => "whitted does not simulate media",
+            },
         );
         let depth_fog = effect("depth fog", census.fog, "the scene asks for it".into(), "the scene has none");
         effect(
@@ -255,12 +260,12 @@ impl EffectPlan {
         );
         // Not an effect but a consequence; forced on with the effects that call for it.
         let chromatic = dispersion || census.chromatic_media > 0 || mode == EffectMode::All;
-        let techniques = if path { path_techniques(census, chromatic) } else { Vec::new() };
+        let techniques = if path && from_camera { path_techniques(census, chromatic) } else { Vec::new() };
         EffectPlan {
             integrator,
             dispersion,
             chromatic,
-            media: media && path,
+            media: media && path && from_camera,
             depth_fog,
             all_dispersive: mode == EffectMode::All,
             layers: LayerPlan::default(),
