@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use super::compound::{Blend, Bump, Mask, NormalMap, Roughness, TwoSided};
 use super::fault::Checker;
 use super::path::At;
 use super::spectrum::{FilePath, Illuminant, Index, Role, Spectrum, SpectrumOrTexture, yes};
@@ -40,6 +41,16 @@ pub enum Material {
     Plastic(Plastic),
     /// Invisible; only bounds a medium.
     Boundary(Boundary),
+    /// Lets a share of the light through, straight on.
+    Mask(Mask),
+    /// Two materials by weight.
+    Blend(Blend),
+    /// A material for each side.
+    TwoSided(TwoSided),
+    /// A material over a relief.
+    Bump(Bump),
+    /// A material over a relief given by its normals.
+    NormalMap(NormalMap),
 }
 
 impl Default for Material {
@@ -70,9 +81,9 @@ pub struct Conductor {
     /// The complex index of refraction η + ik.
     pub index: ConductorIndex,
     /// Factor on the reflection; default 1.
-    pub tint: Spectrum,
+    pub tint: SpectrumOrTexture,
     /// Microfacet roughness α; 0, the default, is a perfect mirror.
-    pub roughness: f64,
+    pub roughness: Roughness,
     /// Distribution of the microfacet normals; default `ggx`.
     pub distribution: Distribution,
     /// Fresnel's equations or Schlick's approximation; default `exact`.
@@ -104,9 +115,9 @@ struct WrittenConductor {
     eta: Option<Spectrum>,
     k: Option<Spectrum>,
     #[serde(default = "unit")]
-    tint: Spectrum,
+    tint: SpectrumOrTexture,
     #[serde(default)]
-    roughness: f64,
+    roughness: Roughness,
     #[serde(default)]
     distribution: Distribution,
     #[serde(default)]
@@ -168,13 +179,19 @@ pub struct Dielectric {
     pub exterior_ior: Index,
     /// Microfacet roughness α; 0, the default, is smooth.
     #[serde(default)]
-    pub roughness: f64,
+    pub roughness: Roughness,
     /// Distribution of the microfacet normals; default `ggx`.
     #[serde(default)]
     pub distribution: Distribution,
     /// Fresnel's equations or Schlick's approximation; default `exact`.
     #[serde(default)]
     pub fresnel: Fresnel,
+    /// Factor on the reflection; default 1.
+    #[serde(default = "unit")]
+    pub reflection_tint: SpectrumOrTexture,
+    /// Factor on the transmission; default 1.
+    #[serde(default = "unit")]
+    pub transmission_tint: SpectrumOrTexture,
     /// Highlight of the `whitted` integrator; default none.
     pub highlight: Option<Highlight>,
 }
@@ -188,6 +205,12 @@ pub struct ThinDielectric {
     /// Index around it; default 1.
     #[serde(default = "vacuum")]
     pub exterior_ior: Index,
+    /// Factor on the reflection; default 1.
+    #[serde(default = "unit")]
+    pub reflection_tint: SpectrumOrTexture,
+    /// Factor on the transmission; default 1.
+    #[serde(default = "unit")]
+    pub transmission_tint: SpectrumOrTexture,
 }
 
 /// `plastic: {reflectance: SPECTRUM_OR_TEXTURE}`
@@ -203,6 +226,9 @@ pub struct Plastic {
     /// Microfacet roughness α of the coat; 0, the default, is smooth.
     #[serde(default)]
     pub roughness: f64,
+    /// Factor on what the coat reflects; default 1.
+    #[serde(default = "unit")]
+    pub tint: SpectrumOrTexture,
     /// Whether light that bounces between coat and base takes on more colour each time; default
     /// false.
     #[serde(default)]
@@ -303,6 +329,9 @@ pub struct ImageTexture {
     /// Added to u and v after scaling; default `[0, 0]`.
     #[serde(default)]
     pub offset: [f64; 2],
+    /// From the surface's u, v to the picture's, as the first two rows of an affine map, applied before `scale` and
+    /// `offset`; default none.
+    pub uv: Option<[[f64; 3]; 2]>,
     /// Whether the values are data, not sRGB colour; default false.
     #[serde(default)]
     pub raw: bool,
@@ -334,25 +363,27 @@ pub enum TextureFilter {
     Nearest,
 }
 
-/// `checkerboard: {a: SPECTRUM, b: SPECTRUM, scale: [12, 12]}`
+/// `checkerboard: {a: SPECTRUM_OR_TEXTURE, b: SPECTRUM_OR_TEXTURE, scale: [12, 12]}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkerboard {
     /// Where ⌊2u⌋ + ⌊2v⌋ of the scaled coordinates is even.
-    pub a: Spectrum,
+    pub a: SpectrumOrTexture,
     /// Where it is odd.
-    pub b: Spectrum,
+    pub b: SpectrumOrTexture,
     /// Periods, of two squares each, in u and v; default `[1, 1]`.
     #[serde(default = "unscaled")]
     pub scale: [f64; 2],
+    /// From u, v to the board's, as the first two rows of an affine map, applied before `scale`; default none.
+    pub uv: Option<[[f64; 3]; 2]>,
 }
 
 fn half() -> SpectrumOrTexture {
     SpectrumOrTexture::Spectrum(Spectrum::Number(0.5))
 }
 
-fn unit() -> Spectrum {
-    Spectrum::Number(1.0)
+fn unit() -> SpectrumOrTexture {
+    SpectrumOrTexture::Spectrum(Spectrum::Number(1.0))
 }
 
 fn nine_tenths() -> Spectrum {
@@ -390,8 +421,20 @@ impl MaterialRef {
 
 impl Material {
     /// Names of the kinds.
-    pub(crate) const KINDS: [&'static str; 7] =
-        ["diffuse", "conductor", "mirror", "dielectric", "thin_dielectric", "plastic", "boundary"];
+    pub(crate) const KINDS: [&'static str; 12] = [
+        "diffuse",
+        "conductor",
+        "mirror",
+        "dielectric",
+        "thin_dielectric",
+        "plastic",
+        "boundary",
+        "mask",
+        "blend",
+        "two_sided",
+        "bump",
+        "normal_map",
+    ];
 
     /// The key under which the material is written.
     #[must_use]
@@ -404,6 +447,11 @@ impl Material {
             Material::ThinDielectric(_) => "thin_dielectric",
             Material::Plastic(_) => "plastic",
             Material::Boundary(_) => "boundary",
+            Material::Mask(_) => "mask",
+            Material::Blend(_) => "blend",
+            Material::TwoSided(_) => "two_sided",
+            Material::Bump(_) => "bump",
+            Material::NormalMap(_) => "normal_map",
         }
     }
 
@@ -420,7 +468,7 @@ impl Material {
                     k.check(Role::Coefficient, at.key("k"), checker);
                 }
                 conductor.tint.check(Role::Reflectance, at.key("tint"), checker);
-                checker.not_negative(at.key("roughness"), conductor.roughness);
+                conductor.roughness.check(at.key("roughness"), checker);
                 check_highlight(conductor.highlight, at, checker);
             }
             Material::Mirror(mirror) => {
@@ -430,20 +478,30 @@ impl Material {
             Material::Dielectric(dielectric) => {
                 dielectric.ior.check(at.key("ior"), checker);
                 dielectric.exterior_ior.check(at.key("exterior_ior"), checker);
-                checker.not_negative(at.key("roughness"), dielectric.roughness);
+                dielectric.roughness.check(at.key("roughness"), checker);
+                dielectric.reflection_tint.check(Role::Reflectance, at.key("reflection_tint"), checker);
+                dielectric.transmission_tint.check(Role::Reflectance, at.key("transmission_tint"), checker);
                 check_highlight(dielectric.highlight, at, checker);
             }
             Material::ThinDielectric(sheet) => {
                 sheet.ior.check(at.key("ior"), checker);
                 sheet.exterior_ior.check(at.key("exterior_ior"), checker);
+                sheet.reflection_tint.check(Role::Reflectance, at.key("reflection_tint"), checker);
+                sheet.transmission_tint.check(Role::Reflectance, at.key("transmission_tint"), checker);
             }
             Material::Plastic(plastic) => {
                 plastic.reflectance.check(Role::Reflectance, at.key("reflectance"), checker);
                 plastic.ior.check(at.key("ior"), checker);
+                plastic.tint.check(Role::Reflectance, at.key("tint"), checker);
                 checker.not_negative(at.key("roughness"), plastic.roughness);
                 check_highlight(plastic.highlight, at, checker);
             }
             Material::Boundary(Boundary {}) => {}
+            Material::Mask(mask) => mask.check(at, checker),
+            Material::Blend(blend) => blend.check(at, checker),
+            Material::TwoSided(sides) => sides.check(at, checker),
+            Material::Bump(bump) => bump.check(at, checker),
+            Material::NormalMap(map) => map.check(at, checker),
         }
     }
 }
@@ -457,6 +515,16 @@ fn check_highlight(highlight: Option<Highlight>, at: At<'_>, checker: &mut Check
 }
 
 impl Texture {
+    /// Names of the textures in it.
+    pub(crate) fn inner(&self) -> Vec<&str> {
+        match self {
+            Texture::Image(_) | Texture::Volume(_) => Vec::new(),
+            Texture::Checkerboard(board) => {
+                [&board.a, &board.b].into_iter().filter_map(SpectrumOrTexture::name).collect()
+            }
+        }
+    }
+
     /// Checks a texture; `role` is how the scene uses it.
     pub(crate) fn check<'a>(&'a self, role: Role, at: At<'_>, checker: &mut Checker<'a>) {
         match self {
@@ -564,9 +632,16 @@ mod tests {
             let fields = match kind {
                 "conductor" => "metal: gold",
                 "dielectric" | "thin_dielectric" => "ior: 1.5",
+                "mask" => "material: {diffuse: {}}",
+                "blend" => "first: {diffuse: {}}, second: {mirror: {}}",
+                "two_sided" => "front: {diffuse: {}}",
+                "bump" => "height: {texture: t}, material: {diffuse: {}}",
+                "normal_map" => "normals: {texture: t}, material: {diffuse: {}}",
                 _ => "",
             };
-            let scene = scene(&format!("materials: {{a: {{{kind}: {{{fields}}}}}}}"));
+            let scene = scene(&format!(
+                "textures: {{t: {{checkerboard: {{a: 0, b: 1}}}}}}\nmaterials: {{a: {{{kind}: {{{fields}}}}}}}"
+            ));
             assert_eq!(scene.materials["a"].kind(), kind);
         }
     }

@@ -72,9 +72,10 @@
 //! textures:
 //!   earth: {image: {file: earth.jpg, wrap: repeat, filter: bilinear, scale: [1, 1], offset: [0, 0], raw: false}}
 //!                                   # repeat, mirror, clamp, and wrap_v where it differs; bilinear, nearest; all but
-//!                                   # file default
+//!                                   # file default; uv: [[a, b, c], [d, e, f]] maps u, v before scale and offset
 //!   marble: {volume: haze}          # a volume where it is cut by the surface
 //!   floor: {checkerboard: {a: 0.1, b: {rgb: [0.9, 0.8, 0.7]}, scale: [12, 12]}}   # scale default [1, 1]
+//!                                   # a and b may be textures; uv as above
 //! volumes:
 //!   haze: {constant: {value: 0.5, transform: [{scale: 2}]}}
 //!                                   # transform as of shapes, from the unit cube; default none
@@ -89,8 +90,9 @@
 //!   ring:
 //!     conductor:
 //!       metal: gold                              # either this, or eta: SPECTRUM and k: SPECTRUM
-//!       tint: 1                                  # ~
-//!       roughness: 0                             # ~ microfacet α, 0 is smooth
+//!       tint: 1                                  # ~ or a texture
+//!       roughness: 0                             # ~ microfacet α, 0 is smooth; a number, {texture: name}, or
+//!                                                # {u: 0.1, v: 0.3} of these: along ∂p/∂u and across
 //!       distribution: ggx                        # ~ ggx, beckmann
 //!       fresnel: exact                           # ~ exact, schlick
 //!                                                # and highlight, two_sided
@@ -99,10 +101,20 @@
 //!     dielectric:
 //!       ior: {glass: N-SF11}                     # an index, see below
 //!       exterior_ior: 1                          # ~ and roughness, distribution, fresnel, highlight
-//!   pane: {thin_dielectric: {ior: 1.5, exterior_ior: 1}}
-//!   lacquer: {plastic: {reflectance: 0.5, ior: 1.5, roughness: 0, nonlinear: false}}
-//!                                                # ~ and distribution, highlight, two_sided
+//!       reflection_tint: 1                       # ~ factors, or textures
+//!       transmission_tint: 1
+//!   pane: {thin_dielectric: {ior: 1.5, exterior_ior: 1}}             # and both tints
+//!   lacquer: {plastic: {reflectance: 0.5, ior: 1.5, roughness: 0, nonlinear: false, tint: 1}}
+//!                                                # ~ and distribution, highlight, two_sided; roughness is a number
 //!   edge: {boundary: {}}                         # only bounds a medium
+//!   leaf: {mask: {opacity: 0.5, material: clay}} # ~ a number or {texture: name}; a material is a name, or a kind
+//!                                                # written in place
+//!   worn: {blend: {weight: 0.5, first: clay, second: ring}}          # ~ of the second
+//!   card: {two_sided: {front: clay, back: lacquer}}                  # ~ back is the front's
+//!   waves: {bump: {height: {texture: floor}, scale: 1, material: clay}}
+//!                                                # ~ scale; metres along the normal
+//!   scales: {normal_map: {normals: {texture: earth}, material: clay}}
+//!                                                # both: turn: true, shadowing: true
 //! media:
 //!   smoke:
 //!     homogeneous: {absorption: 0.1, scattering: {rgb: [0.2, 0.3, 0.4]}, phase: {hg: 0.5}}
@@ -228,6 +240,7 @@
 
 mod batch;
 mod camera;
+mod compound;
 mod decode;
 mod edit;
 mod emitter;
@@ -248,6 +261,7 @@ mod yaml;
 
 pub use batch::{Batch, BatchEntry, Document, load};
 pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection};
+pub use compound::{Blend, Brushed, Bump, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided};
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, ProjectorLight};
 pub use layer::{Layer, LayerContent, LightForm, Quantity};
 pub use light::{Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, Light, PointLight, SpotLight};

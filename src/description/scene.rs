@@ -133,6 +133,18 @@ impl SceneDescription {
         self.locator.fault(field, message)
     }
 
+    /// Textures within textures that reflect do so too.
+    fn reflect_through_textures<'a>(&'a self, checker: &mut Checker<'a>) {
+        let mut open: Vec<&str> = checker.reflecting_textures.iter().copied().collect();
+        while let Some(name) = open.pop() {
+            for inner in self.textures.get(name).into_iter().flat_map(Texture::inner) {
+                if checker.reflecting_textures.insert(inner) {
+                    open.push(inner);
+                }
+            }
+        }
+    }
+
     fn check(&self, root: &Node, sources: &Sources) -> Result<()> {
         let mut checker = Checker::new(root);
         checker.materials = self.materials.keys().map(String::as_str).collect();
@@ -176,6 +188,7 @@ impl SceneDescription {
             fog.check(at.key("fog"), &mut checker);
         }
         // Last, for what a texture may hold depends on where it was used.
+        self.reflect_through_textures(&mut checker);
         for (name, texture) in &self.textures {
             let reflects = checker.reflecting_textures.contains(name.as_str());
             let role = if reflects { Role::Reflectance } else { Role::Emission };
@@ -202,6 +215,7 @@ mod tests {
     fn a_scene_with_everything_becomes_the_structs() {
         let scene = parse(&reference("scene")).unwrap();
         let number = Spectrum::Number;
+        let one_of = |x| SpectrumOrTexture::Spectrum(number(x));
         let text = str::to_owned;
         assert_eq!(
             scene.camera,
@@ -219,9 +233,10 @@ mod tests {
         assert_eq!(
             scene.textures["floor"],
             Texture::Checkerboard(Checkerboard {
-                a: number(0.1),
-                b: Spectrum::Rgb([0.9, 0.8, 0.7]),
-                scale: [12.0, 12.0]
+                a: one_of(0.1),
+                b: SpectrumOrTexture::Spectrum(Spectrum::Rgb([0.9, 0.8, 0.7])),
+                scale: [12.0, 12.0],
+                uv: None,
             })
         );
         assert_eq!(
@@ -236,8 +251,8 @@ mod tests {
             scene.materials["ring"],
             Material::Conductor(Conductor {
                 index: ConductorIndex::Metal(text("gold")),
-                tint: number(1.0),
-                roughness: 0.0,
+                tint: one_of(1.0),
+                roughness: Roughness::Number(0.0),
                 distribution: Distribution::Ggx,
                 fresnel: Fresnel::Exact,
                 highlight: None,
@@ -250,7 +265,9 @@ mod tests {
             Material::Dielectric(Dielectric {
                 ior: Index::Glass(text("N-SF11")),
                 exterior_ior: Index::Number(1.0),
-                roughness: 0.0,
+                roughness: Roughness::Number(0.0),
+                reflection_tint: one_of(1.0),
+                transmission_tint: one_of(1.0),
                 distribution: Distribution::Ggx,
                 fresnel: Fresnel::Exact,
                 highlight: None,
@@ -258,7 +275,12 @@ mod tests {
         );
         assert_eq!(
             scene.materials["pane"],
-            Material::ThinDielectric(ThinDielectric { ior: Index::Number(1.5), exterior_ior: Index::Number(1.0) })
+            Material::ThinDielectric(ThinDielectric {
+                ior: Index::Number(1.5),
+                exterior_ior: Index::Number(1.0),
+                reflection_tint: one_of(1.0),
+                transmission_tint: one_of(1.0),
+            })
         );
         assert_eq!(
             scene.materials["lacquer"],
@@ -266,6 +288,7 @@ mod tests {
                 reflectance: SpectrumOrTexture::Spectrum(number(0.5)),
                 ior: Index::Number(1.5),
                 roughness: 0.0,
+                tint: one_of(1.0),
                 nonlinear: false,
                 distribution: Distribution::Ggx,
                 highlight: None,

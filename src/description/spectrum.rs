@@ -322,6 +322,15 @@ impl Spectrum {
 }
 
 impl SpectrumOrTexture {
+    /// The name of the texture, if it is one.
+    #[must_use]
+    pub fn name(&self) -> Option<&str> {
+        match self {
+            SpectrumOrTexture::Texture(name) => Some(name),
+            SpectrumOrTexture::Spectrum(_) => None,
+        }
+    }
+
     pub(crate) fn check<'a>(&'a self, role: Role, at: At<'_>, checker: &mut Checker<'a>) {
         match self {
             SpectrumOrTexture::Spectrum(spectrum) => spectrum.check(role, at, checker),

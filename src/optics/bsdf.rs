@@ -1,6 +1,6 @@
 //! The closed set of surface scattering functions, evaluated at one point for eight wavelengths.
 
-use super::dielectric::{Dielectric, RoughDielectric};
+use super::dielectric::{Dielectric, RoughDielectric, Tint};
 use super::fresnel::{self, Model};
 use super::mean;
 use super::microfacet::Microfacets;
@@ -36,6 +36,8 @@ pub enum Bsdf {
     Thin {
         /// Index of the pane over the index around it, at the hero's wavelength.
         eta: f64,
+        /// Factors beside Fresnel's.
+        tint: Tint,
     },
     /// A diffuse base under a smooth dielectric coat.
     Plastic(Plastic),
@@ -197,12 +199,12 @@ impl Bsdf {
             }
             Bsdf::Dielectric(glass) => glass.sample(wo, u_lobe),
             Bsdf::RoughDielectric(glass) => glass.sample(wo, u_lobe, u),
-            Bsdf::Thin { eta } => {
+            Bsdf::Thin { eta, tint } => {
                 let reflected = pane_reflectance(wo.z.abs(), *eta);
                 Some(if u_lobe < reflected {
-                    BsdfSample::discrete(mirror(wo), Lanes::ONE)
+                    BsdfSample::discrete(mirror(wo), tint.reflected)
                 } else {
-                    BsdfSample { transmitted: true, ..BsdfSample::discrete(-wo, Lanes::ONE) }
+                    BsdfSample { transmitted: true, ..BsdfSample::discrete(-wo, tint.transmitted) }
                 })
             }
             Bsdf::Plastic(plastic) => plastic.sample(wo, u_lobe, u),

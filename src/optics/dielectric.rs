@@ -46,6 +46,22 @@ pub struct Dielectric {
     pub eta: RelativeIndex,
     /// Which Fresnel formula.
     pub fresnel: Model,
+    /// Factors beside Fresnel's.
+    pub tint: Tint,
+}
+
+/// Factors on what an interface reflects and transmits; one for physical glass.
+#[derive(Clone, Copy, Debug)]
+pub struct Tint {
+    /// On the reflected light.
+    pub reflected: Lanes,
+    /// On the transmitted light.
+    pub transmitted: Lanes,
+}
+
+impl Tint {
+    /// Physical glass.
+    pub const NONE: Tint = Tint { reflected: Lanes::ONE, transmitted: Lanes::ONE };
 }
 
 /// Refracts `wo` at the facet `m` (on the side of `wo`); `cos_t` from Fresnel's equations, `eta` =
@@ -72,7 +88,7 @@ impl Dielectric {
                     self.eta.lanes(|e| fresnel::dielectric(self.fresnel, cos, toward(e)).reflected / split.reflected)
                 }
             };
-            return Some(BsdfSample { ratio, ..BsdfSample::discrete(mirror(wo), ratio) });
+            return Some(BsdfSample { ratio, ..BsdfSample::discrete(mirror(wo), ratio * self.tint.reflected) });
         }
         let m = DVec3::Z * wo.z.signum();
         let wi = refract(wo, m, eta, split.cos_transmitted);
@@ -84,7 +100,7 @@ impl Dielectric {
         let eta2 = eta * eta;
         Some(BsdfSample {
             wi,
-            weight: same * (1.0 / eta2) as f32,
+            weight: same * (1.0 / eta2) as f32 * self.tint.transmitted,
             ratio: same,
             chosen: Chosen::Discrete,
             transmitted: true,
@@ -100,6 +116,8 @@ pub struct RoughDielectric {
     pub eta: RelativeIndex,
     /// Its facets.
     pub facets: Microfacets,
+    /// Factors beside Fresnel's.
+    pub tint: Tint,
 }
 
 impl RoughDielectric {
@@ -133,7 +151,11 @@ impl RoughDielectric {
         if wo.z == 0.0 || wi.z == 0.0 {
             return Evaluation::NONE;
         }
-        Evaluation { f: self.eta.lanes(|e| self.one(wo, wi, e).0), pdf: self.eta.lanes(|e| self.one(wo, wi, e).1) }
+        let tint = if wo.z * wi.z > 0.0 { self.tint.reflected } else { self.tint.transmitted };
+        Evaluation {
+            f: self.eta.lanes(|e| self.one(wo, wi, e).0) * tint,
+            pdf: self.eta.lanes(|e| self.one(wo, wi, e).1),
+        }
     }
 
     /// f and pdf at one index.

@@ -1,6 +1,8 @@
 //! Microfacet distributions: which way the tiny mirrors of a rough surface face.
 //!
-//! Local frame, z = mean normal. Isotropic with width `alpha`; no squaring of a "roughness".
+//! Local frame, z = mean normal. The width `alpha` is along local x, and along y for an isotropic
+//! surface; no squaring of a "roughness". Brushed surfaces are isotropic ones stretched along y: where
+//! slopes occur, the y component counts `ratio` times less (Heitz 2014, 5.3).
 //! Walter et al. 2007 (D, Smith's G, rough dielectrics); Heitz 2018 and Dupuy and Benyoub 2023
 //! (sampling visible GGX normals). Shadowing and masking are separable, G₁(o) G₁(i), as in
 //! Mitsuba 3, so that the two can be compared pixel by pixel.
@@ -24,11 +26,25 @@ pub enum Distribution {
 pub struct Microfacets {
     /// The family.
     pub distribution: Distribution,
-    /// Width; the root mean square slope is of this order.
+    /// Width along local x; the root mean square slope is of this order.
     pub alpha: f64,
+    /// Width along local y over that along x; one for an isotropic surface.
+    pub ratio: f64,
 }
 
 impl Microfacets {
+    /// The same width in all directions.
+    #[must_use]
+    pub fn isotropic(distribution: Distribution, alpha: f64) -> Microfacets {
+        Microfacets { distribution, alpha, ratio: 1.0 }
+    }
+
+    /// `alpha_u` along local x, `alpha_v` along local y.
+    #[must_use]
+    pub fn anisotropic(distribution: Distribution, alpha_u: f64, alpha_v: f64) -> Microfacets {
+        Microfacets { distribution, alpha: alpha_u, ratio: alpha_v / alpha_u }
+    }
+
     /// D(m) in sr⁻¹, by the vector rather than by its angle: cos² forms lose 12 % at α = 1e-3
     /// because 1 − cos² cancels.
     #[must_use]
@@ -37,8 +53,10 @@ impl Microfacets {
             return 0.0;
         }
         let a2 = self.alpha * self.alpha;
-        let slope2 = (m.x * m.x + m.y * m.y) / a2;
+        let y = m.y / self.ratio;
+        let slope2 = (m.x * m.x + y * y) / a2;
         let z2 = m.z * m.z;
+        let a2 = a2 * self.ratio;
         match self.distribution {
             Distribution::Ggx => {
                 let d = slope2 + z2;
@@ -55,7 +73,8 @@ impl Microfacets {
         if v.dot(m) * v.z <= 0.0 {
             return 0.0;
         }
-        let tan2_alpha = (v.x * v.x + v.y * v.y) / (v.z * v.z) * (self.alpha * self.alpha);
+        let y = v.y * self.ratio;
+        let tan2_alpha = (v.x * v.x + y * y) / (v.z * v.z) * (self.alpha * self.alpha);
         if tan2_alpha == 0.0 {
             return 1.0;
         }
@@ -76,18 +95,18 @@ impl Microfacets {
         match self.distribution {
             Distribution::Ggx => {
                 // Dupuy and Benyoub 2023, listing 3: a spherical cap in the stretched frame.
-                let v = DVec3::new(wo.x * self.alpha, wo.y * self.alpha, wo.z).normalize();
+                let v = DVec3::new(wo.x * self.alpha, wo.y * self.ratio * self.alpha, wo.z).normalize();
                 let (sin, cos) = sin_cos_turn(u.x);
                 let z = (1.0 - u.y).mul_add(1.0 + v.z, -v.z);
                 let r = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
                 let h = DVec3::new(r * cos, r * sin, z) + v;
-                DVec3::new(h.x * self.alpha, h.y * self.alpha, h.z.max(0.0)).normalize()
+                DVec3::new(h.x * self.alpha, h.y * self.alpha * self.ratio, h.z.max(0.0)).normalize()
             }
             Distribution::Beckmann => {
                 // tan²θ = −α² ln(1 − u)
                 let tan = (-self.alpha * self.alpha * libm::log1p(-u.y)).sqrt();
                 let (sin, cos) = sin_cos_turn(u.x);
-                DVec3::new(tan * cos, tan * sin, 1.0).normalize()
+                DVec3::new(tan * cos, tan * sin * self.ratio, 1.0).normalize()
             }
         }
     }
@@ -119,7 +138,7 @@ mod tests {
     #[test]
     fn facets_cover_the_mean_surface_once() {
         for distribution in FAMILIES {
-            let m = Microfacets { distribution, alpha: 0.3 };
+            let m = Microfacets::anisotropic(distribution, 0.3, 0.2);
             let mean = grid(1024).map(|u| m.density(warp::cosine_hemisphere(u)) * PI).sum::<f64>() / 1_048_576.0;
             assert!((mean - 1.0).abs() < 1e-3, "{distribution:?} {mean}");
         }
@@ -130,9 +149,17 @@ mod tests {
     #[test]
     fn sampled_normals_have_the_stated_density() {
         for distribution in FAMILIES {
-            for (alpha, z) in [(0.5, 0.9), (0.1, 0.4), (1.0, 0.2)] {
-                let m = Microfacets { distribution, alpha };
-                let wo = DVec3::new((1.0f64 - z * z).sqrt(), 0.0, z);
+            for (alpha, ratio, phi, z) in [
+                (0.5, 1.0, 0.0, 0.9),
+                (0.1, 1.0, 0.0, 0.4),
+                (1.0, 1.0, 0.0, 0.2),
+                (0.1, 4.0, 1.0, 0.4),
+                (0.5, 0.3, 2.0, 0.7),
+            ] {
+                let m = Microfacets { distribution, alpha, ratio };
+                let (sin_phi, cos_phi) = f64::sin_cos(phi);
+                let r = (1.0f64 - z * z).sqrt();
+                let wo = DVec3::new(r * cos_phi, r * sin_phi, z);
                 // g = the distribution of visible normals itself integrates to one only for GGX's
                 // exact Smith term; Beckmann's fit errs by 0.35 % (Walter et al. 2007).
                 let mean = grid(512)
@@ -152,7 +179,7 @@ mod tests {
     #[test]
     fn density_of_a_nearly_smooth_surface_keeps_its_digits() {
         let alpha = 1e-4f64;
-        let m = Microfacets { distribution: Distribution::Ggx, alpha };
+        let m = Microfacets::isotropic(Distribution::Ggx, alpha);
         let s = alpha - alpha.powi(3) / 6.0;
         let h = DVec3::new(s, 0.0, (1.0 - s * s).sqrt());
         let x = 1.0 - alpha * alpha / 3.0;
@@ -165,7 +192,7 @@ mod tests {
         for distribution in FAMILIES {
             for alpha in [1e-4, 1e-2, 1.0] {
                 for z in [1e-7, 1e-4, 0.5, 1.0] {
-                    let m = Microfacets { distribution, alpha };
+                    let m = Microfacets::isotropic(distribution, alpha);
                     let wo = DVec3::new((1.0f64 - z * z).sqrt(), 0.0, z);
                     for u in grid(32).chain([DVec2::ZERO, DVec2::new(0.0, 1.0 - 2f64.powi(-32))]) {
                         let h = m.sample(wo, u);
@@ -175,6 +202,30 @@ mod tests {
                         );
                     }
                 }
+            }
+        }
+    }
+
+    /// A brushed surface is an isotropic one of slopes p/α_u, q/α_v: with m = (−p, −q, 1)/√(1 + p² + q²),
+    /// Walter's isotropic D of the slopes (p/α_u, q/α_v) divided by α_u α_v is
+    /// D = P(p/α_u, q/α_v) / (α_u α_v cos⁴θ), P = 1/(π (1 + s²)²) for GGX and e^(−s²)/π for Beckmann.
+    #[test]
+    fn brushed_surfaces_are_stretched_isotropic_ones() {
+        for distribution in FAMILIES {
+            let facets = Microfacets::anisotropic(distribution, 0.4, 0.1);
+            let (p, q) = (0.3, -0.05);
+            let m = DVec3::new(-p, -q, 1.0).normalize();
+            let s2: f64 = (p / 0.4f64).powi(2) + (q / 0.1f64).powi(2);
+            let of_slopes = match distribution {
+                Distribution::Ggx => 1.0 / (PI * (1.0 + s2).powi(2)),
+                Distribution::Beckmann => (-s2).exp() / PI,
+            };
+            let expected = of_slopes / (0.4 * 0.1 * m.z.powi(4));
+            assert!((facets.density(m) / expected - 1.0).abs() < 1e-12, "{distribution:?}");
+            // Seen along x only the width along x masks, along y only that along y.
+            for (wide, v) in [(0.4, DVec3::new(0.8, 0.0, 0.6)), (0.1, DVec3::new(0.0, 0.8, 0.6))] {
+                let expected = Microfacets::isotropic(distribution, wide).masking(v, DVec3::Z);
+                assert!((facets.masking(v, DVec3::Z) - expected).abs() < 1e-15);
             }
         }
     }

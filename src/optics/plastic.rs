@@ -27,6 +27,8 @@ pub struct Base {
     pub internal: f64,
     /// True where light that bounces under the coat takes up the base's colour each time.
     pub nonlinear: bool,
+    /// Factor on what the coat reflects; one for a physical coat.
+    pub tint: Lanes,
 }
 
 impl Base {
@@ -70,7 +72,7 @@ impl Plastic {
         let fo = self.coat(wo.z);
         let p = coat_probability(fo, self.base.reflectance);
         if u_lobe < p {
-            return Some(BsdfSample::discrete(mirror(wo), Lanes::splat((fo / p) as f32)));
+            return Some(BsdfSample::discrete(mirror(wo), self.base.tint * (fo / p) as f32));
         }
         let wi = warp::cosine_hemisphere(u);
         from_evaluation(wi, wi.z, self.eval(wo, wi), false, 1.0)
@@ -181,7 +183,7 @@ impl RoughPlastic {
         let p = self.coat_share(wo);
         let through = self.table.at(wo.z) * self.table.at(wi.z) / PI;
         Evaluation {
-            f: self.base.albedo() * through as f32 + Lanes::splat(coat as f32),
+            f: self.base.albedo() * through as f32 + self.base.tint * coat as f32,
             pdf: Lanes::splat((p * self.facets.pdf(wo, m) / (4.0 * cos) + (1.0 - p) * wi.z / PI) as f32),
         }
     }

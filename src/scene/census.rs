@@ -49,20 +49,23 @@ impl Census {
                 Geometry::Mesh(mesh) => census.triangles += mesh.mesh.triangles.len(),
             }
             let name = || object.name.clone();
-            match &scene.materials[object.material as usize].kind {
-                Kind::Diffuse { reflectance } | Kind::Plastic { reflectance, .. } if reflectance.varies() => {
-                    census.textured.push(name());
-                }
-                Kind::Dielectric { interior, exterior, facets, .. } => {
-                    census.refractive.push(name());
-                    if interior.is_dispersive() || exterior.is_dispersive() {
-                        if facets.is_some() { &mut census.rough_dispersive } else { &mut census.dispersive }
-                            .push(name());
+            let material = &scene.materials[object.material as usize];
+            if material.varies() {
+                census.textured.push(name());
+            }
+            for leaf in material.leaves() {
+                match &leaf.kind {
+                    Kind::Dielectric { interior, exterior, facets, .. } => {
+                        note(&mut census.refractive, name());
+                        if interior.is_dispersive() || exterior.is_dispersive() {
+                            let rough = facets.is_some();
+                            note(if rough { &mut census.rough_dispersive } else { &mut census.dispersive }, name());
+                        }
                     }
+                    Kind::Thin { .. } => note(&mut census.refractive, name()),
+                    Kind::Mirror { .. } | Kind::Conductor { .. } => note(&mut census.reflective, name()),
+                    Kind::Diffuse { .. } | Kind::Plastic { .. } | Kind::Boundary | Kind::Compound(_) => {}
                 }
-                Kind::Thin { .. } => census.refractive.push(name()),
-                Kind::Mirror { .. } | Kind::Conductor { .. } => census.reflective.push(name()),
-                Kind::Diffuse { .. } | Kind::Plastic { .. } | Kind::Boundary => {}
             }
         }
         for light in &scene.lights {
@@ -91,5 +94,12 @@ impl Census {
             }
         }
         census
+    }
+}
+
+/// Adds a name, once.
+fn note(names: &mut Vec<String>, name: String) {
+    if names.last() != Some(&name) {
+        names.push(name);
     }
 }

@@ -5,29 +5,25 @@
 
 mod lights;
 mod media;
+mod surface;
 
 use super::bvh::{Aabb, Bvh};
 use super::camera::{self, Camera};
 use super::light::Light;
 use super::load;
-use super::material::{Highlight, HighlightModel, Kind, Material};
+use super::material::{Kind, Material};
 use super::mesh::{AreaTable, Mesh, MeshTree, NormalMode};
 use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Plane, Rectangle, Shape, Sphere};
-use super::texture::{Interpolation, Texture, Wrap};
+use super::texture::{Scalar, Texture};
 use super::volume::Volume;
 use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene, TriangleMesh};
 use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
-use crate::optics::fresnel::Model;
-use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::spectrum::{Outside, RefractiveIndex, Spectrum, WavelengthDistribution, catalogue, illuminant, upsample};
-use glam::{DAffine2, DAffine3, DMat2, DMat3, DMat4, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3};
 use std::collections::HashMap;
 use std::path::PathBuf;
-
-/// Roughness below which a surface is computed as smooth: the lobe is then narrower than f32 can
-/// tell directions apart (2⁻²⁴ · 16), and D(m) leaves the range of f32.
-const SMOOTHEST: f64 = 1e-6;
+use std::sync::Arc;
 
 struct Compiler<'a> {
     description: &'a SceneDescription,
@@ -35,8 +31,13 @@ struct Compiler<'a> {
     /// The first curve that could not be read.
     unread: Option<Error>,
     files: Vec<PathBuf>,
+    /// Textures as spectra and as numbers, once they are asked for.
     textures: HashMap<&'a str, Texture>,
     volumes: HashMap<&'a str, Volume>,
+    numbers: HashMap<&'a str, Scalar>,
+    /// Textures and materials that are being made, from the outermost: what holds itself shows here.
+    making: Vec<(&'static str, &'a str)>,
+    named: HashMap<&'a str, Arc<Material>>,
     material_ids: HashMap<&'a str, u32>,
     medium_ids: HashMap<&'a str, u32>,
     materials: Vec<Material>,
@@ -75,6 +76,9 @@ impl<'a> Compiler<'a> {
             files: Vec::new(),
             textures: HashMap::new(),
             volumes: HashMap::new(),
+            numbers: HashMap::new(),
+            making: Vec::new(),
+            named: HashMap::new(),
             material_ids: HashMap::new(),
             medium_ids: HashMap::new(),
             materials: Vec::new(),
@@ -123,15 +127,10 @@ impl<'a> Compiler<'a> {
             let compiled = self.volume(&format!("volumes.{name}"), volume)?;
             self.volumes.insert(name, compiled);
         }
-        for (name, texture) in &d.textures {
-            let at = format!("textures.{name}");
-            let compiled = self.texture(&at, texture)?;
-            self.textures.insert(name, compiled);
-        }
-        for (name, material) in &d.materials {
-            let at = format!("materials.{name}");
-            let id = self.material(&at, material);
-            self.material_ids.insert(name, id);
+        for name in d.materials.keys() {
+            let material = self.named_material(name).as_ref().clone();
+            self.material_ids.insert(name, self.materials.len() as u32);
+            self.materials.push(material);
         }
         let mut media = Vec::new();
         for (name, medium) in &d.media {
@@ -149,7 +148,11 @@ impl<'a> Compiler<'a> {
             let Some(geometry) = self.geometry(&at, shape)? else { continue };
             let material = match &shape.material {
                 written::MaterialRef::Name(name) => self.material_ids[name.as_str()],
-                written::MaterialRef::Inline(material) => self.material(&format!("{at}.material"), material),
+                written::MaterialRef::Inline(material) => {
+                    let material = self.material(&format!("{at}.material"), material);
+                    self.materials.push(material);
+                    self.materials.len() as u32 - 1
+                }
             };
             let object = objects.len() as u32;
             let light = shape.emission.as_ref().map(|emission| {
@@ -199,6 +202,7 @@ impl<'a> Compiler<'a> {
                 weights.push(weight);
             }
         }
+        self.unused_textures();
         let camera = self.camera();
         if !self.faults.is_empty() || self.unread.is_some() {
             // What is wrong is told by `finish`.
@@ -303,12 +307,18 @@ impl<'a> Compiler<'a> {
         }
         let mut reflectances = Vec::new();
         for object in objects {
-            match &self.materials[object.material as usize].kind {
-                Kind::Diffuse { reflectance } | Kind::Plastic { reflectance, .. } => {
-                    reflectances.extend(reflectance.representatives());
+            for leaf in self.materials[object.material as usize].leaves() {
+                match &leaf.kind {
+                    Kind::Diffuse { reflectance } | Kind::Plastic { reflectance, .. } => {
+                        reflectances.extend(reflectance.representatives());
+                    }
+                    Kind::Mirror { reflectance } => reflectances.push(reflectance.clone()),
+                    Kind::Conductor { .. }
+                    | Kind::Dielectric { .. }
+                    | Kind::Thin { .. }
+                    | Kind::Boundary
+                    | Kind::Compound(_) => {}
                 }
-                Kind::Mirror { reflectance } => reflectances.push(reflectance.clone()),
-                Kind::Conductor { .. } | Kind::Dielectric { .. } | Kind::Thin { .. } | Kind::Boundary => {}
             }
         }
         WavelengthDistribution::for_scene(&emitters, &reflectances)
@@ -365,42 +375,6 @@ impl<'a> Compiler<'a> {
         self.spectrum(at, s, Outside::Zero, Role::Light)
     }
 
-    fn reflectance_texture(&mut self, at: &str, s: &written::SpectrumOrTexture) -> Texture {
-        match s {
-            written::SpectrumOrTexture::Texture(name) => self.textures[name.as_str()].clone(),
-            written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.reflectance(at, s)),
-        }
-    }
-
-    fn texture(&mut self, at: &str, texture: &written::Texture) -> Result<Texture> {
-        Ok(match texture {
-            written::Texture::Image(image) => {
-                self.files.push(image.file.to_path_buf());
-                let loaded = load::image_texture(&image.file, image.raw);
-                let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
-                let wrap = |w: written::Wrap| match w {
-                    written::Wrap::Repeat => Wrap::Repeat,
-                    written::Wrap::Mirror => Wrap::Mirror,
-                    written::Wrap::Clamp => Wrap::Clamp,
-                };
-                loaded.grid.wrap = [wrap(image.wrap), wrap(image.wrap_v.unwrap_or(image.wrap))];
-                loaded.grid.interpolation = match image.filter {
-                    written::TextureFilter::Bilinear => Interpolation::Bilinear,
-                    written::TextureFilter::Nearest => Interpolation::Nearest,
-                };
-                let scale = DMat2::from_diagonal(DVec2::from(image.scale));
-                loaded.grid.uv = DAffine2::from_mat2_translation(scale, DVec2::from(image.offset));
-                Texture::Image(loaded)
-            }
-            written::Texture::Volume(name) => Texture::Volume(self.volume_texture(&format!("{at}.volume"), name)),
-            written::Texture::Checkerboard(board) => Texture::Checkerboard {
-                a: Box::new(Texture::Uniform(self.reflectance(&format!("{at}.checkerboard.a"), &board.a))),
-                b: Box::new(Texture::Uniform(self.reflectance(&format!("{at}.checkerboard.b"), &board.b))),
-                uv: DAffine2::from_scale(DVec2::from(board.scale)),
-            },
-        })
-    }
-
     fn index(&mut self, at: &str, index: &written::Index) -> RefractiveIndex {
         let made = match index {
             written::Index::Number(n) => Ok(RefractiveIndex::Constant(*n)),
@@ -412,92 +386,6 @@ impl<'a> Compiler<'a> {
         };
         let checked = made.and_then(|index| index.check_band().map(|()| index));
         self.or(at, checked, RefractiveIndex::Constant(1.0))
-    }
-
-    fn material(&mut self, at: &str, material: &written::Material) -> u32 {
-        let at = format!("{at}.{}", material.kind());
-        let at = |field: &str| format!("{at}.{field}");
-        let (kind, two_sided, highlight) = match material {
-            written::Material::Diffuse(m) => (
-                Kind::Diffuse { reflectance: self.reflectance_texture(&at("reflectance"), &m.reflectance) },
-                m.two_sided,
-                m.highlight,
-            ),
-            written::Material::Mirror(m) => {
-                (Kind::Mirror { reflectance: self.reflectance(&at("reflectance"), &m.reflectance) }, true, m.highlight)
-            }
-            written::Material::Conductor(m) => {
-                let (eta, k) = match &m.index {
-                    written::ConductorIndex::Metal(name) => {
-                        let none = (Spectrum::Constant(1.0), Spectrum::Constant(0.0));
-                        self.or(&at("metal"), catalogue::metal(name), none)
-                    }
-                    written::ConductorIndex::Written { eta, k } => (
-                        self.spectrum(&at("eta"), eta, Outside::Hold, Role::Coefficient),
-                        self.spectrum(&at("k"), k, Outside::Hold, Role::Coefficient),
-                    ),
-                };
-                let tint = self.reflectance(&at("tint"), &m.tint);
-                let facets = facets(m.roughness, m.distribution);
-                (Kind::Conductor { eta, k, tint, fresnel: model(m.fresnel), facets }, m.two_sided, m.highlight)
-            }
-            written::Material::Dielectric(m) => {
-                let interior = self.index(&at("ior"), &m.ior);
-                let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
-                let facets = facets(m.roughness, m.distribution);
-                if facets.is_some() && m.fresnel == written::Fresnel::Schlick {
-                    self.fault(&at("fresnel"), "expected exact on rough glass, found schlick");
-                }
-                // Without a difference of index there is no interface, however rough: light goes on, and
-                // casts no shadow.
-                match (&interior, &exterior) {
-                    (RefractiveIndex::Constant(a), RefractiveIndex::Constant(b)) if a == b => {
-                        (Kind::Boundary, false, None)
-                    }
-                    _ => {
-                        let kind = Kind::Dielectric { interior, exterior, fresnel: model(m.fresnel), facets };
-                        (kind, false, m.highlight)
-                    }
-                }
-            }
-            written::Material::ThinDielectric(m) => {
-                let interior = self.index(&at("ior"), &m.ior);
-                let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
-                if interior.is_dispersive() || exterior.is_dispersive() {
-                    self.fault(
-                        &at("ior"),
-                        "expected one number for a thin pane, found an index that depends on wavelength",
-                    );
-                }
-                (Kind::Thin { interior, exterior }, false, None)
-            }
-            written::Material::Plastic(m) => {
-                let reflectance = self.reflectance_texture(&at("reflectance"), &m.reflectance);
-                let eta = match self.index(&at("ior"), &m.ior) {
-                    RefractiveIndex::Constant(n) => n,
-                    _ => {
-                        self.fault(
-                            &at("ior"),
-                            "expected one number for a coat, found an index that depends on wavelength",
-                        );
-                        1.5
-                    }
-                };
-                let facets = facets(m.roughness, m.distribution);
-                (Kind::plastic(reflectance, eta, m.nonlinear, facets), m.two_sided, m.highlight)
-            }
-            written::Material::Boundary(_) => (Kind::Boundary, false, None),
-        };
-        let highlight = highlight.map(|h| Highlight {
-            strength: h.strength as f32,
-            exponent: h.exponent,
-            model: match h.model {
-                written::HighlightModel::Blinn => HighlightModel::Blinn,
-                written::HighlightModel::Phong => HighlightModel::Phong,
-            },
-        });
-        self.materials.push(Material { kind, two_sided, highlight });
-        self.materials.len() as u32 - 1
     }
 
     fn geometry(&mut self, at: &str, shape: &written::Shape) -> Result<Option<Geometry>> {
@@ -591,21 +479,6 @@ fn fov_axis(axis: written::FovAxis) -> camera::FovAxis {
         written::FovAxis::Larger => camera::FovAxis::Larger,
         written::FovAxis::Diagonal => camera::FovAxis::Diagonal,
     }
-}
-
-fn model(fresnel: written::Fresnel) -> Model {
-    match fresnel {
-        written::Fresnel::Exact => Model::Exact,
-        written::Fresnel::Schlick => Model::Schlick,
-    }
-}
-
-fn facets(alpha: f64, distribution: written::Distribution) -> Option<Microfacets> {
-    let distribution = match distribution {
-        written::Distribution::Ggx => Distribution::Ggx,
-        written::Distribution::Beckmann => Distribution::Beckmann,
-    };
-    (alpha >= SMOOTHEST).then_some(Microfacets { distribution, alpha })
 }
 
 impl Object {

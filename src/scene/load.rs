@@ -1,6 +1,6 @@
 //! Pictures and tables from files.
 
-use super::texture::{Grid, ImageTexture, Texel};
+use super::texture::{DataImage, Grid, ImageTexture, Texel};
 use crate::error::{Error, Result};
 use crate::film::exr;
 use crate::spectrum::{colour, upsample};
@@ -117,6 +117,38 @@ pub fn image_texture(path: &Path, raw: bool) -> Result<ImageTexture> {
     let upsampled: Vec<[f32; 3]> = colours.par_iter().map(|c| upsample::coefficients(c.map(decode))).collect();
     let texels = indices.iter().map(|&i| Texel { coefficients: upsampled[i as usize], scale: 1.0 }).collect();
     Ok(make(texels, rgb.width() as usize, rgb.height() as usize))
+}
+
+/// Reads a picture of numbers: EXR and HDR as they are, 8- and 16-bit files from 0 to 1, decoded from sRGB unless
+/// `raw`. A picture of one channel gives the same number three times.
+///
+/// # Errors
+/// As [`picture`]; numbers may be negative.
+pub fn data_image(path: &Path, raw: bool) -> Result<DataImage> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let (texels, width, height): (Vec<[f32; 3]>, usize, usize) = if extension == "exr" {
+        let file = exr::read_exr(path)?;
+        let part = &file.parts[0];
+        let grey = part.channel("Y");
+        let channel = |name: &str| {
+            let found = part.channel(name).or(grey);
+            found.ok_or_else(|| Error::input(path, format!("expected channels R, G, B or Y; found no {name}")))
+        };
+        let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
+        let texels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+        (texels, part.window.width as usize, part.window.height as usize)
+    } else {
+        let decoded = decode(path)?;
+        let linear = matches!(decoded, image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_));
+        let rgb = decoded.into_rgb32f();
+        let number = |x: f32| if raw || linear { x } else { colour::srgb_decode(x) };
+        (rgb.pixels().map(|p| p.0.map(number)).collect(), rgb.width() as usize, rgb.height() as usize)
+    };
+    if let Some(i) = texels.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        let (x, y) = (i % width, i / width);
+        return Err(Error::input(path, format!("expected finite numbers, found {:?} at ({x}, {y})", texels[i])));
+    }
+    Ok(DataImage { texels: Arc::new(texels), grid: Grid::new(width, height) })
 }
 
 /// Reads a curve: two columns, wavelength in nm and value, separated by commas, semicolons or

@@ -1,11 +1,12 @@
 //! Materials: the scattering function of a surface, for every point and wavelength.
 
 use super::SurfacePoint;
-use super::texture::{Texture, TexturePoint};
+use super::compound::{Composition, Compound};
+use super::texture::{Scalar, Texture, TexturePoint};
 use crate::optics::bsdf::{Bsdf, Metal, pane_reflectance};
-use crate::optics::dielectric::{Dielectric, RelativeIndex, RoughDielectric};
+use crate::optics::dielectric::{Dielectric, RelativeIndex, RoughDielectric, Tint};
 use crate::optics::fresnel::{self, Model};
-use crate::optics::microfacet::Microfacets;
+use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::optics::plastic::{Base, CoatTable, Plastic, RoughPlastic};
 use crate::spectrum::{Lanes, RefractiveIndex, Spectrum};
 use glam::DVec3;
@@ -63,11 +64,11 @@ pub enum Kind {
         /// Imaginary part.
         k: Spectrum,
         /// Factor on the reflectance.
-        tint: Spectrum,
+        tint: Texture,
         /// Which Fresnel formula.
         fresnel: Model,
         /// Rough or smooth.
-        facets: Option<Microfacets>,
+        facets: Option<Roughness>,
     },
     /// An interface between transparent media.
     Dielectric {
@@ -78,7 +79,9 @@ pub enum Kind {
         /// Which Fresnel formula (smooth only).
         fresnel: Model,
         /// Rough or smooth.
-        facets: Option<Microfacets>,
+        facets: Option<Roughness>,
+        /// Factors beside Fresnel's, where there are any.
+        tints: Option<Box<Tints>>,
     },
     /// A thin pane.
     Thin {
@@ -86,6 +89,8 @@ pub enum Kind {
         interior: RefractiveIndex,
         /// Index around it.
         exterior: RefractiveIndex,
+        /// Factors beside Fresnel's, where there are any.
+        tints: Option<Box<Tints>>,
     },
     /// A diffuse base under a clear coat.
     Plastic {
@@ -99,21 +104,101 @@ pub enum Kind {
         nonlinear: bool,
         /// Rough coat.
         rough: Option<(Microfacets, Arc<CoatTable>)>,
+        /// Factor on what the coat reflects, where it is not one.
+        tint: Option<Box<Texture>>,
     },
     /// The boundary of a medium.
     Boundary,
+    /// Made of other materials.
+    Compound(Box<Compound>),
+}
+
+/// How rough a surface is, point by point.
+#[derive(Clone, Debug)]
+pub enum Roughness {
+    /// The same everywhere.
+    Uniform(Microfacets),
+    /// After textures.
+    Textured(Box<TexturedRoughness>),
+}
+
+/// Roughness after textures.
+#[derive(Clone, Debug)]
+pub struct TexturedRoughness {
+    /// The family.
+    pub distribution: Distribution,
+    /// α along ∂p/∂u.
+    pub u: Scalar,
+    /// α across; the same as along where there is none.
+    pub v: Option<Scalar>,
+}
+
+/// The least α that a texture gives, by Mitsuba 3's convention: a texel of zero is not smooth.
+const LEAST_ALPHA: f64 = 1e-4;
+
+impl Roughness {
+    fn at(&self, at: &TexturePoint) -> Microfacets {
+        match self {
+            Roughness::Uniform(facets) => *facets,
+            Roughness::Textured(textured) => {
+                let alpha = |s: &Scalar| s.eval(at).max(LEAST_ALPHA);
+                let u = alpha(&textured.u);
+                match &textured.v {
+                    None => Microfacets::isotropic(textured.distribution, u),
+                    Some(v) => Microfacets::anisotropic(textured.distribution, u, alpha(v)),
+                }
+            }
+        }
+    }
+
+    fn varies(&self) -> bool {
+        match self {
+            Roughness::Uniform(_) => false,
+            Roughness::Textured(t) => t.u.varies() || t.v.as_ref().is_some_and(Scalar::varies),
+        }
+    }
+}
+
+/// Factors on what an interface reflects and transmits.
+#[derive(Clone, Debug)]
+pub struct Tints {
+    /// On the reflected light.
+    pub reflected: Texture,
+    /// On the transmitted light.
+    pub transmitted: Texture,
+}
+
+impl Tints {
+    /// The factors at a point; one where there are none.
+    #[must_use]
+    pub fn at(tints: Option<&Tints>, at: &TexturePoint, nm: Lanes) -> Tint {
+        match tints {
+            None => Tint::NONE,
+            Some(t) => Tint { reflected: t.reflected.eval(at, nm), transmitted: t.transmitted.eval(at, nm) },
+        }
+    }
+
+    fn varies(&self) -> bool {
+        self.reflected.varies() || self.transmitted.varies()
+    }
 }
 
 impl Kind {
     /// A plastic; computes the coat's tables.
     #[must_use]
-    pub fn plastic(reflectance: Texture, eta: f64, nonlinear: bool, facets: Option<Microfacets>) -> Kind {
+    pub fn plastic(
+        reflectance: Texture,
+        tint: Option<Box<Texture>>,
+        eta: f64,
+        nonlinear: bool,
+        facets: Option<Microfacets>,
+    ) -> Kind {
         let rough = facets.map(|f| (f, Arc::new(CoatTable::new(eta, &f))));
         let internal = match &rough {
             Some((_, table)) => table.internal,
             None => fresnel::dielectric_diffuse(1.0 / eta),
         };
-        Kind::Plastic { reflectance, eta, internal, nonlinear, rough }
+        Kind::Plastic { reflectance, eta, internal, nonlinear, rough, tint }
     }
 }
 
@@ -145,11 +230,23 @@ pub struct Straight {
     pub weight: Lanes,
 }
 
+impl Straight {
+    /// All of it, as it is.
+    pub const OPEN: Straight = Straight { share: 1.0, weight: Lanes::ONE };
+}
+
 impl Material {
     /// True where light may go straight through, so that a lamp behind is looked for.
     #[must_use]
     pub fn lets_through(&self) -> bool {
-        matches!(self.kind, Kind::Boundary | Kind::Thin { .. })
+        match &self.kind {
+            Kind::Boundary | Kind::Thin { .. } => true,
+            Kind::Compound(compound) => {
+                matches!(compound.composition, Composition::Mask { .. })
+                    || compound.composition.inner().iter().any(|m| m.lets_through())
+            }
+            _ => false,
+        }
     }
 
     /// What goes straight through at `surface` in `direction`; `None` where nothing can.
@@ -159,16 +256,18 @@ impl Material {
         &self,
         surface: &SurfacePoint,
         direction: DVec3,
-        _at: impl FnOnce() -> TexturePoint,
+        at: impl FnOnce() -> TexturePoint,
         nm: Lanes,
     ) -> Option<Straight> {
         match &self.kind {
-            Kind::Boundary => Some(Straight { share: 1.0, weight: Lanes::ONE }),
-            Kind::Thin { interior, exterior } => {
+            Kind::Boundary => Some(Straight::OPEN),
+            Kind::Thin { interior, exterior, tints } => {
                 let eta = relative_index(interior, exterior, nm, false).hero();
                 let cos = direction.dot(surface.shading_normal).abs();
-                Some(Straight { share: 1.0 - pane_reflectance(cos, eta), weight: Lanes::ONE })
+                let weight = tints.as_ref().map_or(Lanes::ONE, |tints| tints.transmitted.eval(&at(), nm));
+                Some(Straight { share: 1.0 - pane_reflectance(cos, eta), weight })
             }
+            Kind::Compound(compound) => compound.straight(surface, direction, &at(), nm),
             _ => None,
         }
     }
@@ -181,28 +280,31 @@ impl Material {
             Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: reflectance.eval(at, nm) },
             Kind::Mirror { reflectance } => Bsdf::Mirror { reflectance: reflectance.eval(nm) },
             Kind::Conductor { eta, k, tint, fresnel, facets } => {
-                let metal = Metal { eta: eta.eval(nm), k: k.eval(nm), tint: tint.eval(nm), fresnel: *fresnel };
+                let metal = Metal { eta: eta.eval(nm), k: k.eval(nm), tint: tint.eval(at, nm), fresnel: *fresnel };
                 match facets {
-                    Some(facets) => Bsdf::RoughConductor(metal, *facets),
+                    Some(facets) => Bsdf::RoughConductor(metal, facets.at(at)),
                     None => Bsdf::Conductor(metal),
                 }
             }
-            Kind::Dielectric { interior, exterior, fresnel, facets } => {
+            Kind::Dielectric { interior, exterior, fresnel, facets, tints } => {
                 let eta = relative_index(interior, exterior, nm, all_dispersive);
+                let tint = Tints::at(tints.as_deref(), at, nm);
                 match facets {
-                    Some(facets) => Bsdf::RoughDielectric(RoughDielectric { eta, facets: *facets }),
-                    None => Bsdf::Dielectric(Dielectric { eta, fresnel: *fresnel }),
+                    Some(facets) => Bsdf::RoughDielectric(RoughDielectric { eta, facets: facets.at(at), tint }),
+                    None => Bsdf::Dielectric(Dielectric { eta, fresnel: *fresnel, tint }),
                 }
             }
-            Kind::Thin { interior, exterior } => {
-                Bsdf::Thin { eta: relative_index(interior, exterior, nm, false).hero() }
-            }
-            Kind::Plastic { reflectance, eta, internal, nonlinear, rough } => {
+            Kind::Thin { interior, exterior, tints } => Bsdf::Thin {
+                eta: relative_index(interior, exterior, nm, false).hero(),
+                tint: Tints::at(tints.as_deref(), at, nm),
+            },
+            Kind::Plastic { reflectance, eta, internal, nonlinear, rough, tint } => {
                 let base = Base {
                     reflectance: reflectance.eval(at, nm),
                     eta: *eta,
                     internal: *internal,
                     nonlinear: *nonlinear,
+                    tint: tint.as_ref().map_or(Lanes::ONE, |tint| tint.eval(at, nm)),
                 };
                 match rough {
                     Some((facets, table)) => {
@@ -211,7 +313,8 @@ impl Material {
                     None => Bsdf::Plastic(Plastic { base }),
                 }
             }
-            Kind::Boundary => Bsdf::Null,
+            // A compound material is resolved before it comes to this; unresolved it is not there.
+            Kind::Boundary | Kind::Compound(_) => Bsdf::Null,
         }
     }
 
@@ -219,18 +322,48 @@ impl Material {
     #[must_use]
     pub fn varies(&self) -> bool {
         match &self.kind {
-            Kind::Diffuse { reflectance } | Kind::Plastic { reflectance, .. } => reflectance.varies(),
-            Kind::Mirror { .. }
-            | Kind::Conductor { .. }
-            | Kind::Dielectric { .. }
-            | Kind::Thin { .. }
-            | Kind::Boundary => false,
+            Kind::Diffuse { reflectance } => reflectance.varies(),
+            Kind::Plastic { reflectance, tint, .. } => {
+                reflectance.varies() || tint.as_ref().is_some_and(|tint| tint.varies())
+            }
+            Kind::Conductor { tint, facets, .. } => tint.varies() || facets.as_ref().is_some_and(Roughness::varies),
+            Kind::Dielectric { facets, tints, .. } => {
+                facets.as_ref().is_some_and(Roughness::varies) || tints.as_ref().is_some_and(|t| t.varies())
+            }
+            Kind::Thin { tints, .. } => tints.as_ref().is_some_and(|t| t.varies()),
+            Kind::Mirror { .. } | Kind::Boundary => false,
+            Kind::Compound(compound) => compound.varies() || compound.composition.inner().iter().any(|m| m.varies()),
         }
     }
 
     /// True where light can cross the surface.
     #[must_use]
     pub fn transmits(&self) -> bool {
-        matches!(self.kind, Kind::Dielectric { .. } | Kind::Thin { .. } | Kind::Boundary)
+        match &self.kind {
+            Kind::Dielectric { .. } | Kind::Thin { .. } | Kind::Boundary => true,
+            Kind::Diffuse { .. } | Kind::Mirror { .. } | Kind::Conductor { .. } | Kind::Plastic { .. } => false,
+            Kind::Compound(compound) => {
+                matches!(compound.composition, Composition::Mask { .. })
+                    || compound.composition.inner().iter().any(|m| m.transmits())
+            }
+        }
+    }
+
+    /// The layers of a material made of others.
+    #[must_use]
+    pub fn compound(&self) -> Option<&Compound> {
+        match &self.kind {
+            Kind::Compound(compound) => Some(compound),
+            _ => None,
+        }
+    }
+
+    /// The materials of which it is made, or itself.
+    #[must_use]
+    pub fn leaves(&self) -> Vec<&Material> {
+        match &self.kind {
+            Kind::Compound(compound) => compound.composition.inner().iter().flat_map(|m| m.leaves()).collect(),
+            _ => vec![self],
+        }
     }
 }

@@ -9,6 +9,7 @@ pub mod bvh;
 pub mod camera;
 pub mod census;
 pub mod compile;
+pub mod compound;
 pub mod emission;
 pub mod environment;
 pub mod grid;

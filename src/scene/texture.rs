@@ -192,6 +192,8 @@ pub enum Scalar {
         /// From u, v to periods.
         uv: DAffine2,
     },
+    /// What fills space, where the surface cuts it.
+    Volume(Volume),
 }
 
 /// A picture whose texels are numbers.
@@ -218,6 +220,7 @@ impl Scalar {
             Scalar::Uniform(x) => *x,
             Scalar::Image(image) => f64::from(image.grid.value(at.uv, |i| luminance(image.texels[i]))),
             Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).eval(at),
+            Scalar::Volume(volume) => volume.scalar(at.point),
         }
     }
 
@@ -230,6 +233,7 @@ impl Scalar {
                 DVec3::from([0, 1, 2].map(|k| f64::from(image.grid.value(at.uv, |i| image.texels[i][k]))))
             }
             Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).triple(at),
+            Scalar::Volume(volume) => DVec3::splat(volume.scalar(at.point)),
         }
     }
 
@@ -237,7 +241,8 @@ impl Scalar {
     #[must_use]
     pub fn gradient(&self, at: &TexturePoint) -> DVec2 {
         match self {
-            Scalar::Uniform(_) => DVec2::ZERO,
+            // A volume knows nothing of u and v.
+            Scalar::Uniform(_) | Scalar::Volume(_) => DVec2::ZERO,
             Scalar::Image(DataImage { grid, .. }) if grid.interpolation == Interpolation::Nearest => DVec2::ZERO,
             Scalar::Image(image) => {
                 let grid = &image.grid;

@@ -6,6 +6,8 @@
 use super::plan::{EffectPlan, Integrator};
 use crate::math::Ray;
 use crate::optics::bsdf::Bsdf;
+use crate::scene::compound::{Composition, share};
+use crate::scene::material::Material;
 use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
@@ -279,9 +281,28 @@ impl First {
 
     /// The part of light from all around that comes back diffusely.
     fn albedo(&self, scene: &Scene, plan: &EffectPlan, nm: Lanes, ray: &Ray) -> Lanes {
-        let surface = &self.surface;
         let object = &scene.objects[self.hit.object as usize];
         let material = &scene.materials[object.material as usize];
+        self.albedo_of(material, plan, nm, ray)
+    }
+
+    fn albedo_of(&self, material: &Material, plan: &EffectPlan, nm: Lanes, ray: &Ray) -> Lanes {
+        let surface = &self.surface;
+        if let Some(compound) = material.compound() {
+            let inner = |material: &Material| self.albedo_of(material, plan, nm, ray);
+            return match &compound.composition {
+                Composition::Mask { inner: material, .. } | Composition::Relief { inner: material, .. } => {
+                    inner(material)
+                }
+                Composition::Blend { weight, first, second } => {
+                    let w = share(weight, &self.hit.texture_point(surface)) as f32;
+                    inner(first) * (1.0 - w) + inner(second) * w
+                }
+                Composition::TwoSided { front, back } => {
+                    inner(if ray.direction.dot(surface.normal) > 0.0 { back } else { front })
+                }
+            };
+        }
         let bsdf = material.bsdf(&self.hit.texture_point(surface), nm, plan.all_dispersive);
         match &bsdf {
             Bsdf::Diffuse { reflectance } => *reflectance,

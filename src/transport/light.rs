@@ -9,11 +9,13 @@
 //! Found are paths L … D E: what a smooth mirror or glass shows cannot be found, and is black. Light that the camera sees
 //! itself, L E, is the camera's part (`path` of one segment). Wavelengths are carried as in [`path`](super::path).
 
+use super::path::seen_normal;
 use super::plan::{EffectPlan, LightSettings};
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::math::{Frame, Ray};
 use crate::optics::bsdf::Bsdf;
-use crate::scene::material::Kind;
+use crate::scene::compound::Leaf;
+use crate::scene::material::{Kind, Material};
 use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
@@ -87,15 +89,23 @@ pub fn trace(
         if settings.max_depth.is_some_and(|depth| vertex + 2 > depth) {
             return;
         }
-        let Some((hit, surface, from)) = walk.next_surface(&ray) else { return };
+        let numbers = |crossings: u32| sampler.set(Set::Extra((vertex + 1).wrapping_add(crossings << 16)))[2];
+        let Some((hit, surface, from, leaf)) = walk.next_surface(&ray, numbers) else { return };
         let material = &scene.materials[scene.objects[hit.object as usize].material as usize];
+        let material = leaf.as_ref().map_or(material, |leaf| leaf.material);
         let came = -from;
-        let flip = material.two_sided && came.dot(surface.normal) < 0.0;
-        let mut normal = surface.shading_normal;
-        if normal.dot(came) * surface.normal.dot(came) <= 0.0 {
-            normal = surface.normal;
+        let frame = match &leaf {
+            Some(leaf) => leaf.frame,
+            None => {
+                let flip = material.two_sided && came.dot(surface.normal) < 0.0;
+                let normal = seen_normal(&surface, came);
+                Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent)
+            }
+        };
+        // Slopes shadow by the direction to the light alone, which is where the path comes from.
+        if let Some(leaf) = &leaf {
+            power *= leaf.slopes.shadowing(came) as f32;
         }
-        let frame = Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent);
         let bsdf = material.bsdf(&hit.texture_point(&surface), wavelengths.nm, plan.all_dispersive);
         let wo = frame.to_local(came);
         let choice = sampler.set(Set::Choice(vertex));
@@ -104,7 +114,7 @@ pub fn trace(
 
         if !bsdf.is_discrete() {
             let at = Vertex { hit: &hit, surface: &surface, frame: &frame, came, local: wo };
-            if let Some(seen) = walk.connect(&bsdf, &at, u_lens) {
+            if let Some(seen) = walk.connect(&bsdf, &at, u_lens, wavelengths.nm) {
                 splat(&wavelengths, Splat { light: power * seen.light * share, ..seen });
             }
         }
@@ -164,27 +174,42 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// The next surface that is not only a boundary, and the direction in which it is met.
-    fn next_surface(&self, ray: &Ray) -> Option<(Hit, SurfacePoint, DVec3)> {
+    /// The next surface that does not let this path through as if it were not there, the direction in which it is
+    /// met, and of a material made of others the one that is met. `number` chooses, by crossings so far.
+    fn next_surface(
+        &self,
+        ray: &Ray,
+        number: impl Fn(u32) -> f64,
+    ) -> Option<(Hit, SurfacePoint, DVec3, Option<Leaf<'_>>)> {
         let mut ray = *ray;
-        for _ in 0..MAX_BOUNDARIES {
+        for crossings in 0..MAX_BOUNDARIES {
             let hit = self.scene.closest(&ray, f64::INFINITY)?;
             let surface = self.scene.surface(&ray, &hit);
-            if !self.is_boundary(&hit) {
-                return Some((hit, surface, ray.direction));
+            match &self.material(&hit).kind {
+                Kind::Boundary => {}
+                Kind::Compound(compound) => {
+                    let (at, wo) = (&hit.texture_point(&surface), -ray.direction);
+                    let x = crate::scene::compound::Vertex { scene: self.scene, hit: &hit, surface: &surface, at, wo };
+                    let leaf = compound.resolve(&x, seen_normal(&surface, wo), number(crossings));
+                    if let Some(leaf) = leaf
+                        && !matches!(leaf.material.kind, Kind::Boundary)
+                    {
+                        return Some((hit, surface, ray.direction, Some(leaf)));
+                    }
+                }
+                _ => return Some((hit, surface, ray.direction, None)),
             }
             ray = self.scene.leave(&surface, &hit, ray.direction);
         }
         None
     }
 
-    fn is_boundary(&self, hit: &Hit) -> bool {
-        let object = &self.scene.objects[hit.object as usize];
-        matches!(self.scene.materials[object.material as usize].kind, Kind::Boundary)
+    fn material(&self, hit: &Hit) -> &Material {
+        &self.scene.materials[self.scene.objects[hit.object as usize].material as usize]
     }
 
     /// Light of a unit of power that a vertex sends into the camera.
-    fn connect(&self, bsdf: &Bsdf, at: &Vertex, u_lens: DVec2) -> Option<Splat> {
+    fn connect(&self, bsdf: &Bsdf, at: &Vertex, u_lens: DVec2, nm: Lanes) -> Option<Splat> {
         let entry = self.scene.camera.entry(at.surface.point, || u_lens)?;
         if !self.frame.holds(entry.pixel) {
             return None;
@@ -200,27 +225,28 @@ impl Walk<'_> {
             return None;
         }
         let cosines = to_camera.z.abs() * adjoint(at.local.z, to_camera.z, came, went);
-        if !self.open(&self.scene.leave(at.surface, at.hit, entry.direction), entry.distance) {
-            return None;
-        }
-        Some(Splat { place: entry.pixel, light: f * (cosines * entry.density) as f32 })
+        let through = self.open(&self.scene.leave(at.surface, at.hit, entry.direction), entry.distance, nm)?;
+        Some(Splat { place: entry.pixel, light: f * through * (cosines * entry.density) as f32 })
     }
 
-    /// True where nothing but boundaries stands before `distance`.
-    fn open(&self, ray: &Ray, distance: f64) -> bool {
+    /// The share of light that comes straight on to `distance`; `None` where something opaque stands between.
+    fn open(&self, ray: &Ray, distance: f64, nm: Lanes) -> Option<Lanes> {
         if !self.scene.has_boundaries {
-            return !self.scene.occluded(ray, distance, None);
+            return (!self.scene.occluded(ray, distance, None)).then_some(Lanes::ONE);
         }
-        let (mut ray, mut left) = (*ray, distance);
+        let (mut ray, mut left, mut through) = (*ray, distance, Lanes::ONE);
         for _ in 0..MAX_BOUNDARIES {
-            let Some(hit) = self.scene.closest(&ray, left) else { return true };
-            if !self.is_boundary(&hit) {
-                return false;
+            let Some(hit) = self.scene.closest(&ray, left) else { return Some(through) };
+            let material = self.material(&hit);
+            if !material.lets_through() {
+                return None;
             }
             let surface = self.scene.surface(&ray, &hit);
+            let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), nm)?;
+            through *= straight.weight * straight.share as f32;
             ray = self.scene.leave(&surface, &hit, ray.direction);
             left -= hit.t;
         }
-        false
+        None
     }
 }

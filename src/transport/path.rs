@@ -16,10 +16,11 @@ use crate::math::Frame;
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::optics::bsdf::{Bsdf, Chosen};
+use crate::scene::compound::{Compound, Leaf, Slopes, Vertex};
 use crate::scene::light::Arriving;
-use crate::scene::material::{Kind, Material};
+use crate::scene::material::{Kind, Material, Straight};
 use crate::scene::medium::{Dimmed, Medium};
-use crate::scene::{Object, Scene, SurfacePoint};
+use crate::scene::{Hit, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
 
@@ -134,15 +135,25 @@ struct Shadow {
 
 /// What scatters at a vertex.
 enum Scatterer<'a> {
-    Surface { bsdf: &'a Bsdf, frame: &'a Frame, surface: &'a SurfacePoint, object: &'a Object, flip: bool },
-    Medium { medium: &'a Medium, point: DVec3 },
+    Surface {
+        bsdf: &'a Bsdf,
+        frame: &'a Frame,
+        surface: &'a SurfacePoint,
+        object: &'a Object,
+        flip: bool,
+        slopes: Option<&'a Slopes>,
+    },
+    Medium {
+        medium: &'a Medium,
+        point: DVec3,
+    },
 }
 
 impl Scatterer<'_> {
     /// f · |cos| and densities toward `wi` (world), given `wo` (local for surfaces, world for media).
     fn eval(&self, wo: DVec3, wi_world: DVec3) -> (Lanes, Lanes) {
         match self {
-            Scatterer::Surface { bsdf, frame, surface, flip, .. } => {
+            Scatterer::Surface { bsdf, frame, surface, flip, slopes, .. } => {
                 let wi = frame.to_local(wi_world);
                 let geometric = wi_world.dot(surface.normal) * if *flip { -1.0 } else { 1.0 };
                 // Light that the shading normal sees and the true one does not would leak through.
@@ -150,7 +161,8 @@ impl Scatterer<'_> {
                     return (Lanes::ZERO, Lanes::ZERO);
                 }
                 let e = bsdf.eval(wo, wi);
-                (e.f * wi.z.abs() as f32, e.pdf)
+                let cos = wi.z.abs() * slopes.map_or(1.0, |s| s.shadowing(wi_world));
+                (e.f * cos as f32, e.pdf)
             }
             Scatterer::Medium { medium, point } => {
                 let p = Lanes::splat(medium.phase.eval(*point, wo, wi_world) as f32);
@@ -234,14 +246,29 @@ impl Tracer<'_> {
                 continue;
             }
             let material = &scene.materials[object.material as usize];
-            let boundary = matches!(material.kind, Kind::Boundary);
-            let straight = material.straight(&surface, path.ray.direction, || hit.texture_point(&surface), self.nm);
+            let wo_world = -path.ray.direction;
+            // Of a material made of others, what this path meets, if anything.
+            let compound = matches!(material.kind, Kind::Compound(_)).then_some(material);
+            let leaf = match &material.kind {
+                Kind::Compound(compound) => {
+                    let u = self.sampler.set(Set::Extra(path.vertices.wrapping_add(crossings << 16)))[2];
+                    self.resolve(compound, &surface, &hit, wo_world, u)
+                }
+                _ => None,
+            };
+            let open = compound.is_some() && leaf.is_none();
+            let material = leaf.as_ref().map_or(material, |leaf| leaf.material);
+            let boundary = open || matches!(material.kind, Kind::Boundary);
+            let straight = if open {
+                Some(Straight::OPEN)
+            } else {
+                material.straight(&surface, path.ray.direction, || hit.texture_point(&surface), self.nm)
+            };
             if first && !boundary {
                 alpha = 1.0;
                 depth = scene.camera.depth(surface.point);
                 first = false;
             }
-            let wo_world = -path.ray.direction;
 
             // Light that the surface itself sends out.
             if let Some(light) = object.light.filter(|_| self.meets_lights(&path)) {
@@ -279,7 +306,13 @@ impl Tracer<'_> {
                 }
                 path.beta *= straight.weight;
                 if let Some(p) = &mut path.previous {
-                    p.density *= straight.share;
+                    p.density *= match compound {
+                        None => straight.share,
+                        Some(all) => {
+                            let at = || hit.texture_point(&surface);
+                            all.straight(&surface, path.ray.direction, at, self.nm).map_or(1.0, |s| s.share)
+                        }
+                    };
                 }
                 path.medium = self.beyond(object, &surface, path.ray.direction, path.medium);
                 if let Some(p) = &mut path.previous {
@@ -293,14 +326,15 @@ impl Tracer<'_> {
             }
 
             // The local frame: z is the shading normal; two-sided materials turn it to the viewer.
-            let flip = material.two_sided && wo_world.dot(surface.normal) < 0.0;
-            let mut normal = surface.shading_normal;
-            if normal.dot(wo_world) * surface.normal.dot(wo_world) <= 0.0 {
-                // The viewer sees the true surface from one side and the shading normal's from the
-                // other: take the true one.
-                normal = surface.normal;
-            }
-            let frame = Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent);
+            let (frame, flip) = match &leaf {
+                Some(leaf) => (leaf.frame, leaf.flipped),
+                None => {
+                    let flip = material.two_sided && wo_world.dot(surface.normal) < 0.0;
+                    let normal = seen_normal(&surface, wo_world);
+                    (Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent), flip)
+                }
+            };
+            let slopes = leaf.as_ref().map(|leaf| &leaf.slopes);
             let wo = frame.to_local(wo_world);
             let bsdf = material.bsdf(&hit.texture_point(&surface), self.nm, self.plan.all_dispersive);
 
@@ -308,7 +342,8 @@ impl Tracer<'_> {
             let (u_light, u_direction) = pairs(scatter);
             let sided = sided_normal(material, &frame);
             if !bsdf.is_discrete() && self.settings.light_samples > 0 {
-                let scatterer = Scatterer::Surface { bsdf: &bsdf, frame: &frame, surface: &surface, object, flip };
+                let scatterer =
+                    Scatterer::Surface { bsdf: &bsdf, frame: &frame, surface: &surface, object, flip, slopes };
                 self.add_light::<CHROMATIC, MEDIA>(
                     &mut path,
                     &scatterer,
@@ -341,6 +376,9 @@ impl Tracer<'_> {
                 Chosen::Density(_) | Chosen::Discrete => None,
             };
             path.beta *= sample.weight;
+            if let Some(slopes) = slopes {
+                path.beta *= slopes.shadowing(wi) as f32;
+            }
             if CHROMATIC {
                 path.rho *= sample.ratio;
             }
@@ -356,6 +394,20 @@ impl Tracer<'_> {
             }
         }
         Incoming { radiance: path.radiance, alpha, depth }
+    }
+
+    /// What one path meets of a material made of others, chosen by `u`; `None` where it goes straight on.
+    #[inline(never)]
+    fn resolve<'a>(
+        &self,
+        compound: &'a Compound,
+        surface: &SurfacePoint,
+        hit: &Hit,
+        wo: DVec3,
+        u: f64,
+    ) -> Option<Leaf<'a>> {
+        let vertex = Vertex { scene: self.scene, hit, surface, at: &hit.texture_point(surface), wo };
+        compound.resolve(&vertex, seen_normal(surface, wo), u)
     }
 
     /// Segments so far, less one: events that count for `max_depth`.
@@ -565,4 +617,11 @@ impl Tracer<'_> {
 /// The side on which light is wanted: the shading normal for surfaces that only reflect.
 fn sided_normal(material: &Material, frame: &Frame) -> Option<DVec3> {
     (!material.transmits()).then_some(frame.n)
+}
+
+/// The shading normal; the true one where the viewer sees the surface from one side and the shading normal's from
+/// the other.
+pub(super) fn seen_normal(surface: &SurfacePoint, wo: DVec3) -> DVec3 {
+    let normal = surface.shading_normal;
+    if normal.dot(wo) * surface.normal.dot(wo) <= 0.0 { surface.normal } else { normal }
 }

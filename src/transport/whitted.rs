@@ -7,16 +7,18 @@
 //! index depends on the wavelength, each wavelength goes on alone after the first refraction.
 
 use super::Incoming;
+use super::path::seen_normal;
 use super::plan::{EffectPlan, WhittedSettings};
 use crate::math::{Departure, Frame, Ray};
 use crate::optics::dielectric::{RelativeIndex, refract};
 use crate::optics::fresnel::{self, Model};
 use crate::optics::plastic::Base;
+use crate::scene::compound::{Composition, Slopes, Standing, Vertex, share};
 use crate::scene::light::Light;
-use crate::scene::material::{Highlight, HighlightModel, Kind, Material, relative_index};
+use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Tints, relative_index};
 use crate::scene::shape::Shape;
-use crate::scene::texture::{Texture, TexturePoint};
-use crate::scene::{Geometry, Scene, SurfacePoint};
+use crate::scene::texture::Texture;
+use crate::scene::{Geometry, Scene};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -54,6 +56,16 @@ struct Tracer<'a> {
     nm: Lanes,
 }
 
+/// A material as one vertex shows it.
+#[derive(Clone, Copy)]
+struct Seen<'a> {
+    x: &'a Vertex<'a>,
+    material: &'a Material,
+    /// Shading normal, on the side that is seen of a material with two.
+    normal: DVec3,
+    slopes: Slopes,
+}
+
 impl Tracer<'_> {
     /// Light along `ray` for the lanes in which `weight`, the share that reaches the eye, is not zero;
     /// and the first point met.
@@ -73,43 +85,72 @@ impl Tracer<'_> {
             return (light, first);
         }
 
-        let outside = wo.dot(surface.normal) > 0.0;
-        let turned = !outside && material.two_sided;
-        let mut normal = surface.shading_normal;
-        if (normal.dot(wo) > 0.0) != outside {
-            normal = surface.normal;
-        }
-        let normal = if turned { -normal } else { normal };
         let emitted =
             object.light.map_or(Lanes::ZERO, |l| scene.lights[l as usize].emitted(&surface, &hit, wo, self.nm));
-        if !outside && !material.two_sided && !material.transmits() {
-            return (emitted, Some(surface.point));
-        }
+        let vertex = Vertex { scene, hit: &hit, surface: &surface, at: &hit.texture_point(&surface), wo };
+        let standing = Standing::new(seen_normal(&surface, wo), surface.tangent);
+        (emitted + self.scattered(&vertex, material, standing, weight, depth), Some(surface.point))
+    }
 
-        let leave = |direction: DVec3| scene.leave(&surface, &hit, direction);
-        let mut light = emitted + self.shade(material, &surface, &hit.texture_point(&surface), normal, wo, &leave);
-        if depth < self.settings.max_depth {
-            light += self.specular(material, normal, surface.normal, wo, weight, depth, &leave);
+    /// Light that a material sends to the viewer: a material made of others sends the sum of theirs.
+    fn scattered(&self, x: &Vertex, material: &Material, mut standing: Standing, weight: Lanes, depth: u32) -> Lanes {
+        let part = |share: f64, light: &dyn Fn(Lanes) -> Lanes| {
+            let onward = weight * share as f32;
+            let visible = onward.simd_gt(Lanes::splat(FAINTEST)).any();
+            if visible { light(onward) * share as f32 } else { Lanes::ZERO }
+        };
+        let straight = |weight: Lanes| self.trace(&self.scene.leave(x.surface, x.hit, -x.wo), weight, depth).0;
+        let outside = x.wo.dot(x.surface.normal) > 0.0;
+        if let Some(compound) = material.compound() {
+            return match &compound.composition {
+                Composition::Mask { opacity, inner } => {
+                    let opacity = share(opacity, x.at);
+                    part(opacity, &|w| self.scattered(x, inner, standing, w, depth)) + part(1.0 - opacity, &straight)
+                }
+                Composition::Blend { weight: second_share, first, second } => {
+                    let share = share(second_share, x.at);
+                    part(1.0 - share, &|w| self.scattered(x, first, standing, w, depth))
+                        + part(share, &|w| self.scattered(x, second, standing, w, depth))
+                }
+                Composition::TwoSided { front, .. } if outside => self.scattered(x, front, standing, weight, depth),
+                Composition::TwoSided { back, .. } => {
+                    standing.mirror();
+                    self.scattered(x, back, standing, weight, depth)
+                }
+                Composition::Relief { relief, inner } => {
+                    standing.turn(relief, x);
+                    self.scattered(x, inner, standing, weight, depth)
+                }
+            };
         }
-        (light, Some(surface.point))
+        if matches!(material.kind, Kind::Boundary) {
+            return straight(weight);
+        }
+        if !outside && material.two_sided {
+            standing.mirror();
+        }
+        if !outside && !standing.is_mirrored() && !material.transmits() {
+            return Lanes::ZERO;
+        }
+        let seen = Seen { x, material, normal: standing.frame().n, slopes: standing.slopes() };
+        let mut light = self.shade(&seen);
+        if depth < self.settings.max_depth {
+            light += self.specular(&seen, weight, depth);
+        }
+        light
     }
 
     /// Ambient light, and from each light the diffuse part and the highlight.
-    fn shade(
-        &self,
-        material: &Material,
-        surface: &SurfacePoint,
-        at: &TexturePoint,
-        normal: DVec3,
-        wo: DVec3,
-        leave: &impl Fn(DVec3) -> Ray,
-    ) -> Lanes {
+    fn shade(&self, seen: &Seen) -> Lanes {
+        let Seen { x: &Vertex { surface, hit, at, wo, .. }, material, normal, slopes } = *seen;
+        let leave = |direction: DVec3| self.scene.leave(surface, hit, direction);
         let base = match &material.kind {
             Kind::Diffuse { reflectance } => reflectance.eval(at, self.nm),
             Kind::Plastic { reflectance, eta, internal, nonlinear, .. } => {
                 // The base under its coat, for light along the normal both ways.
                 let reflectance = reflectance.eval(at, self.nm);
-                let base = Base { reflectance, eta: *eta, internal: *internal, nonlinear: *nonlinear };
+                let tint = Lanes::ONE;
+                let base = Base { reflectance, eta: *eta, internal: *internal, nonlinear: *nonlinear, tint };
                 let t = 1.0 - fresnel::dielectric(Model::Exact, 1.0, *eta).reflected;
                 base.albedo() * (t * t) as f32
             }
@@ -117,7 +158,8 @@ impl Tracer<'_> {
             | Kind::Conductor { .. }
             | Kind::Dielectric { .. }
             | Kind::Thin { .. }
-            | Kind::Boundary => Lanes::ZERO,
+            | Kind::Boundary
+            | Kind::Compound(_) => Lanes::ZERO,
         };
         let diffuse = base.simd_gt(Lanes::ZERO).any();
         let mut light = base * self.settings.ambient.eval(self.nm);
@@ -134,7 +176,7 @@ impl Tracer<'_> {
             if !through.simd_gt(Lanes::ZERO).any() {
                 continue;
             }
-            let mut reflected = base * (cos / PI) as f32;
+            let mut reflected = base * (cos * slopes.shadowing(wi) / PI) as f32;
             if let Some(h) = &material.highlight {
                 reflected += Lanes::splat(highlight(h, normal, wo, wi) as f32);
             }
@@ -187,7 +229,12 @@ impl Tracer<'_> {
                         fresnel::dielectric(*model, cos.abs(), eta).transmitted
                     });
                 }
-                Kind::Thin { interior, exterior } if self.settings.transparent_shadows => {
+                Kind::Compound(compound) => {
+                    let at = hit.texture_point(&surface);
+                    let Some(s) = compound.straight(&surface, ray.direction, &at, self.nm) else { return Lanes::ZERO };
+                    through *= s.weight * s.share as f32;
+                }
+                Kind::Thin { interior, exterior, .. } if self.settings.transparent_shadows => {
                     let index = relative_index(interior, exterior, self.nm, false);
                     through *= index.lanes(|eta| {
                         let r = fresnel::dielectric(Model::Exact, cos.abs(), eta).reflected;
@@ -203,21 +250,15 @@ impl Tracer<'_> {
     }
 
     /// Light from mirrors and through glass.
-    #[expect(clippy::too_many_arguments, reason = "the state of a vertex, split by borrow")]
-    fn specular(
-        &self,
-        material: &Material,
-        normal: DVec3,
-        geometric: DVec3,
-        wo: DVec3,
-        weight: Lanes,
-        depth: u32,
-        leave: &impl Fn(DVec3) -> Ray,
-    ) -> Lanes {
+    fn specular(&self, seen: &Seen, weight: Lanes, depth: u32) -> Lanes {
+        let Seen { x: &Vertex { surface, hit, at, wo, .. }, material, normal, slopes } = *seen;
+        let geometric = surface.normal;
+        let leave = |direction: DVec3| self.scene.leave(surface, hit, direction);
         let frame = Frame::from_normal(normal);
         let local = frame.to_local(wo);
         let cos = local.z.abs();
         let follow = |share: Lanes, wi: DVec3| -> Lanes {
+            let share = share * slopes.shadowing(wi) as f32;
             let onward = weight * share;
             if onward.simd_gt(Lanes::splat(FAINTEST)).any() {
                 self.trace(&leave(wi), onward, depth + 1).0 * share
@@ -234,24 +275,27 @@ impl Tracer<'_> {
         };
         let cross = |share: Lanes, wi: DVec3| if sides(wi) < 0.0 { follow(share, wi) } else { Lanes::ZERO };
         match &material.kind {
-            Kind::Diffuse { .. } | Kind::Boundary => Lanes::ZERO,
+            Kind::Diffuse { .. } | Kind::Boundary | Kind::Compound(_) => Lanes::ZERO,
             Kind::Mirror { reflectance } => reflect(reflectance.eval(self.nm)),
             // Rough metal and rough glass are shown smooth: a single ray knows one direction.
             Kind::Conductor { eta, k, tint, fresnel: model, .. } => {
                 let r = fresnel::conductor(*model, cos, eta.eval(self.nm), k.eval(self.nm));
-                reflect(r * tint.eval(self.nm))
+                reflect(r * tint.eval(at, self.nm))
             }
-            Kind::Plastic { eta, .. } => {
+            Kind::Plastic { eta, tint, .. } => {
                 let r = fresnel::dielectric(Model::Exact, cos, *eta).reflected;
-                reflect(Lanes::splat(r as f32))
+                let tint = tint.as_ref().map_or(Lanes::ONE, |tint| tint.eval(at, self.nm));
+                reflect(tint * r as f32)
             }
-            Kind::Thin { interior, exterior } => {
+            Kind::Thin { interior, exterior, tints } => {
+                let tint = Tints::at(tints.as_deref(), at, self.nm);
                 let eta = relative_index(interior, exterior, self.nm, false).hero();
                 let r = fresnel::dielectric(Model::Exact, cos, eta).reflected;
                 let r = 2.0 * r / (1.0 + r);
-                reflect(Lanes::splat(r as f32)) + cross(Lanes::splat((1.0 - r) as f32), -wo)
+                reflect(tint.reflected * r as f32) + cross(tint.transmitted * (1.0 - r) as f32, -wo)
             }
-            Kind::Dielectric { interior, exterior, fresnel: model, .. } => {
+            Kind::Dielectric { interior, exterior, fresnel: model, tints, .. } => {
+                let tint = Tints::at(tints.as_deref(), at, self.nm);
                 let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive);
                 let m = DVec3::Z * local.z.signum();
                 let toward = |eta: f64| if local.z > 0.0 { eta } else { 1.0 / eta };
@@ -264,11 +308,11 @@ impl Tracer<'_> {
                 match index {
                     RelativeIndex::Constant(eta) => {
                         let (r, t, wi) = bent(toward(eta));
-                        reflect(Lanes::splat(r)) + cross(Lanes::splat(t), wi)
+                        reflect(tint.reflected * r) + cross(tint.transmitted * t, wi)
                     }
                     RelativeIndex::Dispersive(all) => {
                         let lanes = all.map(|e| bent(toward(e)));
-                        let mut light = reflect(Lanes::new(lanes.map(|l| l.0)));
+                        let mut light = reflect(tint.reflected * Lanes::new(lanes.map(|l| l.0)));
                         // Lanes with the very same index stay together; others part.
                         let mut done = [false; LANES];
                         for k in 0..LANES {
@@ -280,7 +324,7 @@ impl Tracer<'_> {
                                 done[j] |= together;
                                 if together { lanes[j].1 } else { 0.0 }
                             });
-                            light += cross(Lanes::new(share), lanes[k].2);
+                            light += cross(tint.transmitted * Lanes::new(share), lanes[k].2);
                         }
                         light
                     }

@@ -12,26 +12,38 @@ use crate::scene::camera::{self, Camera};
 use crate::spectrum::illuminant;
 use glam::DVec2;
 
-impl Compiler<'_> {
+impl<'a> Compiler<'a> {
     /// A texture as light: the colours of a picture are lit by D65 or what it names.
-    pub(super) fn emission_texture(&mut self, at: &str, s: &written::SpectrumOrTexture) -> Texture {
+    pub(super) fn emission_texture(&mut self, at: &str, s: &'a written::SpectrumOrTexture) -> Texture {
         match s {
             written::SpectrumOrTexture::Texture(name) => {
-                let mut texture = self.textures[name.as_str()].clone();
-                if let Texture::Image(image) = &mut texture {
-                    let named = match &self.description.textures[name.as_str()] {
-                        written::Texture::Image(written) => written.illuminant.clone(),
-                        _ => None,
-                    };
-                    let lit = named.map_or_else(illuminant::d65, |i| {
-                        let at = format!("textures.{name}.image.illuminant");
-                        self.light_spectrum(&at, &written::Spectrum::Illuminant(i))
-                    });
-                    image.illuminant = (!lit.is_constant() || lit.max() != 1.0).then_some(lit);
-                }
+                let mut texture = self.named_texture(&format!("{at}.texture"), name);
+                self.light_up(&mut texture, name);
                 texture
             }
             written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.light_spectrum(at, s)),
+        }
+    }
+
+    /// Gives the pictures in the texture `name` their light.
+    fn light_up(&mut self, texture: &mut Texture, name: &str) {
+        let description = self.description;
+        match (&description.textures[name], texture) {
+            (written::Texture::Image(written), Texture::Image(image)) => {
+                let lit = written.illuminant.clone().map_or_else(illuminant::d65, |i| {
+                    let at = format!("textures.{name}.image.illuminant");
+                    self.light_spectrum(&at, &written::Spectrum::Illuminant(i))
+                });
+                image.illuminant = (!lit.is_constant() || lit.max() != 1.0).then_some(lit);
+            }
+            (written::Texture::Checkerboard(board), Texture::Checkerboard { a, b, .. }) => {
+                for (written, texture) in [(&board.a, a), (&board.b, b)] {
+                    if let Some(name) = written.name() {
+                        self.light_up(texture, name);
+                    }
+                }
+            }
+            _ => {}
         }
     }
 
@@ -39,8 +51,8 @@ impl Compiler<'_> {
     pub(super) fn shining(
         &mut self,
         at: &str,
-        shape: &written::Shape,
-        emission: &written::SpectrumOrTexture,
+        shape: &'a written::Shape,
+        emission: &'a written::SpectrumOrTexture,
         object: u32,
         geometry: &Geometry,
     ) -> Light {
@@ -62,7 +74,7 @@ impl Compiler<'_> {
     }
 
     /// A light that is no surface.
-    pub(super) fn light(&mut self, at: &str, light: &written::Light) -> Result<Option<Light>> {
+    pub(super) fn light(&mut self, at: &str, light: &'a written::Light) -> Result<Option<Light>> {
         Ok(Some(match light {
             written::Light::Point(l) => Light::Point {
                 position: vec3(l.position),
@@ -95,7 +107,7 @@ impl Compiler<'_> {
         }))
     }
 
-    fn spot(&mut self, at: &str, l: &written::SpotLight) -> Option<Light> {
+    fn spot(&mut self, at: &str, l: &'a written::SpotLight) -> Option<Light> {
         let Some(axis) = l.axis().try_normalize() else {
             self.fault(at, "expected a direction, found one of length zero");
             return None;
@@ -110,7 +122,7 @@ impl Compiler<'_> {
                     self.fault(&format!("{at}.up"), "expected a direction that is not along the axis");
                     return None;
                 };
-                let texture = self.textures[name.as_str()].clone();
+                let texture = self.named_texture(&format!("{at}.texture"), name);
                 Some(Box::new(Slide { texture, axes: world_from_spot.matrix3, half: libm::tan(cutoff) }))
             }
         };
@@ -118,7 +130,7 @@ impl Compiler<'_> {
         Some(Light::Spot { position, axis, beam: l.beam_deg.to_radians(), cutoff, intensity, slide })
     }
 
-    fn projector(&mut self, at: &str, l: &written::ProjectorLight) -> Option<Light> {
+    fn projector(&mut self, at: &str, l: &'a written::ProjectorLight) -> Option<Light> {
         let Some(world_from_projector) = Camera::look_at(vec3(l.origin), vec3(l.target), vec3(l.up)) else {
             self.fault(&format!("{at}.up"), "expected a direction that is not along the beam");
             return None;

@@ -68,6 +68,10 @@ impl Compiler<'_> {
         self.named_volume(at, name, Use::Spectrum)
     }
 
+    pub(super) fn volume_numbers(&mut self, at: &str, name: &str) -> Volume {
+        self.named_volume(at, name, Use::Number)
+    }
+
     fn spectrum_or_volume(&mut self, at: &str, s: &written::SpectrumOrVolume) -> Volume {
         match s {
             written::SpectrumOrVolume::Volume(name) => self.named_volume(&format!("{at}.volume"), name, Use::Spectrum),

@@ -1,0 +1,406 @@
+//! Materials and textures, from what a person wrote.
+
+use super::{Compiler, Role};
+use crate::description as written;
+use crate::error::Result;
+use crate::optics::fresnel::Model;
+use crate::optics::microfacet::{Distribution, Microfacets};
+use crate::scene::compound::{Composition, Compound, MOST_PARTS, MOST_RELIEFS, Relief, ReliefForm};
+use crate::scene::load;
+use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Roughness, TexturedRoughness, Tints};
+use crate::scene::texture::{Grid, Interpolation, Scalar, Texture, Wrap};
+use crate::spectrum::{Outside, RefractiveIndex, Spectrum, catalogue};
+use glam::{DAffine2, DMat2, DVec2};
+use std::sync::Arc;
+
+/// Roughness below which a surface is computed as smooth: the lobe is then narrower than f32 can
+/// tell directions apart (2⁻²⁴ · 16), and D(m) leaves the range of f32.
+const SMOOTHEST: f64 = 1e-6;
+
+/// The most materials or textures that hold each other.
+const DEEPEST: usize = 64;
+
+impl<'a> Compiler<'a> {
+    pub(super) fn reflectance_texture(&mut self, at: &str, s: &'a written::SpectrumOrTexture) -> Texture {
+        match s {
+            written::SpectrumOrTexture::Texture(name) => self.named_texture(&format!("{at}.texture"), name),
+            written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.reflectance(at, s)),
+        }
+    }
+
+    /// A number, or a texture of numbers.
+    fn scalar(&mut self, at: &str, s: &'a written::NumberOrTexture) -> Scalar {
+        match s {
+            written::NumberOrTexture::Number(x) => Scalar::Uniform(*x),
+            written::NumberOrTexture::Texture(name) => self.named_numbers(&format!("{at}.texture"), name),
+        }
+    }
+
+    /// Runs `make` for the thing `name` of the kind `kind`, unless that is being made already.
+    fn within<T>(
+        &mut self,
+        at: &str,
+        kind: &'static str,
+        name: &'a str,
+        make: impl FnOnce(&mut Self) -> T,
+    ) -> Option<T> {
+        if self.making.contains(&(kind, name)) {
+            self.fault(at, format!("expected a {kind} that does not hold itself, found \"{name}\""));
+            return None;
+        }
+        if self.making.len() == DEEPEST {
+            self.fault(at, format!("expected at most {DEEPEST} {kind}s that hold each other, found more"));
+            return None;
+        }
+        self.making.push((kind, name));
+        let made = make(self);
+        self.making.pop();
+        Some(made)
+    }
+
+    /// The texture `name` as spectra.
+    pub(super) fn named_texture(&mut self, at: &str, name: &'a str) -> Texture {
+        if let Some(known) = self.textures.get(name) {
+            return known.clone();
+        }
+        let made = self.within(at, "texture", name, |c| {
+            let texture = &c.description.textures[name];
+            c.texture(&format!("textures.{name}"), texture)
+        });
+        let texture = match made {
+            Some(Ok(texture)) => texture,
+            Some(Err(error)) => {
+                self.unread.get_or_insert(error);
+                Texture::one()
+            }
+            None => Texture::one(),
+        };
+        self.textures.insert(name, texture.clone());
+        texture
+    }
+
+    /// The texture `name` as numbers.
+    fn named_numbers(&mut self, at: &str, name: &'a str) -> Scalar {
+        if let Some(known) = self.numbers.get(name) {
+            return known.clone();
+        }
+        let made = self.within(at, "texture", name, |c| {
+            let texture = &c.description.textures[name];
+            c.numbers(&format!("textures.{name}"), texture)
+        });
+        let numbers = match made {
+            Some(Ok(numbers)) => numbers,
+            Some(Err(error)) => {
+                self.unread.get_or_insert(error);
+                Scalar::Uniform(0.5)
+            }
+            None => Scalar::Uniform(0.5),
+        };
+        self.numbers.insert(name, numbers.clone());
+        numbers
+    }
+
+    /// What is wrong with a texture is told even where nothing uses it.
+    pub(super) fn unused_textures(&mut self) {
+        let description = self.description;
+        for name in description.textures.keys() {
+            if !self.textures.contains_key(name.as_str()) && !self.numbers.contains_key(name.as_str()) {
+                self.named_texture(&format!("textures.{name}"), name);
+            }
+        }
+    }
+
+    fn texture(&mut self, at: &str, texture: &'a written::Texture) -> Result<Texture> {
+        Ok(match texture {
+            written::Texture::Image(image) => {
+                self.files.push(image.file.to_path_buf());
+                let loaded = load::image_texture(&image.file, image.raw);
+                let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
+                loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
+                Texture::Image(loaded)
+            }
+            written::Texture::Volume(name) => Texture::Volume(self.volume_texture(&format!("{at}.volume"), name)),
+            written::Texture::Checkerboard(board) => Texture::Checkerboard {
+                a: Box::new(self.reflectance_texture(&format!("{at}.checkerboard.a"), &board.a)),
+                b: Box::new(self.reflectance_texture(&format!("{at}.checkerboard.b"), &board.b)),
+                uv: uv_map(board.uv, board.scale, [0.0; 2]),
+            },
+        })
+    }
+
+    fn numbers(&mut self, at: &str, texture: &'a written::Texture) -> Result<Scalar> {
+        Ok(match texture {
+            written::Texture::Image(image) => {
+                self.files.push(image.file.to_path_buf());
+                let loaded = load::data_image(&image.file, image.raw);
+                let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
+                loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
+                Scalar::Image(loaded)
+            }
+            written::Texture::Volume(name) => Scalar::Volume(self.volume_numbers(&format!("{at}.volume"), name)),
+            written::Texture::Checkerboard(board) => {
+                let mut cell = |key: &str, s: &'a written::SpectrumOrTexture| {
+                    let at = format!("{at}.checkerboard.{key}");
+                    Box::new(match s {
+                        written::SpectrumOrTexture::Spectrum(written::Spectrum::Number(x)) => Scalar::Uniform(*x),
+                        written::SpectrumOrTexture::Spectrum(_) => {
+                            self.fault(&at, "expected a number in a texture that is used as numbers, found a spectrum");
+                            Scalar::Uniform(0.5)
+                        }
+                        written::SpectrumOrTexture::Texture(name) => self.named_numbers(&format!("{at}.texture"), name),
+                    })
+                };
+                Scalar::Checkerboard {
+                    a: cell("a", &board.a),
+                    b: cell("b", &board.b),
+                    uv: uv_map(board.uv, board.scale, [0.0; 2]),
+                }
+            }
+        })
+    }
+
+    /// The material `name`.
+    pub(super) fn named_material(&mut self, name: &'a str) -> Arc<Material> {
+        if let Some(known) = self.named.get(name) {
+            return known.clone();
+        }
+        let at = format!("materials.{name}");
+        let made = self.within(&at, "material", name, |c| {
+            let material = &c.description.materials[name];
+            c.material(&at, material)
+        });
+        let material = Arc::new(made.unwrap_or(Material { kind: Kind::Boundary, two_sided: false, highlight: None }));
+        self.named.insert(name, material.clone());
+        material
+    }
+
+    /// A material within another.
+    fn inner(&mut self, at: &str, material: &'a written::MaterialRef) -> Arc<Material> {
+        match material {
+            written::MaterialRef::Name(name) => self.named_material(name),
+            written::MaterialRef::Inline(material) => Arc::new(self.material(at, material)),
+        }
+    }
+
+    pub(super) fn material(&mut self, at: &str, material: &'a written::Material) -> Material {
+        let place = format!("{at}.{}", material.kind());
+        let at = |field: &str| format!("{place}.{field}");
+        let plain = |kind| (kind, false, None);
+        let (kind, two_sided, highlight) = match material {
+            written::Material::Diffuse(m) => (
+                Kind::Diffuse { reflectance: self.reflectance_texture(&at("reflectance"), &m.reflectance) },
+                m.two_sided,
+                m.highlight,
+            ),
+            written::Material::Mirror(m) => {
+                (Kind::Mirror { reflectance: self.reflectance(&at("reflectance"), &m.reflectance) }, true, m.highlight)
+            }
+            written::Material::Conductor(m) => {
+                let (eta, k) = match &m.index {
+                    written::ConductorIndex::Metal(name) => {
+                        let none = (Spectrum::Constant(1.0), Spectrum::Constant(0.0));
+                        self.or(&at("metal"), catalogue::metal(name), none)
+                    }
+                    written::ConductorIndex::Written { eta, k } => (
+                        self.spectrum(&at("eta"), eta, Outside::Hold, Role::Coefficient),
+                        self.spectrum(&at("k"), k, Outside::Hold, Role::Coefficient),
+                    ),
+                };
+                let tint = self.reflectance_texture(&at("tint"), &m.tint);
+                let facets = self.roughness(&at("roughness"), &m.roughness, m.distribution);
+                (Kind::Conductor { eta, k, tint, fresnel: model(m.fresnel), facets }, m.two_sided, m.highlight)
+            }
+            written::Material::Dielectric(m) => {
+                let interior = self.index(&at("ior"), &m.ior);
+                let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
+                let facets = self.roughness(&at("roughness"), &m.roughness, m.distribution);
+                let tints = self.tints(&place, &m.reflection_tint, &m.transmission_tint);
+                if facets.is_some() && m.fresnel == written::Fresnel::Schlick {
+                    self.fault(&at("fresnel"), "expected exact on rough glass, found schlick");
+                }
+                // Without a difference of index there is no interface, however rough: light goes on, and
+                // casts no shadow.
+                match (&interior, &exterior) {
+                    (RefractiveIndex::Constant(a), RefractiveIndex::Constant(b)) if a == b && tints.is_none() => {
+                        plain(Kind::Boundary)
+                    }
+                    _ => {
+                        let kind = Kind::Dielectric { interior, exterior, fresnel: model(m.fresnel), facets, tints };
+                        (kind, false, m.highlight)
+                    }
+                }
+            }
+            written::Material::ThinDielectric(m) => {
+                let interior = self.index(&at("ior"), &m.ior);
+                let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
+                let tints = self.tints(&place, &m.reflection_tint, &m.transmission_tint);
+                if interior.is_dispersive() || exterior.is_dispersive() {
+                    self.fault(
+                        &at("ior"),
+                        "expected one number for a thin pane, found an index that depends on wavelength",
+                    );
+                }
+                plain(Kind::Thin { interior, exterior, tints })
+            }
+            written::Material::Plastic(m) => {
+                let reflectance = self.reflectance_texture(&at("reflectance"), &m.reflectance);
+                let tint = self.reflectance_texture(&at("tint"), &m.tint);
+                let eta = match self.index(&at("ior"), &m.ior) {
+                    RefractiveIndex::Constant(n) => n,
+                    _ => {
+                        self.fault(
+                            &at("ior"),
+                            "expected one number for a coat, found an index that depends on wavelength",
+                        );
+                        1.5
+                    }
+                };
+                let facets = facets(m.roughness, m.distribution);
+                let tint = (!is_one(&tint)).then(|| Box::new(tint));
+                (Kind::plastic(reflectance, tint, eta, m.nonlinear, facets), m.two_sided, m.highlight)
+            }
+            written::Material::Boundary(_) => plain(Kind::Boundary),
+            written::Material::Mask(m) => {
+                let opacity = self.scalar(&at("opacity"), &m.opacity);
+                let inner = self.inner(&at("material"), &m.material);
+                plain(self.compound(&place, Composition::Mask { opacity, inner }))
+            }
+            written::Material::Blend(m) => {
+                let weight = self.scalar(&at("weight"), &m.weight);
+                let first = self.inner(&at("first"), &m.first);
+                let second = self.inner(&at("second"), &m.second);
+                plain(self.compound(&place, Composition::Blend { weight, first, second }))
+            }
+            written::Material::TwoSided(m) => {
+                let front = self.inner(&at("front"), &m.front);
+                let back = match &m.back {
+                    Some(back) => self.inner(&at("back"), back),
+                    None => front.clone(),
+                };
+                plain(self.compound(&place, Composition::TwoSided { front, back }))
+            }
+            written::Material::Bump(m) => {
+                let heights = self.named_numbers(&at("height.texture"), &m.height.texture);
+                let form = ReliefForm::Heights { heights, scale: m.scale };
+                let relief = Relief { form, turn: m.turn, shadowing: m.shadowing };
+                let inner = self.inner(&at("material"), &m.material);
+                plain(self.compound(&place, Composition::Relief { relief, inner }))
+            }
+            written::Material::NormalMap(m) => {
+                let normals = self.named_numbers(&at("normals.texture"), &m.normals.texture);
+                let relief = Relief { form: ReliefForm::Normals(normals), turn: m.turn, shadowing: m.shadowing };
+                let inner = self.inner(&at("material"), &m.material);
+                plain(self.compound(&place, Composition::Relief { relief, inner }))
+            }
+        };
+        let highlight = highlight.map(|h| Highlight {
+            strength: h.strength as f32,
+            exponent: h.exponent,
+            model: match h.model {
+                written::HighlightModel::Blinn => HighlightModel::Blinn,
+                written::HighlightModel::Phong => HighlightModel::Phong,
+            },
+        });
+        Material { kind, two_sided, highlight }
+    }
+
+    fn compound(&mut self, at: &str, composition: Composition) -> Kind {
+        let compound = Compound::new(composition);
+        if compound.size > MOST_PARTS {
+            self.fault(at, format!("expected at most {MOST_PARTS} layers and materials, found more"));
+            return Kind::Boundary;
+        }
+        if compound.reliefs > MOST_RELIEFS {
+            self.fault(at, format!("expected at most {MOST_RELIEFS} reliefs over each other, found more"));
+            return Kind::Boundary;
+        }
+        Kind::Compound(Box::new(compound))
+    }
+
+    fn roughness(
+        &mut self,
+        at: &str,
+        roughness: &'a written::Roughness,
+        distribution: written::Distribution,
+    ) -> Option<Roughness> {
+        let (u, v) = match roughness {
+            written::Roughness::Number(alpha) => return facets(*alpha, distribution).map(Roughness::Uniform),
+            written::Roughness::Texture(name) => (self.named_numbers(&format!("{at}.texture"), name), None),
+            written::Roughness::Brushed(brushed) => {
+                let u = self.scalar(&format!("{at}.u"), &brushed.u);
+                (u, Some(self.scalar(&format!("{at}.v"), &brushed.v)))
+            }
+        };
+        let distribution = family(distribution);
+        Some(match (u, v) {
+            (Scalar::Uniform(u), Some(Scalar::Uniform(v))) => {
+                Roughness::Uniform(Microfacets::anisotropic(distribution, u.max(SMOOTHEST), v.max(SMOOTHEST)))
+            }
+            (u, v) => Roughness::Textured(Box::new(TexturedRoughness { distribution, u, v })),
+        })
+    }
+
+    /// The factors of an interface, where they are not one.
+    fn tints(
+        &mut self,
+        at: &str,
+        reflection: &'a written::SpectrumOrTexture,
+        transmission: &'a written::SpectrumOrTexture,
+    ) -> Option<Box<Tints>> {
+        let reflected = self.reflectance_texture(&format!("{at}.reflection_tint"), reflection);
+        let transmitted = self.reflectance_texture(&format!("{at}.transmission_tint"), transmission);
+        let needed = !(is_one(&reflected) && is_one(&transmitted));
+        needed.then(|| Box::new(Tints { reflected, transmitted }))
+    }
+}
+
+fn is_one(texture: &Texture) -> bool {
+    matches!(texture, Texture::Uniform(Spectrum::Constant(x)) if *x == 1.0)
+}
+
+/// First the affine map, then scale and offset.
+fn uv_map(map: Option<[[f64; 3]; 2]>, scale: [f64; 2], offset: [f64; 2]) -> DAffine2 {
+    let scaled = DAffine2::from_mat2_translation(DMat2::from_diagonal(DVec2::from(scale)), DVec2::from(offset));
+    match map {
+        None => scaled,
+        Some([[a, b, c], [d, e, f]]) => {
+            scaled * DAffine2::from_cols(DVec2::new(a, d), DVec2::new(b, e), DVec2::new(c, f))
+        }
+    }
+}
+
+fn grid(image: &written::ImageTexture, width: usize, height: usize) -> Grid {
+    let wrap = |w: written::Wrap| match w {
+        written::Wrap::Repeat => Wrap::Repeat,
+        written::Wrap::Mirror => Wrap::Mirror,
+        written::Wrap::Clamp => Wrap::Clamp,
+    };
+    Grid {
+        width,
+        height,
+        wrap: [wrap(image.wrap), wrap(image.wrap_v.unwrap_or(image.wrap))],
+        interpolation: match image.filter {
+            written::TextureFilter::Bilinear => Interpolation::Bilinear,
+            written::TextureFilter::Nearest => Interpolation::Nearest,
+        },
+        uv: uv_map(image.uv, image.scale, image.offset),
+    }
+}
+
+fn model(fresnel: written::Fresnel) -> Model {
+    match fresnel {
+        written::Fresnel::Exact => Model::Exact,
+        written::Fresnel::Schlick => Model::Schlick,
+    }
+}
+
+fn family(distribution: written::Distribution) -> Distribution {
+    match distribution {
+        written::Distribution::Ggx => Distribution::Ggx,
+        written::Distribution::Beckmann => Distribution::Beckmann,
+    }
+}
+
+fn facets(alpha: f64, distribution: written::Distribution) -> Option<Microfacets> {
+    (alpha >= SMOOTHEST).then_some(Microfacets::isotropic(family(distribution), alpha))
+}
