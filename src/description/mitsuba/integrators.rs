@@ -3,7 +3,7 @@
 use super::super::fault::Fault;
 use super::super::node::Node;
 use super::object::{Bag, Family};
-use super::{Fields, Import, whole};
+use super::{Fields, Import, boolean, whole};
 
 const INTEGRATORS: [&str; 5] = ["path", "volpath", "volpathmis", "direct", "moment"];
 
@@ -19,6 +19,10 @@ impl Import<'_> {
                     bag.boolean("use_spectral_mis")?;
                 }
                 depth(&bag, &mut fields)?;
+                if bag.object.plugin == "path" {
+                    // Panes and null surfaces are vertices for it, unlike for the two that know media.
+                    fields.add("count_crossings", boolean(bag.object.place, true));
+                }
             }
             // Light that was scattered once: how many samples each technique takes is noise.
             "direct" => {

@@ -2,12 +2,13 @@
 
 use super::super::fault::Fault;
 use super::super::node::Node;
-use super::object::{Bag, Family};
+use super::object::{Bag, Family, Value};
+use super::parse;
 use super::spectra::Role;
-use super::{Fields, Import, entry, number, text};
+use super::{Fields, Import, boolean, entry, list, number, numbers, text};
 
-const MEDIA: [&str; 1] = ["homogeneous"];
-const PHASES: [&str; 3] = ["isotropic", "hg", "rayleigh"];
+const MEDIA: [&str; 2] = ["homogeneous", "heterogeneous"];
+const PHASES: [&str; 5] = ["isotropic", "hg", "rayleigh", "tabphase", "blendphase"];
 
 impl Import<'_> {
     /// The name under which a medium stands in `media`.
@@ -16,33 +17,56 @@ impl Import<'_> {
             return Ok(name.clone());
         }
         let bag = self.bag(index);
-        let node = match bag.object.plugin.as_str() {
-            "homogeneous" => self.homogeneous(&bag)?,
-            _ => return Err(bag.unknown(MEDIA)),
-        };
-        bag.finish()?;
-        let name = self.name_for(index);
-        self.media.push(self.entry(index, &name, node));
-        Ok(name)
-    }
-
-    fn homogeneous(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
         let place = bag.object.place;
         let mut fields = Fields::new(place);
-        let extinction = self.spectrum(bag, "sigma_t", Role::Coefficient)?.unwrap_or_else(|| number(place, 1.0));
-        let albedo = self.spectrum(bag, "albedo", Role::Reflectance)?.unwrap_or_else(|| number(place, 0.75));
-        fields.add("extinction", extinction);
-        fields.add("albedo", albedo);
+        let kind = match bag.object.plugin.as_str() {
+            "homogeneous" => {
+                let extinction = self.spectrum(&bag, "sigma_t", Role::Coefficient)?;
+                fields.add("extinction", extinction.unwrap_or_else(|| number(place, 1.0)));
+                "homogeneous"
+            }
+            "heterogeneous" => {
+                let extinction = self.volume_of(&bag, "sigma_t", 1.0)?;
+                fields.add("extinction", extinction);
+                "heterogeneous"
+            }
+            _ => return Err(bag.unknown(MEDIA)),
+        };
+        let albedo = self.spectrum_or_volume(&bag, "albedo", Role::Reflectance)?;
+        fields.add("albedo", albedo.unwrap_or_else(|| number(place, 0.75)));
         if let Some(scale) = bag.float("scale")? {
             fields.add("scale", number(bag.place("scale"), scale));
         }
         // How light is looked for, not what there is.
         bag.boolean("has_spectral_extinction")?;
-        bag.boolean("sample_emitters")?;
+        if let Some(sample) = bag.boolean("sample_emitters")? {
+            fields.add("shadow_rays", boolean(bag.place("sample_emitters"), sample));
+        }
         if let Some(phase) = bag.only(Family::Phase)? {
             fields.add("phase", self.phase(phase)?);
         }
-        Ok(fields.kind("homogeneous"))
+        bag.finish()?;
+        let name = self.name_for(index);
+        self.media.push(self.entry(index, &name, fields.kind(kind)));
+        Ok(name)
+    }
+
+    /// The media on the two sides of a shape. A side that a shape does not name is empty if it names the other; a
+    /// shape that names none leaves a ray in what it is in.
+    pub(crate) fn sides(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
+        if !self.document.objects.iter().any(|object| object.family == Family::Medium) {
+            return Ok(());
+        }
+        let sides = [("inside", "interior"), ("outside", "exterior")];
+        let written = sides.iter().any(|(_, theirs)| bag.has(theirs));
+        for (ours, theirs) in sides {
+            let name = match bag.object(theirs, &[Family::Medium])? {
+                Some(medium) => self.medium(medium)?,
+                None => if written { "vacuum" } else { "unchanged" }.to_owned(),
+            };
+            fields.add(ours, text(bag.place(theirs), name));
+        }
+        Ok(())
     }
 
     /// A phase function, written in place.
@@ -56,9 +80,40 @@ impl Import<'_> {
                 let g = bag.float("g")?.unwrap_or(0.8);
                 entry(place, "hg", number(bag.place("g"), g))
             }
+            "tabphase" => {
+                let values = bag.required("values", bag.text("values"))?;
+                let place = bag.place("values");
+                let values: Result<Vec<f64>, Fault> =
+                    parse::tokens(values).map(|token| parse::number(token, place)).collect();
+                entry(place, "table", numbers(place, &values?))
+            }
+            "blendphase" => self.blend(&bag)?,
             _ => return Err(bag.unknown(PHASES)),
         };
         bag.finish()?;
         Ok(node)
+    }
+
+    fn blend(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
+        let mut fields = Fields::new(bag.object.place);
+        let place = bag.place("weight");
+        let weight = match bag.value("weight") {
+            None => return Err(bag.fault("expected the parameter \"weight\", found none")),
+            Some(Value::Object(index)) if bag.document.objects[*index].family == Family::Volume => {
+                let volume = self.declare_volume(*index)?;
+                entry(place, "volume", text(place, volume))
+            }
+            // Mitsuba clamps it.
+            Some(_) => number(place, bag.float("weight")?.unwrap_or_default().clamp(0.0, 1.0)),
+        };
+        fields.add("weight", weight);
+        // In the order of the text. (The names of the two play no part.)
+        let parts = bag.objects(Family::Phase);
+        let [first, second] = parts[..] else {
+            return Err(bag.fault(format!("expected two phase functions, found {}", parts.len())));
+        };
+        let parts = [self.phase(first)?, self.phase(second)?];
+        fields.add("of", list(bag.object.place, parts));
+        Ok(fields.kind("blend"))
     }
 }

@@ -26,6 +26,7 @@ mod sensors;
 mod shapes;
 mod spectra;
 mod textures;
+mod volumes;
 mod xml;
 
 use std::collections::HashMap;
@@ -62,6 +63,7 @@ struct Import<'a> {
     document: &'a Document,
     textures: Vec<Entry>,
     materials: Vec<Entry>,
+    volumes: Vec<Entry>,
     media: Vec<Entry>,
     shapes: Vec<Node>,
     lights: Vec<Node>,
@@ -75,6 +77,7 @@ impl<'a> Import<'a> {
             document,
             textures: Vec::new(),
             materials: Vec::new(),
+            volumes: Vec::new(),
             media: Vec::new(),
             shapes: Vec::new(),
             lights: Vec::new(),
@@ -106,6 +109,9 @@ impl<'a> Import<'a> {
         for bsdf in root.objects(Family::Bsdf) {
             self.material(bsdf)?;
         }
+        for volume in root.objects(Family::Volume) {
+            self.declare_volume(volume)?;
+        }
         for medium in root.objects(Family::Medium) {
             self.medium(medium)?;
         }
@@ -124,6 +130,7 @@ impl<'a> Import<'a> {
         }
         fields.add("textures", Node::new(place, Value::Map(self.textures)));
         fields.add("materials", Node::new(place, Value::Map(self.materials)));
+        fields.add("volumes", Node::new(place, Value::Map(self.volumes)));
         fields.add("media", Node::new(place, Value::Map(self.media)));
         fields.add("shapes", Node::new(place, Value::List(self.shapes)));
         fields.add("lights", Node::new(place, Value::List(self.lights)));

@@ -88,12 +88,7 @@ impl Import<'_> {
         if let Some(emitter) = emitter {
             fields.add("emission", self.area(emitter)?);
         }
-        for (ours, theirs) in [("inside", "interior"), ("outside", "exterior")] {
-            if let Some(medium) = bag.object(theirs, &[Family::Medium])? {
-                let name = self.medium(medium)?;
-                fields.add(ours, text(bag.place(theirs), name));
-            }
-        }
+        self.sides(bag, fields)?;
         if let Some(id) = &bag.object.id {
             fields.add("name", text(place, id.as_str()));
         }

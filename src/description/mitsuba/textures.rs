@@ -4,11 +4,11 @@ use glam::{DMat4, DVec4};
 
 use super::super::fault::Fault;
 use super::super::node::Node;
-use super::object::Bag;
+use super::object::{Bag, Family};
 use super::spectra::Role;
-use super::{Fields, Import, boolean, number, numbers, text};
+use super::{Fields, Import, boolean, entry, number, numbers, text};
 
-const TEXTURES: [&str; 2] = ["bitmap", "checkerboard"];
+const TEXTURES: [&str; 3] = ["bitmap", "checkerboard", "volume"];
 
 impl Import<'_> {
     /// The name under which a texture stands in `textures`.
@@ -20,6 +20,11 @@ impl Import<'_> {
         let node = match bag.object.plugin.as_str() {
             "bitmap" => bitmap(&bag)?,
             "checkerboard" => self.checkerboard(&bag)?,
+            "volume" => {
+                let volume = bag.required("volume", bag.object("volume", &[Family::Volume]))?;
+                let name = self.declare_volume(volume)?;
+                entry(bag.object.place, "volume", text(bag.place("volume"), name))
+            }
             _ => return Err(bag.unknown(TEXTURES)),
         };
         bag.finish()?;
