@@ -457,7 +457,7 @@ mod tests {
             ),
             (
                 "fog: {colour: yes, density: 1}",
-                "2:15: fog.colour: expected one of a number, rgb, table, file, blackbody, illuminant, lines, scaled, found \"yes\"",
+                "2:15: fog.colour: expected one of a number, rgb, table, file, blackbody, illuminant, lines, scaled, zero_outside, found \"yes\"",
             ),
             ("image: {filter: {catmull_rom: 3}}", "2:31: image.filter.catmull_rom: expected an empty map, found 3"),
         ];

@@ -329,7 +329,7 @@ mod tests {
         assert_eq!(
             fault("<shape type=\"sphere\"><float name=\"radius\" value=\"1\"/><float name=\"radius\" value=\"1\"/></shape>", &[])
                 .split("; it is").next().unwrap(),
-            "s.xml:3:55: expected each parameter once, found \"radius\" again"
+            "s.xml:3:54: expected each parameter once, found \"radius\" again"
         );
         assert_eq!(
             fault("<shap type=\"sphere\"/>", &[]),
@@ -356,7 +356,7 @@ mod tests {
                 "<bsdf type=\"twosided\" id=\"a\"><ref id=\"b\"/></bsdf>\n<bsdf type=\"twosided\" id=\"b\"><ref id=\"a\"/></bsdf>",
                 &[]
             ),
-            "s.xml:4:31: expected an object that does not hold itself, found a circle of references"
+            "s.xml:4:30: expected an object that does not hold itself, found a circle of references"
         );
         let scene = good(
             "<bsdf type=\"diffuse\" id=\"a\"/><alias id=\"a\" as=\"b\"/><shape type=\"sphere\"><ref id=\"b\"/></shape>\
