@@ -90,6 +90,26 @@ METALS = [
     ("stainless-steel", "steel", "other/alloys/stainless steel/nk/Karlsson-austenitic.yml"),
     ("titanium-nitride", "TiN", "main/TiN/nk/Shkondin.yml"),
     ("silicon", "Si", "main/Si/nk/Green-2008.yml"),
+    # Further measurements: those of which Mitsuba's tables of the same substance are nearest in reflectance.
+    ("silver-rakic", "", "main/Ag/nk/Rakic-LD.yml"),
+    ("gold-olmon", "", "main/Au/nk/Olmon-ts.yml"),
+    ("copper-hagemann", "", "main/Cu/nk/Hagemann.yml"),
+    ("aluminium-cheng", "", "main/Al/nk/Cheng.yml"),
+    ("chromium-sytchkova", "", "main/Cr/nk/Sytchkova.yml"),
+    ("nickel-rakic", "", "main/Ni/nk/Rakic-LD.yml"),
+    ("amorphous-carbon", "a-C", "main/C/nk/Arakawa.yml"),
+    ("diamond-crystal", "d-C", "main/C/nk/Phillip.yml"),
+    ("potassium", "K", "main/K/nk/Smith.yml"),
+    ("sodium", "Na", "main/Na/nk/Smith.yml"),
+    ("lithium", "Li", "main/Li/nk/Rasigni.yml"),
+    ("niobium", "Nb", "main/Nb/nk/Weaver.yml"),
+    ("aluminium-antimonide", "AlSb", "main/AlSb/nk/Djurisic.yml"),
+    ("caesium-iodide", "CsI", "main/CsI/nk/Querry.yml"),
+    ("magnesium-oxide", "MgO", "main/MgO/nk/Synowicki.yml"),
+    ("titanium-carbide", "TiC", "main/TiC/nk/Pfluger.yml"),
+    ("titanium-nitride-pfluger", "", "main/TiN/nk/Pfluger.yml"),
+    ("vanadium-carbide", "VC", "main/VC/nk/Pfluger.yml"),
+    ("vanadium-nitride", "VN", "main/VN/nk/Pfluger.yml"),
 ]
 
 

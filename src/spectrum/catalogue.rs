@@ -311,7 +311,7 @@ mod tests {
         }
         for m in METALS.iter() {
             assert!(
-                m.k.at(600.0) > 0.0 && m.eta.at(600.0) > 0.0 && !m.eta.is_constant() && !m.reference.is_empty(),
+                m.k.at(600.0) >= 0.0 && m.eta.at(600.0) > 0.0 && !m.eta.is_constant() && !m.reference.is_empty(),
                 "{}",
                 m.name
             );

@@ -88,7 +88,7 @@ impl Import<'_> {
                     fields.add("eta", eta.unwrap_or_else(|| number(place, 0.0)));
                     fields.add("k", k.unwrap_or_else(|| number(place, 1.0)));
                 } else {
-                    fields.add("metal", text(bag.place("material"), metal));
+                    super::metals::metal(&bag, metal, &mut fields)?;
                 }
                 fields.maybe("tint", self.spectrum(&bag, "specular_reflectance", Role::Reflectance)?);
                 if bag.object.plugin == "roughconductor" {

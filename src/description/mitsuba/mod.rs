@@ -9,7 +9,7 @@
 //! - Mitsuba's cameras look along +z with +x to the left; ours have +x to the right.
 //! - Its film divides by 106.7502593994 where ours divides by the integral of ȳ, 106.8569: the
 //!   picture is multiplied by the ratio, [`FILM`], and what is defined by its colour under D65 is
-//!   divided by it.
+//!   divided by it (and made 0.01 % darker, as their D65 is: [`DAYLIGHT`]).
 //! - `<rgb>` and `<float>` of a light are colours under D65; `<spectrum>` is radiance as it stands.
 //!   Outside its wavelengths a `<spectrum>` is zero, also a reflectance.
 //! - Surfaces reflect on the side of their normal only, unless `twosided`; shapes shine on it only.
@@ -20,6 +20,7 @@ mod bsdfs;
 mod emitters;
 mod integrators;
 mod media;
+mod metals;
 mod object;
 mod parse;
 mod sensors;
@@ -39,9 +40,12 @@ use super::node::{Entry, Node, Place, Sources, Value};
 use crate::error::Result;
 use object::{Bag, Document, Family};
 
-/// Ratio of the integral of ȳ (5 nm steps of the CIE 1931 table) to the constant by which
-/// Mitsuba's film divides: 106.856895 / 106.7502593994.
-const FILM: f64 = 1.000_998_93;
+/// Ratio of the integral of ȳ, by which our film divides, to the constant of Mitsuba's film.
+const FILM: f64 = 106.856_914_916_767 / 106.750_259_399_414_06;
+
+/// What Mitsuba's D65 of scale 1 is of ours. Ours has luminance 1. Theirs has 0.999894136 on their film:
+/// the integral of its table, divided by 98.997417518762 there, against ȳ over 106.7502594.
+const DAYLIGHT: f64 = 0.999_894_136 / FILM;
 
 /// Whether a file holds a Mitsuba scene: by its name.
 pub(crate) fn is_xml(path: &Path) -> bool {

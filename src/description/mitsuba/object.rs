@@ -348,10 +348,14 @@ impl Document {
     /// Where the file `name` is: absolute, else in the first directory of the search that has it,
     /// else in that of the file that mentions it.
     pub(crate) fn find(&self, name: &str, source: u32) -> String {
+        self.look_for(name, source).unwrap_or_else(|| self.home().join(name).to_string_lossy().into_owned())
+    }
+
+    /// As [`Document::find`], where there is such a file.
+    pub(crate) fn look_for(&self, name: &str, source: u32) -> Option<String> {
         let own = self.directories.get(&source);
         let found = self.search.iter().chain(own).map(|directory| directory.join(name)).find(|path| path.exists());
-        let fallback = || self.directories.values().next().map_or_else(|| name.into(), |_| self.home().join(name));
-        found.unwrap_or_else(fallback).to_string_lossy().into_owned()
+        found.map(|path| path.to_string_lossy().into_owned())
     }
 
     /// The directory of the scene's file.

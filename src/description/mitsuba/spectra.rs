@@ -4,7 +4,7 @@ use super::super::fault::Fault;
 use super::super::node::{Node, Place, did_you_mean, quote};
 use super::object::{Bag, Family, SpectrumValue, Value};
 use super::parse;
-use super::{FILM, Fields, Import, entry, list, number, numbers, text};
+use super::{DAYLIGHT, Fields, Import, entry, list, number, numbers, text};
 
 /// What a spectrum stands for, which decides what a colour or a bare number means.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -240,7 +240,7 @@ fn grey(place: Place, value: f64, role: Role) -> Node {
 
 fn colour(place: Place, rgb: [f64; 3], role: Role) -> Node {
     match role {
-        Role::Emission => scaled(place, 1.0 / FILM, entry(place, "rgb", numbers(place, &rgb))),
+        Role::Emission => scaled(place, DAYLIGHT, entry(place, "rgb", numbers(place, &rgb))),
         Role::Reflectance | Role::Coefficient => entry(place, "rgb", numbers(place, &rgb)),
     }
 }
@@ -249,7 +249,7 @@ fn colour(place: Place, rgb: [f64; 3], role: Role) -> Node {
 pub(crate) fn d65(place: Place, scale: f64) -> Node {
     let mut fields = Fields::new(place);
     fields.add("name", text(place, "D65"));
-    fields.add("scale", number(place, scale / FILM));
+    fields.add("scale", number(place, scale * DAYLIGHT));
     fields.kind("illuminant")
 }
 

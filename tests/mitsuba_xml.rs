@@ -1,0 +1,195 @@
+//! Mitsuba's scene files on the command line: what is rendered, and what each kind of bad input says.
+
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+/// A scene of a lamp, rendered in no time.
+const GOOD: &str = "<scene version=\"3.0.0\">
+<default name=\"res\" value=\"8\"/>
+<integrator type=\"path\"/>
+<sensor type=\"perspective\">
+  <film type=\"hdrfilm\"><integer name=\"width\" value=\"$res\"/><integer name=\"height\" value=\"4\"/><rfilter type=\"box\"/></film>
+  <sampler type=\"independent\"><integer name=\"sample_count\" value=\"4\"/></sampler>
+</sensor>
+<emitter type=\"constant\"><rgb name=\"radiance\" value=\"1\"/></emitter>
+</scene>";
+
+fn abbe(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_abbe")).current_dir(directory).args(arguments).output().unwrap()
+}
+
+/// The exit code and the lines of the standard error for a file `s.xml` with `text`.
+fn told(text: &str) -> (i32, String) {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("s.xml"), text).unwrap();
+    outcome(&abbe(directory.path(), &["plan", "s.xml"]))
+}
+
+fn outcome(output: &Output) -> (i32, String) {
+    (output.status.code().unwrap(), String::from_utf8(output.stderr.clone()).unwrap())
+}
+
+fn error(message: &str) -> String {
+    format!("error: {message}\n")
+}
+
+#[test]
+fn a_scene_is_rendered_with_parameters_from_the_command_line() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("s.xml"), GOOD).unwrap();
+    let output = abbe(
+        directory.path(),
+        &["render", "s.xml", "-o", "out.exr", "--spp", "16", "-D", "res=6", "-q", "--threads", "1"],
+    );
+    assert_eq!(outcome(&output), (0, String::new()));
+    let file = abbe::film::exr::read_exr(&directory.path().join("out.exr")).unwrap();
+    let part = &file.parts[0];
+    assert_eq!((part.window.width, part.window.height), (6, 4));
+    assert!(directory.path().join("out.png").exists());
+    // White light of radiance 1 on Mitsuba's film: 1 but for the constants of their D65 (1e-4) and half precision (5e-4).
+    for name in ["R", "G", "B"] {
+        let mean = part.channel(name).unwrap().iter().sum::<f32>() / 24.0;
+        // 8 stratified wavelengths, 16 samples, 24 pixels: about 1e-3.
+        assert!((mean - 1.0).abs() < 1e-2, "{name}: {mean}");
+    }
+}
+
+#[test]
+fn a_parameter_that_the_scene_does_not_use_is_an_error() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("s.xml"), GOOD).unwrap();
+    assert_eq!(
+        outcome(&abbe(directory.path(), &["plan", "s.xml", "-D", "ress=6"])),
+        (2, error("-D ress=6: expected a parameter that s.xml uses, found none named \"ress\"; did you mean \"res\"?"))
+    );
+    std::fs::write(directory.path().join("s.yaml"), "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}")
+        .unwrap();
+    assert_eq!(
+        outcome(&abbe(directory.path(), &["plan", "s.yaml", "-D", "res=6"])),
+        (2, error("-D res=6: expected a Mitsuba scene (.xml), found s.yaml; --set changes fields of YAML"))
+    );
+}
+
+#[test]
+fn truncated_text_is_one_error() {
+    assert_eq!(
+        told(GOOD.rsplit_once("</scene>").unwrap().0),
+        (2, error("s.xml:1:1: expected </scene>, found the end of the text"))
+    );
+    assert_eq!(told(""), (2, error("s.xml:1:1: expected the element <scene>, found none")));
+}
+
+#[test]
+fn unknown_plugins_and_parameters_are_one_error() {
+    let with = |text: &str| told(&GOOD.replace("</scene>", &format!("{text}</scene>")));
+    let (code, message) = with("<bsdf type=\"difuse\" id=\"a\"/>");
+    assert!(code == 2 && message.starts_with("error: s.xml:9:13: expected a bsdf that Abbe has ("), "{message}");
+    assert!(
+        message.ends_with("found \"difuse\"; did you mean \"diffuse\"?\n") && message.lines().count() == 1,
+        "{message}"
+    );
+    let (code, message) = with("<bsdf type=\"diffuse\" id=\"a\"><float name=\"reflectence\" value=\"1\"/></bsdf>");
+    assert_eq!(code, 2);
+    assert_eq!(
+        message,
+        error(
+            "s.xml:9:29: bsdf \"diffuse\": expected parameters among reflectance, found \"reflectence\"; did you mean \
+             \"reflectance\"?"
+        )
+    );
+    assert_eq!(
+        with("<bsdf type=\"diffuse\" id=\"a\"><boolean name=\"reflectance\" value=\"true\"/></bsdf>"),
+        (
+            2,
+            error(
+                "s.xml:9:29: bsdf \"diffuse\": reflectance: expected a spectrum, a colour or a float, found a boolean"
+            )
+        )
+    );
+    assert_eq!(
+        with("<bsdf type=\"diffuse\" id=\"a\"><float name=\"reflectance\" value=\"many\"/></bsdf>"),
+        (2, error("s.xml:9:62: expected a finite number, found \"many\""))
+    );
+}
+
+#[test]
+fn ids_are_unique_and_references_lead_somewhere() {
+    let with = |text: &str| told(&GOOD.replace("</scene>", &format!("{text}</scene>")));
+    assert_eq!(
+        with("<bsdf type=\"diffuse\" id=\"a\"/><bsdf type=\"null\" id=\"a\"/>"),
+        (2, error("s.xml:9:30: expected each id once, found \"a\" again; it is first at s.xml:9:1"))
+    );
+    assert_eq!(
+        with("<shape type=\"sphere\"><ref id=\"a\"/></shape>"),
+        (2, error("s.xml:9:22: expected the id of an object, found \"a\""))
+    );
+}
+
+#[test]
+fn missing_files_are_input_errors() {
+    let with = |text: &str| told(&GOOD.replace("</scene>", &format!("{text}</scene>")));
+    let (code, message) = with("<shape type=\"ply\"><string name=\"filename\" value=\"none.ply\"/></shape>");
+    assert!(code == 3 && message.starts_with("error: none.ply: ") && message.contains("s.xml:9:19"), "{message}");
+    let (code, message) = with("<include filename=\"none.xml\"/>");
+    assert_eq!(
+        (code, message.as_str()),
+        (3, "error: none.xml: cannot be read: No such file or directory (os error 2); it is included at s.xml:9:1\n")
+    );
+    let directory = tempfile::tempdir().unwrap();
+    let (code, message) = outcome(&abbe(directory.path(), &["plan", "none.xml"]));
+    assert_eq!(
+        (code, message.as_str()),
+        (3, "error: none.xml: cannot be read: No such file or directory (os error 2)\n")
+    );
+}
+
+#[test]
+fn includes_are_read_in_place_and_do_not_run_in_circles() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    std::fs::create_dir(directory.path().join("parts")).unwrap();
+    write("s.xml", &GOOD.replace("</scene>", "<include filename=\"parts/a.xml\"/></scene>"));
+    write("parts/a.xml", "<scene version=\"3.0.0\"><include filename=\"b.xml\"/><ref id=\"grey\"/></scene>");
+    write("parts/b.xml", "<bsdf version=\"3.0.0\" type=\"diffuse\" id=\"grey\"/>");
+    assert_eq!(outcome(&abbe(directory.path(), &["plan", "s.xml"])), (0, String::new()));
+    write("parts/b.xml", "<scene version=\"3.0.0\">\n<include filename=\"a.xml\"/></scene>");
+    assert_eq!(
+        outcome(&abbe(directory.path(), &["plan", "s.xml"])),
+        (2, error("parts/b.xml:2:1: expected a file that does not include itself, found parts/a.xml"))
+    );
+}
+
+/// Files that include each other twice would be read 2^15 times.
+#[test]
+fn includes_do_not_multiply_without_end() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    write("s.xml", &GOOD.replace("</scene>", "<include filename=\"0.xml\"/></scene>"));
+    for i in 0..20 {
+        let twice = format!("<include filename=\"{}.xml\"/>", i + 1).repeat(2);
+        write(&format!("{i}.xml"), &format!("<scene version=\"3.0.0\">{twice}</scene>"));
+    }
+    let begin = Instant::now();
+    let (code, message) = outcome(&abbe(directory.path(), &["plan", "s.xml"]));
+    assert_eq!(
+        (code, message),
+        (2, error("14.xml:1:24: expected at most 15 files that include each other, found more"))
+    );
+    assert!(begin.elapsed() < Duration::from_secs(20));
+}
+
+#[test]
+fn bombs_are_one_error_and_no_wait() {
+    let begin = Instant::now();
+    let entities = "<!DOCTYPE scene [<!ENTITY a \"aaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]>\n<scene version=\"3.0.0\" id=\"&b;\"/>";
+    assert_eq!(
+        told(entities),
+        (2, error("s.xml:1:11: expected no document type, found <!DOCTYPE …>: entities are not expanded"))
+    );
+    let nested = format!("<scene version=\"3.0.0\">{}", "<shape type=\"sphere\">".repeat(1_000_000));
+    let (code, message) = told(&nested);
+    assert_eq!(code, 2);
+    assert_eq!(message, error("s.xml:1:1347: expected at most 64 levels of nesting, found more"));
+    assert!(begin.elapsed() < Duration::from_secs(20));
+}
