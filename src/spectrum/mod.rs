@@ -17,6 +17,7 @@ pub mod catalogue;
 pub mod colour;
 pub mod illuminant;
 pub mod index;
+pub mod luminance;
 pub mod observer;
 mod spectra;
 mod table;
