@@ -5,6 +5,7 @@ use serde::Deserialize;
 use super::compound::{Blend, Bump, Mask, NormalMap, Roughness, TwoSided};
 use super::fault::Checker;
 use super::path::At;
+use super::principled::{Principled, PrincipledThin};
 use super::spectrum::{FilePath, Illuminant, Index, Role, Spectrum, SpectrumOrTexture, yes};
 
 /// The material of a shape: the name of one, or one written in place.
@@ -39,6 +40,10 @@ pub enum Material {
     ThinDielectric(ThinDielectric),
     /// A diffuse base under a dielectric coat.
     Plastic(Plastic),
+    /// Many looks from a few numbers.
+    Principled(Principled),
+    /// The same for a sheet.
+    PrincipledThin(PrincipledThin),
     /// Invisible; only bounds a medium.
     Boundary(Boundary),
     /// Lets a share of the light through, straight on.
@@ -421,13 +426,15 @@ impl MaterialRef {
 
 impl Material {
     /// Names of the kinds.
-    pub(crate) const KINDS: [&'static str; 12] = [
+    pub(crate) const KINDS: [&'static str; 14] = [
         "diffuse",
         "conductor",
         "mirror",
         "dielectric",
         "thin_dielectric",
         "plastic",
+        "principled",
+        "principled_thin",
         "boundary",
         "mask",
         "blend",
@@ -446,6 +453,8 @@ impl Material {
             Material::Dielectric(_) => "dielectric",
             Material::ThinDielectric(_) => "thin_dielectric",
             Material::Plastic(_) => "plastic",
+            Material::Principled(_) => "principled",
+            Material::PrincipledThin(_) => "principled_thin",
             Material::Boundary(_) => "boundary",
             Material::Mask(_) => "mask",
             Material::Blend(_) => "blend",
@@ -496,6 +505,8 @@ impl Material {
                 checker.not_negative(at.key("roughness"), plastic.roughness);
                 check_highlight(plastic.highlight, at, checker);
             }
+            Material::Principled(surface) => surface.check(at, checker),
+            Material::PrincipledThin(sheet) => sheet.check(at, checker),
             Material::Boundary(Boundary {}) => {}
             Material::Mask(mask) => mask.check(at, checker),
             Material::Blend(blend) => blend.check(at, checker),

@@ -106,6 +106,29 @@
 //!   pane: {thin_dielectric: {ior: 1.5, exterior_ior: 1}}             # and both tints
 //!   lacquer: {plastic: {reflectance: 0.5, ior: 1.5, roughness: 0, nonlinear: false, tint: 1}}
 //!                                                # ~ and distribution, highlight, two_sided; roughness is a number
+//!   paint:
+//!     principled:                                # Burley's, as in Mitsuba 3; numbers are 0 to 1, or {texture: name}
+//!       base_color: {rgb: [0.8, 0.3, 0.1]}       # spectrum or texture; ~ 0.5
+//!       roughness: 0.4                           # ~ 0.5; α is its square
+//!       anisotropic: 0                           # ~ highlights longer along ∂p/∂u
+//!       metallic: 0                              # ~
+//!       spec_trans: 0                            # ~ light enters; the back is then another side
+//!       specular: 0.5                            # ~ reflectance 0.08 specular; or eta: 1.5, the index
+//!       spec_tint: 0                             # ~ reflection takes the hue of the base
+//!       sheen: 0.2                               # ~ 0 and up
+//!       sheen_tint: 0                            # ~
+//!       flatness: 0                              # ~ diffusion looks like subsurface scattering
+//!       clearcoat: 0.5                           # ~ 0 and up
+//!       clearcoat_gloss: 0                       # ~
+//!       luminance: colour                        # ~ what the base is divided by for a tint: its luminance; or
+//!                                                # mitsuba, as its spectral modes estimate it (0.38 of white)
+//!       sampling: {specular: 1, clearcoat: 1, diffuse: 1}          # ~ how often lobes are sampled
+//!       two_sided: true                          # ~ without spec_trans
+//!   petal: {principled_thin: {base_color: 0.5, roughness: 0.5, spec_trans: 0, diff_trans: 1, eta: 1.5}}
+//!                                                # a sheet; diff_trans up to 2: all diffuse light crosses; numbers
+//!                                                # may be textures; and as above anisotropic, spec_tint, sheen,
+//!                                                # sheen_tint, flatness, luminance, sampling: {reflection: 1,
+//!                                                # transmission: 1, diffuse_reflection: 1, diffuse_transmission: 1}
 //!   edge: {boundary: {}}                         # only bounds a medium
 //!   leaf: {mask: {opacity: 0.5, material: clay}} # ~ a number or {texture: name}; a material is a name, or a kind
 //!                                                # written in place
@@ -252,6 +275,7 @@ mod medium;
 mod mitsuba;
 mod node;
 mod path;
+mod principled;
 mod scene;
 mod settings;
 mod shape;
@@ -271,6 +295,7 @@ pub use material::{
 };
 pub use medium::{Coefficients, HeterogeneousMedium, HomogeneousMedium, Medium, Phase, PhaseBlend};
 pub(crate) use medium::{UNCHANGED, VACUUM};
+pub use principled::{Contrast, Luminance, Principled, PrincipledThin, Sampling, ThinSampling};
 pub use scene::{Locator, SceneDescription};
 pub use settings::{
     Channels, Colour, Compression, DepthIntegrator, Effects, Exr, Integrator, LightTracerIntegrator, NoIntegrator,

@@ -62,9 +62,14 @@ impl Census {
                             note(if rough { &mut census.rough_dispersive } else { &mut census.dispersive }, name());
                         }
                     }
-                    Kind::Thin { .. } => note(&mut census.refractive, name()),
+                    Kind::Principled(solid) if solid.transmission.is_some() => note(&mut census.refractive, name()),
+                    Kind::Thin { .. } | Kind::PrincipledThin(_) => note(&mut census.refractive, name()),
                     Kind::Mirror { .. } | Kind::Conductor { .. } => note(&mut census.reflective, name()),
-                    Kind::Diffuse { .. } | Kind::Plastic { .. } | Kind::Boundary | Kind::Compound(_) => {}
+                    Kind::Diffuse { .. }
+                    | Kind::Plastic { .. }
+                    | Kind::Principled(_)
+                    | Kind::Boundary
+                    | Kind::Compound(_) => {}
                 }
             }
         }

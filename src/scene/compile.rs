@@ -5,6 +5,7 @@
 
 mod lights;
 mod media;
+mod principled;
 mod surface;
 
 use super::bvh::{Aabb, Bvh};
@@ -312,6 +313,8 @@ impl<'a> Compiler<'a> {
                     Kind::Diffuse { reflectance } | Kind::Plastic { reflectance, .. } => {
                         reflectances.extend(reflectance.representatives());
                     }
+                    Kind::Principled(solid) => reflectances.extend(solid.base.representatives()),
+                    Kind::PrincipledThin(sheet) => reflectances.extend(sheet.base.representatives()),
                     Kind::Mirror { reflectance } => reflectances.push(reflectance.clone()),
                     Kind::Conductor { .. }
                     | Kind::Dielectric { .. }

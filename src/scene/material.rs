@@ -2,6 +2,7 @@
 
 use super::SurfacePoint;
 use super::compound::{Composition, Compound};
+use super::principled::{Solid, Thin};
 use super::texture::{Scalar, Texture, TexturePoint};
 use crate::optics::bsdf::{Bsdf, Metal, pane_reflectance};
 use crate::optics::dielectric::{Dielectric, RelativeIndex, RoughDielectric, Tint};
@@ -107,6 +108,10 @@ pub enum Kind {
         /// Factor on what the coat reflects, where it is not one.
         tint: Option<Box<Texture>>,
     },
+    /// A principled surface of a solid.
+    Principled(Box<Solid>),
+    /// A principled sheet.
+    PrincipledThin(Box<Thin>),
     /// The boundary of a medium.
     Boundary,
     /// Made of other materials.
@@ -313,6 +318,8 @@ impl Material {
                     None => Bsdf::Plastic(Plastic { base }),
                 }
             }
+            Kind::Principled(solid) => Bsdf::Principled(solid.at(at, nm)),
+            Kind::PrincipledThin(sheet) => Bsdf::PrincipledThin(sheet.at(at, nm)),
             // A compound material is resolved before it comes to this; unresolved it is not there.
             Kind::Boundary | Kind::Compound(_) => Bsdf::Null,
         }
@@ -331,6 +338,8 @@ impl Material {
                 facets.as_ref().is_some_and(Roughness::varies) || tints.as_ref().is_some_and(|t| t.varies())
             }
             Kind::Thin { tints, .. } => tints.as_ref().is_some_and(|t| t.varies()),
+            Kind::Principled(solid) => solid.varies(),
+            Kind::PrincipledThin(sheet) => sheet.varies(),
             Kind::Mirror { .. } | Kind::Boundary => false,
             Kind::Compound(compound) => compound.varies() || compound.composition.inner().iter().any(|m| m.varies()),
         }
@@ -340,7 +349,8 @@ impl Material {
     #[must_use]
     pub fn transmits(&self) -> bool {
         match &self.kind {
-            Kind::Dielectric { .. } | Kind::Thin { .. } | Kind::Boundary => true,
+            Kind::Dielectric { .. } | Kind::Thin { .. } | Kind::PrincipledThin(_) | Kind::Boundary => true,
+            Kind::Principled(solid) => solid.transmission.is_some(),
             Kind::Diffuse { .. } | Kind::Mirror { .. } | Kind::Conductor { .. } | Kind::Plastic { .. } => false,
             Kind::Compound(compound) => {
                 matches!(compound.composition, Composition::Mask { .. })

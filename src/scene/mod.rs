@@ -19,6 +19,7 @@ pub mod material;
 pub mod medium;
 pub mod mesh;
 pub mod partials;
+pub mod principled;
 pub mod projector;
 pub mod shape;
 pub mod texture;

@@ -154,6 +154,8 @@ impl Tracer<'_> {
                 let t = 1.0 - fresnel::dielectric(Model::Exact, 1.0, *eta).reflected;
                 base.albedo() * (t * t) as f32
             }
+            Kind::Principled(solid) => solid.at(at, self.nm).smooth(1.0, true).matte,
+            Kind::PrincipledThin(sheet) => sheet.at(at, self.nm).smooth(1.0).matte,
             Kind::Mirror { .. }
             | Kind::Conductor { .. }
             | Kind::Dielectric { .. }
@@ -286,6 +288,22 @@ impl Tracer<'_> {
                 let r = fresnel::dielectric(Model::Exact, cos, *eta).reflected;
                 let tint = tint.as_ref().map_or(Lanes::ONE, |tint| tint.eval(at, self.nm));
                 reflect(tint * r as f32)
+            }
+            Kind::Principled(solid) => {
+                let front = local.z > 0.0;
+                let parts = solid.at(at, self.nm).smooth(cos, front);
+                if !material.transmits() {
+                    return reflect(parts.reflected);
+                }
+                let eta = if front { solid.eta } else { 1.0 / solid.eta };
+                let split = fresnel::dielectric(Model::Exact, cos, eta);
+                let wi = refract(local, DVec3::Z * local.z.signum(), eta, split.cos_transmitted);
+                let transmitted = parts.transmitted * (1.0 / (eta * eta)) as f32;
+                reflect(parts.reflected) + cross(transmitted, frame.to_world(wi))
+            }
+            Kind::PrincipledThin(sheet) => {
+                let parts = sheet.at(at, self.nm).smooth(cos);
+                reflect(parts.reflected) + cross(parts.transmitted, -wo)
             }
             Kind::Thin { interior, exterior, tints } => {
                 let tint = Tints::at(tints.as_deref(), at, self.nm);

@@ -5,6 +5,7 @@
 //! z = shading normal.
 
 use crate::math::trig::sin_cos_turn;
+use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -38,12 +39,13 @@ pub(super) fn r0(eta: f64) -> f64 {
     ((eta - 1.0) / (eta + 1.0)).powi(2)
 }
 
-/// Widths of the facets along x and y: roughness² stretched by the aspect √(1 − 0.9 anisotropic)
+/// The main facets: of width roughness² along x and y, stretched by the aspect √(1 − 0.9 anisotropic)
 /// (Burley 2012, 5.4).
-pub(super) fn widths(roughness: f64, anisotropic: f64) -> DVec2 {
+pub(super) fn facets(roughness: f64, anisotropic: f64) -> Microfacets {
     let alpha = roughness * roughness;
     let aspect = (1.0 - 0.9 * anisotropic).sqrt();
-    DVec2::new((alpha / aspect).max(NARROWEST), (alpha * aspect).max(NARROWEST))
+    let (along, across) = ((alpha / aspect).max(NARROWEST), (alpha * aspect).max(NARROWEST));
+    Microfacets::anisotropic(Distribution::Ggx, along, across)
 }
 
 /// The factor on base/π of the diffuse lobe: Fresnel-weighted diffusion, retro-reflection of rough
@@ -62,51 +64,6 @@ pub(super) fn diffusion(roughness: f64, flatness: f64, cos_o: f64, cos_i: f64, c
     let fss = (1.0 + at_grazing * fo) * (1.0 + at_grazing * fi);
     let subsurface = 1.25 * (fss * (1.0 / (cos_o + cos_i) - 0.5) + 0.5);
     surface + flatness * (subsurface - surface)
-}
-
-/// Facets of Trowbridge and Reitz 1975 with a width of their own along x and y (Burley 2012, eq. 13).
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Facets {
-    /// Widths along x and y.
-    pub widths: DVec2,
-}
-
-impl Facets {
-    /// D(m) in sr⁻¹.
-    pub fn density(&self, m: DVec3) -> f64 {
-        if m.z <= 0.0 {
-            return 0.0;
-        }
-        let (x, y) = (m.x / self.widths.x, m.y / self.widths.y);
-        let d = x * x + y * y + m.z * m.z;
-        1.0 / (PI * self.widths.x * self.widths.y * d * d)
-    }
-
-    /// G₁(v): the share of facets facing `m` that `v` sees.
-    pub fn masking(&self, v: DVec3, m: DVec3) -> f64 {
-        if v.dot(m) * v.z <= 0.0 {
-            return 0.0;
-        }
-        let (x, y) = (v.x * self.widths.x, v.y * self.widths.y);
-        2.0 / (1.0 + (1.0 + (x * x + y * y) / (v.z * v.z)).sqrt())
-    }
-
-    /// A facet normal that `wo` (z > 0) sees: Dupuy and Benyoub 2023, listing 3.
-    pub fn sample(&self, wo: DVec3, u: DVec2) -> DVec3 {
-        let stretch = self.widths.extend(1.0);
-        let v = (wo * stretch).normalize();
-        let (sin, cos) = sin_cos_turn(u.x);
-        let z = (1.0 - u.y).mul_add(1.0 + v.z, -v.z);
-        let r = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
-        let h = DVec3::new(r * cos, r * sin, z) + v;
-        (DVec3::new(h.x, h.y, h.z.max(0.0)) * stretch).normalize()
-    }
-
-    #[cfg(test)]
-    /// Density of [`Facets::sample`] at `m`, in sr⁻¹ about the facet normal (Heitz 2018, eq. 3).
-    pub fn pdf(&self, wo: DVec3, m: DVec3) -> f64 {
-        self.density(m) * self.masking(wo, m) * wo.dot(m).abs() / wo.z.abs()
-    }
 }
 
 /// The clear coat's facets: Burley 2012, eq. 4 with γ = 1, isotropic.
@@ -150,7 +107,7 @@ impl CoatFacets {
 
     /// Smith's G₁(v) of a width of 0.25 whatever the gloss (Burley 2012, appendix).
     pub fn masking(v: DVec3, m: DVec3) -> f64 {
-        Facets { widths: DVec2::splat(0.25) }.masking(v, m)
+        Microfacets::isotropic(Distribution::Ggx, 0.25).masking(v, m)
     }
 }
 
@@ -167,36 +124,19 @@ mod tests {
     /// cos θ/π the mean of π D is one; 1024² midpoints leave 1e-3 at these widths.
     #[test]
     fn facets_cover_the_mean_surface_once() {
-        let facets = Facets { widths: DVec2::new(0.5, 0.2) };
         let coat = CoatFacets { alpha: 0.1 };
         let n = 1024.0 * 1024.0;
-        let mean = grid(1024).map(|u| facets.density(warp::cosine_hemisphere(u)) * PI).sum::<f64>() / n;
-        assert!((mean - 1.0).abs() < 1e-3, "{mean}");
         let mean = grid(1024).map(|u| coat.density(warp::cosine_hemisphere(u)) * PI).sum::<f64>() / n;
         assert!((mean - 1.0).abs() < 1e-3, "{mean}");
     }
 
-    /// The mean of g/pdf over samples is ∫ g. For g = D G₁ (wo·m)⁺ / cos θ_o it is one (Heitz 2018,
-    /// eq. 2); for the coat take g = cos² θ over the half sphere: 2π/3.
+    /// The mean of cos θ over sampled normals is ∫ cos θ pdf, here by points uniform over the half sphere.
     #[test]
     fn sampled_normals_have_the_stated_density() {
-        let facets = Facets { widths: DVec2::new(0.6, 0.15) };
         let uniform = |u: DVec2| {
             let v = warp::uniform_sphere(u);
             DVec3::new(v.x, v.y, v.z.abs())
         };
-        for wo in [DVec3::new(0.3, -0.5, 0.4).normalize(), DVec3::new(-0.9, 0.1, 0.1).normalize()] {
-            // Against a smooth function that knows nothing of D: the mean of m.x² over visible normals.
-            let sampled = grid(512).map(|u| facets.sample(wo, u)).map(|m| m.x * m.x).sum::<f64>() / 262_144.0;
-            let integral = grid(1024)
-                .map(uniform)
-                .map(|m| if wo.dot(m) > 0.0 { facets.pdf(wo, m) * m.x * m.x } else { 0.0 })
-                .sum::<f64>()
-                * 2.0
-                * PI
-                / 1_048_576.0;
-            assert!((sampled / integral - 1.0).abs() < 3e-3, "{sampled} {integral}");
-        }
         let coat = CoatFacets { alpha: 0.1 };
         let sampled = grid(512).map(|u| coat.sample(u).z).sum::<f64>() / 262_144.0;
         let integral = grid(2048).map(uniform).map(|m| coat.pdf(m) * m.z).sum::<f64>() * 2.0 * PI / (2048.0 * 2048.0);

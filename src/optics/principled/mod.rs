@@ -16,6 +16,8 @@
 //! principled: {base_color: {rgb: [0.8, 0.3, 0.1]}, roughness: 0.3, metallic: 1, clearcoat: 0.5}
 //! ```
 
+use crate::spectrum::Lanes;
+
 mod lobes;
 mod solid;
 #[cfg(test)]
@@ -24,6 +26,17 @@ mod thin;
 
 pub use solid::{Principled, Rates};
 pub use thin::{PrincipledThin, ThinRates};
+
+/// A principled surface as a tracer of single rays shows it.
+#[derive(Clone, Copy, Debug)]
+pub struct SmoothParts {
+    /// Albedo of the diffuse reflection.
+    pub matte: Lanes,
+    /// Reflected as by a mirror.
+    pub reflected: Lanes,
+    /// Transmitted as by smooth glass, as power.
+    pub transmitted: Lanes,
+}
 
 /// Least index contrast of a surface that transmits: without any it would not be seen at all.
 const LEAST_CONTRAST: f64 = 1.001;

@@ -1,10 +1,12 @@
 //! The boundary of a solid.
 
-use super::lobes::{self, CoatFacets, Facets};
+use super::SmoothParts;
+use super::lobes::{self, CoatFacets};
 use crate::math::warp;
 use crate::optics::bsdf::{BsdfSample, Evaluation, from_evaluation};
 use crate::optics::dielectric::refract;
 use crate::optics::fresnel::{self, Model, Split};
+use crate::optics::microfacet::Microfacets;
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -82,8 +84,8 @@ impl Principled {
         (1.0 - f64::from(self.metallic)) * (1.0 - f64::from(self.transmission))
     }
 
-    fn facets(&self) -> Facets {
-        Facets { widths: lobes::widths(f64::from(self.roughness), f64::from(self.anisotropic)) }
+    fn facets(&self) -> Microfacets {
+        lobes::facets(f64::from(self.roughness), f64::from(self.anisotropic))
     }
 
     fn coat(&self) -> CoatFacets {
@@ -136,6 +138,23 @@ impl Principled {
             sum += lobes::toward_one(r0, weight) * ((1.0 - metal) * tint);
         }
         sum
+    }
+
+    /// What a tracer of single rays shows of it, met at the cosine `cos` > 0: all facets smooth, without coat
+    /// and sheen.
+    #[must_use]
+    pub fn smooth(&self, cos: f64, front: bool) -> SmoothParts {
+        let split = self.interface(cos, front);
+        let clear = self.clear() as f32;
+        SmoothParts {
+            matte: self.base * self.matte() as f32,
+            reflected: if front {
+                self.reflectance(cos, split.reflected)
+            } else {
+                Lanes::splat(clear * split.reflected as f32)
+            },
+            transmitted: self.base.sqrt() * (clear * split.transmitted as f32),
+        }
     }
 
     pub(crate) fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {

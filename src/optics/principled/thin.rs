@@ -1,9 +1,11 @@
 //! A sheet without thickness.
 
-use super::lobes::{self, Facets};
+use super::SmoothParts;
+use super::lobes;
 use crate::math::warp;
 use crate::optics::bsdf::{BsdfSample, Evaluation, from_evaluation};
 use crate::optics::fresnel::{self, Model};
+use crate::optics::microfacet::Microfacets;
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -73,9 +75,9 @@ impl PrincipledThin {
         0.5 * f64::from(self.diffuse_transmission)
     }
 
-    fn facets(&self, transmitted: bool) -> Facets {
+    fn facets(&self, transmitted: bool) -> Microfacets {
         let scale = if transmitted { 0.65 * f64::from(self.eta) - 0.35 } else { 1.0 };
-        Facets { widths: lobes::widths(scale * f64::from(self.roughness), f64::from(self.anisotropic)) }
+        lobes::facets(scale * f64::from(self.roughness), f64::from(self.anisotropic))
     }
 
     /// `None` where nothing is sampled: all rates zero.
@@ -93,6 +95,30 @@ impl PrincipledThin {
             diffuse_reflection: diffuse_reflection / total,
             diffuse_transmission: diffuse_transmission / total,
         })
+    }
+
+    /// Reflectance of facets met at the cosine `cos`, and the share that they transmit.
+    fn reflectance(&self, cos: f64) -> (Lanes, f64) {
+        let eta = f64::from(self.eta);
+        let split = fresnel::dielectric(Model::Exact, cos, eta);
+        let mut sum = Lanes::splat((1.0 - self.specular_tint) * split.reflected as f32);
+        if self.specular_tint > 0.0 {
+            let r0 = self.hue * lobes::r0(eta) as f32;
+            sum += lobes::toward_one(r0, lobes::schlick_outside(cos, eta)) * self.specular_tint;
+        }
+        (sum, split.transmitted)
+    }
+
+    /// What a tracer of single rays shows of it, met at the cosine `cos` > 0: all facets smooth, without sheen.
+    #[must_use]
+    pub fn smooth(&self, cos: f64) -> SmoothParts {
+        let (reflected, transmitted) = self.reflectance(cos);
+        let clear = self.transmission;
+        SmoothParts {
+            matte: self.base * ((1.0 - clear) * (1.0 - self.crossing() as f32)),
+            reflected: reflected * clear,
+            transmitted: self.base * (clear * transmitted as f32),
+        }
     }
 
     pub(crate) fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
@@ -117,19 +143,13 @@ impl PrincipledThin {
             let facets = self.facets(!reflect);
             let seen = facets.density(m) * facets.masking(wo, m);
             let geometry = clear * seen * facets.masking(wi, m) / (4.0 * wo.z * wi.z.abs());
-            let eta = f64::from(self.eta);
-            let split = fresnel::dielectric(Model::Exact, cos_o, eta);
+            let (reflectance, transmittance) = self.reflectance(cos_o);
             let pdf_i = seen * cos_o / wo.z / (4.0 * cos_i);
             if reflect {
-                let mut reflectance = Lanes::splat((1.0 - self.specular_tint) * split.reflected as f32);
-                if self.specular_tint > 0.0 {
-                    let r0 = self.hue * lobes::r0(eta) as f32;
-                    reflectance += lobes::toward_one(r0, lobes::schlick_outside(cos_o, eta)) * self.specular_tint;
-                }
                 f += reflectance * geometry as f32;
                 pdf += choice.reflection * pdf_i;
             } else {
-                f += self.base * (split.transmitted * geometry) as f32;
+                f += self.base * (transmittance * geometry) as f32;
                 pdf += choice.transmission * pdf_i;
             }
         }

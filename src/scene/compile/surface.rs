@@ -29,7 +29,7 @@ impl<'a> Compiler<'a> {
     }
 
     /// A number, or a texture of numbers.
-    fn scalar(&mut self, at: &str, s: &'a written::NumberOrTexture) -> Scalar {
+    pub(super) fn scalar(&mut self, at: &str, s: &'a written::NumberOrTexture) -> Scalar {
         match s {
             written::NumberOrTexture::Number(x) => Scalar::Uniform(*x),
             written::NumberOrTexture::Texture(name) => self.named_numbers(&format!("{at}.texture"), name),
@@ -258,6 +258,12 @@ impl<'a> Compiler<'a> {
                 let facets = facets(m.roughness, m.distribution);
                 let tint = (!is_one(&tint)).then(|| Box::new(tint));
                 (Kind::plastic(reflectance, tint, eta, m.nonlinear, facets), m.two_sided, m.highlight)
+            }
+            written::Material::Principled(m) => {
+                (Kind::Principled(Box::new(self.principled(&place, m))), m.two_sided, None)
+            }
+            written::Material::PrincipledThin(m) => {
+                plain(Kind::PrincipledThin(Box::new(self.principled_thin(&place, m))))
             }
             written::Material::Boundary(_) => plain(Kind::Boundary),
             written::Material::Mask(m) => {

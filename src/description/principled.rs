@@ -1,0 +1,348 @@
+//! Burley's principled surfaces as they are written.
+
+use serde::Deserialize;
+
+use super::compound::NumberOrTexture;
+use super::fault::Checker;
+use super::path::At;
+use super::spectrum::{Role, Spectrum, SpectrumOrTexture};
+
+/// `principled: {base_color: SPECTRUM_OR_TEXTURE, roughness: 0.5, metallic: 0, …}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "WrittenPrincipled")]
+pub struct Principled {
+    /// The colour of the diffuse lobe, the metal and the body; default 0.5.
+    pub base_color: SpectrumOrTexture,
+    /// √α of the facets, default 0.5.
+    pub roughness: NumberOrTexture,
+    /// 0 to 1; default 0.
+    pub anisotropic: NumberOrTexture,
+    /// From dielectric to metal, 0 to 1; default 0.
+    pub metallic: NumberOrTexture,
+    /// From diffuse to clear, 0 to 1; default none.
+    pub spec_trans: Option<NumberOrTexture>,
+    /// Contrast of the interface; default a `specular` of 0.5.
+    pub contrast: Contrast,
+    /// Share of the dielectric reflection that is tinted, 0 to 1; default 0.
+    pub spec_tint: NumberOrTexture,
+    /// Default 0.
+    pub sheen: NumberOrTexture,
+    /// Share of it that is tinted, 0 to 1; default 0.
+    pub sheen_tint: NumberOrTexture,
+    /// From diffuse to the shape of subsurface scattering, 0 to 1; default 0.
+    pub flatness: NumberOrTexture,
+    /// Default 0.
+    pub clearcoat: NumberOrTexture,
+    /// 0 to 1; default 0.
+    pub clearcoat_gloss: NumberOrTexture,
+    /// What the base colour is divided by for a tint; default `colour`.
+    pub luminance: Luminance,
+    /// How often the lobes are sampled.
+    pub sampling: Sampling,
+    /// Whether the back reflects like the front; default where nothing is transmitted.
+    pub two_sided: bool,
+}
+
+/// Contrast of an interface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Contrast {
+    /// Index inside over outside.
+    Eta(f64),
+    /// 0 to 1 for a reflectance of 0 to 0.08 along the normal.
+    Specular(f64),
+}
+
+/// What a base colour is divided by for a tint, which is to keep its hue alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Luminance {
+    /// Its luminance under D65.
+    #[default]
+    Colour,
+    /// What Mitsuba 3 takes for it in spectral modes: its tints are about 2.6 times as bright.
+    Mitsuba,
+}
+
+/// Factors on how often the lobes of a [`Principled`] are sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Sampling {
+    /// Main facets; default 1.
+    pub specular: f64,
+    /// Clear coat; default 1.
+    pub clearcoat: f64,
+    /// Default 1.
+    pub diffuse: f64,
+}
+
+impl Default for Sampling {
+    fn default() -> Sampling {
+        Sampling { specular: 1.0, clearcoat: 1.0, diffuse: 1.0 }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenPrincipled {
+    #[serde(default = "half_colour")]
+    base_color: SpectrumOrTexture,
+    #[serde(default = "half")]
+    roughness: NumberOrTexture,
+    #[serde(default = "zero")]
+    anisotropic: NumberOrTexture,
+    #[serde(default = "zero")]
+    metallic: NumberOrTexture,
+    spec_trans: Option<NumberOrTexture>,
+    eta: Option<f64>,
+    specular: Option<f64>,
+    #[serde(default = "zero")]
+    spec_tint: NumberOrTexture,
+    #[serde(default = "zero")]
+    sheen: NumberOrTexture,
+    #[serde(default = "zero")]
+    sheen_tint: NumberOrTexture,
+    #[serde(default = "zero")]
+    flatness: NumberOrTexture,
+    #[serde(default = "zero")]
+    clearcoat: NumberOrTexture,
+    #[serde(default = "zero")]
+    clearcoat_gloss: NumberOrTexture,
+    #[serde(default)]
+    luminance: Luminance,
+    #[serde(default)]
+    sampling: Sampling,
+    two_sided: Option<bool>,
+}
+
+impl TryFrom<WrittenPrincipled> for Principled {
+    type Error = String;
+
+    fn try_from(w: WrittenPrincipled) -> Result<Principled, String> {
+        let contrast = match (w.eta, w.specular) {
+            (Some(_), Some(_)) => return Err("expected either eta or specular, found both".to_owned()),
+            (Some(eta), None) => Contrast::Eta(eta),
+            (None, specular) => Contrast::Specular(specular.unwrap_or(0.5)),
+        };
+        // A surface with `spec_trans: 0` is one without.
+        let spec_trans = w.spec_trans.filter(|t| *t != zero());
+        if spec_trans.is_some() && w.two_sided == Some(true) {
+            return Err("expected two_sided: false with spec_trans, found true".to_owned());
+        }
+        Ok(Principled {
+            base_color: w.base_color,
+            roughness: w.roughness,
+            anisotropic: w.anisotropic,
+            metallic: w.metallic,
+            two_sided: w.two_sided.unwrap_or(spec_trans.is_none()),
+            spec_trans,
+            contrast,
+            spec_tint: w.spec_tint,
+            sheen: w.sheen,
+            sheen_tint: w.sheen_tint,
+            flatness: w.flatness,
+            clearcoat: w.clearcoat,
+            clearcoat_gloss: w.clearcoat_gloss,
+            luminance: w.luminance,
+            sampling: w.sampling,
+        })
+    }
+}
+
+/// `principled_thin: {base_color: SPECTRUM_OR_TEXTURE, roughness: 0.5, diff_trans: 0, …}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PrincipledThin {
+    /// The colour of the diffuse lobes and of what is transmitted; default 0.5.
+    #[serde(default = "half_colour")]
+    pub base_color: SpectrumOrTexture,
+    /// √α of the facets; default 0.5.
+    #[serde(default = "half")]
+    pub roughness: NumberOrTexture,
+    /// 0 to 1; default 0.
+    #[serde(default = "zero")]
+    pub anisotropic: NumberOrTexture,
+    /// From diffuse to clear, 0 to 1; default 0.
+    #[serde(default = "zero")]
+    pub spec_trans: NumberOrTexture,
+    /// How much of the diffuse light crosses the sheet, 0 to 2: all; default 0.
+    #[serde(default = "zero")]
+    pub diff_trans: NumberOrTexture,
+    /// Index of the sheet over that around it; default 1.5.
+    #[serde(default = "index")]
+    pub eta: NumberOrTexture,
+    /// Share of the reflection that is tinted, 0 to 1; default 0.
+    #[serde(default = "zero")]
+    pub spec_tint: NumberOrTexture,
+    /// Default 0.
+    #[serde(default = "zero")]
+    pub sheen: NumberOrTexture,
+    /// Share of it that is tinted, 0 to 1; default 0.
+    #[serde(default = "zero")]
+    pub sheen_tint: NumberOrTexture,
+    /// From diffuse to the shape of subsurface scattering, 0 to 1; default 0.
+    #[serde(default = "zero")]
+    pub flatness: NumberOrTexture,
+    /// What the base colour is divided by for a tint; default `colour`.
+    #[serde(default)]
+    pub luminance: Luminance,
+    /// How often the lobes are sampled.
+    #[serde(default)]
+    pub sampling: ThinSampling,
+}
+
+/// Factors on how often the lobes of a [`PrincipledThin`] are sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ThinSampling {
+    /// Facets that reflect; default 1.
+    pub reflection: f64,
+    /// Facets that transmit; default 1.
+    pub transmission: f64,
+    /// Default 1.
+    pub diffuse_reflection: f64,
+    /// Default 1.
+    pub diffuse_transmission: f64,
+}
+
+impl Default for ThinSampling {
+    fn default() -> ThinSampling {
+        ThinSampling { reflection: 1.0, transmission: 1.0, diffuse_reflection: 1.0, diffuse_transmission: 1.0 }
+    }
+}
+
+fn half_colour() -> SpectrumOrTexture {
+    SpectrumOrTexture::Spectrum(Spectrum::Number(0.5))
+}
+
+fn half() -> NumberOrTexture {
+    NumberOrTexture::Number(0.5)
+}
+
+fn zero() -> NumberOrTexture {
+    NumberOrTexture::Number(0.0)
+}
+
+fn index() -> NumberOrTexture {
+    NumberOrTexture::Number(1.5)
+}
+
+impl Principled {
+    pub(crate) fn check<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
+        self.base_color.check(Role::Reflectance, at.key("base_color"), checker);
+        let shares = [
+            ("anisotropic", Some(&self.anisotropic)),
+            ("metallic", Some(&self.metallic)),
+            ("spec_trans", self.spec_trans.as_ref()),
+            ("spec_tint", Some(&self.spec_tint)),
+            ("sheen_tint", Some(&self.sheen_tint)),
+            ("flatness", Some(&self.flatness)),
+            ("clearcoat_gloss", Some(&self.clearcoat_gloss)),
+        ];
+        for (key, share) in shares {
+            if let Some(share) = share {
+                share.check(1.0, at.key(key), checker);
+            }
+        }
+        for (key, strength) in [("roughness", &self.roughness), ("sheen", &self.sheen), ("clearcoat", &self.clearcoat)]
+        {
+            strength.check(f64::INFINITY, at.key(key), checker);
+        }
+        match self.contrast {
+            Contrast::Eta(eta) => checker.positive(at.key("eta"), eta),
+            Contrast::Specular(s) => {
+                checker.require((0.0..=1.0).contains(&s), at.key("specular"), "a number from 0 to 1", s);
+            }
+        }
+        let at = at.key("sampling");
+        let Sampling { specular, clearcoat, diffuse } = self.sampling;
+        for (key, rate) in [("specular", specular), ("clearcoat", clearcoat), ("diffuse", diffuse)] {
+            checker.not_negative(at.key(key), rate);
+        }
+    }
+}
+
+impl PrincipledThin {
+    pub(crate) fn check<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
+        self.base_color.check(Role::Reflectance, at.key("base_color"), checker);
+        let ranges = [
+            ("roughness", &self.roughness, f64::INFINITY),
+            ("anisotropic", &self.anisotropic, 1.0),
+            ("spec_trans", &self.spec_trans, 1.0),
+            ("diff_trans", &self.diff_trans, 2.0),
+            ("eta", &self.eta, f64::INFINITY),
+            ("spec_tint", &self.spec_tint, 1.0),
+            ("sheen", &self.sheen, f64::INFINITY),
+            ("sheen_tint", &self.sheen_tint, 1.0),
+            ("flatness", &self.flatness, 1.0),
+        ];
+        for (key, number, most) in ranges {
+            number.check(most, at.key(key), checker);
+        }
+        if let NumberOrTexture::Number(eta) = self.eta {
+            checker.positive(at.key("eta"), eta);
+        }
+        let at = at.key("sampling");
+        let ThinSampling { reflection, transmission, diffuse_reflection, diffuse_transmission } = self.sampling;
+        for (key, rate) in [
+            ("reflection", reflection),
+            ("transmission", transmission),
+            ("diffuse_reflection", diffuse_reflection),
+            ("diffuse_transmission", diffuse_transmission),
+        ] {
+            checker.not_negative(at.key(key), rate);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{faults, scene};
+    use super::super::{Contrast, Material, NumberOrTexture};
+
+    fn material(text: &str) -> Material {
+        scene(&format!("materials:\n  m: {{{text}}}\n")).materials.remove("m").unwrap()
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_reference() {
+        let Material::Principled(m) = material("principled: {}") else { panic!("principled") };
+        assert_eq!(m.contrast, Contrast::Specular(0.5));
+        assert_eq!((m.roughness, m.spec_trans, m.two_sided), (NumberOrTexture::Number(0.5), None, true));
+        let Material::Principled(m) = material("principled: {spec_trans: 0.5, eta: 1.3}") else { panic!("principled") };
+        assert_eq!((m.contrast, m.two_sided), (Contrast::Eta(1.3), false));
+        let Material::Principled(m) = material("principled: {spec_trans: 0}") else { panic!("principled") };
+        assert_eq!((m.spec_trans, m.two_sided), (None, true));
+        let Material::PrincipledThin(m) = material("principled_thin: {}") else { panic!("principled_thin") };
+        assert_eq!(m.eta, NumberOrTexture::Number(1.5));
+    }
+
+    #[test]
+    fn what_does_not_go_together_is_refused() {
+        for (text, message) in [
+            (
+                "{eta: 1.5, specular: 0.5}",
+                "dir/s.yaml:3:19: materials.m.principled: expected either eta or specular, found both",
+            ),
+            (
+                "{spec_trans: 1, two_sided: true}",
+                "dir/s.yaml:3:19: materials.m.principled: expected two_sided: false with spec_trans, found true",
+            ),
+            ("{eta: 0}", "dir/s.yaml:3:25: materials.m.principled.eta: expected a number greater than 0, found 0"),
+            (
+                "{metallic: 2}",
+                "dir/s.yaml:3:30: materials.m.principled.metallic: expected a number from 0 to 1, found 2",
+            ),
+            (
+                "{sampling: {diffuse: -1}}",
+                "dir/s.yaml:3:40: materials.m.principled.sampling.diffuse: expected a number of 0 or more, found -1",
+            ),
+        ] {
+            assert_eq!(faults(&format!("materials:\n  m: {{principled: {text}}}")), message);
+        }
+        assert_eq!(
+            faults("materials:\n  m: {principled_thin: {diff_trans: 3, spec_trans: {texture: no}}}"),
+            "dir/s.yaml:3:37: materials.m.principled_thin.diff_trans: expected a number from 0 to 2, found 3\n\
+             dir/s.yaml:3:62: materials.m.principled_thin.spec_trans.texture: unknown texture \"no\"; the scene defines none"
+        );
+    }
+}

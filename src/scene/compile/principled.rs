@@ -1,0 +1,77 @@
+//! Principled surfaces, from what a person wrote.
+
+use super::Compiler;
+use crate::description as written;
+use crate::optics::principled::{Rates, ThinRates, index_of_eta, index_of_specular};
+use crate::scene::principled::{Luminance, Solid, Thin};
+use crate::scene::texture::{Scalar, Texture};
+
+impl<'a> Compiler<'a> {
+    pub(super) fn principled(&mut self, place: &str, m: &'a written::Principled) -> Solid {
+        let base = self.reflectance_texture(&format!("{place}.base_color"), &m.base_color);
+        let mut number = |key: &str, s: &'a written::NumberOrTexture| self.scalar(&format!("{place}.{key}"), s);
+        let transmission = m.spec_trans.as_ref().map(|s| number("spec_trans", s));
+        let specular_tint = number("spec_tint", &m.spec_tint);
+        let sheen_tint = number("sheen_tint", &m.sheen_tint);
+        Solid {
+            luminance: luminance(m.luminance, &base, [&specular_tint, &sheen_tint]),
+            base,
+            eta: match m.contrast {
+                written::Contrast::Eta(eta) => index_of_eta(eta, transmission.is_some()),
+                written::Contrast::Specular(specular) => index_of_specular(specular, transmission.is_some()),
+            },
+            roughness: number("roughness", &m.roughness),
+            anisotropic: number("anisotropic", &m.anisotropic),
+            metallic: number("metallic", &m.metallic),
+            transmission,
+            specular_tint,
+            sheen: number("sheen", &m.sheen),
+            sheen_tint,
+            flatness: number("flatness", &m.flatness),
+            clearcoat: number("clearcoat", &m.clearcoat),
+            clearcoat_gloss: number("clearcoat_gloss", &m.clearcoat_gloss),
+            rates: Rates {
+                specular: m.sampling.specular as f32,
+                clearcoat: m.sampling.clearcoat as f32,
+                diffuse: m.sampling.diffuse as f32,
+            },
+        }
+    }
+
+    pub(super) fn principled_thin(&mut self, place: &str, m: &'a written::PrincipledThin) -> Thin {
+        let base = self.reflectance_texture(&format!("{place}.base_color"), &m.base_color);
+        let mut number = |key: &str, s: &'a written::NumberOrTexture| self.scalar(&format!("{place}.{key}"), s);
+        let specular_tint = number("spec_tint", &m.spec_tint);
+        let sheen_tint = number("sheen_tint", &m.sheen_tint);
+        Thin {
+            luminance: luminance(m.luminance, &base, [&specular_tint, &sheen_tint]),
+            base,
+            eta: number("eta", &m.eta),
+            roughness: number("roughness", &m.roughness),
+            anisotropic: number("anisotropic", &m.anisotropic),
+            transmission: number("spec_trans", &m.spec_trans),
+            diffuse_transmission: number("diff_trans", &m.diff_trans),
+            specular_tint,
+            sheen: number("sheen", &m.sheen),
+            sheen_tint,
+            flatness: number("flatness", &m.flatness),
+            rates: ThinRates {
+                reflection: m.sampling.reflection as f32,
+                transmission: m.sampling.transmission as f32,
+                diffuse_reflection: m.sampling.diffuse_reflection as f32,
+                diffuse_transmission: m.sampling.diffuse_transmission as f32,
+            },
+        }
+    }
+}
+
+/// The luminance that tints need, if there are any.
+fn luminance(written: written::Luminance, base: &Texture, tints: [&Scalar; 2]) -> Luminance {
+    if tints.iter().all(|tint| matches!(tint, Scalar::Uniform(0.0))) {
+        return Luminance::Unused;
+    }
+    match written {
+        written::Luminance::Colour => Luminance::of(base),
+        written::Luminance::Mitsuba => Luminance::Packet,
+    }
+}
