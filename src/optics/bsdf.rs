@@ -2,6 +2,7 @@
 
 use super::dielectric::{Dielectric, RoughDielectric, Tint};
 use super::fresnel::{self, Model};
+use super::hair::Hair;
 use super::mean;
 use super::microfacet::Microfacets;
 use super::plastic::{Plastic, RoughPlastic};
@@ -47,6 +48,8 @@ pub enum Bsdf {
     Principled(Principled),
     /// Burley's surface of a sheet.
     PrincipledThin(PrincipledThin),
+    /// A fibre of hair.
+    Hair(Hair),
     /// No interface: the boundary of a medium only.
     Null,
 }
@@ -142,7 +145,8 @@ impl Bsdf {
             | Bsdf::Plastic(_)
             | Bsdf::RoughPlastic(_)
             | Bsdf::Principled(_)
-            | Bsdf::PrincipledThin(_) => false,
+            | Bsdf::PrincipledThin(_)
+            | Bsdf::Hair(_) => false,
         }
     }
 
@@ -162,6 +166,7 @@ impl Bsdf {
             Bsdf::RoughPlastic(plastic) => plastic.eval(wo, wi),
             Bsdf::Principled(surface) => surface.eval(wo, wi),
             Bsdf::PrincipledThin(sheet) => sheet.eval(wo, wi),
+            Bsdf::Hair(hair) => hair.eval(wo, wi),
             Bsdf::Mirror { .. } | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::Thin { .. } | Bsdf::Null => {
                 Evaluation::NONE
             }
@@ -211,6 +216,7 @@ impl Bsdf {
             Bsdf::RoughPlastic(plastic) => plastic.sample(wo, u_lobe, u),
             Bsdf::Principled(surface) => surface.sample(wo, u_lobe, u),
             Bsdf::PrincipledThin(sheet) => sheet.sample(wo, u_lobe, u),
+            Bsdf::Hair(hair) => hair.sample(wo, u_lobe, u),
             Bsdf::Null => Some(BsdfSample { transmitted: true, ..BsdfSample::discrete(-wo, Lanes::ONE) }),
         }
     }

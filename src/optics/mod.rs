@@ -12,6 +12,7 @@
 pub mod bsdf;
 pub mod dielectric;
 pub mod fresnel;
+pub mod hair;
 pub mod medium;
 pub mod microfacet;
 pub mod phase;
