@@ -6,7 +6,7 @@ use super::object::{Bag, Family};
 use super::spectra::Role;
 use super::{Fields, Import, boolean, number, text};
 
-const BSDFS: [&str; 11] = [
+const BSDFS: [&str; 13] = [
     "diffuse",
     "dielectric",
     "thindielectric",
@@ -16,6 +16,8 @@ const BSDFS: [&str; 11] = [
     "roughconductor",
     "plastic",
     "roughplastic",
+    "principled",
+    "principledthin",
     "null",
     "twosided",
 ];
@@ -116,6 +118,8 @@ impl Import<'_> {
                 "plastic"
             }
             "null" => "boundary",
+            "principled" => return self.principled(&bag, sides),
+            "principledthin" => return self.principled_thin(&bag, sides),
             "twosided" => return self.twosided(&bag),
             _ => return Err(bag.unknown(BSDFS)),
         };
@@ -132,7 +136,7 @@ impl Import<'_> {
 }
 
 /// Glass has two sides of its own.
-fn transparent(bag: &Bag<'_>, sides: Sides) -> Result<(), Fault> {
+pub(super) fn transparent(bag: &Bag<'_>, sides: Sides) -> Result<(), Fault> {
     match sides {
         Sides::Front => Ok(()),
         Sides::Both => Err(bag.fault("expected a surface that lets no light through inside <twosided>")),

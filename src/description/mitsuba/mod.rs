@@ -23,6 +23,7 @@ mod media;
 mod metals;
 mod object;
 mod parse;
+mod principled;
 mod sensors;
 mod shapes;
 mod spectra;

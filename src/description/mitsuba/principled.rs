@@ -1,0 +1,114 @@
+//! Principled surfaces.
+
+use super::super::fault::Fault;
+use super::super::node::Node;
+use super::bsdfs::{Sides, transparent};
+use super::object::Bag;
+use super::spectra::Role;
+use super::{Fields, Import, boolean, number, text};
+
+/// Factors on how often a lobe is sampled: Mitsuba's name and ours.
+type Rates = [(&'static str, &'static str)];
+
+impl Import<'_> {
+    pub(super) fn principled(&mut self, bag: &Bag<'_>, sides: Sides) -> Result<Node, Fault> {
+        let mut fields = Fields::new(bag.object.place);
+        self.principled_numbers(
+            bag,
+            &mut fields,
+            &[
+                "roughness",
+                "anisotropic",
+                "metallic",
+                "spec_trans",
+                "spec_tint",
+                "sheen",
+                "sheen_tint",
+                "flatness",
+                "clearcoat",
+                "clearcoat_gloss",
+            ],
+        )?;
+        if bag.has("eta") && bag.has("specular") {
+            return Err(bag.fault("expected either eta or specular, found both"));
+        }
+        for name in ["eta", "specular"] {
+            fields.maybe(name, bag.float(name)?.map(|value| number(bag.place(name), value)));
+        }
+        rates(
+            bag,
+            &mut fields,
+            &[
+                ("main_specular_sampling_rate", "specular"),
+                ("clearcoat_sampling_rate", "clearcoat"),
+                ("diffuse_reflectance_sampling_rate", "diffuse"),
+            ],
+        )?;
+        fields.add("two_sided", boolean(bag.object.place, sides == Sides::Both));
+        bag.finish()?;
+        Ok(fields.kind("principled"))
+    }
+
+    pub(super) fn principled_thin(&mut self, bag: &Bag<'_>, sides: Sides) -> Result<Node, Fault> {
+        transparent(bag, sides)?;
+        let mut fields = Fields::new(bag.object.place);
+        self.principled_numbers(
+            bag,
+            &mut fields,
+            &[
+                "roughness",
+                "anisotropic",
+                "spec_trans",
+                "diff_trans",
+                "eta",
+                "spec_tint",
+                "sheen",
+                "sheen_tint",
+                "flatness",
+            ],
+        )?;
+        rates(
+            bag,
+            &mut fields,
+            &[
+                ("specular_reflectance_sampling_rate", "reflection"),
+                ("specular_transmittance_sampling_rate", "transmission"),
+                ("diffuse_reflectance_sampling_rate", "diffuse_reflection"),
+                ("diffuse_transmittance_sampling_rate", "diffuse_transmission"),
+            ],
+        )?;
+        bag.finish()?;
+        Ok(fields.kind("principled_thin"))
+    }
+
+    /// The base colour, numbers that have the same name in both grammars, and whose luminance a tint is
+    /// divided by.
+    fn principled_numbers(&mut self, bag: &Bag<'_>, fields: &mut Fields, names: &[&'static str]) -> Result<(), Fault> {
+        fields.maybe("base_color", self.spectrum_or_texture(bag, "base_color", Role::Reflectance)?);
+        for &name in names {
+            fields.maybe(name, self.spectrum_or_texture(bag, name, Role::Coefficient)?);
+        }
+        // A tint is the base colour over a luminance that Mitsuba's spectral modes take from the path's own
+        // four wavelengths: 0.38 for white. The picture is to be the same.
+        if bag.has("spec_tint") || bag.has("sheen_tint") {
+            fields.add("luminance", text(bag.object.place, "mitsuba"));
+        }
+        Ok(())
+    }
+}
+
+/// How often the lobes are sampled.
+fn rates(bag: &Bag<'_>, fields: &mut Fields, rates: &Rates) -> Result<(), Fault> {
+    let mut sampling = Fields::new(bag.object.place);
+    let mut any = false;
+    for &(theirs, ours) in rates {
+        if let Some(rate) = bag.float(theirs)? {
+            sampling.add(ours, number(bag.place(theirs), rate));
+            any = true;
+        }
+    }
+    if any {
+        fields.add("sampling", sampling.map());
+    }
+    Ok(())
+}
