@@ -5,7 +5,6 @@ use crate::error::{Error, Result};
 use crate::film::exr;
 use crate::spectrum::{colour, upsample};
 use rayon::prelude::*;
-use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -94,29 +93,49 @@ pub fn image_texture(path: &Path, raw: bool) -> Result<ImageTexture> {
                 format!("expected reflectances from 0 to 1, found {found:?} at ({x}, {y})"),
             ));
         }
-        let texel = |&rgb: &[f32; 3]| Texel { coefficients: upsample::coefficients(rgb), scale: 1.0 };
-        return Ok(make(picture.pixels.iter().map(texel).collect(), picture.width, picture.height));
+        let texels = picture.pixels.par_iter().map(|&rgb| reflectance_texel(rgb)).collect();
+        return Ok(make(texels, picture.width, picture.height));
     }
-    let rgb = decode(path)?.into_rgb16();
-    let decode = |x: u16| {
-        let x = f32::from(x) / 65535.0;
-        if raw { x } else { colour::srgb_decode(x) }
+    let decoded = decode(path)?;
+    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+    use image::ColorType::{L8, La8, Rgb8, Rgba8};
+    let texels = if matches!(decoded.color(), L8 | La8 | Rgb8 | Rgba8) {
+        let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };
+        upsampled_bytes(decoded.into_rgb8().as_raw(), &level)
+    } else {
+        let level = |x: u16| {
+            let x = f32::from(x) / 65535.0;
+            if raw { x } else { colour::srgb_decode(x) }
+        };
+        let rgb = decoded.into_rgb16();
+        rgb.as_raw().par_chunks_exact(3).map(|p| reflectance_texel([level(p[0]), level(p[1]), level(p[2])])).collect()
     };
-    // Many texels share a colour: each colour is upsampled once.
-    let mut known: HashMap<[u16; 3], u32> = HashMap::new();
-    let mut colours: Vec<[u16; 3]> = Vec::new();
-    let indices: Vec<u32> = rgb
-        .pixels()
-        .map(|p| {
-            *known.entry(p.0).or_insert_with(|| {
-                colours.push(p.0);
-                colours.len() as u32 - 1
-            })
-        })
-        .collect();
-    let upsampled: Vec<[f32; 3]> = colours.par_iter().map(|c| upsample::coefficients(c.map(decode))).collect();
-    let texels = indices.iter().map(|&i| Texel { coefficients: upsampled[i as usize], scale: 1.0 }).collect();
-    Ok(make(texels, rgb.width() as usize, rgb.height() as usize))
+    Ok(make(texels, width, height))
+}
+
+fn reflectance_texel(rgb: [f32; 3]) -> Texel {
+    Texel { coefficients: upsample::coefficients(rgb), scale: 1.0 }
+}
+
+/// Texels of pixels (red, green, blue in turn) of the given levels. Many share a colour: each is upsampled
+/// once.
+fn upsampled_bytes(pixels: &[u8], level: &[f32; 256]) -> Vec<Texel> {
+    // For each of the 2²⁴ colours its number among those met so far, from 1; only the pages that hold a colour
+    // of the picture become memory.
+    let mut number = vec![0u32; 1 << 24];
+    let mut colours: Vec<[u8; 3]> = Vec::new();
+    let key = |p: &[u8]| usize::from(p[0]) << 16 | usize::from(p[1]) << 8 | usize::from(p[2]);
+    for p in pixels.chunks_exact(3) {
+        let number = &mut number[key(p)];
+        if *number == 0 {
+            colours.push([p[0], p[1], p[2]]);
+            *number = colours.len() as u32;
+        }
+    }
+    let texel = |c: &[u8; 3]| reflectance_texel(c.map(|x| level[usize::from(x)]));
+    let upsampled: Vec<Texel> = colours.par_iter().with_min_len(256).map(texel).collect();
+    let numbered = |p: &[u8]| upsampled[number[key(p)] as usize - 1];
+    pixels.par_chunks_exact(3).with_min_len(1 << 14).map(numbered).collect()
 }
 
 /// Reads a picture of numbers: EXR and HDR as they are, 8- and 16-bit files from 0 to 1, decoded from sRGB unless
@@ -190,6 +209,19 @@ mod tests {
         std::fs::write(&path, "400 0.1\n500 zwei\n").unwrap();
         assert_eq!(samples(&path).unwrap_err(), "line 2: expected a wavelength and a value, found \"500 zwei\"");
         assert_eq!(samples(&dir.path().join("none")).unwrap_err(), "expected a file, found none");
+    }
+
+    /// The same colour gives the same texel by both ways, and each pixel finds its own.
+    #[test]
+    fn colours_of_eight_bits_are_upsampled_once_each() {
+        let pixels = [255, 255, 255, 10, 20, 30, 0, 0, 0, 10, 20, 30, 200, 10, 99];
+        let level = colour::srgb8_table();
+        let texels = upsampled_bytes(&pixels, &level);
+        for (p, texel) in pixels.chunks_exact(3).zip(&texels) {
+            let rgb = [0, 1, 2].map(|k| colour::srgb_decode(f32::from(p[k]) / 255.0));
+            assert_eq!(texel.coefficients, upsample::coefficients(rgb), "{p:?}");
+        }
+        assert_eq!(texels.len(), 5);
     }
 
     #[test]
