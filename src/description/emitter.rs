@@ -69,12 +69,26 @@ pub struct ProjectorLight {
     /// white; W·m⁻²·sr⁻¹·nm⁻¹. Spectrum or texture; default D65 of luminance 1.
     #[serde(default = "white")]
     pub irradiance: SpectrumOrTexture,
+    /// Which way the texture's v grows; default `up`.
+    #[serde(default)]
+    pub v: Growth,
     /// Factor; default 1.
     #[serde(default = "one")]
     pub scale: f64,
     /// See [`super::PointLight::sampling_weight`].
     #[serde(default = "one")]
     pub sampling_weight: f64,
+}
+
+/// Which way a coordinate grows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Growth {
+    /// Toward the top.
+    #[default]
+    Up,
+    /// Toward the bottom: for a texture that stands on its head.
+    Down,
 }
 
 fn up() -> Vec3 {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::Deserialize;
 
-use super::emitter::{EnvironmentLight, ProjectorLight, check_weight};
+use super::emitter::{EnvironmentLight, Growth, ProjectorLight, check_weight};
 use super::fault::Checker;
 use super::material::given_fields;
 use super::path::At;
@@ -65,6 +65,8 @@ pub struct SpotLight {
     pub texture: Option<String>,
     /// What is up in that texture; default `[0, 1, 0]`.
     pub up: Option<Vec3>,
+    /// Which way its v grows; default `up`.
+    pub v: Growth,
     /// See [`PointLight::sampling_weight`].
     pub sampling_weight: f64,
 }
@@ -91,6 +93,8 @@ struct WrittenSpot {
     intensity: Spectrum,
     texture: Option<String>,
     up: Option<Vec3>,
+    #[serde(default)]
+    v: Growth,
     #[serde(default = "one")]
     sampling_weight: f64,
 }
@@ -120,6 +124,7 @@ impl TryFrom<WrittenSpot> for SpotLight {
             intensity: written.intensity,
             texture: written.texture,
             up: written.up,
+            v: written.v,
             sampling_weight: written.sampling_weight,
         })
     }

@@ -185,6 +185,7 @@
 //!     intensity: {scaled: {by: 2, of: {illuminant: D65}}}
 //!     texture: earth                # ~ none; multiplies the intensity, over the square around the edge of the light
 //!     up: [0, 0, 1]                 # ~ [0, 1, 0]: of the texture
+//!     v: up                         # ~ up, down: which way the texture's v grows
 //! - directional: {direction: [0, -1, 0], irradiance: 3}                # W·m⁻²·nm⁻¹
 //! - constant: {radiance: 0.1}                                          # W·m⁻²·sr⁻¹·nm⁻¹
 //! - environment: {file: sky.exr, scale: 1, rotate_deg: 0, mapping: texels, transform: [{scale: [-1, 1, 1]}]}
@@ -196,6 +197,7 @@
 //!     up: [0, 1, 0]                 # ~
 //!     fov_deg: 40
 //!     fov_axis: x                   # ~ as of the camera, along the sides of the image
+//!     v: up                         # ~ as of a spot
 //!     irradiance: {texture: earth}  # ~ white; over π on a screen at a distance of 1 m, W·m⁻²·nm⁻¹
 //!     scale: 1                      # ~
 //! ```
@@ -286,7 +288,7 @@ mod yaml;
 pub use batch::{Batch, BatchEntry, Document, load};
 pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection};
 pub use compound::{Blend, Brushed, Bump, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided};
-pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, ProjectorLight};
+pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, Growth, ProjectorLight};
 pub use layer::{Layer, LayerContent, LightForm, Quantity};
 pub use light::{Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, Light, PointLight, SpotLight};
 pub use material::{

@@ -113,6 +113,14 @@ impl Node {
         self.entry(key).map(|entry| &entry.node)
     }
 
+    /// [`Node::get`], to be changed.
+    pub(crate) fn get_mut(&mut self, key: &str) -> Option<&mut Node> {
+        match &mut self.value {
+            Value::Map(entries) => entries.iter_mut().find(|entry| entry.key == key).map(|entry| &mut entry.node),
+            _ => None,
+        }
+    }
+
     /// The place of the node at `path`, or of the nearest node around it.
     pub(crate) fn locate(&self, path: &[Segment]) -> Place {
         let mut node = self;

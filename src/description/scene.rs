@@ -346,6 +346,7 @@ mod tests {
                 }),
                 texture: Some(text("earth")),
                 up: Some([0.0, 0.0, 1.0]),
+                v: Growth::Up,
                 sampling_weight: 1.0,
             })
         );

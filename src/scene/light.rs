@@ -77,8 +77,9 @@ pub struct Slide {
     pub texture: Texture,
     /// Columns: right on the picture, up, the axis.
     pub axes: DMat3,
-    /// Half its side at distance one: the tangent of the cutoff.
-    pub half: f64,
+    /// From its middle to where u and v are one, at distance one: the tangent of the cutoff, and that or its
+    /// negative.
+    pub half: DVec2,
 }
 
 impl Slide {

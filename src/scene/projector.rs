@@ -14,7 +14,7 @@ pub struct Projector {
     position: DVec3,
     /// Columns: right on the picture, up, the way it shines. Unit, at right angles.
     axes: DMat3,
-    /// Half the width and height of the picture at distance one.
+    /// From the middle of the picture to where u and v are one, at distance one; may be negative.
     half: DVec2,
     /// Irradiance over π of a screen across the axis at a distance of one metre, as it varies over the
     /// picture.
@@ -23,7 +23,8 @@ pub struct Projector {
 }
 
 impl Projector {
-    /// A projector that throws a picture `half` wide and high, to each side, at distance one.
+    /// A projector that throws a picture `half` wide and high, to each side, at distance one. With a negative
+    /// height v grows downward.
     #[must_use]
     pub fn new(world_from_projector: DAffine3, half: DVec2, irradiance: Texture, scale: f64) -> Projector {
         let (axes, position) = (world_from_projector.matrix3, world_from_projector.translation);
@@ -77,7 +78,7 @@ impl Projector {
     pub fn power(&self) -> f64 {
         let all = self.irradiance.representatives();
         let mean = all.iter().map(Spectrum::luminance).sum::<f64>() / all.len() as f64;
-        4.0 * self.half.x * self.half.y * PI * f64::from(self.scale) * mean
+        4.0 * (self.half.x * self.half.y).abs() * PI * f64::from(self.scale) * mean
     }
 
     /// Spectra of its light.

@@ -204,7 +204,7 @@ fn size(bag: &Bag<'_>) -> Result<[i64; 2], Fault> {
 }
 
 /// Degrees and the axis along which they are measured.
-fn field_of_view(bag: &Bag<'_>) -> Result<(f64, &'static str), Fault> {
+pub(super) fn field_of_view(bag: &Bag<'_>) -> Result<(f64, &'static str), Fault> {
     let fov = bag.float("fov")?;
     let axis = bag.choice("fov_axis", &["x", "y", "diagonal", "smaller", "larger"])?;
     let focal_length = bag.text("focal_length")?;

@@ -86,7 +86,7 @@ impl Import<'_> {
         };
         fields.add("material", material);
         if let Some(emitter) = emitter {
-            fields.add("emission", self.area(emitter)?);
+            self.emission(emitter, fields)?;
         }
         self.sides(bag, fields)?;
         if let Some(id) = &bag.object.id {

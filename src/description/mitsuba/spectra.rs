@@ -90,6 +90,14 @@ impl Import<'_> {
     ) -> Result<Option<Node>, Fault> {
         if let Some(Value::Object(index)) = bag.value(name)
             && bag.document.objects[*index].family == Family::Texture
+            && bag.document.objects[*index].plugin == "d65"
+            && let Some(texture) = self.lit_texture(*index)?
+        {
+            let place = bag.place(name);
+            return Ok(Some(entry(place, "texture", text(place, texture))));
+        }
+        if let Some(Value::Object(index)) = bag.value(name)
+            && bag.document.objects[*index].family == Family::Texture
             && !SPECTRA.contains(&bag.document.objects[*index].plugin.as_str())
         {
             let place = bag.place(name);
@@ -97,6 +105,33 @@ impl Import<'_> {
             return Ok(Some(entry(place, "texture", text(place, texture))));
         }
         self.spectrum(bag, name, role)
+    }
+
+    /// The picture within a `d65`, under a name of its own, as light of D65; `None` where there is none.
+    fn lit_texture(&mut self, index: usize) -> Result<Option<String>, Fault> {
+        if let Some(name) = self.names.get(&index) {
+            return Ok(Some(name.clone()));
+        }
+        let bag = self.bag(index);
+        let Some(nested) = bag.only(Family::Texture)? else { return Ok(None) };
+        let place = bag.object.place;
+        let scale = bag.float("scale")?.unwrap_or(1.0);
+        bag.finish()?;
+        let plain = self.declare_texture(nested)?;
+        let mut picture = self.textures.iter().find(|entry| entry.key == plain).map(|entry| entry.node.clone());
+        let illuminant = picture.as_mut().and_then(|node| node.get_mut("image")).and_then(|n| n.get_mut("illuminant"));
+        let Some(illuminant) = illuminant else {
+            return Err(bag.fault("expected a bitmap inside, found another texture"));
+        };
+        let mut fields = Fields::new(place);
+        fields.add("name", text(place, "D65"));
+        fields.add("scale", number(place, scale / FILM));
+        *illuminant = fields.map();
+        let name = self.name_for(index);
+        if let Some(picture) = picture {
+            self.textures.push(self.entry(index, &name, picture));
+        }
+        Ok(Some(name))
     }
 
     /// A `<spectrum type="…">`; `None` where the plugin varies over the surface.

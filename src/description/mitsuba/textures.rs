@@ -59,6 +59,8 @@ fn bitmap(bag: &Bag<'_>) -> Result<Node, Fault> {
     if let Some(wrap) = bag.choice("wrap_mode", &["repeat", "mirror", "clamp"])? {
         fields.add("wrap", text(bag.place("wrap_mode"), wrap));
     }
+    // As light it is its own spectrum, not a colour under D65.
+    fields.add("illuminant", text(bag.object.place, "E"));
     if let Some(raw) = bag.boolean("raw")? {
         fields.add("raw", boolean(bag.place("raw"), raw));
     }

@@ -123,7 +123,8 @@ impl<'a> Compiler<'a> {
                     return None;
                 };
                 let texture = self.named_texture(&format!("{at}.texture"), name);
-                Some(Box::new(Slide { texture, axes: world_from_spot.matrix3, half: libm::tan(cutoff) }))
+                let half = libm::tan(cutoff) * DVec2::new(1.0, growth(l.v));
+                Some(Box::new(Slide { texture, axes: world_from_spot.matrix3, half }))
             }
         };
         let intensity = self.light_spectrum(&format!("{at}.intensity"), &l.intensity);
@@ -145,8 +146,17 @@ impl<'a> Compiler<'a> {
         else {
             return None;
         };
-        let half = DVec2::new(half_width, half_width * f64::from(resolution[1]) / f64::from(resolution[0]));
+        let half_height = half_width * f64::from(resolution[1]) / f64::from(resolution[0]);
+        let half = DVec2::new(half_width, half_height * growth(l.v));
         Some(Light::Projector(Box::new(Projector::new(world_from_projector, half, irradiance, l.scale))))
+    }
+}
+
+/// The sign with which v goes up.
+fn growth(v: written::Growth) -> f64 {
+    match v {
+        written::Growth::Up => 1.0,
+        written::Growth::Down => -1.0,
     }
 }
 
