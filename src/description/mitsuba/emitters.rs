@@ -7,7 +7,7 @@ use super::super::node::Node;
 use super::object::{Bag, Family};
 use super::sensors::field_of_view;
 use super::spectra::Role;
-use super::{FILM, Fields, Import, entry, list, matrix, number, numbers, text};
+use super::{DAYLIGHT, Fields, Import, entry, list, matrix, number, numbers, text};
 
 const EMITTERS: [&str; 6] = ["point", "constant", "envmap", "spot", "directional", "projector"];
 
@@ -136,7 +136,7 @@ fn envmap(bag: &Bag<'_>, fields: &mut Fields) -> Result<&'static str, Fault> {
     let file = bag.required("filename", bag.file("filename"))?;
     fields.add("file", text(bag.place("filename"), file));
     let scale = bag.float("scale")?.unwrap_or(1.0);
-    fields.add("scale", number(bag.place("scale"), scale / FILM));
+    fields.add("scale", number(bag.place("scale"), scale * DAYLIGHT));
     // How it is sampled.
     bag.boolean("mis_compensation")?;
     fields.add("mapping", text(bag.object.place, "mitsuba"));
@@ -170,4 +170,74 @@ fn rigid(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
 /// What is not written shines like D65 of luminance 1.
 fn one(bag: &Bag<'_>) -> Node {
     super::spectra::d65(bag.object.place, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{EmissionDirection, EnvironmentMapping, Growth, Light, SpectrumOrTexture, Texture};
+    use super::super::tests::{fault, good};
+    use super::*;
+
+    #[test]
+    fn a_slide_stands_as_mitsuba_has_it() {
+        // Along +z from (1, 2, 3) with +y up.
+        let place = "<transform name=\"to_world\"><translate x=\"1\" y=\"2\" z=\"3\"/></transform>\
+                     <texture type=\"bitmap\" name=\"NAME\"><string name=\"filename\" value=\"a.png\"/></texture>";
+        let spot = format!("<emitter type=\"spot\">{}</emitter>", place.replace("NAME", "texture"));
+        let projector = format!(
+            "<emitter type=\"projector\"><float name=\"fov\" value=\"30\"/>{}</emitter>",
+            place.replace("NAME", "irradiance")
+        );
+        let scene = good(&(spot + &projector));
+        let Light::Spot(spot) = &scene.lights[0] else { panic!("a spot") };
+        assert_eq!((spot.up, spot.v, spot.axis()), (Some([0.0, -1.0, 0.0]), Growth::Down, DVec3::Z));
+        let Light::Projector(projector) = &scene.lights[1] else { panic!("a projector") };
+        assert_eq!((projector.up, projector.v, projector.fov_deg), ([0.0, 1.0, 0.0], Growth::Down, 30.0));
+        assert_eq!((projector.origin, projector.target), ([1.0, 2.0, 3.0], [1.0, 2.0, 4.0]));
+    }
+
+    #[test]
+    fn pictures_shine_as_they_are_and_within_d65_as_daylight() {
+        let bitmap = "<texture type=\"bitmap\" name=\"NAME\"><string name=\"filename\" value=\"a.png\"/></texture>";
+        let plain = bitmap.replace("NAME", "radiance");
+        let lit = format!(
+            "<spectrum type=\"d65\" name=\"radiance\"><float name=\"scale\" value=\"3\"/>{}</spectrum>",
+            bitmap.replace("NAME", "picture")
+        );
+        for (radiance, name, scale) in [(plain, "E", 1.0), (lit, "D65", 3.0 * DAYLIGHT)] {
+            let scene = good(&format!("<shape type=\"sphere\"><emitter type=\"area\">{radiance}</emitter></shape>"));
+            let Some(SpectrumOrTexture::Texture(texture)) = &scene.shapes[0].emission else { panic!("a texture") };
+            let Texture::Image(image) = &scene.textures[texture] else { panic!("an image") };
+            let illuminant = image.illuminant.clone().unwrap();
+            assert_eq!((illuminant.name.as_str(), illuminant.scale), (name, scale));
+        }
+    }
+
+    #[test]
+    fn environments_turn_and_are_mapped_with_rows_at_the_poles() {
+        let map = |transform: &str| {
+            format!(
+                "<emitter type=\"envmap\"><string name=\"filename\" value=\"a.exr\"/>\
+                     <float name=\"sampling_weight\" value=\"0\"/><transform name=\"to_world\">{transform}</transform></emitter>"
+            )
+        };
+        let scene = good(&map("<rotate x=\"1\" angle=\"90\"/><translate x=\"7\"/>"));
+        let Light::Environment(light) = &scene.lights[0] else { panic!("an environment") };
+        assert_eq!((light.mapping, light.sampling_weight), (EnvironmentMapping::Mitsuba, 0.0));
+        assert!((light.world_from_map() * DVec3::Y - DVec3::Z).length() < 1e-15);
+        assert!(fault(&map("<scale x=\"2\"/>"), &[]).contains("expected turns, mirrors and even scaling"));
+    }
+
+    #[test]
+    fn what_a_shape_sends_out_goes_all_over_or_along_its_normals() {
+        let shape = |kind: &str| format!("<shape type=\"disk\"><emitter type=\"{kind}\"/></shape>");
+        let scene = good(&(shape("area") + &shape("directionalarea")));
+        assert_eq!(scene.shapes[0].emission_direction, None);
+        assert_eq!(scene.shapes[1].emission_direction, Some(EmissionDirection::Normal));
+        assert!(fault(&shape("point"), &[]).contains("expected a emitter that Abbe has (area, directionalarea)"));
+        assert!(fault("<emitter type=\"area\"/>", &[]).contains("expected a <shape> around it, found it alone"));
+        let mirrored =
+            "<emitter type=\"projector\"><transform name=\"to_world\"><scale x=\"-1\"/></transform></emitter>";
+        assert!(fault(mirrored, &[]).contains("expected turns and moves"));
+    }
 }

@@ -247,7 +247,7 @@ mod tests {
     }
 
     /// The faults of a scene, without the directory.
-    fn fault(text: &str, defines: &[(&str, &str)]) -> String {
+    pub(super) fn fault(text: &str, defines: &[(&str, &str)]) -> String {
         match scene(text, defines) {
             Ok(_) => "none".to_owned(),
             Err(error) => {
@@ -260,7 +260,7 @@ mod tests {
         }
     }
 
-    fn good(text: &str) -> SceneDescription {
+    pub(super) fn good(text: &str) -> SceneDescription {
         scene(text, &[]).unwrap_or_else(|error| panic!("{error}"))
     }
 

@@ -125,7 +125,7 @@ impl Import<'_> {
         };
         let mut fields = Fields::new(place);
         fields.add("name", text(place, "D65"));
-        fields.add("scale", number(place, scale / FILM));
+        fields.add("scale", number(place, scale * DAYLIGHT));
         *illuminant = fields.map();
         let name = self.name_for(index);
         if let Some(picture) = picture {
