@@ -21,6 +21,7 @@ pub mod mesh;
 pub mod partials;
 pub mod principled;
 pub mod projector;
+pub mod sdf;
 pub mod shape;
 pub mod texture;
 pub mod volume;
