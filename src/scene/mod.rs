@@ -10,6 +10,7 @@ pub mod camera;
 pub mod census;
 pub mod compile;
 pub mod compound;
+pub mod curves;
 pub mod emission;
 pub mod environment;
 pub mod grid;

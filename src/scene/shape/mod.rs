@@ -297,7 +297,7 @@ fn largest(v: DVec3) -> f64 {
 }
 
 /// Turns (one turn = 1) of the angle from x to y, in [0, 1).
-fn turns(x: f64, y: f64) -> f64 {
+pub(super) fn turns(x: f64, y: f64) -> f64 {
     let t = libm::atan2(y, x) / std::f64::consts::TAU;
     // −1e-30 + 1 rounds to one.
     (if t < 0.0 { t + 1.0 } else { t }).clamp(0.0, BELOW_ONE)

@@ -1,0 +1,292 @@
+//! Curves with a thickness: hair, threads, wires; many in one object.
+//!
+//! [`Basis::Linear`]: balls at the control points and between them round cones that touch both, so that
+//! joints and ends are round; see [`cone`]. [`Basis::BSpline`]: uniform cubic B-splines, of which a circle
+//! sweeps the surface; the ends are open; see [`tube`].
+//!
+//! **Only from outside.** As in Mitsuba, a ray meets a curve only where it comes from outside; what starts
+//! inside leaves unseen, and a piece that lies within another one does not show. It follows that a ray which
+//! leaves a curve meets no surface that it left: outward it goes away from a front face, and the step of
+//! [`Ray::leaving`], 16 times the rounding of the point, has put it before or behind the surface for certain.
+//!
+//! **Texture coordinates.** u is the angle about the curve in turns, counted from the horizontal (z is up, as in
+//! Mitsuba) by the right hand about the direction of the curve; v runs over all segments of the file, 0 to 1.
+
+mod cone;
+mod file;
+#[cfg(test)]
+mod tests;
+mod tube;
+
+pub use file::{ControlPoint, load};
+
+use super::bvh::{Aabb, Bvh};
+use super::shape::SurfacePoint;
+use crate::math::{Frame, Ray};
+use cone::RoundCone;
+use glam::{DAffine3, DVec2, DVec3};
+use tube::{RaySpace, Tube};
+
+/// What control points mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// Straight lines from point to point.
+    Linear,
+    /// Uniform cubic B-splines.
+    BSpline,
+}
+
+/// Where a ray meets a curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CurveHit {
+    /// Ray parameter.
+    pub t: f64,
+    /// The segment, counted through the file.
+    pub segment: u32,
+    /// Where on the segment, 0 to 1.
+    pub v: f64,
+}
+
+#[derive(Clone, Debug)]
+enum Pieces {
+    /// One a segment.
+    Cones(Vec<RoundCone>),
+    /// One or more a segment, in order, and the first of each segment.
+    Tubes(Vec<Tube>, Vec<u32>),
+}
+
+/// Curves in the world.
+#[derive(Clone, Debug)]
+pub struct Curves {
+    pieces: Pieces,
+    bvh: Bvh,
+    segments: u32,
+    bounds: Aabb,
+}
+
+impl Curves {
+    /// Curves in the world. Radii are not transformed.
+    ///
+    /// # Errors
+    /// In words: a curve of too few points, a transform that leaves the range of numbers.
+    pub fn new(curves: &[Vec<ControlPoint>], world_from_object: &DAffine3, basis: Basis) -> Result<Curves, String> {
+        let least = match basis {
+            Basis::Linear => 2,
+            Basis::BSpline => 4,
+        };
+        let mut segments: Vec<Vec<ControlPoint>> = Vec::new();
+        for (i, curve) in curves.iter().enumerate() {
+            if curve.len() < least {
+                let found = curve.len();
+                return Err(format!("expected {least} or more control points in a curve, found {found} in curve {i}"));
+            }
+            let place = |&[x, y, z, r]: &ControlPoint| {
+                let p = world_from_object.transform_point3(DVec3::new(x, y, z));
+                [p.x, p.y, p.z, r]
+            };
+            let placed: Vec<ControlPoint> = curve.iter().map(place).collect();
+            if let Some(p) = placed.iter().find(|p| p.iter().any(|x| !x.is_finite())) {
+                return Err(format!("expected control points within the range of numbers, found {p:?} in curve {i}"));
+            }
+            segments.extend(placed.windows(least).map(<[_]>::to_vec));
+        }
+        // A segment has up to eight pieces, of which one tree holds 2²⁸.
+        const MOST: usize = 1 << 25;
+        if segments.len() > MOST {
+            return Err(format!("expected at most {MOST} segments, found {}", segments.len()));
+        }
+
+        let pieces = match basis {
+            Basis::Linear => Pieces::Cones(segments.iter().map(|s| cone_between(s[0], s[1])).collect()),
+            Basis::BSpline => {
+                let (mut tubes, mut first) = (Vec::new(), Vec::new());
+                for (i, s) in segments.iter().enumerate() {
+                    first.push(tubes.len() as u32);
+                    add_pieces(tube_of([s[0], s[1], s[2], s[3]], i as u32), 0, &mut tubes);
+                }
+                first.push(tubes.len() as u32);
+                Pieces::Tubes(tubes, first)
+            }
+        };
+        let pad = |(min, max): (DVec3, DVec3)| {
+            // Surface points have some eight roundings of the coordinates that make them.
+            let pad = 16.0 * f64::EPSILON * min.abs().max(max.abs()).max_element();
+            Aabb { min: min - pad, max: max + pad }
+        };
+        let boxes: Vec<Aabb> = match &pieces {
+            Pieces::Cones(cones) => cones
+                .iter()
+                .map(|c| {
+                    let ball = |v| Aabb { min: c.center(v) - c.radius(v), max: c.center(v) + c.radius(v) };
+                    let both = ball(0.0).union(&ball(1.0));
+                    pad((both.min, both.max))
+                })
+                .collect(),
+            Pieces::Tubes(tubes, _) => tubes.iter().map(|t| pad(t.bounds())).collect(),
+        };
+        let bvh = Bvh::build(&boxes);
+        let bounds = bvh.bounds();
+        Ok(Curves { pieces, bvh, segments: segments.len() as u32, bounds })
+    }
+
+    /// How many segments there are.
+    #[must_use]
+    pub fn segments(&self) -> u32 {
+        self.segments
+    }
+
+    /// The box of all curves.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Memory of the pieces and their tree.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let pieces = match &self.pieces {
+            Pieces::Cones(cones) => cones.capacity() * size_of::<RoundCone>(),
+            Pieces::Tubes(tubes, first) => tubes.capacity() * size_of::<Tube>() + 4 * first.capacity(),
+        };
+        size_of::<Curves>() + pieces + self.bvh.bytes()
+    }
+
+    /// The nearest hit with 0 < t < `t_max` from outside.
+    #[must_use]
+    pub fn closest(&self, ray: &Ray, t_max: f64) -> Option<CurveHit> {
+        let length = ray.direction.length();
+        let direction = ray.direction / length;
+        let mut found = None;
+        let space = RaySpace::new(ray.origin, direction);
+        self.bvh.closest(ray, t_max, |piece, t_max| {
+            let hit = self.entry(piece, &space, ray.origin, direction, length, t_max)?;
+            found = Some(hit);
+            Some(hit.t)
+        });
+        found
+    }
+
+    /// Whether the ray enters any curve at 0 < t < `t_max`.
+    #[must_use]
+    pub fn any(&self, ray: &Ray, t_max: f64) -> bool {
+        let length = ray.direction.length();
+        let direction = ray.direction / length;
+        let space = RaySpace::new(ray.origin, direction);
+        self.bvh.any(ray, t_max, |piece| self.entry(piece, &space, ray.origin, direction, length, t_max).is_some())
+    }
+
+    #[inline]
+    fn entry(
+        &self,
+        piece: u32,
+        space: &RaySpace,
+        origin: DVec3,
+        direction: DVec3,
+        length: f64,
+        t_max: f64,
+    ) -> Option<CurveHit> {
+        let (t, v, segment) = match &self.pieces {
+            Pieces::Cones(cones) => {
+                let (t, v) = cones[piece as usize].entry(origin, direction)?;
+                (t, v, piece)
+            }
+            Pieces::Tubes(tubes, _) => {
+                let tube = &tubes[piece as usize];
+                let (t, v) = tube.entry(space, t_max * length)?;
+                (t, v, tube.segment)
+            }
+        };
+        let t = t / length;
+        (t > 0.0 && t < t_max).then_some(CurveHit { t, segment, v })
+    }
+
+    /// The surface of a segment nearest to `point_on_ray`, which `closest` has found at `v`.
+    #[must_use]
+    pub fn surface(&self, point_on_ray: DVec3, segment: u32, v: f64) -> SurfacePoint {
+        let (center, radius, slope, growth, bend, v) = match &self.pieces {
+            Pieces::Cones(cones) => {
+                let cone = &cones[segment as usize];
+                let v = cone.v_at(point_on_ray);
+                // The ball is part of the surface, so its normal is the surface's.
+                (cone.center(v), cone.radius(v), cone.axis, 0.0, DVec3::ZERO, v)
+            }
+            Pieces::Tubes(tubes, first) => {
+                let range = first[segment as usize] as usize..first[segment as usize + 1] as usize;
+                let pieces = &tubes[range];
+                let tube = pieces.iter().rfind(|t| t.range[0] <= v).unwrap_or(&pieces[0]);
+                // One step of Newton towards (p − c)·c' = 0.
+                let [c, d, e] = tube.at(v).map(|x| DVec3::new(x[0], x[1], x[2]));
+                let step = (point_on_ray - c).dot(d) / (d.length_squared() - (point_on_ray - c).dot(e));
+                const CORRECTION: f64 = 1.0 / (1u64 << 20) as f64;
+                let v = if step.abs() < CORRECTION { (v + step).clamp(0.0, 1.0) } else { v };
+                let [c, d, e] = tube.at(v);
+                let three = |x: [f64; 4]| DVec3::new(x[0], x[1], x[2]);
+                (three(c), c[3], three(d), d[3], three(e), v)
+            }
+        };
+        let along = unit(slope).unwrap_or(DVec3::Z);
+        let away = unit(point_on_ray - center).unwrap_or_else(|| Frame::from_normal(along).s);
+        let point = center + away * radius;
+        let normal = match self.pieces {
+            Pieces::Cones(_) => away,
+            Pieces::Tubes(..) => {
+                let n = away * (slope.length_squared() - radius * away.dot(bend)) - slope * growth;
+                unit(n).unwrap_or(away)
+            }
+        };
+
+        // Up, as far as it is across the curve; u = 0 is across both.
+        let up = unit(DVec3::Z - along * along.z).unwrap_or(DVec3::Y);
+        let side = up.cross(along);
+        let uv = DVec2::new(
+            super::shape::turns(away.dot(side), away.dot(up)),
+            (v + f64::from(segment)) / f64::from(self.segments),
+        );
+        let around = along.cross(away);
+        let tangent = if around.length_squared() > 0.0 { around } else { Frame::from_normal(normal).s };
+        let scale = center.abs().max_element() + radius;
+        SurfacePoint { point, scale, normal, shading_normal: normal, uv, tangent }
+    }
+}
+
+/// Unit length, where there is any; scaled first, so that squares stay in range.
+fn unit(v: DVec3) -> Option<DVec3> {
+    (v / v.abs().max_element()).try_normalize()
+}
+
+fn cone_between(a: ControlPoint, b: ControlPoint) -> RoundCone {
+    let start = DVec3::new(a[0], a[1], a[2]);
+    RoundCone { start, axis: DVec3::new(b[0], b[1], b[2]) - start, radius: a[3], taper: a[3] - b[3] }
+}
+
+/// A segment of a uniform cubic B-spline as a Bézier curve. What it shares with its neighbours, place and slope at the
+/// ends, is computed from the shared control points in the same way, so that it is the same to the last bit.
+fn tube_of([a, b, c, d]: [ControlPoint; 4], segment: u32) -> Tube {
+    let each = |f: &dyn Fn(usize) -> f64| -> [f64; 4] { std::array::from_fn(f) };
+    let knot = |p: ControlPoint, q: ControlPoint, r: ControlPoint| each(&|i| ((p[i] + r[i]) + 4.0 * q[i]) / 6.0);
+    let third = |p: ControlPoint, q: ControlPoint| each(&|i| (2.0 * p[i] + q[i]) / 3.0);
+    let slope = |p: ControlPoint, r: ControlPoint| each(&|i| 0.5 * (r[i] - p[i]));
+    Tube {
+        points: [knot(a, b, c), third(b, c), third(c, b), knot(b, c, d)],
+        slopes: [slope(a, c), each(&|i| c[i] - b[i]), slope(b, d)],
+        segment,
+        range: [0.0, 1.0],
+    }
+}
+
+/// Halves a tube as long as boxes around the halves are much smaller, up to eight pieces.
+fn add_pieces(tube: Tube, depth: u32, pieces: &mut Vec<Tube>) {
+    let area = |t: &Tube| {
+        let (low, high) = t.bounds();
+        let e = high - low;
+        e.x * e.y + e.y * e.z + e.z * e.x
+    };
+    let halves = tube.halves();
+    if depth < 3 && area(&halves[0]) + area(&halves[1]) < 0.8 * area(&tube) {
+        for half in halves {
+            add_pieces(half, depth + 1, pieces);
+        }
+    } else {
+        pieces.push(tube);
+    }
+}
