@@ -175,6 +175,8 @@
 //! - cylinder: {base: [0, 0, 0], top: [0, 1, 0], radius: 0.5, caps: both}    # ~ both, none, base, top
 //! - cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 0.5, cap: true}   # ~ cap
 //! - mesh: {file: knot.ply, normals: file}                              # ~ file, smooth, face
+//! - sdf_grid: {file: torus.vol, normals: smooth}                       # ~ smooth, analytic
+//! - curves: {file: hair.txt, basis: bspline}                           # ~ linear, bspline
 //! lights:                           # each may have a name
 //! - point: {position: [0, 5, 0], intensity: 10}                        # W·sr⁻¹·nm⁻¹
 //! - spot:
@@ -204,6 +206,12 @@
 //!
 //! A sphere, cylinder or cone takes only transforms that keep it one: moves, turns and even
 //! scaling.
+//!
+//! An `sdf_grid` is the zero of signed distances, positive outside, on a grid that fills the unit cube before its
+//! transform; the file is Mitsuba's `.vol`. `curves` are read from lines of `x y z radius`; an empty line ends a curve.
+//! `linear` has round joints and ends and wants two points or more a curve, `bspline` (uniform and cubic, open at the
+//! ends) four. A transform moves the points and leaves the radii. Rays meet curves from outside only; u runs about a curve
+//! and v along all of the file. Neither form shines.
 //!
 //! # Spectra
 //! ```yaml
@@ -304,8 +312,8 @@ pub use settings::{
     Output, PathIntegrator, Png, Precision, Render, Tonemap, Wavelengths, WhittedIntegrator,
 };
 pub use shape::{
-    Caps, Cone, Cube, Cylinder, Disk, Extent, Geometry, Mesh, Normals, Plane, Rectangle, Rotation, Shape, Sphere,
-    TransformStep,
+    Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Extent, Geometry, Mesh, Normals, Plane, Rectangle, Rotation,
+    SdfGrid, SdfNormals, Shape, Sphere, TransformStep,
 };
 pub use spectrum::{
     Abbe, Blackbody, Cauchy, FilePath, Illuminant, Index, Line, Scaled, Sellmeier, Spectrum, SpectrumOrTexture, Vec3,
@@ -356,7 +364,7 @@ mod tests {
     #[test]
     fn the_reference_scene_is_a_scene() {
         let scene = parse(&reference("scene")).unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!(scene.shapes.len(), 8);
+        assert_eq!(scene.shapes.len(), 10);
         assert_eq!(scene.lights.len(), 6);
         assert_eq!(scene.materials.len(), Material::KINDS.len());
         // What the page calls a default is one.

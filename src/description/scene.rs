@@ -330,7 +330,10 @@ mod tests {
         );
         assert_eq!(ball.transform.len(), 4);
         let kinds: Vec<&str> = scene.shapes.iter().map(|shape| shape.geometry.kind()).collect();
-        assert_eq!(kinds, ["sphere", "plane", "disk", "rectangle", "cube", "cylinder", "cone", "mesh"]);
+        assert_eq!(
+            kinds,
+            ["sphere", "plane", "disk", "rectangle", "cube", "cylinder", "cone", "mesh", "sdf_grid", "curves"]
+        );
         assert_eq!(scene.shapes[1].material, MaterialRef::default());
         assert_eq!(
             scene.lights[1],

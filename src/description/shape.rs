@@ -188,6 +188,20 @@ forms! {
         /// Where shading normals come from; default `file`.
         normals: Normals = [default],
     }
+    /// `sdf_grid: {file: torus.vol, normals: smooth}`
+    "sdf_grid" SdfGrid {
+        /// Signed distances on a grid, `.vol`; the grid fills the unit cube.
+        file: FilePath = [],
+        /// Where shading normals come from; default `smooth`.
+        normals: SdfNormals = [default],
+    }
+    /// `curves: {file: hair.txt, basis: linear}`
+    "curves" Curves {
+        /// Lines of `x y z radius`; an empty line ends a curve.
+        file: FilePath = [],
+        /// What the points mean; default `linear`.
+        basis: CurveBasis = [default],
+    }
 }
 
 /// Three lengths, or one for all.
@@ -249,6 +263,28 @@ pub enum Normals {
     Smooth,
     /// The faces.
     Face,
+}
+
+/// Where the shading normals of a grid of distances come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SdfNormals {
+    /// Gradients, interpolated between cells.
+    #[default]
+    Smooth,
+    /// The gradient in the cell.
+    Analytic,
+}
+
+/// What the control points of curves mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CurveBasis {
+    /// Straight lines between them, with round joints and ends.
+    #[default]
+    Linear,
+    /// Uniform cubic B-splines, open at the ends.
+    Bspline,
 }
 
 /// One step of a transform.
@@ -398,6 +434,10 @@ impl Shape {
         self.geometry.check(at, checker);
         self.material.check(at.key("material"), checker);
         if let Some(emission) = &self.emission {
+            if matches!(self.geometry, Geometry::SdfGrid(_) | Geometry::Curves(_)) {
+                let kind = self.geometry.kind();
+                checker.fault(at.key("emission"), format!("expected a form that can shine, found {kind}"));
+            }
             emission.check(Role::Emission, at.key("emission"), checker);
             check_weight(self.sampling_weight.unwrap_or(1.0), at, checker);
         } else {
@@ -417,9 +457,13 @@ impl Shape {
         let Some(linear) = check_steps(&self.transform, at, checker) else { return };
         let round = match self.geometry {
             Geometry::Sphere(_) | Geometry::Cylinder(_) | Geometry::Cone(_) => true,
-            Geometry::Plane(_) | Geometry::Disk(_) | Geometry::Rectangle(_) | Geometry::Cube(_) | Geometry::Mesh(_) => {
-                false
-            }
+            Geometry::Plane(_)
+            | Geometry::Disk(_)
+            | Geometry::Rectangle(_)
+            | Geometry::Cube(_)
+            | Geometry::Mesh(_)
+            | Geometry::SdfGrid(_)
+            | Geometry::Curves(_) => false,
         };
         if round && !is_similarity(linear) {
             let kind = self.geometry.kind();
@@ -474,7 +518,7 @@ impl Geometry {
                 let apart = cone.base != cone.apex;
                 checker.require(apart, at.key("apex"), "a point other than the base", format_args!("{:?}", cone.apex));
             }
-            Geometry::Mesh(_) => {}
+            Geometry::Mesh(_) | Geometry::SdfGrid(_) | Geometry::Curves(_) => {}
         }
     }
 }
@@ -533,6 +577,14 @@ mod tests {
                 "3:33: shapes[0].cone.apex: expected a point other than the base, found [0.0, 0.0, 0.0]",
             ),
             ("mesh: {file: ''}", "3:16: shapes[0].mesh.file: expected the path of a file, found empty text"),
+            (
+                "curves: {file: a.txt, emission: 1}",
+                "3:35: shapes[0].curves.emission: expected a form that can shine, found curves",
+            ),
+            (
+                "sdf_grid: {file: a.vol, emission: 1}",
+                "3:37: shapes[0].sdf_grid.emission: expected a form that can shine, found sdf_grid",
+            ),
         ];
         for (written, message) in cases {
             assert_eq!(shape(written), format!("dir/s.yaml:{message}"));

@@ -65,6 +65,8 @@ pub fn arriving(
                 target: Some(Departure { object, part: triangle }),
             })
         }
+        // They do not shine.
+        Geometry::Sdf(_) | Geometry::Curves(_) => None,
     }
 }
 

@@ -47,6 +47,9 @@ impl Census {
             match &object.geometry {
                 Geometry::Shape(_) => census.shapes += 1,
                 Geometry::Mesh(mesh) => census.triangles += mesh.mesh.triangles.len(),
+                // One surface, however many cells.
+                Geometry::Sdf(_) => census.shapes += 1,
+                Geometry::Curves(curves) => census.shapes += curves.segments() as usize,
             }
             let name = || object.name.clone();
             let material = &scene.materials[object.material as usize];

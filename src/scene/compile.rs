@@ -3,6 +3,7 @@
 //! Faults that only show here (an unknown glass, a missing picture) are collected and come all at
 //! once, each with its place in the file.
 
+mod files;
 mod lights;
 mod media;
 mod principled;
@@ -177,6 +178,9 @@ impl<'a> Compiler<'a> {
             let closed = match &geometry {
                 Geometry::Shape(shape) => shape.is_closed(),
                 Geometry::Mesh(_) => true,
+                Geometry::Sdf(sdf) => sdf.is_closed(),
+                // What goes in comes out unseen.
+                Geometry::Curves(_) => false,
             };
             let unchanged = |side: &Option<String>| side.as_deref() == Some(written::UNCHANGED);
             let medium = |side: &Option<String>, otherwise: Option<u32>| match side.as_deref() {
@@ -437,6 +441,8 @@ impl<'a> Compiler<'a> {
             written::Geometry::Cone(c) => {
                 Cone::new(point(c.base), point(c.apex), c.radius * scale, c.cap).map(Shape::Cone)
             }
+            written::Geometry::SdfGrid(grid) => return self.sdf_grid(at, grid, &DAffine3::from_mat4(m)),
+            written::Geometry::Curves(curves) => return self.curves(at, curves, &DAffine3::from_mat4(m)),
             written::Geometry::Mesh(mesh) => {
                 self.files.push(mesh.file.to_path_buf());
                 let asked = |e| self.asked(&format!("{at}.file"), e);
@@ -493,6 +499,8 @@ impl Object {
                 None => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
             },
             Geometry::Mesh(mesh) => mesh.tree.bounds(),
+            Geometry::Sdf(sdf) => sdf.bounds(),
+            Geometry::Curves(curves) => curves.bounds(),
         }
     }
 }

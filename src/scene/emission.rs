@@ -51,6 +51,8 @@ fn spot_on(objects: &[Object], object: u32, u: DVec2) -> Option<Spot> {
                 area: mesh.areas.total(),
             })
         }
+        // They do not shine.
+        Geometry::Sdf(_) | Geometry::Curves(_) => None,
     }
 }
 

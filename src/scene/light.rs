@@ -169,6 +169,8 @@ impl Light {
         match &objects[*object as usize].geometry {
             Geometry::Shape(shape) => shape.pdf_toward(from, direction, hit.t, normal),
             Geometry::Mesh(mesh) => hit.t * hit.t / (mesh.areas.total() * normal.dot(direction).abs()),
+            // They do not shine.
+            Geometry::Sdf(_) | Geometry::Curves(_) => 0.0,
         }
     }
 
@@ -224,6 +226,7 @@ impl Light {
                             target: target(i),
                         })
                     }
+                    Geometry::Sdf(_) | Geometry::Curves(_) => None,
                 }
             }
             Light::Point { position, intensity } => {

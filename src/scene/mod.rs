@@ -31,11 +31,13 @@ use crate::math::{Departure, Ray};
 use crate::spectrum::{Spectrum, WavelengthDistribution};
 use bvh::Bvh;
 use camera::Camera;
+use curves::Curves;
 use glam::DVec3;
 use light::Light;
 use material::Material;
 pub use medium::Medium;
 use mesh::{AreaTable, Mesh, MeshTree};
+use sdf::SdfGrid;
 use shape::Detail;
 use shape::Shape;
 pub use shape::SurfacePoint;
@@ -119,15 +121,20 @@ pub enum Geometry {
     Shape(Shape),
     /// Triangles.
     Mesh(Box<TriangleMesh>),
+    /// A signed distance on a grid.
+    Sdf(Box<SdfGrid>),
+    /// Curves with a thickness.
+    Curves(Box<Curves>),
 }
 
 impl Geometry {
-    /// Its area, m².
+    /// Its area, m²; zero where it is not known, of forms that do not shine.
     #[must_use]
     pub fn area(&self) -> f64 {
         match self {
             Geometry::Shape(shape) => shape.area(),
             Geometry::Mesh(mesh) => mesh.areas.total(),
+            Geometry::Sdf(_) | Geometry::Curves(_) => 0.0,
         }
     }
 }
@@ -194,9 +201,10 @@ pub struct Hit {
     pub t: f64,
     /// The object.
     pub object: u32,
-    /// Its face or triangle.
+    /// Its face, triangle, cell or segment.
     pub part: u32,
-    /// For triangles the barycentric coordinates of the second and third vertex.
+    /// For triangles the barycentric coordinates of the second and third vertex, for curves first the place along the
+    /// segment.
     pub barycentric: [f64; 2],
 }
 
@@ -232,6 +240,14 @@ impl Scene {
                 part: h.triangle,
                 barycentric: [h.hit.b1, h.hit.b2],
             }),
+            Geometry::Sdf(sdf) => {
+                let hit = sdf.intersect(ray, t_max, departing)?;
+                Some(Hit { t: hit.t, object, part: hit.cell, barycentric: [0.0; 2] })
+            }
+            Geometry::Curves(curves) => {
+                let hit = curves.closest(ray, t_max)?;
+                Some(Hit { t: hit.t, object, part: hit.segment, barycentric: [hit.v, 0.0] })
+            }
         }
     }
 
@@ -260,6 +276,8 @@ impl Scene {
                     target.is_none() && shape.intersect(ray, distance, departing.map(|face| face as u8)).is_some()
                 }
                 Geometry::Mesh(mesh) => mesh.tree.any(ray, distance, [departing, target]),
+                Geometry::Sdf(sdf) => sdf.intersect(ray, distance, departing).is_some(),
+                Geometry::Curves(curves) => curves.any(ray, distance),
             }
         })
     }
@@ -271,6 +289,8 @@ impl Scene {
         match &object.geometry {
             Geometry::Shape(shape) => shape.surface_with(ray.at(hit.t), hit.part as u8, object.detail),
             Geometry::Mesh(mesh) => mesh.mesh.surface(hit.part, hit.barycentric[0], hit.barycentric[1]),
+            Geometry::Sdf(sdf) => sdf.surface(ray.at(hit.t), hit.part),
+            Geometry::Curves(curves) => curves.surface(ray.at(hit.t), hit.part, hit.barycentric[0]),
         }
     }
 

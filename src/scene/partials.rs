@@ -41,13 +41,13 @@ impl Scene {
     pub fn surface_with_texture(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         match &self.objects[hit.object as usize].geometry {
             Geometry::Shape(shape) => shape.surface_with(ray.at(hit.t), hit.part as u8, Detail::Texture),
-            Geometry::Mesh(_) => self.surface(ray, hit),
+            Geometry::Mesh(_) | Geometry::Sdf(_) | Geometry::Curves(_) => self.surface(ray, hit),
         }
     }
 
     /// How (u, v) runs over the surface at a hit.
     ///
-    /// On shapes by central differences over 2⁻¹³ of their size: off by the square of that, 1e-8, for the curvature of
+    /// On shapes and curves by central differences over 2⁻¹³ of their size: off by the square of that, 1e-8, for the curvature of
     /// u and v, and by 1e-12 for their rounding. On triangles exactly.
     #[must_use]
     pub fn uv_gradient(&self, hit: &Hit, surface: &SurfacePoint) -> UvGradient {
@@ -57,16 +57,15 @@ impl Scene {
         let gradient = match &self.objects[hit.object as usize].geometry {
             Geometry::Shape(shape) => {
                 let size = shape.bounds().map_or(surface.scale, |(low, high)| (high - low).max_element());
-                let step = size.max(f64::MIN_POSITIVE) / 8192.0;
                 let uv = |p: DVec3| shape.surface(p, hit.part as u8).uv;
-                let slope = |axis: DVec3| {
-                    let d = uv(surface.point + axis * step) - uv(surface.point - axis * step);
-                    // An angle may pass from one turn to none in between.
-                    let wrapped = DVec2::new(nearest_turn(d.x), nearest_turn(d.y));
-                    let d = if shape.is_closed() || d.abs().max_element() > 0.5 { wrapped } else { d };
-                    d / (2.0 * step)
-                };
-                DMat2::from_cols(slope(s), slope(t))
+                differences(surface, [s, t], size, shape.is_closed(), uv)
+            }
+            // No texture coordinates.
+            Geometry::Sdf(_) => DMat2::ZERO,
+            Geometry::Curves(curves) => {
+                let size = curves.thickness(hit.part, hit.barycentric[0]);
+                let uv = |p: DVec3| curves.surface(p, hit.part, hit.barycentric[0]).uv;
+                differences(surface, [s, t], size, true, uv)
             }
             Geometry::Mesh(mesh) => {
                 let corner = |b1, b2| mesh.mesh.surface(hit.part, b1, b2);
@@ -78,6 +77,25 @@ impl Scene {
         };
         UvGradient { s, t, gradient }
     }
+}
+
+/// Derivatives of `uv` along two axes by central differences over 2⁻¹³ of `size`. Where texture coordinates are
+/// angles they may pass from one turn to none in between.
+fn differences(
+    surface: &SurfacePoint,
+    axes: [DVec3; 2],
+    size: f64,
+    angles: bool,
+    uv: impl Fn(DVec3) -> DVec2,
+) -> DMat2 {
+    let step = size.max(f64::MIN_POSITIVE) / 8192.0;
+    let [s, t] = axes.map(|axis| {
+        let d = uv(surface.point + axis * step) - uv(surface.point - axis * step);
+        let wrapped = DVec2::new(nearest_turn(d.x), nearest_turn(d.y));
+        let d = if angles || d.abs().max_element() > 0.5 { wrapped } else { d };
+        d / (2.0 * step)
+    });
+    DMat2::from_cols(s, t)
 }
 
 /// `d` less the nearest whole number.

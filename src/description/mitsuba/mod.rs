@@ -319,8 +319,8 @@ mod tests {
     fn an_unknown_plugin_or_parameter_is_one_fault_with_a_near_miss() {
         assert_eq!(
             fault("<shape type=\"spere\"/>", &[]),
-            "s.xml:3:14: expected a shape that Abbe has (sphere, cylinder, disk, rectangle, cube, obj, ply), found \
-             \"spere\"; did you mean \"sphere\"?"
+            "s.xml:3:14: expected a shape that Abbe has (sphere, cylinder, disk, rectangle, cube, obj, ply, sdfgrid, \
+             linearcurve, bsplinecurve), found \"spere\"; did you mean \"sphere\"?"
         );
         assert_eq!(
             fault("<shape type=\"sphere\"><float name=\"raduis\" value=\"1\"/></shape>", &[]),

@@ -6,7 +6,8 @@ use super::super::fault::Fault;
 use super::object::{Bag, Family};
 use super::{Fields, Import, entry, list, matrix, number, numbers, text};
 
-const SHAPES: [&str; 7] = ["sphere", "cylinder", "disk", "rectangle", "cube", "obj", "ply"];
+const SHAPES: [&str; 10] =
+    ["sphere", "cylinder", "disk", "rectangle", "cube", "obj", "ply", "sdfgrid", "linearcurve", "bsplinecurve"];
 
 impl Import<'_> {
     /// Adds a shape of the scene to `shapes`.
@@ -65,6 +66,20 @@ impl Import<'_> {
                 }
                 upright(&bag)?;
                 "mesh"
+            }
+            "sdfgrid" => {
+                let file = bag.required("filename", bag.file("filename"))?;
+                fields.add("file", text(bag.place("filename"), file));
+                let normals = bag.choice("normals", &["smooth", "analytic"])?.unwrap_or("smooth");
+                fields.add("normals", text(bag.place("normals"), normals));
+                "sdf_grid"
+            }
+            basis @ ("linearcurve" | "bsplinecurve") => {
+                let file = bag.required("filename", bag.file("filename"))?;
+                fields.add("file", text(bag.place("filename"), file));
+                let basis = if basis == "linearcurve" { "linear" } else { "bspline" };
+                fields.add("basis", text(place, basis));
+                "curves"
             }
             _ => return Err(bag.unknown(SHAPES)),
         };

@@ -200,6 +200,15 @@ impl Curves {
         (t > 0.0 && t < t_max).then_some(CurveHit { t, segment, v })
     }
 
+    /// The radius at `v` of a segment.
+    #[must_use]
+    pub fn thickness(&self, segment: u32, v: f64) -> f64 {
+        match &self.pieces {
+            Pieces::Cones(cones) => cones[segment as usize].radius(v),
+            Pieces::Tubes(tubes, first) => piece_at(tubes, first, segment, v).at(v)[0][3],
+        }
+    }
+
     /// The surface of a segment nearest to `point_on_ray`, which `closest` has found at `v`.
     #[must_use]
     pub fn surface(&self, point_on_ray: DVec3, segment: u32, v: f64) -> SurfacePoint {
@@ -211,16 +220,14 @@ impl Curves {
                 (cone.center(v), cone.radius(v), cone.axis, 0.0, DVec3::ZERO, v)
             }
             Pieces::Tubes(tubes, first) => {
-                let range = first[segment as usize] as usize..first[segment as usize + 1] as usize;
-                let pieces = &tubes[range];
-                let tube = pieces.iter().rfind(|t| t.range[0] <= v).unwrap_or(&pieces[0]);
-                // One step of Newton towards (p − c)·c' = 0.
-                let [c, d, e] = tube.at(v).map(|x| DVec3::new(x[0], x[1], x[2]));
-                let step = (point_on_ray - c).dot(d) / (d.length_squared() - (point_on_ray - c).dot(e));
-                const CORRECTION: f64 = 1.0 / (1u64 << 20) as f64;
-                let v = if step.abs() < CORRECTION { (v + step).clamp(0.0, 1.0) } else { v };
-                let [c, d, e] = tube.at(v);
+                let tube = piece_at(tubes, first, segment, v);
+                // One step of Newton towards (p − c)·c' = 0, where the curve does not bend within its radius.
                 let three = |x: [f64; 4]| DVec3::new(x[0], x[1], x[2]);
+                let [c, d, e] = tube.at(v).map(three);
+                let rate = d.length_squared() - (point_on_ray - c).dot(e);
+                let step = (point_on_ray - c).dot(d) / rate;
+                let v = if rate > 0.0 && step.is_finite() { (v + step).clamp(0.0, 1.0) } else { v };
+                let [c, d, e] = tube.at(v);
                 (three(c), c[3], three(d), d[3], three(e), v)
             }
         };
@@ -247,6 +254,12 @@ impl Curves {
         let scale = center.abs().max_element() + radius;
         SurfacePoint { point, scale, normal, shading_normal: normal, uv, tangent }
     }
+}
+
+/// The piece of a segment that holds `v`.
+fn piece_at<'a>(tubes: &'a [Tube], first: &[u32], segment: u32, v: f64) -> &'a Tube {
+    let pieces = &tubes[first[segment as usize] as usize..first[segment as usize + 1] as usize];
+    pieces.iter().rfind(|t| t.range[0] <= v).unwrap_or(&pieces[0])
 }
 
 /// Unit length, where there is any; scaled first, so that squares stay in range.

@@ -269,3 +269,47 @@ fn a_grid_without_a_surface_is_refused_in_words() {
     let channels = Grid { size: [3, 3, 1], channels: 3, ..grid(3, |_| 1.0) };
     assert!(fault(&channels).contains("one channel, found 3"));
 }
+
+/// Distances, geometric and smooth normals read off Mitsuba 3.9.1 (f32) for the grid of the cross-validation.
+#[test]
+fn smooth_normals_are_those_of_mitsuba() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/cross_validate/mitsuba/assets/ring_and_ball.vol");
+    let grid = Grid::load(std::path::Path::new(file)).unwrap();
+    let scale = DVec3::new(2.4, 2.0, 2.2);
+    let map = DAffine3::from_scale(scale) * DAffine3::from_translation(DVec3::new(-0.5, 0.0, -0.5));
+    let sdf = SdfGrid::new(&grid, &map, SdfNormals::Smooth).unwrap();
+    let cases = [
+        (
+            [0.004_035_927, -0.028_062_772, -0.999_598_03],
+            5.245_332_2,
+            [0.0, 0.733_491, 0.679_699],
+            [0.042_164_2, 0.736_061_5, 0.675_600_3],
+        ),
+        (
+            [0.156_451_87, -0.173_420_5, -0.972_341_6],
+            5.206_315_5,
+            [0.792_165_1, 0.033_085_1, 0.609_409_5],
+            [0.831_995_5, -0.169_039_1, 0.528_402_5],
+        ),
+        (
+            [0.117_923_69, -0.156_182_18, -0.980_663_6],
+            4.929_798_6,
+            [0.454_712_3, 0.600_467, 0.657_781_2],
+            [0.551_369_4, 0.368_508_4, 0.748_460_6],
+        ),
+        (
+            [-0.016_230_276, -0.213_906_33, -0.976_719_3],
+            4.831_676_5,
+            [0.0, -0.700_059, 0.714_085],
+            [-0.058_675_7, -0.806_037_4, 0.588_949],
+        ),
+    ];
+    for (d, t, normal, smooth) in cases {
+        let ray = Ray::new(DVec3::new(0.0, 1.7, 5.5), DVec3::from(d));
+        let hit = sdf.intersect(&ray, FAR, None).unwrap();
+        let s = sdf.surface(ray.at(hit.t), hit.cell);
+        assert!((hit.t - t).abs() < 1e-5, "{hit:?} {t}");
+        assert!((s.normal - DVec3::from(normal)).abs().max_element() < 1e-4, "{} {normal:?}", s.normal);
+        assert!((s.shading_normal - DVec3::from(smooth)).abs().max_element() < 1e-4, "{} {smooth:?}", s.shading_normal);
+    }
+}
