@@ -13,6 +13,7 @@ mod glass;
 mod lights;
 mod media;
 mod techniques;
+mod volumes;
 
 use common::{Bench, bench_with, v};
 use glam::DVec3;
