@@ -1,46 +1,33 @@
-//! Conductors by the names that Mitsuba gives them.
+//! Conductors by the names that Mitsuba gives them, with the measurements that it goes by.
+
+use std::sync::OnceLock;
 
 use super::super::fault::Fault;
-use super::super::node::{did_you_mean, quote};
+use super::super::node::{did_you_mean, enumerate, quote};
 use super::object::Bag;
-use super::{Fields, entry, text};
+use super::{Fields, entry, list, numbers, text};
 
-/// Mitsuba's names, and the entry of our catalogue whose measurement is nearest in reflectance
-/// from 400 to 700 nm: equal for half of them, within 0.01 for most of the others, 0.015 for Au, Cr
-/// and Mo. Mitsuba's own tables are not part of Abbe; see [`metal`].
-const METALS: [(&str, &str); 28] = [
-    ("a-C", "amorphous-carbon"),
-    ("Ag", "silver-rakic"),
-    ("Al", "aluminium-cheng"),
-    ("AlSb", "aluminium-antimonide"),
-    ("Au", "gold-olmon"),
-    ("Be", "beryllium"),
-    ("Cr", "chromium-sytchkova"),
-    ("CsI", "caesium-iodide"),
-    ("Cu", "copper-hagemann"),
-    ("Cu_palik", "copper-hagemann"),
-    ("d-C", "diamond-crystal"),
-    ("Hg", "mercury"),
-    ("Hg_palik", "mercury"),
-    ("K", "potassium"),
-    ("K_palik", "potassium"),
-    ("Li", "lithium"),
-    ("MgO", "magnesium-oxide"),
-    ("Mo", "molybdenum"),
-    ("Na_palik", "sodium"),
-    ("Nb", "niobium"),
-    ("Ni_palik", "nickel-rakic"),
-    ("Rh", "rhodium"),
-    ("TiC", "titanium-carbide"),
-    ("TiN", "titanium-nitride-pfluger"),
-    ("VC", "vanadium-carbide"),
-    ("VN", "vanadium-nitride"),
-    ("V_palik", "vanadium"),
-    ("W", "tungsten"),
-];
+/// Measurements by name; see the head of the file.
+const TABLES: &str = include_str!("data/conductors.txt");
+
+/// nm and value.
+type Curve = Vec<[f64; 2]>;
+
+/// Names with the real and the imaginary part of the index, in alphabetical order.
+fn tables() -> &'static [(&'static str, [Curve; 2])] {
+    static READ: OnceLock<Vec<(&str, [Curve; 2])>> = OnceLock::new();
+    READ.get_or_init(|| {
+        let curve = |line: &str| -> Curve {
+            let pair = |pair: &str| pair.split_once(':').map(|(nm, value)| [nm.parse().ok(), value.parse().ok()]);
+            line.split(' ').filter_map(pair).filter_map(|[nm, value]| Some([nm?, value?])).collect()
+        };
+        let lines: Vec<&str> = TABLES.lines().filter(|line| !line.starts_with('#')).collect();
+        lines.chunks_exact(3).map(|entry| (entry[0], [curve(entry[1]), curve(entry[2])])).collect()
+    })
+}
 
 /// Adds the index of the conductor `name`: from the files `data/ior/NAME.eta.spd` and `….k.spd`
-/// where the search path has them, as Mitsuba reads them, else from the catalogue.
+/// where the search path has them, as Mitsuba reads them, else from [`TABLES`].
 ///
 /// # Errors
 /// If neither knows it.
@@ -54,20 +41,58 @@ pub(crate) fn metal(bag: &Bag<'_>, name: &str, fields: &mut Fields) -> Result<()
         }
         return Ok(());
     }
-    match METALS.iter().find(|(theirs, _)| *theirs == name) {
-        Some((_, ours)) => {
-            fields.add("metal", text(place, *ours));
+    match tables().iter().find(|(known, _)| *known == name) {
+        Some((_, curves)) => {
+            for (key, curve) in ["eta", "k"].iter().zip(curves) {
+                let pairs = list(place, curve.iter().map(|pair| numbers(place, pair)));
+                fields.add(key, entry(place, "zero_outside", entry(place, "table", pairs)));
+            }
             Ok(())
         }
         None => {
-            let known = || METALS.iter().map(|(theirs, _)| *theirs);
+            let known = || tables().iter().map(|(known, _)| *known);
             let hint = did_you_mean(name, known());
             let message = format!(
-                "expected one of {}, or a file data/ior/{name}.eta.spd in the search path, found {}{hint}",
-                known().collect::<Vec<_>>().join(", "),
+                "expected none, or one of {}, or a file data/ior/{name}.eta.spd in the search path, found {}{hint}",
+                enumerate(known()),
                 quote(name)
             );
             Err(bag.fault_of("material", message))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The file holds 71 conductors; each curve is a function of wavelength, and no number was lost in reading.
+    #[test]
+    fn every_conductor_is_a_pair_of_curves() {
+        let numbers = TABLES.lines().filter(|line| !line.starts_with('#')).flat_map(|line| line.matches(':')).count();
+        let read: usize = tables().iter().flat_map(|(_, curves)| curves).map(Vec::len).sum();
+        assert_eq!((tables().len(), read), (71, numbers));
+        for (name, curves) in tables() {
+            for curve in curves {
+                assert!(curve.len() >= 2 && curve.windows(2).all(|w| w[0][0] < w[1][0]), "{name}");
+                assert!(curve.iter().all(|[_, value]| *value >= 0.0), "{name}");
+            }
+        }
+    }
+
+    /// R = ((n − 1)² + k²) / ((n + 1)² + k²) at 650 nm: gold and copper are bright there, carbon is not. Palik prints
+    /// n = 0.166 and k = 3.15 for gold at 652.6 nm.
+    #[test]
+    fn metals_shine_as_they_are_known_to() {
+        let at = |name: &str| {
+            let (_, curves) = tables().iter().find(|(known, _)| *known == name).unwrap();
+            let [n, k] = curves.each_ref().map(|curve| {
+                let i = curve.partition_point(|[nm, _]| *nm < 650.0);
+                let ([x0, y0], [x1, y1]) = (curve[i - 1], curve[i]);
+                y0 + (y1 - y0) * (650.0 - x0) / (x1 - x0)
+            });
+            ((n - 1.0).powi(2) + k * k) / ((n + 1.0).powi(2) + k * k)
+        };
+        assert!(at("Au") > 0.9 && at("Cu") > 0.9 && at("Ag") > 0.95 && at("a-C") < 0.3);
     }
 }
