@@ -156,6 +156,10 @@ impl SceneDescription {
         self.camera.check(at.key("camera"), &mut checker);
         self.image.check(at.key("image"), &mut checker);
         self.integrator.check(at.key("integrator"), &mut checker);
+        if matches!(self.integrator, Integrator::LightTracer(_)) && !self.layers.is_empty() {
+            let expected = "an integrator that follows camera rays, since there are layers";
+            checker.require(false, at.key("integrator"), expected, "light_tracer");
+        }
         for (i, layer) in self.layers.iter().enumerate() {
             let taken = self.layers[..i].iter().any(|other| other.name == layer.name);
             layer.check(taken, at.key("layers").index(i), &mut checker);

@@ -94,7 +94,7 @@ def mitsuba_channels(mitsuba: Mitsuba, case: SceneFile, spp: int, seeds) -> dict
     for seed in seeds:
         scene.integrator().render(scene, seed=int(seed), spp=spp, develop=False)
         bitmap = scene.sensors()[0].film().bitmap(raw=False)
-        pixels = np.array(bitmap.convert(component_format=mi.Struct.Type.Float32), dtype=np.float64)
+        pixels = np.array(bitmap, dtype=np.float64)
         pixels = pixels.reshape(*pixels.shape[:2], -1)
         for i, part in enumerate(bitmap.struct_()):
             stacks.setdefault(part.name, []).append(pixels[..., i])

@@ -1,48 +1,204 @@
-//! Integrators.
+//! Integrators: the fields `integrator` and `layers`.
 
 use super::super::fault::Fault;
-use super::super::node::Node;
-use super::object::{Bag, Family};
-use super::{Fields, Import, boolean, whole};
+use super::super::node::{Node, Place};
+use super::object::{Bag, Family, Object, Value};
+use super::{Fields, Import, boolean, list, text, whole};
 
-const INTEGRATORS: [&str; 5] = ["path", "volpath", "volpathmis", "direct", "moment"];
+const INTEGRATORS: [&str; 8] = ["path", "volpath", "volpathmis", "direct", "ptracer", "depth", "aov", "moment"];
+
+/// What `aov` can show, by its name and by ours.
+const QUANTITIES: [(&str, &str); 12] = [
+    ("albedo", "albedo"),
+    ("depth", "depth"),
+    ("position", "position"),
+    ("uv", "uv"),
+    ("geo_normal", "geometric_normal"),
+    ("sh_normal", "shading_normal"),
+    ("dp_du", "dp_du"),
+    ("dp_dv", "dp_dv"),
+    ("duv_dx", "duv_dx"),
+    ("duv_dy", "duv_dy"),
+    ("prim_index", "primitive"),
+    ("shape_index", "shape"),
+];
+
+/// What computes the picture, and its further channels.
+struct Translated {
+    integrator: Node,
+    layers: Vec<Layer>,
+}
+
+/// A further layer.
+struct Layer {
+    place: Place,
+    name: String,
+    content: Content,
+    squares: bool,
+}
+
+enum Content {
+    Surface(&'static str),
+    Light { of: Node, form: &'static str },
+}
 
 impl Import<'_> {
-    pub(crate) fn integrator(&mut self, index: usize) -> Result<Node, Fault> {
+    /// The fields `integrator` and `layers`.
+    pub(crate) fn integrator(&mut self, index: usize) -> Result<Fields, Fault> {
+        let place = self.bag(index).object.place;
+        let Translated { integrator, layers } = self.translated(index)?;
+        let mut all = Fields::new(place);
+        all.add("integrator", integrator);
+        if !layers.is_empty() {
+            all.add("layers", list(place, layers.into_iter().map(Layer::node)));
+        }
+        Ok(all)
+    }
+
+    fn translated(&mut self, index: usize) -> Result<Translated, Fault> {
         let bag = self.bag(index);
         let mut fields = Fields::new(bag.object.place);
         common(&bag)?;
-        match bag.object.plugin.as_str() {
+        let kind = match bag.object.plugin.as_str() {
             // Ours weighs by all wavelengths and all techniques as `volpathmis` does.
             "path" | "volpath" | "volpathmis" => {
                 if bag.object.plugin == "volpathmis" {
                     bag.boolean("use_spectral_mis")?;
                 }
+                hide_emitters(&bag, &mut fields)?;
                 depth(&bag, &mut fields)?;
                 if bag.object.plugin == "path" {
                     // Panes and null surfaces are vertices for it, unlike for the two that know media.
                     fields.add("count_crossings", boolean(bag.object.place, true));
                 }
+                "path"
             }
-            // Light that was scattered once: how many samples each technique takes is noise.
             "direct" => {
-                for key in ["shading_samples", "emitter_samples", "bsdf_samples"] {
-                    bag.integer(key)?;
-                }
+                hide_emitters(&bag, &mut fields)?;
                 fields.add("max_depth", whole(bag.object.place, 2));
+                samples_of_direct(&bag, &mut fields)?;
+                "path"
             }
-            // Our pictures carry their variance anyway; what is nested makes the picture.
-            "moment" => {
-                let inner = bag.only(Family::Integrator)?;
-                let inner = inner.ok_or_else(|| bag.fault("expected an <integrator> inside, found none"))?;
-                bag.finish()?;
-                return self.integrator(inner);
+            "ptracer" => {
+                hide_emitters(&bag, &mut fields)?;
+                depth(&bag, &mut fields)?;
+                "light_tracer"
             }
+            "depth" => {
+                bag.boolean("hide_emitters")?;
+                "depth"
+            }
+            "aov" => return self.aov(&bag),
+            "moment" => return self.moment(&bag),
             _ => return Err(bag.unknown(INTEGRATORS)),
+        };
+        bag.finish()?;
+        Ok(Translated { integrator: fields.kind(kind), layers: Vec::new() })
+    }
+
+    /// What lies inside an integrator, with its name.
+    fn nested(&mut self, bag: &Bag<'_>) -> Result<Vec<(String, Place, Translated)>, Fault> {
+        bag.boolean("hide_emitters")?;
+        let inside = bag.objects(Family::Integrator);
+        let mut all = Vec::new();
+        for index in inside {
+            let place = self.bag(index).object.place;
+            all.push((name_of(bag.object, index), place, self.translated(index)?));
+        }
+        Ok(all)
+    }
+
+    /// Each integrator inside gives a layer of colour; the first gives the picture.
+    fn aov(&mut self, bag: &Bag<'_>) -> Result<Translated, Fault> {
+        let nested = self.nested(bag)?;
+        let mut layers = Vec::new();
+        let mut picture = None;
+        let mut further = Vec::new();
+        for (name, place, Translated { integrator, layers: inner }) in nested {
+            layers.push(Layer::light(place, name.clone(), integrator.clone(), "rgba"));
+            further.extend(inner.into_iter().map(|layer| layer.within(&name)));
+            picture.get_or_insert(integrator);
+        }
+        layers.extend(further);
+        let place = bag.place("aovs");
+        let written = bag.required("aovs", bag.text("aovs"))?;
+        for token in written.split([' ', ',', ';']).filter(|token| !token.is_empty()) {
+            let quantity = |kind: &str| QUANTITIES.iter().find(|(theirs, _)| *theirs == kind).map(|(_, ours)| *ours);
+            let parts: Vec<&str> = token.split(':').collect();
+            let (name, quantity) = match parts[..] {
+                [name, kind] if !name.is_empty() => (name, quantity(kind)),
+                _ => ("", None),
+            };
+            let Some(quantity) = quantity else {
+                let known: Vec<&str> = QUANTITIES.iter().map(|(theirs, _)| *theirs).collect();
+                let message = format!("expected name:type with a type among {}, found {token:?}", known.join(", "));
+                return Err(bag.fault_of("aovs", message));
+            };
+            layers.push(Layer { place, name: name.to_owned(), content: Content::Surface(quantity), squares: false });
         }
         bag.finish()?;
-        Ok(fields.kind("path"))
+        let none = || Fields::new(bag.object.place).kind("none");
+        Ok(Translated { integrator: picture.unwrap_or_else(none), layers })
     }
+
+    /// Each integrator inside gives a layer of XYZ, and all have their squares.
+    fn moment(&mut self, bag: &Bag<'_>) -> Result<Translated, Fault> {
+        let nested = self.nested(bag)?;
+        let mut layers = Vec::new();
+        let mut picture = None;
+        for (name, place, Translated { integrator, layers: inner }) in nested {
+            if inner.iter().any(|layer| layer.squares) {
+                return Err(bag.fault("expected integrators without moments inside, found moments of moments"));
+            }
+            layers.extend(inner.into_iter().map(|layer| layer.within(&name)));
+            layers.push(Layer::light(place, name, integrator.clone(), "xyz"));
+            picture.get_or_insert(integrator);
+        }
+        layers.iter_mut().for_each(|layer| layer.squares = true);
+        bag.finish()?;
+        let integrator = picture.ok_or_else(|| bag.fault("expected an <integrator> inside, found none"))?;
+        Ok(Translated { integrator, layers })
+    }
+}
+
+impl Layer {
+    fn light(place: Place, name: String, of: Node, form: &'static str) -> Layer {
+        Layer { place, name, content: Content::Light { of, form }, squares: false }
+    }
+
+    fn within(self, outer: &str) -> Layer {
+        Layer { name: format!("{outer}.{}", self.name), ..self }
+    }
+
+    fn node(self) -> Node {
+        let mut fields = Fields::new(self.place);
+        fields.add("name", text(self.place, self.name));
+        match self.content {
+            Content::Surface(quantity) => fields.add("surface", text(self.place, quantity)),
+            Content::Light { of, form } => {
+                fields.add("light", of);
+                fields.add("form", text(self.place, form));
+            }
+        }
+        fields.add("squares", boolean(self.place, self.squares));
+        fields.map()
+    }
+}
+
+/// The name under which an object lies in another: unnamed ones are counted.
+fn name_of(outer: &Object, index: usize) -> String {
+    let objects = outer.properties.iter().filter_map(|property| match property.value {
+        Value::Object(i) => Some((property.name.as_str(), i)),
+        _ => None,
+    });
+    let mut unnamed = 0;
+    for (name, i) in objects {
+        if i == index {
+            return if name.is_empty() { format!("_arg_{unnamed}") } else { name.to_owned() };
+        }
+        unnamed += u32::from(name.is_empty());
+    }
+    String::new()
 }
 
 /// What every integrator has and what says nothing about the picture.
@@ -50,8 +206,28 @@ fn common(bag: &Bag<'_>) -> Result<(), Fault> {
     bag.integer("block_size")?;
     bag.integer("samples_per_pass")?;
     bag.float("timeout")?;
-    if bag.boolean("hide_emitters")? == Some(true) {
-        return Err(bag.fault_of("hide_emitters", "expected false, found true, which Abbe does not have"));
+    Ok(())
+}
+
+fn hide_emitters(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
+    if let Some(hide) = bag.boolean("hide_emitters")? {
+        fields.add("hide_emitters", boolean(bag.place("hide_emitters"), hide));
+    }
+    Ok(())
+}
+
+/// Shadow rays and scattered rays of `direct`.
+fn samples_of_direct(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
+    let both = bag.integer("shading_samples")?;
+    for (theirs, ours) in [("emitter_samples", "light_samples"), ("bsdf_samples", "scatter_samples")] {
+        let own = bag.integer(theirs)?;
+        if own.is_some() && both.is_some() {
+            return Err(bag.fault_of(theirs, "expected either shading_samples or this, found both"));
+        }
+        let name = if own.is_some() { theirs } else { "shading_samples" };
+        if let Some(count) = own.or(both) {
+            fields.add(ours, whole(bag.place(name), count));
+        }
     }
     Ok(())
 }

@@ -131,7 +131,7 @@ impl<'a> Import<'a> {
         let mut fields = Fields::new(place);
         fields.extend(camera);
         if let Some(integrator) = integrator {
-            fields.add("integrator", integrator);
+            fields.extend(integrator);
         }
         fields.add("textures", Node::new(place, Value::Map(self.textures)));
         fields.add("materials", Node::new(place, Value::Map(self.materials)));

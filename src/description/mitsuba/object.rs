@@ -280,6 +280,23 @@ impl<'a> Bag<'a> {
         })
     }
 
+    /// All spectra, written as such or as objects, whatever their names, in the order of the text.
+    pub(crate) fn spectra(&self) -> Vec<(&'a str, Place, &'a Value)> {
+        let mut found = Vec::new();
+        for (property, used) in self.object.properties.iter().zip(&self.used) {
+            let is_spectrum = match &property.value {
+                Value::Spectrum(_) => true,
+                Value::Object(index) => self.document.objects[*index].family == Family::Texture,
+                _ => false,
+            };
+            if is_spectrum {
+                used.set(true);
+                found.push((property.name.as_str(), property.place, &property.value));
+            }
+        }
+        found
+    }
+
     /// All objects of a family, whatever their names, in the order of the text.
     pub(crate) fn objects(&self, family: Family) -> Vec<usize> {
         let mut found = Vec::new();

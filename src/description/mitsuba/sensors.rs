@@ -5,10 +5,11 @@ use glam::{DMat4, DVec3};
 use super::super::fault::Fault;
 use super::super::node::{Node, Place, quote};
 use super::object::{Bag, Family};
-use super::{FILM, Fields, Import, matrix, number, numbers, text, whole};
+use super::spectra::Role;
+use super::{FILM, Fields, Import, list, matrix, number, numbers, text, whole};
 
 const SENSORS: [&str; 3] = ["perspective", "thinlens", "orthographic"];
-const FILMS: [&str; 1] = ["hdrfilm"];
+const FILMS: [&str; 2] = ["hdrfilm", "specfilm"];
 const FILTERS: [&str; 6] = ["box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"];
 const SAMPLERS: [&str; 5] = ["independent", "stratified", "multijitter", "orthogonal", "ldsampler"];
 
@@ -42,7 +43,8 @@ impl Import<'_> {
                 camera.add("fov_deg", number(bag.place("fov"), fov_deg));
                 camera.add("fov_axis", text(bag.place("fov_axis"), axis));
                 let offset = [bag.float("principal_point_offset_x")?, bag.float("principal_point_offset_y")?];
-                let offset = offset.map(|x| x.unwrap_or(0.0));
+                // Theirs says where the middle of the picture looks, ours where the axis falls on it.
+                let offset = offset.map(|x| -x.unwrap_or(0.0));
                 camera.add("principal_point", numbers(bag.place("principal_point_offset_x"), &offset));
             }
         }
@@ -85,7 +87,7 @@ impl Import<'_> {
         let mut image = Fields::new(place);
         let mut output = Fields::new(place);
         let mut exr = Fields::new(place);
-        let (mut filter, mut precision, mut colour) = (None, "half", "rec709");
+        let (mut filter, mut precision, mut channels) = (None, "half", "rgb");
         let [mut width, mut height] = [768, 576];
         if let Some(index) = index {
             let bag = self.bag(index);
@@ -106,19 +108,20 @@ impl Import<'_> {
                 }
                 image.add("crop", crop.map());
             }
-            let pixels = ["rgb", "rgba", "xyz", "xyza", "luminance", "luminance_alpha"];
-            match bag.choice("pixel_format", &pixels)? {
-                Some("xyz" | "xyza") => colour = "xyz",
-                Some("luminance" | "luminance_alpha") => {
-                    return Err(bag.fault_of("pixel_format", "expected rgb, rgba, xyz or xyza, found luminance"));
+            if bag.object.plugin == "specfilm" {
+                image.add("bands", self.bands(&bag)?);
+            } else {
+                // The words are the same.
+                let pixels = ["rgb", "rgba", "xyz", "xyza", "luminance", "luminance_alpha"];
+                if let Some(pixel) = bag.choice("pixel_format", &pixels)? {
+                    channels = pixel;
                 }
-                _ => {}
+                bag.choice("file_format", &["openexr", "exr"])?;
+                bag.boolean("banner")?;
             }
-            if let Some("float32" | "uint32") = bag.choice("component_format", &["float16", "float32", "uint32"])? {
+            if let Some("float32") = bag.choice("component_format", &["float16", "float32"])? {
                 precision = "float";
             }
-            // Pictures are written as OpenEXR whatever was asked for.
-            bag.choice("file_format", &["openexr", "exr", "rgbe", "pfm"])?;
             bag.boolean("sample_border")?;
             bag.boolean("compensate")?;
             if let Some(index) = bag.only(Family::ReconstructionFilter)? {
@@ -131,12 +134,27 @@ impl Import<'_> {
         image.add("sensitivity", number(place, FILM));
         image.add("filter", filter.unwrap_or_else(|| text(place, "gaussian")));
         exr.add("precision", text(place, precision));
+        exr.add("channels", text(place, channels));
         output.add("exr", exr.map());
-        output.add("colour", text(place, colour));
         let mut all = Fields::new(place);
         all.add("image", image.map());
         all.add("output", output.map());
         Ok(all)
+    }
+
+    /// The spectra of a `specfilm`, whatever their names.
+    fn bands(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
+        let mut bands = Vec::new();
+        for (name, place, value) in bag.spectra() {
+            let mut band = Fields::new(place);
+            band.add("name", text(place, name));
+            band.maybe("response", self.spectrum_of(bag, name, value, Role::Coefficient)?);
+            bands.push(band.map());
+        }
+        if bands.is_empty() {
+            return Err(bag.fault("expected a <spectrum> for each band, found none"));
+        }
+        Ok(list(bag.object.place, bands))
     }
 
     fn filter(&mut self, index: usize) -> Result<Node, Fault> {

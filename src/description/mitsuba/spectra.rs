@@ -51,6 +51,17 @@ impl Import<'_> {
     /// The spectrum of a property; `None` where it is not written. Textures are refused.
     pub(crate) fn spectrum(&mut self, bag: &Bag<'_>, name: &'static str, role: Role) -> Result<Option<Node>, Fault> {
         let Some(value) = bag.value(name) else { return Ok(None) };
+        self.spectrum_of(bag, name, value, role)
+    }
+
+    /// The spectrum that is the value of the property `name`.
+    pub(crate) fn spectrum_of(
+        &mut self,
+        bag: &Bag<'_>,
+        name: &str,
+        value: &Value,
+        role: Role,
+    ) -> Result<Option<Node>, Fault> {
         let place = bag.place(name);
         match value {
             Value::Float(value) => Ok(Some(grey(place, *value, role))),

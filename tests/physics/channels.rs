@@ -1,0 +1,257 @@
+//! Integrators besides `path`, and the further channels of a picture.
+
+use super::common::{Bench, bench_with};
+use abbe::batch::frame::{self, Frame, FrameJob};
+use abbe::film::filter::{Filter, FilterSampler};
+use abbe::film::resolve::Image;
+use abbe::math::statistics::Moments;
+use abbe::spectrum::ColourSpace;
+use std::f64::consts::PI;
+use std::sync::atomic::AtomicBool;
+
+/// A camera of parallel rays that looks along −z at 2 m × 2 m about the origin, from five metres.
+const PARALLEL: &str = "camera: {origin: [0, 0, 5], target: [0, 0, 0], orthographic_height: 2}\n";
+
+fn render_with(bench: &Bench, filter: Filter, tile: u32) -> Frame {
+    let prepared = &bench.prepared;
+    let job = FrameJob {
+        scene: &prepared.scene,
+        plan: &prepared.plan,
+        filter: &FilterSampler::new(filter).unwrap(),
+        window: bench.window(),
+        samples: prepared.samples,
+        seed: prepared.description.render.seed,
+        tile,
+    };
+    frame::render(&job, &|_| {}, &AtomicBool::new(false)).unwrap()
+}
+
+fn render(yaml: &str) -> Frame {
+    render_with(&bench_with(yaml, &[]), Filter::Box, 32)
+}
+
+/// Mean luminance of a picture with its standard error.
+fn luminance(frame: &Frame) -> (f64, f64) {
+    let Image { rgb, standard_error, .. } = frame.resolve(&ColourSpace::Xyz.matrix_from_xyz());
+    let n = rgb[1].len() as f64;
+    let mean = rgb[1].iter().map(|y| f64::from(*y)).sum::<f64>() / n;
+    (mean, standard_error[1].iter().map(|e| f64::from(*e).powi(2)).sum::<f64>().sqrt() / n)
+}
+
+fn assert_agree(what: &str, a: &Frame, b: &Frame) {
+    let ((a, ea), (b, eb)) = (luminance(a), luminance(b));
+    let z = (a - b) / ea.hypot(eb);
+    assert!(z.abs() < 3.0 && ea < 0.02 * a, "{what}: {a} ± {ea} against {b} ± {eb}, z = {z:.1}");
+}
+
+/// A corner of two diffuse walls with a ball.
+const CORNER: &str = "\
+camera: {origin: [0, 0.5, 5], target: [0, 0, 0], fov_deg: 40, CAMERA}
+image: {width: 16, height: 12}
+render: {samples: 128}
+integrator: {INTEGRATOR: {max_depth: 4}}
+shapes:
+- rectangle: {corner: [-2, -1, -2], edge_u: [0, 0, 4], edge_v: [4, 0, 0], material: {diffuse: {reflectance: 0.6}}}
+- rectangle: {corner: [-2, -1, -2], edge_u: [4, 0, 0], edge_v: [0, 3, 0], material: {diffuse: {reflectance: 0.4}}}
+- sphere: {center: [0.3, -0.4, 0], radius: 0.6, material: MATERIAL}
+";
+
+fn corner(integrator: &str, camera: &str, material: &str, light: &str) -> String {
+    let scene = CORNER.replace("INTEGRATOR", integrator).replace(", CAMERA", camera).replace("MATERIAL", material);
+    scene + light
+}
+
+/// Two estimators of one integral: paths from the camera and paths from the lights, for each light, each camera and
+/// materials that scatter into an angle; within three standard errors of the difference.
+#[test]
+fn paths_from_the_lights_and_from_the_camera_agree() {
+    let clay = "{diffuse: {reflectance: 0.5}}";
+    let area = "- disk: {center: [0.5, 2, 0.5], normal: [0, -1, 0], radius: 0.3, emission: 10}\n";
+    let cases = [
+        ("area", "", clay, area),
+        ("point", "", clay, "lights: [{point: {position: [0.5, 2, 1], intensity: 5}}]\n"),
+        (
+            "spot",
+            "",
+            clay,
+            "lights: [{spot: {position: [0.5, 2, 1], target: [0, -1, 0], cutoff_deg: 40, intensity: 9}}]\n",
+        ),
+        ("directional", "", clay, "lights: [{directional: {direction: [0.2, -1, -0.5], irradiance: 3}}]\n"),
+        ("constant", "", clay, "lights: [{constant: {radiance: 0.5}}]\n"),
+        ("lens", ", lens: {radius: 0.3, focus_distance: 4}", clay, area),
+        ("off the axis", ", principal_point: [0.1, -0.1]", clay, area),
+        ("rough glass", "", "{dielectric: {ior: 1.5, roughness: 0.3}}", area),
+        ("rough metal", "", "{conductor: {metal: gold, roughness: 0.3}}", area),
+    ];
+    for (what, camera, material, light) in cases {
+        let by = |integrator| render(&corner(integrator, camera, material, light));
+        assert_agree(what, &by("path"), &by("light_tracer"));
+    }
+}
+
+/// The same light lies in other pixels' filters, but none is lost: shares add up to one.
+#[test]
+fn splats_keep_their_light_under_every_filter() {
+    let scene =
+        corner("light_tracer", "", "{diffuse: {}}", "lights: [{point: {position: [0.5, 2, 1], intensity: 5}}]\n");
+    let path = bench_with(&scene.replace("light_tracer", "path"), &[]);
+    let light = bench_with(&scene, &[]);
+    for filter in [Filter::Gaussian { stddev: 0.5 }, Filter::CatmullRom, Filter::Lanczos { radius: 3.0 }] {
+        assert_agree(&format!("{filter:?}"), &render_with(&path, filter, 32), &render_with(&light, filter, 32));
+    }
+}
+
+/// Sums are integers and random numbers are addressed: no bit depends on tiles, units of work or threads.
+#[test]
+fn splats_do_not_depend_on_tiles_or_threads() {
+    let light = "- disk: {center: [0.5, 2, 0.5], normal: [0, -1, 0], radius: 0.3, emission: 10}\n";
+    let scene = corner("light_tracer", "", "{dielectric: {ior: 1.5}}", light).replace("128", "20");
+    let bench = bench_with(&scene, &[]);
+    let run = |threads: usize, tile: u32| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let frame = pool.install(|| render_with(&bench, Filter::Gaussian { stddev: 0.5 }, tile));
+        let splats = frame.splats.unwrap();
+        (frame.film, splats.film, splats.paths)
+    };
+    let expected = run(1, 32);
+    assert_eq!(expected.2, [960; 4]);
+    assert!(expected == run(3, 5), "the sums differ");
+}
+
+/// The sky along two techniques: by directions of the light, by directions of the surface, by both.
+#[test]
+fn each_technique_alone_has_the_same_mean() {
+    let light = "lights: [{constant: {radiance: 0.5}}]\n";
+    let both = corner("path", "", "{diffuse: {}}", light);
+    let one = |samples: &str| render(&both.replace("max_depth: 4", &format!("max_depth: 4, {samples}")));
+    let both = render(&both);
+    assert_agree("lamps", &one("scatter_samples: 0"), &both);
+    assert_agree("surfaces", &one("light_samples: 0"), &both);
+    assert_agree("three of each", &one("light_samples: 3, scatter_samples: 3"), &both);
+}
+
+/// In light of radiance one from everywhere a band holds ∫ response dλ: 25 for a box of 25 nm, 940 for twice the
+/// whole band of 470 nm, 50 for a triangle 100 nm wide. Pixels are independent.
+#[test]
+fn bands_are_integrals_over_the_wavelength() {
+    let frame = render(&format!(
+        "{PARALLEL}render: {{samples: 64}}\nlights: [{{constant: {{radiance: 1}}}}]\n\
+         image:\n  width: 16\n  height: 16\n  bands:\n\
+         \x20 - {{name: box, response: {{table: [[380, 1], [405, 1]]}}}}\n\
+         \x20 - {{name: all, response: 2}}\n\
+         \x20 - {{name: triangle, response: {{table: [[500, 0], [550, 1], [600, 0]]}}}}\n"
+    ));
+    for (channel, expected) in [25.0, 940.0, 50.0].into_iter().enumerate() {
+        let found: Moments = frame.layer(channel).iter().map(|x| f64::from(*x)).collect();
+        let (mean, error) = (found.mean, found.standard_error());
+        assert!((mean - expected).abs() < 4.0 * error && error < 0.01 * expected, "{expected}: {mean} ± {error}");
+    }
+}
+
+/// A rectangle of 2 × 4 across parallel rays: u and v run from 0 to 1 over its edges. A sphere of radius r seen at its
+/// middle, where the camera looks at longitude zero of the equator: 2πr a turn of u, πr from pole to pole.
+#[test]
+fn layers_of_surfaces_are_their_closed_forms() {
+    let layers = "layers:\n- {name: d, surface: depth}\n- {name: p, surface: position}\n- {name: n, surface: geometric_normal}\n\
+                  - {name: t, surface: uv}\n- {name: u, surface: dp_du}\n- {name: v, surface: dp_dv}\n- {name: x, surface: duv_dx}\n\
+                  - {name: i, surface: shape}\n- {name: a, surface: albedo}\n";
+    let scene = |shape: &str, size: u32| {
+        let camera = PARALLEL.replace("height: 2", "height: 2, clip: {near: 1.5, far: 20}");
+        let text = format!(
+            "{camera}image: {{width: {size}, height: {size}}}\nrender: {{samples: 16}}\nintegrator: none\n{layers}shapes:\n- {shape}\n"
+        );
+        let frame = render_with(&bench_with(&text, &[]).grey(), Filter::Box, 32);
+        move |channel: usize, pixel: usize| f64::from(frame.layer(channel)[pixel])
+    };
+    let of = scene(
+        "rectangle: {corner: [-1, -2, 0], edge_u: [2, 0, 0], edge_v: [0, 4, 0], material: {diffuse: {reflectance: 0.25}}}",
+        2,
+    );
+    // The middle of the upper left pixel is (−½, ½): stratified samples average to it within a quarter of their share.
+    let expected = [3.5, -0.5, 0.5, 0.0, 0.0, 0.0, 1.0, 0.25, 0.625, 2.0, 0.0, 0.0, 0.0, 4.0, 0.0];
+    for (channel, expected) in expected.into_iter().enumerate() {
+        let tolerance = if (1..3).contains(&channel) || (7..9).contains(&channel) { 0.05 } else { 1e-6 };
+        assert!((of(channel, 0) - expected).abs() < tolerance, "{channel}: {} {expected}", of(channel, 0));
+    }
+    // A pixel is one metre and samples stand a quarter of it apart: Δu = ¼ / 2.
+    assert!((of(15, 0) - 0.125).abs() < 1e-6 && of(16, 0).abs() < 1e-6);
+    assert_eq!(of(17, 0), 1.0);
+    // Light on a reflectance of ¼ is as much as a radiance of ¼ in the quadrature of eight wavelengths.
+    let unit = 4.0 * of(19, 0);
+    assert!((unit - 1.0).abs() < 0.1, "{unit}");
+
+    let of = scene("sphere: {radius: 1.5}", 1);
+    let length = |from: usize| (0..3).map(|c| of(from + c, 0).powi(2)).sum::<f64>().sqrt();
+    // Over the one pixel of 2 m the directions of the partials turn; seen from near the axis only.
+    assert!(length(9) < 2.0 * PI * 1.5 + 1e-6 && length(12) < PI * 1.5 + 1e-6);
+    let narrow = render(&format!(
+        "{}image: {{width: 1, height: 1}}\nrender: {{samples: 4}}\n{layers}shapes:\n- sphere: {{radius: 1.5}}\n",
+        PARALLEL.replace("height: 2", "height: 1e-5")
+    ));
+    let length = |from: usize| (0..3).map(|c| f64::from(narrow.layer(from + c)[0]).powi(2)).sum::<f64>().sqrt();
+    assert!((length(9) - 2.0 * PI * 1.5).abs() < 1e-4, "{}", length(9));
+    assert!((length(12) - PI * 1.5).abs() < 1e-4, "{}", length(12));
+}
+
+/// A number that is 0 or 1 is its own square: the mean of the squares of the coverage is the coverage. A radiance c
+/// without noise has the mean square c².
+#[test]
+fn squares_are_second_moments() {
+    let scene = format!(
+        "{PARALLEL}image: {{width: 8, height: 8}}\nrender: {{samples: 64}}\n\
+         layers:\n- {{name: a, squares: true}}\n- {{name: b, form: xyz, squares: true, light: {{path: {{hide_emitters: true}}}}}}\n\
+         shapes:\n- disk: {{normal: [0, 0, 1], radius: 0.8, emission: 3, material: {{diffuse: {{reflectance: 0}}}}}}\n"
+    );
+    let frame = render_with(&bench_with(&scene, &[]).grey(), Filter::Box, 32);
+    let plane = |channel| frame.layer(channel);
+    assert_eq!(plane(3), plane(7));
+    assert!(plane(3).iter().any(|a| *a > 0.2 && *a < 0.8));
+    // The middle pixels see the lamp alone; the hidden lamp is black.
+    let (mean, square) = (plane(0)[27], plane(4)[27]);
+    assert!(mean > 2.0 && (square / (mean * mean) - 1.0).abs() < 1e-6, "{mean} {square}");
+    assert!((8..14).all(|channel| plane(channel).iter().all(|x| *x == 0.0)));
+}
+
+/// Before the sky stands a lamp: neither is seen, and neither covers anything; the wall behind is lit by both.
+#[test]
+fn hidden_lights_shine_and_are_not_seen() {
+    let scene = |walls: &str| {
+        render(&format!(
+            "{PARALLEL}image: {{width: 4, height: 4}}\nrender: {{samples: 64}}\n\
+             integrator: {{path: {{hide_emitters: true}}}}\nlights: [{{constant: {{radiance: 1}}}}]\n\
+             shapes:\n- sphere: {{radius: 0.5, emission: 4}}\n{walls}"
+        ))
+        .resolve(&ColourSpace::Xyz.matrix_from_xyz())
+    };
+    let empty = scene("");
+    assert!(empty.rgb.iter().flatten().chain(&empty.alpha).all(|x| *x == 0.0));
+    // A black wall close behind it.
+    let wall = "- rectangle: {corner: [-9, -9, -0.6], edge_u: [18, 0, 0], edge_v: [0, 18, 0], material: {diffuse: {reflectance: RHO}}}\n";
+    let black = scene(&wall.replace("RHO", "0"));
+    assert!(black.rgb.iter().flatten().all(|x| *x == 0.0) && black.alpha.iter().all(|a| *a == 1.0));
+    // A sphere's face of radiance L fills (r/d)² of the cosine-weighted sky at the foot of its axis, d = 0.6:
+    // E/π = (r/d)² L + (1 − (r/d)²). The four middle pixels lie within 0.5 of it, where it is less.
+    let white = scene(&wall.replace("RHO", "1"));
+    let share = (0.5f64 / 0.6).powi(2);
+    let most = share * 4.0 + (1.0 - share);
+    let middle = f64::from(white.rgb[1][5]);
+    assert!(middle > 1.5 && middle < most * 1.02, "{middle} {most}");
+}
+
+/// Between clipping planes at 4 and 6 m from a camera at 5 m there is the unit sphere's middle part: the near cap is
+/// open, and what the camera sees is the inside.
+#[test]
+fn the_camera_sees_between_its_clipping_planes_only() {
+    let depth = |clip: &str| {
+        let camera = PARALLEL.replace("height: 2", &format!("height: 0.01, clip: {{{clip}}}"));
+        let frame = render(&format!(
+            "{camera}image: {{width: 1, height: 1}}\nrender: {{samples: 4}}\nlayers: [{{name: d, surface: depth}}]\n\
+             shapes: [{{sphere: {{radius: 1}}}}]\n"
+        ));
+        f64::from(frame.layer(0)[0])
+    };
+    // Half the picture is 5 mm wide: the sphere is at most 2.5e-5 m off there.
+    for (clip, expected) in [("near: 0", 4.0), ("near: 3.5", 0.5), ("near: 4.5", 1.5), ("near: 4.5, far: 5.5", 0.0)] {
+        assert!((depth(clip) - expected).abs() < 3e-5, "{clip}: {}", depth(clip));
+    }
+}
