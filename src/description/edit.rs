@@ -415,8 +415,8 @@ mod tests {
         );
         assert_eq!(
             says("shapes[0].sphere.radus", "3"),
-            "--set shapes[0].sphere.radus=3: shapes[0].sphere.radus: expected one of center, radius, name, material, \
-             emission, emission_direction, sampling_weight, inside, outside, transform, found \"radus\"; did you mean \"radius\"?"
+            "--set shapes[0].sphere.radus=3: shapes[0].sphere.radus: expected one of center, radius, layout, name, material, \
+             emission, emission_direction, sampling_weight, inside, outside, transform, flip_normals, found \"radus\"; did you mean \"radius\"?"
         );
         assert_eq!(
             says("shapes[2].sphere.radius", "3"),

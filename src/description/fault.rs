@@ -184,6 +184,8 @@ pub(crate) struct Checker<'a> {
     pub(crate) volumes: BTreeSet<&'a str>,
     /// Volumes that were seen in the place of a reflectance.
     pub(crate) reflecting_volumes: BTreeSet<&'a str>,
+    /// Names under `groups`.
+    pub(crate) groups: BTreeSet<&'a str>,
     /// Textures that were seen in the place of a reflectance.
     pub(crate) reflecting_textures: BTreeSet<&'a str>,
 }
@@ -197,6 +199,7 @@ impl<'a> Checker<'a> {
             materials: BTreeSet::new(),
             textures: BTreeSet::new(),
             media: BTreeSet::new(),
+            groups: BTreeSet::new(),
             reflecting_textures: BTreeSet::new(),
             volumes: BTreeSet::new(),
             reflecting_volumes: BTreeSet::new(),
@@ -280,6 +283,13 @@ impl<'a> Checker<'a> {
     pub(crate) fn medium(&mut self, at: At<'_>, name: &str) {
         if let Some(hint) = unknown(name, &self.media, self.untold) {
             self.fault(at, format!("unknown medium {}{hint}", quote(name)));
+        }
+    }
+
+    /// `name` is among the groups.
+    pub(crate) fn group(&mut self, at: At<'_>, name: &str) {
+        if let Some(hint) = unknown(name, &self.groups, self.untold) {
+            self.fault(at, format!("unknown group {}{hint}", quote(name)));
         }
     }
 

@@ -311,6 +311,23 @@ pub enum Texture {
     Checkerboard(Checkerboard),
     /// `volume: haze`: a volume, by name, at the points of the surface.
     Volume(String),
+    /// Numbers that the file of the mesh has at its vertices or on its faces.
+    MeshAttribute(MeshAttribute),
+}
+
+/// `mesh_attribute: {name: vertex_color, scale: 1}`
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshAttribute {
+    /// `vertex_…` or `face_…`; see `scene::mesh::attribute`.
+    pub name: String,
+    /// Factor on the numbers; default 1.
+    #[serde(default = "one")]
+    pub scale: f64,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// `image: {file: earth.jpg}`
@@ -529,7 +546,7 @@ impl Texture {
     /// Names of the textures in it.
     pub(crate) fn inner(&self) -> Vec<&str> {
         match self {
-            Texture::Image(_) | Texture::Volume(_) => Vec::new(),
+            Texture::Image(_) | Texture::Volume(_) | Texture::MeshAttribute(_) => Vec::new(),
             Texture::Checkerboard(board) => {
                 [&board.a, &board.b].into_iter().filter_map(SpectrumOrTexture::name).collect()
             }
@@ -546,6 +563,13 @@ impl Texture {
                 }
             }
             Texture::Image(_) => {}
+            Texture::MeshAttribute(attribute) => {
+                let name = attribute.name.as_str();
+                let named = name.starts_with("vertex_") || name.starts_with("face_");
+                let at = at.key("mesh_attribute");
+                checker.require(named, at.key("name"), "a name that starts with vertex_ or face_", name);
+                checker.not_negative(at.key("scale"), attribute.scale);
+            }
             Texture::Checkerboard(board) => {
                 let at = at.key("checkerboard");
                 board.a.check(role, at.key("a"), checker);

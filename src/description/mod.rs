@@ -74,6 +74,7 @@
 //!                                   # repeat, mirror, clamp, and wrap_v where it differs; bilinear, nearest; all but
 //!                                   # file default; uv: [[a, b, c], [d, e, f]] maps u, v before scale and offset
 //!   marble: {volume: haze}          # a volume where it is cut by the surface
+//!   rust: {mesh_attribute: {name: vertex_color, scale: 1}}   # numbers of the .ply file of the mesh; ~ scale
 //!   floor: {checkerboard: {a: 0.1, b: {rgb: [0.9, 0.8, 0.7]}, scale: [12, 12]}}   # scale default [1, 1]
 //!                                   # a and b may be textures; uv as above
 //! volumes:
@@ -149,6 +150,8 @@
 //! medium: smoke                     # what the camera is in; default none
 //! fog: {colour: 0.8, start: 5, end: 40}
 //!                                   # or {colour, density: 0.1, falloff: exp}: exp (default), exp2
+//! groups:                           # shapes that are seen where an instance copies them; none of them shines
+//!   tree: [{sphere: {center: [0, 2, 0], radius: 1}}, {cylinder: {base: [0, 0, 0], top: [0, 2, 0], radius: 0.1}}]
 //! shapes:
 //! - sphere:
 //!     center: [0, 1, 0]             # ~ origin
@@ -168,15 +171,22 @@
 //!     - rotate: {axis: [0, 1, 0], deg: 30}
 //!     - scale: 2                    # or [2, 1, 1]
 //!     - matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]    # rows
+//!     flip_normals: false           # ~ true turns the normal round: emission, inside and outside change sides
 //! - plane: {point: [0, 0, 0], normal: [0, 1, 0], tangent: [1, 0, 0]}   # ~ point origin, any tangent
 //! - disk: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1}            # ~ center origin
 //! - rectangle: {corner: [0, 0, 0], edge_u: [1, 0, 0], edge_v: [0, 0, -1]}   # normal edge_u × edge_v
 //! - cube: {center: [0, 0, 0], size: [1, 2, 3]}                         # ~ center origin; or size: 2
-//! - cylinder: {base: [0, 0, 0], top: [0, 1, 0], radius: 0.5, caps: both}    # ~ both, none, base, top
+//!                                   # sphere and cube: layout: y_up ~ or z_up, how u and v lie on them
+//! - cylinder: {base: [0, 0, 0], top: [0, 1, 0], radius: 0.5, caps: both}    # ~ both, none, base, top;
+//!                                   # seam: [1, 0, 0] is where u = 0, as seen from the axis, ~ chosen
 //! - cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 0.5, cap: true}   # ~ cap
-//! - mesh: {file: knot.ply, normals: file}                              # ~ file, smooth, face
+//! - mesh: {file: knot.ply, normals: file}    # .obj, .ply, .serialized; ~ file, smooth, vertex (file, else smooth but
+//!                                             # for each vertex of the file by itself), face; and, with defaults,
+//!                                             # winding: object (world: by the right hand after the transform, or the
+//!                                             # file's normals), flip_v: false, index: 0 (of a .serialized file)
 //! - sdf_grid: {file: torus.vol, normals: smooth}                       # ~ smooth, analytic
 //! - curves: {file: hair.txt, basis: bspline}                           # ~ linear, bspline
+//! - instance: {group: tree}                                            # a copy; besides it only name and transform
 //! lights:                           # each may have a name
 //! - point: {position: [0, 5, 0], intensity: 10}                        # W·sr⁻¹·nm⁻¹
 //! - spot:
@@ -205,7 +215,7 @@
 //! ```
 //!
 //! A sphere, cylinder or cone takes only transforms that keep it one: moves, turns and even
-//! scaling.
+//! scaling. An instance takes any that can be inverted.
 //!
 //! An `sdf_grid` is the zero of signed distances, positive outside, on a grid that fills the unit cube before its
 //! transform; the file is Mitsuba's `.vol`. `curves` are read from lines of `x y z radius`; an empty line ends a curve.
@@ -301,7 +311,8 @@ pub use layer::{Layer, LayerContent, LightForm, Quantity};
 pub use light::{Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, Light, PointLight, SpotLight};
 pub use material::{
     Boundary, Checkerboard, Conductor, ConductorIndex, Dielectric, Diffuse, Distribution, Fresnel, Highlight,
-    HighlightModel, ImageTexture, Material, MaterialRef, Mirror, Plastic, Texture, TextureFilter, ThinDielectric, Wrap,
+    HighlightModel, ImageTexture, Material, MaterialRef, MeshAttribute, Mirror, Plastic, Texture, TextureFilter,
+    ThinDielectric, Wrap,
 };
 pub use medium::{Coefficients, HeterogeneousMedium, HomogeneousMedium, Medium, Phase, PhaseBlend};
 pub(crate) use medium::{UNCHANGED, VACUUM};
@@ -312,8 +323,8 @@ pub use settings::{
     Output, PathIntegrator, Png, Precision, Render, Tonemap, Wavelengths, WhittedIntegrator,
 };
 pub use shape::{
-    Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Extent, Geometry, Mesh, Normals, Plane, Rectangle, Rotation,
-    SdfGrid, SdfNormals, Shape, Sphere, TransformStep,
+    Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Extent, Geometry, Instance, Layout, Mesh, Normals, Plane, Rectangle, Rotation,
+    SdfGrid, SdfNormals, Shape, Sphere, TransformStep, Winding,
 };
 pub use spectrum::{
     Abbe, Blackbody, Cauchy, FilePath, Illuminant, Index, Line, Scaled, Sellmeier, Spectrum, SpectrumOrTexture, Vec3,
@@ -364,7 +375,7 @@ mod tests {
     #[test]
     fn the_reference_scene_is_a_scene() {
         let scene = parse(&reference("scene")).unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!(scene.shapes.len(), 10);
+        assert_eq!(scene.shapes.len(), 11);
         assert_eq!(scene.lights.len(), 6);
         assert_eq!(scene.materials.len(), Material::KINDS.len());
         // What the page calls a default is one.
@@ -396,7 +407,7 @@ mod tests {
         assert_eq!(
             parse("scens: []").unwrap_err().to_string(),
             "dir/s.yaml:1:1: scens: expected one of include, camera, image, integrator, layers, render, output, textures, \
-             volumes, materials, media, shapes, lights, medium, fog, scenes, found \"scens\"; did you mean \"scenes\"?"
+             volumes, materials, media, groups, shapes, lights, medium, fog, scenes, found \"scens\"; did you mean \"scenes\"?"
         );
         assert_eq!(faults("scens: []").matches("scenes").count(), 0);
     }

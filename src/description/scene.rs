@@ -62,6 +62,9 @@ pub struct SceneDescription {
     /// By name.
     #[serde(default)]
     pub media: BTreeMap<String, Medium>,
+    /// Shapes that are placed together, by name: seen where an instance copies them.
+    #[serde(default)]
+    pub groups: BTreeMap<String, Vec<Shape>>,
     /// In the order of the text.
     #[serde(default)]
     pub shapes: Vec<Shape>,
@@ -151,6 +154,7 @@ impl SceneDescription {
         checker.textures = self.textures.keys().map(String::as_str).collect();
         checker.volumes = self.volumes.keys().map(String::as_str).collect();
         checker.media = self.media.keys().map(String::as_str).collect();
+        checker.groups = self.groups.keys().map(String::as_str).collect();
         let at = At::ROOT;
 
         self.camera.check(at.key("camera"), &mut checker);
@@ -168,6 +172,16 @@ impl SceneDescription {
         self.output.check(at.key("output"), &mut checker);
         for (name, material) in &self.materials {
             material.check(at.key("materials").key(name), &mut checker);
+        }
+        let groups = at.key("groups");
+        for (name, shapes) in &self.groups {
+            let at = groups.key(name);
+            if shapes.is_empty() {
+                checker.fault(at, "expected one shape or more, found an empty list");
+            }
+            for (i, shape) in shapes.iter().enumerate() {
+                shape.check_child(at.index(i), &mut checker);
+            }
         }
         for (i, shape) in self.shapes.iter().enumerate() {
             shape.check(at.key("shapes").index(i), &mut checker);
@@ -329,14 +343,15 @@ mod tests {
                 inside: Some(text("smoke")),
                 outside: Some(text("smoke")),
                 transform: ball.transform.clone(),
-                geometry: Geometry::Sphere(Sphere { center: [0.0, 1.0, 0.0], radius: 1.0 }),
+                flip_normals: false,
+                geometry: Geometry::Sphere(Sphere { center: [0.0, 1.0, 0.0], radius: 1.0, layout: Layout::YUp }),
             }
         );
         assert_eq!(ball.transform.len(), 4);
         let kinds: Vec<&str> = scene.shapes.iter().map(|shape| shape.geometry.kind()).collect();
         assert_eq!(
             kinds,
-            ["sphere", "plane", "disk", "rectangle", "cube", "cylinder", "cone", "mesh", "sdf_grid", "curves"]
+            ["sphere", "plane", "disk", "rectangle", "cube", "cylinder", "cone", "mesh", "sdf_grid", "curves", "instance"]
         );
         assert_eq!(scene.shapes[1].material, MaterialRef::default());
         assert_eq!(

@@ -31,6 +31,8 @@ pub struct Shape {
     pub outside: Option<String>,
     /// Applied in the order of the list; default none.
     pub transform: Vec<TransformStep>,
+    /// Whether the normal points to the other side than the form's own; default false.
+    pub flip_normals: bool,
     /// The form.
     pub geometry: Geometry,
 }
@@ -87,6 +89,8 @@ macro_rules! forms {
                     outside: Option<String>,
                     #[serde(default)]
                     transform: Vec<TransformStep>,
+                    #[serde(default)]
+                    flip_normals: bool,
                 }
             )*
 
@@ -108,6 +112,7 @@ macro_rules! forms {
                             inside: written.inside,
                             outside: written.outside,
                             transform: written.transform,
+                            flip_normals: written.flip_normals,
                             geometry: Geometry::$form(super::$form { $( $field: written.$field, )* }),
                         }, )*
                     }
@@ -124,6 +129,8 @@ forms! {
         center: Vec3 = [default],
         /// Metres.
         radius: f64 = [],
+        /// How the texture lies on it; default `y_up`.
+        layout: Layout = [default],
     }
     /// `plane: {point: [0, 0, 0], normal: [0, 1, 0]}`: without end.
     "plane" Plane {
@@ -158,6 +165,8 @@ forms! {
         center: Vec3 = [default],
         /// Edges, metres.
         size: Extent = [],
+        /// How the texture lies on its faces; default `y_up`.
+        layout: Layout = [default],
     }
     /// `cylinder: {base, top, radius, caps: both}`
     "cylinder" Cylinder {
@@ -169,6 +178,8 @@ forms! {
         radius: f64 = [],
         /// Which ends are closed; default `both`.
         caps: Caps = [default],
+        /// Where the texture begins, u = 0, as seen from the axis; default chosen.
+        seam: Option<Vec3> = [default],
     }
     /// `cone: {base, apex, radius, cap: true}`
     "cone" Cone {
@@ -181,12 +192,23 @@ forms! {
         /// Whether the base is closed; default true.
         cap: bool = [default = "yes"],
     }
-    /// `mesh: {file: bunny.ply, normals: file}`
+    /// `mesh: {file: bunny.ply, normals: file, winding: object}`
     "mesh" Mesh {
-        /// OBJ or PLY.
+        /// OBJ, PLY or `.serialized`.
         file: FilePath = [],
         /// Where shading normals come from; default `file`.
         normals: Normals = [default],
+        /// Which side is the outside; default `object`.
+        winding: Winding = [default],
+        /// Which mesh of a `.serialized` file, counted from 0; default 0.
+        index: u32 = [default],
+        /// Whether the texture's v is counted from the top, v ↦ 1 − v; default false.
+        flip_v: bool = [default],
+    }
+    /// `instance: {group: tree}`: a copy of a group, which has its own materials and media.
+    "instance" Instance {
+        /// Name under `groups`.
+        group: String = [],
     }
     /// `sdf_grid: {file: torus.vol, normals: smooth}`
     "sdf_grid" SdfGrid {
@@ -237,6 +259,18 @@ impl Extent {
     }
 }
 
+/// How texture coordinates lie on a sphere or a cube.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Layout {
+    /// Pictures stand upright, with their top towards +y.
+    #[default]
+    YUp,
+    /// On a sphere u is the longitude from +x towards +y and v the angle from +z; on a cube u and v grow along
+    /// the axes that `scene::shape::Layout` tells. This is how Mitsuba lays them.
+    ZUp,
+}
+
 /// Closed ends of a cylinder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -256,11 +290,13 @@ pub enum Caps {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Normals {
-    /// The file; faces where it has none.
+    /// The file; `smooth` where it has none.
     #[default]
     File,
-    /// Means of the adjoining faces.
+    /// Means of the adjoining faces; vertices at the same place count as one.
     Smooth,
+    /// The file; where it has none, means of the faces at each of its vertices by itself.
+    Vertex,
     /// The faces.
     Face,
 }
@@ -285,6 +321,18 @@ pub enum CurveBasis {
     Linear,
     /// Uniform cubic B-splines, open at the ends.
     Bspline,
+}
+
+/// Which side of a mesh is the outside.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Winding {
+    /// That from which the corners of its triangles are counterclockwise in the file, whatever the transform.
+    #[default]
+    Object,
+    /// That from which they are counterclockwise in the world, so that a mirror turns the mesh inside out;
+    /// with normals of the file, the side that these are on.
+    World,
 }
 
 /// One step of a transform.
@@ -429,9 +477,36 @@ impl Shape {
         matrix_of(&self.transform)
     }
 
+    /// Checks a shape of a group, which neither shines nor copies another group.
+    pub(crate) fn check_child<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
+        self.check(at, checker);
+        let at = at.key(self.geometry.kind());
+        if self.emission.is_some() {
+            checker.fault(at.key("emission"), "expected no light in a group: only shapes of the scene itself shine");
+        }
+        if let Geometry::Instance(_) = self.geometry {
+            checker.fault(at, "expected a shape, found an instance: a group holds no copies of groups");
+        }
+    }
+
     pub(crate) fn check<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
         let at = at.key(self.geometry.kind());
         self.geometry.check(at, checker);
+        if let Geometry::Instance(_) = self.geometry {
+            let written = [
+                ("material", self.material != MaterialRef::default()),
+                ("emission", self.emission.is_some()),
+                ("inside", self.inside.is_some()),
+                ("outside", self.outside.is_some()),
+                ("flip_normals", self.flip_normals),
+            ];
+            for (key, _) in written.into_iter().filter(|(_, is_written)| *is_written) {
+                checker.fault(
+                    at.key(key),
+                    "expected no such field of an instance: the shapes of its group have their own",
+                );
+            }
+        }
         self.material.check(at.key("material"), checker);
         if let Some(emission) = &self.emission {
             if matches!(self.geometry, Geometry::SdfGrid(_) | Geometry::Curves(_)) {
@@ -463,7 +538,8 @@ impl Shape {
             | Geometry::Cube(_)
             | Geometry::Mesh(_)
             | Geometry::SdfGrid(_)
-            | Geometry::Curves(_) => false,
+            | Geometry::Curves(_),
+            | Geometry::Instance(_) => false,
         };
         if round && !is_similarity(linear) {
             let kind = self.geometry.kind();
@@ -474,6 +550,15 @@ impl Shape {
 }
 
 impl Geometry {
+    /// The group that an instance copies.
+    #[must_use]
+    pub fn group(&self) -> Option<&str> {
+        match self {
+            Geometry::Instance(instance) => Some(&instance.group),
+            _ => None,
+        }
+    }
+
     fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         match self {
             Geometry::Sphere(sphere) => checker.positive(at.key("radius"), sphere.radius),
@@ -512,6 +597,9 @@ impl Geometry {
                     "a point other than the base",
                     format_args!("{:?}", cylinder.top),
                 );
+                if let Some(seam) = cylinder.seam {
+                    checker.direction(at.key("seam"), seam);
+                }
             }
             Geometry::Cone(cone) => {
                 checker.positive(at.key("radius"), cone.radius);
@@ -519,6 +607,7 @@ impl Geometry {
                 checker.require(apart, at.key("apex"), "a point other than the base", format_args!("{:?}", cone.apex));
             }
             Geometry::Mesh(_) | Geometry::SdfGrid(_) | Geometry::Curves(_) => {}
+            Geometry::Instance(instance) => checker.group(at.key("group"), &instance.group),
         }
     }
 }

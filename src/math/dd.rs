@@ -1,4 +1,5 @@
-//! Double-double arithmetic: some 104 bits, the yardstick that tests hold f64 code against.
+//! Double-double arithmetic: some 104 bits, for inverses and as the yardstick that tests hold f64 code
+//! against.
 //!
 //! Dekker 1971; Hida, Li and Bailey 2001, "Algorithms for Quad-Double Precision Floating Point
 //! Arithmetic".

@@ -4,7 +4,6 @@
 //! colour is f32. Vectors are [`glam::DVec3`]; transforms read right to left
 //! (`world_from_object`).
 
-#[cfg(test)]
 pub mod dd;
 pub mod frame;
 pub mod ray;

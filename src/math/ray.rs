@@ -13,6 +13,16 @@ pub struct Departure {
     pub object: u32,
     /// Face of a shape (wall, cap, side of a cube; 0 where there is only one), or triangle of a mesh.
     pub part: u32,
+    /// Index of the instance that `object` belongs to, where it is a child of one.
+    pub instance: Option<u32>,
+}
+
+impl Departure {
+    /// A part of an object that stands for itself.
+    #[must_use]
+    pub fn new(object: u32, part: u32) -> Departure {
+        Departure { object, part, instance: None }
+    }
 }
 
 /// A half line. `direction` has unit length to within rounding, so distances along the ray
@@ -62,7 +72,7 @@ mod tests {
 
     #[test]
     fn leaving_steps_to_the_side_the_ray_goes() {
-        let departure = Departure { object: 3, part: 1 };
+        let departure = Departure::new(3, 1);
         let p = DVec3::new(4.0, -8.0, 1.0);
         let up = Ray::leaving(p, 8.0, DVec3::Y, DVec3::Y, departure);
         let down = Ray::leaving(p, 8.0, DVec3::Y, -DVec3::Y, departure);

@@ -20,10 +20,12 @@ const FACES: u8 = 6;
 /// surface and their normals are good to some eight roundings each.
 const MISS: f64 = 32.0 * f64::EPSILON;
 
-/// Light at `from`. A mesh is asked at one triangle, which `u` chooses by area.
+/// Light at `from`; `facing` is −1 where the surface shines against its own normal, else 1. A mesh is asked
+/// at one triangle, which `u` chooses by area.
 #[must_use]
 pub fn arriving(
     geometry: &Geometry,
+    facing: f64,
     object: u32,
     exitance: &Texture,
     from: DVec3,
@@ -32,7 +34,7 @@ pub fn arriving(
 ) -> Option<Arriving> {
     match geometry {
         Geometry::Shape(shape) => {
-            let foot = foot(shape, from)?;
+            let foot = foot(shape, facing, from)?;
             let surface = shape.surface(foot.point, foot.face);
             let at = TexturePoint::new(&surface, u32::from(foot.face), [0.0; 2]);
             Some(Arriving {
@@ -40,16 +42,16 @@ pub fn arriving(
                 distance: foot.distance,
                 radiance: exitance.eval(&at, nm) * foot.spread as f32,
                 density: None,
-                target: Some(Departure { object, part: u32::from(foot.face) }),
+                target: Some(Departure::new(object, u32::from(foot.face))),
             })
         }
         Geometry::Mesh(mesh) => {
             let (triangle, _) = mesh.areas.sample(u.x)?;
             let [a, b, c] = mesh.mesh.vertices(triangle);
             let (e1, e2, p) = (b - a, c - a, from - mesh.mesh.origin - a);
-            let normal = e1.cross(e2);
+            let normal = e1.cross(e2) * facing;
             let twice = normal.length_squared();
-            let (b1, b2) = (p.cross(e2).dot(normal) / twice, e1.cross(p).dot(normal) / twice);
+            let (b1, b2) = (p.cross(e2).dot(normal) * facing / twice, e1.cross(p).dot(normal) * facing / twice);
             let height = p.dot(normal) / twice.sqrt();
             if !(b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && height > 0.0) {
                 return None;
@@ -58,15 +60,15 @@ pub fn arriving(
             let probability = 0.5 * twice.sqrt() / mesh.areas.total();
             let at = TexturePoint::new(&surface, triangle, [b1, b2]);
             Some(Arriving {
-                wi: -surface.normal,
+                wi: -surface.normal * facing,
                 distance: height,
                 radiance: exitance.eval(&at, nm) * (1.0 / probability) as f32,
                 density: None,
-                target: Some(Departure { object, part: triangle }),
+                target: Some(Departure::new(object, triangle)),
             })
         }
         // They do not shine.
-        Geometry::Sdf(_) | Geometry::Curves(_) => None,
+        Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => None,
     }
 }
 
@@ -81,20 +83,21 @@ struct Foot {
     spread: f64,
 }
 
-fn foot(shape: &Shape, from: DVec3) -> Option<Foot> {
+fn foot(shape: &Shape, facing: f64, from: DVec3) -> Option<Foot> {
     (0..FACES).find_map(|face| {
-        let normal = shape.surface_with(from, face, super::shape::Detail::Geometry).normal;
+        let normal = shape.surface_with(from, face, super::shape::Detail::Geometry).normal * facing;
         let hit = shape.intersect(&Ray::new(from, -normal), f64::INFINITY, None).filter(|hit| hit.face == face)?;
         let surface = shape.surface_with(from - normal * hit.t, face, super::shape::Detail::Geometry);
+        let outward = surface.normal * facing;
         // The foot of another face's normal, or light that comes from the inside.
-        let miss = from - surface.point - surface.normal * hit.t;
+        let miss = from - surface.point - outward * hit.t;
         let largest = surface.scale.max(from.abs().max_element());
-        if surface.normal.dot(normal) <= 0.0 || miss.length() > MISS * largest {
+        if outward.dot(normal) <= 0.0 || miss.length() > MISS * largest {
             return None;
         }
         let [k1, k2] = shape.curvatures(surface.point, face);
-        let spread = 1.0 / (hit.t.mul_add(k1, 1.0) * hit.t.mul_add(k2, 1.0));
-        Some(Foot { direction: -surface.normal, distance: hit.t, point: surface.point, face, spread })
+        let spread = 1.0 / (hit.t.mul_add(k1 * facing, 1.0) * hit.t.mul_add(k2 * facing, 1.0));
+        Some(Foot { direction: -outward, distance: hit.t, point: surface.point, face, spread })
     })
 }
 
@@ -106,7 +109,7 @@ mod tests {
     use glam::{DAffine3, DMat3};
 
     fn light(geometry: &Geometry, from: DVec3, u: DVec2) -> Option<Arriving> {
-        arriving(geometry, 0, &Texture::one(), from, u, Lanes::splat(550.0))
+        arriving(geometry, 1.0, 0, &Texture::one(), from, u, Lanes::splat(550.0))
     }
 
     fn of_shape(shape: impl Into<Shape>, from: DVec3) -> Option<(DVec3, f64, f64)> {
@@ -154,7 +157,8 @@ mod tests {
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             ..mesh::MeshSource::default()
         };
-        let made = mesh::Mesh::new(&source, &DAffine3::IDENTITY, mesh::NormalMode::Face).unwrap();
+        let made =
+            mesh::Mesh::new(&source, &DAffine3::IDENTITY, mesh::NormalMode::Face, mesh::Winding::Object).unwrap();
         let (tree, areas) = (mesh::MeshTree::build(&made), mesh::AreaTable::new(&made));
         let geometry = Geometry::Mesh(Box::new(TriangleMesh { mesh: made, tree, areas }));
         for from in [DVec3::new(0.2, 0.4, 1.0), DVec3::new(-0.2, 0.4, 2.0)] {

@@ -11,6 +11,8 @@ pub struct Census {
     pub shapes: usize,
     /// Triangles.
     pub triangles: usize,
+    /// Copies of groups.
+    pub instances: usize,
     /// Materials in use whose index depends on wavelength, smooth.
     pub dispersive: Vec<String>,
     /// The same, rough.
@@ -50,6 +52,11 @@ impl Census {
                 // One surface, however many cells.
                 Geometry::Sdf(_) => census.shapes += 1,
                 Geometry::Curves(curves) => census.shapes += curves.segments() as usize,
+                Geometry::Instance(_) => {
+                    // Its children are counted once, as themselves.
+                    census.instances += 1;
+                    continue;
+                }
             }
             let name = || object.name.clone();
             let material = &scene.materials[object.material as usize];

@@ -3,6 +3,7 @@
 //! Faults that only show here (an unknown glass, a missing picture) are collected and come all at
 //! once, each with its place in the file.
 
+mod attributes;
 mod files;
 mod lights;
 mod media;
@@ -11,19 +12,21 @@ mod surface;
 
 use super::bvh::{Aabb, Bvh};
 use super::camera::{self, Camera};
+use super::instance::{AffineMap, Group, Instance};
 use super::light::Light;
 use super::load;
 use super::material::{Kind, Material};
-use super::mesh::{AreaTable, Mesh, MeshTree, NormalMode};
-use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Plane, Rectangle, Shape, Sphere};
+use super::mesh::{self, AreaTable, Mesh, MeshTree, NormalMode, Winding};
+use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Layout, Plane, Rectangle, Shape, Sphere};
 use super::texture::{Scalar, Texture};
 use super::volume::Volume;
 use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene, TriangleMesh};
 use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
 use crate::spectrum::{Outside, RefractiveIndex, Spectrum, WavelengthDistribution, catalogue, illuminant, upsample};
+use attributes::{OfMesh, Surface};
 use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -33,6 +36,13 @@ struct Compiler<'a> {
     /// The first curve that could not be read.
     unread: Option<Error>,
     files: Vec<PathBuf>,
+    meshes: mesh::Sources,
+    /// What textures lie on.
+    surface: Surface,
+    /// Whether a texture has asked for that.
+    asks_for_surface: bool,
+    /// Materials that are others on each surface.
+    on_surface: BTreeSet<&'a str>,
     /// Textures as spectra and as numbers, once they are asked for.
     textures: HashMap<&'a str, Texture>,
     volumes: HashMap<&'a str, Volume>,
@@ -42,6 +52,8 @@ struct Compiler<'a> {
     named: HashMap<&'a str, Arc<Material>>,
     material_ids: HashMap<&'a str, u32>,
     medium_ids: HashMap<&'a str, u32>,
+    /// Groups that are copied, and the material of their first shape.
+    groups: HashMap<&'a str, (Arc<Group>, u32)>,
     materials: Vec<Material>,
 }
 
@@ -76,6 +88,10 @@ impl<'a> Compiler<'a> {
             faults: Vec::new(),
             unread: None,
             files: Vec::new(),
+            meshes: mesh::Sources::default(),
+            surface: Surface::Unknown,
+            asks_for_surface: false,
+            on_surface: BTreeSet::new(),
             textures: HashMap::new(),
             volumes: HashMap::new(),
             numbers: HashMap::new(),
@@ -83,6 +99,7 @@ impl<'a> Compiler<'a> {
             named: HashMap::new(),
             material_ids: HashMap::new(),
             medium_ids: HashMap::new(),
+            groups: HashMap::new(),
             materials: Vec::new(),
         }
     }
@@ -130,7 +147,10 @@ impl<'a> Compiler<'a> {
             self.volumes.insert(name, compiled);
         }
         for name in d.materials.keys() {
-            let material = self.named_material(name).as_ref().clone();
+            let (material, asked) = self.asking(|c| c.named_material(name).as_ref().clone());
+            if asked {
+                self.on_surface.insert(name);
+            }
             self.material_ids.insert(name, self.materials.len() as u32);
             self.materials.push(material);
         }
@@ -145,60 +165,20 @@ impl<'a> Compiler<'a> {
         let mut objects: Vec<Object> = Vec::new();
         let mut lights: Vec<Light> = Vec::new();
         let mut weights: Vec<f64> = Vec::new();
+        // Children of groups come after everything that stands in the scene itself.
+        let children = self.groups(camera_medium)?;
         for (i, shape) in d.shapes.iter().enumerate() {
             let at = format!("shapes[{i}].{}", shape.geometry.kind());
-            let Some(geometry) = self.geometry(&at, shape)? else { continue };
-            let material = match &shape.material {
-                written::MaterialRef::Name(name) => self.material_ids[name.as_str()],
-                written::MaterialRef::Inline(material) => {
-                    let material = self.material(&format!("{at}.material"), material);
-                    self.materials.push(material);
-                    self.materials.len() as u32 - 1
+            let name = shape.name.clone().unwrap_or_else(|| format!("{}{i}", shape.geometry.kind()));
+            let index = objects.len() as u32;
+            if let Some(object) = self.object(&at, name, shape, camera_medium, index, &mut lights)? {
+                if object.light.is_some() {
+                    weights.push(shape.sampling_weight.unwrap_or(1.0));
                 }
-            };
-            let object = objects.len() as u32;
-            let light = shape.emission.as_ref().map(|emission| {
-                lights.push(self.shining(&at, shape, emission, object, &geometry));
-                weights.push(shape.sampling_weight.unwrap_or(1.0));
-                lights.len() as u32 - 1
-            });
-            if light.is_some() && matches!(geometry, Geometry::Shape(Shape::Plane(_))) {
-                self.fault(
-                    &format!("{at}.emission"),
-                    "expected a shape with an end, found a plane: its light is infinite",
-                );
+                objects.push(object);
             }
-            let textured = self.materials[material as usize].varies()
-                || light
-                    .is_some_and(|l| matches!(&lights[l as usize], Light::Area { radiance, .. } if radiance.varies()));
-            let detail =
-                if textured || d.render.effects == written::Effects::All { Detail::Texture } else { Detail::Geometry };
-            // A closed body without a word about its inside is empty; an open one has the same
-            // medium on both sides; outside is what the camera is in.
-            let closed = match &geometry {
-                Geometry::Shape(shape) => shape.is_closed(),
-                Geometry::Mesh(_) => true,
-                Geometry::Sdf(sdf) => sdf.is_closed(),
-                // What goes in comes out unseen.
-                Geometry::Curves(_) => false,
-            };
-            let unchanged = |side: &Option<String>| side.as_deref() == Some(written::UNCHANGED);
-            let medium = |side: &Option<String>, otherwise: Option<u32>| match side.as_deref() {
-                None => otherwise,
-                Some(written::VACUUM | written::UNCHANGED) => None,
-                Some(name) => Some(self.medium_ids[name]),
-            };
-            objects.push(Object {
-                name: shape.name.clone().unwrap_or_else(|| format!("{}{i}", shape.geometry.kind())),
-                geometry,
-                material,
-                light,
-                detail,
-                inside: medium(&shape.inside, if closed { None } else { camera_medium }),
-                outside: medium(&shape.outside, camera_medium),
-                keeps_medium: unchanged(&shape.inside) && unchanged(&shape.outside),
-            });
         }
+        self.surface = Surface::Unknown;
         for (i, light) in d.lights.iter().enumerate() {
             let at = format!("lights[{i}].{}", light.kind());
             let weight = light.sampling_weight();
@@ -216,6 +196,7 @@ impl<'a> Compiler<'a> {
 
         let boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
         let bvh = Bvh::build(&boxes);
+        objects.extend(children);
         let (center, radius) = extent(&boxes, &camera);
         let light_cdf = lights::light_cdf(&lights, &weights, &objects, radius);
         let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
@@ -257,6 +238,107 @@ impl<'a> Compiler<'a> {
             has_boundaries,
             files: std::mem::take(&mut self.files),
         })
+    }
+
+    /// The children of all groups that are copied somewhere; each group knows where its own will lie.
+    fn groups(&mut self, camera_medium: Option<u32>) -> Result<Vec<Object>> {
+        let d = self.description;
+        let copied: BTreeSet<&str> = d.shapes.iter().filter_map(|shape| shape.geometry.group()).collect();
+        let mut children: Vec<Object> = Vec::new();
+        for (group, shapes) in d.groups.iter().filter(|(name, _)| copied.contains(name.as_str())) {
+            let first = (d.shapes.len() + children.len()) as u32;
+            let start = children.len();
+            for (i, shape) in shapes.iter().enumerate() {
+                let kind = shape.geometry.kind();
+                let name = shape.name.clone().unwrap_or_else(|| format!("{group}.{kind}{i}"));
+                let at = format!("groups.{group}[{i}].{kind}");
+                // No child shines, by the checks of the description.
+                children.extend(self.object(&at, name, shape, camera_medium, first, &mut Vec::new())?);
+            }
+            let boxes: Vec<Aabb> = children[start..].iter().map(Object::bounds).collect();
+            let material = children.get(start).map_or(0, |child| child.material);
+            self.groups.insert(group, (Arc::new(Group { first, bvh: Bvh::build(&boxes) }), material));
+        }
+        Ok(children)
+    }
+
+    /// The object that `shape` is; `index` is the one that it will have. Its light goes to `lights`.
+    fn object(
+        &mut self,
+        at: &str,
+        name: String,
+        shape: &'a written::Shape,
+        camera_medium: Option<u32>,
+        index: u32,
+        lights: &mut Vec<Light>,
+    ) -> Result<Option<Object>> {
+        self.surface = Surface::Shape;
+        let Some(geometry) = self.geometry(at, shape)? else { return Ok(None) };
+        if let Some(group) = shape.geometry.group() {
+            let (detail, material) = (Detail::Geometry, self.groups[group].1);
+            return Ok(Some(Object {
+                name,
+                geometry,
+                material,
+                light: None,
+                detail,
+                inside: None,
+                outside: None,
+                keeps_medium: false,
+                flipped: false,
+            }));
+        }
+        let material = match &shape.material {
+            written::MaterialRef::Name(name) if !self.on_surface.contains(name.as_str()) => None,
+            written::MaterialRef::Name(name) => Some(self.named_material(name).as_ref().clone()),
+            written::MaterialRef::Inline(material) => Some(self.material(&format!("{at}.material"), material)),
+        };
+        let material = match (material, &shape.material) {
+            (None, written::MaterialRef::Name(name)) => self.material_ids[name.as_str()],
+            (material, _) => {
+                self.materials.extend(material);
+                self.materials.len() as u32 - 1
+            }
+        };
+        let light = shape.emission.as_ref().map(|emission| {
+            lights.push(self.shining(at, shape, emission, index, &geometry));
+            lights.len() as u32 - 1
+        });
+        if light.is_some() && matches!(geometry, Geometry::Shape(Shape::Plane(_))) {
+            self.fault(&format!("{at}.emission"), "expected a shape with an end, found a plane: its light is infinite");
+        }
+        let textured = self.materials[material as usize].varies()
+            || light.is_some_and(|l| matches!(&lights[l as usize], Light::Area { radiance, .. } if radiance.varies()));
+        let all = self.description.render.effects == written::Effects::All;
+        let detail = if textured || all { Detail::Texture } else { Detail::Geometry };
+        // A closed body without a word about its inside is empty; an open one has the same
+        // medium on both sides; outside is what the camera is in.
+        let closed = match &geometry {
+            Geometry::Shape(shape) => shape.is_closed(),
+            Geometry::Mesh(_) => true,
+            Geometry::Sdf(sdf) => sdf.is_closed(),
+            // What goes into curves comes out unseen; an instance is none of its own.
+            Geometry::Curves(_) | Geometry::Instance(_) => false,
+        };
+        let enclosed = if closed { None } else { camera_medium };
+        let (behind, before) = if shape.flip_normals { (camera_medium, enclosed) } else { (enclosed, camera_medium) };
+        let unchanged = |side: &Option<String>| side.as_deref() == Some(written::UNCHANGED);
+        let medium = |side: &Option<String>, otherwise: Option<u32>| match side.as_deref() {
+            None => otherwise,
+            Some(written::VACUUM | written::UNCHANGED) => None,
+            Some(name) => Some(self.medium_ids[name]),
+        };
+        Ok(Some(Object {
+            name,
+            geometry,
+            material,
+            light,
+            detail,
+            inside: medium(&shape.inside, behind),
+            outside: medium(&shape.outside, before),
+            keeps_medium: unchanged(&shape.inside) && unchanged(&shape.outside),
+            flipped: shape.flip_normals,
+        }))
     }
 
     fn camera(&mut self) -> Camera {
@@ -404,7 +486,8 @@ impl<'a> Compiler<'a> {
         let made: std::result::Result<Shape, String> = match &shape.geometry {
             written::Geometry::Sphere(s) => {
                 let rotation = DMat3::from_mat4(m) * (1.0 / scale);
-                Sphere::new(point(s.center), s.radius * scale, rotation).map(Shape::Sphere)
+                let made = Sphere::new(point(s.center), s.radius * scale, rotation);
+                made.map(|sphere| Shape::Sphere(sphere.with_layout(layout(s.layout))))
             }
             written::Geometry::Plane(p) => {
                 let tangent = p.tangent.map_or(DVec3::ZERO, vector);
@@ -427,7 +510,7 @@ impl<'a> Compiler<'a> {
             written::Geometry::Cube(c) => {
                 let [x, y, z] = c.size.xyz();
                 let half = [[0.5 * x, 0.0, 0.0], [0.0, 0.5 * y, 0.0], [0.0, 0.0, 0.5 * z]].map(vector);
-                Cube::new(point(c.center), half).map(Shape::Cube)
+                Cube::new(point(c.center), half).map(|cube| Shape::Cube(cube.with_layout(layout(c.layout))))
             }
             written::Geometry::Cylinder(c) => {
                 let (base, top) = match c.caps {
@@ -436,7 +519,12 @@ impl<'a> Compiler<'a> {
                     written::Caps::Base => (true, false),
                     written::Caps::Top => (false, true),
                 };
-                Cylinder::new(point(c.base), point(c.top), c.radius * scale, base, top).map(Shape::Cylinder)
+                let made = Cylinder::new(point(c.base), point(c.top), c.radius * scale, base, top);
+                let made = match c.seam {
+                    Some(seam) => made.and_then(|cylinder| cylinder.with_seam(vector(seam))),
+                    None => made,
+                };
+                made.map(Shape::Cylinder)
             }
             written::Geometry::Cone(c) => {
                 Cone::new(point(c.base), point(c.apex), c.radius * scale, c.cap).map(Shape::Cone)
@@ -445,17 +533,37 @@ impl<'a> Compiler<'a> {
             written::Geometry::Curves(curves) => return self.curves(at, curves, &DAffine3::from_mat4(m)),
             written::Geometry::Mesh(mesh) => {
                 self.files.push(mesh.file.to_path_buf());
-                let asked = |e| self.asked(&format!("{at}.file"), e);
-                let source = super::mesh::load(&mesh.file).map_err(asked)?;
+                let place = format!("{at}.file");
+                let loaded = self.meshes.load(&mesh.file, mesh.index);
+                let source = loaded.map_err(|e| self.asked(&place, e))?;
                 let mode = match mesh.normals {
                     written::Normals::File => NormalMode::File,
                     written::Normals::Smooth => NormalMode::Smooth,
+                    written::Normals::Vertex => NormalMode::Vertex,
                     written::Normals::Face => NormalMode::Face,
                 };
-                let made = Mesh::new(&source, &DAffine3::from_mat4(m), mode)
-                    .map_err(|message| asked(Error::input(&mesh.file, message)))?;
+                let winding = match mesh.winding {
+                    written::Winding::Object => Winding::Object,
+                    written::Winding::World => Winding::World,
+                };
+                let mut made = Mesh::new(&source, &DAffine3::from_mat4(m), mode, winding)
+                    .map_err(|message| self.asked(&place, Error::input(&mesh.file, message)))?;
+                if mesh.flip_v {
+                    made.uvs.iter_mut().for_each(|uv| uv[1] = 1.0 - uv[1]);
+                }
+                self.surface = Surface::Mesh(OfMesh::new(source, &made));
                 let (tree, areas) = (MeshTree::build(&made), AreaTable::new(&made));
                 return Ok(Some(Geometry::Mesh(Box::new(TriangleMesh { mesh: made, tree, areas }))));
+            }
+            written::Geometry::Instance(instance) => {
+                let group = self.groups[instance.group.as_str()].0.clone();
+                return Ok(match AffineMap::new(DAffine3::from_mat4(m)) {
+                    Ok(map) => Some(Geometry::Instance(Box::new(Instance { group, map }))),
+                    Err(message) => {
+                        self.fault(&format!("{at}.transform"), message);
+                        None
+                    }
+                });
             }
         };
         Ok(match made {
@@ -474,6 +582,13 @@ enum Role {
     Reflectance,
     Light,
     Coefficient,
+}
+
+fn layout(layout: written::Layout) -> Layout {
+    match layout {
+        written::Layout::YUp => Layout::YUp,
+        written::Layout::ZUp => Layout::ZUp,
+    }
 }
 
 fn normal_transform(m: DMat4, n: DVec3) -> DVec3 {
@@ -501,6 +616,7 @@ impl Object {
             Geometry::Mesh(mesh) => mesh.tree.bounds(),
             Geometry::Sdf(sdf) => sdf.bounds(),
             Geometry::Curves(curves) => curves.bounds(),
+            Geometry::Instance(instance) => instance.bounds(),
         }
     }
 }

@@ -28,15 +28,17 @@ struct Spot {
 }
 
 fn spot_on(objects: &[Object], object: u32, u: DVec2) -> Option<Spot> {
+    let facing = objects[object as usize].facing();
     match &objects[object as usize].geometry {
         Geometry::Shape(shape) => {
             let s = shape.sample_area(u);
             let surface = shape.surface(s.point, s.face);
+            let surface = SurfacePoint { normal: surface.normal * facing, ..surface };
             let part = u32::from(s.face);
             (s.pdf_area > 0.0).then(|| Spot {
                 surface,
                 texture: TexturePoint::new(&surface, part, [0.0; 2]),
-                departure: Departure { object, part },
+                departure: Departure::new(object, part),
                 area: 1.0 / s.pdf_area,
             })
         }
@@ -44,15 +46,16 @@ fn spot_on(objects: &[Object], object: u32, u: DVec2) -> Option<Spot> {
             let (part, u_x) = mesh.areas.sample(u.x)?;
             let b = warp::triangle(DVec2::new(u_x, u.y));
             let surface = mesh.mesh.surface(part, b.x, b.y);
+            let surface = SurfacePoint { normal: surface.normal * facing, ..surface };
             Some(Spot {
                 surface,
                 texture: TexturePoint::new(&surface, part, b.into()),
-                departure: Departure { object, part },
+                departure: Departure::new(object, part),
                 area: mesh.areas.total(),
             })
         }
         // They do not shine.
-        Geometry::Sdf(_) | Geometry::Curves(_) => None,
+        Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => None,
     }
 }
 

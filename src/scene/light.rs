@@ -170,7 +170,7 @@ impl Light {
             Geometry::Shape(shape) => shape.pdf_toward(from, direction, hit.t, normal),
             Geometry::Mesh(mesh) => hit.t * hit.t / (mesh.areas.total() * normal.dot(direction).abs()),
             // They do not shine.
-            Geometry::Sdf(_) | Geometry::Curves(_) => 0.0,
+            Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => 0.0,
         }
     }
 
@@ -188,11 +188,12 @@ impl Light {
     ) -> Option<Arriving> {
         match self {
             Light::Area { object, radiance } => {
-                let target = |part: u32| Some(Departure { object: *object, part });
+                let target = |part: u32| Some(Departure::new(*object, part));
+                let facing = objects[*object as usize].facing();
                 match &objects[*object as usize].geometry {
                     Geometry::Shape(shape) => {
                         let s = shape.sample_toward(from, u)?;
-                        if s.direction.dot(s.normal) >= 0.0 {
+                        if s.direction.dot(s.normal) * facing >= 0.0 {
                             return None;
                         }
                         let radiance = match radiance {
@@ -217,7 +218,7 @@ impl Light {
                         let offset = surface.point - from;
                         let distance = offset.length();
                         let wi = offset / distance;
-                        let cos = -wi.dot(surface.normal);
+                        let cos = -wi.dot(surface.normal) * facing;
                         (cos > 0.0 && distance > 0.0).then(|| Arriving {
                             wi,
                             distance,
@@ -226,7 +227,7 @@ impl Light {
                             target: target(i),
                         })
                     }
-                    Geometry::Sdf(_) | Geometry::Curves(_) => None,
+                    Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => None,
                 }
             }
             Light::Point { position, intensity } => {
@@ -249,7 +250,8 @@ impl Light {
                 })
             }
             Light::AlongNormal { object, exitance } => {
-                along_normal::arriving(&objects[*object as usize].geometry, *object, exitance, from, u, nm)
+                let lamp = &objects[*object as usize];
+                along_normal::arriving(&lamp.geometry, lamp.facing(), *object, exitance, from, u, nm)
             }
             Light::Projector(projector) => projector.arriving(from, nm),
             Light::Directional { direction, irradiance } => Some(Arriving {

@@ -14,6 +14,7 @@ pub mod curves;
 pub mod emission;
 pub mod environment;
 pub mod grid;
+pub mod instance;
 pub mod light;
 pub mod load;
 pub mod material;
@@ -33,6 +34,7 @@ use bvh::Bvh;
 use camera::Camera;
 use curves::Curves;
 use glam::DVec3;
+use instance::{AffineMap, Instance, PartHit};
 use light::Light;
 use material::Material;
 pub use medium::Medium;
@@ -51,9 +53,10 @@ pub struct Scene {
     pub name: String,
     /// The camera.
     pub camera: Camera,
-    /// What was written.
+    /// What was written: first what stands in the scene itself, then the children of groups, which are
+    /// seen through instances.
     pub objects: Vec<Object>,
-    /// Over all objects.
+    /// Over the objects that stand in the scene itself.
     pub bvh: Bvh,
     /// Materials, by index.
     pub materials: Vec<Material>,
@@ -111,6 +114,16 @@ pub struct Object {
     pub outside: Option<u32>,
     /// True where a path that crosses stays in the medium that it was in, whatever the two above say.
     pub keeps_medium: bool,
+    /// Whether its normals point to the other side than the form's own.
+    pub flipped: bool,
+}
+
+impl Object {
+    /// −1 where the normals of the form point the other way, else 1.
+    #[must_use]
+    pub fn facing(&self) -> f64 {
+        if self.flipped { -1.0 } else { 1.0 }
+    }
 }
 
 /// The form of an object. Shapes lie in place: a pointer would cost each ray a cache line.
@@ -125,6 +138,8 @@ pub enum Geometry {
     Sdf(Box<SdfGrid>),
     /// Curves with a thickness.
     Curves(Box<Curves>),
+    /// A copy of a group. No hit names it: the child is the object that was met.
+    Instance(Box<Instance>),
 }
 
 impl Geometry {
@@ -134,7 +149,7 @@ impl Geometry {
         match self {
             Geometry::Shape(shape) => shape.area(),
             Geometry::Mesh(mesh) => mesh.areas.total(),
-            Geometry::Sdf(_) | Geometry::Curves(_) => 0.0,
+            Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => 0.0,
         }
     }
 }
@@ -206,9 +221,17 @@ pub struct Hit {
     /// For triangles the barycentric coordinates of the second and third vertex, for curves first the place along the
     /// segment.
     pub barycentric: [f64; 2],
+    /// The instance that the object belongs to, where it is a child of one.
+    pub instance: Option<u32>,
 }
 
 impl Hit {
+    /// The part that was met, as a ray that leaves it names it.
+    #[must_use]
+    pub fn departure(&self) -> Departure {
+        Departure { object: self.object, part: self.part, instance: self.instance }
+    }
+
     /// The hit on `surface`, as textures see it.
     #[must_use]
     pub fn texture_point(&self, surface: &SurfacePoint) -> TexturePoint {
@@ -226,29 +249,14 @@ impl Scene {
     /// Where `ray` meets `object` before `t_max`.
     #[inline]
     fn meet(&self, ray: &Ray, object: u32, t_max: f64) -> Option<Hit> {
-        let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
-        match &self.objects[object as usize].geometry {
-            Geometry::Shape(shape) => shape.intersect(ray, t_max, departing.map(|face| face as u8)).map(|h| Hit {
-                t: h.t,
-                object,
-                part: u32::from(h.face),
-                barycentric: [0.0; 2],
-            }),
-            Geometry::Mesh(mesh) => mesh.tree.closest(ray, t_max, departing).map(|h| Hit {
-                t: h.hit.t,
-                object,
-                part: h.triangle,
-                barycentric: [h.hit.b1, h.hit.b2],
-            }),
-            Geometry::Sdf(sdf) => {
-                let hit = sdf.intersect(ray, t_max, departing)?;
-                Some(Hit { t: hit.t, object, part: hit.cell, barycentric: [0.0; 2] })
-            }
-            Geometry::Curves(curves) => {
-                let hit = curves.closest(ray, t_max)?;
-                Some(Hit { t: hit.t, object, part: hit.segment, barycentric: [hit.v, 0.0] })
-            }
+        let geometry = &self.objects[object as usize].geometry;
+        if let Geometry::Instance(instance) = geometry {
+            return instance.closest(&self.objects, object, ray, t_max);
         }
+        // Children of groups have indices of their own, so that of an instance's child is never this one.
+        let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
+        let PartHit { t, part, barycentric } = geometry.meet(ray, t_max, departing)?;
+        Some(Hit { t, object, part, barycentric, instance: None })
     }
 
     /// The nearest thing that `ray` meets closer than `t_max`.
@@ -269,36 +277,48 @@ impl Scene {
     #[must_use]
     pub fn occluded(&self, ray: &Ray, distance: f64, target: Option<Departure>) -> bool {
         self.bvh.any(ray, distance, |object| {
+            let geometry = &self.objects[object as usize].geometry;
+            if let Geometry::Instance(instance) = geometry {
+                return instance.blocks(&self.objects, object, ray, distance);
+            }
             let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
             let target = target.filter(|t| t.object == object).map(|t| t.part);
-            match &self.objects[object as usize].geometry {
-                Geometry::Shape(shape) => {
-                    target.is_none() && shape.intersect(ray, distance, departing.map(|face| face as u8)).is_some()
-                }
-                Geometry::Mesh(mesh) => mesh.tree.any(ray, distance, [departing, target]),
-                Geometry::Sdf(sdf) => sdf.intersect(ray, distance, departing).is_some(),
-                Geometry::Curves(curves) => curves.any(ray, distance),
-            }
+            geometry.blocks(ray, distance, departing, target)
         })
     }
 
     /// The surface at a hit.
     #[must_use]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        let object = &self.objects[hit.object as usize];
-        match &object.geometry {
-            Geometry::Shape(shape) => shape.surface_with(ray.at(hit.t), hit.part as u8, object.detail),
-            Geometry::Mesh(mesh) => mesh.mesh.surface(hit.part, hit.barycentric[0], hit.barycentric[1]),
-            Geometry::Sdf(sdf) => sdf.surface(ray.at(hit.t), hit.part),
-            Geometry::Curves(curves) => curves.surface(ray.at(hit.t), hit.part, hit.barycentric[0]),
+        self.surface_with(ray, hit, self.objects[hit.object as usize].detail)
+    }
+
+    /// The map of the instance that was met.
+    fn instance_map(&self, hit: &Hit) -> Option<&AffineMap> {
+        match &self.objects[hit.instance? as usize].geometry {
+            Geometry::Instance(instance) => Some(&instance.map),
+            _ => None,
         }
+    }
+
+    /// [`Scene::surface`] with as much as is asked for.
+    fn surface_with(&self, ray: &Ray, hit: &Hit, detail: Detail) -> SurfacePoint {
+        let object = &self.objects[hit.object as usize];
+        let mut surface = match self.instance_map(hit) {
+            Some(map) => map.surface(&object.geometry, ray, hit, detail),
+            None => object.geometry.surface(ray.at(hit.t), hit, detail),
+        };
+        if object.flipped {
+            surface.normal = -surface.normal;
+            surface.shading_normal = -surface.shading_normal;
+        }
+        surface
     }
 
     /// The ray that leaves a surface in `direction`.
     #[must_use]
     pub fn leave(&self, surface: &SurfacePoint, hit: &Hit, direction: DVec3) -> Ray {
-        let departure = Departure { object: hit.object, part: hit.part };
-        Ray::leaving(surface.point, surface.scale, surface.normal, direction, departure)
+        Ray::leaving(surface.point, surface.scale, surface.normal, direction, hit.departure())
     }
 
     /// A light chosen by `u` in [0, 1) and its probability.

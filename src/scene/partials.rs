@@ -39,10 +39,7 @@ impl Scene {
     /// The surface at a hit with its texture coordinates, whether or not anything on it varies.
     #[must_use]
     pub fn surface_with_texture(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        match &self.objects[hit.object as usize].geometry {
-            Geometry::Shape(shape) => shape.surface_with(ray.at(hit.t), hit.part as u8, Detail::Texture),
-            Geometry::Mesh(_) | Geometry::Sdf(_) | Geometry::Curves(_) => self.surface(ray, hit),
-        }
+        self.surface_with(ray, hit, Detail::Texture)
     }
 
     /// How (u, v) runs over the surface at a hit.
@@ -54,43 +51,56 @@ impl Scene {
         let tangent = surface.tangent - surface.normal * surface.tangent.dot(surface.normal);
         let s = tangent.normalize();
         let t = surface.normal.cross(s);
+        // The child of an instance knows its own space only.
+        let map = self.instance_map(hit);
+        let (point, axes) = match map {
+            None => (surface.point, [s, t]),
+            Some(m) => {
+                let m = m.object_from_world();
+                (m.transform_point3(surface.point), [s, t].map(|axis| m.transform_vector3(axis)))
+            }
+        };
         let gradient = match &self.objects[hit.object as usize].geometry {
             Geometry::Shape(shape) => {
                 let size = shape.bounds().map_or(surface.scale, |(low, high)| (high - low).max_element());
                 let uv = |p: DVec3| shape.surface(p, hit.part as u8).uv;
-                differences(surface, [s, t], size, shape.is_closed(), uv)
+                differences(point, axes, size, shape.is_closed(), uv)
             }
             // No texture coordinates.
             Geometry::Sdf(_) => DMat2::ZERO,
             Geometry::Curves(curves) => {
                 let size = curves.thickness(hit.part, hit.barycentric[0]);
                 let uv = |p: DVec3| curves.surface(p, hit.part, hit.barycentric[0]).uv;
-                differences(surface, [s, t], size, true, uv)
+                differences(point, axes, size, true, uv)
             }
             Geometry::Mesh(mesh) => {
                 let corner = |b1, b2| mesh.mesh.surface(hit.part, b1, b2);
                 let (a, b, c) = (corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0));
-                let flat = |d: DVec3| DVec2::new(d.dot(s), d.dot(t));
+                let flat = |d: DVec3| {
+                    let d = map.map_or(d, |m| m.world_from_object().transform_vector3(d));
+                    DVec2::new(d.dot(s), d.dot(t))
+                };
                 let edges = DMat2::from_cols(flat(b.point - a.point), flat(c.point - a.point));
                 DMat2::from_cols(b.uv - a.uv, c.uv - a.uv) * edges.inverse()
             }
+            Geometry::Instance(_) => DMat2::ZERO,
         };
         UvGradient { s, t, gradient }
     }
 }
 
-/// Derivatives of `uv` along two axes by central differences over 2⁻¹³ of `size`. Where texture coordinates are
+/// Derivatives of `uv` at `point` along two axes by central differences over 2⁻¹³ of `size`. Where texture coordinates are
 /// angles they may pass from one turn to none in between.
 fn differences(
-    surface: &SurfacePoint,
+    point: DVec3,
     axes: [DVec3; 2],
     size: f64,
     angles: bool,
     uv: impl Fn(DVec3) -> DVec2,
 ) -> DMat2 {
-    let step = size.max(f64::MIN_POSITIVE) / 8192.0;
     let [s, t] = axes.map(|axis| {
-        let d = uv(surface.point + axis * step) - uv(surface.point - axis * step);
+        let step = size.max(f64::MIN_POSITIVE) / 8192.0 / axis.length();
+        let d = uv(point + axis * step) - uv(point - axis * step);
         let wrapped = DVec2::new(nearest_turn(d.x), nearest_turn(d.y));
         let d = if angles || d.abs().max_element() > 0.5 { wrapped } else { d };
         d / (2.0 * step)

@@ -1,6 +1,7 @@
 //! Spectra that vary over a surface.
 
 use super::SurfacePoint;
+use super::mesh::attribute::AttributeTexture;
 use super::volume::Volume;
 use crate::spectrum::{Lanes, Spectrum, upsample};
 use glam::{DAffine2, DVec2, DVec3};
@@ -46,6 +47,8 @@ pub enum Texture {
     },
     /// What fills space, where the surface cuts it.
     Volume(Volume),
+    /// Numbers of the mesh itself.
+    Attribute(Box<AttributeTexture>),
 }
 
 /// What lies beyond the edge of a picture.
@@ -194,6 +197,8 @@ pub enum Scalar {
     },
     /// What fills space, where the surface cuts it.
     Volume(Volume),
+    /// Numbers of the mesh itself.
+    Attribute(Box<AttributeTexture>),
 }
 
 /// A picture whose texels are numbers.
@@ -221,6 +226,7 @@ impl Scalar {
             Scalar::Image(image) => f64::from(image.grid.value(at.uv, |i| luminance(image.texels[i]))),
             Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).eval(at),
             Scalar::Volume(volume) => volume.scalar(at.point),
+            Scalar::Attribute(attribute) => f64::from(luminance(attribute.triple(at).as_vec3().to_array())),
         }
     }
 
@@ -234,6 +240,7 @@ impl Scalar {
             }
             Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).triple(at),
             Scalar::Volume(volume) => DVec3::splat(volume.scalar(at.point)),
+            Scalar::Attribute(attribute) => attribute.triple(at),
         }
     }
 
@@ -242,7 +249,7 @@ impl Scalar {
     pub fn gradient(&self, at: &TexturePoint) -> DVec2 {
         match self {
             // A volume knows nothing of u and v.
-            Scalar::Uniform(_) | Scalar::Volume(_) => DVec2::ZERO,
+            Scalar::Uniform(_) | Scalar::Volume(_) | Scalar::Attribute(_) => DVec2::ZERO,
             Scalar::Image(DataImage { grid, .. }) if grid.interpolation == Interpolation::Nearest => DVec2::ZERO,
             Scalar::Image(image) => {
                 let grid = &image.grid;
@@ -289,6 +296,7 @@ impl Texture {
             Texture::Image(image) => image.eval(at.uv, nm),
             Texture::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).eval(at, nm),
             Texture::Volume(volume) => volume.eval(at.point, nm),
+            Texture::Attribute(attribute) => attribute.eval(at, nm),
         }
     }
 
@@ -315,6 +323,7 @@ impl Texture {
                     .collect()
             }
             Texture::Volume(volume) => volume.representatives(),
+            Texture::Attribute(attribute) => attribute.representatives(),
             Texture::Checkerboard { a, b, .. } => {
                 let mut all = a.representatives();
                 all.extend(b.representatives());

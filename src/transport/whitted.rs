@@ -18,7 +18,7 @@ use crate::scene::light::Light;
 use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Tints, relative_index};
 use crate::scene::shape::Shape;
 use crate::scene::texture::Texture;
-use crate::scene::{Geometry, Scene};
+use crate::scene::{Geometry, Object, Scene};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -194,10 +194,11 @@ impl Tracer<'_> {
         }
         // The middle of a sphere, which is the point nearest to the receiver, needs no sampling.
         if let Light::Area { object, radiance: Texture::Uniform(radiance) } = light
-            && let Geometry::Shape(Shape::Sphere(sphere)) = &self.scene.objects[*object as usize].geometry
+            && let Object { geometry: Geometry::Shape(Shape::Sphere(sphere)), flipped: false, .. } =
+                &self.scene.objects[*object as usize]
         {
             let (wi, distance, solid_angle) = sphere.toward_middle(from)?;
-            let target = Some(Departure { object: *object, part: 0 });
+            let target = Some(Departure::new(*object, 0));
             return Some((wi, radiance.eval(self.nm) * solid_angle as f32, distance, target));
         }
         let a = light.arriving(&self.scene.objects, from, None, DVec2::splat(0.5), self.nm)?;

@@ -70,6 +70,7 @@ struct Import<'a> {
     materials: Vec<Entry>,
     volumes: Vec<Entry>,
     media: Vec<Entry>,
+    groups: Vec<Entry>,
     shapes: Vec<Node>,
     lights: Vec<Node>,
     /// Under which name an object stands in one of the maps.
@@ -84,6 +85,7 @@ impl<'a> Import<'a> {
             materials: Vec::new(),
             volumes: Vec::new(),
             media: Vec::new(),
+            groups: Vec::new(),
             shapes: Vec::new(),
             lights: Vec::new(),
             names: HashMap::new(),
@@ -137,6 +139,7 @@ impl<'a> Import<'a> {
         fields.add("materials", Node::new(place, Value::Map(self.materials)));
         fields.add("volumes", Node::new(place, Value::Map(self.volumes)));
         fields.add("media", Node::new(place, Value::Map(self.media)));
+        fields.add("groups", Node::new(place, Value::Map(self.groups)));
         fields.add("shapes", Node::new(place, Value::List(self.shapes)));
         fields.add("lights", Node::new(place, Value::List(self.lights)));
         Ok(fields.map())
@@ -319,8 +322,9 @@ mod tests {
     fn an_unknown_plugin_or_parameter_is_one_fault_with_a_near_miss() {
         assert_eq!(
             fault("<shape type=\"spere\"/>", &[]),
-            "s.xml:3:14: expected a shape that Abbe has (sphere, cylinder, disk, rectangle, cube, obj, ply, sdfgrid, \
-             linearcurve, bsplinecurve), found \"spere\"; did you mean \"sphere\"?"
+            "s.xml:3:14: expected a shape that Abbe has (sphere, cylinder, disk, rectangle, cube, obj, ply, \
+             serialized, sdfgrid, linearcurve, bsplinecurve, merge, shapegroup, instance), found \
+             \"spere\"; did you mean \"sphere\"?"
         );
         assert_eq!(
             fault("<shape type=\"sphere\"><float name=\"raduis\" value=\"1\"/></shape>", &[]),

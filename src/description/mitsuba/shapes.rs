@@ -1,70 +1,94 @@
-//! Shapes.
+//! Shapes, groups of them, and copies.
+//!
+//! Shapes keep the texture coordinates that Mitsuba gives them; it is pictures that are turned over, for its
+//! v = 0 is their top.
 
-use glam::{DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 
 use super::super::fault::Fault;
 use super::object::{Bag, Family};
-use super::{Fields, Import, entry, list, matrix, number, numbers, text};
+use super::{Fields, Import, boolean, entry, list, matrix, number, numbers, text, whole};
+use crate::math::Frame;
 
-const SHAPES: [&str; 10] =
-    ["sphere", "cylinder", "disk", "rectangle", "cube", "obj", "ply", "sdfgrid", "linearcurve", "bsplinecurve"];
+const SHAPES: [&str; 14] =
+    ["sphere", "cylinder", "disk", "rectangle", "cube", "obj", "ply", "serialized", "sdfgrid", "linearcurve", "bsplinecurve", "merge", "shapegroup", "instance"];
+
+/// How far from equal and perpendicular the axes of a cylinder may come out: see the check of transforms.
+const SIMILAR: f64 = 3e-6;
 
 impl Import<'_> {
-    /// Adds a shape of the scene to `shapes`.
+    /// Adds a shape of the scene to `shapes`, a group to `groups`.
     pub(crate) fn shape(&mut self, index: usize) -> Result<(), Fault> {
         let bag = self.bag(index);
-        let place = bag.object.place;
-        let mut fields = Fields::new(place);
+        match bag.object.plugin.as_str() {
+            // One mesh made of several looks like these several.
+            "merge" => {
+                for child in bag.objects(Family::Shape) {
+                    self.shape(child)?;
+                }
+                return bag.finish();
+            }
+            "shapegroup" => return self.group(index).map(|_| ()),
+            _ => {}
+        }
+        let mut fields = Fields::new(bag.object.place);
         let to_world = bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
-        if to_world != DMat4::IDENTITY {
+        if to_world != DMat4::IDENTITY && bag.object.plugin != "cylinder" {
             let at = bag.place("to_world");
             fields.add("transform", list(at, [entry(at, "matrix", matrix(at, to_world))]));
         }
+        let kind = self.form(&bag, to_world, &mut fields)?;
+        if kind == "instance" {
+            if let Some(id) = &bag.object.id {
+                fields.add("name", text(bag.object.place, id.as_str()));
+            }
+        } else {
+            self.surface(&bag, &mut fields)?;
+        }
+        bag.finish()?;
+        self.shapes.push(fields.kind(kind));
+        Ok(())
+    }
+
+    /// The form of a shape: its fields, but for the transform, and its kind.
+    fn form(&mut self, bag: &Bag<'_>, to_world: DMat4, fields: &mut Fields) -> Result<&'static str, Fault> {
+        let place = bag.object.place;
+        let mirrored = DMat3::from_mat4(to_world).determinant() < 0.0;
+        let mut turned = false;
         let kind = match bag.object.plugin.as_str() {
             "sphere" => {
                 fields.add("center", numbers(bag.place("center"), &bag.vector("center")?.unwrap_or_default()));
                 fields.add("radius", number(bag.place("radius"), bag.float("radius")?.unwrap_or(1.0)));
-                upright(&bag)?;
+                fields.add("layout", text(place, "z_up"));
+                // A sphere that is mirrored is turned inside out.
+                turned = mirrored;
                 "sphere"
             }
             "cylinder" => {
-                fields.add("base", numbers(bag.place("p0"), &bag.vector("p0")?.unwrap_or_default()));
-                fields.add("top", numbers(bag.place("p1"), &bag.vector("p1")?.unwrap_or([0.0, 0.0, 1.0])));
-                fields.add("radius", number(bag.place("radius"), bag.float("radius")?.unwrap_or(1.0)));
-                fields.add("caps", text(place, "none"));
-                upright(&bag)?;
+                cylinder(bag, to_world, fields)?;
                 "cylinder"
             }
             "disk" => {
                 fields.add("normal", numbers(place, &DVec3::Z.to_array()));
                 fields.add("radius", number(place, 1.0));
-                upright(&bag)?;
+                // The normal is carried along as a normal; ours is that of the edges after the transform.
+                turned = mirrored;
                 "disk"
             }
             "rectangle" => {
                 fields.add("corner", numbers(place, &[-1.0, -1.0, 0.0]));
                 fields.add("edge_u", numbers(place, &[2.0, 0.0, 0.0]));
                 fields.add("edge_v", numbers(place, &[0.0, 2.0, 0.0]));
-                upright(&bag)?;
+                turned = mirrored;
                 "rectangle"
             }
             "cube" => {
                 fields.add("size", number(place, 2.0));
-                upright(&bag)?;
+                fields.add("layout", text(place, "z_up"));
                 "cube"
             }
-            "obj" | "ply" => {
-                let file = bag.required("filename", bag.file("filename"))?;
-                fields.add("file", text(bag.place("filename"), file));
-                let normals = if bag.boolean("face_normals")? == Some(true) { "face" } else { "file" };
-                fields.add("normals", text(bag.place("face_normals"), normals));
-                // OBJ counts v from the bottom of the picture, which is ours, and PLY from its top.
-                let usual = bag.object.plugin == "obj";
-                if bag.boolean("flip_tex_coords")?.unwrap_or(usual) != usual {
-                    let message = format!("expected {usual}, found {}", !usual);
-                    return Err(bag.fault_of("flip_tex_coords", message));
-                }
-                upright(&bag)?;
+            "obj" | "ply" | "serialized" => {
+                mesh(bag, fields)?;
                 "mesh"
             }
             "sdfgrid" => {
@@ -81,12 +105,44 @@ impl Import<'_> {
                 fields.add("basis", text(place, basis));
                 "curves"
             }
+            "instance" => {
+                let found = bag.only(Family::Shape)?;
+                let group = found.ok_or_else(|| bag.fault("expected a reference to a shapegroup, found none"))?;
+                let name = self.group(group)?;
+                fields.add("group", text(place, name));
+                return Ok("instance");
+            }
             _ => return Err(bag.unknown(SHAPES)),
         };
-        self.surface(&bag, &mut fields)?;
+        if bag.boolean("flip_normals")?.unwrap_or(false) != turned {
+            fields.add("flip_normals", boolean(bag.place("flip_normals"), true));
+        }
+        Ok(kind)
+    }
+
+    /// The name under which a shapegroup stands in `groups`.
+    fn group(&mut self, index: usize) -> Result<String, Fault> {
+        if let Some(name) = self.names.get(&index) {
+            return Ok(name.clone());
+        }
+        let bag = self.bag(index);
+        if bag.object.plugin != "shapegroup" {
+            return Err(bag.fault("expected a shapegroup"));
+        }
+        let outside = std::mem::take(&mut self.shapes);
+        for child in bag.objects(Family::Shape) {
+            let child_bag = self.bag(child);
+            if ["shapegroup", "instance"].contains(&child_bag.object.plugin.as_str()) {
+                return Err(child_bag.fault("expected a shape, found a group within a group"));
+            }
+            self.shape(child)?;
+        }
         bag.finish()?;
-        self.shapes.push(fields.kind(kind));
-        Ok(())
+        let shapes = std::mem::replace(&mut self.shapes, outside);
+        let name = self.name_for(index);
+        let node = list(bag.object.place, shapes);
+        self.groups.push(self.entry(index, &name, node));
+        Ok(name)
     }
 
     /// What every shape has: material, emission, media.
@@ -111,9 +167,52 @@ impl Import<'_> {
     }
 }
 
-fn upright(bag: &Bag<'_>) -> Result<(), Fault> {
-    match bag.boolean("flip_normals")? {
-        Some(true) => Err(bag.fault_of("flip_normals", "expected false, found true, which Abbe does not have")),
-        _ => Ok(()),
+/// A cylinder where it lies in the world: its transform may stretch it along its axis.
+fn cylinder(bag: &Bag<'_>, to_world: DMat4, fields: &mut Fields) -> Result<(), Fault> {
+    let base = DVec3::from(bag.vector("p0")?.unwrap_or_default());
+    let top = DVec3::from(bag.vector("p1")?.unwrap_or([0.0, 0.0, 1.0]));
+    let radius = bag.float("radius")?.unwrap_or(1.0);
+    let Some(axis) = (top - base).try_normalize() else {
+        return Err(bag.fault_of("p1", "expected a point other than p0"));
+    };
+    let frame = Frame::from_normal(axis);
+    let [s, t, n] = [frame.s, frame.t, axis].map(|v| to_world.transform_vector3(v));
+    let skew = [(s.dot(t), s, t), (s.dot(n), s, n), (t.dot(n), t, n)]
+        .map(|(dot, a, b)| dot.abs() / (a.length() * b.length()))
+        .into_iter()
+        .fold((s.length() / t.length() - 1.0).abs(), f64::max);
+    // Also where a number is none.
+    if !(skew <= SIMILAR) {
+        let expected =
+            "expected moves, turns and scales that keep a cylinder round and straight, found another transform";
+        return Err(bag.fault_of("to_world", expected));
     }
+    fields.add("base", numbers(bag.place("p0"), &to_world.transform_point3(base).to_array()));
+    fields.add("top", numbers(bag.place("p1"), &to_world.transform_point3(top).to_array()));
+    fields.add("radius", number(bag.place("radius"), radius * s.length()));
+    fields.add("caps", text(bag.object.place, "none"));
+    fields.add("seam", numbers(bag.place("to_world"), &s.to_array()));
+    Ok(())
+}
+
+fn mesh(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
+    let place = bag.object.place;
+    let file = bag.required("filename", bag.file("filename"))?;
+    fields.add("file", text(bag.place("filename"), file));
+    let normals = if bag.boolean("face_normals")? == Some(true) { "face" } else { "vertex" };
+    fields.add("normals", text(bag.place("face_normals"), normals));
+    fields.add("winding", text(place, "world"));
+    match bag.object.plugin.as_str() {
+        "serialized" => {
+            if let Some(index) = bag.integer("shape_index")? {
+                fields.add("index", whole(bag.place("shape_index"), index));
+            }
+        }
+        plugin => {
+            if bag.boolean("flip_tex_coords")?.unwrap_or(plugin == "obj") {
+                fields.add("flip_v", boolean(bag.place("flip_tex_coords"), true));
+            }
+        }
+    }
+    Ok(())
 }

@@ -8,7 +8,7 @@ use super::object::{Bag, Family};
 use super::spectra::Role;
 use super::{Fields, Import, boolean, entry, number, numbers, text};
 
-const TEXTURES: [&str; 3] = ["bitmap", "checkerboard", "volume"];
+const TEXTURES: [&str; 4] = ["bitmap", "checkerboard", "volume", "mesh_attribute"];
 
 impl Import<'_> {
     /// The name under which a texture stands in `textures`.
@@ -20,6 +20,13 @@ impl Import<'_> {
         let node = match bag.object.plugin.as_str() {
             "bitmap" => bitmap(&bag)?,
             "checkerboard" => self.checkerboard(&bag)?,
+            "mesh_attribute" => {
+                let mut fields = Fields::new(bag.object.place);
+                let name = bag.required("name", bag.text("name"))?;
+                fields.add("name", text(bag.place("name"), name));
+                fields.add("scale", number(bag.place("scale"), bag.float("scale")?.unwrap_or(1.0)));
+                fields.kind("mesh_attribute")
+            }
             "volume" => {
                 let volume = bag.required("volume", bag.object("volume", &[Family::Volume]))?;
                 let name = self.declare_volume(volume)?;

@@ -63,9 +63,11 @@ impl<'a> Compiler<'a> {
         if let Some(known) = self.textures.get(name) {
             return known.clone();
         }
-        let made = self.within(at, "texture", name, |c| {
-            let texture = &c.description.textures[name];
-            c.texture(&format!("textures.{name}"), texture)
+        let (made, asked) = self.asking(|c| {
+            c.within(at, "texture", name, |c| {
+                let texture = &c.description.textures[name];
+                c.texture(&format!("textures.{name}"), texture)
+            })
         });
         let texture = match made {
             Some(Ok(texture)) => texture,
@@ -75,7 +77,9 @@ impl<'a> Compiler<'a> {
             }
             None => Texture::one(),
         };
-        self.textures.insert(name, texture.clone());
+        if !asked {
+            self.textures.insert(name, texture.clone());
+        }
         texture
     }
 
@@ -84,9 +88,11 @@ impl<'a> Compiler<'a> {
         if let Some(known) = self.numbers.get(name) {
             return known.clone();
         }
-        let made = self.within(at, "texture", name, |c| {
-            let texture = &c.description.textures[name];
-            c.numbers(&format!("textures.{name}"), texture)
+        let (made, asked) = self.asking(|c| {
+            c.within(at, "texture", name, |c| {
+                let texture = &c.description.textures[name];
+                c.numbers(&format!("textures.{name}"), texture)
+            })
         });
         let numbers = match made {
             Some(Ok(numbers)) => numbers,
@@ -96,7 +102,9 @@ impl<'a> Compiler<'a> {
             }
             None => Scalar::Uniform(0.5),
         };
-        self.numbers.insert(name, numbers.clone());
+        if !asked {
+            self.numbers.insert(name, numbers.clone());
+        }
         numbers
     }
 
@@ -119,6 +127,9 @@ impl<'a> Compiler<'a> {
                 loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
                 Texture::Image(loaded)
             }
+            written::Texture::MeshAttribute(attribute) => {
+                self.attribute(at, attribute).map_or_else(Texture::one, |a| Texture::Attribute(a.into()))
+            }
             written::Texture::Volume(name) => Texture::Volume(self.volume_texture(&format!("{at}.volume"), name)),
             written::Texture::Checkerboard(board) => Texture::Checkerboard {
                 a: Box::new(self.reflectance_texture(&format!("{at}.checkerboard.a"), &board.a)),
@@ -136,6 +147,9 @@ impl<'a> Compiler<'a> {
                 let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
                 loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
                 Scalar::Image(loaded)
+            }
+            written::Texture::MeshAttribute(attribute) => {
+                self.attribute(at, attribute).map_or(Scalar::Uniform(0.5), |a| Scalar::Attribute(a.into()))
             }
             written::Texture::Volume(name) => Scalar::Volume(self.volume_numbers(&format!("{at}.volume"), name)),
             written::Texture::Checkerboard(board) => {
@@ -165,12 +179,16 @@ impl<'a> Compiler<'a> {
             return known.clone();
         }
         let at = format!("materials.{name}");
-        let made = self.within(&at, "material", name, |c| {
-            let material = &c.description.materials[name];
-            c.material(&at, material)
+        let (made, asked) = self.asking(|c| {
+            c.within(&at, "material", name, |c| {
+                let material = &c.description.materials[name];
+                c.material(&at, material)
+            })
         });
         let material = Arc::new(made.unwrap_or(Material { kind: Kind::Boundary, two_sided: false, highlight: None }));
-        self.named.insert(name, material.clone());
+        if !asked {
+            self.named.insert(name, material.clone());
+        }
         material
     }
 

@@ -1,28 +1,60 @@
 //! Mesh files by their extension.
 
-use super::{MeshSource, obj, ply};
+use super::{MeshSource, obj, ply, serialized};
 use crate::error::{Error, Result};
-use std::path::Path;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-/// Reads a Wavefront OBJ (`.obj`) or a PLY (`.ply`; text or binary of either byte order).
-/// Polygons become fans of triangles about their first corner.
+/// Reads a Wavefront OBJ (`.obj`), a PLY (`.ply`; text or binary of either byte order) or mesh `index` of
+/// a `.serialized` file. Polygons become fans of triangles about their first corner.
 ///
 /// # Errors
 /// [`Error::Input`] with what is wrong: missing or truncated file, unknown extension, no
 /// triangles, index out of range, number that is not finite.
-pub fn load(path: &Path) -> Result<MeshSource> {
+pub fn load(path: &Path, index: u32) -> Result<MeshSource> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    let read = match extension.as_str() {
-        "obj" => obj::read,
-        "ply" => ply::read,
-        other => {
-            return Err(Error::input(path, format!("expected a mesh (.obj or .ply), found extension \"{other}\"")));
-        }
+    if index > 0 && extension != "serialized" {
+        return Err(Error::input(path, format!("expected index 0 for a file of one mesh, found {index}")));
+    }
+    let read = |bytes: &[u8]| match extension.as_str() {
+        "obj" => obj::read(bytes),
+        "ply" => ply::read(bytes),
+        "serialized" => serialized::read(bytes, index),
+        other => Err(format!("expected a mesh (.obj, .ply or .serialized), found extension \"{other}\"")),
     };
-    let bytes = std::fs::read(path).map_err(|e| Error::input(path, format!("cannot read: {e}")))?;
+    let bytes = match extension.as_str() {
+        // Unknown kinds are not even opened.
+        "obj" | "ply" | "serialized" => {
+            std::fs::read(path).map_err(|e| Error::input(path, format!("cannot read: {e}")))?
+        }
+        _ => Vec::new(),
+    };
     let source = read(&bytes).map_err(|message| Error::input(path, message))?;
     source.check().map_err(|message| Error::input(path, message))?;
     Ok(source)
+}
+
+/// Mesh files that are read once, however often a scene names them.
+#[derive(Debug, Default)]
+pub struct Sources {
+    read: HashMap<(PathBuf, u32), Arc<MeshSource>>,
+}
+
+impl Sources {
+    /// [`load`], or what it gave before.
+    ///
+    /// # Errors
+    /// As [`load`].
+    pub fn load(&mut self, path: &Path, index: u32) -> Result<Arc<MeshSource>> {
+        let key = (path.to_path_buf(), index);
+        if let Some(known) = self.read.get(&key) {
+            return Ok(known.clone());
+        }
+        let source = Arc::new(load(path, index)?);
+        self.read.insert(key, source.clone());
+        Ok(source)
+    }
 }
 
 #[cfg(test)]
@@ -34,7 +66,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        load(&path)
+        load(&path, 0)
     }
 
     /// The message, without the path that stands before it.
@@ -116,10 +148,33 @@ mod tests {
             normals: Vec::new(),
             uvs: vec![DVec2::new(0.1, 0.0), DVec2::X, DVec2::ONE, DVec2::Y],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
+            attributes: Vec::new(),
         };
         for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
             assert_eq!(read("a.ply", &quad(format)).unwrap(), expected, "{format}");
         }
+    }
+
+    /// A quad whose vertices and faces carry numbers; the quad's colour goes to both of its triangles.
+    #[test]
+    fn ply_attributes_are_kept() {
+        let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+            property float heat_0\nproperty float u\nproperty float v\nelement face 1\n\
+            property list uchar int vertex_index\nproperty uchar r\nproperty uchar g\nproperty uchar b\nend_header\n\
+            0 0 0 1.5 0 0\n1 0 0 2 1 0\n1 1 0 3 1 1\n0 1 0 4 0 1\n4 0 1 2 3 255 0 255\n";
+        let mesh = read("a.ply", text.as_bytes()).unwrap();
+        let named: Vec<(&str, usize, &[f32])> =
+            mesh.attributes.iter().map(|a| (a.name.as_str(), a.channels, a.values.as_slice())).collect();
+        assert_eq!(
+            named,
+            [
+                ("vertex_heat", 1, [1.5, 2.0, 3.0, 4.0].as_slice()),
+                ("face_color", 3, [1.0, 0.0, 1.0, 1.0, 0.0, 1.0].as_slice()),
+            ]
+        );
+        assert_eq!(mesh.uvs[2], DVec2::ONE);
+        let message = fault("a.ply", text.replace("1.5", "nan").as_bytes());
+        assert!(message.contains("attribute vertex_heat of number 0 is NaN"), "{message}");
     }
 
     #[test]
@@ -154,9 +209,9 @@ mod tests {
 
     #[test]
     fn missing_files_and_other_formats_are_told() {
-        let missing = load(Path::new("no/such.obj")).unwrap_err();
+        let missing = load(Path::new("no/such.obj"), 0).unwrap_err();
         assert_eq!(missing.exit_code(), 3);
         assert!(missing.to_string().starts_with("no/such.obj: cannot read: "), "{missing}");
-        assert_eq!(fault("a.stl", b""), "expected a mesh (.obj or .ply), found extension \"stl\"");
+        assert_eq!(fault("a.stl", b""), "expected a mesh (.obj, .ply or .serialized), found extension \"stl\"");
     }
 }

@@ -11,19 +11,22 @@
 //! Triangles are wound counterclockwise seen from outside. A transform that mirrors reverses the
 //! winding, so that outside stays outside.
 
+pub mod attribute;
 mod load;
 mod obj;
 mod ply;
+mod serialized;
 mod tree;
 mod triangle;
 
-pub use load::load;
+pub use load::{Sources, load};
 pub use tree::{MAX_TRIANGLES, MeshHit, MeshTree};
 pub use triangle::{TriangleHit, TriangleRay};
 
 use crate::math::{Frame, warp};
 use crate::scene::bvh::Aabb;
 use crate::scene::shape::SurfacePoint;
+use attribute::{Attribute, Element};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use std::collections::HashMap;
 use triangle::area_vector;
@@ -38,6 +41,20 @@ pub enum NormalMode {
     Smooth,
     /// The file's; [`NormalMode::Smooth`] where it has none.
     File,
+    /// The file's; where it has none, means as for [`NormalMode::Smooth`] but at each vertex of the file by
+    /// itself: an edge between vertices that are only at the same place stays sharp.
+    Vertex,
+}
+
+/// Which side of a triangle is the outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Winding {
+    /// That from which the file's order of corners is counterclockwise, before any transform: outside stays
+    /// outside under a transform that mirrors.
+    Object,
+    /// That from which it is counterclockwise in the world, so that a mirror turns the mesh inside out; but
+    /// where the file's normals are used, the side that they are on, weighted by area.
+    World,
 }
 
 /// What a mesh file says: f64, object space, triangles only.
@@ -51,6 +68,8 @@ pub struct MeshSource {
     pub uvs: Vec<DVec2>,
     /// Indices of vertices, counterclockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// Further numbers at vertices or on triangles.
+    pub attributes: Vec<Attribute>,
 }
 
 impl MeshSource {
@@ -81,12 +100,34 @@ impl MeshSource {
         if let Some((i, v)) = self.uvs.iter().enumerate().find(|(_, v)| !v.is_finite()) {
             return Err(format!("the texture coordinates of vertex {i} are {v}: expected finite numbers"));
         }
+        for a in &self.attributes {
+            let values = if a.element == Element::Vertex { n } else { self.triangles.len() } * a.channels;
+            if a.values.len() != values {
+                return Err(format!("expected {values} numbers of attribute {}, found {}", a.name, a.values.len()));
+            }
+            if let Some(i) = a.values.iter().position(|v| !v.is_finite()) {
+                let (i, v) = (i / a.channels, a.values[i]);
+                return Err(format!("attribute {} of number {i} is {v}: expected finite numbers", a.name));
+            }
+        }
         for (i, t) in self.triangles.iter().enumerate() {
             if let Some(v) = t.iter().find(|&&v| v as usize >= n) {
                 return Err(format!("triangle {i} names vertex {v}, but there are only {n} (counted from 0)"));
             }
         }
         Ok(())
+    }
+}
+
+impl MeshSource {
+    /// True where most of the area has its vertex normals on the side from which its corners are clockwise.
+    fn is_wound_against_its_normals(&self) -> bool {
+        let agreement = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|v| self.positions[v as usize]);
+            let n = t.map(|v| self.normals[v as usize]);
+            (b - a).cross(c - a).dot(n[0] + n[1] + n[2])
+        };
+        self.triangles.iter().map(agreement).sum::<f64>() < 0.0
     }
 }
 
@@ -107,6 +148,8 @@ pub struct Mesh {
     /// Triangles without area. They are kept, so that indices are the file's, but no ray hits
     /// and no sampler chooses them.
     pub flat_triangles: usize,
+    /// True where the second and third corner of each triangle stand the other way round than in the file.
+    pub swapped: bool,
 }
 
 impl Mesh {
@@ -115,7 +158,12 @@ impl Mesh {
     /// # Errors
     /// What [`MeshSource::check`] finds, or that the transform takes a vertex out of the range
     /// of f32.
-    pub fn new(source: &MeshSource, world_from_object: &DAffine3, mode: NormalMode) -> Result<Mesh, String> {
+    pub fn new(
+        source: &MeshSource,
+        world_from_object: &DAffine3,
+        mode: NormalMode,
+        winding: Winding,
+    ) -> Result<Mesh, String> {
         source.check()?;
         let world: Vec<DVec3> = source.positions.iter().map(|&p| world_from_object.transform_point3(p)).collect();
         let origin = choose_origin(&Aabb::from_points(world.iter().copied()));
@@ -126,18 +174,27 @@ impl Mesh {
 
         let linear = world_from_object.matrix3;
         let mirrored = linear.determinant() < 0.0;
+        let with_normals = matches!(mode, NormalMode::File | NormalMode::Vertex) && !source.normals.is_empty();
+        let swapped = match winding {
+            Winding::Object => mirrored,
+            // In object space both kinds of normal are as the file has them; a mirror leaves its normals on
+            // their side.
+            Winding::World if with_normals => mirrored != source.is_wound_against_its_normals(),
+            Winding::World => false,
+        };
         let triangles: Vec<[u32; 3]> =
-            source.triangles.iter().map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] }).collect();
+            source.triangles.iter().map(|&[a, b, c]| if swapped { [a, c, b] } else { [a, b, c] }).collect();
         let uvs = source.uvs.iter().map(|uv| uv.as_vec2().to_array()).collect();
-        let mut mesh = Mesh { origin, positions, normals: Vec::new(), uvs, triangles, flat_triangles: 0 };
+        let mut mesh = Mesh { origin, positions, normals: Vec::new(), uvs, triangles, flat_triangles: 0, swapped };
         mesh.flat_triangles = (0..mesh.triangles.len()).filter(|&i| mesh.area(i as u32) == 0.0).count();
         mesh.normals = match mode {
             NormalMode::Face => Vec::new(),
-            NormalMode::File if !source.normals.is_empty() => {
+            NormalMode::File | NormalMode::Vertex if with_normals => {
                 let to_world = normal_transform(&linear);
                 source.normals.iter().map(|&n| unit_or_zero(to_world * n).as_vec3().to_array()).collect()
             }
-            NormalMode::File | NormalMode::Smooth => smooth_normals(&mesh),
+            NormalMode::File | NormalMode::Smooth => smooth_normals(&mesh, &places(&mesh)),
+            NormalMode::Vertex => smooth_normals(&mesh, &(0..mesh.positions.len()).collect::<Vec<usize>>()),
         };
         Ok(mesh)
     }
@@ -180,7 +237,8 @@ impl Mesh {
         };
 
         let (uv, tangent) = if self.uvs.is_empty() {
-            (DVec2::new(b1, b2), e1)
+            // u and v are the weights of the file's second and third corner.
+            if self.swapped { (DVec2::new(b2, b1), e2) } else { (DVec2::new(b1, b2), e1) }
         } else {
             let [t0, t1, t2] = corners.map(|v| DVec2::from(self.uvs[v].map(f64::from)));
             let (d1, d2) = (t1 - t0, t2 - t0);
@@ -292,20 +350,22 @@ fn unit_or_zero(v: DVec3) -> DVec3 {
     if largest > 0.0 && largest.is_finite() { (v / largest).normalize() } else { DVec3::ZERO }
 }
 
-/// Angle-weighted vertex normals: Thürmer and Wüthrich 1998, "Computing Vertex Normals from
-/// Polygonal Facets".
-fn smooth_normals(mesh: &Mesh) -> Vec<[f32; 3]> {
-    // Vertices at the same place, −0 and 0 alike, share a sum.
+/// For each vertex the number of its place: vertices at the same place, −0 and 0 alike, share it.
+fn places(mesh: &Mesh) -> Vec<usize> {
     let mut place_of = HashMap::with_capacity(mesh.positions.len());
-    let places: Vec<usize> = mesh
-        .positions
+    mesh.positions
         .iter()
         .map(|p| {
             let next = place_of.len();
             *place_of.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(next)
         })
-        .collect();
-    let mut sums = vec![DVec3::ZERO; place_of.len()];
+        .collect()
+}
+
+/// Angle-weighted normals of vertices that share a number in `places`: Thürmer and Wüthrich 1998,
+/// "Computing Vertex Normals from Polygonal Facets".
+fn smooth_normals(mesh: &Mesh, places: &[usize]) -> Vec<[f32; 3]> {
+    let mut sums = vec![DVec3::ZERO; places.len()];
     for (i, corners) in mesh.triangles.iter().enumerate() {
         let v = mesh.vertices(i as u32);
         let normal = unit_or_zero(area_vector(v));

@@ -5,91 +5,120 @@
 
 use super::MeshSource;
 use glam::{DVec2, DVec3};
-use std::collections::HashMap;
 
-/// Position, texture coordinate and normal of a corner of a face, counted from 0.
-type Corner = [Option<usize>; 3];
+/// Position, texture coordinate and normal of a corner of a face, counted from 1; 0 where there is none.
+type Corner = [u32; 3];
+
+/// What the three numbers of a corner name.
+const LISTS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+
+/// Faces as they are read: all corners, and for each face its line and the end of its corners.
+#[derive(Default)]
+struct Faces {
+    corners: Vec<Corner>,
+    ends: Vec<(u32, usize)>,
+}
 
 pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
-    let text = String::from_utf8_lossy(bytes);
     let mut positions: Vec<DVec3> = Vec::new();
     let mut uvs: Vec<DVec2> = Vec::new();
     let mut normals: Vec<DVec3> = Vec::new();
-    let mut faces: Vec<(usize, Vec<Corner>)> = Vec::new();
-    let mut carried = String::new();
-    for (number, line) in text.lines().enumerate() {
-        let number = number + 1;
+    let mut faces = Faces::default();
+    let mut carried: Vec<u8> = Vec::new();
+    for (i, line) in bytes.split(|&b| b == b'\n').enumerate() {
+        let number = i + 1;
         // A backslash at the end joins the next line.
-        if let Some(head) = line.trim_end().strip_suffix('\\') {
-            carried.push_str(head);
-            carried.push(' ');
+        if let Some(head) = line.trim_ascii_end().strip_suffix(b"\\") {
+            carried.extend(head);
+            carried.push(b' ');
             continue;
         }
-        let joined = std::mem::take(&mut carried) + line;
-        let mut words = joined.split('#').next().unwrap_or("").split_whitespace();
+        let joined;
+        let line = if carried.is_empty() {
+            line
+        } else {
+            carried.extend(line);
+            joined = std::mem::take(&mut carried);
+            &joined
+        };
+        let line = line.split(|&b| b == b'#').next().unwrap_or(line);
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
         match words.next() {
-            Some("v") => positions.push(DVec3::from(numbers::<3>(words, number)?)),
-            Some("vt") => uvs.push(texture_coordinates(words, number)?),
-            Some("vn") => normals.push(DVec3::from(numbers::<3>(words, number)?)),
-            Some("f") => {
+            Some(b"v") => positions.push(DVec3::from(numbers::<3>(words, number)?)),
+            Some(b"vt") => uvs.push(texture_coordinates(words, number)?),
+            Some(b"vn") => normals.push(DVec3::from(numbers::<3>(words, number)?)),
+            Some(b"f") => {
                 let counts = [positions.len(), uvs.len(), normals.len()];
-                let face = words.map(|w| corner(w, counts, number)).collect::<Result<Vec<Corner>, String>>()?;
-                if face.len() < 3 {
-                    return Err(format!("line {number}: expected a face of 3 or more corners, found {}", face.len()));
+                let start = faces.corners.len();
+                for word in words {
+                    faces.corners.push(corner(word, counts, number)?);
                 }
-                faces.push((number, face));
+                let found = faces.corners.len() - start;
+                if found < 3 {
+                    return Err(format!("line {number}: expected a face of 3 or more corners, found {found}"));
+                }
+                faces.ends.push((u32::try_from(number).unwrap_or(u32::MAX), faces.corners.len()));
             }
             _ => {}
         }
     }
+    weld(&positions, &uvs, &normals, &faces)
+}
 
-    // Each distinct corner becomes a vertex. Positions that several share stay equal bit for bit.
+/// Each distinct corner becomes a vertex. Positions that several share stay equal bit for bit.
+fn weld(positions: &[DVec3], uvs: &[DVec2], normals: &[DVec3], faces: &Faces) -> Result<MeshSource, String> {
     let mut out = MeshSource::default();
-    let has = |k: usize| faces.iter().flat_map(|f| &f.1).any(|c| c[k].is_some());
+    let counts = [positions.len(), uvs.len(), normals.len()];
+    let has = |k: usize| faces.corners.iter().any(|c| c[k] != 0);
     let (has_uvs, has_normals) = (has(1), has(2));
-    let mut vertex_of: HashMap<Corner, u32> = HashMap::new();
+    // The vertices at a position form a chain: the first of each, and after each vertex the next.
+    const END: u32 = u32::MAX;
+    let mut first = vec![END; positions.len()];
+    let mut next: Vec<u32> = Vec::new();
+    let mut of_vertex: Vec<Corner> = Vec::new();
     let mut vertices = Vec::new();
-    for (number, face) in &faces {
+    let mut start = 0;
+    for &(line, end) in &faces.ends {
         vertices.clear();
-        for &c in face {
-            for (k, (what, count)) in
-                [("vertex", positions.len()), ("texture coordinate", uvs.len()), ("normal", normals.len())]
-                    .into_iter()
-                    .enumerate()
-            {
-                if let Some(i) = c[k].filter(|&i| i >= count) {
-                    return Err(format!(
-                        "line {number}: face names {what} {}, but the file has {count}",
-                        i.saturating_add(1)
-                    ));
+        for &c in &faces.corners[start..end] {
+            for ((&i, what), count) in c.iter().zip(LISTS).zip(counts) {
+                if i as usize > count {
+                    return Err(format!("line {line}: face names {what} {i}, but the file has {count}"));
                 }
             }
-            let next = u32::try_from(vertex_of.len()).map_err(|_| "more than 2^32 vertices".to_string())?;
-            let vertex = *vertex_of.entry(c).or_insert_with(|| {
-                out.positions.push(c[0].map_or(DVec3::ZERO, |i| positions[i]));
+            let place = c[0] as usize - 1;
+            let mut vertex = first[place];
+            while vertex != END && of_vertex[vertex as usize] != c {
+                vertex = next[vertex as usize];
+            }
+            if vertex == END {
+                vertex = u32::try_from(of_vertex.len()).ok().filter(|&v| v != END).ok_or("more than 2^32 vertices")?;
+                next.push(std::mem::replace(&mut first[place], vertex));
+                of_vertex.push(c);
+                out.positions.push(positions[place]);
                 if has_uvs {
-                    out.uvs.push(c[1].map_or(DVec2::ZERO, |i| uvs[i]));
+                    out.uvs.push(if c[1] == 0 { DVec2::ZERO } else { uvs[c[1] as usize - 1] });
                 }
                 if has_normals {
-                    out.normals.push(c[2].map_or(DVec3::ZERO, |i| normals[i]));
+                    out.normals.push(if c[2] == 0 { DVec3::ZERO } else { normals[c[2] as usize - 1] });
                 }
-                next
-            });
+            }
             vertices.push(vertex);
         }
+        start = end;
         out.triangles.extend((2..vertices.len()).map(|k| [vertices[0], vertices[k - 1], vertices[k]]));
     }
     Ok(out)
 }
 
-fn number(word: &str, line: usize) -> Result<f64, String> {
-    match word.parse::<f64>() {
-        Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(format!("line {line}: expected a finite number, found \"{word}\"")),
+fn number(word: &[u8], line: usize) -> Result<f64, String> {
+    match std::str::from_utf8(word).ok().and_then(|w| w.parse::<f64>().ok()) {
+        Some(x) if x.is_finite() => Ok(x),
+        _ => Err(format!("line {line}: expected a finite number, found \"{}\"", String::from_utf8_lossy(word))),
     }
 }
 
-fn numbers<'a, const N: usize>(mut words: impl Iterator<Item = &'a str>, line: usize) -> Result<[f64; N], String> {
+fn numbers<'a, const N: usize>(mut words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<[f64; N], String> {
     let mut out = [0.0; N];
     for (k, x) in out.iter_mut().enumerate() {
         let word = words.next().ok_or_else(|| format!("line {line}: expected {N} numbers, found {k}"))?;
@@ -99,27 +128,29 @@ fn numbers<'a, const N: usize>(mut words: impl Iterator<Item = &'a str>, line: u
 }
 
 /// The second of two is optional and zero by default.
-fn texture_coordinates<'a>(mut words: impl Iterator<Item = &'a str>, line: usize) -> Result<DVec2, String> {
+fn texture_coordinates<'a>(mut words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<DVec2, String> {
     let u = words.next().ok_or_else(|| format!("line {line}: expected 2 numbers, found 0"))?;
     let v = words.next().map_or(Ok(0.0), |w| number(w, line))?;
     Ok(DVec2::new(number(u, line)?, v))
 }
 
 /// `v`, `v/t`, `v//n` or `v/t/n`; negative numbers count back from the last one read.
-fn corner(word: &str, counts: [usize; 3], line: usize) -> Result<Corner, String> {
-    let fault = || format!("line {line}: expected a corner like 1, 1/2, 1//3 or 1/2/3, found \"{word}\"");
-    let mut out = [None; 3];
-    for (k, part) in word.split('/').enumerate() {
+fn corner(word: &[u8], counts: [usize; 3], line: usize) -> Result<Corner, String> {
+    let fault = || {
+        let word = String::from_utf8_lossy(word);
+        format!("line {line}: expected a corner like 1, 1/2, 1//3 or 1/2/3, found \"{word}\"")
+    };
+    let mut out = [0; 3];
+    for (k, part) in word.split(|&b| b == b'/').enumerate() {
         if k > 2 {
             return Err(fault());
         }
         if part.is_empty() && k > 0 {
             continue;
         }
-        let i: i64 = part.parse().map_err(|_| fault())?;
-        let from_zero =
-            if i > 0 { Some(i - 1) } else { (counts[k] as i64).checked_add(i).filter(|&j| i < 0 && j >= 0) };
-        out[k] = Some(usize::try_from(from_zero.ok_or_else(fault)?).map_err(|_| fault())?);
+        let i: i64 = std::str::from_utf8(part).ok().and_then(|p| p.parse().ok()).ok_or_else(fault)?;
+        let from_one = if i > 0 { Some(i) } else { (counts[k] as i64 + 1).checked_add(i).filter(|&j| i < 0 && j > 0) };
+        out[k] = from_one.and_then(|i| u32::try_from(i).ok()).ok_or_else(fault)?;
     }
     Ok(out)
 }

@@ -1,146 +1,307 @@
-//! PLY: elements `vertex` and `face`; the only file that names the PLY crate.
+//! PLY: elements `vertex` and `face`, as text or binary of either byte order (Turk 1994, "The PLY Polygon
+//! File Format").
+//!
+//! Other elements are passed over. Properties beyond position, normal and texture coordinates become
+//! attributes, see [`super::attribute`].
 
 use super::MeshSource;
+use super::attribute::{Attribute, Channel, Column, Element, named_columns};
 use glam::{DVec2, DVec3};
-use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
-/// The properties that a vertex may have.
-#[derive(Default)]
-struct Vertex {
-    position: DVec3,
-    normal: DVec3,
-    uv: DVec2,
+/// The type of a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Type {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F16,
+    F32,
+    F64,
 }
 
-impl Vertex {
-    fn set(&mut self, name: &str, value: f64) -> PropertyAccessResult {
-        match name {
-            "x" => self.position.x = value,
-            "y" => self.position.y = value,
-            "z" => self.position.z = value,
-            "nx" => self.normal.x = value,
-            "ny" => self.normal.y = value,
-            "nz" => self.normal.z = value,
-            _ if U_NAMES.contains(&name) => self.uv.x = value,
-            _ if V_NAMES.contains(&name) => self.uv.y = value,
-            _ => return PropertyAccessResult::Ignored,
-        }
-        PropertyAccessResult::Set
-    }
-}
-
-/// What writers call texture coordinates.
-const U_NAMES: [&str; 4] = ["u", "s", "texture_u", "texture_s"];
-const V_NAMES: [&str; 4] = ["v", "t", "texture_v", "texture_t"];
-
-impl PropertyAccess for Vertex {
-    fn new() -> Self {
-        Vertex::default()
+impl Type {
+    fn named(name: &str) -> Option<Type> {
+        Some(match name {
+            "char" | "int8" => Type::I8,
+            "uchar" | "uint8" => Type::U8,
+            "short" | "int16" => Type::I16,
+            "ushort" | "uint16" => Type::U16,
+            "int" | "int32" => Type::I32,
+            "uint" | "uint32" => Type::U32,
+            "long" | "int64" => Type::I64,
+            "ulong" | "uint64" => Type::U64,
+            "half" | "float16" => Type::F16,
+            "float" | "float32" => Type::F32,
+            "double" | "float64" => Type::F64,
+            _ => return None,
+        })
     }
 
-    fn set_float(&mut self, name: &str, value: f32) -> PropertyAccessResult {
-        self.set(name, f64::from(value))
-    }
-
-    fn set_double(&mut self, name: &str, value: f64) -> PropertyAccessResult {
-        self.set(name, value)
-    }
-
-    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
-        match value {
-            Property::Char(x) => self.set(name, f64::from(x)),
-            Property::UChar(x) => self.set(name, f64::from(x)),
-            Property::Short(x) => self.set(name, f64::from(x)),
-            Property::UShort(x) => self.set(name, f64::from(x)),
-            Property::Int(x) => self.set(name, f64::from(x)),
-            Property::UInt(x) => self.set(name, f64::from(x)),
-            _ => PropertyAccessResult::Ignored,
+    fn size(self) -> usize {
+        match self {
+            Type::I8 | Type::U8 => 1,
+            Type::I16 | Type::U16 | Type::F16 => 2,
+            Type::I32 | Type::U32 | Type::F32 => 4,
+            Type::I64 | Type::U64 | Type::F64 => 8,
         }
     }
-}
 
-/// The corners of a face; None where the list has something else than counts.
-#[derive(Default)]
-struct Face {
-    corners: Option<Vec<u32>>,
-}
-
-impl PropertyAccess for Face {
-    fn new() -> Self {
-        Face::default()
-    }
-
-    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
-        if name != "vertex_indices" && name != "vertex_index" {
-            return PropertyAccessResult::Ignored;
+    /// One over the greatest number of a type of whole numbers; one for others.
+    fn unit(self) -> f32 {
+        match self {
+            Type::I8 => 1.0 / 127.0,
+            Type::U8 => 1.0 / 255.0,
+            Type::I16 => 1.0 / 32_767.0,
+            Type::U16 => 1.0 / 65_535.0,
+            Type::I32 => 1.0 / i32::MAX as f32,
+            Type::U32 => 1.0 / u32::MAX as f32,
+            Type::I64 => 1.0 / i64::MAX as f32,
+            Type::U64 => 1.0 / u64::MAX as f32,
+            Type::F16 | Type::F32 | Type::F64 => 1.0,
         }
-        self.corners = match value {
-            // An index that is negative becomes one that no file has vertices for.
-            Property::ListInt(list) => Some(list.iter().map(|&i| u32::try_from(i).unwrap_or(u32::MAX)).collect()),
-            other => other.to_u32_list(),
-        };
-        if self.corners.is_some() { PropertyAccessResult::Set } else { PropertyAccessResult::UnsupportedType }
+    }
+
+    /// The number that lies in `bytes`.
+    fn read(self, bytes: &[u8], big: bool) -> f64 {
+        fn raw<const N: usize>(bytes: &[u8], big: bool) -> [u8; N] {
+            let mut out = [0; N];
+            out.copy_from_slice(&bytes[..N]);
+            if big {
+                out.reverse();
+            }
+            out
+        }
+        match self {
+            Type::I8 => f64::from(bytes[0] as i8),
+            Type::U8 => f64::from(bytes[0]),
+            Type::I16 => f64::from(i16::from_le_bytes(raw(bytes, big))),
+            Type::U16 => f64::from(u16::from_le_bytes(raw(bytes, big))),
+            Type::I32 => f64::from(i32::from_le_bytes(raw(bytes, big))),
+            Type::U32 => f64::from(u32::from_le_bytes(raw(bytes, big))),
+            Type::I64 => i64::from_le_bytes(raw(bytes, big)) as f64,
+            Type::U64 => u64::from_le_bytes(raw(bytes, big)) as f64,
+            Type::F16 => half::f16::from_le_bytes(raw(bytes, big)).to_f64(),
+            Type::F32 => f64::from(f32::from_le_bytes(raw(bytes, big))),
+            Type::F64 => f64::from_le_bytes(raw(bytes, big)),
+        }
+    }
+
+    /// The number that a word of text is, rounded as the type says.
+    fn parse(self, word: &str) -> Option<f64> {
+        let x: f64 = word.parse().ok()?;
+        Some(match self {
+            Type::F32 => f64::from(x as f32),
+            Type::F16 => half::f16::from_f64(x).to_f64(),
+            _ => x,
+        })
     }
 }
 
-/// Any other element.
-struct Other;
+#[derive(Clone, Debug)]
+struct Property {
+    name: String,
+    kind: Type,
+    /// The type of the count, for lists.
+    list: Option<Type>,
+}
 
-impl PropertyAccess for Other {
-    fn new() -> Self {
-        Other
+struct Header {
+    /// None for text.
+    big: Option<bool>,
+    elements: Vec<(String, usize, Vec<Property>)>,
+}
+
+/// Reads the header; what is left of `bytes` is the payload.
+fn header(bytes: &mut &[u8]) -> Result<Header, String> {
+    let mut out = Header { big: None, elements: Vec::new() };
+    let mut format = None;
+    for number in 1.. {
+        let end = bytes.iter().position(|&b| b == b'\n').ok_or("truncated: the header does not end")?;
+        let line = std::str::from_utf8(&bytes[..end]).map_err(|_| format!("line {number}: expected text"))?;
+        *bytes = &bytes[end + 1..];
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let unknown = |word: &str| format!("line {number}: unknown type \"{word}\"");
+        let of = |word: &str| Type::named(word).ok_or_else(|| unknown(word));
+        match (number, words.as_slice()) {
+            (1, ["ply"]) => {}
+            (1, _) => return Err("expected \"ply\" in the first line".into()),
+            (_, [] | ["comment" | "obj_info", ..]) => {}
+            (_, ["format", name, "1.0"]) => {
+                out.big = match *name {
+                    "ascii" => None,
+                    "binary_little_endian" => Some(false),
+                    "binary_big_endian" => Some(true),
+                    _ => return Err(format!("line {number}: unknown format \"{name}\"")),
+                };
+                format = Some(());
+            }
+            (_, ["element", name, count]) => {
+                let count = count.parse().map_err(|_| format!("line {number}: expected a count, found \"{count}\""))?;
+                out.elements.push(((*name).to_owned(), count, Vec::new()));
+            }
+            (_, ["property", rest @ ..]) => {
+                let Some((_, _, properties)) = out.elements.last_mut() else {
+                    return Err(format!("line {number}: property without element"));
+                };
+                properties.push(match rest {
+                    ["list", count, kind, name] => {
+                        Property { name: (*name).to_owned(), kind: of(kind)?, list: Some(of(count)?) }
+                    }
+                    [kind, name] => Property { name: (*name).to_owned(), kind: of(kind)?, list: None },
+                    _ => return Err(format!("line {number}: expected a type and a name")),
+                });
+            }
+            (_, ["end_header"]) if format.is_some() => return Ok(out),
+            (_, ["end_header"]) => return Err("the header names no format".into()),
+            _ => return Err(format!("line {number}: expected a line of a header, found \"{}\"", words.join(" "))),
+        }
+    }
+    unreachable!("lines are counted without end")
+}
+
+/// The payload, number by number.
+enum Payload<'a> {
+    Text(std::str::SplitAsciiWhitespace<'a>),
+    Binary { bytes: &'a [u8], big: bool },
+}
+
+impl Payload<'_> {
+    fn next(&mut self, kind: Type) -> Result<f64, String> {
+        match self {
+            Payload::Text(words) => {
+                let word = words.next().ok_or("truncated")?;
+                kind.parse(word).ok_or_else(|| format!("expected a number, found \"{word}\""))
+            }
+            Payload::Binary { bytes, big } => {
+                let size = kind.size();
+                if bytes.len() < size {
+                    return Err("truncated".into());
+                }
+                let x = kind.read(bytes, *big);
+                *bytes = &bytes[size..];
+                Ok(x)
+            }
+        }
+    }
+
+    /// Reads the numbers of one row: those of properties that are no lists to `scalars`, in order, and the
+    /// list `chosen` to `list`.
+    fn row(
+        &mut self,
+        properties: &[Property],
+        chosen: Option<usize>,
+        scalars: &mut Vec<f64>,
+        list: &mut Vec<f64>,
+    ) -> Result<(), String> {
+        scalars.clear();
+        list.clear();
+        for (i, property) in properties.iter().enumerate() {
+            let Some(count) = property.list else {
+                scalars.push(self.next(property.kind)?);
+                continue;
+            };
+            let count = self.next(count)?;
+            if !(0.0..=f64::from(u32::MAX)).contains(&count) || count.fract() != 0.0 {
+                return Err(format!("expected the length of a list, found {count}"));
+            }
+            for _ in 0..count as u64 {
+                let x = self.next(property.kind)?;
+                if Some(i) == chosen {
+                    list.push(x);
+                }
+            }
+        }
+        Ok(())
     }
 }
+
+/// Names of texture coordinates, by precedence.
+const UV_NAMES: [[&str; 2]; 4] = [["u", "v"], ["texture_u", "texture_v"], ["s", "t"], ["texture_s", "texture_t"]];
 
 pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
-    let mut reader = Reader::new(bytes);
-    let parser = Parser::<Vertex>::new();
-    let header = parser.read_header(&mut reader).map_err(|e| fault(&e))?;
-    let mut out = MeshSource::default();
-    for (name, element) in &header.elements {
-        // Every element takes at least a byte: a count beyond that is a fault, not a long wait.
-        if element.count > bytes.len() {
-            return Err(format!("truncated: expected {} of element {name} in {} bytes", element.count, bytes.len()));
+    let total = bytes.len();
+    let mut rest = bytes;
+    let header = header(&mut rest).map_err(|e| format!("not a valid PLY file: {e}"))?;
+    let mut payload = match header.big {
+        Some(big) => Payload::Binary { bytes: rest, big },
+        None => {
+            let text = std::str::from_utf8(rest).map_err(|_| "not a valid PLY file: expected text".to_owned())?;
+            Payload::Text(text.split_ascii_whitespace())
         }
+    };
+    let mut out = MeshSource::default();
+    for (name, count, properties) in &header.elements {
+        // Every row takes at least a byte: a count beyond that is a fault, not a long wait.
+        if *count > total {
+            return Err(format!("truncated: expected {count} of element {name} in {total} bytes"));
+        }
+        let row_fault = |i: usize, e: String| format!("not a valid PLY file: {name} {i}: {e}");
+        // Scalars of a row come without the lists.
+        let scalar_names: Vec<&str> = properties.iter().filter(|p| p.list.is_none()).map(|p| p.name.as_str()).collect();
+        let column = |name: &str| scalar_names.iter().position(|n| *n == name);
+        let (mut scalars, mut list) = (Vec::new(), Vec::new());
         match name.as_str() {
             "vertex" => {
-                let has = |names: &[&str]| names.iter().any(|n| element.properties.contains_key(*n));
-                if !["x", "y", "z"].iter().all(|n| has(&[n])) {
-                    return Err("expected vertices with x, y and z".into());
+                let all = |names: [&str; 3]| Some([column(names[0])?, column(names[1])?, column(names[2])?]);
+                let position = all(["x", "y", "z"]).ok_or("expected vertices with x, y and z")?;
+                let normal = all(["nx", "ny", "nz"]);
+                let uv_names = UV_NAMES.into_iter().find(|n| n.iter().all(|n| column(n).is_some()));
+                let uv = uv_names.and_then(|[u, v]| Some([column(u)?, column(v)?]));
+                let taken = [["x", "y", "z"], ["nx", "ny", "nz"]];
+                let mut free = columns(properties, |n| taken.iter().flatten().any(|t| *t == n));
+                free.iter_mut().for_each(|c| c.taken |= uv_names.is_some_and(|names| names.contains(&c.name.as_str())));
+                let mut attributes = named_columns(Element::Vertex, &free);
+                for i in 0..*count {
+                    payload.row(properties, None, &mut scalars, &mut list).map_err(|e| row_fault(i, e))?;
+                    let vector = |at: [usize; 3]| DVec3::from(at.map(|k| scalars[k]));
+                    out.positions.push(vector(position));
+                    out.normals.extend(normal.map(vector));
+                    out.uvs.extend(uv.map(|at| DVec2::from(at.map(|k| scalars[k]))));
+                    attributes.iter_mut().for_each(|(attribute, from)| push(attribute, from, &scalars));
                 }
-                let vertices = parser.read_payload_for_element(&mut reader, element, &header).map_err(|e| fault(&e))?;
-                out.positions = vertices.iter().map(|v| v.position).collect();
-                if ["nx", "ny", "nz"].iter().all(|n| has(&[n])) {
-                    out.normals = vertices.iter().map(|v| v.normal).collect();
-                }
-                if has(&U_NAMES) && has(&V_NAMES) {
-                    out.uvs = vertices.iter().map(|v| v.uv).collect();
-                }
+                out.attributes.extend(attributes.into_iter().map(|(attribute, _)| attribute));
             }
             "face" => {
-                let faces = Parser::<Face>::new()
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(|e| fault(&e))?;
-                for (i, face) in faces.iter().enumerate() {
-                    let corners = face.corners.as_deref().unwrap_or(&[]);
-                    if corners.len() < 3 {
-                        return Err(format!("face {i}: expected 3 or more vertices, found {}", corners.len()));
+                let chosen = ["vertex_index", "vertex_indices"]
+                    .into_iter()
+                    .find_map(|n| properties.iter().position(|p| p.list.is_some() && p.name == n))
+                    .ok_or("expected faces with vertex_index or vertex_indices")?;
+                let mut attributes = named_columns(Element::Face, &columns(properties, |_| false));
+                for i in 0..*count {
+                    payload.row(properties, Some(chosen), &mut scalars, &mut list).map_err(|e| row_fault(i, e))?;
+                    if list.len() < 3 {
+                        return Err(format!("face {i}: expected 3 or more vertices, found {}", list.len()));
                     }
-                    out.triangles.extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]]));
+                    // An index that is none becomes one that no file has vertices for: casts saturate.
+                    let corner = |k: usize| if list[k] < 0.0 { u32::MAX } else { list[k] as u32 };
+                    for k in 2..list.len() {
+                        out.triangles.push([corner(0), corner(k - 1), corner(k)]);
+                        attributes.iter_mut().for_each(|(attribute, from)| push(attribute, from, &scalars));
+                    }
                 }
+                out.attributes.extend(attributes.into_iter().map(|(attribute, _)| attribute));
             }
             _ => {
-                Parser::<Other>::new()
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(|e| fault(&e))?;
+                for i in 0..*count {
+                    payload.row(properties, None, &mut scalars, &mut list).map_err(|e| row_fault(i, e))?;
+                }
             }
         }
     }
     Ok(out)
 }
 
-/// The parser's message on one line.
-fn fault(error: &ParseError) -> String {
-    format!("not a valid PLY file: {}", error.to_string().split_whitespace().collect::<Vec<_>>().join(" "))
+/// The properties of an element that are no lists.
+fn columns(properties: &[Property], taken: impl Fn(&str) -> bool) -> Vec<Column> {
+    let scalars = properties.iter().filter(|p| p.list.is_none());
+    scalars.map(|p| Column { name: p.name.clone(), taken: taken(&p.name), unit: p.kind.unit() }).collect()
+}
+
+fn push(attribute: &mut Attribute, from: &[Channel], scalars: &[f64]) {
+    attribute.values.extend(from.iter().map(|&(k, factor)| scalars[k] as f32 * factor));
 }

@@ -22,7 +22,7 @@ impl Numbers {
 
 fn mesh(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Mesh {
     let source = MeshSource { positions, triangles, ..MeshSource::default() };
-    Mesh::new(&source, &DAffine3::IDENTITY, NormalMode::Face).unwrap()
+    Mesh::new(&source, &DAffine3::IDENTITY, NormalMode::Face, Winding::Object).unwrap()
 }
 
 /// A grid of `n` × `n` cells, its corners placed by `place` on the unit square.
@@ -268,9 +268,9 @@ fn a_surface_has_point_normal_area_and_tangent() {
         // u runs along y over 4 m from 0 to 2, v along x.
         uvs: vec![DVec2::ZERO, DVec2::new(0.0, 1.0), DVec2::new(2.0, 0.0)],
         triangles: vec![[0, 1, 2]],
-        normals: Vec::new(),
+        ..MeshSource::default()
     };
-    let mesh = Mesh::new(&source, &DAffine3::IDENTITY, NormalMode::Face).unwrap();
+    let mesh = Mesh::new(&source, &DAffine3::IDENTITY, NormalMode::Face, Winding::Object).unwrap();
     assert_eq!(mesh.area(0), 6.0);
     let s = mesh.surface(0, 0.5, 0.5);
     assert_eq!(s.point, DVec3::new(1.5, 2.0, 5.0));
@@ -295,14 +295,14 @@ fn a_mirrored_mesh_keeps_its_outside() {
     let source = MeshSource {
         positions: as_f64(&unit.positions),
         normals: as_f64(&unit.positions),
-        uvs: Vec::new(),
         triangles: unit.triangles.clone(),
+        ..MeshSource::default()
     };
     let centre = DVec3::new(1e6, -3e6, 7e5);
     let scale = DVec3::new(-2.0, 1.0, 0.5);
     let place = DAffine3 { matrix3: DMat3::from_diagonal(scale), translation: centre };
     for mode in [NormalMode::Face, NormalMode::Smooth, NormalMode::File] {
-        let mesh = Mesh::new(&source, &place, mode).unwrap();
+        let mesh = Mesh::new(&source, &place, mode, Winding::Object).unwrap();
         for (p, source) in mesh.positions.iter().zip(&source.positions) {
             let world = DVec3::from(p.map(f64::from)) + mesh.origin;
             // Half an ulp of f32 at up to 4 m, and f64 at 3e6 m.
@@ -352,9 +352,48 @@ fn smooth_normals_do_not_depend_on_how_faces_are_split() {
         }
     }
     let source = MeshSource { positions, triangles, ..MeshSource::default() };
-    let cube = Mesh::new(&source, &DAffine3::IDENTITY, NormalMode::Smooth).unwrap();
+    let cube = Mesh::new(&source, &DAffine3::IDENTITY, NormalMode::Smooth, Winding::Object).unwrap();
     for (n, p) in cube.normals.iter().zip(&source.positions) {
         assert!((DVec3::from(n.map(f64::from)) - p.normalize()).length() < 4.0 * f64::from(f32::EPSILON), "{n:?} {p}");
+    }
+    // Vertex by vertex of the file each corner keeps its face's normal.
+    let sharp = Mesh::new(&source, &DAffine3::IDENTITY, NormalMode::Vertex, Winding::Object).unwrap();
+    for (i, t) in sharp.triangles.iter().enumerate() {
+        for &v in t {
+            let n = DVec3::from(sharp.normals[v as usize].map(f64::from));
+            assert!((n - sharp.surface(i as u32, 0.2, 0.2).normal).length() < 1e-6);
+        }
+    }
+}
+
+/// A triangle in the plane z = 0, counterclockwise from +z, with normals of the file up or down or none,
+/// mirrored or not: by the right hand in the world a mirror turns it over, but normals keep their side.
+#[test]
+fn winding_in_the_world_follows_the_right_hand_or_the_normals() {
+    for (normal, mirrored, outside) in [
+        (None, false, 1.0),
+        (None, true, -1.0),
+        (Some(1.0), false, 1.0),
+        (Some(1.0), true, 1.0),
+        (Some(-1.0), false, -1.0),
+        (Some(-1.0), true, -1.0),
+    ] {
+        let source = MeshSource {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            normals: normal.map_or(Vec::new(), |z| vec![DVec3::Z * z; 3]),
+            triangles: vec![[0, 1, 2]],
+            ..MeshSource::default()
+        };
+        let place = DAffine3::from_scale(DVec3::new(if mirrored { -1.0 } else { 1.0 }, 1.0, 1.0));
+        let mesh = Mesh::new(&source, &place, NormalMode::Vertex, Winding::World).unwrap();
+        // u and v stay with the file's corners: here (0.2, 0.3) is x = ±0.2, y = 0.3.
+        let (b1, b2) = if mesh.swapped { (0.3, 0.2) } else { (0.2, 0.3) };
+        let s = mesh.surface(0, b1, b2);
+        assert_eq!((s.normal.z, s.shading_normal.z), (outside, outside), "{normal:?} {mirrored}");
+        assert!((s.uv - DVec2::new(0.2, 0.3)).length() < 1e-15 && (s.point.y - 0.3).abs() < 1e-15, "{s:?}");
+        assert!((s.tangent - mesh.surface(0, 0.0, 0.0).tangent).length() < 1e-15 && s.tangent.x.abs() == 1.0);
+        let faced = Mesh::new(&source, &place, NormalMode::Face, Winding::World).unwrap();
+        assert_eq!(faced.surface(0, 0.2, 0.2).normal.z, if mirrored { -1.0 } else { 1.0 });
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::exact::{along, dot};
 use super::span::{Exit, Span};
-use super::{AreaSample, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest};
+use super::{AreaSample, Layout, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest};
 use crate::math::Ray;
 use glam::{DVec2, DVec3};
 
@@ -19,6 +19,8 @@ pub struct Cube {
     /// Areas of the faces of each pair.
     areas: [f64; 3],
     scale: f64,
+    /// How u and v lie on the faces.
+    pictures: &'static [Picture; 6],
 }
 
 const SLAB: (f64, f64) = (-1.0, 1.0);
@@ -31,6 +33,7 @@ fn side(face: u8) -> f64 {
 }
 
 /// Picture axes of a face: (index of the half edge, sign) for right and for up.
+#[derive(Debug)]
 struct Picture {
     right: (usize, f64),
     up: (usize, f64),
@@ -44,6 +47,16 @@ const PICTURES: [Picture; 6] = [
     Picture { right: (0, 1.0), up: (2, -1.0) },
     Picture { right: (0, -1.0), up: (1, 1.0) },
     Picture { right: (0, 1.0), up: (1, 1.0) },
+];
+
+/// The faces of [`Layout::ZUp`].
+const PICTURES_Z_UP: [Picture; 6] = [
+    Picture { right: (1, 1.0), up: (2, 1.0) },
+    Picture { right: (1, 1.0), up: (2, -1.0) },
+    Picture { right: (2, 1.0), up: (0, 1.0) },
+    Picture { right: (0, -1.0), up: (2, -1.0) },
+    Picture { right: (1, -1.0), up: (0, 1.0) },
+    Picture { right: (1, 1.0), up: (0, 1.0) },
 ];
 
 impl Cube {
@@ -73,7 +86,17 @@ impl Cube {
             normals: duals.map(DVec3::normalize),
             areas: crosses.map(|c| 4.0 * c.length()),
             scale: largest(center).max(largest(e0.abs() + e1.abs() + e2.abs())),
+            pictures: &PICTURES,
         })
+    }
+
+    /// The cube with its texture laid out so.
+    #[must_use]
+    pub fn with_layout(self, layout: Layout) -> Cube {
+        match layout {
+            Layout::YUp => self,
+            Layout::ZUp => Cube { pictures: &PICTURES_Z_UP, ..self },
+        }
     }
 
     #[inline]
@@ -125,7 +148,7 @@ impl Cube {
         at[axis] = side;
         let [e0, e1, e2] = self.half_edges;
         let normal = self.normals[axis] * side;
-        let Picture { right, up } = &PICTURES[usize::from(face) % 6];
+        let Picture { right, up } = &self.pictures[usize::from(face) % 6];
         SurfacePoint {
             point: self.center + (e0 * at[0] + e1 * at[1] + e2 * at[2]),
             scale: self.scale,

@@ -58,6 +58,22 @@ impl Cylinder {
         })
     }
 
+    /// The cylinder with u = 0 in the half plane of the axis and `direction`.
+    ///
+    /// # Errors
+    /// In words: a direction along the axis.
+    pub fn with_seam(self, direction: DVec3) -> Result<Cylinder, String> {
+        let unit = direction / check_direction("seam", direction)?;
+        let across = unit - self.frame.n * self.frame.n.dot(unit);
+        // Both are rounded: an angle below 4 ε between them is none.
+        if across.length() <= 4.0 * f64::EPSILON {
+            return Err(format!("seam: expected a direction that is not along the axis, found {direction}"));
+        }
+        let frame = Frame::from_normal_and_tangent(self.frame.n, unit);
+        let rows = [frame.s / self.radius, frame.t / self.radius, self.rows[2]];
+        Ok(Cylinder { frame, rows, ..self })
+    }
+
     #[inline]
     fn to_unit(&self, v: DVec3) -> DVec3 {
         rows_times(&self.rows, v)

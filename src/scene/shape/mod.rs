@@ -72,6 +72,20 @@ pub enum Detail {
     Texture,
 }
 
+/// How texture coordinates lie on a sphere or a cube.
+///
+/// | face of a cube, `ZUp` | −x | +x | −y | +y | −z | +z |
+/// |---|---|---|---|---|---|---|
+/// | u grows along | +y | +y | +z | −x | −y | +y |
+/// | v grows along | +z | −z | +x | −z | +x | +x |
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// As the table of the module says.
+    YUp,
+    /// On a sphere u = φ/2π, φ from +x towards +y, and v = θ/π from +z; on a cube as above.
+    ZUp,
+}
+
 impl Detail {
     #[inline]
     fn uv(self, uv: impl FnOnce() -> DVec2) -> DVec2 {

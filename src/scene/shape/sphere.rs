@@ -9,12 +9,12 @@
 //! grows upward from the south pole (v = 0, bottom of the picture) to the north pole. The seam is
 //! at −z. A texture whose first row is the top of the picture is read at row (1 − v)·height.
 //!
-//! [`Z_POLE`] turns this into the other usual convention (u' = φ/2π with φ = atan2(y, x), v' = θ/π
-//! from the +z pole): with it u = u' and v = 1 − v'.
+//! [`Layout::ZUp`] is the other usual convention, u' = φ/2π with φ = atan2(y, x) and v' = θ/π from the +z pole. [`Z_POLE`]
+//! as the frame gives u = u' and v = 1 − v'.
 
 use super::exact::{cross, dot};
 use super::{
-    AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, TowardSample, check_length, check_point, largest,
+    AreaSample, BELOW_ONE, Detail, Layout, ShapeHit, SurfacePoint, TowardSample, check_length, check_point, largest,
     solid_angle_density, toward_by_area,
 };
 use crate::math::warp::{uniform_cone, uniform_sphere};
@@ -37,6 +37,8 @@ pub struct Sphere {
     radius_squared: f64,
     /// Rotation of the object frame, for texture coordinates only.
     world_from_object: DMat3,
+    /// Whether v is counted from the pole at +y of that frame, not from the one at −y.
+    from_north: bool,
 }
 
 impl Sphere {
@@ -52,7 +54,17 @@ impl Sphere {
         if !error.to_cols_array().iter().all(|e| e.abs() <= FRAME_TOLERANCE) {
             return Err(format!("frame: expected a rotation, found {world_from_object}"));
         }
-        Ok(Sphere { center, radius, radius_squared: radius * radius, world_from_object })
+        let radius_squared = radius * radius;
+        Ok(Sphere { center, radius, radius_squared, world_from_object, from_north: false })
+    }
+
+    /// The sphere with its texture laid out so.
+    #[must_use]
+    pub fn with_layout(self, layout: Layout) -> Sphere {
+        match layout {
+            Layout::YUp => self,
+            Layout::ZUp => Sphere { world_from_object: self.world_from_object * Z_POLE, from_north: true, ..self },
+        }
     }
 
     /// Moment form: with m = oc × d the discriminant is r²d² − m², where m is exact to 1.5 ulp, so
@@ -94,7 +106,8 @@ impl Sphere {
         let uv = || {
             let u = 0.5 + libm::atan2(n.x, n.z) / TAU;
             // asin(y) by its tangent: asin itself loses half the digits at the poles.
-            let v = 0.5 + libm::atan2(n.y, (n.x * n.x + n.z * n.z).sqrt()) / PI;
+            let latitude = libm::atan2(n.y, (n.x * n.x + n.z * n.z).sqrt()) / PI;
+            let v = if self.from_north { 0.5 - latitude } else { 0.5 + latitude };
             DVec2::new(if u >= 1.0 { 0.0 } else { u.min(BELOW_ONE) }, v.clamp(0.0, BELOW_ONE))
         };
         // East; at the poles every direction is, take the object frame's x.

@@ -24,7 +24,7 @@ fn direction_at(cos: f64, normal: DVec3, random: &mut Random) -> DVec3 {
 }
 
 fn leaving(s: &SurfacePoint, face: u8, direction: DVec3) -> Ray {
-    Ray::leaving(s.point, s.scale, s.normal, direction, Departure { object: 0, part: u32::from(face) })
+    Ray::leaving(s.point, s.scale, s.normal, direction, Departure::new(0, u32::from(face)))
 }
 
 fn is_in(point: DVec3, (low, high): (DVec3, DVec3)) -> bool {
