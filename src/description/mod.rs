@@ -323,8 +323,8 @@ pub use settings::{
     Output, PathIntegrator, Png, Precision, Render, Tonemap, Wavelengths, WhittedIntegrator,
 };
 pub use shape::{
-    Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Extent, Geometry, Instance, Layout, Mesh, Normals, Plane, Rectangle, Rotation,
-    SdfGrid, SdfNormals, Shape, Sphere, TransformStep, Winding,
+    Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Extent, Geometry, Instance, Layout, Mesh, Normals, Plane,
+    Rectangle, Rotation, SdfGrid, SdfNormals, Shape, Sphere, TransformStep, Winding,
 };
 pub use spectrum::{
     Abbe, Blackbody, Cauchy, FilePath, Illuminant, Index, Line, Scaled, Sellmeier, Spectrum, SpectrumOrTexture, Vec3,

@@ -351,7 +351,19 @@ mod tests {
         let kinds: Vec<&str> = scene.shapes.iter().map(|shape| shape.geometry.kind()).collect();
         assert_eq!(
             kinds,
-            ["sphere", "plane", "disk", "rectangle", "cube", "cylinder", "cone", "mesh", "sdf_grid", "curves", "instance"]
+            [
+                "sphere",
+                "plane",
+                "disk",
+                "rectangle",
+                "cube",
+                "cylinder",
+                "cone",
+                "mesh",
+                "sdf_grid",
+                "curves",
+                "instance"
+            ]
         );
         assert_eq!(scene.shapes[1].material, MaterialRef::default());
         assert_eq!(

@@ -538,7 +538,7 @@ impl Shape {
             | Geometry::Cube(_)
             | Geometry::Mesh(_)
             | Geometry::SdfGrid(_)
-            | Geometry::Curves(_),
+            | Geometry::Curves(_)
             | Geometry::Instance(_) => false,
         };
         if round && !is_similarity(linear) {

@@ -159,12 +159,12 @@ impl Geometry {
                 part: h.triangle,
                 barycentric: [h.hit.b1, h.hit.b2],
             }),
-            Geometry::Sdf(sdf) => sdf
-                .intersect(ray, t_max, departing)
-                .map(|h| PartHit { t: h.t, part: h.cell, barycentric: [0.0; 2] }),
-            Geometry::Curves(curves) => curves
-                .closest(ray, t_max)
-                .map(|h| PartHit { t: h.t, part: h.segment, barycentric: [h.v, 0.0] }),
+            Geometry::Sdf(sdf) => {
+                sdf.intersect(ray, t_max, departing).map(|h| PartHit { t: h.t, part: h.cell, barycentric: [0.0; 2] })
+            }
+            Geometry::Curves(curves) => {
+                curves.closest(ray, t_max).map(|h| PartHit { t: h.t, part: h.segment, barycentric: [h.v, 0.0] })
+            }
             // An instance holds several objects: its own `closest` finds them.
             Geometry::Instance(_) => None,
         }

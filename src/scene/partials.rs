@@ -91,13 +91,7 @@ impl Scene {
 
 /// Derivatives of `uv` at `point` along two axes by central differences over 2⁻¹³ of `size`. Where texture coordinates are
 /// angles they may pass from one turn to none in between.
-fn differences(
-    point: DVec3,
-    axes: [DVec3; 2],
-    size: f64,
-    angles: bool,
-    uv: impl Fn(DVec3) -> DVec2,
-) -> DMat2 {
+fn differences(point: DVec3, axes: [DVec3; 2], size: f64, angles: bool, uv: impl Fn(DVec3) -> DVec2) -> DMat2 {
     let [s, t] = axes.map(|axis| {
         let step = size.max(f64::MIN_POSITIVE) / 8192.0 / axis.length();
         let d = uv(point + axis * step) - uv(point - axis * step);

@@ -10,8 +10,22 @@ use super::object::{Bag, Family};
 use super::{Fields, Import, boolean, entry, list, matrix, number, numbers, text, whole};
 use crate::math::Frame;
 
-const SHAPES: [&str; 14] =
-    ["sphere", "cylinder", "disk", "rectangle", "cube", "obj", "ply", "serialized", "sdfgrid", "linearcurve", "bsplinecurve", "merge", "shapegroup", "instance"];
+const SHAPES: [&str; 14] = [
+    "sphere",
+    "cylinder",
+    "disk",
+    "rectangle",
+    "cube",
+    "obj",
+    "ply",
+    "serialized",
+    "sdfgrid",
+    "linearcurve",
+    "bsplinecurve",
+    "merge",
+    "shapegroup",
+    "instance",
+];
 
 /// How far from equal and perpendicular the axes of a cylinder may come out: see the check of transforms.
 const SIMILAR: f64 = 3e-6;

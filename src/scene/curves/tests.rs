@@ -31,7 +31,7 @@ fn ray_at(target: DVec3, distance: f64, random: &mut Random) -> Ray {
 
 fn leaving(curves: &Curves, hit: CurveHit, ray: &Ray, direction: DVec3) -> Ray {
     let s = curves.surface(ray.at(hit.t), hit.segment, hit.v);
-    Ray::leaving(s.point, s.scale, s.normal, direction, Departure { object: 0, part: hit.segment })
+    Ray::leaving(s.point, s.scale, s.normal, direction, Departure::new(0, hit.segment))
 }
 
 /// The ray enters the hull at the least over v of where it enters the ball of v, a convex function: halving by thirds

@@ -43,7 +43,7 @@ fn through(random: &mut Random) -> Ray {
 
 fn leaving(sdf: &SdfGrid, hit: SdfHit, ray: &Ray, direction: DVec3) -> Ray {
     let s = sdf.surface(ray.at(hit.t), hit.cell);
-    Ray::leaving(s.point, s.scale, s.normal, direction, Departure { object: 0, part: hit.cell })
+    Ray::leaving(s.point, s.scale, s.normal, direction, Departure::new(0, hit.cell))
 }
 
 /// The interpolant of the distance to a sphere of radius r is off by at most h²/8 · (sum of its second
