@@ -2,11 +2,11 @@
 
 use super::super::fault::Fault;
 use super::super::node::{Node, Place};
-use super::object::{Bag, Family};
+use super::object::Bag;
 use super::spectra::Role;
 use super::{Fields, Import, boolean, number, text};
 
-const BSDFS: [&str; 13] = [
+const BSDFS: [&str; 17] = [
     "diffuse",
     "dielectric",
     "thindielectric",
@@ -20,6 +20,10 @@ const BSDFS: [&str; 13] = [
     "principledthin",
     "null",
     "twosided",
+    "mask",
+    "blendbsdf",
+    "bumpmap",
+    "normalmap",
 ];
 
 /// On which sides a surface reflects.
@@ -56,7 +60,7 @@ impl Import<'_> {
         fields.kind("diffuse")
     }
 
-    fn bsdf(&mut self, index: usize, sides: Sides) -> Result<Node, Fault> {
+    pub(crate) fn bsdf(&mut self, index: usize, sides: Sides) -> Result<Node, Fault> {
         let bag = self.bag(index);
         let place = bag.object.place;
         let mut fields = Fields::new(place);
@@ -71,14 +75,16 @@ impl Import<'_> {
                 fields.add("ior", self.index(&bag, "int_ior", "bk7")?.node);
                 fields.add("exterior_ior", self.index(&bag, "ext_ior", "air")?.node);
                 if bag.object.plugin == "roughdielectric" {
-                    roughness(&bag, &mut fields)?;
+                    self.roughness(&bag, &mut fields)?;
                 }
+                self.tints(&bag, &mut fields)?;
                 transparent(&bag, sides)?;
                 "dielectric"
             }
             "thindielectric" => {
                 fields.add("ior", self.index(&bag, "int_ior", "bk7")?.node);
                 fields.add("exterior_ior", self.index(&bag, "ext_ior", "air")?.node);
+                self.tints(&bag, &mut fields)?;
                 transparent(&bag, sides)?;
                 "thin_dielectric"
             }
@@ -92,9 +98,9 @@ impl Import<'_> {
                 } else {
                     super::metals::metal(&bag, metal, &mut fields)?;
                 }
-                fields.maybe("tint", self.spectrum(&bag, "specular_reflectance", Role::Reflectance)?);
+                fields.maybe("tint", self.spectrum_or_texture(&bag, "specular_reflectance", Role::Reflectance)?);
                 if bag.object.plugin == "roughconductor" {
-                    roughness(&bag, &mut fields)?;
+                    self.roughness(&bag, &mut fields)?;
                 }
                 fields.add("two_sided", two_sided);
                 "conductor"
@@ -102,6 +108,7 @@ impl Import<'_> {
             "plastic" | "roughplastic" => {
                 let reflectance = self.spectrum_or_texture(&bag, "diffuse_reflectance", Role::Reflectance)?;
                 fields.maybe("reflectance", reflectance);
+                fields.maybe("tint", self.spectrum_or_texture(&bag, "specular_reflectance", Role::Reflectance)?);
                 let (inside, outside) =
                     (self.index(&bag, "int_ior", "polypropylene")?, self.index(&bag, "ext_ior", "air")?);
                 // Ours is given relative to what surrounds it.
@@ -112,7 +119,7 @@ impl Import<'_> {
                 fields.add("ior", ior);
                 fields.maybe("nonlinear", bag.boolean("nonlinear")?.map(|on| boolean(bag.place("nonlinear"), on)));
                 if bag.object.plugin == "roughplastic" {
-                    roughness(&bag, &mut fields)?;
+                    self.roughness(&bag, &mut fields)?;
                 }
                 fields.add("two_sided", two_sided);
                 "plastic"
@@ -121,17 +128,24 @@ impl Import<'_> {
             "principled" => return self.principled(&bag, sides),
             "principledthin" => return self.principled_thin(&bag, sides),
             "twosided" => return self.twosided(&bag),
+            "mask" => return self.mask(&bag),
+            "blendbsdf" => return self.blended(&bag),
+            "bumpmap" => return self.bump(&bag),
+            "normalmap" => return self.normal_map(&bag),
             _ => return Err(bag.unknown(BSDFS)),
         };
         bag.finish()?;
         Ok(fields.kind(kind))
     }
 
-    fn twosided(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
-        let inner = bag.only(Family::Bsdf)?.ok_or_else(|| bag.fault("expected a <bsdf> inside, found none"))?;
-        bag.boolean("allow_transmission")?;
-        bag.finish()?;
-        self.bsdf(inner, Sides::Both)
+    /// What colours an interface beside Fresnel's equations.
+    fn tints(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
+        for (ours, theirs) in
+            [("reflection_tint", "specular_reflectance"), ("transmission_tint", "specular_transmittance")]
+        {
+            fields.maybe(ours, self.spectrum_or_texture(bag, theirs, Role::Reflectance)?);
+        }
+        Ok(())
     }
 }
 
@@ -141,15 +155,4 @@ pub(super) fn transparent(bag: &Bag<'_>, sides: Sides) -> Result<(), Fault> {
         Sides::Front => Ok(()),
         Sides::Both => Err(bag.fault("expected a surface that lets no light through inside <twosided>")),
     }
-}
-
-/// `alpha` and `distribution`.
-fn roughness(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
-    let alpha = bag.float("alpha")?.unwrap_or(0.1);
-    fields.add("roughness", number(bag.place("alpha"), alpha));
-    let distribution = bag.choice("distribution", &["beckmann", "ggx"])?.unwrap_or("beckmann");
-    fields.add("distribution", text(bag.place("distribution"), distribution));
-    // How directions are drawn, not which there are.
-    bag.boolean("sample_visible")?;
-    Ok(())
 }

@@ -17,6 +17,7 @@
 //! A plugin or parameter that is not translated is a fault with its place, never passed over.
 
 mod bsdfs;
+mod compounds;
 mod emitters;
 mod integrators;
 mod media;

@@ -1,12 +1,12 @@
 //! Textures.
 
-use glam::{DMat4, DVec4};
+use glam::DVec4;
 
 use super::super::fault::Fault;
 use super::super::node::Node;
 use super::object::{Bag, Family};
 use super::spectra::Role;
-use super::{Fields, Import, boolean, entry, number, numbers, text};
+use super::{Fields, Import, boolean, entry, list, number, numbers, text};
 
 const TEXTURES: [&str; 4] = ["bitmap", "checkerboard", "volume", "mesh_attribute"];
 
@@ -19,7 +19,7 @@ impl Import<'_> {
         let bag = self.bag(index);
         let node = match bag.object.plugin.as_str() {
             "bitmap" => bitmap(&bag)?,
-            "checkerboard" => self.checkerboard(&bag)?,
+            "checkerboard" => self.checkerboard(&bag, Use::Spectra)?,
             "mesh_attribute" => {
                 let mut fields = Fields::new(bag.object.place);
                 let name = bag.required("name", bag.text("name"))?;
@@ -40,20 +40,46 @@ impl Import<'_> {
         Ok(name)
     }
 
-    fn checkerboard(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
+    /// The name of a texture that is asked for numbers. Mitsuba's checkerboard then has its colours the other
+    /// way round, so it stands in `textures` a second time.
+    pub(crate) fn declare_numbers(&mut self, index: usize) -> Result<String, Fault> {
+        let bag = self.bag(index);
+        if bag.object.plugin != "checkerboard" {
+            return self.declare_texture(index);
+        }
+        let name = format!("{} as numbers", bag.object.id.clone().unwrap_or_else(|| format!("checkerboard {index}")));
+        if self.textures.iter().any(|entry| entry.key == name) {
+            return Ok(name);
+        }
+        let node = self.checkerboard(&bag, Use::Numbers)?;
+        bag.finish()?;
+        self.textures.push(self.entry(index, &name, node));
+        Ok(name)
+    }
+
+    fn checkerboard(&mut self, bag: &Bag<'_>, used: Use) -> Result<Node, Fault> {
         let place = bag.object.place;
         let mut fields = Fields::new(place);
-        for (ours, theirs, default) in [("a", "color0", 0.4), ("b", "color1", 0.2)] {
-            let colour = self.spectrum(bag, theirs, Role::Reflectance)?;
+        let keys = if used == Use::Spectra { ["a", "b"] } else { ["b", "a"] };
+        for (ours, theirs, default) in [(keys[0], "color0", 0.4), (keys[1], "color1", 0.2)] {
+            let colour = match used {
+                Use::Spectra => self.spectrum_or_texture(bag, theirs, Role::Reflectance)?,
+                Use::Numbers => self.number_or_texture(bag, theirs)?,
+            };
             fields.add(ours, colour.unwrap_or_else(|| number(place, default)));
         }
-        let to_uv = to_uv(bag)?;
-        if to_uv.offset != [0.0; 2] {
-            return Err(bag.fault_of("to_uv", "expected only a scale, found an offset"));
+        if let Some(rows) = to_uv(bag)? {
+            fields.add("uv", uv_rows(bag, rows));
         }
-        fields.add("scale", numbers(bag.place("to_uv"), &to_uv.scale));
         Ok(fields.kind("checkerboard"))
     }
+}
+
+/// What a texture is asked for.
+#[derive(Clone, Copy, PartialEq)]
+enum Use {
+    Spectra,
+    Numbers,
 }
 
 fn bitmap(bag: &Bag<'_>) -> Result<Node, Fault> {
@@ -75,24 +101,27 @@ fn bitmap(bag: &Bag<'_>) -> Result<Node, Fault> {
     bag.choice("format", &["auto", "variant", "fp16", "float16"])?;
     bag.boolean("accel")?;
     // Theirs begins at the upper left corner of the file, ours at the lower left.
-    let to_uv = to_uv(bag)?;
+    let [u, v] = to_uv(bag)?.unwrap_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
     let place = bag.place("to_uv");
-    fields.add("scale", numbers(place, &[to_uv.scale[0], -to_uv.scale[1]]));
-    fields.add("offset", numbers(place, &[to_uv.offset[0], 1.0 - to_uv.offset[1]]));
+    if u[1] == 0.0 && v[0] == 0.0 {
+        fields.add("scale", numbers(place, &[u[0], -v[1]]));
+        fields.add("offset", numbers(place, &[u[2], 1.0 - v[2]]));
+    } else {
+        fields.add("uv", uv_rows(bag, [u, [-v[0], -v[1], 1.0 - v[2]]]));
+    }
     Ok(fields.kind("image"))
 }
 
-/// What is done to u and v: scaled, then moved.
-struct ToUv {
-    scale: [f64; 2],
-    offset: [f64; 2],
+/// What is done to u and v: the first two rows of an affine map.
+fn to_uv(bag: &Bag<'_>) -> Result<Option<[[f64; 3]; 2]>, Fault> {
+    let Some(matrix) = bag.transform("to_uv")? else { return Ok(None) };
+    if matrix.row(3) != DVec4::W {
+        return Err(bag.fault_of("to_uv", "expected an affine transform of u and v, found a projective one"));
+    }
+    Ok(Some([matrix.row(0), matrix.row(1)].map(|row| [row.x, row.y, row.w])))
 }
 
-fn to_uv(bag: &Bag<'_>) -> Result<ToUv, Fault> {
-    let matrix = bag.transform("to_uv")?.unwrap_or(DMat4::IDENTITY);
-    let [x, y, w] = [matrix.row(0), matrix.row(1), matrix.row(3)];
-    if x.y != 0.0 || y.x != 0.0 || w != DVec4::W {
-        return Err(bag.fault_of("to_uv", "expected scales and moves of u and v, found another transform"));
-    }
-    Ok(ToUv { scale: [x.x, y.y], offset: [x.w, y.w] })
+fn uv_rows(bag: &Bag<'_>, rows: [[f64; 3]; 2]) -> Node {
+    let place = bag.place("to_uv");
+    list(place, rows.iter().map(|row| numbers(place, row)))
 }

@@ -1,0 +1,147 @@
+//! Materials that are made of others, and numbers that may follow a texture.
+
+use super::super::fault::Fault;
+use super::super::node::Node;
+use super::bsdfs::Sides;
+use super::object::{Bag, Family, SpectrumValue, Value};
+use super::{Fields, Import, boolean, entry, number, text};
+
+/// The least roughness: Mitsuba takes what is less for this.
+const LEAST_ALPHA: f64 = 1e-4;
+
+impl Import<'_> {
+    /// A number, or `{texture: name}`; `None` where it is not written.
+    pub(crate) fn number_or_texture(&mut self, bag: &Bag<'_>, name: &'static str) -> Result<Option<Node>, Fault> {
+        let Some(value) = bag.value(name) else { return Ok(None) };
+        let place = bag.place(name);
+        match value {
+            Value::Float(value) => Ok(Some(number(place, *value))),
+            Value::Integer(value) => Ok(Some(number(place, *value as f64))),
+            Value::Spectrum(SpectrumValue::Uniform(value)) => Ok(Some(number(place, *value))),
+            Value::Object(index) if bag.document.objects[*index].family == Family::Texture => {
+                let texture = self.declare_numbers(*index)?;
+                Ok(Some(entry(place, "texture", text(place, texture))))
+            }
+            other => {
+                let found = other.kind(bag.document);
+                Err(bag.fault_of(name, format!("expected a float or a texture of numbers, found {found}")))
+            }
+        }
+    }
+
+    /// `alpha`, or `alpha_u` and `alpha_v`, and `distribution`.
+    pub(crate) fn roughness(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
+        let clamped = |node: Node| match node.value {
+            super::Value::Float(x) => number(node.place, x.max(LEAST_ALPHA)),
+            _ => node,
+        };
+        let brushed = [self.number_or_texture(bag, "alpha_u")?, self.number_or_texture(bag, "alpha_v")?];
+        let place = bag.object.place;
+        match brushed {
+            [None, None] => {
+                let alpha = self.number_or_texture(bag, "alpha")?.unwrap_or_else(|| number(place, 0.1));
+                fields.add("roughness", clamped(alpha));
+            }
+            [Some(u), Some(v)] if !bag.has("alpha") => {
+                let mut both = Fields::new(place);
+                both.add("u", clamped(u));
+                both.add("v", clamped(v));
+                fields.add("roughness", both.map());
+            }
+            _ => return Err(bag.fault("expected either alpha, or both alpha_u and alpha_v")),
+        }
+        let distribution = bag.choice("distribution", &["beckmann", "ggx"])?.unwrap_or("beckmann");
+        fields.add("distribution", text(bag.place("distribution"), distribution));
+        // How directions are drawn, not which there are.
+        bag.boolean("sample_visible")?;
+        Ok(())
+    }
+
+    /// The one material in another.
+    fn covered(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
+        let inner = bag.only(Family::Bsdf)?.ok_or_else(|| bag.fault("expected a <bsdf> inside, found none"))?;
+        self.material(inner)
+    }
+
+    pub(crate) fn twosided(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
+        bag.boolean("allow_transmission")?;
+        let inner = bag.objects(Family::Bsdf);
+        bag.finish()?;
+        match inner[..] {
+            // Named once for all who refer to it, it stands on its own.
+            [one] if !self.is_compound(one) => self.bsdf(one, Sides::Both),
+            [one] => {
+                let mut fields = Fields::new(bag.object.place);
+                fields.add("front", self.material(one)?);
+                Ok(fields.kind("two_sided"))
+            }
+            [front, back] => {
+                let mut fields = Fields::new(bag.object.place);
+                fields.add("front", self.material(front)?);
+                fields.add("back", self.material(back)?);
+                Ok(fields.kind("two_sided"))
+            }
+            _ => Err(bag.fault(format!("expected one <bsdf> inside, or two, found {}", inner.len()))),
+        }
+    }
+
+    /// Whether a material is made of others.
+    fn is_compound(&self, index: usize) -> bool {
+        let plugin = self.document.objects[index].plugin.as_str();
+        ["mask", "blendbsdf", "bumpmap", "normalmap", "twosided"].contains(&plugin)
+    }
+
+    pub(crate) fn mask(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
+        let mut fields = Fields::new(bag.object.place);
+        fields.maybe("opacity", self.number_or_texture(bag, "opacity")?);
+        fields.add("material", self.covered(bag)?);
+        bag.finish()?;
+        Ok(fields.kind("mask"))
+    }
+
+    pub(crate) fn blended(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
+        let mut fields = Fields::new(bag.object.place);
+        let weight = self.number_or_texture(bag, "weight")?;
+        fields.add("weight", weight.ok_or_else(|| bag.fault("expected the parameter \"weight\", found none"))?);
+        let inner = bag.objects(Family::Bsdf);
+        let [first, second] = inner[..] else {
+            return Err(bag.fault(format!("expected two <bsdf> inside, found {}", inner.len())));
+        };
+        fields.add("first", self.material(first)?);
+        fields.add("second", self.material(second)?);
+        bag.finish()?;
+        Ok(fields.kind("blend"))
+    }
+
+    pub(crate) fn bump(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
+        let place = bag.object.place;
+        let mut fields = Fields::new(place);
+        let height = bag.only(Family::Texture)?.ok_or_else(|| bag.fault("expected a <texture> inside, found none"))?;
+        let height = self.declare_numbers(height)?;
+        fields.add("height", entry(place, "texture", text(place, height)));
+        if let Some(scale) = bag.float("scale")? {
+            fields.add("scale", number(bag.place("scale"), scale));
+        }
+        self.relief(bag, fields, "bump")
+    }
+
+    pub(crate) fn normal_map(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
+        let place = bag.place("normalmap");
+        let mut fields = Fields::new(bag.object.place);
+        let normals = bag.required("normalmap", bag.object("normalmap", &[Family::Texture]))?;
+        let normals = self.declare_numbers(normals)?;
+        fields.add("normals", entry(place, "texture", text(place, normals)));
+        self.relief(bag, fields, "normal_map")
+    }
+
+    fn relief(&mut self, bag: &Bag<'_>, mut fields: Fields, kind: &str) -> Result<Node, Fault> {
+        for (ours, theirs) in [("turn", "flip_invalid_normals"), ("shadowing", "use_shadowing_function")] {
+            if let Some(on) = bag.boolean(theirs)? {
+                fields.add(ours, boolean(bag.place(theirs), on));
+            }
+        }
+        fields.add("material", self.covered(bag)?);
+        bag.finish()?;
+        Ok(fields.kind(kind))
+    }
+}
