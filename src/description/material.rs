@@ -241,11 +241,25 @@ pub struct Plastic {
     /// Distribution of the microfacet normals; default `ggx`.
     #[serde(default)]
     pub distribution: Distribution,
+    /// Of a rough coat; default `integral`.
+    #[serde(default)]
+    pub diffuse_mean: DiffuseMean,
     /// Highlight of the `whitted` integrator; default none.
     pub highlight: Option<Highlight>,
     /// Whether the back reflects like the front; default true.
     #[serde(default = "yes")]
     pub two_sided: bool,
+}
+
+/// How the diffuse reflectance of a rough coat from inside is taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DiffuseMean {
+    /// By an integral.
+    #[default]
+    Integral,
+    /// By the mean over 64 cosines from 0 to 1, as Mitsuba 3 does: 1/64 too little.
+    Nodes,
 }
 
 /// `boundary: {}`

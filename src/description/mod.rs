@@ -106,7 +106,9 @@
 //!       transmission_tint: 1
 //!   pane: {thin_dielectric: {ior: 1.5, exterior_ior: 1}}             # and both tints
 //!   lacquer: {plastic: {reflectance: 0.5, ior: 1.5, roughness: 0, nonlinear: false, tint: 1}}
-//!                                                # ~ and distribution, highlight, two_sided; roughness is a number
+//!                                                # ~ and distribution, highlight, two_sided; roughness is a number;
+//!                                                # diffuse_mean: integral (~), nodes: how a rough coat's diffuse
+//!                                                # reflectance from inside is taken, nodes as in Mitsuba 3
 //!   paint:
 //!     principled:                                # Burley's, as in Mitsuba 3; numbers are 0 to 1, or {texture: name}
 //!       base_color: {rgb: [0.8, 0.3, 0.1]}       # spectrum or texture; ~ 0.5
@@ -310,9 +312,9 @@ pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, Growt
 pub use layer::{Layer, LayerContent, LightForm, Quantity};
 pub use light::{Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, Light, PointLight, SpotLight};
 pub use material::{
-    Boundary, Checkerboard, Conductor, ConductorIndex, Dielectric, Diffuse, Distribution, Fresnel, Highlight,
-    HighlightModel, ImageTexture, Material, MaterialRef, MeshAttribute, Mirror, Plastic, Texture, TextureFilter,
-    ThinDielectric, Wrap,
+    Boundary, Checkerboard, Conductor, ConductorIndex, Dielectric, Diffuse, DiffuseMean, Distribution, Fresnel,
+    Highlight, HighlightModel, ImageTexture, Material, MaterialRef, MeshAttribute, Mirror, Plastic, Texture,
+    TextureFilter, ThinDielectric, Wrap,
 };
 pub use medium::{Coefficients, HeterogeneousMedium, HomogeneousMedium, Medium, Phase, PhaseBlend};
 pub(crate) use medium::{UNCHANGED, VACUUM};

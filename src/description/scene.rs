@@ -309,6 +309,7 @@ mod tests {
                 tint: one_of(1.0),
                 nonlinear: false,
                 distribution: Distribution::Ggx,
+                diffuse_mean: DiffuseMean::Integral,
                 highlight: None,
                 two_sided: true,
             })

@@ -8,7 +8,7 @@ use crate::optics::bsdf::{Bsdf, Metal, pane_reflectance};
 use crate::optics::dielectric::{Dielectric, RelativeIndex, RoughDielectric, Tint};
 use crate::optics::fresnel::{self, Model};
 use crate::optics::microfacet::{Distribution, Microfacets};
-use crate::optics::plastic::{Base, CoatTable, Plastic, RoughPlastic};
+use crate::optics::plastic::{Base, CoatTable, DiffuseMean, Plastic, RoughPlastic};
 use crate::spectrum::{Lanes, RefractiveIndex, Spectrum};
 use glam::DVec3;
 use std::sync::Arc;
@@ -197,8 +197,9 @@ impl Kind {
         eta: f64,
         nonlinear: bool,
         facets: Option<Microfacets>,
+        mean: DiffuseMean,
     ) -> Kind {
-        let rough = facets.map(|f| (f, Arc::new(CoatTable::new(eta, &f))));
+        let rough = facets.map(|f| (f, Arc::new(CoatTable::new(eta, &f, mean))));
         let internal = match &rough {
             Some((_, table)) => table.internal,
             None => fresnel::dielectric_diffuse(1.0 / eta),

@@ -119,6 +119,7 @@ impl Import<'_> {
                 fields.add("ior", ior);
                 fields.maybe("nonlinear", bag.boolean("nonlinear")?.map(|on| boolean(bag.place("nonlinear"), on)));
                 if bag.object.plugin == "roughplastic" {
+                    fields.add("diffuse_mean", text(place, "nodes"));
                     self.roughness(&bag, &mut fields)?;
                 }
                 fields.add("two_sided", two_sided);

@@ -5,6 +5,7 @@ use crate::description as written;
 use crate::error::Result;
 use crate::optics::fresnel::Model;
 use crate::optics::microfacet::{Distribution, Microfacets};
+use crate::optics::plastic::DiffuseMean;
 use crate::scene::compound::{Composition, Compound, MOST_PARTS, MOST_RELIEFS, Relief, ReliefForm};
 use crate::scene::load;
 use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Roughness, TexturedRoughness, Tints};
@@ -275,7 +276,11 @@ impl<'a> Compiler<'a> {
                 };
                 let facets = facets(m.roughness, m.distribution);
                 let tint = (!is_one(&tint)).then(|| Box::new(tint));
-                (Kind::plastic(reflectance, tint, eta, m.nonlinear, facets), m.two_sided, m.highlight)
+                let mean = match m.diffuse_mean {
+                    written::DiffuseMean::Integral => DiffuseMean::Integral,
+                    written::DiffuseMean::Nodes => DiffuseMean::Nodes,
+                };
+                (Kind::plastic(reflectance, tint, eta, m.nonlinear, facets, mean), m.two_sided, m.highlight)
             }
             written::Material::Principled(m) => {
                 (Kind::Principled(Box::new(self.principled(&place, m))), m.two_sided, None)
