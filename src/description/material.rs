@@ -4,6 +4,7 @@ use serde::Deserialize;
 
 use super::compound::{Blend, Bump, Mask, NormalMap, Roughness, TwoSided};
 use super::fault::Checker;
+use super::hair::Hair;
 use super::path::At;
 use super::principled::{Principled, PrincipledThin};
 use super::spectrum::{FilePath, Illuminant, Index, Role, Spectrum, SpectrumOrTexture, yes};
@@ -44,6 +45,8 @@ pub enum Material {
     Principled(Principled),
     /// The same for a sheet.
     PrincipledThin(PrincipledThin),
+    /// Fibres of hair.
+    Hair(Hair),
     /// Invisible; only bounds a medium.
     Boundary(Boundary),
     /// Lets a share of the light through, straight on.
@@ -457,7 +460,7 @@ impl MaterialRef {
 
 impl Material {
     /// Names of the kinds.
-    pub(crate) const KINDS: [&'static str; 14] = [
+    pub(crate) const KINDS: [&'static str; 15] = [
         "diffuse",
         "conductor",
         "mirror",
@@ -466,6 +469,7 @@ impl Material {
         "plastic",
         "principled",
         "principled_thin",
+        "hair",
         "boundary",
         "mask",
         "blend",
@@ -486,6 +490,7 @@ impl Material {
             Material::Plastic(_) => "plastic",
             Material::Principled(_) => "principled",
             Material::PrincipledThin(_) => "principled_thin",
+            Material::Hair(_) => "hair",
             Material::Boundary(_) => "boundary",
             Material::Mask(_) => "mask",
             Material::Blend(_) => "blend",
@@ -538,6 +543,7 @@ impl Material {
             }
             Material::Principled(surface) => surface.check(at, checker),
             Material::PrincipledThin(sheet) => sheet.check(at, checker),
+            Material::Hair(hair) => hair.check(at, checker),
             Material::Boundary(Boundary {}) => {}
             Material::Mask(mask) => mask.check(at, checker),
             Material::Blend(blend) => blend.check(at, checker),

@@ -132,6 +132,15 @@
 //!                                                # may be textures; and as above anisotropic, spec_tint, sheen,
 //!                                                # sheen_tint, flatness, luminance, sampling: {reflection: 1,
 //!                                                # transmission: 1, diffuse_reflection: 1, diffuse_transmission: 1}
+//!   fur:
+//!     hair:                                      # for curves and cylinders: fibres along ∂p/∂v
+//!       eumelanin: 1.3                           # ~ pigments; or absorption: SPECTRUM, times the fibre's radius
+//!       pheomelanin: 0.2                         # ~
+//!       ior: 1.55                                # ~
+//!       exterior_ior: 1                          # ~
+//!       roughness_along: 0.3                     # ~ 0.01 to 1
+//!       roughness_around: 0.3                    # ~
+//!       tilt_deg: 2                              # ~ of the scales toward the root
 //!   edge: {boundary: {}}                         # only bounds a medium
 //!   leaf: {mask: {opacity: 0.5, material: clay}} # ~ a number or {texture: name}; a material is a name, or a kind
 //!                                                # written in place
@@ -290,6 +299,7 @@ mod decode;
 mod edit;
 mod emitter;
 mod fault;
+mod hair;
 mod layer;
 mod light;
 mod material;
@@ -309,6 +319,7 @@ pub use batch::{Batch, BatchEntry, Document, load};
 pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection};
 pub use compound::{Blend, Brushed, Bump, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided};
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, Growth, ProjectorLight};
+pub use hair::{Hair, HairColour};
 pub use layer::{Layer, LayerContent, LightForm, Quantity};
 pub use light::{Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, Light, PointLight, SpotLight};
 pub use material::{

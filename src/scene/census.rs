@@ -78,6 +78,7 @@ impl Census {
                     Kind::Diffuse { .. }
                     | Kind::Plastic { .. }
                     | Kind::Principled(_)
+                    | Kind::Hair { .. }
                     | Kind::Boundary
                     | Kind::Compound(_) => {}
                 }

@@ -5,6 +5,7 @@
 
 mod attributes;
 mod files;
+mod hair;
 mod lights;
 mod media;
 mod principled;
@@ -405,6 +406,7 @@ impl<'a> Compiler<'a> {
                     Kind::Conductor { .. }
                     | Kind::Dielectric { .. }
                     | Kind::Thin { .. }
+                    | Kind::Hair { .. }
                     | Kind::Boundary
                     | Kind::Compound(_) => {}
                 }

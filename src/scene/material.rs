@@ -7,6 +7,7 @@ use super::texture::{Scalar, Texture, TexturePoint};
 use crate::optics::bsdf::{Bsdf, Metal, pane_reflectance};
 use crate::optics::dielectric::{Dielectric, RelativeIndex, RoughDielectric, Tint};
 use crate::optics::fresnel::{self, Model};
+use crate::optics::hair::{Fibre, Hair};
 use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::optics::plastic::{Base, CoatTable, DiffuseMean, Plastic, RoughPlastic};
 use crate::spectrum::{Lanes, RefractiveIndex, Spectrum};
@@ -112,6 +113,13 @@ pub enum Kind {
     Principled(Box<Solid>),
     /// A principled sheet.
     PrincipledThin(Box<Thin>),
+    /// Fibres of hair.
+    Hair {
+        /// Their shape and finish.
+        fibre: Arc<Fibre>,
+        /// Absorption times the radius, as a sum.
+        absorption: Vec<Spectrum>,
+    },
     /// The boundary of a medium.
     Boundary,
     /// Made of other materials.
@@ -321,6 +329,10 @@ impl Material {
             }
             Kind::Principled(solid) => Bsdf::Principled(solid.at(at, nm)),
             Kind::PrincipledThin(sheet) => Bsdf::PrincipledThin(sheet.at(at, nm)),
+            Kind::Hair { fibre, absorption } => Bsdf::Hair(Hair {
+                fibre: fibre.clone(),
+                absorption: absorption.iter().fold(Lanes::ZERO, |sum, s| sum + s.eval(nm)),
+            }),
             // A compound material is resolved before it comes to this; unresolved it is not there.
             Kind::Boundary | Kind::Compound(_) => Bsdf::Null,
         }
@@ -341,7 +353,7 @@ impl Material {
             Kind::Thin { tints, .. } => tints.as_ref().is_some_and(|t| t.varies()),
             Kind::Principled(solid) => solid.varies(),
             Kind::PrincipledThin(sheet) => sheet.varies(),
-            Kind::Mirror { .. } | Kind::Boundary => false,
+            Kind::Mirror { .. } | Kind::Hair { .. } | Kind::Boundary => false,
             Kind::Compound(compound) => compound.varies() || compound.composition.inner().iter().any(|m| m.varies()),
         }
     }
@@ -350,7 +362,11 @@ impl Material {
     #[must_use]
     pub fn transmits(&self) -> bool {
         match &self.kind {
-            Kind::Dielectric { .. } | Kind::Thin { .. } | Kind::PrincipledThin(_) | Kind::Boundary => true,
+            Kind::Dielectric { .. }
+            | Kind::Thin { .. }
+            | Kind::PrincipledThin(_)
+            | Kind::Hair { .. }
+            | Kind::Boundary => true,
             Kind::Principled(solid) => solid.transmission.is_some(),
             Kind::Diffuse { .. } | Kind::Mirror { .. } | Kind::Conductor { .. } | Kind::Plastic { .. } => false,
             Kind::Compound(compound) => {

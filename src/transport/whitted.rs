@@ -156,6 +156,10 @@ impl Tracer<'_> {
             }
             Kind::Principled(solid) => solid.at(at, self.nm).smooth(1.0, true).matte,
             Kind::PrincipledThin(sheet) => sheet.at(at, self.nm).smooth(1.0).matte,
+            // Hair is shown matte, in the colour of light that crosses its middle.
+            Kind::Hair { absorption, .. } => {
+                (absorption.iter().fold(Lanes::ZERO, |sum, s| sum + s.eval(self.nm)) * -2.0).exp()
+            }
             Kind::Mirror { .. }
             | Kind::Conductor { .. }
             | Kind::Dielectric { .. }
@@ -278,7 +282,7 @@ impl Tracer<'_> {
         };
         let cross = |share: Lanes, wi: DVec3| if sides(wi) < 0.0 { follow(share, wi) } else { Lanes::ZERO };
         match &material.kind {
-            Kind::Diffuse { .. } | Kind::Boundary | Kind::Compound(_) => Lanes::ZERO,
+            Kind::Diffuse { .. } | Kind::Hair { .. } | Kind::Boundary | Kind::Compound(_) => Lanes::ZERO,
             Kind::Mirror { reflectance } => reflect(reflectance.eval(self.nm)),
             // Rough metal and rough glass are shown smooth: a single ray knows one direction.
             Kind::Conductor { eta, k, tint, fresnel: model, .. } => {

@@ -6,7 +6,7 @@ use super::object::Bag;
 use super::spectra::Role;
 use super::{Fields, Import, boolean, number, text};
 
-const BSDFS: [&str; 17] = [
+const BSDFS: [&str; 18] = [
     "diffuse",
     "dielectric",
     "thindielectric",
@@ -18,6 +18,7 @@ const BSDFS: [&str; 17] = [
     "roughplastic",
     "principled",
     "principledthin",
+    "hair",
     "null",
     "twosided",
     "mask",
@@ -127,6 +128,7 @@ impl Import<'_> {
             }
             "null" => "boundary",
             "principled" => return self.principled(&bag, sides),
+            "hair" => return self.hair(&bag, sides),
             "principledthin" => return self.principled_thin(&bag, sides),
             "twosided" => return self.twosided(&bag),
             "mask" => return self.mask(&bag),

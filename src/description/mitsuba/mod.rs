@@ -19,6 +19,7 @@
 mod bsdfs;
 mod compounds;
 mod emitters;
+mod hair;
 mod integrators;
 mod media;
 mod metals;

@@ -86,7 +86,7 @@ impl Import<'_> {
     fn principled_numbers(&mut self, bag: &Bag<'_>, fields: &mut Fields, names: &[&'static str]) -> Result<(), Fault> {
         fields.maybe("base_color", self.spectrum_or_texture(bag, "base_color", Role::Reflectance)?);
         for &name in names {
-            fields.maybe(name, self.spectrum_or_texture(bag, name, Role::Coefficient)?);
+            fields.maybe(name, self.number_or_texture(bag, name)?);
         }
         // A tint is the base colour over a luminance that Mitsuba's spectral modes take from the path's own
         // four wavelengths: 0.38 for white. The picture is to be the same.

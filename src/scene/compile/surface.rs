@@ -282,6 +282,7 @@ impl<'a> Compiler<'a> {
                 };
                 (Kind::plastic(reflectance, tint, eta, m.nonlinear, facets, mean), m.two_sided, m.highlight)
             }
+            written::Material::Hair(m) => plain(self.hair(&place, m)),
             written::Material::Principled(m) => {
                 (Kind::Principled(Box::new(self.principled(&place, m))), m.two_sided, None)
             }
