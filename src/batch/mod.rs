@@ -121,6 +121,7 @@ fn integrator(description: &SceneDescription, written: &description::Integrator)
             max_depth: p.max_depth,
             roulette_depth: p.roulette_depth,
             hide_emitters: p.hide_emitters,
+            opaque_sky: p.opaque_sky,
             light_samples: p.light_samples,
             scatter_samples: p.scatter_samples,
             count_crossings: p.count_crossings,

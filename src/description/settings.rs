@@ -44,6 +44,9 @@ pub struct PathIntegrator {
     /// from infinity as nothing; default false.
     #[serde(default)]
     pub hide_emitters: bool,
+    /// Whether light from infinity counts as coverage; default false.
+    #[serde(default)]
+    pub opaque_sky: bool,
     /// Shadow rays at the first surface; with 0 lights are only met by chance, and those without extent never;
     /// default 1.
     #[serde(default = "one")]
@@ -64,6 +67,7 @@ impl Default for PathIntegrator {
             max_depth: None,
             roulette_depth: roulette_depth(),
             hide_emitters: false,
+            opaque_sky: false,
             light_samples: one(),
             scatter_samples: one(),
             count_crossings: false,

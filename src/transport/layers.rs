@@ -6,7 +6,7 @@
 use super::plan::{EffectPlan, Integrator};
 use crate::math::Ray;
 use crate::optics::bsdf::Bsdf;
-use crate::scene::compound::{Composition, share};
+use crate::scene::compound::{Composition, Vertex, share};
 use crate::scene::material::Material;
 use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
@@ -250,7 +250,7 @@ impl First {
             Quantity::Position => values.extend(three(surface.point)),
             Quantity::Uv => values.extend(surface.uv.to_array().map(|x| x as f32)),
             Quantity::GeometricNormal => values.extend(three(surface.normal)),
-            Quantity::ShadingNormal => values.extend(three(surface.shading_normal)),
+            Quantity::ShadingNormal => values.extend(three(self.shading_normal(scene, ray))),
             Quantity::DpDu | Quantity::DpDv => {
                 let [du, dv] = scene.uv_gradient(&self.hit, surface).partials();
                 values.extend(three(if quantity == Quantity::DpDu { du } else { dv }));
@@ -277,6 +277,16 @@ impl First {
         let distance = (self.surface.point - other.origin).dot(n) / other.direction.dot(n);
         let change = scene.uv_gradient(&self.hit, &self.surface).change(other.at(distance) - self.surface.point);
         if change.is_finite() { change } else { DVec2::ZERO }
+    }
+
+    /// The normal of the outermost relief, or the interpolated one.
+    fn shading_normal(&self, scene: &Scene, ray: &Ray) -> DVec3 {
+        let (surface, hit) = (&self.surface, &self.hit);
+        let material = &scene.materials[scene.objects[hit.object as usize].material as usize];
+        let relief = material.compound().filter(|c| matches!(c.composition, Composition::Relief { .. }));
+        let vertex = Vertex { scene, hit, surface, at: &hit.texture_point(surface), wo: -ray.direction };
+        let leaf = relief.and_then(|compound| compound.resolve(&vertex, surface.shading_normal, 0.5));
+        leaf.map_or(surface.shading_normal, |leaf| leaf.frame.n)
     }
 
     /// The part of light from all around that comes back diffusely.
@@ -308,6 +318,8 @@ impl First {
             Bsdf::Diffuse { reflectance } => *reflectance,
             Bsdf::Plastic(plastic) => plastic.base.reflectance,
             Bsdf::RoughPlastic(plastic) => plastic.base.reflectance,
+            Bsdf::Principled(principled) => principled.base,
+            Bsdf::PrincipledThin(principled) => principled.base,
             other => {
                 // As if the light came along the normal.
                 let frame = crate::math::Frame::from_normal(surface.shading_normal);

@@ -232,6 +232,9 @@ impl Tracer<'_> {
 
             let Some(hit) = hit else {
                 self.add_background::<CHROMATIC>(&mut path);
+                if self.settings.opaque_sky && !self.settings.hide_emitters && !scene.backgrounds.is_empty() {
+                    alpha = 1.0;
+                }
                 break;
             };
             let surface = scene.surface(&path.ray, &hit);

@@ -45,6 +45,8 @@ pub struct PathSettings {
     pub roulette_depth: u32,
     /// Whether lights that the camera sees itself are left out.
     pub hide_emitters: bool,
+    /// Whether light from infinity covers what is behind the picture.
+    pub opaque_sky: bool,
     /// Shadow rays at the first surface; 0 leaves next-event estimation out everywhere.
     pub light_samples: u32,
     /// Scattered rays at the first surface; 0 leaves light met by scattering out everywhere.
@@ -59,6 +61,7 @@ impl Default for PathSettings {
             max_depth: None,
             roulette_depth: 5,
             hide_emitters: false,
+            opaque_sky: false,
             light_samples: 1,
             scatter_samples: 1,
             count_crossings: false,

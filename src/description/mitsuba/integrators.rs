@@ -67,6 +67,7 @@ impl Import<'_> {
                 }
                 hide_emitters(&bag, &mut fields)?;
                 depth(&bag, &mut fields)?;
+                fields.add("opaque_sky", boolean(bag.object.place, true));
                 if bag.object.plugin == "path" {
                     // Panes and null surfaces are vertices for it, unlike for the two that know media.
                     fields.add("count_crossings", boolean(bag.object.place, true));
@@ -241,4 +242,59 @@ fn depth(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
         fields.add("roulette_depth", whole(bag.place("rr_depth"), depth));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{Integrator, LayerContent, LightForm, PathIntegrator, Quantity};
+    use super::super::tests::{fault, good};
+
+    #[test]
+    fn a_moment_is_a_picture_with_xyz_and_squares() {
+        let scene = good(
+            "<integrator type=\"moment\"><integrator type=\"direct\"><integer name=\"shading_samples\" value=\"4\"/>\
+             <boolean name=\"hide_emitters\" value=\"true\"/></integrator></integrator>",
+        );
+        let direct = Integrator::Path(PathIntegrator {
+            max_depth: Some(2),
+            hide_emitters: true,
+            light_samples: 4,
+            scatter_samples: 4,
+            ..PathIntegrator::default()
+        });
+        assert_eq!(scene.integrator, direct);
+        let [layer] = &scene.layers[..] else { panic!("one layer") };
+        assert_eq!((layer.name.as_str(), layer.squares), ("_arg_0", true));
+        assert_eq!(layer.content, LayerContent::Light { of: Some(direct), form: LightForm::Xyz });
+    }
+
+    #[test]
+    fn aovs_stand_beside_the_integrators_that_they_hold() {
+        let scene = good(
+            "<integrator type=\"aov\"><string name=\"aovs\" value=\"dd.y:depth,nn:sh_normal\"/>\
+             <integrator type=\"depth\" name=\"d\"/><integrator type=\"path\"/></integrator>",
+        );
+        let names: Vec<&str> = scene.layers.iter().map(|layer| layer.name.as_str()).collect();
+        assert_eq!(names, ["d", "_arg_0", "dd.y", "nn"]);
+        assert!(matches!(scene.integrator, Integrator::Depth(_)));
+        assert_eq!(scene.layers[3].content, LayerContent::Surface(Quantity::ShadingNormal));
+        let alone = good("<integrator type=\"aov\"><string name=\"aovs\" value=\"a:uv\"/></integrator>");
+        assert!(matches!(alone.integrator, Integrator::None(_)));
+    }
+
+    #[test]
+    fn what_is_inside_has_to_be_there_and_to_be_known() {
+        assert_eq!(
+            fault("<integrator type=\"moment\"/>", &[]),
+            "s.xml:3:1: integrator \"moment\": expected an <integrator> inside, found none"
+        );
+        let aov = |aovs: &str| {
+            fault(&format!("<integrator type=\"aov\"><string name=\"aovs\" value=\"{aovs}\"/></integrator>"), &[])
+        };
+        assert!(aov("nn").contains("aovs: expected name:type with a type among albedo, depth"), "{}", aov("nn"));
+        assert!(aov("nn:normal").ends_with("found \"nn:normal\""), "{}", aov("nn:normal"));
+        let two = "<integrator type=\"direct\"><integer name=\"shading_samples\" value=\"4\"/>\
+                   <integer name=\"bsdf_samples\" value=\"4\"/></integrator>";
+        assert!(fault(two, &[]).ends_with("expected either shading_samples or this, found both"));
+    }
 }
