@@ -47,22 +47,32 @@ pub struct Tube {
     pub range: [f64; 2],
 }
 
-fn lerp<const N: usize>(a: [f64; N], b: [f64; N], u: f64) -> [f64; N] {
+/// Four at once, written out for the compiler's sake.
+#[inline(always)]
+fn four(f: impl Fn(usize) -> f64) -> Four {
+    [f(0), f(1), f(2), f(3)]
+}
+
+#[inline(always)]
+fn lerp(a: Four, b: Four, u: f64) -> Four {
     // Exact at both ends.
-    std::array::from_fn(|i| a[i] * (1.0 - u) + b[i] * u)
+    four(|i| a[i] * (1.0 - u) + b[i] * u)
 }
 
 /// The point of a Bernstein polynomial.
+#[inline(always)]
 fn cubic(b: &[Four; 4], u: f64) -> Four {
     quadratic(&[lerp(b[0], b[1], u), lerp(b[1], b[2], u), lerp(b[2], b[3], u)], u)
 }
 
+#[inline(always)]
 fn quadratic(b: &[Four; 3], u: f64) -> Four {
     lerp(lerp(b[0], b[1], u), lerp(b[1], b[2], u), u)
 }
 
+#[inline(always)]
 fn middle(a: Four, b: Four) -> Four {
-    std::array::from_fn(|i| 0.5 * a[i] + 0.5 * b[i])
+    four(|i| 0.5 * a[i] + 0.5 * b[i])
 }
 
 /// A ray's own coordinates.
@@ -78,11 +88,13 @@ impl RaySpace {
         RaySpace { origin, frame: Frame::from_normal(direction) }
     }
 
+    #[inline(always)]
     fn vector(&self, v: Four) -> Four {
         let w = self.frame.to_local(DVec3::new(v[0], v[1], v[2]));
         [w.x, w.y, w.z, v[3]]
     }
 
+    #[inline(always)]
     fn point(&self, p: Four) -> Four {
         self.vector([p[0] - self.origin.x, p[1] - self.origin.y, p[2] - self.origin.z, p[3]])
     }
@@ -123,6 +135,7 @@ struct Bounds {
     high: f64,
 }
 
+#[inline(always)]
 fn bounds<const N: usize>(c: &[f64; N]) -> Bounds {
     c.iter().fold(Bounds { low: f64::INFINITY, high: f64::NEG_INFINITY }, |b, &x| Bounds {
         low: b.low.min(x),
@@ -130,7 +143,13 @@ fn bounds<const N: usize>(c: &[f64; N]) -> Bounds {
     })
 }
 
+#[inline(always)]
+fn scaled(a: &Bounds, by: f64) -> Bounds {
+    Bounds { low: a.low * by, high: a.high * by }
+}
+
 /// Bounds of a·b with b ≥ 0.
+#[inline(always)]
 fn times(a: &Bounds, b: &Bounds) -> Bounds {
     Bounds {
         low: a.low * if a.low < 0.0 { b.high } else { b.low },
@@ -152,6 +171,7 @@ impl Part {
 type Halves = [([Four; 4], [Four; 3]); 2];
 
 /// De Casteljau's algorithm at ½; the two halves share what they have in common.
+#[inline(always)]
 fn split(b: &[Four; 4], e: &[Four; 3]) -> Halves {
     let (b01, b12, b23) = (middle(b[0], b[1]), middle(b[1], b[2]), middle(b[2], b[3]));
     let (b012, b123) = (middle(b01, b12), middle(b12, b23));
@@ -200,12 +220,14 @@ impl Tube {
 
     /// The first hit with 0 < t < `t_max` from outside: t and the segment's parameter.
     pub fn entry(&self, space: &RaySpace, t_max: f64) -> Option<(f64, f64)> {
-        let whole = Part {
-            points: self.points.map(|p| space.point(p)),
-            slopes: self.slopes.map(|v| space.vector(v)),
-            from: 0.0,
-            width: 1.0,
-        };
+        let points = [0, 1, 2, 3].map(|i: usize| space.point(self.points[i]));
+        // Most rays pass by: ρ ≤ r needs |x| ≤ r and |y| ≤ r.
+        let [x, y, r] = [0, 1, 3].map(|axis| bounds(&column(&points, axis)));
+        if x.low > r.high || -x.high > r.high || y.low > r.high || -y.high > r.high {
+            return None;
+        }
+        let whole =
+            Part { points, slopes: [0, 1, 2].map(|i: usize| space.vector(self.slopes[i])), from: 0.0, width: 1.0 };
         let mut search = Search { tube: self, whole, t_max, found: None, count: 0 };
         search.part(&whole, [true; 2], 0);
         search.found.map(|(t, u)| (t, self.range[0] + u * self.range[1]))
@@ -342,7 +364,8 @@ impl Search<'_> {
                     continue;
                 }
             }
-            let dz = dz.map(|x| x * side.sign());
+            let sign = side.sign();
+            let dz = [dz[0] * sign, dz[1] * sign, dz[2] * sign];
             let f = times(&bounds(&dz), &s);
             if p_bounds.low + f.low > rounding || p_bounds.high + f.high < -rounding {
                 *open = false;
@@ -366,31 +389,36 @@ impl Search<'_> {
     }
 }
 
+#[inline(always)]
 fn column<const N: usize>(c: &[Four; N], axis: usize) -> [f64; N] {
-    std::array::from_fn(|i| c[i][axis])
+    let mut out = [0.0; N];
+    for (out, c) in out.iter_mut().zip(c) {
+        *out = c[axis];
+    }
+    out
 }
 
 /// The second derivative by the segment's parameter, of a piece that is `width` of the segment.
 fn second(e: &[Four; 3], u: f64, width: f64) -> Four {
-    let a: Four = std::array::from_fn(|i| 2.0 * (e[1][i] - e[0][i]) / width);
-    let b: Four = std::array::from_fn(|i| 2.0 * (e[2][i] - e[1][i]) / width);
+    let a = four(|i| 2.0 * (e[1][i] - e[0][i]) / width);
+    let b = four(|i| 2.0 * (e[2][i] - e[1][i]) / width);
     lerp(a, b, u)
 }
 
 /// The direction of the third derivative.
 fn third(e: &[Four; 3]) -> Four {
-    std::array::from_fn(|i| (e[2][i] - e[1][i]) - (e[1][i] - e[0][i]))
+    four(|i| (e[2][i] - e[1][i]) - (e[1][i] - e[0][i]))
 }
 
 /// Whether F = P + z'√S keeps the sign of its derivative: that of P where S < 0, and of
 /// √S F' = P'√S + z''S + z'S'/2 where S > 0, with S' = 2 (r r' − P). `width` is that of the part in the segment's
 /// parameter, by which S' is multiplied to match the other derivatives, which are differences of coefficients.
 fn monotone(p: &[f64; 6], rr: &[f64; 6], dz: &[f64; 3], s2: &Bounds, s: &Bounds, width: f64) -> bool {
-    let slope: [f64; 5] = std::array::from_fn(|i| 5.0 * (p[i + 1] - p[i]));
-    let slope = bounds(&slope);
+    let slope = [p[1] - p[0], p[2] - p[1], p[3] - p[2], p[4] - p[3], p[5] - p[4]];
+    let slope = scaled(&bounds(&slope), 5.0);
     let bend = bounds(&[2.0 * (dz[1] - dz[0]), 2.0 * (dz[2] - dz[1])]);
-    let half: [f64; 6] = std::array::from_fn(|i| width * (rr[i] - p[i]));
-    let (half, dz) = (bounds(&half), bounds(dz));
+    let half = [rr[0] - p[0], rr[1] - p[1], rr[2] - p[2], rr[3] - p[3], rr[4] - p[4], rr[5] - p[5]];
+    let (half, dz) = (scaled(&bounds(&half), width), bounds(dz));
     let products = [dz.low * half.low, dz.low * half.high, dz.high * half.low, dz.high * half.high];
     let cross = bounds(&products);
     let a = times(&slope, s);

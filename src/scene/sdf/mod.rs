@@ -139,7 +139,7 @@ impl SdfGrid {
             return Err(format!("expected fewer than 2³¹ cells, found a grid of {nx} × {ny} × {nz} points"));
         }
         let extent = DVec3::from(cells.map(|n| n as f64));
-        let linear: DMat3 = world_from_object.matrix3.into();
+        let linear = world_from_object.matrix3;
         let world_from_grid = linear * DMat3::from_diagonal(extent.recip());
         let grid_from_world = world_from_grid.inverse();
         let origin = world_from_object.translation;

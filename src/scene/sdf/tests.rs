@@ -232,7 +232,7 @@ fn stretched_and_sheared_grids_are_the_same_surface() {
         if m.determinant().abs() < 0.1 {
             continue;
         }
-        let map = DAffine3 { matrix3: m.into(), translation: random.direction() * 10.0 };
+        let map = DAffine3 { matrix3: m, translation: random.direction() * 10.0 };
         let moved = SdfGrid::new(&grid, &map, SdfNormals::Smooth).unwrap();
         for _ in 0..50 {
             let ray = through(&mut random);
