@@ -3,6 +3,7 @@
 use super::super::environment::{Environment, Mapping};
 use super::super::light::{Light, Slide};
 use super::super::projector::Projector;
+use super::super::shape::Shape;
 use super::super::texture::Texture;
 use super::super::{Geometry, Object, load};
 use super::{Compiler, vec3};
@@ -66,6 +67,14 @@ impl<'a> Compiler<'a> {
                     self.fault(
                         &format!("{at}.emission_direction"),
                         "expected all for a mesh with smooth normals: along them light is found on flat triangles only",
+                    );
+                }
+                let curved =
+                    matches!(geometry, Geometry::Shape(Shape::Sphere(_) | Shape::Cylinder(_) | Shape::Cone(_)));
+                if curved && shape.flip_normals {
+                    self.fault(
+                        &format!("{at}.emission_direction"),
+                        "expected all on a curved shape turned inside out: two of its normals meet at each point",
                     );
                 }
                 Light::AlongNormal { object, exitance: radiance }
