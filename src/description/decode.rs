@@ -413,7 +413,7 @@ mod tests {
         assert_eq!(
             faults("shapes:\n- spere: {radius: 1}"),
             "dir/s.yaml:3:3: shapes[0].spere: expected one of sphere, plane, disk, rectangle, cube, cylinder, cone, \
-             mesh, sdf_grid, curves, instance, found \"spere\"; did you mean \"sphere\"?"
+             mesh, instance, sdf_grid, curves, found \"spere\"; did you mean \"sphere\"?"
         );
         assert_eq!(
             faults("integrator: pth"),

@@ -330,7 +330,7 @@ mod tests {
         );
         assert_eq!(
             fault("<shape type=\"sphere\"><float name=\"raduis\" value=\"1\"/></shape>", &[]),
-            "s.xml:3:22: shape \"sphere\": expected parameters among center, exterior, flip_normals, interior, radius, \
+            "s.xml:3:22: shape \"sphere\": expected parameters among center, flip_normals, radius, \
              silhouette_sampling_weight, to_world, found \"raduis\"; did you mean \"radius\"?"
         );
         assert_eq!(

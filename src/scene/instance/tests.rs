@@ -83,7 +83,7 @@ fn a_copy_is_the_shape_under_the_same_transform() {
                     }
                 }
             }
-            assert!(met > 1000 && on > 1000, "{met} {on}");
+            assert!(met > 500 && on > 500, "{met} {on}");
         }
     }
 }
