@@ -112,3 +112,37 @@ fn rates(bag: &Bag<'_>, fields: &mut Fields, rates: &Rates) -> Result<(), Fault>
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{Contrast, HairColour, Luminance, Material, NumberOrTexture};
+    use super::super::tests::{fault, good};
+
+    #[test]
+    fn principled_surfaces_keep_their_parameters() {
+        let text = "<bsdf type=\"principled\" id=\"a\"><float name=\"eta\" value=\"1.3\"/><float name=\"metallic\" value=\"0.5\"/>\
+                    <float name=\"sheen_tint\" value=\"1\"/><float name=\"clearcoat_sampling_rate\" value=\"2\"/></bsdf>\
+                    <bsdf type=\"twosided\" id=\"b\"><bsdf type=\"principled\"><texture type=\"checkerboard\" \
+                    name=\"roughness\"/></bsdf></bsdf>\
+                    <bsdf type=\"principledthin\" id=\"c\"><float name=\"diff_trans\" value=\"2\"/></bsdf>\
+                    <bsdf type=\"hair\" id=\"d\"/>";
+        let scene = good(text);
+        let Material::Principled(a) = &scene.materials["a"] else { panic!("principled") };
+        assert_eq!((a.contrast, a.two_sided, a.luminance), (Contrast::Eta(1.3), false, Luminance::Mitsuba));
+        assert_eq!((&a.metallic, a.sampling.clearcoat), (&NumberOrTexture::Number(0.5), 2.0));
+        let Material::Principled(b) = &scene.materials["b"] else { panic!("principled") };
+        assert!(b.two_sided && matches!(b.roughness, NumberOrTexture::Texture(_)) && b.luminance == Luminance::Colour);
+        let Material::PrincipledThin(c) = &scene.materials["c"] else { panic!("principled_thin") };
+        assert_eq!(c.diff_trans, NumberOrTexture::Number(2.0));
+        let Material::Hair(d) = &scene.materials["d"] else { panic!("hair") };
+        assert!(matches!(d.colour, HairColour::Absorption(_)) && d.ior == 1.55);
+    }
+
+    #[test]
+    fn an_index_given_twice_is_refused() {
+        let text =
+            "<bsdf type=\"principled\"><float name=\"eta\" value=\"1\"/><float name=\"specular\" value=\"1\"/></bsdf>";
+        let found = fault(text, &[]);
+        assert!(found.ends_with("bsdf \"principled\": expected either eta or specular, found both"), "{found}");
+    }
+}
