@@ -156,7 +156,8 @@ pub struct Vertex<'a> {
 #[derive(Clone, Copy)]
 pub struct Standing {
     frame: Frame,
-    mirrored: bool,
+    /// Where the back is seen, the normal of the plane about which it mirrors the front.
+    mirrored: Option<DVec3>,
     slopes: Slopes,
 }
 
@@ -165,18 +166,23 @@ impl Standing {
     #[must_use]
     pub fn new(normal: DVec3, tangent: DVec3) -> Standing {
         let frame = Frame::from_normal_and_tangent(normal, tangent);
-        Standing { frame, mirrored: false, slopes: Slopes::default() }
+        Standing { frame, mirrored: None, slopes: Slopes::default() }
     }
 
     /// Seen from behind, by a material with two sides.
     pub fn mirror(&mut self) {
-        self.mirrored = true;
+        self.mirrored = Some(self.frame.n);
+    }
+
+    /// A direction in the mirror.
+    fn reflected(&self, v: DVec3) -> DVec3 {
+        self.mirrored.map_or(v, |n| v - n * (2.0 * v.dot(n)))
     }
 
     /// True where it is seen from behind.
     #[must_use]
     pub fn is_mirrored(&self) -> bool {
-        self.mirrored
+        self.mirrored.is_some()
     }
 
     /// Turns the frame as `relief` says.
@@ -192,10 +198,7 @@ impl Standing {
                 self.frame.to_local(if turned.dot(x.surface.normal) < 0.0 { -turned } else { turned })
             }
         };
-        let mut wo = self.frame.to_local(x.wo);
-        if self.mirrored {
-            wo.z = -wo.z;
-        }
+        let wo = self.frame.to_local(self.reflected(x.wo));
         let local =
             if relief.turn && wo.z * wo.dot(local) <= 0.0 { DVec3::new(-local.x, -local.y, local.z) } else { local };
         // A texel without direction leaves the surface as it is.
@@ -203,7 +206,7 @@ impl Standing {
         if relief.shadowing && self.slopes.count < MOST_RELIEFS {
             let tan2 = (local.x * local.x + local.y * local.y) / (local.z * local.z);
             // A normal in the surface has an infinite slope.
-            self.slopes.turned[self.slopes.count] = (n, (0.125 * tan2).min(1.0));
+            self.slopes.turned[self.slopes.count] = (self.reflected(n), (0.125 * tan2).min(1.0));
             self.slopes.count += 1;
         }
         self.frame = Frame::from_normal_and_tangent(self.frame.to_world(local), self.frame.s);
@@ -212,8 +215,11 @@ impl Standing {
     /// The local frame: right-handed, z on the side that is seen where the material has two.
     #[must_use]
     pub fn frame(&self) -> Frame {
-        let Frame { s, t, n } = self.frame;
-        if self.mirrored { Frame { s, t: -t, n: -n } } else { self.frame }
+        if self.mirrored.is_none() {
+            return self.frame;
+        }
+        let (s, n) = (self.reflected(self.frame.s), self.reflected(self.frame.n));
+        Frame { s, t: n.cross(s), n }
     }
 
     /// How the slopes shadow each other.
@@ -268,7 +274,7 @@ impl Compound {
                     }
                 }
                 Composition::TwoSided { front, back } => {
-                    if from_behind {
+                    if from_behind && !standing.is_mirrored() {
                         standing.mirror();
                         back
                     } else {
@@ -283,10 +289,10 @@ impl Compound {
             match inner.compound() {
                 Some(next) => compound = next,
                 None => {
-                    if inner.two_sided && from_behind {
+                    if inner.two_sided && from_behind && !standing.is_mirrored() {
                         standing.mirror();
                     }
-                    let (frame, flipped, slopes) = (standing.frame(), standing.mirrored, standing.slopes);
+                    let (frame, flipped, slopes) = (standing.frame(), standing.is_mirrored(), standing.slopes);
                     return Some(Leaf { material: inner, frame, flipped, slopes });
                 }
             }
@@ -344,4 +350,72 @@ fn mixed(first: Option<Straight>, second: Option<Straight>, weight: f64) -> Opti
     let ((a, by_a), (b, by_b)) = (part(first, 1.0 - weight), part(second, weight));
     let share = a + b;
     (share > 0.0).then(|| Straight { share, weight: by_a * (a / share) as f32 + by_b * (b / share) as f32 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tilted() -> Relief {
+        // n = (0.6, 0, 0.8) as a colour.
+        let texel = [0.8f32, 0.5, 0.9];
+        let grid = crate::scene::texture::Grid::new(1, 1);
+        let normals = Scalar::Image(crate::scene::texture::DataImage { texels: Arc::new(vec![texel]), grid });
+        Relief { form: ReliefForm::Normals(normals), turn: true, shadowing: true }
+    }
+
+    /// What is left of a number that fell below a share, or above it, is uniform again.
+    #[test]
+    fn a_split_number_is_uniform_on_both_sides() {
+        let (mut low, mut high) = (0.15, 0.65);
+        assert!(below(&mut low, 0.3) && !below(&mut high, 0.3));
+        assert!((low - 0.5).abs() < 1e-15 && (high - 0.5).abs() < 1e-15);
+        assert!(!below(&mut 0.0, 0.0) && below(&mut 0.999, 1.0));
+    }
+
+    /// A mask of opacity a over a mask of opacity b stops a b; a blend mixes what its parts let through.
+    #[test]
+    fn shares_that_go_straight_multiply_in_masks_and_mix_in_blends() {
+        let open = |share: f64| (share > 0.0).then_some(Straight { share, weight: Lanes::ONE });
+        let within = mixed(Some(Straight::OPEN), open(0.4), 0.5).unwrap();
+        assert!((within.share - (1.0 - 0.5 * 0.6)).abs() < 1e-15);
+        let blend = mixed(None, open(0.4), 0.25).unwrap();
+        assert!((blend.share - 0.1).abs() < 1e-15 && blend.weight.to_array()[0] == 1.0);
+        assert!(mixed(None, None, 0.5).is_none());
+    }
+
+    /// G₁ of GGX at 45° and α² = 1/2 is 2/(1 + √1.5); along the normal nothing is in the way.
+    #[test]
+    fn slopes_shadow_as_microfacets_do() {
+        assert!((shadowing(0.5, 0.5f64.sqrt()) - 2.0 / (1.0 + 1.5f64.sqrt())).abs() < 1e-15);
+        assert_eq!([shadowing(1.0, 1.0), shadowing(1.0, 0.0)], [1.0, 0.0]);
+    }
+
+    /// The back of a relief is the mirror image of its front: the tilted normal leans to the same side and
+    /// points away from the front.
+    #[test]
+    fn the_back_of_a_relief_is_the_mirror_image_of_its_front() {
+        let bench = crate::description::testing::scene(
+            "shapes:\n- rectangle: {corner: [-1, -1, 0], edge_u: [2, 0, 0], edge_v: [0, 2, 0]}\n",
+        );
+        let scene = crate::scene::compile::compile(&bench, "s").unwrap();
+        for (side, expected) in [(1.0, DVec3::new(0.6, 0.0, 0.8)), (-1.0, DVec3::new(0.6, 0.0, -0.8))] {
+            let ray = crate::math::Ray::new(DVec3::new(0.1, 0.2, 3.0 * side), DVec3::new(0.0, 0.0, -side));
+            let hit = scene.closest(&ray, f64::INFINITY).unwrap();
+            let surface = scene.surface(&ray, &hit);
+            let at = hit.texture_point(&surface);
+            let x = Vertex { scene: &scene, hit: &hit, surface: &surface, at: &at, wo: -ray.direction };
+            let mut standing = Standing::new(surface.shading_normal, surface.tangent);
+            if side < 0.0 {
+                standing.mirror();
+            }
+            standing.turn(&tilted(), &x);
+            let frame = standing.frame();
+            // Texels are f32.
+            assert!((frame.n - expected).length() < 1e-6, "{side}: {frame:?}");
+            assert!((frame.s.cross(frame.t) - frame.n).length() < 1e-12);
+            // tan²θ/8 = 0.5625/8; along the surface's normal no slope is in the way.
+            assert!((standing.slopes().shadowing(DVec3::Z) - 1.0).abs() < 1e-12);
+        }
+    }
 }
