@@ -191,12 +191,9 @@ fn cylinder(bag: &Bag<'_>, to_world: DMat4, fields: &mut Fields) -> Result<(), F
     };
     let frame = Frame::from_normal(axis);
     let [s, t, n] = [frame.s, frame.t, axis].map(|v| to_world.transform_vector3(v));
-    let skew = [(s.dot(t), s, t), (s.dot(n), s, n), (t.dot(n), t, n)]
-        .map(|(dot, a, b)| dot.abs() / (a.length() * b.length()))
-        .into_iter()
-        .fold((s.length() / t.length() - 1.0).abs(), f64::max);
-    // Also where a number is none.
-    if !(skew <= SIMILAR) {
+    let across = [(s.dot(t), s, t), (s.dot(n), s, n), (t.dot(n), t, n)];
+    let round = (s.length() / t.length() - 1.0).abs() <= SIMILAR;
+    if !round || !across.iter().all(|(dot, a, b)| dot.abs() <= SIMILAR * a.length() * b.length()) {
         let expected =
             "expected moves, turns and scales that keep a cylinder round and straight, found another transform";
         return Err(bag.fault_of("to_world", expected));

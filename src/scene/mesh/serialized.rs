@@ -35,8 +35,8 @@ pub(super) fn read(bytes: &[u8], index: u32) -> Result<MeshSource, String> {
     let vertices = u64::from_le_bytes(stream.array()?);
     let triangles = u64::from_le_bytes(stream.array()?);
     let double = flags & DOUBLE != 0;
-    let mut out = MeshSource::default();
-    out.positions = stream.vectors::<3>(vertices, double)?.map(DVec3::from).collect();
+    let positions = stream.vectors::<3>(vertices, double)?.map(DVec3::from).collect();
+    let mut out = MeshSource { positions, ..MeshSource::default() };
     if flags & HAS_NORMALS != 0 {
         out.normals = stream.vectors::<3>(vertices, double)?.map(DVec3::from).collect();
     }
