@@ -101,17 +101,17 @@ impl Scene {
             }
             Light::Projector(projector) => projector.emit(u_direction, nm),
             Light::Directional { direction, irradiance } => {
-                (self.from_infinity(*direction, u_point), irradiance.eval(nm) * self.section())
+                (self.arriving_ray(*direction, u_point), irradiance.eval(nm) * self.section())
             }
             Light::Constant { radiance } => {
                 let direction = warp::uniform_sphere(u_direction);
                 let factor = (4.0 * PI) as f32 * self.section();
-                (self.from_infinity(direction, u_point), radiance.eval(nm) * factor)
+                (self.arriving_ray(direction, u_point), radiance.eval(nm) * factor)
             }
             Light::Environment(map) => {
                 let s = map.sample(u_direction)?;
                 let factor = self.section() * (1.0 / s.pdf_solid_angle) as f32;
-                (self.from_infinity(-s.direction, u_point), map.radiance(s.direction, nm) * factor)
+                (self.arriving_ray(-s.direction, u_point), map.radiance(s.direction, nm) * factor)
             }
         };
         Some(Emission { ray, power: power * (1.0 / probability) as f32 })
@@ -123,7 +123,7 @@ impl Scene {
     }
 
     /// A ray from outside the scene.
-    fn from_infinity(&self, direction: DVec3, u: DVec2) -> Ray {
+    fn arriving_ray(&self, direction: DVec3, u: DVec2) -> Ray {
         let frame = Frame::from_normal(direction);
         let disk = warp::concentric_disk(u) * self.radius;
         Ray::new(self.center + frame.s * disk.x + frame.t * disk.y - direction * self.radius, direction)
