@@ -233,6 +233,7 @@ impl First {
         Some(First { hit, surface: scene.surface_with_texture(ray, &hit) })
     }
 
+    #[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
     fn append(
         &self,
         scene: &Scene,
