@@ -109,10 +109,13 @@ struct Row {
     pdf: f64,
 }
 
-/// The table of vectors: materials (as written, as scattering functions) and their rows.
-fn vectors() -> Vec<(String, Bsdf, Vec<Row>)> {
+/// A material as written, as a scattering function, and its rows.
+type Case = (String, Bsdf, Vec<Row>);
+
+/// The table of vectors.
+fn vectors() -> Vec<Case> {
     let (mut base, mut hue) = (Lanes::ONE, Lanes::ONE);
-    let mut all: Vec<(String, Bsdf, Vec<Row>)> = Vec::new();
+    let mut all: Vec<Case> = Vec::new();
     for line in include_str!("vectors.txt").lines().filter(|line| !line.starts_with('#')) {
         let words: Vec<&str> = line.split_whitespace().collect();
         let number = |w: &&str| w.parse::<f64>().unwrap();
