@@ -4,6 +4,7 @@
 //! 4 invalid samples, 130 interrupted.
 
 mod compare;
+mod convert;
 mod plan;
 mod progress;
 mod render;
@@ -31,6 +32,12 @@ enum Verb {
     /// Print what a scene calls for, each effect with its reason, and render nothing
     #[command(after_help = "Example:\n  abbe plan configs/gallery.yaml --scene prism --format json")]
     Plan(PlanArguments),
+    /// Print a Mitsuba scene as YAML
+    #[command(after_help = "Example:\n  abbe import cornell-box.xml -D res=256 -o cornell-box.yaml")]
+    Import(ConvertArguments),
+    /// Print a scene as Mitsuba 3 XML, and say what Mitsuba cannot express
+    #[command(after_help = "Example:\n  abbe export configs/scenes/flint.yaml -o flint.xml")]
+    Export(ConvertArguments),
     /// Say whether two EXR files show the same picture, within their noise (exit 0 same, 1 different, 2 cannot compare)
     #[command(after_help = "Example:\n  abbe compare ours.exr theirs.exr --json figures.json")]
     Compare(CompareArguments),
@@ -86,6 +93,15 @@ struct PlanArguments {
     /// How to print it
     #[arg(long, value_enum, default_value_t = PlanFormat::Text)]
     format: PlanFormat,
+}
+
+#[derive(Debug, Args)]
+struct ConvertArguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Write it here instead; files that it names are then named from there
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -196,6 +212,8 @@ pub fn run() -> i32 {
     let result = check_cpu().and_then(|()| match &arguments.verb {
         Verb::Render(a) => render::run(a),
         Verb::Plan(a) => plan::run(a),
+        Verb::Import(a) => convert::import(a),
+        Verb::Export(a) => convert::export(a),
         Verb::Compare(a) => compare::run(a),
     });
     match result {

@@ -309,6 +309,7 @@ mod mitsuba;
 mod node;
 mod path;
 mod principled;
+mod print;
 mod scene;
 mod settings;
 mod shape;
@@ -330,7 +331,9 @@ pub use material::{
 };
 pub use medium::{Coefficients, HeterogeneousMedium, HomogeneousMedium, Medium, Phase, PhaseBlend};
 pub(crate) use medium::{UNCHANGED, VACUUM};
+pub use mitsuba::export::{Exported, Loss, export};
 pub use principled::{Contrast, Luminance, Principled, PrincipledThin, Sampling, ThinSampling};
+pub use print::yaml;
 pub use scene::{Locator, SceneDescription};
 pub use settings::{
     Channels, Colour, Compression, DepthIntegrator, Effects, Exr, Integrator, LightTracerIntegrator, NoIntegrator,

@@ -138,6 +138,15 @@ impl Node {
         node.place
     }
 
+    /// The node at `path`.
+    pub(crate) fn find(&self, path: &[Segment]) -> Option<&Node> {
+        path.iter().try_fold(self, |node, segment| match (segment, &node.value) {
+            (Segment::Key(key), Value::Map(_)) => node.get(key),
+            (Segment::Index(index), Value::List(items)) => items.get(*index),
+            _ => None,
+        })
+    }
+
     /// Says that this and all inside it stands at one place.
     pub(crate) fn move_to(&mut self, place: Place) {
         self.place = place;

@@ -130,6 +130,11 @@ impl SceneDescription {
         Ok(scene)
     }
 
+    /// The tree that it was decoded from, where there is one.
+    pub(crate) fn tree(&self) -> Option<(&Node, &Sources)> {
+        self.locator.text.as_deref().map(|(root, sources)| (root, sources))
+    }
+
     /// A message about a field, with its place: see [`Locator::fault`].
     #[must_use]
     pub fn fault(&self, field: &str, message: &str) -> String {

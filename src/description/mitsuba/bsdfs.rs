@@ -63,6 +63,9 @@ impl Import<'_> {
 
     pub(crate) fn bsdf(&mut self, index: usize, sides: Sides) -> Result<Node, Fault> {
         let bag = self.bag(index);
+        if let Some(node) = bag.written() {
+            return Ok(node);
+        }
         let place = bag.object.place;
         let mut fields = Fields::new(place);
         let two_sided = boolean(place, sides == Sides::Both);

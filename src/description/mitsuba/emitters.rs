@@ -18,6 +18,10 @@ impl Import<'_> {
     /// Adds an emitter of the scene to `lights`.
     pub(crate) fn emitter(&mut self, index: usize) -> Result<(), Fault> {
         let bag = self.bag(index);
+        if let Some(node) = bag.written() {
+            self.lights.push(node);
+            return Ok(());
+        }
         let mut fields = Fields::new(bag.object.place);
         weight(&bag, &mut fields)?;
         let plugin = bag.object.plugin.as_str();

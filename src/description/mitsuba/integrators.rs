@@ -57,6 +57,9 @@ impl Import<'_> {
 
     fn translated(&mut self, index: usize) -> Result<Translated, Fault> {
         let bag = self.bag(index);
+        if let Some(node) = bag.written() {
+            return Ok(Translated { integrator: node, layers: Vec::new() });
+        }
         let mut fields = Fields::new(bag.object.place);
         common(&bag)?;
         let kind = match bag.object.plugin.as_str() {

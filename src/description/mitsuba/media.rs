@@ -17,6 +17,11 @@ impl Import<'_> {
             return Ok(name.clone());
         }
         let bag = self.bag(index);
+        if let Some(node) = bag.written() {
+            let name = self.name_for(index);
+            self.media.push(self.entry(index, &name, node));
+            return Ok(name);
+        }
         let place = bag.object.place;
         let mut fields = Fields::new(place);
         let kind = match bag.object.plugin.as_str() {

@@ -19,6 +19,7 @@
 mod bsdfs;
 mod compounds;
 mod emitters;
+pub(crate) mod export;
 mod hair;
 mod integrators;
 mod media;
@@ -144,13 +145,20 @@ impl<'a> Import<'a> {
         fields.add("groups", Node::new(place, Value::Map(self.groups)));
         fields.add("shapes", Node::new(place, Value::List(self.shapes)));
         fields.add("lights", Node::new(place, Value::List(self.lights)));
-        Ok(fields.map())
+        let mut root = fields.map();
+        for setting in &self.document.settings {
+            setting.apply(&mut root)?;
+        }
+        Ok(root)
     }
 
     /// A name for an object in one of the maps: its id, or one made from its place.
     fn name_for(&mut self, index: usize) -> String {
         let object = &self.document.objects[index];
-        let name = object.id.clone().unwrap_or_else(|| format!("{} {index}", object.plugin));
+        // One list of ids, but a list of names for each kind: see `export`.
+        let kind = format!(" ({})", object.family.tag());
+        let id = object.id.as_ref().map(|id| id.strip_suffix(&kind).unwrap_or(id).to_owned());
+        let name = id.unwrap_or_else(|| format!("{} {index}", object.plugin));
         self.names.insert(index, name.clone());
         name
     }

@@ -8,8 +8,9 @@ use std::cell::{Cell, RefCell};
 
 use glam::DMat4;
 
+use super::super::edit::Setting;
 use super::super::fault::Fault;
-use super::super::node::{Place, did_you_mean, quote};
+use super::super::node::{Node, Place, did_you_mean, quote};
 
 /// What kind of thing an element describes: its tag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,6 +98,8 @@ pub(crate) enum Value {
     Transform(DMat4),
     /// An object inside, or one that a `<ref>` names: index into the document's.
     Object(usize),
+    /// The object itself, as it stands in the grammar: `<?abbe instead …?>`.
+    Written(Node),
 }
 
 /// `<spectrum value="…"/>` or `<spectrum filename="…"/>`
@@ -121,6 +124,7 @@ impl Value {
             Value::Rgb(_) => "an rgb colour".to_owned(),
             Value::Spectrum(_) => "a spectrum".to_owned(),
             Value::Transform(_) => "a transform".to_owned(),
+            Value::Written(_) => "a field of the grammar".to_owned(),
             Value::Object(index) => {
                 let object = &document.objects[*index];
                 format!("the {} {}", object.family.tag(), quote(&object.plugin))
@@ -134,6 +138,8 @@ impl Value {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Document {
     pub(crate) objects: Vec<Object>,
+    /// Fields of the grammar that are set past everything else, in the order of the text.
+    pub(crate) settings: Vec<Setting>,
     /// Directories in which files are looked for, in order.
     pub(crate) search: Vec<std::path::PathBuf>,
     /// Directory of each file that was read, by source.
@@ -155,6 +161,14 @@ impl<'a> Bag<'a> {
         let object = &document.objects[index];
         let used = object.properties.iter().map(|_| Cell::new(false)).collect();
         Bag { document, object, used, asked: RefCell::default() }
+    }
+
+    /// The object as it stands in the grammar, if it was written so.
+    pub(crate) fn written(&self) -> Option<Node> {
+        match &self.object.properties.first()?.value {
+            Value::Written(node) => Some(node.clone()),
+            _ => None,
+        }
     }
 
     /// A fault of the whole object.

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat4, DVec3};
 
-use super::super::edit::read_bytes;
+use super::super::edit::{Setting, read_bytes};
 use super::super::fault::Fault;
-use super::super::node::{Place, Sources, did_you_mean, quote};
-use super::super::yaml::MAX_NODES;
+use super::super::node::{Node, Place, Sources, Value as NodeValue, did_you_mean, quote};
+use super::super::yaml::{self, MAX_NODES};
 use super::object::{Document, Family, Object, Property, SpectrumValue, Value};
 use super::xml::{self, Attribute, Element, MAX_DEPTH};
 use crate::error::{Error, Result};
@@ -166,6 +166,9 @@ impl Parser<'_> {
 
     /// Makes an object of an element and gives its index.
     fn object(&mut self, element: &Element, family: Family, in_file: InFile) -> std::result::Result<usize, Fault> {
+        if let Some(yaml) = element.attribute(xml::YAML) {
+            return self.written(element, yaml, family, in_file);
+        }
         match family {
             Family::Scene => check_attributes(element, &["version"], &["id", "type", "name"])?,
             _ => check_attributes(element, &["type"], &["id", "name"])?,
@@ -195,6 +198,45 @@ impl Parser<'_> {
         Ok(index)
     }
 
+    /// Makes an object that is written in the grammar.
+    fn written(
+        &mut self,
+        element: &Element,
+        yaml: &Attribute,
+        family: Family,
+        in_file: InFile,
+    ) -> std::result::Result<usize, Fault> {
+        let node = self.grammar(&yaml.value, yaml.place, in_file)?;
+        let id = element.attribute("id").map(|id| self.text(id)).transpose()?;
+        let index = self.document.objects.len();
+        if let Some(id) = &id {
+            self.name(id, index, element.place)?;
+        }
+        self.document.objects.push(Object {
+            family,
+            plugin: "<?abbe instead?>".to_owned(),
+            plugin_place: element.place,
+            id,
+            place: element.place,
+            source: in_file.source,
+            properties: vec![Property { name: String::new(), place: element.place, value: Value::Written(node) }],
+        });
+        Ok(index)
+    }
+
+    /// YAML inside an instruction; all of it stands at `place`, and files are found from this file.
+    fn grammar(&self, text: &str, place: Place, in_file: InFile) -> std::result::Result<Node, Fault> {
+        let mut node = yaml::read(text.as_bytes(), place.source).map_err(|mut fault| {
+            fault.place = Some(place);
+            fault
+        })?;
+        node.move_to(place);
+        if let Some(directory) = self.document.directories.get(&in_file.source) {
+            find_files(&mut node, directory);
+        }
+        Ok(node)
+    }
+
     fn name(&mut self, id: &str, index: usize, place: Place) -> std::result::Result<(), Fault> {
         if let Some(first) = self.ids.insert(id.to_owned(), index) {
             let first = self.sources.describe(self.document.objects[first].place);
@@ -207,6 +249,15 @@ impl Parser<'_> {
     /// Reads an element inside an object.
     fn child(&mut self, element: &Element, parent: usize, in_file: InFile) -> std::result::Result<(), Fault> {
         let tag = element.tag.as_str();
+        if let (xml::SET, Some(setting)) = (tag, element.attribute(xml::YAML)) {
+            let Some((key, yaml)) = setting.value.split_once(": ") else {
+                let message = format!("expected <?abbe set KEY: VALUE?>, found {}", quote(&setting.value));
+                return Err(Fault::at_place(setting.place, message));
+            };
+            let node = self.grammar(yaml, setting.place, in_file)?;
+            self.document.settings.push(Setting::new(key.trim(), setting.place, node)?);
+            return Ok(());
+        }
         let family = match tag {
             "spectrum" if element.attribute("type").is_some() => Some(Family::Texture),
             "scene" => None,
@@ -625,6 +676,24 @@ fn check_attributes(element: &Element, required: &[&str], optional: &[&str]) -> 
     match required.iter().find(|name| element.attribute(name).is_none()) {
         Some(name) => Err(missing(element, name)),
         None => Ok(()),
+    }
+}
+
+/// Makes the paths of files, which stand under `file` throughout the grammar, start from `directory`.
+fn find_files(node: &mut Node, directory: &Path) {
+    match &mut node.value {
+        NodeValue::List(items) => items.iter_mut().for_each(|item| find_files(item, directory)),
+        NodeValue::Map(entries) => {
+            for entry in entries {
+                match &mut entry.node.value {
+                    NodeValue::Text(file) if entry.key == "file" => {
+                        *file = directory.join(&*file).to_string_lossy().into_owned();
+                    }
+                    _ => find_files(&mut entry.node, directory),
+                }
+            }
+        }
+        _ => {}
     }
 }
 

@@ -34,6 +34,10 @@ impl Import<'_> {
     /// Adds a shape of the scene to `shapes`, a group to `groups`.
     pub(crate) fn shape(&mut self, index: usize) -> Result<(), Fault> {
         let bag = self.bag(index);
+        if let Some(node) = bag.written() {
+            self.shapes.push(node);
+            return Ok(());
+        }
         match bag.object.plugin.as_str() {
             // One mesh made of several looks like these several.
             "merge" => {

@@ -17,6 +17,11 @@ impl Import<'_> {
             return Ok(name.clone());
         }
         let bag = self.bag(index);
+        if let Some(node) = bag.written() {
+            let name = self.name_for(index);
+            self.textures.push(self.entry(index, &name, node));
+            return Ok(name);
+        }
         let node = match bag.object.plugin.as_str() {
             "bitmap" => bitmap(&bag)?,
             "checkerboard" => self.checkerboard(&bag, Use::Spectra)?,

@@ -2,7 +2,8 @@
 //!
 //! `quick-xml` is a pull parser without recursion and without external entities, whose events
 //! borrow from the text, so that the offset of each name and value is known. Nesting is limited
-//! here, before anything deep is built. A document type is refused, and with it every entity but
+//! here, before anything deep is built. Instructions `<?abbe …?>` become elements of their own: what
+//! [`export`](super::export) says past Mitsuba. A document type is refused, and with it every entity but
 //! the five of XML and character references: there is nothing to expand without end.
 
 use quick_xml::Reader;
@@ -47,6 +48,11 @@ impl Element {
     }
 }
 
+/// The tag of an element made of `<?abbe set KEY: YAML?>`.
+pub(crate) const SET: &str = "?set";
+/// The attribute of an element made of an instruction that holds its YAML.
+pub(crate) const YAML: &str = "?yaml";
+
 /// Reads one document. Each element and attribute takes one from `budget`.
 ///
 /// # Errors
@@ -64,7 +70,8 @@ pub(crate) fn read(bytes: &[u8], source: u32, budget: &mut usize) -> Result<Elem
         Fault::at_place(place, format!("expected text in UTF-8, found the byte 0x{:02x}", bytes[error.valid_up_to()]))
     })?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    Builder { text, source, cursor: Cursor::new(text, source), open: Vec::new(), root: None, budget }.build()
+    Builder { text, source, cursor: Cursor::new(text, source), open: Vec::new(), root: None, replaced: None, budget }
+        .build()
 }
 
 /// Counts lines and columns up to offsets that mostly grow.
@@ -105,6 +112,8 @@ struct Builder<'a, 'b> {
     /// Elements that are not closed yet, outermost first.
     open: Vec<Element>,
     root: Option<Element>,
+    /// Between `<?abbe instead …?>` and `<?abbe end?>`.
+    replaced: Option<Replaced>,
     budget: &'b mut usize,
 }
 
@@ -116,6 +125,10 @@ impl<'a> Builder<'a, '_> {
                 Ok(Event::Start(tag)) => self.start(&tag, Closing::Later)?,
                 Ok(Event::Empty(tag)) => self.start(&tag, Closing::Now)?,
                 Ok(Event::End(_)) => self.end(),
+                Ok(Event::PI(instruction)) => {
+                    let at = self.offset_of(&instruction);
+                    self.instruction(&instruction, at)?;
+                }
                 Ok(Event::DocType(kind)) => {
                     let at = self.offset_of(&kind);
                     let message = "expected no document type, found <!DOCTYPE …>: entities are not expanded";
@@ -133,6 +146,9 @@ impl<'a> Builder<'a, '_> {
                     return Err(self.fault(at, format!("expected XML, found a fault of syntax: {error}")));
                 }
             }
+        }
+        if let Some(replaced) = &self.replaced {
+            return Err(Fault::at_place(replaced.place, "expected <?abbe end?> further on, found none"));
         }
         if let Some(element) = self.open.last() {
             let message = format!("expected </{}>, found the end of the text", element.tag);
@@ -200,14 +216,75 @@ impl<'a> Builder<'a, '_> {
         Ok(())
     }
 
+    /// `<?abbe …?>`; those of other programs say nothing here.
+    fn instruction(&mut self, text: &str, at: usize) -> Result<(), Fault> {
+        let Some(text) = text.strip_prefix("abbe").filter(|rest| rest.starts_with(char::is_whitespace)) else {
+            return Ok(());
+        };
+        let place = self.cursor.place(at);
+        self.charge(at)?;
+        let text = text.trim();
+        let element = |tag: &str, yaml: &str| {
+            let yaml = Attribute { name: YAML.to_owned(), value: yaml.to_owned(), place };
+            Element { tag: tag.to_owned(), place, attributes: vec![yaml], children: Vec::new() }
+        };
+        if text == "end" {
+            match &mut self.replaced {
+                Some(replaced) if replaced.nested > 0 => replaced.nested -= 1,
+                Some(replaced) if replaced.level == self.open.len() => self.replaced = None,
+                _ => return Err(Fault::at_place(place, "expected <?abbe instead …?> before, found <?abbe end?>")),
+            }
+            return Ok(());
+        }
+        if let Some(replaced) = &mut self.replaced {
+            replaced.nested += usize::from(text.starts_with("instead "));
+            return Ok(());
+        }
+        let made = if let Some(setting) = text.strip_prefix("set ") {
+            element(SET, setting)
+        } else if let Some((tag, yaml)) = text.strip_prefix("instead ").and_then(|rest| rest.split_once(':')) {
+            self.replaced = Some(Replaced { level: self.open.len(), nested: 0, place });
+            element(tag.trim(), yaml.trim())
+        } else {
+            let message = format!("expected set, instead or end after <?abbe, found {}", quote(text));
+            return Err(Fault::at_place(place, message));
+        };
+        match self.open.last_mut() {
+            Some(parent) => parent.children.push(made),
+            None => return Err(Fault::at_place(place, "expected <?abbe …?> inside an element, found it outside")),
+        }
+        Ok(())
+    }
+
     fn end(&mut self) {
         // The reader has checked that it closes what was opened.
         let Some(element) = self.open.pop() else { return };
+        let level = self.open.len();
+        if self.replaced.as_ref().is_some_and(|replaced| replaced.level == level)
+            && let Some(parent) = self.open.last_mut()
+        {
+            // Only its id is kept, for those who refer to it.
+            if let (Some(id), Some(made)) = (element.attribute("id"), parent.children.last_mut())
+                && made.attribute("id").is_none()
+            {
+                made.attributes.push(id.clone());
+            }
+            return;
+        }
         match self.open.last_mut() {
             Some(parent) => parent.children.push(element),
             None => self.root = Some(element),
         }
     }
+}
+
+/// Elements that stand for something that Mitsuba cannot express.
+struct Replaced {
+    /// How many elements are open around them.
+    level: usize,
+    /// Such stretches inside this one.
+    nested: usize,
+    place: Place,
 }
 
 enum Closing {

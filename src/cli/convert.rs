@@ -1,0 +1,66 @@
+//! `abbe import` and `abbe export`: Mitsuba's XML to YAML and back.
+
+use super::ConvertArguments;
+use crate::batch;
+use crate::description::{self, SceneDescription};
+use crate::error::{Error, Result};
+use crate::film::output::{directory_of, write_atomically};
+use std::path::Path;
+
+/// Prints the scene as YAML, or writes it.
+pub fn import(arguments: &ConvertArguments) -> Result<i32> {
+    let scene = read(arguments)?;
+    let directory = arguments.output.as_deref().map_or(Path::new(""), directory_of);
+    write(arguments.output.as_deref(), &description::yaml(&scene, directory))?;
+    Ok(0)
+}
+
+/// Prints the scene as Mitsuba's XML, or writes it, and says what Mitsuba cannot express.
+pub fn export(arguments: &ConvertArguments) -> Result<i32> {
+    let scene = read(arguments)?;
+    let output = arguments.output.as_deref();
+    let exported = description::export(&scene, output.unwrap_or(Path::new("")));
+    match output {
+        Some(path) => {
+            for (name, bytes) in &exported.files {
+                write_atomically(&directory_of(path).join(name), bytes)?;
+            }
+        }
+        None if !exported.files.is_empty() => {
+            return Err(Error::Config(
+                "expected -o FILE.xml, for a cone becomes a mesh that is written beside the scene; found none".into(),
+            ));
+        }
+        None => {}
+    }
+    write(output, &exported.xml)?;
+    for loss in &exported.losses {
+        let message = format!("Mitsuba cannot express this; it gets {}", loss.instead);
+        super::complain(&format!("note: {}", scene.fault(&loss.field, &message)));
+    }
+    Ok(0)
+}
+
+/// The one scene that is asked for.
+fn read(arguments: &ConvertArguments) -> Result<SceneDescription> {
+    let file = &arguments.scene.file;
+    let overrides = arguments.scene.overrides(None);
+    match &batch::entries(file, &overrides)?[..] {
+        [entry] => entry.scene(&overrides.set),
+        entries => Err(Error::Config(format!(
+            "{}: expected one scene, found {}; --scene NAME picks one",
+            file.display(),
+            entries.len()
+        ))),
+    }
+}
+
+fn write(path: Option<&Path>, text: &str) -> Result<()> {
+    match path {
+        Some(path) => write_atomically(path, text.as_bytes()),
+        None => {
+            super::say(text);
+            Ok(())
+        }
+    }
+}

@@ -1,0 +1,326 @@
+//! Scenes of the grammar as Mitsuba 3 XML.
+//!
+//! What Mitsuba can express becomes its plugins. What it cannot is told as a [`Loss`], and stands in
+//! the file twice: as the nearest thing that Mitsuba has, for Mitsuba, and before it as it was
+//! written, in a processing instruction, which Mitsuba passes over and the importer reads:
+//!
+//! ```xml
+//! <?abbe set render.seed: 7?>
+//! <?abbe instead bsdf: {dielectric: {ior: {glass: N-SF11}}}?>
+//! <bsdf type="dielectric" id="flint"><float name="int_ior" value="1.785"/></bsdf>
+//! <?abbe end?>
+//! ```
+//!
+//! So reading the file back gives the scene. Mitsuba's picture of it is brighter by the factor of
+//! [`FILM`](super::FILM), everywhere and evenly.
+//!
+//! Ids are one list in Mitsuba and one for each kind in the grammar: where two kinds share a name, the
+//! id of one ends in its kind, `floor (texture)`, which the importer takes away.
+
+mod light;
+mod shape;
+mod spectra;
+mod surface;
+mod xml;
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::super::camera::{Camera, Clip, Filter, FovAxis, Image, Pose, Projection};
+use super::super::node::{Node, Sources, Value};
+use super::super::path;
+use super::super::print::{Printer, relative};
+use super::super::scene::SceneDescription;
+use super::super::settings::Integrator;
+use super::DAYLIGHT;
+use xml::Xml;
+
+/// Something that Mitsuba cannot express.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loss {
+    /// The field, as `shapes[3].cone`.
+    pub field: String,
+    /// What stands in its place.
+    pub instead: String,
+}
+
+/// A scene for Mitsuba.
+#[derive(Clone, Debug)]
+pub struct Exported {
+    /// The text of the scene file.
+    pub xml: String,
+    /// What it cannot say, in the order of the text.
+    pub losses: Vec<Loss>,
+    /// Files that it names and that do not exist yet: name, beside the scene, and content.
+    pub files: Vec<(String, Vec<u8>)>,
+}
+
+/// Writes `scene` for the file `path`.
+#[must_use]
+pub fn export(scene: &SceneDescription, path: &Path) -> Exported {
+    let nothing = Node::new(Default::default(), Value::Null);
+    let no_sources = Sources::default();
+    let (root, sources) = scene.tree().unwrap_or((&nothing, &no_sources));
+    let stem = path.file_stem().map_or(String::new(), |stem| format!("{}.", stem.to_string_lossy()));
+    let directory = path.parent().unwrap_or(Path::new(""));
+    let (losses, files) = (Vec::new(), Vec::new());
+    let ids = BTreeSet::new();
+    let mut export = Export { scene, root, sources, directory, stem, ids, xml: Xml::default(), losses, files };
+    export.scene();
+    let Export { xml, mut losses, files, .. } = export;
+    losses.dedup();
+    Exported { xml: xml.finish(), losses, files }
+}
+
+struct Export<'a> {
+    scene: &'a SceneDescription,
+    root: &'a Node,
+    sources: &'a Sources,
+    directory: &'a Path,
+    /// Before the names of files that are written beside the scene.
+    stem: String,
+    /// Ids that shapes have.
+    ids: BTreeSet<String>,
+    xml: Xml,
+    losses: Vec<Loss>,
+    files: Vec<(String, Vec<u8>)>,
+}
+
+/// Settings that are about the work and the files, not about the light: Mitsuba has other words for
+/// some, but the same ones mean other things.
+const SETTINGS: [&str; 7] = ["render", "output", "fog", "medium", "layers", "volumes", "groups"];
+
+impl<'a> Export<'a> {
+    fn scene(&mut self) {
+        self.xml.open("scene", &[("version", "3.0.0")]);
+        for key in SETTINGS {
+            if let Some(node) = self.root.get(key) {
+                let yaml = self.yaml(node);
+                self.xml.instruction(&format!("set {key}: {yaml}"));
+                if key == "fog" {
+                    self.lose("fog", "nothing: Mitsuba has no fog by depth");
+                }
+            }
+        }
+        let samples = self.scene.render.samples.to_string();
+        self.xml.leaf("default", &[("name", "spp"), ("value", &samples)]);
+        self.integrator();
+        self.sensor();
+        for (name, texture) in &self.scene.textures {
+            self.texture(name, texture);
+        }
+        let used = self.used_materials();
+        for (name, material) in self.scene.materials.iter().filter(|(name, _)| used.contains(name.as_str())) {
+            self.material(&format!("materials.{name}"), material, Some(name));
+        }
+        for (name, medium) in &self.scene.media {
+            self.medium(name, medium);
+        }
+        for (i, shape) in self.scene.shapes.iter().enumerate() {
+            self.shape(i, shape);
+        }
+        for (i, light) in self.scene.lights.iter().enumerate() {
+            self.light(i, light);
+        }
+        self.xml.close();
+    }
+
+    /// Names of the materials that shapes have, or that such materials are made of.
+    fn used_materials(&self) -> BTreeSet<&'a str> {
+        let mut used = BTreeSet::new();
+        let mut open: Vec<&Node> = ["shapes", "groups"].iter().filter_map(|key| self.root.get(key)).collect();
+        while let Some(node) = open.pop() {
+            match &node.value {
+                Value::List(items) => open.extend(items),
+                Value::Map(entries) => open.extend(entries.iter().map(|entry| &entry.node)),
+                // Any text may be a name; one that is not used does no harm.
+                Value::Text(text) => {
+                    if let Some((name, _)) = self.scene.materials.get_key_value(text)
+                        && used.insert(name.as_str())
+                    {
+                        open.extend(self.root.get("materials").and_then(|materials| materials.get(name)));
+                    }
+                }
+                _ => {}
+            }
+        }
+        used
+    }
+
+    /// An id for something of a kind that has this name.
+    fn id(&mut self, name: &str, kind: &str) -> String {
+        let [materials, textures] = [self.scene.materials.contains_key(name), self.scene.textures.contains_key(name)];
+        let taken = match kind {
+            "bsdf" => false,
+            "texture" => materials,
+            "medium" => materials || textures,
+            _ => materials || textures || self.scene.media.contains_key(name),
+        };
+        if taken { format!("{name} ({kind})") } else { name.to_owned() }
+    }
+
+    /// Says that Mitsuba gets something else.
+    fn lose(&mut self, field: &str, instead: impl Into<String>) {
+        self.losses.push(Loss { field: field.to_owned(), instead: instead.into() });
+    }
+
+    /// Begins what stands for a field that Mitsuba cannot express; `end` closes it.
+    fn instead(&mut self, tag: &str, field: &str, instead: impl Into<String>) {
+        self.lose(field, instead);
+        let yaml = path::parse(field).ok().and_then(|path| self.root.find(&path)).map(|node| self.yaml(node));
+        self.xml.instruction(&format!("instead {tag}: {}", yaml.unwrap_or_else(|| "{}".to_owned())));
+    }
+
+    fn end(&mut self) {
+        self.xml.instruction("end");
+    }
+
+    fn yaml(&self, node: &Node) -> String {
+        Printer { sources: self.sources, directory: self.directory }.flow(node)
+    }
+
+    /// A path as it is written in the file.
+    fn file(&self, file: &Path) -> String {
+        relative(file, self.directory).to_string_lossy().into_owned()
+    }
+
+    fn integrator(&mut self) {
+        // Theirs counts the crossing of a pane as scattering, unless it is the one for media.
+        let counts = matches!(&self.scene.integrator, Integrator::Path(path) if path.count_crossings);
+        let plugin = if counts { "path" } else { "volpath" };
+        let (depth, roulette, hidden) = match &self.scene.integrator {
+            Integrator::Path(path) => {
+                if path.light_samples != 1 || path.scatter_samples != 1 {
+                    self.lose("integrator.path", "one shadow ray and one scattered ray at each surface");
+                }
+                (path.max_depth, path.roulette_depth, path.hide_emitters)
+            }
+            other => {
+                let (tag, what) = match other {
+                    Integrator::Whitted(_) => ("whitted", "a path tracer: Mitsuba has no Whitted ray tracer"),
+                    _ => ("", "a path tracer"),
+                };
+                let field = if tag.is_empty() { "integrator".to_owned() } else { format!("integrator.{tag}") };
+                self.lose(&field, what);
+                let yaml = self.root.get("integrator").map(|node| self.yaml(node)).unwrap_or_default();
+                self.xml.instruction(&format!("instead integrator: {yaml}"));
+                self.xml.open("integrator", &[("type", plugin)]);
+                self.xml.close();
+                self.end();
+                return;
+            }
+        };
+        self.xml.open("integrator", &[("type", plugin)]);
+        if let Some(depth) = depth {
+            self.xml.value("integer", "max_depth", depth);
+        }
+        self.xml.value("integer", "rr_depth", roulette);
+        if hidden {
+            self.xml.value("boolean", "hide_emitters", true);
+        }
+        self.xml.close();
+    }
+
+    fn sensor(&mut self) {
+        let Camera { pose, projection, lens, clip, principal_point } = &self.scene.camera;
+        let Image { width, height, filter, crop, sensitivity, .. } = &self.scene.image;
+        // The film's unit is theirs.
+        let yaml = Node::new(self.root.place, Value::Float(*sensitivity));
+        let yaml = self.yaml(&yaml);
+        self.xml.instruction(&format!("set image.sensitivity: {yaml}"));
+        let plugin = match (projection, lens) {
+            (Projection::Orthographic { .. }, _) => "orthographic",
+            (Projection::Perspective { .. }, Some(_)) => "thinlens",
+            (Projection::Perspective { .. }, None) => "perspective",
+        };
+        self.xml.open("sensor", &[("type", plugin)]);
+        self.xml.open("transform", &[("name", "to_world")]);
+        if let Projection::Orthographic { height: shown } = projection {
+            // Theirs shows −1 to 1 across the width.
+            let half = 0.5 * shown * f64::from(*width) / f64::from(*height);
+            self.xml.leaf("scale", &[("x", &half.to_string()), ("y", &half.to_string())]);
+            if lens.is_some() {
+                self.lose("camera.lens", "none: Mitsuba's orthographic camera has no lens");
+            }
+        }
+        match pose {
+            Pose::LookAt { origin, target, up } => {
+                let [origin, target, up] = [origin, target, up].map(|v| xml::numbers(v));
+                self.xml.leaf("lookat", &[("origin", &origin), ("target", &target), ("up", &up)]);
+            }
+            Pose::ToWorld(rows) => {
+                // Theirs has +x to the left.
+                let rows = rows.map(|[x, y, z, w]| [-x, y, z, w]);
+                self.xml.leaf("matrix", &[("value", &xml::numbers(rows.as_flattened()))]);
+            }
+        }
+        self.xml.close();
+        if let Projection::Perspective { fov_deg, fov_axis } = projection {
+            let axis = match fov_axis {
+                FovAxis::X => "x",
+                FovAxis::Y => "y",
+                FovAxis::Smaller => "smaller",
+                FovAxis::Larger => "larger",
+                FovAxis::Diagonal => "diagonal",
+            };
+            self.xml.value("float", "fov", fov_deg);
+            self.xml.value("string", "fov_axis", axis);
+            if *principal_point != [0.0; 2] {
+                self.xml.value("float", "principal_point_offset_x", principal_point[0]);
+                self.xml.value("float", "principal_point_offset_y", principal_point[1]);
+            }
+        }
+        if *clip == Clip::default() {
+            // Theirs always ends somewhere.
+            self.xml.instruction("set camera.clip: {near: 0}");
+        }
+        self.xml.value("float", "near_clip", if clip.near > 0.0 { clip.near } else { 1e-4 });
+        self.xml.value("float", "far_clip", clip.far.min(1e8));
+        if let (Some(lens), "thinlens") = (lens, plugin) {
+            self.xml.value("float", "aperture_radius", lens.radius);
+            self.xml.value("float", "focus_distance", lens.focus_distance);
+        }
+        self.xml.open("sampler", &[("type", "independent")]);
+        self.xml.value("integer", "sample_count", "$spp");
+        self.xml.close();
+        self.xml.open("film", &[("type", "hdrfilm")]);
+        self.xml.value("integer", "width", width);
+        self.xml.value("integer", "height", height);
+        if let Some(crop) = crop {
+            self.xml.value("integer", "crop_offset_x", crop.x);
+            self.xml.value("integer", "crop_offset_y", crop.y);
+            self.xml.value("integer", "crop_width", crop.width);
+            self.xml.value("integer", "crop_height", crop.height);
+        }
+        self.xml.value("string", "pixel_format", "rgba");
+        self.xml.value("string", "component_format", "float32");
+        self.filter(*filter);
+        self.xml.close();
+        self.xml.close();
+        // Set above, since the importer maps what the film says to these.
+        self.image_settings();
+    }
+
+    /// What the importer would read from the film, said in our words.
+    fn image_settings(&mut self) {
+        if self.root.get("output").is_none() {
+            self.xml.instruction("set output: {}");
+        }
+    }
+
+    fn filter(&mut self, filter: Filter) {
+        let (plugin, field): (&str, Option<(&str, String)>) = match filter {
+            Filter::Box => ("box", None),
+            Filter::Tent { radius } => ("tent", Some(("radius", radius.to_string()))),
+            Filter::Gaussian { stddev, .. } => ("gaussian", Some(("stddev", stddev.to_string()))),
+            Filter::Mitchell { .. } => ("mitchell", None),
+            Filter::CatmullRom => ("catmullrom", None),
+            Filter::Lanczos { radius } => ("lanczos", Some(("lobes", radius.to_string()))),
+        };
+        self.xml.open("rfilter", &[("type", plugin)]);
+        if let Some((name, value)) = field {
+            self.xml.value(if name == "lobes" { "integer" } else { "float" }, name, value);
+        }
+        self.xml.close();
+    }
+}

@@ -1,0 +1,252 @@
+//! Shapes.
+
+use glam::{DMat4, DVec3, DVec4};
+
+use super::super::super::material::{Material, MaterialRef};
+use super::super::super::shape::{Caps, Cone, Geometry, Layout, Normals, Shape, Sphere};
+use super::super::super::spectrum::SpectrumOrTexture;
+use super::Export;
+use super::xml::numbers;
+use crate::math::Frame;
+use crate::math::trig::sin_cos_turn;
+
+/// Half the side of what stands for a plane without end, metres.
+const PLANE: f64 = 1e4;
+
+impl Export<'_> {
+    /// A shape of the scene's list.
+    pub(super) fn shape(&mut self, i: usize, shape: &Shape) {
+        let why = self.shape_shortfall(shape);
+        if let Some(why) = &why {
+            self.instead("shape", &format!("shapes[{i}]"), why.as_str());
+        }
+        let field = format!("shapes[{i}].{}", shape.geometry.kind());
+        let world = shape.world_from_object();
+        match &shape.geometry {
+            Geometry::Sphere(sphere) => {
+                self.open("sphere", shape);
+                self.xml.value("point", "center", numbers(&sphere.center));
+                self.xml.value("float", "radius", sphere.radius);
+                self.to_world(world);
+            }
+            Geometry::Cylinder(cylinder) => {
+                for (cap, at, from) in
+                    [(Caps::Base, cylinder.base, cylinder.top), (Caps::Top, cylinder.top, cylinder.base)]
+                {
+                    if cylinder.caps == Caps::Both || cylinder.caps == cap {
+                        let outward = DVec3::from(at) - DVec3::from(from);
+                        self.xml.open("shape", &[("type", "disk")]);
+                        self.to_world(world * placed(at.into(), outward, cylinder.radius));
+                        self.surface(&field, shape);
+                        self.xml.close();
+                    }
+                }
+                self.open("cylinder", shape);
+                self.xml.value("point", "p0", numbers(&cylinder.base));
+                self.xml.value("point", "p1", numbers(&cylinder.top));
+                self.xml.value("float", "radius", cylinder.radius);
+                self.to_world(world);
+            }
+            Geometry::Cone(cone) => {
+                self.open("ply", shape);
+                let name = format!("{}shape{i}.ply", self.stem);
+                self.xml.value("string", "filename", &name);
+                self.files.push((name, cone_mesh(cone).into_bytes()));
+                self.to_world(world);
+            }
+            Geometry::Disk(disk) => {
+                self.open("disk", shape);
+                self.to_world(world * placed(disk.center.into(), disk.normal.into(), disk.radius));
+            }
+            Geometry::Plane(plane) => {
+                self.open("rectangle", shape);
+                self.to_world(world * placed(plane.point.into(), plane.normal.into(), PLANE));
+            }
+            Geometry::Rectangle(rectangle) => {
+                self.open("rectangle", shape);
+                let [corner, u, v] = [rectangle.corner, rectangle.edge_u, rectangle.edge_v].map(|v| DVec3::from(v));
+                let (u, v) = (0.5 * u, 0.5 * v);
+                let columns = [u, v, u.cross(v).normalize_or_zero()].map(|column| column.extend(0.0));
+                let centre = (corner + u + v).extend(1.0);
+                self.to_world(world * DMat4::from_cols(columns[0], columns[1], columns[2], centre));
+            }
+            Geometry::Cube(cube) => {
+                self.open("cube", shape);
+                let half = DVec3::from(cube.size.xyz()) * 0.5;
+                self.to_world(world * DMat4::from_translation(cube.center.into()) * DMat4::from_scale(half));
+            }
+            Geometry::Mesh(mesh) => {
+                let ply = mesh.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
+                self.open(if ply { "ply" } else { "obj" }, shape);
+                let file = self.file(&mesh.file);
+                self.xml.value("string", "filename", file);
+                if mesh.normals == Normals::Face {
+                    self.xml.value("boolean", "face_normals", true);
+                }
+                self.to_world(world);
+            }
+            #[allow(unreachable_patterns, reason = "kinds to come")]
+            _ => {
+                self.open("sphere", shape);
+                self.to_world(world);
+            }
+        }
+        self.surface(&field, shape);
+        self.xml.close();
+        let layout = match &shape.geometry {
+            Geometry::Sphere(sphere) => Some(sphere.layout),
+            Geometry::Cube(cube) => Some(cube.layout),
+            _ => None,
+        };
+        match (why, layout) {
+            (Some(_), _) => self.end(),
+            // No picture lies on it, but the same random numbers shall mean the same directions.
+            (None, Some(Layout::YUp)) => {
+                self.xml.instruction(&format!("set shapes[{i}].{}.layout: y_up", shape.geometry.kind()));
+            }
+            (None, _) => {}
+        }
+    }
+
+    /// Material, light and media.
+    fn surface(&mut self, field: &str, shape: &Shape) {
+        let mirrored = shape.world_from_object().determinant() < 0.0;
+        // A sphere, disk or rectangle that is mirrored is turned inside out by Mitsuba.
+        let flat = matches!(shape.geometry, Geometry::Sphere(_) | Geometry::Disk(_) | Geometry::Rectangle(_));
+        if shape.flip_normals != (mirrored && flat) {
+            self.xml.value("boolean", "flip_normals", true);
+        }
+        self.material_ref(&format!("{field}.material"), &shape.material);
+        if let Some(emission) = &shape.emission {
+            self.area(emission);
+        }
+        for (key, medium) in [("interior", &shape.inside), ("exterior", &shape.outside)] {
+            if let Some(medium) = medium {
+                let id = self.id(medium, "medium");
+                self.xml.leaf("ref", &[("name", key), ("id", &id)]);
+            }
+        }
+    }
+
+    fn open(&mut self, plugin: &str, shape: &Shape) {
+        match shape.name.as_ref().map(|name| self.id(name, "shape")) {
+            Some(id) if self.ids.insert(id.clone()) => self.xml.open("shape", &[("type", plugin), ("id", &id)]),
+            _ => self.xml.open("shape", &[("type", plugin)]),
+        }
+    }
+
+    fn to_world(&mut self, matrix: DMat4) {
+        if matrix != DMat4::IDENTITY {
+            let rows = matrix.transpose().to_cols_array();
+            self.xml.open("transform", &[("name", "to_world")]);
+            self.xml.leaf("matrix", &[("value", &numbers(&rows))]);
+            self.xml.close();
+        }
+    }
+
+    /// What Mitsuba gets in place of a shape that it cannot express.
+    fn shape_shortfall(&self, shape: &Shape) -> Option<String> {
+        let said = |text: &str| Some(text.to_owned());
+        let textured =
+            self.is_textured(&shape.material) || matches!(shape.emission, Some(SpectrumOrTexture::Texture(_)));
+        let grey = match &shape.emission {
+            Some(SpectrumOrTexture::Spectrum(spectrum)) if !Export::can_say(spectrum) => said("a grey light"),
+            _ => None,
+        };
+        let own = match &shape.geometry {
+            Geometry::Rectangle(_) => None,
+            Geometry::Plane(_) => said("a square of 20 km: Mitsuba has no plane without end"),
+            Geometry::Cone(cone) => Some(format!(
+                "a mesh of {SEGMENTS} sides, at most {:.2e} m inside: Mitsuba has no cone",
+                cone.radius * (1.0 - libm::cos(std::f64::consts::PI / f64::from(SEGMENTS)))
+            )),
+            Geometry::Cylinder(c) if c.caps != Caps::None => {
+                said("a tube and disks at its ends: Mitsuba's cylinder has none")
+            }
+            Geometry::Sphere(Sphere { layout: Layout::ZUp, .. }) => None,
+            Geometry::Sphere(_) | Geometry::Cylinder(_) | Geometry::Disk(_) | Geometry::Cube(_) if textured => {
+                said("the same shape with Mitsuba's texture coordinates")
+            }
+            Geometry::Sphere(_) | Geometry::Cylinder(_) | Geometry::Disk(_) | Geometry::Cube(_) => None,
+            Geometry::Mesh(mesh) => match mesh.normals {
+                Normals::File | Normals::Smooth => {
+                    said("the same mesh; without normals in its file Mitsuba smooths each vertex by itself")
+                }
+                _ => None,
+            },
+            #[allow(unreachable_patterns, reason = "kinds to come")]
+            _ => said("a ball: this kind is not exported yet"),
+        };
+        let weight =
+            shape.sampling_weight.is_some().then(|| "the same light, chosen as often as the others".to_owned());
+        let beam = shape.emission_direction.is_some().then(|| "light in all directions".to_owned());
+        own.or(grey).or(weight).or(beam)
+    }
+
+    fn is_textured(&self, material: &MaterialRef) -> bool {
+        let material = match material {
+            MaterialRef::Name(name) => self.scene.materials.get(name),
+            MaterialRef::Inline(material) => Some(material),
+        };
+        match material {
+            Some(Material::Diffuse(m)) => matches!(m.reflectance, SpectrumOrTexture::Texture(_)),
+            Some(Material::Plastic(m)) => {
+                [&m.reflectance, &m.tint].iter().any(|t| matches!(t, SpectrumOrTexture::Texture(_)))
+            }
+            Some(Material::Mirror(_) | Material::Boundary(_)) | None => false,
+            // Grain and relief follow the texture coordinates too.
+            Some(other) => format!("{other:?}").contains("Texture(") || format!("{other:?}").contains("Brushed"),
+        }
+    }
+}
+
+/// Sides of the mesh that stands for a cone.
+const SEGMENTS: u32 = 256;
+
+/// A cone as a PLY of smooth sides: each triangle has its corners and their normals for itself.
+fn cone_mesh(cone: &Cone) -> String {
+    let (base, apex) = (DVec3::from(cone.base), DVec3::from(cone.apex));
+    let axis = apex - base;
+    let height = axis.length();
+    let frame = Frame::from_normal(axis / height);
+    let turn = |k: f64| {
+        let (sin, cos) = sin_cos_turn((k / f64::from(SEGMENTS)).fract());
+        frame.s * cos + frame.t * sin
+    };
+    let slope = |k: f64| (turn(k) * height + frame.n * cone.radius).normalize_or_zero();
+    let mut corners: Vec<(DVec3, DVec3)> = Vec::new();
+    for k in 0..SEGMENTS {
+        let k = f64::from(k);
+        let ring = [k, k + 1.0].map(|k| base + turn(k) * cone.radius);
+        corners.extend([(ring[0], slope(k)), (ring[1], slope(k + 1.0)), (apex, slope(k + 0.5))]);
+        if cone.cap {
+            corners.extend([ring[1], ring[0], base].map(|corner| (corner, -frame.n)));
+        }
+    }
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
+         property double nx\nproperty double ny\nproperty double nz\nelement face {}\n\
+         property list uchar int vertex_indices\nend_header\n",
+        corners.len(),
+        corners.len() / 3
+    );
+    for (p, n) in &corners {
+        text.push_str(&format!("{} {} {} {} {} {}\n", p.x, p.y, p.z, n.x, n.y, n.z));
+    }
+    for i in (0..corners.len()).step_by(3) {
+        text.push_str(&format!("3 {i} {} {}\n", i + 1, i + 2));
+    }
+    text
+}
+
+/// The unit square or disk across z, moved, turned and scaled.
+fn placed(centre: DVec3, normal: DVec3, scale: f64) -> DMat4 {
+    let frame = Frame::from_normal(normal.normalize_or_zero());
+    let column = |v: DVec3, by: f64| (v * by).extend(0.0);
+    DMat4::from_cols(
+        column(frame.s, scale),
+        column(frame.t, scale),
+        column(frame.n, 1.0),
+        DVec4::new(centre.x, centre.y, centre.z, 1.0),
+    )
+}

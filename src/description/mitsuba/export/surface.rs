@@ -1,0 +1,311 @@
+//! Materials and textures.
+
+use super::super::super::compound::{NumberOrTexture, Roughness};
+use super::super::super::material::{
+    Conductor, ConductorIndex, Dielectric, DiffuseMean, Distribution, Fresnel, Material, MaterialRef, Plastic, Texture,
+    TextureFilter, ThinDielectric, Wrap,
+};
+use super::super::super::spectrum::{Index, Spectrum, SpectrumOrTexture};
+use super::Export;
+use super::spectra::Role;
+use super::xml::numbers;
+use crate::spectrum::{Lanes, RefractiveIndex, catalogue};
+
+/// The wavelength at which a dispersive index is taken where there can be only one: the d line, nm.
+const D_LINE_NM: f64 = 587.5618;
+
+impl Export<'_> {
+    /// A material of the scene's list.
+    pub(super) fn material(&mut self, field: &str, material: &Material, id: Option<&str>) {
+        match shortfall(material) {
+            Some(why) => {
+                self.instead("bsdf", field, why);
+                self.bsdf(material, id);
+                self.end();
+            }
+            None => self.bsdf(material, id),
+        }
+    }
+
+    /// The material of a shape.
+    pub(super) fn material_ref(&mut self, field: &str, material: &MaterialRef) {
+        match material {
+            MaterialRef::Name(name) => self.xml.leaf("ref", &[("id", name)]),
+            MaterialRef::Inline(material) => self.material(field, material, None),
+        }
+    }
+
+    fn bsdf(&mut self, material: &Material, id: Option<&str>) {
+        let two_sided = match material {
+            Material::Diffuse(m) => m.two_sided,
+            Material::Conductor(m) => m.two_sided,
+            Material::Plastic(m) => m.two_sided,
+            Material::Mirror(_) => true,
+            _ => false,
+        };
+        let named = |plugin: &'static str, id: Option<&str>| -> Vec<(&'static str, String)> {
+            let mut attributes = vec![("type", plugin.to_owned())];
+            attributes.extend(id.map(|id| ("id", id.to_owned())));
+            attributes
+        };
+        let inner_id = if two_sided { None } else { id };
+        if two_sided {
+            let attributes = named("twosided", id);
+            self.open_owned("bsdf", &attributes);
+        }
+        match material {
+            Material::Diffuse(m) => {
+                self.open_owned("bsdf", &named("diffuse", inner_id));
+                self.spectrum_or_texture("reflectance", &m.reflectance, Role::Reflectance);
+            }
+            Material::Mirror(m) => {
+                self.open_owned("bsdf", &named("conductor", inner_id));
+                self.xml.value("string", "material", "none");
+                self.spectrum("specular_reflectance", &m.reflectance, Role::Reflectance);
+            }
+            Material::Conductor(m) => {
+                self.conductor(m, &named(plugin("conductor", "roughconductor", &m.roughness), inner_id))
+            }
+            Material::Dielectric(m) => {
+                self.dielectric(m, &named(plugin("dielectric", "roughdielectric", &m.roughness), inner_id));
+            }
+            Material::ThinDielectric(m) => self.thin(m, &named("thindielectric", inner_id)),
+            Material::Plastic(m) => {
+                let kind = if m.roughness > 0.0 { "roughplastic" } else { "plastic" };
+                self.plastic(m, &named(kind, inner_id));
+            }
+            Material::Boundary(_) => self.open_owned("bsdf", &named("null", inner_id)),
+            _ => self.open_owned("bsdf", &named("diffuse", inner_id)),
+        }
+        self.xml.close();
+        if two_sided {
+            self.xml.close();
+        }
+    }
+
+    fn open_owned(&mut self, tag: &'static str, attributes: &[(&'static str, String)]) {
+        let borrowed: Vec<(&str, &str)> = attributes.iter().map(|(name, value)| (*name, value.as_str())).collect();
+        self.xml.open(tag, &borrowed);
+    }
+
+    fn conductor(&mut self, m: &Conductor, attributes: &[(&'static str, String)]) {
+        self.open_owned("bsdf", attributes);
+        match &m.index {
+            ConductorIndex::Metal(name) => {
+                if let Ok((eta, k)) = catalogue::metal(name) {
+                    for (key, curve) in [("eta", eta), ("k", k)] {
+                        let pair = |nm: u32| format!("{nm}:{}", curve.eval(Lanes::splat(nm as f32)).to_array()[0]);
+                        let pairs: Vec<String> = (360..=830).step_by(5).map(pair).collect();
+                        self.xml.value("spectrum", key, pairs.join(", "));
+                    }
+                }
+            }
+            ConductorIndex::Written { eta, k } => {
+                self.spectrum("eta", eta, Role::Coefficient);
+                self.spectrum("k", k, Role::Coefficient);
+            }
+        }
+        self.tint("specular_reflectance", &m.tint);
+        self.roughness(&m.roughness, m.distribution);
+    }
+
+    fn dielectric(&mut self, m: &Dielectric, attributes: &[(&'static str, String)]) {
+        self.open_owned("bsdf", attributes);
+        self.indices(&m.ior, &m.exterior_ior);
+        self.tints(&m.reflection_tint, &m.transmission_tint);
+        self.roughness(&m.roughness, m.distribution);
+    }
+
+    fn thin(&mut self, m: &ThinDielectric, attributes: &[(&'static str, String)]) {
+        self.open_owned("bsdf", attributes);
+        self.indices(&m.ior, &m.exterior_ior);
+        self.tints(&m.reflection_tint, &m.transmission_tint);
+    }
+
+    fn plastic(&mut self, m: &Plastic, attributes: &[(&'static str, String)]) {
+        self.open_owned("bsdf", attributes);
+        self.spectrum_or_texture("diffuse_reflectance", &m.reflectance, Role::Reflectance);
+        self.tint("specular_reflectance", &m.tint);
+        self.indices(&m.ior, &Index::Number(1.0));
+        self.xml.value("boolean", "nonlinear", m.nonlinear);
+        if m.roughness > 0.0 {
+            self.roughness(&Roughness::Number(m.roughness), m.distribution);
+        }
+    }
+
+    fn indices(&mut self, inside: &Index, outside: &Index) {
+        self.xml.value("float", "int_ior", at_d(inside));
+        self.xml.value("float", "ext_ior", at_d(outside));
+    }
+
+    fn tints(&mut self, reflection: &SpectrumOrTexture, transmission: &SpectrumOrTexture) {
+        self.tint("specular_reflectance", reflection);
+        self.tint("specular_transmittance", transmission);
+    }
+
+    /// A factor, where it is one.
+    fn tint(&mut self, name: &str, tint: &SpectrumOrTexture) {
+        if *tint != SpectrumOrTexture::Spectrum(Spectrum::Number(1.0)) {
+            self.spectrum_or_texture(name, tint, Role::Reflectance);
+        }
+    }
+
+    fn roughness(&mut self, roughness: &Roughness, distribution: Distribution) {
+        match roughness {
+            Roughness::Number(alpha) if *alpha == 0.0 => return,
+            Roughness::Number(alpha) => self.xml.value("float", "alpha", alpha),
+            Roughness::Texture(name) => self.texture_ref("alpha", name),
+            Roughness::Brushed(brushed) => {
+                for (key, alpha) in [("alpha_u", &brushed.u), ("alpha_v", &brushed.v)] {
+                    match alpha {
+                        NumberOrTexture::Number(alpha) => self.xml.value("float", key, alpha),
+                        NumberOrTexture::Texture(name) => self.texture_ref(key, name),
+                    }
+                }
+            }
+        }
+        let name = match distribution {
+            Distribution::Ggx => "ggx",
+            Distribution::Beckmann => "beckmann",
+        };
+        self.xml.value("string", "distribution", name);
+    }
+
+    /// A texture of the scene's list.
+    pub(super) fn texture(&mut self, name: &str, texture: &Texture) {
+        let id = &self.id(name, "texture");
+        match texture {
+            Texture::Image(image) => {
+                let odd = image.wrap_v.is_some_and(|wrap| wrap != image.wrap) || image.illuminant.is_some();
+                if odd {
+                    let why = "one way to go on beyond the edges for u and v, and D65 where it shines";
+                    self.instead("texture", &format!("textures.{name}"), why);
+                }
+                self.xml.open("texture", &[("type", "bitmap"), ("id", id)]);
+                let file = self.file(&image.file);
+                self.xml.value("string", "filename", file);
+                let filter = match image.filter {
+                    TextureFilter::Bilinear => "bilinear",
+                    TextureFilter::Nearest => "nearest",
+                };
+                self.xml.value("string", "filter_type", filter);
+                let wrap = match image.wrap {
+                    Wrap::Repeat => "repeat",
+                    Wrap::Mirror => "mirror",
+                    Wrap::Clamp => "clamp",
+                };
+                self.xml.value("string", "wrap_mode", wrap);
+                self.xml.value("boolean", "raw", image.raw);
+                // Their pictures begin at the top.
+                let [[a, b, c], [d, e, f]] = affine(image.uv, image.scale, image.offset);
+                self.to_uv([[a, b, c], [-d, -e, 1.0 - f]]);
+                self.xml.close();
+                if odd {
+                    self.end();
+                }
+            }
+            Texture::Checkerboard(board) => {
+                let good = Export::can_say_either(&board.a) && Export::can_say_either(&board.b);
+                if !good {
+                    self.instead("texture", &format!("textures.{name}"), "grey squares in place of a spectrum");
+                }
+                self.xml.open("texture", &[("type", "checkerboard"), ("id", id)]);
+                self.spectrum_or_texture("color0", &board.a, Role::Reflectance);
+                self.spectrum_or_texture("color1", &board.b, Role::Reflectance);
+                self.to_uv(affine(board.uv, board.scale, [0.0; 2]));
+                self.xml.close();
+                if !good {
+                    self.end();
+                }
+            }
+            #[allow(unreachable_patterns, reason = "kinds that Mitsuba's files carry, or that are to come")]
+            _ => {
+                self.instead("texture", &format!("textures.{name}"), "grey: this kind is not exported yet");
+                self.xml.open("texture", &[("type", "checkerboard"), ("id", id)]);
+                self.xml.close();
+                self.end();
+            }
+        }
+    }
+
+    fn to_uv(&mut self, [[a, b, c], [d, e, f]]: [[f64; 3]; 2]) {
+        let rows = [a, b, 0.0, c, d, e, 0.0, f, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+        self.xml.open("transform", &[("name", "to_uv")]);
+        self.xml.leaf("matrix", &[("value", &numbers(&rows))]);
+        self.xml.close();
+    }
+}
+
+/// What Mitsuba gets in place of a material that it cannot express.
+fn shortfall(material: &Material) -> Option<String> {
+    let highlight = |given: bool| given.then(|| "no highlight: those belong to the Whitted ray tracer".to_owned());
+    let spectra = |all: &[&SpectrumOrTexture]| {
+        let good = all.iter().all(|spectrum| Export::can_say_either(spectrum));
+        (!good).then(|| "grey in place of a spectrum".to_owned())
+    };
+    let schlick = |fresnel: Fresnel| {
+        (fresnel == Fresnel::Schlick).then(|| "Fresnel's equations in place of Schlick's approximation".to_owned())
+    };
+    match material {
+        Material::Diffuse(m) => highlight(m.highlight.is_some()).or(spectra(&[&m.reflectance])),
+        Material::Mirror(m) => {
+            highlight(m.highlight.is_some()).or((!Export::can_say(&m.reflectance)).then(|| "a grey mirror".into()))
+        }
+        Material::Conductor(m) => {
+            let index = match &m.index {
+                ConductorIndex::Metal(_) => Some("its index at every fifth nanometre".to_owned()),
+                ConductorIndex::Written { eta, k } => {
+                    let good = Export::can_say_all(&[(eta, Role::Coefficient), (k, Role::Coefficient)]);
+                    (!good).then(|| "grey indices in place of spectra".to_owned())
+                }
+            };
+            highlight(m.highlight.is_some()).or(schlick(m.fresnel)).or(index).or(spectra(&[&m.tint]))
+        }
+        Material::Dielectric(m) => highlight(m.highlight.is_some())
+            .or(schlick(m.fresnel))
+            .or(dispersive(&m.ior, &m.exterior_ior))
+            .or(spectra(&[&m.reflection_tint, &m.transmission_tint])),
+        Material::ThinDielectric(m) => {
+            dispersive(&m.ior, &m.exterior_ior).or(spectra(&[&m.reflection_tint, &m.transmission_tint]))
+        }
+        Material::Plastic(m) if m.roughness > 0.0 && m.diffuse_mean == DiffuseMean::Integral => {
+            Some("the coat's mean over 64 cosines, which makes the base darker by up to 2 %".to_owned())
+        }
+        Material::Plastic(m) => highlight(m.highlight.is_some())
+            .or(dispersive(&m.ior, &Index::Number(1.0)))
+            .or(spectra(&[&m.reflectance, &m.tint])),
+        Material::Boundary(_) => None,
+        _ => Some("a grey diffuse surface: this kind is not exported yet".to_owned()),
+    }
+}
+
+/// u, v to the picture's: the map, then the scale, then the offset.
+fn affine(uv: Option<[[f64; 3]; 2]>, scale: [f64; 2], offset: [f64; 2]) -> [[f64; 3]; 2] {
+    let [u, v] = uv.unwrap_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    let row = |row: [f64; 3], scale: f64, offset: f64| [row[0] * scale, row[1] * scale, row[2] * scale + offset];
+    [row(u, scale[0], offset[0]), row(v, scale[1], offset[1])]
+}
+
+fn plugin(smooth: &'static str, rough: &'static str, roughness: &Roughness) -> &'static str {
+    if *roughness == Roughness::Number(0.0) { smooth } else { rough }
+}
+
+fn dispersive(inside: &Index, outside: &Index) -> Option<String> {
+    let constant = |index: &Index| matches!(index, Index::Number(_));
+    (!constant(inside) || !constant(outside)).then(|| {
+        format!("the index at {D_LINE_NM} nm, {:.4} over {:.4}: Mitsuba has no dispersion", at_d(inside), at_d(outside))
+    })
+}
+
+/// The index at the d line; 1.5 where it cannot be had, which the compiler will say.
+fn at_d(index: &Index) -> f64 {
+    let curve = match index {
+        Index::Number(n) => return *n,
+        Index::Abbe(abbe) => return abbe.nd,
+        Index::Glass(name) => catalogue::glass(name).ok(),
+        Index::Sellmeier(s) => Some(RefractiveIndex::Sellmeier { b: s.b, c: s.c }),
+        Index::Cauchy(c) => Some(RefractiveIndex::Cauchy { a: vec![c.a, c.b, c.c] }),
+        Index::Table(samples) => Some(RefractiveIndex::Table { samples: samples.clone() }),
+    };
+    curve.map_or(1.5, |curve| f64::from(curve.lanes(Lanes::splat(D_LINE_NM as f32))[0]))
+}
