@@ -370,7 +370,8 @@ impl Bounds {
         let origin = self.place_from_world.transform_point3(ray.origin);
         let direction = self.place_from_world.transform_vector3(ray.direction);
         let (inside, outside) = slab(origin, direction, [DVec3::ZERO, DVec3::from(self.size)], [enter, leave]);
-        if !(enter < leave) {
+        let meets = enter < leave;
+        if !meets {
             return March {
                 bounds: self,
                 origin,
@@ -382,14 +383,14 @@ impl Bounds {
                 block: None,
             };
         }
-        let empty = !(inside < outside);
+        let through_grid = inside < outside;
         March {
             bounds: self,
             origin,
             direction,
             at: enter,
-            inside: if empty { leave } else { inside },
-            outside: if empty { leave } else { outside },
+            inside: if through_grid { inside } else { leave },
+            outside: if through_grid { outside } else { leave },
             leave,
             block: None,
         }
@@ -454,7 +455,8 @@ impl Iterator for March<'_> {
 
     fn next(&mut self) -> Option<Stretch> {
         let from = self.at;
-        if !(from < self.leave) {
+        let goes_on = from < self.leave;
+        if !goes_on {
             return None;
         }
         let global = self.bounds.global;

@@ -161,7 +161,7 @@ fn grid_volume(written: &written::GridVolume, world_from_local: DAffine3) -> Res
     let mut local_from_world = world_from_local.inverse();
     if written.file_box {
         let extent = grid.max - grid.min;
-        if !(extent.min_element() > 0.0) {
+        if extent.min_element() <= 0.0 {
             let (min, max) = (grid.min, grid.max);
             return Err(Error::input(path, format!("expected a box with a volume, found {min} to {max}")));
         }
