@@ -12,6 +12,7 @@ use super::spectrum::{FilePath, Illuminant, Index, Role, Spectrum, SpectrumOrTex
 /// The material of a shape: the name of one, or one written in place.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[expect(clippy::large_enum_variant, reason = "one a shape, read once")]
 pub enum MaterialRef {
     /// A name under `materials`.
     Name(String),

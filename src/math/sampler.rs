@@ -287,7 +287,8 @@ mod tests {
     fn walks_are_independent() {
         let n = 4096;
         let walk = |i: u32, vertex| Sampler::new(3, [5, 8], 1, i).walk(Set::Extra(vertex));
-        let variants: [(&str, fn(u32) -> (u32, u32, u32)); 3] =
+        type Address = fn(u32) -> (u32, u32, u32);
+        let variants: [(&str, Address); 3] =
             [("step", |i| (i, 0, 1)), ("set", |i| (i, 1, 0)), ("sample", |i| (i + 1, 0, 0))];
         for (name, other) in variants {
             let product = |i| {

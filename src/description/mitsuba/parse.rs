@@ -618,8 +618,8 @@ impl Parser<'_> {
                 stack.pop();
                 continue;
             };
-            match property.value {
-                Value::Object(inner) => match states[inner] {
+            if let Value::Object(inner) = property.value {
+                match states[inner] {
                     State::Done(below) => visit.depth = visit.depth.max(below + 1),
                     State::Open => {
                         let message = "expected an object that does not hold itself, found a circle of references";
@@ -629,8 +629,7 @@ impl Parser<'_> {
                         stack.push(Visit { object: inner, next: 0, depth: 0 });
                         continue;
                     }
-                },
-                _ => {}
+                }
             }
             visit.next += 1;
         }

@@ -27,7 +27,7 @@ impl Export<'_> {
                 self.open("sphere", shape);
                 self.xml.value("point", "center", numbers(&sphere.center));
                 self.xml.value("float", "radius", sphere.radius);
-                self.to_world(world);
+                self.placing(world);
             }
             Geometry::Cylinder(cylinder) => {
                 for (cap, at, from) in
@@ -36,7 +36,7 @@ impl Export<'_> {
                     if cylinder.caps == Caps::Both || cylinder.caps == cap {
                         let outward = DVec3::from(at) - DVec3::from(from);
                         self.xml.open("shape", &[("type", "disk")]);
-                        self.to_world(world * placed(at.into(), outward, cylinder.radius));
+                        self.placing(world * placed(at.into(), outward, cylinder.radius));
                         self.surface(&field, shape);
                         self.xml.close();
                     }
@@ -45,35 +45,35 @@ impl Export<'_> {
                 self.xml.value("point", "p0", numbers(&cylinder.base));
                 self.xml.value("point", "p1", numbers(&cylinder.top));
                 self.xml.value("float", "radius", cylinder.radius);
-                self.to_world(world);
+                self.placing(world);
             }
             Geometry::Cone(cone) => {
                 self.open("ply", shape);
                 let name = format!("{}shape{i}.ply", self.stem);
                 self.xml.value("string", "filename", &name);
                 self.files.push((name, cone_mesh(cone).into_bytes()));
-                self.to_world(world);
+                self.placing(world);
             }
             Geometry::Disk(disk) => {
                 self.open("disk", shape);
-                self.to_world(world * placed(disk.center.into(), disk.normal.into(), disk.radius));
+                self.placing(world * placed(disk.center.into(), disk.normal.into(), disk.radius));
             }
             Geometry::Plane(plane) => {
                 self.open("rectangle", shape);
-                self.to_world(world * placed(plane.point.into(), plane.normal.into(), PLANE));
+                self.placing(world * placed(plane.point.into(), plane.normal.into(), PLANE));
             }
             Geometry::Rectangle(rectangle) => {
                 self.open("rectangle", shape);
-                let [corner, u, v] = [rectangle.corner, rectangle.edge_u, rectangle.edge_v].map(|v| DVec3::from(v));
+                let [corner, u, v] = [rectangle.corner, rectangle.edge_u, rectangle.edge_v].map(DVec3::from);
                 let (u, v) = (0.5 * u, 0.5 * v);
                 let columns = [u, v, u.cross(v).normalize_or_zero()].map(|column| column.extend(0.0));
                 let centre = (corner + u + v).extend(1.0);
-                self.to_world(world * DMat4::from_cols(columns[0], columns[1], columns[2], centre));
+                self.placing(world * DMat4::from_cols(columns[0], columns[1], columns[2], centre));
             }
             Geometry::Cube(cube) => {
                 self.open("cube", shape);
                 let half = DVec3::from(cube.size.xyz()) * 0.5;
-                self.to_world(world * DMat4::from_translation(cube.center.into()) * DMat4::from_scale(half));
+                self.placing(world * DMat4::from_translation(cube.center.into()) * DMat4::from_scale(half));
             }
             Geometry::Mesh(mesh) => {
                 let ply = mesh.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
@@ -83,12 +83,12 @@ impl Export<'_> {
                 if mesh.normals == Normals::Face {
                     self.xml.value("boolean", "face_normals", true);
                 }
-                self.to_world(world);
+                self.placing(world);
             }
             #[allow(unreachable_patterns, reason = "kinds to come")]
             _ => {
                 self.open("sphere", shape);
-                self.to_world(world);
+                self.placing(world);
             }
         }
         self.surface(&field, shape);
@@ -135,7 +135,7 @@ impl Export<'_> {
         }
     }
 
-    fn to_world(&mut self, matrix: DMat4) {
+    fn placing(&mut self, matrix: DMat4) {
         if matrix != DMat4::IDENTITY {
             let rows = matrix.transpose().to_cols_array();
             self.xml.open("transform", &[("name", "to_world")]);

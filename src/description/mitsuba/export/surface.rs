@@ -198,7 +198,7 @@ impl Export<'_> {
                 self.xml.value("boolean", "raw", image.raw);
                 // Their pictures begin at the top.
                 let [[a, b, c], [d, e, f]] = affine(image.uv, image.scale, image.offset);
-                self.to_uv([[a, b, c], [-d, -e, 1.0 - f]]);
+                self.uv_map([[a, b, c], [-d, -e, 1.0 - f]]);
                 self.xml.close();
                 if odd {
                     self.end();
@@ -212,7 +212,7 @@ impl Export<'_> {
                 self.xml.open("texture", &[("type", "checkerboard"), ("id", id)]);
                 self.spectrum_or_texture("color0", &board.a, Role::Reflectance);
                 self.spectrum_or_texture("color1", &board.b, Role::Reflectance);
-                self.to_uv(affine(board.uv, board.scale, [0.0; 2]));
+                self.uv_map(affine(board.uv, board.scale, [0.0; 2]));
                 self.xml.close();
                 if !good {
                     self.end();
@@ -228,7 +228,7 @@ impl Export<'_> {
         }
     }
 
-    fn to_uv(&mut self, [[a, b, c], [d, e, f]]: [[f64; 3]; 2]) {
+    fn uv_map(&mut self, [[a, b, c], [d, e, f]]: [[f64; 3]; 2]) {
         let rows = [a, b, 0.0, c, d, e, 0.0, f, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
         self.xml.open("transform", &[("name", "to_uv")]);
         self.xml.leaf("matrix", &[("value", &numbers(&rows))]);
@@ -307,5 +307,5 @@ fn at_d(index: &Index) -> f64 {
         Index::Cauchy(c) => Some(RefractiveIndex::Cauchy { a: vec![c.a, c.b, c.c] }),
         Index::Table(samples) => Some(RefractiveIndex::Table { samples: samples.clone() }),
     };
-    curve.map_or(1.5, |curve| f64::from(curve.lanes(Lanes::splat(D_LINE_NM as f32))[0]))
+    curve.map_or(1.5, |curve| curve.at(D_LINE_NM))
 }
