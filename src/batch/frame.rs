@@ -144,6 +144,21 @@ pub fn tiles(window: Window, side: u32) -> Vec<Window> {
         .collect()
 }
 
+/// Tiles of at most `side` pixels, halved until every thread has eight or they are 4 pixels wide: a
+/// small picture keeps all threads busy to its end. How it is cut changes no bit of it.
+fn shares(window: Window, side: u32, threads: usize) -> Vec<Window> {
+    let halves = std::iter::successors(Some(side), |side| (*side >= 8).then_some(side / 2));
+    let cuts = halves.map(|side| tiles(window, side));
+    let mut last = Vec::new();
+    for cut in cuts {
+        last = cut;
+        if last.len() >= 8 * threads {
+            break;
+        }
+    }
+    last
+}
+
 /// Sample ranges of the passes: 4, 8, 16, … up to `samples`.
 #[must_use]
 pub fn passes(samples: u32) -> Vec<Range<u32>> {
@@ -232,7 +247,7 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
     let total = job.window.pixels() as u64 * u64::from(job.samples);
     let done = AtomicU64::new(0);
     let mut milestones: Vec<Milestone> = Vec::new();
-    let tiles = tiles(job.window, job.tile);
+    let tiles = shares(job.window, job.tile, rayon::current_num_threads());
     let random = !matches!(job.plan.integrator, Integrator::Whitted(_));
 
     for pass in passes(job.samples) {
@@ -393,6 +408,15 @@ mod tests {
         assert_eq!(passes(1), vec![0..1; 1]);
         assert_eq!(passes(4), vec![0..4; 1]);
         assert_eq!(passes(21), [0..4, 4..8, 8..16, 16..21]);
+    }
+
+    #[test]
+    fn a_small_picture_is_cut_for_all_threads() {
+        let window = |side: u32| Window { x: 0, y: 0, width: side, height: side };
+        // 16 × 16 pixels make 16 tiles of 4 × 4, as small as they get; 1024 × 1024 stay whole tiles.
+        assert_eq!(shares(window(16), 32, 8).len(), 16);
+        assert_eq!(shares(window(48), 32, 2).len(), 36);
+        assert_eq!(shares(window(1024), 32, 2).len(), 1024);
     }
 
     #[test]

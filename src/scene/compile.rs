@@ -219,6 +219,7 @@ impl<'a> Compiler<'a> {
                 }
             },
         });
+        let shines_on_rays = lights.iter().any(|light| light.is_environment() || matches!(light, Light::Area { .. }));
         let has_boundaries = objects.iter().any(|o| self.materials[o.material as usize].lets_through());
         Ok(Scene {
             name: name.to_owned(),
@@ -237,6 +238,7 @@ impl<'a> Compiler<'a> {
             center,
             radius,
             has_boundaries,
+            shines_on_rays,
             files: std::mem::take(&mut self.files),
         })
     }

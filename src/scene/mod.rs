@@ -82,6 +82,8 @@ pub struct Scene {
     pub radius: f64,
     /// True where light may go straight through some object: the boundary of a medium, a pane.
     pub has_boundaries: bool,
+    /// True where a ray can meet light by chance: some light has an extent.
+    pub shines_on_rays: bool,
     /// Files that were read.
     pub files: Vec<PathBuf>,
 }

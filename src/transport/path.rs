@@ -359,6 +359,11 @@ impl Tracer<'_> {
                 );
             }
 
+            // The last ray of a path only looks for light: there is none to meet.
+            if !scene.shines_on_rays && self.is_next_to_last(&path) {
+                break;
+            }
+
             // On along a direction of the material's choice.
             // A pane that did not let the path straight through reflects it.
             let u_lobe = if straight.is_some() { 0.0 } else { choice[1] };
@@ -421,6 +426,11 @@ impl Tracer<'_> {
     /// Whether the path may not go on from where it is.
     fn is_last(&self, path: &Path) -> bool {
         self.settings.max_depth.is_some_and(|d| self.events(path) + 1 >= d)
+    }
+
+    /// Whether the path may go on once more, to see what shines there.
+    fn is_next_to_last(&self, path: &Path) -> bool {
+        self.settings.max_depth.is_some_and(|d| self.events(path) + 2 >= d)
     }
 
     /// Surfaces that a shadow ray from where the path is may go straight through.
