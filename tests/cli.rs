@@ -184,7 +184,7 @@ fn faults_with_words_of_others_begin_with_ours() {
         ),
         (
             "shapes: [{mesh: {file: no_picture.png}}]",
-            "no_picture.png: expected a mesh (.obj or .ply), found extension \"png\"",
+            "no_picture.png: expected a mesh (.obj, .ply or .serialized), found extension \"png\"",
             3,
         ),
         ("shapes: [{mesh: {file: odd.ply}}]", "odd.ply: ", 3),

@@ -1,8 +1,8 @@
 //! Curves with a thickness: hair, threads, wires; many in one object.
 //!
 //! [`Basis::Linear`]: balls at the control points and between them round cones that touch both, so that
-//! joints and ends are round; see [`cone`]. [`Basis::BSpline`]: uniform cubic B-splines, of which a circle
-//! sweeps the surface; the ends are open; see [`tube`].
+//! joints and ends are round; see `cone.rs`. [`Basis::BSpline`]: uniform cubic B-splines, of which a circle
+//! sweeps the surface; the ends are open; see `tube.rs`.
 //!
 //! **Only from outside.** As in Mitsuba, a ray meets a curve only where it comes from outside; what starts
 //! inside leaves unseen, and a piece that lies within another one does not show. It follows that a ray which
