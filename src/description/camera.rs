@@ -6,8 +6,8 @@ use serde::Deserialize;
 use super::fault::Checker;
 use super::material::given_fields;
 use super::path::At;
-use super::shape::{TransformStep, is_similarity, parallel};
 use super::spectrum::{Role, Spectrum, Vec3, one};
+use super::transform::{TransformStep, is_similarity, parallel};
 
 /// `camera: {origin: [0, 3.2, 12], target: [0, 1.1, 0], fov_deg: 38}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]

@@ -6,8 +6,8 @@ use serde::Deserialize;
 use super::camera::FovAxis;
 use super::fault::Checker;
 use super::path::At;
-use super::shape::{TransformStep, is_similarity, parallel};
 use super::spectrum::{FilePath, Role, SpectrumOrTexture, Vec3, one};
+use super::transform::{TransformStep, is_similarity, parallel};
 
 /// `environment: {file: sky.exr}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]

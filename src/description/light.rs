@@ -7,8 +7,8 @@ use super::emitter::{EnvironmentLight, Growth, ProjectorLight, check_weight};
 use super::fault::Checker;
 use super::material::given_fields;
 use super::path::At;
-use super::shape::parallel;
 use super::spectrum::{Role, Spectrum, Vec3, one};
+use super::transform::parallel;
 
 /// A light that is not a surface. Surfaces emit by their field `emission`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

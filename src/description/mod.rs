@@ -314,6 +314,8 @@ mod scene;
 mod settings;
 mod shape;
 mod spectrum;
+mod texture;
+mod transform;
 mod volume;
 mod yaml;
 
@@ -325,9 +327,8 @@ pub use hair::{Hair, HairColour};
 pub use layer::{Layer, LayerContent, LightForm, Quantity};
 pub use light::{Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, Light, PointLight, SpotLight};
 pub use material::{
-    Boundary, Checkerboard, Conductor, ConductorIndex, Dielectric, Diffuse, DiffuseMean, Distribution, Fresnel,
-    Highlight, HighlightModel, ImageTexture, Material, MaterialRef, MeshAttribute, Mirror, Plastic, Texture,
-    TextureFilter, ThinDielectric, Wrap,
+    Boundary, Conductor, ConductorIndex, Dielectric, Diffuse, DiffuseMean, Distribution, Fresnel, Highlight,
+    HighlightModel, Material, MaterialRef, Mirror, Plastic, ThinDielectric,
 };
 pub use medium::{Coefficients, HeterogeneousMedium, HomogeneousMedium, Medium, Phase, PhaseBlend};
 pub(crate) use medium::{UNCHANGED, VACUUM};
@@ -340,12 +341,14 @@ pub use settings::{
     Output, PathIntegrator, Png, Precision, Render, Tonemap, Wavelengths, WhittedIntegrator,
 };
 pub use shape::{
-    Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Extent, Geometry, Instance, Layout, Mesh, Normals, Plane,
-    Rectangle, Rotation, SdfGrid, SdfNormals, Shape, Sphere, TransformStep, Winding,
+    Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Geometry, Instance, Layout, Mesh, Normals, Plane, Rectangle,
+    SdfGrid, SdfNormals, Shape, Sphere, Winding,
 };
 pub use spectrum::{
     Abbe, Blackbody, Cauchy, FilePath, Illuminant, Index, Line, Scaled, Sellmeier, Spectrum, SpectrumOrTexture, Vec3,
 };
+pub use texture::{Checkerboard, ImageTexture, MeshAttribute, Texture, TextureFilter, Wrap};
+pub use transform::{Extent, Rotation, TransformStep};
 pub use volume::{ConstantVolume, GridVolume, NumberOrVolume, SpectrumOrVolume, Volume, VolumeFilter};
 
 #[cfg(test)]

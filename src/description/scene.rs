@@ -12,13 +12,14 @@ use super::edit;
 use super::fault::{Checker, Fault};
 use super::layer::Layer;
 use super::light::{Fog, Light};
-use super::material::{Material, Texture};
+use super::material::Material;
 use super::medium::{Medium, UNCHANGED, VACUUM};
 use super::node::{Node, Sources};
 use super::path::{self, At};
 use super::settings::{Integrator, Output, Render};
 use super::shape::Shape;
 use super::spectrum::{FilePath, Role};
+use super::texture::Texture;
 use super::volume::Volume;
 use crate::error::Result;
 

@@ -4,10 +4,10 @@ use glam::{DMat3, DMat4};
 use serde::Deserialize;
 
 use super::fault::Checker;
-use super::material::Wrap;
 use super::path::At;
-use super::shape::{TransformStep, check_steps, matrix_of};
 use super::spectrum::{FilePath, Role, Spectrum};
+use super::texture::Wrap;
+use super::transform::{TransformStep, check_steps, matrix_of};
 
 /// A spectrum at every point of space.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

@@ -1,5 +1,6 @@
 //! Elements to objects: parameters, includes, references, transforms.
 
+mod text;
 mod transform;
 
 use std::collections::HashMap;
@@ -7,6 +8,8 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat4, DVec3};
 
+use self::text::{major_version, spectrum_value, underscored};
+pub(crate) use self::text::{number, tokens};
 use super::super::edit::{Setting, read_bytes};
 use super::super::fault::Fault;
 use super::super::node::{Node, Place, Sources, Value as NodeValue, did_you_mean, quote};
@@ -694,73 +697,4 @@ fn find_files(node: &mut Node, directory: &Path) {
         }
         _ => {}
     }
-}
-
-/// What stands between blanks and commas.
-pub(crate) fn tokens(text: &str) -> impl Iterator<Item = &str> {
-    text.split(|c: char| c == ',' || c.is_whitespace()).filter(|token| !token.is_empty())
-}
-
-pub(crate) fn number(text: &str, place: Place) -> std::result::Result<f64, Fault> {
-    match text.trim().parse::<f64>() {
-        Ok(number) if number.is_finite() => Ok(number),
-        _ => Err(Fault::at_place(place, format!("expected a finite number, found {}", quote(text)))),
-    }
-}
-
-/// One number, or `nm:value` pairs.
-fn spectrum_value(text: &str, place: Place) -> std::result::Result<SpectrumValue, Fault> {
-    let tokens: Vec<&str> = tokens(text).collect();
-    if let [only] = tokens[..]
-        && !only.contains(':')
-    {
-        return number(only, place).map(SpectrumValue::Uniform);
-    }
-    let mut table: Vec<[f64; 2]> = Vec::with_capacity(tokens.len());
-    for token in &tokens {
-        let Some((nm, value)) = token.split_once(':') else {
-            let message = format!("expected pairs such as 400:0.5, found {}", quote(token));
-            return Err(Fault::at_place(place, message));
-        };
-        let nm = number(nm, place)?;
-        if let Some(&[last, _]) = table.last()
-            && nm <= last
-        {
-            let message = format!("expected wavelengths that increase, found {nm} nm after {last} nm");
-            return Err(Fault::at_place(place, message));
-        }
-        table.push([nm, number(value, place)?]);
-    }
-    match table.len() {
-        0 => Err(Fault::at_place(place, "expected a number or pairs such as 400:0.5, found none")),
-        _ => Ok(SpectrumValue::Table(table)),
-    }
-}
-
-fn major_version(attribute: &Attribute) -> std::result::Result<u32, Fault> {
-    let parts: Option<Vec<u32>> = attribute.value.split('.').map(|part| part.trim().parse().ok()).collect();
-    match parts.as_deref() {
-        Some([major, _, _]) => Ok(*major),
-        _ => {
-            let message = format!("expected a version such as 3.0.0, found {}", quote(&attribute.value));
-            Err(Fault::at_place(attribute.place, message))
-        }
-    }
-}
-
-/// `toWorld` to `to_world`, `intIOR` to `int_ior`.
-fn underscored(name: &str) -> String {
-    let mut text = String::with_capacity(name.len() + 4);
-    let mut before: Option<char> = None;
-    let mut inside_capitals = false;
-    for c in name.chars() {
-        let begins = c.is_ascii_uppercase() && before.is_some_and(|before| before.is_ascii_lowercase());
-        if begins {
-            text.push('_');
-        }
-        inside_capitals = begins || (inside_capitals && c.is_ascii_uppercase());
-        text.push(if inside_capitals { c.to_ascii_lowercase() } else { c });
-        before = Some(c);
-    }
-    text
 }

@@ -2,10 +2,11 @@
 
 use super::super::super::compound::{NumberOrTexture, Roughness};
 use super::super::super::material::{
-    Conductor, ConductorIndex, Dielectric, DiffuseMean, Distribution, Fresnel, Material, MaterialRef, Plastic, Texture,
-    TextureFilter, ThinDielectric, Wrap,
+    Conductor, ConductorIndex, Dielectric, DiffuseMean, Distribution, Fresnel, Material, MaterialRef, Plastic,
+    ThinDielectric,
 };
 use super::super::super::spectrum::{Index, Spectrum, SpectrumOrTexture};
+use super::super::super::texture::{Texture, TextureFilter, Wrap};
 use super::Export;
 use super::spectra::Role;
 use super::xml::numbers;

@@ -4,7 +4,7 @@ use glam::{DMat4, DVec3};
 
 use super::super::super::fault::Fault;
 use super::super::super::node::did_you_mean;
-use super::super::super::shape::rotation;
+use super::super::super::transform::rotation;
 use super::super::xml::{Attribute, Element};
 use super::{Parser, attribute, check_attributes};
 
