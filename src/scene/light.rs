@@ -166,7 +166,9 @@ impl Light {
     #[must_use]
     pub fn area_pdf(&self, objects: &[Object], from: DVec3, direction: DVec3, hit: &Hit, normal: DVec3) -> f64 {
         let Light::Area { object, .. } = self else { return 0.0 };
-        match &objects[*object as usize].geometry {
+        let lamp = &objects[*object as usize];
+        match &lamp.geometry {
+            Geometry::Shape(shape) if lamp.flipped => hit.t * hit.t / (shape.area() * normal.dot(direction).abs()),
             Geometry::Shape(shape) => shape.pdf_toward(from, direction, hit.t, normal),
             Geometry::Mesh(mesh) => hit.t * hit.t / (mesh.areas.total() * normal.dot(direction).abs()),
             // They do not shine.
@@ -192,7 +194,7 @@ impl Light {
                 let facing = objects[*object as usize].facing();
                 match &objects[*object as usize].geometry {
                     Geometry::Shape(shape) => {
-                        let s = shape.sample_toward(from, u)?;
+                        let s = if facing < 0.0 { shape.sample_inward(from, u) } else { shape.sample_toward(from, u) }?;
                         if s.direction.dot(s.normal) * facing >= 0.0 {
                             return None;
                         }

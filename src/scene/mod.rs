@@ -274,8 +274,9 @@ impl Scene {
     }
 
     /// True where anything stands between the ray's origin and `distance`. `target` is the face or
-    /// triangle that lies at the far end, facing the ray. Every shape is convex, so it cannot stand in
-    /// its own way, and skipping it needs no tolerance.
+    /// triangle that lies at the far end, facing the ray. Every shape is convex, so that of its outside what
+    /// faces the ray cannot stand in its own way, and skipping it needs no tolerance; of its inside
+    /// everything is hidden by the wall through which the ray would enter.
     #[must_use]
     pub fn occluded(&self, ray: &Ray, distance: f64, target: Option<Departure>) -> bool {
         self.bvh.any(ray, distance, |object| {
@@ -285,8 +286,26 @@ impl Scene {
             }
             let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
             let target = target.filter(|t| t.object == object).map(|t| t.part);
-            geometry.blocks(ray, distance, departing, target)
+            match geometry {
+                Geometry::Shape(shape) if target.is_some() && self.objects[object as usize].flipped => {
+                    let first = shape.intersect(ray, distance, departing.map(|face| face as u8));
+                    first.is_some_and(|hit| enters(shape, ray, hit.t, hit.face))
+                }
+                _ => geometry.blocks(ray, distance, departing, target),
+            }
         })
+    }
+
+    /// True where `hit` is what a shadow ray toward `target` was to reach: on it, and not on the outside of a
+    /// shape that shines inward.
+    #[must_use]
+    pub fn reaches(&self, ray: &Ray, hit: &Hit, target: Option<Departure>) -> bool {
+        let object = &self.objects[hit.object as usize];
+        hit.is_on(target)
+            && match &object.geometry {
+                Geometry::Shape(shape) if object.flipped => !enters(shape, ray, hit.t, hit.part as u8),
+                _ => true,
+            }
     }
 
     /// The surface at a hit.
@@ -335,6 +354,11 @@ impl Scene {
     pub fn light_probability(&self, i: usize) -> f64 {
         self.light_cdf[i] - if i == 0 { 0.0 } else { self.light_cdf[i - 1] }
     }
+}
+
+/// Whether a ray crosses a face from outside.
+fn enters(shape: &Shape, ray: &Ray, t: f64, face: u8) -> bool {
+    shape.surface(ray.at(t), face).normal.dot(ray.direction) < 0.0
 }
 
 #[cfg(test)]

@@ -605,7 +605,7 @@ impl Tracer<'_> {
         let (mut through, mut passing) = (Lanes::ONE, Lanes::ONE);
         let (mut ray, mut left) = (*ray, light.distance);
         for crossings in 0..=panes {
-            let hit = scene.closest(&ray, left).filter(|h| !h.is_on(target));
+            let hit = scene.closest(&ray, left).filter(|h| !scene.reaches(&ray, h, target));
             let dimmed = dim(medium, &ray, hit.map_or(left, |h| h.t), crossings);
             through *= dimmed.through;
             passing *= dimmed.passing;

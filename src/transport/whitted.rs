@@ -221,7 +221,7 @@ impl Tracer<'_> {
         }
         let (mut ray, mut left, mut through) = (*ray, distance, Lanes::ONE);
         for _ in 0..MAX_PANES {
-            let Some(hit) = scene.closest(&ray, left).filter(|h| !h.is_on(target)) else {
+            let Some(hit) = scene.closest(&ray, left).filter(|h| !scene.reaches(&ray, h, target)) else {
                 return through;
             };
             let surface = scene.surface(&ray, &hit);

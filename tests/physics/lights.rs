@@ -229,3 +229,26 @@ fn lights_add_and_walls_hide_them() {
         }
     }
 }
+
+/// Inside a glowing closed shape of albedo ρ the light is L / (1 − ρ) in every direction: each bounce sees walls all
+/// around. Outside it is dark but for what the outer wall reflects of nothing.
+#[test]
+fn a_shape_that_shines_inward_lights_its_inside_alone() {
+    let forms = [
+        "sphere: {radius: 1",
+        "cube: {size: 2",
+        "cylinder: {base: [0, -1, 0], top: [0, 1, 0], radius: 1",
+        "cone: {base: [0, -1, 0], apex: [0, 2, 0], radius: 2",
+    ];
+    for form in forms {
+        let scene = bench(&format!(
+            "integrator: {{path: {{max_depth: 40}}}}\nshapes:\n\
+             - {form}, flip_normals: true, emission: 1, material: {{diffuse: {{reflectance: 0.5}}}}}}\n\
+             - rectangle: {{corner: [-9, -5, 9], edge_u: [18, 0, 0], edge_v: [0, 0, -18]}}\n"
+        ))
+        .grey();
+        // The forty-first segment would bring 2⁻⁴⁰.
+        scene.estimate(&ray(v(0.1, 0.2, 0.3), v(0.5, 0.3, -2.0)), 16_384).assert_is(2.0, 5e-3);
+        assert_eq!(scene.estimate(&ray(v(3.0, 0.0, 5.0), v(3.0, -5.0, 0.0)), 500).mean, 0.0, "{form}");
+    }
+}

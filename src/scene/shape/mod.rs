@@ -273,6 +273,16 @@ impl Shape {
         }
     }
 
+    /// A direction from `from` to a point of the whole area, uniform on it: for a shape that shines inward, whose
+    /// outer face says nothing about what is seen. `None` as for [`Shape::sample_toward`].
+    #[must_use]
+    pub fn sample_inward(&self, from: DVec3, u: DVec2) -> Option<TowardSample> {
+        match self {
+            Shape::Plane(_) => None,
+            other => toward_by_area(from, other.sample_area(u)),
+        }
+    }
+
     /// The principal curvatures of `face` at `point`, m⁻¹: positive where the surface bends away from its normal.
     #[must_use]
     pub fn curvatures(&self, point: DVec3, face: u8) -> [f64; 2] {
