@@ -12,11 +12,11 @@ impl Export<'_> {
     /// A light of the scene's list.
     pub(super) fn light(&mut self, i: usize, light: &Light) {
         let why = match light {
-            Light::Point(l) => (!Export::can_say(&l.intensity)).then_some("a grey light"),
+            Light::Point(l) => Export::light_shortfall(&l.intensity),
             Light::Spot(l) if l.texture.is_some() => Some("a spot without its slide"),
-            Light::Spot(l) => (!Export::can_say(&l.intensity)).then_some("a grey light"),
-            Light::Directional(l) => (!Export::can_say(&l.irradiance)).then_some("a grey light"),
-            Light::Constant(l) => (!Export::can_say(&l.radiance)).then_some("a grey light"),
+            Light::Spot(l) => Export::light_shortfall(&l.intensity),
+            Light::Directional(l) => Export::light_shortfall(&l.irradiance),
+            Light::Constant(l) => Export::light_shortfall(&l.radiance),
             Light::Environment(_) => Some("the same image on Mitsuba's grid, shifted by half a row toward the poles"),
             _ => Some("a weak grey light: this kind is not exported yet"),
         };

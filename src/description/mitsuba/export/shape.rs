@@ -150,7 +150,7 @@ impl Export<'_> {
         let textured =
             self.is_textured(&shape.material) || matches!(shape.emission, Some(SpectrumOrTexture::Texture(_)));
         let grey = match &shape.emission {
-            Some(SpectrumOrTexture::Spectrum(spectrum)) if !Export::can_say(spectrum) => said("a grey light"),
+            Some(SpectrumOrTexture::Spectrum(spectrum)) => Export::light_shortfall(spectrum).map(str::to_owned),
             _ => None,
         };
         let own = match &shape.geometry {

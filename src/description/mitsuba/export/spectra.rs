@@ -3,7 +3,7 @@
 use super::super::super::spectrum::{Spectrum, SpectrumOrTexture};
 use super::xml::numbers;
 use super::{DAYLIGHT, Export};
-use crate::spectrum::BAND_NM;
+use crate::spectrum::{BAND_NM, Lanes, Spectrum as Curve, illuminant};
 
 /// What a spectrum is of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,18 +59,41 @@ impl Export<'_> {
                 Spectrum::Table(pairs) => self.table(name, pairs, by, Ends::Zero),
                 _ => self.xml.value("spectrum", name, 0.5 * by),
             },
-            Spectrum::Illuminant(illuminant) => {
+            Spectrum::Illuminant(illuminant) if illuminant.name.eq_ignore_ascii_case("D65") => {
                 self.xml.open("spectrum", &[("type", "d65"), ("name", name)]);
                 self.xml.value("float", "scale", illuminant.scale * by / DAYLIGHT);
                 self.xml.close();
             }
-            Spectrum::Blackbody(body) if by == 1.0 => {
+            Spectrum::Blackbody(body) if by == 1.0 && Export::can_say(spectrum) => {
                 self.xml.open("spectrum", &[("type", "blackbody"), ("name", name)]);
                 self.xml.value("float", "temperature", body.kelvin);
                 self.xml.close();
             }
             Spectrum::Scaled(scaled) => self.scaled_spectrum(name, &scaled.of, role, by * scaled.by),
-            _ => self.xml.value("spectrum", name, 0.5 * by),
+            other => match sampled(other) {
+                Some(curve) => self.curve(name, &curve, by),
+                None => self.xml.value("spectrum", name, 0.5 * by),
+            },
+        }
+    }
+
+    /// A curve at every fifth nanometre.
+    pub(super) fn curve(&mut self, name: &str, curve: &Curve, by: f64) {
+        let value = |nm: u32| f64::from(curve.eval(Lanes::splat(nm as f32)).to_array()[0]) * by;
+        let pairs: Vec<String> = (360..=830).step_by(5).map(|nm| format!("{nm}:{}", value(nm))).collect();
+        self.xml.value("spectrum", name, pairs.join(", "));
+    }
+
+    /// What Mitsuba gets in place of a light that it has no words for.
+    pub(super) fn light_shortfall(spectrum: &Spectrum) -> Option<&'static str> {
+        let inner = match spectrum {
+            Spectrum::Scaled(scaled) => &scaled.of,
+            other => other,
+        };
+        match (Export::can_say(spectrum), sampled(inner)) {
+            (true, _) => None,
+            (false, Some(_)) => Some("its spectrum at every fifth nanometre"),
+            (false, None) => Some("a grey light"),
         }
     }
 
@@ -108,6 +131,21 @@ impl Export<'_> {
             SpectrumOrTexture::Texture(_) => true,
         }
     }
+}
+
+/// A light whose spectrum has a formula or a table of ours.
+fn sampled(spectrum: &Spectrum) -> Option<Curve> {
+    match spectrum {
+        Spectrum::Blackbody(body) if body.normalised => illuminant::blackbody_normalised(body.kelvin).ok(),
+        Spectrum::Blackbody(body) => illuminant::blackbody(body.kelvin).ok(),
+        Spectrum::Illuminant(light) => illuminant::illuminant(&light.name).ok(),
+        _ => None,
+    }
+    .map(|curve| match spectrum {
+        Spectrum::Blackbody(body) => curve.scaled(body.scale),
+        Spectrum::Illuminant(light) => curve.scaled(light.scale),
+        _ => curve,
+    })
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,7 +10,7 @@ use super::super::super::texture::{Texture, TextureFilter, Wrap};
 use super::Export;
 use super::spectra::Role;
 use super::xml::numbers;
-use crate::spectrum::{Lanes, RefractiveIndex, catalogue};
+use crate::spectrum::{RefractiveIndex, catalogue};
 
 /// The wavelength at which a dispersive index is taken where there can be only one: the d line, nm.
 const D_LINE_NM: f64 = 587.5618;
@@ -94,11 +94,8 @@ impl Export<'_> {
         match &m.index {
             ConductorIndex::Metal(name) => {
                 if let Ok((eta, k)) = catalogue::metal(name) {
-                    for (key, curve) in [("eta", eta), ("k", k)] {
-                        let pair = |nm: u32| format!("{nm}:{}", curve.eval(Lanes::splat(nm as f32)).to_array()[0]);
-                        let pairs: Vec<String> = (360..=830).step_by(5).map(pair).collect();
-                        self.xml.value("spectrum", key, pairs.join(", "));
-                    }
+                    self.curve("eta", &eta, 1.0);
+                    self.curve("k", &k, 1.0);
                 }
             }
             ConductorIndex::Written { eta, k } => {
