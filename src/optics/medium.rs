@@ -50,12 +50,21 @@ impl MediumLanes {
     /// that does not scatter is crossed without a draw.
     #[must_use]
     pub fn fly(&self, distance: f64, u: f64) -> FreeFlight {
-        let through = self.transmittance(distance);
-        if !self.scatters() {
-            return FreeFlight { scattered_at: None, weight: through, ratio: Lanes::ONE, density: 1.0 };
-        }
+        self.arrive(distance, self.reach(u))
+    }
+
+    /// How far the flight drawn by `u` goes where no surface ends it; infinite where nothing scatters.
+    #[must_use]
+    #[inline]
+    pub fn reach(&self, u: f64) -> f64 {
         let hero = f64::from(self.extinction.to_array()[0]);
-        let t = if hero > 0.0 { -libm::log1p(-u) / hero } else { f64::INFINITY };
+        if hero > 0.0 && self.scatters() { -libm::log1p(-u) / hero } else { f64::INFINITY }
+    }
+
+    /// The flight of [`MediumLanes::reach`] `t` toward a surface at `distance`.
+    #[must_use]
+    #[inline]
+    pub fn arrive(&self, distance: f64, t: f64) -> FreeFlight {
         if t < distance {
             let here = self.transmittance(t);
             let density = here * self.extinction;
@@ -70,6 +79,10 @@ impl MediumLanes {
             }
             // So dense and so far that exp underflows: no light comes through.
             return FreeFlight { scattered_at: Some(t), weight: Lanes::ZERO, ratio: Lanes::ONE, density: 0.0 };
+        }
+        let through = self.transmittance(distance);
+        if !self.scatters() {
+            return FreeFlight { scattered_at: None, weight: through, ratio: Lanes::ONE, density: 1.0 };
         }
         let p = through.to_array()[0];
         if p > 0.0 {

@@ -3,6 +3,7 @@
 //! Equirectangular. In the frame of the map +y is up; columns to the right turn from −z toward +x.
 //! Two conventions say where the texels lie, see [`Mapping`].
 
+use super::bvh::prefetch;
 use super::texture::Texel;
 use crate::spectrum::{Lanes, Spectrum, illuminant, upsample};
 use glam::{DMat3, DVec2, DVec3};
@@ -161,6 +162,14 @@ impl Environment {
                 (at, pdf, 0.0)
             }
         };
+        // Who looks there next finds the texels in the cache.
+        let x = (at.x * self.width as f64 - 0.5).max(0.0) as usize;
+        let y = match self.mapping {
+            Mapping::Texels => (at.y * self.height as f64 - 0.5).max(0.0) as usize,
+            Mapping::Poles => (at.y * (self.height - 1) as f64) as usize,
+        };
+        prefetch(&self.texels, y * self.width + x);
+        prefetch(&self.texels, (y + 1) * self.width + x);
         let (sin_theta, cos_theta) = (libm::sin(at.y * PI), libm::cos(at.y * PI));
         let phi = (at.x - offset) * 2.0 * PI;
         let d = DVec3::new(sin_theta * libm::sin(phi), cos_theta, -sin_theta * libm::cos(phi));
@@ -168,10 +177,20 @@ impl Environment {
         (sin_theta > 0.0).then(|| EnvironmentSample { direction: self.world_from_map * d, pdf_solid_angle })
     }
 
+    /// [`Environment::radiance`] and [`Environment::pdf`] at once.
+    #[must_use]
+    pub fn radiance_and_pdf(&self, direction: DVec3, nm: Lanes) -> (Lanes, f64) {
+        let at = self.place(direction);
+        (self.radiance_at(at, nm), self.pdf_at(at))
+    }
+
     /// Density of [`Environment::sample`] at `direction`, sr⁻¹.
     #[must_use]
     pub fn pdf(&self, direction: DVec3) -> f64 {
-        let at = self.place(direction);
+        self.pdf_at(self.place(direction))
+    }
+
+    fn pdf_at(&self, at: DVec2) -> f64 {
         let sin_theta = libm::sin(at.y * PI);
         if sin_theta <= 0.0 {
             return 0.0;
@@ -307,6 +326,9 @@ fn linear(a: f64, b: f64, u: f64) -> f64 {
     (u * (a + b) / (a + root)).clamp(0.0, 1.0)
 }
 
+/// Cells for which a row has one entry in its guide.
+const CELLS_A_GUIDE: usize = 8;
+
 /// A density on the unit square that is constant in each cell of a grid.
 #[derive(Clone, Debug)]
 struct PiecewiseConstant2d {
@@ -316,6 +338,11 @@ struct PiecewiseConstant2d {
     rows: Vec<f64>,
     /// The same over rows.
     marginal: Vec<f64>,
+    /// For each row, where in it the searches for k / `guides` start, `guides + 1` entries: a search stays within two
+    /// cache lines instead of one for each halving (Chen and Asau 1974).
+    guide: Vec<u32>,
+    /// A power of two, so that u · `guides` is exact.
+    guides: usize,
 }
 
 /// A place in a cell of a grid.
@@ -345,17 +372,36 @@ impl PiecewiseConstant2d {
             weights.chunks_exact(width).map(|row| running(&mut row.iter().copied(), &mut rows)).collect();
         let mut marginal = Vec::with_capacity(height + 1);
         running(&mut totals.into_iter(), &mut marginal);
-        PiecewiseConstant2d { width, height, rows, marginal }
+        let guides = (width / CELLS_A_GUIDE).max(1).next_power_of_two();
+        let start = |row: &[f64], k: usize| row.partition_point(|&c| c <= k as f64 / guides as f64) as u32;
+        let guide = rows
+            .chunks_exact(width + 1)
+            .flat_map(|row| (0..guides).map(move |k| start(row, k)).chain([row.len() as u32]))
+            .collect();
+        PiecewiseConstant2d { width, height, rows, marginal, guide, guides }
     }
 
     fn row(&self, y: usize) -> &[f64] {
         &self.rows[y * (self.width + 1)..(y + 1) * (self.width + 1)]
     }
 
+    /// [`PiecewiseConstant2d::invert`] of a row.
+    fn invert_row(&self, row: usize, u: f64) -> Option<(usize, f64)> {
+        let k = row * (self.guides + 1) + ((u * self.guides as f64) as usize).min(self.guides - 1);
+        let (from, to) = (self.guide[k] as usize, self.guide[k + 1] as usize);
+        let cdf = self.row(row);
+        Self::within(cdf, from + cdf[from..to].partition_point(|&c| c <= u), u)
+    }
+
     /// Cell and position within the table where the running sum reaches `u`.
     fn invert(cdf: &[f64], u: f64) -> Option<(usize, f64)> {
+        Self::within(cdf, cdf.partition_point(|&c| c <= u), u)
+    }
+
+    /// The same, where `above` sums of the table are not above `u`.
+    fn within(cdf: &[f64], above: usize, u: f64) -> Option<(usize, f64)> {
         let n = cdf.len() - 1;
-        let cell = cdf.partition_point(|&c| c <= u).saturating_sub(1).min(n - 1);
+        let cell = above.saturating_sub(1).min(n - 1);
         let mass = cdf[cell + 1] - cdf[cell];
         (mass > 0.0).then(|| (cell, (cell as f64 + ((u - cdf[cell]) / mass).clamp(0.0, 1.0)) / n as f64))
     }
@@ -363,14 +409,14 @@ impl PiecewiseConstant2d {
     /// A point and its density.
     fn sample(&self, u: DVec2) -> Option<(DVec2, f64)> {
         let (row, y) = Self::invert(&self.marginal, u.y)?;
-        let (column, x) = Self::invert(self.row(row), u.x)?;
+        let (column, x) = self.invert_row(row, u.x)?;
         Some((DVec2::new(x, y), self.density(row, column)))
     }
 
     /// A cell, and numbers uniform in [0, 1] within it.
     fn sample_cell(&self, u: DVec2) -> Option<Cell> {
         let (row, y) = Self::invert(&self.marginal, u.y)?;
-        let (column, x) = Self::invert(self.row(row), u.x)?;
+        let (column, x) = self.invert_row(row, u.x)?;
         let within = DVec2::new(x * self.width as f64 - column as f64, y * self.height as f64 - row as f64);
         Some(Cell { row, column, within: within.clamp(DVec2::ZERO, DVec2::ONE) })
     }
@@ -405,6 +451,28 @@ mod tests {
 
     fn green(map: &Environment, direction: DVec3) -> f64 {
         f64::from(map.radiance(direction.normalize(), Lanes::splat(550.0)).to_array()[0])
+    }
+
+    /// The guide changes how many sums are looked at, not which one is found: rows with cells of nothing at either
+    /// end and between, one that is all in one cell, one that is empty, at sums themselves and between.
+    #[test]
+    fn guided_searches_find_what_a_search_of_the_whole_row_finds() {
+        let width = 200;
+        let weight = |row: usize, x: usize| match row {
+            0 => 1.0 + (x % 7) as f64,
+            1 => f64::from(u8::from(x % 40 > 30)) * x as f64,
+            2 => f64::from(u8::from(x == 117)),
+            _ => 0.0,
+        };
+        let weights: Vec<f64> = (0..4 * width).map(|i| weight(i / width, i % width)).collect();
+        let table = PiecewiseConstant2d::new(&weights, width, 4);
+        assert!(table.guides > 1);
+        for row in 0..4 {
+            let sums = table.row(row).to_vec();
+            for u in (0..4096).map(|k| f64::from(k) / 4096.0).chain(sums.into_iter().filter(|&u| u < 1.0)) {
+                assert_eq!(table.invert_row(row, u), PiecewiseConstant2d::invert(table.row(row), u), "{row} {u}");
+            }
+        }
     }
 
     #[test]

@@ -136,6 +136,15 @@ impl Light {
         }
     }
 
+    /// [`Light::background`] and [`Light::background_pdf`] at once.
+    #[must_use]
+    pub fn background_and_pdf(&self, direction: DVec3, normal: Option<DVec3>, nm: Lanes) -> (Lanes, f64) {
+        match self {
+            Light::Environment(map) => map.radiance_and_pdf(direction, nm),
+            _ => (self.background(direction, nm), self.background_pdf(direction, normal)),
+        }
+    }
+
     /// Density of [`Light::arriving`] toward the background along `direction`, sr⁻¹. `normal` is the
     /// shading normal that the sample was asked with.
     #[must_use]

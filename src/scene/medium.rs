@@ -66,6 +66,15 @@ pub struct Varying {
     scatters: bool,
 }
 
+/// A flight drawn before it is known what ends it.
+#[derive(Clone, Copy, Debug)]
+pub struct Draft {
+    lanes: MediumLanes,
+    u: f64,
+    /// No surface beyond this many metres matters to it.
+    pub reach: f64,
+}
+
 /// What a shadow ray keeps.
 #[derive(Clone, Copy, Debug)]
 pub struct Dimmed {
@@ -81,18 +90,49 @@ impl Medium {
     #[must_use]
     #[inline]
     pub fn fly(&self, ray: &Ray, distance: f64, nm: Lanes, u: f64, walk: impl FnOnce() -> Walk) -> FreeFlight {
-        match &self.filling {
-            Filling::Even { absorption, scattering } => even(absorption, scattering, nm).fly(distance, u),
-            Filling::EvenExtinction { extinction, albedo, scatters } => {
+        self.arrive(&self.set_out(nm, u), ray, distance, nm, walk)
+    }
+
+    /// Draws a flight by `u` in [0, 1), before it is known what ends it.
+    #[must_use]
+    #[inline]
+    pub fn set_out(&self, nm: Lanes, u: f64) -> Draft {
+        let lanes = match &self.filling {
+            Filling::Even { absorption, scattering } => even(absorption, scattering, nm),
+            Filling::EvenExtinction { extinction, scatters, .. } => {
                 let extinction = extinction.eval(nm);
-                let scattering = if *scatters { extinction } else { Lanes::ZERO };
-                let mut flight = MediumLanes { extinction, scattering }.fly(distance, u);
+                MediumLanes { extinction, scattering: if *scatters { extinction } else { Lanes::ZERO } }
+            }
+            Filling::Varying(_) => {
+                let lanes = MediumLanes { extinction: Lanes::ZERO, scattering: Lanes::ZERO };
+                return Draft { lanes, u, reach: f64::INFINITY };
+            }
+        };
+        Draft { lanes, u, reach: lanes.reach(u) }
+    }
+
+    /// The flight of `draft` along `ray` toward a surface at `distance`, infinite where there is none within its reach;
+    /// `walk` decides what `draft` does not.
+    #[must_use]
+    #[inline]
+    pub fn arrive(
+        &self,
+        draft: &Draft,
+        ray: &Ray,
+        distance: f64,
+        nm: Lanes,
+        walk: impl FnOnce() -> Walk,
+    ) -> FreeFlight {
+        match &self.filling {
+            Filling::Even { .. } => draft.lanes.arrive(distance, draft.reach),
+            Filling::EvenExtinction { albedo, .. } => {
+                let mut flight = draft.lanes.arrive(distance, draft.reach);
                 if let Some(t) = flight.scattered_at {
                     flight.weight *= albedo.eval(ray.at(t), nm);
                 }
                 flight
             }
-            Filling::Varying(varying) => varying.fly(ray, distance, nm, u, walk()),
+            Filling::Varying(varying) => varying.fly(ray, distance, nm, draft.u, walk()),
         }
     }
 

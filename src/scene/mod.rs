@@ -26,6 +26,7 @@ pub mod projector;
 pub mod sdf;
 pub mod shape;
 pub mod texture;
+pub mod through;
 pub mod volume;
 
 use crate::math::{Departure, Ray};

@@ -20,6 +20,7 @@ use crate::scene::compound::{Compound, Leaf, Slopes, Vertex};
 use crate::scene::light::Arriving;
 use crate::scene::material::{Kind, Material, Straight};
 use crate::scene::medium::{Dimmed, Medium};
+use crate::scene::through::Way;
 use crate::scene::{Hit, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
@@ -196,17 +197,24 @@ impl Tracer<'_> {
         let mut reach = scene.camera.reach(ray);
 
         loop {
-            let hit = scene.closest(&path.ray, reach);
-            reach = f64::INFINITY;
-            let distance = hit.map_or(f64::INFINITY, |h| h.t);
             let choice = self.sampler.set(Set::Choice(path.vertices));
-
-            // The medium between here and the next surface may scatter the path first.
-            if MEDIA && let Some(medium) = path.medium {
+            // The flight through a medium is drawn first: beyond its reach no surface matters.
+            let flying = if MEDIA { path.medium } else { None }.map(|medium| {
                 let medium = &scene.media[medium as usize];
                 let set = Set::Extra(path.vertices.wrapping_add(crossings << 16));
                 let u = if crossings == 0 { choice[3] } else { self.sampler.set(set)[0] };
-                let flight = medium.fly(&path.ray, distance, self.nm, u, || self.sampler.walk(set));
+                let draft = medium.set_out(self.nm, u);
+                reach = reach.min(draft.reach);
+                (medium, set, draft)
+            });
+            let hit = scene.closest(&path.ray, reach);
+            reach = f64::INFINITY;
+            let distance = hit.map_or(f64::INFINITY, |h| h.t);
+
+            // The medium between here and the next surface may scatter the path first.
+            if MEDIA && let Some((medium, set, draft)) = &flying {
+                let (medium, set) = (*medium, *set);
+                let flight = medium.arrive(draft, &path.ray, distance, self.nm, || self.sampler.walk(set));
                 path.beta *= flight.weight;
                 if CHROMATIC {
                     path.rho *= flight.ratio;
@@ -522,13 +530,12 @@ impl Tracer<'_> {
         }
         for &i in &self.scene.backgrounds {
             let light = &self.scene.lights[i as usize];
-            let l = light.background(path.ray.direction, self.nm);
-            let weight = match &path.previous {
-                None => 1.0,
+            let (l, weight) = match &path.previous {
+                None => (light.background(path.ray.direction, self.nm), 1.0),
                 Some(p) => {
-                    let q =
-                        self.scene.light_probability(i as usize) * light.background_pdf(path.ray.direction, p.normal);
-                    power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho)
+                    let (l, pdf) = light.background_and_pdf(path.ray.direction, p.normal, self.nm);
+                    let q = self.scene.light_probability(i as usize) * pdf;
+                    (l, power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho))
                 }
             };
             path.add::<CHROMATIC>(l, weight);
@@ -600,6 +607,33 @@ impl Tracer<'_> {
             }
             let Dimmed { through, passing } = dim(medium, ray, light.distance, 0);
             return Some((through, passing));
+        }
+        let way = if MEDIA { scene.way(ray, light.distance, target) } else { Way::Long };
+        if let Way::Blocked = way {
+            return None;
+        }
+        if let Way::Open(crossed) = way {
+            let hits = crossed.hits();
+            if hits.len() > panes as usize {
+                return None;
+            }
+            let (mut through, mut passing, mut from) = (Lanes::ONE, Lanes::ONE, 0.0);
+            for (crossings, hit) in (0..).zip(hits) {
+                let dimmed = dim(medium, &Ray::new(ray.at(from), ray.direction), hit.t - from, crossings);
+                through *= dimmed.through;
+                passing *= dimmed.passing;
+                let object = &scene.objects[hit.object as usize];
+                let material = &scene.materials[object.material as usize];
+                let surface = scene.surface(ray, hit);
+                let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), self.nm)?;
+                through *= straight.weight * straight.share as f32;
+                passing *= straight.share as f32;
+                medium = self.beyond(object, &surface, ray.direction, medium);
+                from = hit.t;
+            }
+            let last = Ray::new(ray.at(from), ray.direction);
+            let dimmed = dim(medium, &last, light.distance - from, hits.len() as u32);
+            return Some((through * dimmed.through, passing * dimmed.passing));
         }
         // Walk from one surface that lets light straight through to the next.
         let (mut through, mut passing) = (Lanes::ONE, Lanes::ONE);

@@ -3,6 +3,7 @@
 use super::LAMP;
 use super::common::{Bench, SPREAD_NM, assert_close, bench, mean, ray, v};
 use abbe::math::Ray;
+use abbe::scene::through::Way;
 use abbe::spectrum::observer;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -241,4 +242,54 @@ fn the_thinnest_fog_scatters_its_share() {
     let dense = filled("{scattering: 1.0e+9}", "{boundary: {}}", "lights: [{constant: {radiance: 1}}]");
     let found = dense.estimate(&ray(v(0.1, 0.2, 5.0), v(0.1, 0.2, 0.0)), 256);
     assert!(found.mean.is_finite() && found.mean >= 0.0, "{found:?}");
+}
+
+/// One search for all that a shadow ray goes through finds what going from surface to surface finds: nested cubes and
+/// spheres of boundaries, from outside, from within and from a surface, in the same order and at the same distances to
+/// 1e-12 of the size of the scene; and where something opaque stands, that.
+#[test]
+fn one_search_lists_what_a_walk_from_surface_to_surface_meets() {
+    let bench = bench(
+        "shapes:\n- cube: {size: 2, material: {boundary: {}}}\n- sphere: {radius: 0.7, material: {boundary: {}}}\n\
+         - cube: {size: 0.5, material: {boundary: {}}}\n- sphere: {center: [5, 0, 0], radius: 1, material: {diffuse: {}}}\n",
+    );
+    let scene = &bench.prepared.scene;
+    let (mut open, mut blocked) = (0, 0);
+    for i in 0..400 {
+        let (a, b) = (f64::from(i) * 0.731, f64::from(i % 20) * 0.3);
+        let direction = DVec3::new(a.cos(), 0.4 * (1.7 * a).sin(), a.sin()).normalize();
+        let mut ray = Ray::new(-direction * b + DVec3::new(0.01, 0.02, 0.03), direction);
+        if i % 3 == 0
+            && let Some(hit) = scene.closest(&ray, f64::INFINITY)
+        {
+            ray = scene.leave(&scene.surface(&ray, &hit), &hit, direction);
+        }
+        let (mut walked, mut on, mut gone, mut opaque) = (Vec::new(), ray, 0.0, false);
+        while let Some(hit) = scene.closest(&on, f64::INFINITY) {
+            if !scene.materials[scene.objects[hit.object as usize].material as usize].lets_through() {
+                opaque = true;
+                break;
+            }
+            gone += hit.t;
+            walked.push((hit.object, gone));
+            on = scene.leave(&scene.surface(&on, &hit), &hit, direction);
+        }
+        match scene.way(&ray, f64::INFINITY, None) {
+            Way::Open(crossed) => {
+                open += 1;
+                assert!(!opaque);
+                assert_eq!(crossed.hits().len(), walked.len());
+                for (hit, (object, t)) in crossed.hits().iter().zip(walked) {
+                    assert_eq!(hit.object, object);
+                    assert!((hit.t - t).abs() < 1e-11, "{} {t}", hit.t);
+                }
+            }
+            Way::Blocked => {
+                blocked += 1;
+                assert!(opaque);
+            }
+            Way::Long => panic!("six surfaces fit"),
+        }
+    }
+    assert!(open > 300 && blocked > 5, "{open} {blocked}");
 }

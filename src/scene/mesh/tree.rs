@@ -94,6 +94,12 @@ impl MeshTree {
     /// Whether `ray` hits any triangle at 0 < t < `t_max`, other than those in `skip`.
     #[must_use]
     pub fn any(&self, ray: &Ray, t_max: f64, skip: [Option<u32>; 2]) -> bool {
+        self.any_of(ray, t_max, skip, |_| true)
+    }
+
+    /// Shows `met` the triangles that `ray` hits at 0 < t < `t_max`, other than those in `skip`, in any order, until
+    /// it says stop; true if it did. A hit on the edge of two triangles is one on both.
+    pub fn any_of(&self, ray: &Ray, t_max: f64, skip: [Option<u32>; 2], mut met: impl FnMut(MeshHit) -> bool) -> bool {
         let sheared = TriangleRay::new(ray, self.origin);
         self.bvh.any_block(
             &self.local(ray),
@@ -101,8 +107,9 @@ impl MeshTree {
             |i| prefetch(&self.blocks, i as usize / LANES),
             |leaf| {
                 (leaf.start as usize / LANES..(leaf.end as usize).div_ceil(LANES)).any(|b| {
-                    sheared.each_hit(&self.blocks[b], t_max, |lane, _| {
-                        !skip.contains(&Some(self.bvh.order()[b * LANES + lane]))
+                    sheared.each_hit(&self.blocks[b], t_max, |lane, hit| {
+                        let triangle = self.bvh.order()[b * LANES + lane];
+                        !skip.contains(&Some(triangle)) && met(MeshHit { triangle, hit })
                     })
                 })
             },
