@@ -332,7 +332,6 @@ fn render_and_write(
     let image = frame.resolve(&space.matrix_from_xyz().map(|row| row.map(|x| x * sensitivity)));
     report.pixel_hash = pixel_hash(&image);
     let written = Instant::now();
-    write_exr(&exr_path, prepared, &frame, &image, base, space, report)?;
     let png_path = exr_path.with_extension("png");
     let settings = PngSettings {
         exposure_stops: description.output.png.exposure,
@@ -345,7 +344,11 @@ fn render_and_write(
         rec709_from_rgb: space.to_rec709(),
         ..PngSettings::default()
     };
-    png::write_png(&png_path, &image, &settings)?;
+    let (exr, png) = rayon::join(
+        || write_exr(&exr_path, prepared, &frame, &image, base, space, report),
+        || png::write_png(&png_path, &image, &settings),
+    );
+    exr.and(png)?;
     report.files = vec![exr_path, png_path];
     report.seconds.writing = written.elapsed().as_secs_f64();
 

@@ -13,6 +13,7 @@ use super::microfacet::Microfacets;
 use crate::math::warp;
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -113,6 +114,7 @@ impl CoatTable {
     pub fn new(eta: f64, facets: &Microfacets, mean: DiffuseMean) -> CoatTable {
         let cosine = |i: u32| f64::from(i) / f64::from(COAT_ENTRIES - 1);
         let transmission = (0..COAT_ENTRIES)
+            .into_par_iter()
             .map(|i| {
                 let share = mean_over_facets(facets, cosine(i), |wo, m| {
                     let split = fresnel::dielectric(Model::Exact, wo.dot(m), eta);
@@ -122,7 +124,8 @@ impl CoatTable {
                 share as f32
             })
             .collect();
-        let internal = (0..COAT_ENTRIES)
+        let terms: Vec<f64> = (0..COAT_ENTRIES)
+            .into_par_iter()
             .map(|i| {
                 let cos = match mean {
                     DiffuseMean::Integral => (f64::from(i) + 0.5) / f64::from(COAT_ENTRIES),
@@ -135,8 +138,9 @@ impl CoatTable {
                 });
                 2.0 * cos * reflected / f64::from(COAT_ENTRIES)
             })
-            .sum();
-        CoatTable { transmission, internal }
+            .collect();
+        // Added in order: the same bits on any number of threads.
+        CoatTable { transmission, internal: terms.iter().sum() }
     }
 
     fn at(&self, cos: f64) -> f64 {

@@ -8,6 +8,7 @@ mod files;
 mod hair;
 mod lights;
 mod media;
+mod meshes;
 mod principled;
 mod surface;
 
@@ -17,16 +18,16 @@ use super::instance::{AffineMap, Group, Instance};
 use super::light::Light;
 use super::load;
 use super::material::{Kind, Material};
-use super::mesh::{self, AreaTable, Mesh, MeshTree, NormalMode, Winding};
 use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Layout, Plane, Rectangle, Shape, Sphere};
 use super::texture::{Scalar, Texture};
 use super::volume::Volume;
-use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene, TriangleMesh};
+use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene};
 use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
 use crate::spectrum::{Outside, RefractiveIndex, Spectrum, WavelengthDistribution, catalogue, illuminant, upsample};
 use attributes::{OfMesh, Surface};
 use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3};
+use meshes::Meshes;
 use std::collections::{BTreeSet, HashMap};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -37,7 +38,7 @@ struct Compiler<'a> {
     /// The first curve that could not be read.
     unread: Option<Error>,
     files: Vec<PathBuf>,
-    meshes: mesh::Sources,
+    meshes: Meshes,
     /// What textures lie on.
     surface: Surface,
     /// Whether a texture has asked for that.
@@ -89,7 +90,7 @@ impl<'a> Compiler<'a> {
             faults: Vec::new(),
             unread: None,
             files: Vec::new(),
-            meshes: mesh::Sources::default(),
+            meshes: Meshes::default(),
             surface: Surface::Unknown,
             asks_for_surface: false,
             on_surface: BTreeSet::new(),
@@ -143,18 +144,9 @@ impl<'a> Compiler<'a> {
 
     fn scene(&mut self, name: &str) -> Result<Scene> {
         let d = self.description;
-        for (name, volume) in &d.volumes {
-            let compiled = self.volume(&format!("volumes.{name}"), volume)?;
-            self.volumes.insert(name, compiled);
-        }
-        for name in d.materials.keys() {
-            let (material, asked) = self.asking(|c| c.named_material(name).as_ref().clone());
-            if asked {
-                self.on_surface.insert(name);
-            }
-            self.material_ids.insert(name, self.materials.len() as u32);
-            self.materials.push(material);
-        }
+        let (meshes, made) = rayon::join(|| Meshes::of(d), || self.volumes_and_materials());
+        made?;
+        self.meshes = meshes;
         let mut media = Vec::new();
         for (name, medium) in &d.media {
             self.medium_ids.insert(name, media.len() as u32);
@@ -241,6 +233,23 @@ impl<'a> Compiler<'a> {
             shines_on_rays,
             files: std::mem::take(&mut self.files),
         })
+    }
+
+    fn volumes_and_materials(&mut self) -> Result<()> {
+        let d = self.description;
+        for (name, volume) in &d.volumes {
+            let compiled = self.volume(&format!("volumes.{name}"), volume)?;
+            self.volumes.insert(name, compiled);
+        }
+        for name in d.materials.keys() {
+            let (material, asked) = self.asking(|c| c.named_material(name).as_ref().clone());
+            if asked {
+                self.on_surface.insert(name);
+            }
+            self.material_ids.insert(name, self.materials.len() as u32);
+            self.materials.push(material);
+        }
+        Ok(())
     }
 
     /// The children of all groups that are copied somewhere; each group knows where its own will lie.
@@ -538,26 +547,13 @@ impl<'a> Compiler<'a> {
             written::Geometry::Mesh(mesh) => {
                 self.files.push(mesh.file.to_path_buf());
                 let place = format!("{at}.file");
-                let loaded = self.meshes.load(&mesh.file, mesh.index);
-                let source = loaded.map_err(|e| self.asked(&place, e))?;
-                let mode = match mesh.normals {
-                    written::Normals::File => NormalMode::File,
-                    written::Normals::Smooth => NormalMode::Smooth,
-                    written::Normals::Vertex => NormalMode::Vertex,
-                    written::Normals::Face => NormalMode::Face,
-                };
-                let winding = match mesh.winding {
-                    written::Winding::Object => Winding::Object,
-                    written::Winding::World => Winding::World,
-                };
-                let mut made = Mesh::new(&source, &DAffine3::from_mat4(m), mode, winding)
+                let source = self.meshes.source(mesh).map_err(|e| self.asked(&place, e))?;
+                let made = self
+                    .meshes
+                    .take(at, &source, mesh, &DAffine3::from_mat4(m))
                     .map_err(|message| self.asked(&place, Error::input(&mesh.file, message)))?;
-                if mesh.flip_v {
-                    made.uvs.iter_mut().for_each(|uv| uv[1] = 1.0 - uv[1]);
-                }
-                self.surface = Surface::Mesh(OfMesh::new(source, &made));
-                let (tree, areas) = (MeshTree::build(&made), AreaTable::new(&made));
-                return Ok(Some(Geometry::Mesh(Box::new(TriangleMesh { mesh: made, tree, areas }))));
+                self.surface = Surface::Mesh(OfMesh::new(source, &made.mesh));
+                return Ok(Some(Geometry::Mesh(Box::new(made))));
             }
             written::Geometry::Instance(instance) => {
                 let group = self.groups[instance.group.as_str()].0.clone();

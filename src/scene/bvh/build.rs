@@ -58,8 +58,9 @@ impl Bounds {
 
     fn add(&mut self, lo: [f32; 3], hi: [f32; 3]) {
         for a in 0..3 {
-            self.lo[a] = self.lo[a].min(lo[a]);
-            self.hi[a] = self.hi[a].max(hi[a]);
+            // Nothing is NaN here, so a comparison does: it is one instruction.
+            self.lo[a] = if lo[a] < self.lo[a] { lo[a] } else { self.lo[a] };
+            self.hi[a] = if hi[a] > self.hi[a] { hi[a] } else { self.hi[a] };
         }
     }
 
@@ -210,7 +211,7 @@ fn best_plane(primitives: &[Primitive], part: &Part, leaf: LeafSize) -> Option<P
         if extent <= 0.0 {
             continue;
         }
-        let mut plane = Plane { axis, low, per_unit: BINS as f32 / extent, first_right: 0 };
+        let plane = Plane { axis, low, per_unit: BINS as f32 / extent, first_right: 0 };
         let mut bins = [(Bounds::EMPTY, 0usize); BINS];
         for p in primitives {
             let bin = &mut bins[plane.bin(p)];
@@ -222,21 +223,28 @@ fn best_plane(primitives: &[Primitive], part: &Part, leaf: LeafSize) -> Option<P
         let mut right_cost = [0.0f32; BINS];
         let (mut bounds, mut count) = (Bounds::EMPTY, 0);
         for i in (1..BINS).rev() {
+            if bins[i].1 == 0 {
+                right_cost[i] = if count == 0 { 0.0 } else { right_cost[i + 1] };
+                continue;
+            }
             bounds.add(bins[i].0.lo, bins[i].0.hi);
             count += bins[i].1;
             right_cost[i] = bounds.half_area() * blocks(count);
         }
         let (mut bounds, mut count) = (Bounds::EMPTY, 0);
         for i in 1..BINS {
+            // Behind an empty bin the plane parts the primitives as the one before it does.
+            if bins[i - 1].1 == 0 {
+                continue;
+            }
             bounds.add(bins[i - 1].0.lo, bins[i - 1].0.hi);
             count += bins[i - 1].1;
-            if count == 0 || count == primitives.len() {
-                continue;
+            if count == primitives.len() {
+                break;
             }
             let cost = bounds.half_area() * blocks(count) + right_cost[i];
             if cost < best_cost {
                 best_cost = cost;
-                plane.first_right = i;
                 best = Some(Plane { axis, low, per_unit: plane.per_unit, first_right: i });
             }
         }

@@ -2,7 +2,8 @@
 
 use super::{MeshSource, obj, ply, serialized};
 use crate::error::{Error, Result};
-use std::collections::HashMap;
+use rayon::prelude::*;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -42,6 +43,24 @@ pub struct Sources {
 }
 
 impl Sources {
+    /// All of `wanted` that can be read, read on the current rayon pool.
+    #[must_use]
+    pub fn of<'a>(wanted: impl Iterator<Item = (&'a Path, u32)>) -> Sources {
+        let distinct: BTreeSet<(&Path, u32)> = wanted.collect();
+        let distinct: Vec<(&Path, u32)> = distinct.into_iter().collect();
+        let read = distinct
+            .into_par_iter()
+            .filter_map(|(path, index)| Some(((path.to_path_buf(), index), Arc::new(load(path, index).ok()?))))
+            .collect();
+        Sources { read }
+    }
+
+    /// What was read from mesh `index` of `path`, if it was.
+    #[must_use]
+    pub fn known(&self, path: &Path, index: u32) -> Option<&MeshSource> {
+        self.read.get(&(path.to_path_buf(), index)).map(|source| &**source)
+    }
+
     /// [`load`], or what it gave before.
     ///
     /// # Errors
