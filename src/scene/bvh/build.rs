@@ -10,6 +10,7 @@
 //! evenly spaced.)
 
 use super::{LEAF, LEAF_COUNT_SHIFT, NO_PRIMITIVE, Node};
+use wide::f32x4;
 
 /// Bins per axis. With 32, rays visit as many nodes and leaves of a 256 000-triangle mesh.
 const BINS: usize = 16;
@@ -35,6 +36,10 @@ impl Primitive {
     fn centroid(&self, axis: usize) -> f32 {
         self.lo[axis] + self.hi[axis]
     }
+
+    fn corners(&self) -> [f32x4; 2] {
+        [self.lo, self.hi].map(|[x, y, z]| f32x4::new([x, y, z, 0.0]))
+    }
 }
 
 /// How many primitives a leaf holds.
@@ -47,26 +52,36 @@ pub(super) struct LeafSize {
     pub max: usize,
 }
 
+/// The fourth lane is zero once something is in. Whole registers: bins that one primitive after the other writes
+/// are read back at once.
 #[derive(Clone, Copy)]
 struct Bounds {
-    lo: [f32; 3],
-    hi: [f32; 3],
+    lo: f32x4,
+    hi: f32x4,
 }
 
 impl Bounds {
-    const EMPTY: Bounds = Bounds { lo: [f32::INFINITY; 3], hi: [f32::NEG_INFINITY; 3] };
+    const EMPTY: Bounds = Bounds { lo: f32x4::new([f32::INFINITY; 4]), hi: f32x4::new([f32::NEG_INFINITY; 4]) };
 
-    fn add(&mut self, lo: [f32; 3], hi: [f32; 3]) {
-        for a in 0..3 {
-            // Nothing is NaN here, so a comparison does: it is one instruction.
-            self.lo[a] = if lo[a] < self.lo[a] { lo[a] } else { self.lo[a] };
-            self.hi[a] = if hi[a] > self.hi[a] { hi[a] } else { self.hi[a] };
-        }
+    fn add(&mut self, lo: f32x4, hi: f32x4) {
+        // Nothing is NaN here.
+        self.lo = self.lo.fast_min(lo);
+        self.hi = self.hi.fast_max(hi);
+    }
+
+    fn lo(&self) -> [f32; 3] {
+        let [x, y, z, _] = self.lo.to_array();
+        [x, y, z]
+    }
+
+    fn hi(&self) -> [f32; 3] {
+        let [x, y, z, _] = self.hi.to_array();
+        [x, y, z]
     }
 
     /// Half the surface; zero where empty.
     fn half_area(&self) -> f32 {
-        let [x, y, z] = [0, 1, 2].map(|a| (self.hi[a] - self.lo[a]).max(0.0));
+        let [x, y, z, _] = (self.hi - self.lo).to_array().map(|d| d.max(0.0));
         x * y + y * z + z * x
     }
 }
@@ -85,9 +100,9 @@ impl Part {
     fn of(primitives: &[Primitive], first: usize, count: usize) -> Part {
         let mut part = Part { first, count, bounds: Bounds::EMPTY, centroids: Bounds::EMPTY };
         for p in &primitives[first..first + count] {
-            part.bounds.add(p.lo, p.hi);
-            let c = [0, 1, 2].map(|a| p.centroid(a));
-            part.centroids.add(c, c);
+            let [lo, hi] = p.corners();
+            part.bounds.add(lo, hi);
+            part.centroids.add(lo + hi, lo + hi);
         }
         part
     }
@@ -141,7 +156,7 @@ impl Builder<'_> {
 
         for (slot, part) in parts[..used].iter().enumerate() {
             let child = if part.count <= self.leaf.max { self.add_leaf(part) } else { self.add_node(*part, level + 1) };
-            self.nodes[id].set(slot, part.bounds.lo, part.bounds.hi, child);
+            self.nodes[id].set(slot, part.bounds.lo(), part.bounds.hi(), child);
         }
         id as u32
     }
@@ -177,7 +192,7 @@ fn split(primitives: &mut [Primitive], part: &Part, leaf: LeafSize, level: usize
 
 /// Halves by count along the widest axis of the centroids.
 fn halve(primitives: &mut [Primitive], part: &Part) -> usize {
-    let extent = [0, 1, 2].map(|a| part.centroids.hi[a] - part.centroids.lo[a]);
+    let extent = (part.centroids.hi - part.centroids.lo).to_array();
     let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);
     let middle = primitives.len() / 2;
     primitives.select_nth_unstable_by(middle, |a, b| {
@@ -206,8 +221,8 @@ fn best_plane(primitives: &[Primitive], part: &Part, leaf: LeafSize) -> Option<P
     let mut best: Option<Plane> = None;
     let mut best_cost = f32::INFINITY;
     for axis in 0..3 {
-        let low = part.centroids.lo[axis];
-        let extent = part.centroids.hi[axis] - low;
+        let low = part.centroids.lo()[axis];
+        let extent = part.centroids.hi()[axis] - low;
         if extent <= 0.0 {
             continue;
         }
@@ -215,7 +230,8 @@ fn best_plane(primitives: &[Primitive], part: &Part, leaf: LeafSize) -> Option<P
         let mut bins = [(Bounds::EMPTY, 0usize); BINS];
         for p in primitives {
             let bin = &mut bins[plane.bin(p)];
-            bin.0.add(p.lo, p.hi);
+            let [lo, hi] = p.corners();
+            bin.0.add(lo, hi);
             bin.1 += 1;
         }
         // Cost of a side: the chance that a line meets it times the blocks it holds.

@@ -155,8 +155,64 @@ impl Bvh {
         Bvh::build_leaves(boxes, LeafSize { block, max: 8 })
     }
 
+    /// A tree of the same shape over other boxes, as many and all finite: an eighth of the work of a new tree, and
+    /// as good where the boxes are those of the same things turned, moved or resized.
+    ///
+    /// `None` where the boxes are not finite or not as many.
+    #[must_use]
+    pub fn refitted(&self, boxes: &[Aabb]) -> Option<Bvh> {
+        let (primitives, tree) = Bvh::space(boxes);
+        let count = self.order.iter().filter(|&&i| i != NO_PRIMITIVE).count();
+        if self.bounded as usize != self.order.len() || primitives.len() != boxes.len() || count != boxes.len() {
+            return None;
+        }
+        let mut nodes = self.nodes.clone();
+        let mut of_node = vec![([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]); nodes.len()];
+        let add = |all: &mut ([f32; 3], [f32; 3]), lo: [f32; 3], hi: [f32; 3]| {
+            for a in 0..3 {
+                all.0[a] = all.0[a].min(lo[a]);
+                all.1[a] = all.1[a].max(hi[a]);
+            }
+        };
+        // A node stands before its children.
+        for id in (0..nodes.len()).rev() {
+            for slot in 0..8 {
+                let child = nodes[id].children[slot];
+                if child == EMPTY_CHILD {
+                    continue;
+                }
+                let mut part = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+                if child & LEAF == 0 {
+                    part = of_node[child as usize];
+                } else {
+                    let first = (child & POSITION) as usize;
+                    let count = (child >> LEAF_COUNT_SHIFT & 7) as usize + 1;
+                    for &i in &self.order[first..first + count] {
+                        let p = &primitives[i as usize];
+                        add(&mut part, p.lo, p.hi);
+                    }
+                }
+                nodes[id].set(slot, part.0, part.1, child);
+                add(&mut of_node[id], part.0, part.1);
+            }
+        }
+        Some(Bvh { nodes, order: self.order.clone(), bounded: self.bounded, ..tree })
+    }
+
     fn build_leaves(boxes: &[Aabb], leaf: LeafSize) -> Bvh {
         assert!(boxes.len() <= MAX_POSITIONS / leaf.block, "more primitives than one tree can address");
+        let (mut primitives, tree) = Bvh::space(boxes);
+        let mut builder = Builder { primitives: &mut primitives, leaf, nodes: Vec::new(), order: Vec::new() };
+        builder.run();
+        let Builder { nodes, mut order, .. } = builder;
+        let bounded = order.len() as u32;
+        order.extend(&tree.order);
+        Bvh { nodes, order, bounded, ..tree }
+    }
+
+    /// The finite boxes in the coordinates of their tree, and the tree without nodes; its order holds the boxes that
+    /// are not finite.
+    fn space(boxes: &[Aabb]) -> (Vec<Primitive>, Bvh) {
         let finite = || boxes.iter().filter(|b| b.is_finite());
         let all = finite().fold(Aabb::EMPTY, |a, b| a.union(b));
         let bounds = boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b));
@@ -180,11 +236,6 @@ impl Bvh {
             }
         }
 
-        let mut builder = Builder { primitives: &mut primitives, leaf, nodes: Vec::new(), order: Vec::new() };
-        builder.run();
-        let Builder { nodes, mut order, .. } = builder;
-        let bounded = order.len() as u32;
-        order.extend(unbounded);
         let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for p in &primitives {
             for a in 0..3 {
@@ -193,7 +244,7 @@ impl Bvh {
             }
         }
         let root = [lo, hi].map(|c| f64x4::new([c[0].into(), c[1].into(), c[2].into(), 0.0]));
-        Bvh { nodes, order, bounded, centre, scale, root, bounds }
+        (primitives, Bvh { nodes: Vec::new(), order: unbounded, bounded: 0, centre, scale, root, bounds })
     }
 
     /// The original indices in leaf order. A caller who keeps primitives in this order reads

@@ -279,3 +279,47 @@ fn leaves_of_blocks_start_at_multiples() {
     assert_eq!(bvh.order().len(), 4 * blocks);
     assert_eq!(bvh.order().iter().filter(|&&i| i != NO_PRIMITIVE).count(), 500);
 }
+
+/// Boxes along a spiral, then the same mirrored and twice as large: the refitted tree visits what a new one holds.
+#[test]
+fn a_refitted_tree_finds_what_a_new_one_finds() {
+    let spiral = |scale: f64| -> Vec<Aabb> {
+        (0..500)
+            .map(|i| {
+                let t = f64::from(i) * 0.1;
+                let p = DVec3::new(t * libm::cos(t), t * libm::sin(t), 0.3 * t) * scale;
+                Aabb::from_points([p, p + DVec3::splat(0.4)])
+            })
+            .collect()
+    };
+    let (before, after) = (spiral(1.0), spiral(-2.0));
+    let refitted = Bvh::build_blocks(&before, 4).refitted(&after).unwrap();
+    let new = Bvh::build_blocks(&after, 4);
+    assert_eq!(refitted.bounds(), new.bounds());
+    let met = |tree: &Bvh, ray: &Ray| {
+        let mut found = Vec::new();
+        let stopped = tree.any(ray, f64::INFINITY, |i| {
+            let b = &after[i as usize];
+            let (t0, t1) = ((b.min - ray.origin) / ray.direction, (b.max - ray.origin) / ray.direction);
+            if t0.min(t1).max_element().max(0.0) <= t0.max(t1).min_element() {
+                found.push(i);
+            }
+            false
+        });
+        assert!(!stopped);
+        found.sort_unstable();
+        found
+    };
+    let mut all = 0;
+    for i in 0..200 {
+        let a = f64::from(i);
+        let direction =
+            DVec3::new(libm::sin(a * 1.3) + 0.01, libm::cos(a * 0.7) + 0.01, 0.2 * libm::sin(a)).normalize();
+        let ray = Ray::new(DVec3::new(3.0, 2.0, -20.0) + direction, direction);
+        let found = met(&refitted, &ray);
+        assert_eq!(found, met(&new, &ray));
+        all += found.len();
+    }
+    assert!(all > 50, "{all}");
+    assert!(refitted.refitted(&after[1..]).is_none());
+}

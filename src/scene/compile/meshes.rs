@@ -3,9 +3,10 @@
 use crate::description::{self as written, SceneDescription};
 use crate::scene::TriangleMesh;
 use crate::scene::mesh::{AreaTable, Mesh, MeshSource, MeshTree, NormalMode, Sources, Winding};
-use glam::DAffine3;
+use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
+use std::path::Path;
 use std::sync::Arc;
 
 /// The meshes of a scene, by where their shapes stand in the description (`shapes[3].mesh`).
@@ -32,11 +33,47 @@ impl Meshes {
             })
             .collect();
         let sources = Sources::of(wanted.iter().map(|(_, _, mesh)| (&*mesh.file, mesh.index)));
-        let placed = wanted
-            .into_par_iter()
-            .filter_map(|(at, shape, mesh)| {
+        let placed: Vec<Option<Result<Mesh, String>>> = wanted
+            .par_iter()
+            .map(|(_, shape, mesh)| {
                 let source = sources.known(&mesh.file, mesh.index)?;
-                Some((at, place(source, mesh, &DAffine3::from_mat4(shape.world_from_object()))))
+                Some(place(source, mesh, &DAffine3::from_mat4(shape.world_from_object())))
+            })
+            .collect();
+        // The first mesh of a file gives its tree to all others that are the same turned, moved or resized.
+        let mut first: HashMap<(&Path, u32), usize> = HashMap::new();
+        let model: Vec<usize> = wanted
+            .iter()
+            .enumerate()
+            .map(|(i, (_, shape, mesh))| {
+                let placed = matches!(placed[i], Some(Ok(_)));
+                let alike = placed && keeps_angles(&DAffine3::from_mat4(shape.world_from_object()));
+                if alike { *first.entry((&*mesh.file, mesh.index)).or_insert(i) } else { i }
+            })
+            .collect();
+        let built: Vec<Option<MeshTree>> = placed
+            .par_iter()
+            .enumerate()
+            .map(|(i, mesh)| match mesh {
+                Some(Ok(mesh)) if model[i] == i => Some(MeshTree::build(mesh)),
+                _ => None,
+            })
+            .collect();
+        let again: Vec<Option<MeshTree>> = placed
+            .par_iter()
+            .zip(&model)
+            .enumerate()
+            .map(|(i, (mesh, &model))| match (mesh, &built[model]) {
+                (Some(Ok(mesh)), Some(tree)) if model != i => Some(tree.again(mesh)),
+                _ => None,
+            })
+            .collect();
+        let placed = wanted
+            .into_iter()
+            .zip(placed)
+            .zip(built.into_iter().zip(again))
+            .filter_map(|(((at, ..), mesh), (built, again))| {
+                Some((at, mesh?.map(|mesh| with_tree(mesh, built.or(again)))))
             })
             .collect();
         Meshes { sources, placed }
@@ -58,11 +95,25 @@ impl Meshes {
         mesh: &written::Mesh,
         world_from_object: &DAffine3,
     ) -> Result<TriangleMesh, String> {
-        self.placed.remove(at).unwrap_or_else(|| place(source, mesh, world_from_object))
+        self.placed.remove(at).unwrap_or_else(|| Ok(with_tree(place(source, mesh, world_from_object)?, None)))
     }
 }
 
-fn place(source: &MeshSource, written: &written::Mesh, world_from_object: &DAffine3) -> Result<TriangleMesh, String> {
+/// Whether shapes stay similar, to a thousandth: trees of turned and resized meshes are about as good.
+fn keeps_angles(map: &DAffine3) -> bool {
+    let square = map.matrix3.transpose() * map.matrix3;
+    let scale = square.x_axis.x;
+    let off = square - DMat3::from_diagonal(DVec3::splat(scale));
+    off.to_cols_array().iter().all(|x| x.abs() <= 1e-3 * scale)
+}
+
+fn with_tree(mesh: Mesh, tree: Option<MeshTree>) -> TriangleMesh {
+    let tree = tree.unwrap_or_else(|| MeshTree::build(&mesh));
+    let areas = AreaTable::new(&mesh);
+    TriangleMesh { mesh, tree, areas }
+}
+
+fn place(source: &MeshSource, written: &written::Mesh, world_from_object: &DAffine3) -> Result<Mesh, String> {
     let mode = match written.normals {
         written::Normals::File => NormalMode::File,
         written::Normals::Smooth => NormalMode::Smooth,
@@ -77,6 +128,5 @@ fn place(source: &MeshSource, written: &written::Mesh, world_from_object: &DAffi
     if written.flip_v {
         mesh.uvs.iter_mut().for_each(|uv| uv[1] = 1.0 - uv[1]);
     }
-    let (tree, areas) = (MeshTree::build(&mesh), AreaTable::new(&mesh));
-    Ok(TriangleMesh { mesh, tree, areas })
+    Ok(mesh)
 }

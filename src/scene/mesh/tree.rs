@@ -43,9 +43,20 @@ impl MeshTree {
     /// Over more than [`MAX_TRIANGLES`], which [`Mesh::new`] refuses.
     #[must_use]
     pub fn build(mesh: &Mesh) -> MeshTree {
-        // Boxes and rays relative to the mesh's origin: nothing is rounded.
-        let boxes: Vec<Aabb> = (0..mesh.triangles.len()).map(|i| Aabb::from_points(mesh.vertices(i as u32))).collect();
-        let bvh = Bvh::build_blocks(&boxes, LANES);
+        MeshTree::over(mesh, Bvh::build_blocks(&boxes(mesh), LANES))
+    }
+
+    /// A hierarchy over `mesh` of the shape that this one has: cheaper than a new one, and as good where both are
+    /// meshes of one file, turned, moved or resized. A new one where they have not as many triangles.
+    #[must_use]
+    pub fn again(&self, mesh: &Mesh) -> MeshTree {
+        match self.bvh.refitted(&boxes(mesh)) {
+            Some(bvh) => MeshTree::over(mesh, bvh),
+            None => MeshTree::build(mesh),
+        }
+    }
+
+    fn over(mesh: &Mesh, bvh: Bvh) -> MeshTree {
         let block = |indices: &[u32]| {
             let mut out = Block([[[f32::NAN; LANES]; 3]; 3]);
             for (lane, &i) in indices.iter().enumerate().filter(|(_, i)| **i != NO_PRIMITIVE) {
@@ -132,6 +143,11 @@ impl MeshTree {
     fn local(&self, ray: &Ray) -> Ray {
         Ray::new(ray.origin - self.origin, ray.direction)
     }
+}
+
+/// Boxes of triangles relative to the mesh's origin, as rays are: nothing is rounded.
+fn boxes(mesh: &Mesh) -> Vec<Aabb> {
+    (0..mesh.triangles.len()).map(|i| Aabb::from_points(mesh.vertices(i as u32))).collect()
 }
 
 impl TriangleRay {
