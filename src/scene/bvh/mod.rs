@@ -155,8 +155,8 @@ impl Bvh {
         Bvh::build_leaves(boxes, LeafSize { block, max: 8 })
     }
 
-    /// A tree of the same shape over other boxes, as many and all finite: an eighth of the work of a new tree, and
-    /// as good where the boxes are those of the same things turned, moved or resized.
+    /// A tree of the same shape over other boxes, as many and all finite: cheaper than a new tree, and
+    /// about as good where the boxes are those of the same things turned, moved or resized.
     ///
     /// `None` where the boxes are not finite or not as many.
     #[must_use]
