@@ -12,6 +12,7 @@ const MOST: usize = 8;
 
 /// What a ray meets on its way.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::large_enum_variant, reason = "it lies on the stack of one shadow ray")]
 pub enum Way {
     /// Something that lets nothing through.
     Blocked,
