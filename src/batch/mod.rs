@@ -347,11 +347,9 @@ fn render_and_write(
         rec709_from_rgb: space.to_rec709(),
         ..PngSettings::default()
     };
-    let (exr, png) = rayon::join(
-        || write_exr(&exr_path, prepared, &frame, &image, base, space, report),
-        || png::write_png(&png_path, &image, &settings),
-    );
-    exr.and(png)?;
+    // One after the other: where the first cannot be written, nothing of the picture is left.
+    write_exr(&exr_path, prepared, &frame, &image, base, space, report)?;
+    png::write_png(&png_path, &image, &settings)?;
     report.files = vec![exr_path, png_path];
     report.seconds.writing = written.elapsed().as_secs_f64();
 
