@@ -238,7 +238,7 @@ mod tests {
         let scene = good(&(shape("area") + &shape("directionalarea")));
         assert_eq!(scene.shapes[0].emission_direction, None);
         assert_eq!(scene.shapes[1].emission_direction, Some(EmissionDirection::Normal));
-        assert!(fault(&shape("point"), &[]).contains("expected a emitter that Abbe has (area, directionalarea)"));
+        assert!(fault(&shape("point"), &[]).contains("expected an emitter that Abbe has (area, directionalarea)"));
         assert!(fault("<emitter type=\"area\"/>", &[]).contains("expected a <shape> around it, found it alone"));
         let mirrored =
             "<emitter type=\"projector\"><transform name=\"to_world\"><scale x=\"-1\"/></transform></emitter>";

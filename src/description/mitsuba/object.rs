@@ -370,7 +370,8 @@ impl<'a> Bag<'a> {
         let known: Vec<&str> = known.into_iter().collect();
         let hint = did_you_mean(&self.object.plugin, known.iter().copied());
         let (tag, plugin) = (self.object.family.tag(), quote(&self.object.plugin));
-        let message = format!("expected a {tag} that Abbe has ({}), found {plugin}{hint}", known.join(", "));
+        let article = if tag.starts_with(['e', 'i']) { "an" } else { "a" };
+        let message = format!("expected {article} {tag} that Abbe has ({}), found {plugin}{hint}", known.join(", "));
         Fault::at_place(self.object.plugin_place, message)
     }
 }

@@ -297,12 +297,7 @@ impl<'a> Export<'a> {
         self.filter(*filter);
         self.xml.close();
         self.xml.close();
-        // Set above, since the importer maps what the film says to these.
-        self.image_settings();
-    }
-
-    /// What the importer would read from the film, said in our words.
-    fn image_settings(&mut self) {
+        // The importer would map what the film says to `output`, where nothing else is set.
         if self.root.get("output").is_none() {
             self.xml.instruction("set output: {}");
         }

@@ -85,8 +85,7 @@ impl Export<'_> {
                 }
                 self.placing(world);
             }
-            #[allow(unreachable_patterns, reason = "kinds to come")]
-            _ => {
+            Geometry::Instance(_) | Geometry::SdfGrid(_) | Geometry::Curves(_) => {
                 self.open("sphere", shape);
                 self.placing(world);
             }
@@ -174,8 +173,9 @@ impl Export<'_> {
                 }
                 _ => None,
             },
-            #[allow(unreachable_patterns, reason = "kinds to come")]
-            _ => said("a ball: this kind is not exported yet"),
+            Geometry::Instance(_) | Geometry::SdfGrid(_) | Geometry::Curves(_) => {
+                said("a ball: this kind is not exported yet")
+            }
         };
         let weight =
             shape.sampling_weight.is_some().then(|| "the same light, chosen as often as the others".to_owned());

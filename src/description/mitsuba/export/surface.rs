@@ -216,8 +216,7 @@ impl Export<'_> {
                     self.end();
                 }
             }
-            #[allow(unreachable_patterns, reason = "kinds that Mitsuba's files carry, or that are to come")]
-            _ => {
+            Texture::Volume(_) | Texture::MeshAttribute(_) => {
                 self.instead("texture", &format!("textures.{name}"), "grey: this kind is not exported yet");
                 self.xml.open("texture", &[("type", "checkerboard"), ("id", id)]);
                 self.xml.close();
