@@ -9,11 +9,13 @@ use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, TileBuffer};
 use crate::film::filter::FilterSampler;
 use crate::film::resolve::{self, ErrorEstimate, Image, Splats};
+use crate::film::run::{LONGEST, LayerRun, Run};
+use crate::math::sampler::Octet;
 use crate::scene::Scene;
 use crate::spectrum::{ColourSpace, LANES, Lanes, SampledWavelengths, observer};
 use crate::transport::light::{Bounds, Splat};
 use crate::transport::plan::{EffectPlan, Integrator, LightSettings};
-use crate::transport::{self, PixelSample};
+use crate::transport::{self, PixelSample, Samples, Shot};
 use glam::DVec2;
 use rayon::prelude::*;
 use std::cell::RefCell;
@@ -175,41 +177,73 @@ pub fn passes(samples: u32) -> Vec<Range<u32>> {
 
 /// Renders one work unit into `tile`.
 pub fn render_unit(job: &FrameJob, samples: Range<u32>, tile: &mut TileBuffer) {
+    let FrameJob { scene, plan, filter, seed, .. } = *job;
+    let shot = Shot { scene, plan, filter, seed };
     let window = tile.window();
-    let layers = tile.layers.channels() > 0;
-    let mut values = Vec::new();
+    let mut memory = Samples::default();
+    let mut layers = LayerRun::default();
     for y in window.y..window.y + window.height as i32 {
         for x in window.x..window.x + window.width as i32 {
-            // Overscan makes negative coordinates; as addresses they wrap.
-            let pixel = [x as u32, y as u32];
-            for s in samples.clone() {
-                let replicate = s % REPLICATES as u32;
-                let index = s / REPLICATES as u32;
-                let FrameJob { scene, plan, filter, seed, .. } = *job;
-                if layers {
-                    let sample =
-                        transport::sample_with_layers(scene, plan, filter, seed, pixel, replicate, index, &mut values);
-                    let at = ((y - window.y) * window.width as i32 + (x - window.x)) as usize;
-                    tile.layers.add(at, sample.weight, &values);
-                    record(tile, [x, y], replicate, &sample);
-                } else {
-                    let sample = transport::sample(scene, plan, filter, seed, pixel, replicate, index);
-                    record(tile, [x, y], replicate, &sample);
+            for replicate in 0..REPLICATES as u32 {
+                // Samples take turns among the replicates.
+                let turns = |s: u32| s.saturating_sub(replicate).div_ceil(REPLICATES as u32);
+                let (mut start, end) = (turns(samples.start), turns(samples.end));
+                while start < end {
+                    let next = (start - start % Octet::SAMPLES).saturating_add(LONGEST).min(end);
+                    render_run(&shot, tile, &mut memory, &mut layers, [x, y], replicate, start..next);
+                    start = next;
                 }
             }
         }
     }
 }
 
-fn record(tile: &mut TileBuffer, pixel: [i32; 2], replicate: u32, sample: &PixelSample) {
+/// Renders samples of one replicate of `pixel`, at most [`LONGEST`].
+fn render_run(
+    shot: &Shot,
+    tile: &mut TileBuffer,
+    memory: &mut Samples,
+    layers: &mut LayerRun,
+    pixel: [i32; 2],
+    replicate: u32,
+    indices: Range<u32>,
+) {
+    let index = tile.window().index(pixel).expect("the pixel lies in the tile");
+    let channels = tile.layers.channels();
+    let mut run = Run::default();
+    layers.reset(channels);
+    // Overscan makes negative coordinates; as addresses they wrap.
+    let address = pixel.map(|x| x as u32);
+    let mut start = indices.start;
+    while start < indices.end {
+        let next = (start - start % Octet::SAMPLES).saturating_add(Octet::SAMPLES).min(indices.end);
+        memory.render(shot, address, replicate, start..next, |sample, values| {
+            if channels > 0 && !layers.add(sample.weight, values) {
+                tile.layers.add(index, sample.weight, values);
+            }
+            record(tile, &mut run, pixel, replicate, sample);
+        });
+        start = next;
+    }
+    tile.add_run(pixel, replicate as usize, &run);
+    if channels > 0 {
+        tile.layers.add_run(index, layers);
+    }
+}
+
+#[inline]
+fn record(tile: &mut TileBuffer, run: &mut Run, pixel: [i32; 2], replicate: u32, sample: &PixelSample) {
     let r = sample.radiance;
     let light = r.simd_ge(Lanes::ZERO) & r.simd_le(Lanes::splat(f32::MAX));
     if !light.all() {
         tile.drop_sample(pixel, replicate as usize, cause(r));
         return;
     }
-    let xyz = observer::xyz(r, &sample.wavelengths).map(|x| x * sample.weight);
-    tile.add(pixel, replicate as usize, xyz, sample.alpha * sample.weight);
+    let xyz = sample.xyz.map(|x| x * sample.weight);
+    let alpha = sample.alpha * sample.weight;
+    if !run.add(xyz, alpha) {
+        tile.add(pixel, replicate as usize, xyz, alpha);
+    }
 }
 
 /// What is wrong with a radiance that has a lane light cannot have.

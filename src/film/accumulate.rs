@@ -18,6 +18,7 @@
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::layers::LayerSums;
+use crate::film::run::Run;
 
 /// Independently scrambled sample sets of each pixel; their spread is the error bar.
 pub const REPLICATES: usize = 4;
@@ -281,6 +282,15 @@ impl TileBuffer {
         if let Err(cause) = self.cells[index][replicate].add(xyz, alpha) {
             self.invalid.record(cause);
         }
+    }
+
+    /// Adds the samples of a run to `replicate` of `pixel` (in the full frame).
+    ///
+    /// # Panics
+    /// If the pixel lies outside the window or there is no such replicate.
+    pub fn add_run(&mut self, pixel: [i32; 2], replicate: usize, run: &Run) {
+        let index = self.window.index(pixel).expect("the pixel lies in the tile");
+        self.cells[index][replicate].merge(&run.cell(), &mut self.invalid);
     }
 }
 

@@ -7,6 +7,7 @@
 
 use super::Window;
 use super::accumulate::{Invalid, InvalidCounts, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum};
+use super::run::LayerRun;
 
 /// Sums of all layers of a window, pixel by pixel in raster order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -75,6 +76,22 @@ impl LayerSums {
             let _ = sum.add(x * weight);
         }
         self.counts[index] += 1;
+    }
+
+    /// Adds the samples of a run to the pixel at `index`.
+    ///
+    /// # Panics
+    /// If the run has other channels.
+    pub fn add_run(&mut self, index: usize, run: &LayerRun) {
+        if self.counts[index] + run.count() > SAMPLES_LIMIT {
+            self.invalid.overflow += u64::from(run.count());
+            return;
+        }
+        let start = index * self.channels;
+        for (sum, part) in self.sums[start..start + self.channels].iter_mut().zip(run.sums()) {
+            *sum += part;
+        }
+        self.counts[index] += run.count();
     }
 
     /// Adds the sums of `part`, which cover `inner`, to these, which cover `window` around it.

@@ -1,6 +1,6 @@
 //! Samples to files: accumulators, filters, EXR, PNG, and the comparison of two pictures.
 //!
-//! Samples are added as integers ([`accumulate`]), so any split of the work gives the same bits;
+//! Samples are added as integers ([`accumulate`], a pixel's in [`run`]s), so any split of the work gives the same bits;
 //! [`resolve`] turns sums into a picture with its standard error; [`exr`] and [`png`] write it
 //! atomically ([`output`]); [`compare`] says whether two pictures show the same scene.
 //!
@@ -15,6 +15,7 @@ pub mod layers;
 pub mod output;
 pub mod png;
 pub mod resolve;
+pub mod run;
 
 /// A rectangle of pixels: a crop, a tile, the data or the display window of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]

@@ -9,6 +9,7 @@
 //! every block of 2ᵐ consecutive samples.
 
 use glam::DVec2;
+use std::cell::Cell;
 
 /// What a set of four numbers is for. A path asks for [`Set::Camera`] and [`Set::Lens`] once and
 /// for the others once a vertex.
@@ -40,37 +41,119 @@ impl Set {
 
 /// The numbers of one sample of one pixel.
 #[derive(Clone, Copy, Debug)]
-pub struct Sampler {
-    /// Hash of (seed, pixel, replicate).
+pub struct Sampler<'a> {
+    /// See [`stream`].
     stream: u32,
     /// Index of the sample within its replicate.
     index: u32,
+    /// Sets that it shares with its neighbours.
+    octet: Option<&'a Octet>,
 }
 
-impl Sampler {
+/// Hash of (seed, pixel, replicate).
+fn stream(seed: u64, pixel: [u32; 2], replicate: u32) -> u32 {
+    let key = mix64(
+        seed ^ mix64(u64::from(pixel[0]) << 32 | u64::from(pixel[1]))
+            ^ u64::from(replicate).wrapping_mul(0x9e37_79b9_7f4a_7c15),
+    );
+    (key >> 32) as u32
+}
+
+impl Sampler<'_> {
     /// The sampler of sample `index` of `replicate` at `pixel`, for a render with `seed`.
     #[must_use]
-    pub fn new(seed: u64, pixel: [u32; 2], replicate: u32, index: u32) -> Sampler {
-        let key = mix64(
-            seed ^ mix64(u64::from(pixel[0]) << 32 | u64::from(pixel[1]))
-                ^ u64::from(replicate).wrapping_mul(0x9e37_79b9_7f4a_7c15),
-        );
-        Sampler { stream: (key >> 32) as u32, index }
+    pub fn new(seed: u64, pixel: [u32; 2], replicate: u32, index: u32) -> Sampler<'static> {
+        Sampler { stream: stream(seed, pixel, replicate), index, octet: None }
     }
 
     /// Four numbers in [0, 1): multiples of 2⁻³², so never one.
     #[must_use]
+    #[inline]
     pub fn set(&self, set: Set) -> [f64; 4] {
-        let key = mix64(u64::from(self.stream) << 32 | u64::from(set.index()));
-        let shuffled = owen_scramble(self.index.reverse_bits(), key as u32).reverse_bits();
-        let point = sobol_reversed(shuffled);
-        // A key of its own for each dimension; the four run side by side.
-        let key = (key >> 32) as u32;
-        std::array::from_fn(|d| {
-            let scrambled = owen_scramble(point[d], key ^ DIMENSION_KEYS[d]).reverse_bits();
-            f64::from(scrambled) * (1.0 / 4_294_967_296.0)
-        })
+        let bits = match self.octet {
+            Some(octet) if set.index() < SHARED_SETS => octet.set(set, self.index),
+            _ => points(self.stream, [self.index], set)[0],
+        };
+        bits.map(|x| f64::from(x) * (1.0 / 4_294_967_296.0))
     }
+}
+
+/// Sets that an [`Octet`] keeps: those of the camera and of five vertices.
+const SHARED_SETS: u32 = 17;
+
+/// The numbers of eight samples with consecutive indices, of one replicate of one pixel. The first that asks for a
+/// set has it made for all: eight side by side take little longer than one.
+#[derive(Debug)]
+pub struct Octet {
+    /// See [`stream`].
+    stream: u32,
+    /// Index of the first sample, a multiple of eight.
+    first: u32,
+    /// One bit a set: whether it is made.
+    made: Cell<u32>,
+    /// The four numbers of each sample in units of 2⁻³², set by set.
+    sets: [Cell<[[u32; 4]; Octet::SAMPLES as usize]>; SHARED_SETS as usize],
+}
+
+impl Default for Octet {
+    fn default() -> Octet {
+        Octet { stream: 0, first: 0, made: Cell::new(0), sets: [const { Cell::new([[0; 4]; 8]) }; 17] }
+    }
+}
+
+impl Octet {
+    /// How many samples share their sets.
+    pub const SAMPLES: u32 = 8;
+
+    /// Moves to the samples around `index` of `replicate` at `pixel`, for a render with `seed`.
+    pub fn reset(&mut self, seed: u64, pixel: [u32; 2], replicate: u32, index: u32) {
+        self.stream = stream(seed, pixel, replicate);
+        self.first = index - index % Octet::SAMPLES;
+        self.made.set(0);
+    }
+
+    /// The sampler of sample `index`: the numbers of [`Sampler::new`].
+    ///
+    /// # Panics
+    /// If it is not one of the eight.
+    #[must_use]
+    pub fn sampler(&self, index: u32) -> Sampler<'_> {
+        assert_eq!(index - index % Octet::SAMPLES, self.first, "one of the eight samples");
+        Sampler { stream: self.stream, index, octet: Some(self) }
+    }
+
+    #[inline]
+    fn set(&self, set: Set, index: u32) -> [u32; 4] {
+        let place = set.index();
+        if self.made.get() >> place & 1 == 0 {
+            self.make(set);
+        }
+        let numbers = self.sets[place as usize].as_array_of_cells();
+        numbers[(index % Octet::SAMPLES) as usize].get()
+    }
+
+    #[inline(never)]
+    fn make(&self, set: Set) {
+        let place = set.index();
+        self.sets[place as usize].set(points(self.stream, std::array::from_fn(|i| self.first + i as u32), set));
+        self.made.set(self.made.get() | 1 << place);
+    }
+}
+
+/// The points of `set` for samples of one stream, in units of 2⁻³².
+#[inline(always)]
+fn points<const N: usize>(stream: u32, indices: [u32; N], set: Set) -> [[u32; 4]; N] {
+    let key = mix64(u64::from(stream) << 32 | u64::from(set.index()));
+    let shuffled = indices.map(|i| owen_scramble(i.reverse_bits(), key as u32).reverse_bits());
+    let mut points = shuffled.map(sobol_reversed);
+    // A key of its own for each dimension; all numbers run side by side.
+    let keys = DIMENSION_KEYS.map(|k| k ^ (key >> 32) as u32);
+    for point in &mut points {
+        for (x, key) in point.iter_mut().zip(keys) {
+            *x = owen_scramble(*x, key).reverse_bits();
+        }
+    }
+    points
 }
 
 /// Independent numbers for a walk whose length nobody knows beforehand: the tentative collisions of
@@ -80,7 +163,7 @@ pub struct Walk {
     state: u64,
 }
 
-impl Sampler {
+impl Sampler<'_> {
     /// The walk that belongs to `set`; its numbers have nothing in common with those of the set.
     #[must_use]
     pub fn walk(&self, set: Set) -> Walk {
@@ -118,6 +201,7 @@ pub fn pairs(set: [f64; 4]) -> (DVec2, DVec2) {
 /// A well-mixed 64-bit hash: the finaliser of SplitMix64 (Steele et al. 2014; constants of
 /// Stafford's variant 13).
 #[must_use]
+#[inline]
 pub fn mix64(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -127,6 +211,7 @@ pub fn mix64(x: u64) -> u64 {
 
 /// Nested uniform (Owen) scramble of a bit-reversed number by the hash of Laine and Karras 2011,
 /// with the constants of Burley 2020, section 3.
+#[inline(always)]
 fn owen_scramble(reversed: u32, key: u32) -> u32 {
     let mut x = reversed.wrapping_add(key);
     x ^= x.wrapping_mul(0x6c50_b47c);
@@ -204,6 +289,7 @@ const fn sobol_bytes() -> [[[u32; 4]; 256]; 4] {
     table
 }
 
+#[inline(always)]
 fn sobol_reversed(index: u32) -> [u32; 4] {
     let [b0, b1, b2, b3] = index.to_le_bytes();
     let mut out = [0; 4];
@@ -262,7 +348,7 @@ mod tests {
     #[test]
     fn streams_are_uncorrelated() {
         let first = |s: Sampler, set| s.set(set)[0] - 0.5;
-        type Stream = fn(u32) -> (Sampler, Set);
+        type Stream = fn(u32) -> (Sampler<'static>, Set);
         let variants: [(&str, Stream); 4] = [
             ("pixel", |i| (Sampler::new(1, [i + 1, 0], 0, 0), Set::Camera)),
             ("replicate", |i| (Sampler::new(1, [i, 0], 1, 0), Set::Camera)),
@@ -303,6 +389,21 @@ mod tests {
         let mut one = walk(0, 0);
         let mean = (0..n).map(|_| one.exponential()).sum::<f64>() / f64::from(n);
         assert!((mean - 1.0).abs() < 4.5 / f64::from(n).sqrt(), "{mean}");
+    }
+
+    /// A sample has the same numbers by itself and among its neighbours, in sets that they share and beyond.
+    #[test]
+    fn numbers_do_not_depend_on_the_neighbours() {
+        let mut octet = Octet::default();
+        for (pixel, replicate, first) in [([3, u32::MAX], 1, 8), ([3, 4], 0, 0), ([3, 4], 3, 0xffff_fff8)] {
+            octet.reset(9, pixel, replicate, first + 5);
+            for set in (0..8).flat_map(|v| [Set::Camera, Set::Lens, Set::Scatter(v), Set::Choice(v), Set::Extra(v)]) {
+                for index in [2, 0, 7].map(|i| first + i) {
+                    let alone = Sampler::new(9, pixel, replicate, index);
+                    assert_eq!(octet.sampler(index).set(set), alone.set(set), "{set:?} of {index}");
+                }
+            }
+        }
     }
 
     #[test]

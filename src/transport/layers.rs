@@ -164,13 +164,23 @@ impl LayerPlan {
 pub struct Seen {
     /// Radiance.
     pub radiance: Lanes,
+    /// CIE XYZ of it.
+    pub xyz: [f32; 3],
     /// Coverage.
     pub alpha: f32,
 }
 
-/// The numbers of one sample, appended to `values`. `light` gives the light of an integrator, by number.
+/// The numbers of one sample, in the order of the channels.
+#[derive(Debug, Default)]
+pub struct Values {
+    /// The numbers.
+    pub numbers: Vec<f32>,
+    others: Vec<Seen>,
+}
+
+/// Fills `values` with the numbers of one sample. `light` gives the light of an integrator.
 #[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
-pub fn append(
+pub fn fill(
     scene: &Scene,
     plan: &EffectPlan,
     wavelengths: &SampledWavelengths,
@@ -178,11 +188,14 @@ pub fn append(
     neighbours: impl Fn(DVec2) -> Ray,
     own: Seen,
     light: impl Fn(&Integrator) -> Seen,
-    values: &mut Vec<f32>,
+    values: &mut Values,
 ) {
+    let Values { numbers: values, others } = values;
+    values.clear();
     let layers = &plan.layers;
     let sensitivity = layers.sensitivity as f32;
-    let others: Vec<Seen> = layers.integrators.iter().map(light).collect();
+    others.clear();
+    others.extend(layers.integrators.iter().map(light));
     let looks = layers.layers.iter().any(|layer| matches!(layer.source, Source::Surface(_)));
     let first = if looks { First::met(scene, ray) } else { None };
     for layer in &layers.layers {
@@ -194,7 +207,7 @@ pub fn append(
             },
             Source::Light(of, form) => {
                 let seen = of.map_or(own, |i| others[i]);
-                let xyz = observer::xyz(seen.radiance * sensitivity, wavelengths);
+                let xyz = seen.xyz.map(|x| x * sensitivity);
                 match form {
                     Form::Xyz => values.extend(xyz),
                     Form::Rgba => {

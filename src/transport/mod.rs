@@ -1,8 +1,8 @@
 //! Which effects, which paths, how much light.
 //!
 //! [`plan`] decides from the scene what has to be simulated; [`path`] and [`whitted`] carry eight
-//! wavelengths along paths of light; [`sample`] is the one entry: the light of one sample of one
-//! pixel.
+//! wavelengths along paths of light; [`Samples`] is the one entry: the light of some samples of one
+//! pixel; [`sample`] is that of a single one.
 
 pub mod layers;
 pub mod light;
@@ -13,11 +13,12 @@ pub mod whitted;
 use crate::film::accumulate::REPLICATES;
 use crate::film::filter::FilterSampler;
 use crate::math::Ray;
-use crate::math::sampler::{Sampler, Set, pairs};
+use crate::math::sampler::{Octet, Sampler, Set, pairs};
 use crate::scene::Scene;
-use crate::spectrum::{LANES, Lanes, SampledWavelengths};
+use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::DVec2;
 use plan::{EffectPlan, Integrator, PathSettings};
+use std::ops::Range;
 
 /// Light that a camera ray brings, before fog.
 #[derive(Clone, Copy, Debug)]
@@ -38,19 +39,38 @@ pub struct PixelSample {
     pub radiance: Lanes,
     /// Its wavelengths.
     pub wavelengths: SampledWavelengths,
+    /// CIE XYZ of the light.
+    pub xyz: [f32; 3],
     /// Coverage.
     pub alpha: f32,
     /// Weight of the reconstruction filter: ±1 up to its norm.
     pub weight: f32,
 }
 
-/// A camera ray, and the random numbers of what follows.
-struct Begun {
-    seed: u64,
+/// What all samples of a picture share.
+#[derive(Clone, Copy, Debug)]
+pub struct Shot<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// What is simulated.
+    pub plan: &'a EffectPlan,
+    /// Reconstruction filter.
+    pub filter: &'a FilterSampler,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+/// Where the random numbers of a sample come from.
+#[derive(Clone, Copy)]
+struct Address {
     pixel: [u32; 2],
     replicate: u32,
     index: u32,
-    sampler: Sampler,
+}
+
+/// A camera ray.
+struct Begun {
+    at: Address,
     wavelengths: SampledWavelengths,
     /// On the picture, in pixels.
     place: DVec2,
@@ -59,43 +79,37 @@ struct Begun {
 }
 
 impl Begun {
-    fn new(
-        scene: &Scene,
-        plan: &EffectPlan,
-        filter: &FilterSampler,
-        seed: u64,
-        pixel: [u32; 2],
-        replicate: u32,
-        index: u32,
-    ) -> Begun {
+    #[inline]
+    fn new(shot: &Shot, at: Address, sampler: &Sampler) -> Begun {
+        let Shot { scene, plan, filter, .. } = shot;
         // Overscan has negative coordinates, which wrap as addresses.
-        let corner = DVec2::new(f64::from(pixel[0] as i32), f64::from(pixel[1] as i32));
-        let sampler = Sampler::new(seed, pixel, replicate, index);
+        let corner = DVec2::new(f64::from(at.pixel[0] as i32), f64::from(at.pixel[1] as i32));
         if let Integrator::Whitted(settings) = &plan.integrator {
             // A regular grid, the same for every pixel. The wavelengths of all samples together make one
             // lattice: a step of the lanes' own distance over their number.
             let n = settings.grid;
-            let s = index * REPLICATES as u32 + replicate;
+            let s = at.index * REPLICATES as u32 + at.replicate;
             let cell = s % (n * n);
             let offset = DVec2::new(f64::from(cell % n) + 0.5, f64::from(cell / n) + 0.5) / f64::from(n);
             let nodes = f64::from(settings.samples()) * LANES as f64;
             let wavelengths = scene.wavelengths.sample((f64::from(s) + 0.5) / nodes);
             let place = corner + offset;
             let ray = scene.camera.ray(place, || DVec2::splat(0.5));
-            return Begun { seed, pixel, replicate, index, sampler, wavelengths, place, weight: 1.0, ray };
+            return Begun { at, wavelengths, place, weight: 1.0, ray };
         }
         let (u_pixel, u_time) = pairs(sampler.set(Set::Camera));
         let wavelengths = scene.wavelengths.sample(u_time.x);
         let chosen = filter.sample(u_pixel);
         let place = corner + DVec2::splat(0.5) + chosen.offset;
         let ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
-        Begun { seed, pixel, replicate, index, sampler, wavelengths, place, weight: chosen.weight, ray }
+        Begun { at, wavelengths, place, weight: chosen.weight, ray }
     }
 
     /// What `integrator` makes of the ray.
     #[inline]
-    fn light(&self, scene: &Scene, plan: &EffectPlan, integrator: &Integrator) -> Incoming {
-        let Begun { sampler, wavelengths, ray, .. } = self;
+    fn light(&self, shot: &Shot, sampler: &Sampler, integrator: &Integrator) -> Incoming {
+        let Begun { at, wavelengths, ray, .. } = self;
+        let Shot { scene, plan, .. } = shot;
         match integrator {
             Integrator::Path(settings) => {
                 let rays = settings.light_samples.max(settings.scatter_samples);
@@ -105,8 +119,8 @@ impl Begun {
                 // Several paths from one camera ray, each with numbers of its own.
                 let mut sum = Incoming { radiance: Lanes::ZERO, alpha: 0.0, depth: f64::INFINITY };
                 for i in 0..rays {
-                    let index = self.index.wrapping_mul(rays).wrapping_add(i);
-                    let sampler = Sampler::new(self.seed, self.pixel, self.replicate, index);
+                    let index = at.index.wrapping_mul(rays).wrapping_add(i);
+                    let sampler = Sampler::new(shot.seed, at.pixel, at.replicate, index);
                     let one = path::radiance(scene, plan, settings, &sampler, wavelengths, ray);
                     sum.radiance += one.radiance;
                     sum.alpha += one.alpha;
@@ -136,10 +150,13 @@ impl Begun {
         }
     }
 
-    fn finish(&self, scene: &Scene, plan: &EffectPlan, light: Incoming) -> PixelSample {
+    #[inline]
+    fn finish(&self, shot: &Shot, light: Incoming) -> PixelSample {
+        let radiance = fogged(shot.scene, shot.plan, light, self.wavelengths.nm);
         PixelSample {
-            radiance: fogged(scene, plan, light, self.wavelengths.nm),
+            radiance,
             wavelengths: self.wavelengths,
+            xyz: observer::xyz(radiance, &self.wavelengths),
             alpha: light.alpha,
             weight: self.weight,
         }
@@ -157,40 +174,68 @@ pub fn sample(
     replicate: u32,
     index: u32,
 ) -> PixelSample {
-    let begun = Begun::new(scene, plan, filter, seed, pixel, replicate, index);
-    begun.finish(scene, plan, begun.light(scene, plan, &plan.integrator))
+    let shot = Shot { scene, plan, filter, seed };
+    let sampler = Sampler::new(seed, pixel, replicate, index);
+    let begun = Begun::new(&shot, Address { pixel, replicate, index }, &sampler);
+    begun.finish(&shot, begun.light(&shot, &sampler, &plan.integrator))
 }
 
-/// [`sample`] with the numbers of its layers in `values`.
-#[expect(clippy::too_many_arguments, reason = "the address of a sample and where to put it")]
-pub fn sample_with_layers(
-    scene: &Scene,
-    plan: &EffectPlan,
-    filter: &FilterSampler,
-    seed: u64,
-    pixel: [u32; 2],
-    replicate: u32,
-    index: u32,
-    values: &mut Vec<f32>,
-) -> PixelSample {
-    let begun = Begun::new(scene, plan, filter, seed, pixel, replicate, index);
-    let own = begun.light(scene, plan, &plan.integrator);
-    let sample = begun.finish(scene, plan, own);
-    values.clear();
-    layers::append(
-        scene,
-        plan,
-        &begun.wavelengths,
-        &begun.ray,
-        |step| scene.camera.ray(begun.place + step, || pairs(begun.sampler.set(Set::Lens)).0),
-        layers::Seen { radiance: sample.radiance, alpha: own.alpha },
-        |integrator| {
-            let light = begun.light(scene, plan, integrator);
-            layers::Seen { radiance: light.radiance, alpha: light.alpha }
-        },
-        values,
-    );
-    sample
+/// The memory of samples that are rendered one after the other.
+#[derive(Default)]
+pub struct Samples {
+    octet: Octet,
+    begun: Vec<Begun>,
+    layers: layers::Values,
+}
+
+impl Samples {
+    /// Renders the samples `indices` of `replicate` at `pixel`, and gives each with the numbers of its layers. The
+    /// indices over eight are of one whole number.
+    pub fn render(
+        &mut self,
+        shot: &Shot,
+        pixel: [u32; 2],
+        replicate: u32,
+        indices: Range<u32>,
+        mut give: impl FnMut(&PixelSample, &[f32]),
+    ) {
+        let Samples { octet, begun, layers } = self;
+        octet.reset(shot.seed, pixel, replicate, indices.start);
+        // All camera rays first: one need not wait for the other.
+        begun.clear();
+        for index in indices {
+            begun.push(Begun::new(shot, Address { pixel, replicate, index }, &octet.sampler(index)));
+        }
+        for begun in begun {
+            let sampler = octet.sampler(begun.at.index);
+            let light = begun.light(shot, &sampler, &shot.plan.integrator);
+            let sample = begun.finish(shot, light);
+            if !shot.plan.layers.layers.is_empty() {
+                begun.layers(shot, &sampler, &sample, layers);
+            }
+            give(&sample, &layers.numbers);
+        }
+    }
+}
+
+impl Begun {
+    /// The numbers of the layers of `sample`, which began here.
+    fn layers(&self, shot: &Shot, sampler: &Sampler, sample: &PixelSample, values: &mut layers::Values) {
+        layers::fill(
+            shot.scene,
+            shot.plan,
+            &self.wavelengths,
+            &self.ray,
+            |step| shot.scene.camera.ray(self.place + step, || pairs(sampler.set(Set::Lens)).0),
+            layers::Seen { radiance: sample.radiance, xyz: sample.xyz, alpha: sample.alpha },
+            |integrator| {
+                let light = self.light(shot, sampler, integrator);
+                let xyz = observer::xyz(light.radiance, &self.wavelengths);
+                layers::Seen { radiance: light.radiance, xyz, alpha: light.alpha }
+            },
+            values,
+        );
+    }
 }
 
 /// Depth fog over what the camera sees.

@@ -65,7 +65,7 @@ struct Tracer<'a> {
     scene: &'a Scene,
     plan: &'a EffectPlan,
     settings: &'a PathSettings,
-    sampler: &'a Sampler,
+    sampler: &'a Sampler<'a>,
     nm: Lanes,
 }
 
