@@ -1,12 +1,33 @@
 //! `<transform>`: its steps as one matrix.
 
-use glam::{DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 
 use super::super::super::fault::Fault;
 use super::super::super::node::did_you_mean;
 use super::super::super::transform::rotation;
 use super::super::xml::{Attribute, Element};
 use super::{Parser, attribute, check_attributes};
+
+/// What the length of a unit vector that is written with three digits may be off by.
+const ABOUT_ONE: f64 = 1e-3;
+
+/// Mitsuba's turn: Rodrigues' formula with the axis as it is written. Where that is not of length one it stretches too,
+/// and files that were made by looking at the picture mean what they showed. What was rounded is taken for a unit vector.
+fn turn(axis: DVec3, deg: f64) -> DMat4 {
+    let length = axis.length();
+    let turned = rotation(axis, deg);
+    if (length - 1.0).abs() <= ABOUT_ONE {
+        return turned;
+    }
+    // R = cos θ + sin θ [a]× + (1 − cos θ) a aᵀ of the unit vector a; of l a the second term has l, the third l².
+    let along = axis / length;
+    let outer = DMat3::from_cols(along * along.x, along * along.y, along * along.z);
+    let turned = DMat3::from_mat4(turned);
+    let cos = 0.5 * (turned.col(0).x + turned.col(1).y + turned.col(2).z - 1.0);
+    let skew = (turned - turned.transpose()) * 0.5;
+    let stretched = DMat3::from_diagonal(DVec3::splat(cos)) + skew * length + outer * ((1.0 - cos) * length * length);
+    DMat4::from_mat3(stretched)
+}
 
 impl Parser<'_> {
     /// The product of the steps inside, the first step nearest to the object.
@@ -29,7 +50,7 @@ impl Parser<'_> {
                     if axis == DVec3::ZERO {
                         return Err(at("expected an axis other than 0, 0, 0 in <rotate>".to_owned()));
                     }
-                    rotation(axis, self.number(attribute(step, "angle")?)?)
+                    turn(axis, self.number(attribute(step, "angle")?)?)
                 }
                 "matrix" => {
                     check_attributes(step, &["value"], &[])?;
@@ -86,4 +107,22 @@ fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> Option<DMat4> {
     let x = up.cross(z).try_normalize()?;
     let y = z.cross(x);
     Some(DMat4::from_cols(x.extend(0.0), y.extend(0.0), z.extend(0.0), origin.extend(1.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Mitsuba 3.9.1's matrix of `<rotate value="1, 1, 0" angle="40"/>`, to its six digits.
+    #[test]
+    fn an_axis_that_is_no_unit_vector_stretches_as_in_mitsuba() {
+        let rows = turn(DVec3::new(1.0, 1.0, 0.0), 40.0).transpose().to_cols_array_2d();
+        let expected = [[1.0, 0.233956, 0.642788], [0.233956, 1.0, -0.642788], [-0.642788, 0.642788, 0.766044]];
+        for (row, expected) in rows.iter().zip(expected) {
+            assert!(row.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{rows:?}");
+        }
+        // A rounded unit vector turns and does nothing else.
+        let turned = DMat3::from_mat4(turn(DVec3::new(0.7071, 0.7071, 0.0), 40.0));
+        assert!((turned.determinant() - 1.0).abs() < 1e-15);
+    }
 }
