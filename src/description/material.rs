@@ -232,6 +232,9 @@ pub struct Plastic {
     /// Index of the coat; default 1.5.
     #[serde(default = "coat")]
     pub ior: Index,
+    /// Index outside; default 1.
+    #[serde(default = "vacuum")]
+    pub exterior_ior: Index,
     /// Microfacet roughness α of the coat; 0, the default, is smooth.
     #[serde(default)]
     pub roughness: f64,
@@ -435,6 +438,7 @@ impl Material {
             Material::Plastic(plastic) => {
                 plastic.reflectance.check(Role::Reflectance, at.key("reflectance"), checker);
                 plastic.ior.check(at.key("ior"), checker);
+                plastic.exterior_ior.check(at.key("exterior_ior"), checker);
                 plastic.tint.check(Role::Reflectance, at.key("tint"), checker);
                 checker.not_negative(at.key("roughness"), plastic.roughness);
                 check_highlight(plastic.highlight, at, checker);

@@ -106,8 +106,9 @@
 //!       reflection_tint: 1                       # ~ factors, or textures
 //!       transmission_tint: 1
 //!   pane: {thin_dielectric: {ior: 1.5, exterior_ior: 1}}             # and both tints
-//!   lacquer: {plastic: {reflectance: 0.5, ior: 1.5, roughness: 0, nonlinear: false, tint: 1}}
-//!                                                # ~ and distribution, highlight, two_sided; roughness is a number;
+//!   lacquer: {plastic: {reflectance: 0.5, ior: 1.5, exterior_ior: 1, roughness: 0, tint: 1}}
+//!                                                # ~ and nonlinear: false, distribution, highlight, two_sided;
+//!                                                # roughness is a number;
 //!                                                # diffuse_mean: integral (~), nodes: how a rough coat's diffuse
 //!                                                # reflectance from inside is taken, nodes as in Mitsuba 3
 //!   paint:

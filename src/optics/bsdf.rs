@@ -1,6 +1,6 @@
 //! The closed set of surface scattering functions, evaluated at one point for eight wavelengths.
 
-use super::dielectric::{Dielectric, RoughDielectric, Tint};
+use super::dielectric::{Dielectric, RelativeIndex, RoughDielectric, Tint};
 use super::fresnel::{self, Model};
 use super::hair::Hair;
 use super::mean;
@@ -8,7 +8,7 @@ use super::microfacet::Microfacets;
 use super::plastic::{Plastic, RoughPlastic};
 use super::principled::{Principled, PrincipledThin};
 use crate::math::warp;
-use crate::spectrum::Lanes;
+use crate::spectrum::{LANES, Lanes};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
@@ -35,8 +35,8 @@ pub enum Bsdf {
     RoughDielectric(RoughDielectric),
     /// A thin pane: two smooth interfaces that the path crosses as one, without bending.
     Thin {
-        /// Index of the pane over the index around it, at the hero's wavelength.
-        eta: f64,
+        /// Index of the pane over the index around it.
+        eta: RelativeIndex,
         /// Factors beside Fresnel's.
         tint: Tint,
     },
@@ -121,11 +121,41 @@ impl BsdfSample {
     }
 }
 
-/// What a thin pane reflects in all: the series of reflections inside, R + T²R + T²R³ + … = 2R/(1 + R).
-#[must_use]
-pub fn pane_reflectance(cos: f64, eta: f64) -> f64 {
-    let single = fresnel::dielectric(Model::Exact, cos, eta).reflected;
-    2.0 * single / (1.0 + single)
+/// What a thin pane reflects and lets through, of light at one angle.
+#[derive(Clone, Copy, Debug)]
+pub struct Pane {
+    /// The probability to go through: the mean of the lanes' shares, so that no wavelength leads.
+    pub share: f64,
+    /// What goes through, over `share`.
+    pub transmitted: Lanes,
+    /// What is reflected, over 1 − `share`.
+    pub reflected: Lanes,
+}
+
+impl Pane {
+    /// The pane of relative index `eta` at |cos θ| = `cos`. It reflects the series of reflections inside,
+    /// R + T²R + T²R³ + … = 2R/(1 + R), and lets T/(1 + R) through.
+    #[must_use]
+    pub fn new(cos: f64, eta: &RelativeIndex) -> Pane {
+        let through = |eta| {
+            let split = fresnel::dielectric(Model::Exact, cos, eta);
+            split.transmitted / (1.0 + split.reflected)
+        };
+        match eta {
+            RelativeIndex::Constant(eta) => {
+                Pane { share: through(*eta), transmitted: Lanes::ONE, reflected: Lanes::ONE }
+            }
+            RelativeIndex::Dispersive(eta) => {
+                let shares = eta.map(through);
+                let share = shares.iter().sum::<f64>() / LANES as f64;
+                // Nothing is chosen with probability zero.
+                let over = |sum: f64, part: [f64; LANES]| {
+                    if sum > 0.0 { Lanes::new(part.map(|p| (p / sum) as f32)) } else { Lanes::ZERO }
+                };
+                Pane { share, transmitted: over(share, shares), reflected: over(1.0 - share, shares.map(|s| 1.0 - s)) }
+            }
+        }
+    }
 }
 
 /// `wo` reflected about the local normal.
@@ -205,11 +235,11 @@ impl Bsdf {
             Bsdf::Dielectric(glass) => glass.sample(wo, u_lobe),
             Bsdf::RoughDielectric(glass) => glass.sample(wo, u_lobe, u),
             Bsdf::Thin { eta, tint } => {
-                let reflected = pane_reflectance(wo.z.abs(), *eta);
-                Some(if u_lobe < reflected {
-                    BsdfSample::discrete(mirror(wo), tint.reflected)
+                let pane = Pane::new(wo.z.abs(), eta);
+                Some(if u_lobe < 1.0 - pane.share {
+                    BsdfSample::discrete(mirror(wo), pane.reflected * tint.reflected)
                 } else {
-                    BsdfSample { transmitted: true, ..BsdfSample::discrete(-wo, tint.transmitted) }
+                    BsdfSample { transmitted: true, ..BsdfSample::discrete(-wo, pane.transmitted * tint.transmitted) }
                 })
             }
             Bsdf::Plastic(plastic) => plastic.sample(wo, u_lobe, u),

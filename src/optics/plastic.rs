@@ -5,10 +5,14 @@
 //! diffuse reflectance from inside and ρ the base's albedo,
 //! f_base = ρ/π · T(o) T(i) / (η² (1 − F_int ρ')), ρ' = ρ with colour shift ("nonlinear") or 1
 //! without. Conventions of Mitsuba 3's `plastic` and `roughplastic`.
+//!
+//! Where the coat's index depends on wavelength, T, F_int and η do, lane by lane. Coat or base is chosen by the mean over
+//! the lanes, so that no wavelength leads.
 
 use super::bsdf::{BsdfSample, Evaluation, coat_probability, from_evaluation, mirror};
-use super::dielectric::refract;
+use super::dielectric::{RelativeIndex, refract};
 use super::fresnel::{self, Model};
+use super::mean;
 use super::microfacet::Microfacets;
 use crate::math::warp;
 use crate::spectrum::Lanes;
@@ -23,9 +27,9 @@ pub struct Base {
     /// Albedo of the diffuse base.
     pub reflectance: Lanes,
     /// Index of the coat over the index outside.
-    pub eta: f64,
+    pub eta: RelativeIndex,
     /// Diffuse reflectance of the coat from inside.
-    pub internal: f64,
+    pub internal: Lanes,
     /// True where light that bounces under the coat takes up the base's colour each time.
     pub nonlinear: bool,
     /// Factor on what the coat reflects; one for a physical coat.
@@ -37,8 +41,8 @@ impl Base {
     #[must_use]
     pub fn albedo(&self) -> Lanes {
         let shifted = if self.nonlinear { self.reflectance } else { Lanes::ONE };
-        let inside = Lanes::ONE - shifted * self.internal as f32;
-        self.reflectance / inside * (1.0 / (self.eta * self.eta)) as f32
+        let inside = Lanes::ONE - shifted * self.internal;
+        self.reflectance / inside * self.eta.lanes(|eta| 1.0 / (eta * eta))
     }
 }
 
@@ -50,18 +54,30 @@ pub struct Plastic {
 }
 
 impl Plastic {
-    fn coat(&self, cos: f64) -> f64 {
-        fresnel::dielectric(Model::Exact, cos, self.base.eta).reflected
+    /// What the coat reflects, what it lets in, and the mean of the first.
+    fn coat(&self, cos: f64) -> (Lanes, Lanes, f64) {
+        let split = |eta| fresnel::dielectric(Model::Exact, cos, eta);
+        match self.base.eta {
+            RelativeIndex::Constant(eta) => {
+                let split = split(eta);
+                (Lanes::splat(split.reflected as f32), Lanes::splat(split.transmitted as f32), split.reflected)
+            }
+            RelativeIndex::Dispersive(eta) => {
+                let splits = eta.map(split);
+                let reflected = Lanes::new(splits.map(|s| s.reflected as f32));
+                (reflected, Lanes::new(splits.map(|s| s.transmitted as f32)), mean(reflected))
+            }
+        }
     }
 
     pub(super) fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
         if wo.z <= 0.0 || wi.z <= 0.0 {
             return Evaluation::NONE;
         }
-        let (fo, fi) = (self.coat(wo.z), self.coat(wi.z));
+        let ((_, into, fo), (_, out, _)) = (self.coat(wo.z), self.coat(wi.z));
         let p = coat_probability(fo, self.base.reflectance);
         Evaluation {
-            f: self.base.albedo() * ((1.0 - fo) * (1.0 - fi) / PI) as f32,
+            f: self.base.albedo() * into * out * (1.0 / PI) as f32,
             pdf: Lanes::splat(((1.0 - p) * wi.z / PI) as f32),
         }
     }
@@ -70,10 +86,10 @@ impl Plastic {
         if wo.z <= 0.0 {
             return None;
         }
-        let fo = self.coat(wo.z);
+        let (reflected, _, fo) = self.coat(wo.z);
         let p = coat_probability(fo, self.base.reflectance);
         if u_lobe < p {
-            return Some(BsdfSample::discrete(mirror(wo), self.base.tint * (fo / p) as f32));
+            return Some(BsdfSample::discrete(mirror(wo), self.base.tint * reflected * (1.0 / p) as f32));
         }
         let wi = warp::cosine_hemisphere(u);
         from_evaluation(wi, wi.z, self.eval(wo, wi), false, 1.0)
@@ -151,6 +167,68 @@ impl CoatTable {
     }
 }
 
+/// What of a coat depends on its index alone, for a range of indices: tables at even steps, linear between.
+///
+/// Along the index T and F_int bend by about one a unit squared where η ≥ 1.1, so linear steps of h leave h²/8: 5e-5 at
+/// [`COAT_STEP`], below what a table's 64 cosines leave.
+#[derive(Clone, Debug)]
+pub struct Coats {
+    low: f64,
+    step: f64,
+    /// Diffuse reflectance from inside.
+    internal: Vec<f64>,
+    /// Of rough coats.
+    tables: Vec<CoatTable>,
+}
+
+/// Between the indices of [`Coats`].
+const COAT_STEP: f64 = 0.02;
+
+/// The most tables of [`Coats`]: an index that runs over more than 0.64 gets wider steps.
+const MOST_COATS: f64 = 32.0;
+
+impl Coats {
+    /// For indices from `low` to `high`, over that outside; with `facets` where the coat is rough.
+    #[must_use]
+    pub fn new(low: f64, high: f64, facets: Option<&Microfacets>, mean: DiffuseMean) -> Coats {
+        let steps = ((high - low) / COAT_STEP).ceil().clamp(0.0, MOST_COATS);
+        let step = if steps > 0.0 { (high - low) / steps } else { 0.0 };
+        let etas = (0..=steps as u32).map(|i| low + step * f64::from(i));
+        let tables: Vec<CoatTable> = match facets {
+            Some(facets) => etas.clone().map(|eta| CoatTable::new(eta, facets, mean)).collect(),
+            None => Vec::new(),
+        };
+        let internal = match facets {
+            Some(_) => tables.iter().map(|table| table.internal).collect(),
+            None => etas.map(|eta| fresnel::dielectric_diffuse(1.0 / eta)).collect(),
+        };
+        Coats { low, step, internal, tables }
+    }
+
+    /// `f` of the entry at `eta`, linear between entries.
+    fn at(&self, eta: f64, f: impl Fn(usize) -> f64) -> f64 {
+        if self.step == 0.0 {
+            return f(0);
+        }
+        let last = self.internal.len() - 1;
+        let x = ((eta - self.low) / self.step).clamp(0.0, last as f64);
+        let i = (x as usize).min(last - 1);
+        let w = x - i as f64;
+        f(i) * (1.0 - w) + f(i + 1) * w
+    }
+
+    /// Diffuse reflectance from inside.
+    #[must_use]
+    pub fn internal(&self, eta: f64) -> f64 {
+        self.at(eta, |i| self.internal[i])
+    }
+
+    /// Transmission of a rough coat.
+    fn transmission(&self, cos: f64, eta: f64) -> f64 {
+        self.at(eta, |i| self.tables[i].at(cos))
+    }
+}
+
 /// The mean of `f(wo, m)` over the facets m that a direction of cosine `cos` sees.
 fn mean_over_facets(facets: &Microfacets, cos: f64, f: impl Fn(DVec3, DVec3) -> f64) -> f64 {
     const N: u32 = 64;
@@ -180,12 +258,21 @@ pub struct RoughPlastic {
     /// The coat's facets.
     pub facets: Microfacets,
     /// Its transmission.
-    pub table: Arc<CoatTable>,
+    pub coats: Arc<Coats>,
 }
 
 impl RoughPlastic {
-    fn coat_share(&self, wo: DVec3) -> f64 {
-        coat_probability(1.0 - self.table.at(wo.z), self.base.reflectance)
+    fn transmission(&self, cos: f64) -> Lanes {
+        self.base.eta.lanes(|eta| self.coats.transmission(cos, eta))
+    }
+
+    /// The probability of the coat's lobe where `through` comes through.
+    fn coat_share(&self, through: Lanes) -> f64 {
+        let through = match self.base.eta {
+            RelativeIndex::Constant(_) => f64::from(through.to_array()[0]),
+            RelativeIndex::Dispersive(_) => mean(through),
+        };
+        coat_probability(1.0 - through, self.base.reflectance)
     }
 
     pub(super) fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
@@ -194,13 +281,14 @@ impl RoughPlastic {
         }
         let m = (wo + wi).normalize();
         let cos = wo.dot(m);
-        let reflected = fresnel::dielectric(Model::Exact, cos, self.base.eta).reflected;
-        let coat = reflected * self.facets.density(m) * self.facets.masking(wo, m) * self.facets.masking(wi, m)
-            / (4.0 * wo.z * wi.z);
-        let p = self.coat_share(wo);
-        let through = self.table.at(wo.z) * self.table.at(wi.z) / PI;
+        let reflected = self.base.eta.lanes(|eta| fresnel::dielectric(Model::Exact, cos, eta).reflected);
+        let coat =
+            self.facets.density(m) * self.facets.masking(wo, m) * self.facets.masking(wi, m) / (4.0 * wo.z * wi.z);
+        let into = self.transmission(wo.z);
+        let p = self.coat_share(into);
+        let base = self.base.albedo() * into * self.transmission(wi.z) * (1.0 / PI) as f32;
         Evaluation {
-            f: self.base.albedo() * through as f32 + self.base.tint * coat as f32,
+            f: base + self.base.tint * reflected * coat as f32,
             pdf: Lanes::splat((p * self.facets.pdf(wo, m) / (4.0 * cos) + (1.0 - p) * wi.z / PI) as f32),
         }
     }
@@ -209,7 +297,7 @@ impl RoughPlastic {
         if wo.z <= 0.0 {
             return None;
         }
-        let wi = if u_lobe < self.coat_share(wo) {
+        let wi = if u_lobe < self.coat_share(self.transmission(wo.z)) {
             let m = self.facets.sample(wo, u);
             m * (2.0 * wo.dot(m)) - wo
         } else {

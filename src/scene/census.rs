@@ -17,6 +17,8 @@ pub struct Census {
     pub dispersive: Vec<String>,
     /// The same, rough.
     pub rough_dispersive: Vec<String>,
+    /// Materials in use that reflect by an index that depends on wavelength and bend nothing by it: panes and coats.
+    pub coloured_coats: Vec<String>,
     /// Transparent objects.
     pub refractive: Vec<String>,
     /// Objects with a texture that varies.
@@ -73,10 +75,20 @@ impl Census {
                         }
                     }
                     Kind::Principled(solid) if solid.transmission.is_some() => note(&mut census.refractive, name()),
-                    Kind::Thin { .. } | Kind::PrincipledThin(_) => note(&mut census.refractive, name()),
+                    Kind::Thin { interior, exterior, .. } => {
+                        note(&mut census.refractive, name());
+                        if interior.is_dispersive() || exterior.is_dispersive() {
+                            note(&mut census.coloured_coats, name());
+                        }
+                    }
+                    Kind::Plastic { coat, .. } => {
+                        if coat.interior.is_dispersive() || coat.exterior.is_dispersive() {
+                            note(&mut census.coloured_coats, name());
+                        }
+                    }
+                    Kind::PrincipledThin(_) => note(&mut census.refractive, name()),
                     Kind::Mirror { .. } | Kind::Conductor { .. } => note(&mut census.reflective, name()),
                     Kind::Diffuse { .. }
-                    | Kind::Plastic { .. }
                     | Kind::Principled(_)
                     | Kind::Hair { .. }
                     | Kind::Boundary

@@ -4,13 +4,13 @@ use super::SurfacePoint;
 use super::compound::{Composition, Compound};
 use super::principled::{Solid, Thin};
 use super::texture::{Scalar, Texture, TexturePoint};
-use crate::optics::bsdf::{Bsdf, Metal, pane_reflectance};
+use crate::optics::bsdf::{Bsdf, Metal, Pane};
 use crate::optics::dielectric::{Dielectric, RelativeIndex, RoughDielectric, Tint};
-use crate::optics::fresnel::{self, Model};
+use crate::optics::fresnel::Model;
 use crate::optics::hair::{Fibre, Hair};
 use crate::optics::microfacet::{Distribution, Microfacets};
-use crate::optics::plastic::{Base, CoatTable, DiffuseMean, Plastic, RoughPlastic};
-use crate::spectrum::{Lanes, RefractiveIndex, Spectrum};
+use crate::optics::plastic::{Base, Coats, DiffuseMean, Plastic, RoughPlastic};
+use crate::spectrum::{BAND_NM, Lanes, RefractiveIndex, Spectrum};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -98,14 +98,10 @@ pub enum Kind {
     Plastic {
         /// Albedo of the base.
         reflectance: Texture,
-        /// Index of the coat.
-        eta: f64,
-        /// Diffuse reflectance of the coat from inside.
-        internal: f64,
+        /// The coat.
+        coat: Box<Coat>,
         /// Colour shift of light that bounces under the coat.
         nonlinear: bool,
-        /// Rough coat.
-        rough: Option<(Microfacets, Arc<CoatTable>)>,
         /// Factor on what the coat reflects, where it is not one.
         tint: Option<Box<Texture>>,
     },
@@ -124,6 +120,49 @@ pub enum Kind {
     Boundary,
     /// Made of other materials.
     Compound(Box<Compound>),
+}
+
+/// The clear coat of a plastic.
+#[derive(Clone, Debug)]
+pub struct Coat {
+    /// Index of the coat.
+    pub interior: RefractiveIndex,
+    /// Index outside.
+    pub exterior: RefractiveIndex,
+    /// Rough or smooth.
+    pub facets: Option<Microfacets>,
+    /// What follows from them.
+    pub tables: Arc<Coats>,
+}
+
+impl Coat {
+    /// Computes the tables.
+    #[must_use]
+    pub fn new(
+        interior: RefractiveIndex,
+        exterior: RefractiveIndex,
+        facets: Option<Microfacets>,
+        mean: DiffuseMean,
+    ) -> Coat {
+        // Formulas and tables have no peak within a nanometre.
+        let range = BAND_NM[0] as u32..=BAND_NM[1] as u32;
+        let etas = range.map(|nm| interior.at(f64::from(nm)) / exterior.at(f64::from(nm)));
+        let (low, high) = etas.fold((f64::INFINITY, 0.0f64), |(low, high), eta| (low.min(eta), high.max(eta)));
+        Coat { interior, exterior, facets, tables: Arc::new(Coats::new(low, high, facets.as_ref(), mean)) }
+    }
+
+    /// Index of the coat over that outside.
+    #[must_use]
+    pub fn eta(&self, nm: Lanes) -> RelativeIndex {
+        relative_index(&self.interior, &self.exterior, nm, false)
+    }
+
+    /// A base under it, whose reflection has the factor `tint`.
+    #[must_use]
+    pub fn base(&self, reflectance: Lanes, nonlinear: bool, tint: Lanes, nm: Lanes) -> Base {
+        let eta = self.eta(nm);
+        Base { reflectance, eta, internal: eta.lanes(|eta| self.tables.internal(eta)), nonlinear, tint }
+    }
 }
 
 /// How rough a surface is, point by point.
@@ -196,26 +235,6 @@ impl Tints {
     }
 }
 
-impl Kind {
-    /// A plastic; computes the coat's tables.
-    #[must_use]
-    pub fn plastic(
-        reflectance: Texture,
-        tint: Option<Box<Texture>>,
-        eta: f64,
-        nonlinear: bool,
-        facets: Option<Microfacets>,
-        mean: DiffuseMean,
-    ) -> Kind {
-        let rough = facets.map(|f| (f, Arc::new(CoatTable::new(eta, &f, mean))));
-        let internal = match &rough {
-            Some((_, table)) => table.internal,
-            None => fresnel::dielectric_diffuse(1.0 / eta),
-        };
-        Kind::Plastic { reflectance, eta, internal, nonlinear, rough, tint }
-    }
-}
-
 /// η inside over η outside, for each lane.
 #[must_use]
 pub fn relative_index(
@@ -276,10 +295,10 @@ impl Material {
         match &self.kind {
             Kind::Boundary => Some(Straight::OPEN),
             Kind::Thin { interior, exterior, tints } => {
-                let eta = relative_index(interior, exterior, nm, false).hero();
-                let cos = direction.dot(surface.shading_normal).abs();
-                let weight = tints.as_ref().map_or(Lanes::ONE, |tints| tints.transmitted.eval(&at(), nm));
-                Some(Straight { share: 1.0 - pane_reflectance(cos, eta), weight })
+                let eta = relative_index(interior, exterior, nm, false);
+                let pane = Pane::new(direction.dot(surface.shading_normal).abs(), &eta);
+                let tint = tints.as_ref().map_or(Lanes::ONE, |tints| tints.transmitted.eval(&at(), nm));
+                Some(Straight { share: pane.share, weight: pane.transmitted * tint })
             }
             Kind::Compound(compound) => compound.straight(surface, direction, &at(), nm),
             _ => None,
@@ -309,21 +328,14 @@ impl Material {
                 }
             }
             Kind::Thin { interior, exterior, tints } => Bsdf::Thin {
-                eta: relative_index(interior, exterior, nm, false).hero(),
+                eta: relative_index(interior, exterior, nm, false),
                 tint: Tints::at(tints.as_deref(), at, nm),
             },
-            Kind::Plastic { reflectance, eta, internal, nonlinear, rough, tint } => {
-                let base = Base {
-                    reflectance: reflectance.eval(at, nm),
-                    eta: *eta,
-                    internal: *internal,
-                    nonlinear: *nonlinear,
-                    tint: tint.as_ref().map_or(Lanes::ONE, |tint| tint.eval(at, nm)),
-                };
-                match rough {
-                    Some((facets, table)) => {
-                        Bsdf::RoughPlastic(RoughPlastic { base, facets: *facets, table: table.clone() })
-                    }
+            Kind::Plastic { reflectance, coat, nonlinear, tint } => {
+                let tint = tint.as_ref().map_or(Lanes::ONE, |tint| tint.eval(at, nm));
+                let base = coat.base(reflectance.eval(at, nm), *nonlinear, tint, nm);
+                match coat.facets {
+                    Some(facets) => Bsdf::RoughPlastic(RoughPlastic { base, facets, coats: coat.tables.clone() }),
                     None => Bsdf::Plastic(Plastic { base }),
                 }
             }

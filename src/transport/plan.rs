@@ -195,7 +195,8 @@ impl EffectPlan {
         };
         let count = |n: usize, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
 
-        let dispersive: Vec<String> = census.dispersive.iter().chain(&census.rough_dispersive).cloned().collect();
+        let bent = census.dispersive.iter().chain(&census.rough_dispersive);
+        let dispersive: Vec<String> = bent.chain(&census.coloured_coats).cloned().collect();
         let dispersion = effect(
             "dispersion",
             !dispersive.is_empty(),
@@ -262,7 +263,8 @@ impl EffectPlan {
             "whitted knows light of mirrors and glass only, and an ambient term",
         );
         // Not an effect but a consequence; forced on with the effects that call for it.
-        let chromatic = dispersion || census.chromatic_media > 0 || mode == EffectMode::All;
+        let bends = !(census.dispersive.is_empty() && census.rough_dispersive.is_empty());
+        let chromatic = bends || census.chromatic_media > 0 || mode == EffectMode::All;
         let techniques = if path && from_camera { path_techniques(census, chromatic) } else { Vec::new() };
         EffectPlan {
             integrator,

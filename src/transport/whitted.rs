@@ -10,9 +10,9 @@ use super::Incoming;
 use super::path::seen_normal;
 use super::plan::{EffectPlan, WhittedSettings};
 use crate::math::{Departure, Frame, Ray};
+use crate::optics::bsdf::Pane;
 use crate::optics::dielectric::{RelativeIndex, refract};
 use crate::optics::fresnel::{self, Model};
-use crate::optics::plastic::Base;
 use crate::scene::compound::{Composition, Slopes, Standing, Vertex, share};
 use crate::scene::light::Light;
 use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Tints, relative_index};
@@ -146,13 +146,11 @@ impl Tracer<'_> {
         let leave = |direction: DVec3| self.scene.leave(surface, hit, direction);
         let base = match &material.kind {
             Kind::Diffuse { reflectance } => reflectance.eval(at, self.nm),
-            Kind::Plastic { reflectance, eta, internal, nonlinear, .. } => {
+            Kind::Plastic { reflectance, coat, nonlinear, .. } => {
                 // The base under its coat, for light along the normal both ways.
-                let reflectance = reflectance.eval(at, self.nm);
-                let tint = Lanes::ONE;
-                let base = Base { reflectance, eta: *eta, internal: *internal, nonlinear: *nonlinear, tint };
-                let t = 1.0 - fresnel::dielectric(Model::Exact, 1.0, *eta).reflected;
-                base.albedo() * (t * t) as f32
+                let base = coat.base(reflectance.eval(at, self.nm), *nonlinear, Lanes::ONE, self.nm);
+                let t = base.eta.lanes(|eta| fresnel::dielectric(Model::Exact, 1.0, eta).transmitted);
+                base.albedo() * t * t
             }
             Kind::Principled(solid) => solid.at(at, self.nm).smooth(1.0, true).matte,
             Kind::PrincipledThin(sheet) => sheet.at(at, self.nm).smooth(1.0).matte,
@@ -242,11 +240,8 @@ impl Tracer<'_> {
                     through *= s.weight * s.share as f32;
                 }
                 Kind::Thin { interior, exterior, .. } if self.settings.transparent_shadows => {
-                    let index = relative_index(interior, exterior, self.nm, false);
-                    through *= index.lanes(|eta| {
-                        let r = fresnel::dielectric(Model::Exact, cos.abs(), eta).reflected;
-                        (1.0 - r) / (1.0 + r)
-                    });
+                    let pane = Pane::new(cos.abs(), &relative_index(interior, exterior, self.nm, false));
+                    through *= pane.transmitted * pane.share as f32;
                 }
                 _ => return Lanes::ZERO,
             }
@@ -289,10 +284,10 @@ impl Tracer<'_> {
                 let r = fresnel::conductor(*model, cos, eta.eval(self.nm), k.eval(self.nm));
                 reflect(r * tint.eval(at, self.nm))
             }
-            Kind::Plastic { eta, tint, .. } => {
-                let r = fresnel::dielectric(Model::Exact, cos, *eta).reflected;
+            Kind::Plastic { coat, tint, .. } => {
+                let r = coat.eta(self.nm).lanes(|eta| fresnel::dielectric(Model::Exact, cos, eta).reflected);
                 let tint = tint.as_ref().map_or(Lanes::ONE, |tint| tint.eval(at, self.nm));
-                reflect(tint * r as f32)
+                reflect(tint * r)
             }
             Kind::Principled(solid) => {
                 let front = local.z > 0.0;
@@ -312,10 +307,9 @@ impl Tracer<'_> {
             }
             Kind::Thin { interior, exterior, tints } => {
                 let tint = Tints::at(tints.as_deref(), at, self.nm);
-                let eta = relative_index(interior, exterior, self.nm, false).hero();
-                let r = fresnel::dielectric(Model::Exact, cos, eta).reflected;
-                let r = 2.0 * r / (1.0 + r);
-                reflect(tint.reflected * r as f32) + cross(tint.transmitted * (1.0 - r) as f32, -wo)
+                let pane = Pane::new(cos, &relative_index(interior, exterior, self.nm, false));
+                let reflected = tint.reflected * pane.reflected * (1.0 - pane.share) as f32;
+                reflect(reflected) + cross(tint.transmitted * pane.transmitted * pane.share as f32, -wo)
             }
             Kind::Dielectric { interior, exterior, fresnel: model, tints, .. } => {
                 let tint = Tints::at(tints.as_deref(), at, self.nm);

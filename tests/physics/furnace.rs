@@ -170,7 +170,7 @@ fn plastic_in_even_light_reflects_coat_and_base() {
     for (nonlinear, albedo) in [(false, 1.0), (false, 0.5), (true, 1.0), (true, 0.5)] {
         let scene = disc(&format!("{{plastic: {{reflectance: {albedo}, ior: 1.5, nonlinear: {nonlinear}}}}}"));
         let internal = match &scene.prepared.scene.materials[0].kind {
-            Kind::Plastic { internal, .. } => *internal,
+            Kind::Plastic { coat, .. } => coat.tables.internal(1.5),
             other => panic!("{other:?}"),
         };
         // The published diffuse reflectance from inside glass of 1.5: 0.5964 (Egan and Hilgeman 1973).
@@ -210,4 +210,97 @@ fn the_quadrature_of_this_file_integrates_a_known_lobe() {
     let [above, below] = albedo_by_quadrature(&disc("{diffuse: {reflectance: 0.7}}"), 0.5);
     assert_close(above, 0.7, 1e-5);
     assert_eq!(below, 0.0);
+}
+
+/// The shortest and the longest of the wavelengths: each lane's light there over what it should be.
+fn at_both_ends(scene: Bench, cos: f64, expected: impl Fn(f64) -> f64) {
+    let scene = scene.grey();
+    for longest in [false, true] {
+        let lane = |nm: [f32; 8]| {
+            let by = |a: &usize, b: &usize| nm[*a].total_cmp(&nm[*b]);
+            if longest { (0..8).max_by(by).unwrap() } else { (0..8).min_by(by).unwrap() }
+        };
+        let over = scene.estimate_of(&toward_the_middle(cos), 16384, |light, wavelengths| {
+            let nm = wavelengths.nm.to_array();
+            let k = lane(nm);
+            f64::from(light.radiance.to_array()[k]) / expected(f64::from(nm[k]))
+        });
+        // A coat's tables are linear between indices and good to 1e-4.
+        assert!((over.mean - 1.0).abs() <= 4.0 * over.error + 2e-4, "{cos} {longest}: {over:?}");
+        assert!(over.error < 0.02, "{over:?}");
+    }
+}
+
+/// n(λ) of the tests below, linear from violet to red, and a coat or pane that has it.
+fn steep(nm: f64) -> f64 {
+    1.3 + 0.6 * (nm - 360.0) / 470.0
+}
+
+const STEEP: &str = "ior: {table: [[360, 1.3], [830, 1.9]]}";
+
+/// A pane whose index depends on wavelength reflects 2R/(1 + R) and lets (1 − R)/(1 + R) through, by Fresnel's R at each
+/// wavelength: before a dark wall only the first is seen, and where nothing but the pane shines only the second.
+#[test]
+fn a_pane_reflects_each_wavelength_by_its_own_index() {
+    for cos in [1.0, 0.5] {
+        let r = |nm: f64| fresnel::dielectric(Model::Exact, cos, steep(nm)).reflected;
+        let pane = |more: &str| {
+            bench(&format!(
+                "shapes:\n- disk: {{normal: [0, 0, 1], radius: 1, material: {{thin_dielectric: {{{STEEP}}}}}}}\n{more}"
+            ))
+        };
+        let wall =
+            "- disk: {center: [0, 0, -1], normal: [0, 0, 1], radius: 99, material: {diffuse: {reflectance: 0}}}\n";
+        let sky = "lights: [{constant: {radiance: 1}}]\n";
+        at_both_ends(pane(&format!("{wall}{sky}")), cos, |nm| 2.0 * r(nm) / (1.0 + r(nm)));
+        let lamp = "- disk: {center: [0, 0, -1], normal: [0, 0, 1], radius: 99, emission: 1, material: {diffuse: {reflectance: 0}}}\n";
+        at_both_ends(pane(lamp), cos, |nm| (1.0 - r(nm)) / (1.0 + r(nm)));
+    }
+}
+
+/// A lamp without extent behind such a pane is found by shadow rays alone, each lane dimmed by its own share.
+#[test]
+fn a_point_lamp_shines_through_a_pane_by_each_wavelengths_index() {
+    let scene = bench(&format!(
+        "lights: [{{point: {{position: [0, 2, 0], intensity: 4}}}}]\nintegrator: {{path: {{max_depth: 2}}}}\nshapes:\n\
+         - plane: {{normal: [0, 1, 0], material: {{diffuse: {{reflectance: 0.6}}}}}}\n\
+         - rectangle: {{corner: [-1, 1, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2], material: {{thin_dielectric: {{{STEEP}}}}}}}\n",
+    ))
+    .grey();
+    let found = scene.lanes(&ray(v(0.3, 0.5, 0.0), v(0.0, 0.0, 0.0)));
+    for (nm, found) in super::common::SPREAD_NM.iter().zip(found) {
+        let r = ((steep(*nm) - 1.0) / (steep(*nm) + 1.0)).powi(2);
+        assert_close(found, 0.6 / PI * (1.0 - r) / (1.0 + r), 4e-6);
+    }
+}
+
+/// As plastic of one index, wavelength by wavelength: E = R + T ρ (1 − F) / (1 − ρ F), F from inside at its index; a rough
+/// coat as the same coat of one index.
+#[test]
+fn a_coat_reflects_each_wavelength_by_its_own_index() {
+    let cos = 0.4;
+    for nonlinear in [false, true] {
+        let scene = disc(&format!("{{plastic: {{reflectance: 0.5, nonlinear: {nonlinear}, {STEEP}}}}}"));
+        at_both_ends(scene, cos, |nm| {
+            let split = fresnel::dielectric(Model::Exact, cos, steep(nm));
+            let f = fresnel::dielectric_diffuse(1.0 / steep(nm));
+            let base = if nonlinear { 0.5 * (1.0 - f) / (1.0 - 0.5 * f) } else { 0.5 };
+            split.reflected + split.transmitted * base
+        });
+    }
+    let rough = |ior: &str| disc(&format!("{{plastic: {{reflectance: 0.5, roughness: 0.3, {ior}}}}}"));
+    let of_one = [360.0, 830.0].map(|nm| {
+        let [above, _] = albedo_by_quadrature(&rough(&format!("ior: {}", steep(nm))), cos);
+        above
+    });
+    // Of the fixed wavelengths the first and the last are near the ends; E runs smoothly between.
+    let mid = {
+        let [above, _] = albedo_by_quadrature(&rough(&format!("ior: {}", steep(595.0))), cos);
+        above
+    };
+    at_both_ends(rough(STEEP), cos, |nm| {
+        // The parabola through three indices: E bends by less than 0.1 a unit cubed of the index.
+        let x = (nm - 360.0) / 470.0;
+        of_one[0] * (1.0 - x) * (1.0 - 2.0 * x) + 4.0 * mid * x * (1.0 - x) + of_one[1] * x * (2.0 * x - 1.0)
+    });
 }

@@ -115,12 +115,16 @@ impl Import<'_> {
                 fields.maybe("tint", self.spectrum_or_texture(&bag, "specular_reflectance", Role::Reflectance)?);
                 let (inside, outside) =
                     (self.index(&bag, "int_ior", "polypropylene")?, self.index(&bag, "ext_ior", "air")?);
-                // Ours is given relative to what surrounds it.
-                let ior = match (inside.number, outside.number) {
-                    (Some(inside), Some(outside)) => number(bag.place("int_ior"), inside / outside),
-                    _ => inside.node,
-                };
-                fields.add("ior", ior);
+                // As one number, relative to what surrounds it, where it is one.
+                match (inside.number, outside.number) {
+                    (Some(inside), Some(outside)) => {
+                        fields.add("ior", number(bag.place("int_ior"), inside / outside));
+                    }
+                    _ => {
+                        fields.add("ior", inside.node);
+                        fields.add("exterior_ior", outside.node);
+                    }
+                }
                 fields.maybe("nonlinear", bag.boolean("nonlinear")?.map(|on| boolean(bag.place("nonlinear"), on)));
                 if bag.object.plugin == "roughplastic" {
                     fields.add("diffuse_mean", text(place, "nodes"));

@@ -8,7 +8,7 @@ use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::optics::plastic::DiffuseMean;
 use crate::scene::compound::{Composition, Compound, MOST_PARTS, MOST_RELIEFS, Relief, ReliefForm};
 use crate::scene::load;
-use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Roughness, TexturedRoughness, Tints};
+use crate::scene::material::{Coat, Highlight, HighlightModel, Kind, Material, Roughness, TexturedRoughness, Tints};
 use crate::scene::texture::{Grid, Interpolation, Scalar, Texture, Wrap};
 use crate::spectrum::{Outside, RefractiveIndex, Spectrum, catalogue};
 use glam::{DAffine2, DMat2, DVec2};
@@ -253,34 +253,21 @@ impl<'a> Compiler<'a> {
                 let interior = self.index(&at("ior"), &m.ior);
                 let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
                 let tints = self.tints(&place, &m.reflection_tint, &m.transmission_tint);
-                if interior.is_dispersive() || exterior.is_dispersive() {
-                    self.fault(
-                        &at("ior"),
-                        "expected one number for a thin pane, found an index that depends on wavelength",
-                    );
-                }
                 plain(Kind::Thin { interior, exterior, tints })
             }
             written::Material::Plastic(m) => {
                 let reflectance = self.reflectance_texture(&at("reflectance"), &m.reflectance);
                 let tint = self.reflectance_texture(&at("tint"), &m.tint);
-                let eta = match self.index(&at("ior"), &m.ior) {
-                    RefractiveIndex::Constant(n) => n,
-                    _ => {
-                        self.fault(
-                            &at("ior"),
-                            "expected one number for a coat, found an index that depends on wavelength",
-                        );
-                        1.5
-                    }
-                };
+                let interior = self.index(&at("ior"), &m.ior);
+                let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
                 let facets = facets(m.roughness, m.distribution);
                 let tint = (!is_one(&tint)).then(|| Box::new(tint));
                 let mean = match m.diffuse_mean {
                     written::DiffuseMean::Integral => DiffuseMean::Integral,
                     written::DiffuseMean::Nodes => DiffuseMean::Nodes,
                 };
-                (Kind::plastic(reflectance, tint, eta, m.nonlinear, facets, mean), m.two_sided, m.highlight)
+                let coat = Box::new(Coat::new(interior, exterior, facets, mean));
+                (Kind::Plastic { reflectance, coat, nonlinear: m.nonlinear, tint }, m.two_sided, m.highlight)
             }
             written::Material::Hair(m) => plain(self.hair(&place, m)),
             written::Material::Principled(m) => {

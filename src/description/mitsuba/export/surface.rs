@@ -124,7 +124,7 @@ impl Export<'_> {
         self.open_owned("bsdf", attributes);
         self.spectrum_or_texture("diffuse_reflectance", &m.reflectance, Role::Reflectance);
         self.tint("specular_reflectance", &m.tint);
-        self.indices(&m.ior, &Index::Number(1.0));
+        self.indices(&m.ior, &m.exterior_ior);
         self.xml.value("boolean", "nonlinear", m.nonlinear);
         if m.roughness > 0.0 {
             self.roughness(&Roughness::Number(m.roughness), m.distribution);
@@ -269,7 +269,7 @@ fn shortfall(material: &Material) -> Option<String> {
             Some("the coat's mean over 64 cosines, which makes the base darker by up to 2 %".to_owned())
         }
         Material::Plastic(m) => highlight(m.highlight.is_some())
-            .or(dispersive(&m.ior, &Index::Number(1.0)))
+            .or(dispersive(&m.ior, &m.exterior_ior))
             .or(spectra(&[&m.reflectance, &m.tint])),
         Material::Boundary(_) => None,
         _ => Some("a grey diffuse surface: this kind is not exported yet".to_owned()),
