@@ -96,6 +96,74 @@ lights:
     same_picture(&yaml);
 }
 
+/// Materials made of others, principled ones, media of volumes, groups, curves, distances on a grid and textures of all
+/// kinds have plugins of Mitsuba's, and nothing of ours is left in the file.
+#[test]
+fn a_scene_of_all_that_mitsuba_has_plugins_for_loses_nothing() {
+    let root = env!("CARGO_MANIFEST_DIR");
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    let scene = format!(
+        "
+camera: {{origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 50}}
+medium: haze
+volumes:
+  puff: {{grid: {{file: {root}/tools/cross_validate/mitsuba/assets/puff.vol, transform: [{{translate: [-3, 0, 0]}}]}}}}
+  mix: {{constant: {{value: 0.4}}}}
+media:
+  haze: {{homogeneous: {{absorption: {{table: [[400, 0.01], [700, 0.02]]}}}}}}
+  cloud:
+    heterogeneous:
+      extinction: {{volume: puff}}
+      albedo: {{rgb: [0.9, 0.8, 0.7]}}
+      scale: 4
+      phase: {{blend: {{weight: {{volume: mix}}, of: [rayleigh, {{table: [1, 2, 4]}}]}}}}
+textures:
+  board: {{checkerboard: {{a: 0.1, b: 0.7, scale: [3, 3]}}}}
+  coat: {{checkerboard: {{a: {{rgb: [0.6, 0.3, 0.2]}}, b: 0.3}}}}
+  waves: {{image: {{file: {root}/tools/cross_validate/mitsuba/assets/waves.png, raw: true}}}}
+  normals: {{image: {{file: {root}/tools/cross_validate/mitsuba/assets/normals.png, raw: true}}}}
+  through: {{volume: mix}}
+  painted: {{mesh_attribute: {{name: vertex_color}}}}
+materials:
+  car: {{principled: {{base_color: {{texture: coat}}, roughness: {{texture: board}}, metallic: 0.3, clearcoat: 0.5}}}}
+  leaf: {{principled_thin: {{base_color: 0.4, diff_trans: 0.8, spec_trans: 0.2}}}}
+  strand: {{hair: {{absorption: 0.3, ior: 1.5}}}}
+  lace: {{mask: {{opacity: {{texture: board}}, material: car}}}}
+  patched: {{blend: {{weight: {{texture: board}}, first: {{diffuse: {{}}}}, second: {{conductor: {{eta: 0.2, k: 3}}}}}}}}
+  a_page: {{two_sided: {{front: {{diffuse: {{reflectance: {{texture: through}}}}}}, back: car}}}}
+  pool: {{bump: {{height: {{texture: waves}}, scale: 0.1, material: {{diffuse: {{}}}}}}}}
+  tiles: {{normal_map: {{normals: {{texture: normals}}, shadowing: false, material: {{plastic: {{}}}}}}}}
+  mosaic: {{diffuse: {{reflectance: {{texture: painted}}}}}}
+groups:
+  pair:
+  - sphere: {{radius: 0.3, layout: z_up, material: car}}
+  - cube: {{center: [0.5, 0, 0], size: 0.4, layout: z_up, material: patched}}
+shapes:
+- rectangle: {{corner: [-4, 0, 4], edge_u: [8, 0, 0], edge_v: [0, 0, -8], material: pool, outside: haze, inside: haze}}
+- rectangle: {{corner: [-1, 0, -2], edge_u: [2, 0, 0], edge_v: [0, 2, 0], material: tiles}}
+- rectangle: {{corner: [1, 0, -2], edge_u: [1, 0, 1], edge_v: [0, 2, 0], material: lace, inside: unchanged, outside: unchanged}}
+- rectangle: {{corner: [2, 0, -2], edge_u: [1, 0, 1], edge_v: [0, 2, 0], material: leaf, inside: haze, outside: haze}}
+- rectangle: {{corner: [-3, 0, -1], edge_u: [1, 0, 1], edge_v: [0, 2, 0], material: a_page}}
+- cube: {{center: [-2.5, 0.5, 0.5], size: 1, layout: z_up, material: {{boundary: {{}}}}, inside: cloud, outside: haze}}
+- instance: {{group: pair, transform: [{{scale: 1.5}}, {{translate: [0, 1, 0]}}]}}
+- instance: {{group: pair, transform: [{{translate: [1.5, 0.4, 1]}}]}}
+- curves: {{file: {root}/tools/cross_validate/mitsuba/assets/tuft.txt, basis: bspline, material: strand, inside: haze, outside: haze}}
+- sdf_grid: {{file: {root}/tools/cross_validate/mitsuba/assets/ring_and_ball.vol, material: car, transform: [{{translate: [-1.5, 0, 1]}}]}}
+- mesh: {{file: {root}/tools/cross_validate/mitsuba/assets/tile.ply, normals: vertex, winding: world, material: mosaic, transform: [{{translate: [0, 0.3, 2]}}]}}
+lights:
+- constant: {{radiance: 0.5, sampling_weight: 2}}
+- projector: {{origin: [0, 3, 5], target: [0, 0, 0], fov_deg: 30, irradiance: {{texture: waves}}}}
+- spot: {{position: [3, 4, 3], target: [0, 0, 0], intensity: 20, texture: coat, cutoff_deg: 30}}
+"
+    );
+    common::write(&yaml, scene.as_bytes());
+    let (_, exported) = prepared(&yaml, directory.path(), false);
+    assert_eq!(exported.losses, []);
+    assert!(!exported.xml.contains("instead"), "{}", exported.xml);
+    same_picture(&yaml);
+}
+
 /// Each loss names its field, and its reason names what Mitsuba lacks.
 #[test]
 fn what_mitsuba_lacks_is_told_by_name() {

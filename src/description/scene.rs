@@ -311,6 +311,7 @@ mod tests {
             Material::Plastic(Plastic {
                 reflectance: SpectrumOrTexture::Spectrum(number(0.5)),
                 ior: Index::Number(1.5),
+                exterior_ior: Index::Number(1.0),
                 roughness: 0.0,
                 tint: one_of(1.0),
                 nonlinear: false,

@@ -1,26 +1,31 @@
-//! Lights and media.
+//! Lights.
 
+use glam::DVec3;
+
+use super::super::super::camera::FovAxis;
+use super::super::super::emitter::{EmissionDirection, EnvironmentMapping, Growth};
 use super::super::super::light::{Aim, Light};
-use super::super::super::medium::{Coefficients, Medium, Phase};
-use super::super::super::spectrum::{Spectrum, SpectrumOrTexture};
-use super::super::super::volume::SpectrumOrVolume;
-use super::Export;
+use super::super::super::shape::Shape;
+use super::super::super::spectrum::SpectrumOrTexture;
+use super::super::super::texture::Texture;
+use super::super::super::transform::{matrix_of, rotation};
 use super::spectra::Role;
+use super::textures::Stands;
 use super::xml::numbers;
+use super::{DAYLIGHT, Export};
 
 impl Export<'_> {
     /// A light of the scene's list.
     pub(super) fn light(&mut self, i: usize, light: &Light) {
         let why = match light {
             Light::Point(l) => Export::light_shortfall(&l.intensity),
-            Light::Spot(l) if l.texture.is_some() => Some("a spot without its slide"),
             Light::Spot(l) => Export::light_shortfall(&l.intensity),
             Light::Directional(l) => Export::light_shortfall(&l.irradiance),
             Light::Constant(l) => Export::light_shortfall(&l.radiance),
+            Light::Environment(l) if l.mapping == EnvironmentMapping::Mitsuba => None,
             Light::Environment(_) => Some("the same image on Mitsuba's grid, shifted by half a row toward the poles"),
-            _ => Some("a weak grey light: this kind is not exported yet"),
+            Light::Projector(l) => self.shining_shortfall(&l.irradiance),
         };
-        let why = why.or((light.sampling_weight() != 1.0).then_some("the same light, chosen as often as the others"));
         if let Some(why) = why {
             self.instead("emitter", &format!("lights[{i}]"), why);
         }
@@ -33,9 +38,11 @@ impl Export<'_> {
             Light::Spot(l) => {
                 self.xml.open("emitter", &[("type", "spot")]);
                 let axis = l.axis();
-                let target = glam::DVec3::from(l.position) + axis;
-                // Any direction across will do without a slide.
-                let up = if axis.x.abs() <= axis.y.abs().max(axis.z.abs()) { glam::DVec3::X } else { glam::DVec3::Y };
+                let target = DVec3::from(l.position) + axis;
+                // Any direction across will do without a slide. With one, u grows to the left of who looks along the
+                // axis and v upward: with the slide's up for their down, u grows to the right and v downward.
+                let across = if axis.x.abs() <= axis.y.abs().max(axis.z.abs()) { DVec3::X } else { DVec3::Y };
+                let up = if l.texture.is_some() { -l.up.map_or(DVec3::Y, DVec3::from) } else { across };
                 let target = match l.aim {
                     Aim::Target(target) => target,
                     Aim::Direction(_) => target.into(),
@@ -47,6 +54,9 @@ impl Export<'_> {
                 self.xml.value("float", "cutoff_angle", l.cutoff_deg);
                 self.xml.value("float", "beam_width", l.beam_deg);
                 self.spectrum("intensity", &l.intensity, Role::Emission);
+                if let Some(texture) = &l.texture {
+                    self.thrown("texture", texture, stands(l.v));
+                }
             }
             Light::Directional(l) => {
                 self.xml.open("emitter", &[("type", "directional")]);
@@ -61,17 +71,31 @@ impl Export<'_> {
                 self.xml.open("emitter", &[("type", "envmap")]);
                 let file = self.file(&l.file);
                 self.xml.value("string", "filename", file);
-                self.xml.value("float", "scale", l.scale / super::DAYLIGHT);
-                self.xml.open("transform", &[("name", "to_world")]);
+                self.xml.value("float", "scale", l.scale / DAYLIGHT);
                 // Its left edge, where ours has the middle, looks along -z.
-                self.xml.leaf("rotate", &[("y", "1"), ("angle", &(l.rotate_deg + 180.0).to_string())]);
-                self.xml.close();
+                let turn = if l.mapping == EnvironmentMapping::Mitsuba { 0.0 } else { 180.0 };
+                self.placing(matrix_of(&l.transform) * rotation(DVec3::Y, l.rotate_deg + turn));
             }
-            _ => {
-                self.xml.open("emitter", &[("type", "constant")]);
-                self.xml.value("spectrum", "radiance", 0.01);
+            Light::Projector(l) => {
+                self.xml.open("emitter", &[("type", "projector")]);
+                self.xml.open("transform", &[("name", "to_world")]);
+                let [origin, target, up] = [l.origin, l.target, l.up].map(|v| numbers(&v));
+                self.xml.leaf("lookat", &[("origin", &origin), ("target", &target), ("up", &up)]);
+                self.xml.close();
+                self.xml.value("float", "fov", l.fov_deg);
+                let axis = match l.fov_axis {
+                    FovAxis::X => "x",
+                    FovAxis::Y => "y",
+                    FovAxis::Smaller => "smaller",
+                    FovAxis::Larger => "larger",
+                    FovAxis::Diagonal => "diagonal",
+                };
+                self.xml.value("string", "fov_axis", axis);
+                self.shining("irradiance", &l.irradiance, stands(l.v));
+                self.xml.value("float", "scale", l.scale);
             }
         }
+        self.weight(light.sampling_weight());
         self.xml.close();
         if why.is_some() {
             self.end();
@@ -79,65 +103,74 @@ impl Export<'_> {
     }
 
     /// The emission of a shape.
-    pub(super) fn area(&mut self, emission: &SpectrumOrTexture) {
-        self.xml.open("emitter", &[("type", "area")]);
-        self.spectrum_or_texture("radiance", emission, Role::Emission);
+    pub(super) fn area(&mut self, shape: &Shape, emission: &SpectrumOrTexture) {
+        let plugin = match shape.emission_direction {
+            Some(EmissionDirection::Normal) => "directionalarea",
+            Some(EmissionDirection::All) | None => "area",
+        };
+        self.xml.open("emitter", &[("type", plugin)]);
+        self.shining("radiance", emission, Stands::Upright);
+        self.weight(shape.sampling_weight.unwrap_or(1.0));
         self.xml.close();
     }
 
-    /// A medium of the scene's list.
-    pub(super) fn medium(&mut self, name: &str, medium: &Medium) {
-        let said = match medium {
-            Medium::Homogeneous(m) => coefficients(&m.coefficients).zip(phase(&m.phase)),
-            Medium::Heterogeneous(_) => None,
+    fn weight(&mut self, weight: f64) {
+        if weight != 1.0 {
+            self.xml.value("float", "sampling_weight", weight);
+        }
+    }
+
+    /// What shines, as a spectrum or as a picture that is light of its illuminant.
+    fn shining(&mut self, name: &str, value: &SpectrumOrTexture, stands: Stands) {
+        let SpectrumOrTexture::Texture(texture) = value else {
+            self.spectrum_or_texture(name, value, Role::Emission);
+            return;
         };
-        if said.is_none() {
-            let why = "a grey medium of extinction 1 and albedo 0.75";
-            self.instead("medium", &format!("media.{name}"), why);
+        match self.illuminant_of(texture) {
+            Some(Lit::Daylight(scale)) => {
+                self.xml.open("spectrum", &[("type", "d65"), ("name", name)]);
+                self.xml.value("float", "scale", scale / DAYLIGHT);
+                self.thrown("picture", texture, stands);
+                self.xml.close();
+            }
+            Some(Lit::AsItIs | Lit::Otherwise) | None => self.thrown(name, texture, stands),
         }
-        let id = self.id(name, "medium");
-        self.xml.open("medium", &[("type", "homogeneous"), ("id", &id)]);
-        match &said {
-            Some(((extinction, albedo, scale), (plugin, g))) => {
-                self.spectrum("sigma_t", extinction, Role::Coefficient);
-                self.spectrum("albedo", albedo, Role::Reflectance);
-                self.xml.value("float", "scale", scale);
-                self.xml.open("phase", &[("type", plugin)]);
-                if let Some(g) = g {
-                    self.xml.value("float", "g", g);
-                }
-                self.xml.close();
-                self.xml.close();
-            }
-            None => {
-                self.xml.close();
-                self.end();
-            }
+    }
+
+    /// What multiplies a picture where it shines; `None` of what is no picture.
+    fn illuminant_of(&self, texture: &str) -> Option<Lit> {
+        let Some(Texture::Image(image)) = self.scene.textures.get(texture) else { return None };
+        Some(match &image.illuminant {
+            None => Lit::Daylight(1.0),
+            Some(light) if light.name.eq_ignore_ascii_case("D65") => Lit::Daylight(light.scale),
+            Some(light) if light.name == "E" && light.scale == 1.0 => Lit::AsItIs,
+            Some(_) => Lit::Otherwise,
+        })
+    }
+
+    /// What Mitsuba gets in place of what shines, where it cannot express it.
+    pub(super) fn shining_shortfall(&self, value: &SpectrumOrTexture) -> Option<&'static str> {
+        match value {
+            SpectrumOrTexture::Spectrum(spectrum) => Export::light_shortfall(spectrum),
+            SpectrumOrTexture::Texture(texture) => matches!(self.illuminant_of(texture), Some(Lit::Otherwise))
+                .then_some("the picture as the spectra of its colours, without its illuminant"),
         }
     }
 }
 
-/// σₜ, albedo and scale, where Mitsuba has words for them.
-fn coefficients(coefficients: &Coefficients) -> Option<(Spectrum, Spectrum, f64)> {
-    match coefficients {
-        Coefficients::Parts { absorption: Spectrum::Number(a), scattering: Spectrum::Number(s) } if a + s > 0.0 => {
-            Some((Spectrum::Number(a + s), Spectrum::Number(s / (a + s)), 1.0))
-        }
-        Coefficients::Sum { extinction, albedo: SpectrumOrVolume::Spectrum(albedo), scale }
-            if Export::can_say(extinction) && Export::can_say(albedo) =>
-        {
-            Some((extinction.clone(), albedo.clone(), *scale))
-        }
-        Coefficients::Parts { .. } | Coefficients::Sum { .. } => None,
-    }
+/// What multiplies a picture where it shines.
+enum Lit {
+    /// D65 of this luminance.
+    Daylight(f64),
+    /// One at each wavelength.
+    AsItIs,
+    Otherwise,
 }
 
-/// The plugin, and its g.
-fn phase(phase: &Phase) -> Option<(&'static str, Option<f64>)> {
-    match phase {
-        Phase::Isotropic => Some(("isotropic", None)),
-        Phase::Rayleigh => Some(("rayleigh", None)),
-        Phase::Hg(g) => Some(("hg", Some(*g))),
-        Phase::Table(_) | Phase::Blend(_) => None,
+/// How Mitsuba has a picture that is thrown: its v grows downward.
+fn stands(v: Growth) -> Stands {
+    match v {
+        Growth::Up => Stands::OnItsHead,
+        Growth::Down => Stands::Upright,
     }
 }

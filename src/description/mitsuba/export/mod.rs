@@ -17,10 +17,13 @@
 //! Ids are one list in Mitsuba and one for each kind in the grammar: where two kinds share a name, the
 //! id of one ends in its kind, `floor (texture)`, which the importer takes away.
 
+mod compounds;
 mod light;
 mod shape;
 mod spectra;
 mod surface;
+mod textures;
+mod volumes;
 mod xml;
 
 use std::collections::BTreeSet;
@@ -28,7 +31,7 @@ use std::path::Path;
 
 use super::super::camera::{Camera, Clip, Filter, FovAxis, Image, Pose, Projection};
 use super::super::node::{Node, Sources, Value};
-use super::super::path;
+use super::super::path::{self, Segment};
 use super::super::print::{Printer, relative};
 use super::super::scene::SceneDescription;
 use super::super::settings::Integrator;
@@ -64,8 +67,9 @@ pub fn export(scene: &SceneDescription, path: &Path) -> Exported {
     let stem = path.file_stem().map_or(String::new(), |stem| format!("{}.", stem.to_string_lossy()));
     let directory = path.parent().unwrap_or(Path::new(""));
     let (losses, files) = (Vec::new(), Vec::new());
-    let ids = BTreeSet::new();
-    let mut export = Export { scene, root, sources, directory, stem, ids, xml: Xml::default(), losses, files };
+    let (ids, mentioned) = (BTreeSet::new(), BTreeSet::new());
+    let xml = Xml::default();
+    let mut export = Export { scene, root, sources, directory, stem, ids, mentioned, xml, losses, files };
     export.scene();
     let Export { xml, mut losses, files, .. } = export;
     losses.dedup();
@@ -81,6 +85,8 @@ struct Export<'a> {
     stem: String,
     /// Ids that shapes have.
     ids: BTreeSet<String>,
+    /// Texts in what is written as it was: a name of a volume among them needs that volume.
+    mentioned: BTreeSet<String>,
     xml: Xml,
     losses: Vec<Loss>,
     files: Vec<(String, Vec<u8>)>,
@@ -88,7 +94,13 @@ struct Export<'a> {
 
 /// Settings that are about the work and the files, not about the light: Mitsuba has other words for
 /// some, but the same ones mean other things.
-const SETTINGS: [&str; 7] = ["render", "output", "fog", "medium", "layers", "volumes", "groups"];
+const SETTINGS: [&str; 4] = ["render", "output", "fog", "layers"];
+
+/// The path of a field.
+fn field(keys: &[&str]) -> String {
+    let keys: Vec<Segment> = keys.iter().map(|key| Segment::Key((*key).to_owned())).collect();
+    path::display(&keys)
+}
 
 impl<'a> Export<'a> {
     fn scene(&mut self) {
@@ -111,16 +123,27 @@ impl<'a> Export<'a> {
         }
         let used = self.used_materials();
         for (name, material) in self.scene.materials.iter().filter(|(name, _)| used.contains(name.as_str())) {
-            self.material(&format!("materials.{name}"), material, Some(name));
+            self.material(&field(&["materials", name]), material, Some(name));
         }
         for (name, medium) in &self.scene.media {
             self.medium(name, medium);
         }
+        for (name, shapes) in &self.scene.groups {
+            self.group(name, shapes);
+        }
         for (i, shape) in self.scene.shapes.iter().enumerate() {
-            self.shape(i, shape);
+            self.shape("shapes", i, shape);
         }
         for (i, light) in self.scene.lights.iter().enumerate() {
             self.light(i, light);
+        }
+        // Volumes stand where they are used, but what is written as it was knows them by name.
+        let volumes = self.scene.volumes.keys().filter(|name| self.mentioned.contains(*name));
+        for name in volumes.collect::<Vec<_>>() {
+            if let Some(node) = self.root.get("volumes").and_then(|volumes| volumes.get(name)) {
+                let yaml = self.yaml(node);
+                self.xml.instruction(&format!("set {}: {yaml}", field(&["volumes", name])));
+            }
         }
         self.xml.close();
     }
@@ -167,8 +190,24 @@ impl<'a> Export<'a> {
     /// Begins what stands for a field that Mitsuba cannot express; `end` closes it.
     fn instead(&mut self, tag: &str, field: &str, instead: impl Into<String>) {
         self.lose(field, instead);
-        let yaml = path::parse(field).ok().and_then(|path| self.root.find(&path)).map(|node| self.yaml(node));
-        self.xml.instruction(&format!("instead {tag}: {}", yaml.unwrap_or_else(|| "{}".to_owned())));
+        let node = path::parse(field).ok().and_then(|path| self.root.find(&path));
+        if let Some(node) = node {
+            self.mention(node);
+        }
+        let yaml = node.map_or("{}".to_owned(), |node| self.yaml(node));
+        self.xml.instruction(&format!("instead {tag}: {yaml}"));
+    }
+
+    /// Remembers the texts of what is written as it was.
+    fn mention(&mut self, node: &Node) {
+        match &node.value {
+            Value::List(items) => items.iter().for_each(|item| self.mention(item)),
+            Value::Map(entries) => entries.iter().for_each(|entry| self.mention(&entry.node)),
+            Value::Text(text) => {
+                self.mentioned.insert(text.clone());
+            }
+            _ => {}
+        }
     }
 
     fn end(&mut self) {
@@ -188,12 +227,20 @@ impl<'a> Export<'a> {
         // Theirs counts the crossing of a pane as scattering, unless it is the one for media.
         let counts = matches!(&self.scene.integrator, Integrator::Path(path) if path.count_crossings);
         let plugin = if counts { "path" } else { "volpath" };
-        let (depth, roulette, hidden) = match &self.scene.integrator {
+        let (plugin, depth, roulette, hidden) = match &self.scene.integrator {
+            Integrator::Depth(_) => {
+                self.xml.open("integrator", &[("type", "depth")]);
+                self.xml.close();
+                return;
+            }
+            Integrator::LightTracer(tracer) => {
+                ("ptracer", tracer.max_depth, tracer.roulette_depth, tracer.hide_emitters)
+            }
             Integrator::Path(path) => {
                 if path.light_samples != 1 || path.scatter_samples != 1 {
                     self.lose("integrator.path", "one shadow ray and one scattered ray at each surface");
                 }
-                (path.max_depth, path.roulette_depth, path.hide_emitters)
+                (plugin, path.max_depth, path.roulette_depth, path.hide_emitters)
             }
             other => {
                 let (tag, what) = match other {
@@ -279,6 +326,10 @@ impl<'a> Export<'a> {
         if let (Some(lens), "thinlens") = (lens, plugin) {
             self.xml.value("float", "aperture_radius", lens.radius);
             self.xml.value("float", "focus_distance", lens.focus_distance);
+        }
+        if let Some(medium) = &self.scene.medium {
+            let id = self.id(medium, "medium");
+            self.xml.leaf("ref", &[("name", "medium"), ("id", &id)]);
         }
         self.xml.open("sampler", &[("type", "independent")]);
         self.xml.value("integer", "sample_count", "$spp");

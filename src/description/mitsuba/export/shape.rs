@@ -1,9 +1,13 @@
 //! Shapes.
 
+use std::path::Path;
+
 use glam::{DMat4, DVec3, DVec4};
 
-use super::super::super::material::{Material, MaterialRef};
-use super::super::super::shape::{Caps, Cone, Geometry, Layout, Normals, Shape, Sphere};
+use super::super::super::medium::{UNCHANGED, VACUUM};
+use super::super::super::shape::{
+    Caps, Cone, Cube, CurveBasis, Geometry, Layout, Normals, SdfNormals, Shape, Sphere, Winding,
+};
 use super::super::super::spectrum::SpectrumOrTexture;
 use super::Export;
 use super::xml::numbers;
@@ -14,13 +18,25 @@ use crate::math::trig::sin_cos_turn;
 const PLANE: f64 = 1e4;
 
 impl Export<'_> {
-    /// A shape of the scene's list.
-    pub(super) fn shape(&mut self, i: usize, shape: &Shape) {
+    /// The shapes of a group.
+    pub(super) fn group(&mut self, name: &str, shapes: &[Shape]) {
+        let id = self.id(name, "shape");
+        self.xml.open("shape", &[("type", "shapegroup"), ("id", &id)]);
+        let list = super::field(&["groups", name]);
+        for (i, shape) in shapes.iter().enumerate() {
+            self.shape(&list, i, shape);
+        }
+        self.xml.close();
+    }
+
+    /// A shape of a list: the scene's, or a group's.
+    pub(super) fn shape(&mut self, list: &str, i: usize, shape: &Shape) {
         let why = self.shape_shortfall(shape);
         if let Some(why) = &why {
-            self.instead("shape", &format!("shapes[{i}]"), why.as_str());
+            self.instead("shape", &format!("{list}[{i}]"), why.as_str());
         }
-        let field = format!("shapes[{i}].{}", shape.geometry.kind());
+        let kind = shape.geometry.kind();
+        let field = format!("{list}[{i}].{kind}");
         let world = shape.world_from_object();
         match &shape.geometry {
             Geometry::Sphere(sphere) => {
@@ -49,7 +65,7 @@ impl Export<'_> {
             }
             Geometry::Cone(cone) => {
                 self.open("ply", shape);
-                let name = format!("{}shape{i}.ply", self.stem);
+                let name = format!("{}shape{}.ply", self.stem, self.files.len());
                 self.xml.value("string", "filename", &name);
                 self.files.push((name, cone_mesh(cone).into_bytes()));
                 self.placing(world);
@@ -76,21 +92,55 @@ impl Export<'_> {
                 self.placing(world * DMat4::from_translation(cube.center.into()) * DMat4::from_scale(half));
             }
             Geometry::Mesh(mesh) => {
-                let ply = mesh.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
-                self.open(if ply { "ply" } else { "obj" }, shape);
+                let plugin = mesh_plugin(&mesh.file);
+                self.open(plugin, shape);
                 let file = self.file(&mesh.file);
                 self.xml.value("string", "filename", file);
+                match plugin {
+                    "serialized" => self.xml.value("integer", "shape_index", mesh.index),
+                    plugin => {
+                        if mesh.flip_v != (plugin == "obj") {
+                            self.xml.value("boolean", "flip_tex_coords", mesh.flip_v);
+                        }
+                    }
+                }
                 if mesh.normals == Normals::Face {
                     self.xml.value("boolean", "face_normals", true);
                 }
                 self.placing(world);
             }
-            Geometry::Instance(_) | Geometry::SdfGrid(_) | Geometry::Curves(_) => {
-                self.open("sphere", shape);
+            Geometry::Instance(instance) => {
+                self.open("instance", shape);
+                let id = self.id(&instance.group, "shape");
+                self.xml.leaf("ref", &[("id", &id)]);
+                self.placing(world);
+            }
+            Geometry::SdfGrid(grid) => {
+                self.open("sdfgrid", shape);
+                let file = self.file(&grid.file);
+                self.xml.value("string", "filename", file);
+                let normals = match grid.normals {
+                    SdfNormals::Smooth => "smooth",
+                    SdfNormals::Analytic => "analytic",
+                };
+                self.xml.value("string", "normals", normals);
+                self.placing(world);
+            }
+            Geometry::Curves(curves) => {
+                let plugin = match curves.basis {
+                    CurveBasis::Linear => "linearcurve",
+                    CurveBasis::Bspline => "bsplinecurve",
+                };
+                self.open(plugin, shape);
+                let file = self.file(&curves.file);
+                self.xml.value("string", "filename", file);
                 self.placing(world);
             }
         }
-        self.surface(&field, shape);
+        // The shapes of a group have their own.
+        if !matches!(shape.geometry, Geometry::Instance(_)) {
+            self.surface(&field, shape);
+        }
         self.xml.close();
         let layout = match &shape.geometry {
             Geometry::Sphere(sphere) => Some(sphere.layout),
@@ -101,7 +151,7 @@ impl Export<'_> {
             (Some(_), _) => self.end(),
             // No picture lies on it, but the same random numbers shall mean the same directions.
             (None, Some(Layout::YUp)) => {
-                self.xml.instruction(&format!("set shapes[{i}].{}.layout: y_up", shape.geometry.kind()));
+                self.xml.instruction(&format!("set {field}.layout: y_up"));
             }
             (None, _) => {}
         }
@@ -111,16 +161,21 @@ impl Export<'_> {
     fn surface(&mut self, field: &str, shape: &Shape) {
         let mirrored = shape.world_from_object().determinant() < 0.0;
         // A sphere, disk or rectangle that is mirrored is turned inside out by Mitsuba.
-        let flat = matches!(shape.geometry, Geometry::Sphere(_) | Geometry::Disk(_) | Geometry::Rectangle(_));
+        let flat = match &shape.geometry {
+            Geometry::Sphere(_) | Geometry::Disk(_) | Geometry::Rectangle(_) => true,
+            // So is a mesh; one that keeps its outside is turned back.
+            Geometry::Mesh(mesh) => mesh.winding == Winding::Object,
+            _ => false,
+        };
         if shape.flip_normals != (mirrored && flat) {
             self.xml.value("boolean", "flip_normals", true);
         }
         self.material_ref(&format!("{field}.material"), &shape.material);
         if let Some(emission) = &shape.emission {
-            self.area(emission);
+            self.area(shape, emission);
         }
         for (key, medium) in [("interior", &shape.inside), ("exterior", &shape.outside)] {
-            if let Some(medium) = medium {
+            if let Some(medium) = medium.as_ref().filter(|medium| ![VACUUM, UNCHANGED].contains(&medium.as_str())) {
                 let id = self.id(medium, "medium");
                 self.xml.leaf("ref", &[("name", key), ("id", &id)]);
             }
@@ -134,7 +189,7 @@ impl Export<'_> {
         }
     }
 
-    fn placing(&mut self, matrix: DMat4) {
+    pub(super) fn placing(&mut self, matrix: DMat4) {
         if matrix != DMat4::IDENTITY {
             let rows = matrix.transpose().to_cols_array();
             self.xml.open("transform", &[("name", "to_world")]);
@@ -147,11 +202,8 @@ impl Export<'_> {
     fn shape_shortfall(&self, shape: &Shape) -> Option<String> {
         let said = |text: &str| Some(text.to_owned());
         let textured =
-            self.is_textured(&shape.material) || matches!(shape.emission, Some(SpectrumOrTexture::Texture(_)));
-        let grey = match &shape.emission {
-            Some(SpectrumOrTexture::Spectrum(spectrum)) => Export::light_shortfall(spectrum).map(str::to_owned),
-            _ => None,
-        };
+            self.follows_uv(&shape.material) || matches!(shape.emission, Some(SpectrumOrTexture::Texture(_)));
+        let grey = shape.emission.as_ref().and_then(|emission| self.shining_shortfall(emission)).map(str::to_owned);
         let own = match &shape.geometry {
             Geometry::Rectangle(_) => None,
             Geometry::Plane(_) => said("a square of 20 km: Mitsuba has no plane without end"),
@@ -162,41 +214,53 @@ impl Export<'_> {
             Geometry::Cylinder(c) if c.caps != Caps::None => {
                 said("a tube and disks at its ends: Mitsuba's cylinder has none")
             }
-            Geometry::Sphere(Sphere { layout: Layout::ZUp, .. }) => None,
+            Geometry::Sphere(Sphere { layout: Layout::ZUp, .. }) | Geometry::Cube(Cube { layout: Layout::ZUp, .. }) => {
+                None
+            }
             Geometry::Sphere(_) | Geometry::Cylinder(_) | Geometry::Disk(_) | Geometry::Cube(_) if textured => {
                 said("the same shape with Mitsuba's texture coordinates")
             }
             Geometry::Sphere(_) | Geometry::Cylinder(_) | Geometry::Disk(_) | Geometry::Cube(_) => None,
+            Geometry::Mesh(mesh) if textured && mesh.flip_v && mesh_plugin(&mesh.file) == "serialized" => {
+                said("the same mesh, its textures upside down")
+            }
             Geometry::Mesh(mesh) => match mesh.normals {
                 Normals::File | Normals::Smooth => {
                     said("the same mesh; without normals in its file Mitsuba smooths each vertex by itself")
                 }
                 _ => None,
             },
-            Geometry::Instance(_) | Geometry::SdfGrid(_) | Geometry::Curves(_) => {
-                said("a ball: this kind is not exported yet")
-            }
+            Geometry::Instance(_) | Geometry::SdfGrid(_) | Geometry::Curves(_) => None,
         };
-        let weight =
-            shape.sampling_weight.is_some().then(|| "the same light, chosen as often as the others".to_owned());
-        let beam = shape.emission_direction.is_some().then(|| "light in all directions".to_owned());
-        own.or(grey).or(weight).or(beam)
+        own.or(grey).or(self.sides_shortfall(shape).map(str::to_owned))
     }
 
-    fn is_textured(&self, material: &MaterialRef) -> bool {
-        let material = match material {
-            MaterialRef::Name(name) => self.scene.materials.get(name),
-            MaterialRef::Inline(material) => Some(material),
-        };
-        match material {
-            Some(Material::Diffuse(m)) => matches!(m.reflectance, SpectrumOrTexture::Texture(_)),
-            Some(Material::Plastic(m)) => {
-                [&m.reflectance, &m.tint].iter().any(|t| matches!(t, SpectrumOrTexture::Texture(_)))
-            }
-            Some(Material::Mirror(_) | Material::Boundary(_)) | None => false,
-            // Grain and relief follow the texture coordinates too.
-            Some(other) => format!("{other:?}").contains("Texture(") || format!("{other:?}").contains("Brushed"),
+    /// What Mitsuba gets in place of the media of a shape: there a side that is not named is empty if the other is, and
+    /// a shape that names neither leaves a ray in what it is in.
+    fn sides_shortfall(&self, shape: &Shape) -> Option<&'static str> {
+        if self.scene.media.is_empty() || !self.transmits(&shape.material) {
+            return None;
         }
+        let unchanged = [&shape.inside, &shape.outside].map(|side| side.as_deref() == Some(UNCHANGED));
+        let medium = [&shape.inside, &shape.outside].map(|side| side.as_deref().is_some_and(|s| s != VACUUM));
+        match (unchanged, medium) {
+            ([true, true], _) => None,
+            ([true, _] | [_, true], _) => Some("empty space on the side that leaves the medium as it is"),
+            (_, [false, false]) => Some("the medium of one side on the other, too"),
+            _ => None,
+        }
+    }
+}
+
+/// The plugin that reads a mesh.
+fn mesh_plugin(file: &Path) -> &'static str {
+    let is = |extension: &str| file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
+    if is("ply") {
+        "ply"
+    } else if is("serialized") {
+        "serialized"
+    } else {
+        "obj"
     }
 }
 

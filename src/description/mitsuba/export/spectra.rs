@@ -1,9 +1,11 @@
 //! Spectra and textures in the place of one.
 
+use std::path::Path;
+
 use super::super::super::spectrum::{Spectrum, SpectrumOrTexture};
 use super::xml::numbers;
 use super::{DAYLIGHT, Export};
-use crate::spectrum::{BAND_NM, Lanes, Spectrum as Curve, illuminant};
+use crate::spectrum::{BAND_NM, Lanes, Spectrum as Curve, illuminant, upsample};
 
 /// What a spectrum is of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +31,11 @@ impl Export<'_> {
                 }
                 _ => false,
             },
-            Spectrum::ZeroOutside(inner) => matches!(**inner, Spectrum::Table(_)),
+            Spectrum::ZeroOutside(inner) => match &**inner {
+                Spectrum::Table(_) => true,
+                Spectrum::File(file) => reads(file),
+                _ => false,
+            },
             _ => false,
         }
     }
@@ -57,6 +63,10 @@ impl Export<'_> {
             }
             Spectrum::ZeroOutside(inner) => match &**inner {
                 Spectrum::Table(pairs) => self.table(name, pairs, by, Ends::Zero),
+                Spectrum::File(file) if by == 1.0 && reads(file) => {
+                    let file = self.file(file);
+                    self.xml.leaf("spectrum", &[("name", name), ("filename", &file)]);
+                }
                 _ => self.xml.value("spectrum", name, 0.5 * by),
             },
             Spectrum::Illuminant(illuminant) if illuminant.name.eq_ignore_ascii_case("D65") => {
@@ -79,8 +89,12 @@ impl Export<'_> {
 
     /// A curve at every fifth nanometre.
     pub(super) fn curve(&mut self, name: &str, curve: &Curve, by: f64) {
-        let value = |nm: u32| f64::from(curve.eval(Lanes::splat(nm as f32)).to_array()[0]) * by;
-        let pairs: Vec<String> = (360..=830).step_by(5).map(|nm| format!("{nm}:{}", value(nm))).collect();
+        self.samples(name, |nm| at(curve, nm) * by);
+    }
+
+    /// What a function is at every fifth nanometre.
+    pub(super) fn samples(&mut self, name: &str, value: impl Fn(f64) -> f64) {
+        let pairs: Vec<String> = (360..=830u32).step_by(5).map(|nm| format!("{nm}:{}", value(f64::from(nm)))).collect();
         self.xml.value("spectrum", name, pairs.join(", "));
     }
 
@@ -130,6 +144,41 @@ impl Export<'_> {
             SpectrumOrTexture::Spectrum(spectrum) => Export::can_say(spectrum),
             SpectrumOrTexture::Texture(_) => true,
         }
+    }
+}
+
+/// Whether Mitsuba reads such a file of two columns: one between which are blanks.
+fn reads(file: &Path) -> bool {
+    file.extension().is_some_and(|e| e.eq_ignore_ascii_case("spd"))
+}
+
+/// A curve at one wavelength, nm.
+pub(super) fn at(curve: &Curve, nm: f64) -> f64 {
+    f64::from(curve.eval(Lanes::splat(nm as f32)).to_array()[0])
+}
+
+/// A coefficient as a function of the wavelength, where it is numbers.
+pub(super) fn curve_of(spectrum: &Spectrum) -> Option<Box<dyn Fn(f64) -> f64 + '_>> {
+    match spectrum {
+        Spectrum::Number(value) => Some(Box::new(|_| *value)),
+        // Linear between samples, held beyond the ends.
+        Spectrum::Table(pairs) => Some(Box::new(|nm| {
+            let after = pairs.partition_point(|pair| pair[0] <= nm);
+            match (after.checked_sub(1).and_then(|before| pairs.get(before)), pairs.get(after)) {
+                (Some([x0, y0]), Some([x1, y1])) => y0 + (y1 - y0) * (nm - x0) / (x1 - x0),
+                (Some(end), None) | (None, Some(end)) => end[1],
+                (None, None) => 0.0,
+            }
+        })),
+        Spectrum::Rgb(rgb) => {
+            let curve = upsample::unbounded(*rgb).ok()?;
+            Some(Box::new(move |nm| at(&curve, nm)))
+        }
+        Spectrum::Scaled(scaled) => {
+            let inner = curve_of(&scaled.of)?;
+            Some(Box::new(move |nm| inner(nm) * scaled.by))
+        }
+        _ => None,
     }
 }
 

@@ -1,30 +1,48 @@
 //! Materials and textures.
 
-use super::super::super::compound::{NumberOrTexture, Roughness};
+use super::super::super::compound::Roughness;
 use super::super::super::material::{
     Conductor, ConductorIndex, Dielectric, DiffuseMean, Distribution, Fresnel, Material, MaterialRef, Plastic,
     ThinDielectric,
 };
 use super::super::super::spectrum::{Index, Spectrum, SpectrumOrTexture};
-use super::super::super::texture::{Texture, TextureFilter, Wrap};
 use super::Export;
 use super::spectra::Role;
-use super::xml::numbers;
 use crate::spectrum::{RefractiveIndex, catalogue};
 
 /// The wavelength at which a dispersive index is taken where there can be only one: the d line, nm.
 const D_LINE_NM: f64 = 587.5618;
 
+/// Names and values of an element's attributes.
+pub(super) type Attributes = [(&'static str, String)];
+
 impl Export<'_> {
+    /// What Mitsuba gets in place of a material that it cannot express.
+    fn shortfall(&self, material: &Material) -> Option<String> {
+        plain_shortfall(material).or_else(|| self.compound_shortfall(material))
+    }
+
     /// A material of the scene's list.
     pub(super) fn material(&mut self, field: &str, material: &Material, id: Option<&str>) {
-        match shortfall(material) {
+        match self.shortfall(material) {
             Some(why) => {
                 self.instead("bsdf", field, why);
-                self.bsdf(material, id);
+                self.bsdf(field, material, id, both_sides(material));
                 self.end();
             }
-            None => self.bsdf(material, id),
+            None => self.bsdf(field, material, id, both_sides(material)),
+        }
+    }
+
+    /// A material within one that says what the other side is.
+    pub(super) fn one_sided(&mut self, field: &str, material: &Material) {
+        let why = self.shortfall(material);
+        if let Some(why) = &why {
+            self.instead("bsdf", field, why.as_str());
+        }
+        self.bsdf(field, material, None, false);
+        if why.is_some() {
+            self.end();
         }
     }
 
@@ -36,14 +54,7 @@ impl Export<'_> {
         }
     }
 
-    fn bsdf(&mut self, material: &Material, id: Option<&str>) {
-        let two_sided = match material {
-            Material::Diffuse(m) => m.two_sided,
-            Material::Conductor(m) => m.two_sided,
-            Material::Plastic(m) => m.two_sided,
-            Material::Mirror(_) => true,
-            _ => false,
-        };
+    fn bsdf(&mut self, field: &str, material: &Material, id: Option<&str>, two_sided: bool) {
         let named = |plugin: &'static str, id: Option<&str>| -> Vec<(&'static str, String)> {
             let mut attributes = vec![("type", plugin.to_owned())];
             attributes.extend(id.map(|id| ("id", id.to_owned())));
@@ -76,7 +87,18 @@ impl Export<'_> {
                 self.plastic(m, &named(kind, inner_id));
             }
             Material::Boundary(_) => self.open_owned("bsdf", &named("null", inner_id)),
-            _ => self.open_owned("bsdf", &named("diffuse", inner_id)),
+            Material::Principled(m) => self.principled(m, &named("principled", inner_id)),
+            Material::PrincipledThin(m) => self.principled_thin(m, &named("principledthin", inner_id)),
+            Material::Hair(m) => self.hair(m, &named("hair", inner_id)),
+            Material::Mask(m) => self.mask(field, m, &named("mask", inner_id)),
+            Material::Blend(m) => self.blend(field, m, &named("blendbsdf", inner_id)),
+            // What lets light through cannot have two sides.
+            Material::TwoSided(_) if self.shortfall(material).is_some() => {
+                self.open_owned("bsdf", &named("diffuse", inner_id));
+            }
+            Material::TwoSided(m) => self.two_sided(field, m, &named("twosided", inner_id)),
+            Material::Bump(m) => self.bump(field, m, &named("bumpmap", inner_id)),
+            Material::NormalMap(m) => self.normal_map(field, m, &named("normalmap", inner_id)),
         }
         self.xml.close();
         if two_sided {
@@ -84,12 +106,12 @@ impl Export<'_> {
         }
     }
 
-    fn open_owned(&mut self, tag: &'static str, attributes: &[(&'static str, String)]) {
+    pub(super) fn open_owned(&mut self, tag: &'static str, attributes: &Attributes) {
         let borrowed: Vec<(&str, &str)> = attributes.iter().map(|(name, value)| (*name, value.as_str())).collect();
         self.xml.open(tag, &borrowed);
     }
 
-    fn conductor(&mut self, m: &Conductor, attributes: &[(&'static str, String)]) {
+    fn conductor(&mut self, m: &Conductor, attributes: &Attributes) {
         self.open_owned("bsdf", attributes);
         match &m.index {
             ConductorIndex::Metal(name) => {
@@ -107,20 +129,20 @@ impl Export<'_> {
         self.roughness(&m.roughness, m.distribution);
     }
 
-    fn dielectric(&mut self, m: &Dielectric, attributes: &[(&'static str, String)]) {
+    fn dielectric(&mut self, m: &Dielectric, attributes: &Attributes) {
         self.open_owned("bsdf", attributes);
         self.indices(&m.ior, &m.exterior_ior);
         self.tints(&m.reflection_tint, &m.transmission_tint);
         self.roughness(&m.roughness, m.distribution);
     }
 
-    fn thin(&mut self, m: &ThinDielectric, attributes: &[(&'static str, String)]) {
+    fn thin(&mut self, m: &ThinDielectric, attributes: &Attributes) {
         self.open_owned("bsdf", attributes);
         self.indices(&m.ior, &m.exterior_ior);
         self.tints(&m.reflection_tint, &m.transmission_tint);
     }
 
-    fn plastic(&mut self, m: &Plastic, attributes: &[(&'static str, String)]) {
+    fn plastic(&mut self, m: &Plastic, attributes: &Attributes) {
         self.open_owned("bsdf", attributes);
         self.spectrum_or_texture("diffuse_reflectance", &m.reflectance, Role::Reflectance);
         self.tint("specular_reflectance", &m.tint);
@@ -152,14 +174,10 @@ impl Export<'_> {
         match roughness {
             Roughness::Number(alpha) if *alpha == 0.0 => return,
             Roughness::Number(alpha) => self.xml.value("float", "alpha", alpha),
-            Roughness::Texture(name) => self.texture_ref("alpha", name),
+            Roughness::Texture(name) => self.numbers_of(Some("alpha"), name),
             Roughness::Brushed(brushed) => {
-                for (key, alpha) in [("alpha_u", &brushed.u), ("alpha_v", &brushed.v)] {
-                    match alpha {
-                        NumberOrTexture::Number(alpha) => self.xml.value("float", key, alpha),
-                        NumberOrTexture::Texture(name) => self.texture_ref(key, name),
-                    }
-                }
+                self.number("alpha_u", &brushed.u);
+                self.number("alpha_v", &brushed.v);
             }
         }
         let name = match distribution {
@@ -168,73 +186,10 @@ impl Export<'_> {
         };
         self.xml.value("string", "distribution", name);
     }
-
-    /// A texture of the scene's list.
-    pub(super) fn texture(&mut self, name: &str, texture: &Texture) {
-        let id = &self.id(name, "texture");
-        match texture {
-            Texture::Image(image) => {
-                let odd = image.wrap_v.is_some_and(|wrap| wrap != image.wrap) || image.illuminant.is_some();
-                if odd {
-                    let why = "one way to go on beyond the edges for u and v, and D65 where it shines";
-                    self.instead("texture", &format!("textures.{name}"), why);
-                }
-                self.xml.open("texture", &[("type", "bitmap"), ("id", id)]);
-                let file = self.file(&image.file);
-                self.xml.value("string", "filename", file);
-                let filter = match image.filter {
-                    TextureFilter::Bilinear => "bilinear",
-                    TextureFilter::Nearest => "nearest",
-                };
-                self.xml.value("string", "filter_type", filter);
-                let wrap = match image.wrap {
-                    Wrap::Repeat => "repeat",
-                    Wrap::Mirror => "mirror",
-                    Wrap::Clamp => "clamp",
-                };
-                self.xml.value("string", "wrap_mode", wrap);
-                self.xml.value("boolean", "raw", image.raw);
-                // Their pictures begin at the top.
-                let [[a, b, c], [d, e, f]] = affine(image.uv, image.scale, image.offset);
-                self.uv_map([[a, b, c], [-d, -e, 1.0 - f]]);
-                self.xml.close();
-                if odd {
-                    self.end();
-                }
-            }
-            Texture::Checkerboard(board) => {
-                let good = Export::can_say_either(&board.a) && Export::can_say_either(&board.b);
-                if !good {
-                    self.instead("texture", &format!("textures.{name}"), "grey squares in place of a spectrum");
-                }
-                self.xml.open("texture", &[("type", "checkerboard"), ("id", id)]);
-                self.spectrum_or_texture("color0", &board.a, Role::Reflectance);
-                self.spectrum_or_texture("color1", &board.b, Role::Reflectance);
-                self.uv_map(affine(board.uv, board.scale, [0.0; 2]));
-                self.xml.close();
-                if !good {
-                    self.end();
-                }
-            }
-            Texture::Volume(_) | Texture::MeshAttribute(_) => {
-                self.instead("texture", &format!("textures.{name}"), "grey: this kind is not exported yet");
-                self.xml.open("texture", &[("type", "checkerboard"), ("id", id)]);
-                self.xml.close();
-                self.end();
-            }
-        }
-    }
-
-    fn uv_map(&mut self, [[a, b, c], [d, e, f]]: [[f64; 3]; 2]) {
-        let rows = [a, b, 0.0, c, d, e, 0.0, f, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
-        self.xml.open("transform", &[("name", "to_uv")]);
-        self.xml.leaf("matrix", &[("value", &numbers(&rows))]);
-        self.xml.close();
-    }
 }
 
-/// What Mitsuba gets in place of a material that it cannot express.
-fn shortfall(material: &Material) -> Option<String> {
+/// The same for materials that are not made of others.
+fn plain_shortfall(material: &Material) -> Option<String> {
     let highlight = |given: bool| given.then(|| "no highlight: those belong to the Whitted ray tracer".to_owned());
     let spectra = |all: &[&SpectrumOrTexture]| {
         let good = all.iter().all(|spectrum| Export::can_say_either(spectrum));
@@ -271,16 +226,20 @@ fn shortfall(material: &Material) -> Option<String> {
         Material::Plastic(m) => highlight(m.highlight.is_some())
             .or(dispersive(&m.ior, &m.exterior_ior))
             .or(spectra(&[&m.reflectance, &m.tint])),
-        Material::Boundary(_) => None,
-        _ => Some("a grey diffuse surface: this kind is not exported yet".to_owned()),
+        _ => None,
     }
 }
 
-/// u, v to the picture's: the map, then the scale, then the offset.
-fn affine(uv: Option<[[f64; 3]; 2]>, scale: [f64; 2], offset: [f64; 2]) -> [[f64; 3]; 2] {
-    let [u, v] = uv.unwrap_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
-    let row = |row: [f64; 3], scale: f64, offset: f64| [row[0] * scale, row[1] * scale, row[2] * scale + offset];
-    [row(u, scale[0], offset[0]), row(v, scale[1], offset[1])]
+/// Whether the back of a material is like its front.
+fn both_sides(material: &Material) -> bool {
+    match material {
+        Material::Diffuse(m) => m.two_sided,
+        Material::Conductor(m) => m.two_sided,
+        Material::Plastic(m) => m.two_sided,
+        Material::Principled(m) => m.two_sided,
+        Material::Mirror(_) => true,
+        _ => false,
+    }
 }
 
 fn plugin(smooth: &'static str, rough: &'static str, roughness: &Roughness) -> &'static str {

@@ -1,0 +1,261 @@
+//! Materials that are made of others, principled ones, and hair.
+
+use super::super::super::compound::{Blend, Bump, Mask, NormalMap, NumberOrTexture, TwoSided};
+use super::super::super::hair::{Hair, HairColour};
+use super::super::super::material::{Material, MaterialRef};
+use super::super::super::principled::{Contrast, Luminance, Principled, PrincipledThin};
+use super::super::super::spectrum::SpectrumOrTexture;
+use super::Export;
+use super::spectra::Role;
+use super::surface::Attributes;
+use crate::spectrum::upsample;
+
+/// Absorption of the two pigments of concentration one in red, green and blue: d'Eon et al. 2011.
+const PIGMENTS: [[f64; 3]; 2] = [[0.419, 0.697, 1.37], [0.187, 0.4, 1.05]];
+
+const ZERO: NumberOrTexture = NumberOrTexture::Number(0.0);
+
+impl Export<'_> {
+    /// A `<float>`, or a texture that is asked for numbers.
+    pub(super) fn number(&mut self, name: &str, value: &NumberOrTexture) {
+        match value {
+            NumberOrTexture::Number(x) => self.xml.value("float", name, x),
+            NumberOrTexture::Texture(texture) => self.numbers_of(Some(name), texture),
+        }
+    }
+
+    /// Numbers, where they are not the plugin's default.
+    fn numbers_but(&mut self, numbers: &[(&str, &NumberOrTexture, f64)]) {
+        for (name, value, default) in numbers {
+            if **value != NumberOrTexture::Number(*default) {
+                self.number(name, value);
+            }
+        }
+    }
+
+    fn rates(&mut self, rates: &[(&str, f64)]) {
+        for (name, rate) in rates.iter().filter(|(_, rate)| *rate != 1.0) {
+            self.xml.value("float", name, rate);
+        }
+    }
+
+    pub(super) fn principled(&mut self, m: &Principled, attributes: &Attributes) {
+        self.open_owned("bsdf", attributes);
+        self.spectrum_or_texture("base_color", &m.base_color, Role::Reflectance);
+        self.numbers_but(&[
+            ("roughness", &m.roughness, 0.5),
+            ("anisotropic", &m.anisotropic, 0.0),
+            ("metallic", &m.metallic, 0.0),
+            ("spec_trans", m.spec_trans.as_ref().unwrap_or(&ZERO), 0.0),
+            ("spec_tint", &m.spec_tint, 0.0),
+            ("sheen", &m.sheen, 0.0),
+            ("sheen_tint", &m.sheen_tint, 0.0),
+            ("flatness", &m.flatness, 0.0),
+            ("clearcoat", &m.clearcoat, 0.0),
+            ("clearcoat_gloss", &m.clearcoat_gloss, 0.0),
+        ]);
+        match m.contrast {
+            Contrast::Eta(eta) => self.xml.value("float", "eta", eta),
+            Contrast::Specular(specular) => self.xml.value("float", "specular", specular),
+        }
+        self.rates(&[
+            ("main_specular_sampling_rate", m.sampling.specular),
+            ("clearcoat_sampling_rate", m.sampling.clearcoat),
+            ("diffuse_reflectance_sampling_rate", m.sampling.diffuse),
+        ]);
+    }
+
+    pub(super) fn principled_thin(&mut self, m: &PrincipledThin, attributes: &Attributes) {
+        self.open_owned("bsdf", attributes);
+        self.spectrum_or_texture("base_color", &m.base_color, Role::Reflectance);
+        self.numbers_but(&[
+            ("roughness", &m.roughness, 0.5),
+            ("anisotropic", &m.anisotropic, 0.0),
+            ("spec_trans", &m.spec_trans, 0.0),
+            ("diff_trans", &m.diff_trans, 0.0),
+            ("eta", &m.eta, 1.5),
+            ("spec_tint", &m.spec_tint, 0.0),
+            ("sheen", &m.sheen, 0.0),
+            ("sheen_tint", &m.sheen_tint, 0.0),
+            ("flatness", &m.flatness, 0.0),
+        ]);
+        self.rates(&[
+            ("specular_reflectance_sampling_rate", m.sampling.reflection),
+            ("specular_transmittance_sampling_rate", m.sampling.transmission),
+            ("diffuse_reflectance_sampling_rate", m.sampling.diffuse_reflection),
+            ("diffuse_transmittance_sampling_rate", m.sampling.diffuse_transmission),
+        ]);
+    }
+
+    pub(super) fn hair(&mut self, m: &Hair, attributes: &Attributes) {
+        self.open_owned("bsdf", attributes);
+        self.xml.value("float", "longitudinal_roughness", m.roughness_along);
+        self.xml.value("float", "azimuthal_roughness", m.roughness_around);
+        self.xml.value("float", "scale_tilt", m.tilt_deg);
+        self.xml.value("float", "int_ior", m.ior);
+        self.xml.value("float", "ext_ior", m.exterior_ior);
+        match &m.colour {
+            HairColour::Absorption(absorption) => self.spectrum("sigma_a", absorption, Role::Coefficient),
+            HairColour::Pigments { eumelanin, pheomelanin } => {
+                let curves = PIGMENTS.map(|rgb| upsample::unbounded(rgb).ok());
+                let value = |nm: f64| {
+                    let parts = curves.iter().zip([eumelanin, pheomelanin]);
+                    parts.map(|(curve, share)| curve.as_ref().map_or(0.0, |c| share * super::spectra::at(c, nm))).sum()
+                };
+                self.samples("sigma_a", value);
+            }
+        }
+    }
+
+    pub(super) fn mask(&mut self, field: &str, m: &Mask, attributes: &Attributes) {
+        self.open_owned("bsdf", attributes);
+        self.number("opacity", &m.opacity);
+        self.material_ref(&format!("{field}.mask.material"), &m.material);
+    }
+
+    pub(super) fn blend(&mut self, field: &str, m: &Blend, attributes: &Attributes) {
+        self.open_owned("bsdf", attributes);
+        self.number("weight", &m.weight);
+        self.material_ref(&format!("{field}.blend.first"), &m.first);
+        self.material_ref(&format!("{field}.blend.second"), &m.second);
+    }
+
+    pub(super) fn two_sided(&mut self, field: &str, m: &TwoSided, attributes: &Attributes) {
+        self.open_owned("bsdf", attributes);
+        for (key, side) in [("front", Some(&m.front)), ("back", m.back.as_ref())] {
+            match side.map(|side| &**side) {
+                // Each is seen from one side only.
+                Some(MaterialRef::Inline(material)) => {
+                    self.one_sided(&format!("{field}.two_sided.{key}"), material);
+                }
+                Some(name) => self.material_ref("", name),
+                None => {}
+            }
+        }
+    }
+
+    pub(super) fn bump(&mut self, field: &str, m: &Bump, attributes: &Attributes) {
+        self.open_owned("bsdf", attributes);
+        self.numbers_of(None, &m.height.texture);
+        self.xml.value("float", "scale", m.scale);
+        self.relief(m.turn, m.shadowing);
+        self.material_ref(&format!("{field}.bump.material"), &m.material);
+    }
+
+    pub(super) fn normal_map(&mut self, field: &str, m: &NormalMap, attributes: &Attributes) {
+        self.open_owned("bsdf", attributes);
+        self.numbers_of(Some("normalmap"), &m.normals.texture);
+        self.relief(m.turn, m.shadowing);
+        self.material_ref(&format!("{field}.normal_map.material"), &m.material);
+    }
+
+    fn relief(&mut self, turn: bool, shadowing: bool) {
+        self.xml.value("boolean", "flip_invalid_normals", turn);
+        self.xml.value("boolean", "use_shadowing_function", shadowing);
+    }
+
+    /// The material that a reference means.
+    pub(super) fn meant<'m>(&'m self, material: &'m MaterialRef) -> Option<&'m Material> {
+        match material {
+            MaterialRef::Name(name) => self.scene.materials.get(name),
+            MaterialRef::Inline(material) => Some(material),
+        }
+    }
+
+    /// Whether light may cross a surface.
+    pub(super) fn transmits(&self, material: &MaterialRef) -> bool {
+        match self.meant(material) {
+            None => false,
+            Some(Material::Dielectric(_) | Material::ThinDielectric(_) | Material::PrincipledThin(_)) => true,
+            Some(Material::Hair(_) | Material::Boundary(_) | Material::Mask(_)) => true,
+            Some(Material::Principled(m)) => m.spec_trans.is_some(),
+            Some(Material::Diffuse(_) | Material::Conductor(_) | Material::Mirror(_) | Material::Plastic(_)) => false,
+            Some(Material::Blend(m)) => self.transmits(&m.first) || self.transmits(&m.second),
+            Some(Material::TwoSided(m)) => {
+                self.transmits(&m.front) || m.back.as_ref().is_some_and(|back| self.transmits(back))
+            }
+            Some(Material::Bump(m)) => self.transmits(&m.material),
+            Some(Material::NormalMap(m)) => self.transmits(&m.material),
+        }
+    }
+
+    /// What Mitsuba gets in place of such a material, where it cannot express it.
+    pub(super) fn compound_shortfall(&self, material: &Material) -> Option<String> {
+        let colour =
+            |s: &SpectrumOrTexture| (!Export::can_say_either(s)).then(|| "grey in place of a spectrum".to_owned());
+        let tinted = |luminance: Luminance, tints: [&NumberOrTexture; 2]| {
+            let bright = luminance == Luminance::Colour && tints.iter().any(|tint| **tint != ZERO);
+            bright.then(|| "tints over the luminance that Mitsuba takes, about 2.6 times as bright".to_owned())
+        };
+        match material {
+            Material::Principled(m) => colour(&m.base_color).or(tinted(m.luminance, [&m.spec_tint, &m.sheen_tint])),
+            Material::PrincipledThin(m) => colour(&m.base_color).or(tinted(m.luminance, [&m.spec_tint, &m.sheen_tint])),
+            Material::Hair(m) => match &m.colour {
+                HairColour::Pigments { .. } => {
+                    Some("the absorption of its pigments at every fifth nanometre".to_owned())
+                }
+                HairColour::Absorption(s) => {
+                    (!Export::can_say_all(&[(s, Role::Coefficient)])).then(|| "a grey absorption".to_owned())
+                }
+            },
+            Material::TwoSided(m) => {
+                let sides = [Some(&m.front), m.back.as_ref()];
+                let through = sides.into_iter().flatten().any(|side| self.transmits(side));
+                through.then(|| "two sides of grey: Mitsuba's twosided lets no light through".to_owned())
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether what covers a shape depends on how u and v run over it.
+    pub(super) fn follows_uv(&self, material: &MaterialRef) -> bool {
+        let texture = |name: &String| self.texture_follows_uv(name);
+        let colour = |s: &SpectrumOrTexture| s.name().is_some_and(|name| self.texture_follows_uv(name));
+        let number = |n: &NumberOrTexture| matches!(n, NumberOrTexture::Texture(name) if texture(name));
+        // The grain lies along u.
+        let grain = |n: &NumberOrTexture| *n != ZERO;
+        match self.meant(material) {
+            None | Some(Material::Mirror(_) | Material::Boundary(_)) => false,
+            Some(Material::Diffuse(m)) => colour(&m.reflectance),
+            Some(Material::Conductor(m)) => colour(&m.tint) || self.roughness_follows_uv(&m.roughness),
+            Some(Material::Dielectric(m)) => {
+                colour(&m.reflection_tint) || colour(&m.transmission_tint) || self.roughness_follows_uv(&m.roughness)
+            }
+            Some(Material::ThinDielectric(m)) => colour(&m.reflection_tint) || colour(&m.transmission_tint),
+            Some(Material::Plastic(m)) => colour(&m.reflectance) || colour(&m.tint),
+            Some(Material::Principled(m)) => {
+                let numbers = [
+                    &m.roughness,
+                    &m.metallic,
+                    &m.spec_tint,
+                    &m.sheen,
+                    &m.sheen_tint,
+                    &m.flatness,
+                    &m.clearcoat,
+                    &m.clearcoat_gloss,
+                ];
+                grain(&m.anisotropic) || colour(&m.base_color) || numbers.into_iter().chain(&m.spec_trans).any(number)
+            }
+            Some(Material::PrincipledThin(m)) => {
+                let numbers = [
+                    &m.roughness,
+                    &m.spec_trans,
+                    &m.diff_trans,
+                    &m.eta,
+                    &m.spec_tint,
+                    &m.sheen,
+                    &m.sheen_tint,
+                    &m.flatness,
+                ];
+                grain(&m.anisotropic) || colour(&m.base_color) || numbers.into_iter().any(number)
+            }
+            Some(Material::Mask(m)) => number(&m.opacity) || self.follows_uv(&m.material),
+            Some(Material::Blend(m)) => number(&m.weight) || self.follows_uv(&m.first) || self.follows_uv(&m.second),
+            Some(Material::TwoSided(m)) => {
+                self.follows_uv(&m.front) || m.back.as_ref().is_some_and(|back| self.follows_uv(back))
+            }
+            // Fibres lie along u; slopes are by u and v.
+            Some(Material::Hair(_) | Material::Bump(_) | Material::NormalMap(_)) => true,
+        }
+    }
+}
