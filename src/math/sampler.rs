@@ -144,8 +144,15 @@ impl Octet {
 #[inline(always)]
 fn points<const N: usize>(stream: u32, indices: [u32; N], set: Set) -> [[u32; 4]; N] {
     let key = mix64(u64::from(stream) << 32 | u64::from(set.index()));
-    let shuffled = indices.map(|i| owen_scramble(i.reverse_bits(), key as u32).reverse_bits());
-    let mut points = shuffled.map(sobol_reversed);
+    // Plain loops over arrays become vectors; `map` calls a function for each element.
+    let mut shuffled = indices;
+    for i in &mut shuffled {
+        *i = owen_scramble(i.reverse_bits(), key as u32).reverse_bits();
+    }
+    let mut points = [[0; 4]; N];
+    for (point, i) in points.iter_mut().zip(shuffled) {
+        *point = sobol_reversed(i);
+    }
     // A key of its own for each dimension; all numbers run side by side.
     let keys = DIMENSION_KEYS.map(|k| k ^ (key >> 32) as u32);
     for point in &mut points {

@@ -20,6 +20,25 @@ pub struct Camera {
     pub clip: [f64; 2],
     /// Where the axis meets the picture, from its middle to the right and down, in widths and heights.
     pub principal_point: DVec2,
+    /// What follows for every ray.
+    view: View,
+}
+
+/// What of a camera's rays does not depend on the ray.
+#[derive(Clone, Copy, Debug)]
+struct View {
+    /// Where the axis meets the picture, in pixels.
+    middle: DVec2,
+    /// In the world, of the picture at distance one (a perspective) or where it is (parallel rays): a pixel to the
+    /// right, a pixel down.
+    right: DVec3,
+    down: DVec3,
+    /// The axis in the world, as long as the matrix makes it; that length; and the axis of unit length.
+    axis: DVec3,
+    axis_length: f64,
+    unit_axis: DVec3,
+    /// Where the axis meets the near clipping plane.
+    near: DVec3,
 }
 
 /// A thin lens.
@@ -92,6 +111,32 @@ impl Projection {
 }
 
 impl Camera {
+    /// A camera of these parts; see the fields.
+    #[must_use]
+    pub fn new(
+        world_from_camera: DAffine3,
+        projection: Projection,
+        resolution: [u32; 2],
+        lens: Option<Lens>,
+        clip: [f64; 2],
+        principal_point: DVec2,
+    ) -> Camera {
+        let size = DVec2::new(f64::from(resolution[0]), f64::from(resolution[1]));
+        let (Projection::Perspective { half_width } | Projection::Orthographic { half_width }) = projection;
+        let side = 2.0 * half_width / size.x;
+        let m = world_from_camera.matrix3;
+        let view = View {
+            middle: (DVec2::splat(0.5) + principal_point) * size,
+            right: m.x_axis * side,
+            down: m.y_axis * -side,
+            axis: m.z_axis,
+            axis_length: m.z_axis.length(),
+            unit_axis: m.z_axis.normalize(),
+            near: world_from_camera.translation + m.z_axis * clip[0],
+        };
+        Camera { world_from_camera, projection, resolution, lens, clip, principal_point, view }
+    }
+
     /// Where the camera stands and looks; `None` where `target` is `origin` or `up` is along the view.
     #[must_use]
     pub fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> Option<DAffine3> {
@@ -105,23 +150,37 @@ impl Camera {
     /// The ray through `pixel` (continuous; (0, 0) is the corner of the top left one) and the point
     /// `lens` of the unit square.
     #[must_use]
+    #[inline]
     pub fn ray(&self, pixel: DVec2, lens: impl FnOnce() -> DVec2) -> Ray {
-        let (w, h) = (f64::from(self.resolution[0]), f64::from(self.resolution[1]));
-        // −1…1 across the width, the same scale down the height.
-        let pixel = pixel - self.principal_point * DVec2::new(w, h);
-        let plane = DVec2::new(2.0 * pixel.x - w, h - 2.0 * pixel.y) / w;
-        let (mut origin, mut direction) = match self.projection {
-            Projection::Perspective { half_width } => {
-                (DVec3::ZERO, DVec3::new(plane.x * half_width, plane.y * half_width, 1.0))
-            }
-            Projection::Orthographic { half_width } => ((plane * half_width).extend(0.0), DVec3::Z),
-        };
-        if let Some(Lens { radius, focus_distance }) = self.lens {
-            // Every ray of a pixel meets in the plane of focus.
-            let focus = origin + direction * focus_distance;
-            origin += (warp::concentric_disk(lens()) * radius).extend(0.0);
-            direction = focus - origin;
+        let view = &self.view;
+        let place = pixel - view.middle;
+        if let Some(l) = self.lens {
+            return self.ray_through_lens(l, place, warp::concentric_disk(lens()) * l.radius);
         }
+        let across = view.right * place.x + view.down * place.y;
+        match self.projection {
+            Projection::Perspective { .. } => {
+                let direction = view.axis + across;
+                let origin = view.near + across * self.clip[0];
+                Ray::new(origin, direction.normalize())
+            }
+            Projection::Orthographic { .. } => Ray::new(view.near + across, view.unit_axis),
+        }
+    }
+
+    /// The ray through a point of the picture, in pixels from its middle, and a point of the lens, in metres.
+    #[inline(never)]
+    fn ray_through_lens(&self, lens: Lens, place: DVec2, on_lens: DVec2) -> Ray {
+        let (Projection::Perspective { half_width } | Projection::Orthographic { half_width }) = self.projection;
+        let plane = DVec2::new(place.x, -place.y) * (2.0 * half_width / f64::from(self.resolution[0]));
+        let (mut origin, direction) = match self.projection {
+            Projection::Perspective { .. } => (DVec3::ZERO, plane.extend(1.0)),
+            Projection::Orthographic { .. } => (plane.extend(0.0), DVec3::Z),
+        };
+        // Every ray of a pixel meets in the plane of focus.
+        let focus = origin + direction * lens.focus_distance;
+        origin += on_lens.extend(0.0);
+        let direction = focus - origin;
         origin += direction * (self.clip[0] / direction.z);
         Ray::new(
             self.world_from_camera.transform_point3(origin),
@@ -131,12 +190,12 @@ impl Camera {
 
     /// How far along one of the camera's rays it sees, metres.
     #[must_use]
+    #[inline]
     pub fn reach(&self, ray: &Ray) -> f64 {
         if self.clip[1] == f64::INFINITY {
             return f64::INFINITY;
         }
-        let axis = self.world_from_camera.matrix3.z_axis;
-        (self.clip[1] - self.clip[0]) * axis.length() / ray.direction.dot(axis)
+        (self.clip[1] - self.clip[0]) * self.view.axis_length / ray.direction.dot(self.view.axis)
     }
 
     /// How light from `point` enters the camera through the point `lens` of the unit square of its lens; `None` where
@@ -237,14 +296,14 @@ mod tests {
 
     fn camera(lens: Option<Lens>) -> Camera {
         let resolution = [200, 100];
-        Camera {
-            world_from_camera: Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y).unwrap(),
-            projection: Projection::perspective(90f64.to_radians(), FovAxis::X, resolution),
+        Camera::new(
+            Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y).unwrap(),
+            Projection::perspective(90f64.to_radians(), FovAxis::X, resolution),
             resolution,
             lens,
-            clip: [0.0, f64::INFINITY],
-            principal_point: DVec2::ZERO,
-        }
+            [0.0, f64::INFINITY],
+            DVec2::ZERO,
+        )
     }
 
     /// 90° across 200 pixels, looking along −z: the left edge is at x = −z, the top at y = z/2.

@@ -375,7 +375,7 @@ impl<'a> Compiler<'a> {
         let lens = d.lens.as_ref().map(|l| camera::Lens { radius: l.radius, focus_distance: l.focus_distance });
         let clip = [d.clip.near, d.clip.far];
         let principal_point = DVec2::from(d.principal_point);
-        Camera { world_from_camera, projection, resolution, lens, clip, principal_point }
+        Camera::new(world_from_camera, projection, resolution, lens, clip, principal_point)
     }
 
     /// Bands of the spectrum; a response must lie in what is rendered.

@@ -34,20 +34,12 @@ const ROWS: usize = KNOTS / LANES;
 /// How wavelengths are drawn: see the module's words.
 #[derive(Clone)]
 pub struct WavelengthDistribution {
-    /// For each row r, twice the sequence over k of the knot r + k · ROWS: a lattice that starts in any
-    /// lane is 8 neighbours.
-    rows: Vec<Row>,
+    /// For each row r, twice the sequence over k of the knot r + k · ROWS, nm: a lattice that starts in any
+    /// lane is 8 neighbours. The row after it holds the ends of its intervals.
+    rows: Vec<[f32; 2 * LANES]>,
     /// Always these wavelengths, whatever u.
     fixed: Option<SampledWavelengths>,
     description: String,
-}
-
-#[derive(Clone, Copy)]
-struct Row {
-    /// The wavelength where an interval begins, nm.
-    nm: [f32; 2 * LANES],
-    /// The width of the interval, nm.
-    width: [f32; 2 * LANES],
 }
 
 impl std::fmt::Debug for WavelengthDistribution {
@@ -189,12 +181,12 @@ impl WavelengthDistribution {
         let at = u * KNOTS as f64;
         let knot = (at as usize).min(KNOTS - 1);
         let place = Lanes::splat((at - knot as f64) as f32);
-        let row = &self.rows[knot % ROWS];
         let first = knot / ROWS;
-        let eight = |x: &[f32; 2 * LANES]| Lanes::new(std::array::from_fn(|k| x[first + k]));
-        let width = eight(&row.width);
-        // nm + width is the next knot exactly (`distribution`), and rounding is monotonic: never beyond.
-        SampledWavelengths { nm: place.mul_add(width, eight(&row.nm)), inv_pdf: width * Lanes::splat(KNOTS as f32) }
+        let eight = |row: usize| Lanes::new(std::array::from_fn(|k| self.rows[row][first + k]));
+        let begin = eight(knot % ROWS);
+        // Exact (`distribution`), so that begin + width is the end, and rounding is monotonic: never beyond.
+        let width = eight(knot % ROWS + 1) - begin;
+        SampledWavelengths { nm: place.mul_add(width, begin), inv_pdf: width * Lanes::splat(KNOTS as f32) }
     }
 
     /// Which density this is, and for a scene's own the figures it was chosen by.
@@ -284,15 +276,7 @@ impl Density {
         knots[KNOTS] = BAND_NM[1] as f32;
         // Neighbours lie well within a factor of two of each other (a 2048th of a density that is at least a
         // tenth of `vis` spans 21 nm at most), so their difference is exact in f32 (Sterbenz).
-        let rows = (0..ROWS)
-            .map(|r| {
-                let knot = |k: usize| r + k % LANES * ROWS;
-                Row {
-                    nm: std::array::from_fn(|k| knots[knot(k)]),
-                    width: std::array::from_fn(|k| knots[knot(k) + 1] - knots[knot(k)]),
-                }
-            })
-            .collect();
+        let rows = (0..=ROWS).map(|r| std::array::from_fn(|k| knots[r + k % LANES * ROWS])).collect();
         WavelengthDistribution { rows, fixed: None, description }
     }
 }

@@ -129,6 +129,12 @@ pub struct Channel {
 }
 
 impl LayerPlan {
+    /// Whether the layers hold nothing but what the picture's own light gives.
+    fn own_light_only(&self) -> bool {
+        let own = |layer: &Layer| !matches!(layer.source, Source::Surface(_));
+        self.integrators.is_empty() && self.layers.iter().all(own)
+    }
+
     /// The channels in the order of the sums.
     #[must_use]
     pub fn channels(&self) -> Vec<Channel> {
@@ -175,55 +181,89 @@ pub struct Seen {
 pub struct Values {
     /// The numbers.
     pub numbers: Vec<f32>,
+    /// What is seen of the first surface, in the order of the layers.
+    surface: Vec<f32>,
+    /// Light of the further integrators.
     others: Vec<Seen>,
 }
 
-/// Fills `values` with the numbers of one sample. `light` gives the light of an integrator.
-#[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
-pub fn fill(
-    scene: &Scene,
-    plan: &EffectPlan,
-    wavelengths: &SampledWavelengths,
-    ray: &Ray,
-    neighbours: impl Fn(DVec2) -> Ray,
-    own: Seen,
-    light: impl Fn(&Integrator) -> Seen,
-    values: &mut Values,
-) {
-    let Values { numbers: values, others } = values;
-    values.clear();
-    let layers = &plan.layers;
-    let sensitivity = layers.sensitivity as f32;
-    others.clear();
-    others.extend(layers.integrators.iter().map(light));
-    let looks = layers.layers.iter().any(|layer| matches!(layer.source, Source::Surface(_)));
-    let first = if looks { First::met(scene, ray) } else { None };
-    for layer in &layers.layers {
-        let start = values.len();
-        match layer.source {
-            Source::Surface(quantity) => match &first {
-                Some(first) => first.append(scene, plan, wavelengths, ray, &neighbours, quantity, values),
-                None => values.extend(quantity.components().iter().map(|_| 0.0)),
-            },
-            Source::Light(of, form) => {
-                let seen = of.map_or(own, |i| others[i]);
-                let xyz = seen.xyz.map(|x| x * sensitivity);
-                match form {
-                    Form::Xyz => values.extend(xyz),
-                    Form::Rgba => {
-                        values.extend(rgb(&layers.rgb_from_xyz, xyz));
-                        values.push(seen.alpha);
-                    }
+impl Values {
+    /// Looks at what is more than the picture's own light: the first surface that `ray` meets, and the `light` of
+    /// further integrators.
+    #[inline(never)]
+    fn look(
+        &mut self,
+        scene: &Scene,
+        plan: &EffectPlan,
+        wavelengths: &SampledWavelengths,
+        ray: &Ray,
+        neighbours: impl Fn(DVec2) -> Ray,
+        light: impl Fn(&Integrator) -> Seen,
+    ) {
+        self.others.clear();
+        self.others.extend(plan.layers.integrators.iter().map(light));
+        self.surface.clear();
+        let quantities = plan.layers.layers.iter().filter_map(|layer| match layer.source {
+            Source::Surface(quantity) => Some(quantity),
+            Source::Light(..) | Source::Band(_) => None,
+        });
+        let mut first = None;
+        for quantity in quantities {
+            match first.get_or_insert_with(|| First::met(scene, ray)) {
+                Some(first) => {
+                    first.append(scene, plan, wavelengths, ray, &neighbours, quantity, &mut self.surface);
                 }
-            }
-            Source::Band(i) => {
-                let counted = own.radiance * wavelengths.inv_pdf * scene.bands[i].response.eval(wavelengths.nm);
-                values.push(counted.reduce_add() / LANES as f32);
+                None => self.surface.extend(quantity.components().iter().map(|_| 0.0)),
             }
         }
-        if layer.squares {
-            for i in start..values.len() {
-                values.push(values[i] * values[i]);
+    }
+
+    /// Fills in the numbers of one sample. `light` gives the light of an integrator, `neighbours` the ray of a sample
+    /// some pixels away.
+    #[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
+    #[inline]
+    pub fn fill(
+        &mut self,
+        scene: &Scene,
+        plan: &EffectPlan,
+        wavelengths: &SampledWavelengths,
+        ray: &Ray,
+        neighbours: impl Fn(DVec2) -> Ray,
+        own: Seen,
+        light: impl Fn(&Integrator) -> Seen,
+    ) {
+        let layers = &plan.layers;
+        if !layers.own_light_only() {
+            self.look(scene, plan, wavelengths, ray, neighbours, light);
+        }
+        let Values { numbers, surface, others } = self;
+        let mut surface = surface.iter();
+        let sensitivity = layers.sensitivity as f32;
+        numbers.clear();
+        for layer in &layers.layers {
+            let start = numbers.len();
+            match layer.source {
+                Source::Surface(quantity) => numbers.extend(surface.by_ref().take(quantity.components().len())),
+                Source::Light(of, form) => {
+                    let seen = of.map_or(own, |i| others[i]);
+                    let xyz = seen.xyz.map(|x| x * sensitivity);
+                    match form {
+                        Form::Xyz => numbers.extend(xyz),
+                        Form::Rgba => {
+                            numbers.extend(rgb(&layers.rgb_from_xyz, xyz));
+                            numbers.push(seen.alpha);
+                        }
+                    }
+                }
+                Source::Band(i) => {
+                    let counted = own.radiance * wavelengths.inv_pdf * scene.bands[i].response.eval(wavelengths.nm);
+                    numbers.push(counted.reduce_add() / LANES as f32);
+                }
+            }
+            if layer.squares {
+                for i in start..numbers.len() {
+                    numbers.push(numbers[i] * numbers[i]);
+                }
             }
         }
     }

@@ -220,8 +220,9 @@ impl Samples {
 
 impl Begun {
     /// The numbers of the layers of `sample`, which began here.
+    #[inline]
     fn layers(&self, shot: &Shot, sampler: &Sampler, sample: &PixelSample, values: &mut layers::Values) {
-        layers::fill(
+        values.fill(
             shot.scene,
             shot.plan,
             &self.wavelengths,
@@ -233,7 +234,6 @@ impl Begun {
                 let xyz = observer::xyz(light.radiance, &self.wavelengths);
                 layers::Seen { radiance: light.radiance, xyz, alpha: light.alpha }
             },
-            values,
         );
     }
 }

@@ -197,12 +197,14 @@ impl Tracer<'_> {
         let mut reach = scene.camera.reach(ray);
 
         loop {
-            let choice = self.sampler.set(Set::Choice(path.vertices));
             // The flight through a medium is drawn first: beyond its reach no surface matters.
             let flying = if MEDIA { path.medium } else { None }.map(|medium| {
                 let medium = &scene.media[medium as usize];
                 let set = Set::Extra(path.vertices.wrapping_add(crossings << 16));
-                let u = if crossings == 0 { choice[3] } else { self.sampler.set(set)[0] };
+                let u = match crossings {
+                    0 => self.sampler.set(Set::Choice(path.vertices))[3],
+                    _ => self.sampler.set(set)[0],
+                };
                 let draft = medium.set_out(self.nm, u);
                 reach = reach.min(draft.reach);
                 (medium, set, draft)
@@ -230,7 +232,7 @@ impl Tracer<'_> {
                         depth = scene.camera.depth(point);
                         first = false;
                     }
-                    if !self.scatter_in_medium::<CHROMATIC, MEDIA>(&mut path, point, medium, choice) {
+                    if !self.scatter_in_medium::<CHROMATIC, MEDIA>(&mut path, point, medium) {
                         break;
                     }
                     crossings = 0;
@@ -349,8 +351,8 @@ impl Tracer<'_> {
             let wo = frame.to_local(wo_world);
             let bsdf = material.bsdf(&hit.texture_point(&surface), self.nm, self.plan.all_dispersive);
 
-            let scatter = self.sampler.set(Set::Scatter(path.vertices));
-            let (u_light, u_direction) = pairs(scatter);
+            let choice = self.sampler.set(Set::Choice(path.vertices));
+            let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
             let sided = sided_normal(material, &frame);
             if !bsdf.is_discrete() && self.settings.light_samples > 0 {
                 let scatterer =
@@ -467,11 +469,11 @@ impl Tracer<'_> {
         path: &mut Path,
         point: DVec3,
         medium: &Medium,
-        choice: [f64; 4],
     ) -> bool {
         if self.is_last(path) {
             return false;
         }
+        let choice = self.sampler.set(Set::Choice(path.vertices));
         let wo = -path.ray.direction;
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
         let next_event = self.settings.light_samples > 0 && medium.shadow_rays;
