@@ -5,6 +5,7 @@
 //! (`world_from_object`).
 
 pub mod dd;
+pub mod elementary;
 pub mod frame;
 pub mod ray;
 pub mod sampler;
