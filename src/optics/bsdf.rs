@@ -4,7 +4,7 @@ use super::dielectric::{Dielectric, RelativeIndex, RoughDielectric, Tint};
 use super::fresnel::{self, Model};
 use super::hair::Hair;
 use super::mean;
-use super::microfacet::Microfacets;
+use super::microfacet::{Microfacets, Terms};
 use super::plastic::{Plastic, RoughPlastic};
 use super::principled::{Principled, PrincipledThin};
 use crate::math::warp;
@@ -13,8 +13,8 @@ use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
 /// What a surface does with light, with its parameters at one point.
-#[derive(Clone, Debug)]
-pub enum Bsdf {
+#[derive(Clone, Copy, Debug)]
+pub enum Bsdf<'a> {
     /// Lambert: f = ρ/π on the side of the normal.
     Diffuse {
         /// Albedo ρ.
@@ -43,13 +43,13 @@ pub enum Bsdf {
     /// A diffuse base under a smooth dielectric coat.
     Plastic(Plastic),
     /// A diffuse base under a rough dielectric coat.
-    RoughPlastic(RoughPlastic),
+    RoughPlastic(RoughPlastic<'a>),
     /// Burley's surface of a solid.
     Principled(Principled),
     /// Burley's surface of a sheet.
     PrincipledThin(PrincipledThin),
     /// A fibre of hair.
-    Hair(Hair),
+    Hair(Hair<'a>),
     /// No interface: the boundary of a medium only.
     Null,
 }
@@ -163,7 +163,7 @@ pub(super) fn mirror(wo: DVec3) -> DVec3 {
     DVec3::new(-wo.x, -wo.y, wo.z)
 }
 
-impl Bsdf {
+impl Bsdf<'_> {
     /// True where every direction is one of finitely many: next-event estimation is pointless.
     #[must_use]
     pub fn is_discrete(&self) -> bool {
@@ -229,8 +229,12 @@ impl Bsdf {
                     return None;
                 }
                 let m = facets.sample(wo, u);
-                let wi = m * (2.0 * wo.dot(m)) - wo;
-                from_evaluation(wi, wi.z, rough_conductor(metal, facets, wo, wi), false, 1.0)
+                let cos = wo.dot(m);
+                let wi = m * (2.0 * cos) - wo;
+                if cos <= 0.0 || wi.z <= 0.0 {
+                    return None;
+                }
+                from_evaluation(wi, wi.z, rough_conductor_by(metal, facets, wo, wi, m), false, 1.0)
             }
             Bsdf::Dielectric(glass) => glass.sample(wo, u_lobe),
             Bsdf::RoughDielectric(glass) => glass.sample(wo, u_lobe, u),
@@ -257,10 +261,14 @@ fn rough_conductor(metal: &Metal, facets: &Microfacets, wo: DVec3, wi: DVec3) ->
     if wo.z <= 0.0 || wi.z <= 0.0 {
         return Evaluation::NONE;
     }
-    let m = (wo + wi).normalize();
+    rough_conductor_by(metal, facets, wo, wi, (wo + wi).normalize())
+}
+
+/// The same by the half vector `m`.
+fn rough_conductor_by(metal: &Metal, facets: &Microfacets, wo: DVec3, wi: DVec3, m: DVec3) -> Evaluation {
     let cos = wo.dot(m);
-    let f = facets.density(m) * facets.masking(wo, m) * facets.masking(wi, m) / (4.0 * wo.z * wi.z);
-    Evaluation { f: metal.reflectance(cos) * f as f32, pdf: Lanes::splat((facets.pdf(wo, m) / (4.0 * cos)) as f32) }
+    let Terms { flow, pdf } = facets.terms(wo, wi, m);
+    Evaluation { f: metal.reflectance(cos) * (0.25 * flow) as f32, pdf: Lanes::splat((pdf / (4.0 * cos)) as f32) }
 }
 
 /// The sample record of a direction drawn from a density that `eval` states; `cos` is |cos θ_i|.

@@ -6,8 +6,8 @@
 //! Radiance that crosses is scaled by 1/η², the square of the index ratio (Veach 1997, 5.2).
 
 use super::bsdf::{BsdfSample, Chosen, Evaluation, from_evaluation, mirror};
-use super::fresnel::{self, Model};
-use super::microfacet::Microfacets;
+use super::fresnel::{self, Model, Split};
+use super::microfacet::{Microfacets, Terms};
 use crate::spectrum::{LANES, Lanes};
 use glam::{DVec2, DVec3};
 
@@ -144,7 +144,23 @@ impl RoughDielectric {
             return None;
         }
         let eta2 = if transmitted { eta * eta } else { 1.0 };
-        from_evaluation(wi, wi.z.abs(), self.eval(wo, wi), transmitted, eta2)
+        let evaluation = match self.eta {
+            // The facet is known, and what it reflects.
+            RelativeIndex::Constant(_) => {
+                let tint = if transmitted { self.tint.transmitted } else { self.tint.reflected };
+                let (f, pdf) = by_facet(
+                    &self.facets,
+                    above,
+                    wi * DVec3::new(1.0, 1.0, side),
+                    m * DVec3::new(1.0, 1.0, side),
+                    &split,
+                    eta,
+                );
+                Evaluation { f: tint * f as f32, pdf: Lanes::splat(pdf as f32) }
+            }
+            RelativeIndex::Dispersive(_) => self.eval(wo, wi),
+        };
+        from_evaluation(wi, wi.z.abs(), evaluation, transmitted, eta2)
     }
 
     pub(super) fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
@@ -152,42 +168,53 @@ impl RoughDielectric {
             return Evaluation::NONE;
         }
         let tint = if wo.z * wi.z > 0.0 { self.tint.reflected } else { self.tint.transmitted };
-        Evaluation {
-            f: self.eta.lanes(|e| self.one(wo, wi, e).0) * tint,
-            pdf: self.eta.lanes(|e| self.one(wo, wi, e).1),
+        // Seen from the side of `wo`.
+        let side = wo.z.signum();
+        let flip = DVec3::new(1.0, 1.0, side);
+        let (wo, wi) = (wo * flip, wi * flip);
+        let one = |eta: f64| one(&self.facets, wo, wi, if side > 0.0 { eta } else { 1.0 / eta });
+        match self.eta {
+            RelativeIndex::Constant(eta) => {
+                let (f, pdf) = one(eta);
+                Evaluation { f: tint * f as f32, pdf: Lanes::splat(pdf as f32) }
+            }
+            RelativeIndex::Dispersive(eta) => {
+                let all = eta.map(one);
+                Evaluation {
+                    f: Lanes::new(all.map(|(f, _)| f as f32)) * tint,
+                    pdf: Lanes::new(all.map(|(_, pdf)| pdf as f32)),
+                }
+            }
         }
     }
+}
 
-    /// f and pdf at one index.
-    fn one(&self, wo: DVec3, wi: DVec3, eta: f64) -> (f64, f64) {
-        let side = wo.z.signum();
-        let eta = if side > 0.0 { eta } else { 1.0 / eta };
-        let reflect = wi.z * side > 0.0;
-        // The half vector, on the side of `wo`; for refraction of the two directions scaled by
-        // their indices (eq. 16).
-        let sum = if reflect { wo + wi } else { wo + wi * eta };
-        let Some(m) = sum.try_normalize() else { return (0.0, 0.0) };
-        let m = m * (m.z * side).signum();
-        let (cos_o, cos_i) = (wo.dot(m), wi.dot(m));
-        if cos_o <= 0.0 || (cos_i > 0.0) != reflect {
-            return (0.0, 0.0);
-        }
-        let flip = DVec3::new(1.0, 1.0, side);
-        let (wo_up, wi_up, m_up) = (wo * flip, wi * flip, m * flip);
-        let split = fresnel::dielectric(Model::Exact, cos_o, eta);
-        let dg = self.facets.density(m_up) * self.facets.masking(wo_up, m_up) * self.facets.masking(wi_up, m_up);
-        let pdf_m = self.facets.pdf(wo_up, m_up);
-        if reflect {
-            (split.reflected * dg / (4.0 * (wo.z * wi.z).abs()), split.reflected * pdf_m / (4.0 * cos_o))
-        } else {
-            // Eq. 21 and 17; radiance scales by 1/η² on crossing, which cancels the η² of the Jacobian
-            // in f but not in the density.
-            let denominator = (cos_o + eta * cos_i).powi(2);
-            let jacobian = cos_i.abs() / denominator;
-            (
-                split.transmitted * dg * cos_o * jacobian / (wo.z * wi.z).abs(),
-                split.transmitted * pdf_m * eta * eta * jacobian,
-            )
-        }
+/// f and pdf at one index, beyond over on this side; `wo` has z > 0.
+fn one(facets: &Microfacets, wo: DVec3, wi: DVec3, eta: f64) -> (f64, f64) {
+    let reflect = wi.z > 0.0;
+    // The half vector, on the side of `wo`; for refraction of the two directions scaled by their
+    // indices (eq. 16).
+    let Some(m) = (if reflect { wo + wi } else { wo + wi * eta }).try_normalize() else { return (0.0, 0.0) };
+    let m = m * m.z.signum();
+    let (cos_o, cos_i) = (wo.dot(m), wi.dot(m));
+    if cos_o <= 0.0 || (cos_i > 0.0) != reflect {
+        return (0.0, 0.0);
+    }
+    by_facet(facets, wo, wi, m, &fresnel::dielectric(Model::Exact, cos_o, eta), eta)
+}
+
+/// f and pdf where the facet `m` leads from `wi` to `wo` (z > 0) and divides light as `split` says.
+fn by_facet(facets: &Microfacets, wo: DVec3, wi: DVec3, m: DVec3, split: &Split, eta: f64) -> (f64, f64) {
+    let cos_o = wo.dot(m);
+    let Terms { flow, pdf } = facets.terms(wo, wi, m);
+    if wi.z > 0.0 {
+        (split.reflected * flow * 0.25, split.reflected * pdf / (4.0 * cos_o))
+    } else {
+        // Eq. 21 and 17; radiance scales by 1/η² on crossing, which cancels the η² of the Jacobian
+        // in f but not in the density.
+        let cos_i = wi.dot(m);
+        let root = cos_o + eta * cos_i;
+        let jacobian = cos_i.abs() / (root * root);
+        (split.transmitted * flow * cos_o * jacobian, split.transmitted * pdf * eta * eta * jacobian)
     }
 }

@@ -15,7 +15,6 @@ use super::mean;
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
 
 /// Ways through the fibre that have a direction.
 const WAYS: usize = 3;
@@ -54,10 +53,10 @@ impl Fibre {
 }
 
 /// Hair at one point.
-#[derive(Clone, Debug)]
-pub struct Hair {
+#[derive(Clone, Copy, Debug)]
+pub struct Hair<'a> {
     /// The fibre.
-    pub fibre: Arc<Fibre>,
+    pub fibre: &'a Fibre,
     /// Absorption times the fibre's radius.
     pub absorption: Lanes,
 }
@@ -138,9 +137,9 @@ fn sample_around(u: f64, s: f64) -> f64 {
     (-s * libm::log(1.0 / c - 1.0)).clamp(-PI, PI)
 }
 
-impl Hair {
+impl Hair<'_> {
     fn seen(&self, wo: DVec3) -> Option<Seen> {
-        let fibre = &*self.fibre;
+        let fibre = self.fibre;
         let a = Angles::of(wo);
         if a.cos_theta == 0.0 {
             return None;
@@ -236,8 +235,8 @@ mod tests {
     use crate::math::warp;
     use crate::optics::bsdf::Bsdf;
 
-    fn hair(along: f64, around: f64, absorption: f32) -> Bsdf {
-        let fibre = Arc::new(Fibre::new(1.55, along, around, 2f64.to_radians()));
+    fn hair(along: f64, around: f64, absorption: f32) -> Bsdf<'static> {
+        let fibre = Box::leak(Box::new(Fibre::new(1.55, along, around, 2f64.to_radians())));
         Bsdf::Hair(Hair { fibre, absorption: Lanes::splat(absorption) })
     }
 
@@ -325,7 +324,7 @@ mod tests {
             let (kind, rest) = line.split_once(' ').unwrap();
             let x: Vec<f64> = rest.split(' ').map(|w| w.parse().unwrap()).collect();
             if kind == "hair" {
-                let fibre = Arc::new(Fibre::new(x[0], x[1], x[2], x[3].to_radians()));
+                let fibre = Box::leak(Box::new(Fibre::new(x[0], x[1], x[2], x[3].to_radians())));
                 current = Some(Bsdf::Hair(Hair { fibre, absorption: Lanes::splat(x[4] as f32) }));
                 continue;
             }

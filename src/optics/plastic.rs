@@ -13,13 +13,12 @@ use super::bsdf::{BsdfSample, Evaluation, coat_probability, from_evaluation, mir
 use super::dielectric::{RelativeIndex, refract};
 use super::fresnel::{self, Model};
 use super::mean;
-use super::microfacet::Microfacets;
+use super::microfacet::{Distribution, Microfacets, Terms};
 use crate::math::warp;
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
-use std::sync::Arc;
 
 /// The base under a coat, shared by both kinds.
 #[derive(Clone, Copy, Debug)]
@@ -129,34 +128,42 @@ impl CoatTable {
     #[must_use]
     pub fn new(eta: f64, facets: &Microfacets, mean: DiffuseMean) -> CoatTable {
         let cosine = |i: u32| f64::from(i) / f64::from(COAT_ENTRIES - 1);
-        let transmission = (0..COAT_ENTRIES)
+        let seen = Facets::new(facets);
+        let transmitted = |wo: DVec3, m: DVec3| {
+            let split = fresnel::dielectric(Model::Exact, wo.dot(m), eta);
+            let wt = refract(wo, m, eta, split.cos_transmitted);
+            if wt.z < 0.0 { split.transmitted * facets.masking(wt, m) } else { 0.0 }
+        };
+        let reflected = |wo: DVec3, m: DVec3| {
+            let wi = m * (2.0 * wo.dot(m)) - wo;
+            let f = fresnel::dielectric(Model::Exact, wo.dot(m), 1.0 / eta).reflected;
+            if wi.z > 0.0 { f * facets.masking(wi, m) } else { 0.0 }
+        };
+        let entries: Vec<(f32, f64)> = (0..COAT_ENTRIES)
             .into_par_iter()
             .map(|i| {
-                let share = mean_over_facets(facets, cosine(i), |wo, m| {
-                    let split = fresnel::dielectric(Model::Exact, wo.dot(m), eta);
-                    let wt = refract(wo, m, eta, split.cos_transmitted);
-                    if wt.z < 0.0 { split.transmitted * facets.masking(wt, m) } else { 0.0 }
-                });
-                share as f32
-            })
-            .collect();
-        let terms: Vec<f64> = (0..COAT_ENTRIES)
-            .into_par_iter()
-            .map(|i| {
-                let cos = match mean {
-                    DiffuseMean::Integral => (f64::from(i) + 0.5) / f64::from(COAT_ENTRIES),
-                    DiffuseMean::Nodes => cosine(i),
+                let cos = cosine(i);
+                // From inside at the same cosine, or halfway to the next.
+                let (inside, share, back) = match mean {
+                    DiffuseMean::Nodes => {
+                        let [share, back] = seen.mean(cos, |wo, m| [transmitted(wo, m), reflected(wo, m)]);
+                        (cos, share, back)
+                    }
+                    DiffuseMean::Integral => {
+                        let inside = (f64::from(i) + 0.5) / f64::from(COAT_ENTRIES);
+                        let [share] = seen.mean(cos, |wo, m| [transmitted(wo, m)]);
+                        let [back] = seen.mean(inside, |wo, m| [reflected(wo, m)]);
+                        (inside, share, back)
+                    }
                 };
-                let reflected = mean_over_facets(facets, cos, |wo, m| {
-                    let wi = m * (2.0 * wo.dot(m)) - wo;
-                    let f = fresnel::dielectric(Model::Exact, wo.dot(m), 1.0 / eta).reflected;
-                    if wi.z > 0.0 { f * facets.masking(wi, m) } else { 0.0 }
-                });
-                2.0 * cos * reflected / f64::from(COAT_ENTRIES)
+                (share as f32, 2.0 * inside * back / f64::from(COAT_ENTRIES))
             })
             .collect();
         // Added in order: the same bits on any number of threads.
-        CoatTable { transmission, internal: terms.iter().sum() }
+        CoatTable {
+            transmission: entries.iter().map(|(share, _)| *share).collect(),
+            internal: entries.iter().map(|(_, back)| back).sum(),
+        }
     }
 
     fn at(&self, cos: f64) -> f64 {
@@ -229,39 +236,75 @@ impl Coats {
     }
 }
 
-/// The mean of `f(wo, m)` over the facets m that a direction of cosine `cos` sees.
-fn mean_over_facets(facets: &Microfacets, cos: f64, f: impl Fn(DVec3, DVec3) -> f64) -> f64 {
-    const N: u32 = 64;
-    let cos = cos.max(1e-3); // the limit at grazing; the table is interpolated from there
-    let wo = DVec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
-    let sum: f64 = (0..N * N)
-        .map(|i| {
-            let u = DVec2::new(f64::from(i % N) + 0.5, f64::from(i / N) + 0.5) / f64::from(N);
-            let m = facets.sample(wo, u);
-            let pdf = facets.pdf(wo, m);
-            if wo.dot(m) <= 0.0 || pdf <= 0.0 {
-                return 0.0;
+/// Midpoints along each side of the square that samples facets.
+const MIDPOINTS: u32 = 64;
+
+/// The facets over which a coat is averaged. Directions lie over the x axis, so those with y < 0 give the same as
+/// their mirror images, and are left out.
+struct Facets<'a> {
+    facets: &'a Microfacets,
+    /// Drawn once, where they do not depend on who looks.
+    drawn: Vec<DVec3>,
+}
+
+/// The midpoints that give facets with y > 0.
+fn midpoints() -> impl Iterator<Item = DVec2> {
+    let n = f64::from(MIDPOINTS);
+    let at = move |i: u32| (f64::from(i) + 0.5) / n;
+    (0..MIDPOINTS).flat_map(move |j| (0..MIDPOINTS / 2).map(move |i| DVec2::new(at(i), at(j))))
+}
+
+impl Facets<'_> {
+    fn new(facets: &Microfacets) -> Facets<'_> {
+        let drawn = match facets.distribution {
+            Distribution::Ggx => Vec::new(),
+            Distribution::Beckmann => midpoints().map(|u| facets.sample(DVec3::Z, u)).collect(),
+        };
+        Facets { facets, drawn }
+    }
+
+    /// The means of `f(wo, m)` over the facets m that a direction of cosine `cos` sees.
+    fn mean<const N: usize>(&self, cos: f64, f: impl Fn(DVec3, DVec3) -> [f64; N]) -> [f64; N] {
+        let cos = cos.max(1e-3); // the limit at grazing; the table is interpolated from there
+        let wo = DVec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+        let mut sum = [0.0; N];
+        let mut add = |m: DVec3, weight: f64| {
+            for (sum, x) in sum.iter_mut().zip(f(wo, m)) {
+                *sum += x * weight;
             }
-            // Heitz 2018, eq. 3: the density of visible facets.
-            let visible = facets.density(m) * facets.masking(wo, m) * wo.dot(m) / wo.z;
-            f(wo, m) * visible / pdf
-        })
-        .sum();
-    sum / f64::from(N * N)
+        };
+        match self.facets.distribution {
+            // Those that are drawn are those that are seen.
+            Distribution::Ggx => midpoints().for_each(|u| {
+                let m = self.facets.sample(wo, u);
+                if wo.dot(m) > 0.0 {
+                    add(m, 1.0);
+                }
+            }),
+            Distribution::Beckmann => self.drawn.iter().for_each(|&m| {
+                let seen = wo.dot(m);
+                if seen > 0.0 {
+                    // Heitz 2018, eq. 3, the density of visible facets, over D(m) cos θ.
+                    add(m, self.facets.masking(wo, m) * seen / (wo.z * m.z));
+                }
+            }),
+        }
+        sum.map(|x| x / f64::from(MIDPOINTS * MIDPOINTS / 2))
+    }
 }
 
 /// A diffuse base under a rough coat.
-#[derive(Clone, Debug)]
-pub struct RoughPlastic {
+#[derive(Clone, Copy, Debug)]
+pub struct RoughPlastic<'a> {
     /// What lies under the coat.
     pub base: Base,
     /// The coat's facets.
     pub facets: Microfacets,
     /// Its transmission.
-    pub coats: Arc<Coats>,
+    pub coats: &'a Coats,
 }
 
-impl RoughPlastic {
+impl RoughPlastic<'_> {
     fn transmission(&self, cos: f64) -> Lanes {
         self.base.eta.lanes(|eta| self.coats.transmission(cos, eta))
     }
@@ -282,14 +325,13 @@ impl RoughPlastic {
         let m = (wo + wi).normalize();
         let cos = wo.dot(m);
         let reflected = self.base.eta.lanes(|eta| fresnel::dielectric(Model::Exact, cos, eta).reflected);
-        let coat =
-            self.facets.density(m) * self.facets.masking(wo, m) * self.facets.masking(wi, m) / (4.0 * wo.z * wi.z);
+        let Terms { flow, pdf } = self.facets.terms(wo, wi, m);
         let into = self.transmission(wo.z);
         let p = self.coat_share(into);
         let base = self.base.albedo() * into * self.transmission(wi.z) * (1.0 / PI) as f32;
         Evaluation {
-            f: base + self.base.tint * reflected * coat as f32,
-            pdf: Lanes::splat((p * self.facets.pdf(wo, m) / (4.0 * cos) + (1.0 - p) * wi.z / PI) as f32),
+            f: base + self.base.tint * reflected * (0.25 * flow) as f32,
+            pdf: Lanes::splat((p * pdf / (4.0 * cos) + (1.0 - p) * wi.z / PI) as f32),
         }
     }
 

@@ -308,7 +308,7 @@ impl Material {
     /// The scattering function at a point for the wavelengths `nm`. `all_dispersive` treats every
     /// glass as if its index depended on wavelength (`effects: all`).
     #[must_use]
-    pub fn bsdf(&self, at: &TexturePoint, nm: Lanes, all_dispersive: bool) -> Bsdf {
+    pub fn bsdf(&self, at: &TexturePoint, nm: Lanes, all_dispersive: bool) -> Bsdf<'_> {
         match &self.kind {
             Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: reflectance.eval(at, nm) },
             Kind::Mirror { reflectance } => Bsdf::Mirror { reflectance: reflectance.eval(nm) },
@@ -335,16 +335,15 @@ impl Material {
                 let tint = tint.as_ref().map_or(Lanes::ONE, |tint| tint.eval(at, nm));
                 let base = coat.base(reflectance.eval(at, nm), *nonlinear, tint, nm);
                 match coat.facets {
-                    Some(facets) => Bsdf::RoughPlastic(RoughPlastic { base, facets, coats: coat.tables.clone() }),
+                    Some(facets) => Bsdf::RoughPlastic(RoughPlastic { base, facets, coats: &coat.tables }),
                     None => Bsdf::Plastic(Plastic { base }),
                 }
             }
             Kind::Principled(solid) => Bsdf::Principled(solid.at(at, nm)),
             Kind::PrincipledThin(sheet) => Bsdf::PrincipledThin(sheet.at(at, nm)),
-            Kind::Hair { fibre, absorption } => Bsdf::Hair(Hair {
-                fibre: fibre.clone(),
-                absorption: absorption.iter().fold(Lanes::ZERO, |sum, s| sum + s.eval(nm)),
-            }),
+            Kind::Hair { fibre, absorption } => {
+                Bsdf::Hair(Hair { fibre, absorption: absorption.iter().fold(Lanes::ZERO, |sum, s| sum + s.eval(nm)) })
+            }
             // A compound material is resolved before it comes to this; unresolved it is not there.
             Kind::Boundary | Kind::Compound(_) => Bsdf::Null,
         }

@@ -137,7 +137,7 @@ struct Shadow {
 /// What scatters at a vertex.
 enum Scatterer<'a> {
     Surface {
-        bsdf: &'a Bsdf,
+        bsdf: &'a Bsdf<'a>,
         frame: &'a Frame,
         surface: &'a SurfacePoint,
         object: &'a Object,

@@ -16,15 +16,15 @@ fn random(i: u64) -> [f64; 3] {
 }
 
 /// The first hit of a ray, and its material there.
-struct Vertex {
+struct Vertex<'a> {
     hit: Hit,
     surface: SurfacePoint,
     frame: Frame,
     wo: DVec3,
-    bsdf: Bsdf,
+    bsdf: Bsdf<'a>,
 }
 
-fn vertex(bench: &Bench, ray: &Ray) -> Vertex {
+fn vertex<'a>(bench: &'a Bench, ray: &Ray) -> Vertex<'a> {
     let scene = &bench.prepared.scene;
     let hit = scene.closest(ray, f64::INFINITY).unwrap();
     let surface = scene.surface(ray, &hit);

@@ -6,7 +6,7 @@ use crate::math::warp;
 use crate::optics::bsdf::{BsdfSample, Evaluation, from_evaluation};
 use crate::optics::dielectric::refract;
 use crate::optics::fresnel::{self, Model, Split};
-use crate::optics::microfacet::Microfacets;
+use crate::optics::microfacet::{Microfacets, Terms};
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -180,13 +180,11 @@ impl Principled {
         let mut pdf = 0.0;
         if facing {
             let facets = self.facets();
-            let up = wo * side;
-            let seen = facets.density(m) * facets.masking(up, m);
-            let pdf_m = seen * cos_o / up.z;
+            let Terms { flow, pdf: pdf_m } = facets.terms(wo * side, wi, m);
             if reflect {
                 // Torrance and Sparrow 1967. Where the interface has no contrast, metal too is invisible.
                 if split.reflected > 0.0 {
-                    let geometry = seen * facets.masking(wi, m) / (4.0 * wo.z * wi.z);
+                    let geometry = 0.25 * flow;
                     f += if front {
                         self.reflectance(cos_o, split.reflected) * geometry as f32
                     } else {
@@ -197,8 +195,9 @@ impl Principled {
             } else {
                 // Walter et al. 2007, eqs. 17 and 21; radiance scales by 1/η² on crossing. The base
                 // colour is that of a way in and out, so each crossing takes its root.
-                let jacobian = cos_i.abs() / (cos_o + eta * cos_i).powi(2);
-                let geometry = seen * facets.masking(wi, m) * cos_o * jacobian / (wo.z * wi.z).abs();
+                let root = cos_o + eta * cos_i;
+                let jacobian = cos_i.abs() / (root * root);
+                let geometry = flow * cos_o * jacobian;
                 f += self.base.sqrt() * (self.clear() * split.transmitted * geometry) as f32;
                 pdf += choice.refraction * pdf_m * eta * eta * jacobian;
             }

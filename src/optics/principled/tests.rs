@@ -50,7 +50,7 @@ fn thin(base: Lanes, hue: Lanes) -> PrincipledThin {
 }
 
 /// One material of the table of vectors.
-fn material(kind: &str, parameters: &[(String, f32)], base: Lanes, hue: Lanes) -> Bsdf {
+fn material(kind: &str, parameters: &[(String, f32)], base: Lanes, hue: Lanes) -> Bsdf<'static> {
     let given = |name: &str| parameters.iter().any(|(key, _)| key == name);
     if kind == "principled" {
         let mut m = solid(base, hue);
@@ -110,7 +110,7 @@ struct Row {
 }
 
 /// A material as written, as a scattering function, and its rows.
-type Case = (String, Bsdf, Vec<Row>);
+type Case = (String, Bsdf<'static>, Vec<Row>);
 
 /// The table of vectors.
 fn vectors() -> Vec<Case> {
