@@ -111,7 +111,7 @@ impl Scene {
             Light::Environment(map) => {
                 let s = map.sample(u_direction)?;
                 let factor = self.section() * (1.0 / s.pdf_solid_angle) as f32;
-                (self.arriving_ray(-s.direction, u_point), map.radiance(s.direction, nm) * factor)
+                (self.arriving_ray(-s.direction, u_point), map.radiance_of(&s, nm) * factor)
             }
         };
         Some(Emission { ray, power: power * (1.0 / probability) as f32 })

@@ -3,12 +3,16 @@
 //! Equirectangular. In the frame of the map +y is up; columns to the right turn from −z toward +x.
 //! Two conventions say where the texels lie, see [`Mapping`].
 
-use super::bvh::prefetch;
+mod table;
+
 use super::texture::Texel;
+use crate::math::elementary::atan2;
+use crate::math::trig::sin_cos_turn;
 use crate::spectrum::{Lanes, Spectrum, illuminant, upsample};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use table::PiecewiseConstant2d;
 
 /// Where the texels of an environment lie on the sphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,8 +43,16 @@ pub struct Environment {
 /// The density of directions over the unit square (longitude, colatitude).
 #[derive(Clone, Debug)]
 enum Table {
+    /// Constant in each texel.
     Constant(PiecewiseConstant2d),
-    Bilinear(PiecewiseBilinear2d),
+    /// Bilinear between the factors of the texels as [`Mapping::Poles`] places them, so that a look-up of the light
+    /// gives its density too, times the mean of sin θ in each row of cells. Cell (x, y) lies between columns x and
+    /// x + 1, and rows y and y + 1, of texels.
+    Bilinear {
+        cells: PiecewiseConstant2d,
+        /// For each row of cells, the density over the factor.
+        density: Vec<f64>,
+    },
 }
 
 /// A direction toward the environment.
@@ -50,20 +62,43 @@ pub struct EnvironmentSample {
     pub direction: DVec3,
     /// sr⁻¹.
     pub pdf_solid_angle: f64,
+    /// Where on the map.
+    at: DVec2,
+}
+
+/// A direction in the terms of the map.
+#[derive(Clone, Copy)]
+struct Place {
+    /// Longitude in turns from the left edge of the map and colatitude in half turns.
+    at: DVec2,
+    /// Sine of the colatitude.
+    sin_theta: f64,
 }
 
 /// Four texels around a direction and how far it is beyond the first, in columns and rows.
 struct Corners<'a> {
     texels: [&'a Texel; 4],
-    x: f32,
-    y: f32,
+    /// Row of the first texel.
+    row: usize,
+    x: f64,
+    y: f64,
 }
 
 impl Corners<'_> {
-    fn mix<T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>>(&self, f: impl Fn(&Texel) -> T) -> T {
+    fn mix(&self, f: impl Fn(&Texel) -> Lanes) -> Lanes {
         let [a, b, c, d] = self.texels.map(f);
-        let row = |l: T, r: T| l * (1.0 - self.x) + r * self.x;
-        row(a, b) * (1.0 - self.y) + row(c, d) * self.y
+        let (x, y) = (Lanes::splat(self.x as f32), Lanes::splat(self.y as f32));
+        let row = |l: Lanes, r: Lanes| (r - l).mul_add(x, l);
+        let (upper, lower) = (row(a, b), row(c, d));
+        (lower - upper).mul_add(y, upper)
+    }
+
+    /// The factor, in f64: a density beside a bright texel depends on the last digits of the place.
+    fn scale(&self) -> f64 {
+        let [a, b, c, d] = self.texels.map(|t| f64::from(t.scale));
+        let (upper, lower) = (a + (b - a) * self.x, c + (d - c) * self.x);
+        // Rounding must not make light negative.
+        (upper + (lower - upper) * self.y).max(0.0)
     }
 }
 
@@ -78,23 +113,18 @@ impl Environment {
         mapping: Mapping,
         world_from_map: DMat3,
     ) -> Environment {
-        let luminance: Vec<f64> = pixels
-            .iter()
-            .map(|p| (0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])).max(0.0))
-            .collect();
         let row_angle = |y: usize| match mapping {
             Mapping::Texels => PI * (y as f64 + 0.5) / height as f64,
             Mapping::Poles => PI * y as f64 / (height.max(2) - 1) as f64,
         };
-        let mut table = match mapping {
-            Mapping::Texels => Table::Constant(neighbourhood(&luminance, width, height)),
-            Mapping::Poles => Table::Bilinear(PiecewiseBilinear2d::new(&luminance, width, height)),
-        };
-        // Some maps are black.
-        if luminance.iter().all(|&l| l == 0.0) {
-            table = Table::Constant(PiecewiseConstant2d::new(&[0.0], 1, 1));
-        }
+        // A single row stands for both poles.
+        let doubled = mapping == Mapping::Poles && height == 1;
+        let (pixels, height) = if doubled { (&[pixels, pixels].concat()[..], 2) } else { (pixels, height) };
         let texels = upsampled(pixels, scale as f32, mapping);
+        let table = match mapping {
+            Mapping::Texels => Table::Constant(neighbourhood(pixels, width, height)),
+            Mapping::Poles => bilinear(&texels, width, height),
+        };
         let illuminant = illuminant::d65();
         let (mut sum, mut weight) = (0.0, 0.0);
         for (y, row) in texels.chunks_exact(width).enumerate() {
@@ -107,99 +137,123 @@ impl Environment {
         Environment { texels, width, height, mapping, world_from_map, illuminant, mean_luminance, table }
     }
 
-    /// Longitude in turns from the left edge of the map and colatitude in half turns.
-    fn place(&self, direction: DVec3) -> DVec2 {
+    fn place(&self, direction: DVec3) -> Place {
         let d = self.world_from_map.transpose() * direction;
-        let turns = libm::atan2(d.x, -d.z) / (2.0 * PI);
+        let turns = atan2(d.x, -d.z) / (2.0 * PI);
         let u = match self.mapping {
             Mapping::Texels => 0.5 + turns,
             Mapping::Poles => turns - turns.floor(),
         };
-        DVec2::new(u, libm::atan2((d.x * d.x + d.z * d.z).sqrt(), d.y) / PI)
+        let sin_theta = (d.x * d.x + d.z * d.z).sqrt();
+        Place { at: DVec2::new(u, atan2(sin_theta, d.y) / PI), sin_theta }
     }
 
     fn corners(&self, at: DVec2) -> Corners<'_> {
-        let (w, h) = (self.width as i64, self.height as i64);
-        let x = at.x * w as f64 - 0.5;
-        let y = match self.mapping {
-            Mapping::Texels => at.y * h as f64 - 0.5,
-            Mapping::Poles => at.y * (h - 1) as f64,
-        };
+        let (w, h) = (self.width, self.height);
+        let (x, y) = (at.x * w as f64 - 0.5, self.rows(at.y));
         let (x0, y0) = (x.floor(), y.floor());
-        // Columns go around, rows do not: beyond the pole lies the pole's own row.
-        let (left, right) = ((x0 as i64).rem_euclid(w), (x0 as i64 + 1).rem_euclid(w));
-        let (upper, lower) = ((y0 as i64).clamp(0, h - 1), (y0 as i64 + 1).clamp(0, h - 1));
-        let texel = |x: i64, y: i64| &self.texels[(y * w + x) as usize];
+        // Columns go around, rows do not: beyond the pole lies the pole's own row. The casts saturate.
+        let left = if x0 < 0.0 { w - 1 } else { (x0 as usize).min(w - 1) };
+        let right = if left + 1 == w { 0 } else { left + 1 };
+        let upper = (y0 as usize).min(h - 1);
+        let lower = if y0 < 0.0 { 0 } else { (upper + 1).min(h - 1) };
+        let texel = |x: usize, y: usize| &self.texels[y * w + x];
         let texels = [texel(left, upper), texel(right, upper), texel(left, lower), texel(right, lower)];
-        Corners { texels, x: (x - x0) as f32, y: (y - y0) as f32 }
+        Corners { texels, row: upper, x: x - x0, y: y - y0 }
+    }
+
+    /// Rows from the centres of the first to a colatitude in half turns.
+    fn rows(&self, half_turns: f64) -> f64 {
+        match self.mapping {
+            Mapping::Texels => half_turns * self.height as f64 - 0.5,
+            Mapping::Poles => half_turns * (self.height - 1) as f64,
+        }
     }
 
     /// Radiance from `direction` (pointing away from the viewer).
     #[must_use]
     pub fn radiance(&self, direction: DVec3, nm: Lanes) -> Lanes {
-        self.radiance_at(self.place(direction), nm)
+        self.light(&self.corners(self.place(direction).at), nm)
     }
 
-    fn radiance_at(&self, at: DVec2, nm: Lanes) -> Lanes {
-        let corners = self.corners(at);
+    /// Radiance from where `sample` points.
+    #[must_use]
+    pub fn radiance_of(&self, sample: &EnvironmentSample, nm: Lanes) -> Lanes {
+        self.light(&self.corners(sample.at), nm)
+    }
+
+    fn light(&self, corners: &Corners, nm: Lanes) -> Lanes {
         let value = match self.mapping {
             Mapping::Texels => corners.mix(|t| upsample::eval_sigmoid(t.coefficients, nm) * t.scale),
-            Mapping::Poles => corners.mix(|t| upsample::eval_sigmoid(t.coefficients, nm)) * corners.mix(|t| t.scale),
+            Mapping::Poles => corners.mix(|t| upsample::eval_sigmoid(t.coefficients, nm)) * corners.scale() as f32,
         };
         value * self.illuminant.eval(nm)
     }
 
-    /// A direction by luminance; `None` for a black map.
+    /// A direction by brightness; `None` for a black map.
     #[must_use]
     pub fn sample(&self, u: DVec2) -> Option<EnvironmentSample> {
-        let (at, pdf, offset) = match &self.table {
+        let (at, pdf, left_edge) = match &self.table {
             Table::Constant(table) => {
                 let (at, pdf) = table.sample(u)?;
                 (at, pdf, 0.5)
             }
-            Table::Bilinear(table) => {
-                let (at, pdf) = table.sample(u)?;
-                (at, pdf, 0.0)
+            Table::Bilinear { cells, density } => {
+                let cell = cells.sample_cell(u)?;
+                let first = cell.row * self.width;
+                let right = if cell.column + 1 == self.width { 0 } else { cell.column + 1 };
+                let scale = |i: usize| f64::from(self.texels[first + i].scale);
+                let (a, b, c, d) =
+                    (scale(cell.column), scale(right), scale(self.width + cell.column), scale(self.width + right));
+                // Down the cell by the sums of its rows, then across by the values at that height.
+                let y = linear(a + b, c + d, cell.within.y);
+                let (left, right) = (a + (c - a) * y, b + (d - b) * y);
+                let x = linear(left, right, cell.within.x);
+                let (n, m) = (self.width as f64, (self.height - 1) as f64);
+                // A cell is half a column to the right of its left texel's edge.
+                let mut at = DVec2::new((cell.column as f64 + x + 0.5) / n, (cell.row as f64 + y) / m);
+                if at.x >= 1.0 {
+                    at.x -= 1.0;
+                }
+                (at, density[cell.row] * (left + (right - left) * x), 0.0)
             }
         };
-        // Who looks there next finds the texels in the cache.
-        let x = (at.x * self.width as f64 - 0.5).max(0.0) as usize;
-        let y = match self.mapping {
-            Mapping::Texels => (at.y * self.height as f64 - 0.5).max(0.0) as usize,
-            Mapping::Poles => (at.y * (self.height - 1) as f64) as usize,
-        };
-        prefetch(&self.texels, y * self.width + x);
-        prefetch(&self.texels, (y + 1) * self.width + x);
-        let (sin_theta, cos_theta) = (libm::sin(at.y * PI), libm::cos(at.y * PI));
-        let phi = (at.x - offset) * 2.0 * PI;
-        let d = DVec3::new(sin_theta * libm::sin(phi), cos_theta, -sin_theta * libm::cos(phi));
+        let (sin_theta, cos_theta) = sin_cos_turn(0.5 * at.y);
+        let (sin_phi, cos_phi) = sin_cos_turn(if at.x < left_edge { at.x + 1.0 - left_edge } else { at.x - left_edge });
+        let d = DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi);
         let pdf_solid_angle = pdf / (2.0 * PI * PI * sin_theta);
-        (sin_theta > 0.0).then(|| EnvironmentSample { direction: self.world_from_map * d, pdf_solid_angle })
+        (sin_theta > 0.0 && pdf > 0.0).then(|| EnvironmentSample {
+            direction: self.world_from_map * d,
+            pdf_solid_angle,
+            at,
+        })
     }
 
     /// [`Environment::radiance`] and [`Environment::pdf`] at once.
     #[must_use]
     pub fn radiance_and_pdf(&self, direction: DVec3, nm: Lanes) -> (Lanes, f64) {
-        let at = self.place(direction);
-        (self.radiance_at(at, nm), self.pdf_at(at))
+        let place = self.place(direction);
+        let corners = self.corners(place.at);
+        (self.light(&corners, nm), self.density(&place, &corners))
     }
 
     /// Density of [`Environment::sample`] at `direction`, sr⁻¹.
     #[must_use]
     pub fn pdf(&self, direction: DVec3) -> f64 {
-        self.pdf_at(self.place(direction))
+        let place = self.place(direction);
+        self.density(&place, &self.corners(place.at))
     }
 
-    fn pdf_at(&self, at: DVec2) -> f64 {
-        let sin_theta = libm::sin(at.y * PI);
-        if sin_theta <= 0.0 {
+    fn density(&self, place: &Place, corners: &Corners) -> f64 {
+        if place.sin_theta <= 0.0 {
             return 0.0;
         }
         let pdf = match &self.table {
-            Table::Constant(table) => table.pdf(at),
-            Table::Bilinear(table) => table.pdf(at),
+            Table::Constant(table) => table.pdf(place.at),
+            // The south pole itself belongs to the last row of cells.
+            Table::Bilinear { density, .. } => density[corners.row.min(density.len() - 1)] * corners.scale(),
         };
-        pdf / (2.0 * PI * PI * sin_theta)
+        pdf / (2.0 * PI * PI * place.sin_theta)
     }
 
     /// Mean luminance over the sphere of directions, film units.
@@ -230,7 +284,11 @@ fn upsampled(pixels: &[[f32; 3]], scale: f32, mapping: Mapping) -> Vec<Texel> {
 
 /// The density that follows the luminance of each texel's neighbourhood (the largest of its 3 × 3,
 /// because bilinear look-ups spread a texel over its neighbours) times sin θ.
-fn neighbourhood(luminance: &[f64], width: usize, height: usize) -> PiecewiseConstant2d {
+fn neighbourhood(pixels: &[[f32; 3]], width: usize, height: usize) -> PiecewiseConstant2d {
+    let luminance: Vec<f64> = pixels
+        .iter()
+        .map(|p| (0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])).max(0.0))
+        .collect();
     let mut weights = vec![0.0; width * height];
     for y in 0..height {
         let sin = libm::sin(PI * (y as f64 + 0.5) / height as f64);
@@ -247,76 +305,28 @@ fn neighbourhood(luminance: &[f64], width: usize, height: usize) -> PiecewiseCon
     PiecewiseConstant2d::new(&weights, width, height)
 }
 
-/// A density on the unit square that is bilinear between the values at texels as [`Mapping::Poles`]
-/// places them, times the mean of sin θ in each row of cells.
-///
-/// Cell (x, y) lies between columns x and x + 1, and rows y and y + 1, of texels.
-#[derive(Clone, Debug)]
-struct PiecewiseBilinear2d {
-    cells: PiecewiseConstant2d,
-    /// At texels: width × height.
-    values: Vec<f32>,
-    width: usize,
-    height: usize,
-}
-
-impl PiecewiseBilinear2d {
-    fn new(values: &[f64], width: usize, height: usize) -> PiecewiseBilinear2d {
-        // A single row stands for both poles.
-        let values: Vec<f32> = if height == 1 { [values, values].concat() } else { values.to_vec() }
-            .into_iter()
-            .map(|v| v as f32)
-            .collect();
-        let height = height.max(2);
-        let mut table = PiecewiseBilinear2d { cells: PiecewiseConstant2d::new(&[0.0], 1, 1), values, width, height };
-        let rows = height - 1;
-        let mut weights = Vec::with_capacity(width * rows);
-        for y in 0..rows {
-            // ∫ sin θ over the row of cells.
-            let (from, to) = (y as f64 / rows as f64, (y + 1) as f64 / rows as f64);
-            let sin = libm::cos(PI * from) - libm::cos(PI * to);
-            weights.extend((0..width).map(|x| table.corners(x, y).into_iter().sum::<f64>() * sin));
-        }
-        table.cells = PiecewiseConstant2d::new(&weights, width, rows);
-        table
+/// The density that is bilinear between the factors of texels.
+fn bilinear(texels: &[Texel], width: usize, height: usize) -> Table {
+    let rows = height - 1;
+    let scale = |x: usize, y: usize| f64::from(texels[y * width + x].scale);
+    let mut weights = Vec::with_capacity(width * rows);
+    let mut density = Vec::with_capacity(rows);
+    for y in 0..rows {
+        // ∫ sin θ over the row of cells.
+        let (from, to) = (y as f64 / rows as f64, (y + 1) as f64 / rows as f64);
+        let sin = libm::cos(PI * from) - libm::cos(PI * to);
+        let pair = |x: usize| scale(x, y) + scale(x, y + 1);
+        weights.extend((0..width).map(|x| (pair(x) + pair(if x + 1 == width { 0 } else { x + 1 })) * sin));
+        density.push(sin);
     }
-
-    /// The values at the corners of a cell: upper left, upper right, lower left, lower right.
-    fn corners(&self, x: usize, y: usize) -> [f64; 4] {
-        let right = if x + 1 == self.width { 0 } else { x + 1 };
-        let at = |x: usize, y: usize| f64::from(self.values[y * self.width + x]);
-        [at(x, y), at(right, y), at(x, y + 1), at(right, y + 1)]
+    // A cell of weight w = Σ sin of a total W has the mean density (w / W) n m, and the factor there the mean Σ / 4.
+    let total: f64 = weights.iter().sum();
+    density.iter_mut().for_each(|sin| *sin *= 4.0 * weights.len() as f64 / total);
+    // Some maps are black: none of these is asked for.
+    if total == 0.0 {
+        density.fill(0.0);
     }
-
-    /// A point and its density. A cell is half a column to the right of its left texel's edge.
-    fn sample(&self, u: DVec2) -> Option<(DVec2, f64)> {
-        let cell = self.cells.sample_cell(u)?;
-        let [a, b, c, d] = self.corners(cell.column, cell.row);
-        // Down the cell by the sums of its rows, then across by the values at that height.
-        let y = linear(a + b, c + d, cell.within.y);
-        let (left, right) = (a + (c - a) * y, b + (d - b) * y);
-        let x = linear(left, right, cell.within.x);
-        let (n, m) = (self.width as f64, (self.height - 1) as f64);
-        let mut at = DVec2::new((cell.column as f64 + x + 0.5) / n, (cell.row as f64 + y) / m);
-        if at.x >= 1.0 {
-            at.x -= 1.0;
-        }
-        let shape = 4.0 * (left + (right - left) * x) / (a + b + c + d);
-        (shape > 0.0).then(|| (at, self.cells.density(cell.row, cell.column) * shape))
-    }
-
-    fn pdf(&self, at: DVec2) -> f64 {
-        let (n, m) = (self.width as f64, (self.height - 1) as f64);
-        let x = at.x * n - 0.5;
-        let x = if x < 0.0 { x + n } else { x };
-        let column = (x as usize).min(self.width - 1);
-        let row = ((at.y * m) as usize).min(self.height - 2);
-        let (fx, fy) = (x - column as f64, at.y * m - row as f64);
-        let [a, b, c, d] = self.corners(column, row);
-        let (left, right) = (a + (c - a) * fy, b + (d - b) * fy);
-        let density = self.cells.density(row, column);
-        if density > 0.0 { density * 4.0 * (left + (right - left) * fx) / (a + b + c + d) } else { 0.0 }
-    }
+    Table::Bilinear { cells: PiecewiseConstant2d::new(&weights, width, rows), density }
 }
 
 /// A number in [0, 1] with a density that goes linearly from `a` to `b`, not both zero, by `u`.
@@ -324,114 +334,6 @@ fn linear(a: f64, b: f64, u: f64) -> f64 {
     // The root of a x + (b − a) x² / 2 = u (a + b) / 2, free of cancellation.
     let root = (a * a + u * (b * b - a * a)).max(0.0).sqrt();
     (u * (a + b) / (a + root)).clamp(0.0, 1.0)
-}
-
-/// Cells for which a row has one entry in its guide.
-const CELLS_A_GUIDE: usize = 8;
-
-/// A density on the unit square that is constant in each cell of a grid.
-#[derive(Clone, Debug)]
-struct PiecewiseConstant2d {
-    width: usize,
-    height: usize,
-    /// For each row, the running sums of its cells over the row's total, `width + 1` entries.
-    rows: Vec<f64>,
-    /// The same over rows.
-    marginal: Vec<f64>,
-    /// For each row, where in it the searches for k / `guides` start, `guides + 1` entries: a search stays within two
-    /// cache lines instead of one for each halving (Chen and Asau 1974).
-    guide: Vec<u32>,
-    /// A power of two, so that u · `guides` is exact.
-    guides: usize,
-}
-
-/// A place in a cell of a grid.
-struct Cell {
-    row: usize,
-    column: usize,
-    within: DVec2,
-}
-
-impl PiecewiseConstant2d {
-    fn new(weights: &[f64], width: usize, height: usize) -> PiecewiseConstant2d {
-        let running = |cells: &mut dyn Iterator<Item = f64>, out: &mut Vec<f64>| -> f64 {
-            let start = out.len();
-            out.push(0.0);
-            let mut sum = 0.0;
-            for w in cells {
-                sum += w;
-                out.push(sum);
-            }
-            if sum > 0.0 {
-                out[start..].iter_mut().for_each(|x| *x /= sum);
-            }
-            sum
-        };
-        let mut rows = Vec::with_capacity(height * (width + 1));
-        let totals: Vec<f64> =
-            weights.chunks_exact(width).map(|row| running(&mut row.iter().copied(), &mut rows)).collect();
-        let mut marginal = Vec::with_capacity(height + 1);
-        running(&mut totals.into_iter(), &mut marginal);
-        let guides = (width / CELLS_A_GUIDE).max(1).next_power_of_two();
-        let start = |row: &[f64], k: usize| row.partition_point(|&c| c <= k as f64 / guides as f64) as u32;
-        let guide = rows
-            .chunks_exact(width + 1)
-            .flat_map(|row| (0..guides).map(move |k| start(row, k)).chain([row.len() as u32]))
-            .collect();
-        PiecewiseConstant2d { width, height, rows, marginal, guide, guides }
-    }
-
-    fn row(&self, y: usize) -> &[f64] {
-        &self.rows[y * (self.width + 1)..(y + 1) * (self.width + 1)]
-    }
-
-    /// [`PiecewiseConstant2d::invert`] of a row.
-    fn invert_row(&self, row: usize, u: f64) -> Option<(usize, f64)> {
-        let k = row * (self.guides + 1) + ((u * self.guides as f64) as usize).min(self.guides - 1);
-        let (from, to) = (self.guide[k] as usize, self.guide[k + 1] as usize);
-        let cdf = self.row(row);
-        Self::within(cdf, from + cdf[from..to].partition_point(|&c| c <= u), u)
-    }
-
-    /// Cell and position within the table where the running sum reaches `u`.
-    fn invert(cdf: &[f64], u: f64) -> Option<(usize, f64)> {
-        Self::within(cdf, cdf.partition_point(|&c| c <= u), u)
-    }
-
-    /// The same, where `above` sums of the table are not above `u`.
-    fn within(cdf: &[f64], above: usize, u: f64) -> Option<(usize, f64)> {
-        let n = cdf.len() - 1;
-        let cell = above.saturating_sub(1).min(n - 1);
-        let mass = cdf[cell + 1] - cdf[cell];
-        (mass > 0.0).then(|| (cell, (cell as f64 + ((u - cdf[cell]) / mass).clamp(0.0, 1.0)) / n as f64))
-    }
-
-    /// A point and its density.
-    fn sample(&self, u: DVec2) -> Option<(DVec2, f64)> {
-        let (row, y) = Self::invert(&self.marginal, u.y)?;
-        let (column, x) = self.invert_row(row, u.x)?;
-        Some((DVec2::new(x, y), self.density(row, column)))
-    }
-
-    /// A cell, and numbers uniform in [0, 1] within it.
-    fn sample_cell(&self, u: DVec2) -> Option<Cell> {
-        let (row, y) = Self::invert(&self.marginal, u.y)?;
-        let (column, x) = self.invert_row(row, u.x)?;
-        let within = DVec2::new(x * self.width as f64 - column as f64, y * self.height as f64 - row as f64);
-        Some(Cell { row, column, within: within.clamp(DVec2::ZERO, DVec2::ONE) })
-    }
-
-    fn density(&self, row: usize, column: usize) -> f64 {
-        let cdf = self.row(row);
-        (self.marginal[row + 1] - self.marginal[row])
-            * (cdf[column + 1] - cdf[column])
-            * (self.width * self.height) as f64
-    }
-
-    fn pdf(&self, p: DVec2) -> f64 {
-        let cell = |x: f64, n: usize| ((x * n as f64) as usize).min(n - 1);
-        self.density(cell(p.y, self.height), cell(p.x, self.width))
-    }
 }
 
 #[cfg(test)]
@@ -451,28 +353,6 @@ mod tests {
 
     fn green(map: &Environment, direction: DVec3) -> f64 {
         f64::from(map.radiance(direction.normalize(), Lanes::splat(550.0)).to_array()[0])
-    }
-
-    /// The guide changes how many sums are looked at, not which one is found: rows with cells of nothing at either
-    /// end and between, one that is all in one cell, one that is empty, at sums themselves and between.
-    #[test]
-    fn guided_searches_find_what_a_search_of_the_whole_row_finds() {
-        let width = 200;
-        let weight = |row: usize, x: usize| match row {
-            0 => 1.0 + (x % 7) as f64,
-            1 => f64::from(u8::from(x % 40 > 30)) * x as f64,
-            2 => f64::from(u8::from(x == 117)),
-            _ => 0.0,
-        };
-        let weights: Vec<f64> = (0..4 * width).map(|i| weight(i / width, i % width)).collect();
-        let table = PiecewiseConstant2d::new(&weights, width, 4);
-        assert!(table.guides > 1);
-        for row in 0..4 {
-            let sums = table.row(row).to_vec();
-            for u in (0..4096).map(|k| f64::from(k) / 4096.0).chain(sums.into_iter().filter(|&u| u < 1.0)) {
-                assert_eq!(table.invert_row(row, u), PiecewiseConstant2d::invert(table.row(row), u), "{row} {u}");
-            }
-        }
     }
 
     #[test]

@@ -291,7 +291,7 @@ impl Light {
                 Some(Arriving {
                     wi: s.direction,
                     distance: f64::INFINITY,
-                    radiance: map.radiance(s.direction, nm),
+                    radiance: map.radiance_of(&s, nm),
                     density: Some(s.pdf_solid_angle),
                     target: None,
                 })
