@@ -16,7 +16,7 @@ use super::bvh::{Aabb, Bvh};
 use super::camera::{self, Camera};
 use super::instance::{AffineMap, Group, Instance};
 use super::light::Light;
-use super::load;
+use super::load::{self, Pictures, Wanted};
 use super::material::{Kind, Material};
 use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Layout, Plane, Rectangle, Shape, Sphere};
 use super::texture::{Scalar, Texture};
@@ -29,7 +29,7 @@ use attributes::{OfMesh, Surface};
 use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3};
 use meshes::Meshes;
 use std::collections::{BTreeSet, HashMap};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 struct Compiler<'a> {
@@ -39,6 +39,8 @@ struct Compiler<'a> {
     unread: Option<Error>,
     files: Vec<PathBuf>,
     meshes: Meshes,
+    /// Decoded before they are asked for.
+    pictures: Pictures,
     /// What textures lie on.
     surface: Surface,
     /// Whether a texture has asked for that.
@@ -79,6 +81,21 @@ pub fn compile(description: &SceneDescription, name: &str) -> Result<Scene> {
     c.finish(scene)
 }
 
+/// The pictures that a scene names. What textures are used for shows later: without `raw` mostly as colours.
+fn pictures(d: &SceneDescription) -> impl Iterator<Item = (&Path, Wanted)> {
+    let textures = d.textures.values().filter_map(|texture| match texture {
+        written::Texture::Image(image) => {
+            Some((&*image.file, if image.raw { Wanted::Pixels } else { Wanted::Colours }))
+        }
+        _ => None,
+    });
+    let skies = d.lights.iter().filter_map(|light| match light {
+        written::Light::Environment(sky) => Some((&*sky.file, Wanted::Pixels)),
+        _ => None,
+    });
+    textures.chain(skies)
+}
+
 fn vec3(v: [f64; 3]) -> DVec3 {
     DVec3::from_array(v)
 }
@@ -91,6 +108,7 @@ impl<'a> Compiler<'a> {
             unread: None,
             files: Vec::new(),
             meshes: Meshes::default(),
+            pictures: Pictures::default(),
             surface: Surface::Unknown,
             asks_for_surface: false,
             on_surface: BTreeSet::new(),
@@ -144,7 +162,13 @@ impl<'a> Compiler<'a> {
 
     fn scene(&mut self, name: &str) -> Result<Scene> {
         let d = self.description;
-        let (meshes, made) = rayon::join(|| Meshes::of(d), || self.volumes_and_materials());
+        let (meshes, made) = rayon::join(
+            || Meshes::of(d),
+            || {
+                self.pictures = Pictures::of(pictures(d));
+                self.volumes_and_materials()
+            },
+        );
         made?;
         self.meshes = meshes;
         let mut media = Vec::new();

@@ -360,7 +360,8 @@ mod tests {
         // n = (0.6, 0, 0.8) as a colour.
         let texel = [0.8f32, 0.5, 0.9];
         let grid = crate::scene::texture::Grid::new(1, 1);
-        let normals = Scalar::Image(crate::scene::texture::DataImage { texels: Arc::new(vec![texel]), grid });
+        let texels = crate::scene::texture::Numbers::Floats(Arc::new(vec![texel]));
+        let normals = Scalar::Image(crate::scene::texture::DataImage { texels, grid });
         Relief { form: ReliefForm::Normals(normals), turn: true, shadowing: true }
     }
 

@@ -1,11 +1,12 @@
 //! Pictures and tables from files.
 
-use super::texture::{DataImage, Grid, ImageTexture, Texel};
+use super::texture::{DataImage, Grid, ImageTexture, Numbers, Texel, Texels};
 use crate::error::{Error, Result};
 use crate::film::exr;
 use crate::spectrum::{colour, upsample};
 use rayon::prelude::*;
-use std::path::Path;
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A picture in linear Rec. 709, row 0 at the top.
@@ -31,6 +32,98 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     reader.decode().map_err(|e| Error::input(path, format!("expected a PNG, JPEG, HDR or EXR picture: {e}")))
 }
 
+/// A file of pixels, as it was decoded.
+#[derive(Debug)]
+pub enum Decoded {
+    /// EXR.
+    Exr(exr::ExrFile),
+    /// 8 bits a channel.
+    Bytes {
+        /// Red, green and blue in turn.
+        rgb: Vec<u8>,
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Its colours, where they have been counted.
+        counted: Option<Counted>,
+    },
+    /// All others.
+    Other(image::DynamicImage),
+}
+
+/// The colours of a picture: each once, and for each pixel the number of its own.
+#[derive(Debug)]
+pub struct Counted {
+    colours: Vec<[u8; 3]>,
+    numbers: Vec<u32>,
+}
+
+/// Reads a file of pixels.
+///
+/// # Errors
+/// [`Error::Input`] where there is no such file or it is no picture.
+pub fn open(path: &Path) -> Result<Decoded> {
+    use image::ColorType::{L8, La8, Rgb8, Rgba8};
+    if extension(path) == "exr" {
+        return exr::read_exr(path).map(Decoded::Exr);
+    }
+    let decoded = decode(path)?;
+    if !matches!(decoded.color(), L8 | La8 | Rgb8 | Rgba8) {
+        return Ok(Decoded::Other(decoded));
+    }
+    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+    Ok(Decoded::Bytes { rgb: decoded.into_rgb8().into_raw(), width, height, counted: None })
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase()
+}
+
+/// What a picture is wanted for, as far as is known before it is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Wanted {
+    /// Its pixels.
+    Pixels,
+    /// Its colours.
+    Colours,
+}
+
+/// Pictures that are decoded before they are asked for.
+#[derive(Debug, Default)]
+pub struct Pictures {
+    decoded: HashMap<PathBuf, Decoded>,
+}
+
+impl Pictures {
+    /// All of `wanted` that can be read, on the current rayon pool.
+    #[must_use]
+    pub fn of<'a>(wanted: impl Iterator<Item = (&'a Path, Wanted)>) -> Pictures {
+        let mut distinct: BTreeMap<&Path, Wanted> = BTreeMap::new();
+        for (path, what) in wanted {
+            let known = distinct.entry(path).or_insert(what);
+            *known = what.max(*known);
+        }
+        let read = |(path, what): (&Path, Wanted)| {
+            let mut decoded = open(path).ok()?;
+            if let (Decoded::Bytes { rgb, counted, .. }, Wanted::Colours) = (&mut decoded, what) {
+                *counted = Some(count(rgb));
+            }
+            Some((path.to_path_buf(), decoded))
+        };
+        let distinct: Vec<(&Path, Wanted)> = distinct.into_iter().collect();
+        Pictures { decoded: distinct.into_par_iter().filter_map(read).collect() }
+    }
+
+    /// What `path` holds; it is read again where it is asked for again.
+    ///
+    /// # Errors
+    /// As [`open`].
+    pub fn take(&mut self, path: &Path) -> Result<Decoded> {
+        self.decoded.remove(path).map_or_else(|| open(path), Ok)
+    }
+}
+
 fn words(e: &std::io::Error) -> String {
     match e.kind() {
         std::io::ErrorKind::NotFound => "expected a file, found none".into(),
@@ -39,28 +132,34 @@ fn words(e: &std::io::Error) -> String {
     }
 }
 
-/// Reads a picture of light: EXR and HDR as they are, 8- and 16-bit files decoded from sRGB.
+/// A picture of light from the file `path`: EXR and HDR as they are, 8- and 16-bit files decoded from sRGB.
 ///
 /// # Errors
-/// [`Error::Input`] where there is no such file or it is no picture, or a pixel is not finite.
-pub fn picture(path: &Path) -> Result<Picture> {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    let picture = if extension == "exr" {
-        let file = exr::read_exr(path)?;
-        let part = &file.parts[0];
-        let channel = |name: &str| {
-            part.channel(name).ok_or_else(|| Error::input(path, format!("expected channels R, G, B; found no {name}")))
-        };
-        let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
-        let pixels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
-        Picture { pixels, width: part.window.width as usize, height: part.window.height as usize }
-    } else {
-        let decoded = decode(path)?;
-        let linear = matches!(decoded, image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_));
-        let rgb = decoded.into_rgb32f();
-        let (width, height) = (rgb.width() as usize, rgb.height() as usize);
-        let decode = |x: f32| if linear { x } else { colour::srgb_decode(x) };
-        Picture { pixels: rgb.pixels().map(|p| p.0.map(decode)).collect(), width, height }
+/// [`Error::Input`] where a pixel is not finite.
+pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
+    let picture = match decoded {
+        Decoded::Exr(file) => {
+            let part = &file.parts[0];
+            let channel = |name: &str| {
+                let found = part.channel(name);
+                found.ok_or_else(|| Error::input(path, format!("expected channels R, G, B; found no {name}")))
+            };
+            let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
+            let pixels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+            Picture { pixels, width: part.window.width as usize, height: part.window.height as usize }
+        }
+        Decoded::Bytes { rgb, width, height, .. } => {
+            let level = colour::srgb8_table();
+            let pixel = |p: &[u8]| [0, 1, 2].map(|k| level[usize::from(p[k])]);
+            Picture { pixels: rgb.chunks_exact(3).map(pixel).collect(), width, height }
+        }
+        Decoded::Other(decoded) => {
+            let linear = is_linear(&decoded);
+            let rgb = decoded.into_rgb32f();
+            let (width, height) = (rgb.width() as usize, rgb.height() as usize);
+            let decode = |x: f32| if linear { x } else { colour::srgb_decode(x) };
+            Picture { pixels: rgb.pixels().map(|p| p.0.map(decode)).collect(), width, height }
+        }
     };
     if let Some(i) = picture.pixels.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
         let (x, y) = (i % picture.width, i / picture.width);
@@ -71,103 +170,118 @@ pub fn picture(path: &Path) -> Result<Picture> {
     Ok(Picture { pixels, ..picture })
 }
 
-/// Reads a picture of reflectances, upsampled texel by texel; `raw` takes 8- and 16-bit values as
+fn is_linear(decoded: &image::DynamicImage) -> bool {
+    matches!(decoded, image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_))
+}
+
+/// A picture of reflectances from the file `path`, upsampled texel by texel; `raw` takes 8- and 16-bit values as
 /// linear.
 ///
 /// # Errors
 /// As [`picture`]; values above one are refused.
-pub fn image_texture(path: &Path, raw: bool) -> Result<ImageTexture> {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    let make = |texels: Vec<Texel>, width: usize, height: usize| ImageTexture {
-        texels: Arc::new(texels),
+pub fn image_texture(path: &Path, decoded: Decoded, raw: bool) -> Result<ImageTexture> {
+    let make = |texels: Texels, width: usize, height: usize| ImageTexture {
+        texels,
         grid: Grid::new(width, height),
         illuminant: None,
     };
-    if extension == "exr" || extension == "hdr" {
-        let picture = picture(path)?;
-        if let Some(i) = picture.pixels.iter().position(|p| p.iter().any(|&x| x > 1.0)) {
-            let (x, y) = (i % picture.width, i / picture.width);
-            let found = picture.pixels[i];
-            return Err(Error::input(
-                path,
-                format!("expected reflectances from 0 to 1, found {found:?} at ({x}, {y})"),
-            ));
+    match decoded {
+        Decoded::Bytes { rgb, width, height, counted } => {
+            let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };
+            Ok(make(upsampled_bytes(counted.unwrap_or_else(|| count(&rgb)), &level), width, height))
         }
-        let texels = picture.pixels.par_iter().map(|&rgb| reflectance_texel(rgb)).collect();
-        return Ok(make(texels, picture.width, picture.height));
+        Decoded::Other(decoded) if !is_linear(&decoded) => {
+            let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+            let level = |x: u16| {
+                let x = f32::from(x) / 65535.0;
+                if raw { x } else { colour::srgb_decode(x) }
+            };
+            let rgb = decoded.into_rgb16();
+            let texel = |p: &[u16]| reflectance_texel([level(p[0]), level(p[1]), level(p[2])]);
+            Ok(make(Texels::each(rgb.as_raw().par_chunks_exact(3).map(texel).collect()), width, height))
+        }
+        decoded => {
+            let picture = picture(path, decoded)?;
+            if let Some(i) = picture.pixels.iter().position(|p| p.iter().any(|&x| x > 1.0)) {
+                let (x, y) = (i % picture.width, i / picture.width);
+                let found = picture.pixels[i];
+                return Err(Error::input(
+                    path,
+                    format!("expected reflectances from 0 to 1, found {found:?} at ({x}, {y})"),
+                ));
+            }
+            let texels = picture.pixels.par_iter().map(|&rgb| reflectance_texel(rgb)).collect();
+            Ok(make(Texels::each(texels), picture.width, picture.height))
+        }
     }
-    let decoded = decode(path)?;
-    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
-    use image::ColorType::{L8, La8, Rgb8, Rgba8};
-    let texels = if matches!(decoded.color(), L8 | La8 | Rgb8 | Rgba8) {
-        let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };
-        upsampled_bytes(decoded.into_rgb8().as_raw(), &level)
-    } else {
-        let level = |x: u16| {
-            let x = f32::from(x) / 65535.0;
-            if raw { x } else { colour::srgb_decode(x) }
-        };
-        let rgb = decoded.into_rgb16();
-        rgb.as_raw().par_chunks_exact(3).map(|p| reflectance_texel([level(p[0]), level(p[1]), level(p[2])])).collect()
-    };
-    Ok(make(texels, width, height))
 }
 
 fn reflectance_texel(rgb: [f32; 3]) -> Texel {
     Texel { coefficients: upsample::coefficients(rgb), scale: 1.0 }
 }
 
-/// Texels of pixels (red, green, blue in turn) of the given levels. Many share a colour: each is upsampled
-/// once.
-fn upsampled_bytes(pixels: &[u8], level: &[f32; 256]) -> Vec<Texel> {
+/// The colours of pixels (red, green, blue in turn).
+fn count(pixels: &[u8]) -> Counted {
     // For each of the 2²⁴ colours its number among those met so far, from 1; only the pages that hold a colour
     // of the picture become memory.
     let mut number = vec![0u32; 1 << 24];
     let mut colours: Vec<[u8; 3]> = Vec::new();
-    let key = |p: &[u8]| usize::from(p[0]) << 16 | usize::from(p[1]) << 8 | usize::from(p[2]);
-    for p in pixels.chunks_exact(3) {
-        let number = &mut number[key(p)];
-        if *number == 0 {
-            colours.push([p[0], p[1], p[2]]);
-            *number = colours.len() as u32;
-        }
-    }
-    let texel = |c: &[u8; 3]| reflectance_texel(c.map(|x| level[usize::from(x)]));
-    let upsampled: Vec<Texel> = colours.par_iter().with_min_len(256).map(texel).collect();
-    let numbered = |p: &[u8]| upsampled[number[key(p)] as usize - 1];
-    pixels.par_chunks_exact(3).with_min_len(1 << 14).map(numbered).collect()
+    let numbers = pixels
+        .chunks_exact(3)
+        .map(|p| {
+            let number = &mut number[usize::from(p[0]) << 16 | usize::from(p[1]) << 8 | usize::from(p[2])];
+            if *number == 0 {
+                colours.push([p[0], p[1], p[2]]);
+                *number = colours.len() as u32;
+            }
+            *number - 1
+        })
+        .collect();
+    Counted { colours, numbers }
 }
 
-/// Reads a picture of numbers: EXR and HDR as they are, 8- and 16-bit files from 0 to 1, decoded from sRGB unless
-/// `raw`. A picture of one channel gives the same number three times.
+/// Texels of pixels of the given levels. Many share a colour: each is upsampled once.
+fn upsampled_bytes(counted: Counted, level: &[f32; 256]) -> Texels {
+    let texel = |c: &[u8; 3]| reflectance_texel(c.map(|x| level[usize::from(x)]));
+    let colours = counted.colours.par_iter().with_min_len(256).map(texel).collect();
+    Texels { colours: Arc::new(colours), numbers: Some(Arc::new(counted.numbers)) }
+}
+
+/// A picture of numbers from the file `path`: EXR and HDR as they are, 8- and 16-bit files from 0 to 1, decoded from
+/// sRGB unless `raw`. A picture of one channel gives the same number three times.
 ///
 /// # Errors
 /// As [`picture`]; numbers may be negative.
-pub fn data_image(path: &Path, raw: bool) -> Result<DataImage> {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    let (texels, width, height): (Vec<[f32; 3]>, usize, usize) = if extension == "exr" {
-        let file = exr::read_exr(path)?;
-        let part = &file.parts[0];
-        let grey = part.channel("Y");
-        let channel = |name: &str| {
-            let found = part.channel(name).or(grey);
-            found.ok_or_else(|| Error::input(path, format!("expected channels R, G, B or Y; found no {name}")))
-        };
-        let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
-        let texels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
-        (texels, part.window.width as usize, part.window.height as usize)
-    } else {
-        let decoded = decode(path)?;
-        let linear = matches!(decoded, image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_));
-        let rgb = decoded.into_rgb32f();
-        let number = |x: f32| if raw || linear { x } else { colour::srgb_decode(x) };
-        (rgb.pixels().map(|p| p.0.map(number)).collect(), rgb.width() as usize, rgb.height() as usize)
+pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<DataImage> {
+    let (texels, width, height): (Vec<[f32; 3]>, usize, usize) = match decoded {
+        Decoded::Bytes { rgb, width, height, .. } => {
+            let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };
+            let texels = Numbers::Bytes { bytes: Arc::new(rgb), level: Box::new(level) };
+            return Ok(DataImage { texels, grid: Grid::new(width, height) });
+        }
+        Decoded::Exr(file) => {
+            let part = &file.parts[0];
+            let grey = part.channel("Y");
+            let channel = |name: &str| {
+                let found = part.channel(name).or(grey);
+                found.ok_or_else(|| Error::input(path, format!("expected channels R, G, B or Y; found no {name}")))
+            };
+            let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
+            let texels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+            (texels, part.window.width as usize, part.window.height as usize)
+        }
+        Decoded::Other(decoded) => {
+            let linear = is_linear(&decoded);
+            let rgb = decoded.into_rgb32f();
+            let number = |x: f32| if raw || linear { x } else { colour::srgb_decode(x) };
+            (rgb.pixels().map(|p| p.0.map(number)).collect(), rgb.width() as usize, rgb.height() as usize)
+        }
     };
     if let Some(i) = texels.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
         let (x, y) = (i % width, i / width);
         return Err(Error::input(path, format!("expected finite numbers, found {:?} at ({x}, {y})", texels[i])));
     }
-    Ok(DataImage { texels: Arc::new(texels), grid: Grid::new(width, height) })
+    Ok(DataImage { texels: Numbers::Floats(Arc::new(texels)), grid: Grid::new(width, height) })
 }
 
 /// Reads a curve: two columns, wavelength in nm and value, separated by commas, semicolons or
@@ -216,12 +330,13 @@ mod tests {
     fn colours_of_eight_bits_are_upsampled_once_each() {
         let pixels = [255, 255, 255, 10, 20, 30, 0, 0, 0, 10, 20, 30, 200, 10, 99];
         let level = colour::srgb8_table();
-        let texels = upsampled_bytes(&pixels, &level);
-        for (p, texel) in pixels.chunks_exact(3).zip(&texels) {
+        let texels = upsampled_bytes(count(&pixels), &level);
+        for (i, p) in pixels.chunks_exact(3).enumerate() {
+            let texel = texels.at(i);
             let rgb = [0, 1, 2].map(|k| colour::srgb_decode(f32::from(p[k]) / 255.0));
             assert_eq!(texel.coefficients, upsample::coefficients(rgb), "{p:?}");
         }
-        assert_eq!(texels.len(), 5);
+        assert_eq!(texels.colours.len(), 4);
     }
 
     #[test]
@@ -229,7 +344,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("earth.jpg");
         std::fs::write(&path, "not a picture").unwrap();
-        let e = image_texture(&path, false).unwrap_err();
+        let e = open(&path).unwrap_err();
         assert!(e.exit_code() == 3 && e.to_string().contains("expected a PNG, JPEG, HDR or EXR picture"), "{e}");
     }
 }

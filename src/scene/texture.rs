@@ -4,7 +4,7 @@ use super::SurfacePoint;
 use super::mesh::attribute::AttributeTexture;
 use super::volume::Volume;
 use crate::spectrum::{Lanes, Spectrum, upsample};
-use glam::{DAffine2, DVec2, DVec3};
+use glam::{DAffine2, DVec2, DVec3, Vec3};
 use std::ops::{Add, Mul};
 use std::sync::Arc;
 
@@ -112,6 +112,15 @@ pub(super) fn wrapped(i: f64, n: usize, wrap: Wrap) -> usize {
     (folded as usize).min(n - 1)
 }
 
+/// Indices of the texels at `i` and `i + 1` of `n` under `wrap`.
+fn wrapped_pair(i: f64, n: usize, wrap: Wrap) -> (usize, usize) {
+    let first = wrapped(i, n, wrap);
+    match wrap {
+        Wrap::Repeat => (first, if first + 1 == n { 0 } else { first + 1 }),
+        Wrap::Mirror | Wrap::Clamp => (first, wrapped(i + 1.0, n, wrap)),
+    }
+}
+
 impl Grid {
     /// A picture of `width` × `height` texels that repeats, once over the unit square.
     #[must_use]
@@ -120,9 +129,13 @@ impl Grid {
         Grid { width, height, wrap, interpolation, uv: DAffine2::IDENTITY }
     }
 
-    /// Index of the texel in column `x` of row `y`, counted from the top.
-    fn index(&self, x: f64, y: f64) -> usize {
-        wrapped(y, self.height, self.wrap[1]) * self.width + wrapped(x, self.width, self.wrap[0])
+    /// Indices of the four texels whose upper left one is in column `corner.x` of row `corner.y`, counted from the
+    /// top: upper left, upper right, lower left, lower right.
+    fn four(&self, corner: DVec2) -> [usize; 4] {
+        let (left, right) = wrapped_pair(corner.x, self.width, self.wrap[0]);
+        let (upper, lower) = wrapped_pair(corner.y, self.height, self.wrap[1]);
+        let (upper, lower) = (upper * self.width, lower * self.width);
+        [upper + left, upper + right, lower + left, lower + right]
     }
 
     /// Column and row of the texel above and to the left of `uv`, and how far beyond its centre that lies.
@@ -140,24 +153,56 @@ impl Grid {
             Interpolation::Nearest => {
                 let uv = self.uv.transform_point2(uv);
                 let (x, up) = (uv.x * self.width as f64, uv.y * self.height as f64);
-                texel(self.index(x.floor(), self.height as f64 - 1.0 - up.floor()))
+                let row = wrapped(self.height as f64 - 1.0 - up.floor(), self.height, self.wrap[1]);
+                texel(row * self.width + wrapped(x.floor(), self.width, self.wrap[0]))
             }
             Interpolation::Bilinear => {
                 let (corner, weight) = self.corner(uv);
                 let (wx, wy) = (weight.x as f32, weight.y as f32);
-                let row =
-                    |y: f64| texel(self.index(corner.x, y)) * (1.0 - wx) + texel(self.index(corner.x + 1.0, y)) * wx;
-                row(corner.y) * (1.0 - wy) + row(corner.y + 1.0) * wy
+                let [a, b, c, d] = self.four(corner).map(texel);
+                let row = |l: T, r: T| l * (1.0 - wx) + r * wx;
+                row(a, b) * (1.0 - wy) + row(c, d) * wy
             }
         }
+    }
+}
+
+/// The texels of a picture, row by row.
+#[derive(Clone, Debug)]
+pub struct Texels {
+    /// Each colour once, if they are numbered; else one a texel.
+    pub colours: Arc<Vec<Texel>>,
+    /// For each texel the number of its colour: a quarter of the memory of a picture of few colours.
+    pub numbers: Option<Arc<Vec<u32>>>,
+}
+
+impl Texels {
+    /// Texels with a colour each.
+    #[must_use]
+    pub fn each(texels: Vec<Texel>) -> Texels {
+        Texels { colours: Arc::new(texels), numbers: None }
+    }
+
+    /// The texel at `index`.
+    #[must_use]
+    #[inline]
+    pub fn at(&self, index: usize) -> &Texel {
+        match &self.numbers {
+            None => &self.colours[index],
+            Some(numbers) => &self.colours[numbers[index] as usize],
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.numbers.as_ref().map_or(self.colours.len(), |numbers| numbers.len())
     }
 }
 
 /// A picture whose texels are spectra.
 #[derive(Clone, Debug)]
 pub struct ImageTexture {
-    /// Row by row.
-    pub texels: Arc<Vec<Texel>>,
+    /// Their spectra.
+    pub texels: Texels,
     /// Where they lie.
     pub grid: Grid,
     /// A spectrum that multiplies every texel: one for reflectances, D65 for light.
@@ -169,7 +214,7 @@ impl ImageTexture {
     #[must_use]
     pub fn eval(&self, uv: DVec2, nm: Lanes) -> Lanes {
         let value = self.grid.value(uv, |i| {
-            let texel = &self.texels[i];
+            let texel = self.texels.at(i);
             upsample::eval_sigmoid(texel.coefficients, nm) * texel.scale
         });
         match &self.illuminant {
@@ -201,11 +246,40 @@ pub enum Scalar {
     Attribute(Box<AttributeTexture>),
 }
 
+/// Three numbers a texel, row by row; all three are the same in a picture of one channel.
+#[derive(Clone, Debug)]
+pub enum Numbers {
+    /// As they are.
+    Floats(Arc<Vec<[f32; 3]>>),
+    /// Bytes, and what each stands for.
+    Bytes {
+        /// Three a texel.
+        bytes: Arc<Vec<u8>>,
+        /// By byte.
+        level: Box<[f32; 256]>,
+    },
+}
+
+impl Numbers {
+    /// The numbers of the texel at `index`.
+    #[must_use]
+    #[inline]
+    pub fn at(&self, index: usize) -> [f32; 3] {
+        match self {
+            Numbers::Floats(texels) => texels[index],
+            Numbers::Bytes { bytes, level } => {
+                let texel = &bytes[3 * index..3 * index + 3];
+                [0, 1, 2].map(|k| level[usize::from(texel[k])])
+            }
+        }
+    }
+}
+
 /// A picture whose texels are numbers.
 #[derive(Clone, Debug)]
 pub struct DataImage {
-    /// Row by row; all three are the same in a picture of one channel.
-    pub texels: Arc<Vec<[f32; 3]>>,
+    /// What they are.
+    pub texels: Numbers,
     /// Where they lie.
     pub grid: Grid,
 }
@@ -223,7 +297,7 @@ impl Scalar {
     pub fn eval(&self, at: &TexturePoint) -> f64 {
         match self {
             Scalar::Uniform(x) => *x,
-            Scalar::Image(image) => f64::from(image.grid.value(at.uv, |i| luminance(image.texels[i]))),
+            Scalar::Image(image) => f64::from(image.grid.value(at.uv, |i| luminance(image.texels.at(i)))),
             Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).eval(at),
             Scalar::Volume(volume) => volume.scalar(at.point),
             Scalar::Attribute(attribute) => f64::from(luminance(attribute.triple(at).as_vec3().to_array())),
@@ -235,9 +309,7 @@ impl Scalar {
     pub fn triple(&self, at: &TexturePoint) -> DVec3 {
         match self {
             Scalar::Uniform(x) => DVec3::splat(*x),
-            Scalar::Image(image) => {
-                DVec3::from([0, 1, 2].map(|k| f64::from(image.grid.value(at.uv, |i| image.texels[i][k]))))
-            }
+            Scalar::Image(image) => image.grid.value(at.uv, |i| Vec3::from(image.texels.at(i))).as_dvec3(),
             Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).triple(at),
             Scalar::Volume(volume) => DVec3::splat(volume.scalar(at.point)),
             Scalar::Attribute(attribute) => attribute.triple(at),
@@ -254,9 +326,7 @@ impl Scalar {
             Scalar::Image(image) => {
                 let grid = &image.grid;
                 let (corner, w) = grid.corner(at.uv);
-                let height =
-                    |x: f64, y: f64| f64::from(luminance(image.texels[grid.index(corner.x + x, corner.y + y)]));
-                let (h00, h10, h01, h11) = (height(0.0, 0.0), height(1.0, 0.0), height(0.0, 1.0), height(1.0, 1.0));
+                let [h00, h10, h01, h11] = grid.four(corner).map(|i| f64::from(luminance(image.texels.at(i))));
                 // Of the bilinear form, by columns and by rows; rows count downward.
                 let by_x = (h10 - h00) * (1.0 - w.y) + (h11 - h01) * w.y;
                 let by_y = (h01 - h00) * (1.0 - w.x) + (h11 - h10) * w.x;
@@ -314,9 +384,10 @@ impl Texture {
             Texture::Uniform(spectrum) => vec![spectrum.clone()],
             Texture::Image(image) => {
                 let step = (image.texels.len() / 16).max(1);
-                let texels = image.texels.iter().step_by(step);
-                texels
-                    .map(|t| {
+                (0..image.texels.len())
+                    .step_by(step)
+                    .map(|i| {
+                        let t = image.texels.at(i);
                         let s = Spectrum::Sigmoid { c: t.coefficients, scale: t.scale };
                         image.illuminant.as_ref().map_or(s.clone(), |i| s.times(i))
                     })
@@ -342,7 +413,7 @@ mod tests {
         let grey = |v: f64| upsample::coefficients([v as f32; 3]);
         let texel = |v: f64| Texel { coefficients: grey(v), scale: 1.0 };
         ImageTexture {
-            texels: Arc::new(vec![texel(0.2), texel(0.8), texel(0.8), texel(0.2)]),
+            texels: Texels::each(vec![texel(0.2), texel(0.8), texel(0.8), texel(0.2)]),
             grid: Grid { wrap: [wrap; 2], interpolation, ..Grid::new(2, 2) },
             illuminant: None,
         }
@@ -410,7 +481,10 @@ mod tests {
 
     fn numbers(interpolation: Interpolation, uv: DAffine2) -> Scalar {
         let grid = Grid { wrap: [Wrap::Clamp; 2], interpolation, uv, ..Grid::new(2, 2) };
-        Scalar::Image(DataImage { texels: Arc::new([0.1, 0.5, 0.3, 0.9].map(|x| [x; 3]).to_vec()), grid })
+        Scalar::Image(DataImage {
+            texels: Numbers::Floats(Arc::new([0.1, 0.5, 0.3, 0.9].map(|x| [x; 3]).to_vec())),
+            grid,
+        })
     }
 
     fn point(u: f64, v: f64) -> TexturePoint {

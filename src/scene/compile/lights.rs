@@ -103,7 +103,8 @@ impl<'a> Compiler<'a> {
             }
             written::Light::Environment(l) => {
                 self.files.push(l.file.to_path_buf());
-                let picture = load::picture(&l.file).map_err(|e| self.asked(&format!("{at}.file"), e))?;
+                let picture = self.pictures.take(&l.file).and_then(|p| load::picture(&l.file, p));
+                let picture = picture.map_err(|e| self.asked(&format!("{at}.file"), e))?;
                 let mapping = match l.mapping {
                     written::EnvironmentMapping::Texels => Mapping::Texels,
                     written::EnvironmentMapping::Mitsuba => Mapping::Poles,

@@ -123,7 +123,8 @@ impl<'a> Compiler<'a> {
         Ok(match texture {
             written::Texture::Image(image) => {
                 self.files.push(image.file.to_path_buf());
-                let loaded = load::image_texture(&image.file, image.raw);
+                let loaded =
+                    self.pictures.take(&image.file).and_then(|p| load::image_texture(&image.file, p, image.raw));
                 let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
                 loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
                 Texture::Image(loaded)
@@ -144,7 +145,7 @@ impl<'a> Compiler<'a> {
         Ok(match texture {
             written::Texture::Image(image) => {
                 self.files.push(image.file.to_path_buf());
-                let loaded = load::data_image(&image.file, image.raw);
+                let loaded = self.pictures.take(&image.file).and_then(|p| load::data_image(&image.file, p, image.raw));
                 let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
                 loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
                 Scalar::Image(loaded)
