@@ -25,8 +25,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
     let mut normals: Vec<DVec3> = Vec::new();
     let mut faces = Faces::default();
     let mut carried: Vec<u8> = Vec::new();
-    for (i, line) in bytes.split(|&b| b == b'\n').enumerate() {
-        let number = i + 1;
+    let mut rest = bytes;
+    for number in 1.. {
+        if rest.is_empty() {
+            break;
+        }
+        let end = newline(rest);
+        let line = &rest[..end];
+        rest = &rest[(end + 1).min(rest.len())..];
         // A backslash at the end joins the next line.
         if let Some(head) = line.trim_ascii_end().strip_suffix(b"\\") {
             carried.extend(head);
@@ -41,8 +47,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
             joined = std::mem::take(&mut carried);
             &joined
         };
-        let line = line.split(|&b| b == b'#').next().unwrap_or(line);
-        let mut words = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
+        let mut words = Words { rest: line };
         match words.next() {
             Some(b"v") => positions.push(DVec3::from(numbers::<3>(words, number)?)),
             Some(b"vt") => uvs.push(texture_coordinates(words, number)?),
@@ -111,7 +116,88 @@ fn weld(positions: &[DVec3], uvs: &[DVec2], normals: &[DVec3], faces: &Faces) ->
     Ok(out)
 }
 
+/// Where the first line of `text` ends.
+fn newline(text: &[u8]) -> usize {
+    const ONES: u64 = 0x0101_0101_0101_0101;
+    let mut at = 0;
+    for eight in text.as_chunks::<8>().0 {
+        // A byte of `x` is zero where there is a newline; borrows reach only bytes after the first of them.
+        let x = u64::from_le_bytes(*eight) ^ (ONES * u64::from(b'\n'));
+        let zero = x.wrapping_sub(ONES) & !x & (ONES << 7);
+        if zero != 0 {
+            return at + zero.trailing_zeros() as usize / 8;
+        }
+        at += 8;
+    }
+    at + text[at..].iter().position(|&b| b == b'\n').unwrap_or(text.len() - at)
+}
+
+/// The words of a line, up to where a comment begins.
+struct Words<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Iterator for Words<'a> {
+    type Item = &'a [u8];
+
+    #[inline]
+    fn next(&mut self) -> Option<&'a [u8]> {
+        // As a rule words are one blank apart.
+        let start = self.rest.iter().position(|b| !b.is_ascii_whitespace())?;
+        let rest = &self.rest[start..];
+        if rest[0] == b'#' {
+            self.rest = &[];
+            return None;
+        }
+        let end = rest.iter().position(|&b| b.is_ascii_whitespace() || b == b'#').unwrap_or(rest.len());
+        self.rest = &rest[end..];
+        Some(&rest[..end])
+    }
+}
+
+/// Powers of ten that f64 holds exactly.
+const TENS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
+    1e21, 1e22,
+];
+
+/// The number that a word of digits with or without a point and a sign is, where one rounding makes it: at most 2⁵³
+/// over a power of ten that f64 holds exactly (Clinger 1990). `None` for all others.
+#[inline]
+fn short_decimal(word: &[u8]) -> Option<f64> {
+    let (negative, digits) = match word {
+        [b'-', rest @ ..] => (true, rest),
+        [b'+', rest @ ..] => (false, rest),
+        _ => (false, word),
+    };
+    // 19 digits are below 2⁶⁴; a point makes one byte more.
+    if digits.is_empty() || digits.len() > 20 {
+        return None;
+    }
+    let (mut whole, mut places, mut points, mut count) = (0u64, 0usize, 0usize, 0usize);
+    for &b in digits {
+        let digit = b.wrapping_sub(b'0');
+        if digit < 10 {
+            whole = whole.wrapping_mul(10).wrapping_add(u64::from(digit));
+            places += points;
+            count += 1;
+        } else if b == b'.' && points == 0 {
+            points = 1;
+        } else {
+            return None;
+        }
+    }
+    if count == 0 || count > 19 || whole > 1 << 53 {
+        return None;
+    }
+    let x = whole as f64 / TENS[places];
+    Some(if negative { -x } else { x })
+}
+
 fn number(word: &[u8], line: usize) -> Result<f64, String> {
+    if let Some(x) = short_decimal(word) {
+        return Ok(x);
+    }
     match std::str::from_utf8(word).ok().and_then(|w| w.parse::<f64>().ok()) {
         Some(x) if x.is_finite() => Ok(x),
         _ => Err(format!("line {line}: expected a finite number, found \"{}\"", String::from_utf8_lossy(word))),
@@ -134,6 +220,18 @@ fn texture_coordinates<'a>(mut words: impl Iterator<Item = &'a [u8]>, line: usiz
     Ok(DVec2::new(number(u, line)?, v))
 }
 
+/// The whole number that a word of at most nine digits is; `None` for all others.
+#[inline]
+fn short_whole(word: &[u8]) -> Option<i64> {
+    if word.is_empty() || word.len() > 9 {
+        return None;
+    }
+    word.iter().try_fold(0, |sum, &b| {
+        let digit = b.wrapping_sub(b'0');
+        (digit < 10).then_some(10 * sum + i64::from(digit))
+    })
+}
+
 /// `v`, `v/t`, `v//n` or `v/t/n`; negative numbers count back from the last one read.
 fn corner(word: &[u8], counts: [usize; 3], line: usize) -> Result<Corner, String> {
     let fault = || {
@@ -148,9 +246,50 @@ fn corner(word: &[u8], counts: [usize; 3], line: usize) -> Result<Corner, String
         if part.is_empty() && k > 0 {
             continue;
         }
-        let i: i64 = std::str::from_utf8(part).ok().and_then(|p| p.parse().ok()).ok_or_else(fault)?;
+        let i: i64 = match short_whole(part) {
+            Some(i) => i,
+            None => std::str::from_utf8(part).ok().and_then(|p| p.parse().ok()).ok_or_else(fault)?,
+        };
         let from_one = if i > 0 { Some(i) } else { (counts[k] as i64 + 1).checked_add(i).filter(|&j| i < 0 && j > 0) };
         out[k] = from_one.and_then(|i| u32::try_from(i).ok()).ok_or_else(fault)?;
     }
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The short way gives the nearest f64, as the long way does, or nothing.
+    #[test]
+    fn short_numbers_are_rounded_as_long_ones_are() {
+        let mut state = 7u64;
+        for n in 0..200_000usize {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let digits = (state >> 11).to_string();
+            let (head, tail) = digits.split_at(n % (digits.len() + 1));
+            let word = format!("{}{head}.{}", ["", "-", "+"][n % 3], &tail[..tail.len().min(n % 17)]);
+            match short_decimal(word.as_bytes()) {
+                Some(x) => assert_eq!(x.to_bits(), word.parse::<f64>().unwrap().to_bits(), "{word}"),
+                None => assert!(word.parse::<f64>().is_err() || word.len() > 16, "{word}"),
+            }
+        }
+        for word in ["", "-", ".", "+.", "1e3", "nan", "1.2.3", "12345678901234567890", "0.00000000000000000001"] {
+            let long = word.parse::<f64>().ok();
+            assert!(short_decimal(word.as_bytes()).is_none_or(|x| long == Some(x)), "{word}");
+        }
+        assert_eq!(short_decimal(b"-0").map(f64::to_bits), Some((-0.0f64).to_bits()));
+    }
+
+    #[test]
+    fn lines_end_at_the_first_newline() {
+        for length in 0..40 {
+            for at in 0..length {
+                let mut text = vec![b'x'; length];
+                text[at..].iter_mut().step_by(3).for_each(|b| *b = b'\n');
+                assert_eq!(newline(&text), at);
+            }
+            assert_eq!(newline(&vec![0x8a; length]), length);
+        }
+    }
 }
