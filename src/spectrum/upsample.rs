@@ -9,9 +9,8 @@
 //! Rec.709's rounded white point (0.3127, 0.3290) do.
 //!
 //! Two ways lead to the coefficients. [`reflectance`] solves for them in f64 (about 0.1 ms, exact to
-//! 1e-6). [`coefficients`] is for textures: a guess from a table of 8³ solutions for each largest
-//! channel, then Newton's method on 96 wavelengths at once (about 0.4 µs, exact to 2e-4). The table
-//! of guesses is solved for at first use, in some 40 ms, so no file of numbers has to be trusted.
+//! 1e-6). [`coefficients`] is for textures: a guess from a table of 16³ solutions for each largest
+//! channel, then one or two of Newton's steps on 96 wavelengths at once (about 0.2 µs, exact to 2e-4).
 //! Interpolation alone would need ten times the accuracy that a 1 MB table has: at 32³ the worst
 //! colour is off by 1.3e-2 (narrow blue on white), with Newton's steps 8³ is off by 1e-4.
 //!
