@@ -21,7 +21,7 @@ use crate::transport::layers::{Form, Layer, LayerPlan, Quantity, Source};
 use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
 use frame::{Frame, FrameJob, Progress};
 use report::{Report, SceneReport, Status};
-use std::collections::HashMap;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -222,11 +222,13 @@ fn hash(description: &SceneDescription, files: &[PathBuf]) -> String {
         text = text.replace(&format!("{}/", description.directory.display()), "");
     }
     hasher.update(text.as_bytes());
-    // A file that is named several times counts several times, and is read once.
-    let mut read: HashMap<&Path, Option<Vec<u8>>> = HashMap::new();
+    // A file that is named several times counts once: where else it is named stands in the text.
+    let mut read: HashSet<&Path> = HashSet::new();
     for file in files {
-        if let Some(bytes) = read.entry(file).or_insert_with(|| std::fs::read(file).ok()) {
-            hasher.update(bytes);
+        if read.insert(file)
+            && let Ok(bytes) = std::fs::read(file)
+        {
+            hasher.update(&bytes);
         }
     }
     hasher.finalize().to_hex()[..32].to_owned()
