@@ -154,23 +154,21 @@ impl Camera {
     pub fn ray(&self, pixel: DVec2, lens: impl FnOnce() -> DVec2) -> Ray {
         let view = &self.view;
         let place = pixel - view.middle;
-        if let Some(l) = self.lens {
-            return self.ray_through_lens(l, place, warp::concentric_disk(lens()) * l.radius);
-        }
         let across = view.right * place.x + view.down * place.y;
-        match self.projection {
-            Projection::Perspective { .. } => {
-                let direction = view.axis + across;
-                let origin = view.near + across * self.clip[0];
-                Ray::new(origin, direction.normalize())
+        let (origin, direction) = match (self.lens, self.projection) {
+            (Some(l), _) => self.through_lens(l, place, warp::concentric_disk(lens()) * l.radius),
+            (None, Projection::Perspective { .. }) => {
+                (view.near + across * self.clip[0], (view.axis + across).normalize())
             }
-            Projection::Orthographic { .. } => Ray::new(view.near + across, view.unit_axis),
-        }
+            (None, Projection::Orthographic { .. }) => (view.near + across, view.unit_axis),
+        };
+        Ray::new(origin, direction)
     }
 
-    /// The ray through a point of the picture, in pixels from its middle, and a point of the lens, in metres.
+    /// Origin and direction of the ray through a point of the picture, in pixels from its middle, and a point of the
+    /// lens, in metres.
     #[inline(never)]
-    fn ray_through_lens(&self, lens: Lens, place: DVec2, on_lens: DVec2) -> Ray {
+    fn through_lens(&self, lens: Lens, place: DVec2, on_lens: DVec2) -> (DVec3, DVec3) {
         let (Projection::Perspective { half_width } | Projection::Orthographic { half_width }) = self.projection;
         let plane = DVec2::new(place.x, -place.y) * (2.0 * half_width / f64::from(self.resolution[0]));
         let (mut origin, direction) = match self.projection {
@@ -182,10 +180,8 @@ impl Camera {
         origin += on_lens.extend(0.0);
         let direction = focus - origin;
         origin += direction * (self.clip[0] / direction.z);
-        Ray::new(
-            self.world_from_camera.transform_point3(origin),
-            self.world_from_camera.transform_vector3(direction).normalize(),
-        )
+        let to_world = self.world_from_camera;
+        (to_world.transform_point3(origin), to_world.transform_vector3(direction).normalize())
     }
 
     /// How far along one of the camera's rays it sees, metres.

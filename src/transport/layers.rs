@@ -176,14 +176,14 @@ pub struct Seen {
     pub alpha: f32,
 }
 
-/// The numbers of one sample, in the order of the channels.
+/// The numbers of samples, each in the order of the channels.
 #[derive(Debug, Default)]
 pub struct Values {
     /// The numbers.
     pub numbers: Vec<f32>,
-    /// What is seen of the first surface, in the order of the layers.
+    /// What one sample sees of the first surface, in the order of the layers.
     surface: Vec<f32>,
-    /// Light of the further integrators.
+    /// Its light of the further integrators.
     others: Vec<Seen>,
 }
 
@@ -218,11 +218,11 @@ impl Values {
         }
     }
 
-    /// Fills in the numbers of one sample. `light` gives the light of an integrator, `neighbours` the ray of a sample
+    /// Appends the numbers of one sample. `light` gives the light of an integrator, `neighbours` the ray of a sample
     /// some pixels away.
     #[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
     #[inline]
-    pub fn fill(
+    pub fn append(
         &mut self,
         scene: &Scene,
         plan: &EffectPlan,
@@ -239,7 +239,6 @@ impl Values {
         let Values { numbers, surface, others } = self;
         let mut surface = surface.iter();
         let sensitivity = layers.sensitivity as f32;
-        numbers.clear();
         for layer in &layers.layers {
             let start = numbers.len();
             match layer.source {

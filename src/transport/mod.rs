@@ -16,7 +16,7 @@ use crate::math::Ray;
 use crate::math::sampler::{Octet, Sampler, Set, pairs};
 use crate::scene::Scene;
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use plan::{EffectPlan, Integrator, PathSettings};
 use std::ops::Range;
 
@@ -68,20 +68,32 @@ struct Address {
     index: u32,
 }
 
-/// A camera ray.
+/// A sample on its way.
 struct Begun {
     at: Address,
-    wavelengths: SampledWavelengths,
     /// On the picture, in pixels.
     place: DVec2,
-    weight: f32,
     ray: Ray,
+    sample: PixelSample,
 }
 
 impl Begun {
+    fn blank() -> Begun {
+        let zero = Lanes::ZERO;
+        let wavelengths = SampledWavelengths { nm: zero, inv_pdf: zero };
+        Begun {
+            at: Address { pixel: [0; 2], replicate: 0, index: 0 },
+            place: DVec2::ZERO,
+            ray: Ray::new(DVec3::ZERO, DVec3::Z),
+            sample: PixelSample { radiance: zero, wavelengths, xyz: [0.0; 3], alpha: 0.0, weight: 1.0 },
+        }
+    }
+
+    /// Draws its wavelengths, its place and its ray.
     #[inline]
-    fn new(shot: &Shot, at: Address, sampler: &Sampler) -> Begun {
+    fn begin(&mut self, shot: &Shot, at: Address, sampler: &Sampler) {
         let Shot { scene, plan, filter, .. } = shot;
+        self.at = at;
         // Overscan has negative coordinates, which wrap as addresses.
         let corner = DVec2::new(f64::from(at.pixel[0] as i32), f64::from(at.pixel[1] as i32));
         if let Integrator::Whitted(settings) = &plan.integrator {
@@ -92,23 +104,25 @@ impl Begun {
             let cell = s % (n * n);
             let offset = DVec2::new(f64::from(cell % n) + 0.5, f64::from(cell / n) + 0.5) / f64::from(n);
             let nodes = f64::from(settings.samples()) * LANES as f64;
-            let wavelengths = scene.wavelengths.sample((f64::from(s) + 0.5) / nodes);
-            let place = corner + offset;
-            let ray = scene.camera.ray(place, || DVec2::splat(0.5));
-            return Begun { at, wavelengths, place, weight: 1.0, ray };
+            self.sample.wavelengths = scene.wavelengths.sample((f64::from(s) + 0.5) / nodes);
+            self.place = corner + offset;
+            self.ray = scene.camera.ray(self.place, || DVec2::splat(0.5));
+            self.sample.weight = 1.0;
+            return;
         }
         let (u_pixel, u_time) = pairs(sampler.set(Set::Camera));
-        let wavelengths = scene.wavelengths.sample(u_time.x);
         let chosen = filter.sample(u_pixel);
         let place = corner + DVec2::splat(0.5) + chosen.offset;
-        let ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
-        Begun { at, wavelengths, place, weight: chosen.weight, ray }
+        self.sample.wavelengths = scene.wavelengths.sample(u_time.x);
+        self.sample.weight = chosen.weight;
+        self.place = place;
+        self.ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
     }
 
     /// What `integrator` makes of the ray.
     #[inline]
     fn light(&self, shot: &Shot, sampler: &Sampler, integrator: &Integrator) -> Incoming {
-        let Begun { at, wavelengths, ray, .. } = self;
+        let Begun { at, ray, sample: PixelSample { wavelengths, .. }, .. } = self;
         let Shot { scene, plan, .. } = shot;
         match integrator {
             Integrator::Path(settings) => {
@@ -150,16 +164,37 @@ impl Begun {
         }
     }
 
+    /// Follows the ray with the picture's own integrator.
     #[inline]
-    fn finish(&self, shot: &Shot, light: Incoming) -> PixelSample {
-        let radiance = fogged(shot.scene, shot.plan, light, self.wavelengths.nm);
-        PixelSample {
-            radiance,
-            wavelengths: self.wavelengths,
-            xyz: observer::xyz(radiance, &self.wavelengths),
-            alpha: light.alpha,
-            weight: self.weight,
-        }
+    fn follow(&mut self, shot: &Shot, sampler: &Sampler) {
+        let light = self.light(shot, sampler, &shot.plan.integrator);
+        self.sample.radiance = fogged(shot.scene, shot.plan, light, self.sample.wavelengths.nm);
+        self.sample.alpha = light.alpha;
+    }
+
+    /// What the film needs of the light.
+    #[inline]
+    fn finish(&mut self) {
+        self.sample.xyz = observer::xyz(self.sample.radiance, &self.sample.wavelengths);
+    }
+
+    /// Appends the numbers of the layers of the finished sample.
+    #[inline]
+    fn layers(&self, shot: &Shot, sampler: &Sampler, values: &mut layers::Values) {
+        let Begun { place, ray, sample: PixelSample { radiance, wavelengths, xyz, alpha, .. }, .. } = *self;
+        values.append(
+            shot.scene,
+            shot.plan,
+            &wavelengths,
+            &ray,
+            |step| shot.scene.camera.ray(place + step, || pairs(sampler.set(Set::Lens)).0),
+            layers::Seen { radiance, xyz, alpha },
+            |integrator| {
+                let light = self.light(shot, sampler, integrator);
+                let xyz = observer::xyz(light.radiance, &wavelengths);
+                layers::Seen { radiance: light.radiance, xyz, alpha: light.alpha }
+            },
+        );
     }
 }
 
@@ -176,21 +211,35 @@ pub fn sample(
 ) -> PixelSample {
     let shot = Shot { scene, plan, filter, seed };
     let sampler = Sampler::new(seed, pixel, replicate, index);
-    let begun = Begun::new(&shot, Address { pixel, replicate, index }, &sampler);
-    begun.finish(&shot, begun.light(&shot, &sampler, &plan.integrator))
+    let mut begun = Begun::blank();
+    begun.begin(&shot, Address { pixel, replicate, index }, &sampler);
+    begun.follow(&shot, &sampler);
+    begun.finish();
+    begun.sample
 }
 
 /// The memory of samples that are rendered one after the other.
-#[derive(Default)]
 pub struct Samples {
     octet: Octet,
-    begun: Vec<Begun>,
+    begun: [Begun; Octet::SAMPLES as usize],
     layers: layers::Values,
 }
 
+impl Default for Samples {
+    fn default() -> Samples {
+        Samples {
+            octet: Octet::default(),
+            begun: std::array::from_fn(|_| Begun::blank()),
+            layers: layers::Values::default(),
+        }
+    }
+}
+
 impl Samples {
-    /// Renders the samples `indices` of `replicate` at `pixel`, and gives each with the numbers of its layers. The
-    /// indices over eight are of one whole number.
+    /// Renders the samples `indices` of `replicate` at `pixel`, and gives each with the numbers of its layers.
+    ///
+    /// # Panics
+    /// If the indices are not of one [`Octet`].
     pub fn render(
         &mut self,
         shot: &Shot,
@@ -200,41 +249,26 @@ impl Samples {
         mut give: impl FnMut(&PixelSample, &[f32]),
     ) {
         let Samples { octet, begun, layers } = self;
+        let begun = &mut begun[..indices.len()];
         octet.reset(shot.seed, pixel, replicate, indices.start);
-        // All camera rays first: one need not wait for the other.
-        begun.clear();
-        for index in indices {
-            begun.push(Begun::new(shot, Address { pixel, replicate, index }, &octet.sampler(index)));
+        // Step by step: in all but the second no sample waits for the one before, so that they overlap.
+        for (begun, index) in begun.iter_mut().zip(indices) {
+            begun.begin(shot, Address { pixel, replicate, index }, &octet.sampler(index));
         }
-        for begun in begun {
-            let sampler = octet.sampler(begun.at.index);
-            let light = begun.light(shot, &sampler, &shot.plan.integrator);
-            let sample = begun.finish(shot, light);
-            if !shot.plan.layers.layers.is_empty() {
-                begun.layers(shot, &sampler, &sample, layers);
+        for begun in begun.iter_mut() {
+            begun.follow(shot, &octet.sampler(begun.at.index));
+        }
+        begun.iter_mut().for_each(Begun::finish);
+        layers.numbers.clear();
+        if !shot.plan.layers.layers.is_empty() {
+            for begun in begun.iter() {
+                begun.layers(shot, &octet.sampler(begun.at.index), layers);
             }
-            give(&sample, &layers.numbers);
         }
-    }
-}
-
-impl Begun {
-    /// The numbers of the layers of `sample`, which began here.
-    #[inline]
-    fn layers(&self, shot: &Shot, sampler: &Sampler, sample: &PixelSample, values: &mut layers::Values) {
-        values.fill(
-            shot.scene,
-            shot.plan,
-            &self.wavelengths,
-            &self.ray,
-            |step| shot.scene.camera.ray(self.place + step, || pairs(sampler.set(Set::Lens)).0),
-            layers::Seen { radiance: sample.radiance, xyz: sample.xyz, alpha: sample.alpha },
-            |integrator| {
-                let light = self.light(shot, sampler, integrator);
-                let xyz = observer::xyz(light.radiance, &self.wavelengths);
-                layers::Seen { radiance: light.radiance, xyz, alpha: light.alpha }
-            },
-        );
+        let channels = layers.numbers.len() / begun.len().max(1);
+        for (i, begun) in begun.iter().enumerate() {
+            give(&begun.sample, &layers.numbers[i * channels..(i + 1) * channels]);
+        }
     }
 }
 
