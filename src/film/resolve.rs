@@ -14,6 +14,7 @@
 use crate::film::Window;
 use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES};
 use crate::math::statistics::{Moments, student_t_half_width};
+use rayon::prelude::*;
 use std::fmt;
 
 /// Light that was splatted from photons: sums that are divided by the photons emitted, not by the
@@ -82,7 +83,7 @@ impl fmt::Display for NoEstimate {
     }
 }
 
-/// The picture that `film` holds, in the colour space of `rgb_from_xyz`, with `splats` added.
+/// The picture that `film` holds, in the colour space of `rgb_from_xyz`, with `splats` added; on the current rayon pool.
 ///
 /// # Panics
 /// If the windows of film and splats differ.
@@ -92,34 +93,47 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
     if let Some(splats) = &splats {
         assert_eq!(splats.film.window(), film.window(), "splats cover the window of the film");
     }
-    let plane = || Vec::with_capacity(pixels);
-    let mut image = Image {
+    let resolved: Vec<Resolved> = (0..pixels)
+        .into_par_iter()
+        .with_min_len(1024)
+        .map(|index| {
+            let cells = &film.cells()[index];
+            let counts = cells.map(|cell| u64::from(cell.count));
+            let mut pixel = mean_of(cells, counts, rgb_from_xyz);
+            if let Some(splats) = &splats {
+                // Two independent estimates of two parts of the light: means and variances add.
+                let light = mean_of(&splats.film.cells()[index], splats.photons, rgb_from_xyz);
+                for c in 0..3 {
+                    pixel.rgb[c] += light.rgb[c];
+                    pixel.variance[c] += light.variance[c];
+                }
+            }
+            let samples: u64 = counts.iter().sum();
+            let alpha: f64 = cells.iter().map(Cell::alpha_sum).sum();
+            Resolved {
+                rgb: pixel.rgb.map(|x| x as f32),
+                standard_error: pixel.variance.map(|v| v.sqrt() as f32),
+                alpha: if samples == 0 { 0.0 } else { (alpha / samples as f64) as f32 },
+            }
+        })
+        .collect();
+    let planes = |of: fn(&Resolved) -> [f32; 3]| {
+        [0, 1, 2].map(|c| resolved.iter().map(|pixel| of(pixel)[c]).collect::<Vec<f32>>())
+    };
+    Image {
         frame: film.frame(),
         window: film.window(),
-        rgb: [plane(), plane(), plane()],
-        alpha: plane(),
-        standard_error: [plane(), plane(), plane()],
-    };
-    for (index, cells) in film.cells().iter().enumerate() {
-        let counts = cells.map(|cell| u64::from(cell.count));
-        let mut pixel = mean_of(cells, counts, rgb_from_xyz);
-        if let Some(splats) = &splats {
-            // Two independent estimates of two parts of the light: means and variances add.
-            let light = mean_of(&splats.film.cells()[index], splats.photons, rgb_from_xyz);
-            for c in 0..3 {
-                pixel.rgb[c] += light.rgb[c];
-                pixel.variance[c] += light.variance[c];
-            }
-        }
-        for c in 0..3 {
-            image.rgb[c].push(pixel.rgb[c] as f32);
-            image.standard_error[c].push(pixel.variance[c].sqrt() as f32);
-        }
-        let samples: u64 = counts.iter().sum();
-        let alpha: f64 = cells.iter().map(Cell::alpha_sum).sum();
-        image.alpha.push(if samples == 0 { 0.0 } else { (alpha / samples as f64) as f32 });
+        rgb: planes(|pixel| pixel.rgb),
+        alpha: resolved.iter().map(|pixel| pixel.alpha).collect(),
+        standard_error: planes(|pixel| pixel.standard_error),
     }
-    image
+}
+
+/// A pixel of an [`Image`].
+struct Resolved {
+    rgb: [f32; 3],
+    standard_error: [f32; 3],
+    alpha: f32,
 }
 
 struct PixelMean {
