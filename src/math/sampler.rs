@@ -10,6 +10,7 @@
 
 use glam::DVec2;
 use std::cell::Cell;
+use std::ops::Range;
 
 /// What a set of four numbers is for. A path asks for [`Set::Camera`] and [`Set::Lens`] once and
 /// for the others once a vertex.
@@ -89,6 +90,8 @@ pub struct Octet {
     stream: u32,
     /// Index of the first sample, a multiple of eight.
     first: u32,
+    /// Whether so few samples are wanted that each makes its own numbers.
+    few: bool,
     /// One bit a set: whether it is made.
     made: Cell<u32>,
     /// The four numbers of each sample in units of 2⁻³², set by set.
@@ -97,7 +100,7 @@ pub struct Octet {
 
 impl Default for Octet {
     fn default() -> Octet {
-        Octet { stream: 0, first: 0, made: Cell::new(0), sets: [const { Cell::new([[0; 4]; 8]) }; 17] }
+        Octet { stream: 0, first: 0, few: true, made: Cell::new(0), sets: [const { Cell::new([[0; 4]; 8]) }; 17] }
     }
 }
 
@@ -105,10 +108,12 @@ impl Octet {
     /// How many samples share their sets.
     pub const SAMPLES: u32 = 8;
 
-    /// Moves to the samples around `index` of `replicate` at `pixel`, for a render with `seed`.
-    pub fn reset(&mut self, seed: u64, pixel: [u32; 2], replicate: u32, index: u32) {
+    /// Moves to the samples around the first of `indices` of `replicate` at `pixel`, for a render with `seed`.
+    pub fn reset(&mut self, seed: u64, pixel: [u32; 2], replicate: u32, indices: &Range<u32>) {
         self.stream = stream(seed, pixel, replicate);
-        self.first = index - index % Octet::SAMPLES;
+        self.first = indices.start - indices.start % Octet::SAMPLES;
+        // Eight side by side take as long as two or three.
+        self.few = indices.len() <= 2;
         self.made.set(0);
     }
 
@@ -119,7 +124,7 @@ impl Octet {
     #[must_use]
     pub fn sampler(&self, index: u32) -> Sampler<'_> {
         assert_eq!(index - index % Octet::SAMPLES, self.first, "one of the eight samples");
-        Sampler { stream: self.stream, index, octet: Some(self) }
+        Sampler { stream: self.stream, index, octet: (!self.few).then_some(self) }
     }
 
     #[inline]
@@ -403,7 +408,7 @@ mod tests {
     fn numbers_do_not_depend_on_the_neighbours() {
         let mut octet = Octet::default();
         for (pixel, replicate, first) in [([3, u32::MAX], 1, 8), ([3, 4], 0, 0), ([3, 4], 3, 0xffff_fff8)] {
-            octet.reset(9, pixel, replicate, first + 5);
+            octet.reset(9, pixel, replicate, &(first..first.saturating_add(7)));
             for set in (0..8).flat_map(|v| [Set::Camera, Set::Lens, Set::Scatter(v), Set::Choice(v), Set::Extra(v)]) {
                 for index in [2, 0, 7].map(|i| first + i) {
                     let alone = Sampler::new(9, pixel, replicate, index);

@@ -116,7 +116,9 @@ impl Begun {
         self.sample.wavelengths = scene.wavelengths.sample(u_time.x);
         self.sample.weight = chosen.weight;
         self.place = place;
-        self.ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
+        // Rays of the camera leave no surface, and never did here: two vectors are stored, no enum is copied.
+        let ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
+        (self.ray.origin, self.ray.direction) = (ray.origin, ray.direction);
     }
 
     /// What `integrator` makes of the ray.
@@ -250,7 +252,7 @@ impl Samples {
     ) {
         let Samples { octet, begun, layers } = self;
         let begun = &mut begun[..indices.len()];
-        octet.reset(shot.seed, pixel, replicate, indices.start);
+        octet.reset(shot.seed, pixel, replicate, &indices);
         // Step by step: in all but the second no sample waits for the one before, so that they overlap.
         for (begun, index) in begun.iter_mut().zip(indices) {
             begun.begin(shot, Address { pixel, replicate, index }, &octet.sampler(index));
