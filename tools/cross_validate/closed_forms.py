@@ -62,7 +62,8 @@ class Case:
 
 
 def cases() -> list[Case]:
-    convex = "a convex grey body under a sky of one: every point gets the whole hemisphere, ρ · 1"
+    # Every point of a convex body gets the whole hemisphere of an even sky of one.
+    convex = "a convex body in an even sky, ρ"
     found = []
     for r in (1e-2, 1e-3, 1e-4):
         # A lamp of radius r straight above at distance 1 + r, its surface at 1: E = π L (r / d)², and L is chosen such
