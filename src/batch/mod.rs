@@ -152,7 +152,7 @@ fn layer_plan(description: &SceneDescription, scene: &Scene, samples: u32) -> Re
         ..LayerPlan::default()
     };
     for (i, band) in scene.bands.iter().enumerate() {
-        plan.layers.push(Layer { name: band.name.clone(), source: Source::Band(i), squares: false });
+        plan.layers.push(Layer { name: band.name.clone(), source: Source::Band(i), squares: None });
     }
     for layer in &description.layers {
         let source = match &layer.content {
@@ -172,7 +172,7 @@ fn layer_plan(description: &SceneDescription, scene: &Scene, samples: u32) -> Re
                 Source::Light(of, form)
             }
         };
-        plan.layers.push(Layer { name: layer.name.clone(), source, squares: layer.squares });
+        plan.layers.push(Layer { name: layer.name.clone(), source, squares: layer.squares.clone() });
     }
     Ok(plan)
 }

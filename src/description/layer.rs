@@ -16,9 +16,8 @@ pub struct Layer {
     pub name: String,
     /// What it holds.
     pub content: LayerContent,
-    /// Whether the squares of its numbers are written too, in a layer of the name with `m2_` before it; default
-    /// false.
-    pub squares: bool,
+    /// The layer in which the squares of its numbers are written too; default none.
+    pub squares: Option<String>,
 }
 
 /// What a layer holds.
@@ -85,13 +84,14 @@ struct WrittenLayer {
     form: Option<LightForm>,
     #[serde(default)]
     squares: bool,
+    squares_name: Option<String>,
 }
 
 impl TryFrom<WrittenLayer> for Layer {
     type Error = String;
 
     fn try_from(written: WrittenLayer) -> Result<Layer, String> {
-        let WrittenLayer { name, surface, light, form, squares } = written;
+        let WrittenLayer { name, surface, light, form, squares, squares_name } = written;
         let content = match (surface, light, form) {
             (Some(quantity), None, None) => LayerContent::Surface(quantity),
             (None, of, form) => LayerContent::Light { of, form: form.unwrap_or_default() },
@@ -100,6 +100,7 @@ impl TryFrom<WrittenLayer> for Layer {
                 return Err(format!("expected either surface, or light and form, found {}", given_fields(&given)));
             }
         };
+        let squares = squares.then(|| squares_name.unwrap_or_else(|| format!("m2_{name}")));
         Ok(Layer { name, content, squares })
     }
 }
@@ -109,8 +110,8 @@ impl Layer {
         check_channel(&self.name, taken, at.key("name"), checker);
         if let LayerContent::Light { of: Some(integrator), .. } = &self.content {
             let at = at.key("light");
-            let by_camera = matches!(integrator, Integrator::Path(_) | Integrator::Depth(_));
-            checker.require(by_camera, at, "path or depth", "another integrator");
+            let by_camera = matches!(integrator, Integrator::Path(_) | Integrator::Depth(_) | Integrator::None(_));
+            checker.require(by_camera, at, "path, depth or none", "another integrator");
             integrator.check(at, checker);
         }
     }
@@ -137,7 +138,7 @@ mod tests {
         assert_eq!(
             faults("layers:\n- {name: a, surface: depth}\n- {name: a, light: whitted}\n"),
             "dir/s.yaml:4:10: layers[1].name: expected a name of its own, found \"a\" again\n\
-             dir/s.yaml:4:20: layers[1].light: expected path or depth, found another integrator"
+             dir/s.yaml:4:20: layers[1].light: expected path, depth or none, found another integrator"
         );
     }
 }

@@ -56,8 +56,8 @@
 //!                                   # geometric_normal, shading_normal, dp_du, dp_dv (X, Y, Z), duv_dx, duv_dy (U, V),
 //!                                   # albedo (R, G, B), primitive, shape (I)
 //! - {name: direct, light: {path: {max_depth: 2}}, form: rgba, squares: false}
-//!                                   # light: ~ of the picture, path or depth; ~ form rgba, xyz; ~ squares: the mean
-//!                                   # of squares as m2_direct.R, …
+//!                                   # light: ~ of the picture, path, depth, none; ~ form rgba, xyz; ~ squares: the mean
+//!                                   # of squares as m2_direct.R, …, or under squares_name
 //! render:                           # these are the defaults
 //!   samples: 64                     # paths per pixel
 //!   seed: 0

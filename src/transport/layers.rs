@@ -88,8 +88,8 @@ pub struct Layer {
     pub name: String,
     /// Its numbers.
     pub source: Source,
-    /// Whether the squares of the numbers are channels too, in a layer called `m2_` and the name.
-    pub squares: bool,
+    /// The layer in which the squares of the numbers are channels too, if any.
+    pub squares: Option<String>,
 }
 
 /// All further channels of a picture.
@@ -140,10 +140,9 @@ impl LayerPlan {
     pub fn channels(&self) -> Vec<Channel> {
         let mut all = Vec::new();
         for layer in &self.layers {
-            let squares: &[&str] = if layer.squares { &["", "m2_"] } else { &[""] };
-            for prefix in squares {
-                let name = format!("{prefix}{}", layer.name);
-                let light = prefix.is_empty();
+            for (name, light) in
+                [Some((&layer.name, true)), layer.squares.as_ref().map(|name| (name, false))].into_iter().flatten()
+            {
                 match layer.source {
                     Source::Surface(quantity) => {
                         let names = quantity.components().iter().map(|c| format!("{name}.{c}"));
@@ -157,7 +156,7 @@ impl LayerPlan {
                         };
                         all.extend(components.iter().map(|c| Channel { name: format!("{name}.{c}"), light }));
                     }
-                    Source::Band(_) => all.push(Channel { name, light }),
+                    Source::Band(_) => all.push(Channel { name: name.clone(), light }),
                 }
             }
         }
@@ -259,7 +258,7 @@ impl Values {
                     numbers.push(counted.reduce_add() / LANES as f32);
                 }
             }
-            if layer.squares {
+            if layer.squares.is_some() {
                 for i in start..numbers.len() {
                     numbers.push(numbers[i] * numbers[i]);
                 }

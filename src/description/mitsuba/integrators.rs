@@ -34,7 +34,8 @@ struct Layer {
     place: Place,
     name: String,
     content: Content,
-    squares: bool,
+    /// The name of the layer of squares.
+    squares: Option<String>,
 }
 
 enum Content {
@@ -138,7 +139,7 @@ impl Import<'_> {
                 let message = format!("expected name:type with a type among {}, found {token:?}", known.join(", "));
                 return Err(bag.fault_of("aovs", message));
             };
-            layers.push(Layer { place, name: name.to_owned(), content: Content::Surface(quantity), squares: false });
+            layers.push(Layer { place, name: name.to_owned(), content: Content::Surface(quantity), squares: None });
         }
         bag.finish()?;
         let none = || Fields::new(bag.object.place).kind("none");
@@ -151,14 +152,14 @@ impl Import<'_> {
         let mut layers = Vec::new();
         let mut picture = None;
         for (name, place, Translated { integrator, layers: inner }) in nested {
-            if inner.iter().any(|layer| layer.squares) {
+            if inner.iter().any(|layer| layer.squares.is_some()) {
                 return Err(bag.fault("expected integrators without moments inside, found moments of moments"));
             }
             layers.extend(inner.into_iter().map(|layer| layer.within(&name)));
             layers.push(Layer::light(place, name, integrator.clone(), "xyz"));
             picture.get_or_insert(integrator);
         }
-        layers.iter_mut().for_each(|layer| layer.squares = true);
+        layers.iter_mut().for_each(|layer| layer.squares = Some(format!("m2_{}", layer.name)));
         bag.finish()?;
         let integrator = picture.ok_or_else(|| bag.fault("expected an <integrator> inside, found none"))?;
         Ok(Translated { integrator, layers })
@@ -167,11 +168,12 @@ impl Import<'_> {
 
 impl Layer {
     fn light(place: Place, name: String, of: Node, form: &'static str) -> Layer {
-        Layer { place, name, content: Content::Light { of, form }, squares: false }
+        Layer { place, name, content: Content::Light { of, form }, squares: None }
     }
 
     fn within(self, outer: &str) -> Layer {
-        Layer { name: format!("{outer}.{}", self.name), ..self }
+        let within = |name: String| format!("{outer}.{name}");
+        Layer { name: within(self.name), squares: self.squares.map(within), ..self }
     }
 
     fn node(self) -> Node {
@@ -184,7 +186,10 @@ impl Layer {
                 fields.add("form", text(self.place, form));
             }
         }
-        fields.add("squares", boolean(self.place, self.squares));
+        if let Some(name) = self.squares {
+            fields.add("squares", boolean(self.place, true));
+            fields.add("squares_name", text(self.place, name));
+        }
         fields.map()
     }
 }
@@ -267,7 +272,7 @@ mod tests {
         });
         assert_eq!(scene.integrator, direct);
         let [layer] = &scene.layers[..] else { panic!("one layer") };
-        assert_eq!((layer.name.as_str(), layer.squares), ("_arg_0", true));
+        assert_eq!((layer.name.as_str(), layer.squares.as_deref()), ("_arg_0", Some("m2__arg_0")));
         assert_eq!(layer.content, LayerContent::Light { of: Some(direct), form: LightForm::Xyz });
     }
 
@@ -283,6 +288,21 @@ mod tests {
         assert_eq!(scene.layers[3].content, LayerContent::Surface(Quantity::ShadingNormal));
         let alone = good("<integrator type=\"aov\"><string name=\"aovs\" value=\"a:uv\"/></integrator>");
         assert!(matches!(alone.integrator, Integrator::None(_)));
+    }
+
+    /// Mitsuba 3.9.1 calls these channels m.p.X, m.m2_p.X and a.d.T, m2_a.d.T, a.X, m2_a.X.
+    #[test]
+    fn squares_are_named_where_the_moments_are_taken() {
+        let squares = |text: &str| -> Vec<(String, Option<String>)> {
+            good(text).layers.into_iter().map(|layer| (layer.name, layer.squares)).collect()
+        };
+        let named = |name: &str, squares: Option<&str>| (name.to_owned(), squares.map(str::to_owned));
+        let within = "<integrator type=\"aov\"><string name=\"aovs\" value=\"d:depth\"/>\
+                      <integrator type=\"moment\" name=\"m\"><integrator type=\"path\" name=\"p\"/></integrator></integrator>";
+        assert_eq!(squares(within), [named("m", None), named("m.p", Some("m.m2_p")), named("d", None)]);
+        let around = "<integrator type=\"moment\"><integrator type=\"aov\" name=\"a\">\
+                      <string name=\"aovs\" value=\"d:depth\"/></integrator></integrator>";
+        assert_eq!(squares(around), [named("a.d", Some("m2_a.d")), named("a", Some("m2_a"))]);
     }
 
     #[test]
