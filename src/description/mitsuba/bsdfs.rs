@@ -94,6 +94,9 @@ impl Import<'_> {
             }
             "conductor" | "roughconductor" => {
                 let metal = bag.text("material")?.unwrap_or("none");
+                if metal != "none" && (bag.has("eta") || bag.has("k")) {
+                    return Err(bag.fault_of("material", "expected either material, or eta and k, found both"));
+                }
                 if bag.has("eta") || bag.has("k") || metal == "none" {
                     let (eta, k) =
                         (self.spectrum(&bag, "eta", Role::Coefficient)?, self.spectrum(&bag, "k", Role::Coefficient)?);

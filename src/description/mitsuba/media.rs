@@ -26,7 +26,7 @@ impl Import<'_> {
         let mut fields = Fields::new(place);
         let kind = match bag.object.plugin.as_str() {
             "homogeneous" => {
-                let extinction = self.spectrum(&bag, "sigma_t", Role::Coefficient)?;
+                let extinction = self.even_volume(&bag, "sigma_t")?;
                 fields.add("extinction", extinction.unwrap_or_else(|| number(place, 1.0)));
                 "homogeneous"
             }
@@ -120,5 +120,28 @@ impl Import<'_> {
         let parts = [self.phase(first)?, self.phase(second)?];
         fields.add("of", list(bag.object.place, parts));
         Ok(fields.kind("blend"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{Coefficients, Medium, Spectrum};
+    use super::super::tests::{fault, good};
+
+    /// A volume that is the same everywhere is a spectrum, wherever it is; one that varies is no even extinction.
+    #[test]
+    fn an_even_extinction_may_stand_in_a_volume() {
+        let medium =
+            |volume: &str| format!("<medium type=\"homogeneous\" id=\"m\"><volume type=\"{volume}\" name=\"sigma_t\">");
+        let text = medium("constvolume")
+            + "<float name=\"value\" value=\"0.3\"/><transform name=\"to_world\"><scale value=\"2\"/></transform>\
+               </volume></medium>";
+        let scene = good(&text);
+        let Medium::Homogeneous(m) = &scene.media["m"] else { panic!("homogeneous") };
+        let Coefficients::Sum { extinction, .. } = &m.coefficients else { panic!("a sum") };
+        assert_eq!(*extinction, Spectrum::Number(0.3));
+        assert!(scene.volumes.is_empty());
+        let varies = medium("gridvolume") + "<string name=\"filename\" value=\"a.vol\"/></volume></medium>";
+        assert!(fault(&varies, &[]).contains("sigma_t: expected a spectrum, a colour or a float"));
     }
 }

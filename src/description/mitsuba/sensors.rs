@@ -36,16 +36,18 @@ impl Import<'_> {
         clip.add("far", number(bag.place("far_clip"), far));
         camera.add("clip", clip.map());
         let focus_distance = bag.float("focus_distance")?;
+        if plugin == "perspective" {
+            let offset = [bag.float("principal_point_offset_x")?, bag.float("principal_point_offset_y")?];
+            // Theirs says where the middle of the picture looks, ours where the axis falls on it.
+            let offset = offset.map(|x| -x.unwrap_or(0.0));
+            camera.add("principal_point", numbers(bag.place("principal_point_offset_x"), &offset));
+        }
         match plugin {
             "orthographic" => camera.add("orthographic_height", self.orthographic_height(&bag)?),
             _ => {
                 let (fov_deg, axis) = field_of_view(&bag)?;
                 camera.add("fov_deg", number(bag.place("fov"), fov_deg));
                 camera.add("fov_axis", text(bag.place("fov_axis"), axis));
-                let offset = [bag.float("principal_point_offset_x")?, bag.float("principal_point_offset_y")?];
-                // Theirs says where the middle of the picture looks, ours where the axis falls on it.
-                let offset = offset.map(|x| -x.unwrap_or(0.0));
-                camera.add("principal_point", numbers(bag.place("principal_point_offset_x"), &offset));
             }
         }
         if plugin == "thinlens" {

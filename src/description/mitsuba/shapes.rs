@@ -94,6 +94,7 @@ impl Import<'_> {
                 "disk"
             }
             "rectangle" => {
+                bag.boolean("face_normals")?;
                 fields.add("corner", numbers(place, &[-1.0, -1.0, 0.0]));
                 fields.add("edge_u", numbers(place, &[2.0, 0.0, 0.0]));
                 fields.add("edge_v", numbers(place, &[0.0, 2.0, 0.0]));
@@ -101,6 +102,8 @@ impl Import<'_> {
                 "rectangle"
             }
             "cube" => {
+                // They are flat either way.
+                bag.boolean("face_normals")?;
                 fields.add("size", number(place, 2.0));
                 fields.add("layout", text(place, "z_up"));
                 "cube"
@@ -132,7 +135,9 @@ impl Import<'_> {
             }
             _ => return Err(bag.unknown(SHAPES)),
         };
-        if bag.boolean("flip_normals")?.unwrap_or(false) != turned {
+        // Distances and curves have no side to turn: Mitsuba refuses it, and so it is left unread.
+        let has_sides = !["sdfgrid", "linearcurve", "bsplinecurve"].contains(&bag.object.plugin.as_str());
+        if (has_sides && bag.boolean("flip_normals")?.unwrap_or(false)) != turned {
             fields.add("flip_normals", boolean(bag.place("flip_normals"), true));
         }
         Ok(kind)

@@ -150,6 +150,7 @@ impl Import<'_> {
         let bag = self.bag(index);
         let place = bag.object.place;
         let node = match bag.object.plugin.as_str() {
+            "rawconstant" => number(place, bag.required("value", bag.float("value"))?),
             "uniform" => {
                 let value = bag.float("value")?.unwrap_or(1.0);
                 // The range is read and, as in Mitsuba, does not cut the spectrum.
@@ -269,7 +270,7 @@ pub(crate) struct Index {
 }
 
 /// Plugins that are a spectrum, the same everywhere.
-const SPECTRA: [&str; 6] = ["uniform", "d65", "srgb", "regular", "irregular", "blackbody"];
+const SPECTRA: [&str; 7] = ["uniform", "rawconstant", "d65", "srgb", "regular", "irregular", "blackbody"];
 
 /// The numbers of a string such as `"1, 2, 3"`.
 fn floats(bag: &Bag<'_>, name: &'static str) -> Result<Vec<f64>, Fault> {

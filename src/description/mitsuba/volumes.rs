@@ -51,6 +51,21 @@ impl Import<'_> {
         }
     }
 
+    /// A spectrum, which may stand in a volume that is the same everywhere.
+    pub(crate) fn even_volume(&mut self, bag: &Bag<'_>, name: &'static str) -> Result<Option<Node>, Fault> {
+        match bag.value(name) {
+            Some(Value::Object(index)) if bag.document.objects[*index].plugin == "constvolume" => {
+                let volume = self.bag(*index);
+                let value = self.spectrum(&volume, "value", Role::Coefficient)?;
+                // Wherever it is.
+                volume.transform("to_world")?;
+                volume.finish()?;
+                Ok(Some(value.unwrap_or_else(|| number(volume.object.place, 1.0))))
+            }
+            _ => self.spectrum(bag, name, Role::Coefficient),
+        }
+    }
+
     /// The volume of a property: what is the same everywhere fills the unit cube, as it does for Mitsuba.
     pub(crate) fn volume_of(&mut self, bag: &Bag<'_>, name: &'static str, default: f64) -> Result<Node, Fault> {
         let place = bag.place(name);

@@ -312,9 +312,13 @@ impl<'a> Export<'a> {
             };
             self.xml.value("float", "fov", fov_deg);
             self.xml.value("string", "fov_axis", axis);
-            if *principal_point != [0.0; 2] {
-                self.xml.value("float", "principal_point_offset_x", principal_point[0]);
-                self.xml.value("float", "principal_point_offset_y", principal_point[1]);
+            if *principal_point != [0.0; 2] && lens.is_none() {
+                // Theirs says where the middle of the picture looks, ours where the axis falls on it.
+                self.xml.value("float", "principal_point_offset_x", -principal_point[0]);
+                self.xml.value("float", "principal_point_offset_y", -principal_point[1]);
+            } else if *principal_point != [0.0; 2] {
+                self.lose("camera.principal_point", "the middle of the picture: Mitsuba's lens has no other");
+                self.xml.instruction(&format!("set camera.principal_point: {principal_point:?}"));
             }
         }
         if *clip == Clip::default() {
