@@ -159,7 +159,7 @@ mod tests {
         };
         let made =
             mesh::Mesh::new(&source, &DAffine3::IDENTITY, mesh::NormalMode::Face, mesh::Winding::Object).unwrap();
-        let (tree, areas) = (mesh::MeshTree::build(&made), mesh::AreaTable::new(&made));
+        let (tree, areas) = (Some(mesh::MeshTree::build(&made)), mesh::AreaTable::new(&made));
         let geometry = Geometry::Mesh(Box::new(TriangleMesh { mesh: made, tree, areas }));
         for from in [DVec3::new(0.2, 0.4, 1.0), DVec3::new(-0.2, 0.4, 2.0)] {
             let at = |i: u32| light(&geometry, from, DVec2::new((f64::from(i) + 0.5) / 64.0, 0.5));

@@ -18,6 +18,8 @@ use super::instance::{AffineMap, Group, Instance};
 use super::light::Light;
 use super::load::{self, Pictures, Wanted};
 use super::material::{Kind, Material};
+use super::mesh::MeshTree;
+use super::mesh::together::Together;
 use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Layout, Plane, Rectangle, Shape, Sphere};
 use super::texture::{Scalar, Texture};
 use super::volume::Volume;
@@ -212,7 +214,10 @@ impl<'a> Compiler<'a> {
         }
 
         let boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
-        let bvh = Bvh::build(&boxes);
+        let together = Together::take(&mut objects, &boxes);
+        let alone: Vec<u32> =
+            (0..objects.len() as u32).filter(|&i| !together.as_ref().is_some_and(|t| t.holds(i))).collect();
+        let bvh = Bvh::build(&alone.iter().map(|&i| boxes[i as usize]).collect::<Vec<Aabb>>()).named(&alone);
         objects.extend(children);
         let (center, radius) = extent(&boxes, &camera);
         let light_cdf = lights::light_cdf(&lights, &weights, &objects, radius);
@@ -242,6 +247,7 @@ impl<'a> Compiler<'a> {
             camera,
             objects,
             bvh,
+            together,
             materials: std::mem::take(&mut self.materials),
             media,
             camera_medium,
@@ -637,7 +643,7 @@ impl Object {
                 Some((min, max)) => Aabb { min, max },
                 None => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
             },
-            Geometry::Mesh(mesh) => mesh.tree.bounds(),
+            Geometry::Mesh(mesh) => mesh.tree.as_ref().map_or_else(|| mesh.mesh.bounds(), MeshTree::bounds),
             Geometry::Sdf(sdf) => sdf.bounds(),
             Geometry::Curves(curves) => curves.bounds(),
             Geometry::Instance(instance) => instance.bounds(),

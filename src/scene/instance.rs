@@ -154,7 +154,7 @@ impl Geometry {
                 part: u32::from(h.face),
                 barycentric: [0.0; 2],
             }),
-            Geometry::Mesh(mesh) => mesh.tree.closest(ray, t_max, departing).map(|h| PartHit {
+            Geometry::Mesh(mesh) => mesh.tree.as_ref()?.closest(ray, t_max, departing).map(|h| PartHit {
                 t: h.hit.t,
                 part: h.triangle,
                 barycentric: [h.hit.b1, h.hit.b2],
@@ -178,7 +178,7 @@ impl Geometry {
             Geometry::Shape(shape) => {
                 target.is_none() && shape.intersect(ray, distance, departing.map(|face| face as u8)).is_some()
             }
-            Geometry::Mesh(mesh) => mesh.tree.any(ray, distance, [departing, target]),
+            Geometry::Mesh(mesh) => mesh.tree.as_ref().is_some_and(|tree| tree.any(ray, distance, [departing, target])),
             Geometry::Sdf(sdf) => sdf.intersect(ray, distance, departing).is_some(),
             Geometry::Curves(curves) => curves.any(ray, distance),
             Geometry::Instance(_) => false,

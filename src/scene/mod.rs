@@ -39,6 +39,7 @@ use instance::{AffineMap, Instance, PartHit};
 use light::Light;
 use material::Material;
 pub use medium::Medium;
+use mesh::together::Together;
 use mesh::{AreaTable, Mesh, MeshTree};
 use sdf::SdfGrid;
 use shape::Detail;
@@ -57,8 +58,10 @@ pub struct Scene {
     /// What was written: first what stands in the scene itself, then the children of groups, which are
     /// seen through instances.
     pub objects: Vec<Object>,
-    /// Over the objects that stand in the scene itself.
+    /// Over the objects that stand in the scene itself, but for the meshes of [`Scene::together`].
     pub bvh: Bvh,
+    /// The triangles of most meshes that stand in the scene itself: a ray is made ready for them once.
+    pub together: Option<Together>,
     /// Materials, by index.
     pub materials: Vec<Material>,
     /// Media, by index.
@@ -162,8 +165,8 @@ impl Geometry {
 pub struct TriangleMesh {
     /// The triangles.
     pub mesh: Mesh,
-    /// For rays.
-    pub tree: MeshTree,
+    /// For rays; none where the triangles are in [`Scene::together`].
+    pub tree: Option<MeshTree>,
     /// For light.
     pub areas: AreaTable,
 }
@@ -271,6 +274,10 @@ impl Scene {
             best = Some(hit);
             Some(hit.t)
         });
+        if let Some(together) = &self.together {
+            let t_max = best.map_or(t_max, |hit| hit.t);
+            best = together.closest(ray, t_max).or(best);
+        }
         best
     }
 
@@ -280,7 +287,8 @@ impl Scene {
     /// everything is hidden by the wall through which the ray would enter.
     #[must_use]
     pub fn occluded(&self, ray: &Ray, distance: f64, target: Option<Departure>) -> bool {
-        self.bvh.any(ray, distance, |object| {
+        let by_triangles = || self.together.as_ref().is_some_and(|t| t.any(ray, distance, target, |_| true));
+        let by_others = self.bvh.any(ray, distance, |object| {
             let geometry = &self.objects[object as usize].geometry;
             if let Geometry::Instance(instance) = geometry {
                 return instance.blocks(&self.objects, object, ray, distance);
@@ -294,7 +302,8 @@ impl Scene {
                 }
                 _ => geometry.blocks(ray, distance, departing, target),
             }
-        })
+        });
+        by_others || by_triangles()
     }
 
     /// True where `hit` is what a shadow ray toward `target` was to reach: on it, and not on the outside of a

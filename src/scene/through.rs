@@ -60,42 +60,53 @@ impl Scene {
         let mut crossed = Crossed { hits: [NOTHING; MOST], count: 0 };
         let mut long = false;
         let lets_through = |object: u32| self.materials[self.objects[object as usize].material as usize].lets_through();
-        let stopped = self.bvh.any(ray, distance, |object| {
-            let geometry = &self.objects[object as usize].geometry;
-            let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
-            let aimed = target.filter(|t| t.object == object).map(|t| t.part);
-            match geometry {
-                Geometry::Instance(_) => {}
-                _ if !lets_through(object) => return geometry.blocks(ray, distance, departing, aimed),
-                Geometry::Mesh(mesh) => {
-                    return mesh.tree.any_of(ray, distance, [departing, aimed], |met| {
-                        let barycentric = [met.hit.b1, met.hit.b2];
-                        let hit = Hit { t: met.hit.t, object, part: met.triangle, barycentric, instance: None };
-                        long = !crossed.push(hit);
-                        long
-                    });
-                }
-                _ => {}
-            }
-            // From one surface of it to the next.
-            let (mut ray, mut gone) = (*ray, 0.0);
-            while let Some(hit) = self.meet(&ray, object, distance - gone) {
-                if hit.is_on(target) {
-                    break;
-                }
+        let by_triangles = self.together.as_ref().is_some_and(|together| {
+            together.any(ray, distance, target, |hit| {
                 if !lets_through(hit.object) {
                     return true;
                 }
-                let surface = self.surface_with(&ray, &hit, Detail::Geometry);
-                ray = self.leave(&surface, &hit, ray.direction);
-                gone += hit.t;
-                long = !crossed.push(Hit { t: gone, ..hit });
-                if long {
-                    return true;
-                }
-            }
-            false
+                long = !crossed.push(hit);
+                long
+            })
         });
+        let stopped = by_triangles
+            || self.bvh.any(ray, distance, |object| {
+                let geometry = &self.objects[object as usize].geometry;
+                let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
+                let aimed = target.filter(|t| t.object == object).map(|t| t.part);
+                match geometry {
+                    Geometry::Instance(_) => {}
+                    _ if !lets_through(object) => return geometry.blocks(ray, distance, departing, aimed),
+                    Geometry::Mesh(mesh) => {
+                        let Some(tree) = &mesh.tree else { return false };
+                        return tree.any_of(ray, distance, [departing, aimed], |met| {
+                            let barycentric = [met.hit.b1, met.hit.b2];
+                            let hit = Hit { t: met.hit.t, object, part: met.triangle, barycentric, instance: None };
+                            long = !crossed.push(hit);
+                            long
+                        });
+                    }
+                    _ => {}
+                }
+                // From one surface of it to the next.
+                let (mut ray, mut gone) = (*ray, 0.0);
+                while let Some(hit) = self.meet(&ray, object, distance - gone) {
+                    if hit.is_on(target) {
+                        break;
+                    }
+                    if !lets_through(hit.object) {
+                        return true;
+                    }
+                    let surface = self.surface_with(&ray, &hit, Detail::Geometry);
+                    ray = self.leave(&surface, &hit, ray.direction);
+                    gone += hit.t;
+                    long = !crossed.push(Hit { t: gone, ..hit });
+                    if long {
+                        return true;
+                    }
+                }
+                false
+            });
         match (long, stopped) {
             (true, _) => Way::Long,
             (false, true) => Way::Blocked,

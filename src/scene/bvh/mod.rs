@@ -130,8 +130,9 @@ struct Entry {
     child: u32,
 }
 
-/// Each node on the way down leaves at most seven siblings behind, the last one eight children.
-const STACK: usize = 7 * DEPTH + 8;
+/// Each node on the way down leaves at most seven siblings behind, the last one eight children. Twice the depth of
+/// one tree: [`Bvh::joined`].
+const STACK: usize = 7 * 2 * DEPTH + 8;
 
 impl Bvh {
     /// A tree over `boxes`, one or two a leaf. Same boxes, same tree.
@@ -167,36 +168,62 @@ impl Bvh {
             return None;
         }
         let mut nodes = self.nodes.clone();
-        let mut of_node = vec![([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]); nodes.len()];
-        let add = |all: &mut ([f32; 3], [f32; 3]), lo: [f32; 3], hi: [f32; 3]| {
-            for a in 0..3 {
-                all.0[a] = all.0[a].min(lo[a]);
-                all.1[a] = all.1[a].max(hi[a]);
-            }
-        };
-        // A node stands before its children.
-        for id in (0..nodes.len()).rev() {
-            for slot in 0..8 {
-                let child = nodes[id].children[slot];
-                if child == EMPTY_CHILD {
-                    continue;
+        fit(&mut nodes, &self.order, &primitives);
+        Some(Bvh { nodes, order: self.order.clone(), bounded: self.bounded, ..tree })
+    }
+
+    /// One tree over the primitives of several, each given with its boxes, all finite: their numbers and positions
+    /// in [`Bvh::order`] follow one another as the trees do. Below its upper nodes it has the shape that they have.
+    ///
+    /// # Panics
+    /// Over more than 2²⁸ positions.
+    #[must_use]
+    pub fn joined(parts: &[(&Bvh, &[Aabb])]) -> Bvh {
+        let boxes: Vec<Aabb> = parts.iter().flat_map(|(_, boxes)| *boxes).copied().collect();
+        let positions: usize = parts.iter().map(|(part, _)| part.order.len()).sum();
+        assert!(positions <= MAX_POSITIONS, "more primitives than one tree can address");
+        let (primitives, tree) = Bvh::space(&boxes);
+
+        // The upper nodes: over the boxes of the parts, one a leaf.
+        let mut first = 0;
+        let mut whole: Vec<Primitive> = Vec::with_capacity(parts.len());
+        for (index, (_, boxes)) in (0..).zip(parts) {
+            let mut all = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+            primitives[first..first + boxes.len()].iter().for_each(|p| widen(&mut all, p.lo, p.hi));
+            whole.push(Primitive { lo: all.0, hi: all.1, index });
+            first += boxes.len();
+        }
+        let leaf = LeafSize { block: 1, max: 1 };
+        let mut builder = Builder { primitives: &mut whole, leaf, nodes: Vec::new(), order: Vec::new() };
+        if parts.len() > 1 {
+            builder.run();
+        }
+        let Builder { mut nodes, order: upper, .. } = builder;
+
+        // Below them the nodes of the parts, moved.
+        let mut order = Vec::with_capacity(positions);
+        let mut roots = Vec::with_capacity(parts.len());
+        let (upper_nodes, mut number) = (nodes.len(), 0u32);
+        for (part, boxes) in parts {
+            let (node, position) = (nodes.len() as u32, order.len() as u32);
+            roots.push(node);
+            nodes.extend(part.nodes.iter().map(|old| {
+                let mut new = *old;
+                for child in new.children.iter_mut().filter(|child| **child != EMPTY_CHILD) {
+                    *child += if *child & LEAF == 0 { node } else { position };
                 }
-                let mut part = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-                if child & LEAF == 0 {
-                    part = of_node[child as usize];
-                } else {
-                    let first = (child & POSITION) as usize;
-                    let count = (child >> LEAF_COUNT_SHIFT & 7) as usize + 1;
-                    for &i in &self.order[first..first + count] {
-                        let p = &primitives[i as usize];
-                        add(&mut part, p.lo, p.hi);
-                    }
-                }
-                nodes[id].set(slot, part.0, part.1, child);
-                add(&mut of_node[id], part.0, part.1);
+                new
+            }));
+            order.extend(part.order.iter().map(|&i| if i == NO_PRIMITIVE { i } else { i + number }));
+            number += boxes.len() as u32;
+        }
+        for child in nodes[..upper_nodes].iter_mut().flat_map(|node| &mut node.children) {
+            if *child != EMPTY_CHILD && *child & LEAF != 0 {
+                *child = roots[upper[(*child & POSITION) as usize] as usize];
             }
         }
-        Some(Bvh { nodes, order: self.order.clone(), bounded: self.bounded, ..tree })
+        fit(&mut nodes, &order, &primitives);
+        Bvh { nodes, bounded: order.len() as u32, order, ..tree }
     }
 
     fn build_leaves(boxes: &[Aabb], leaf: LeafSize) -> Bvh {
@@ -245,6 +272,13 @@ impl Bvh {
         }
         let root = [lo, hi].map(|c| f64x4::new([c[0].into(), c[1].into(), c[2].into(), 0.0]));
         (primitives, Bvh { nodes: Vec::new(), order: unbounded, bounded: 0, centre, scale, root, bounds })
+    }
+
+    /// Gives each primitive the number in `names`, by its original index.
+    #[must_use]
+    pub fn named(mut self, names: &[u32]) -> Bvh {
+        self.order.iter_mut().filter(|i| **i != NO_PRIMITIVE).for_each(|i| *i = names[*i as usize]);
+        self
     }
 
     /// The original indices in leaf order. A caller who keeps primitives in this order reads
@@ -415,6 +449,40 @@ impl Bvh {
                     Next::Stop => return true,
                 }
             }
+        }
+    }
+}
+
+/// Makes a box large enough for another.
+fn widen(all: &mut ([f32; 3], [f32; 3]), lo: [f32; 3], hi: [f32; 3]) {
+    for a in 0..3 {
+        all.0[a] = all.0[a].min(lo[a]);
+        all.1[a] = all.1[a].max(hi[a]);
+    }
+}
+
+/// Gives `nodes` the boxes that hold `primitives`. A node stands before its children.
+fn fit(nodes: &mut [Node], order: &[u32], primitives: &[Primitive]) {
+    let mut of_node = vec![([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]); nodes.len()];
+    for id in (0..nodes.len()).rev() {
+        for slot in 0..8 {
+            let child = nodes[id].children[slot];
+            if child == EMPTY_CHILD {
+                continue;
+            }
+            let mut part = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+            if child & LEAF == 0 {
+                part = of_node[child as usize];
+            } else {
+                let first = (child & POSITION) as usize;
+                let count = (child >> LEAF_COUNT_SHIFT & 7) as usize + 1;
+                for &i in &order[first..first + count] {
+                    let p = &primitives[i as usize];
+                    widen(&mut part, p.lo, p.hi);
+                }
+            }
+            nodes[id].set(slot, part.0, part.1, child);
+            widen(&mut of_node[id], part.0, part.1);
         }
     }
 }

@@ -108,7 +108,7 @@ fn keeps_angles(map: &DAffine3) -> bool {
 }
 
 fn with_tree(mesh: Mesh, tree: Option<MeshTree>) -> TriangleMesh {
-    let tree = tree.unwrap_or_else(|| MeshTree::build(&mesh));
+    let tree = Some(tree.unwrap_or_else(|| MeshTree::build(&mesh)));
     let areas = AreaTable::new(&mesh);
     TriangleMesh { mesh, tree, areas }
 }

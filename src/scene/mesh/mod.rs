@@ -16,6 +16,7 @@ mod load;
 mod obj;
 mod ply;
 mod serialized;
+pub mod together;
 mod tree;
 mod triangle;
 

@@ -56,6 +56,19 @@ impl MeshTree {
         }
     }
 
+    /// One hierarchy over the triangles of several meshes of one [`Mesh::origin`], each given with its own: triangles
+    /// are numbered through, mesh after mesh.
+    ///
+    /// # Panics
+    /// Over more than [`MAX_TRIANGLES`], or where `parts` is empty.
+    #[must_use]
+    pub fn joined(parts: &[(&Mesh, &MeshTree)]) -> MeshTree {
+        let boxes: Vec<Vec<Aabb>> = parts.iter().map(|(mesh, _)| boxes(mesh)).collect();
+        let trees: Vec<(&Bvh, &[Aabb])> = parts.iter().zip(&boxes).map(|((_, t), b)| (&t.bvh, &**b)).collect();
+        let blocks = parts.iter().flat_map(|(_, tree)| &tree.blocks).copied().collect();
+        MeshTree { bvh: Bvh::joined(&trees), blocks, origin: parts[0].0.origin }
+    }
+
     fn over(mesh: &Mesh, bvh: Bvh) -> MeshTree {
         let block = |indices: &[u32]| {
             let mut out = Block([[[f32::NAN; LANES]; 3]; 3]);

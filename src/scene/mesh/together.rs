@@ -1,0 +1,97 @@
+//! Several meshes of a scene in one tree, so that a ray is made ready once and walks down once.
+
+use super::{MAX_TRIANGLES, MeshHit, MeshTree};
+use crate::math::{Departure, Ray};
+use crate::scene::bvh::Aabb;
+use crate::scene::{Geometry, Hit, Object, TriangleMesh};
+
+/// A mesh that is smaller than this share of the largest keeps a tree of its own: boxes of a tree are rounded to 2⁻²⁴
+/// of its size, which is then at most 2⁻¹⁶ of the mesh's.
+const SMALLEST: f64 = 1.0 / 256.0;
+
+/// Marks objects without triangles here.
+const NONE: u32 = u32::MAX;
+
+/// The triangles of some objects, numbered through.
+#[derive(Clone, Debug)]
+pub struct Together {
+    tree: MeshTree,
+    /// The number of the first triangle, by object.
+    first: Vec<u32>,
+    /// The object, by number of the triangle.
+    object: Vec<u32>,
+}
+
+impl Together {
+    /// Takes the trees of all meshes among `objects` that belong together: of one origin and comparable size. `boxes`
+    /// are the objects'. None where there are no meshes.
+    #[must_use]
+    pub fn take(objects: &mut [Object], boxes: &[Aabb]) -> Option<Together> {
+        fn mesh(object: &Object) -> Option<&TriangleMesh> {
+            match &object.geometry {
+                Geometry::Mesh(mesh) => Some(mesh),
+                _ => None,
+            }
+        }
+        let size = |i: usize| (boxes[i].max - boxes[i].min).max_element();
+        let meshes = || (0..objects.len()).filter(|&i| mesh(&objects[i]).is_some());
+        let largest = meshes().max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
+        let origin = mesh(&objects[largest])?.mesh.origin;
+
+        let (mut first, mut object, mut parts) = (vec![NONE; objects.len()], Vec::new(), Vec::new());
+        for i in meshes() {
+            let Some(TriangleMesh { mesh, tree: Some(tree), .. }) = mesh(&objects[i]) else { continue };
+            let fits = object.len() + mesh.triangles.len() <= MAX_TRIANGLES;
+            if fits && mesh.origin == origin && size(i) >= SMALLEST * size(largest) {
+                first[i] = object.len() as u32;
+                object.resize(object.len() + mesh.triangles.len(), i as u32);
+                parts.push((mesh, tree));
+            }
+        }
+        let tree = MeshTree::joined(&parts);
+        for (i, taken) in objects.iter_mut().enumerate() {
+            if let Geometry::Mesh(mesh) = &mut taken.geometry
+                && first[i] != NONE
+            {
+                mesh.tree = None;
+            }
+        }
+        Some(Together { tree, first, object })
+    }
+
+    /// Whether the triangles of an object are here.
+    #[must_use]
+    pub fn holds(&self, object: u32) -> bool {
+        self.first.get(object as usize).is_some_and(|&first| first != NONE)
+    }
+
+    /// The nearest triangle that `ray` hits before `t_max`, other than the one that it leaves.
+    #[must_use]
+    #[inline]
+    pub fn closest(&self, ray: &Ray, t_max: f64) -> Option<Hit> {
+        self.tree.closest(ray, t_max, self.number(ray.departure)).map(|met| self.hit(&met))
+    }
+
+    /// Shows `met` the triangles that `ray` hits before `t_max`, other than the one that it leaves and `target`, in any
+    /// order, until it says stop; true if it did.
+    #[inline]
+    pub fn any(&self, ray: &Ray, t_max: f64, target: Option<Departure>, mut met: impl FnMut(Hit) -> bool) -> bool {
+        let skip = [self.number(ray.departure), self.number(target)];
+        self.tree.any_of(ray, t_max, skip, |hit| met(self.hit(&hit)))
+    }
+
+    /// The number of a triangle, if it is here. Children of groups come after the objects of the scene.
+    #[inline]
+    fn number(&self, part: Option<Departure>) -> Option<u32> {
+        let part = part?;
+        let first = *self.first.get(part.object as usize)?;
+        (first != NONE).then(|| first + part.part)
+    }
+
+    #[inline]
+    fn hit(&self, met: &MeshHit) -> Hit {
+        let object = self.object[met.triangle as usize];
+        let part = met.triangle - self.first[object as usize];
+        Hit { t: met.hit.t, object, part, barycentric: [met.hit.b1, met.hit.b2], instance: None }
+    }
+}
