@@ -45,9 +45,10 @@ impl Primitive {
 /// How many primitives a leaf holds.
 #[derive(Clone, Copy)]
 pub(super) struct LeafSize {
-    /// Parts of this size are not split although a slot is free, the cost of a leaf counts in
-    /// blocks of this many, and each leaf starts at a multiple of it.
+    /// Parts of this size are not split although a slot is free, and the cost of a leaf counts in blocks of this many.
     pub block: usize,
+    /// Each leaf starts at a multiple of it.
+    pub align: usize,
     /// Parts of up to this size become leaves rather than nodes.
     pub max: usize,
 }
@@ -166,8 +167,8 @@ impl Builder<'_> {
         let first = self.order.len();
         let run = &self.primitives[part.first..part.first + part.count];
         self.order.extend(run.iter().map(|p| p.index));
-        self.order.resize(self.order.len().next_multiple_of(self.leaf.block), NO_PRIMITIVE);
-        LEAF | ((part.count - 1) as u32) << LEAF_COUNT_SHIFT | first as u32
+        self.order.resize(self.order.len().next_multiple_of(self.leaf.align), NO_PRIMITIVE);
+        LEAF | ((part.count - 1) as u32) << LEAF_COUNT_SHIFT | (first / self.leaf.align) as u32
     }
 }
 

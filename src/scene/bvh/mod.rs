@@ -67,7 +67,7 @@ impl Aabb {
 
 /// Bit of a child word that marks a leaf.
 const LEAF: u32 = 1 << 31;
-/// Three bits of a leaf hold its count − 1, the rest the position of its first primitive.
+/// Three bits of a leaf hold its count − 1, the rest the position of its first primitive, over [`Bvh::align`].
 const LEAF_COUNT_SHIFT: u32 = 28;
 const POSITION: u32 = (1 << LEAF_COUNT_SHIFT) - 1;
 /// Fills the order up to where the next leaf of a tree of blocks starts.
@@ -108,6 +108,8 @@ pub struct Bvh {
     order: Vec<u32>,
     /// How many positions of `order` belong to the tree.
     bounded: u32,
+    /// Leaves start at multiples of it.
+    align: u32,
     /// Tree coordinates are (world − `centre`) · `scale`; `scale` is a power of two.
     centre: DVec3,
     scale: f64,
@@ -117,9 +119,12 @@ pub struct Bvh {
 }
 
 /// What a visit makes of the search.
-enum Next {
+pub(in crate::scene) enum Next {
+    /// On as before.
     Go,
+    /// Only what is nearer than this counts from now on.
     Shorten(f64),
+    /// No more.
     Stop,
 }
 
@@ -141,19 +146,17 @@ impl Bvh {
     /// Over more than 2²⁸ boxes (13 GB of them).
     #[must_use]
     pub fn build(boxes: &[Aabb]) -> Bvh {
-        Bvh::build_leaves(boxes, LeafSize { block: 1, max: 2 })
+        Bvh::build_leaves(boxes, LeafSize { block: 1, align: 1, max: 2 })
     }
 
-    /// A tree for primitives that are tested `block` at a time, as a SIMD kernel does; see
-    /// [`Bvh::closest_leaf`]. A leaf holds up to eight and starts at a multiple of `block`; the
-    /// positions that it leaves over hold [`NO_PRIMITIVE`] in [`Bvh::order`].
+    /// A tree for primitives that are tested eight at a time, as a SIMD kernel does. A leaf holds up to eight and
+    /// starts at a multiple of eight; the positions that it leaves over hold [`NO_PRIMITIVE`] in [`Bvh::order`].
     ///
     /// # Panics
-    /// Over more than 2²⁸ / `block` boxes, or where `block` is not 1, 2, 4 or 8.
+    /// Over more than 2²⁸ boxes.
     #[must_use]
-    pub fn build_blocks(boxes: &[Aabb], block: usize) -> Bvh {
-        assert!([1, 2, 4, 8].contains(&block), "blocks of 1, 2, 4 or 8 primitives");
-        Bvh::build_leaves(boxes, LeafSize { block, max: 8 })
+    pub fn build_blocks(boxes: &[Aabb]) -> Bvh {
+        Bvh::build_leaves(boxes, LeafSize { block: 4, align: 8, max: 8 })
     }
 
     /// A tree of the same shape over other boxes, as many and all finite: cheaper than a new tree, and
@@ -168,20 +171,22 @@ impl Bvh {
             return None;
         }
         let mut nodes = self.nodes.clone();
-        fit(&mut nodes, &self.order, &primitives);
-        Some(Bvh { nodes, order: self.order.clone(), bounded: self.bounded, ..tree })
+        fit(&mut nodes, &self.order, self.align, &primitives);
+        let order = self.order.clone();
+        Some(Bvh { nodes, order, bounded: self.bounded, align: self.align, ..tree })
     }
 
     /// One tree over the primitives of several, each given with its boxes, all finite: their numbers and positions
     /// in [`Bvh::order`] follow one another as the trees do. Below its upper nodes it has the shape that they have.
     ///
     /// # Panics
-    /// Over more than 2²⁸ positions.
+    /// Over more than 2²⁸ boxes, or where some of the trees have blocks and some have not.
     #[must_use]
     pub fn joined(parts: &[(&Bvh, &[Aabb])]) -> Bvh {
         let boxes: Vec<Aabb> = parts.iter().flat_map(|(_, boxes)| *boxes).copied().collect();
-        let positions: usize = parts.iter().map(|(part, _)| part.order.len()).sum();
-        assert!(positions <= MAX_POSITIONS, "more primitives than one tree can address");
+        assert!(boxes.len() <= MAX_POSITIONS, "more primitives than one tree can address");
+        let align = parts.first().map_or(1, |(part, _)| part.align);
+        assert!(parts.iter().all(|(part, _)| part.align == align), "trees of one kind");
         let (primitives, tree) = Bvh::space(&boxes);
 
         // The upper nodes: over the boxes of the parts, one a leaf.
@@ -193,7 +198,7 @@ impl Bvh {
             whole.push(Primitive { lo: all.0, hi: all.1, index });
             first += boxes.len();
         }
-        let leaf = LeafSize { block: 1, max: 1 };
+        let leaf = LeafSize { block: 1, align: 1, max: 1 };
         let mut builder = Builder { primitives: &mut whole, leaf, nodes: Vec::new(), order: Vec::new() };
         if parts.len() > 1 {
             builder.run();
@@ -201,11 +206,11 @@ impl Bvh {
         let Builder { mut nodes, order: upper, .. } = builder;
 
         // Below them the nodes of the parts, moved.
-        let mut order = Vec::with_capacity(positions);
+        let mut order = Vec::with_capacity(parts.iter().map(|(part, _)| part.order.len()).sum());
         let mut roots = Vec::with_capacity(parts.len());
         let (upper_nodes, mut number) = (nodes.len(), 0u32);
         for (part, boxes) in parts {
-            let (node, position) = (nodes.len() as u32, order.len() as u32);
+            let (node, position) = (nodes.len() as u32, order.len() as u32 / align);
             roots.push(node);
             nodes.extend(part.nodes.iter().map(|old| {
                 let mut new = *old;
@@ -222,19 +227,19 @@ impl Bvh {
                 *child = roots[upper[(*child & POSITION) as usize] as usize];
             }
         }
-        fit(&mut nodes, &order, &primitives);
-        Bvh { nodes, bounded: order.len() as u32, order, ..tree }
+        fit(&mut nodes, &order, align, &primitives);
+        Bvh { nodes, bounded: order.len() as u32, align, order, ..tree }
     }
 
     fn build_leaves(boxes: &[Aabb], leaf: LeafSize) -> Bvh {
-        assert!(boxes.len() <= MAX_POSITIONS / leaf.block, "more primitives than one tree can address");
+        assert!(boxes.len() <= MAX_POSITIONS, "more primitives than one tree can address");
         let (mut primitives, tree) = Bvh::space(boxes);
         let mut builder = Builder { primitives: &mut primitives, leaf, nodes: Vec::new(), order: Vec::new() };
         builder.run();
         let Builder { nodes, mut order, .. } = builder;
         let bounded = order.len() as u32;
         order.extend(&tree.order);
-        Bvh { nodes, order, bounded, ..tree }
+        Bvh { nodes, order, bounded, align: leaf.align as u32, ..tree }
     }
 
     /// The finite boxes in the coordinates of their tree, and the tree without nodes; its order holds the boxes that
@@ -271,7 +276,7 @@ impl Bvh {
             }
         }
         let root = [lo, hi].map(|c| f64x4::new([c[0].into(), c[1].into(), c[2].into(), 0.0]));
-        (primitives, Bvh { nodes: Vec::new(), order: unbounded, bounded: 0, centre, scale, root, bounds })
+        (primitives, Bvh { nodes: Vec::new(), order: unbounded, bounded: 0, align: 1, centre, scale, root, bounds })
     }
 
     /// Gives each primitive the number in `names`, by its original index.
@@ -307,12 +312,12 @@ impl Bvh {
     where
         F: FnMut(u32, f64) -> Option<f64>,
     {
-        self.closest_leaf(ray, t_max, |leaf, t_max| {
+        self.walk::<true>(ray, t_max, |leaf, t_max| {
             let mut nearest = None;
             for &index in &self.order[leaf.start as usize..leaf.end as usize] {
                 nearest = visit(index, nearest.unwrap_or(t_max)).or(nearest);
             }
-            nearest
+            nearest.map_or(Next::Go, Next::Shorten)
         });
     }
 
@@ -322,50 +327,17 @@ impl Bvh {
     where
         F: FnMut(u32) -> bool,
     {
-        self.any_leaf(ray, t_max, |leaf| {
-            self.order[leaf.start as usize..leaf.end as usize].iter().any(|&index| visit(index))
+        self.walk::<false>(ray, t_max, |leaf, _| {
+            let yes = self.order[leaf.start as usize..leaf.end as usize].iter().any(|&index| visit(index));
+            if yes { Next::Stop } else { Next::Go }
         })
     }
 
-    /// [`Bvh::closest`] with whole leaves: `visit` gets a range of positions in [`Bvh::order`].
-    pub fn closest_leaf<F>(&self, ray: &Ray, t_max: f64, mut visit: F)
-    where
-        F: FnMut(Range<u32>, f64) -> Option<f64>,
-    {
-        self.walk::<true>(ray, t_max, |_| {}, |leaf, t_max| visit(leaf, t_max).map_or(Next::Go, Next::Shorten));
-    }
-
-    /// [`Bvh::any`] with whole leaves: `visit` gets a range of positions in [`Bvh::order`].
-    pub fn any_leaf<F>(&self, ray: &Ray, t_max: f64, mut visit: F) -> bool
-    where
-        F: FnMut(Range<u32>) -> bool,
-    {
-        self.walk::<false>(ray, t_max, |_| {}, |leaf, _| if visit(leaf) { Next::Stop } else { Next::Go })
-    }
-
-    /// [`Bvh::closest_leaf`] that calls `soon` with the first position of a leaf when it becomes
-    /// likely that the leaf is visited: time to fetch its primitives into the cache.
-    pub(in crate::scene) fn closest_block<F>(&self, ray: &Ray, t_max: f64, soon: impl Fn(u32), mut visit: F)
-    where
-        F: FnMut(Range<u32>, f64) -> Option<f64>,
-    {
-        self.walk::<true>(ray, t_max, soon, |leaf, t_max| visit(leaf, t_max).map_or(Next::Go, Next::Shorten));
-    }
-
-    /// [`Bvh::any_leaf`] with `soon` as in [`Bvh::closest_block`].
-    pub(in crate::scene) fn any_block<F>(&self, ray: &Ray, t_max: f64, soon: impl Fn(u32), mut visit: F) -> bool
-    where
-        F: FnMut(Range<u32>) -> bool,
-    {
-        self.walk::<false>(ray, t_max, soon, |leaf, _| if visit(leaf) { Next::Stop } else { Next::Go })
-    }
-
-    /// Visits the leaves, nearest first where `SORTED`. True if a visit said stop.
+    /// Visits what is outside of the tree and then the leaves, nearest first where `SORTED`. True if a visit said stop.
     fn walk<const SORTED: bool>(
         &self,
         ray: &Ray,
         mut t_max: f64,
-        soon: impl Fn(u32),
         mut visit: impl FnMut(Range<u32>, f64) -> Next,
     ) -> bool {
         // A tree this small costs more than it saves.
@@ -382,63 +354,80 @@ impl Bvh {
         if self.bounded <= FEW {
             return false;
         }
-        let Some(ray) = TreeRay::new(self, ray) else {
-            return false;
-        };
+        let Some(ray) = self.enter(ray) else { return false };
+        self.descend::<SORTED>(&ray, t_max, |_| {}, visit)
+    }
+
+    /// The ray, ready for this tree; none where it misses the whole.
+    #[inline]
+    pub(in crate::scene) fn enter(&self, ray: &Ray) -> Option<TreeRay> {
+        if self.nodes.is_empty() { None } else { TreeRay::new(self, ray) }
+    }
+
+    /// Visits the leaves of a tree of blocks that the ray meets within `t_max`, nearest first where `SORTED`: `visit`
+    /// gets a range of positions in [`Bvh::order`] and the distance that still counts. `soon` is told the first
+    /// position of a leaf when it becomes likely that the leaf is visited: time to fetch its primitives into the
+    /// cache. True if a visit said stop.
+    #[inline(always)]
+    pub(in crate::scene) fn descend<const SORTED: bool>(
+        &self,
+        ray: &TreeRay,
+        mut t_max: f64,
+        soon: impl Fn(u32),
+        mut visit: impl FnMut(Range<u32>, f64) -> Next,
+    ) -> bool {
         let mut limit = ray.limit(t_max);
         if limit < 0.0 || limit.is_nan() {
             return false;
         }
-
         let mut stack = [const { MaybeUninit::<Entry>::uninit() }; STACK];
         let mut depth = 0;
-        let mut node = 0u32;
+        let mut entry = Entry { near: 0.0, child: 0 };
         loop {
-            // Push the children that the ray meets, the nearest last, and have them fetched.
-            let current = &self.nodes[node as usize];
-            let (mut mask, near) = ray.meets(current, limit);
-            let near = near.as_array();
-            let bottom = depth;
-            while mask != 0 {
-                let slot = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                let entry = Entry { near: near[slot & 7], child: current.children[slot & 7] };
-                if entry.child & LEAF == 0 {
-                    prefetch(&self.nodes, entry.child as usize);
-                } else {
-                    soon(entry.child & POSITION);
-                }
-                let mut at = depth;
-                if SORTED {
-                    while at > bottom {
-                        // SAFETY: entries below `depth` have been written.
-                        let below = unsafe { stack[at - 1].assume_init() };
-                        if below.near >= entry.near {
-                            break;
+            if entry.child & LEAF == 0 {
+                // The nearest child that the ray meets is next; the others wait, the nearest last, and are fetched.
+                let node = &self.nodes[entry.child as usize];
+                let (mut mask, near) = ray.meets(node, limit);
+                if mask != 0 {
+                    let near = near.as_array();
+                    let mut take = || {
+                        let slot = mask.trailing_zeros() as usize & 7;
+                        mask &= mask - 1;
+                        (Entry { near: near[slot], child: node.children[slot] }, mask != 0)
+                    };
+                    let (mut nearest, mut more) = take();
+                    let bottom = depth;
+                    while more {
+                        let mut other;
+                        (other, more) = take();
+                        if SORTED && other.near < nearest.near {
+                            std::mem::swap(&mut other, &mut nearest);
                         }
-                        stack[at].write(below);
-                        at -= 1;
+                        if other.child & LEAF == 0 {
+                            prefetch(&self.nodes, other.child as usize);
+                        } else {
+                            soon((other.child & POSITION) * self.align);
+                        }
+                        let mut at = depth;
+                        if SORTED {
+                            while at > bottom {
+                                // SAFETY: entries below `depth` have been written.
+                                let below = unsafe { stack[at - 1].assume_init() };
+                                if below.near >= other.near {
+                                    break;
+                                }
+                                stack[at].write(below);
+                                at -= 1;
+                            }
+                        }
+                        stack[at].write(other);
+                        depth += 1;
                     }
-                }
-                stack[at].write(entry);
-                depth += 1;
-            }
-            // Take the nearest: leaves are visited here, a node goes round the loop.
-            loop {
-                if depth == 0 {
-                    return false;
-                }
-                depth -= 1;
-                // SAFETY: entries below the old `depth` have been written.
-                let entry = unsafe { stack[depth].assume_init() };
-                if SORTED && entry.near > limit {
+                    entry = nearest;
                     continue;
                 }
-                if entry.child & LEAF == 0 {
-                    node = entry.child;
-                    break;
-                }
-                let first = entry.child & POSITION;
+            } else {
+                let first = (entry.child & POSITION) * self.align;
                 let count = (entry.child >> LEAF_COUNT_SHIFT & 7) + 1;
                 match visit(first..first + count, t_max) {
                     Next::Go => {}
@@ -447,6 +436,17 @@ impl Bvh {
                         limit = ray.limit(t_max);
                     }
                     Next::Stop => return true,
+                }
+            }
+            loop {
+                if depth == 0 {
+                    return false;
+                }
+                depth -= 1;
+                // SAFETY: entries below the old `depth` have been written.
+                entry = unsafe { stack[depth].assume_init() };
+                if !SORTED || entry.near <= limit {
+                    break;
                 }
             }
         }
@@ -462,7 +462,7 @@ fn widen(all: &mut ([f32; 3], [f32; 3]), lo: [f32; 3], hi: [f32; 3]) {
 }
 
 /// Gives `nodes` the boxes that hold `primitives`. A node stands before its children.
-fn fit(nodes: &mut [Node], order: &[u32], primitives: &[Primitive]) {
+fn fit(nodes: &mut [Node], order: &[u32], align: u32, primitives: &[Primitive]) {
     let mut of_node = vec![([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]); nodes.len()];
     for id in (0..nodes.len()).rev() {
         for slot in 0..8 {
@@ -474,7 +474,7 @@ fn fit(nodes: &mut [Node], order: &[u32], primitives: &[Primitive]) {
             if child & LEAF == 0 {
                 part = of_node[child as usize];
             } else {
-                let first = (child & POSITION) as usize;
+                let first = (child & POSITION) as usize * align as usize;
                 let count = (child >> LEAF_COUNT_SHIFT & 7) as usize + 1;
                 for &i in &order[first..first + count] {
                     let p = &primitives[i as usize];
@@ -522,7 +522,7 @@ const U: f64 = 1.0 / (1u64 << 24) as f64;
 const PAD: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// A ray in tree coordinates, ready for f32 planes; see the module for the bounds.
-struct TreeRay {
+pub(in crate::scene) struct TreeRay {
     near_origin: [f32; 3],
     far_origin: [f32; 3],
     near_inverse: [f32; 3],
@@ -588,6 +588,12 @@ impl TreeRay {
             skipped,
             scale: tree.scale,
         })
+    }
+
+    /// Metres from the origin to where the ray enters the whole.
+    #[inline]
+    pub(in crate::scene) fn entry(&self) -> f64 {
+        self.skipped / self.scale
     }
 
     /// `t_max` in tree distance from the entry, rounded up; negative where it is not reached.

@@ -256,7 +256,7 @@ fn depth_is_bounded_whatever_the_boxes() {
         (0..20_000).map(|i| DVec3::X * f64::from(i)).map(|p| Aabb { min: p, max: p }).collect(),
     ];
     for boxes in cases {
-        for bvh in [Bvh::build(&boxes), Bvh::build_blocks(&boxes, 1), Bvh::build_blocks(&boxes, 8)] {
+        for bvh in [Bvh::build(&boxes), Bvh::build_blocks(&boxes)] {
             let depth = depth(&bvh, 0);
             assert!(depth <= DEPTH, "{depth}");
             let centre = Ray::new(boxes[boxes.len() - 1].min, DVec3::X);
@@ -268,15 +268,17 @@ fn depth_is_bounded_whatever_the_boxes() {
 #[test]
 fn leaves_of_blocks_start_at_multiples() {
     let boxes = boxes(&mut Numbers(5), 500, 1.0, DVec3::ZERO);
-    let bvh = Bvh::build_blocks(&boxes, 4);
-    let mut blocks = 0;
+    let bvh = Bvh::build_blocks(&boxes);
+    let mut seen = vec![false; bvh.order().len() / 8];
     for node in &bvh.nodes {
         for child in node.children.iter().filter(|&&c| c != EMPTY_CHILD && c & LEAF != 0) {
-            assert_eq!(child & POSITION & 3, 0);
-            blocks += ((child >> LEAF_COUNT_SHIFT & 7) as usize + 1).div_ceil(4);
+            let (block, count) = ((child & POSITION) as usize, (child >> LEAF_COUNT_SHIFT & 7) as usize + 1);
+            assert!(!std::mem::replace(&mut seen[block], true));
+            let held = bvh.order()[8 * block..8 * block + 8].iter().filter(|&&i| i != NO_PRIMITIVE).count();
+            assert_eq!(held, count);
         }
     }
-    assert_eq!(bvh.order().len(), 4 * blocks);
+    assert!(seen.iter().all(|&s| s));
     assert_eq!(bvh.order().iter().filter(|&&i| i != NO_PRIMITIVE).count(), 500);
 }
 
@@ -293,8 +295,8 @@ fn a_refitted_tree_finds_what_a_new_one_finds() {
             .collect()
     };
     let (before, after) = (spiral(1.0), spiral(-2.0));
-    let refitted = Bvh::build_blocks(&before, 4).refitted(&after).unwrap();
-    let new = Bvh::build_blocks(&after, 4);
+    let refitted = Bvh::build_blocks(&before).refitted(&after).unwrap();
+    let new = Bvh::build_blocks(&after);
     assert_eq!(refitted.bounds(), new.bounds());
     let met = |tree: &Bvh, ray: &Ray| {
         let mut found = Vec::new();
@@ -323,4 +325,44 @@ fn a_refitted_tree_finds_what_a_new_one_finds() {
     }
     assert!(all >= 200, "{all}");
     assert!(refitted.refitted(&after[1..]).is_none());
+}
+
+/// Three sets of boxes, one of a single box and one far from the others: each ray visits in the joined tree what it
+/// visits in a tree of all, as far as it meets the boxes themselves.
+#[test]
+fn a_joined_tree_finds_what_one_of_all_finds() {
+    let mut numbers = Numbers(8);
+    let sets = [
+        boxes(&mut numbers, 300, 1.0, DVec3::ZERO),
+        boxes(&mut numbers, 1, 1.0, DVec3::Y),
+        boxes(&mut numbers, 40, 0.1, DVec3::new(20.0, 3.0, -5.0)),
+    ];
+    for count in 1..=3 {
+        let trees: Vec<Bvh> = sets[..count].iter().map(|set| Bvh::build_blocks(set)).collect();
+        let parts: Vec<(&Bvh, &[Aabb])> = trees.iter().zip(&sets).map(|(tree, set)| (tree, &**set)).collect();
+        let joined = Bvh::joined(&parts);
+        let all: Vec<Aabb> = sets[..count].iter().flatten().copied().collect();
+        assert_eq!(joined.bounds(), Bvh::build(&all).bounds());
+        let mut met = 0;
+        for _ in 0..4000 {
+            let ray = aimed(&mut numbers, &all, 1.0);
+            let found = visited(&joined, &ray, f64::INFINITY);
+            assert!(found.windows(2).all(|w| w[0] < w[1]), "visited twice");
+            for (i, _) in all.iter().enumerate().filter(|(_, b)| entry(&ray, b).is_some()) {
+                assert!(found.binary_search(&(i as u32)).is_ok(), "box {i} ray {ray:?}");
+                met += 1;
+            }
+        }
+        assert!(met >= 4000, "{met}");
+    }
+}
+
+#[test]
+fn primitives_of_a_named_tree_have_other_numbers() {
+    let boxes = boxes(&mut Numbers(9), 20, 1.0, DVec3::ZERO);
+    let names: Vec<u32> = (0..20).map(|i| 100 + 3 * i).collect();
+    let (plain, named) = (Bvh::build(&boxes), Bvh::build(&boxes).named(&names));
+    let ray = aimed(&mut Numbers(10), &boxes, 1.0);
+    let expected: Vec<u32> = visited(&plain, &ray, f64::INFINITY).iter().map(|&i| names[i as usize]).collect();
+    assert_eq!(visited(&named, &ray, f64::INFINITY), expected);
 }

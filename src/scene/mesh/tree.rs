@@ -1,22 +1,38 @@
-//! A mesh with its hierarchy: triangles are tested four at a time, up to eight a leaf.
+//! A mesh with its hierarchy: eight triangles a leaf are tested at once in f32, and what that cannot rule out exactly.
+//!
+//! **No false misses.** [`Coarse`] repeats the test of [`TriangleRay`] in f32, from a point of the ray where it enters
+//! the mesh. With u = 2⁻²⁴ and B the largest coordinate of the mesh, relative to its origin, the point has coordinates
+//! of at most B, and those of a corner after the shear, X = (vx − ox) − sx (vz − oz) with |sx| ≤ 1, are off by at most
+//! 14uB: 2uB from the rounding of the point, 2uB of that of sx, 4uB from the two differences, and 4uB or, without FMA,
+//! 6uB from product and sum; all below δ = 16uB. The point itself is known to 2⁻⁵⁰ of the coordinates of the ray's
+//! origin, which is added to δ. An edge function C.x B.y − C.y B.x is then off by at most
+//! δ(|C.x| + |C.y| + |B.x| + |B.y|) + 2δ² for the coordinates, and 3u(|C.x B.y| + |C.y B.x|) for the arithmetic. No
+//! coordinate exceeds 4B, so that the latter is at most 12uB(|B.x| + |B.y|), less than the δ once more. Twice the first
+//! bound covers both, and the rounding of the bound.
 
 use super::Mesh;
 use super::triangle::{TriangleHit, TriangleRay, area_vector};
 use crate::math::Ray;
-use crate::scene::bvh::{Aabb, Bvh, NO_PRIMITIVE, prefetch};
+use crate::scene::bvh::{Aabb, Bvh, NO_PRIMITIVE, Next, TreeRay, prefetch};
 use glam::DVec3;
-use wide::f64x4;
+use wide::f32x8;
 
 /// Triangles a block.
-const LANES: usize = 4;
-/// The most triangles of one mesh: 2²⁶, the positions of 2²⁸ that blocks leave in the worst case.
+const LANES: usize = 8;
+/// The most triangles of one mesh: 2²⁶.
 pub const MAX_TRIANGLES: usize = 1 << 26;
 
-/// Four triangles by corner, axis, lane. A lane without triangle, or with one without area,
+/// Eight triangles by corner, axis, lane. A lane without triangle, or with one without area,
 /// is NaN and never hit.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(16))]
-struct Block([[[f32; LANES]; 3]; 3]);
+struct Block([[f32x8; 3]; 3]);
+
+impl Block {
+    #[inline(always)]
+    fn corners(&self, lane: usize) -> [DVec3; 3] {
+        self.0.each_ref().map(|v| DVec3::from(v.each_ref().map(|axis| f64::from(axis.as_array()[lane]))))
+    }
+}
 
 /// The nearest triangle on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +50,8 @@ pub struct MeshTree {
     bvh: Bvh,
     blocks: Vec<Block>,
     origin: DVec3,
+    /// Largest coordinate of all corners, relative to the origin.
+    extent: f64,
 }
 
 impl MeshTree {
@@ -43,7 +61,7 @@ impl MeshTree {
     /// Over more than [`MAX_TRIANGLES`], which [`Mesh::new`] refuses.
     #[must_use]
     pub fn build(mesh: &Mesh) -> MeshTree {
-        MeshTree::over(mesh, Bvh::build_blocks(&boxes(mesh), LANES))
+        MeshTree::over(mesh, Bvh::build_blocks(&boxes(mesh)))
     }
 
     /// A hierarchy over `mesh` of the shape that this one has: cheaper than a new one, and as good where both are
@@ -66,52 +84,62 @@ impl MeshTree {
         let boxes: Vec<Vec<Aabb>> = parts.iter().map(|(mesh, _)| boxes(mesh)).collect();
         let trees: Vec<(&Bvh, &[Aabb])> = parts.iter().zip(&boxes).map(|((_, t), b)| (&t.bvh, &**b)).collect();
         let blocks = parts.iter().flat_map(|(_, tree)| &tree.blocks).copied().collect();
-        MeshTree { bvh: Bvh::joined(&trees), blocks, origin: parts[0].0.origin }
+        MeshTree::of(Bvh::joined(&trees), blocks, parts[0].0.origin)
     }
 
     fn over(mesh: &Mesh, bvh: Bvh) -> MeshTree {
         let block = |indices: &[u32]| {
-            let mut out = Block([[[f32::NAN; LANES]; 3]; 3]);
+            let mut out = Block([[f32x8::splat(f32::NAN); 3]; 3]);
             for (lane, &i) in indices.iter().enumerate().filter(|(_, i)| **i != NO_PRIMITIVE) {
                 if area_vector(mesh.vertices(i)) == DVec3::ZERO {
                     continue;
                 }
                 for (corner, &v) in mesh.triangles[i as usize].iter().enumerate() {
                     for axis in 0..3 {
-                        out.0[corner][axis][lane] = mesh.positions[v as usize][axis];
+                        out.0[corner][axis].as_mut_array()[lane] = mesh.positions[v as usize][axis];
                     }
                 }
             }
             out
         };
         let blocks = bvh.order().chunks(LANES).map(block).collect();
-        MeshTree { bvh, blocks, origin: mesh.origin }
+        MeshTree::of(bvh, blocks, mesh.origin)
+    }
+
+    fn of(bvh: Bvh, blocks: Vec<Block>, origin: DVec3) -> MeshTree {
+        let Aabb { min, max } = bvh.bounds();
+        MeshTree { bvh, blocks, origin, extent: min.abs().max(max.abs()).max_element() }
     }
 
     /// The nearest triangle that `ray` hits at 0 < t < `t_max`, other than `skip`.
     #[must_use]
     pub fn closest(&self, ray: &Ray, t_max: f64, skip: Option<u32>) -> Option<MeshHit> {
-        let sheared = TriangleRay::new(ray, self.origin);
+        let local = self.local(ray);
+        let entering = self.bvh.enter(&local)?;
+        let (sheared, coarse) = self.ready(&local, &entering);
         let mut found = None;
-        self.bvh.closest_block(
-            &self.local(ray),
-            t_max,
-            |i| prefetch(&self.blocks, i as usize / LANES),
-            |leaf, mut t_max| {
-                let before = t_max;
-                for b in leaf.start as usize / LANES..(leaf.end as usize).div_ceil(LANES) {
-                    sheared.each_hit(&self.blocks[b], t_max, |lane, hit| {
-                        let triangle = self.bvh.order()[b * LANES + lane];
-                        if hit.t < t_max && Some(triangle) != skip {
-                            t_max = hit.t;
-                            found = Some(MeshHit { triangle, hit });
-                        }
-                        false
-                    });
+        let soon = |i| prefetch(&self.blocks, i as usize / LANES);
+        self.bvh.descend::<true>(&entering, t_max, soon, |leaf, mut t_max| {
+            let first = leaf.start as usize;
+            let block = &self.blocks[first / LANES];
+            let mut next = Next::Go;
+            let mut mask = coarse.may_hit(block);
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize % LANES;
+                mask &= mask - 1;
+                if let Some(hit) = sheared.intersect(block.corners(lane))
+                    && hit.t < t_max
+                {
+                    let triangle = self.bvh.order()[first + lane];
+                    if Some(triangle) != skip {
+                        t_max = hit.t;
+                        found = Some(MeshHit { triangle, hit });
+                        next = Next::Shorten(t_max);
+                    }
                 }
-                (t_max < before).then_some(t_max)
-            },
-        );
+            }
+            next
+        });
         found
     }
 
@@ -124,20 +152,28 @@ impl MeshTree {
     /// Shows `met` the triangles that `ray` hits at 0 < t < `t_max`, other than those in `skip`, in any order, until
     /// it says stop; true if it did. A hit on the edge of two triangles is one on both.
     pub fn any_of(&self, ray: &Ray, t_max: f64, skip: [Option<u32>; 2], mut met: impl FnMut(MeshHit) -> bool) -> bool {
-        let sheared = TriangleRay::new(ray, self.origin);
-        self.bvh.any_block(
-            &self.local(ray),
-            t_max,
-            |i| prefetch(&self.blocks, i as usize / LANES),
-            |leaf| {
-                (leaf.start as usize / LANES..(leaf.end as usize).div_ceil(LANES)).any(|b| {
-                    sheared.each_hit(&self.blocks[b], t_max, |lane, hit| {
-                        let triangle = self.bvh.order()[b * LANES + lane];
-                        !skip.contains(&Some(triangle)) && met(MeshHit { triangle, hit })
-                    })
-                })
-            },
-        )
+        let local = self.local(ray);
+        let Some(entering) = self.bvh.enter(&local) else { return false };
+        let (sheared, coarse) = self.ready(&local, &entering);
+        let soon = |i| prefetch(&self.blocks, i as usize / LANES);
+        self.bvh.descend::<false>(&entering, t_max, soon, |leaf, t_max| {
+            let first = leaf.start as usize;
+            let block = &self.blocks[first / LANES];
+            let mut mask = coarse.may_hit(block);
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize % LANES;
+                mask &= mask - 1;
+                if let Some(hit) = sheared.intersect(block.corners(lane))
+                    && hit.t < t_max
+                {
+                    let triangle = self.bvh.order()[first + lane];
+                    if !skip.contains(&Some(triangle)) && met(MeshHit { triangle, hit }) {
+                        return Next::Stop;
+                    }
+                }
+            }
+            Next::Go
+        })
     }
 
     /// The box of the mesh in world space.
@@ -156,6 +192,14 @@ impl MeshTree {
     fn local(&self, ray: &Ray) -> Ray {
         Ray::new(ray.origin - self.origin, ray.direction)
     }
+
+    /// `local` in the frame of the exact test and in that of the coarse one.
+    #[inline(always)]
+    fn ready(&self, local: &Ray, entering: &TreeRay) -> (TriangleRay, Coarse) {
+        let sheared = TriangleRay::new(local, DVec3::ZERO);
+        let coarse = Coarse::new(&sheared, local, entering.entry(), self.extent);
+        (sheared, coarse)
+    }
 }
 
 /// Boxes of triangles relative to the mesh's origin, as rays are: nothing is rounded.
@@ -163,67 +207,62 @@ fn boxes(mesh: &Mesh) -> Vec<Aabb> {
     (0..mesh.triangles.len()).map(|i| Aabb::from_points(mesh.vertices(i as u32))).collect()
 }
 
-impl TriangleRay {
-    /// Four corners in the coordinates of the ray.
+/// A ray made ready for blocks of triangles, in f32: rules out what it misses by more than rounding.
+struct Coarse {
+    axes: [usize; 3],
+    /// Where the ray enters the mesh, in the order of `axes`.
+    origin: [f32; 3],
+    shear: [f32; 2],
+    /// 2δ; see the page of the module.
+    slack: f32,
+    /// False where the mesh is so small or large that products leave the range of f32.
+    rules_out: bool,
+}
+
+impl Coarse {
+    /// `entry` is how far `ray` goes to the mesh, and `extent` the largest coordinate there.
     #[inline(always)]
-    fn shear_x4(&self, corners: &[[f32; LANES]; 3]) -> [f64x4; 3] {
+    fn new(sheared: &TriangleRay, ray: &Ray, entry: f64, extent: f64) -> Coarse {
+        /// 2 · 16u.
+        const SLACK: f64 = 1.0 / (1u64 << 19) as f64;
+        /// 2 · 2⁻⁵⁰.
+        const ORIGIN: f64 = 1.0 / (1u64 << 49) as f64;
+        const LARGE: f64 = (1u64 << 40) as f64;
+        let axes = sheared.axes;
+        let point = ray.at(entry).to_array();
+        let [sx, sy, _] = sheared.shear;
+        let slack = SLACK * extent + ORIGIN * ray.origin.abs().max_element();
+        Coarse {
+            axes,
+            origin: axes.map(|k| point[k] as f32),
+            shear: [sx as f32, sy as f32],
+            slack: slack as f32,
+            rules_out: extent > 1.0 / LARGE && slack < LARGE,
+        }
+    }
+
+    /// A bit for each triangle that the line of the ray may hit.
+    #[inline(always)]
+    fn may_hit(&self, block: &Block) -> u32 {
+        if !self.rules_out {
+            return (1 << LANES) - 1;
+        }
         let [kx, ky, kz] = self.axes;
-        let [sx, sy, sz] = self.shear;
-        let x = widen(&corners[kx]) - f64x4::splat(self.origin[0]);
-        let y = widen(&corners[ky]) - f64x4::splat(self.origin[1]);
-        let z = widen(&corners[kz]) - f64x4::splat(self.origin[2]);
-        [f64x4::splat(sx).mul_neg_add(z, x), f64x4::splat(sy).mul_neg_add(z, y), f64x4::splat(sz) * z]
+        let [ox, oy, oz] = self.origin.map(f32x8::splat);
+        let [sx, sy] = self.shear.map(f32x8::splat);
+        let slack = f32x8::splat(self.slack);
+        let [a, b, c] = block.0.each_ref().map(|v| {
+            let z = v[kz] - oz;
+            let (x, y) = (sx.mul_neg_add(z, v[kx] - ox), sy.mul_neg_add(z, v[ky] - oy));
+            // δ is in the sizes, so that the bound of an edge is 2δ times the sum of two of them.
+            (x, y, x.abs() + y.abs() + slack)
+        });
+        let edge =
+            |p: (f32x8, f32x8, f32x8), q: (f32x8, f32x8, f32x8)| (p.0.mul_sub(q.1, p.1 * q.0), slack * (p.2 + q.2));
+        let [(e0, t0), (e1, t1), (e2, t2)] = [edge(c, b), edge(a, c), edge(b, a)];
+        let most = (e0 + t0).fast_min(e1 + t1).fast_min(e2 + t2);
+        let least = (e0 - t0).fast_max(e1 - t1).fast_max(e2 - t2);
+        // A lane of NaN is none: all its numbers are.
+        (most.simd_ge(f32x8::ZERO) | least.simd_le(f32x8::ZERO)).to_bitmask()
     }
-
-    /// Calls `visit` with the lanes of `block` that the ray hits before `t_max` until it says
-    /// stop; true if it did. The arithmetic is that of [`TriangleRay::intersect`], step by
-    /// step, so the results are the same bits.
-    #[inline(always)]
-    fn each_hit(&self, block: &Block, t_max: f64, mut visit: impl FnMut(usize, TriangleHit) -> bool) -> bool {
-        // Without FMA in hardware, four lanes would round each product: one lane at a time then.
-        if cfg!(not(any(target_feature = "fma", target_arch = "aarch64"))) {
-            return (0..LANES).any(|lane| {
-                let corners = block.0.map(|v| DVec3::from(v.map(|axis| f64::from(axis[lane]))));
-                self.intersect(corners).is_some_and(|hit| hit.t < t_max && visit(lane, hit))
-            });
-        }
-        let a = self.shear_x4(&block.0[0]);
-        let b = self.shear_x4(&block.0[1]);
-        let c = self.shear_x4(&block.0[2]);
-        let e0 = difference_of_products_x4(c[0], b[1], c[1], b[0]);
-        let e1 = difference_of_products_x4(a[0], c[1], a[1], c[0]);
-        let e2 = difference_of_products_x4(b[0], a[1], b[1], a[0]);
-        let least = e0.fast_min(e1).fast_min(e2);
-        let most = e0.fast_max(e1).fast_max(e2);
-        let inside = least.simd_ge(f64x4::ZERO) | most.simd_le(f64x4::ZERO);
-        if inside.to_bitmask() == 0 {
-            return false;
-        }
-        let det = e0 + e1 + e2;
-        let t = e2.mul_add(c[2], e1.mul_add(b[2], e0 * a[2])) / det;
-        let hit = inside & t.simd_gt(f64x4::ZERO) & t.simd_lt(f64x4::splat(t_max));
-        let mut mask = hit.to_bitmask();
-        while mask != 0 {
-            let lane = mask.trailing_zeros() as usize & (LANES - 1);
-            mask &= mask - 1;
-            let at = |x: &f64x4| x.as_array()[lane];
-            let det = at(&det);
-            if visit(lane, TriangleHit { t: at(&t), b1: at(&e1) / det, b2: at(&e2) / det }) {
-                return true;
-            }
-        }
-        false
-    }
-}
-
-#[inline(always)]
-fn widen(x: &[f32; LANES]) -> f64x4 {
-    f64x4::new([f64::from(x[0]), f64::from(x[1]), f64::from(x[2]), f64::from(x[3])])
-}
-
-#[inline(always)]
-fn difference_of_products_x4(a: f64x4, b: f64x4, c: f64x4, d: f64x4) -> f64x4 {
-    let cd = c * d;
-    let error = c.mul_neg_add(d, cd);
-    a.mul_sub(b, cd) + error
 }
