@@ -352,7 +352,12 @@ impl<'a> Compiler<'a> {
         let textured = self.materials[material as usize].varies()
             || light.is_some_and(|l| matches!(&lights[l as usize], Light::Area { radiance, .. } if radiance.varies()));
         let all = self.description.render.effects == written::Effects::All;
-        let detail = if textured || all { Detail::Texture } else { Detail::Geometry };
+        let boundary = light.is_none() && matches!(self.materials[material as usize].kind, Kind::Boundary);
+        let detail = match (textured || all, boundary) {
+            (true, _) => Detail::Texture,
+            (false, true) => Detail::Boundary,
+            (false, false) => Detail::Geometry,
+        };
         // A closed body without a word about its inside is empty; an open one has the same
         // medium on both sides; outside is what the camera is in.
         let closed = match &geometry {

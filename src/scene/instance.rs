@@ -190,7 +190,13 @@ impl Geometry {
     pub(super) fn surface(&self, point_on_ray: DVec3, hit: &Hit, detail: Detail) -> SurfacePoint {
         match self {
             Geometry::Shape(shape) => shape.surface_with(point_on_ray, hit.part as u8, detail),
-            Geometry::Mesh(mesh) => mesh.mesh.surface(hit.part, hit.barycentric[0], hit.barycentric[1]),
+            Geometry::Mesh(mesh) => {
+                let [b1, b2] = hit.barycentric;
+                match detail {
+                    Detail::Boundary => mesh.mesh.boundary(hit.part, b1, b2),
+                    Detail::Geometry | Detail::Texture => mesh.mesh.surface(hit.part, b1, b2),
+                }
+            }
             Geometry::Sdf(sdf) => sdf.surface(point_on_ray, hit.part),
             Geometry::Curves(curves) => curves.surface(point_on_ray, hit.part, hit.barycentric[0]),
             Geometry::Instance(_) => unreachable!("a hit names the child of an instance"),

@@ -218,6 +218,17 @@ impl Mesh {
         0.5 * area_vector(self.vertices(i)).length()
     }
 
+    /// Point and normal of [`Mesh::surface`], to the bit; the triangle's own normal and first side stand in for the rest.
+    #[must_use]
+    pub fn boundary(&self, i: u32, b1: f64, b2: f64) -> SurfacePoint {
+        let [a, b, c] = self.vertices(i);
+        let (e1, e2) = (b - a, c - a);
+        let point = a + e1 * b1 + e2 * b2 + self.origin;
+        let scale = a.abs().max(b.abs()).max(c.abs()).max(self.origin.abs()).max_element();
+        let normal = area_vector([a, b, c]).normalize();
+        SurfacePoint { point, scale, normal, shading_normal: normal, uv: DVec2::ZERO, tangent: e1 }
+    }
+
     /// The surface of triangle `i` at barycentric coordinates `b1` (of its second corner) and
     /// `b2` (of its third). The triangle must have an area.
     #[must_use]

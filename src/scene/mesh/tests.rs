@@ -273,6 +273,8 @@ fn a_surface_has_point_normal_area_and_tangent() {
     let mesh = Mesh::new(&source, &DAffine3::IDENTITY, NormalMode::Face, Winding::Object).unwrap();
     assert_eq!(mesh.area(0), 6.0);
     let s = mesh.surface(0, 0.5, 0.5);
+    let b = mesh.boundary(0, 0.5, 0.5);
+    assert_eq!((b.point, b.scale, b.normal), (s.point, s.scale, s.normal));
     assert_eq!(s.point, DVec3::new(1.5, 2.0, 5.0));
     assert_eq!(s.scale, 5.0);
     assert_eq!((s.normal, s.shading_normal), (DVec3::Z, DVec3::Z));

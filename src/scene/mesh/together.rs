@@ -95,3 +95,83 @@ impl Together {
         Hit { t: met.hit.t, object, part, barycentric: [met.hit.b1, met.hit.b2], instance: None }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::mesh::{AreaTable, Mesh, MeshSource, NormalMode, Winding};
+    use crate::scene::shape::Detail;
+    use crate::scene::shape::testing::Random;
+    use glam::{DAffine3, DVec3};
+
+    /// Some triangles in the unit sphere, moved and resized.
+    fn soup(random: &mut Random, triangles: u32, size: f64, centre: DVec3) -> Mesh {
+        let positions = (0..3 * triangles).map(|_| centre + random.direction() * (size * random.uniform())).collect();
+        let triangles = (0..triangles).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let source = MeshSource { positions, triangles, ..MeshSource::default() };
+        Mesh::new(&source, &DAffine3::IDENTITY, NormalMode::Face, Winding::Object).unwrap()
+    }
+
+    fn object(mesh: Mesh) -> Object {
+        let (tree, areas) = (Some(MeshTree::build(&mesh)), AreaTable::new(&mesh));
+        Object {
+            name: String::new(),
+            geometry: Geometry::Mesh(Box::new(TriangleMesh { mesh, tree, areas })),
+            material: 0,
+            light: None,
+            detail: Detail::Geometry,
+            inside: None,
+            outside: None,
+            keeps_medium: false,
+            flipped: false,
+        }
+    }
+
+    /// Of four meshes the third is a thousandth of the others in size and the fourth lies far away: those keep their
+    /// trees. Rays toward the other two meet the triangle, at the distance, that the trees of each find, and go on from
+    /// there.
+    #[test]
+    fn triangles_are_found_as_in_trees_of_their_own() {
+        let mut random = Random::new(5);
+        let meshes = [
+            soup(&mut random, 40, 1.0, DVec3::ZERO),
+            soup(&mut random, 7, 2.0, DVec3::X),
+            soup(&mut random, 9, 0.001, DVec3::Y),
+            soup(&mut random, 9, 1.0, DVec3::X * 1e6),
+        ];
+        let trees = meshes.each_ref().map(MeshTree::build);
+        let boxes = meshes.each_ref().map(Mesh::bounds);
+        let mut objects: Vec<Object> = meshes.into_iter().map(object).collect();
+        let together = Together::take(&mut objects, &boxes).unwrap();
+        for (i, object) in (0..).zip(&objects) {
+            let Geometry::Mesh(mesh) = &object.geometry else { panic!("{i}") };
+            assert_eq!((together.holds(i), mesh.tree.is_none()), (i < 2, i < 2), "{i}");
+        }
+        assert!(!together.holds(4));
+
+        let mut met = [0; 2];
+        for _ in 0..20_000 {
+            let origin = random.direction() * 5.0;
+            let mut ray = Ray::new(origin, (random.direction() - origin).normalize());
+            for _ in 0..3 {
+                let alone = |i: u32| {
+                    let skip = ray.departure.filter(|d| d.object == i).map(|d| d.part);
+                    trees[i as usize].closest(&ray, f64::INFINITY, skip).map(|hit| (i, hit))
+                };
+                let expected =
+                    [alone(0), alone(1)].into_iter().flatten().min_by(|a, b| a.1.hit.t.total_cmp(&b.1.hit.t));
+                let found = together.closest(&ray, f64::INFINITY);
+                let named = found.map(|hit| (hit.object, hit.part, hit.t, hit.barycentric));
+                assert_eq!(named, expected.map(|(i, m)| (i, m.triangle, m.hit.t, [m.hit.b1, m.hit.b2])));
+                assert_eq!(together.any(&ray, f64::INFINITY, None, |_| true), found.is_some());
+                let Some(hit) = found else { break };
+                met[hit.object as usize] += 1;
+                // A target does not stand in its own way, whatever else does.
+                let target = hit.departure();
+                assert!(!together.any(&ray, f64::INFINITY, Some(target), |other| other.departure() == target));
+                ray = Ray { origin: ray.at(hit.t), departure: Some(target), ..ray };
+            }
+        }
+        assert!(met.iter().all(|&n| n > 1000), "{met:?}");
+    }
+}

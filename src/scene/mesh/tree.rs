@@ -28,9 +28,18 @@ pub const MAX_TRIANGLES: usize = 1 << 26;
 struct Block([[f32x8; 3]; 3]);
 
 impl Block {
+    /// One axis of the corners of one triangle.
     #[inline(always)]
-    fn corners(&self, lane: usize) -> [DVec3; 3] {
-        self.0.each_ref().map(|v| DVec3::from(v.each_ref().map(|axis| f64::from(axis.as_array()[lane]))))
+    fn axis(&self, k: usize, lane: usize) -> [f64; 3] {
+        let at = |corner: &[f32x8; 3]| f64::from(corner[k].as_array()[lane]);
+        [at(&self.0[0]), at(&self.0[1]), at(&self.0[2])]
+    }
+
+    /// The exact test of one triangle.
+    #[inline(always)]
+    fn meet(&self, ray: &TriangleRay, lane: usize) -> Option<TriangleHit> {
+        let [kx, ky, kz] = ray.axes;
+        ray.meet([self.axis(kx, lane), self.axis(ky, lane), self.axis(kz, lane)])
     }
 }
 
@@ -127,7 +136,7 @@ impl MeshTree {
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize % LANES;
                 mask &= mask - 1;
-                if let Some(hit) = sheared.intersect(block.corners(lane))
+                if let Some(hit) = block.meet(&sheared, lane)
                     && hit.t < t_max
                 {
                     let triangle = self.bvh.order()[first + lane];
@@ -163,7 +172,7 @@ impl MeshTree {
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize % LANES;
                 mask &= mask - 1;
-                if let Some(hit) = sheared.intersect(block.corners(lane))
+                if let Some(hit) = block.meet(&sheared, lane)
                     && hit.t < t_max
                 {
                     let triangle = self.bvh.order()[first + lane];
@@ -248,18 +257,19 @@ impl Coarse {
             return (1 << LANES) - 1;
         }
         let [kx, ky, kz] = self.axes;
-        let [ox, oy, oz] = self.origin.map(f32x8::splat);
-        let [sx, sy] = self.shear.map(f32x8::splat);
-        let slack = f32x8::splat(self.slack);
-        let [a, b, c] = block.0.each_ref().map(|v| {
+        let splat = f32x8::splat;
+        let (ox, oy, oz) = (splat(self.origin[0]), splat(self.origin[1]), splat(self.origin[2]));
+        let (sx, sy, slack) = (splat(self.shear[0]), splat(self.shear[1]), splat(self.slack));
+        let corner = |v: &[f32x8; 3]| {
             let z = v[kz] - oz;
             let (x, y) = (sx.mul_neg_add(z, v[kx] - ox), sy.mul_neg_add(z, v[ky] - oy));
             // δ is in the sizes, so that the bound of an edge is 2δ times the sum of two of them.
             (x, y, x.abs() + y.abs() + slack)
-        });
+        };
+        let (a, b, c) = (corner(&block.0[0]), corner(&block.0[1]), corner(&block.0[2]));
         let edge =
-            |p: (f32x8, f32x8, f32x8), q: (f32x8, f32x8, f32x8)| (p.0.mul_sub(q.1, p.1 * q.0), slack * (p.2 + q.2));
-        let [(e0, t0), (e1, t1), (e2, t2)] = [edge(c, b), edge(a, c), edge(b, a)];
+            |p: &(f32x8, f32x8, f32x8), q: &(f32x8, f32x8, f32x8)| (p.0.mul_sub(q.1, p.1 * q.0), slack * (p.2 + q.2));
+        let ((e0, t0), (e1, t1), (e2, t2)) = (edge(&c, &b), edge(&a, &c), edge(&b, &a));
         let most = (e0 + t0).fast_min(e1 + t1).fast_min(e2 + t2);
         let least = (e0 - t0).fast_max(e1 - t1).fast_max(e2 - t2);
         // A lane of NaN is none: all its numbers are.

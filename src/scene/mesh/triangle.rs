@@ -55,24 +55,30 @@ impl TriangleRay {
     /// triangles without area.
     #[must_use]
     pub fn intersect(&self, v: [DVec3; 3]) -> Option<TriangleHit> {
-        let [kx, ky, kz] = self.axes;
+        let hit = self.meet(self.axes.map(|k| v.map(|corner| corner[k])))?;
+        (area_vector(v) != DVec3::ZERO).then_some(hit)
+    }
+
+    /// [`TriangleRay::intersect`] with a triangle that has an area; its corners by axis, in the order of the ray's.
+    #[inline(always)]
+    pub(super) fn meet(&self, [x, y, z]: [[f64; 3]; 3]) -> Option<TriangleHit> {
+        let [ox, oy, oz] = self.origin;
         let [sx, sy, sz] = self.shear;
-        let sheared = v.map(|v| {
-            let (x, y, z) = (v[kx] - self.origin[0], v[ky] - self.origin[1], v[kz] - self.origin[2]);
-            DVec3::new((-sx).mul_add(z, x), (-sy).mul_add(z, y), sz * z)
-        });
-        let [a, b, c] = sheared;
-        let e0 = difference_of_products(c.x, b.y, c.y, b.x);
-        let e1 = difference_of_products(a.x, c.y, a.y, c.x);
-        let e2 = difference_of_products(b.x, a.y, b.y, a.x);
-        let inside = (e0 >= 0.0 && e1 >= 0.0 && e2 >= 0.0) || (e0 <= 0.0 && e1 <= 0.0 && e2 <= 0.0);
+        // One by one: what is written as a map of arrays is not kept in registers.
+        let (az, bz, cz) = (z[0] - oz, z[1] - oz, z[2] - oz);
+        let (ax, bx, cx) = ((-sx).mul_add(az, x[0] - ox), (-sx).mul_add(bz, x[1] - ox), (-sx).mul_add(cz, x[2] - ox));
+        let (ay, by, cy) = ((-sy).mul_add(az, y[0] - oy), (-sy).mul_add(bz, y[1] - oy), (-sy).mul_add(cz, y[2] - oy));
+        let e0 = difference_of_products(cx, by, cy, bx);
+        let e1 = difference_of_products(ax, cy, ay, cx);
+        let e2 = difference_of_products(bx, ay, by, ax);
+        let inside = e0.min(e1).min(e2) >= 0.0 || e0.max(e1).max(e2) <= 0.0;
         if !inside {
             return None;
         }
         let det = e0 + e1 + e2;
-        let t = e2.mul_add(c.z, e1.mul_add(b.z, e0 * a.z)) / det;
+        let t = e2.mul_add(sz * cz, e1.mul_add(sz * bz, e0 * (sz * az))) / det;
         // det = 0 makes t infinite or NaN.
-        if !(t > 0.0 && t < f64::INFINITY) || area_vector(v) == DVec3::ZERO {
+        if !(t > 0.0 && t < f64::INFINITY) {
             return None;
         }
         Some(TriangleHit { t, b1: e1 / det, b2: e2 / det })
@@ -80,6 +86,7 @@ impl TriangleRay {
 }
 
 /// a b − c d with a relative error below 2⁻⁵², hence with the exact sign.
+#[inline(always)]
 pub(super) fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     let cd = c * d;
     let error = (-c).mul_add(d, cd);

@@ -66,6 +66,8 @@ pub struct ShapeHit {
 /// What is wanted of a surface: texture coordinates cost an arc tangent or two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
+    /// Point and normal; the rest may be anything that is finite.
+    Boundary,
     /// Point, normal and tangent; the texture coordinates are zero where they are not free.
     Geometry,
     /// All.
@@ -90,7 +92,7 @@ impl Detail {
     #[inline]
     fn uv(self, uv: impl FnOnce() -> DVec2) -> DVec2 {
         match self {
-            Detail::Geometry => DVec2::ZERO,
+            Detail::Boundary | Detail::Geometry => DVec2::ZERO,
             Detail::Texture => uv(),
         }
     }
