@@ -13,8 +13,8 @@ use crate::film::run::{LONGEST, LayerRun, Run};
 use crate::math::sampler::Octet;
 use crate::scene::Scene;
 use crate::spectrum::{ColourSpace, LANES, Lanes, SampledWavelengths, observer};
-use crate::transport::light::{Bounds, Splat};
-use crate::transport::plan::{EffectPlan, Integrator, LightSettings};
+use crate::transport::light::{Bounds, LightPaths, Splat};
+use crate::transport::plan::{EffectPlan, Integrator};
 use crate::transport::{self, PixelSample, Samples, Shot};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -271,12 +271,12 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
     let start = Instant::now();
     let layers = job.plan.layers.channels().len();
     let film = Mutex::new(Film::new(job.scene.camera.resolution, job.window)?.with_layers(layers));
-    let splats = match &job.plan.integrator {
-        Integrator::Light(settings) => {
+    let splats = match light_paths(job) {
+        Some(paths) => {
             let film = Film::new(job.scene.camera.resolution, job.window)?.with_layers(job.scene.bands.len());
-            Some((settings, Mutex::new(SplatFilm { film, paths: [0; REPLICATES] })))
+            Some((paths, Mutex::new(SplatFilm { film, paths: [0; REPLICATES] })))
         }
-        Integrator::Path(_) | Integrator::Whitted(_) | Integrator::Depth | Integrator::Nothing => None,
+        None => None,
     };
     let total = job.window.pixels() as u64 * u64::from(job.samples);
     let done = AtomicU64::new(0);
@@ -300,8 +300,8 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
             let done = done.fetch_add(unit, Ordering::Relaxed) + unit;
             watch(Progress { done, total, elapsed: start.elapsed(), error: latest });
         });
-        if let Some((settings, splats)) = &splats {
-            from_lights(job, settings, pass.clone(), splats, stop);
+        if let Some((paths, splats)) = &splats {
+            from_lights(job, paths, pass.clone(), splats, stop);
         }
         if stop.load(Ordering::Relaxed) {
             return Err(Error::Render("stopped before the picture was finished; nothing was written".into()));
@@ -324,24 +324,36 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
 /// Paths of one work unit from the lights.
 const PATHS_OF_A_UNIT: u64 = 1 << 14;
 
-/// Follows as many paths from the lights as the frame has pixels, for each sample of `samples`. A sample's replicate
-/// and number address its paths as they do for the camera, so the sums do not depend on units or passes.
-fn from_lights(
-    job: &FrameJob,
-    settings: &LightSettings,
-    samples: Range<u32>,
-    splats: &Mutex<SplatFilm>,
-    stop: &AtomicBool,
-) {
+/// The paths from the lights that the plan calls for.
+fn light_paths<'a>(job: &FrameJob<'a>) -> Option<LightPaths<'a>> {
     let FrameJob { scene, plan, filter, window, seed, .. } = *job;
-    let [width, height] = scene.camera.resolution.map(u64::from);
-    let paths = width * height;
+    let (settings, caustics) = match &plan.integrator {
+        Integrator::Light(settings) => (*settings, None),
+        Integrator::Path(settings) => (settings.of_light_paths(), Some(plan.caustics.as_deref()?)),
+        Integrator::Whitted(_) | Integrator::Depth | Integrator::Nothing => return None,
+    };
     let radius = filter.radius() + 0.5;
     let corner = DVec2::new(f64::from(window.x), f64::from(window.y));
     let bounds = Bounds {
         low: corner - radius,
         high: corner + DVec2::new(f64::from(window.width), f64::from(window.height)) + radius,
     };
+    Some(LightPaths { scene, plan, settings, caustics, seed, bounds })
+}
+
+/// Follows paths from the lights for each sample of `samples`: as many as the frame has pixels, or the share of them
+/// that the plan wants. A sample's replicate and number address its paths as they do for the camera, so the sums do
+/// not depend on units or passes.
+fn from_lights(
+    job: &FrameJob,
+    light_paths: &LightPaths,
+    samples: Range<u32>,
+    splats: &Mutex<SplatFilm>,
+    stop: &AtomicBool,
+) {
+    let FrameJob { scene, filter, window, .. } = *job;
+    let [width, height] = scene.camera.resolution.map(u64::from);
+    let paths = light_paths.caustics.map_or(width * height, |c| c.paths(width * height));
     let units: Vec<(u32, Range<u64>)> = samples
         .flat_map(|s| {
             (0..paths).step_by(PATHS_OF_A_UNIT as usize).map(move |j| (s, j..(j + PATHS_OF_A_UNIT).min(paths)))
@@ -356,7 +368,7 @@ fn from_lights(
         let mut landed = Landed::default();
         let count = unit.end - unit.start;
         for j in unit {
-            transport::light::trace(scene, plan, settings, seed, replicate, base + j, bounds, |wavelengths, splat| {
+            transport::light::trace(light_paths, replicate, base + j, &mut |wavelengths, splat| {
                 landed.add(scene, filter, window, wavelengths, &splat);
             });
         }

@@ -18,6 +18,7 @@ use crate::scene::census::Census;
 use crate::scene::compile;
 use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Form, Layer, LayerPlan, Quantity, Source};
+use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
 use frame::{Frame, FrameJob, Progress};
 use report::{Report, SceneReport, Status};
@@ -111,8 +112,23 @@ pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
     };
     let mut plan = EffectPlan::of(&Census::of(&scene), integrator, mode);
     plan.layers = layer_plan(&description, &scene, samples)?;
+    let filter = FilterSampler::new(filter(&description.image.filter))?;
+    let (caustics, said) = pilot::decide(&scene, &plan, &filter, description.render.seed, wishes(&description));
+    plan.caustics = caustics;
+    plan.techniques.extend(said);
     let hash = hash(&description, &scene.files);
     Ok(Prepared { description, scene, plan, samples, hash })
+}
+
+/// Techniques that the description asks for or forbids.
+fn wishes(description: &SceneDescription) -> Wishes {
+    let of = |technique| match technique {
+        description::Technique::Auto => Use::Auto,
+        description::Technique::On => Use::On,
+        description::Technique::Off => Use::Off,
+    };
+    let written = &description.render.techniques;
+    Wishes { light_tracing: of(written.light_tracing), packets: of(written.packets) }
 }
 
 /// What computes the light.

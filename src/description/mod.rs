@@ -339,7 +339,7 @@ pub use print::yaml;
 pub use scene::{Locator, SceneDescription};
 pub use settings::{
     Channels, Colour, Compression, DepthIntegrator, Effects, Exr, Integrator, LightTracerIntegrator, NoIntegrator,
-    Output, PathIntegrator, Png, Precision, Render, Tonemap, Wavelengths, WhittedIntegrator,
+    Output, PathIntegrator, Png, Precision, Render, Technique, Techniques, Tonemap, Wavelengths, WhittedIntegrator,
 };
 pub use shape::{
     Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Geometry, Instance, Layout, Mesh, Normals, Plane, Rectangle,

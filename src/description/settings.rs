@@ -153,6 +153,9 @@ pub struct Render {
     /// How wavelengths are drawn; default `auto`.
     #[serde(default)]
     pub wavelengths: Wavelengths,
+    /// How light is found; default each where it pays.
+    #[serde(default)]
+    pub techniques: Techniques,
 }
 
 fn samples() -> u32 {
@@ -171,8 +174,34 @@ impl Default for Render {
             effects: Effects::default(),
             tile: tile(),
             wavelengths: Wavelengths::default(),
+            techniques: Techniques::default(),
         }
     }
+}
+
+/// `techniques: {light_tracing: auto, packets: auto}`
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Techniques {
+    /// Whether light of mirrors and glass is traced from the lights.
+    #[serde(default)]
+    pub light_tracing: Technique,
+    /// Whether wavelengths that part in glass on their way from a light are followed together.
+    #[serde(default)]
+    pub packets: Technique,
+}
+
+/// Whether a technique is used; the picture is the same but for its noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Technique {
+    /// Where it pays.
+    #[default]
+    Auto,
+    /// Wherever it can be.
+    On,
+    /// Not.
+    Off,
 }
 
 /// Which effects are simulated.
@@ -428,7 +457,14 @@ mod tests {
         let scene = scene("");
         assert_eq!(
             scene.render,
-            Render { samples: 64, seed: 0, effects: Effects::Auto, tile: 32, wavelengths: Wavelengths::Auto }
+            Render {
+                samples: 64,
+                seed: 0,
+                effects: Effects::Auto,
+                tile: 32,
+                wavelengths: Wavelengths::Auto,
+                techniques: Techniques::default()
+            }
         );
         assert_eq!(scene.integrator, Integrator::Path(PathIntegrator::default()));
         assert_eq!(scene.output.dir, PathBuf::from("out"));

@@ -75,6 +75,32 @@ pub fn refract(wo: DVec3, m: DVec3, eta: f64, cos_t: f64) -> DVec3 {
 }
 
 impl Dielectric {
+    /// The interface as one wavelength meets it.
+    #[must_use]
+    pub fn lane(&self, lane: usize) -> Dielectric {
+        let eta = match self.eta {
+            RelativeIndex::Constant(eta) => eta,
+            RelativeIndex::Dispersive(eta) => eta[lane],
+        };
+        let only = |x: Lanes| Lanes::splat(x.to_array()[lane]);
+        let tint = Tint { reflected: only(self.tint.reflected), transmitted: only(self.tint.transmitted) };
+        Dielectric { eta: RelativeIndex::Constant(eta), tint, ..*self }
+    }
+
+    /// The reflection, where `u_lobe` has every wavelength reflected that decides for itself.
+    #[must_use]
+    pub fn reflects_all(&self, wo: DVec3, u_lobe: f64) -> Option<BsdfSample> {
+        let reflects = |eta: f64| {
+            let toward = if wo.z > 0.0 { eta } else { 1.0 / eta };
+            u_lobe < fresnel::dielectric(self.fresnel, wo.z.abs(), toward).reflected
+        };
+        let all = match self.eta {
+            RelativeIndex::Constant(eta) => reflects(eta),
+            RelativeIndex::Dispersive(eta) => eta.into_iter().all(reflects),
+        };
+        all.then(|| BsdfSample::discrete(mirror(wo), self.tint.reflected))
+    }
+
     /// Reflects with the hero's reflectance, else refracts.
     pub(super) fn sample(&self, wo: DVec3, u_lobe: f64) -> Option<BsdfSample> {
         let cos = wo.z.abs();

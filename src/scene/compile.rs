@@ -642,7 +642,8 @@ fn fov_axis(axis: written::FovAxis) -> camera::FovAxis {
 
 impl Object {
     /// The object's box; without end for a plane.
-    fn bounds(&self) -> Aabb {
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
         match &self.geometry {
             Geometry::Shape(shape) => match shape.bounds() {
                 Some((min, max)) => Aabb { min, max },

@@ -59,6 +59,82 @@ fn spot_on(objects: &[Object], object: u32, u: DVec2) -> Option<Spot> {
     }
 }
 
+/// A light of which a point, or for light from infinity a direction, has been drawn.
+pub struct Start<'a> {
+    light: &'a Light,
+    place: Place,
+    /// The wavelengths.
+    nm: Lanes,
+}
+
+enum Place {
+    /// On a shape that shines in all directions of a hemisphere.
+    Surface(Spot),
+    /// On a shape that shines along its normal, or a point that throws its light one way only.
+    Beam { ray: Ray, power: Lanes },
+    /// A point.
+    Point(DVec3),
+    /// Infinitely far: where the light goes, and what falls on an area across it over the density of the direction,
+    /// W·m⁻²·nm⁻¹.
+    Infinity { direction: DVec3, irradiance: Lanes },
+}
+
+/// The freedom that is left when a [`Start`] has been drawn.
+pub enum Freedom {
+    /// None: this is the ray, and its power over its density, W·nm⁻¹.
+    None(Ray, Lanes),
+    /// The direction, from this point.
+    Direction(DVec3),
+    /// The place of the ray, whose direction this is.
+    Place(DVec3),
+}
+
+impl Start<'_> {
+    /// What is still free.
+    #[must_use]
+    pub fn freedom(&self) -> Freedom {
+        match &self.place {
+            Place::Surface(spot) => Freedom::Direction(spot.surface.point),
+            Place::Beam { ray, power } => Freedom::None(*ray, *power),
+            Place::Point(position) => Freedom::Direction(*position),
+            Place::Infinity { direction, .. } => Freedom::Place(*direction),
+        }
+    }
+
+    /// The ray in `direction`, with its power by solid angle over the density of its start, W·sr⁻¹·nm⁻¹; `None` where
+    /// there is no light.
+    #[must_use]
+    pub fn toward(&self, direction: DVec3) -> Option<(Ray, Lanes)> {
+        match (&self.place, self.light) {
+            (Place::Surface(spot), Light::Area { radiance, .. }) => {
+                let cos = direction.dot(spot.surface.normal);
+                let light = || radiance.eval(&spot.texture, self.nm) * (cos * spot.area) as f32;
+                (cos > 0.0).then(|| (spot.ray(direction), light()))
+            }
+            (Place::Point(position), Light::Point { intensity, .. }) => {
+                Some((Ray::new(*position, direction), intensity.eval(self.nm)))
+            }
+            (Place::Point(position), Light::Spot { axis, beam, cutoff, intensity, slide, .. }) => {
+                let falloff = spot_falloff(direction.dot(*axis), *beam, *cutoff);
+                let slide = || slide.as_ref().map_or(Lanes::ONE, |slide| slide.eval(-direction, self.nm));
+                (falloff > 0.0)
+                    .then(|| (Ray::new(*position, direction), intensity.eval(self.nm) * slide() * falloff as f32))
+            }
+            _ => None,
+        }
+    }
+
+    /// For light from infinity: what falls on an area across its direction, over the density of the direction,
+    /// W·m⁻²·nm⁻¹.
+    #[must_use]
+    pub fn irradiance(&self) -> Lanes {
+        match &self.place {
+            Place::Infinity { irradiance, .. } => *irradiance,
+            Place::Surface(_) | Place::Beam { .. } | Place::Point(_) => Lanes::ZERO,
+        }
+    }
+}
+
 impl Spot {
     fn ray(&self, direction: DVec3) -> Ray {
         Ray::leaving(self.surface.point, self.surface.scale, self.surface.normal, direction, self.departure)
@@ -73,48 +149,70 @@ impl Scene {
     #[must_use]
     pub fn emit(&self, u_light: f64, u_point: DVec2, u_direction: DVec2, nm: Lanes) -> Option<Emission> {
         let (i, probability) = self.choose_light(u_light)?;
-        let light = &self.lights[i];
-        let (ray, power) = match light {
-            Light::Area { object, radiance } => {
-                let spot = spot_on(&self.objects, *object, u_point)?;
-                let local = warp::cosine_hemisphere(u_direction);
-                let direction = Frame::from_normal(spot.surface.normal).to_world(local);
-                // L cos θ over the density (1 / area) (cos θ / π).
-                (spot.ray(direction), radiance.eval(&spot.texture, nm) * (PI * spot.area) as f32)
+        let environment = self.lights[i].is_environment();
+        let (u_start, u_rest) = if environment { (u_direction, u_point) } else { (u_point, u_direction) };
+        let start = self.start(i, u_start, u_rest, nm)?;
+        let (ray, power) = match start.freedom() {
+            Freedom::None(ray, power) => (ray, power),
+            Freedom::Direction(_) => {
+                let (direction, factor) = self.spread(&start, u_rest);
+                let (ray, power) = start.toward(direction).filter(|_| factor.is_finite())?;
+                (ray, power * factor as f32)
             }
-            Light::AlongNormal { object, exitance } => {
-                let spot = spot_on(&self.objects, *object, u_point)?;
-                (spot.ray(spot.surface.normal), exitance.eval(&spot.texture, nm) * spot.area as f32)
+            Freedom::Place(direction) => (self.arriving_ray(direction, u_rest), start.irradiance() * self.section()),
+        };
+        Some(Emission { ray, power: power * (1.0 / probability) as f32 })
+    }
+
+    /// A direction after the way a light shines by itself, and one over its density, sr.
+    fn spread(&self, start: &Start, u: DVec2) -> (DVec3, f64) {
+        match (&start.place, start.light) {
+            (Place::Surface(spot), _) => {
+                let local = warp::cosine_hemisphere(u);
+                (Frame::from_normal(spot.surface.normal).to_world(local), PI / local.z)
             }
-            Light::Point { position, intensity } => {
-                let direction = warp::uniform_sphere(u_direction);
-                (Ray::new(*position, direction), intensity.eval(nm) * (4.0 * PI) as f32)
-            }
-            Light::Spot { position, axis, beam, cutoff, intensity, slide } => {
+            (_, Light::Spot { axis, cutoff, .. }) => {
                 // 1 − cos of the cutoff without cancellation.
                 let half = libm::sin(0.5 * cutoff);
                 let one_minus_cos = 2.0 * half * half;
-                let direction = Frame::from_normal(*axis).to_world(warp::uniform_cone(u_direction, one_minus_cos));
-                let factor = spot_falloff(direction.dot(*axis), *beam, *cutoff) * 2.0 * PI * one_minus_cos;
-                let slide = slide.as_ref().map_or(Lanes::ONE, |slide| slide.eval(-direction, nm));
-                (Ray::new(*position, direction), intensity.eval(nm) * slide * factor as f32)
+                let direction = Frame::from_normal(*axis).to_world(warp::uniform_cone(u, one_minus_cos));
+                (direction, 2.0 * PI * one_minus_cos)
             }
-            Light::Projector(projector) => projector.emit(u_direction, nm),
+            _ => (warp::uniform_sphere(u), 4.0 * PI),
+        }
+    }
+
+    /// Draws where light `i` begins by `u`, for light from infinity the direction that it comes from; `None` where there
+    /// is none. Lights that have no other freedom take `rest`.
+    #[must_use]
+    pub fn start(&self, i: usize, u: DVec2, rest: DVec2, nm: Lanes) -> Option<Start<'_>> {
+        let light = &self.lights[i];
+        let place = match light {
+            Light::Area { object, .. } => Place::Surface(spot_on(&self.objects, *object, u)?),
+            Light::AlongNormal { object, exitance } => {
+                let spot = spot_on(&self.objects, *object, u)?;
+                let power = exitance.eval(&spot.texture, nm) * spot.area as f32;
+                Place::Beam { ray: spot.ray(spot.surface.normal), power }
+            }
+            Light::Point { position, .. } | Light::Spot { position, .. } => Place::Point(*position),
+            Light::Projector(projector) => {
+                let (ray, power) = projector.emit(rest, nm);
+                Place::Beam { ray, power }
+            }
             Light::Directional { direction, irradiance } => {
-                (self.arriving_ray(*direction, u_point), irradiance.eval(nm) * self.section())
+                Place::Infinity { direction: *direction, irradiance: irradiance.eval(nm) }
             }
             Light::Constant { radiance } => {
-                let direction = warp::uniform_sphere(u_direction);
-                let factor = (4.0 * PI) as f32 * self.section();
-                (self.arriving_ray(direction, u_point), radiance.eval(nm) * factor)
+                let irradiance = radiance.eval(nm) * (4.0 * PI) as f32;
+                Place::Infinity { direction: warp::uniform_sphere(u), irradiance }
             }
             Light::Environment(map) => {
-                let s = map.sample(u_direction)?;
-                let factor = self.section() * (1.0 / s.pdf_solid_angle) as f32;
-                (self.arriving_ray(-s.direction, u_point), map.radiance_of(&s, nm) * factor)
+                let s = map.sample(u)?;
+                let irradiance = map.radiance_of(&s, nm) * (1.0 / s.pdf_solid_angle) as f32;
+                Place::Infinity { direction: -s.direction, irradiance }
             }
         };
-        Some(Emission { ray, power: power * (1.0 / probability) as f32 })
+        Some(Start { light, place, nm })
     }
 
     /// The area of the disc through which light from infinity comes, m².

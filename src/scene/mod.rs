@@ -7,6 +7,7 @@
 pub mod along_normal;
 pub mod bvh;
 pub mod camera;
+pub mod casters;
 pub mod census;
 pub mod compile;
 pub mod compound;
@@ -129,6 +130,18 @@ impl Object {
     #[must_use]
     pub fn facing(&self) -> f64 {
         if self.flipped { -1.0 } else { 1.0 }
+    }
+
+    /// The medium that a ray in `direction`, which was in `before`, is in after it has crossed the surface.
+    #[must_use]
+    pub fn beyond(&self, surface: &SurfacePoint, direction: DVec3, before: Option<u32>) -> Option<u32> {
+        if self.keeps_medium {
+            before
+        } else if direction.dot(surface.normal) < 0.0 {
+            self.inside
+        } else {
+            self.outside
+        }
     }
 }
 

@@ -9,14 +9,17 @@
 //! Found are paths L … D E: what a smooth mirror or glass shows cannot be found, and is black. Light that the camera sees
 //! itself, L E, is the camera's part (`path` of one segment). Wavelengths are carried as in [`path`](super::path).
 
+use super::caustics::Caustics;
 use super::path::seen_normal;
 use super::plan::{EffectPlan, LightSettings};
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::math::{Frame, Ray};
-use crate::optics::bsdf::Bsdf;
+use crate::optics::bsdf::{Bsdf, BsdfSample};
+use crate::optics::dielectric::RelativeIndex;
+use crate::scene::camera::Entry;
 use crate::scene::compound::Leaf;
 use crate::scene::material::{Kind, Material};
-use crate::scene::{Hit, Scene, SurfacePoint};
+use crate::scene::{Hit, Medium, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
 
@@ -28,6 +31,12 @@ const SURVIVAL: f64 = 0.999;
 
 /// Boundaries in a row that a ray crosses at the most.
 const MAX_BOUNDARIES: u32 = 256;
+
+/// Sets the numbers of rays to the camera apart from those of the path, as in `path`.
+const TO_CAMERA: u32 = 1 << 28;
+
+/// The set that chooses which wavelength goes on: above every vertex's.
+const CHOSEN: u32 = 1 << 29;
 
 /// Tells the random numbers of lights from those of the camera.
 const STREAM: u64 = 0x6c69_6768_7470_6174;
@@ -56,92 +65,425 @@ impl Bounds {
     }
 }
 
-/// Follows path `index` of `replicate` and hands each of its splats within `bounds` to `splat`.
-#[expect(clippy::too_many_arguments, reason = "the address of a path, and where its light goes")]
+/// Which paths from the lights are wanted.
+#[derive(Clone, Copy, Debug)]
+pub struct LightPaths<'a> {
+    /// What light crosses.
+    pub scene: &'a Scene,
+    /// What is simulated.
+    pub plan: &'a EffectPlan,
+    /// How far.
+    pub settings: LightSettings,
+    /// Only those of the class C, and how they are aimed; all for `None`.
+    pub caustics: Option<&'a Caustics>,
+    /// Of the random numbers.
+    pub seed: u64,
+    /// Where light is wanted.
+    pub bounds: Bounds,
+}
+
+/// What a path was.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Traced {
+    /// Rays that were followed, to surfaces and to the camera.
+    pub rays: u32,
+    /// The source and the place in its guide.
+    pub began: Option<(usize, DVec2)>,
+}
+
+/// Follows path `index` of `replicate` and hands each of its splats within the bounds to `splat`.
 pub fn trace(
-    scene: &Scene,
-    plan: &EffectPlan,
-    settings: &LightSettings,
-    seed: u64,
+    paths: &LightPaths,
     replicate: u32,
     index: u64,
-    bounds: Bounds,
-    mut splat: impl FnMut(&SampledWavelengths, Splat),
-) {
+    splat: &mut dyn FnMut(&SampledWavelengths, Splat),
+) -> Traced {
+    let scene = paths.scene;
     // One long sequence a replicate, as the lights are the same for every pixel.
-    let sampler = Sampler::new(seed ^ STREAM, [(index >> 32) as u32, 0], replicate, index as u32);
+    let sampler = Sampler::new(paths.seed ^ STREAM, [(index >> 32) as u32, 0], replicate, index as u32);
     let (u_choice, u_time) = pairs(sampler.set(Set::Camera));
     let (u_point, u_direction) = pairs(sampler.set(Set::Extra(0)));
     let wavelengths = scene.wavelengths.sample(u_time.x);
-    let Some(emission) = scene.emit(u_choice.x, u_point, u_direction, wavelengths.nm) else { return };
+    let mut traced = Traced::default();
+    let emission = match paths.caustics {
+        None => scene.emit(u_choice.x, u_point, u_direction, wavelengths.nm),
+        Some(caustics) => caustics.begin(scene, u_choice.x, u_point, u_direction, wavelengths.nm).map(|aimed| {
+            traced.began = Some((aimed.source, aimed.cell));
+            aimed.emission
+        }),
+    };
+    let Some(emission) = emission else { return traced };
     let start = largest(emission.power);
     if start.is_nan() || start <= 0.0 {
-        return;
+        return traced;
     }
-    let walk = Walk { scene, frame: bounds };
-    let mut ray = emission.ray;
-    let mut power = emission.power;
-    // Density of each lane over the hero's, as in `path`.
-    let mut rho = Lanes::ONE;
+    let mut walk = Walk { paths, sampler: &sampler, wavelengths: &wavelengths, start, splat, rays: 0 };
+    walk.follow(Beam {
+        ray: emission.ray,
+        power: emission.power,
+        rho: Lanes::ONE,
+        nm: wavelengths.nm,
+        alone: None,
+        chosen: false,
+        medium: None,
+        vertex: 0,
+    });
+    traced.rays = walk.rays;
+    traced
+}
 
-    for vertex in 0u32.. {
-        // The camera is one segment further than the next surface.
-        if settings.max_depth.is_some_and(|depth| vertex + 2 > depth) {
-            return;
-        }
-        let numbers = |crossings: u32| sampler.set(Set::Extra((vertex + 1).wrapping_add(crossings << 16)))[2];
-        let Some((hit, surface, from, leaf)) = walk.next_surface(&ray, numbers) else { return };
-        let material = &scene.materials[scene.objects[hit.object as usize].material as usize];
-        let material = leaf.as_ref().map_or(material, |leaf| leaf.material);
-        let came = -from;
-        let frame = match &leaf {
-            Some(leaf) => leaf.frame,
-            None => {
-                let flip = material.two_sided && came.dot(surface.normal) < 0.0;
-                let normal = seen_normal(&surface, came);
-                Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent)
-            }
-        };
-        // Slopes shadow by the direction to the light alone, which is where the path comes from.
-        if let Some(leaf) = &leaf {
-            power *= leaf.slopes.shadowing(came) as f32;
-        }
-        let bsdf = material.bsdf(&hit.texture_point(&surface), wavelengths.nm, plan.all_dispersive);
-        let wo = frame.to_local(came);
-        let choice = sampler.set(Set::Choice(vertex));
-        let (u_lens, u_scatter) = pairs(sampler.set(Set::Scatter(vertex)));
-        let share = LANES as f32 / rho.reduce_add();
+/// Light on its way.
+#[derive(Clone, Copy)]
+struct Beam {
+    ray: Ray,
+    /// Over the hero's density.
+    power: Lanes,
+    /// Density of each lane over the hero's, as in `path`.
+    rho: Lanes,
+    /// The wavelengths; all the same for one that goes alone.
+    nm: Lanes,
+    /// The wavelength that goes alone, since the others took another way.
+    alone: Option<usize>,
+    /// Whether it has been chosen to go on for all that parted.
+    chosen: bool,
+    /// What the beam is in: `None` while it is not known.
+    medium: Option<Option<u32>>,
+    /// Vertices so far.
+    vertex: u32,
+}
 
-        if !bsdf.is_discrete() {
-            let at = Vertex { hit: &hit, surface: &surface, frame: &frame, came, local: wo };
-            if let Some(seen) = walk.connect(&bsdf, &at, u_lens, wavelengths.nm) {
-                splat(&wavelengths, Splat { light: power * seen.light * share, ..seen });
-            }
-        }
+/// What ends a flight.
+enum Met<'a> {
+    Surface { hit: Hit, surface: SurfacePoint, leaf: Option<Leaf<'a>>, pane: bool },
+    Medium { point: DVec3, medium: &'a Medium },
+}
 
-        let Some(sample) = bsdf.sample(wo, choice[1], u_scatter) else { return };
-        let went = frame.to_world(sample.wi);
-        let side = went.dot(surface.normal) * came.dot(surface.normal);
-        if (side > 0.0) == sample.transmitted || side == 0.0 {
-            return;
-        }
-        // Power, not radiance: no 1/η² on crossing, and the cosines of the true normal for those of the other.
-        let adjoint = sample.eta2 * adjoint(wo.z, sample.wi.z, came.dot(surface.normal), went.dot(surface.normal));
-        power *= sample.weight * adjoint as f32;
-        rho *= sample.ratio;
-        let carried = largest(power) * f64::from(LANES as f32 / rho.reduce_add());
-        if carried.is_nan() || carried <= 0.0 {
-            return;
-        }
-        if vertex + 2 >= settings.roulette_depth {
-            let q = (carried / start).min(if vertex < FOR_SURE { 1.0 } else { SURVIVAL });
-            if choice[2] >= q {
+/// A walk from a light and what it has cost.
+struct Walk<'a, 'b> {
+    paths: &'a LightPaths<'a>,
+    sampler: &'a Sampler<'a>,
+    wavelengths: &'a SampledWavelengths,
+    /// Largest power at the start.
+    start: f64,
+    splat: &'b mut dyn FnMut(&SampledWavelengths, Splat),
+    rays: u32,
+}
+
+impl<'a> Walk<'a, '_> {
+    fn follow(&mut self, mut beam: Beam) {
+        let LightPaths { scene, plan, settings, caustics, .. } = *self.paths;
+        loop {
+            let vertex = beam.vertex;
+            // The camera is one segment further than the next surface.
+            if settings.max_depth.is_some_and(|depth| vertex + 2 > depth) {
                 return;
             }
-            power *= (1.0 / q) as f32;
+            let choice = self.sampler.set(Set::Choice(vertex));
+            let Some(met) = self.fly(&mut beam, choice[3]) else { return };
+            let came = -beam.ray.direction;
+            let (hit, surface, leaf, pane) = match met {
+                Met::Surface { hit, surface, leaf, pane } => (hit, surface, leaf, pane),
+                Met::Medium { point, medium } => {
+                    // Next to the light something sharp is wanted.
+                    if caustics.is_some() && vertex == 0 {
+                        return;
+                    }
+                    let (u_lens, u_scatter) = pairs(self.sampler.set(Set::Scatter(vertex)));
+                    self.connect_medium(&beam, point, medium, u_lens);
+                    if !self.goes_on(&mut beam) {
+                        return;
+                    }
+                    let went = medium.phase.sample(point, came, u_scatter);
+                    beam.ray = Ray::new(point, went);
+                    beam.vertex += 1;
+                    if !self.survives(&mut beam, choice[2]) {
+                        return;
+                    }
+                    continue;
+                }
+            };
+            let object = &scene.objects[hit.object as usize];
+            let sharp = caustics.is_some_and(|c| c.is_sharp(hit.object));
+            if vertex == 0 && caustics.is_some() && !sharp {
+                return;
+            }
+            let material = leaf.as_ref().map_or(&scene.materials[object.material as usize], |leaf| leaf.material);
+            let frame = match &leaf {
+                Some(leaf) => leaf.frame,
+                None => {
+                    let flip = material.two_sided && came.dot(surface.normal) < 0.0;
+                    let normal = seen_normal(&surface, came);
+                    Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent)
+                }
+            };
+            // Slopes shadow by the direction to the light alone, which is where the path comes from.
+            if let Some(leaf) = &leaf {
+                beam.power *= leaf.slopes.shadowing(came) as f32;
+            }
+            let bsdf = material.bsdf(&hit.texture_point(&surface), beam.nm, plan.all_dispersive);
+            let wo = frame.to_local(came);
+            let (u_lens, u_scatter) = pairs(self.sampler.set(Set::Scatter(vertex)));
+
+            if !bsdf.is_discrete() && !sharp {
+                let at = Vertex { hit: &hit, surface: &surface, frame: &frame, came, local: wo, object };
+                self.connect(&beam, &bsdf, &at, u_lens);
+                if !self.goes_on(&mut beam) {
+                    return;
+                }
+            }
+
+            // A pane that did not let the path straight through reflects it.
+            let u_lobe = if pane { 0.0 } else { choice[1] };
+            let crossing = Crossing { hit: &hit, surface: &surface, frame: &frame, came, roulette: choice[2] };
+            if let Bsdf::Dielectric(glass) = &bsdf
+                && caustics.is_some_and(|c| c.packets)
+                && beam.alone.is_none()
+                && matches!(glass.eta, RelativeIndex::Dispersive(_))
+            {
+                // Each wavelength decides for itself with the same random numbers: none leads.
+                beam.power *= LANES as f32 / beam.rho.reduce_add();
+                beam.rho = Lanes::ONE;
+                if let Some(sample) = glass.reflects_all(wo, u_lobe) {
+                    if !self.cross(&mut beam, &sample, &crossing, wo) {
+                        return;
+                    }
+                    continue;
+                }
+                let (nm, power) = (beam.nm.to_array(), beam.power.to_array());
+                for (lane, (&nm, &power)) in nm.iter().zip(&power).enumerate() {
+                    let (nm, power) = (Lanes::splat(nm), Lanes::splat(power));
+                    let mut alone = Beam { power, nm, alone: Some(lane), ..beam };
+                    let sample = Bsdf::Dielectric(glass.lane(lane)).sample(wo, u_lobe, u_scatter);
+                    if sample.is_some_and(|sample| self.cross(&mut alone, &sample, &crossing, wo)) {
+                        self.follow(alone);
+                    }
+                }
+                return;
+            }
+            let Some(sample) = bsdf.sample(wo, u_lobe, u_scatter) else { return };
+            if !self.cross(&mut beam, &sample, &crossing, wo) {
+                return;
+            }
         }
-        ray = scene.leave(&surface, &hit, went);
     }
+
+    /// Sends the beam on from a surface; false where it ends.
+    fn cross(&self, beam: &mut Beam, sample: &BsdfSample, at: &Crossing, wo: DVec3) -> bool {
+        let went = at.frame.to_world(sample.wi);
+        let side = went.dot(at.surface.normal) * at.came.dot(at.surface.normal);
+        if (side > 0.0) == sample.transmitted || side == 0.0 {
+            return false;
+        }
+        // Power, not radiance: no 1/η² on crossing, and the cosines of the true normal for those of the other.
+        let normal = at.surface.normal;
+        let adjoint = sample.eta2 * adjoint(wo.z, sample.wi.z, at.came.dot(normal), went.dot(normal));
+        beam.power *= sample.weight * adjoint as f32;
+        beam.rho *= sample.ratio;
+        let scene = self.paths.scene;
+        if sample.transmitted {
+            let object = &scene.objects[at.hit.object as usize];
+            beam.medium = Some(object.beyond(at.surface, went, beam.medium.flatten()));
+        }
+        beam.ray = scene.leave(at.surface, at.hit, went);
+        beam.vertex += 1;
+        self.survives(beam, at.roulette)
+    }
+
+    /// Russian roulette on the largest lane; false where the beam ends.
+    fn survives(&self, beam: &mut Beam, u: f64) -> bool {
+        let carried = largest(beam.power) * f64::from(LANES as f32 / beam.rho.reduce_add());
+        if carried.is_nan() || carried <= 0.0 {
+            return false;
+        }
+        if beam.vertex + 1 >= self.paths.settings.roulette_depth {
+            let q = (carried / self.start).min(if beam.vertex <= FOR_SURE { 1.0 } else { SURVIVAL });
+            if u >= q {
+                return false;
+            }
+            beam.power *= (1.0 / q) as f32;
+        }
+        true
+    }
+
+    /// Of wavelengths that parted, only one goes on from where all have been seen: beyond, their ways have nothing in
+    /// common.
+    fn goes_on(&self, beam: &mut Beam) -> bool {
+        let Some(lane) = beam.alone.filter(|_| !beam.chosen) else { return true };
+        // The same number for each of them, wherever they are.
+        let u = self.sampler.set(Set::Extra(CHOSEN))[0];
+        if (u * LANES as f64) as usize != lane {
+            return false;
+        }
+        beam.power *= LANES as f32;
+        beam.chosen = true;
+        true
+    }
+
+    /// The next thing that the beam meets, other than boundaries and open panes, which it crosses.
+    fn fly(&mut self, beam: &mut Beam, u_flight: f64) -> Option<Met<'a>> {
+        let scene = self.paths.scene;
+        for crossings in 0..MAX_BOUNDARIES {
+            let set = Set::Extra((beam.vertex + 1).wrapping_add(crossings << 16));
+            self.rays += 1;
+            let hit = scene.closest(&beam.ray, f64::INFINITY);
+            let surface = hit.map(|hit| scene.surface(&beam.ray, &hit));
+            if self.paths.plan.media {
+                let known = beam.medium.unwrap_or_else(|| {
+                    // The side on which the beam meets the first surface tells what it is in.
+                    let before = hit.zip(surface).and_then(|(hit, surface)| {
+                        let object = &scene.objects[hit.object as usize];
+                        object.beyond(&surface, -beam.ray.direction, scene.camera_medium)
+                    });
+                    if hit.is_some() { before } else { scene.camera_medium }
+                });
+                beam.medium = Some(known);
+                if let Some(medium) = known.map(|m| &scene.media[m as usize]) {
+                    let u = if crossings == 0 { u_flight } else { self.sampler.set(set)[0] };
+                    let distance = hit.map_or(f64::INFINITY, |h| h.t);
+                    let flight = medium.fly(&beam.ray, distance, beam.nm, u, || self.sampler.walk(set));
+                    beam.power *= flight.weight;
+                    beam.rho *= flight.ratio;
+                    if let Some(t) = flight.scattered_at {
+                        return Some(Met::Medium { point: beam.ray.at(t), medium });
+                    }
+                }
+            }
+            let (hit, surface) = hit.zip(surface)?;
+            let direction = beam.ray.direction;
+            let object = &scene.objects[hit.object as usize];
+            let material = &scene.materials[object.material as usize];
+            let met = |leaf, pane| Some(Met::Surface { hit, surface, leaf, pane });
+            match &material.kind {
+                Kind::Boundary => {}
+                Kind::Compound(compound) => {
+                    let (at, wo) = (&hit.texture_point(&surface), -direction);
+                    let x = crate::scene::compound::Vertex { scene, hit: &hit, surface: &surface, at, wo };
+                    let leaf = compound.resolve(&x, seen_normal(&surface, wo), self.sampler.set(set)[2]);
+                    if let Some(leaf) = leaf
+                        && !matches!(leaf.material.kind, Kind::Boundary)
+                    {
+                        let straight = leaf.material.straight(&surface, direction, || *at, beam.nm);
+                        match straight {
+                            None => return met(Some(leaf), false),
+                            Some(straight) if self.sampler.set(set)[1] >= straight.share => {
+                                return met(Some(leaf), true);
+                            }
+                            Some(straight) => beam.power *= straight.weight,
+                        }
+                    }
+                }
+                _ => match material.straight(&surface, direction, || hit.texture_point(&surface), beam.nm) {
+                    None => return met(None, false),
+                    Some(straight) if self.sampler.set(set)[1] >= straight.share => return met(None, true),
+                    Some(straight) => beam.power *= straight.weight,
+                },
+            }
+            beam.medium = beam.medium.map(|before| object.beyond(&surface, direction, before));
+            beam.ray = scene.leave(&surface, &hit, direction);
+        }
+        None
+    }
+
+    fn material(&self, hit: &Hit) -> &'a Material {
+        let scene = self.paths.scene;
+        &scene.materials[scene.objects[hit.object as usize].material as usize]
+    }
+
+    /// Light that a surface sends into the camera.
+    fn connect(&mut self, beam: &Beam, bsdf: &Bsdf, at: &Vertex, u_lens: DVec2) {
+        let scene = self.paths.scene;
+        let Some(entry) = scene.camera.entry(at.surface.point, || u_lens) else { return };
+        if !self.paths.bounds.holds(entry.pixel) {
+            return;
+        }
+        let to_camera = at.frame.to_local(entry.direction);
+        let (came, went) = (at.came.dot(at.surface.normal), entry.direction.dot(at.surface.normal));
+        if came * at.local.z * went * to_camera.z <= 0.0 {
+            return;
+        }
+        // The viewer is at the camera: f as radiance has it.
+        let f = bsdf.eval(to_camera, at.local).f;
+        if f.simd_eq(Lanes::ZERO).all() {
+            return;
+        }
+        let cosines = to_camera.z.abs() * adjoint(at.local.z, to_camera.z, came, went);
+        let before = beam.medium.flatten();
+        let medium = if came * went < 0.0 { at.object.beyond(at.surface, entry.direction, before) } else { before };
+        let ray = scene.leave(at.surface, at.hit, entry.direction);
+        let light = f * (cosines * entry.density) as f32;
+        self.send(beam, at.surface.point, &ray, medium, &entry, light);
+    }
+
+    /// Light that a point of a medium sends into the camera.
+    fn connect_medium(&mut self, beam: &Beam, point: DVec3, medium: &Medium, u_lens: DVec2) {
+        let Some(entry) = self.paths.scene.camera.entry(point, || u_lens) else { return };
+        if !self.paths.bounds.holds(entry.pixel) {
+            return;
+        }
+        let f = medium.phase.eval(point, -beam.ray.direction, entry.direction);
+        let light = Lanes::splat((f * entry.density) as f32);
+        self.send(beam, point, &Ray::new(point, entry.direction), beam.medium.flatten(), &entry, light);
+    }
+
+    /// Splats the light of a beam that is scattered by `light` into the camera, as far as it gets there.
+    fn send(&mut self, beam: &Beam, point: DVec3, ray: &Ray, medium: Option<u32>, entry: &Entry, light: Lanes) {
+        let Some(through) = self.open(ray, entry.distance, medium, beam) else { return };
+        let share = LANES as f32 / beam.rho.reduce_add();
+        let mut light = beam.power * light * through * share;
+        if let Some(lane) = beam.alone {
+            let value = light.to_array()[0];
+            light = Lanes::new(std::array::from_fn(|k| if k == lane { value } else { 0.0 }));
+        }
+        if let Some(fog) = self.paths.scene.fog.as_ref().filter(|_| self.paths.plan.depth_fog) {
+            light *= 1.0 - fog.falloff.amount(self.paths.scene.camera.depth(point)) as f32;
+        }
+        (self.splat)(self.wavelengths, Splat { place: entry.pixel, light });
+    }
+
+    /// The share of light that comes straight on to `distance`; `None` where something opaque stands between.
+    fn open(&mut self, ray: &Ray, distance: f64, mut medium: Option<u32>, beam: &Beam) -> Option<Lanes> {
+        let scene = self.paths.scene;
+        let media = self.paths.plan.media;
+        self.rays += 1;
+        let dim = |medium: Option<u32>, ray: &Ray, distance: f64, crossings: u32| match medium {
+            Some(m) if media => {
+                // Rays to the camera walk by numbers of their own.
+                let set = Set::Extra((beam.vertex + 1).wrapping_add(crossings << 16).wrapping_add(TO_CAMERA));
+                scene.media[m as usize].dim(ray, distance, beam.nm, || self.sampler.walk(set)).through
+            }
+            _ => Lanes::ONE,
+        };
+        if !scene.has_boundaries {
+            return (!scene.occluded(ray, distance, None)).then(|| dim(medium, ray, distance, 0));
+        }
+        let (mut ray, mut left, mut through) = (*ray, distance, Lanes::ONE);
+        for crossings in 0..MAX_BOUNDARIES {
+            let hit = scene.closest(&ray, left);
+            through *= dim(medium, &ray, hit.map_or(left, |h| h.t), crossings);
+            let Some(hit) = hit else { return Some(through) };
+            let material = self.material(&hit);
+            if !material.lets_through() {
+                return None;
+            }
+            let surface = scene.surface(&ray, &hit);
+            let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), beam.nm)?;
+            through *= straight.weight * straight.share as f32;
+            medium = scene.objects[hit.object as usize].beyond(&surface, ray.direction, medium);
+            ray = scene.leave(&surface, &hit, ray.direction);
+            left -= hit.t;
+        }
+        None
+    }
+}
+
+/// Where a beam crosses or leaves a surface.
+struct Crossing<'a> {
+    hit: &'a Hit,
+    surface: &'a SurfacePoint,
+    frame: &'a Frame,
+    /// Toward where the light came from.
+    came: DVec3,
+    roulette: f64,
 }
 
 /// |cos(came, n_s) cos(went, n_g) / (cos(came, n_g) cos(went, n_s))|, Veach 1997, eq. 5.19.
@@ -166,87 +508,5 @@ struct Vertex<'a> {
     came: DVec3,
     /// The same in the frame.
     local: DVec3,
-}
-
-struct Walk<'a> {
-    scene: &'a Scene,
-    frame: Bounds,
-}
-
-impl Walk<'_> {
-    /// The next surface that does not let this path through as if it were not there, the direction in which it is
-    /// met, and of a material made of others the one that is met. `number` chooses, by crossings so far.
-    fn next_surface(
-        &self,
-        ray: &Ray,
-        number: impl Fn(u32) -> f64,
-    ) -> Option<(Hit, SurfacePoint, DVec3, Option<Leaf<'_>>)> {
-        let mut ray = *ray;
-        for crossings in 0..MAX_BOUNDARIES {
-            let hit = self.scene.closest(&ray, f64::INFINITY)?;
-            let surface = self.scene.surface(&ray, &hit);
-            match &self.material(&hit).kind {
-                Kind::Boundary => {}
-                Kind::Compound(compound) => {
-                    let (at, wo) = (&hit.texture_point(&surface), -ray.direction);
-                    let x = crate::scene::compound::Vertex { scene: self.scene, hit: &hit, surface: &surface, at, wo };
-                    let leaf = compound.resolve(&x, seen_normal(&surface, wo), number(crossings));
-                    if let Some(leaf) = leaf
-                        && !matches!(leaf.material.kind, Kind::Boundary)
-                    {
-                        return Some((hit, surface, ray.direction, Some(leaf)));
-                    }
-                }
-                _ => return Some((hit, surface, ray.direction, None)),
-            }
-            ray = self.scene.leave(&surface, &hit, ray.direction);
-        }
-        None
-    }
-
-    fn material(&self, hit: &Hit) -> &Material {
-        &self.scene.materials[self.scene.objects[hit.object as usize].material as usize]
-    }
-
-    /// Light of a unit of power that a vertex sends into the camera.
-    fn connect(&self, bsdf: &Bsdf, at: &Vertex, u_lens: DVec2, nm: Lanes) -> Option<Splat> {
-        let entry = self.scene.camera.entry(at.surface.point, || u_lens)?;
-        if !self.frame.holds(entry.pixel) {
-            return None;
-        }
-        let to_camera = at.frame.to_local(entry.direction);
-        let (came, went) = (at.came.dot(at.surface.normal), entry.direction.dot(at.surface.normal));
-        if came * at.local.z * went * to_camera.z <= 0.0 {
-            return None;
-        }
-        // The viewer is at the camera: f as radiance has it.
-        let f = bsdf.eval(to_camera, at.local).f;
-        if f.simd_eq(Lanes::ZERO).all() {
-            return None;
-        }
-        let cosines = to_camera.z.abs() * adjoint(at.local.z, to_camera.z, came, went);
-        let through = self.open(&self.scene.leave(at.surface, at.hit, entry.direction), entry.distance, nm)?;
-        Some(Splat { place: entry.pixel, light: f * through * (cosines * entry.density) as f32 })
-    }
-
-    /// The share of light that comes straight on to `distance`; `None` where something opaque stands between.
-    fn open(&self, ray: &Ray, distance: f64, nm: Lanes) -> Option<Lanes> {
-        if !self.scene.has_boundaries {
-            return (!self.scene.occluded(ray, distance, None)).then_some(Lanes::ONE);
-        }
-        let (mut ray, mut left, mut through) = (*ray, distance, Lanes::ONE);
-        for _ in 0..MAX_BOUNDARIES {
-            let Some(hit) = self.scene.closest(&ray, left) else { return Some(through) };
-            let material = self.material(&hit);
-            if !material.lets_through() {
-                return None;
-            }
-            let surface = self.scene.surface(&ray, &hit);
-            let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), nm)?;
-            through *= straight.weight * straight.share as f32;
-            ray = self.scene.leave(&surface, &hit, ray.direction);
-            left -= hit.t;
-        }
-        None
-    }
+    object: &'a Object,
 }

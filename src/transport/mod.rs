@@ -4,9 +4,12 @@
 //! wavelengths along paths of light; [`Samples`] is the one entry: the light of some samples of one
 //! pixel; [`sample`] is that of a single one.
 
+pub mod caustics;
+pub mod guide;
 pub mod layers;
 pub mod light;
 pub mod path;
+pub mod pilot;
 pub mod plan;
 pub mod whitted;
 
@@ -30,6 +33,16 @@ pub struct Incoming {
     pub alpha: f32,
     /// Distance of the first surface along the axis of the camera; infinite for none.
     pub depth: f64,
+    /// Light that was left to paths from the lights, like `radiance`.
+    pub left: Lanes,
+    /// Vertices of the path, and surfaces that it went straight through.
+    pub events: u32,
+}
+
+impl Incoming {
+    /// No light.
+    pub const NONE: Incoming =
+        Incoming { radiance: Lanes::ZERO, alpha: 0.0, depth: f64::INFINITY, left: Lanes::ZERO, events: 0 };
 }
 
 /// One sample of one pixel.
@@ -133,7 +146,7 @@ impl Begun {
                     return path::radiance(scene, plan, settings, sampler, wavelengths, ray);
                 }
                 // Several paths from one camera ray, each with numbers of its own.
-                let mut sum = Incoming { radiance: Lanes::ZERO, alpha: 0.0, depth: f64::INFINITY };
+                let mut sum = Incoming::NONE;
                 for i in 0..rays {
                     let index = at.index.wrapping_mul(rays).wrapping_add(i);
                     let sampler = Sampler::new(shot.seed, at.pixel, at.replicate, index);
@@ -141,8 +154,11 @@ impl Begun {
                     sum.radiance += one.radiance;
                     sum.alpha += one.alpha;
                     sum.depth = one.depth;
+                    sum.left += one.left;
+                    sum.events += one.events;
                 }
-                Incoming { radiance: sum.radiance / rays as f32, alpha: sum.alpha / rays as f32, ..sum }
+                let share = 1.0 / rays as f32;
+                Incoming { radiance: sum.radiance * share, alpha: sum.alpha * share, left: sum.left * share, ..sum }
             }
             Integrator::Whitted(settings) => whitted::radiance(scene, plan, settings, wavelengths, ray),
             Integrator::Depth => {
@@ -151,6 +167,7 @@ impl Begun {
                     radiance: Lanes::splat(hit.map_or(0.0, |h| h.t as f32)),
                     alpha: if hit.is_some() { 1.0 } else { 0.0 },
                     depth: hit.map_or(f64::INFINITY, |h| scene.camera.depth(ray.at(h.t))),
+                    ..Incoming::NONE
                 }
             }
             // Lights that the camera sees itself; the rest comes by itself.
@@ -162,7 +179,7 @@ impl Begun {
                 };
                 path::radiance(scene, plan, &direct, sampler, wavelengths, ray)
             }
-            Integrator::Nothing => Incoming { radiance: Lanes::ZERO, alpha: 0.0, depth: f64::INFINITY },
+            Integrator::Nothing => Incoming::NONE,
         }
     }
 
@@ -218,6 +235,13 @@ pub fn sample(
     begun.follow(&shot, &sampler);
     begun.finish();
     begun.sample
+}
+
+/// The light of sample `index` of `replicate` at `pixel` before fog, with what it left to paths from the lights.
+fn probe(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Incoming, SampledWavelengths) {
+    let sampler = Sampler::new(shot.seed, pixel, replicate, index);
+    let begun = Begun::new(shot, Address { pixel, replicate, index }, &sampler);
+    (begun.light(shot, &sampler, &shot.plan.integrator), begun.wavelengths)
 }
 
 /// The memory of samples that are rendered one after the other.

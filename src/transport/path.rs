@@ -99,6 +99,12 @@ struct Path {
     vertices: u32,
     /// Surfaces so far that it went straight through.
     crossings: u32,
+    /// Whether the camera could see the first vertex from a path that came to it from a light.
+    seen: bool,
+    /// Whether the last vertex is on something sharp.
+    sharp: bool,
+    /// Light of paths that are traced from the lights.
+    left: Lanes,
 }
 
 impl Path {
@@ -111,6 +117,13 @@ impl Path {
     fn add<const CHROMATIC: bool>(&mut self, l: Lanes, w: f64) {
         let share = if CHROMATIC { w * LANES as f64 / self.rho_sum::<true>() } else { w };
         self.radiance += self.beta * l * share as f32;
+    }
+
+    /// Notes light `l` that paths from the lights add.
+    #[cold]
+    fn leave_out<const CHROMATIC: bool>(&mut self, l: Lanes) {
+        let share = if CHROMATIC { LANES as f64 / self.rho_sum::<true>() } else { 1.0 };
+        self.left += self.beta * l * share as f32;
     }
 }
 
@@ -186,6 +199,9 @@ impl Tracer<'_> {
             radiance: Lanes::ZERO,
             vertices: 0,
             crossings: 0,
+            seen: false,
+            sharp: false,
+            left: Lanes::ZERO,
         };
         let mut alpha = 0.0;
         let mut depth = f64::INFINITY;
@@ -287,6 +303,10 @@ impl Tracer<'_> {
             if let Some(light) = object.light.filter(|_| self.meets_lights(&path)) {
                 let emitted = scene.lights[light as usize].emitted(&surface, &hit, wo_world, self.nm);
                 let weight = match &path.previous {
+                    None if self.leaves(&path, light) => {
+                        path.leave_out::<CHROMATIC>(emitted);
+                        0.0
+                    }
                     None => 1.0,
                     Some(p) => {
                         let total = crate::scene::Hit { t: p.distance + hit.t, ..hit };
@@ -327,7 +347,7 @@ impl Tracer<'_> {
                         }
                     };
                 }
-                path.medium = self.beyond(object, &surface, path.ray.direction, path.medium);
+                path.medium = object.beyond(&surface, path.ray.direction, path.medium);
                 if let Some(p) = &mut path.previous {
                     p.distance += hit.t;
                 }
@@ -393,6 +413,12 @@ impl Tracer<'_> {
                 }),
                 Chosen::Density(_) | Chosen::Discrete => None,
             };
+            if let Some(caustics) = &self.plan.caustics {
+                path.sharp = caustics.is_sharp(hit.object);
+                if path.vertices == 0 {
+                    path.seen = !path.sharp && sample.chosen != Chosen::Discrete;
+                }
+            }
             path.beta *= sample.weight;
             if let Some(slopes) = slopes {
                 path.beta *= slopes.shadowing(wi) as f32;
@@ -402,7 +428,7 @@ impl Tracer<'_> {
             }
             path.eta2 *= sample.eta2;
             if MEDIA && sample.transmitted {
-                path.medium = self.beyond(object, &surface, wi, path.medium);
+                path.medium = object.beyond(&surface, wi, path.medium);
             }
             path.ray = scene.leave(&surface, &hit, wi);
             path.vertices += 1;
@@ -411,7 +437,8 @@ impl Tracer<'_> {
                 break;
             }
         }
-        Incoming { radiance: path.radiance, alpha, depth }
+        let events = path.vertices + path.crossings;
+        Incoming { radiance: path.radiance, alpha, depth, left: path.left, events }
     }
 
     /// What one path meets of a material made of others, chosen by `u`; `None` where it goes straight on.
@@ -451,18 +478,6 @@ impl Tracer<'_> {
         }
     }
 
-    /// The medium that a ray in `direction`, which was in `before`, is in after it has crossed the surface of
-    /// `object`.
-    fn beyond(&self, object: &Object, surface: &SurfacePoint, direction: DVec3, before: Option<u32>) -> Option<u32> {
-        if object.keeps_medium {
-            before
-        } else if direction.dot(surface.normal) < 0.0 {
-            object.inside
-        } else {
-            object.outside
-        }
-    }
-
     /// One event of scattering inside a medium; false where the path ends.
     fn scatter_in_medium<const CHROMATIC: bool, const MEDIA: bool>(
         &self,
@@ -498,6 +513,8 @@ impl Tracer<'_> {
             distance: 0.0,
         });
         path.ray = Ray::new(point, wi);
+        path.seen |= path.vertices == 0;
+        path.sharp = false;
         path.vertices += 1;
         self.survives::<CHROMATIC>(path, choice[2])
     }
@@ -520,6 +537,11 @@ impl Tracer<'_> {
         true
     }
 
+    /// Whether light that the path meets is of the class that is traced from `light`; see [`super::caustics`].
+    fn leaves(&self, path: &Path, light: u32) -> bool {
+        path.seen && path.sharp && self.plan.caustics.as_ref().is_some_and(|c| c.traced[light as usize])
+    }
+
     /// Whether light that the path meets counts: always for the camera, else where scattering is a technique.
     fn meets_lights(&self, path: &Path) -> bool {
         self.settings.scatter_samples > 0 || path.vertices == 0
@@ -533,6 +555,10 @@ impl Tracer<'_> {
         for &i in &self.scene.backgrounds {
             let light = &self.scene.lights[i as usize];
             let (l, weight) = match &path.previous {
+                None if self.leaves(path, i) => {
+                    path.leave_out::<CHROMATIC>(light.background(path.ray.direction, self.nm));
+                    continue;
+                }
                 None => (light.background(path.ray.direction, self.nm), 1.0),
                 Some(p) => {
                     let (l, pdf) = light.background_and_pdf(path.ray.direction, p.normal, self.nm);
@@ -569,7 +595,7 @@ impl Tracer<'_> {
             Scatterer::Surface { surface, object, .. }
                 if MEDIA && light.wi.dot(surface.normal) * path.ray.direction.dot(surface.normal) > 0.0 =>
             {
-                self.beyond(object, surface, light.wi, path.medium)
+                object.beyond(surface, light.wi, path.medium)
             }
             _ => path.medium,
         };
@@ -630,7 +656,7 @@ impl Tracer<'_> {
                 let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), self.nm)?;
                 through *= straight.weight * straight.share as f32;
                 passing *= straight.share as f32;
-                medium = self.beyond(object, &surface, ray.direction, medium);
+                medium = object.beyond(&surface, ray.direction, medium);
                 from = hit.t;
             }
             let last = Ray::new(ray.at(from), ray.direction);
@@ -655,7 +681,7 @@ impl Tracer<'_> {
             let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), self.nm)?;
             through *= straight.weight * straight.share as f32;
             passing *= straight.share as f32;
-            medium = self.beyond(object, &surface, ray.direction, medium);
+            medium = object.beyond(&surface, ray.direction, medium);
             ray = scene.leave(&surface, &hit, ray.direction);
             left -= hit.t;
         }

@@ -5,10 +5,12 @@
 //! on and is the proof. A *technique* is how an effect is computed; it changes noise and time,
 //! never the mean.
 
+use super::caustics::Caustics;
 use super::layers::LayerPlan;
 use crate::scene::census::Census;
 use crate::spectrum::Spectrum;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// Which light transport is simulated.
 #[derive(Clone, Debug)]
@@ -53,6 +55,18 @@ pub struct PathSettings {
     pub scatter_samples: u32,
     /// Whether going straight through a pane or a boundary ends a segment for `max_depth`.
     pub count_crossings: bool,
+}
+
+impl PathSettings {
+    /// The same limits for paths from the lights.
+    #[must_use]
+    pub fn of_light_paths(&self) -> LightSettings {
+        LightSettings {
+            max_depth: self.max_depth,
+            roulette_depth: self.roulette_depth,
+            hide_emitters: self.hide_emitters,
+        }
+    }
 }
 
 impl Default for PathSettings {
@@ -129,6 +143,8 @@ pub struct EffectPlan {
     pub depth_fog: bool,
     /// Every glass is computed as if it were dispersive.
     pub all_dispersive: bool,
+    /// Light of mirrors and glass that is traced from the lights.
+    pub caustics: Option<Arc<Caustics>>,
     /// Further channels of the picture.
     pub layers: LayerPlan,
     /// What is simulated, for people.
@@ -138,7 +154,7 @@ pub struct EffectPlan {
 }
 
 /// At most three names, then how many more.
-fn some_of(names: &[String]) -> String {
+pub(super) fn some_of(names: &[String]) -> String {
     let shown = names.iter().take(3).map(String::as_str).collect::<Vec<_>>().join(", ");
     match names.len().saturating_sub(3) {
         0 => shown,
@@ -273,6 +289,7 @@ impl EffectPlan {
             media: media && path && from_camera,
             depth_fog,
             all_dispersive: mode == EffectMode::All,
+            caustics: None,
             layers: LayerPlan::default(),
             effects,
             techniques,

@@ -46,6 +46,7 @@ pub fn radiance(
         radiance,
         alpha: if first.is_some() { 1.0 } else { 0.0 },
         depth: first.map_or(f64::INFINITY, |point| scene.camera.depth(point)),
+        ..Incoming::NONE
     }
 }
 

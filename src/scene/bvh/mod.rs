@@ -60,7 +60,9 @@ impl Aabb {
         Aabb { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    fn is_finite(&self) -> bool {
+    /// Whether it ends on all sides.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
         self.min.is_finite() && self.max.is_finite()
     }
 }

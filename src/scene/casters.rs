@@ -1,0 +1,159 @@
+//! What focuses light: objects that only mirror and refract, and the balls around them.
+
+use super::bvh::Aabb;
+use super::material::{Kind, Material};
+use super::{Geometry, Scene};
+use glam::DVec3;
+
+/// A ball around something that focuses light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Its centre.
+    pub center: DVec3,
+    /// Its radius, metres; wider than the thing by more than rounding.
+    pub radius: f64,
+}
+
+impl Ball {
+    /// Around a box; `None` where that has no end.
+    fn around(b: &Aabb) -> Option<Ball> {
+        let (center, half) = (0.5 * b.min + 0.5 * b.max, 0.5 * b.max - 0.5 * b.min);
+        let size = half.length() + center.abs().max_element();
+        let radius = half.length() + 8.0 * f64::EPSILON * size;
+        (radius.is_finite() && center.is_finite()).then_some(Ball { center, radius })
+    }
+
+    fn around_both(&self, other: &Ball) -> Ball {
+        let offset = other.center - self.center;
+        let distance = offset.length();
+        if distance + other.radius <= self.radius {
+            return *self;
+        }
+        if distance + self.radius <= other.radius {
+            return *other;
+        }
+        let radius = 0.5 * (distance + self.radius + other.radius);
+        let center = self.center + offset * ((radius - self.radius) / distance);
+        Ball { center, radius: radius * (1.0 + 8.0 * f64::EPSILON) }
+    }
+}
+
+/// The objects of a scene that focus light.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Casters {
+    /// For each object of the scene.
+    pub casts: Vec<bool>,
+    /// Balls that hold all of them, at most [`MAX_BALLS`].
+    pub balls: Vec<Ball>,
+    /// Names, one for each object that stands in the scene itself.
+    pub names: Vec<String>,
+    /// Names of mirrors and glasses without end, which no light can be aimed at: they do not count.
+    pub endless: Vec<String>,
+}
+
+/// Balls at the most: what is near to each other shares one beyond.
+pub const MAX_BALLS: usize = 64;
+
+/// Whether every part of a material mirrors or refracts in single directions, and it bends or turns light.
+fn is_sharp(material: &Material) -> bool {
+    let sharp = |m: &&Material| {
+        matches!(
+            m.kind,
+            Kind::Mirror { .. } | Kind::Conductor { facets: None, .. } | Kind::Dielectric { facets: None, .. }
+        )
+    };
+    let leaves = material.leaves();
+    leaves.iter().any(sharp) && leaves.iter().all(|m| sharp(m) || matches!(m.kind, Kind::Boundary))
+}
+
+impl Casters {
+    /// Finds them.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Casters {
+        let sharp = |i: usize| is_sharp(&scene.materials[scene.objects[i].material as usize]);
+        let mut casters = Casters { casts: vec![false; scene.objects.len()], ..Casters::default() };
+        for (i, object) in scene.objects.iter().enumerate() {
+            let (casts, children) = match &object.geometry {
+                Geometry::Instance(instance) => {
+                    let first = instance.group.first as usize;
+                    let members = first..first + instance.group.bvh.order().len();
+                    (members.clone().any(sharp), members)
+                }
+                _ => (sharp(i), i..i + 1),
+            };
+            // Children of groups are seen through their instances.
+            if !casts || i >= scene.bvh.order().len() {
+                continue;
+            }
+            match Ball::around(&object.bounds()) {
+                Some(ball) => {
+                    casters.balls.push(ball);
+                    casters.names.push(object.name.clone());
+                    for child in children {
+                        casters.casts[child] = sharp(child);
+                    }
+                }
+                None => casters.endless.push(object.name.clone()),
+            }
+        }
+        merge_nearest(&mut casters.balls);
+        casters
+    }
+}
+
+/// Joins the two balls whose common ball is smallest, until few are left.
+fn merge_nearest(balls: &mut Vec<Ball>) {
+    // So many that all pairs would take long: neighbours along the longest side first.
+    while balls.len() > 4 * MAX_BALLS {
+        let all = balls.iter().fold(Aabb::EMPTY, |b, x| b.union(&Aabb { min: x.center, max: x.center }));
+        let size = (all.max - all.min).to_array();
+        let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
+        balls.sort_by(|a, b| a.center[axis].total_cmp(&b.center[axis]));
+        let pairs = balls.chunks(2).map(|pair| pair.iter().skip(1).fold(pair[0], |a, b| a.around_both(b)));
+        *balls = pairs.collect();
+    }
+    while balls.len() > MAX_BALLS {
+        let mut best = (f64::INFINITY, 0, 1);
+        for i in 0..balls.len() {
+            for j in i + 1..balls.len() {
+                let radius = balls[i].around_both(&balls[j]).radius;
+                if radius < best.0 {
+                    best = (radius, i, j);
+                }
+            }
+        }
+        let (_, i, j) = best;
+        balls[i] = balls[i].around_both(&balls[j]);
+        balls.swap_remove(j);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ball(x: f64, radius: f64) -> Ball {
+        Ball { center: DVec3::new(x, 0.0, 0.0), radius }
+    }
+
+    #[test]
+    fn a_ball_around_two_holds_both_and_no_more() {
+        let both = ball(0.0, 1.0).around_both(&ball(5.0, 2.0));
+        assert!((both.center.x - 3.0).abs() < 1e-14 && (both.radius - 4.0).abs() < 1e-14);
+        assert_eq!(ball(0.0, 5.0).around_both(&ball(1.0, 1.0)), ball(0.0, 5.0));
+        assert_eq!(ball(1.0, 1.0).around_both(&ball(0.0, 5.0)), ball(0.0, 5.0));
+    }
+
+    /// A thousand balls in a row become 64, and each of the thousand lies in one of them.
+    #[test]
+    fn many_balls_share_a_few_that_hold_them_all() {
+        let many: Vec<Ball> = (0..1000).map(|i| ball(f64::from(i), 0.25)).collect();
+        let mut few = many.clone();
+        merge_nearest(&mut few);
+        assert!(few.len() <= MAX_BALLS && few.len() > MAX_BALLS / 4);
+        for one in &many {
+            let held = |b: &Ball| (b.center - one.center).length() + one.radius <= b.radius * (1.0 + 1e-12);
+            assert!(few.iter().any(held), "{one:?}");
+        }
+    }
+}

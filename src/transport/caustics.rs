@@ -1,0 +1,238 @@
+//! Light that mirrors and glass throw onto other things, traced from the lights.
+//!
+//! A path belongs to the class C if its vertex next to the light is on something sharp, an object that only mirrors
+//! and refracts in single directions, and its vertex next to the camera is not and scatters over a density: in
+//! Heckbert's notation L S (D|S)* D E. The path tracer finds such light only by chance, and of a lamp without extent
+//! never; so it leaves the class out, and paths from the lights, which connect to the camera at every vertex, add it.
+//! Every path of light belongs to one of the two, so nothing is lost and nothing counted twice, and no weights are
+//! needed.
+//!
+//! Paths of the class begin toward something sharp. They are aimed at balls around it: by direction from a point of
+//! a lamp, by place for light from infinity. A pilot of paths with fixed random numbers learns which pairs of lamp
+//! and ball, and which part of each ball, send light to the picture, and how many paths from the lights are worth one
+//! from the camera; then all is frozen, so that the estimate stays unbiased and any split of the work agrees.
+
+use super::guide::Guide;
+use crate::math::Frame;
+use crate::math::Ray;
+use crate::math::trig::sin_cos_turn;
+use crate::scene::Scene;
+use crate::scene::casters::Ball;
+use crate::scene::emission::{Emission, Freedom};
+use crate::spectrum::Lanes;
+use glam::{DVec2, DVec3};
+use std::f64::consts::{PI, TAU};
+
+/// How the class C is traced from the lights.
+#[derive(Clone, Debug)]
+pub struct Caustics {
+    /// For each object, whether it is sharp.
+    pub casts: Vec<bool>,
+    /// For each light, whether its part of the class is traced from it.
+    pub traced: Vec<bool>,
+    /// Pairs of a light and what it is aimed at, those of one light together.
+    pub sources: Vec<Source>,
+    /// Paths from the lights for each path from the camera.
+    pub ratio: f64,
+    /// Whether wavelengths that part in glass are followed together.
+    pub packets: bool,
+    /// Whether something that stands in the scene has no end.
+    pub endless: bool,
+}
+
+/// A light and a ball that it is aimed at.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// The light.
+    pub light: u32,
+    /// What it is aimed at; `None` where its rays have no freedom.
+    pub ball: Option<Ball>,
+    /// How often it is chosen.
+    pub probability: f64,
+    /// Where in the cone or disc around the ball.
+    pub guide: Guide,
+}
+
+/// The path that begins.
+#[derive(Clone, Copy, Debug)]
+pub struct Aimed {
+    /// Its ray, and the power over all densities.
+    pub emission: Emission,
+    /// Index of the source.
+    pub source: usize,
+    /// Where in the guide's square.
+    pub cell: DVec2,
+}
+
+/// The directions from a point to a ball, or the rays of a direction through it, mapped to the unit square by area.
+enum Aim {
+    /// A cone: frame, and 1 − cos of its half angle.
+    Cone(Frame, f64),
+    /// A disc across a direction: frame, centre, radius.
+    Disc(Frame, DVec3, f64),
+}
+
+impl Aim {
+    /// At `ball` from `point`.
+    fn cone(ball: &Ball, point: DVec3) -> Aim {
+        let offset = ball.center - point;
+        let d2 = offset.length_squared();
+        let sin2 = ball.radius * ball.radius / d2;
+        // From inside, or so near that it makes no difference: all directions.
+        if sin2.is_nan() || sin2 >= 1.0 {
+            return Aim::Cone(Frame::from_normal(DVec3::Z), 2.0);
+        }
+        // 1 − √(1 − s²) without cancellation.
+        Aim::Cone(Frame::from_normal(offset / d2.sqrt()), sin2 / (1.0 + (1.0 - sin2).sqrt()))
+    }
+
+    /// At `ball` along `direction`.
+    fn disc(ball: &Ball, direction: DVec3) -> Aim {
+        Aim::Disc(Frame::from_normal(direction), ball.center, ball.radius)
+    }
+
+    /// Solid angle or area.
+    fn measure(&self) -> f64 {
+        match self {
+            Aim::Cone(_, h) => TAU * h,
+            Aim::Disc(_, _, radius) => PI * radius * radius,
+        }
+    }
+
+    /// The direction, or the point of the disc, at `u` of the unit square.
+    fn at(&self, u: DVec2) -> DVec3 {
+        let (sin, cos) = sin_cos_turn(u.y);
+        match self {
+            Aim::Cone(frame, most) => {
+                let h = u.x * most;
+                let r = (h * (2.0 - h)).max(0.0).sqrt();
+                frame.to_world(DVec3::new(r * cos, r * sin, 1.0 - h))
+            }
+            Aim::Disc(frame, center, radius) => {
+                let r = u.x.sqrt() * radius;
+                *center + frame.s * (r * cos) + frame.t * (r * sin)
+            }
+        }
+    }
+
+    /// The inverse of [`Aim::at`]; `None` outside.
+    fn coordinates(&self, x: DVec3) -> Option<DVec2> {
+        let turn = |x: f64, y: f64| {
+            let turn = libm::atan2(y, x) / TAU;
+            if turn < 0.0 { turn + 1.0 } else { turn }
+        };
+        let (first, local) = match self {
+            Aim::Cone(frame, most) => {
+                let local = frame.to_local(x);
+                // 1 − z, for narrow cones from the sine.
+                let sin2 = local.x * local.x + local.y * local.y;
+                let h = if local.z > 0.0 { sin2 / (1.0 + local.z) } else { 1.0 - local.z };
+                (h / most, local)
+            }
+            Aim::Disc(frame, center, radius) => {
+                let local = frame.to_local(x - *center);
+                ((local.x * local.x + local.y * local.y) / (radius * radius), local)
+            }
+        };
+        (first < 1.0).then(|| DVec2::new(first, turn(local.x, local.y)))
+    }
+}
+
+impl Caustics {
+    /// Begins a path: `u_source` chooses light and ball, `u_start` the point of the light or the direction of light
+    /// from infinity, `u_aim` the rest. `None` where no light goes that way.
+    #[must_use]
+    pub fn begin(&self, scene: &Scene, u_source: f64, u_start: DVec2, u_aim: DVec2, nm: Lanes) -> Option<Aimed> {
+        let mut below = 0.0;
+        let index = self.sources.iter().position(|s| {
+            below += s.probability;
+            u_source < below
+        })?;
+        let source = &self.sources[index];
+        let start = scene.start(source.light as usize, u_start, u_aim, nm)?;
+        let cell = source.guide.sample(u_aim);
+        let aim = |ball: &Ball, freedom: &Freedom| match *freedom {
+            Freedom::Direction(from) => Aim::cone(ball, from),
+            Freedom::Place(direction) | Freedom::None(Ray { direction, .. }, _) => Aim::disc(ball, direction),
+        };
+        let freedom = start.freedom();
+        let Some(ball) = &source.ball else {
+            let Freedom::None(ray, power) = freedom else { return None };
+            let emission = Emission { ray, power: power * (1.0 / source.probability) as f32 };
+            return Some(Aimed { emission, source: index, cell });
+        };
+        let own = aim(ball, &freedom);
+        let x = own.at(cell);
+        let mut density = source.probability * source.guide.density(cell) / own.measure();
+        // Balls may hide each other: what any of them would have aimed at counts.
+        for (i, other) in self.sources.iter().enumerate() {
+            if i != index
+                && other.light == source.light
+                && let Some(ball) = &other.ball
+            {
+                let aim = aim(ball, &freedom);
+                if let Some(u) = aim.coordinates(x) {
+                    density += other.probability * other.guide.density(u) / aim.measure();
+                }
+            }
+        }
+        let (ray, power) = match freedom {
+            Freedom::Direction(_) => start.toward(x)?,
+            Freedom::Place(direction) => {
+                // From outside everything that has an end.
+                let back = (ball.center - scene.center).length() + scene.radius + ball.radius;
+                let ray = Ray::new(x - direction * back, direction);
+                // What has no end may stand farther out.
+                if self.endless && scene.occluded(&Ray::new(ray.origin, -direction), f64::INFINITY, None) {
+                    return None;
+                }
+                (ray, start.irradiance())
+            }
+            Freedom::None(..) => return None,
+        };
+        let emission = Emission { ray, power: power * (1.0 / density) as f32 };
+        Some(Aimed { emission, source: index, cell })
+    }
+
+    /// Paths from the lights for `samples` paths from the camera, at least one.
+    #[must_use]
+    pub fn paths(&self, samples: u64) -> u64 {
+        ((samples as f64 * self.ratio).round() as u64).max(1)
+    }
+
+    /// Whether what a ray met at `object` is sharp.
+    #[must_use]
+    pub fn is_sharp(&self, object: u32) -> bool {
+        self.casts[object as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The maps from the square and back agree to rounding, in wide, narrow and whole cones and on discs.
+    #[test]
+    fn aims_are_inverted() {
+        let ball = Ball { center: DVec3::new(1.0, 2.0, -3.0), radius: 0.5 };
+        let far = Ball { center: DVec3::new(1e6, 0.0, 0.0), radius: 1.0 };
+        let aims = [
+            Aim::cone(&ball, DVec3::ZERO),
+            Aim::cone(&far, DVec3::ZERO),
+            Aim::cone(&ball, ball.center + DVec3::new(0.1, 0.0, 0.0)),
+            Aim::disc(&ball, DVec3::new(0.6, 0.0, 0.8)),
+        ];
+        for (k, aim) in aims.iter().enumerate() {
+            for i in 0..100 {
+                let u = DVec2::new((f64::from(i) + 0.5) / 100.0, (f64::from(i) * 0.618).fract());
+                let back = aim.coordinates(aim.at(u)).unwrap();
+                // A direction is good to 1e-16; at a distance of a million radii its angle from the axis is only to 1e-10.
+                assert!((back - u).abs().max_element() < 1e-9, "{k}: {u} {back}");
+            }
+        }
+        assert!(Aim::cone(&ball, DVec3::ZERO).coordinates(DVec3::X).is_none());
+        // 1 − √(1 − 0.25/14)
+        let cone = Aim::cone(&ball, DVec3::ZERO).measure();
+        assert!((cone / (TAU * (1.0 - (1.0f64 - 0.25 / 14.0).sqrt())) - 1.0).abs() < 1e-12);
+    }
+}
