@@ -225,6 +225,12 @@ fn from_camera(shot: &Shot) -> Camera {
     camera
 }
 
+/// The weight of a squared error in each block: relative to its mean, in the dark to a tenth of that of the picture.
+fn relative(means: &[f64]) -> Vec<f64> {
+    let mean = means.iter().sum::<f64>() / means.len() as f64;
+    means.iter().map(|m| if mean > 0.0 { 1.0 / (m * m + 0.01 * mean * mean) } else { 1.0 }).collect()
+}
+
 /// The mean of values with weights, without the largest hundredth: single fireflies do not decide.
 fn trimmed(values: &[(usize, f64)], weights: &[f64]) -> f64 {
     let mut weighted: Vec<f64> = values.iter().map(|(block, v)| v * weights[*block]).collect();
@@ -281,10 +287,7 @@ fn run(
     let camera = from_camera(&Shot { scene, plan: &trial, filter, seed: seed ^ STREAM });
     let [width, height] = scene.camera.resolution.map(f64::from);
     let pixels = width * height;
-    let mean = camera.means.iter().sum::<f64>() / camera.means.len() as f64;
-    // Errors count relative to the picture, in the dark relative to a tenth of its mean.
-    let weights: Vec<f64> = camera.means.iter().map(|m| 1.0 / (m * m + 0.01 * mean * mean)).collect();
-    let weights = if mean > 0.0 { weights } else { vec![1.0; BLOCKS * BLOCKS] };
+    let mut weights = relative(&camera.means);
 
     let bounds = Bounds { low: DVec2::ZERO, high: DVec2::new(width, height) };
     let mut learnt = vec![[[0.0; SIDE]; SIDE]; caustics.sources.len()];
@@ -312,6 +315,15 @@ fn run(
             }
         }
         caustics.learn(&learnt);
+        if round == 0 {
+            // What the lights send there is part of the picture that errors are relative to.
+            let mut means = camera.means.clone();
+            let share = (BLOCKS * BLOCKS) as f64 / (pixels * FROM_LIGHTS as f64);
+            for (block, y) in all.iter().flat_map(|landed| &landed.splats) {
+                means[*block] += y * share;
+            }
+            weights = relative(&means);
+        }
     }
     if reached == 0 {
         return off(format!(

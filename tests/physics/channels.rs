@@ -12,7 +12,7 @@ use std::sync::atomic::AtomicBool;
 /// A camera of parallel rays that looks along −z at 2 m × 2 m about the origin, from five metres.
 const PARALLEL: &str = "camera: {origin: [0, 0, 5], target: [0, 0, 0], orthographic_height: 2}\n";
 
-fn render_with(bench: &Bench, filter: Filter, tile: u32) -> Frame {
+pub(super) fn render_with(bench: &Bench, filter: Filter, tile: u32) -> Frame {
     let prepared = &bench.prepared;
     let job = FrameJob {
         scene: &prepared.scene,
