@@ -131,7 +131,7 @@ fn in_parts(bench: &Bench, ranges: &[Range<u32>], side: u32) -> Film {
         // Tiles from the last to the first.
         for window in tiles(job.window, side).into_iter().rev() {
             let mut tile = TileBuffer::new(window);
-            render_unit(&job, range.clone(), &mut tile);
+            render_unit(&job, range.clone(), None, &mut tile);
             part.merge_tile(&tile);
         }
         whole.merge(&part).unwrap();

@@ -14,6 +14,7 @@ use crate::math::sampler::Octet;
 use crate::scene::Scene;
 use crate::spectrum::{ColourSpace, LANES, Lanes, SampledWavelengths, observer};
 use crate::transport::light::{Bounds, LightPaths, Splat};
+use crate::transport::merge::{self, Collection, Photon, PhotonMap};
 use crate::transport::plan::{EffectPlan, Integrator};
 use crate::transport::{self, PixelSample, Samples, Shot};
 use glam::DVec2;
@@ -176,9 +177,9 @@ pub fn passes(samples: u32) -> Vec<Range<u32>> {
 }
 
 /// Renders one work unit into `tile`.
-pub fn render_unit(job: &FrameJob, samples: Range<u32>, tile: &mut TileBuffer) {
+pub fn render_unit(job: &FrameJob, samples: Range<u32>, photons: Option<Collection>, tile: &mut TileBuffer) {
     let FrameJob { scene, plan, filter, seed, .. } = *job;
-    let shot = Shot { scene, plan, filter, seed };
+    let shot = Shot { scene, plan, filter, seed, photons };
     let window = tile.window();
     let mut memory = Samples::default();
     let mut layers = LayerRun::default();
@@ -283,25 +284,35 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
     let mut milestones: Vec<Milestone> = Vec::new();
     let tiles = shares(job.window, job.tile, rayon::current_num_threads());
     let random = !matches!(job.plan.integrator, Integrator::Whitted(_));
+    let merging = job.plan.caustics.as_ref().and_then(|c| c.merging);
 
     for pass in passes(job.samples) {
         let latest = milestones.last().and_then(|m| m.error);
-        tiles.par_iter().for_each(|&window| {
-            if stop.load(Ordering::Relaxed) {
-                return;
+        // Where photons are collected, sample by sample.
+        let step = if merging.is_some() { 1 } else { pass.len() };
+        for samples in pass.clone().step_by(step).map(|s| s..(s + step as u32).min(pass.end)) {
+            let mut collected = None;
+            if let Some((paths, splats)) = &splats {
+                collected = merging.map(|first| from_lights_for(job, paths, samples.start, first, splats, stop));
+                if merging.is_none() {
+                    from_lights(job, paths, samples.clone(), splats, stop, None);
+                }
             }
-            TILE.with_borrow_mut(|slot| {
-                let tile = slot.get_or_insert_with(|| TileBuffer::new(window));
-                tile.reset(window, layers);
-                render_unit(job, pass.clone(), tile);
-                film.lock().unwrap_or_else(std::sync::PoisonError::into_inner).merge_tile(tile);
+            let photons = collected.as_ref().map(|(map, wavelength)| Collection { map, wavelength: *wavelength });
+            tiles.par_iter().for_each(|&window| {
+                if stop.load(Ordering::Relaxed) {
+                    return;
+                }
+                TILE.with_borrow_mut(|slot| {
+                    let tile = slot.get_or_insert_with(|| TileBuffer::new(window));
+                    tile.reset(window, layers);
+                    render_unit(job, samples.clone(), photons, tile);
+                    film.lock().unwrap_or_else(std::sync::PoisonError::into_inner).merge_tile(tile);
+                });
+                let unit = window.pixels() as u64 * samples.len() as u64;
+                let done = done.fetch_add(unit, Ordering::Relaxed) + unit;
+                watch(Progress { done, total, elapsed: start.elapsed(), error: latest });
             });
-            let unit = window.pixels() as u64 * pass.len() as u64;
-            let done = done.fetch_add(unit, Ordering::Relaxed) + unit;
-            watch(Progress { done, total, elapsed: start.elapsed(), error: latest });
-        });
-        if let Some((paths, splats)) = &splats {
-            from_lights(job, paths, pass.clone(), splats, stop);
         }
         if stop.load(Ordering::Relaxed) {
             return Err(Error::Render("stopped before the picture was finished; nothing was written".into()));
@@ -338,7 +349,7 @@ fn light_paths<'a>(job: &FrameJob<'a>) -> Option<LightPaths<'a>> {
         low: corner - radius,
         high: corner + DVec2::new(f64::from(window.width), f64::from(window.height)) + radius,
     };
-    Some(LightPaths { scene, plan, settings, caustics, seed, bounds })
+    Some(LightPaths { scene, plan, settings, caustics, seed, bounds, wavelength: None })
 }
 
 /// Follows paths from the lights for each sample of `samples`: as many as the frame has pixels, or the share of them
@@ -350,6 +361,7 @@ fn from_lights(
     samples: Range<u32>,
     splats: &Mutex<SplatFilm>,
     stop: &AtomicBool,
+    photons: Option<&mut Vec<Photon>>,
 ) {
     let FrameJob { scene, filter, window, .. } = *job;
     let [width, height] = scene.camera.resolution.map(u64::from);
@@ -359,21 +371,49 @@ fn from_lights(
             (0..paths).step_by(PATHS_OF_A_UNIT as usize).map(move |j| (s, j..(j + PATHS_OF_A_UNIT).min(paths)))
         })
         .collect();
-    units.into_par_iter().for_each(|(sample, unit)| {
+    let wanted = photons.is_some();
+    let left = units.into_par_iter().map(|(sample, unit)| {
+        let mut left = Vec::new();
         if stop.load(Ordering::Relaxed) {
-            return;
+            return left;
         }
         let replicate = sample % REPLICATES as u32;
         let base = u64::from(sample / REPLICATES as u32) * paths;
         let mut landed = Landed::default();
         let count = unit.end - unit.start;
         for j in unit {
-            transport::light::trace(light_paths, replicate, base + j, &mut |wavelengths, splat| {
+            let photons = wanted.then_some(&mut left);
+            transport::light::trace(light_paths, replicate, base + j, photons, &mut |wavelengths, splat| {
                 landed.add(scene, filter, window, wavelengths, &splat);
             });
         }
         landed.add_to(&mut splats.lock().unwrap_or_else(std::sync::PoisonError::into_inner), replicate, count);
+        left
     });
+    match photons {
+        // In the order of the paths, whoever follows them.
+        Some(photons) => *photons = left.collect::<Vec<_>>().concat(),
+        None => left.for_each(drop),
+    }
+}
+
+/// [`from_lights`] for one sample, with the photons for its paths from the camera and what chooses their wavelengths.
+fn from_lights_for(
+    job: &FrameJob,
+    light_paths: &LightPaths,
+    sample: u32,
+    first_radius: f64,
+    splats: &Mutex<SplatFilm>,
+    stop: &AtomicBool,
+) -> (PhotonMap, f64) {
+    let (replicate, index) = (sample % REPLICATES as u32, sample / REPLICATES as u32);
+    let wavelength = merge::shared_wavelength(job.seed, replicate, index);
+    let paths = LightPaths { wavelength: Some(wavelength), ..*light_paths };
+    let mut photons = Vec::new();
+    from_lights(job, &paths, sample..sample + 1, splats, stop, Some(&mut photons));
+    let [width, height] = job.scene.camera.resolution.map(u64::from);
+    let followed = light_paths.caustics.map_or(0, |c| c.paths(width * height));
+    (PhotonMap::new(&photons, followed, merge::radius(first_radius, index)), wavelength)
 }
 
 /// What the paths of one unit left on the picture.

@@ -128,7 +128,7 @@ fn wishes(description: &SceneDescription) -> Wishes {
         description::Technique::Off => Use::Off,
     };
     let written = &description.render.techniques;
-    Wishes { light_tracing: of(written.light_tracing), packets: of(written.packets) }
+    Wishes { light_tracing: of(written.light_tracing), packets: of(written.packets), merging: of(written.merging) }
 }
 
 /// What computes the light.

@@ -179,7 +179,7 @@ impl Default for Render {
     }
 }
 
-/// `techniques: {light_tracing: auto, packets: auto}`
+/// `techniques: {light_tracing: auto, packets: auto, merging: auto}`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Techniques {
@@ -189,6 +189,10 @@ pub struct Techniques {
     /// Whether wavelengths that part in glass on their way from a light are followed together.
     #[serde(default)]
     pub packets: Technique,
+    /// Whether photons are collected where light of mirrors and glass is seen in mirrors and through glass. Without
+    /// it that light is left to chance; with it, it is blurred a little.
+    #[serde(default)]
+    pub merging: Technique,
 }
 
 /// Whether a technique is used; the picture is the same but for its noise.

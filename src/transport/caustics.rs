@@ -36,6 +36,8 @@ pub struct Caustics {
     pub ratio: f64,
     /// Whether wavelengths that part in glass are followed together.
     pub packets: bool,
+    /// The first radius within which photons are collected where mirrors and glass are seen, metres.
+    pub merging: Option<f64>,
     /// Whether something that stands in the scene has no end.
     pub endless: bool,
 }

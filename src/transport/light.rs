@@ -10,6 +10,7 @@
 //! itself, L E, is the camera's part (`path` of one segment). Wavelengths are carried as in [`path`](super::path).
 
 use super::caustics::Caustics;
+use super::merge::Photon;
 use super::path::seen_normal;
 use super::plan::{EffectPlan, LightSettings};
 use crate::math::sampler::{Sampler, Set, pairs};
@@ -80,6 +81,8 @@ pub struct LightPaths<'a> {
     pub seed: u64,
     /// Where light is wanted.
     pub bounds: Bounds,
+    /// Chooses the wavelengths of all paths, where they share them.
+    pub wavelength: Option<f64>,
 }
 
 /// What a path was.
@@ -96,6 +99,7 @@ pub fn trace(
     paths: &LightPaths,
     replicate: u32,
     index: u64,
+    photons: Option<&mut Vec<Photon>>,
     splat: &mut dyn FnMut(&SampledWavelengths, Splat),
 ) -> Traced {
     let scene = paths.scene;
@@ -103,7 +107,7 @@ pub fn trace(
     let sampler = Sampler::new(paths.seed ^ STREAM, [(index >> 32) as u32, 0], replicate, index as u32);
     let (u_choice, u_time) = pairs(sampler.set(Set::Camera));
     let (u_point, u_direction) = pairs(sampler.set(Set::Extra(0)));
-    let wavelengths = scene.wavelengths.sample(u_time.x);
+    let wavelengths = scene.wavelengths.sample(paths.wavelength.unwrap_or(u_time.x));
     let mut traced = Traced::default();
     let emission = match paths.caustics {
         None => scene.emit(u_choice.x, u_point, u_direction, wavelengths.nm),
@@ -117,7 +121,7 @@ pub fn trace(
     if start.is_nan() || start <= 0.0 {
         return traced;
     }
-    let mut walk = Walk { paths, sampler: &sampler, wavelengths: &wavelengths, start, splat, rays: 0 };
+    let mut walk = Walk { paths, sampler: &sampler, wavelengths: &wavelengths, start, splat, photons, rays: 0 };
     walk.follow(Beam {
         ray: emission.ray,
         power: emission.power,
@@ -152,6 +156,15 @@ struct Beam {
     vertex: u32,
 }
 
+impl Beam {
+    /// Of light at the wavelengths of the beam, that at those of the path.
+    fn only(&self, light: Lanes) -> Lanes {
+        let Some(lane) = self.alone else { return light };
+        let value = light.to_array()[0];
+        Lanes::new(std::array::from_fn(|k| if k == lane { value } else { 0.0 }))
+    }
+}
+
 /// What ends a flight.
 enum Met<'a> {
     Surface { hit: Hit, surface: SurfacePoint, leaf: Option<Leaf<'a>>, pane: bool },
@@ -166,6 +179,8 @@ struct Walk<'a, 'b> {
     /// Largest power at the start.
     start: f64,
     splat: &'b mut dyn FnMut(&SampledWavelengths, Splat),
+    /// Where photons are left, if they are wanted.
+    photons: Option<&'b mut Vec<Photon>>,
     rays: u32,
 }
 
@@ -227,6 +242,7 @@ impl<'a> Walk<'a, '_> {
             if !bsdf.is_discrete() && !sharp {
                 let at = Vertex { hit: &hit, surface: &surface, frame: &frame, came, local: wo, object };
                 self.connect(&beam, &bsdf, &at, u_lens);
+                self.leave_photon(&beam, &surface);
                 if !self.goes_on(&mut beam) {
                     return;
                 }
@@ -389,6 +405,14 @@ impl<'a> Walk<'a, '_> {
         &scene.materials[scene.objects[hit.object as usize].material as usize]
     }
 
+    /// Leaves a photon where the beam has come to, if photons are wanted.
+    fn leave_photon(&mut self, beam: &Beam, surface: &SurfacePoint) {
+        let Some(photons) = &mut self.photons else { return };
+        let power = beam.only(beam.power * (LANES as f32 / beam.rho.reduce_add()));
+        let came = -beam.ray.direction;
+        photons.push(Photon { point: surface.point, came, normal: surface.normal, power, vertices: beam.vertex });
+    }
+
     /// Light that a surface sends into the camera.
     fn connect(&mut self, beam: &Beam, bsdf: &Bsdf, at: &Vertex, u_lens: DVec2) {
         let scene = self.paths.scene;
@@ -429,11 +453,7 @@ impl<'a> Walk<'a, '_> {
     fn send(&mut self, beam: &Beam, point: DVec3, ray: &Ray, medium: Option<u32>, entry: &Entry, light: Lanes) {
         let Some(through) = self.open(ray, entry.distance, medium, beam) else { return };
         let share = LANES as f32 / beam.rho.reduce_add();
-        let mut light = beam.power * light * through * share;
-        if let Some(lane) = beam.alone {
-            let value = light.to_array()[0];
-            light = Lanes::new(std::array::from_fn(|k| if k == lane { value } else { 0.0 }));
-        }
+        let mut light = beam.only(beam.power * light * through * share);
         if let Some(fog) = self.paths.scene.fog.as_ref().filter(|_| self.paths.plan.depth_fog) {
             light *= 1.0 - fog.falloff.amount(self.paths.scene.camera.depth(point)) as f32;
         }

@@ -10,7 +10,7 @@
 
 use crate::math::sampler::mix64;
 use crate::spectrum::Lanes;
-use glam::{DVec3, IVec3};
+use glam::DVec3;
 
 /// Light that came to a surface.
 #[derive(Clone, Copy, Debug)]
@@ -23,6 +23,8 @@ pub struct Photon {
     pub normal: DVec3,
     /// Spectral power over all densities, W·nm⁻¹.
     pub power: Lanes,
+    /// Vertices of its path before.
+    pub vertices: u32,
 }
 
 /// The photons of one sample.
@@ -77,10 +79,10 @@ impl PhotonMap {
         // A third where rounding puts one on an edge.
         let mut seen = [usize::MAX; 27];
         let mut count = 0;
-        for x in low.x..=high.x {
-            for y in low.y..=high.y {
-                for z in low.z..=high.z {
-                    let b = bucket(IVec3::new(x, y, z), buckets);
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    let b = bucket([x, y, z], buckets);
                     // Two cells may share a bucket, which counts once.
                     if seen[..count].contains(&b) {
                         continue;
@@ -104,15 +106,37 @@ impl PhotonMap {
 /// Least cosine between normals of one surface.
 const FACING: f64 = 0.7;
 
-fn cell(point: DVec3, radius: f64) -> IVec3 {
+fn cell(point: DVec3, radius: f64) -> [i32; 3] {
     // As numbers out of range become the ends of the range, far things share cells; they are told apart by distance.
-    (point / (2.0 * radius)).floor().as_ivec3()
+    (point / (2.0 * radius)).floor().to_array().map(|x| x as i32)
 }
 
-fn bucket(cell: IVec3, buckets: usize) -> usize {
-    let key = mix64(u64::from(cell.x as u32) << 32 | u64::from(cell.y as u32));
-    (mix64(key ^ u64::from(cell.z as u32)) as usize) & (buckets - 1)
+fn bucket([x, y, z]: [i32; 3], buckets: usize) -> usize {
+    let key = mix64(u64::from(x as u32) << 32 | u64::from(y as u32));
+    (mix64(key ^ u64::from(z as u32)) as usize) & (buckets - 1)
 }
+
+/// What the paths of one sample share where photons are collected.
+#[derive(Clone, Copy, Debug)]
+pub struct Collection<'a> {
+    /// The photons.
+    pub map: &'a PhotonMap,
+    /// Chooses the wavelengths, in [0, 1).
+    pub wavelength: f64,
+}
+
+/// Chooses the wavelengths of sample `index` of `replicate`: a Kronecker sequence by the golden ratio, which is evenly
+/// spread over the unit interval and over each eighth of it, shifted for each replicate.
+#[must_use]
+pub fn shared_wavelength(seed: u64, replicate: u32, index: u32) -> f64 {
+    let shift = mix64(seed ^ mix64(STREAM + u64::from(replicate)));
+    // 2⁶⁴ over the golden ratio.
+    let turns = u64::from(index).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(shift);
+    (turns >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
+}
+
+/// Tells these numbers from all others.
+const STREAM: u64 = 0x7068_6f74_6f6e_7300;
 
 /// The radius for sample `index` of a replicate, counted from 0.
 #[must_use]
@@ -130,7 +154,7 @@ mod tests {
             .map(|i| {
                 let u = Sampler::new(7, [0, 0], 0, i).set(Set::Camera);
                 let point = DVec3::new(4.0 * u[0] - 2.0, 0.0, 4.0 * u[1] - 2.0);
-                Photon { point, came: DVec3::Y, normal: DVec3::Y, power: Lanes::splat(1.0 + u[2] as f32) }
+                Photon { point, came: DVec3::Y, normal: DVec3::Y, power: Lanes::splat(1.0 + u[2] as f32), vertices: 1 }
             })
             .collect()
     }

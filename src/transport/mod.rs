@@ -8,6 +8,7 @@ pub mod caustics;
 pub mod guide;
 pub mod layers;
 pub mod light;
+pub mod merge;
 pub mod path;
 pub mod pilot;
 pub mod plan;
@@ -20,6 +21,7 @@ use crate::math::sampler::{Octet, Sampler, Set, pairs};
 use crate::scene::Scene;
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
+use merge::Collection;
 use plan::{EffectPlan, Integrator, PathSettings};
 use std::ops::Range;
 
@@ -37,12 +39,20 @@ pub struct Incoming {
     pub left: Lanes,
     /// Vertices of the path, and surfaces that it went straight through.
     pub events: u32,
+    /// Whether the first of them was on something sharp.
+    pub mirrored: bool,
 }
 
 impl Incoming {
     /// No light.
-    pub const NONE: Incoming =
-        Incoming { radiance: Lanes::ZERO, alpha: 0.0, depth: f64::INFINITY, left: Lanes::ZERO, events: 0 };
+    pub const NONE: Incoming = Incoming {
+        radiance: Lanes::ZERO,
+        alpha: 0.0,
+        depth: f64::INFINITY,
+        left: Lanes::ZERO,
+        events: 0,
+        mirrored: false,
+    };
 }
 
 /// One sample of one pixel.
@@ -71,6 +81,8 @@ pub struct Shot<'a> {
     pub filter: &'a FilterSampler,
     /// Seed of all random numbers.
     pub seed: u64,
+    /// Photons that paths collect, and the wavelengths that all then share.
+    pub photons: Option<Collection<'a>>,
 }
 
 /// Where the random numbers of a sample come from.
@@ -124,6 +136,7 @@ impl Begun {
             return;
         }
         let (u_pixel, u_time) = pairs(sampler.set(Set::Camera));
+        let wavelengths = scene.wavelengths.sample(shot.photons.map_or(u_time.x, |p| p.wavelength));
         let chosen = filter.sample(u_pixel);
         let place = corner + DVec2::splat(0.5) + chosen.offset;
         self.sample.wavelengths = scene.wavelengths.sample(u_time.x);
@@ -139,18 +152,19 @@ impl Begun {
     fn light(&self, shot: &Shot, sampler: &Sampler, integrator: &Integrator) -> Incoming {
         let Begun { at, ray, sample: PixelSample { wavelengths, .. }, .. } = self;
         let Shot { scene, plan, .. } = shot;
+        let map = shot.photons.map(|p| p.map);
         match integrator {
             Integrator::Path(settings) => {
                 let rays = settings.light_samples.max(settings.scatter_samples);
                 if rays == 1 {
-                    return path::radiance(scene, plan, settings, sampler, wavelengths, ray);
+                    return path::radiance(scene, plan, settings, sampler, wavelengths, ray, map);
                 }
                 // Several paths from one camera ray, each with numbers of its own.
                 let mut sum = Incoming::NONE;
                 for i in 0..rays {
                     let index = at.index.wrapping_mul(rays).wrapping_add(i);
                     let sampler = Sampler::new(shot.seed, at.pixel, at.replicate, index);
-                    let one = path::radiance(scene, plan, settings, &sampler, wavelengths, ray);
+                    let one = path::radiance(scene, plan, settings, &sampler, wavelengths, ray, map);
                     sum.radiance += one.radiance;
                     sum.alpha += one.alpha;
                     sum.depth = one.depth;
@@ -177,7 +191,7 @@ impl Begun {
                     hide_emitters: settings.hide_emitters,
                     ..PathSettings::default()
                 };
-                path::radiance(scene, plan, &direct, sampler, wavelengths, ray)
+                path::radiance(scene, plan, &direct, sampler, wavelengths, ray, None)
             }
             Integrator::Nothing => Incoming::NONE,
         }
@@ -228,7 +242,7 @@ pub fn sample(
     replicate: u32,
     index: u32,
 ) -> PixelSample {
-    let shot = Shot { scene, plan, filter, seed };
+    let shot = Shot { scene, plan, filter, seed, photons: None };
     let sampler = Sampler::new(seed, pixel, replicate, index);
     let mut begun = Begun::blank();
     begun.begin(&shot, Address { pixel, replicate, index }, &sampler);

@@ -11,6 +11,7 @@
 //! they are combined by the power heuristic (Veach 1997, eq. 9.13).
 
 use super::Incoming;
+use super::merge::PhotonMap;
 use super::plan::{EffectPlan, PathSettings};
 use crate::math::Frame;
 use crate::math::Ray;
@@ -50,8 +51,9 @@ pub fn radiance(
     sampler: &Sampler,
     wavelengths: &SampledWavelengths,
     ray: &Ray,
+    photons: Option<&PhotonMap>,
 ) -> Incoming {
-    let tracer = Tracer { scene, plan, settings, sampler, nm: wavelengths.nm };
+    let tracer = Tracer { scene, plan, settings, sampler, nm: wavelengths.nm, photons };
     // The plan chooses the kernel: what a scene lacks is not in the code that runs.
     match (plan.chromatic, plan.media) {
         (false, false) => tracer.trace::<false, false>(ray),
@@ -67,6 +69,7 @@ struct Tracer<'a> {
     settings: &'a PathSettings,
     sampler: &'a Sampler<'a>,
     nm: Lanes,
+    photons: Option<&'a PhotonMap>,
 }
 
 /// The last vertex that light could also have been found from by next-event estimation.
@@ -99,8 +102,13 @@ struct Path {
     vertices: u32,
     /// Surfaces so far that it went straight through.
     crossings: u32,
-    /// Whether the camera could see the first vertex from a path that came to it from a light.
+    /// Whether it has met mirrors and glass only.
+    specular: bool,
+    /// Whether paths from the lights can be joined to it: by the camera at its first vertex, by merging behind mirrors
+    /// and glass.
     seen: bool,
+    /// Whether its first vertex was on something sharp.
+    mirrored: bool,
     /// Whether the last vertex is on something sharp.
     sharp: bool,
     /// Light of paths that are traced from the lights.
@@ -199,7 +207,9 @@ impl Tracer<'_> {
             radiance: Lanes::ZERO,
             vertices: 0,
             crossings: 0,
+            specular: true,
             seen: false,
+            mirrored: false,
             sharp: false,
             left: Lanes::ZERO,
         };
@@ -389,6 +399,18 @@ impl Tracer<'_> {
                 );
             }
 
+            if let Some(map) = self.photons
+                && path.specular
+                && path.vertices > 0
+                && !bsdf.is_discrete()
+                && !self.plan.caustics.as_ref().is_some_and(|c| c.is_sharp(hit.object))
+            {
+                let scatterer =
+                    Scatterer::Surface { bsdf: &bsdf, frame: &frame, surface: &surface, object, flip, slopes };
+                let merged = self.merge(map, &path, &scatterer, &surface, wo);
+                path.add::<CHROMATIC>(merged, 1.0);
+            }
+
             // The last ray of a path only looks for light: there is none to meet.
             if !scene.shines_on_rays && self.is_next_to_last(&path) {
                 break;
@@ -415,8 +437,10 @@ impl Tracer<'_> {
             };
             if let Some(caustics) = &self.plan.caustics {
                 path.sharp = caustics.is_sharp(hit.object);
-                if path.vertices == 0 {
-                    path.seen = !path.sharp && sample.chosen != Chosen::Discrete;
+                path.mirrored |= path.sharp && path.vertices == 0;
+                if path.specular && sample.chosen != Chosen::Discrete {
+                    path.specular = false;
+                    path.seen = !path.sharp && (path.vertices == 0 || caustics.merging.is_some());
                 }
             }
             path.beta *= sample.weight;
@@ -438,7 +462,21 @@ impl Tracer<'_> {
             }
         }
         let events = path.vertices + path.crossings;
-        Incoming { radiance: path.radiance, alpha, depth, left: path.left, events }
+        Incoming { radiance: path.radiance, alpha, depth, left: path.left, events, mirrored: path.mirrored }
+    }
+
+    /// Light of the photons around a vertex behind mirrors and glass.
+    #[inline(never)]
+    fn merge(&self, map: &PhotonMap, path: &Path, scatterer: &Scatterer, surface: &SurfacePoint, wo: DVec3) -> Lanes {
+        map.gather(surface.point, surface.normal, |photon| {
+            // The camera's segments and the light's.
+            if self.settings.max_depth.is_some_and(|most| path.vertices + photon.vertices + 2 > most) {
+                return Lanes::ZERO;
+            }
+            let cosine = photon.came.dot(surface.normal).abs();
+            let f = scatterer.eval(wo, photon.came).0;
+            if cosine > 0.0 { f * (1.0 / cosine) as f32 } else { Lanes::ZERO }
+        })
     }
 
     /// What one path meets of a material made of others, chosen by `u`; `None` where it goes straight on.
@@ -514,6 +552,7 @@ impl Tracer<'_> {
         });
         path.ray = Ray::new(point, wi);
         path.seen |= path.vertices == 0;
+        path.specular = false;
         path.sharp = false;
         path.vertices += 1;
         self.survives::<CHROMATIC>(path, choice[2])

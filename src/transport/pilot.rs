@@ -11,6 +11,7 @@ use super::plan::{Effect, EffectPlan, Integrator, PathSettings};
 use crate::film::filter::FilterSampler;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::bvh::Aabb;
+use crate::scene::camera::Projection;
 use crate::scene::casters::Casters;
 use crate::scene::environment::Environment;
 use crate::scene::light::Light;
@@ -41,6 +42,8 @@ pub struct Wishes {
     pub light_tracing: Use,
     /// Wavelengths that part followed together.
     pub packets: Use,
+    /// Photons collected where mirrors and glass are seen.
+    pub merging: Use,
 }
 
 /// Paths from the lights in each of two rounds: the second is aimed by what the first has learnt.
@@ -170,7 +173,7 @@ impl Caustics {
         sources.iter_mut().for_each(|s| s.probability /= total);
         let stands = &scene.objects[..scene.bvh.order().len()];
         let endless = stands.iter().any(|o| !o.bounds().is_finite());
-        Caustics { casts: casters.casts.clone(), traced, sources, ratio: 1.0, packets, endless }
+        Caustics { casts: casters.casts.clone(), traced, sources, ratio: 1.0, packets, endless, merging: None }
     }
 }
 
@@ -185,6 +188,8 @@ struct Camera {
     met: usize,
     /// Rays of a path.
     rays: f64,
+    /// Share of the paths that begin on something sharp.
+    sharp: f64,
 }
 
 fn luminance(light: Lanes, wavelengths: &SampledWavelengths) -> f64 {
@@ -206,21 +211,23 @@ fn from_camera(shot: &Shot) -> Camera {
             let pair = [0, 1].map(|replicate| {
                 let (light, wavelengths) = super::probe(shot, pixel, replicate, n);
                 let (kept, left) = (luminance(light.radiance, &wavelengths), luminance(light.left, &wavelengths));
-                (kept, left, light.events)
+                (kept, left, light)
             });
             (block, pair)
         })
         .collect();
-    let mut camera = Camera { means: vec![0.0; BLOCKS * BLOCKS], kept: Vec::new(), all: Vec::new(), met: 0, rays: 0.0 };
+    let mut camera =
+        Camera { means: vec![0.0; BLOCKS * BLOCKS], kept: Vec::new(), all: Vec::new(), met: 0, rays: 0.0, sharp: 0.0 };
     for (block, pair) in &tried {
         let variance = |a: f64, b: f64| 0.5 * (a - b) * (a - b);
-        let [(a, a_left, a_events), (b, b_left, b_events)] = *pair;
+        let [(a, a_left, a_light), (b, b_left, b_light)] = *pair;
         camera.means[*block] += 0.5 * (a + b) / f64::from(PIXELS);
         camera.kept.push((*block, variance(a, b)));
         camera.all.push((*block, variance(a + a_left, b + b_left)));
         camera.met += usize::from(a_left > 0.0) + usize::from(b_left > 0.0);
         // A ray to the next vertex and one to a light from each.
-        camera.rays += f64::from(2 + 2 * (a_events + b_events)) / (2 * tried.len()) as f64;
+        camera.rays += f64::from(2 + 2 * (a_light.events + b_light.events)) / (2 * tried.len()) as f64;
+        camera.sharp += f64::from(u32::from(a_light.mirrored) + u32::from(b_light.mirrored)) / (2 * tried.len()) as f64;
     }
     camera
 }
@@ -259,7 +266,7 @@ fn from_lights(paths: &LightPaths, round: u64) -> Vec<Landed> {
         .into_par_iter()
         .map(|i| {
             let mut splats = Vec::new();
-            let traced = trace(paths, round as u32, i, &mut |wavelengths, splat| {
+            let traced = trace(paths, round as u32, i, None, &mut |wavelengths, splat| {
                 let y = f64::from(observer::xyz(splat.light, wavelengths)[1]);
                 if y.is_finite() {
                     splats.push((block_of(splat.place), y));
@@ -284,7 +291,7 @@ fn run(
 ) -> (Option<Arc<Caustics>>, Vec<Effect>) {
     let off = |reason: String| (None, vec![technique("light tracing", false, reason)]);
     let trial = EffectPlan { caustics: Some(Arc::new(caustics.clone())), ..plan.clone() };
-    let camera = from_camera(&Shot { scene, plan: &trial, filter, seed: seed ^ STREAM });
+    let camera = from_camera(&Shot { scene, plan: &trial, filter, seed: seed ^ STREAM, photons: None });
     let [width, height] = scene.camera.resolution.map(f64::from);
     let pixels = width * height;
     let mut weights = relative(&camera.means);
@@ -300,6 +307,7 @@ fn run(
             caustics: Some(&caustics),
             seed: seed ^ STREAM,
             bounds,
+            wavelength: None,
         };
         let all = from_lights(&paths, round);
         (squares, rays) = (0.0, 0.0);
@@ -368,7 +376,42 @@ fn run(
             (false, false) => "no wavelengths part".into(),
         },
     ));
+    let sharp_seen = camera.sharp > 0.0;
+    let radius = merging_radius(scene, casters);
+    if sharp_seen && wishes.merging != Use::Off {
+        caustics.merging = Some(radius);
+    }
+    said.push(technique(
+        "photon merging",
+        caustics.merging.is_some(),
+        match (sharp_seen, caustics.merging) {
+            (false, _) => "the camera sees no mirror and no glass".into(),
+            (true, None) => "the scene says so: caustics in mirrors and behind glass are left to chance".into(),
+            (true, Some(radius)) => format!(
+                "caustics seen in mirrors and through glass, blurred within {radius:.3} m at the first sample and the \
+                 sixth root of the sample's number less at later ones"
+            ),
+        },
+    ));
     (Some(Arc::new(caustics)), said)
+}
+
+/// Pixels, as wide as they are at what mirrors and refracts, that the first radius of merging spans.
+const FIRST_RADIUS: f64 = 2.5;
+
+/// The first radius of merging: some pixels at the nearest thing that casts.
+fn merging_radius(scene: &Scene, casters: &Casters) -> f64 {
+    let width = f64::from(scene.camera.resolution[0]);
+    let eye = scene.camera.world_from_camera.translation;
+    // To the middle: what lies behind is farther, what is before nearer.
+    let distance = casters.balls.iter().map(|b| (b.center - eye).length()).fold(f64::INFINITY, f64::min);
+    let pixel = match scene.camera.projection {
+        Projection::Perspective { half_width } => 2.0 * half_width / width * distance,
+        Projection::Orthographic { half_width } => {
+            2.0 * half_width / width * scene.camera.world_from_camera.matrix3.x_axis.length()
+        }
+    };
+    FIRST_RADIUS * pixel
 }
 
 fn some(casters: &Casters) -> String {

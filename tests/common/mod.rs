@@ -12,7 +12,7 @@ use abbe::math::Ray;
 use abbe::math::sampler::{Sampler, Set, pairs};
 use abbe::math::statistics::Moments;
 use abbe::spectrum::{ColourSpace, LANES, Lanes, SampledWavelengths, WavelengthDistribution, observer};
-use abbe::transport::plan::Integrator;
+use abbe::transport::plan::{EffectPlan, Integrator};
 use abbe::transport::{self, Incoming, path, whitted};
 use glam::{DVec2, DVec3};
 use std::path::Path;
@@ -108,8 +108,11 @@ impl Bench {
     /// Light along `ray` at `wavelengths` for one sample.
     pub fn incoming(&self, ray: &Ray, wavelengths: &SampledWavelengths, sampler: &Sampler) -> Incoming {
         let Prepared { scene, plan, .. } = &self.prepared;
+        // One ray knows nothing of paths from the lights.
+        let whole = plan.caustics.is_some().then(|| EffectPlan { caustics: None, ..plan.clone() });
+        let plan = whole.as_ref().unwrap_or(plan);
         match &plan.integrator {
-            Integrator::Path(settings) => path::radiance(scene, plan, settings, sampler, wavelengths, ray),
+            Integrator::Path(settings) => path::radiance(scene, plan, settings, sampler, wavelengths, ray, None),
             Integrator::Whitted(settings) => whitted::radiance(scene, plan, settings, wavelengths, ray),
             other => panic!("{other:?} has no light along a ray"),
         }
