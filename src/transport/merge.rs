@@ -8,8 +8,8 @@
 //!
 //! Photons of one sample are collected by that sample's paths of all pixels, so both share their wavelengths.
 
-use crate::math::sampler::mix64;
-use crate::spectrum::Lanes;
+use crate::math::sampler::{Sampler, Set, mix64};
+use crate::spectrum::{LANES, Lanes};
 use glam::DVec3;
 
 /// Light that came to a surface.
@@ -125,14 +125,13 @@ pub struct Collection<'a> {
     pub wavelength: f64,
 }
 
-/// Chooses the wavelengths of sample `index` of `replicate`: a Kronecker sequence by the golden ratio, which is evenly
-/// spread over the unit interval and over each eighth of it, shifted for each replicate.
+/// Chooses the wavelengths of sample `index` of `replicate`. The eight of a sample are an eighth apart: where they
+/// begin in an eighth and which of them leads are two dimensions of one low-discrepancy sequence.
 #[must_use]
 pub fn shared_wavelength(seed: u64, replicate: u32, index: u32) -> f64 {
-    let shift = mix64(seed ^ mix64(STREAM + u64::from(replicate)));
-    // 2⁶⁴ over the golden ratio.
-    let turns = u64::from(index).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(shift);
-    (turns >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
+    let u = Sampler::new(seed ^ STREAM, [0, 0], replicate, index).set(Set::Camera);
+    let lanes = LANES as f64;
+    (u[0] + (u[1] * lanes).floor()) / lanes
 }
 
 /// Tells these numbers from all others.
@@ -147,7 +146,6 @@ pub fn radius(first: f64, index: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::sampler::{Sampler, Set};
 
     fn photons(n: u32) -> Vec<Photon> {
         (0..n)
@@ -186,6 +184,24 @@ mod tests {
         // Low-discrepancy points err less than the 8 % of independent ones.
         assert!((found / (1.5 / 16.0) - 1.0).abs() < 0.08, "{found}");
         assert_eq!(map.gather(DVec3::ZERO, DVec3::X, |_| Lanes::ONE).to_array()[0], 0.0);
+    }
+
+    /// Of 64 samples of a replicate, the eight lanes of each fall into 512 equal parts of the unit interval once each, and
+    /// each of 8 consecutive samples is led from another eighth.
+    #[test]
+    fn shared_wavelengths_are_evenly_spread() {
+        for replicate in 0..4 {
+            let all: Vec<f64> = (0..64).map(|i| shared_wavelength(3, replicate, i)).collect();
+            let lanes = all.iter().flat_map(|u| (0..8).map(move |k| (u + f64::from(k) / 8.0).fract()));
+            let mut parts: Vec<usize> = lanes.map(|u| (u * 512.0) as usize).collect();
+            parts.sort_unstable();
+            assert!(parts.iter().enumerate().all(|(i, part)| i == *part));
+            for eight in all.chunks(8) {
+                let mut leads: Vec<usize> = eight.iter().map(|u| (u * 8.0) as usize).collect();
+                leads.sort_unstable();
+                assert_eq!(leads, [0, 1, 2, 3, 4, 5, 6, 7]);
+            }
+        }
     }
 
     #[test]
