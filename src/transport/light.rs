@@ -408,9 +408,13 @@ impl<'a> Walk<'a, '_> {
     /// Leaves a photon where the beam has come to, if photons are wanted.
     fn leave_photon(&mut self, beam: &Beam, surface: &SurfacePoint) {
         let Some(photons) = &mut self.photons else { return };
-        let power = beam.only(beam.power * (LANES as f32 / beam.rho.reduce_add()));
-        let came = -beam.ray.direction;
-        photons.push(Photon { point: surface.point, came, normal: surface.normal, power, vertices: beam.vertex });
+        // Of wavelengths that parted each has a photon of its own: none led the others.
+        let (power, rho) = match beam.alone {
+            None => (beam.power, beam.rho),
+            Some(_) => (beam.only(beam.power * (LANES as f32 / beam.rho.reduce_add())), Lanes::ONE),
+        };
+        let (point, came, normal) = (surface.point, -beam.ray.direction, surface.normal);
+        photons.push(Photon { point, came, normal, power, rho, vertices: beam.vertex });
     }
 
     /// Light that a surface sends into the camera.

@@ -21,8 +21,10 @@ pub struct Photon {
     pub came: DVec3,
     /// True normal there, on the side that it came from.
     pub normal: DVec3,
-    /// Spectral power over all densities, W·nm⁻¹.
+    /// Spectral power over the hero's density, W·nm⁻¹.
     pub power: Lanes,
+    /// Density of each lane over the hero's.
+    pub rho: Lanes,
     /// Vertices of its path before.
     pub vertices: u32,
 }
@@ -152,7 +154,14 @@ mod tests {
             .map(|i| {
                 let u = Sampler::new(7, [0, 0], 0, i).set(Set::Camera);
                 let point = DVec3::new(4.0 * u[0] - 2.0, 0.0, 4.0 * u[1] - 2.0);
-                Photon { point, came: DVec3::Y, normal: DVec3::Y, power: Lanes::splat(1.0 + u[2] as f32), vertices: 1 }
+                Photon {
+                    point,
+                    came: DVec3::Y,
+                    normal: DVec3::Y,
+                    power: Lanes::splat(1.0 + u[2] as f32),
+                    rho: Lanes::ONE,
+                    vertices: 1,
+                }
             })
             .collect()
     }

@@ -136,10 +136,9 @@ impl Begun {
             return;
         }
         let (u_pixel, u_time) = pairs(sampler.set(Set::Camera));
-        let wavelengths = scene.wavelengths.sample(shot.photons.map_or(u_time.x, |p| p.wavelength));
         let chosen = filter.sample(u_pixel);
         let place = corner + DVec2::splat(0.5) + chosen.offset;
-        self.sample.wavelengths = scene.wavelengths.sample(u_time.x);
+        self.sample.wavelengths = scene.wavelengths.sample(shot.photons.map_or(u_time.x, |p| p.wavelength));
         self.sample.weight = chosen.weight;
         self.place = place;
         // Rays of the camera leave no surface, and never did here: two vectors are stored, no enum is copied.
@@ -254,8 +253,9 @@ pub fn sample(
 /// The light of sample `index` of `replicate` at `pixel` before fog, with what it left to paths from the lights.
 fn probe(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Incoming, SampledWavelengths) {
     let sampler = Sampler::new(shot.seed, pixel, replicate, index);
-    let begun = Begun::new(shot, Address { pixel, replicate, index }, &sampler);
-    (begun.light(shot, &sampler, &shot.plan.integrator), begun.wavelengths)
+    let mut begun = Begun::blank();
+    begun.begin(shot, Address { pixel, replicate, index }, &sampler);
+    (begun.light(shot, &sampler, &shot.plan.integrator), begun.sample.wavelengths)
 }
 
 /// The memory of samples that are rendered one after the other.

@@ -407,8 +407,7 @@ impl Tracer<'_> {
             {
                 let scatterer =
                     Scatterer::Surface { bsdf: &bsdf, frame: &frame, surface: &surface, object, flip, slopes };
-                let merged = self.merge(map, &path, &scatterer, &surface, wo);
-                path.add::<CHROMATIC>(merged, 1.0);
+                path.radiance += path.beta * self.merge::<CHROMATIC>(map, &path, &scatterer, &surface, wo);
             }
 
             // The last ray of a path only looks for light: there is none to meet.
@@ -465,9 +464,17 @@ impl Tracer<'_> {
         Incoming { radiance: path.radiance, alpha, depth, left: path.left, events, mirrored: path.mirrored }
     }
 
-    /// Light of the photons around a vertex behind mirrors and glass.
+    /// Light of the photons around a vertex behind mirrors and glass. A lane could lead both parts of the joined path
+    /// with the product of its densities.
     #[inline(never)]
-    fn merge(&self, map: &PhotonMap, path: &Path, scatterer: &Scatterer, surface: &SurfacePoint, wo: DVec3) -> Lanes {
+    fn merge<const CHROMATIC: bool>(
+        &self,
+        map: &PhotonMap,
+        path: &Path,
+        scatterer: &Scatterer,
+        surface: &SurfacePoint,
+        wo: DVec3,
+    ) -> Lanes {
         map.gather(surface.point, surface.normal, |photon| {
             // The camera's segments and the light's.
             if self.settings.max_depth.is_some_and(|most| path.vertices + photon.vertices + 2 > most) {
@@ -475,7 +482,9 @@ impl Tracer<'_> {
             }
             let cosine = photon.came.dot(surface.normal).abs();
             let f = scatterer.eval(wo, photon.came).0;
-            if cosine > 0.0 { f * (1.0 / cosine) as f32 } else { Lanes::ZERO }
+            let led = if CHROMATIC { f64::from((path.rho * photon.rho).reduce_add()) } else { LANES as f64 };
+            let share = LANES as f64 / (led * cosine);
+            if share.is_finite() { f * share as f32 } else { Lanes::ZERO }
         })
     }
 

@@ -149,3 +149,40 @@ fn lights_without_extent_agree_with_the_light_tracer() {
         assert_agree(what, &render(&on), &render(&all));
     }
 }
+
+/// Photons are collected in the order of their paths, radii and wavelengths go by the sample's number: no bit depends on
+/// threads or tiles.
+#[test]
+fn merged_light_does_not_depend_on_tiles_or_threads() {
+    let case = Case { what: "flint", material: FLINT, ..AREA };
+    let bench = case.bench("on", "auto", 12);
+    assert!(bench.prepared.plan.caustics.as_ref().unwrap().merging.is_some());
+    let run = |threads: usize, tile: u32| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let frame = pool.install(|| render_with(&bench, Filter::Gaussian { stddev: 0.5 }, tile));
+        let splats = frame.splats.unwrap();
+        (frame.film, splats.film, splats.paths)
+    };
+    assert!(run(1, 32) == run(3, 5), "the sums differ");
+}
+
+/// A closed white box with a lamp and a ball of glass, flint or mirror: what is traced from the light and what from the
+/// camera is the same light. Walls reflect 0.8, so light that were lost or counted twice once would show fivefold.
+#[test]
+fn a_closed_box_keeps_its_light() {
+    for material in [GLASS, FLINT] {
+        let scene = |tracing: &str, samples: u32| {
+            let text = format!(
+                "camera: {{origin: [0, 0, 0.95], target: [0, 0, -1], fov_deg: 80}}\n\
+                 image: {{width: 24, height: 24}}\n\
+                 render: {{samples: {samples}, techniques: {{light_tracing: {tracing}, merging: off}}}}\n\
+                 shapes:\n\
+                 - cube: {{center: [0, 0, 0], size: 2, flip_normals: true, material: {{diffuse: {{reflectance: 0.8}}}}}}\n\
+                 - sphere: {{center: [0.3, -0.4, -0.2], radius: 0.4, material: {material}}}\n\
+                 - sphere: {{center: [-0.4, 0.5, 0], radius: 0.2, emission: 1, material: {{diffuse: {{reflectance: 0}}}}}}\n"
+            );
+            bench_with(&text, &[])
+        };
+        assert_agree(material, &render(&scene("on", 128)), &render(&scene("off", 512)));
+    }
+}
