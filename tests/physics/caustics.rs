@@ -36,6 +36,15 @@ const FLINT: &str = "{dielectric: {ior: {glass: SF11}}}";
 const LAMP: &str = "- sphere: {center: [-1.5, 2, 1], radius: 0.5, emission: {illuminant: {name: D65, scale: 10}}}\n";
 const AREA: Case = Case { what: "area", camera: "", material: GLASS, light: LAMP, depth: "null" };
 
+/// The same lamp in a room full of fog, and the ball with coloured glass inside.
+const FOGGY: &str = "\
+- sphere: {center: [-1.5, 2, 1], radius: 0.5, emission: {illuminant: {name: D65, scale: 10}}}
+media:
+  fog: {homogeneous: {scattering: {rgb: [0.15, 0.1, 0.05]}, absorption: 0.02, phase: {hg: 0.3}}}
+  amber: {homogeneous: {absorption: {table: [[360, 3], [450, 2], [550, 0.5], [650, 0.08], [830, 0.02]]}}}
+medium: fog
+";
+
 impl Case {
     fn scene(&self, integrator: &str, tracing: &str, packets: &str, samples: u32) -> String {
         SCENE
@@ -46,6 +55,10 @@ impl Case {
             .replace("PACKETS", packets)
             .replace("INTEGRATOR", integrator)
             .replace("DEPTH", self.depth)
+            .replace(
+                ", material: glass}",
+                if self.light == FOGGY { ", material: glass, inside: amber}" } else { ", material: glass}" },
+            )
             + self.light
     }
 
@@ -107,6 +120,7 @@ fn no_light_is_lost_and_none_counted_twice() {
         Case { what: "lens", camera: ", lens: {radius: 0.2, focus_distance: 4}", ..AREA },
         Case { what: "depth 4", depth: "4", ..AREA },
         Case { what: "depth 3", depth: "3", material: "{mirror: {reflectance: 0.9}}", ..AREA },
+        Case { what: "fog", light: FOGGY, ..AREA },
     ];
     for case in cases {
         let on = case.bench("on", "auto", 128);
