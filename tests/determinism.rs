@@ -3,10 +3,10 @@
 
 mod common;
 
-use abbe::batch::frame::{FrameJob, render_unit, tiles};
+use abbe::batch::frame::{FrameJob, render_part};
 use abbe::batch::{self, Overrides, Prepared, Watcher};
 use abbe::film::Window;
-use abbe::film::accumulate::{Film, TileBuffer};
+use abbe::film::accumulate::Film;
 use abbe::film::exr::{ExrFile, read_exr};
 use abbe::film::filter::{Filter, FilterSampler};
 use common::{Bench, bench_with, grey_png, try_bench};
@@ -127,13 +127,7 @@ fn in_parts(bench: &Bench, ranges: &[Range<u32>], side: u32) -> Film {
     let frame = scene.camera.resolution;
     let mut whole = Film::new(frame, job.window).unwrap();
     for range in ranges {
-        let mut part = Film::new(frame, job.window).unwrap();
-        // Tiles from the last to the first.
-        for window in tiles(job.window, side).into_iter().rev() {
-            let mut tile = TileBuffer::new(window);
-            render_unit(&job, range.clone(), None, &mut tile);
-            part.merge_tile(&tile);
-        }
+        let (part, _) = render_part(&job, range.clone()).unwrap();
         whole.merge(&part).unwrap();
     }
     whole

@@ -177,7 +177,7 @@ pub fn passes(samples: u32) -> Vec<Range<u32>> {
 }
 
 /// Renders one work unit into `tile`.
-pub fn render_unit(job: &FrameJob, samples: Range<u32>, photons: Option<Collection>, tile: &mut TileBuffer) {
+fn render_unit(job: &FrameJob, samples: Range<u32>, photons: Option<Collection>, tile: &mut TileBuffer) {
     let FrameJob { scene, plan, filter, seed, .. } = *job;
     let shot = Shot { scene, plan, filter, seed, photons };
     let window = tile.window();
@@ -259,6 +259,93 @@ fn cause(r: Lanes) -> Invalid {
     }
 }
 
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+/// Renders some of the samples of a picture, with their paths from the lights. What any split of the samples adds up to
+/// is the whole picture, bit for bit.
+///
+/// # Errors
+/// [`Error::Render`] if the memory cannot be had.
+pub fn render_part(job: &FrameJob, samples: Range<u32>) -> Result<(Film, Option<SplatFilm>)> {
+    let part = Part::new(job)?;
+    part.add(samples, &AtomicBool::new(false), &|_| {});
+    Ok(part.finish())
+}
+
+/// The sums of a picture on the way.
+struct Part<'a> {
+    job: &'a FrameJob<'a>,
+    film: Mutex<Film>,
+    splats: Option<(LightPaths<'a>, Mutex<SplatFilm>)>,
+    tiles: Vec<Window>,
+    layers: usize,
+}
+
+impl<'a> Part<'a> {
+    fn new(job: &'a FrameJob<'a>) -> Result<Part<'a>> {
+        let layers = job.plan.layers.channels().len();
+        let film = |layers| Ok(Film::new(job.scene.camera.resolution, job.window)?.with_layers(layers));
+        let splats = match light_paths(job) {
+            Some(paths) => {
+                let film = film(job.scene.bands.len())?;
+                Some((paths, Mutex::new(SplatFilm { film, paths: [0; REPLICATES] })))
+            }
+            None => None,
+        };
+        let tiles = shares(job.window, job.tile, rayon::current_num_threads());
+        Ok(Part { job, film: Mutex::new(film(layers)?), splats, tiles, layers })
+    }
+
+    /// Adds `samples` of all pixels; `finished` hears how many were done with each tile.
+    fn add(&self, samples: Range<u32>, stop: &AtomicBool, finished: &(dyn Fn(u64) + Sync)) {
+        let merging = self.job.plan.caustics.as_ref().and_then(|c| c.merging);
+        let (Some(first), Some((paths, splats))) = (merging, &self.splats) else {
+            if let Some((paths, splats)) = &self.splats {
+                from_lights(self.job, paths, samples.clone(), splats, stop, None);
+            }
+            self.add_tiles(samples, None, stop, finished);
+            return;
+        };
+        // Photons are collected sample by sample.
+        for sample in samples {
+            let (map, wavelength) = from_lights_for(self.job, paths, sample, first, splats, stop);
+            self.add_tiles(sample..sample + 1, Some(Collection { map: &map, wavelength }), stop, finished);
+        }
+    }
+
+    fn add_tiles(
+        &self,
+        samples: Range<u32>,
+        photons: Option<Collection>,
+        stop: &AtomicBool,
+        finished: &(dyn Fn(u64) + Sync),
+    ) {
+        thread_local! {
+            static TILE: RefCell<Option<TileBuffer>> = const { RefCell::new(None) };
+        }
+        self.tiles.par_iter().for_each(|&window| {
+            if stop.load(Ordering::Relaxed) {
+                return;
+            }
+            TILE.with_borrow_mut(|slot| {
+                let tile = slot.get_or_insert_with(|| TileBuffer::new(window));
+                tile.reset(window, self.layers);
+                render_unit(self.job, samples.clone(), photons, tile);
+                lock(&self.film).merge_tile(tile);
+            });
+            finished(window.pixels() as u64 * samples.len() as u64);
+        });
+    }
+
+    fn finish(self) -> (Film, Option<SplatFilm>) {
+        let film = self.film.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let splats = self.splats.map(|(_, s)| s.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner));
+        (film, splats)
+    }
+}
+
 /// Renders the picture on the threads of the current rayon pool. `watch` hears of progress now and
 /// then, from any thread; `stop` ends the render at the next unit.
 ///
@@ -266,60 +353,25 @@ fn cause(r: Lanes) -> Invalid {
 /// [`Error::Render`] if more than [`INVALID_LIMIT`] of the samples were invalid, or the memory cannot be
 /// had, or the render was stopped.
 pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBool) -> Result<Frame> {
-    thread_local! {
-        static TILE: RefCell<Option<TileBuffer>> = const { RefCell::new(None) };
-    }
     let start = Instant::now();
-    let layers = job.plan.layers.channels().len();
-    let film = Mutex::new(Film::new(job.scene.camera.resolution, job.window)?.with_layers(layers));
-    let splats = match light_paths(job) {
-        Some(paths) => {
-            let film = Film::new(job.scene.camera.resolution, job.window)?.with_layers(job.scene.bands.len());
-            Some((paths, Mutex::new(SplatFilm { film, paths: [0; REPLICATES] })))
-        }
-        None => None,
-    };
+    let part = Part::new(job)?;
     let total = job.window.pixels() as u64 * u64::from(job.samples);
     let done = AtomicU64::new(0);
     let mut milestones: Vec<Milestone> = Vec::new();
-    let tiles = shares(job.window, job.tile, rayon::current_num_threads());
     let random = !matches!(job.plan.integrator, Integrator::Whitted(_));
-    let merging = job.plan.caustics.as_ref().and_then(|c| c.merging);
 
     for pass in passes(job.samples) {
         let latest = milestones.last().and_then(|m| m.error);
-        // Where photons are collected, sample by sample.
-        let step = if merging.is_some() { 1 } else { pass.len() };
-        for samples in pass.clone().step_by(step).map(|s| s..(s + step as u32).min(pass.end)) {
-            let mut collected = None;
-            if let Some((paths, splats)) = &splats {
-                collected = merging.map(|first| from_lights_for(job, paths, samples.start, first, splats, stop));
-                if merging.is_none() {
-                    from_lights(job, paths, samples.clone(), splats, stop, None);
-                }
-            }
-            let photons = collected.as_ref().map(|(map, wavelength)| Collection { map, wavelength: *wavelength });
-            tiles.par_iter().for_each(|&window| {
-                if stop.load(Ordering::Relaxed) {
-                    return;
-                }
-                TILE.with_borrow_mut(|slot| {
-                    let tile = slot.get_or_insert_with(|| TileBuffer::new(window));
-                    tile.reset(window, layers);
-                    render_unit(job, samples.clone(), photons, tile);
-                    film.lock().unwrap_or_else(std::sync::PoisonError::into_inner).merge_tile(tile);
-                });
-                let unit = window.pixels() as u64 * samples.len() as u64;
-                let done = done.fetch_add(unit, Ordering::Relaxed) + unit;
-                watch(Progress { done, total, elapsed: start.elapsed(), error: latest });
-            });
-        }
+        part.add(pass.clone(), stop, &|unit| {
+            let done = done.fetch_add(unit, Ordering::Relaxed) + unit;
+            watch(Progress { done, total, elapsed: start.elapsed(), error: latest });
+        });
         if stop.load(Ordering::Relaxed) {
             return Err(Error::Render("stopped before the picture was finished; nothing was written".into()));
         }
-        let film = film.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let error = if random {
-            let photons = splats.as_ref().map(|(_, s)| s.lock().unwrap_or_else(std::sync::PoisonError::into_inner));
+            let film = lock(&part.film);
+            let photons = part.splats.as_ref().map(|(_, splats)| lock(splats));
             let photons = photons.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
             resolve::resolve(&film, photons, &ColourSpace::Rec709.matrix_from_xyz()).relative_error().ok()
         } else {
@@ -327,8 +379,7 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
         };
         milestones.push(Milestone { samples: pass.end, elapsed: start.elapsed(), error });
     }
-    let film = film.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    let splats = splats.map(|(_, s)| s.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner));
+    let (film, splats) = part.finish();
     Ok(Frame { film, splats, elapsed: start.elapsed(), milestones })
 }
 

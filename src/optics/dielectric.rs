@@ -75,6 +75,15 @@ pub fn refract(wo: DVec3, m: DVec3, eta: f64, cos_t: f64) -> DVec3 {
 }
 
 impl Dielectric {
+    /// Whether wavelengths part here.
+    #[must_use]
+    pub fn parts(&self) -> bool {
+        match self.eta {
+            RelativeIndex::Constant(_) => false,
+            RelativeIndex::Dispersive(eta) => eta.iter().any(|e| *e != eta[0]),
+        }
+    }
+
     /// The interface as one wavelength meets it.
     #[must_use]
     pub fn lane(&self, lane: usize) -> Dielectric {

@@ -47,6 +47,8 @@ pub struct Casters {
     pub balls: Vec<Ball>,
     /// Names, one for each object that stands in the scene itself.
     pub names: Vec<String>,
+    /// Whether any of them has an index that depends on wavelength.
+    pub parts: bool,
     /// Names of mirrors and glasses without end, which no light can be aimed at: they do not count.
     pub endless: Vec<String>,
 }
@@ -64,6 +66,14 @@ fn is_sharp(material: &Material) -> bool {
     };
     let leaves = material.leaves();
     leaves.iter().any(sharp) && leaves.iter().all(|m| sharp(m) || matches!(m.kind, Kind::Boundary))
+}
+
+/// Whether an index of a material depends on wavelength.
+fn is_dispersive(material: &Material) -> bool {
+    material.leaves().iter().any(|m| match &m.kind {
+        Kind::Dielectric { interior, exterior, .. } => interior.is_dispersive() || exterior.is_dispersive(),
+        _ => false,
+    })
 }
 
 impl Casters {
@@ -91,6 +101,8 @@ impl Casters {
                     casters.names.push(object.name.clone());
                     for child in children {
                         casters.casts[child] = sharp(child);
+                        let material = &scene.materials[scene.objects[child].material as usize];
+                        casters.parts |= sharp(child) && is_dispersive(material);
                     }
                 }
                 None => casters.endless.push(object.name.clone()),

@@ -98,8 +98,9 @@ mod tests {
         for row in 0..SIDE {
             for column in 0..SIDE {
                 let expected = weights[row][column] / total;
-                // A cell's sides are met to one step of the grid each.
-                let slack = 2.0 * (expected + 1.0 / f64::from(n)) / f64::from(n) * 2.0;
+                // A share of n numbers is met to one of them along each axis.
+                let of_row = weights[row].iter().sum::<f64>() / total;
+                let slack = (of_row + expected / of_row + 1.0 / f64::from(n)) / f64::from(n) + 1e-12;
                 assert!((found[row][column] - expected).abs() < slack, "{row} {column}");
                 let x = (DVec2::new(column as f64, row as f64) + 0.5) / SIDE as f64;
                 assert!((guide.density(x) / (SIDE * SIDE) as f64 - expected).abs() < 1e-12);

@@ -16,7 +16,6 @@ use super::plan::{EffectPlan, LightSettings};
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::math::{Frame, Ray};
 use crate::optics::bsdf::{Bsdf, BsdfSample};
-use crate::optics::dielectric::RelativeIndex;
 use crate::scene::camera::Entry;
 use crate::scene::compound::Leaf;
 use crate::scene::material::{Kind, Material};
@@ -166,6 +165,7 @@ impl Beam {
 }
 
 /// What ends a flight.
+#[expect(clippy::large_enum_variant, reason = "surfaces are what is met, and a box would cost an allocation each")]
 enum Met<'a> {
     Surface { hit: Hit, surface: SurfacePoint, leaf: Option<Leaf<'a>>, pane: bool },
     Medium { point: DVec3, medium: &'a Medium },
@@ -254,7 +254,7 @@ impl<'a> Walk<'a, '_> {
             if let Bsdf::Dielectric(glass) = &bsdf
                 && caustics.is_some_and(|c| c.packets)
                 && beam.alone.is_none()
-                && matches!(glass.eta, RelativeIndex::Dispersive(_))
+                && glass.parts()
             {
                 // Each wavelength decides for itself with the same random numbers: none leads.
                 beam.power *= LANES as f32 / beam.rho.reduce_add();

@@ -106,7 +106,7 @@ pub fn decide(
     if !traced.contains(&true) {
         return off("no light is small or has a sun");
     }
-    let caustics = Caustics::untrained(scene, &casters, traced, wishes.packets != Use::Off && plan.dispersion);
+    let caustics = Caustics::untrained(scene, &casters, traced, wishes.packets != Use::Off && casters.parts);
     run(scene, plan, settings, filter, seed, wishes, &casters, caustics)
 }
 
@@ -366,7 +366,7 @@ fn run(
             some(casters)
         ),
     )];
-    let parts = plan.dispersion;
+    let parts = casters.parts;
     said.push(technique(
         "wavelength packets",
         caustics.packets,

@@ -257,13 +257,9 @@ impl EffectPlan {
         );
         let media = effect(
             "media",
-            path && from_camera && census.media > 0,
+            path && census.media > 0,
             count(census.media, "medium that light crosses", "media that light crosses"),
-            match (path, from_camera) {
-                (true, true) => "all space is empty",
-                (true, false) => "light_tracer does not simulate media",
-                (false, _) => "whitted does not simulate media",
-            },
+            if path { "all space is empty" } else { "whitted does not simulate media" },
         );
         let depth_fog = effect("depth fog", census.fog, "the scene asks for it".into(), "the scene has none");
         effect(
@@ -286,7 +282,7 @@ impl EffectPlan {
             integrator,
             dispersion,
             chromatic,
-            media: media && path && from_camera,
+            media: media && path,
             depth_fog,
             all_dispersive: mode == EffectMode::All,
             caustics: None,

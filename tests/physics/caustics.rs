@@ -1,8 +1,9 @@
 //! Light of mirrors and glass that is traced from the lights: none is lost, none counted twice.
 
-use super::channels::render_with;
+use super::channels::{job, render_with};
 use super::common::{Bench, bench_with};
-use abbe::film::filter::Filter;
+use abbe::batch::frame::render_part;
+use abbe::film::filter::{Filter, FilterSampler};
 use abbe::film::resolve::Image;
 use abbe::spectrum::ColourSpace;
 
@@ -123,9 +124,9 @@ fn no_light_is_lost_and_none_counted_twice() {
         Case { what: "fog", light: FOGGY, ..AREA },
     ];
     for case in cases {
-        let on = case.bench("on", "auto", 128);
+        let on = case.bench("on", "auto", 64);
         assert!(on.prepared.plan.caustics.is_some(), "{}", case.what);
-        let off = case.bench("off", "auto", 2048);
+        let off = case.bench("off", "auto", 768);
         assert!(off.prepared.plan.caustics.is_none());
         assert_agree(case.what, &render(&on), &render(&off));
     }
@@ -134,9 +135,9 @@ fn no_light_is_lost_and_none_counted_twice() {
 #[test]
 fn wavelengths_that_part_are_all_there_with_and_without_packets() {
     let flint = Case { what: "flint", material: FLINT, ..AREA };
-    let off = render(&flint.bench("off", "auto", 4096));
-    assert_agree("packets", &render(&flint.bench("on", "on", 256)), &off);
-    assert_agree("single", &render(&flint.bench("on", "off", 256)), &off);
+    let off = render(&flint.bench("off", "auto", 1536));
+    assert_agree("packets", &render(&flint.bench("on", "on", 96)), &off);
+    assert_agree("single", &render(&flint.bench("on", "off", 96)), &off);
 }
 
 /// Light without extent, which no path from the camera finds behind glass, against the tracer of all paths from the
@@ -157,9 +158,9 @@ fn lights_without_extent_agree_with_the_light_tracer() {
     ];
     for (what, light) in lights {
         let case = Case { what, light, ..AREA };
-        let on = bench_with(&place(case.scene("path", "on", "auto", 256)), &[]);
+        let on = bench_with(&place(case.scene("path", "on", "auto", 96)), &[]);
         assert!(on.prepared.plan.caustics.is_some(), "{what}");
-        let all = bench_with(&place(case.scene("light_tracer", "auto", "auto", 4096)), &[]);
+        let all = bench_with(&place(case.scene("light_tracer", "auto", "auto", 1024)), &[]);
         assert_agree(what, &render(&on), &render(&all));
     }
 }
@@ -167,7 +168,7 @@ fn lights_without_extent_agree_with_the_light_tracer() {
 /// Photons are collected in the order of their paths, radii and wavelengths go by the sample's number: no bit depends on
 /// threads or tiles.
 #[test]
-fn merged_light_does_not_depend_on_tiles_or_threads() {
+fn merged_light_does_not_depend_on_tiles_threads_or_parts() {
     let case = Case { what: "flint", material: FLINT, ..AREA };
     let bench = case.bench("on", "auto", 12);
     assert!(bench.prepared.plan.caustics.as_ref().unwrap().merging.is_some());
@@ -177,7 +178,16 @@ fn merged_light_does_not_depend_on_tiles_or_threads() {
         let splats = frame.splats.unwrap();
         (frame.film, splats.film, splats.paths)
     };
-    assert!(run(1, 32) == run(3, 5), "the sums differ");
+    let whole = run(1, 32);
+    assert!(whole == run(3, 5), "the sums differ");
+    let filter = FilterSampler::new(Filter::Gaussian { stddev: 0.5 }).unwrap();
+    let parts = [5..12, 0..5].map(|samples| render_part(&job(&bench, &filter, 8), samples).unwrap());
+    let [(mut film, splats), (second, more)] = parts;
+    let (mut splats, more) = (splats.unwrap(), more.unwrap());
+    film.merge(&second).unwrap();
+    splats.film.merge(&more.film).unwrap();
+    let paths = std::array::from_fn(|r| splats.paths[r] + more.paths[r]);
+    assert!(whole == (film, splats.film, paths), "the sums of two parts differ");
 }
 
 /// A closed white box with a lamp and a ball of glass, flint or mirror: what is traced from the light and what from the

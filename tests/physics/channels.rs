@@ -12,18 +12,22 @@ use std::sync::atomic::AtomicBool;
 /// A camera of parallel rays that looks along −z at 2 m × 2 m about the origin, from five metres.
 const PARALLEL: &str = "camera: {origin: [0, 0, 5], target: [0, 0, 0], orthographic_height: 2}\n";
 
-pub(super) fn render_with(bench: &Bench, filter: Filter, tile: u32) -> Frame {
+pub(super) fn job<'a>(bench: &'a Bench, filter: &'a FilterSampler, tile: u32) -> FrameJob<'a> {
     let prepared = &bench.prepared;
-    let job = FrameJob {
+    FrameJob {
         scene: &prepared.scene,
         plan: &prepared.plan,
-        filter: &FilterSampler::new(filter).unwrap(),
+        filter,
         window: bench.window(),
         samples: prepared.samples,
         seed: prepared.description.render.seed,
         tile,
-    };
-    frame::render(&job, &|_| {}, &AtomicBool::new(false)).unwrap()
+    }
+}
+
+pub(super) fn render_with(bench: &Bench, filter: Filter, tile: u32) -> Frame {
+    let filter = FilterSampler::new(filter).unwrap();
+    frame::render(&job(bench, &filter, tile), &|_| {}, &AtomicBool::new(false)).unwrap()
 }
 
 fn render(yaml: &str) -> Frame {
@@ -67,6 +71,7 @@ fn corner(integrator: &str, camera: &str, material: &str, light: &str) -> String
 fn paths_from_the_lights_and_from_the_camera_agree() {
     let clay = "{diffuse: {reflectance: 0.5}}";
     let area = "- disk: {center: [0.5, 2, 0.5], normal: [0, -1, 0], radius: 0.3, emission: 10}\n";
+    let fog = format!("{area}media: {{fog: {{homogeneous: {{scattering: 0.2, absorption: 0.05}}}}}}\nmedium: fog\n");
     let cases = [
         ("area", "", clay, area),
         ("point", "", clay, "lights: [{point: {position: [0.5, 2, 1], intensity: 5}}]\n"),
@@ -79,6 +84,7 @@ fn paths_from_the_lights_and_from_the_camera_agree() {
         ("directional", "", clay, "lights: [{directional: {direction: [0.2, -1, -0.5], irradiance: 3}}]\n"),
         ("constant", "", clay, "lights: [{constant: {radiance: 0.5}}]\n"),
         ("lens", ", lens: {radius: 0.3, focus_distance: 4}", clay, area),
+        ("fog", "", clay, &fog),
         ("off the axis", ", principal_point: [0.1, -0.1]", clay, area),
         ("rough glass", "", "{dielectric: {ior: 1.5, roughness: 0.3}}", area),
         ("rough metal", "", "{conductor: {metal: gold, roughness: 0.3}}", area),
