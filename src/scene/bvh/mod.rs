@@ -343,7 +343,7 @@ impl Bvh {
         mut visit: impl FnMut(Range<u32>, f64) -> Next,
     ) -> bool {
         // A tree this small costs more than it saves.
-        const FEW: u32 = 2;
+        const FEW: u32 = 4;
         let all = self.order.len() as u32;
         let outside = if self.bounded <= FEW { 0..all } else { self.bounded..all };
         if !outside.is_empty() {
