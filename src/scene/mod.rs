@@ -4,6 +4,7 @@
 //! and that of the face or triangle, so that nothing is met again by rounding; see
 //! [`crate::math::Departure`].
 
+pub mod ahead;
 pub mod along_normal;
 pub mod bvh;
 pub mod camera;
@@ -281,16 +282,23 @@ impl Scene {
     /// The nearest thing that `ray` meets closer than `t_max`.
     #[must_use]
     pub fn closest(&self, ray: &Ray, t_max: f64) -> Option<Hit> {
+        let mut best = self.closest_apart(ray, t_max);
+        if let Some(together) = &self.together {
+            let t_max = best.map_or(t_max, |hit| hit.t);
+            best = together.closest(ray, t_max).or(best);
+        }
+        best
+    }
+
+    /// [`Scene::closest`] but for the triangles of [`Scene::together`].
+    #[inline]
+    fn closest_apart(&self, ray: &Ray, t_max: f64) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         self.bvh.closest(ray, t_max, |object, t_max| {
             let hit = self.meet(ray, object, t_max)?;
             best = Some(hit);
             Some(hit.t)
         });
-        if let Some(together) = &self.together {
-            let t_max = best.map_or(t_max, |hit| hit.t);
-            best = together.closest(ray, t_max).or(best);
-        }
         best
     }
 

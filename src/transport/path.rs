@@ -17,6 +17,7 @@ use crate::math::Frame;
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::optics::bsdf::{Bsdf, Chosen};
+use crate::scene::ahead::Ahead;
 use crate::scene::compound::{Compound, Leaf, Slopes, Vertex};
 use crate::scene::light::Arriving;
 use crate::scene::material::{Kind, Material, Straight};
@@ -221,6 +222,7 @@ impl Tracer<'_> {
         let mut crossings = 0u32;
         // The camera does not see beyond its clipping plane; what it sees lies in everything's light.
         let mut reach = scene.camera.reach(ray);
+        let mut ahead = Ahead::UNKNOWN;
 
         loop {
             // The flight through a medium is drawn first: beyond its reach no surface matters.
@@ -235,7 +237,10 @@ impl Tracer<'_> {
                 reach = reach.min(draft.reach);
                 (medium, set, draft)
             });
-            let hit = scene.closest(&path.ray, reach);
+            let hit = match MEDIA && scene.has_boundaries {
+                true => scene.next(&mut ahead, &path.ray, reach),
+                false => scene.closest(&path.ray, reach),
+            };
             reach = f64::INFINITY;
             let distance = hit.map_or(f64::INFINITY, |h| h.t);
 
@@ -282,6 +287,7 @@ impl Tracer<'_> {
                     break;
                 }
                 path.ray = scene.leave(&surface, &hit, path.ray.direction);
+                ahead.go_on(hit.t);
                 continue;
             }
             let material = &scene.materials[object.material as usize];
@@ -362,6 +368,7 @@ impl Tracer<'_> {
                     p.distance += hit.t;
                 }
                 path.ray = scene.leave(&surface, &hit, path.ray.direction);
+                ahead.go_on(hit.t);
                 continue;
             }
             if self.is_last(&path) {

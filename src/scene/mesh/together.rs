@@ -72,6 +72,13 @@ impl Together {
         self.tree.closest(ray, t_max, self.number(ray.departure)).map(|met| self.hit(&met))
     }
 
+    /// Shows `met` the triangles that `ray` hits before `t_max`, other than the one that it leaves, roughly front to
+    /// back. From then on only what is nearer than it answers counts.
+    #[inline]
+    pub fn nearest(&self, ray: &Ray, t_max: f64, mut met: impl FnMut(Hit) -> Option<f64>) {
+        self.tree.nearest_of(ray, t_max, self.number(ray.departure), |hit| met(self.hit(&hit)));
+    }
+
     /// Shows `met` the triangles that `ray` hits before `t_max`, other than the one that it leaves and `target`, in any
     /// order, until it says stop; true if it did.
     #[inline]

@@ -123,10 +123,27 @@ impl MeshTree {
     /// The nearest triangle that `ray` hits at 0 < t < `t_max`, other than `skip`.
     #[must_use]
     pub fn closest(&self, ray: &Ray, t_max: f64, skip: Option<u32>) -> Option<MeshHit> {
-        let local = self.local(ray);
-        let entering = self.bvh.enter(&local)?;
-        let (sheared, coarse) = self.ready(&local, &entering);
         let mut found = None;
+        self.nearest_of(ray, t_max, skip, |met| {
+            found = Some(met);
+            Some(met.hit.t)
+        });
+        found
+    }
+
+    /// Shows `met` the triangles that `ray` hits at 0 < t < `t_max`, other than `skip`, roughly front to back. From
+    /// then on only what is nearer than it answers counts.
+    #[inline(always)]
+    pub(in crate::scene) fn nearest_of(
+        &self,
+        ray: &Ray,
+        t_max: f64,
+        skip: Option<u32>,
+        mut met: impl FnMut(MeshHit) -> Option<f64>,
+    ) {
+        let local = self.local(ray);
+        let Some(entering) = self.bvh.enter(&local) else { return };
+        let (sheared, coarse) = self.ready(&local, &entering);
         let soon = |i| prefetch(&self.blocks, i as usize / LANES);
         self.bvh.descend::<true>(&entering, t_max, soon, |leaf, mut t_max| {
             let first = leaf.start as usize;
@@ -140,16 +157,16 @@ impl MeshTree {
                     && hit.t < t_max
                 {
                     let triangle = self.bvh.order()[first + lane];
-                    if Some(triangle) != skip {
-                        t_max = hit.t;
-                        found = Some(MeshHit { triangle, hit });
+                    if Some(triangle) != skip
+                        && let Some(t) = met(MeshHit { triangle, hit })
+                    {
+                        t_max = t;
                         next = Next::Shorten(t_max);
                     }
                 }
             }
             next
         });
-        found
     }
 
     /// Whether `ray` hits any triangle at 0 < t < `t_max`, other than those in `skip`.
