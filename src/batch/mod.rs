@@ -365,9 +365,13 @@ fn render_and_write(
         rec709_from_rgb: space.to_rec709(),
         ..PngSettings::default()
     };
-    // One after the other: where the first cannot be written, nothing of the picture is left.
-    write_exr(&exr_path, prepared, &frame, &image, base, space, report)?;
-    png::write_png(&png_path, &image, &settings)?;
+    // Packed together but written one after the other: where the first cannot be written, nothing of the picture is left.
+    let (written_exr, png) = rayon::join(
+        || write_exr(&exr_path, prepared, &frame, &image, base, space, report),
+        || png::encode_png(&image, &settings),
+    );
+    written_exr?;
+    png::write_encoded(&png_path, png)?;
     report.files = vec![exr_path, png_path];
     report.seconds.writing = written.elapsed().as_secs_f64();
 

@@ -147,8 +147,20 @@ impl Sum {
 
     /// The sum, rounded once to f64.
     #[must_use]
+    #[inline]
     pub fn value(self) -> f64 {
-        self.0 as f64 * QUANTUM
+        let size = self.0.unsigned_abs();
+        let value = match (size >> 64) as u64 {
+            0 => size as u64 as f64,
+            high => {
+                // The first 64 bits, the last of which also says whether anything follows: rounded once to 53.
+                let shift = high.leading_zeros();
+                let aligned = size << shift;
+                let first = (aligned >> 64) as u64 | u64::from(aligned as u64 != 0);
+                first as f64 * f64::from_bits(u64::from(1023 + 64 - shift) << 52)
+            }
+        };
+        if self.0 < 0 { -value * QUANTUM } else { value * QUANTUM }
     }
 }
 

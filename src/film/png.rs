@@ -73,8 +73,15 @@ impl Default for PngSettings {
 /// # Errors
 /// [`Error::Output`].
 pub fn write_png(path: &Path, image: &Image, settings: &PngSettings) -> Result<()> {
-    let bytes = encode_png(image, settings).map_err(|message| Error::output(path, message))?;
-    write_atomically(path, &bytes)
+    write_encoded(path, encode_png(image, settings))
+}
+
+/// Writes what [`encode_png`] gave.
+///
+/// # Errors
+/// [`Error::Output`].
+pub fn write_encoded(path: &Path, bytes: std::result::Result<Vec<u8>, String>) -> Result<()> {
+    write_atomically(path, &bytes.map_err(|message| Error::output(path, message))?)
 }
 
 /// The bytes of the file.

@@ -99,7 +99,19 @@ pub fn log1p(x: f64) -> f64 {
         return if w < 0.0 { f64::NAN } else { f64::NEG_INFINITY };
     }
     // What rounding took from 1 + x, over it.
-    let lost = (x - (w - 1.0)) / w;
+    log_and(w, (x - (w - 1.0)) / w)
+}
+
+/// ln `x` for normal `x` > 0.
+#[must_use]
+#[inline]
+pub fn log(x: f64) -> f64 {
+    log_and(x, 0.0)
+}
+
+/// ln w + `more`, which is small against ln 2 or nothing.
+#[inline(always)]
+fn log_and(w: f64, more: f64) -> f64 {
     // w = 2ᵏ m with m in [√½, √2).
     let bits = w.to_bits();
     let k = ((bits + (0x3ff0_0000_0000_0000 - std::f64::consts::FRAC_1_SQRT_2.to_bits())) >> 52) as i64 - 1023;
@@ -107,7 +119,7 @@ pub fn log1p(x: f64) -> f64 {
     let s = (m - 1.0) / (m + 1.0);
     let z = s * s;
     let k = k as f64;
-    let log = (s * z).mul_add(polynomial(&LOG, z), k.mul_add(LN2[1], lost));
+    let log = (s * z).mul_add(polynomial(&LOG, z), k.mul_add(LN2[1], more));
     k.mul_add(LN2[0], 2.0 * s + log)
 }
 
@@ -160,7 +172,14 @@ mod tests {
                 near(log1p(x), libm::log1p(x), x);
             }
         }
+        for i in 1..100_000 {
+            let u = f64::from(i) / 100_000.0;
+            for x in [u, u * 1e-9, u * 1e-300, 1.0 + u * 1e-3, 1.0 / u] {
+                near(log(x), libm::log(x), x);
+            }
+        }
         assert_eq!(log1p(0.0), 0.0);
+        assert_eq!(log(1.0), 0.0);
         assert_eq!(log1p(-1.0), f64::NEG_INFINITY);
     }
 }

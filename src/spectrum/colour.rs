@@ -4,6 +4,8 @@
 //! (SMPTE RP 177-1993). XYZ inside the renderer is relative to D65, so a space with another white
 //! (ACES) is reached by Bradford adaptation (Lam 1985), as ACES' own transforms are.
 
+use crate::math::elementary::{exp_down, log};
+
 /// Chromaticities (x, y).
 type Xy = [f64; 2];
 type Matrix = [[f64; 3]; 3];
@@ -199,7 +201,14 @@ pub fn srgb_encode(linear: f32) -> f32 {
 /// The curve of sRGB for `linear` ≥ 0, IEC 61966-2-1.
 #[must_use]
 pub fn srgb_curve(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 }
+    if linear <= 0.003_130_8 {
+        12.92 * linear
+    } else if linear <= 1.0 {
+        // Within some ten ulp; previews have three such powers a pixel.
+        1.055 * exp_down(log(linear) / 2.4) - 0.055
+    } else {
+        1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055
+    }
 }
 
 /// The inverse of [`srgb_encode`]: a coded value to linear light.
