@@ -68,8 +68,18 @@ impl Default for Rates {
 struct Choice {
     diffuse: f64,
     clearcoat: f64,
-    /// Refraction and reflection by facets that reflect the share `F`.
+    /// Reflection and refraction by the main facets.
+    main: f64,
+}
+
+/// A facet of the main lobe and what it does.
+struct Facet {
+    /// Its normal, on the side of the surface's.
+    m: DVec3,
+    split: Split,
+    /// Probability of refraction by a drawn facet, beside the other lobes.
     refraction: f64,
+    /// The same of reflection.
     reflection: f64,
 }
 
@@ -99,27 +109,34 @@ impl Principled {
     }
 
     /// `None` where nothing is sampled: all rates zero.
-    fn choice(&self, front: bool, split: &Split) -> Option<Choice> {
+    fn choice(&self, front: bool) -> Option<Choice> {
         if !front {
-            return Some(Choice {
-                diffuse: 0.0,
-                clearcoat: 0.0,
-                refraction: split.transmitted,
-                reflection: split.reflected,
-            });
+            return Some(Choice { diffuse: 0.0, clearcoat: 0.0, main: 1.0 });
         }
         let specular = f64::from(self.rates.specular);
         // The coat reflects about a quarter of what the main lobe does.
         let clearcoat = 0.25 * f64::from(self.clearcoat) * f64::from(self.rates.clearcoat);
         let diffuse = self.matte() * f64::from(self.rates.diffuse);
         let total = specular + clearcoat + diffuse;
-        let refraction = specular * self.clear() * split.transmitted;
-        (total > 0.0).then(|| Choice {
-            diffuse: diffuse / total,
-            clearcoat: clearcoat / total,
-            refraction: refraction / total,
-            reflection: (specular - refraction) / total,
+        (total > 0.0).then(|| {
+            let share = 1.0 / total;
+            Choice { diffuse: diffuse * share, clearcoat: clearcoat * share, main: specular * share }
         })
+    }
+
+    /// The facet `m`, which `wo` meets at the cosine `cos`.
+    #[inline]
+    fn facet(&self, choice: &Choice, m: DVec3, cos: f64, front: bool) -> Facet {
+        let split = self.interface(cos.max(0.0), front);
+        let (refraction, reflection) = if !front {
+            (split.transmitted, split.reflected)
+        } else if self.transmission > 0.0 {
+            let refraction = choice.main * self.clear() * split.transmitted;
+            (refraction, choice.main - refraction)
+        } else {
+            (0.0, choice.main)
+        };
+        Facet { m, split, refraction, reflection }
     }
 
     /// Reflectance of the main facets, met at the cosine `cos` from the front: Fresnel's equations for the
@@ -166,20 +183,27 @@ impl Principled {
         let reflect = wi.z * side > 0.0;
         let eta = if front { f64::from(self.eta) } else { 1.0 / f64::from(self.eta) };
         // The half vector, of the directions scaled by their indices for refraction (Walter et al.
-        // 2007, eq. 16), on the side of the normal; and its cosines on the side of `wo`.
+        // 2007, eq. 16), on the side of the normal.
         let Some(m) = (if reflect { wo + wi } else { wo + wi * eta }).try_normalize() else {
             return Evaluation::NONE;
         };
         let m = m * m.z.signum();
+        let Some(choice) = self.choice(front) else { return Evaluation::NONE };
+        self.eval_by(wo, wi, &choice, &self.facet(&choice, m, wo.dot(m) * side, front), &self.facets())
+    }
+
+    /// The same by the facet between the directions; neither lies in the surface.
+    #[inline]
+    fn eval_by(&self, wo: DVec3, wi: DVec3, choice: &Choice, facet: &Facet, facets: &Microfacets) -> Evaluation {
+        let Facet { m, split, .. } = *facet;
+        let front = wo.z > 0.0;
+        let side = wo.z.signum();
+        let reflect = wi.z * side > 0.0;
         let (cos_o, cos_i) = (wo.dot(m) * side, wi.dot(m) * side);
         let facing = cos_o > 0.0 && (cos_i > 0.0) == reflect;
-        let split = self.interface(cos_o.max(0.0), front);
-        let Some(choice) = self.choice(front, &split) else { return Evaluation::NONE };
-
         let mut f = Lanes::ZERO;
         let mut pdf = 0.0;
         if facing {
-            let facets = self.facets();
             let Terms { flow, pdf: pdf_m } = facets.terms(wo * side, wi, m);
             if reflect {
                 // Torrance and Sparrow 1967. Where the interface has no contrast, metal too is invisible.
@@ -191,15 +215,16 @@ impl Principled {
                         Lanes::splat((self.clear() * split.reflected * geometry) as f32)
                     };
                 }
-                pdf += choice.reflection * pdf_m / (4.0 * cos_i);
+                pdf += facet.reflection * pdf_m / (4.0 * cos_i);
             } else {
                 // Walter et al. 2007, eqs. 17 and 21; radiance scales by 1/η² on crossing. The base
                 // colour is that of a way in and out, so each crossing takes its root.
+                let eta = if front { f64::from(self.eta) } else { 1.0 / f64::from(self.eta) };
                 let root = cos_o + eta * cos_i;
                 let jacobian = cos_i.abs() / (root * root);
                 let geometry = flow * cos_o * jacobian;
                 f += self.base.sqrt() * (self.clear() * split.transmitted * geometry) as f32;
-                pdf += choice.refraction * pdf_m * eta * eta * jacobian;
+                pdf += facet.refraction * pdf_m * eta * eta * jacobian;
             }
         }
         if reflect && front {
@@ -207,7 +232,7 @@ impl Principled {
                 let coat = self.coat();
                 let density = coat.density(m);
                 let fresnel = 0.04 + 0.96 * lobes::schlick_outside(cos_o, f64::from(self.eta));
-                let masking = CoatFacets::masking(wo, m) * CoatFacets::masking(wi, m);
+                let masking = CoatFacets::masking(wo, wi);
                 // Without the 1/(4 cos cos) of a microfacet lobe: Burley 2012 scales the coat by 1/4.
                 f += Lanes::splat((0.25 * f64::from(self.clearcoat) * fresnel * density * masking) as f32);
                 pdf += choice.clearcoat * density * m.z / (4.0 * cos_i);
@@ -233,33 +258,30 @@ impl Principled {
         }
         let side = wo.z.signum();
         let up = wo * side;
-        // The facet of the main lobe is drawn first: what it reflects decides between its two ways.
-        let m = self.facets().sample(up, u);
-        let cos = up.dot(m);
-        let split = self.interface(cos.max(0.0), front);
-        let choice = self.choice(front, &split)?;
-        let eta = if front { f64::from(self.eta) } else { 1.0 / f64::from(self.eta) };
+        let choice = self.choice(front)?;
         let mut left = u_lobe - choice.diffuse;
         if left < 0.0 {
             let wi = warp::cosine_hemisphere(u);
             return from_evaluation(wi, wi.z, self.eval(wo, wi), false, 1.0);
         }
         left -= choice.clearcoat;
-        if left < 0.0 {
-            let m = self.coat().sample(u);
-            let wi = m * (2.0 * wo.dot(m)) - wo;
-            return (wi.z > 0.0).then(|| from_evaluation(wi, wi.z, self.eval(wo, wi), false, 1.0))?;
-        }
+        let facets = self.facets();
+        let coat = left < 0.0;
+        let m = if coat { self.coat().sample(u) } else { facets.sample(up, u) };
+        let cos = up.dot(m);
         if cos <= 0.0 {
             return None;
         }
-        let transmitted = left < choice.refraction;
-        let wi_up = if transmitted { refract(up, m, eta, split.cos_transmitted) } else { m * (2.0 * cos) - up };
-        if (wi_up.z > 0.0) == transmitted {
+        // What the facet reflects decides between its two ways.
+        let facet = self.facet(&choice, m, cos, front);
+        let transmitted = !coat && left < facet.refraction;
+        let eta = if front { f64::from(self.eta) } else { 1.0 / f64::from(self.eta) };
+        let wi_up = if transmitted { refract(up, m, eta, facet.split.cos_transmitted) } else { m * (2.0 * cos) - up };
+        if (wi_up.z > 0.0) == transmitted || wi_up.z == 0.0 {
             return None;
         }
         let eta2 = if transmitted { eta * eta } else { 1.0 };
         let wi = wi_up * side;
-        from_evaluation(wi, wi.z.abs(), self.eval(wo, wi), transmitted, eta2)
+        from_evaluation(wi, wi.z.abs(), self.eval_by(wo, wi, &choice, &facet, &facets), transmitted, eta2)
     }
 }
