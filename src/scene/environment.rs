@@ -152,10 +152,10 @@ impl Environment {
         let (w, h) = (self.width, self.height);
         let (x, y) = (at.x * w as f64 - 0.5, self.rows(at.y));
         let (x0, y0) = (x.floor(), y.floor());
-        // Columns go around, rows do not: beyond the pole lies the pole's own row. The casts saturate.
-        let left = if x0 < 0.0 { w - 1 } else { (x0 as usize).min(w - 1) };
+        // Columns go around, rows do not: beyond the pole lies the pole's own row. The casts, of numbers from 0 up, saturate.
+        let left = if x0 < 0.0 { w - 1 } else { (x0 as i64 as usize).min(w - 1) };
         let right = if left + 1 == w { 0 } else { left + 1 };
-        let upper = (y0 as usize).min(h - 1);
+        let upper = (y0.max(0.0) as i64 as usize).min(h - 1);
         let lower = if y0 < 0.0 { 0 } else { (upper + 1).min(h - 1) };
         let texel = |x: usize, y: usize| &self.texels[y * w + x];
         let texels = [texel(left, upper), texel(right, upper), texel(left, lower), texel(right, lower)];

@@ -294,7 +294,21 @@ fn same_cell(uv: &DAffine2, at: &TexturePoint) -> bool {
 impl Scalar {
     /// The number at a point; of three their mean by luminance (Rec. 709).
     #[must_use]
+    #[inline]
     pub fn eval(&self, at: &TexturePoint) -> f64 {
+        match self {
+            Scalar::Uniform(x) => *x,
+            // Most boards are of two numbers.
+            Scalar::Checkerboard { a, b, uv } => match &**(if same_cell(uv, at) { a } else { b }) {
+                Scalar::Uniform(x) => *x,
+                varying => varying.eval_varying(at),
+            },
+            _ => self.eval_varying(at),
+        }
+    }
+
+    #[inline(never)]
+    fn eval_varying(&self, at: &TexturePoint) -> f64 {
         match self {
             Scalar::Uniform(x) => *x,
             Scalar::Image(image) => f64::from(image.grid.value(at.uv, |i| luminance(image.texels.at(i)))),

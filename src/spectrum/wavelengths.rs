@@ -179,7 +179,7 @@ impl WavelengthDistribution {
         // The lanes are whole rows apart, so they share the place within their intervals. The product
         // with a power of two is exact.
         let at = u * KNOTS as f64;
-        let knot = (at as usize).min(KNOTS - 1);
+        let knot = (at as u32 as usize).min(KNOTS - 1);
         let place = Lanes::splat((at - knot as f64) as f32);
         let first = knot / ROWS;
         let eight = |row: usize| Lanes::new(std::array::from_fn(|k| self.rows[row][first + k]));

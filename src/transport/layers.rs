@@ -239,31 +239,43 @@ impl Values {
         let mut surface = surface.iter();
         let sensitivity = layers.sensitivity as f32;
         for layer in &layers.layers {
-            let start = numbers.len();
+            let squares = layer.squares.is_some();
             match layer.source {
-                Source::Surface(quantity) => numbers.extend(surface.by_ref().take(quantity.components().len())),
+                Source::Surface(quantity) => {
+                    let count = quantity.components().len();
+                    let start = numbers.len();
+                    numbers.extend(surface.by_ref().take(count));
+                    if squares {
+                        numbers.extend_from_within(start..);
+                        numbers[start + count..].iter_mut().for_each(|x| *x *= *x);
+                    }
+                }
                 Source::Light(of, form) => {
                     let seen = of.map_or(own, |i| others[i]);
                     let xyz = seen.xyz.map(|x| x * sensitivity);
                     match form {
-                        Form::Xyz => numbers.extend(xyz),
+                        Form::Xyz => put(numbers, xyz, squares),
                         Form::Rgba => {
-                            numbers.extend(rgb(&layers.rgb_from_xyz, xyz));
-                            numbers.push(seen.alpha);
+                            let [r, g, b] = rgb(&layers.rgb_from_xyz, xyz);
+                            put(numbers, [r, g, b, seen.alpha], squares);
                         }
                     }
                 }
                 Source::Band(i) => {
                     let counted = own.radiance * wavelengths.inv_pdf * scene.bands[i].response.eval(wavelengths.nm);
-                    numbers.push(counted.reduce_add() / LANES as f32);
-                }
-            }
-            if layer.squares.is_some() {
-                for i in start..numbers.len() {
-                    numbers.push(numbers[i] * numbers[i]);
+                    put(numbers, [counted.reduce_add() / LANES as f32], squares);
                 }
             }
         }
+    }
+}
+
+/// Appends `values`, and their squares if they are wanted.
+#[inline]
+fn put<const N: usize>(numbers: &mut Vec<f32>, values: [f32; N], squares: bool) {
+    numbers.extend_from_slice(&values);
+    if squares {
+        numbers.extend_from_slice(&values.map(|x| x * x));
     }
 }
 

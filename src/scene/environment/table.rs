@@ -67,7 +67,7 @@ impl Rows {
         let at = u * ONE;
         // The last 2⁻³² counts as what lies before it: what is stored as 1 − 2⁻³² is one.
         let whole = (at as u32).min(u32::MAX - 1);
-        let k = row * (self.guides + 1) + ((u * self.guides as f64) as usize).min(self.guides - 1);
+        let k = row * (self.guides + 1) + ((u * self.guides as f64) as u32 as usize).min(self.guides - 1);
         let (from, to) = (self.guide[k] as usize, self.guide[k + 1] as usize);
         let sums = self.row(row);
         let above = from + sums[from..to].partition_point(|&sum| sum <= whole);
