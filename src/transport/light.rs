@@ -193,8 +193,11 @@ impl<'a> Walk<'a, '_> {
             if settings.max_depth.is_some_and(|depth| vertex + 2 > depth) {
                 return;
             }
-            let choice = self.sampler.set(Set::Choice(vertex));
-            let Some(met) = self.fly(&mut beam, choice[3]) else { return };
+            // Beyond the first ray, evenly spread numbers gain nothing: what a path adds to a pixel is too rugged.
+            let mut numbers = self.sampler.walk(Set::Choice(vertex));
+            let [u_flight, u_lobe, u_roulette] = std::array::from_fn(|_| numbers.draw());
+            let [u_lens, u_scatter] = std::array::from_fn(|_| DVec2::new(numbers.draw(), numbers.draw()));
+            let Some(met) = self.fly(&mut beam, u_flight) else { return };
             let came = -beam.ray.direction;
             let (hit, surface, leaf, pane) = match met {
                 Met::Surface { hit, surface, leaf, pane } => (hit, surface, leaf, pane),
@@ -203,7 +206,6 @@ impl<'a> Walk<'a, '_> {
                     if caustics.is_some() && vertex == 0 {
                         return;
                     }
-                    let (u_lens, u_scatter) = pairs(self.sampler.set(Set::Scatter(vertex)));
                     self.connect_medium(&beam, point, medium, u_lens);
                     if !self.goes_on(&mut beam) {
                         return;
@@ -211,7 +213,7 @@ impl<'a> Walk<'a, '_> {
                     let went = medium.phase.sample(point, came, u_scatter);
                     beam.ray = Ray::new(point, went);
                     beam.vertex += 1;
-                    if !self.survives(&mut beam, choice[2]) {
+                    if !self.survives(&mut beam, u_roulette) {
                         return;
                     }
                     continue;
@@ -237,7 +239,6 @@ impl<'a> Walk<'a, '_> {
             }
             let bsdf = material.bsdf(&hit.texture_point(&surface), beam.nm, plan.all_dispersive);
             let wo = frame.to_local(came);
-            let (u_lens, u_scatter) = pairs(self.sampler.set(Set::Scatter(vertex)));
 
             if !bsdf.is_discrete() && !sharp {
                 let at = Vertex { hit: &hit, surface: &surface, frame: &frame, came, local: wo, object };
@@ -249,8 +250,8 @@ impl<'a> Walk<'a, '_> {
             }
 
             // A pane that did not let the path straight through reflects it.
-            let u_lobe = if pane { 0.0 } else { choice[1] };
-            let crossing = Crossing { hit: &hit, surface: &surface, frame: &frame, came, roulette: choice[2] };
+            let u_lobe = if pane { 0.0 } else { u_lobe };
+            let crossing = Crossing { hit: &hit, surface: &surface, frame: &frame, came, roulette: u_roulette };
             if let Bsdf::Dielectric(glass) = &bsdf
                 && caustics.is_some_and(|c| c.packets)
                 && beam.alone.is_none()
