@@ -3,11 +3,11 @@
 //! All numbers of the pilot are functions of scene and seed, and costs are counted in rays, not in seconds: every
 //! machine that renders a part of a picture decides alike.
 
-use super::Shot;
 use super::caustics::{Caustics, Source};
 use super::guide::{Guide, SIDE};
 use super::light::{Bounds, LightPaths, trace};
 use super::plan::{Effect, EffectPlan, Integrator, PathSettings};
+use super::{Incoming, Shot};
 use crate::film::filter::FilterSampler;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::bvh::Aabb;
@@ -62,10 +62,13 @@ const STREAM: u64 = 0x7069_6c6f_7470_696c;
 const ANYWHERE: f64 = 0.2;
 
 /// How often the pilot must have met light of the class on its paths from the camera to trust what they say about it.
-const ENOUGH: usize = 64;
+const ENOUGH: usize = 16;
 
 /// Half of the solid angle of a hemisphere in which light counts as coming from one place, over 2π.
 const SMALL: f64 = 0.3;
+
+/// What light tracing with merging costs beyond its rays: 1.2 to 1.5 in scenes of the gallery.
+const OVERHEAD: f64 = 1.4;
 
 /// A name and whether it holds, for people.
 fn technique(name: &'static str, on: bool, reason: String) -> Effect {
@@ -184,8 +187,11 @@ struct Camera {
     /// Variances of single samples: of what remains with the camera, and of all.
     kept: Vec<(usize, f64)>,
     all: Vec<(usize, f64)>,
-    /// How many paths met light of the class.
+    /// Of light of the class that is seen in mirrors and glass.
+    mirrored: Vec<(usize, f64)>,
+    /// How many paths met light of the class, and how many in mirrors and glass.
     met: usize,
+    met_mirrored: usize,
     /// Rays of a path.
     rays: f64,
     /// Share of the paths that begin on something sharp.
@@ -216,15 +222,28 @@ fn from_camera(shot: &Shot) -> Camera {
             (block, pair)
         })
         .collect();
-    let mut camera =
-        Camera { means: vec![0.0; BLOCKS * BLOCKS], kept: Vec::new(), all: Vec::new(), met: 0, rays: 0.0, sharp: 0.0 };
+    let mut camera = Camera {
+        means: vec![0.0; BLOCKS * BLOCKS],
+        kept: Vec::new(),
+        mirrored: Vec::new(),
+        all: Vec::new(),
+        met: 0,
+        met_mirrored: 0,
+        rays: 0.0,
+        sharp: 0.0,
+    };
     for (block, pair) in &tried {
         let variance = |a: f64, b: f64| 0.5 * (a - b) * (a - b);
         let [(a, a_left, a_light), (b, b_left, b_light)] = *pair;
         camera.means[*block] += 0.5 * (a + b) / f64::from(PIXELS);
+        // Light of the class that is seen in mirrors and glass stays with the camera unless it is merged.
+        let seen = |left: f64, light: &Incoming| if light.mirrored { (0.0, left) } else { (left, 0.0) };
+        let ((a_left, a_seen), (b_left, b_seen)) = (seen(a_left, &a_light), seen(b_left, &b_light));
         camera.kept.push((*block, variance(a, b)));
+        camera.mirrored.push((*block, variance(a_seen, b_seen)));
         camera.all.push((*block, variance(a + a_left, b + b_left)));
         camera.met += usize::from(a_left > 0.0) + usize::from(b_left > 0.0);
+        camera.met_mirrored += usize::from(a_seen > 0.0) + usize::from(b_seen > 0.0);
         // A ray to the next vertex and one to a light from each.
         camera.rays += f64::from(2 + 2 * (a_light.events + b_light.events)) / (2 * tried.len()) as f64;
         camera.sharp += f64::from(u32::from(a_light.mirrored) + u32::from(b_light.mirrored)) / (2 * tried.len()) as f64;
@@ -237,6 +256,23 @@ fn relative(means: &[f64]) -> Vec<f64> {
     let mean = means.iter().sum::<f64>() / means.len() as f64;
     means.iter().map(|m| if mean > 0.0 { 1.0 / (m * m + 0.01 * mean * mean) } else { 1.0 }).collect()
 }
+
+/// The mean of values with weights.
+fn average(values: &[(usize, f64)], weights: &[f64]) -> f64 {
+    values.iter().map(|(block, v)| v * weights[*block]).sum::<f64>() / values.len() as f64
+}
+
+/// Whether a light that is traced has no extent, so that no path from the camera can find it by chance.
+fn endless_odds(scene: &Scene, caustics: &Caustics) -> bool {
+    scene
+        .lights
+        .iter()
+        .zip(&caustics.traced)
+        .any(|(light, traced)| *traced && !light.is_environment() && !matches!(light, Light::Area { .. }))
+}
+
+/// Share of the rest's variance above which light that is met in mirrors and glass is worth merging.
+const WORTH: f64 = 0.3;
 
 /// The mean of values with weights, without the largest hundredth: single fireflies do not decide.
 fn trimmed(values: &[(usize, f64)], weights: &[f64]) -> f64 {
@@ -290,7 +326,10 @@ fn run(
     mut caustics: Caustics,
 ) -> (Option<Arc<Caustics>>, Vec<Effect>) {
     let off = |reason: String| (None, vec![technique("light tracing", false, reason)]);
-    let trial = EffectPlan { caustics: Some(Arc::new(caustics.clone())), ..plan.clone() };
+    // As if photons were collected, so that what they would bring is told from the rest.
+    let radius = merging_radius(scene, casters);
+    let wanted = Caustics { merging: Some(radius), ..caustics.clone() };
+    let trial = EffectPlan { caustics: Some(Arc::new(wanted)), ..plan.clone() };
     let camera = from_camera(&Shot { scene, plan: &trial, filter, seed: seed ^ STREAM, photons: None });
     let [width, height] = scene.camera.resolution.map(f64::from);
     let pixels = width * height;
@@ -299,6 +338,7 @@ fn run(
     let bounds = Bounds { low: DVec2::ZERO, high: DVec2::new(width, height) };
     let mut learnt = vec![[[0.0; SIDE]; SIDE]; caustics.sources.len()];
     let (mut squares, mut rays, mut reached) = (0.0, 0.0, 0usize);
+    let mut thrown = vec![0.0; BLOCKS * BLOCKS];
     for round in 0..2 {
         let paths = LightPaths {
             scene,
@@ -323,13 +363,14 @@ fn run(
             }
         }
         caustics.learn(&learnt);
+        thrown.fill(0.0);
+        let share = (BLOCKS * BLOCKS) as f64 / (pixels * FROM_LIGHTS as f64);
+        for (block, y) in all.iter().flat_map(|landed| &landed.splats) {
+            thrown[*block] += y * share;
+        }
         if round == 0 {
             // What the lights send there is part of the picture that errors are relative to.
-            let mut means = camera.means.clone();
-            let share = (BLOCKS * BLOCKS) as f64 / (pixels * FROM_LIGHTS as f64);
-            for (block, y) in all.iter().flat_map(|landed| &landed.splats) {
-                means[*block] += y * share;
-            }
+            let means: Vec<f64> = camera.means.iter().zip(&thrown).map(|(a, b)| a + b).collect();
             weights = relative(&means);
         }
     }
@@ -342,17 +383,25 @@ fn run(
     }
 
     // Errors by sample and pixel: (A + B / k)(a + k b) is least for k = √(B a / (A b)).
-    let (kept, all) = (trimmed(&camera.kept, &weights), trimmed(&camera.all, &weights));
+    let kept = trimmed(&camera.kept, &weights);
     let splatted = squares / (pixels * pixels);
     let ratio = (splatted * camera.rays / (kept.max(f64::MIN_POSITIVE) * rays)).sqrt();
     caustics.ratio = ratio.clamp(1.0 / 16.0, 16.0);
     let k = caustics.ratio;
-    let with = (kept + splatted / k) * (camera.rays + k * rays);
-    let without = all * camera.rays;
-    if wishes.light_tracing == Use::Auto && camera.met >= ENOUGH && without < with {
+    // Paths from the camera that find light of mean m with a probability p have a variance of m² / p, whether or not so
+    // few paths met it; for a lamp without extent p is zero.
+    let tries = 2.0 * camera.kept.len() as f64;
+    let chance = if endless_odds(scene, &caustics) { 0.0 } else { (camera.met as f64).max(1.0) / tries };
+    let by_chance = thrown.iter().zip(&weights).map(|(m, w)| w * m * m).sum::<f64>() / thrown.len() as f64 / chance;
+    let mirrored = average(&camera.mirrored, &weights);
+    let kept = average(&camera.kept, &weights) + mirrored;
+    let with = OVERHEAD * (kept + splatted / k) * (camera.rays + k * rays);
+    let measured = if camera.met >= ENOUGH { average(&camera.all, &weights) } else { f64::INFINITY };
+    let without = measured.min(kept + by_chance) * camera.rays;
+    if wishes.light_tracing == Use::Auto && without < with {
         let loss = with / without;
         return off(format!(
-            "the pilot expects {loss:.1} times the cost: paths from the camera find the light over {}",
+            "the pilot expects it to cost {loss:.1} times as much: paths from the camera find the light over {}, or it hardly counts",
             some(casters)
         ));
     }
@@ -377,8 +426,10 @@ fn run(
         },
     ));
     let sharp_seen = camera.sharp > 0.0;
-    let radius = merging_radius(scene, casters);
-    if sharp_seen && wishes.merging != Use::Off {
+    // Often met, it is known what it costs to leave it to chance; else chance will not do.
+    let counts = camera.met_mirrored < ENOUGH || mirrored > WORTH * kept;
+    let merging = wishes.merging == Use::On || wishes.merging == Use::Auto && counts;
+    if sharp_seen && merging {
         caustics.merging = Some(radius);
     }
     said.push(technique(
@@ -386,7 +437,10 @@ fn run(
         caustics.merging.is_some(),
         match (sharp_seen, caustics.merging) {
             (false, _) => "the camera sees no mirror and no glass".into(),
-            (true, None) => "the scene says so: caustics in mirrors and behind glass are left to chance".into(),
+            (true, None) if wishes.merging == Use::Off => {
+                "the scene says so: caustics in mirrors and behind glass are left to chance".into()
+            }
+            (true, None) => "paths from the camera find the caustics in mirrors and behind glass".into(),
             (true, Some(radius)) => format!(
                 "caustics seen in mirrors and through glass, blurred within {radius:.3} m at the first sample and the \
                  sixth root of the sample's number less at later ones"
