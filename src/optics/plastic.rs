@@ -177,7 +177,7 @@ impl CoatTable {
 /// What of a coat depends on its index alone, for a range of indices: tables at even steps, linear between.
 ///
 /// Along the index T and F_int bend by about one a unit squared where η ≥ 1.1, so linear steps of h leave h²/8: 5e-5 at
-/// [`COAT_STEP`], below what a table's 64 cosines leave.
+/// `COAT_STEP`, below what a table's 64 cosines leave.
 #[derive(Clone, Debug)]
 pub struct Coats {
     low: f64,
