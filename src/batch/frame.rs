@@ -438,7 +438,7 @@ fn from_lights(
                 landed.add(scene, filter, window, wavelengths, &splat);
             });
         }
-        landed.add_to(&mut splats.lock().unwrap_or_else(std::sync::PoisonError::into_inner), replicate, count);
+        landed.add_to(&mut lock(splats), replicate, count);
         left
     });
     match photons {

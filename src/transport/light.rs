@@ -13,12 +13,13 @@ use super::caustics::Caustics;
 use super::merge::Photon;
 use super::path::seen_normal;
 use super::plan::{EffectPlan, LightSettings};
+use super::shadow::{MAX_BOUNDARIES, Shadow};
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::math::{Frame, Ray};
 use crate::optics::bsdf::{Bsdf, BsdfSample};
 use crate::scene::camera::Entry;
 use crate::scene::compound::Leaf;
-use crate::scene::material::{Kind, Material};
+use crate::scene::material::Kind;
 use crate::scene::{Hit, Medium, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
@@ -28,12 +29,6 @@ const FOR_SURE: u32 = 256;
 
 /// Longest survival of a path beyond that.
 const SURVIVAL: f64 = 0.999;
-
-/// Boundaries in a row that a ray crosses at the most.
-const MAX_BOUNDARIES: u32 = 256;
-
-/// Sets the numbers of rays to the camera apart from those of the path, as in `path`.
-const TO_CAMERA: u32 = 1 << 28;
 
 /// The set that chooses which wavelength goes on: above every vertex's.
 const CHOSEN: u32 = 1 << 29;
@@ -369,41 +364,26 @@ impl<'a> Walk<'a, '_> {
             let direction = beam.ray.direction;
             let object = &scene.objects[hit.object as usize];
             let material = &scene.materials[object.material as usize];
-            let met = |leaf, pane| Some(Met::Surface { hit, surface, leaf, pane });
-            match &material.kind {
-                Kind::Boundary => {}
+            // Of a material made of others, what this path meets, if anything.
+            let (shown, leaf) = match &material.kind {
                 Kind::Compound(compound) => {
                     let (at, wo) = (&hit.texture_point(&surface), -direction);
                     let x = crate::scene::compound::Vertex { scene, hit: &hit, surface: &surface, at, wo };
                     let leaf = compound.resolve(&x, seen_normal(&surface, wo), self.sampler.set(set)[2]);
-                    if let Some(leaf) = leaf
-                        && !matches!(leaf.material.kind, Kind::Boundary)
-                    {
-                        let straight = leaf.material.straight(&surface, direction, || *at, beam.nm);
-                        match straight {
-                            None => return met(Some(leaf), false),
-                            Some(straight) if self.sampler.set(set)[1] >= straight.share => {
-                                return met(Some(leaf), true);
-                            }
-                            Some(straight) => beam.power *= straight.weight,
-                        }
-                    }
+                    (leaf.as_ref().map(|leaf| leaf.material), leaf)
                 }
-                _ => match material.straight(&surface, direction, || hit.texture_point(&surface), beam.nm) {
-                    None => return met(None, false),
-                    Some(straight) if self.sampler.set(set)[1] >= straight.share => return met(None, true),
-                    Some(straight) => beam.power *= straight.weight,
-                },
+                _ => (Some(material), None),
+            };
+            if let Some(shown) = shown.filter(|m| !matches!(m.kind, Kind::Boundary)) {
+                match shown.straight(&surface, direction, || hit.texture_point(&surface), beam.nm) {
+                    Some(straight) if self.sampler.set(set)[1] < straight.share => beam.power *= straight.weight,
+                    pane => return Some(Met::Surface { hit, surface, leaf, pane: pane.is_some() }),
+                }
             }
             beam.medium = beam.medium.map(|before| object.beyond(&surface, direction, before));
             beam.ray = scene.leave(&surface, &hit, direction);
         }
         None
-    }
-
-    fn material(&self, hit: &Hit) -> &'a Material {
-        let scene = self.paths.scene;
-        &scene.materials[scene.objects[hit.object as usize].material as usize]
     }
 
     /// Leaves a photon where the beam has come to, if photons are wanted.
@@ -465,39 +445,15 @@ impl<'a> Walk<'a, '_> {
         (self.splat)(self.wavelengths, Splat { place: entry.pixel, light });
     }
 
-    /// The share of light that comes straight on to `distance`; `None` where something opaque stands between.
-    fn open(&mut self, ray: &Ray, distance: f64, mut medium: Option<u32>, beam: &Beam) -> Option<Lanes> {
-        let scene = self.paths.scene;
-        let media = self.paths.plan.media;
+    /// The share of light that comes straight on to the camera at `distance`; `None` where something opaque stands
+    /// between.
+    fn open(&mut self, ray: &Ray, distance: f64, medium: Option<u32>, beam: &Beam) -> Option<Lanes> {
+        let LightPaths { scene, plan, .. } = *self.paths;
         self.rays += 1;
-        let dim = |medium: Option<u32>, ray: &Ray, distance: f64, crossings: u32| match medium {
-            Some(m) if media => {
-                // Rays to the camera walk by numbers of their own.
-                let set = Set::Extra((beam.vertex + 1).wrapping_add(crossings << 16).wrapping_add(TO_CAMERA));
-                scene.media[m as usize].dim(ray, distance, beam.nm, || self.sampler.walk(set)).through
-            }
-            _ => Lanes::ONE,
-        };
-        if !scene.has_boundaries {
-            return (!scene.occluded(ray, distance, None)).then(|| dim(medium, ray, distance, 0));
-        }
-        let (mut ray, mut left, mut through) = (*ray, distance, Lanes::ONE);
-        for crossings in 0..MAX_BOUNDARIES {
-            let hit = scene.closest(&ray, left);
-            through *= dim(medium, &ray, hit.map_or(left, |h| h.t), crossings);
-            let Some(hit) = hit else { return Some(through) };
-            let material = self.material(&hit);
-            if !material.lets_through() {
-                return None;
-            }
-            let surface = scene.surface(&ray, &hit);
-            let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), beam.nm)?;
-            through *= straight.weight * straight.share as f32;
-            medium = scene.objects[hit.object as usize].beyond(&surface, ray.direction, medium);
-            ray = scene.leave(&surface, &hit, ray.direction);
-            left -= hit.t;
-        }
-        None
+        let (sampler, nm, vertex) = (self.sampler, beam.nm, beam.vertex + 1);
+        let shadow = Shadow { scene, sampler, nm, vertex, medium, panes: MAX_BOUNDARIES, target: None };
+        let came = if plan.media { shadow.cast::<true>(ray, distance) } else { shadow.cast::<false>(ray, distance) };
+        came.map(|(through, _)| through)
     }
 }
 

@@ -19,7 +19,7 @@ pub struct Photon {
     pub point: DVec3,
     /// Toward where it came from, unit.
     pub came: DVec3,
-    /// True normal there, on the side that it came from.
+    /// True normal there, on either side.
     pub normal: DVec3,
     /// Spectral power over the hero's density, W·nm⁻¹.
     pub power: Lanes,
@@ -66,7 +66,7 @@ impl PhotonMap {
     }
 
     /// Light by area that the photons around `point` bring, through `scatter`: f of each from where it came, per
-    /// unit of its power. `normal` is the true one on the side of the viewer or away from it.
+    /// unit of its power. `normal` is the true one, on either side.
     #[must_use]
     pub fn gather(&self, point: DVec3, normal: DVec3, mut scatter: impl FnMut(&Photon) -> Lanes) -> Lanes {
         let mut sum = Lanes::ZERO;

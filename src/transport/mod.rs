@@ -12,6 +12,7 @@ pub mod merge;
 pub mod path;
 pub mod pilot;
 pub mod plan;
+mod shadow;
 pub mod whitted;
 
 use crate::film::accumulate::REPLICATES;

@@ -13,16 +13,15 @@
 use super::Incoming;
 use super::merge::PhotonMap;
 use super::plan::{EffectPlan, PathSettings};
+use super::shadow::{MAX_BOUNDARIES, Shadow};
 use crate::math::Frame;
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::optics::bsdf::{Bsdf, Chosen};
 use crate::scene::ahead::Ahead;
 use crate::scene::compound::{Compound, Leaf, Slopes, Vertex};
-use crate::scene::light::Arriving;
 use crate::scene::material::{Kind, Material, Straight};
-use crate::scene::medium::{Dimmed, Medium};
-use crate::scene::through::Way;
+use crate::scene::medium::Medium;
 use crate::scene::{Hit, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
@@ -34,14 +33,6 @@ const FOR_SURE: u32 = 256;
 /// Longest survival of a path beyond that: one in a thousand is ended at each vertex, so that light
 /// trapped between perfect mirrors costs some thousand vertices, not for ever.
 const SURVIVAL: f64 = 0.999;
-
-/// Boundaries of media that a shadow ray crosses at the most: beyond it the light counts as hidden.
-/// A bound on time, far above any scene's nesting.
-const MAX_BOUNDARIES: u32 = 256;
-
-/// Sets the numbers of shadow rays apart from those of the path: 2²⁸ is above any vertex plus 2¹⁶ times any count of
-/// boundaries.
-const SHADOW: u32 = 1 << 28;
 
 /// Light that arrives along a camera ray.
 #[must_use]
@@ -143,17 +134,6 @@ fn power_heuristic(a: f64, b: f64) -> f64 {
     }
     let r = b / a;
     1.0 / r.mul_add(r, 1.0)
-}
-
-/// Where a shadow ray starts.
-#[derive(Clone, Copy)]
-struct Shadow {
-    /// Events of the path before.
-    vertex: u32,
-    /// What it starts in.
-    medium: Option<u32>,
-    /// Surfaces that it may go straight through.
-    panes: u32,
 }
 
 /// What scatters at a vertex.
@@ -654,8 +634,16 @@ impl Tracer<'_> {
             }
             _ => path.medium,
         };
-        let shadow = Shadow { vertex: path.vertices, medium, panes: self.panes(path) };
-        let Some((through, passing)) = self.visible::<MEDIA>(shadow, &leave(light.wi), &light) else { return };
+        let shadow = Shadow {
+            scene,
+            sampler: self.sampler,
+            nm: self.nm,
+            vertex: path.vertices,
+            medium,
+            panes: self.panes(path),
+            target: light.target,
+        };
+        let Some((through, passing)) = shadow.cast::<MEDIA>(&leave(light.wi), light.distance) else { return };
         let value = f * light.radiance * through;
         match light.density {
             None => path.add::<CHROMATIC>(value, 1.0 / probability),
@@ -668,79 +656,6 @@ impl Tracer<'_> {
                 path.add::<CHROMATIC>(value, weight / q);
             }
         }
-    }
-
-    /// Transmittance to a light, and for each lane the probability that a path would have come
-    /// through without scattering; `None` where something opaque stands between.
-    fn visible<const MEDIA: bool>(&self, shadow: Shadow, ray: &Ray, light: &Arriving) -> Option<(Lanes, Lanes)> {
-        let scene = self.scene;
-        let target = light.target;
-        let Shadow { vertex, mut medium, panes } = shadow;
-        let dim = |medium: Option<u32>, ray: &Ray, distance: f64, crossings: u32| match medium {
-            Some(m) if MEDIA => {
-                // Shadow rays walk by numbers of their own.
-                let set = Set::Extra(vertex.wrapping_add(crossings << 16).wrapping_add(SHADOW));
-                scene.media[m as usize].dim(ray, distance, self.nm, || self.sampler.walk(set))
-            }
-            _ => Dimmed { through: Lanes::ONE, passing: Lanes::ONE },
-        };
-        if !scene.has_boundaries {
-            if scene.occluded(ray, light.distance, target) {
-                return None;
-            }
-            let Dimmed { through, passing } = dim(medium, ray, light.distance, 0);
-            return Some((through, passing));
-        }
-        let way = if MEDIA { scene.way(ray, light.distance, target) } else { Way::Long };
-        if let Way::Blocked = way {
-            return None;
-        }
-        if let Way::Open(crossed) = way {
-            let hits = crossed.hits();
-            if hits.len() > panes as usize {
-                return None;
-            }
-            let (mut through, mut passing, mut from) = (Lanes::ONE, Lanes::ONE, 0.0);
-            for (crossings, hit) in (0..).zip(hits) {
-                let dimmed = dim(medium, &Ray::new(ray.at(from), ray.direction), hit.t - from, crossings);
-                through *= dimmed.through;
-                passing *= dimmed.passing;
-                let object = &scene.objects[hit.object as usize];
-                let material = &scene.materials[object.material as usize];
-                let surface = scene.surface(ray, hit);
-                let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), self.nm)?;
-                through *= straight.weight * straight.share as f32;
-                passing *= straight.share as f32;
-                medium = object.beyond(&surface, ray.direction, medium);
-                from = hit.t;
-            }
-            let last = Ray::new(ray.at(from), ray.direction);
-            let dimmed = dim(medium, &last, light.distance - from, hits.len() as u32);
-            return Some((through * dimmed.through, passing * dimmed.passing));
-        }
-        // Walk from one surface that lets light straight through to the next.
-        let (mut through, mut passing) = (Lanes::ONE, Lanes::ONE);
-        let (mut ray, mut left) = (*ray, light.distance);
-        for crossings in 0..=panes {
-            let hit = scene.closest(&ray, left).filter(|h| !scene.reaches(&ray, h, target));
-            let dimmed = dim(medium, &ray, hit.map_or(left, |h| h.t), crossings);
-            through *= dimmed.through;
-            passing *= dimmed.passing;
-            let Some(hit) = hit else { return Some((through, passing)) };
-            let object = &scene.objects[hit.object as usize];
-            let material = &scene.materials[object.material as usize];
-            if !material.lets_through() {
-                return None;
-            }
-            let surface = scene.surface(&ray, &hit);
-            let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), self.nm)?;
-            through *= straight.weight * straight.share as f32;
-            passing *= straight.share as f32;
-            medium = object.beyond(&surface, ray.direction, medium);
-            ray = scene.leave(&surface, &hit, ray.direction);
-            left -= hit.t;
-        }
-        None
     }
 }
 

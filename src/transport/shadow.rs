@@ -1,0 +1,106 @@
+//! What comes through between two points that are joined: a vertex and a lamp, or a vertex and the camera.
+
+use crate::math::sampler::{Sampler, Set};
+use crate::math::{Departure, Ray};
+use crate::scene::Scene;
+use crate::scene::medium::Dimmed;
+use crate::scene::through::Way;
+use crate::spectrum::Lanes;
+
+/// Boundaries of media that a ray crosses at the most: beyond it what it aims at counts as hidden.
+/// A bound on time, far above any scene's nesting.
+pub(super) const MAX_BOUNDARIES: u32 = 256;
+
+/// Sets the numbers of shadow rays apart from those of the path: 2²⁸ is above any vertex plus 2¹⁶ times any count of
+/// boundaries.
+const SHADOW: u32 = 1 << 28;
+
+/// A ray that only asks what comes through.
+#[derive(Clone, Copy)]
+pub(super) struct Shadow<'a> {
+    pub scene: &'a Scene,
+    pub sampler: &'a Sampler<'a>,
+    /// Wavelengths.
+    pub nm: Lanes,
+    /// Tells its random numbers from those of other rays of the path: events of the path before.
+    pub vertex: u32,
+    /// What it starts in.
+    pub medium: Option<u32>,
+    /// Surfaces that it may go straight through.
+    pub panes: u32,
+    /// The face or triangle that it aims at, where there is one.
+    pub target: Option<Departure>,
+}
+
+impl Shadow<'_> {
+    /// Transmittance along `ray` to `distance`, and for each lane the probability that a path would have come through
+    /// without scattering; `None` where something opaque stands between.
+    pub fn cast<const MEDIA: bool>(self, ray: &Ray, distance: f64) -> Option<(Lanes, Lanes)> {
+        let Shadow { scene, sampler, nm, vertex, mut medium, panes, target } = self;
+        let dim = |medium: Option<u32>, ray: &Ray, distance: f64, crossings: u32| match medium {
+            Some(m) if MEDIA => {
+                // Shadow rays walk by numbers of their own.
+                let set = Set::Extra(vertex.wrapping_add(crossings << 16).wrapping_add(SHADOW));
+                scene.media[m as usize].dim(ray, distance, nm, || sampler.walk(set))
+            }
+            _ => Dimmed { through: Lanes::ONE, passing: Lanes::ONE },
+        };
+        if !scene.has_boundaries {
+            if scene.occluded(ray, distance, target) {
+                return None;
+            }
+            let Dimmed { through, passing } = dim(medium, ray, distance, 0);
+            return Some((through, passing));
+        }
+        let way = if MEDIA { scene.way(ray, distance, target) } else { Way::Long };
+        if let Way::Blocked = way {
+            return None;
+        }
+        if let Way::Open(crossed) = way {
+            let hits = crossed.hits();
+            if hits.len() > panes as usize {
+                return None;
+            }
+            let (mut through, mut passing, mut from) = (Lanes::ONE, Lanes::ONE, 0.0);
+            for (crossings, hit) in (0..).zip(hits) {
+                let dimmed = dim(medium, &Ray::new(ray.at(from), ray.direction), hit.t - from, crossings);
+                through *= dimmed.through;
+                passing *= dimmed.passing;
+                let object = &scene.objects[hit.object as usize];
+                let material = &scene.materials[object.material as usize];
+                let surface = scene.surface(ray, hit);
+                let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), nm)?;
+                through *= straight.weight * straight.share as f32;
+                passing *= straight.share as f32;
+                medium = object.beyond(&surface, ray.direction, medium);
+                from = hit.t;
+            }
+            let last = Ray::new(ray.at(from), ray.direction);
+            let dimmed = dim(medium, &last, distance - from, hits.len() as u32);
+            return Some((through * dimmed.through, passing * dimmed.passing));
+        }
+        // Walk from one surface that lets light straight through to the next.
+        let (mut through, mut passing) = (Lanes::ONE, Lanes::ONE);
+        let (mut ray, mut left) = (*ray, distance);
+        for crossings in 0..=panes {
+            let hit = scene.closest(&ray, left).filter(|h| !scene.reaches(&ray, h, target));
+            let dimmed = dim(medium, &ray, hit.map_or(left, |h| h.t), crossings);
+            through *= dimmed.through;
+            passing *= dimmed.passing;
+            let Some(hit) = hit else { return Some((through, passing)) };
+            let object = &scene.objects[hit.object as usize];
+            let material = &scene.materials[object.material as usize];
+            if !material.lets_through() {
+                return None;
+            }
+            let surface = scene.surface(&ray, &hit);
+            let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), nm)?;
+            through *= straight.weight * straight.share as f32;
+            passing *= straight.share as f32;
+            medium = object.beyond(&surface, ray.direction, medium);
+            ray = scene.leave(&surface, &hit, ray.direction);
+            left -= hit.t;
+        }
+        None
+    }
+}
