@@ -12,7 +12,7 @@ use crate::film::filter::FilterSampler;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::bvh::Aabb;
 use crate::scene::camera::Projection;
-use crate::scene::casters::Casters;
+use crate::scene::casters::{Ball, Casters};
 use crate::scene::environment::Environment;
 use crate::scene::light::Light;
 use crate::scene::{Geometry, Scene};
@@ -457,8 +457,10 @@ const FIRST_RADIUS: f64 = 2.5;
 fn merging_radius(scene: &Scene, casters: &Casters) -> f64 {
     let width = f64::from(scene.camera.resolution[0]);
     let eye = scene.camera.world_from_camera.translation;
-    // To the middle: what lies behind is farther, what is before nearer.
-    let distance = casters.balls.iter().map(|b| (b.center - eye).length()).fold(f64::INFINITY, f64::min);
+    // To the middle: what lies behind is farther, what is before nearer. From within, what is seen is as far as the thing is
+    // large.
+    let distance = |b: &Ball| (b.center - eye).length().max(b.radius);
+    let distance = casters.balls.iter().map(distance).fold(f64::INFINITY, f64::min);
     let pixel = match scene.camera.projection {
         Projection::Perspective { half_width } => 2.0 * half_width / width * distance,
         Projection::Orthographic { half_width } => {

@@ -210,3 +210,23 @@ fn a_closed_box_keeps_its_light() {
         assert_agree(material, &render(&scene("on", 128)), &render(&scene("off", 512)));
     }
 }
+
+/// A camera in the very middle of a mirror, where the distance to it is zero: the radius of merging is not.
+#[test]
+fn a_camera_in_the_middle_of_a_mirror_sees_its_light() {
+    let text = "camera: {origin: [0, 2, 0], target: [0, 0, 0.2], up: [0, 0, 1], fov_deg: 90}\n\
+                image: {width: 24, height: 24}\n\
+                render: {samples: 16, techniques: {light_tracing: on, merging: on}}\n\
+                shapes:\n\
+                - rectangle: {corner: [-5, 0, 5], edge_u: [10, 0, 0], edge_v: [0, 0, -10]}\n\
+                - cylinder: {base: [0, 1.5, 0], top: [0, 2.5, 0], radius: 0.5, caps: none, flip_normals: true,\n  \
+                    material: {mirror: {}}}\n\
+                lights:\n\
+                - point: {position: [1, 5, 1], intensity: 10}\n";
+    let bench = bench_with(text, &[]);
+    let radius = bench.prepared.plan.caustics.as_ref().unwrap().merging.unwrap();
+    // 2.5 pixels, 2 tan 45° / 24 wide, at no less than the half diagonal of the box around the mirror.
+    assert!((radius / (2.5 * 2.0 / 24.0 * 0.75f64.sqrt()) - 1.0).abs() < 1e-12, "{radius}");
+    // No sample is invalid.
+    render(&bench);
+}
