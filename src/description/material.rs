@@ -201,6 +201,8 @@ pub struct Dielectric {
     /// Factor on the transmission; default 1.
     #[serde(default = "unit")]
     pub transmission_tint: SpectrumOrTexture,
+    /// Which of two bodies has the place where they overlap: that of the higher one; default none.
+    pub priority: Option<i32>,
     /// Highlight of the `whitted` integrator; default none.
     pub highlight: Option<Highlight>,
 }
@@ -427,6 +429,9 @@ impl Material {
                 dielectric.roughness.check(at.key("roughness"), checker);
                 dielectric.reflection_tint.check(Role::Reflectance, at.key("reflection_tint"), checker);
                 dielectric.transmission_tint.check(Role::Reflectance, at.key("transmission_tint"), checker);
+                let alone = dielectric.priority.is_none() || dielectric.exterior_ior == vacuum();
+                let expected = "none beside priority: the index outside is that of the body around";
+                checker.require(alone, at.key("exterior_ior"), expected, "one");
                 check_highlight(dielectric.highlight, at, checker);
             }
             Material::ThinDielectric(sheet) => {

@@ -108,6 +108,7 @@
 //!       exterior_ior: 1                          # ~ and roughness, distribution, fresnel, highlight
 //!       reflection_tint: 1                       # ~ factors, or textures
 //!       transmission_tint: 1
+//!       priority: 2                              # ~ none; see below
 //!   pane: {thin_dielectric: {ior: 1.5, exterior_ior: 1}}             # and both tints
 //!   lacquer: {plastic: {reflectance: 0.5, ior: 1.5, exterior_ior: 1, roughness: 0, tint: 1}}
 //!                                                # ~ and nonlinear: false, distribution, highlight, two_sided;
@@ -238,6 +239,13 @@
 //! `linear` has round joints and ends and wants two points or more a curve, `bspline` (uniform and cubic, open at the
 //! ends) four. A transform moves the points and leaves the radii. Rays meet curves from outside only; u runs about a curve
 //! and v along all of the file. Neither form shines.
+//!
+//! Bodies of `dielectric` may overlap where they have a `priority`, any whole number: the higher one has the place, of
+//! equal ones that which is written first. Light then goes by the ratio of the indices of the two that truly meet, and the
+//! medium is that which `inside` names for the one that has the place. So liquid reaches into the wall of its glass (glass
+//! above liquid), and ice into water, and no surfaces have to touch. Such a body is a closed shape or a plane, which bounds
+//! all that is behind it; its `exterior_ior` is not written; up to eight may share a place. The camera and lamps may be
+//! inside.
 //!
 //! # Spectra
 //! ```yaml

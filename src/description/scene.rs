@@ -292,6 +292,7 @@ mod tests {
                 roughness: Roughness::Number(0.0),
                 reflection_tint: one_of(1.0),
                 transmission_tint: one_of(1.0),
+                priority: Some(2),
                 distribution: Distribution::Ggx,
                 fresnel: Fresnel::Exact,
                 highlight: None,

@@ -137,6 +137,12 @@ impl Camera {
         Camera { world_from_camera, projection, resolution, lens, clip, principal_point, view }
     }
 
+    /// Where the ray through the middle of the lens begins.
+    #[must_use]
+    pub fn eye(&self) -> DVec3 {
+        self.view.near
+    }
+
     /// Where the camera stands and looks; `None` where `target` is `origin` or `up` is along the view.
     #[must_use]
     pub fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> Option<DAffine3> {

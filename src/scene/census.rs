@@ -35,6 +35,8 @@ pub struct Census {
     pub media: usize,
     /// Of those, media that scatter and whose extinction depends on wavelength.
     pub chromatic_media: usize,
+    /// Bodies with a priority.
+    pub nested: Vec<String>,
     /// A lens with a radius above zero.
     pub lens: bool,
     /// Depth fog.
@@ -111,6 +113,8 @@ impl Census {
                 Light::Constant { .. } | Light::Environment(_) => {}
             }
         }
+        let bodies = scene.nested.bodies().iter().rev();
+        census.nested = bodies.map(|body| scene.objects[body.object as usize].name.clone()).collect();
         let used = |i: usize| {
             let i = Some(i as u32);
             scene.camera_medium == i || scene.objects.iter().any(|o| o.inside == i || o.outside == i)

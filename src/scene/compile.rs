@@ -4,6 +4,7 @@
 //! once, each with its place in the file.
 
 mod attributes;
+mod bodies;
 mod files;
 mod hair;
 mod lights;
@@ -20,12 +21,14 @@ use super::load::{self, Pictures, Wanted};
 use super::material::{Kind, Material};
 use super::mesh::MeshTree;
 use super::mesh::together::Together;
+use super::nested::{Inside, Nested};
 use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Layout, Plane, Rectangle, Shape, Sphere};
 use super::texture::{Scalar, Texture};
 use super::volume::Volume;
 use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene};
 use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
+use crate::math::Ray;
 use crate::spectrum::{Outside, RefractiveIndex, Spectrum, WavelengthDistribution, catalogue, illuminant, upsample};
 use attributes::{OfMesh, Surface};
 use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3};
@@ -219,6 +222,9 @@ impl<'a> Compiler<'a> {
             (0..objects.len() as u32).filter(|&i| !together.as_ref().is_some_and(|t| t.holds(i))).collect();
         let bvh = Bvh::build(&alone.iter().map(|&i| boxes[i as usize]).collect::<Vec<Aabb>>()).named(&alone);
         objects.extend(children);
+        let nested = Nested::of(&mut objects, boxes.len(), |object| {
+            self.materials[object.material as usize].body().ok().flatten()
+        });
         let (center, radius) = extent(&boxes, &camera);
         let light_cdf = lights::light_cdf(&lights, &weights, &objects, radius);
         let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
@@ -241,8 +247,9 @@ impl<'a> Compiler<'a> {
             },
         });
         let shines_on_rays = lights.iter().any(|light| light.is_environment() || matches!(light, Light::Area { .. }));
-        let has_boundaries = objects.iter().any(|o| self.materials[o.material as usize].lets_through());
-        Ok(Scene {
+        let lets_through = |o: &Object| o.body != 0 || self.materials[o.material as usize].lets_through();
+        let has_boundaries = objects.iter().any(lets_through);
+        let mut scene = Scene {
             name: name.to_owned(),
             camera,
             objects,
@@ -251,6 +258,8 @@ impl<'a> Compiler<'a> {
             materials: std::mem::take(&mut self.materials),
             media,
             camera_medium,
+            nested,
+            camera_inside: Inside::default(),
             lights,
             light_cdf,
             backgrounds,
@@ -262,7 +271,10 @@ impl<'a> Compiler<'a> {
             has_boundaries,
             shines_on_rays,
             files: std::mem::take(&mut self.files),
-        })
+        };
+        let eye = Ray::new(scene.camera.eye(), DVec3::Z);
+        scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);
+        Ok(scene)
     }
 
     fn volumes_and_materials(&mut self) -> Result<()> {
@@ -328,6 +340,7 @@ impl<'a> Compiler<'a> {
                 outside: None,
                 keeps_medium: false,
                 flipped: false,
+                body: 0,
             }));
         }
         let material = match &shape.material {
@@ -367,6 +380,9 @@ impl<'a> Compiler<'a> {
             // What goes into curves comes out unseen; an instance is none of its own.
             Geometry::Curves(_) | Geometry::Instance(_) => false,
         };
+        if let Some(fault) = self.unfit_for_a_body(&self.materials[material as usize], &geometry, closed, shape) {
+            self.fault(&format!("{at}.material"), fault);
+        }
         let enclosed = if closed { None } else { camera_medium };
         let (behind, before) = if shape.flip_normals { (camera_medium, enclosed) } else { (enclosed, camera_medium) };
         let unchanged = |side: &Option<String>| side.as_deref() == Some(written::UNCHANGED);
@@ -385,6 +401,7 @@ impl<'a> Compiler<'a> {
             outside: medium(&shape.outside, before),
             keeps_medium: unchanged(&shape.inside) && unchanged(&shape.outside),
             flipped: shape.flip_normals,
+            body: 0,
         }))
     }
 

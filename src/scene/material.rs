@@ -84,6 +84,8 @@ pub enum Kind {
         facets: Option<Roughness>,
         /// Factors beside Fresnel's, where there are any.
         tints: Option<Box<Tints>>,
+        /// Which of two bodies has the place where they overlap: that of the higher one.
+        priority: Option<i32>,
     },
     /// A thin pane.
     Thin {
@@ -309,6 +311,18 @@ impl Material {
     /// glass as if its index depended on wavelength (`effects: all`).
     #[must_use]
     pub fn bsdf(&self, at: &TexturePoint, nm: Lanes, all_dispersive: bool) -> Bsdf<'_> {
+        self.bsdf_beside(at, nm, all_dispersive, None)
+    }
+
+    /// [`Material::bsdf`] with another index on the outside, if there is one.
+    #[must_use]
+    pub fn bsdf_beside(
+        &self,
+        at: &TexturePoint,
+        nm: Lanes,
+        all_dispersive: bool,
+        around: Option<&RefractiveIndex>,
+    ) -> Bsdf<'_> {
         match &self.kind {
             Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: reflectance.eval(at, nm) },
             Kind::Mirror { reflectance } => Bsdf::Mirror { reflectance: reflectance.eval(nm) },
@@ -319,8 +333,8 @@ impl Material {
                     None => Bsdf::Conductor(metal),
                 }
             }
-            Kind::Dielectric { interior, exterior, fresnel, facets, tints } => {
-                let eta = relative_index(interior, exterior, nm, all_dispersive);
+            Kind::Dielectric { interior, exterior, fresnel, facets, tints, .. } => {
+                let eta = relative_index(interior, around.unwrap_or(exterior), nm, all_dispersive);
                 let tint = Tints::at(tints.as_deref(), at, nm);
                 match facets {
                     Some(facets) => Bsdf::RoughDielectric(RoughDielectric { eta, facets: facets.at(at), tint }),
@@ -385,6 +399,26 @@ impl Material {
                     || compound.composition.inner().iter().any(|m| m.transmits())
             }
         }
+    }
+
+    /// Priority and index of the body that the material bounds, and whether its surface shows by more than the index;
+    /// `None` without a priority.
+    ///
+    /// # Errors
+    /// In words, where parts of the surface bound different bodies.
+    pub fn body(&self) -> Result<Option<(i32, RefractiveIndex, bool)>, String> {
+        let leaves = self.leaves();
+        let mut found = None;
+        for leaf in &leaves {
+            if let Kind::Dielectric { interior, tints, priority, .. } = &leaf.kind {
+                let shows = leaves.len() > 1 || tints.is_some();
+                let body = priority.map(|priority| (priority, interior.clone(), shows));
+                if found.get_or_insert_with(|| body.clone()) != &body {
+                    return Err("expected one priority and one index all over a body, found several".into());
+                }
+            }
+        }
+        Ok(found.flatten())
     }
 
     /// The layers of a material made of others.

@@ -22,6 +22,7 @@ pub mod load;
 pub mod material;
 pub mod medium;
 pub mod mesh;
+pub mod nested;
 pub mod partials;
 pub mod principled;
 pub mod projector;
@@ -43,6 +44,8 @@ use material::Material;
 pub use medium::Medium;
 use mesh::together::Together;
 use mesh::{AreaTable, Mesh, MeshTree};
+pub use nested::Inside;
+use nested::Nested;
 use sdf::SdfGrid;
 use shape::Detail;
 use shape::Shape;
@@ -68,8 +71,12 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Media, by index.
     pub media: Vec<Medium>,
-    /// What the camera is in.
+    /// What is where no body is.
     pub camera_medium: Option<u32>,
+    /// Bodies with a priority.
+    pub nested: Nested,
+    /// What paths of the camera begin in.
+    pub camera_inside: Inside,
     /// Lights.
     pub lights: Vec<Light>,
     /// How lights are chosen: running sums of probabilities.
@@ -86,7 +93,7 @@ pub struct Scene {
     pub center: DVec3,
     /// Its radius, metres.
     pub radius: f64,
-    /// True where light may go straight through some object: the boundary of a medium, a pane.
+    /// True where light may go straight through some object: the boundary of a medium, a pane, a body within another.
     pub has_boundaries: bool,
     /// True where a ray can meet light by chance: some light has an extent.
     pub shines_on_rays: bool,
@@ -124,6 +131,8 @@ pub struct Object {
     pub keeps_medium: bool,
     /// Whether its normals point to the other side than the form's own.
     pub flipped: bool,
+    /// Its rank among the bodies with a priority, from 1; 0 for none.
+    pub body: u32,
 }
 
 impl Object {

@@ -59,7 +59,7 @@ impl Scene {
         const NOTHING: Hit = Hit { t: 0.0, object: 0, part: 0, barycentric: [0.0; 2], instance: None };
         let mut crossed = Crossed { hits: [NOTHING; MOST], count: 0 };
         let mut long = false;
-        let lets_through = |object: u32| self.materials[self.objects[object as usize].material as usize].lets_through();
+        let lets_through = |object: u32| self.lets_through(object);
         let by_triangles = self.together.as_ref().is_some_and(|together| {
             together.any(ray, distance, target, |hit| {
                 if !lets_through(hit.object) {

@@ -20,7 +20,8 @@ use crate::optics::bsdf::{Bsdf, BsdfSample};
 use crate::scene::camera::Entry;
 use crate::scene::compound::Leaf;
 use crate::scene::material::Kind;
-use crate::scene::{Hit, Medium, Object, Scene, SurfacePoint};
+use crate::scene::nested::{Bodies, Crossing as Meeting};
+use crate::scene::{Hit, Inside, Medium, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
 
@@ -124,6 +125,7 @@ pub fn trace(
         alone: None,
         chosen: false,
         medium: None,
+        bodies: if paths.plan.nested { scene.bodies_around(&emission.ray) } else { Bodies::NONE },
         vertex: 0,
     });
     traced.rays = walk.rays;
@@ -146,11 +148,17 @@ struct Beam {
     chosen: bool,
     /// What the beam is in: `None` while it is not known.
     medium: Option<Option<u32>>,
+    /// The bodies with a priority that it is in.
+    bodies: Bodies,
     /// Vertices so far.
     vertex: u32,
 }
 
 impl Beam {
+    fn inside(&self) -> Inside {
+        Inside { medium: self.medium.flatten(), bodies: self.bodies }
+    }
+
     /// Of light at the wavelengths of the beam, that at those of the path.
     fn only(&self, light: Lanes) -> Lanes {
         let Some(lane) = self.alone else { return light };
@@ -162,7 +170,7 @@ impl Beam {
 /// What ends a flight.
 #[expect(clippy::large_enum_variant, reason = "surfaces are what is met, and a box would cost an allocation each")]
 enum Met<'a> {
-    Surface { hit: Hit, surface: SurfacePoint, leaf: Option<Leaf<'a>>, pane: bool },
+    Surface { hit: Hit, surface: SurfacePoint, leaf: Option<Leaf<'a>>, pane: bool, meeting: Option<Meeting<'a>> },
     Medium { point: DVec3, medium: &'a Medium },
 }
 
@@ -194,8 +202,8 @@ impl<'a> Walk<'a, '_> {
             let [u_lens, u_scatter] = std::array::from_fn(|_| DVec2::new(numbers.draw(), numbers.draw()));
             let Some(met) = self.fly(&mut beam, u_flight) else { return };
             let came = -beam.ray.direction;
-            let (hit, surface, leaf, pane) = match met {
-                Met::Surface { hit, surface, leaf, pane } => (hit, surface, leaf, pane),
+            let (hit, surface, leaf, pane, meeting) = match met {
+                Met::Surface { hit, surface, leaf, pane, meeting } => (hit, surface, leaf, pane, meeting),
                 Met::Medium { point, medium } => {
                     // Next to the light something sharp is wanted.
                     if caustics.is_some() && vertex == 0 {
@@ -232,7 +240,11 @@ impl<'a> Walk<'a, '_> {
             if let Some(leaf) = &leaf {
                 beam.power *= leaf.slopes.shadowing(came) as f32;
             }
-            let bsdf = material.bsdf(&hit.texture_point(&surface), beam.nm, plan.all_dispersive);
+            let around = meeting.and_then(|meeting| meeting.around);
+            if let Some(meeting) = meeting {
+                beam.bodies = meeting.here;
+            }
+            let bsdf = material.bsdf_beside(&hit.texture_point(&surface), beam.nm, plan.all_dispersive, around);
             let wo = frame.to_local(came);
 
             if !bsdf.is_discrete() && !sharp {
@@ -294,7 +306,8 @@ impl<'a> Walk<'a, '_> {
         let scene = self.paths.scene;
         if sample.transmitted {
             let object = &scene.objects[at.hit.object as usize];
-            beam.medium = Some(object.beyond(at.surface, went, beam.medium.flatten()));
+            let beyond = scene.beyond(object, at.surface, went, beam.inside());
+            (beam.medium, beam.bodies) = (Some(beyond.medium), beyond.bodies);
         }
         beam.ray = scene.leave(at.surface, at.hit, went);
         beam.vertex += 1;
@@ -346,7 +359,8 @@ impl<'a> Walk<'a, '_> {
                         let object = &scene.objects[hit.object as usize];
                         object.beyond(&surface, -beam.ray.direction, scene.camera_medium)
                     });
-                    if hit.is_some() { before } else { scene.camera_medium }
+                    let before = if hit.is_some() { before } else { scene.camera_medium };
+                    scene.inside(beam.bodies, before).medium
                 });
                 beam.medium = Some(known);
                 if let Some(medium) = known.map(|m| &scene.media[m as usize]) {
@@ -364,8 +378,11 @@ impl<'a> Walk<'a, '_> {
             let direction = beam.ray.direction;
             let object = &scene.objects[hit.object as usize];
             let material = &scene.materials[object.material as usize];
+            let meeting = scene.crossing(object, &surface, direction, &beam.bodies);
+            let hidden = meeting.is_some_and(|meeting| !meeting.shows);
             // Of a material made of others, what this path meets, if anything.
             let (shown, leaf) = match &material.kind {
+                _ if hidden => (None, None),
                 Kind::Compound(compound) => {
                     let (at, wo) = (&hit.texture_point(&surface), -direction);
                     let x = crate::scene::compound::Vertex { scene, hit: &hit, surface: &surface, at, wo };
@@ -377,10 +394,12 @@ impl<'a> Walk<'a, '_> {
             if let Some(shown) = shown.filter(|m| !matches!(m.kind, Kind::Boundary)) {
                 match shown.straight(&surface, direction, || hit.texture_point(&surface), beam.nm) {
                     Some(straight) if self.sampler.set(set)[1] < straight.share => beam.power *= straight.weight,
-                    pane => return Some(Met::Surface { hit, surface, leaf, pane: pane.is_some() }),
+                    pane => return Some(Met::Surface { hit, surface, leaf, pane: pane.is_some(), meeting }),
                 }
             }
-            beam.medium = beam.medium.map(|before| object.beyond(&surface, direction, before));
+            let beyond = scene.beyond(object, &surface, direction, beam.inside());
+            beam.medium = beam.medium.map(|_| beyond.medium);
+            beam.bodies = beyond.bodies;
             beam.ray = scene.leave(&surface, &hit, direction);
         }
         None
@@ -416,11 +435,12 @@ impl<'a> Walk<'a, '_> {
             return;
         }
         let cosines = to_camera.z.abs() * adjoint(at.local.z, to_camera.z, came, went);
-        let before = beam.medium.flatten();
-        let medium = if came * went < 0.0 { at.object.beyond(at.surface, entry.direction, before) } else { before };
+        let before = beam.inside();
+        let inside =
+            if came * went < 0.0 { scene.beyond(at.object, at.surface, entry.direction, before) } else { before };
         let ray = scene.leave(at.surface, at.hit, entry.direction);
         let light = f * (cosines * entry.density) as f32;
-        self.send(beam, at.surface.point, &ray, medium, &entry, light);
+        self.send(beam, at.surface.point, &ray, inside, &entry, light);
     }
 
     /// Light that a point of a medium sends into the camera.
@@ -431,12 +451,12 @@ impl<'a> Walk<'a, '_> {
         }
         let f = medium.phase.eval(point, -beam.ray.direction, entry.direction);
         let light = Lanes::splat((f * entry.density) as f32);
-        self.send(beam, point, &Ray::new(point, entry.direction), beam.medium.flatten(), &entry, light);
+        self.send(beam, point, &Ray::new(point, entry.direction), beam.inside(), &entry, light);
     }
 
     /// Splats the light of a beam that is scattered by `light` into the camera, as far as it gets there.
-    fn send(&mut self, beam: &Beam, point: DVec3, ray: &Ray, medium: Option<u32>, entry: &Entry, light: Lanes) {
-        let Some(through) = self.open(ray, entry.distance, medium, beam) else { return };
+    fn send(&mut self, beam: &Beam, point: DVec3, ray: &Ray, inside: Inside, entry: &Entry, light: Lanes) {
+        let Some(through) = self.open(ray, entry.distance, inside, beam) else { return };
         let share = LANES as f32 / beam.rho.reduce_add();
         let mut light = beam.only(beam.power * light * through * share);
         if let Some(fog) = self.paths.scene.fog.as_ref().filter(|_| self.paths.plan.depth_fog) {
@@ -447,12 +467,13 @@ impl<'a> Walk<'a, '_> {
 
     /// The share of light that comes straight on to the camera at `distance`; `None` where something opaque stands
     /// between.
-    fn open(&mut self, ray: &Ray, distance: f64, medium: Option<u32>, beam: &Beam) -> Option<Lanes> {
+    fn open(&mut self, ray: &Ray, distance: f64, inside: Inside, beam: &Beam) -> Option<Lanes> {
         let LightPaths { scene, plan, .. } = *self.paths;
         self.rays += 1;
         let (sampler, nm, vertex) = (self.sampler, beam.nm, beam.vertex + 1);
-        let shadow = Shadow { scene, sampler, nm, vertex, medium, panes: MAX_BOUNDARIES, target: None };
-        let came = if plan.media { shadow.cast::<true>(ray, distance) } else { shadow.cast::<false>(ray, distance) };
+        let shadow = Shadow { scene, sampler, nm, vertex, inside, panes: MAX_BOUNDARIES, target: None };
+        let tracked = plan.media || plan.nested;
+        let came = if tracked { shadow.cast::<true>(ray, distance) } else { shadow.cast::<false>(ray, distance) };
         came.map(|(through, _)| through)
     }
 }

@@ -22,7 +22,7 @@ use crate::scene::ahead::Ahead;
 use crate::scene::compound::{Compound, Leaf, Slopes, Vertex};
 use crate::scene::material::{Kind, Material, Straight};
 use crate::scene::medium::Medium;
-use crate::scene::{Hit, Object, Scene, SurfacePoint};
+use crate::scene::{Hit, Inside, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::{DVec2, DVec3};
 
@@ -47,7 +47,7 @@ pub fn radiance(
 ) -> Incoming {
     let tracer = Tracer { scene, plan, settings, sampler, nm: wavelengths.nm, photons };
     // The plan chooses the kernel: what a scene lacks is not in the code that runs.
-    match (plan.chromatic, plan.media) {
+    match (plan.chromatic, plan.media || plan.nested) {
         (false, false) => tracer.trace::<false, false>(ray),
         (true, false) => tracer.trace::<true, false>(ray),
         (false, true) => tracer.trace::<false, true>(ray),
@@ -86,7 +86,7 @@ struct Path {
     /// Product of η² over crossings: β shrinks by it in glass and regains it, and roulette must not
     /// take that for a loss.
     eta2: f64,
-    medium: Option<u32>,
+    inside: Inside,
     /// `None` where only scattering could find light: at the camera and after mirrors.
     previous: Option<Previous>,
     radiance: Lanes,
@@ -183,7 +183,7 @@ impl Tracer<'_> {
             beta: Lanes::ONE,
             rho: Lanes::ONE,
             eta2: 1.0,
-            medium: if MEDIA { scene.camera_medium } else { None },
+            inside: if MEDIA { scene.camera_inside } else { Inside::default() },
             previous: None,
             radiance: Lanes::ZERO,
             vertices: 0,
@@ -206,7 +206,7 @@ impl Tracer<'_> {
 
         loop {
             // The flight through a medium is drawn first: beyond its reach no surface matters.
-            let flying = if MEDIA { path.medium } else { None }.map(|medium| {
+            let flying = if MEDIA { path.inside.medium } else { None }.map(|medium| {
                 let medium = &scene.media[medium as usize];
                 let set = Set::Extra(path.vertices.wrapping_add(crossings << 16));
                 let u = match crossings {
@@ -272,10 +272,14 @@ impl Tracer<'_> {
             }
             let material = &scene.materials[object.material as usize];
             let wo_world = -path.ray.direction;
+            // Of bodies that overlap one has the place; the surfaces of the others are not there.
+            let bodies = &path.inside.bodies;
+            let crossing = if MEDIA { scene.crossing(object, &surface, path.ray.direction, bodies) } else { None };
+            let hidden = crossing.is_some_and(|crossing| !crossing.shows);
             // Of a material made of others, what this path meets, if anything.
-            let compound = matches!(material.kind, Kind::Compound(_)).then_some(material);
+            let compound = (matches!(material.kind, Kind::Compound(_)) && !hidden).then_some(material);
             let leaf = match &material.kind {
-                Kind::Compound(compound) => {
+                Kind::Compound(compound) if !hidden => {
                     let u = self.sampler.set(Set::Extra(path.vertices.wrapping_add(crossings << 16)))[2];
                     self.resolve(compound, &surface, &hit, wo_world, u)
                 }
@@ -283,8 +287,8 @@ impl Tracer<'_> {
             };
             let open = compound.is_some() && leaf.is_none();
             let material = leaf.as_ref().map_or(material, |leaf| leaf.material);
-            let boundary = open || matches!(material.kind, Kind::Boundary);
-            let straight = if open {
+            let boundary = open || hidden || matches!(material.kind, Kind::Boundary);
+            let straight = if open || hidden {
                 Some(Straight::OPEN)
             } else {
                 material.straight(&surface, path.ray.direction, || hit.texture_point(&surface), self.nm)
@@ -343,7 +347,9 @@ impl Tracer<'_> {
                         }
                     };
                 }
-                path.medium = object.beyond(&surface, path.ray.direction, path.medium);
+                if MEDIA {
+                    path.inside = scene.beyond(object, &surface, path.ray.direction, path.inside);
+                }
                 if let Some(p) = &mut path.previous {
                     p.distance += hit.t;
                 }
@@ -366,7 +372,9 @@ impl Tracer<'_> {
             };
             let slopes = leaf.as_ref().map(|leaf| &leaf.slopes);
             let wo = frame.to_local(wo_world);
-            let bsdf = material.bsdf(&hit.texture_point(&surface), self.nm, self.plan.all_dispersive);
+            let around = crossing.and_then(|crossing| crossing.around);
+            let at = hit.texture_point(&surface);
+            let bsdf = material.bsdf_beside(&at, self.nm, self.plan.all_dispersive, around);
 
             let choice = self.sampler.set(Set::Choice(path.vertices));
             let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
@@ -438,7 +446,9 @@ impl Tracer<'_> {
             }
             path.eta2 *= sample.eta2;
             if MEDIA && sample.transmitted {
-                path.medium = object.beyond(&surface, wi, path.medium);
+                path.inside = scene.beyond(object, &surface, wi, path.inside);
+            } else if let Some(crossing) = crossing {
+                path.inside.bodies = crossing.here;
             }
             path.ray = scene.leave(&surface, &hit, wi);
             path.vertices += 1;
@@ -625,21 +635,21 @@ impl Tracer<'_> {
         if f.simd_eq(Lanes::ZERO).all() {
             return;
         }
-        let medium = match scatterer {
+        let inside = match scatterer {
             // Light from the other side comes through what is there.
             Scatterer::Surface { surface, object, .. }
                 if MEDIA && light.wi.dot(surface.normal) * path.ray.direction.dot(surface.normal) > 0.0 =>
             {
-                object.beyond(surface, light.wi, path.medium)
+                scene.beyond(object, surface, light.wi, path.inside)
             }
-            _ => path.medium,
+            _ => path.inside,
         };
         let shadow = Shadow {
             scene,
             sampler: self.sampler,
             nm: self.nm,
             vertex: path.vertices,
-            medium,
+            inside,
             panes: self.panes(path),
             target: light.target,
         };

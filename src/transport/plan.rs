@@ -139,6 +139,8 @@ pub struct EffectPlan {
     pub chromatic: bool,
     /// Media.
     pub media: bool,
+    /// Bodies with a priority.
+    pub nested: bool,
     /// Depth fog.
     pub depth_fog: bool,
     /// Every glass is computed as if it were dispersive.
@@ -261,6 +263,12 @@ impl EffectPlan {
             count(census.media, "medium that light crosses", "media that light crosses"),
             if path { "all space is empty" } else { "whitted does not simulate media" },
         );
+        let nested = effect(
+            "nested bodies",
+            !census.nested.is_empty(),
+            format!("the higher priority has the place: {}", some_of(&census.nested)),
+            "no body has a priority",
+        );
         let depth_fog = effect("depth fog", census.fog, "the scene asks for it".into(), "the scene has none");
         effect(
             "depth of field",
@@ -283,6 +291,7 @@ impl EffectPlan {
             dispersion,
             chromatic,
             media: media && path,
+            nested,
             depth_fog,
             all_dispersive: mode == EffectMode::All,
             caustics: None,

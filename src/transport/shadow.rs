@@ -2,9 +2,10 @@
 
 use crate::math::sampler::{Sampler, Set};
 use crate::math::{Departure, Ray};
-use crate::scene::Scene;
+use crate::scene::material::Straight;
 use crate::scene::medium::Dimmed;
 use crate::scene::through::Way;
+use crate::scene::{Hit, Inside, Scene, SurfacePoint};
 use crate::spectrum::Lanes;
 
 /// Boundaries of media that a ray crosses at the most: beyond it what it aims at counts as hidden.
@@ -25,7 +26,7 @@ pub(super) struct Shadow<'a> {
     /// Tells its random numbers from those of other rays of the path: events of the path before.
     pub vertex: u32,
     /// What it starts in.
-    pub medium: Option<u32>,
+    pub inside: Inside,
     /// Surfaces that it may go straight through.
     pub panes: u32,
     /// The face or triangle that it aims at, where there is one.
@@ -36,7 +37,7 @@ impl Shadow<'_> {
     /// Transmittance along `ray` to `distance`, and for each lane the probability that a path would have come through
     /// without scattering; `None` where something opaque stands between.
     pub fn cast<const MEDIA: bool>(self, ray: &Ray, distance: f64) -> Option<(Lanes, Lanes)> {
-        let Shadow { scene, sampler, nm, vertex, mut medium, panes, target } = self;
+        let Shadow { scene, sampler, nm, vertex, mut inside, panes, target } = self;
         let dim = |medium: Option<u32>, ray: &Ray, distance: f64, crossings: u32| match medium {
             Some(m) if MEDIA => {
                 // Shadow rays walk by numbers of their own.
@@ -49,7 +50,7 @@ impl Shadow<'_> {
             if scene.occluded(ray, distance, target) {
                 return None;
             }
-            let Dimmed { through, passing } = dim(medium, ray, distance, 0);
+            let Dimmed { through, passing } = dim(inside.medium, ray, distance, 0);
             return Some((through, passing));
         }
         let way = if MEDIA { scene.way(ray, distance, target) } else { Way::Long };
@@ -63,20 +64,16 @@ impl Shadow<'_> {
             }
             let (mut through, mut passing, mut from) = (Lanes::ONE, Lanes::ONE, 0.0);
             for (crossings, hit) in (0..).zip(hits) {
-                let dimmed = dim(medium, &Ray::new(ray.at(from), ray.direction), hit.t - from, crossings);
+                let dimmed = dim(inside.medium, &Ray::new(ray.at(from), ray.direction), hit.t - from, crossings);
                 through *= dimmed.through;
                 passing *= dimmed.passing;
-                let object = &scene.objects[hit.object as usize];
-                let material = &scene.materials[object.material as usize];
-                let surface = scene.surface(ray, hit);
-                let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), nm)?;
+                let (straight, _) = self.pass(ray, hit, &mut inside)?;
                 through *= straight.weight * straight.share as f32;
                 passing *= straight.share as f32;
-                medium = object.beyond(&surface, ray.direction, medium);
                 from = hit.t;
             }
             let last = Ray::new(ray.at(from), ray.direction);
-            let dimmed = dim(medium, &last, distance - from, hits.len() as u32);
+            let dimmed = dim(inside.medium, &last, distance - from, hits.len() as u32);
             return Some((through * dimmed.through, passing * dimmed.passing));
         }
         // Walk from one surface that lets light straight through to the next.
@@ -84,23 +81,35 @@ impl Shadow<'_> {
         let (mut ray, mut left) = (*ray, distance);
         for crossings in 0..=panes {
             let hit = scene.closest(&ray, left).filter(|h| !scene.reaches(&ray, h, target));
-            let dimmed = dim(medium, &ray, hit.map_or(left, |h| h.t), crossings);
+            let dimmed = dim(inside.medium, &ray, hit.map_or(left, |h| h.t), crossings);
             through *= dimmed.through;
             passing *= dimmed.passing;
             let Some(hit) = hit else { return Some((through, passing)) };
-            let object = &scene.objects[hit.object as usize];
-            let material = &scene.materials[object.material as usize];
-            if !material.lets_through() {
+            if !scene.lets_through(hit.object) {
                 return None;
             }
-            let surface = scene.surface(&ray, &hit);
-            let straight = material.straight(&surface, ray.direction, || hit.texture_point(&surface), nm)?;
+            let (straight, surface) = self.pass(&ray, &hit, &mut inside)?;
             through *= straight.weight * straight.share as f32;
             passing *= straight.share as f32;
-            medium = object.beyond(&surface, ray.direction, medium);
             ray = scene.leave(&surface, &hit, ray.direction);
             left -= hit.t;
         }
         None
+    }
+
+    /// What goes straight on at `hit`, after which the ray is in `inside`; `None` where nothing can.
+    fn pass(&self, ray: &Ray, hit: &Hit, inside: &mut Inside) -> Option<(Straight, SurfacePoint)> {
+        let scene = self.scene;
+        let object = &scene.objects[hit.object as usize];
+        let material = &scene.materials[object.material as usize];
+        let surface = scene.surface(ray, hit);
+        let crossing = scene.crossing(object, &surface, ray.direction, &inside.bodies);
+        let straight = if crossing.is_some_and(|c| !c.shows) {
+            Straight::OPEN
+        } else {
+            material.straight(&surface, ray.direction, || hit.texture_point(&surface), self.nm)?
+        };
+        *inside = scene.beyond(object, &surface, ray.direction, *inside);
+        Some((straight, surface))
     }
 }

@@ -18,8 +18,8 @@ use crate::scene::light::Light;
 use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Tints, relative_index};
 use crate::scene::shape::Shape;
 use crate::scene::texture::Texture;
-use crate::scene::{Geometry, Object, Scene};
-use crate::spectrum::{LANES, Lanes, SampledWavelengths};
+use crate::scene::{Geometry, Inside, Object, Scene};
+use crate::spectrum::{LANES, Lanes, RefractiveIndex, SampledWavelengths};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
@@ -41,7 +41,7 @@ pub fn radiance(
     ray: &Ray,
 ) -> Incoming {
     let tracer = Tracer { scene, plan, settings, nm: wavelengths.nm };
-    let (radiance, first) = tracer.trace(ray, Lanes::ONE, 0);
+    let (radiance, first) = tracer.trace(ray, scene.camera_inside, Lanes::ONE, 0);
     Incoming {
         radiance,
         alpha: if first.is_some() { 1.0 } else { 0.0 },
@@ -57,10 +57,29 @@ struct Tracer<'a> {
     nm: Lanes,
 }
 
+/// What is on the two sides of a surface.
+#[derive(Clone, Copy)]
+struct Standpoint<'a> {
+    /// Where the viewer is.
+    here: Inside,
+    /// Behind.
+    beyond: Inside,
+    /// The index on the outside, where it is not that of the material.
+    around: Option<&'a RefractiveIndex>,
+}
+
+/// A vertex and what is around it.
+#[derive(Clone, Copy)]
+struct Meeting<'a> {
+    x: &'a Vertex<'a>,
+    standpoint: Standpoint<'a>,
+}
+
 /// A material as one vertex shows it.
 #[derive(Clone, Copy)]
 struct Seen<'a> {
     x: &'a Vertex<'a>,
+    standpoint: &'a Standpoint<'a>,
     material: &'a Material,
     /// Shading normal, on the side that is seen of a material with two.
     normal: DVec3,
@@ -70,7 +89,7 @@ struct Seen<'a> {
 impl Tracer<'_> {
     /// Light along `ray` for the lanes in which `weight`, the share that reaches the eye, is not zero;
     /// and the first point met.
-    fn trace(&self, ray: &Ray, weight: Lanes, depth: u32) -> (Lanes, Option<DVec3>) {
+    fn trace(&self, ray: &Ray, inside: Inside, weight: Lanes, depth: u32) -> (Lanes, Option<DVec3>) {
         let scene = self.scene;
         let Some(hit) = scene.closest(ray, f64::INFINITY) else {
             let all = &scene.backgrounds;
@@ -81,46 +100,55 @@ impl Tracer<'_> {
         let object = &scene.objects[hit.object as usize];
         let material = &scene.materials[object.material as usize];
         let wo = -ray.direction;
-        if matches!(material.kind, Kind::Boundary) {
-            let (light, first) = self.trace(&scene.leave(&surface, &hit, ray.direction), weight, depth);
-            return (light, first);
+        let crossing = scene.crossing(object, &surface, ray.direction, &inside.bodies);
+        if matches!(material.kind, Kind::Boundary) || crossing.is_some_and(|crossing| !crossing.shows) {
+            let beyond = scene.beyond(object, &surface, ray.direction, inside);
+            return self.trace(&scene.leave(&surface, &hit, ray.direction), beyond, weight, depth);
         }
+        let standpoint = Standpoint {
+            here: crossing.map_or(inside, |crossing| Inside { bodies: crossing.here, ..inside }),
+            beyond: scene.beyond(object, &surface, ray.direction, inside),
+            around: crossing.and_then(|crossing| crossing.around),
+        };
 
         let emitted =
             object.light.map_or(Lanes::ZERO, |l| scene.lights[l as usize].emitted(&surface, &hit, wo, self.nm));
         let vertex = Vertex { scene, hit: &hit, surface: &surface, at: &hit.texture_point(&surface), wo };
         let standing = Standing::new(seen_normal(&surface, wo), surface.tangent);
-        (emitted + self.scattered(&vertex, material, standing, weight, depth), Some(surface.point))
+        let at = Meeting { x: &vertex, standpoint };
+        (emitted + self.scattered(&at, material, standing, weight, depth), Some(surface.point))
     }
 
     /// Light that a material sends to the viewer: a material made of others sends the sum of theirs.
-    fn scattered(&self, x: &Vertex, material: &Material, mut standing: Standing, weight: Lanes, depth: u32) -> Lanes {
+    fn scattered(&self, at: &Meeting, material: &Material, mut standing: Standing, weight: Lanes, depth: u32) -> Lanes {
+        let Meeting { x, standpoint } = at;
         let part = |share: f64, light: &dyn Fn(Lanes) -> Lanes| {
             let onward = weight * share as f32;
             let visible = onward.simd_gt(Lanes::splat(FAINTEST)).any();
             if visible { light(onward) * share as f32 } else { Lanes::ZERO }
         };
-        let straight = |weight: Lanes| self.trace(&self.scene.leave(x.surface, x.hit, -x.wo), weight, depth).0;
+        let straight =
+            |weight: Lanes| self.trace(&self.scene.leave(x.surface, x.hit, -x.wo), standpoint.beyond, weight, depth).0;
         let outside = x.wo.dot(x.surface.normal) > 0.0;
         if let Some(compound) = material.compound() {
             return match &compound.composition {
                 Composition::Mask { opacity, inner } => {
                     let opacity = share(opacity, x.at);
-                    part(opacity, &|w| self.scattered(x, inner, standing, w, depth)) + part(1.0 - opacity, &straight)
+                    part(opacity, &|w| self.scattered(at, inner, standing, w, depth)) + part(1.0 - opacity, &straight)
                 }
                 Composition::Blend { weight: second_share, first, second } => {
                     let share = share(second_share, x.at);
-                    part(1.0 - share, &|w| self.scattered(x, first, standing, w, depth))
-                        + part(share, &|w| self.scattered(x, second, standing, w, depth))
+                    part(1.0 - share, &|w| self.scattered(at, first, standing, w, depth))
+                        + part(share, &|w| self.scattered(at, second, standing, w, depth))
                 }
-                Composition::TwoSided { front, .. } if outside => self.scattered(x, front, standing, weight, depth),
+                Composition::TwoSided { front, .. } if outside => self.scattered(at, front, standing, weight, depth),
                 Composition::TwoSided { back, .. } => {
                     standing.mirror();
-                    self.scattered(x, back, standing, weight, depth)
+                    self.scattered(at, back, standing, weight, depth)
                 }
                 Composition::Relief { relief, inner } => {
                     standing.turn(relief, x);
-                    self.scattered(x, inner, standing, weight, depth)
+                    self.scattered(at, inner, standing, weight, depth)
                 }
             };
         }
@@ -133,7 +161,7 @@ impl Tracer<'_> {
         if !outside && !standing.is_mirrored() && !material.transmits() {
             return Lanes::ZERO;
         }
-        let seen = Seen { x, material, normal: standing.frame().n, slopes: standing.slopes() };
+        let seen = Seen { x, standpoint, material, normal: standing.frame().n, slopes: standing.slopes() };
         let mut light = self.shade(&seen);
         if depth < self.settings.max_depth {
             light += self.specular(&seen, weight, depth);
@@ -143,7 +171,7 @@ impl Tracer<'_> {
 
     /// Ambient light, and from each light the diffuse part and the highlight.
     fn shade(&self, seen: &Seen) -> Lanes {
-        let Seen { x: &Vertex { surface, hit, at, wo, .. }, material, normal, slopes } = *seen;
+        let Seen { x: &Vertex { surface, hit, at, wo, .. }, standpoint, material, normal, slopes } = *seen;
         let leave = |direction: DVec3| self.scene.leave(surface, hit, direction);
         let base = match &material.kind {
             Kind::Diffuse { reflectance } => reflectance.eval(at, self.nm),
@@ -177,7 +205,7 @@ impl Tracer<'_> {
             if cos <= 0.0 || wi.dot(surface.normal) * wo.dot(surface.normal) <= 0.0 {
                 continue;
             }
-            let through = self.unshadowed(&leave(wi), distance, target);
+            let through = self.unshadowed(&leave(wi), standpoint.here, distance, target);
             if !through.simd_gt(Lanes::ZERO).any() {
                 continue;
             }
@@ -213,7 +241,7 @@ impl Tracer<'_> {
     }
 
     /// One where nothing stands between; the tint of transparent surfaces where the scene asks for it.
-    fn unshadowed(&self, ray: &Ray, distance: f64, target: Option<Departure>) -> Lanes {
+    fn unshadowed(&self, ray: &Ray, mut inside: Inside, distance: f64, target: Option<Departure>) -> Lanes {
         let scene = self.scene;
         if !self.settings.transparent_shadows && !scene.has_boundaries {
             return if scene.occluded(ray, distance, target) { Lanes::ZERO } else { Lanes::ONE };
@@ -224,11 +252,16 @@ impl Tracer<'_> {
                 return through;
             };
             let surface = scene.surface(&ray, &hit);
-            let material = &scene.materials[scene.objects[hit.object as usize].material as usize];
+            let object = &scene.objects[hit.object as usize];
+            let material = &scene.materials[object.material as usize];
+            let crossing = scene.crossing(object, &surface, ray.direction, &inside.bodies);
+            inside = scene.beyond(object, &surface, ray.direction, inside);
             let cos = ray.direction.dot(surface.normal);
             match &material.kind {
                 Kind::Boundary => {}
+                _ if crossing.is_some_and(|crossing| !crossing.shows) => {}
                 Kind::Dielectric { interior, exterior, fresnel: model, .. } if self.settings.transparent_shadows => {
+                    let exterior = crossing.and_then(|crossing| crossing.around).unwrap_or(exterior);
                     let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive);
                     through *= index.lanes(|eta| {
                         let eta = if cos < 0.0 { eta } else { 1.0 / eta };
@@ -254,17 +287,17 @@ impl Tracer<'_> {
 
     /// Light from mirrors and through glass.
     fn specular(&self, seen: &Seen, weight: Lanes, depth: u32) -> Lanes {
-        let Seen { x: &Vertex { surface, hit, at, wo, .. }, material, normal, slopes } = *seen;
+        let Seen { x: &Vertex { surface, hit, at, wo, .. }, standpoint, material, normal, slopes } = *seen;
         let geometric = surface.normal;
         let leave = |direction: DVec3| self.scene.leave(surface, hit, direction);
         let frame = Frame::from_normal(normal);
         let local = frame.to_local(wo);
         let cos = local.z.abs();
-        let follow = |share: Lanes, wi: DVec3| -> Lanes {
+        let follow = |share: Lanes, wi: DVec3, inside: Inside| -> Lanes {
             let share = share * slopes.shadowing(wi) as f32;
             let onward = weight * share;
             if onward.simd_gt(Lanes::splat(FAINTEST)).any() {
-                self.trace(&leave(wi), onward, depth + 1).0 * share
+                self.trace(&leave(wi), inside, onward, depth + 1).0 * share
             } else {
                 Lanes::ZERO
             }
@@ -274,9 +307,11 @@ impl Tracer<'_> {
         let sides = |wi: DVec3| wi.dot(geometric) * wo.dot(geometric);
         let reflect = |share: Lanes| -> Lanes {
             let wi = frame.to_world(DVec3::new(-local.x, -local.y, local.z));
-            if sides(wi) > 0.0 { follow(share, wi) } else { Lanes::ZERO }
+            if sides(wi) > 0.0 { follow(share, wi, standpoint.here) } else { Lanes::ZERO }
         };
-        let cross = |share: Lanes, wi: DVec3| if sides(wi) < 0.0 { follow(share, wi) } else { Lanes::ZERO };
+        let cross = |share: Lanes, wi: DVec3| {
+            if sides(wi) < 0.0 { follow(share, wi, standpoint.beyond) } else { Lanes::ZERO }
+        };
         match &material.kind {
             Kind::Diffuse { .. } | Kind::Hair { .. } | Kind::Boundary | Kind::Compound(_) => Lanes::ZERO,
             Kind::Mirror { reflectance } => reflect(reflectance.eval(self.nm)),
@@ -314,6 +349,7 @@ impl Tracer<'_> {
             }
             Kind::Dielectric { interior, exterior, fresnel: model, tints, .. } => {
                 let tint = Tints::at(tints.as_deref(), at, self.nm);
+                let exterior = standpoint.around.unwrap_or(exterior);
                 let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive);
                 let m = DVec3::Z * local.z.signum();
                 let toward = |eta: f64| if local.z > 0.0 { eta } else { 1.0 / eta };

@@ -42,7 +42,7 @@ fn luminance(frame: &Frame) -> (f64, f64) {
     (mean, standard_error[1].iter().map(|e| f64::from(*e).powi(2)).sum::<f64>().sqrt() / n)
 }
 
-fn assert_agree(what: &str, a: &Frame, b: &Frame) {
+pub(super) fn assert_agree(what: &str, a: &Frame, b: &Frame) {
     let ((a, ea), (b, eb)) = (luminance(a), luminance(b));
     let z = (a - b) / ea.hypot(eb);
     assert!(z.abs() < 3.0 && ea < 0.02 * a, "{what}: {a} ± {ea} against {b} ± {eb}, z = {z:.1}");

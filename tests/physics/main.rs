@@ -14,6 +14,7 @@ mod furnace;
 mod glass;
 mod lights;
 mod media;
+mod nested;
 mod techniques;
 mod volumes;
 

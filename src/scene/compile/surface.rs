@@ -241,11 +241,14 @@ impl<'a> Compiler<'a> {
                 // Without a difference of index there is no interface, however rough: light goes on, and
                 // casts no shadow.
                 match (&interior, &exterior) {
-                    (RefractiveIndex::Constant(a), RefractiveIndex::Constant(b)) if a == b && tints.is_none() => {
+                    (RefractiveIndex::Constant(a), RefractiveIndex::Constant(b))
+                        if a == b && tints.is_none() && m.priority.is_none() =>
+                    {
                         plain(Kind::Boundary)
                     }
                     _ => {
-                        let kind = Kind::Dielectric { interior, exterior, fresnel: model(m.fresnel), facets, tints };
+                        let (fresnel, priority) = (model(m.fresnel), m.priority);
+                        let kind = Kind::Dielectric { interior, exterior, fresnel, facets, tints, priority };
                         (kind, false, m.highlight)
                     }
                 }

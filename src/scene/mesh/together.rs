@@ -131,6 +131,7 @@ mod tests {
             outside: None,
             keeps_medium: false,
             flipped: false,
+            body: 0,
         }
     }
 

@@ -15,6 +15,12 @@ pub struct Plane {
 }
 
 impl Plane {
+    /// How far `point` lies on the side of the normal, metres.
+    #[must_use]
+    pub fn height(&self, point: DVec3) -> f64 {
+        (point - self.point).dot(self.frame.n)
+    }
+
     /// A plane; u runs along `tangent` made perpendicular to `normal`. A zero `tangent` leaves
     /// the choice open.
     ///

@@ -216,6 +216,7 @@ fn plain_shortfall(material: &Material) -> Option<String> {
         Material::Dielectric(m) => highlight(m.highlight.is_some())
             .or(schlick(m.fresnel))
             .or(dispersive(&m.ior, &m.exterior_ior))
+            .or(m.priority.map(|_| "no priority: in Mitsuba bodies that overlap are wrong".to_owned()))
             .or(spectra(&[&m.reflection_tint, &m.transmission_tint])),
         Material::ThinDielectric(m) => {
             dispersive(&m.ior, &m.exterior_ior).or(spectra(&[&m.reflection_tint, &m.transmission_tint]))

@@ -1,0 +1,289 @@
+//! Bodies that overlap: which of them a point belongs to.
+//!
+//! A glass of water is two bodies whose surfaces should share a place, which rounding does not let them: a film of air
+//! or of neither would lie between. So bodies overlap, and where they do the one of higher priority has the space
+//! (Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images"). A path keeps the list of the bodies that
+//! it is in. Of a surface that it meets it asks who is the strongest of the *other* bodies there: if that is stronger
+//! than the surface's own body, nothing changes at the surface, and the path goes straight through; else light passes
+//! between the two, by the ratio of their indices.
+//!
+//! Bodies are ranked by priority; of equal ones that comes first that was written first. Parts of one body that overlap,
+//! and copies of one, are one body: the list counts how often the path is in it.
+
+use super::bvh::Aabb;
+use super::{Geometry, Object, Scene, SurfacePoint};
+use crate::math::Ray;
+use crate::scene::shape::Shape;
+use crate::spectrum::RefractiveIndex;
+use glam::DVec3;
+
+/// Bodies that a path is in at one time; of more the weakest are forgotten.
+const MOST: usize = 8;
+
+/// Surfaces that are counted to find out what a point is in.
+const MOST_SURFACES: u32 = 1 << 16;
+
+/// A body with a priority.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// The object that it is.
+    pub object: u32,
+    /// Its priority.
+    pub priority: i32,
+    /// Its index.
+    pub index: RefractiveIndex,
+    /// The medium within.
+    pub medium: Option<u32>,
+    /// Bodies of one kind have the same index, and between them light notices nothing; 0 is empty space, and none for
+    /// a body whose surface shows by more than its index.
+    kind: Option<u32>,
+}
+
+/// The bodies of a scene, from the weakest to the strongest.
+#[derive(Clone, Debug, Default)]
+pub struct Nested {
+    bodies: Vec<Body>,
+    /// Around all of them.
+    bounds: Option<Aabb>,
+}
+
+/// The bodies that a point is in: their ranks from 1, the strongest first; 0 for none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Bodies([u32; MOST]);
+
+/// What a path is in.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Inside {
+    /// The medium.
+    pub medium: Option<u32>,
+    /// The bodies with a priority.
+    pub bodies: Bodies,
+}
+
+/// How a path meets the surface of a body.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossing<'a> {
+    /// Whether light notices the surface.
+    pub shows: bool,
+    /// The index on the outside; that of the material itself for none.
+    pub around: Option<&'a RefractiveIndex>,
+    /// The bodies on the side from where the path comes.
+    pub here: Bodies,
+}
+
+impl Bodies {
+    /// None.
+    pub const NONE: Bodies = Bodies([0; MOST]);
+
+    /// The rank of the strongest; 0 for none.
+    #[must_use]
+    pub fn strongest(&self) -> u32 {
+        self.0[0]
+    }
+
+    /// With one more.
+    #[must_use]
+    fn with(&self, rank: u32) -> Bodies {
+        let mut all = self.0;
+        let mut carried = rank;
+        for place in &mut all {
+            if *place < carried {
+                std::mem::swap(place, &mut carried);
+            }
+        }
+        Bodies(all)
+    }
+
+    /// With one less, if it is among them.
+    #[must_use]
+    fn without(&self, rank: u32) -> Bodies {
+        let Some(at) = self.0.iter().position(|r| *r == rank) else { return *self };
+        let mut all = self.0;
+        all.copy_within(at + 1.., at);
+        all[MOST - 1] = 0;
+        Bodies(all)
+    }
+}
+
+impl Nested {
+    /// Ranks the bodies of `objects`, of which the first `alone` stand in the scene itself. `of` tells an object's
+    /// priority, its index, and whether its surface shows by more than that.
+    pub(super) fn of(
+        objects: &mut [Object],
+        alone: usize,
+        of: impl Fn(&Object) -> Option<(i32, RefractiveIndex, bool)>,
+    ) -> Nested {
+        let found = objects.iter().zip(0u32..).filter_map(|(o, i)| of(o).map(|(p, index, shows)| (p, i, index, shows)));
+        let mut all: Vec<(i32, u32, RefractiveIndex, bool)> = found.collect();
+        all.sort_by_key(|(priority, object, ..)| (*priority, std::cmp::Reverse(*object)));
+        let mut kinds = vec![RefractiveIndex::Constant(1.0)];
+        let mut nested = Nested::default();
+        for ((priority, object, index, shows), rank) in all.into_iter().zip(1..) {
+            let kind = (!shows).then(|| {
+                let known = kinds.iter().position(|kind| *kind == index);
+                known.unwrap_or_else(|| {
+                    kinds.push(index.clone());
+                    kinds.len() - 1
+                }) as u32
+            });
+            let owner = &mut objects[object as usize];
+            owner.body = rank;
+            nested.bodies.push(Body { object, priority, index, medium: owner.inside, kind });
+        }
+        let holds = |object: &Object| match &object.geometry {
+            Geometry::Instance(instance) => {
+                let first = instance.group.first as usize;
+                objects[first..first + instance.group.bvh.order().len()].iter().any(|child| child.body != 0)
+            }
+            _ => object.body != 0,
+        };
+        let boxes = objects[..alone].iter().filter(|object| holds(object)).map(Object::bounds);
+        nested.bounds = boxes.reduce(|a, b| a.union(&b));
+        nested
+    }
+
+    /// The bodies, from the weakest to the strongest.
+    #[must_use]
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    fn body(&self, rank: u32) -> Option<&Body> {
+        self.bodies.get((rank as usize).wrapping_sub(1))
+    }
+
+    fn kind(&self, rank: u32) -> Option<u32> {
+        self.body(rank).map_or(Some(0), |body| body.kind)
+    }
+}
+
+impl Scene {
+    /// How a path that is in `bodies` meets `object` in `direction`; `None` where that is no body with a priority.
+    #[must_use]
+    pub fn crossing(
+        &self,
+        object: &Object,
+        surface: &SurfacePoint,
+        direction: DVec3,
+        bodies: &Bodies,
+    ) -> Option<Crossing<'_>> {
+        let rank = object.body;
+        if rank == 0 {
+            return None;
+        }
+        let entering = direction.dot(surface.normal) < 0.0;
+        let others = if entering { *bodies } else { bodies.without(rank) };
+        let around = others.strongest();
+        let same = self.nested.kind(rank).is_some_and(|kind| Some(kind) == self.nested.kind(around));
+        Some(Crossing {
+            shows: rank > around && !same,
+            around: self.nested.body(around).map(|body| &body.index),
+            here: if entering { others } else { others.with(rank) },
+        })
+    }
+
+    /// What a path is in beyond the surface of `object`, which it crosses in `direction`.
+    #[must_use]
+    pub fn beyond(&self, object: &Object, surface: &SurfacePoint, direction: DVec3, before: Inside) -> Inside {
+        let rank = object.body;
+        if rank == 0 {
+            return Inside { medium: object.beyond(surface, direction, before.medium), ..before };
+        }
+        let entering = direction.dot(surface.normal) < 0.0;
+        let others = if entering { before.bodies } else { before.bodies.without(rank) };
+        let around = others.strongest();
+        let bodies = if entering { others.with(rank) } else { others };
+        // Behind a surface that is not there the medium stays, whatever it is.
+        let medium = match self.nested.body(if entering { rank } else { around }) {
+            _ if rank <= around => before.medium,
+            Some(body) => body.medium,
+            None => object.beyond(surface, direction, before.medium),
+        };
+        Inside { medium, bodies }
+    }
+
+    /// The bodies that hold `origin` of a ray.
+    ///
+    /// Whoever leaves a body once more often than it enters it on its way out to infinity has begun inside. A plane is
+    /// left on one side only, and is asked itself.
+    #[must_use]
+    pub fn bodies_around(&self, origin: &Ray) -> Bodies {
+        let point = origin.origin;
+        let near = self.nested.bounds.is_some_and(|b| point.cmpge(b.min).all() && point.cmple(b.max).all());
+        if !near {
+            return Bodies::NONE;
+        }
+        // Along no axis, face or diagonal that a person would write.
+        let direction = DVec3::new(0.359_814_2, 0.771_356_8, 0.525_127_9).normalize();
+        let mut ray = Ray { direction, ..*origin };
+        let mut depths = vec![0i64; self.nested.bodies.len()];
+        for _ in 0..MOST_SURFACES {
+            let Some(hit) = self.closest(&ray, f64::INFINITY) else { break };
+            let surface = self.surface(&ray, &hit);
+            let rank = self.objects[hit.object as usize].body;
+            if rank != 0 {
+                depths[rank as usize - 1] += if direction.dot(surface.normal) > 0.0 { 1 } else { -1 };
+            }
+            ray = self.leave(&surface, &hit, direction);
+        }
+        let mut bodies = Bodies::NONE;
+        for ((body, depth), rank) in self.nested.bodies.iter().zip(depths).zip(1..) {
+            let times = match &self.objects[body.object as usize].geometry {
+                Geometry::Shape(Shape::Plane(plane)) => i64::from(plane.height(point) < 0.0),
+                _ => depth,
+            };
+            bodies = (0..times.min(MOST as i64)).fold(bodies, |bodies, _| bodies.with(rank));
+        }
+        bodies
+    }
+
+    /// What a path is in that begins in `bodies`, where there is `otherwise` in none of them.
+    #[must_use]
+    pub fn inside(&self, bodies: Bodies, otherwise: Option<u32>) -> Inside {
+        let medium = self.nested.body(bodies.strongest()).map_or(otherwise, |body| body.medium);
+        Inside { medium, bodies }
+    }
+
+    /// True where light may go straight through an object.
+    #[must_use]
+    pub fn lets_through(&self, object: u32) -> bool {
+        let object = &self.objects[object as usize];
+        object.body != 0 || self.materials[object.material as usize].lets_through()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The list is the sorted multiset of what was put in and not taken out: against a plain list, for 10,000 random
+    /// steps among twelve bodies, of which it may hold eight.
+    #[test]
+    fn the_list_holds_the_eight_strongest_of_what_a_path_is_in() {
+        let mut random = crate::scene::shape::testing::Random::new(3);
+        let (mut list, mut plain): (Bodies, Vec<u32>) = (Bodies::NONE, Vec::new());
+        for _ in 0..10_000 {
+            let rank = 1 + (random.uniform() * 12.0) as u32;
+            let at = plain.iter().position(|r| *r == rank);
+            match at {
+                Some(at) if random.uniform() < 0.6 => {
+                    plain.remove(at);
+                    list = list.without(rank);
+                }
+                _ if plain.len() < MOST => {
+                    plain.push(rank);
+                    list = list.with(rank);
+                }
+                _ => assert_eq!(list.with(0), list),
+            }
+            plain.sort_by_key(|r| std::cmp::Reverse(*r));
+            let kept: Vec<u32> = list.0.iter().copied().filter(|r| *r != 0).collect();
+            assert_eq!(kept, plain);
+            assert_eq!(list.strongest(), plain.first().copied().unwrap_or(0));
+        }
+        // A ninth drives out the weakest.
+        let many = (1..=9).fold(Bodies::NONE, |bodies, rank| bodies.with(rank));
+        assert_eq!(many.0, [9, 8, 7, 6, 5, 4, 3, 2]);
+        assert_eq!(many.without(1), many);
+    }
+}
