@@ -178,6 +178,7 @@ impl SceneReport {
 
     /// Notes what is to be rendered.
     pub fn describe(&mut self, prepared: &Prepared, loading: Duration) {
+        self.notes.extend(prepared.scene.notes.iter().cloned());
         self.integrator = match prepared.plan.integrator {
             Integrator::Path(_) => "path",
             Integrator::Whitted(_) => "whitted",

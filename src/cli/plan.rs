@@ -34,6 +34,9 @@ pub fn run(arguments: &PlanArguments) -> Result<i32> {
                         let _ = writeln!(text, "    {state}  {:width$}  {}", effect.name, effect.reason);
                     }
                 }
+                for note in &prepared.scene.notes {
+                    let _ = writeln!(text, "  note: {note}");
+                }
                 let _ = writeln!(text, "  wavelengths: {}\n", prepared.scene.wavelengths.describe());
                 super::say(&text);
             }
@@ -43,6 +46,7 @@ pub fn run(arguments: &PlanArguments) -> Result<i32> {
                 "samples": prepared.samples,
                 "effects": prepared.plan.effects,
                 "techniques": prepared.plan.techniques,
+                "notes": prepared.scene.notes,
                 "wavelengths": prepared.scene.wavelengths.describe(),
             })),
         }

@@ -38,6 +38,11 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     if !arguments.quiet && style != ProgressStyle::Json {
         super::say(&table(&report));
     }
+    if arguments.quiet || style == ProgressStyle::Json {
+        for (scene, note) in report.scenes.iter().flat_map(|s| s.notes.iter().map(move |note| (s, note))) {
+            super::complain(&format!("note: {}: {note}", scene.name));
+        }
+    }
     for scene in &report.scenes {
         if let Status::Failed { message, .. } = &scene.status {
             for line in message.lines() {

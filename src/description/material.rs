@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use super::coating::{Film, Thickness};
 use super::compound::{Blend, Bump, Mask, NormalMap, Roughness, TwoSided};
 use super::fault::Checker;
 use super::hair::Hair;
@@ -97,6 +98,8 @@ pub struct Conductor {
     pub distribution: Distribution,
     /// Fresnel's equations or Schlick's approximation; default `exact`.
     pub fresnel: Fresnel,
+    /// A thin film on it; default none.
+    pub film: Option<Film>,
     /// Highlight of the `whitted` integrator; default none.
     pub highlight: Option<Highlight>,
     /// Whether the back reflects like the front; default true.
@@ -131,6 +134,7 @@ struct WrittenConductor {
     distribution: Distribution,
     #[serde(default)]
     fresnel: Fresnel,
+    film: Option<Film>,
     highlight: Option<Highlight>,
     #[serde(default = "yes")]
     two_sided: bool,
@@ -154,6 +158,7 @@ impl TryFrom<WrittenConductor> for Conductor {
             roughness: written.roughness,
             distribution: written.distribution,
             fresnel: written.fresnel,
+            film: written.film,
             highlight: written.highlight,
             two_sided: written.two_sided,
         })
@@ -203,6 +208,8 @@ pub struct Dielectric {
     pub transmission_tint: SpectrumOrTexture,
     /// Which of two bodies has the place where they overlap: that of the higher one; default none.
     pub priority: Option<i32>,
+    /// A thin film on it; default none.
+    pub film: Option<Film>,
     /// Highlight of the `whitted` integrator; default none.
     pub highlight: Option<Highlight>,
 }
@@ -216,6 +223,8 @@ pub struct ThinDielectric {
     /// Index around it; default 1.
     #[serde(default = "vacuum")]
     pub exterior_ior: Index,
+    /// Thickness, nm, where it is so small that light reflected by the two faces interferes; default none.
+    pub thickness_nm: Option<Thickness>,
     /// Factor on the reflection; default 1.
     #[serde(default = "unit")]
     pub reflection_tint: SpectrumOrTexture,
@@ -417,6 +426,7 @@ impl Material {
                 }
                 conductor.tint.check(Role::Reflectance, at.key("tint"), checker);
                 conductor.roughness.check(at.key("roughness"), checker);
+                check_film(conductor.film.as_ref(), conductor.fresnel, at, checker);
                 check_highlight(conductor.highlight, at, checker);
             }
             Material::Mirror(mirror) => {
@@ -429,6 +439,7 @@ impl Material {
                 dielectric.roughness.check(at.key("roughness"), checker);
                 dielectric.reflection_tint.check(Role::Reflectance, at.key("reflection_tint"), checker);
                 dielectric.transmission_tint.check(Role::Reflectance, at.key("transmission_tint"), checker);
+                check_film(dielectric.film.as_ref(), dielectric.fresnel, at, checker);
                 let alone = dielectric.priority.is_none() || dielectric.exterior_ior == vacuum();
                 let expected = "none beside priority: the index outside is that of the body around";
                 checker.require(alone, at.key("exterior_ior"), expected, "one");
@@ -437,6 +448,9 @@ impl Material {
             Material::ThinDielectric(sheet) => {
                 sheet.ior.check(at.key("ior"), checker);
                 sheet.exterior_ior.check(at.key("exterior_ior"), checker);
+                if let Some(thickness) = &sheet.thickness_nm {
+                    thickness.check(at.key("thickness_nm"), checker);
+                }
                 sheet.reflection_tint.check(Role::Reflectance, at.key("reflection_tint"), checker);
                 sheet.transmission_tint.check(Role::Reflectance, at.key("transmission_tint"), checker);
             }
@@ -458,6 +472,14 @@ impl Material {
             Material::Bump(bump) => bump.check(at, checker),
             Material::NormalMap(map) => map.check(at, checker),
         }
+    }
+}
+
+/// A film counts by Fresnel's equations.
+fn check_film<'a>(film: Option<&'a Film>, fresnel: Fresnel, at: At<'_>, checker: &mut Checker<'a>) {
+    if let Some(film) = film {
+        film.check(at.key("film"), checker);
+        checker.require(fresnel == Fresnel::Exact, at.key("fresnel"), "exact under a film", "schlick");
     }
 }
 

@@ -100,7 +100,7 @@
 //!                                                # {u: 0.1, v: 0.3} of these: along ∂p/∂u and across
 //!       distribution: ggx                        # ~ ggx, beckmann
 //!       fresnel: exact                           # ~ exact, schlick
-//!                                                # and highlight, two_sided
+//!       film: {ior: 2.5, thickness_nm: 45}       # ~ none; a thin film, see below; and highlight, two_sided
 //!   silvered: {mirror: {reflectance: 0.9}}       # ~ and highlight
 //!   flint:
 //!     dielectric:
@@ -108,8 +108,9 @@
 //!       exterior_ior: 1                          # ~ and roughness, distribution, fresnel, highlight
 //!       reflection_tint: 1                       # ~ factors, or textures
 //!       transmission_tint: 1
-//!       priority: 2                              # ~ none; see below
-//!   pane: {thin_dielectric: {ior: 1.5, exterior_ior: 1}}             # and both tints
+//!       priority: 2                              # ~ none; see below; and film
+//!   pane: {thin_dielectric: {ior: 1.5, exterior_ior: 1}}             # and both tints; thickness_nm: ~ none; with one
+//!                                                # the sheet is a film that stands free: a soap bubble
 //!   lacquer: {plastic: {reflectance: 0.5, ior: 1.5, exterior_ior: 1, roughness: 0, tint: 1}}
 //!                                                # ~ and nonlinear: false, distribution, highlight, two_sided;
 //!                                                # roughness is a number;
@@ -247,6 +248,10 @@
 //! all that is behind it; its `exterior_ior` is not written; up to eight may share a place. The camera and lamps may be
 //! inside.
 //!
+//! A `film` lies on the side of the normal, between what is there and the material; light from its two faces interferes,
+//! at each wavelength. Its thickness is a number, or follows a texture of numbers: `{texture: name, from: 100, to: 800}`,
+//! nm where they are 0 and 1; ~ 0 and 1, for a texture of nanometres.
+//!
 //! # Spectra
 //! ```yaml
 //! # spectra
@@ -307,6 +312,7 @@
 
 mod batch;
 mod camera;
+mod coating;
 mod compound;
 mod decode;
 mod edit;
@@ -333,6 +339,7 @@ mod yaml;
 
 pub use batch::{Batch, BatchEntry, Document, load};
 pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection};
+pub use coating::{Film, TexturedThickness, Thickness};
 pub use compound::{Blend, Brushed, Bump, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided};
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, Growth, ProjectorLight};
 pub use hair::{Hair, HairColour};

@@ -279,6 +279,7 @@ mod tests {
                 roughness: Roughness::Number(0.0),
                 distribution: Distribution::Ggx,
                 fresnel: Fresnel::Exact,
+                film: Some(Film { ior: Index::Number(2.5), thickness_nm: Thickness::Number(45.0) }),
                 highlight: None,
                 two_sided: true,
             })
@@ -293,6 +294,7 @@ mod tests {
                 reflection_tint: one_of(1.0),
                 transmission_tint: one_of(1.0),
                 priority: Some(2),
+                film: None,
                 distribution: Distribution::Ggx,
                 fresnel: Fresnel::Exact,
                 highlight: None,
@@ -303,6 +305,7 @@ mod tests {
             Material::ThinDielectric(ThinDielectric {
                 ior: Index::Number(1.5),
                 exterior_ior: Index::Number(1.0),
+                thickness_nm: None,
                 reflection_tint: one_of(1.0),
                 transmission_tint: one_of(1.0),
             })

@@ -7,6 +7,7 @@ use super::mean;
 use super::microfacet::{Microfacets, Terms};
 use super::plastic::{Plastic, RoughPlastic};
 use super::principled::{Principled, PrincipledThin};
+use super::thin_film::{self, ThinFilm};
 use crate::math::warp;
 use crate::spectrum::{LANES, Lanes};
 use glam::{DVec2, DVec3};
@@ -37,6 +38,9 @@ pub enum Bsdf<'a> {
     Thin {
         /// Index of the pane over the index around it.
         eta: RelativeIndex,
+        /// Its thickness over the wavelength around it, where that is so small that light reflected by its faces
+        /// interferes.
+        thickness: Option<Lanes>,
         /// Factors beside Fresnel's.
         tint: Tint,
     },
@@ -65,11 +69,16 @@ pub struct Metal {
     pub tint: Lanes,
     /// Which Fresnel formula.
     pub fresnel: Model,
+    /// A film on it.
+    pub film: Option<ThinFilm>,
 }
 
 impl Metal {
-    fn reflectance(&self, cos: f64) -> Lanes {
-        fresnel::conductor(self.fresnel, cos, self.eta, self.k) * self.tint
+    /// What is reflected at |cos θ| = `cos`.
+    #[must_use]
+    pub fn reflectance(&self, cos: f64) -> Lanes {
+        let plain = || fresnel::conductor(self.fresnel, cos, self.eta, self.k);
+        self.film.as_ref().map_or_else(plain, |film| film.over_metal(cos, self.eta, self.k)) * self.tint
     }
 }
 
@@ -134,9 +143,16 @@ pub struct Pane {
 
 impl Pane {
     /// The pane of relative index `eta` at |cos θ| = `cos`. It reflects the series of reflections inside,
-    /// R + T²R + T²R³ + … = 2R/(1 + R), and lets T/(1 + R) through.
+    /// R + T²R + T²R³ + … = 2R/(1 + R), and lets T/(1 + R) through. With a `thickness` in wavelengths the reflections
+    /// are added by amplitude: a film that stands free.
     #[must_use]
-    pub fn new(cos: f64, eta: &RelativeIndex) -> Pane {
+    pub fn new(cos: f64, eta: &RelativeIndex, thickness: Option<Lanes>) -> Pane {
+        if let Some(thickness) = thickness {
+            let thickness = thickness.to_array();
+            let eta = eta.each();
+            let film = |k: usize| thin_film::reflectance(cos, eta[k], f64::from(thickness[k]), 1.0, 0.0);
+            return Pane::of(std::array::from_fn(|k| 1.0 - film(k)));
+        }
         let through = |eta| {
             let split = fresnel::dielectric(Model::Exact, cos, eta);
             split.transmitted / (1.0 + split.reflected)
@@ -145,16 +161,18 @@ impl Pane {
             RelativeIndex::Constant(eta) => {
                 Pane { share: through(*eta), transmitted: Lanes::ONE, reflected: Lanes::ONE }
             }
-            RelativeIndex::Dispersive(eta) => {
-                let shares = eta.map(through);
-                let share = shares.iter().sum::<f64>() / LANES as f64;
-                // Nothing is chosen with probability zero.
-                let over = |sum: f64, part: [f64; LANES]| {
-                    if sum > 0.0 { Lanes::new(part.map(|p| (p / sum) as f32)) } else { Lanes::ZERO }
-                };
-                Pane { share, transmitted: over(share, shares), reflected: over(1.0 - share, shares.map(|s| 1.0 - s)) }
-            }
+            RelativeIndex::Dispersive(eta) => Pane::of(eta.map(through)),
         }
+    }
+
+    /// The pane that lets `shares` through.
+    fn of(shares: [f64; LANES]) -> Pane {
+        let share = shares.iter().sum::<f64>() / LANES as f64;
+        // Nothing is chosen with probability zero.
+        let over = |sum: f64, part: [f64; LANES]| {
+            if sum > 0.0 { Lanes::new(part.map(|p| (p / sum) as f32)) } else { Lanes::ZERO }
+        };
+        Pane { share, transmitted: over(share, shares), reflected: over(1.0 - share, shares.map(|s| 1.0 - s)) }
     }
 }
 
@@ -238,8 +256,8 @@ impl Bsdf<'_> {
             }
             Bsdf::Dielectric(glass) => glass.sample(wo, u_lobe),
             Bsdf::RoughDielectric(glass) => glass.sample(wo, u_lobe, u),
-            Bsdf::Thin { eta, tint } => {
-                let pane = Pane::new(wo.z.abs(), eta);
+            Bsdf::Thin { eta, thickness, tint } => {
+                let pane = Pane::new(wo.z.abs(), eta, *thickness);
                 Some(if u_lobe < 1.0 - pane.share {
                     BsdfSample::discrete(mirror(wo), pane.reflected * tint.reflected)
                 } else {

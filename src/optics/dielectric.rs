@@ -8,6 +8,7 @@
 use super::bsdf::{BsdfSample, Chosen, Evaluation, from_evaluation, mirror};
 use super::fresnel::{self, Model, Split};
 use super::microfacet::{Microfacets, Terms};
+use super::thin_film::ThinFilm;
 use crate::spectrum::{LANES, Lanes};
 use glam::{DVec2, DVec3};
 
@@ -30,6 +31,15 @@ impl RelativeIndex {
         }
     }
 
+    /// Each lane's.
+    #[must_use]
+    pub fn each(&self) -> [f64; LANES] {
+        match self {
+            RelativeIndex::Constant(eta) => [*eta; LANES],
+            RelativeIndex::Dispersive(eta) => *eta,
+        }
+    }
+
     /// `f` of each lane's index; once where all are the same.
     pub fn lanes(&self, f: impl Fn(f64) -> f64) -> Lanes {
         match self {
@@ -48,6 +58,8 @@ pub struct Dielectric {
     pub fresnel: Model,
     /// Factors beside Fresnel's.
     pub tint: Tint,
+    /// A film on it.
+    pub film: Option<ThinFilm>,
 }
 
 /// Factors on what an interface reflects and transmits; one for physical glass.
@@ -93,7 +105,8 @@ impl Dielectric {
         };
         let only = |x: Lanes| Lanes::splat(x.to_array()[lane]);
         let tint = Tint { reflected: only(self.tint.reflected), transmitted: only(self.tint.transmitted) };
-        Dielectric { eta: RelativeIndex::Constant(eta), tint, ..*self }
+        let film = self.film.as_ref().map(|film| film.lane(lane));
+        Dielectric { eta: RelativeIndex::Constant(eta), tint, film, ..*self }
     }
 
     /// The reflection, where `u_lobe` has every wavelength reflected that decides for itself.
@@ -104,14 +117,59 @@ impl Dielectric {
             u_lobe < fresnel::dielectric(self.fresnel, wo.z.abs(), toward).reflected
         };
         let all = match self.eta {
+            _ if self.film.is_some() => self.film_reflects(wo).is_some_and(|r| r.into_iter().all(|r| u_lobe < r)),
             RelativeIndex::Constant(eta) => reflects(eta),
             RelativeIndex::Dispersive(eta) => eta.into_iter().all(reflects),
         };
         all.then(|| BsdfSample::discrete(mirror(wo), self.tint.reflected))
     }
 
+    /// What each lane has reflected by the film; `None` where there is none.
+    fn film_reflects(&self, wo: DVec3) -> Option<[f64; LANES]> {
+        self.film.as_ref().map(|film| film.over_dielectric(wo.z.abs(), self.eta.each(), wo.z > 0.0))
+    }
+
+    /// The same with a film, whose reflectance depends on the wavelength even where the index does not. Where all
+    /// wavelengths go the same two ways they are chosen by the mean, so that none leads.
+    fn sample_filmed(&self, reflected: [f64; LANES], wo: DVec3, u_lobe: f64) -> Option<BsdfSample> {
+        let eta = if wo.z > 0.0 { self.eta.hero() } else { 1.0 / self.eta.hero() };
+        let (share, same) = match self.eta {
+            RelativeIndex::Constant(_) => (reflected.iter().sum::<f64>() / LANES as f64, None),
+            RelativeIndex::Dispersive(all) => (reflected[0], Some(all.map(|e| e == all[0]))),
+        };
+        let over = |part: [f64; LANES], share: f64| Lanes::new(part.map(|p| (p / share) as f32));
+        if u_lobe < share {
+            let weight = over(reflected, share);
+            let ratio = if same.is_some() { weight } else { Lanes::ONE };
+            return Some(BsdfSample { ratio, ..BsdfSample::discrete(mirror(wo), weight * self.tint.reflected) });
+        }
+        let split = fresnel::dielectric(Model::Exact, wo.z.abs(), eta);
+        // All is reflected but for rounding.
+        if split.transmitted == 0.0 || share >= 1.0 {
+            return None;
+        }
+        let wi = refract(wo, DVec3::Z * wo.z.signum(), eta, split.cos_transmitted);
+        let mut transmitted = reflected.map(|r| 1.0 - r);
+        if let Some(same) = same {
+            transmitted = std::array::from_fn(|k| if same[k] { transmitted[k] } else { 0.0 });
+        }
+        let weight = over(transmitted, 1.0 - share);
+        let eta2 = eta * eta;
+        Some(BsdfSample {
+            wi,
+            weight: weight * (1.0 / eta2) as f32 * self.tint.transmitted,
+            ratio: if same.is_some() { weight } else { Lanes::ONE },
+            chosen: Chosen::Discrete,
+            transmitted: true,
+            eta2,
+        })
+    }
+
     /// Reflects with the hero's reflectance, else refracts.
     pub(super) fn sample(&self, wo: DVec3, u_lobe: f64) -> Option<BsdfSample> {
+        if let Some(reflected) = self.film_reflects(wo) {
+            return self.sample_filmed(reflected, wo, u_lobe);
+        }
         let cos = wo.z.abs();
         let toward = |eta: f64| if wo.z > 0.0 { eta } else { 1.0 / eta };
         let eta = toward(self.eta.hero());
@@ -153,6 +211,8 @@ pub struct RoughDielectric {
     pub facets: Microfacets,
     /// Factors beside Fresnel's.
     pub tint: Tint,
+    /// A film on each facet.
+    pub film: Option<ThinFilm>,
 }
 
 impl RoughDielectric {
@@ -170,18 +230,25 @@ impl RoughDielectric {
         }
         let eta = if side > 0.0 { self.eta.hero() } else { 1.0 / self.eta.hero() };
         let split = fresnel::dielectric(Model::Exact, cos, eta);
-        let (wi, transmitted) = if u_lobe < split.reflected {
+        // With a film as on a smooth interface: by the mean where none leads, else by the hero's.
+        let share = match (&self.film, self.eta) {
+            (None, _) => split.reflected,
+            (Some(film), RelativeIndex::Constant(eta)) => mean_of(film.over_dielectric(cos, [eta; LANES], side > 0.0)),
+            (Some(film), RelativeIndex::Dispersive(all)) => film.of_lane(0, cos, all[0], side > 0.0),
+        };
+        let (wi, transmitted) = if u_lobe < share {
             (m * (2.0 * cos) - wo, false)
         } else {
             (refract(wo, m, eta, split.cos_transmitted), true)
         };
-        if (wi.z * side > 0.0) == transmitted {
+        // Behind a film rounding may find a way where there is none.
+        if (wi.z * side > 0.0) == transmitted || transmitted && split.transmitted == 0.0 {
             return None;
         }
         let eta2 = if transmitted { eta * eta } else { 1.0 };
         let evaluation = match self.eta {
             // The facet is known, and what it reflects.
-            RelativeIndex::Constant(_) => {
+            RelativeIndex::Constant(_) if self.film.is_none() => {
                 let tint = if transmitted { self.tint.transmitted } else { self.tint.reflected };
                 let (f, pdf) = by_facet(
                     &self.facets,
@@ -193,7 +260,7 @@ impl RoughDielectric {
                 );
                 Evaluation { f: tint * f as f32, pdf: Lanes::splat(pdf as f32) }
             }
-            RelativeIndex::Dispersive(_) => self.eval(wo, wi),
+            _ => self.eval(wo, wi),
         };
         from_evaluation(wi, wi.z.abs(), evaluation, transmitted, eta2)
     }
@@ -207,6 +274,9 @@ impl RoughDielectric {
         let side = wo.z.signum();
         let flip = DVec3::new(1.0, 1.0, side);
         let (wo, wi) = (wo * flip, wi * flip);
+        if let Some(film) = &self.film {
+            return self.eval_filmed(film, wo, wi, side > 0.0, tint);
+        }
         let one = |eta: f64| one(&self.facets, wo, wi, if side > 0.0 { eta } else { 1.0 / eta });
         match self.eta {
             RelativeIndex::Constant(eta) => {
@@ -224,18 +294,56 @@ impl RoughDielectric {
     }
 }
 
+fn mean_of(x: [f64; LANES]) -> f64 {
+    x.iter().sum::<f64>() / LANES as f64
+}
+
+impl RoughDielectric {
+    /// f and the densities with a film, seen from a side where `wo` has z > 0.
+    fn eval_filmed(&self, film: &ThinFilm, wo: DVec3, wi: DVec3, front: bool, tint: Lanes) -> Evaluation {
+        // Of facets that do all of what is asked for; the film then divides light.
+        const WHOLE: Split = Split { reflected: 1.0, transmitted: 1.0, cos_transmitted: 0.0 };
+        let reflect = wi.z > 0.0;
+        let parts = |reflected: [f64; LANES]| if reflect { reflected } else { reflected.map(|r| 1.0 - r) };
+        let whole = |eta: f64| facet(wo, wi, eta).map(|m| (m, by_facet(&self.facets, wo, wi, m, &WHOLE, eta)));
+        let lanes = |x: [f64; LANES]| Lanes::new(x.map(|x| x as f32));
+        match self.eta {
+            RelativeIndex::Constant(eta) => {
+                let Some((m, (f, pdf))) = whole(if front { eta } else { 1.0 / eta }) else { return Evaluation::NONE };
+                let parts = parts(film.over_dielectric(wo.dot(m), [eta; LANES], front));
+                Evaluation {
+                    f: lanes(parts.map(|part| f * part)) * tint,
+                    pdf: Lanes::splat((pdf * mean_of(parts)) as f32),
+                }
+            }
+            RelativeIndex::Dispersive(all) => {
+                let each: [(f64, f64); LANES] = std::array::from_fn(|k| {
+                    let found = whole(if front { all[k] } else { 1.0 / all[k] });
+                    found.map_or((0.0, 0.0), |(m, (f, pdf))| {
+                        let reflected = film.of_lane(k, wo.dot(m), all[k], front);
+                        let part = if reflect { reflected } else { 1.0 - reflected };
+                        (f * part, pdf * part)
+                    })
+                });
+                Evaluation { f: lanes(each.map(|e| e.0)) * tint, pdf: lanes(each.map(|e| e.1)) }
+            }
+        }
+    }
+}
+
+/// The facet that leads from `wi` to `wo` (z > 0), on the side of `wo`, where there is one.
+fn facet(wo: DVec3, wi: DVec3, eta: f64) -> Option<DVec3> {
+    let reflect = wi.z > 0.0;
+    // The half vector; for refraction of the two directions scaled by their indices (eq. 16).
+    let m = (if reflect { wo + wi } else { wo + wi * eta }).try_normalize()?;
+    let m = m * m.z.signum();
+    (wo.dot(m) > 0.0 && (wi.dot(m) > 0.0) == reflect).then_some(m)
+}
+
 /// f and pdf at one index, beyond over on this side; `wo` has z > 0.
 fn one(facets: &Microfacets, wo: DVec3, wi: DVec3, eta: f64) -> (f64, f64) {
-    let reflect = wi.z > 0.0;
-    // The half vector, on the side of `wo`; for refraction of the two directions scaled by their
-    // indices (eq. 16).
-    let Some(m) = (if reflect { wo + wi } else { wo + wi * eta }).try_normalize() else { return (0.0, 0.0) };
-    let m = m * m.z.signum();
-    let (cos_o, cos_i) = (wo.dot(m), wi.dot(m));
-    if cos_o <= 0.0 || (cos_i > 0.0) != reflect {
-        return (0.0, 0.0);
-    }
-    by_facet(facets, wo, wi, m, &fresnel::dielectric(Model::Exact, cos_o, eta), eta)
+    let Some(m) = facet(wo, wi, eta) else { return (0.0, 0.0) };
+    by_facet(facets, wo, wi, m, &fresnel::dielectric(Model::Exact, wo.dot(m), eta), eta)
 }
 
 /// f and pdf where the facet `m` leads from `wi` to `wo` (z > 0) and divides light as `split` says.

@@ -18,6 +18,7 @@ pub mod microfacet;
 pub mod phase;
 pub mod plastic;
 pub mod principled;
+pub mod thin_film;
 
 pub use bsdf::{Bsdf, BsdfSample, Evaluation};
 

@@ -35,6 +35,8 @@ pub struct Census {
     pub media: usize,
     /// Of those, media that scatter and whose extinction depends on wavelength.
     pub chromatic_media: usize,
+    /// Objects with a film.
+    pub films: Vec<String>,
     /// Bodies with a priority.
     pub nested: Vec<String>,
     /// A lens with a radius above zero.
@@ -68,6 +70,9 @@ impl Census {
                 census.textured.push(name());
             }
             for leaf in material.leaves() {
+                if leaf.has_film() {
+                    note(&mut census.films, name());
+                }
                 match &leaf.kind {
                     Kind::Dielectric { interior, exterior, facets, .. } => {
                         note(&mut census.refractive, name());

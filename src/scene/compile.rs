@@ -6,6 +6,7 @@
 mod attributes;
 mod bodies;
 mod files;
+mod films;
 mod hair;
 mod lights;
 mod media;
@@ -40,6 +41,8 @@ use std::sync::Arc;
 struct Compiler<'a> {
     description: &'a SceneDescription,
     faults: Vec<String>,
+    /// What a person should know.
+    notes: Vec<String>,
     /// The first curve that could not be read.
     unread: Option<Error>,
     files: Vec<PathBuf>,
@@ -110,6 +113,7 @@ impl<'a> Compiler<'a> {
         Compiler {
             description,
             faults: Vec::new(),
+            notes: Vec::new(),
             unread: None,
             files: Vec::new(),
             meshes: Meshes::default(),
@@ -131,6 +135,14 @@ impl<'a> Compiler<'a> {
 
     fn fault(&mut self, at: &str, message: impl AsRef<str>) {
         self.faults.push(self.description.fault(at, message.as_ref()));
+    }
+
+    /// Something at `at` that is no fault, once.
+    fn note(&mut self, at: &str, message: &str) {
+        let note = self.description.fault(at, message);
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
     }
 
     /// An error about a file that the field `at` names: the message says so.
@@ -271,6 +283,7 @@ impl<'a> Compiler<'a> {
             has_boundaries,
             shines_on_rays,
             files: std::mem::take(&mut self.files),
+            notes: std::mem::take(&mut self.notes),
         };
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);

@@ -10,6 +10,7 @@ use crate::optics::fresnel::Model;
 use crate::optics::hair::{Fibre, Hair};
 use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::optics::plastic::{Base, Coats, DiffuseMean, Plastic, RoughPlastic};
+use crate::optics::thin_film::ThinFilm;
 use crate::spectrum::{BAND_NM, Lanes, RefractiveIndex, Spectrum};
 use glam::DVec3;
 use std::sync::Arc;
@@ -71,6 +72,8 @@ pub enum Kind {
         fresnel: Model,
         /// Rough or smooth.
         facets: Option<Roughness>,
+        /// A film on it.
+        film: Option<Box<Film>>,
     },
     /// An interface between transparent media.
     Dielectric {
@@ -86,6 +89,8 @@ pub enum Kind {
         tints: Option<Box<Tints>>,
         /// Which of two bodies has the place where they overlap: that of the higher one.
         priority: Option<i32>,
+        /// A film on it.
+        film: Option<Box<Film>>,
     },
     /// A thin pane.
     Thin {
@@ -95,6 +100,8 @@ pub enum Kind {
         exterior: RefractiveIndex,
         /// Factors beside Fresnel's, where there are any.
         tints: Option<Box<Tints>>,
+        /// Where it is thin enough for its faces to interfere.
+        thickness: Option<Box<Thickness>>,
     },
     /// A diffuse base under a clear coat.
     Plastic {
@@ -122,6 +129,61 @@ pub enum Kind {
     Boundary,
     /// Made of other materials.
     Compound(Box<Compound>),
+}
+
+/// A thin film on a surface.
+#[derive(Clone, Debug)]
+pub struct Film {
+    /// Its index.
+    pub index: RefractiveIndex,
+    /// Its thickness.
+    pub thickness: Thickness,
+}
+
+impl Film {
+    /// The film at a point for the wavelengths `nm`, where the index on the side of the normal is `outside`.
+    #[must_use]
+    pub fn at(&self, at: &TexturePoint, nm: Lanes, outside: &RefractiveIndex) -> ThinFilm {
+        ThinFilm::new(self.index.lanes(nm), self.thickness.at(at), outside.lanes(nm), nm)
+    }
+}
+
+/// How thick a film is, nm.
+#[derive(Clone, Debug)]
+pub enum Thickness {
+    /// The same everywhere.
+    Uniform(f64),
+    /// After a texture.
+    Textured {
+        /// The numbers.
+        numbers: Scalar,
+        /// Where they are 0.
+        from: f64,
+        /// Where they are 1.
+        to: f64,
+    },
+}
+
+impl Thickness {
+    /// At a point, nm; not below zero.
+    #[must_use]
+    pub fn at(&self, at: &TexturePoint) -> f64 {
+        match self {
+            Thickness::Uniform(d) => *d,
+            Thickness::Textured { numbers, from, to } => (to - from).mul_add(numbers.eval(at), *from).max(0.0),
+        }
+    }
+
+    /// Over the wavelength in a medium of index `outside`.
+    #[must_use]
+    pub fn waves(&self, at: &TexturePoint, nm: Lanes, outside: &RefractiveIndex) -> Lanes {
+        let (d, outside, nm) = (self.at(at), outside.lanes(nm), nm.to_array());
+        Lanes::new(std::array::from_fn(|k| (outside[k] * d / f64::from(nm[k])) as f32))
+    }
+
+    fn varies(&self) -> bool {
+        matches!(self, Thickness::Textured { numbers, .. } if numbers.varies())
+    }
 }
 
 /// The clear coat of a plastic.
@@ -237,6 +299,24 @@ impl Tints {
     }
 }
 
+/// A metal at a point.
+pub fn metal(
+    eta: &Spectrum,
+    k: &Spectrum,
+    tint: &Texture,
+    fresnel: Model,
+    film: Option<&Film>,
+    at: &TexturePoint,
+    nm: Lanes,
+) -> Metal {
+    let film = film.map(|film| film.at(at, nm, &RefractiveIndex::Constant(1.0)));
+    Metal { eta: eta.eval(nm), k: k.eval(nm), tint: tint.eval(at, nm), fresnel, film }
+}
+
+fn film_varies(film: &Option<Box<Film>>) -> bool {
+    film.as_ref().is_some_and(|film| film.thickness.varies())
+}
+
 /// η inside over η outside, for each lane.
 #[must_use]
 pub fn relative_index(
@@ -296,10 +376,12 @@ impl Material {
     ) -> Option<Straight> {
         match &self.kind {
             Kind::Boundary => Some(Straight::OPEN),
-            Kind::Thin { interior, exterior, tints } => {
+            Kind::Thin { interior, exterior, tints, thickness } => {
                 let eta = relative_index(interior, exterior, nm, false);
-                let pane = Pane::new(direction.dot(surface.shading_normal).abs(), &eta);
-                let tint = tints.as_ref().map_or(Lanes::ONE, |tints| tints.transmitted.eval(&at(), nm));
+                let at = (tints.is_some() || thickness.is_some()).then(at);
+                let waves = at.as_ref().and_then(|at| thickness.as_ref().map(|t| t.waves(at, nm, exterior)));
+                let pane = Pane::new(direction.dot(surface.shading_normal).abs(), &eta, waves);
+                let tint = at.zip(tints.as_ref()).map_or(Lanes::ONE, |(at, tints)| tints.transmitted.eval(&at, nm));
                 Some(Straight { share: pane.share, weight: pane.transmitted * tint })
             }
             Kind::Compound(compound) => compound.straight(surface, direction, &at(), nm),
@@ -326,23 +408,26 @@ impl Material {
         match &self.kind {
             Kind::Diffuse { reflectance } => Bsdf::Diffuse { reflectance: reflectance.eval(at, nm) },
             Kind::Mirror { reflectance } => Bsdf::Mirror { reflectance: reflectance.eval(nm) },
-            Kind::Conductor { eta, k, tint, fresnel, facets } => {
-                let metal = Metal { eta: eta.eval(nm), k: k.eval(nm), tint: tint.eval(at, nm), fresnel: *fresnel };
+            Kind::Conductor { eta, k, tint, fresnel, facets, film } => {
+                let metal = metal(eta, k, tint, *fresnel, film.as_deref(), at, nm);
                 match facets {
                     Some(facets) => Bsdf::RoughConductor(metal, facets.at(at)),
                     None => Bsdf::Conductor(metal),
                 }
             }
-            Kind::Dielectric { interior, exterior, fresnel, facets, tints, .. } => {
-                let eta = relative_index(interior, around.unwrap_or(exterior), nm, all_dispersive);
+            Kind::Dielectric { interior, exterior, fresnel, facets, tints, film, .. } => {
+                let exterior = around.unwrap_or(exterior);
+                let eta = relative_index(interior, exterior, nm, all_dispersive);
+                let film = film.as_ref().map(|film| film.at(at, nm, exterior));
                 let tint = Tints::at(tints.as_deref(), at, nm);
                 match facets {
-                    Some(facets) => Bsdf::RoughDielectric(RoughDielectric { eta, facets: facets.at(at), tint }),
-                    None => Bsdf::Dielectric(Dielectric { eta, fresnel: *fresnel, tint }),
+                    Some(facets) => Bsdf::RoughDielectric(RoughDielectric { eta, facets: facets.at(at), tint, film }),
+                    None => Bsdf::Dielectric(Dielectric { eta, fresnel: *fresnel, tint, film }),
                 }
             }
-            Kind::Thin { interior, exterior, tints } => Bsdf::Thin {
+            Kind::Thin { interior, exterior, tints, thickness } => Bsdf::Thin {
                 eta: relative_index(interior, exterior, nm, false),
+                thickness: thickness.as_ref().map(|t| t.waves(at, nm, exterior)),
                 tint: Tints::at(tints.as_deref(), at, nm),
             },
             Kind::Plastic { reflectance, coat, nonlinear, tint } => {
@@ -371,11 +456,16 @@ impl Material {
             Kind::Plastic { reflectance, tint, .. } => {
                 reflectance.varies() || tint.as_ref().is_some_and(|tint| tint.varies())
             }
-            Kind::Conductor { tint, facets, .. } => tint.varies() || facets.as_ref().is_some_and(Roughness::varies),
-            Kind::Dielectric { facets, tints, .. } => {
-                facets.as_ref().is_some_and(Roughness::varies) || tints.as_ref().is_some_and(|t| t.varies())
+            Kind::Conductor { tint, facets, film, .. } => {
+                tint.varies() || facets.as_ref().is_some_and(Roughness::varies) || film_varies(film)
             }
-            Kind::Thin { tints, .. } => tints.as_ref().is_some_and(|t| t.varies()),
+            Kind::Dielectric { facets, tints, film, .. } => {
+                let facets = facets.as_ref().is_some_and(Roughness::varies);
+                facets || tints.as_ref().is_some_and(|t| t.varies()) || film_varies(film)
+            }
+            Kind::Thin { tints, thickness, .. } => {
+                tints.as_ref().is_some_and(|t| t.varies()) || thickness.as_ref().is_some_and(|t| t.varies())
+            }
             Kind::Principled(solid) => solid.varies(),
             Kind::PrincipledThin(sheet) => sheet.varies(),
             Kind::Mirror { .. } | Kind::Hair { .. } | Kind::Boundary => false,
@@ -410,8 +500,8 @@ impl Material {
         let leaves = self.leaves();
         let mut found = None;
         for leaf in &leaves {
-            if let Kind::Dielectric { interior, tints, priority, .. } = &leaf.kind {
-                let shows = leaves.len() > 1 || tints.is_some();
+            if let Kind::Dielectric { interior, tints, priority, film, .. } = &leaf.kind {
+                let shows = leaves.len() > 1 || tints.is_some() || film.is_some();
                 let body = priority.map(|priority| (priority, interior.clone(), shows));
                 if found.get_or_insert_with(|| body.clone()) != &body {
                     return Err("expected one priority and one index all over a body, found several".into());
@@ -419,6 +509,16 @@ impl Material {
             }
         }
         Ok(found.flatten())
+    }
+
+    /// Whether light interferes in a film on the surface, or in the sheet that it is.
+    #[must_use]
+    pub fn has_film(&self) -> bool {
+        match &self.kind {
+            Kind::Conductor { film, .. } | Kind::Dielectric { film, .. } => film.is_some(),
+            Kind::Thin { thickness, .. } => thickness.is_some(),
+            _ => false,
+        }
     }
 
     /// The layers of a material made of others.

@@ -99,6 +99,8 @@ pub struct Scene {
     pub shines_on_rays: bool,
     /// Files that were read.
     pub files: Vec<PathBuf>,
+    /// What a person should know of the scene, with its place in the file.
+    pub notes: Vec<String>,
 }
 
 /// A band of the spectrum.

@@ -228,6 +228,12 @@ impl EffectPlan {
             "nothing is transparent",
         );
         effect(
+            "interference",
+            !census.films.is_empty(),
+            format!("thin films, at each wavelength: {}", some_of(&census.films)),
+            "no surface has a thin film",
+        );
+        effect(
             "specular reflection",
             !census.reflective.is_empty(),
             format!("mirrors and metals: {}", some_of(&census.reflective)),

@@ -15,7 +15,7 @@ use crate::optics::dielectric::{RelativeIndex, refract};
 use crate::optics::fresnel::{self, Model};
 use crate::scene::compound::{Composition, Slopes, Standing, Vertex, share};
 use crate::scene::light::Light;
-use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Tints, relative_index};
+use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Thickness, Tints, metal, relative_index};
 use crate::scene::shape::Shape;
 use crate::scene::texture::Texture;
 use crate::scene::{Geometry, Inside, Object, Scene};
@@ -260,21 +260,32 @@ impl Tracer<'_> {
             match &material.kind {
                 Kind::Boundary => {}
                 _ if crossing.is_some_and(|crossing| !crossing.shows) => {}
-                Kind::Dielectric { interior, exterior, fresnel: model, .. } if self.settings.transparent_shadows => {
+                Kind::Dielectric { interior, exterior, fresnel: model, film, .. }
+                    if self.settings.transparent_shadows =>
+                {
                     let exterior = crossing.and_then(|crossing| crossing.around).unwrap_or(exterior);
                     let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive);
-                    through *= index.lanes(|eta| {
-                        let eta = if cos < 0.0 { eta } else { 1.0 / eta };
-                        fresnel::dielectric(*model, cos.abs(), eta).transmitted
-                    });
+                    through *= match film {
+                        None => index.lanes(|eta| {
+                            let eta = if cos < 0.0 { eta } else { 1.0 / eta };
+                            fresnel::dielectric(*model, cos.abs(), eta).transmitted
+                        }),
+                        Some(film) => {
+                            let film = film.at(&hit.texture_point(&surface), self.nm, exterior);
+                            let reflected = film.over_dielectric(cos.abs(), index.each(), cos < 0.0);
+                            Lanes::new(reflected.map(|r| (1.0 - r) as f32))
+                        }
+                    };
                 }
                 Kind::Compound(compound) => {
                     let at = hit.texture_point(&surface);
                     let Some(s) = compound.straight(&surface, ray.direction, &at, self.nm) else { return Lanes::ZERO };
                     through *= s.weight * s.share as f32;
                 }
-                Kind::Thin { interior, exterior, .. } if self.settings.transparent_shadows => {
-                    let pane = Pane::new(cos.abs(), &relative_index(interior, exterior, self.nm, false));
+                Kind::Thin { interior, exterior, thickness, .. } if self.settings.transparent_shadows => {
+                    let waves = |t: &Thickness| t.waves(&hit.texture_point(&surface), self.nm, exterior);
+                    let waves = thickness.as_deref().map(waves);
+                    let pane = Pane::new(cos.abs(), &relative_index(interior, exterior, self.nm, false), waves);
                     through *= pane.transmitted * pane.share as f32;
                 }
                 _ => return Lanes::ZERO,
@@ -316,9 +327,8 @@ impl Tracer<'_> {
             Kind::Diffuse { .. } | Kind::Hair { .. } | Kind::Boundary | Kind::Compound(_) => Lanes::ZERO,
             Kind::Mirror { reflectance } => reflect(reflectance.eval(self.nm)),
             // Rough metal and rough glass are shown smooth: a single ray knows one direction.
-            Kind::Conductor { eta, k, tint, fresnel: model, .. } => {
-                let r = fresnel::conductor(*model, cos, eta.eval(self.nm), k.eval(self.nm));
-                reflect(r * tint.eval(at, self.nm))
+            Kind::Conductor { eta, k, tint, fresnel, film, .. } => {
+                reflect(metal(eta, k, tint, *fresnel, film.as_deref(), at, self.nm).reflectance(cos))
             }
             Kind::Plastic { coat, tint, .. } => {
                 let r = coat.eta(self.nm).lanes(|eta| fresnel::dielectric(Model::Exact, cos, eta).reflected);
@@ -341,31 +351,44 @@ impl Tracer<'_> {
                 let parts = sheet.at(at, self.nm).smooth(cos);
                 reflect(parts.reflected) + cross(parts.transmitted, -wo)
             }
-            Kind::Thin { interior, exterior, tints } => {
+            Kind::Thin { interior, exterior, tints, thickness } => {
                 let tint = Tints::at(tints.as_deref(), at, self.nm);
-                let pane = Pane::new(cos, &relative_index(interior, exterior, self.nm, false));
+                let waves = thickness.as_ref().map(|t| t.waves(at, self.nm, exterior));
+                let pane = Pane::new(cos, &relative_index(interior, exterior, self.nm, false), waves);
                 let reflected = tint.reflected * pane.reflected * (1.0 - pane.share) as f32;
                 reflect(reflected) + cross(tint.transmitted * pane.transmitted * pane.share as f32, -wo)
             }
-            Kind::Dielectric { interior, exterior, fresnel: model, tints, .. } => {
+            Kind::Dielectric { interior, exterior, fresnel: model, tints, film, .. } => {
                 let tint = Tints::at(tints.as_deref(), at, self.nm);
                 let exterior = standpoint.around.unwrap_or(exterior);
                 let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive);
                 let m = DVec3::Z * local.z.signum();
                 let toward = |eta: f64| if local.z > 0.0 { eta } else { 1.0 / eta };
                 // Radiance that crosses scales by 1/η².
-                let bent = |eta: f64| {
-                    let split = fresnel::dielectric(*model, cos, eta);
+                let bent = |eta: f64, reflected: Option<f64>| {
+                    let mut split = fresnel::dielectric(*model, cos, eta);
+                    if let Some(reflected) = reflected {
+                        (split.reflected, split.transmitted) = (reflected, 1.0 - reflected);
+                    }
                     let wi = frame.to_world(refract(local, m, eta, split.cos_transmitted));
                     (split.reflected as f32, (split.transmitted / (eta * eta)) as f32, wi)
                 };
+                let filmed = film
+                    .as_ref()
+                    .map(|film| film.at(at, self.nm, exterior).over_dielectric(cos, index.each(), local.z > 0.0));
                 match index {
+                    RelativeIndex::Constant(eta) if filmed.is_some() => {
+                        let (_, _, wi) = bent(toward(eta), None);
+                        let r = Lanes::new(filmed.unwrap_or_default().map(|r| r as f32));
+                        let scale = (1.0 / (toward(eta) * toward(eta))) as f32;
+                        reflect(tint.reflected * r) + cross(tint.transmitted * (Lanes::ONE - r) * scale, wi)
+                    }
                     RelativeIndex::Constant(eta) => {
-                        let (r, t, wi) = bent(toward(eta));
+                        let (r, t, wi) = bent(toward(eta), None);
                         reflect(tint.reflected * r) + cross(tint.transmitted * t, wi)
                     }
                     RelativeIndex::Dispersive(all) => {
-                        let lanes = all.map(|e| bent(toward(e)));
+                        let lanes: [_; LANES] = std::array::from_fn(|k| bent(toward(all[k]), filmed.map(|f| f[k])));
                         let mut light = reflect(tint.reflected * Lanes::new(lanes.map(|l| l.0)));
                         // Lanes with the very same index stay together; others part.
                         let mut done = [false; LANES];

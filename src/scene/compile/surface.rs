@@ -85,7 +85,7 @@ impl<'a> Compiler<'a> {
     }
 
     /// The texture `name` as numbers.
-    fn named_numbers(&mut self, at: &str, name: &'a str) -> Scalar {
+    pub(super) fn named_numbers(&mut self, at: &str, name: &'a str) -> Scalar {
         if let Some(known) = self.numbers.get(name) {
             return known.clone();
         }
@@ -228,13 +228,15 @@ impl<'a> Compiler<'a> {
                 };
                 let tint = self.reflectance_texture(&at("tint"), &m.tint);
                 let facets = self.roughness(&at("roughness"), &m.roughness, m.distribution);
-                (Kind::Conductor { eta, k, tint, fresnel: model(m.fresnel), facets }, m.two_sided, m.highlight)
+                let film = self.film(&at("film"), m.film.as_ref());
+                (Kind::Conductor { eta, k, tint, fresnel: model(m.fresnel), facets, film }, m.two_sided, m.highlight)
             }
             written::Material::Dielectric(m) => {
                 let interior = self.index(&at("ior"), &m.ior);
                 let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
                 let facets = self.roughness(&at("roughness"), &m.roughness, m.distribution);
                 let tints = self.tints(&place, &m.reflection_tint, &m.transmission_tint);
+                let film = self.film(&at("film"), m.film.as_ref());
                 if facets.is_some() && m.fresnel == written::Fresnel::Schlick {
                     self.fault(&at("fresnel"), "expected exact on rough glass, found schlick");
                 }
@@ -242,13 +244,13 @@ impl<'a> Compiler<'a> {
                 // casts no shadow.
                 match (&interior, &exterior) {
                     (RefractiveIndex::Constant(a), RefractiveIndex::Constant(b))
-                        if a == b && tints.is_none() && m.priority.is_none() =>
+                        if a == b && tints.is_none() && m.priority.is_none() && film.is_none() =>
                     {
                         plain(Kind::Boundary)
                     }
                     _ => {
                         let (fresnel, priority) = (model(m.fresnel), m.priority);
-                        let kind = Kind::Dielectric { interior, exterior, fresnel, facets, tints, priority };
+                        let kind = Kind::Dielectric { interior, exterior, fresnel, facets, tints, priority, film };
                         (kind, false, m.highlight)
                     }
                 }
@@ -257,7 +259,9 @@ impl<'a> Compiler<'a> {
                 let interior = self.index(&at("ior"), &m.ior);
                 let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
                 let tints = self.tints(&place, &m.reflection_tint, &m.transmission_tint);
-                plain(Kind::Thin { interior, exterior, tints })
+                let thickness = m.thickness_nm.as_ref();
+                let thickness = thickness.map(|t| Box::new(self.thickness(&at("thickness_nm"), t, &interior)));
+                plain(Kind::Thin { interior, exterior, tints, thickness })
             }
             written::Material::Plastic(m) => {
                 let reflectance = self.reflectance_texture(&at("reflectance"), &m.reflectance);

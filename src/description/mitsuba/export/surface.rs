@@ -198,6 +198,7 @@ fn plain_shortfall(material: &Material) -> Option<String> {
     let schlick = |fresnel: Fresnel| {
         (fresnel == Fresnel::Schlick).then(|| "Fresnel's equations in place of Schlick's approximation".to_owned())
     };
+    let film = |given: bool| given.then(|| "no interference: Mitsuba has no thin films".to_owned());
     match material {
         Material::Diffuse(m) => highlight(m.highlight.is_some()).or(spectra(&[&m.reflectance])),
         Material::Mirror(m) => {
@@ -211,16 +212,18 @@ fn plain_shortfall(material: &Material) -> Option<String> {
                     (!good).then(|| "grey indices in place of spectra".to_owned())
                 }
             };
-            highlight(m.highlight.is_some()).or(schlick(m.fresnel)).or(index).or(spectra(&[&m.tint]))
+            let film = film(m.film.is_some());
+            highlight(m.highlight.is_some()).or(schlick(m.fresnel)).or(film).or(index).or(spectra(&[&m.tint]))
         }
         Material::Dielectric(m) => highlight(m.highlight.is_some())
             .or(schlick(m.fresnel))
             .or(dispersive(&m.ior, &m.exterior_ior))
+            .or(film(m.film.is_some()))
             .or(m.priority.map(|_| "no priority: in Mitsuba bodies that overlap are wrong".to_owned()))
             .or(spectra(&[&m.reflection_tint, &m.transmission_tint])),
-        Material::ThinDielectric(m) => {
-            dispersive(&m.ior, &m.exterior_ior).or(spectra(&[&m.reflection_tint, &m.transmission_tint]))
-        }
+        Material::ThinDielectric(m) => film(m.thickness_nm.is_some())
+            .or(dispersive(&m.ior, &m.exterior_ior))
+            .or(spectra(&[&m.reflection_tint, &m.transmission_tint])),
         Material::Plastic(m) if m.roughness > 0.0 && m.diffuse_mean == DiffuseMean::Integral => {
             Some("the coat's mean over 64 cosines, which makes the base darker by up to 2 %".to_owned())
         }
