@@ -174,7 +174,7 @@ pub enum Geometry {
 }
 
 impl Geometry {
-    /// Its area, m²; zero where it is not known, of forms that do not shine.
+    /// Its area, m²; zero where it is not known, of forms and meshes that do not shine.
     #[must_use]
     pub fn area(&self) -> f64 {
         match self {
@@ -192,7 +192,7 @@ pub struct TriangleMesh {
     pub mesh: Mesh,
     /// For rays; none where the triangles are in [`Scene::together`].
     pub tree: Option<MeshTree>,
-    /// For light.
+    /// For light; of none where the mesh does not shine.
     pub areas: AreaTable,
 }
 

@@ -10,6 +10,7 @@
 //! evenly spaced.)
 
 use super::{LEAF, LEAF_COUNT_SHIFT, NO_PRIMITIVE, Node};
+use rayon::prelude::*;
 use wide::f32x4;
 
 /// Bins per axis. With 32, rays visit as many nodes and leaves of a 256 000-triangle mesh.
@@ -22,6 +23,9 @@ const MEDIAN_LEVELS: usize = 10;
 pub(super) const DEPTH: usize = SAH_LEVELS + MEDIAN_LEVELS;
 /// Positions that a child word can address.
 pub(super) const MAX_POSITIONS: usize = 1 << LEAF_COUNT_SHIFT;
+
+/// Parts of fewer primitives are built on one thread.
+pub(super) const ALONE: usize = 4096;
 
 /// A primitive's box in the tree's own coordinates.
 #[derive(Clone, Copy)]
@@ -155,11 +159,51 @@ impl Builder<'_> {
             used += 1;
         }
 
+        if whole.count >= ALONE {
+            self.add_children(id, &parts[..used], level);
+            return id as u32;
+        }
         for (slot, part) in parts[..used].iter().enumerate() {
             let child = if part.count <= self.leaf.max { self.add_leaf(part) } else { self.add_node(*part, level + 1) };
             self.nodes[id].set(slot, part.bounds.lo(), part.bounds.hi(), child);
         }
         id as u32
+    }
+
+    /// Appends what lies below the node `id`, made on the current rayon pool: the same as one after the other.
+    fn add_children(&mut self, id: usize, parts: &[Part], level: usize) {
+        let mut slots: Vec<usize> = (0..parts.len()).collect();
+        slots.sort_by_key(|&slot| parts[slot].first);
+        let mut rest = &mut *self.primitives;
+        let mut start = 0;
+        let mut below: Vec<(usize, Builder)> = Vec::with_capacity(parts.len());
+        for slot in slots {
+            let part = &parts[slot];
+            let (primitives, others) = rest.split_at_mut(part.first - start).1.split_at_mut(part.count);
+            (rest, start) = (others, part.first + part.count);
+            below.push((slot, Builder { primitives, leaf: self.leaf, nodes: Vec::new(), order: Vec::new() }));
+        }
+        below.sort_by_key(|(slot, _)| *slot);
+        below.par_iter_mut().for_each(|(slot, builder)| {
+            let part = Part { first: 0, ..parts[*slot] };
+            if part.count > self.leaf.max {
+                builder.add_node(part, level + 1);
+            } else {
+                builder.add_leaf(&part);
+            }
+        });
+        for (slot, Builder { nodes, order, .. }) in below {
+            let part = &parts[slot];
+            let (node, position) = (self.nodes.len() as u32, (self.order.len() / self.leaf.align) as u32);
+            let child =
+                if nodes.is_empty() { LEAF | ((part.count - 1) as u32) << LEAF_COUNT_SHIFT | position } else { node };
+            self.nodes[id].set(slot, part.bounds.lo(), part.bounds.hi(), child);
+            self.order.extend(order);
+            self.nodes.extend(nodes.into_iter().map(|mut moved| {
+                moved.rebase(node, position);
+                moved
+            }));
+        }
     }
 
     /// Appends a leaf to the order and returns its child word.

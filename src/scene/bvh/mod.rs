@@ -32,6 +32,7 @@ mod build;
 use crate::math::Ray;
 use build::{Builder, DEPTH, LeafSize, MAX_POSITIONS, Primitive};
 use glam::DVec3;
+use rayon::prelude::*;
 use std::mem::MaybeUninit;
 use std::ops::Range;
 use wide::{f32x8, f64x4};
@@ -100,6 +101,13 @@ impl Node {
         }
         self.children[slot] = child;
     }
+
+    /// Moves what its children name: nodes by `node`, positions over the alignment by `position`.
+    fn rebase(&mut self, node: u32, position: u32) {
+        for child in self.children.iter_mut().filter(|child| **child != EMPTY_CHILD) {
+            *child += if *child & LEAF == 0 { node } else { position };
+        }
+    }
 }
 
 /// The hierarchy. Built once, then read by any number of threads.
@@ -161,45 +169,37 @@ impl Bvh {
         Bvh::build_leaves(boxes, LeafSize { block: 4, align: 8, max: 8 })
     }
 
-    /// A tree of the same shape over other boxes, as many and all finite: cheaper than a new tree, and
-    /// about as good where the boxes are those of the same things turned, moved or resized.
-    ///
-    /// `None` where the boxes are not finite or not as many.
+    /// A tree of blocks of the same shape over other primitives: cheaper than a new tree, and about as good where they
+    /// are the same things turned, moved or resized. `block` tells the box of the primitives whose positions in
+    /// [`Bvh::order`] start at a number, and `bounds`, which are finite, that of all.
     #[must_use]
-    pub fn refitted(&self, boxes: &[Aabb]) -> Option<Bvh> {
-        let (primitives, tree) = Bvh::space(boxes);
-        let count = self.order.iter().filter(|&&i| i != NO_PRIMITIVE).count();
-        if self.bounded as usize != self.order.len() || primitives.len() != boxes.len() || count != boxes.len() {
-            return None;
-        }
+    pub fn refitted(&self, bounds: Aabb, block: impl Fn(usize) -> Aabb) -> Bvh {
+        let tree = Bvh::space(bounds);
         let mut nodes = self.nodes.clone();
-        fit(&mut nodes, &self.order, self.align, &primitives);
-        let order = self.order.clone();
-        Some(Bvh { nodes, order, bounded: self.bounded, align: self.align, ..tree })
+        fit(&mut nodes, |first, _| tree.rounded(&block(first * self.align as usize)));
+        Bvh { nodes, order: self.order.clone(), bounded: self.bounded, align: self.align, ..tree }
     }
 
-    /// One tree over the primitives of several, each given with its boxes, all finite: their numbers and positions
-    /// in [`Bvh::order`] follow one another as the trees do. Below its upper nodes it has the shape that they have.
+    /// One tree over the primitives of several, which are all finite: their numbers and positions in [`Bvh::order`]
+    /// follow one another as the trees do. Below its upper nodes it has the shape that they have. `counts` are how many
+    /// primitives each has.
     ///
     /// # Panics
-    /// Over more than 2²⁸ boxes, or where some of the trees have blocks and some have not.
+    /// Over more than 2²⁸ positions, or where some of the trees have blocks and some have not.
     #[must_use]
-    pub fn joined(parts: &[(&Bvh, &[Aabb])]) -> Bvh {
-        let boxes: Vec<Aabb> = parts.iter().flat_map(|(_, boxes)| *boxes).copied().collect();
-        assert!(boxes.len() <= MAX_POSITIONS, "more primitives than one tree can address");
+    pub fn joined(parts: &[(&Bvh, u32)]) -> Bvh {
         let align = parts.first().map_or(1, |(part, _)| part.align);
         assert!(parts.iter().all(|(part, _)| part.align == align), "trees of one kind");
-        let (primitives, tree) = Bvh::space(&boxes);
+        let tree = Bvh::space(parts.iter().fold(Aabb::EMPTY, |all, (part, _)| all.union(&part.bounds)));
 
         // The upper nodes: over the boxes of the parts, one a leaf.
-        let mut first = 0;
-        let mut whole: Vec<Primitive> = Vec::with_capacity(parts.len());
-        for (index, (_, boxes)) in (0..).zip(parts) {
-            let mut all = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-            primitives[first..first + boxes.len()].iter().for_each(|p| widen(&mut all, p.lo, p.hi));
-            whole.push(Primitive { lo: all.0, hi: all.1, index });
-            first += boxes.len();
-        }
+        let mut whole: Vec<Primitive> = (0..)
+            .zip(parts)
+            .map(|(index, (part, _))| {
+                let (lo, hi) = tree.rounded(&part.bounds);
+                Primitive { lo, hi, index }
+            })
+            .collect();
         let leaf = LeafSize { block: 1, align: 1, max: 1 };
         let mut builder = Builder { primitives: &mut whole, leaf, nodes: Vec::new(), order: Vec::new() };
         if parts.len() > 1 {
@@ -208,77 +208,115 @@ impl Bvh {
         let Builder { mut nodes, order: upper, .. } = builder;
 
         // Below them the nodes of the parts, moved.
-        let mut order = Vec::with_capacity(parts.iter().map(|(part, _)| part.order.len()).sum());
-        let mut roots = Vec::with_capacity(parts.len());
-        let (upper_nodes, mut number) = (nodes.len(), 0u32);
-        for (part, boxes) in parts {
-            let (node, position) = (nodes.len() as u32, order.len() as u32 / align);
-            roots.push(node);
-            nodes.extend(part.nodes.iter().map(|old| {
-                let mut new = *old;
-                for child in new.children.iter_mut().filter(|child| **child != EMPTY_CHILD) {
-                    *child += if *child & LEAF == 0 { node } else { position };
-                }
-                new
-            }));
-            order.extend(part.order.iter().map(|&i| if i == NO_PRIMITIVE { i } else { i + number }));
-            number += boxes.len() as u32;
+        let mut starts = Vec::with_capacity(parts.len());
+        let (mut node, mut position, mut number) = (nodes.len() as u32, 0, 0);
+        for (part, count) in parts {
+            starts.push((node, position, number));
+            node += part.nodes.len() as u32;
+            position += part.order.len() as u32 / align;
+            number += count;
         }
-        for child in nodes[..upper_nodes].iter_mut().flat_map(|node| &mut node.children) {
+        assert!(position as usize * align as usize <= MAX_POSITIONS, "more primitives than one tree can address");
+        let moved: Vec<Vec<Node>> = parts
+            .par_iter()
+            .zip(&starts)
+            .map(|((part, _), &(node, position, _))| {
+                let mut moved = part.nodes.clone();
+                moved.iter_mut().for_each(|new| new.rebase(node, position));
+                tree.take_planes(&mut moved, part);
+                moved
+            })
+            .collect();
+        nodes.reserve(node as usize - nodes.len());
+        for child in nodes.iter_mut().flat_map(|node| &mut node.children) {
             if *child != EMPTY_CHILD && *child & LEAF != 0 {
-                *child = roots[upper[(*child & POSITION) as usize] as usize];
+                *child = starts[upper[(*child & POSITION) as usize] as usize].0;
             }
         }
-        fit(&mut nodes, &order, align, &primitives);
+        moved.iter().for_each(|moved| nodes.extend(moved));
+        let mut order = Vec::with_capacity(position as usize * align as usize);
+        for ((part, _), (_, _, number)) in parts.iter().zip(&starts) {
+            order.extend(part.order.iter().map(|&i| if i == NO_PRIMITIVE { i } else { i + number }));
+        }
         Bvh { nodes, bounded: order.len() as u32, align, order, ..tree }
+    }
+
+    /// Expresses the planes of the nodes of `from` in the coordinates of this tree, rounded outward.
+    fn take_planes(&self, nodes: &mut [Node], from: &Bvh) {
+        /// 2⁻⁵²: more than the two roundings of f64, of the way to the world and from there.
+        const SLACK: f64 = f64::EPSILON;
+        let (per_unit, scale) = (1.0 / from.scale, self.scale);
+        for node in nodes {
+            for axis in 0..3 {
+                let (there, here) = (from.centre[axis], self.centre[axis]);
+                let taken = |x: f32, outward: f64| {
+                    let world = f64::from(x) * per_unit + there;
+                    let moved = (world - here) * scale;
+                    plane_below(moved * outward - SLACK * (moved.abs() + world.abs() * scale))
+                };
+                for slot in 0..8 {
+                    if node.children[slot] == EMPTY_CHILD {
+                        continue;
+                    }
+                    let lo = &mut node.planes[2 * axis].as_mut_array()[slot];
+                    *lo = taken(*lo, 1.0);
+                    let hi = &mut node.planes[2 * axis + 1].as_mut_array()[slot];
+                    *hi = -taken(*hi, -1.0);
+                }
+            }
+        }
     }
 
     fn build_leaves(boxes: &[Aabb], leaf: LeafSize) -> Bvh {
         assert!(boxes.len() <= MAX_POSITIONS, "more primitives than one tree can address");
-        let (mut primitives, tree) = Bvh::space(boxes);
-        let mut builder = Builder { primitives: &mut primitives, leaf, nodes: Vec::new(), order: Vec::new() };
-        builder.run();
-        let Builder { nodes, mut order, .. } = builder;
-        let bounded = order.len() as u32;
-        order.extend(&tree.order);
-        Bvh { nodes, order, bounded, align: leaf.align as u32, ..tree }
-    }
-
-    /// The finite boxes in the coordinates of their tree, and the tree without nodes; its order holds the boxes that
-    /// are not finite.
-    fn space(boxes: &[Aabb]) -> (Vec<Primitive>, Bvh) {
         let finite = || boxes.iter().filter(|b| b.is_finite());
-        let all = finite().fold(Aabb::EMPTY, |a, b| a.union(b));
-        let bounds = boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b));
-
-        // Halve before adding: no overflow up to the largest f64.
-        let centre = if all.is_finite() { 0.5 * all.min + 0.5 * all.max } else { DVec3::ZERO };
-        let half_size = if all.is_finite() { (all.max - centre).max(centre - all.min).max_element() } else { 1.0 };
-        let exponent = (half_size.to_bits() >> 52 & 0x7ff) as i64 - 1023;
-        let scale = f64::from_bits(((1023 - exponent.clamp(-1022, 1022)) as u64) << 52);
-
+        let tree = Bvh::space(finite().fold(Aabb::EMPTY, |a, b| a.union(b)));
         let mut primitives = Vec::with_capacity(boxes.len());
         let mut unbounded = Vec::new();
-        for (index, b) in boxes.iter().enumerate() {
-            let index = index as u32;
+        for (index, b) in (0..).zip(boxes) {
             if b.is_finite() {
-                let lo = ((b.min - centre) * scale).to_array().map(plane_below);
-                let hi = ((b.max - centre) * scale).to_array().map(|x| -plane_below(-x));
+                let (lo, hi) = tree.rounded(b);
                 primitives.push(Primitive { lo, hi, index });
             } else {
                 unbounded.push(index);
             }
         }
+        let mut builder = Builder { primitives: &mut primitives, leaf, nodes: Vec::new(), order: Vec::new() };
+        builder.run();
+        let Builder { nodes, mut order, .. } = builder;
+        let bounded = order.len() as u32;
+        order.extend(unbounded);
+        let bounds = boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(b));
+        Bvh { nodes, order, bounded, align: leaf.align as u32, bounds, ..tree }
+    }
 
-        let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        for p in &primitives {
-            for a in 0..3 {
-                lo[a] = lo[a].min(p.lo[a]);
-                hi[a] = hi[a].max(p.hi[a]);
-            }
-        }
+    /// A tree of nothing yet, with the coordinates for what lies in `all`.
+    fn space(all: Aabb) -> Bvh {
+        // Halve before adding: no overflow up to the largest f64.
+        let centre = if all.is_finite() { 0.5 * all.min + 0.5 * all.max } else { DVec3::ZERO };
+        let half_size = if all.is_finite() { (all.max - centre).max(centre - all.min).max_element() } else { 1.0 };
+        let exponent = (half_size.to_bits() >> 52 & 0x7ff) as i64 - 1023;
+        let scale = f64::from_bits(((1023 - exponent.clamp(-1022, 1022)) as u64) << 52);
+        let empty = Bvh {
+            nodes: Vec::new(),
+            order: Vec::new(),
+            bounded: 0,
+            align: 1,
+            centre,
+            scale,
+            root: [f64x4::ZERO; 2],
+            bounds: all,
+        };
+        let (lo, hi) = if all.is_finite() { empty.rounded(&all) } else { ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]) };
         let root = [lo, hi].map(|c| f64x4::new([c[0].into(), c[1].into(), c[2].into(), 0.0]));
-        (primitives, Bvh { nodes: Vec::new(), order: unbounded, bounded: 0, align: 1, centre, scale, root, bounds })
+        Bvh { root, ..empty }
+    }
+
+    /// A finite box in the coordinates of the tree, rounded outward.
+    fn rounded(&self, b: &Aabb) -> ([f32; 3], [f32; 3]) {
+        let lo = ((b.min - self.centre) * self.scale).to_array().map(plane_below);
+        let hi = ((b.max - self.centre) * self.scale).to_array().map(|x| -plane_below(-x));
+        (lo, hi)
     }
 
     /// Gives each primitive the number in `names`, by its original index.
@@ -463,8 +501,9 @@ fn widen(all: &mut ([f32; 3], [f32; 3]), lo: [f32; 3], hi: [f32; 3]) {
     }
 }
 
-/// Gives `nodes` the boxes that hold `primitives`. A node stands before its children.
-fn fit(nodes: &mut [Node], order: &[u32], align: u32, primitives: &[Primitive]) {
+/// Gives `nodes` the boxes that hold their leaves; `leaf` tells that of a leaf by its position over the alignment and
+/// its count. A node stands before its children.
+fn fit(nodes: &mut [Node], leaf: impl Fn(usize, usize) -> ([f32; 3], [f32; 3])) {
     let mut of_node = vec![([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]); nodes.len()];
     for id in (0..nodes.len()).rev() {
         for slot in 0..8 {
@@ -472,17 +511,11 @@ fn fit(nodes: &mut [Node], order: &[u32], align: u32, primitives: &[Primitive]) 
             if child == EMPTY_CHILD {
                 continue;
             }
-            let mut part = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-            if child & LEAF == 0 {
-                part = of_node[child as usize];
+            let part = if child & LEAF == 0 {
+                of_node[child as usize]
             } else {
-                let first = (child & POSITION) as usize * align as usize;
-                let count = (child >> LEAF_COUNT_SHIFT & 7) as usize + 1;
-                for &i in &order[first..first + count] {
-                    let p = &primitives[i as usize];
-                    widen(&mut part, p.lo, p.hi);
-                }
-            }
+                leaf((child & POSITION) as usize, (child >> LEAF_COUNT_SHIFT & 7) as usize + 1)
+            };
             nodes[id].set(slot, part.0, part.1, child);
             widen(&mut of_node[id], part.0, part.1);
         }

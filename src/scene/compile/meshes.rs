@@ -72,8 +72,11 @@ impl Meshes {
             .into_iter()
             .zip(placed)
             .zip(built.into_iter().zip(again))
-            .filter_map(|(((at, ..), mesh), (built, again))| {
-                Some((at, mesh?.map(|mesh| with_tree(mesh, built.or(again)))))
+            .filter_map(|(((at, shape, _), mesh), (built, again))| {
+                // Only a lamp is asked for its area.
+                let areas =
+                    |mesh: &Mesh| shape.emission.as_ref().map_or_else(AreaTable::default, |_| AreaTable::new(mesh));
+                Some((at, mesh?.map(|mesh| with_tree(areas(&mesh), mesh, built.or(again)))))
             })
             .collect();
         Meshes { sources, placed }
@@ -95,7 +98,10 @@ impl Meshes {
         mesh: &written::Mesh,
         world_from_object: &DAffine3,
     ) -> Result<TriangleMesh, String> {
-        self.placed.remove(at).unwrap_or_else(|| Ok(with_tree(place(source, mesh, world_from_object)?, None)))
+        self.placed.remove(at).unwrap_or_else(|| {
+            let mesh = place(source, mesh, world_from_object)?;
+            Ok(with_tree(AreaTable::new(&mesh), mesh, None))
+        })
     }
 }
 
@@ -107,9 +113,8 @@ fn keeps_angles(map: &DAffine3) -> bool {
     off.to_cols_array().iter().all(|x| x.abs() <= 1e-3 * scale)
 }
 
-fn with_tree(mesh: Mesh, tree: Option<MeshTree>) -> TriangleMesh {
+fn with_tree(areas: AreaTable, mesh: Mesh, tree: Option<MeshTree>) -> TriangleMesh {
     let tree = Some(tree.unwrap_or_else(|| MeshTree::build(&mesh)));
-    let areas = AreaTable::new(&mesh);
     TriangleMesh { mesh, tree, areas }
 }
 

@@ -291,8 +291,8 @@ impl Mesh {
     }
 }
 
-/// Chooses triangles of a mesh in proportion to their area.
-#[derive(Clone, Debug)]
+/// Chooses triangles of a mesh in proportion to their area; by default none.
+#[derive(Clone, Debug, Default)]
 pub struct AreaTable {
     /// Sum of the areas of all triangles up to and with each, m².
     cumulative: Vec<f64>,

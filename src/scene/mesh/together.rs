@@ -40,23 +40,21 @@ impl Together {
 
         let (mut first, mut object, mut parts) = (vec![NONE; objects.len()], Vec::new(), Vec::new());
         for i in meshes() {
-            let Some(TriangleMesh { mesh, tree: Some(tree), .. }) = mesh(&objects[i]) else { continue };
+            let Some(TriangleMesh { mesh, tree: Some(_), .. }) = mesh(&objects[i]) else { continue };
             let fits = object.len() + mesh.triangles.len() <= MAX_TRIANGLES;
             if fits && mesh.origin == origin && size(i) >= SMALLEST * size(largest) {
                 first[i] = object.len() as u32;
                 object.resize(object.len() + mesh.triangles.len(), i as u32);
-                parts.push((mesh, tree));
             }
         }
-        let tree = MeshTree::joined(&parts);
         for (i, taken) in objects.iter_mut().enumerate() {
             if let Geometry::Mesh(mesh) = &mut taken.geometry
                 && first[i] != NONE
             {
-                mesh.tree = None;
+                parts.extend(mesh.tree.take());
             }
         }
-        Some(Together { tree, first, object })
+        Some(Together { tree: MeshTree::joined(parts), first, object })
     }
 
     /// Whether the triangles of an object are here.

@@ -15,6 +15,7 @@ use super::triangle::{TriangleHit, TriangleRay, area_vector};
 use crate::math::Ray;
 use crate::scene::bvh::{Aabb, Bvh, NO_PRIMITIVE, Next, TreeRay, prefetch};
 use glam::DVec3;
+use rayon::prelude::*;
 use wide::f32x8;
 
 /// Triangles a block.
@@ -33,6 +34,21 @@ impl Block {
     fn axis(&self, k: usize, lane: usize) -> [f64; 3] {
         let at = |corner: &[f32x8; 3]| f64::from(corner[k].as_array()[lane]);
         [at(&self.0[0]), at(&self.0[1]), at(&self.0[2])]
+    }
+
+    /// The box of its triangles, relative to the mesh's origin; [`Aabb::EMPTY`] where there are none.
+    fn bounds(&self) -> Aabb {
+        let mut all = Aabb::EMPTY;
+        for axis in 0..3 {
+            let (mut lo, mut hi) = (f32::INFINITY, f32::NEG_INFINITY);
+            for &x in self.0.iter().flat_map(|corner| corner[axis].as_array()) {
+                // What is no number is neither.
+                lo = if x < lo { x } else { lo };
+                hi = if x > hi { x } else { hi };
+            }
+            (all.min[axis], all.max[axis]) = (lo.into(), hi.into());
+        }
+        all
     }
 
     /// The exact test of one triangle.
@@ -61,6 +77,8 @@ pub struct MeshTree {
     origin: DVec3,
     /// Largest coordinate of all corners, relative to the origin.
     extent: f64,
+    /// How many there are.
+    triangles: u32,
 }
 
 impl MeshTree {
@@ -77,26 +95,46 @@ impl MeshTree {
     /// meshes of one file, turned, moved or resized. A new one where they have not as many triangles.
     #[must_use]
     pub fn again(&self, mesh: &Mesh) -> MeshTree {
-        match self.bvh.refitted(&boxes(mesh)) {
-            Some(bvh) => MeshTree::over(mesh, bvh),
-            None => MeshTree::build(mesh),
+        if self.triangles as usize != mesh.triangles.len() {
+            return MeshTree::build(mesh);
         }
+        let blocks = MeshTree::blocks(mesh, &self.bvh);
+        let boxes: Vec<Aabb> = blocks.iter().map(Block::bounds).collect();
+        let bounds = boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b));
+        if !bounds.is_finite() {
+            return MeshTree::build(mesh);
+        }
+        let bvh = self.bvh.refitted(bounds, |position| boxes[position / LANES]);
+        MeshTree::of(bvh, blocks, mesh)
     }
 
-    /// One hierarchy over the triangles of several meshes of one [`Mesh::origin`], each given with its own: triangles
-    /// are numbered through, mesh after mesh.
+    /// One hierarchy over the triangles of several meshes of one [`Mesh::origin`]: triangles are numbered through, mesh
+    /// after mesh.
     ///
     /// # Panics
     /// Over more than [`MAX_TRIANGLES`], or where `parts` is empty.
     #[must_use]
-    pub fn joined(parts: &[(&Mesh, &MeshTree)]) -> MeshTree {
-        let boxes: Vec<Vec<Aabb>> = parts.iter().map(|(mesh, _)| boxes(mesh)).collect();
-        let trees: Vec<(&Bvh, &[Aabb])> = parts.iter().zip(&boxes).map(|((_, t), b)| (&t.bvh, &**b)).collect();
-        let blocks = parts.iter().flat_map(|(_, tree)| &tree.blocks).copied().collect();
-        MeshTree::of(Bvh::joined(&trees), blocks, parts[0].0.origin)
+    pub fn joined(mut parts: Vec<MeshTree>) -> MeshTree {
+        if parts.len() == 1 {
+            return parts.remove(0);
+        }
+        let trees: Vec<(&Bvh, u32)> = parts.iter().map(|tree| (&tree.bvh, tree.triangles)).collect();
+        let bvh = Bvh::joined(&trees);
+        let part: Vec<(u32, u32)> =
+            (0..).zip(&parts).flat_map(|(i, tree)| (0..tree.blocks.len() as u32).map(move |k| (i, k))).collect();
+        let blocks =
+            part.into_par_iter().with_min_len(1024).map(|(i, k)| parts[i as usize].blocks[k as usize]).collect();
+        let extent = parts.iter().map(|tree| tree.extent).fold(0.0, f64::max);
+        let triangles = parts.iter().map(|tree| tree.triangles).sum();
+        MeshTree { bvh, blocks, origin: parts[0].origin, extent, triangles }
     }
 
     fn over(mesh: &Mesh, bvh: Bvh) -> MeshTree {
+        let blocks = MeshTree::blocks(mesh, &bvh);
+        MeshTree::of(bvh, blocks, mesh)
+    }
+
+    fn blocks(mesh: &Mesh, bvh: &Bvh) -> Vec<Block> {
         let block = |indices: &[u32]| {
             let mut out = Block([[f32x8::splat(f32::NAN); 3]; 3]);
             for (lane, &i) in indices.iter().enumerate().filter(|(_, i)| **i != NO_PRIMITIVE) {
@@ -111,13 +149,13 @@ impl MeshTree {
             }
             out
         };
-        let blocks = bvh.order().chunks(LANES).map(block).collect();
-        MeshTree::of(bvh, blocks, mesh.origin)
+        bvh.order().chunks(LANES).map(block).collect()
     }
 
-    fn of(bvh: Bvh, blocks: Vec<Block>, origin: DVec3) -> MeshTree {
+    fn of(bvh: Bvh, blocks: Vec<Block>, mesh: &Mesh) -> MeshTree {
         let Aabb { min, max } = bvh.bounds();
-        MeshTree { bvh, blocks, origin, extent: min.abs().max(max.abs()).max_element() }
+        let extent = min.abs().max(max.abs()).max_element();
+        MeshTree { bvh, blocks, origin: mesh.origin, extent, triangles: mesh.triangles.len() as u32 }
     }
 
     /// The nearest triangle that `ray` hits at 0 < t < `t_max`, other than `skip`.
