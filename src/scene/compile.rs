@@ -58,6 +58,8 @@ struct Compiler<'a> {
     /// Textures as spectra and as numbers, once they are asked for.
     textures: HashMap<&'a str, Texture>,
     volumes: HashMap<&'a str, Volume>,
+    /// Environments, by where they stand among the lights, until they are asked for.
+    skies: HashMap<usize, Result<Option<Light>>>,
     numbers: HashMap<&'a str, Scalar>,
     /// Textures and materials that are being made, from the outermost: what holds itself shows here.
     making: Vec<(&'static str, &'a str)>,
@@ -123,6 +125,7 @@ impl<'a> Compiler<'a> {
             on_surface: BTreeSet::new(),
             textures: HashMap::new(),
             volumes: HashMap::new(),
+            skies: HashMap::new(),
             numbers: HashMap::new(),
             making: Vec::new(),
             named: HashMap::new(),
@@ -183,6 +186,11 @@ impl<'a> Compiler<'a> {
             || Meshes::of(d),
             || {
                 self.pictures = Pictures::of(pictures(d));
+                for (i, sky) in d.lights.iter().enumerate().filter(|(_, l)| matches!(l, written::Light::Environment(_)))
+                {
+                    let light = self.light(&format!("lights[{i}].{}", sky.kind()), sky);
+                    self.skies.insert(i, light);
+                }
                 self.volumes_and_materials()
             },
         );
@@ -216,7 +224,8 @@ impl<'a> Compiler<'a> {
         for (i, light) in d.lights.iter().enumerate() {
             let at = format!("lights[{i}].{}", light.kind());
             let weight = light.sampling_weight();
-            if let Some(light) = self.light(&at, light)? {
+            let made = self.skies.remove(&i).unwrap_or_else(|| self.light(&at, light));
+            if let Some(light) = made? {
                 lights.push(light);
                 weights.push(weight);
             }
