@@ -1,5 +1,12 @@
 //! The `abbe` command.
 
+#[cfg(all(target_os = "linux", target_env = "gnu", target_pointer_width = "64"))]
+mod memory;
+
+#[cfg(all(target_os = "linux", target_env = "gnu", target_pointer_width = "64"))]
+#[global_allocator]
+static ALLOCATOR: memory::LargePages = memory::LargePages;
+
 fn main() {
     std::process::exit(abbe::cli::run());
 }
