@@ -75,6 +75,8 @@ pub struct Frame {
     pub elapsed: Duration,
     /// The error after each pass.
     pub milestones: Vec<Milestone>,
+    /// The picture from which the last error was estimated, and its colour space.
+    resolved: Option<([[f64; 3]; 3], Image)>,
 }
 
 /// How far a frame is.
@@ -94,6 +96,9 @@ impl Frame {
     /// The picture in the colour space of `rgb_from_xyz`.
     #[must_use]
     pub fn resolve(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> Image {
+        if let Some((_, image)) = self.resolved.as_ref().filter(|(space, _)| space == rgb_from_xyz) {
+            return image.clone();
+        }
         let splats = self.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
         resolve::resolve(&self.film, splats, rgb_from_xyz)
     }
@@ -147,7 +152,7 @@ pub fn tiles(window: Window, side: u32) -> Vec<Window> {
         .collect()
 }
 
-/// Tiles of at most `side` pixels, halved until every thread has eight or they are 4 pixels wide: a
+/// Tiles of at most `side` pixels, halved until every thread has 32 or they are 4 pixels wide: a
 /// small picture keeps all threads busy to its end. How it is cut changes no bit of it.
 fn shares(window: Window, side: u32, threads: usize) -> Vec<Window> {
     let halves = std::iter::successors(Some(side), |side| (*side >= 8).then_some(side / 2));
@@ -155,7 +160,7 @@ fn shares(window: Window, side: u32, threads: usize) -> Vec<Window> {
     let mut last = Vec::new();
     for cut in cuts {
         last = cut;
-        if last.len() >= 8 * threads {
+        if last.len() >= 32 * threads {
             break;
         }
     }
@@ -358,6 +363,7 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
     let total = job.window.pixels() as u64 * u64::from(job.samples);
     let done = AtomicU64::new(0);
     let mut milestones: Vec<Milestone> = Vec::new();
+    let mut resolved = None;
     let random = !matches!(job.plan.integrator, Integrator::Whitted(_));
 
     for pass in passes(job.samples) {
@@ -373,14 +379,18 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), stop: &AtomicBo
             let film = lock(&part.film);
             let photons = part.splats.as_ref().map(|(_, splats)| lock(splats));
             let photons = photons.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
-            resolve::resolve(&film, photons, &ColourSpace::Rec709.matrix_from_xyz()).relative_error().ok()
+            let space = ColourSpace::Rec709.matrix_from_xyz();
+            let image = resolve::resolve(&film, photons, &space);
+            let error = image.relative_error().ok();
+            resolved = Some((space, image));
+            error
         } else {
             None
         };
         milestones.push(Milestone { samples: pass.end, elapsed: start.elapsed(), error });
     }
     let (film, splats) = part.finish();
-    Ok(Frame { film, splats, elapsed: start.elapsed(), milestones })
+    Ok(Frame { film, splats, elapsed: start.elapsed(), milestones, resolved })
 }
 
 /// Paths of one work unit from the lights.
@@ -552,7 +562,8 @@ mod tests {
         let window = |side: u32| Window { x: 0, y: 0, width: side, height: side };
         // 16 × 16 pixels make 16 tiles of 4 × 4, as small as they get; 1024 × 1024 stay whole tiles.
         assert_eq!(shares(window(16), 32, 8).len(), 16);
-        assert_eq!(shares(window(48), 32, 2).len(), 36);
+        assert_eq!(shares(window(48), 32, 2).len(), 144);
+        assert_eq!(shares(window(256), 32, 2).len(), 64);
         assert_eq!(shares(window(1024), 32, 2).len(), 1024);
     }
 

@@ -253,10 +253,11 @@ fn hash(description: &SceneDescription, files: &[PathBuf]) -> String {
 /// 128 bits of BLAKE3 over the numbers of a picture.
 fn pixel_hash(image: &Image) -> String {
     let mut hasher = blake3::Hasher::new();
+    let mut bytes = Vec::new();
     for plane in image.rgb.iter().chain([&image.alpha]) {
-        for x in plane {
-            hasher.update(&x.to_le_bytes());
-        }
+        bytes.clear();
+        bytes.extend(plane.iter().flat_map(|x| x.to_le_bytes()));
+        hasher.update(&bytes);
     }
     hasher.finalize().to_hex()[..32].to_owned()
 }

@@ -19,6 +19,7 @@ use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::layers::LayerSums;
 use crate::film::run::Run;
+use rayon::prelude::*;
 
 /// Independently scrambled sample sets of each pixel; their spread is the error bar.
 pub const REPLICATES: usize = 4;
@@ -370,7 +371,8 @@ impl Film {
     /// Samples in the film, and samples that were dropped.
     #[must_use]
     pub fn samples(&self) -> (u64, u64) {
-        let counted = self.cells.iter().flatten().map(|cell| u64::from(cell.count)).sum();
+        let of_pixel = |cells: &PixelCells| cells.iter().map(|cell| u64::from(cell.count)).sum::<u64>();
+        let counted = self.cells.par_iter().with_min_len(4096).map(of_pixel).sum();
         (counted, self.invalid.total())
     }
 
