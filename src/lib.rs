@@ -4,7 +4,7 @@
 //! (`tests/layers.rs` holds the picture):
 //!
 //! ```text
-//!  main.rs  cli/                 process edge: arguments in, exit code and messages out
+//!  main.rs  memory.rs  cli/      process edge: allocator | arguments in, exit code and messages out
 //!  batch/                        jobs, work units, threads, report
 //!  transport/                    which effects, which paths, how much light
 //!  scene/                        compiled, immutable, Send + Sync; what rays meet
