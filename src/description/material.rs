@@ -2,13 +2,14 @@
 
 use serde::Deserialize;
 
+use super::absorption::Absorption;
 use super::coating::{Film, Thickness};
 use super::compound::{Blend, Bump, Mask, NormalMap, Roughness, TwoSided};
 use super::fault::Checker;
 use super::hair::Hair;
 use super::path::At;
 use super::principled::{Principled, PrincipledThin};
-use super::spectrum::{Index, Role, Spectrum, SpectrumOrTexture, yes};
+use super::spectrum::{FilePath, Index, Role, Spectrum, SpectrumOrTexture, yes};
 
 /// The material of a shape: the name of one, or one written in place.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -111,6 +112,8 @@ pub struct Conductor {
 pub enum ConductorIndex {
     /// Measured, by name: `gold`.
     Metal(String),
+    /// Measured, as refractiveindex.info writes it: `Au.yml`.
+    File(FilePath),
     /// Written out.
     Written {
         /// Real part η, relative to vacuum.
@@ -124,6 +127,7 @@ pub enum ConductorIndex {
 #[serde(deny_unknown_fields)]
 struct WrittenConductor {
     metal: Option<String>,
+    file: Option<FilePath>,
     eta: Option<Spectrum>,
     k: Option<Spectrum>,
     #[serde(default = "unit")]
@@ -144,12 +148,14 @@ impl TryFrom<WrittenConductor> for Conductor {
     type Error = String;
 
     fn try_from(written: WrittenConductor) -> Result<Conductor, String> {
-        let index = match (written.metal, written.eta, written.k) {
-            (Some(metal), None, None) => ConductorIndex::Metal(metal),
-            (None, Some(eta), Some(k)) => ConductorIndex::Written { eta, k },
-            (metal, eta, k) => {
-                let given = [("metal", metal.is_some()), ("eta", eta.is_some()), ("k", k.is_some())];
-                return Err(format!("expected either metal, or eta and k, found {}", given_fields(&given)));
+        let index = match (written.metal, written.file, written.eta, written.k) {
+            (Some(metal), None, None, None) => ConductorIndex::Metal(metal),
+            (None, Some(file), None, None) => ConductorIndex::File(file),
+            (None, None, Some(eta), Some(k)) => ConductorIndex::Written { eta, k },
+            (metal, file, eta, k) => {
+                let given =
+                    [("metal", metal.is_some()), ("file", file.is_some()), ("eta", eta.is_some()), ("k", k.is_some())];
+                return Err(format!("expected either metal, or file, or eta and k, found {}", given_fields(&given)));
             }
         };
         Ok(Conductor {
@@ -210,6 +216,8 @@ pub struct Dielectric {
     pub priority: Option<i32>,
     /// A thin film on it; default none.
     pub film: Option<Film>,
+    /// How its inside absorbs; default by the k of the file of its index, if it has one.
+    pub absorption: Option<Absorption>,
     /// Highlight of the `whitted` integrator; default none.
     pub highlight: Option<Highlight>,
 }
@@ -439,6 +447,9 @@ impl Material {
                 dielectric.roughness.check(at.key("roughness"), checker);
                 dielectric.reflection_tint.check(Role::Reflectance, at.key("reflection_tint"), checker);
                 dielectric.transmission_tint.check(Role::Reflectance, at.key("transmission_tint"), checker);
+                if let Some(absorption) = &dielectric.absorption {
+                    absorption.check(at.key("absorption"), checker);
+                }
                 check_film(dielectric.film.as_ref(), dielectric.fresnel, at, checker);
                 let alone = dielectric.priority.is_none() || dielectric.exterior_ior == vacuum();
                 let expected = "none beside priority: the index outside is that of the body around";
@@ -499,7 +510,7 @@ mod tests {
     #[test]
     fn a_conductor_is_a_metal_or_eta_and_k() {
         let conductor = |fields: &str| faults(&format!("materials:\n  a: {{conductor: {{{fields}}}}}"));
-        let place = "dir/s.yaml:3:18: materials.a.conductor: expected either metal, or eta and k, found ";
+        let place = "dir/s.yaml:3:18: materials.a.conductor: expected either metal, or file, or eta and k, found ";
         assert_eq!(conductor(""), format!("{place}neither"));
         assert_eq!(conductor("eta: 1"), format!("{place}eta"));
         assert_eq!(conductor("metal: gold, k: 1"), format!("{place}metal and k"));

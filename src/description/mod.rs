@@ -94,7 +94,7 @@
 //!       two_sided: true                          # ~
 //!   ring:
 //!     conductor:
-//!       metal: gold                              # either this, or eta: SPECTRUM and k: SPECTRUM
+//!       metal: gold                              # either this, or file: Au.yml, or eta: SPECTRUM and k: SPECTRUM
 //!       tint: 1                                  # ~ or a texture
 //!       roughness: 0                             # ~ microfacet α, 0 is smooth; a number, {texture: name}, or
 //!                                                # {u: 0.1, v: 0.3} of these: along ∂p/∂u and across
@@ -109,6 +109,8 @@
 //!       reflection_tint: 1                       # ~ factors, or textures
 //!       transmission_tint: 1
 //!       priority: 2                              # ~ none; see below; and film
+//!       absorption: {color: 0.9, at: 0.05}       # ~ by the k of the file of ior, if it has one; or {file: F.yml}, none:
+//!                                                # what a way of 0.05 m leaves of white light, spectrum above 0 to 1
 //!   pane: {thin_dielectric: {ior: 1.5, exterior_ior: 1}}             # and both tints; thickness_nm: ~ none; with one
 //!                                                # the sheet is a film that stands free: a soap bubble
 //!   lacquer: {plastic: {reflectance: 0.5, ior: 1.5, exterior_ior: 1, roughness: 0, tint: 1}}
@@ -279,8 +281,16 @@
 //! - {sellmeier: {b: [1.03961212, 0.231792344, 1.01046945], c: [0.00600069867, 0.0200179144, 103.560653]}}
 //! - {cauchy: [1.5046, 0.0042]}      # µm²; a third number, µm⁴, may follow
 //! - {abbe: {nd: 1.5, vd: 30}}
-//! - {table: [[400, 1.53], [700, 1.51]]}
+//! - {table: [[350, 1.54], [840, 1.51]]}
+//! - {schott: [2.2718929, -0.010108077, 0.010592509, 0.00020816965, -7.6472538e-6, 4.9240991e-7]}
+//! - {formula: {number: 2, coefficients: [0, 1.03961212, 0.00600069867]}}      # of refractiveindex.info, 1 to 9
+//! - {file: N-BK7.yml}               # YAML of refractiveindex.info, or CSV (wl,n and wl,k in µm) of its site
 //! ```
+//! An index has to hold over 360 to 830 nm: a table covers that, and a formula has no resonance there. A formula of the
+//! catalogue or a file is used beyond the range for which it is stated if that covers 405 to 700 nm, with a note. Where a
+//! file says how much its material absorbs (k), a closed body of `dielectric` whose `inside` is not written does so, by
+//! σ = 4πk/λ. An index below 1 belongs to a metal, which has k: `dielectric` refuses such files, and notes such numbers,
+//! which are right as a ratio to another index only.
 //! (The Sellmeier coefficients, c in µm², are those that Schott publishes for N-BK7.)
 //!
 //! # A batch
@@ -310,6 +320,7 @@
 //! and unknown names are told all at once. Limits: 64 MiB of text, 64 levels, 4 million values
 //! with aliases written out.
 
+mod absorption;
 mod batch;
 mod camera;
 mod coating;
@@ -325,6 +336,7 @@ mod material;
 mod medium;
 mod mitsuba;
 mod node;
+mod optical_data;
 mod path;
 mod principled;
 mod print;
@@ -337,6 +349,7 @@ mod transform;
 mod volume;
 mod yaml;
 
+pub use absorption::{Absorption, ColorAt};
 pub use batch::{Batch, BatchEntry, Document, load};
 pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection};
 pub use coating::{Film, TexturedThickness, Thickness};
@@ -352,6 +365,7 @@ pub use material::{
 pub use medium::{Coefficients, HeterogeneousMedium, HomogeneousMedium, Medium, Phase, PhaseBlend};
 pub(crate) use medium::{UNCHANGED, VACUUM};
 pub use mitsuba::export::{Exported, Loss, export};
+pub use optical_data::{OpticalData, optical_data};
 pub use principled::{Contrast, Luminance, Principled, PrincipledThin, Sampling, ThinSampling};
 pub use print::yaml;
 pub use scene::{Locator, SceneDescription};
@@ -364,7 +378,8 @@ pub use shape::{
     SdfGrid, SdfNormals, Shape, Sphere, Winding,
 };
 pub use spectrum::{
-    Abbe, Blackbody, Cauchy, FilePath, Illuminant, Index, Line, Scaled, Sellmeier, Spectrum, SpectrumOrTexture, Vec3,
+    Abbe, Blackbody, Cauchy, FilePath, Illuminant, Index, Line, NumberedFormula, Scaled, Sellmeier, Spectrum,
+    SpectrumOrTexture, Vec3,
 };
 pub use texture::{Checkerboard, ImageTexture, MeshAttribute, Texture, TextureFilter, Wrap};
 pub use transform::{Extent, Rotation, TransformStep};

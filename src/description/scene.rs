@@ -295,6 +295,7 @@ mod tests {
                 transmission_tint: one_of(1.0),
                 priority: Some(2),
                 film: None,
+                absorption: Some(Absorption::Color(ColorAt { color: number(0.9), at: 0.05 })),
                 distribution: Distribution::Ggx,
                 fresnel: Fresnel::Exact,
                 highlight: None,

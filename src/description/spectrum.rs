@@ -190,6 +190,22 @@ pub enum Index {
     Abbe(Abbe),
     /// `{table: [[nm, n], …]}`: wavelengths increase.
     Table(Vec<[f64; 2]>),
+    /// `{schott: [..6]}`: n² = a₀ + a₁λ² + a₂λ⁻² + a₃λ⁻⁴ + a₄λ⁻⁶ + a₅λ⁻⁸, λ in µm.
+    Schott([f64; 6]),
+    /// `{formula: {number: 2, coefficients: […]}}`: of refractiveindex.info.
+    Formula(NumberedFormula),
+    /// `{file: N-BK7.yml}`: as refractiveindex.info writes them.
+    File(FilePath),
+}
+
+/// A formula of refractiveindex.info.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NumberedFormula {
+    /// Which one, from 1 to 9.
+    pub number: u8,
+    /// As the database lists them, λ in µm.
+    pub coefficients: Vec<f64>,
 }
 
 /// Sellmeier's equation, n² = 1 + Σ bᵢ λ² / (λ² − cᵢ), λ in µm.
@@ -348,7 +364,7 @@ impl Index {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         match self {
             Index::Number(n) => checker.positive(at, *n),
-            Index::Glass(_) => {}
+            Index::Glass(_) | Index::Schott(_) | Index::Formula(_) | Index::File(_) => {}
             Index::Sellmeier(Sellmeier { c, .. }) => {
                 let at = at.key("sellmeier");
                 let at = at.key("c");

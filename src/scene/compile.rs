@@ -8,6 +8,7 @@ mod bodies;
 mod files;
 mod films;
 mod hair;
+mod indices;
 mod lights;
 mod media;
 mod meshes;
@@ -20,6 +21,7 @@ use super::instance::{AffineMap, Group, Instance};
 use super::light::Light;
 use super::load::{self, Pictures, Wanted};
 use super::material::{Kind, Material};
+use super::medium::Medium;
 use super::mesh::MeshTree;
 use super::mesh::together::Together;
 use super::nested::{Inside, Nested};
@@ -30,7 +32,7 @@ use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene};
 use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
 use crate::math::Ray;
-use crate::spectrum::{Outside, RefractiveIndex, Spectrum, WavelengthDistribution, catalogue, illuminant, upsample};
+use crate::spectrum::{Outside, Spectrum, WavelengthDistribution, illuminant, upsample};
 use attributes::{OfMesh, Surface};
 use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3};
 use meshes::Meshes;
@@ -66,6 +68,10 @@ struct Compiler<'a> {
     named: HashMap<&'a str, Arc<Material>>,
     material_ids: HashMap<&'a str, u32>,
     medium_ids: HashMap<&'a str, u32>,
+    /// Media of bodies that absorb by themselves, after those that have names.
+    absorbing: Vec<Medium>,
+    /// Which of them is that of a material.
+    absorbing_ids: HashMap<u32, u32>,
     /// Groups that are copied, and the material of their first shape.
     groups: HashMap<&'a str, (Arc<Group>, u32)>,
     materials: Vec<Material>,
@@ -131,6 +137,8 @@ impl<'a> Compiler<'a> {
             named: HashMap::new(),
             material_ids: HashMap::new(),
             medium_ids: HashMap::new(),
+            absorbing: Vec::new(),
+            absorbing_ids: HashMap::new(),
             groups: HashMap::new(),
             materials: Vec::new(),
         }
@@ -246,6 +254,7 @@ impl<'a> Compiler<'a> {
         let nested = Nested::of(&mut objects, boxes.len(), |object| {
             self.materials[object.material as usize].body().ok().flatten()
         });
+        media.append(&mut self.absorbing);
         let (center, radius) = extent(&boxes, &camera);
         let light_cdf = lights::light_cdf(&lights, &weights, &objects, radius);
         let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
@@ -274,6 +283,7 @@ impl<'a> Compiler<'a> {
             name: name.to_owned(),
             camera,
             objects,
+            standing: boxes.len(),
             bvh,
             together,
             materials: std::mem::take(&mut self.materials),
@@ -295,6 +305,7 @@ impl<'a> Compiler<'a> {
             notes: std::mem::take(&mut self.notes),
         };
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
+        self.note_overlaps(&mut scene);
         scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);
         Ok(scene)
     }
@@ -407,6 +418,7 @@ impl<'a> Compiler<'a> {
         }
         let enclosed = if closed { None } else { camera_medium };
         let (behind, before) = if shape.flip_normals { (camera_medium, enclosed) } else { (enclosed, camera_medium) };
+        let behind = self.absorbing(at, material, closed, &geometry, shape).or(behind);
         let unchanged = |side: &Option<String>| side.as_deref() == Some(written::UNCHANGED);
         let medium = |side: &Option<String>, otherwise: Option<u32>| match side.as_deref() {
             None => otherwise,
@@ -549,19 +561,6 @@ impl<'a> Compiler<'a> {
 
     fn light_spectrum(&mut self, at: &str, s: &written::Spectrum) -> Spectrum {
         self.spectrum(at, s, Outside::Zero, Role::Light)
-    }
-
-    fn index(&mut self, at: &str, index: &written::Index) -> RefractiveIndex {
-        let made = match index {
-            written::Index::Number(n) => Ok(RefractiveIndex::Constant(*n)),
-            written::Index::Glass(name) => catalogue::glass(name),
-            written::Index::Sellmeier(s) => Ok(RefractiveIndex::Sellmeier { b: s.b, c: s.c }),
-            written::Index::Cauchy(c) => Ok(RefractiveIndex::Cauchy { a: vec![c.a, c.b, c.c] }),
-            written::Index::Abbe(a) => RefractiveIndex::from_abbe(a.nd, a.vd),
-            written::Index::Table(samples) => Ok(RefractiveIndex::Table { samples: samples.clone() }),
-        };
-        let checked = made.and_then(|index| index.check_band().map(|()| index));
-        self.or(at, checked, RefractiveIndex::Constant(1.0))
     }
 
     fn geometry(&mut self, at: &str, shape: &written::Shape) -> Result<Option<Geometry>> {

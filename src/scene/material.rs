@@ -91,6 +91,8 @@ pub enum Kind {
         priority: Option<i32>,
         /// A film on it.
         film: Option<Box<Film>>,
+        /// What its inside absorbs, m⁻¹, where no other medium fills it.
+        absorption: Option<Box<Spectrum>>,
     },
     /// A thin pane.
     Thin {
@@ -509,6 +511,15 @@ impl Material {
             }
         }
         Ok(found.flatten())
+    }
+
+    /// What the inside of a body absorbs that the material bounds, m⁻¹; that of the first part that does.
+    #[must_use]
+    pub fn absorption(&self) -> Option<&Spectrum> {
+        self.leaves().into_iter().find_map(|leaf| match &leaf.kind {
+            Kind::Dielectric { absorption, .. } => absorption.as_deref(),
+            _ => None,
+        })
     }
 
     /// Whether light interferes in a film on the surface, or in the sheet that it is.

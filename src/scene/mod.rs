@@ -23,6 +23,7 @@ pub mod material;
 pub mod medium;
 pub mod mesh;
 pub mod nested;
+pub mod overlaps;
 pub mod partials;
 pub mod principled;
 pub mod projector;
@@ -63,6 +64,8 @@ pub struct Scene {
     /// What was written: first what stands in the scene itself, then the children of groups, which are
     /// seen through instances.
     pub objects: Vec<Object>,
+    /// How many of them stand in the scene itself.
+    pub standing: usize,
     /// Over the objects that stand in the scene itself, but for the meshes of [`Scene::together`].
     pub bvh: Bvh,
     /// The triangles of most meshes that stand in the scene itself: a ray is made ready for them once.

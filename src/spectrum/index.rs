@@ -36,9 +36,9 @@ pub enum RefractiveIndex {
         /// The six coefficients.
         a: [f64; 6],
     },
-    /// A numbered formula of refractiveindex.info, 1 to 6 (see [`RefractiveIndex::formula`]).
+    /// A numbered formula of refractiveindex.info, 1 to 9 (see [`RefractiveIndex::formula`]).
     Formula {
-        /// Which of the six.
+        /// Which of the nine.
         number: u8,
         /// As the database lists them.
         coefficients: Vec<f64>,
@@ -79,6 +79,9 @@ impl RefractiveIndex {
     /// 4. n² = C₁ + C₂λ^C₃ / (λ² − C₄^C₅) + C₆λ^C₇ / (λ² − C₈^C₉) + Σ C₁₀λ^C₁₁
     /// 5. n = C₁ + Σ C₂λ^C₃
     /// 6. n − 1 = C₁ + Σ C₂ / (C₃ − λ⁻²)
+    /// 7. n = C₁ + C₂ / (λ² − 0.028) + C₃ / (λ² − 0.028)² + C₄λ² + C₅λ⁴ + C₆λ⁶, Herzberger's
+    /// 8. (n² − 1) / (n² + 2) = C₁ + C₂λ² / (λ² − C₃) + C₄λ²
+    /// 9. n² = C₁ + C₂ / (λ² − C₃) + C₄(λ − C₅) / ((λ − C₅)² + C₆)
     ///
     /// Formulas 1 and 2 of three terms or fewer without a constant become
     /// [`RefractiveIndex::Sellmeier`].
@@ -86,14 +89,13 @@ impl RefractiveIndex {
     /// # Errors
     /// In words, if there is no such formula here or the coefficients do not pair up.
     pub fn formula(number: u8, coefficients: &[f64]) -> Result<RefractiveIndex, String> {
-        if !(1..=6).contains(&number) {
-            return Err(format!("expected formula 1 to 6, found {number}"));
-        }
         let count = coefficients.len();
-        let (fits, shape) = if number == 4 {
-            (count >= 9 && count % 2 == 1, "9, 11, 13, …")
-        } else {
-            (count % 2 == 1, "1, 3, 5, …")
+        let (fits, shape) = match number {
+            1..=3 | 5 | 6 => (count % 2 == 1, "1, 3, 5, …"),
+            4 => (count >= 9 && count % 2 == 1, "9, 11, 13, …"),
+            7 | 9 => (count == 6, "6"),
+            8 => (count == 4, "4"),
+            _ => return Err(format!("expected formula 1 to 9, found {number}")),
         };
         if !fits {
             return Err(format!("formula {number}: expected {shape} coefficients, found {count}"));
@@ -233,6 +235,7 @@ impl RefractiveIndex {
                 2 => c[1..].chunks_exact(2).filter(|p| p[0] != 0.0).map(|p| p[1]).collect(),
                 4 => [1, 5].iter().filter(|i| c[**i] != 0.0).map(|i| power(c[i + 2], c[i + 3])).collect(),
                 6 => c[1..].chunks_exact(2).filter(|p| p[0] != 0.0).map(|p| 1.0 / p[1]).collect(),
+                8 | 9 if c[1] != 0.0 => vec![c[2]],
                 _ => Vec::new(),
             },
             _ => Vec::new(),
@@ -267,6 +270,18 @@ fn numbered(number: u8, c: &[f64], w: f64) -> f64 {
         }
         5 => c[0] + pairs(1).map(|p| p[0] * power(w, p[1])).sum::<f64>(),
         6 => 1.0 + c[0] + pairs(1).map(|p| p[0] / (p[1] - 1.0 / w2)).sum::<f64>(),
+        7 => {
+            let l = 1.0 / (w2 - 0.028);
+            c[0] + l * (c[1] + l * c[2]) + w2 * (c[3] + w2 * (c[4] + w2 * c[5]))
+        }
+        8 => {
+            let s = c[0] + c[1] * w2 / (w2 - c[2]) + c[3] * w2;
+            ((1.0 + 2.0 * s) / (1.0 - s)).sqrt()
+        }
+        9 => {
+            let d = w - c[4];
+            (c[0] + c[1] / (w2 - c[2]) + c[3] * d / (d * d + c[5])).sqrt()
+        }
         _ => f64::NAN,
     }
 }
@@ -333,6 +348,9 @@ mod tests {
             + 0.0004 * w.powi(-6)
             + 0.00005 * w.powi(-8);
         assert!((schott.at(500.0) - n2.sqrt()).abs() < 1e-15);
+        // BK7 of Schott's catalogue of 1982: n_d = 1.51680.
+        let a = [2.2718929, -0.010108077, 0.010592509, 0.00020816965, -7.6472538e-6, 4.9240991e-7];
+        assert!((RefractiveIndex::Schott { a }.at(LINE_D) - 1.5168).abs() < 5e-6);
         let at = |number, c: &[f64]| RefractiveIndex::formula(number, c).unwrap().at(500.0);
         assert!((at(1, &[0.1, 1.2, 0.1]) - (1.1 + 1.2 * 0.25 / 0.24f64).sqrt()).abs() < 1e-15);
         assert!((at(2, &[0.1, 1.2, 0.01]) - (1.1 + 1.2 * 0.25 / 0.24f64).sqrt()).abs() < 1e-15);
@@ -342,7 +360,13 @@ mod tests {
         assert!((at(4, &four) - (2.0 + 0.3 * 0.25 / 0.24 + 0.2f64).sqrt()).abs() < 1e-15);
         assert!((at(5, &[1.5, 0.01, -2.0]) - 1.54).abs() < 1e-15);
         assert!((at(6, &[0.0, 0.05, 238.0]) - (1.0 + 0.05 / 234.0)).abs() < 1e-15);
-        assert!(RefractiveIndex::formula(7, &[1.0]).unwrap_err().contains("1 to 6"));
+        // λ² − 0.028 = 0.222; s = 0.1 + 0.3 · 0.25/0.24 + 0.2 · 0.25 = 0.4625, n² = 1.925/0.5375.
+        let seven = 1.5 + 0.01 / 0.222 + 0.001 / (0.222 * 0.222) + 0.1 * 0.25 + 0.2 * 0.0625 + 0.3 * 0.015625;
+        assert!((at(7, &[1.5, 0.01, 0.001, 0.1, 0.2, 0.3]) - seven).abs() < 1e-15);
+        assert!((at(8, &[0.1, 0.3, 0.01, 0.2]) - (1.925 / 0.5375f64).sqrt()).abs() < 1e-15);
+        // (λ − c)² = 0.04, so that the last term is 0.5 · 0.2/0.14.
+        assert!((at(9, &[2.0, 0.03, 0.01, 0.5, 0.3, 0.1]) - (2.125 + 0.1 / 0.14f64).sqrt()).abs() < 1e-14);
+        assert!(RefractiveIndex::formula(10, &[1.0]).unwrap_err().contains("1 to 9"));
         assert!(RefractiveIndex::formula(2, &[1.0, 2.0]).unwrap_err().contains("found 2"));
         assert!(RefractiveIndex::formula(4, &[1.0]).is_err());
     }

@@ -13,6 +13,7 @@ mod films;
 mod fog;
 mod furnace;
 mod glass;
+mod indices;
 mod lights;
 mod media;
 mod nested;

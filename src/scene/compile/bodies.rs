@@ -2,11 +2,30 @@
 
 use super::Compiler;
 use crate::description as written;
-use crate::scene::Geometry;
 use crate::scene::material::Material;
 use crate::scene::shape::Shape;
+use crate::scene::{Geometry, Scene};
+
+/// Pairs that are told.
+const TOLD: usize = 8;
 
 impl Compiler<'_> {
+    /// Notes which bodies overlap without priorities.
+    pub(super) fn note_overlaps(&self, scene: &mut Scene) {
+        let pairs = scene.overlaps();
+        for [a, b] in pairs.iter().take(TOLD) {
+            let at = format!("shapes[{b}].{}", self.description.shapes[*b as usize].geometry.kind());
+            let note = format!(
+                "overlaps shapes[{a}], and not both have a priority: where they share a place, light is refracted by \
+                 indices that neither has; a higher priority says which has the place"
+            );
+            scene.notes.push(self.description.fault(&at, &note));
+        }
+        if pairs.len() > TOLD {
+            scene.notes.push(format!("{} more pairs of bodies overlap without priorities", pairs.len() - TOLD));
+        }
+    }
+
     /// Why an object of this form cannot be a body with a priority, if its material asks for one.
     pub(super) fn unfit_for_a_body(
         &self,

@@ -221,6 +221,7 @@ impl<'a> Compiler<'a> {
                         let none = (Spectrum::Constant(1.0), Spectrum::Constant(0.0));
                         self.or(&at("metal"), catalogue::metal(name), none)
                     }
+                    written::ConductorIndex::File(file) => self.metal_file(&at("file"), file),
                     written::ConductorIndex::Written { eta, k } => (
                         self.spectrum(&at("eta"), eta, Outside::Hold, Role::Coefficient),
                         self.spectrum(&at("k"), k, Outside::Hold, Role::Coefficient),
@@ -237,6 +238,7 @@ impl<'a> Compiler<'a> {
                 let facets = self.roughness(&at("roughness"), &m.roughness, m.distribution);
                 let tints = self.tints(&place, &m.reflection_tint, &m.transmission_tint);
                 let film = self.film(&at("film"), m.film.as_ref());
+                let absorption = self.absorption(&place, m).map(Box::new);
                 if facets.is_some() && m.fresnel == written::Fresnel::Schlick {
                     self.fault(&at("fresnel"), "expected exact on rough glass, found schlick");
                 }
@@ -244,13 +246,18 @@ impl<'a> Compiler<'a> {
                 // casts no shadow.
                 match (&interior, &exterior) {
                     (RefractiveIndex::Constant(a), RefractiveIndex::Constant(b))
-                        if a == b && tints.is_none() && m.priority.is_none() && film.is_none() =>
+                        if a == b
+                            && tints.is_none()
+                            && m.priority.is_none()
+                            && film.is_none()
+                            && absorption.is_none() =>
                     {
                         plain(Kind::Boundary)
                     }
                     _ => {
                         let (fresnel, priority) = (model(m.fresnel), m.priority);
-                        let kind = Kind::Dielectric { interior, exterior, fresnel, facets, tints, priority, film };
+                        let kind =
+                            Kind::Dielectric { interior, exterior, fresnel, facets, tints, priority, film, absorption };
                         (kind, false, m.highlight)
                     }
                 }

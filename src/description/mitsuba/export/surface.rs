@@ -5,10 +5,11 @@ use super::super::super::material::{
     Conductor, ConductorIndex, Dielectric, DiffuseMean, Distribution, Fresnel, Material, MaterialRef, Plastic,
     ThinDielectric,
 };
+use super::super::super::optical_data::optical_data;
 use super::super::super::spectrum::{Index, Spectrum, SpectrumOrTexture};
 use super::Export;
 use super::spectra::Role;
-use crate::spectrum::{RefractiveIndex, catalogue};
+use crate::spectrum::{self, Outside, RefractiveIndex, catalogue};
 
 /// The wavelength at which a dispersive index is taken where there can be only one: the d line, nm.
 const D_LINE_NM: f64 = 587.5618;
@@ -120,6 +121,22 @@ impl Export<'_> {
                     self.curve("k", &k, 1.0);
                 }
             }
+            ConductorIndex::File(file) => {
+                if let Ok(data) = optical_data(file) {
+                    let curve = |f: &dyn Fn(f64) -> f64| {
+                        let all = (0..=94).map(|i| 360.0 + 5.0 * f64::from(i)).map(|nm| (nm, f(nm)));
+                        spectrum::Spectrum::from_samples(&all.collect::<Vec<_>>(), Outside::Hold)
+                    };
+                    for (name, made) in [
+                        ("eta", curve(&|nm| data.index.as_ref().map_or(1.0, |index| index.at(nm)))),
+                        ("k", curve(&|nm| data.k_at(nm))),
+                    ] {
+                        if let Ok(made) = made {
+                            self.curve(name, &made, 1.0);
+                        }
+                    }
+                }
+            }
             ConductorIndex::Written { eta, k } => {
                 self.spectrum("eta", eta, Role::Coefficient);
                 self.spectrum("k", k, Role::Coefficient);
@@ -206,7 +223,9 @@ fn plain_shortfall(material: &Material) -> Option<String> {
         }
         Material::Conductor(m) => {
             let index = match &m.index {
-                ConductorIndex::Metal(_) => Some("its index at every fifth nanometre".to_owned()),
+                ConductorIndex::Metal(_) | ConductorIndex::File(_) => {
+                    Some("its index at every fifth nanometre".to_owned())
+                }
                 ConductorIndex::Written { eta, k } => {
                     let good = Export::can_say_all(&[(eta, Role::Coefficient), (k, Role::Coefficient)]);
                     (!good).then(|| "grey indices in place of spectra".to_owned())
@@ -219,6 +238,7 @@ fn plain_shortfall(material: &Material) -> Option<String> {
             .or(schlick(m.fresnel))
             .or(dispersive(&m.ior, &m.exterior_ior))
             .or(film(m.film.is_some()))
+            .or(m.absorption.as_ref().map(|_| "no absorption inside, which Mitsuba has in media only".to_owned()))
             .or(m.priority.map(|_| "no priority: in Mitsuba bodies that overlap are wrong".to_owned()))
             .or(spectra(&[&m.reflection_tint, &m.transmission_tint])),
         Material::ThinDielectric(m) => film(m.thickness_nm.is_some())
@@ -266,6 +286,9 @@ fn at_d(index: &Index) -> f64 {
         Index::Sellmeier(s) => Some(RefractiveIndex::Sellmeier { b: s.b, c: s.c }),
         Index::Cauchy(c) => Some(RefractiveIndex::Cauchy { a: vec![c.a, c.b, c.c] }),
         Index::Table(samples) => Some(RefractiveIndex::Table { samples: samples.clone() }),
+        Index::Schott(a) => Some(RefractiveIndex::Schott { a: *a }),
+        Index::Formula(f) => RefractiveIndex::formula(f.number, &f.coefficients).ok(),
+        Index::File(file) => optical_data(file).ok().and_then(|data| data.index),
     };
     curve.map_or(1.5, |curve| curve.at(D_LINE_NM))
 }
