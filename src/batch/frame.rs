@@ -12,7 +12,7 @@ use crate::film::resolve::{self, ErrorEstimate, Image, Splats};
 use crate::film::run::{LONGEST, LayerRun, Run};
 use crate::math::sampler::Octet;
 use crate::scene::Scene;
-use crate::spectrum::{ColourSpace, LANES, Lanes, SampledWavelengths, observer};
+use crate::spectrum::{ColourSpace, LANES, Lanes, SampledWavelengths};
 use crate::transport::light::{Bounds, LightPaths, Splat};
 use crate::transport::merge::{self, Collection, Photon, PhotonMap};
 use crate::transport::plan::{EffectPlan, Integrator};
@@ -500,7 +500,7 @@ impl Landed {
             self.invalid.record(cause(splat.light));
             return;
         }
-        let xyz = observer::xyz(splat.light, wavelengths);
+        let xyz = splat.xyz(wavelengths);
         filter.deal(splat.place, |pixel, share| {
             if window.index(pixel).is_some() {
                 self.pixels.push((pixel, xyz.map(|x| x * share)));

@@ -49,6 +49,17 @@ impl RelativeIndex {
     }
 }
 
+/// What a smooth interface does with light of each lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Ways {
+    /// Index beyond over index on the side that it comes from.
+    pub eta: [f64; LANES],
+    /// Reflected share.
+    pub reflected: [f64; LANES],
+    /// Cosine of the refracted direction; zero under total reflection.
+    pub cos_transmitted: [f64; LANES],
+}
+
 /// A smooth interface.
 #[derive(Clone, Copy, Debug)]
 pub struct Dielectric {
@@ -107,6 +118,23 @@ impl Dielectric {
         let tint = Tint { reflected: only(self.tint.reflected), transmitted: only(self.tint.transmitted) };
         let film = self.film.as_ref().map(|film| film.lane(lane));
         Dielectric { eta: RelativeIndex::Constant(eta), tint, film, ..*self }
+    }
+
+    /// What the interface does with light of each lane at an angle of its own: `cosines` to the normal.
+    #[must_use]
+    pub fn lanes(&self, cosines: &[f64; LANES]) -> Ways {
+        let mut ways = Ways { eta: [1.0; LANES], reflected: [0.0; LANES], cos_transmitted: [1.0; LANES] };
+        for (lane, &cos) in cosines.iter().enumerate() {
+            let eta = match &self.eta {
+                RelativeIndex::Constant(eta) => *eta,
+                RelativeIndex::Dispersive(eta) => eta[lane],
+            };
+            let eta = if cos > 0.0 { eta } else { 1.0 / eta };
+            let split = fresnel::dielectric(self.fresnel, cos.abs(), eta);
+            ways.eta[lane] = eta;
+            (ways.reflected[lane], ways.cos_transmitted[lane]) = (split.reflected, split.cos_transmitted);
+        }
+        ways
     }
 
     /// The reflection, where `u_lobe` has every wavelength reflected that decides for itself.

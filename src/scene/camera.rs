@@ -39,6 +39,8 @@ struct View {
     unit_axis: DVec3,
     /// Where the axis meets the near clipping plane.
     near: DVec3,
+    /// World to camera space.
+    camera_from_world: DAffine3,
 }
 
 /// A thin lens.
@@ -133,6 +135,7 @@ impl Camera {
             axis_length: m.z_axis.length(),
             unit_axis: m.z_axis.normalize(),
             near: world_from_camera.translation + m.z_axis * clip[0],
+            camera_from_world: world_from_camera.inverse(),
         };
         Camera { world_from_camera, projection, resolution, lens, clip, principal_point, view }
     }
@@ -209,7 +212,7 @@ impl Camera {
     #[must_use]
     pub fn entry(&self, point: DVec3, lens: impl FnOnce() -> DVec2) -> Option<Entry> {
         let (w, h) = (f64::from(self.resolution[0]), f64::from(self.resolution[1]));
-        let local = self.world_from_camera.inverse().transform_point3(point);
+        let local = self.view.camera_from_world.transform_point3(point);
         if !(local.z > 0.0 && local.z >= self.clip[0] && local.z <= self.clip[1]) {
             return None;
         }
@@ -253,7 +256,7 @@ impl Camera {
     /// +z forward.
     #[must_use]
     pub fn camera_from_world(&self) -> [f32; 16] {
-        DMat4::from(self.world_from_camera.inverse()).to_cols_array().map(|x| x as f32)
+        DMat4::from(self.view.camera_from_world).to_cols_array().map(|x| x as f32)
     }
 
     /// World to the picture for row vectors: x and y from (0, 0) at the top left to (1, 1).
@@ -282,7 +285,7 @@ impl Camera {
                 )
             }
         };
-        (ndc_from_camera * DMat4::from(self.world_from_camera.inverse())).to_cols_array().map(|x| x as f32)
+        (ndc_from_camera * DMat4::from(self.view.camera_from_world)).to_cols_array().map(|x| x as f32)
     }
 
     /// Distance of `point` along the axis.

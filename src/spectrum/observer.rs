@@ -86,6 +86,19 @@ pub fn xyz(radiance: Lanes, wavelengths: &SampledWavelengths) -> [f32; 3] {
     [(s[0] + s[4]) * SCALE, (s[1] + s[5]) * SCALE, (s[2] + s[6]) * SCALE]
 }
 
+/// [`xyz`] of light that is dark in all lanes but one.
+#[must_use]
+#[inline]
+pub fn xyz_of_lane(radiance: Lanes, lane: usize, wavelengths: &SampledWavelengths) -> [f32; 3] {
+    let at = |x: Lanes| x.to_array()[lane];
+    let t = at(wavelengths.nm) - 360.0;
+    let row = (t as usize).min(ROWS - 1);
+    let entry = OBSERVER.packed[row].to_array();
+    let weight = at(radiance) * at(wavelengths.inv_pdf) * (1.0 / (LANES as f64 * Y_INTEGRAL)) as f32;
+    let fraction = t - row as f32;
+    std::array::from_fn(|c| weight * fraction.mul_add(entry[4 + c], entry[c]))
+}
+
 /// CIE XYZ of a whole spectrum.
 ///
 /// Two-point Gauss quadrature in each cell between neighbouring nanometres and knots of the

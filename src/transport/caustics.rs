@@ -32,6 +32,8 @@ pub struct Caustics {
     pub traced: Vec<bool>,
     /// Pairs of a light and what it is aimed at, those of one light together.
     pub sources: Vec<Source>,
+    /// Running sums of their probabilities.
+    pub sums: Vec<f64>,
     /// Paths from the lights for each path from the camera.
     pub ratio: f64,
     /// Whether wavelengths that part in glass are followed together.
@@ -145,12 +147,8 @@ impl Caustics {
     /// from infinity, `u_aim` the rest. `None` where no light goes that way.
     #[must_use]
     pub fn begin(&self, scene: &Scene, u_source: f64, u_start: DVec2, u_aim: DVec2, nm: Lanes) -> Option<Aimed> {
-        let mut below = 0.0;
-        let index = self.sources.iter().position(|s| {
-            below += s.probability;
-            u_source < below
-        })?;
-        let source = &self.sources[index];
+        let index = self.sums.partition_point(|&sum| sum <= u_source);
+        let source = self.sources.get(index)?;
         let start = scene.start(source.light as usize, u_start, u_aim, nm)?;
         let cell = source.guide.sample(u_aim);
         let aim = |ball: &Ball, freedom: &Freedom| match *freedom {
@@ -167,9 +165,13 @@ impl Caustics {
         let x = own.at(cell);
         let mut density = source.probability * source.guide.density(cell) / own.measure();
         // Balls may hide each other: what any of them would have aimed at counts.
-        for (i, other) in self.sources.iter().enumerate() {
+        let mut below = index;
+        while below > 0 && self.sources[below - 1].light == source.light {
+            below -= 1;
+        }
+        let of_light = self.sources[below..].iter().take_while(|other| other.light == source.light);
+        for (i, other) in (below..).zip(of_light) {
             if i != index
-                && other.light == source.light
                 && let Some(ball) = &other.ball
             {
                 let aim = aim(ball, &freedom);
@@ -194,6 +196,17 @@ impl Caustics {
         };
         let emission = Emission { ray, power: power * (1.0 / density) as f32 };
         Some(Aimed { emission, source: index, cell })
+    }
+
+    /// The running sums of the probabilities of `sources`.
+    #[must_use]
+    pub fn sums(sources: &[Source]) -> Vec<f64> {
+        let mut below = 0.0;
+        let mut sum = |s: &Source| {
+            below += s.probability;
+            below
+        };
+        sources.iter().map(&mut sum).collect()
     }
 
     /// Paths from the lights for `samples` paths from the camera, at least one.

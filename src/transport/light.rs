@@ -9,6 +9,8 @@
 //! Found are paths L … D E: what a smooth mirror or glass shows cannot be found, and is black. Light that the camera sees
 //! itself, L E, is the camera's part (`path` of one segment). Wavelengths are carried as in [`path`](super::path).
 
+mod packet;
+
 use super::caustics::Caustics;
 use super::merge::Photon;
 use super::path::seen_normal;
@@ -22,7 +24,7 @@ use crate::scene::compound::Leaf;
 use crate::scene::material::Kind;
 use crate::scene::nested::{Bodies, Crossing as Meeting};
 use crate::scene::{Hit, Inside, Medium, Object, Scene, SurfacePoint};
-use crate::spectrum::{LANES, Lanes, SampledWavelengths};
+use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
 
 /// Vertices up to which a path that has lost nothing goes on for sure, as in `path`.
@@ -44,6 +46,19 @@ pub struct Splat {
     pub place: DVec2,
     /// Spectral power by pixel, W·nm⁻¹, for each lane; its mean over paths is the picture's radiance.
     pub light: Lanes,
+    /// The one lane that is not dark, where wavelengths have parted.
+    pub alone: Option<usize>,
+}
+
+impl Splat {
+    /// CIE XYZ of the light.
+    #[must_use]
+    pub fn xyz(&self, wavelengths: &SampledWavelengths) -> [f32; 3] {
+        match self.alone {
+            Some(lane) => observer::xyz_of_lane(self.light, lane, wavelengths),
+            None => observer::xyz(self.light, wavelengths),
+        }
+    }
 }
 
 /// The part of the plane of the picture where light is wanted, in pixels.
@@ -187,7 +202,29 @@ struct Walk<'a, 'b> {
     rays: u32,
 }
 
+/// What is drawn at a vertex.
+struct Numbers {
+    flight: f64,
+    lobe: f64,
+    roulette: f64,
+    lens: DVec2,
+    scatter: DVec2,
+}
+
 impl<'a> Walk<'a, '_> {
+    /// Beyond the first ray, evenly spread numbers gain nothing: what a path adds to a pixel is too rugged.
+    fn numbers(&self, vertex: u32) -> Numbers {
+        let mut numbers = self.sampler.walk(Set::Choice(vertex));
+        let [flight, lobe, roulette] = std::array::from_fn(|_| numbers.draw());
+        let [lens, scatter] = std::array::from_fn(|_| DVec2::new(numbers.draw(), numbers.draw()));
+        Numbers { flight, lobe, roulette, lens, scatter }
+    }
+
+    /// The numbers of a flight after some boundaries.
+    fn set_of_flight(vertex: u32, crossings: u32) -> Set {
+        Set::Extra((vertex + 1).wrapping_add(crossings << 16))
+    }
+
     fn follow(&mut self, mut beam: Beam) {
         let LightPaths { scene, plan, settings, caustics, .. } = *self.paths;
         loop {
@@ -196,10 +233,8 @@ impl<'a> Walk<'a, '_> {
             if settings.max_depth.is_some_and(|depth| vertex + 2 > depth) {
                 return;
             }
-            // Beyond the first ray, evenly spread numbers gain nothing: what a path adds to a pixel is too rugged.
-            let mut numbers = self.sampler.walk(Set::Choice(vertex));
-            let [u_flight, u_lobe, u_roulette] = std::array::from_fn(|_| numbers.draw());
-            let [u_lens, u_scatter] = std::array::from_fn(|_| DVec2::new(numbers.draw(), numbers.draw()));
+            let Numbers { flight: u_flight, lobe: u_lobe, roulette: u_roulette, lens: u_lens, scatter: u_scatter } =
+                self.numbers(vertex);
             let Some(met) = self.fly(&mut beam, u_flight) else { return };
             let came = -beam.ray.direction;
             let (hit, surface, leaf, pane, meeting) = match met {
@@ -244,7 +279,10 @@ impl<'a> Walk<'a, '_> {
             if let Some(meeting) = meeting {
                 beam.bodies = meeting.here;
             }
-            let bsdf = material.bsdf_beside(&hit.texture_point(&surface), beam.nm, plan.all_dispersive, around);
+            let mut bsdf = material.bsdf_beside(&hit.texture_point(&surface), beam.nm, plan.all_dispersive, around);
+            if let (Bsdf::Dielectric(glass), Some(_)) = (&bsdf, beam.alone) {
+                bsdf = Bsdf::Dielectric(glass.lane(0));
+            }
             let wo = frame.to_local(came);
 
             if !bsdf.is_discrete() && !sharp {
@@ -273,15 +311,7 @@ impl<'a> Walk<'a, '_> {
                     }
                     continue;
                 }
-                let (nm, power) = (beam.nm.to_array(), beam.power.to_array());
-                for (lane, (&nm, &power)) in nm.iter().zip(&power).enumerate() {
-                    let (nm, power) = (Lanes::splat(nm), Lanes::splat(power));
-                    let mut alone = Beam { power, nm, alone: Some(lane), ..beam };
-                    let sample = Bsdf::Dielectric(glass.lane(lane)).sample(wo, u_lobe, u_scatter);
-                    if sample.is_some_and(|sample| self.cross(&mut alone, &sample, &crossing, wo)) {
-                        self.follow(alone);
-                    }
-                }
+                self.part(&beam, glass, &crossing, u_lobe);
                 return;
             }
             let Some(sample) = bsdf.sample(wo, u_lobe, u_scatter) else { return };
@@ -334,9 +364,7 @@ impl<'a> Walk<'a, '_> {
     /// common.
     fn goes_on(&self, beam: &mut Beam) -> bool {
         let Some(lane) = beam.alone.filter(|_| !beam.chosen) else { return true };
-        // The same number for each of them, wherever they are.
-        let u = self.sampler.set(Set::Extra(CHOSEN))[0];
-        if (u * LANES as f64) as usize != lane {
+        if self.chosen_lane() != lane {
             return false;
         }
         beam.power *= LANES as f32;
@@ -344,11 +372,16 @@ impl<'a> Walk<'a, '_> {
         true
     }
 
+    /// Which wavelength goes on: the same answer for each of them, wherever they are.
+    fn chosen_lane(&self) -> usize {
+        (self.sampler.set(Set::Extra(CHOSEN))[0] * LANES as f64) as usize
+    }
+
     /// The next thing that the beam meets, other than boundaries and open panes, which it crosses.
     fn fly(&mut self, beam: &mut Beam, u_flight: f64) -> Option<Met<'a>> {
         let scene = self.paths.scene;
         for crossings in 0..MAX_BOUNDARIES {
-            let set = Set::Extra((beam.vertex + 1).wrapping_add(crossings << 16));
+            let set = Walk::set_of_flight(beam.vertex, crossings);
             self.rays += 1;
             let hit = scene.closest(&beam.ray, f64::INFINITY);
             let surface = hit.map(|hit| scene.surface(&beam.ray, &hit));
@@ -458,11 +491,14 @@ impl<'a> Walk<'a, '_> {
     fn send(&mut self, beam: &Beam, point: DVec3, ray: &Ray, inside: Inside, entry: &Entry, light: Lanes) {
         let Some(through) = self.open(ray, entry.distance, inside, beam) else { return };
         let share = LANES as f32 / beam.rho.reduce_add();
-        let mut light = beam.only(beam.power * light * through * share);
-        if let Some(fog) = self.paths.scene.fog.as_ref().filter(|_| self.paths.plan.depth_fog) {
-            light *= 1.0 - fog.falloff.amount(self.paths.scene.camera.depth(point)) as f32;
-        }
-        (self.splat)(self.wavelengths, Splat { place: entry.pixel, light });
+        let light = beam.only(beam.power * light * through * share) * self.clear(point);
+        (self.splat)(self.wavelengths, Splat { place: entry.pixel, light, alone: beam.alone });
+    }
+
+    /// What depth fog leaves of light from a point.
+    fn clear(&self, point: DVec3) -> f32 {
+        let fog = self.paths.scene.fog.as_ref().filter(|_| self.paths.plan.depth_fog);
+        fog.map_or(1.0, |fog| 1.0 - fog.falloff.amount(self.paths.scene.camera.depth(point)) as f32)
     }
 
     /// The share of light that comes straight on to the camera at `distance`; `None` where something opaque stands

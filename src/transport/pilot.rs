@@ -176,7 +176,8 @@ impl Caustics {
         sources.iter_mut().for_each(|s| s.probability /= total);
         let stands = &scene.objects[..scene.bvh.order().len()];
         let endless = stands.iter().any(|o| !o.bounds().is_finite());
-        Caustics { casts: casters.casts.clone(), traced, sources, ratio: 1.0, packets, endless, merging: None }
+        let sums = Caustics::sums(&sources);
+        Caustics { casts: casters.casts.clone(), traced, sources, sums, ratio: 1.0, packets, endless, merging: None }
     }
 }
 
@@ -303,7 +304,7 @@ fn from_lights(paths: &LightPaths, round: u64) -> Vec<Landed> {
         .map(|i| {
             let mut splats = Vec::new();
             let traced = trace(paths, round as u32, i, None, &mut |wavelengths, splat| {
-                let y = f64::from(observer::xyz(splat.light, wavelengths)[1]);
+                let y = f64::from(splat.xyz(wavelengths)[1]);
                 if y.is_finite() {
                     splats.push((block_of(splat.place), y));
                 }
@@ -498,5 +499,6 @@ impl Caustics {
                 source.guide = Guide::of(&root.map(|row| row.map(|x| (1.0 - ANYWHERE) * x / sum + floor)));
             }
         }
+        self.sums = Caustics::sums(&self.sources);
     }
 }

@@ -1,0 +1,73 @@
+//! Eight rays that lie close together: what one meets is tried with all.
+
+use super::{Geometry, Hit, Scene};
+use crate::math::Ray;
+use crate::spectrum::LANES;
+
+/// Objects up to which all are tried.
+const FEW: usize = 8;
+
+fn each(lanes: u8) -> impl Iterator<Item = usize> {
+    (0..LANES).filter(move |lane| lanes >> lane & 1 == 1)
+}
+
+impl Scene {
+    /// [`Scene::closest`] for the rays whose bits are in `lanes`; `None` for the others.
+    #[must_use]
+    pub fn closest_of(&self, rays: &[Ray; LANES], lanes: u8) -> [Option<Hit>; LANES] {
+        let mut best = [None; LANES];
+        if self.bvh.order().len() > FEW {
+            for lane in each(lanes) {
+                best[lane] = self.closest(&rays[lane], f64::INFINITY);
+            }
+            return best;
+        }
+        for &object in self.bvh.order() {
+            for lane in each(lanes) {
+                let t_max = best[lane].map_or(f64::INFINITY, |hit: Hit| hit.t);
+                if let Some(hit) = self.meet(&rays[lane], object, t_max) {
+                    best[lane] = Some(hit);
+                }
+            }
+        }
+        if let Some(together) = &self.together {
+            for lane in each(lanes) {
+                let t_max = best[lane].map_or(f64::INFINITY, |hit| hit.t);
+                best[lane] = together.closest(&rays[lane], t_max).or(best[lane]);
+            }
+        }
+        best
+    }
+
+    /// The rays among `lanes` in whose way anything stands before their `distances`; see [`Scene::occluded`].
+    #[must_use]
+    pub fn occluded_of(&self, rays: &[Ray; LANES], distances: &[f64; LANES], lanes: u8) -> u8 {
+        let mut hidden = 0;
+        if self.bvh.order().len() > FEW {
+            for lane in each(lanes) {
+                hidden |= u8::from(self.occluded(&rays[lane], distances[lane], None)) << lane;
+            }
+            return hidden;
+        }
+        for &object in self.bvh.order() {
+            let geometry = &self.objects[object as usize].geometry;
+            for lane in each(lanes & !hidden) {
+                let (ray, distance) = (&rays[lane], distances[lane]);
+                let blocked = match geometry {
+                    Geometry::Instance(instance) => instance.blocks(&self.objects, object, ray, distance),
+                    _ => {
+                        let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
+                        geometry.blocks(ray, distance, departing, None)
+                    }
+                };
+                hidden |= u8::from(blocked) << lane;
+            }
+        }
+        if let Some(together) = &self.together {
+            for lane in each(lanes & !hidden) {
+                hidden |= u8::from(together.any(&rays[lane], distances[lane], None, |_| true)) << lane;
+            }
+        }
+        hidden
+    }
+}

@@ -1,0 +1,326 @@
+//! Wavelengths that have parted in glass, side by side: eight rays that meet the same things at places of their own.
+//!
+//! Each lane is a path alone, with the random numbers of all. As long as they meet the same object from the same side
+//! and go the same way from there, what depends on neither place nor direction is found once: the numbers, the material,
+//! its indices. A lane that takes another way goes on with those that take it, too, or as a [`Beam`] alone.
+
+use super::{Beam, Crossing, FOR_SURE, SURVIVAL, Splat, Walk, adjoint};
+use crate::math::{Frame, Ray};
+use crate::optics::bsdf::Bsdf;
+use crate::optics::dielectric::{Dielectric, refract};
+use crate::scene::material::{Kind, Material};
+use crate::scene::texture::Texture;
+use crate::scene::{Hit, SurfacePoint};
+use crate::spectrum::{LANES, Lanes};
+use crate::transport::path::seen_normal;
+use glam::{DVec2, DVec3};
+use std::f32::consts::FRAC_1_PI;
+
+/// Wavelengths on rays of their own.
+#[derive(Clone, Copy)]
+pub(super) struct Packet {
+    /// What they have in common. Its power is that of each lane on its ray; its own ray says nothing.
+    beam: Beam,
+    /// Which of the eight are here, a bit each.
+    lanes: u8,
+    rays: [Ray; LANES],
+}
+
+/// Where each lane has come to; anything for lanes that are not there.
+type Places<'a> = [(&'a SurfacePoint, &'a Hit); LANES];
+
+fn each(lanes: u8) -> impl Iterator<Item = usize> {
+    (0..LANES).filter(move |lane| lanes >> lane & 1 == 1)
+}
+
+impl Packet {
+    /// One of the wavelengths alone.
+    fn alone(&self, lane: usize) -> Beam {
+        let only = |x: Lanes| Lanes::splat(x.to_array()[lane]);
+        let Beam { power, nm, .. } = self.beam;
+        Beam { ray: self.rays[lane], power: only(power), nm: only(nm), alone: Some(lane), ..self.beam }
+    }
+}
+
+impl Walk<'_, '_> {
+    /// Sends each wavelength of a beam on from glass in which they part. None has led so far.
+    pub(super) fn part(&mut self, beam: &Beam, glass: &Dielectric, at: &Crossing, u_lobe: f64) {
+        let mut packet = Packet { beam: *beam, lanes: u8::MAX, rays: [beam.ray; LANES] };
+        self.cross_glass(&mut packet, glass, &[(at.surface, at.hit); LANES], u_lobe, at.roulette);
+        self.together(packet);
+    }
+
+    /// Follows a packet to the end of all its paths.
+    fn together(&mut self, mut packet: Packet) {
+        let (scene, plan) = (self.paths.scene, self.paths.plan);
+        loop {
+            // One needs no company. What they are in is known but for light that has only been reflected so far, and where
+            // bodies overlap each meets others.
+            let unknown = plan.nested || plan.media && packet.beam.medium.is_none();
+            if packet.lanes.count_ones() < 2 || unknown {
+                each(packet.lanes).for_each(|lane| self.follow(packet.alone(lane)));
+                return;
+            }
+            let vertex = packet.beam.vertex;
+            if self.paths.settings.max_depth.is_some_and(|depth| vertex + 2 > depth) {
+                return;
+            }
+            let numbers = self.numbers(vertex);
+            self.rays += packet.lanes.count_ones();
+            let hits = scene.closest_of(&packet.rays, packet.lanes);
+            let Some(first) = each(packet.lanes).find(|&lane| hits[lane].is_some()) else {
+                self.drift_apart(&packet, packet.lanes);
+                return;
+            };
+            let Some(leader) = hits[first] else { return };
+            let object = &scene.objects[leader.object as usize];
+            let material = &scene.materials[object.material as usize];
+            if !matches!(&material.kind, Kind::Diffuse { .. } | Kind::Dielectric { facets: None, .. }) {
+                each(packet.lanes).for_each(|lane| self.follow(packet.alone(lane)));
+                return;
+            }
+
+            // Those that have come to the same side of the same thing.
+            let met = |lane: usize| hits[lane].filter(|hit| hit.object == leader.object);
+            let leading = scene.surface(&packet.rays[first], &leader);
+            let surfaces: [SurfacePoint; LANES] = std::array::from_fn(|lane| match met(lane) {
+                Some(hit) if lane != first => scene.surface(&packet.rays[lane], &hit),
+                _ => leading,
+            });
+            let facing = |lane: usize| surfaces[lane].normal.dot(packet.rays[lane].direction);
+            let mut here = 0;
+            for lane in each(packet.lanes) {
+                if met(lane).is_some() && facing(lane) * facing(first) > 0.0 {
+                    here |= 1 << lane;
+                }
+            }
+            let others = packet.lanes & !here;
+            if others != 0 {
+                let missed = each(others).filter(|&lane| hits[lane].is_none()).fold(0, |set, lane| set | 1 << lane);
+                self.drift_apart(&packet, missed);
+                if here != 0 {
+                    self.together(Packet { lanes: others & !missed, ..packet });
+                } else {
+                    // Along the surface: each decides for itself.
+                    each(others & !missed).for_each(|lane| self.follow(packet.alone(lane)));
+                }
+            }
+            packet.lanes = here;
+            let hits: [Hit; LANES] = std::array::from_fn(|lane| met(lane).unwrap_or(leader));
+            self.fly_together(&mut packet, &hits, numbers.flight);
+
+            let places: Places = std::array::from_fn(|lane| (&surfaces[lane], &hits[lane]));
+            if let Kind::Diffuse { reflectance } = &material.kind {
+                self.receive(&packet, material, reflectance, &places, &numbers);
+                return;
+            }
+            if material.varies() || material.two_sided {
+                // What it lets through is another thing at each place.
+                each(packet.lanes).for_each(|lane| self.follow(packet.alone(lane)));
+                return;
+            }
+            let at = leader.texture_point(&leading);
+            let Bsdf::Dielectric(glass) = material.bsdf(&at, packet.beam.nm, plan.all_dispersive) else { return };
+            self.cross_glass(&mut packet, &glass, &places, numbers.lobe, numbers.roulette);
+        }
+    }
+
+    /// Lanes that meet no surface: only something between could scatter them.
+    fn drift_apart(&mut self, packet: &Packet, lanes: u8) {
+        if self.paths.plan.media {
+            each(lanes).for_each(|lane| self.follow(packet.alone(lane)));
+        }
+    }
+
+    /// Takes each lane through what fills the space before what it hits. A lane that is scattered there goes alone.
+    fn fly_together(&mut self, packet: &mut Packet, hits: &[Hit; LANES], u: f64) {
+        let Some(medium) = packet.beam.medium.flatten().filter(|_| self.paths.plan.media) else { return };
+        let medium = &self.paths.scene.media[medium as usize];
+        for lane in each(packet.lanes) {
+            let (ray, nm) = (&packet.rays[lane], Lanes::splat(packet.beam.nm.to_array()[lane]));
+            let walk = || self.sampler.walk(Walk::set_of_flight(packet.beam.vertex, 0));
+            let flight = medium.fly(ray, hits[lane].t, nm, u, walk);
+            if flight.scattered_at.is_some() {
+                self.follow(packet.alone(lane));
+                packet.lanes &= !(1 << lane);
+            } else {
+                packet.beam.power.as_mut_array()[lane] *= flight.weight.to_array()[0];
+            }
+        }
+    }
+
+    /// Sends each lane on from smooth glass. Those that it reflects where it lets the others through are followed to
+    /// their end, or these where they are fewer; the packet has the rest.
+    fn cross_glass(&mut self, packet: &mut Packet, glass: &Dielectric, at: &Places, u_lobe: f64, roulette: f64) {
+        let scene = self.paths.scene;
+        let mut normals = [DVec3::ZERO; LANES];
+        let mut cosines = [1.0; LANES];
+        for lane in each(packet.lanes) {
+            let came = -packet.rays[lane].direction;
+            normals[lane] = seen_normal(at[lane].0, came);
+            cosines[lane] = came.dot(normals[lane]);
+        }
+        let ways = glass.lanes(&cosines);
+        let (mut reflected, mut transmitted) = (0, 0);
+        let mut beyond = None;
+        let vertex = packet.beam.vertex + 1;
+        let [mirrored, through] = [glass.tint.reflected, glass.tint.transmitted].map(|tint| tint.to_array());
+        for lane in each(packet.lanes) {
+            let ((surface, hit), normal, cos) = (at[lane], normals[lane], cosines[lane]);
+            let came = -packet.rays[lane].direction;
+            let reflects = u_lobe < ways.reflected[lane];
+            let went = if reflects {
+                normal * (2.0 * cos) - came
+            } else {
+                refract(came, normal * 1.0f64.copysign(cos), ways.eta[lane], ways.cos_transmitted[lane])
+            };
+            let (true_came, true_went) = (came.dot(surface.normal), went.dot(surface.normal));
+            if true_came * true_went == 0.0 || (true_came * true_went > 0.0) != reflects {
+                continue;
+            }
+            let tint = if reflects { mirrored[lane] } else { through[lane] };
+            let adjoint = adjoint(cos, went.dot(normal), true_came, true_went);
+            let power = &mut packet.beam.power.as_mut_array()[lane];
+            *power *= tint * adjoint as f32;
+            if !self.one_survives(power, vertex, roulette) {
+                continue;
+            }
+            packet.rays[lane] = scene.leave(surface, hit, went);
+            if reflects {
+                reflected |= 1 << lane;
+            } else {
+                transmitted |= 1 << lane;
+                let object = &scene.objects[hit.object as usize];
+                beyond.get_or_insert_with(|| scene.beyond(object, surface, went, packet.beam.inside()));
+            }
+        }
+        packet.beam.vertex = vertex;
+        let mut crossed = Packet { lanes: transmitted, ..*packet };
+        if let Some(beyond) = beyond {
+            (crossed.beam.medium, crossed.beam.bodies) = (Some(beyond.medium), beyond.bodies);
+        }
+        packet.lanes = reflected;
+        if reflected == 0 {
+            *packet = crossed;
+        } else if transmitted != 0 {
+            let (few, most) =
+                if reflected.count_ones() < transmitted.count_ones() { (*packet, crossed) } else { (crossed, *packet) };
+            self.together(few);
+            *packet = most;
+        }
+    }
+
+    /// Russian roulette of one lane with the number of all.
+    fn one_survives(&self, power: &mut f32, vertex: u32, u: f64) -> bool {
+        let carried = f64::from(*power);
+        if carried.is_nan() || carried <= 0.0 {
+            return false;
+        }
+        if vertex + 1 >= self.paths.settings.roulette_depth {
+            let q = (carried / self.start).min(if vertex <= FOR_SURE { 1.0 } else { SURVIVAL });
+            if u >= q {
+                return false;
+            }
+            *power *= (1.0 / q) as f32;
+        }
+        true
+    }
+
+    /// Light of each lane on a diffuse surface: seen by the camera, kept as photons, and of one lane followed on.
+    fn receive(
+        &mut self,
+        packet: &Packet,
+        material: &Material,
+        reflectance: &Texture,
+        at: &Places,
+        numbers: &super::Numbers,
+    ) {
+        let scene = self.paths.scene;
+        let nm = packet.beam.nm;
+        let Some(first) = each(packet.lanes).next() else { return };
+        let texture_point = |lane: usize| at[lane].1.texture_point(at[lane].0);
+        let alike = (!reflectance.varies()).then(|| reflectance.eval(&texture_point(first), nm).to_array());
+        let normals: [DVec3; LANES] = std::array::from_fn(|lane| {
+            let (surface, came) = (at[lane].0, -packet.rays[lane].direction);
+            let normal = seen_normal(surface, came);
+            if material.two_sided && came.dot(surface.normal) < 0.0 { -normal } else { normal }
+        });
+
+        // What each would send into the camera.
+        let mut rays = packet.rays;
+        let mut distances = [0.0; LANES];
+        let mut places = [DVec2::ZERO; LANES];
+        let mut light = [0.0f32; LANES];
+        let mut wanted = 0;
+        for lane in each(packet.lanes) {
+            let ((surface, hit), normal, came) = (at[lane], normals[lane], -packet.rays[lane].direction);
+            let Some(entry) = scene.camera.entry(surface.point, || numbers.lens) else { continue };
+            let (from, to) = (came.dot(normal), entry.direction.dot(normal));
+            let (true_from, true_to) = (came.dot(surface.normal), entry.direction.dot(surface.normal));
+            let seen = from > 0.0 && to > 0.0 && true_from * from * true_to * to > 0.0;
+            if !seen || !self.paths.bounds.holds(entry.pixel) {
+                continue;
+            }
+            let reflectance = match &alike {
+                Some(all) => all[lane],
+                None => reflectance.eval(&texture_point(lane), nm).to_array()[lane],
+            };
+            let cosines = to * adjoint(from, to, true_from, true_to);
+            let fogged = self.clear(surface.point);
+            light[lane] = packet.beam.power.to_array()[lane]
+                * (reflectance * FRAC_1_PI * (cosines * entry.density) as f32)
+                * fogged;
+            if light[lane] != 0.0 {
+                rays[lane] = scene.leave(surface, hit, entry.direction);
+                (distances[lane], places[lane]) = (entry.distance, entry.pixel);
+                wanted |= 1 << lane;
+            }
+        }
+        if scene.has_boundaries || self.paths.plan.media {
+            for lane in each(wanted) {
+                let (surface, came) = (at[lane].0, -packet.rays[lane].direction);
+                let object = &scene.objects[at[lane].1.object as usize];
+                let beam = packet.alone(lane);
+                let went = rays[lane].direction;
+                let crosses = came.dot(surface.normal) * went.dot(surface.normal) < 0.0;
+                let inside =
+                    if crosses { scene.beyond(object, surface, went, beam.inside()) } else { beam.inside() };
+                match self.open(&rays[lane], distances[lane], inside, &beam) {
+                    Some(through) => light[lane] *= through.to_array()[0],
+                    None => wanted &= !(1 << lane),
+                }
+            }
+        } else if wanted != 0 {
+            self.rays += wanted.count_ones();
+            wanted &= !scene.occluded_of(&rays, &distances, wanted);
+        }
+        for lane in each(wanted) {
+            let mut lanes = [0.0; LANES];
+            lanes[lane] = light[lane];
+            let splat = Splat { place: places[lane], light: Lanes::new(lanes), alone: Some(lane) };
+            (self.splat)(self.wavelengths, splat);
+        }
+
+        if self.photons.is_some() {
+            for lane in each(packet.lanes) {
+                self.leave_photon(&packet.alone(lane), at[lane].0);
+            }
+        }
+        let lane = self.chosen_lane();
+        if packet.lanes >> lane & 1 == 0 {
+            return;
+        }
+        let ((surface, hit), came) = (at[lane], -packet.rays[lane].direction);
+        let mut beam = packet.alone(lane);
+        beam.power *= LANES as f32;
+        beam.chosen = true;
+        let bsdf = material.bsdf(&texture_point(lane), beam.nm, false);
+        let frame = Frame::from_normal_and_tangent(normals[lane], surface.tangent);
+        let wo = frame.to_local(came);
+        let crossing = Crossing { hit, surface, frame: &frame, came, roulette: numbers.roulette };
+        let sample = bsdf.sample(wo, numbers.lobe, numbers.scatter);
+        if sample.is_some_and(|sample| self.cross(&mut beam, &sample, &crossing, wo)) {
+            self.follow(beam);
+        }
+    }
+}
