@@ -113,7 +113,8 @@ pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
     let mut plan = EffectPlan::of(&Census::of(&scene), integrator, mode);
     plan.layers = layer_plan(&description, &scene, samples)?;
     let filter = FilterSampler::new(filter(&description.image.filter))?;
-    let (caustics, said) = pilot::decide(&scene, &plan, &filter, description.render.seed, wishes(&description));
+    let seed = description.render.seed;
+    let (caustics, said) = pilot::decide(&scene, &plan, &filter, seed, samples, wishes(&description));
     plan.caustics = caustics;
     plan.techniques.extend(said);
     let hash = hash(&description, &scene.files);

@@ -1,7 +1,7 @@
 //! What focuses light: objects that only mirror and refract, and the balls around them.
 
 use super::bvh::Aabb;
-use super::material::{Kind, Material};
+use super::material::{Kind, Material, Roughness};
 use super::{Geometry, Scene};
 use glam::DVec3;
 
@@ -49,20 +49,35 @@ pub struct Casters {
     pub names: Vec<String>,
     /// Whether any of them has an index that depends on wavelength.
     pub parts: bool,
-    /// Names of mirrors and glasses without end, which no light can be aimed at: they do not count.
+    /// Names of mirrors and glasses without end, which no light can be aimed at.
     pub endless: Vec<String>,
+    /// For each object of the scene, whether it is one of those.
+    pub unending: Vec<bool>,
 }
 
 /// Balls at the most: what is near to each other shares one beyond.
 pub const MAX_BALLS: usize = 64;
 
-/// Whether every part of a material mirrors or refracts in single directions, and it bends or turns light.
+/// Width of microfacets below which a surface counts as sharp, as in LuxCore: light that it throws from a small lamp is
+/// met by chance too seldom.
+pub const SHARP_ALPHA: f64 = 0.05;
+
+/// Whether facets are so narrow that chance seldom finds what they mirror.
+fn is_narrow(facets: Option<&Roughness>) -> bool {
+    match facets {
+        None => true,
+        Some(Roughness::Uniform(facets)) => facets.alpha.max(facets.alpha * facets.ratio) < SHARP_ALPHA,
+        Some(Roughness::Textured(_)) => false,
+    }
+}
+
+/// Whether every part of a material mirrors or refracts in directions that chance seldom finds, and it bends or turns
+/// light.
 fn is_sharp(material: &Material) -> bool {
-    let sharp = |m: &&Material| {
-        matches!(
-            m.kind,
-            Kind::Mirror { .. } | Kind::Conductor { facets: None, .. } | Kind::Dielectric { facets: None, .. }
-        )
+    let sharp = |m: &&Material| match &m.kind {
+        Kind::Mirror { .. } | Kind::Thin { .. } => true,
+        Kind::Conductor { facets, .. } | Kind::Dielectric { facets, .. } => is_narrow(facets.as_ref()),
+        _ => false,
     };
     let leaves = material.leaves();
     leaves.iter().any(sharp) && leaves.iter().all(|m| sharp(m) || matches!(m.kind, Kind::Boundary))
@@ -81,7 +96,8 @@ impl Casters {
     #[must_use]
     pub fn of(scene: &Scene) -> Casters {
         let sharp = |i: usize| is_sharp(&scene.materials[scene.objects[i].material as usize]);
-        let mut casters = Casters { casts: vec![false; scene.objects.len()], ..Casters::default() };
+        let none = vec![false; scene.objects.len()];
+        let mut casters = Casters { casts: none.clone(), unending: none, ..Casters::default() };
         for (i, object) in scene.objects.iter().enumerate() {
             let (casts, children) = match &object.geometry {
                 Geometry::Instance(instance) => {
@@ -95,15 +111,17 @@ impl Casters {
             if !casts || i >= scene.bvh.order().len() {
                 continue;
             }
-            match Ball::around(&object.bounds()) {
+            let ball = Ball::around(&object.bounds());
+            for child in children {
+                casters.casts[child] = sharp(child);
+                casters.unending[child] = sharp(child) && ball.is_none();
+                let material = &scene.materials[scene.objects[child].material as usize];
+                casters.parts |= sharp(child) && is_dispersive(material);
+            }
+            match ball {
                 Some(ball) => {
                     casters.balls.push(ball);
                     casters.names.push(object.name.clone());
-                    for child in children {
-                        casters.casts[child] = sharp(child);
-                        let material = &scene.materials[scene.objects[child].material as usize];
-                        casters.parts |= sharp(child) && is_dispersive(material);
-                    }
                 }
                 None => casters.endless.push(object.name.clone()),
             }

@@ -151,8 +151,16 @@ impl Scene {
         let (i, probability) = self.choose_light(u_light)?;
         let environment = self.lights[i].is_environment();
         let (u_start, u_rest) = if environment { (u_direction, u_point) } else { (u_point, u_direction) };
+        let (ray, power) = self.shine(i, u_start, u_rest, nm)?;
+        Some(Emission { ray, power: power * (1.0 / probability) as f32 })
+    }
+
+    /// A ray of light `i` as it shines by itself, and its power over its density, W·nm⁻¹: `u_start` and `u_rest` as for
+    /// [`Scene::start`].
+    #[must_use]
+    pub fn shine(&self, i: usize, u_start: DVec2, u_rest: DVec2, nm: Lanes) -> Option<(Ray, Lanes)> {
         let start = self.start(i, u_start, u_rest, nm)?;
-        let (ray, power) = match start.freedom() {
+        Some(match start.freedom() {
             Freedom::None(ray, power) => (ray, power),
             Freedom::Direction(_) => {
                 let (direction, factor) = self.spread(&start, u_rest);
@@ -160,8 +168,7 @@ impl Scene {
                 (ray, power * factor as f32)
             }
             Freedom::Place(direction) => (self.arriving_ray(direction, u_rest), start.irradiance() * self.section()),
-        };
-        Some(Emission { ray, power: power * (1.0 / probability) as f32 })
+        })
     }
 
     /// A direction after the way a light shines by itself, and one over its density, sr.

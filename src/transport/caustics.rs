@@ -1,14 +1,14 @@
 //! Light that mirrors and glass throw onto other things, traced from the lights.
 //!
 //! A path belongs to the class C if its vertex next to the light is on something sharp, an object that only mirrors
-//! and refracts in single directions, and its vertex next to the camera is not and scatters over a density: in
+//! and refracts in single directions or nearly so, and its vertex next to the camera is not and scatters over a density: in
 //! Heckbert's notation L S (D|S)* D E. The path tracer finds such light only by chance, and of a lamp without extent
 //! never; so it leaves the class out, and paths from the lights, which connect to the camera at every vertex, add it.
 //! Every path of light belongs to one of the two, so nothing is lost and nothing counted twice, and no weights are
 //! needed.
 //!
 //! Paths of the class begin toward something sharp. They are aimed at balls around it: by direction from a point of
-//! a lamp, by place for light from infinity. A pilot of paths with fixed random numbers learns which pairs of lamp
+//! a lamp, by place for light from infinity. Toward what has no end a lamp shines as it does. A pilot of paths with fixed random numbers learns which pairs of lamp
 //! and ball, and which part of each ball, send light to the picture, and how many paths from the lights are worth one
 //! from the camera; then all is frozen, so that the estimate stays unbiased and any split of the work agrees.
 
@@ -28,6 +28,8 @@ use std::f64::consts::{PI, TAU};
 pub struct Caustics {
     /// For each object, whether it is sharp.
     pub casts: Vec<bool>,
+    /// For each object, whether it is sharp and has no end.
+    pub unending: Vec<bool>,
     /// For each light, whether its part of the class is traced from it.
     pub traced: Vec<bool>,
     /// Pairs of a light and what it is aimed at, those of one light together.
@@ -44,17 +46,29 @@ pub struct Caustics {
     pub endless: bool,
 }
 
-/// A light and a ball that it is aimed at.
+/// A light and what it is aimed at.
 #[derive(Clone, Debug)]
 pub struct Source {
     /// The light.
     pub light: u32,
-    /// What it is aimed at; `None` where its rays have no freedom.
-    pub ball: Option<Ball>,
+    /// What it is aimed at.
+    pub target: Target,
     /// How often it is chosen.
     pub probability: f64,
-    /// Where in the cone or disc around the ball.
+    /// Where in the cone or disc around the ball, else in the square that the ray is drawn from.
     pub guide: Guide,
+}
+
+/// What a path is aimed at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// Sharp things in a ball.
+    Ball(Ball),
+    /// Sharp things without end: the light shines as it does. Paths that first meet something else sharp do not count,
+    /// as other sources send them.
+    Endless,
+    /// Whatever the light shines on: its rays have no freedom.
+    Own,
 }
 
 /// The path that begins.
@@ -64,6 +78,8 @@ pub struct Aimed {
     pub emission: Emission,
     /// Index of the source.
     pub source: usize,
+    /// What the source is aimed at.
+    pub target: Target,
     /// Where in the guide's square.
     pub cell: DVec2,
 }
@@ -149,21 +165,35 @@ impl Caustics {
     pub fn begin(&self, scene: &Scene, u_source: f64, u_start: DVec2, u_aim: DVec2, nm: Lanes) -> Option<Aimed> {
         let index = self.sums.partition_point(|&sum| sum <= u_source);
         let source = self.sources.get(index)?;
-        let start = scene.start(source.light as usize, u_start, u_aim, nm)?;
+        let light = source.light as usize;
+        let aimed = |ray, power: Lanes, density: f64, cell| {
+            let emission = Emission { ray, power: power * (1.0 / density) as f32 };
+            Aimed { emission, source: index, target: source.target, cell }
+        };
+        let own_density = |cell| source.probability * source.guide.density(cell);
+        let ball = match &source.target {
+            Target::Ball(ball) => ball,
+            Target::Own => {
+                let cell = source.guide.sample(u_aim);
+                let Freedom::None(ray, power) = scene.start(light, cell, cell, nm)?.freedom() else { return None };
+                return Some(aimed(ray, power, own_density(cell), cell));
+            }
+            Target::Endless => {
+                let cell = source.guide.sample(u_aim);
+                let (ray, power) = scene.shine(light, u_start, cell, nm)?;
+                return Some(aimed(ray, power, own_density(cell), cell));
+            }
+        };
+        let start = scene.start(light, u_start, u_aim, nm)?;
         let cell = source.guide.sample(u_aim);
         let aim = |ball: &Ball, freedom: &Freedom| match *freedom {
             Freedom::Direction(from) => Aim::cone(ball, from),
             Freedom::Place(direction) | Freedom::None(Ray { direction, .. }, _) => Aim::disc(ball, direction),
         };
         let freedom = start.freedom();
-        let Some(ball) = &source.ball else {
-            let Freedom::None(ray, power) = freedom else { return None };
-            let emission = Emission { ray, power: power * (1.0 / source.probability) as f32 };
-            return Some(Aimed { emission, source: index, cell });
-        };
         let own = aim(ball, &freedom);
         let x = own.at(cell);
-        let mut density = source.probability * source.guide.density(cell) / own.measure();
+        let mut density = own_density(cell) / own.measure();
         // Balls may hide each other: what any of them would have aimed at counts.
         let mut below = index;
         while below > 0 && self.sources[below - 1].light == source.light {
@@ -172,7 +202,7 @@ impl Caustics {
         let of_light = self.sources[below..].iter().take_while(|other| other.light == source.light);
         for (i, other) in (below..).zip(of_light) {
             if i != index
-                && let Some(ball) = &other.ball
+                && let Target::Ball(ball) = &other.target
             {
                 let aim = aim(ball, &freedom);
                 if let Some(u) = aim.coordinates(x) {
@@ -194,8 +224,7 @@ impl Caustics {
             }
             Freedom::None(..) => return None,
         };
-        let emission = Emission { ray, power: power * (1.0 / density) as f32 };
-        Some(Aimed { emission, source: index, cell })
+        Some(aimed(ray, power, density, cell))
     }
 
     /// The running sums of the probabilities of `sources`.
@@ -213,6 +242,18 @@ impl Caustics {
     #[must_use]
     pub fn paths(&self, samples: u64) -> u64 {
         ((samples as f64 * self.ratio).round() as u64).max(1)
+    }
+
+    /// Whether a path that is aimed at `target` counts where `object` is what it meets first.
+    #[must_use]
+    pub fn begins_at(&self, target: Target, object: u32) -> bool {
+        let unending = self.unending[object as usize];
+        self.is_sharp(object)
+            && match target {
+                Target::Ball(_) => !unending,
+                Target::Endless => unending,
+                Target::Own => true,
+            }
     }
 
     /// Whether what a ray met at `object` is sharp.

@@ -11,7 +11,7 @@
 
 mod packet;
 
-use super::caustics::Caustics;
+use super::caustics::{Caustics, Target};
 use super::merge::Photon;
 use super::path::seen_normal;
 use super::plan::{EffectPlan, LightSettings};
@@ -98,10 +98,12 @@ pub struct LightPaths<'a> {
 /// What a path was.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Traced {
-    /// Rays that were followed, to surfaces and to the camera.
+    /// Rays that were followed, to surfaces and to the camera; of those that went side by side half.
     pub rays: u32,
     /// The source and the place in its guide.
     pub began: Option<(usize, DVec2)>,
+    /// Its wavelengths.
+    pub wavelengths: Option<SampledWavelengths>,
 }
 
 /// Follows path `index` of `replicate` and hands each of its splats within the bounds to `splat`.
@@ -118,11 +120,13 @@ pub fn trace(
     let (u_choice, u_time) = pairs(sampler.set(Set::Camera));
     let (u_point, u_direction) = pairs(sampler.set(Set::Extra(0)));
     let wavelengths = scene.wavelengths.sample(paths.wavelength.unwrap_or(u_time.x));
-    let mut traced = Traced::default();
+    let mut traced = Traced { wavelengths: Some(wavelengths), ..Traced::default() };
+    let mut target = Target::Own;
     let emission = match paths.caustics {
         None => scene.emit(u_choice.x, u_point, u_direction, wavelengths.nm),
         Some(caustics) => caustics.begin(scene, u_choice.x, u_point, u_direction, wavelengths.nm).map(|aimed| {
             traced.began = Some((aimed.source, aimed.cell));
+            target = aimed.target;
             aimed.emission
         }),
     };
@@ -131,7 +135,7 @@ pub fn trace(
     if start.is_nan() || start <= 0.0 {
         return traced;
     }
-    let mut walk = Walk { paths, sampler: &sampler, wavelengths: &wavelengths, start, splat, photons, rays: 0 };
+    let mut walk = Walk { paths, sampler: &sampler, wavelengths: &wavelengths, start, splat, photons, target, rays: 0 };
     walk.follow(Beam {
         ray: emission.ray,
         power: emission.power,
@@ -145,6 +149,32 @@ pub fn trace(
     });
     traced.rays = walk.rays;
     traced
+}
+
+/// Where what is not sharp is seen in sharp things along a ray of the camera, as if a photon of unit power came out of it.
+#[must_use]
+pub(super) fn seen_in_sharp(
+    paths: &LightPaths,
+    ray: &Ray,
+    wavelengths: &SampledWavelengths,
+    sampler: &Sampler,
+) -> Option<Photon> {
+    let mut seen = Vec::new();
+    let splat = &mut |_: &SampledWavelengths, _| {};
+    let (start, target, photons) = (1.0, Target::Own, Some(&mut seen));
+    let mut walk = Walk { paths, sampler, wavelengths, start, splat, photons, target, rays: 0 };
+    walk.follow(Beam {
+        ray: *ray,
+        power: Lanes::ONE,
+        rho: Lanes::ONE,
+        nm: wavelengths.nm,
+        alone: None,
+        chosen: false,
+        medium: Some(paths.scene.camera_inside.medium),
+        bodies: paths.scene.camera_inside.bodies,
+        vertex: 0,
+    });
+    seen.first().copied()
 }
 
 /// Light on its way.
@@ -199,6 +229,8 @@ struct Walk<'a, 'b> {
     splat: &'b mut dyn FnMut(&SampledWavelengths, Splat),
     /// Where photons are left, if they are wanted.
     photons: Option<&'b mut Vec<Photon>>,
+    /// What it is aimed at.
+    target: Target,
     rays: u32,
 }
 
@@ -259,7 +291,7 @@ impl<'a> Walk<'a, '_> {
             };
             let object = &scene.objects[hit.object as usize];
             let sharp = caustics.is_some_and(|c| c.is_sharp(hit.object));
-            if vertex == 0 && caustics.is_some() && !sharp {
+            if vertex == 0 && caustics.is_some_and(|c| !c.begins_at(self.target, hit.object)) {
                 return;
             }
             let material = leaf.as_ref().map_or(&scene.materials[object.material as usize], |leaf| leaf.material);

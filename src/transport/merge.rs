@@ -70,8 +70,14 @@ impl PhotonMap {
     #[must_use]
     pub fn gather(&self, point: DVec3, normal: DVec3, mut scatter: impl FnMut(&Photon) -> Lanes) -> Lanes {
         let mut sum = Lanes::ZERO;
+        self.each_near(point, normal, |photon| sum += scatter(photon) * photon.power);
+        sum * (1.0 / (std::f64::consts::PI * self.radius * self.radius * self.paths)) as f32
+    }
+
+    /// Shows `visit` the photons around `point` on a surface of `normal`.
+    pub fn each_near(&self, point: DVec3, normal: DVec3, mut visit: impl FnMut(&Photon)) {
         if self.photons.is_empty() {
-            return sum;
+            return;
         }
         let buckets = self.starts.len() - 1;
         let r2 = self.radius * self.radius;
@@ -95,13 +101,12 @@ impl PhotonMap {
                         let offset = photon.point - point;
                         // What lies around a corner or on the other side of a sheet is another surface.
                         if offset.length_squared() <= r2 && photon.normal.dot(normal).abs() > FACING {
-                            sum += scatter(photon) * photon.power;
+                            visit(photon);
                         }
                     }
                 }
             }
         }
-        sum * (1.0 / (std::f64::consts::PI * r2 * self.paths)) as f32
     }
 }
 

@@ -101,7 +101,7 @@ struct Path {
     seen: bool,
     /// Whether its first vertex was on something sharp.
     mirrored: bool,
-    /// Whether the last vertex is on something sharp.
+    /// Whether the last vertex that it has come to is on something sharp.
     sharp: bool,
     /// Light of paths that are traced from the lights.
     left: Lanes,
@@ -119,10 +119,10 @@ impl Path {
         self.radiance += self.beta * l * share as f32;
     }
 
-    /// Notes light `l` that paths from the lights add.
+    /// Notes light `l`, found with weight `w`, that paths from the lights add.
     #[cold]
-    fn leave_out<const CHROMATIC: bool>(&mut self, l: Lanes) {
-        let share = if CHROMATIC { LANES as f64 / self.rho_sum::<true>() } else { 1.0 };
+    fn leave_out<const CHROMATIC: bool>(&mut self, l: Lanes, w: f64) {
+        let share = if CHROMATIC { w * LANES as f64 / self.rho_sum::<true>() } else { w };
         self.left += self.beta * l * share as f32;
     }
 }
@@ -303,10 +303,6 @@ impl Tracer<'_> {
             if let Some(light) = object.light.filter(|_| self.meets_lights(&path)) {
                 let emitted = scene.lights[light as usize].emitted(&surface, &hit, wo_world, self.nm);
                 let weight = match &path.previous {
-                    None if self.leaves(&path, light) => {
-                        path.leave_out::<CHROMATIC>(emitted);
-                        0.0
-                    }
                     None => 1.0,
                     Some(p) => {
                         let total = crate::scene::Hit { t: p.distance + hit.t, ..hit };
@@ -321,7 +317,11 @@ impl Tracer<'_> {
                         power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho)
                     }
                 };
-                path.add::<CHROMATIC>(emitted, weight);
+                if self.leaves(&path, light) {
+                    path.leave_out::<CHROMATIC>(emitted, weight);
+                } else {
+                    path.add::<CHROMATIC>(emitted, weight);
+                }
             }
 
             // What goes straight on has no vertex there: a lamp behind is also found from the vertex before.
@@ -376,6 +376,10 @@ impl Tracer<'_> {
             let at = hit.texture_point(&surface);
             let bsdf = material.bsdf_beside(&at, self.nm, self.plan.all_dispersive, around);
 
+            if let Some(caustics) = &self.plan.caustics {
+                path.sharp = caustics.is_sharp(hit.object);
+            }
+
             let choice = self.sampler.set(Set::Choice(path.vertices));
             let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
             let sided = sided_normal(material, &frame);
@@ -398,7 +402,7 @@ impl Tracer<'_> {
                 && path.specular
                 && path.vertices > 0
                 && !bsdf.is_discrete()
-                && !self.plan.caustics.as_ref().is_some_and(|c| c.is_sharp(hit.object))
+                && !path.sharp
             {
                 let scatterer =
                     Scatterer::Surface { bsdf: &bsdf, frame: &frame, surface: &surface, object, flip, slopes };
@@ -430,11 +434,10 @@ impl Tracer<'_> {
                 Chosen::Density(_) | Chosen::Discrete => None,
             };
             if let Some(caustics) = &self.plan.caustics {
-                path.sharp = caustics.is_sharp(hit.object);
                 path.mirrored |= path.sharp && path.vertices == 0;
-                if path.specular && sample.chosen != Chosen::Discrete {
+                if path.specular && !path.sharp && sample.chosen != Chosen::Discrete {
                     path.specular = false;
-                    path.seen = !path.sharp && (path.vertices == 0 || caustics.merging.is_some());
+                    path.seen = path.vertices == 0 || caustics.merging.is_some();
                 }
             }
             path.beta *= sample.weight;
@@ -532,6 +535,7 @@ impl Tracer<'_> {
         if self.is_last(path) {
             return false;
         }
+        path.sharp = false;
         let choice = self.sampler.set(Set::Choice(path.vertices));
         let wo = -path.ray.direction;
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
@@ -559,7 +563,6 @@ impl Tracer<'_> {
         path.ray = Ray::new(point, wi);
         path.seen |= path.vertices == 0;
         path.specular = false;
-        path.sharp = false;
         path.vertices += 1;
         self.survives::<CHROMATIC>(path, choice[2])
     }
@@ -600,10 +603,6 @@ impl Tracer<'_> {
         for &i in &self.scene.backgrounds {
             let light = &self.scene.lights[i as usize];
             let (l, weight) = match &path.previous {
-                None if self.leaves(path, i) => {
-                    path.leave_out::<CHROMATIC>(light.background(path.ray.direction, self.nm));
-                    continue;
-                }
                 None => (light.background(path.ray.direction, self.nm), 1.0),
                 Some(p) => {
                     let (l, pdf) = light.background_and_pdf(path.ray.direction, p.normal, self.nm);
@@ -611,7 +610,11 @@ impl Tracer<'_> {
                     (l, power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho))
                 }
             };
-            path.add::<CHROMATIC>(l, weight);
+            if self.leaves(path, i) {
+                path.leave_out::<CHROMATIC>(l, weight);
+            } else {
+                path.add::<CHROMATIC>(l, weight);
+            }
         }
     }
 
@@ -655,16 +658,20 @@ impl Tracer<'_> {
         };
         let Some((through, passing)) = shadow.cast::<MEDIA>(&leave(light.wi), light.distance) else { return };
         let value = f * light.radiance * through;
-        match light.density {
-            None => path.add::<CHROMATIC>(value, 1.0 / probability),
+        let weight = match light.density {
+            None => 1.0 / probability,
             Some(density) => {
                 let q = density * probability;
                 // B: what scattering, led by any lane, would have found this light with.
                 let led = if CHROMATIC { path.rho * pdf * passing } else { pdf * passing };
                 let scattering = if self.settings.scatter_samples > 0 { f64::from(led.reduce_add()) } else { 0.0 };
-                let weight = power_heuristic(q * path.rho_sum::<CHROMATIC>(), scattering);
-                path.add::<CHROMATIC>(value, weight / q);
+                power_heuristic(q * path.rho_sum::<CHROMATIC>(), scattering) / q
             }
+        };
+        if self.leaves(path, i as u32) {
+            path.leave_out::<CHROMATIC>(value, weight);
+        } else {
+            path.add::<CHROMATIC>(value, weight);
         }
     }
 }

@@ -3,16 +3,19 @@
 //! All numbers of the pilot are functions of scene and seed, and costs are counted in rays, not in seconds: every
 //! machine that renders a part of a picture decides alike.
 
-use super::caustics::{Caustics, Source};
+mod seen;
+
+use super::caustics::{Caustics, Source, Target};
 use super::guide::{Guide, SIDE};
 use super::light::{Bounds, LightPaths, trace};
+use super::merge;
 use super::plan::{Effect, EffectPlan, Integrator, PathSettings};
 use super::{Incoming, Shot};
+use crate::film::accumulate::REPLICATES;
 use crate::film::filter::FilterSampler;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::bvh::Aabb;
-use crate::scene::camera::Projection;
-use crate::scene::casters::{Ball, Casters};
+use crate::scene::casters::Casters;
 use crate::scene::environment::Environment;
 use crate::scene::light::Light;
 use crate::scene::{Geometry, Scene};
@@ -20,7 +23,9 @@ use crate::spectrum::{Lanes, SampledWavelengths, observer};
 use crate::transport::layers::Source as Channel;
 use glam::DVec2;
 use rayon::prelude::*;
+use seen::{Arrival, Seen};
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Whether a technique is used.
@@ -46,13 +51,19 @@ pub struct Wishes {
     pub merging: Use,
 }
 
-/// Paths from the lights in each of two rounds: the second is aimed by what the first has learnt.
-const FROM_LIGHTS: u64 = 1 << 15;
+/// Paths from the lights in each of two rounds, at least and at most: the second is aimed by what the first has learnt.
+const FROM_LIGHTS: [u64; 2] = [1 << 12, 1 << 15];
+
+/// Of that many are always as many followed as all.
+const AT_ONCE: u64 = 1 << 11;
+
+/// Share of the rays of the picture that a round may take beyond the least number of paths.
+const SHARE: f64 = 1.0 / 128.0;
 
 /// Blocks of the picture along each side; each gets paths from the camera.
 const BLOCKS: usize = 32;
 
-/// Pixels of a block that are tried, with two paths each.
+/// Pixels of a block that are tried at the most, with two paths each.
 const PIXELS: u32 = 4;
 
 /// Tells the pilot's numbers from the picture's.
@@ -67,21 +78,22 @@ const ENOUGH: usize = 16;
 /// Half of the solid angle of a hemisphere in which light counts as coming from one place, over 2π.
 const SMALL: f64 = 0.3;
 
-/// What light tracing with merging costs beyond its rays: 1.2 to 1.5 in scenes of the gallery.
-const OVERHEAD: f64 = 1.4;
+/// What light tracing with merging costs beyond its rays: 1.05 to 1.3 in scenes of the gallery.
+const OVERHEAD: f64 = 1.2;
 
 /// A name and whether it holds, for people.
 fn technique(name: &'static str, on: bool, reason: String) -> Effect {
     Effect { name, on, reason }
 }
 
-/// Decides, and returns what to trace and what to say of it.
+/// Decides for a picture of `samples` a pixel, and returns what to trace and what to say of it.
 #[must_use]
 pub fn decide(
     scene: &Scene,
     plan: &EffectPlan,
     filter: &FilterSampler,
     seed: u64,
+    samples: u32,
     wishes: Wishes,
 ) -> (Option<Arc<Caustics>>, Vec<Effect>) {
     let off = |reason: &str| (None, vec![technique("light tracing", false, reason.to_owned())]);
@@ -90,11 +102,8 @@ pub fn decide(
         return off("the scene says so");
     }
     let casters = Casters::of(scene);
-    if casters.balls.is_empty() {
-        return match casters.endless.first() {
-            Some(name) => off(&format!("what mirrors or refracts sharply has no end: {name}")),
-            None => off("nothing mirrors or refracts sharply"),
-        };
+    if casters.balls.is_empty() && casters.endless.is_empty() {
+        return off("nothing mirrors or refracts sharply");
     }
     if settings.scatter_samples == 0 || settings.max_depth.is_some_and(|depth| depth < 3) {
         return off("paths are too short for light of mirrors and glass");
@@ -110,7 +119,38 @@ pub fn decide(
         return off("no light is small or has a sun");
     }
     let caustics = Caustics::untrained(scene, &casters, traced, wishes.packets != Use::Off && casters.parts);
-    run(scene, plan, settings, filter, seed, wishes, &casters, caustics)
+    if caustics.sources.is_empty() {
+        let name = casters.endless.first().map_or("", String::as_str);
+        return off(&format!("light from infinity cannot be aimed at what has no end: {name}"));
+    }
+    run(&Trial { scene, plan, settings, filter, seed, samples, wishes, casters: &casters }, caustics)
+}
+
+/// What a decision rests on.
+struct Trial<'a> {
+    scene: &'a Scene,
+    plan: &'a EffectPlan,
+    settings: &'a PathSettings,
+    filter: &'a FilterSampler,
+    seed: u64,
+    /// Of a pixel.
+    samples: u32,
+    wishes: Wishes,
+    casters: &'a Casters,
+}
+
+impl Trial<'_> {
+    /// Paths from the camera for the whole picture.
+    fn paths(&self) -> f64 {
+        let [width, height] = self.scene.camera.resolution.map(f64::from);
+        width * height * f64::from(self.samples)
+    }
+
+    /// Pixels of a block to try: two paths for each make no more than a hundredth of the picture's, or one pixel.
+    fn pixels(&self) -> u32 {
+        let wanted = 0.01 * self.paths() / (2 * BLOCKS * BLOCKS) as f64;
+        (wanted as u32).clamp(1, PIXELS)
+    }
 }
 
 /// Whether light `i` comes from so small a part of the sphere, seen from what casts, that chance finds it seldom.
@@ -132,12 +172,14 @@ fn is_small(scene: &Scene, i: usize, casters: &Casters) -> bool {
                 Geometry::Shape(_) | Geometry::Mesh(_) => 0.5 * (b.max - b.min).length(),
                 Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => return false,
             };
-            casters.balls.iter().any(|ball| {
-                let distance = (ball.center - centre).length();
-                let sine = radius / distance;
-                // 1 − cos of the half angle: its solid angle over 2π.
-                sine < 1.0 && 1.0 - (1.0 - sine * sine).sqrt() < SMALL
-            })
+            // How near to a mirror without end it is does not bound how it is seen there.
+            !casters.endless.is_empty()
+                || casters.balls.iter().any(|ball| {
+                    let distance = (ball.center - centre).length();
+                    let sine = radius / distance;
+                    // 1 − cos of the half angle: its solid angle over 2π.
+                    sine < 1.0 && 1.0 - (1.0 - sine * sine).sqrt() < SMALL
+                })
         }
     }
 }
@@ -161,15 +203,26 @@ fn has_sun(map: &Environment) -> bool {
 impl Caustics {
     /// Aimed at everything alike.
     fn untrained(scene: &Scene, casters: &Casters, traced: Vec<bool>, packets: bool) -> Caustics {
+        let infinite = |light: &Light| light.is_environment() || matches!(light, Light::Directional { .. });
+        // Light from infinity meets what has no end everywhere: neither is aimed at the other.
+        let bounded = scene.lights.iter().zip(&traced).any(|(light, traced)| *traced && infinite(light));
+        let (mut casts, mut unending) = (casters.casts.clone(), casters.unending.clone());
+        if bounded {
+            casts.iter_mut().zip(&mut unending).for_each(|(casts, unending)| *casts &= !std::mem::take(unending));
+        }
+        let mut targets: Vec<Target> = casters.balls.iter().map(|ball| Target::Ball(*ball)).collect();
+        if unending.contains(&true) {
+            targets.push(Target::Endless);
+        }
         let mut sources = Vec::new();
         for (i, light) in scene.lights.iter().enumerate().filter(|(i, _)| traced[*i]) {
             let probability = scene.light_probability(i);
-            let source = |ball, probability| Source { light: i as u32, ball, probability, guide: Guide::uniform() };
+            let source = |target, probability| Source { light: i as u32, target, probability, guide: Guide::uniform() };
             if matches!(light, Light::AlongNormal { .. } | Light::Projector(_)) {
-                sources.push(source(None, probability));
+                sources.push(source(Target::Own, probability));
             } else {
-                let each = probability / casters.balls.len() as f64;
-                sources.extend(casters.balls.iter().map(|ball| source(Some(*ball), each)));
+                let each = probability / targets.len() as f64;
+                sources.extend(targets.iter().map(|target| source(*target, each)));
             }
         }
         let total: f64 = sources.iter().map(|s| s.probability).sum();
@@ -177,7 +230,7 @@ impl Caustics {
         let stands = &scene.objects[..scene.bvh.order().len()];
         let endless = stands.iter().any(|o| !o.bounds().is_finite());
         let sums = Caustics::sums(&sources);
-        Caustics { casts: casters.casts.clone(), traced, sources, sums, ratio: 1.0, packets, endless, merging: None }
+        Caustics { casts, unending, traced, sources, sums, ratio: 1.0, packets, endless, merging: None }
     }
 }
 
@@ -205,11 +258,11 @@ fn luminance(light: Lanes, wavelengths: &SampledWavelengths) -> f64 {
 }
 
 /// Paths from the camera through all blocks.
-fn from_camera(shot: &Shot) -> Camera {
+fn from_camera(shot: &Shot, pixels: u32) -> Camera {
     let [width, height] = shot.scene.camera.resolution;
     let tried: Vec<_> = (0..BLOCKS * BLOCKS)
         .into_par_iter()
-        .flat_map_iter(|block| (0..PIXELS).map(move |n| (block, n)))
+        .flat_map_iter(|block| (0..pixels).map(move |n| (block, n)))
         .map(|(block, n)| {
             let u = pairs(Sampler::new(shot.seed, [block as u32, n], 0, 0).set(Set::Lens)).0;
             let corner = DVec2::new((block % BLOCKS) as f64, (block / BLOCKS) as f64);
@@ -236,7 +289,7 @@ fn from_camera(shot: &Shot) -> Camera {
     for (block, pair) in &tried {
         let variance = |a: f64, b: f64| 0.5 * (a - b) * (a - b);
         let [(a, a_left, a_light), (b, b_left, b_light)] = *pair;
-        camera.means[*block] += 0.5 * (a + b) / f64::from(PIXELS);
+        camera.means[*block] += 0.5 * (a + b) / f64::from(pixels);
         // Light of the class that is seen in mirrors and glass stays with the camera unless it is merged.
         let seen = |left: f64, light: &Incoming| if light.mirrored { (0.0, left) } else { (left, 0.0) };
         let ((a_left, a_seen), (b_left, b_seen)) = (seen(a_left, &a_light), seen(b_left, &b_light));
@@ -287,118 +340,196 @@ fn trimmed(values: &[(usize, f64)], weights: &[f64]) -> f64 {
 struct Landed {
     source: usize,
     place: DVec2,
-    /// Luminance in each block.
-    splats: Vec<(usize, f64)>,
+    /// What the camera sees itself.
+    splats: Vec<Arrival>,
+    /// What it would collect where mirrors and glass are seen.
+    collected: Vec<Arrival>,
     rays: u32,
 }
 
-/// One round of paths from the lights, in the order of their numbers.
-fn from_lights(paths: &LightPaths, round: u64) -> Vec<Landed> {
+/// Paths `indices` of one round, in the order of their numbers.
+fn from_lights(paths: &LightPaths, seen: Option<&Seen>, round: u32, indices: Range<u64>) -> Vec<Landed> {
     let [width, height] = paths.scene.camera.resolution.map(f64::from);
     let block_of = |place: DVec2| {
         let index = |x: f64, size: f64| ((x / size * BLOCKS as f64).max(0.0) as usize).min(BLOCKS - 1);
         index(place.y, height) * BLOCKS + index(place.x, width)
     };
-    (0..FROM_LIGHTS)
+    indices
         .into_par_iter()
         .map(|i| {
-            let mut splats = Vec::new();
-            let traced = trace(paths, round as u32, i, None, &mut |wavelengths, splat| {
+            let (mut splats, mut collected) = (Vec::new(), Vec::new());
+            let mut photons = Vec::new();
+            let traced = trace(paths, round, i, seen.map(|_| &mut photons), &mut |wavelengths, splat| {
                 let y = f64::from(splat.xyz(wavelengths)[1]);
                 if y.is_finite() {
-                    splats.push((block_of(splat.place), y));
+                    splats.push(Arrival { block: block_of(splat.place), y, pixels: 1.0 });
                 }
             });
+            if let (Some(seen), Some(wavelengths)) = (seen, &traced.wavelengths) {
+                photons.iter().for_each(|photon| seen.collect(photon, wavelengths, &mut collected));
+            }
             let (source, place) = traced.began.unwrap_or((usize::MAX, DVec2::ZERO));
-            Landed { source, place, splats, rays: traced.rays }
+            Landed { source, place, splats, collected, rays: traced.rays }
         })
         .collect()
 }
 
-#[expect(clippy::too_many_arguments, reason = "all that a decision rests on")]
-fn run(
-    scene: &Scene,
-    plan: &EffectPlan,
-    settings: &PathSettings,
-    filter: &FilterSampler,
-    seed: u64,
-    wishes: Wishes,
-    casters: &Casters,
-    mut caustics: Caustics,
-) -> (Option<Arc<Caustics>>, Vec<Effect>) {
+/// A path that came to the picture.
+struct Arrived {
+    source: usize,
+    place: DVec2,
+    /// Of its source and place.
+    density: f64,
+    /// Weighted squares.
+    splatted: f64,
+    collected: f64,
+}
+
+impl Arrived {
+    fn squares(&self) -> f64 {
+        self.splatted + self.collected
+    }
+}
+
+/// What a round of paths from the lights has found, a path.
+#[derive(Default)]
+struct Round {
+    paths: u64,
+    rays: f64,
+    /// Weighted squares of what came to pixels: by itself, and collected.
+    splatted: f64,
+    collected: f64,
+    /// Mean luminance of each block.
+    thrown: Vec<f64>,
+}
+
+impl Trial<'_> {
+    /// Follows paths from the lights, as many as the picture is worth, and adds what sources and cells sent to `learnt`.
+    fn round(
+        &self,
+        paths: &LightPaths,
+        seen: Option<&Seen>,
+        number: u32,
+        weights: &[f64],
+        most_rays: f64,
+        learnt: &mut [[[f64; SIDE]; SIDE]],
+    ) -> Round {
+        let Some(caustics) = paths.caustics else { return Round::default() };
+        let mut round = Round { thrown: vec![0.0; BLOCKS * BLOCKS], ..Round::default() };
+        let mut arrived = Vec::new();
+        let [least, most] = FROM_LIGHTS;
+        while round.paths < least || round.paths < most && round.rays < most_rays {
+            for landed in from_lights(paths, seen, number, round.paths..round.paths + AT_ONCE) {
+                round.rays += f64::from(1 + landed.rays);
+                let squares =
+                    |all: &[Arrival]| all.iter().map(|a| weights[a.block] * a.pixels * a.y * a.y).sum::<f64>();
+                let (splatted, collected) = (squares(&landed.splats), squares(&landed.collected));
+                for arrival in landed.splats.iter().chain(&landed.collected) {
+                    round.thrown[arrival.block] += arrival.pixels * arrival.y;
+                }
+                if splatted + collected > 0.0 {
+                    let source = &caustics.sources[landed.source];
+                    let density = source.probability * source.guide.density(landed.place);
+                    arrived.push(Arrived { source: landed.source, place: landed.place, density, splatted, collected });
+                }
+            }
+            round.paths += AT_ONCE;
+        }
+        // Single fireflies do not decide where to aim and how much.
+        arrived.sort_by(|a, b| b.squares().total_cmp(&a.squares()));
+        let most = arrived.get(arrived.len() / 500).map_or(0.0, Arrived::squares);
+        for a in &arrived {
+            let cut = (most / a.squares()).min(1.0);
+            round.splatted += a.splatted * cut;
+            round.collected += a.collected * cut;
+            let (row, column) = Guide::cell(a.place);
+            learnt[a.source][row][column] += a.squares() * cut * a.density;
+        }
+        let paths = round.paths as f64;
+        let [width, height] = self.scene.camera.resolution.map(f64::from);
+        let share = (BLOCKS * BLOCKS) as f64 / (width * height * paths);
+        round.thrown.iter_mut().for_each(|y| *y *= share);
+        Round {
+            rays: round.rays / paths,
+            splatted: round.splatted / paths,
+            collected: round.collected / paths,
+            ..round
+        }
+    }
+}
+
+fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Effect>) {
+    let Trial { scene, plan, settings, filter, seed, wishes, casters, .. } = *trial;
     let off = |reason: String| (None, vec![technique("light tracing", false, reason)]);
+    let seen = match wishes.merging {
+        Use::Off => None,
+        Use::Auto | Use::On => Seen::of(trial, plan, &caustics),
+    };
     // As if photons were collected, so that what they would bring is told from the rest.
-    let radius = merging_radius(scene, casters);
-    let wanted = Caustics { merging: Some(radius), ..caustics.clone() };
-    let trial = EffectPlan { caustics: Some(Arc::new(wanted)), ..plan.clone() };
-    let camera = from_camera(&Shot { scene, plan: &trial, filter, seed: seed ^ STREAM, photons: None });
+    let wanted = Caustics { merging: Some(1.0), ..caustics.clone() };
+    let with_all = EffectPlan { caustics: Some(Arc::new(wanted)), ..plan.clone() };
+    let shot = Shot { scene, plan: &with_all, filter, seed: seed ^ STREAM, photons: None };
+    let camera = from_camera(&shot, trial.pixels());
     let [width, height] = scene.camera.resolution.map(f64::from);
     let pixels = width * height;
-    let mut weights = relative(&camera.means);
 
     let bounds = Bounds { low: DVec2::ZERO, high: DVec2::new(width, height) };
+    let mut weights = relative(&camera.means);
     let mut learnt = vec![[[0.0; SIDE]; SIDE]; caustics.sources.len()];
-    let (mut squares, mut rays, mut reached) = (0.0, 0.0, 0usize);
-    let mut thrown = vec![0.0; BLOCKS * BLOCKS];
-    for round in 0..2 {
+    let most_rays = SHARE * trial.paths() * camera.rays;
+    let (mut found, mut followed) = (Round::default(), 0);
+    for number in 0..2 {
         let paths = LightPaths {
             scene,
-            plan: &trial,
+            plan: &with_all,
             settings: settings.of_light_paths(),
             caustics: Some(&caustics),
             seed: seed ^ STREAM,
             bounds,
             wavelength: None,
         };
-        let all = from_lights(&paths, round);
-        (squares, rays) = (0.0, 0.0);
-        for landed in &all {
-            rays += f64::from(1 + landed.rays) / FROM_LIGHTS as f64;
-            let square: f64 = landed.splats.iter().map(|&(block, y)| weights[block] * y * y).sum();
-            squares += square / FROM_LIGHTS as f64;
-            if square > 0.0 {
-                reached += 1;
-                let source = &caustics.sources[landed.source];
-                let (row, column) = Guide::cell(landed.place);
-                learnt[landed.source][row][column] += square * source.probability * source.guide.density(landed.place);
-            }
-        }
+        found = trial.round(&paths, seen.as_ref(), number, &weights, most_rays, &mut learnt);
+        followed += found.paths;
         caustics.learn(&learnt);
-        thrown.fill(0.0);
-        let share = (BLOCKS * BLOCKS) as f64 / (pixels * FROM_LIGHTS as f64);
-        for (block, y) in all.iter().flat_map(|landed| &landed.splats) {
-            thrown[*block] += y * share;
-        }
-        if round == 0 {
-            // What the lights send there is part of the picture that errors are relative to.
-            let means: Vec<f64> = camera.means.iter().zip(&thrown).map(|(a, b)| a + b).collect();
+        // What the lights send there is part of the picture that errors are relative to.
+        let means: Vec<f64> = camera.means.iter().zip(&found.thrown).map(|(a, b)| a + b).collect();
+        if number == 0 {
             weights = relative(&means);
         }
     }
-    if reached == 0 {
-        return off(format!(
-            "of {} paths from the lights none came to the picture over {}",
-            2 * FROM_LIGHTS,
-            some(casters)
-        ));
+    if found.splatted + found.collected <= 0.0 && wishes.light_tracing == Use::Auto {
+        return off(format!("of {followed} paths from the lights none came to the picture over {}", some(casters)));
     }
 
+    // Light that is seen in mirrors and glass: often met, it is known what it costs to leave it to chance; else chance
+    // will not do.
+    let mirrored = average(&camera.mirrored, &weights);
+    let kept = average(&camera.kept, &weights);
+    let counts = found.collected > 0.0 && (camera.met_mirrored < ENOUGH || mirrored > WORTH * kept);
+    let merging = match wishes.merging {
+        Use::On => true,
+        Use::Auto => counts,
+        Use::Off => false,
+    };
+    caustics.merging = seen.as_ref().filter(|_| merging).map(|seen| seen.radius);
+    let merges = caustics.merging.is_some();
+
     // Errors by sample and pixel: (A + B / k)(a + k b) is least for k = √(B a / (A b)).
-    let kept = trimmed(&camera.kept, &weights);
-    let splatted = squares / (pixels * pixels);
-    let ratio = (splatted * camera.rays / (kept.max(f64::MIN_POSITIVE) * rays)).sqrt();
-    caustics.ratio = ratio.clamp(1.0 / 16.0, 16.0);
+    let (a, b) = (camera.rays, found.rays);
+    let thrown = (found.splatted + if merges { found.collected } else { 0.0 }) / (pixels * pixels);
+    let ratio = (thrown * a / (trimmed(&camera.kept, &weights).max(f64::MIN_POSITIVE) * b)).sqrt();
+    caustics.ratio = ratio.clamp(1.0 / 64.0, 16.0);
     let k = caustics.ratio;
     // Paths from the camera that find light of mean m with a probability p have a variance of m² / p, whether or not so
     // few paths met it; for a lamp without extent p is zero.
     let tries = 2.0 * camera.kept.len() as f64;
     let chance = if endless_odds(scene, &caustics) { 0.0 } else { (camera.met as f64).max(1.0) / tries };
-    let by_chance = thrown.iter().zip(&weights).map(|(m, w)| w * m * m).sum::<f64>() / thrown.len() as f64 / chance;
-    let mirrored = average(&camera.mirrored, &weights);
-    let kept = average(&camera.kept, &weights) + mirrored;
-    let with = OVERHEAD * (kept + splatted / k) * (camera.rays + k * rays);
+    let means = found.thrown.iter().zip(&weights);
+    let by_chance = means.map(|(m, w)| w * m * m).sum::<f64>() / found.thrown.len() as f64 / chance;
+    let (left, overhead) = if merges { (0.0, OVERHEAD) } else { (mirrored, 1.0) };
+    let with = overhead * (kept + left + thrown / k) * (a + k * b);
     let measured = if camera.met >= ENOUGH { average(&camera.all, &weights) } else { f64::INFINITY };
-    let without = measured.min(kept + by_chance) * camera.rays;
+    let without = measured.min(kept + mirrored + by_chance) * a;
     if wishes.light_tracing == Use::Auto && without < with {
         let loss = with / without;
         return off(format!(
@@ -406,73 +537,52 @@ fn run(
             some(casters)
         ));
     }
-    let share = 100.0 * k * rays / (camera.rays + k * rays);
-    let mut said = vec![technique(
-        "light tracing",
-        true,
-        format!(
-            "of {} over {}: {k:.2} paths from the lights for each from the camera, {share:.0} % of the rays",
-            lamps(scene, &caustics),
-            some(casters)
-        ),
-    )];
-    let parts = casters.parts;
-    said.push(technique(
-        "wavelength packets",
-        caustics.packets,
-        match (caustics.packets, parts) {
-            (true, _) => "wavelengths that part in glass are followed together from the lights".into(),
-            (false, true) => "the scene says so".into(),
-            (false, false) => "no wavelengths part".into(),
-        },
-    ));
-    let sharp_seen = camera.sharp > 0.0;
-    // Often met, it is known what it costs to leave it to chance; else chance will not do.
-    let counts = camera.met_mirrored < ENOUGH || mirrored > WORTH * kept;
-    let merging = wishes.merging == Use::On || wishes.merging == Use::Auto && counts;
-    if sharp_seen && merging {
-        caustics.merging = Some(radius);
-    }
-    said.push(technique(
-        "photon merging",
-        caustics.merging.is_some(),
-        match (sharp_seen, caustics.merging) {
-            (false, _) => "the camera sees no mirror and no glass".into(),
-            (true, None) if wishes.merging == Use::Off => {
-                "the scene says so: caustics in mirrors and behind glass are left to chance".into()
-            }
-            (true, None) => "paths from the camera find the caustics in mirrors and behind glass".into(),
-            (true, Some(radius)) => format!(
-                "caustics seen in mirrors and through glass, blurred within {radius:.3} m at the first sample and the \
-                 sixth root of the sample's number less at later ones"
-            ),
-        },
-    ));
+    let said = say(trial, &caustics, &camera, k * b / (a + k * b), seen.is_some(), found.collected > 0.0);
     (Some(Arc::new(caustics)), said)
 }
 
-/// Pixels, as wide as they are at what mirrors and refracts, that the first radius of merging spans.
-const FIRST_RADIUS: f64 = 2.5;
-
-/// The first radius of merging: some pixels at the nearest thing that casts.
-fn merging_radius(scene: &Scene, casters: &Casters) -> f64 {
-    let width = f64::from(scene.camera.resolution[0]);
-    let eye = scene.camera.world_from_camera.translation;
-    // To the middle: what lies behind is farther, what is before nearer. From within, what is seen is as far as the thing is
-    // large.
-    let distance = |b: &Ball| (b.center - eye).length().max(b.radius);
-    let distance = casters.balls.iter().map(distance).fold(f64::INFINITY, f64::min);
-    let pixel = match scene.camera.projection {
-        Projection::Perspective { half_width } => 2.0 * half_width / width * distance,
-        Projection::Orthographic { half_width } => {
-            2.0 * half_width / width * scene.camera.world_from_camera.matrix3.x_axis.length()
-        }
+/// The decision for people; `share` of the rays come from the lights.
+fn say(trial: &Trial, caustics: &Caustics, camera: &Camera, share: f64, seen: bool, collected: bool) -> Vec<Effect> {
+    let Trial { scene, plan, wishes, casters, .. } = *trial;
+    let tracing = format!(
+        "of {} over {}: {:.2} paths from the lights for each from the camera, {:.0} % of the rays",
+        lamps(scene, caustics),
+        some(casters),
+        caustics.ratio,
+        100.0 * share
+    );
+    let packets = match (caustics.packets, casters.parts) {
+        (true, _) => "wavelengths that part in glass are followed together from the lights",
+        (false, true) => "the scene says so",
+        (false, false) => "no wavelengths part",
     };
-    FIRST_RADIUS * pixel
+    let merging = match caustics.merging {
+        _ if wishes.merging == Use::Off => {
+            "the scene says so: caustics in mirrors and behind glass are left to chance".into()
+        }
+        None if !seen => "the camera sees nothing in mirrors and through glass".into(),
+        None if !collected => "no light of mirrors and glass comes to what is seen in them".into(),
+        None => format!(
+            "paths from the camera find the caustics in mirrors and behind glass: {} of {}",
+            camera.met_mirrored,
+            2 * camera.kept.len()
+        ),
+        Some(radius) => format!(
+            "caustics seen in mirrors and through glass, blurred within {radius:.3} m at the first sample, {:.3} m at the last{}",
+            merge::radius(radius, trial.samples.div_ceil(REPLICATES as u32).max(1) - 1),
+            if plan.media { "; those in media are left to chance" } else { "" }
+        ),
+    };
+    vec![
+        technique("light tracing", true, tracing),
+        technique("wavelength packets", caustics.packets, packets.to_owned()),
+        technique("photon merging", caustics.merging.is_some(), merging),
+    ]
 }
 
 fn some(casters: &Casters) -> String {
-    super::plan::some_of(&casters.names)
+    let names: Vec<String> = casters.names.iter().chain(&casters.endless).cloned().collect();
+    super::plan::some_of(&names)
 }
 
 fn lamps(scene: &Scene, caustics: &Caustics) -> String {
@@ -494,7 +604,7 @@ impl Caustics {
         let even = ANYWHERE / self.sources.len() as f64;
         for ((source, root), sum) in self.sources.iter_mut().zip(&roots).zip(&totals) {
             source.probability = (1.0 - ANYWHERE) * sum / total + even;
-            if *sum > 0.0 && source.ball.is_some() {
+            if *sum > 0.0 {
                 let floor = ANYWHERE / (SIDE * SIDE) as f64;
                 source.guide = Guide::of(&root.map(|row| row.map(|x| (1.0 - ANYWHERE) * x / sum + floor)));
             }

@@ -66,7 +66,7 @@ impl Walk<'_, '_> {
                 return;
             }
             let numbers = self.numbers(vertex);
-            self.rays += packet.lanes.count_ones();
+            self.rays += packet.lanes.count_ones().div_ceil(2);
             let hits = scene.closest_of(&packet.rays, packet.lanes);
             let Some(first) = each(packet.lanes).find(|&lane| hits[lane].is_some()) else {
                 self.drift_apart(&packet, packet.lanes);
@@ -283,15 +283,14 @@ impl Walk<'_, '_> {
                 let beam = packet.alone(lane);
                 let went = rays[lane].direction;
                 let crosses = came.dot(surface.normal) * went.dot(surface.normal) < 0.0;
-                let inside =
-                    if crosses { scene.beyond(object, surface, went, beam.inside()) } else { beam.inside() };
+                let inside = if crosses { scene.beyond(object, surface, went, beam.inside()) } else { beam.inside() };
                 match self.open(&rays[lane], distances[lane], inside, &beam) {
                     Some(through) => light[lane] *= through.to_array()[0],
                     None => wanted &= !(1 << lane),
                 }
             }
         } else if wanted != 0 {
-            self.rays += wanted.count_ones();
+            self.rays += wanted.count_ones().div_ceil(2);
             wanted &= !scene.occluded_of(&rays, &distances, wanted);
         }
         for lane in each(wanted) {

@@ -1,0 +1,95 @@
+//! What the camera sees in mirrors and through glass: tells the pilot which photons would be collected.
+
+use super::super::caustics::Caustics;
+use super::super::light::{Bounds, LightPaths, seen_in_sharp};
+use super::super::merge::{Photon, PhotonMap};
+use super::super::plan::EffectPlan;
+use super::{BLOCKS, STREAM, Trial};
+use crate::math::sampler::{Sampler, Set, pairs};
+use crate::scene::camera::Projection;
+use crate::spectrum::{LANES, SampledWavelengths};
+use glam::DVec2;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Pixels, as wide as they are at what is seen, that the first radius of merging spans.
+const FIRST_RADIUS: f64 = 2.5;
+
+/// What surfaces are taken to reflect.
+const ALBEDO: f64 = 0.5;
+
+/// Places that are seen in sharp things.
+pub(super) struct Seen {
+    map: PhotonMap,
+    /// Pixels for which each place stands.
+    pixels: f64,
+    /// Within which a photon is taken to be near a place, over the first radius of merging.
+    widened: f64,
+    /// The first radius of merging, metres.
+    pub radius: f64,
+}
+
+/// Light that came to some pixels.
+pub(super) struct Arrival {
+    pub block: usize,
+    /// Luminance, as that of a splat.
+    pub y: f64,
+    /// Pixels that get it.
+    pub pixels: f64,
+}
+
+impl Seen {
+    /// Looks through a few pixels of each block; `None` where nothing is seen so.
+    pub fn of(trial: &Trial, plan: &EffectPlan, caustics: &Caustics) -> Option<Seen> {
+        let Trial { scene, settings, seed, .. } = *trial;
+        // One wavelength stands for all.
+        let caustics = Caustics { packets: false, ..caustics.clone() };
+        let bounds = Bounds { low: DVec2::INFINITY, high: DVec2::NEG_INFINITY };
+        let settings = settings.of_light_paths();
+        let paths = LightPaths { scene, plan, settings, caustics: Some(&caustics), seed, bounds, wavelength: None };
+        let size = DVec2::from(scene.camera.resolution.map(f64::from));
+        let tries = trial.pixels() * 2;
+        let look = |block: usize, n: u32| {
+            let sampler = Sampler::new(seed ^ STREAM, [block as u32, n], 1, 0);
+            let (u_place, u) = pairs(sampler.set(Set::Camera));
+            let corner = DVec2::new((block % BLOCKS) as f64, (block / BLOCKS) as f64);
+            let place = (corner + u_place) / BLOCKS as f64 * size;
+            let ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
+            let seen = seen_in_sharp(&paths, &ray, &scene.wavelengths.sample(u.x), &sampler)?;
+            Some(Photon { vertices: block as u32, ..seen })
+        };
+        let places: Vec<Photon> = (0..BLOCKS * BLOCKS)
+            .into_par_iter()
+            .flat_map_iter(|block| (0..tries).filter_map(move |n| look(block, n)))
+            .collect();
+        let eye = scene.camera.world_from_camera.translation;
+        let mut distances: Vec<f64> = places.iter().map(|p| (p.point - eye).length()).collect();
+        distances.sort_by(f64::total_cmp);
+        let distance = *distances.get(distances.len() / 2)?;
+        let side = 2.0 / size.x;
+        let pixel = match scene.camera.projection {
+            Projection::Perspective { half_width } => half_width * side * distance,
+            Projection::Orthographic { half_width } => {
+                half_width * side * scene.camera.world_from_camera.matrix3.x_axis.length()
+            }
+        };
+        let radius = FIRST_RADIUS * pixel;
+        let pixels = size.x * size.y / (BLOCKS * BLOCKS * tries as usize) as f64;
+        let widened = pixels.sqrt().max(1.0);
+        (radius > 0.0).then(|| Seen { map: PhotonMap::new(&places, 1, radius * widened), pixels, widened, radius })
+    }
+
+    /// Where the light of a photon would come to.
+    pub fn collect(&self, photon: &Photon, wavelengths: &SampledWavelengths, arrivals: &mut Vec<Arrival>) {
+        let light = photon.power * (LANES as f32 / photon.rho.reduce_add());
+        let by_area = super::luminance(light, wavelengths) * ALBEDO / (PI * PI * self.radius * self.radius);
+        if by_area <= 0.0 {
+            return;
+        }
+        let pixels = self.pixels / (self.widened * self.widened);
+        self.map.each_near(photon.point, photon.normal, |seen| {
+            let share = f64::from(seen.power.reduce_add() / seen.rho.reduce_add());
+            arrivals.push(Arrival { block: seen.vertices as usize, y: by_area * share, pixels });
+        });
+    }
+}
