@@ -12,6 +12,7 @@ mod indices;
 mod lights;
 mod media;
 mod meshes;
+mod notes;
 mod principled;
 mod surface;
 
@@ -44,7 +45,7 @@ struct Compiler<'a> {
     description: &'a SceneDescription,
     faults: Vec<String>,
     /// What a person should know.
-    notes: Vec<String>,
+    notes: Vec<(String, String)>,
     /// The first curve that could not be read.
     unread: Option<Error>,
     files: Vec<PathBuf>,
@@ -146,14 +147,6 @@ impl<'a> Compiler<'a> {
 
     fn fault(&mut self, at: &str, message: impl AsRef<str>) {
         self.faults.push(self.description.fault(at, message.as_ref()));
-    }
-
-    /// Something at `at` that is no fault, once.
-    fn note(&mut self, at: &str, message: &str) {
-        let note = self.description.fault(at, message);
-        if !self.notes.contains(&note) {
-            self.notes.push(note);
-        }
     }
 
     /// An error about a file that the field `at` names: the message says so.
@@ -302,7 +295,7 @@ impl<'a> Compiler<'a> {
             has_boundaries,
             shines_on_rays,
             files: std::mem::take(&mut self.files),
-            notes: std::mem::take(&mut self.notes),
+            notes: self.told_notes(),
         };
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         self.note_overlaps(&mut scene);

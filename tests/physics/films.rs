@@ -248,8 +248,9 @@ fn a_bubble_goes_black_before_it_bursts() {
 #[test]
 fn films_that_cannot_be_are_told_and_thick_ones_are_noted() {
     let told = |material: &str| {
-        let text =
-            format!("camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nmaterials:\n  m: {material}\n");
+        let text = format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nmaterials:\n  m: {material}\nshapes: [{{sphere: {{radius: 1, material: m}}}}]\n"
+        );
         match try_bench(&text, &[]) {
             Err(fault) => fault.replace("DIR/scene.yaml:", ""),
             Ok(bench) => bench.prepared.scene.notes.join("\n").replace(bench.directory.path().to_str().unwrap(), "DIR"),

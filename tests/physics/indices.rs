@@ -109,10 +109,12 @@ fn files_that_cannot_be_used_are_told_with_both_places() {
     );
 }
 
+const SHOWN: &str = "shapes: [{sphere: {radius: 1, material: {mask: {material: m}}}}]\n";
+
 #[test]
 fn what_is_used_beyond_its_range_is_noted() {
     let notes = |ior: &str| {
-        let scene = bench_with(&format!("{CAMERA}materials: {{m: {{dielectric: {{ior: {ior}}}}}}}\n"), &[]);
+        let scene = bench_with(&format!("{CAMERA}materials: {{m: {{dielectric: {{ior: {ior}}}}}}}\n{SHOWN}"), &[]);
         scene.prepared.scene.notes.join("\n")
     };
     assert!(
@@ -121,4 +123,7 @@ fn what_is_used_beyond_its_range_is_noted() {
     );
     assert!(notes("0.9").ends_with("an index of 0.9, below 1 and without k, is right as a ratio to another only"));
     assert_eq!(notes("{glass: N-BK7}"), "");
+    // What nothing shows needs no word.
+    let unused = bench_with(&format!("{CAMERA}materials: {{m: {{dielectric: {{ior: 0.9}}}}}}\n"), &[]);
+    assert!(unused.prepared.scene.notes.is_empty());
 }
