@@ -133,6 +133,10 @@ impl Dielectric {
             let split = fresnel::dielectric(self.fresnel, cos.abs(), eta);
             ways.eta[lane] = eta;
             (ways.reflected[lane], ways.cos_transmitted[lane]) = (split.reflected, split.cos_transmitted);
+            if let Some(film) = self.film.as_ref().filter(|_| split.transmitted > 0.0) {
+                let inside = if cos > 0.0 { eta } else { 1.0 / eta };
+                ways.reflected[lane] = film.of_lane(lane, cos.abs(), inside, cos > 0.0);
+            }
         }
         ways
     }

@@ -2,8 +2,10 @@
 //!
 //! The reference is Airy's sum with complex numbers, written here apart from the renderer's matrices.
 
-use super::common::{Bench, SPREAD_NM, assert_close, bench, ray, try_bench, v, wavelengths};
+use super::channels::{assert_agree, render_with};
+use super::common::{Bench, SPREAD_NM, assert_close, bench, bench_with, ray, try_bench, v, wavelengths};
 use super::{across_the_unit_sphere, in_even_light};
+use abbe::film::filter::Filter;
 use abbe::math::sampler::Sampler;
 use abbe::spectrum::catalogue;
 use std::f64::consts::TAU;
@@ -207,6 +209,28 @@ fn rough_surfaces_under_films_are_sampled_as_they_scatter() {
             .luminance(&ray(v(0.0, 0.0, 5.0), v(0.2, 0.5, 0.0)), 30_000)
         };
         at("light_samples: 0").assert_agrees(&at("light_samples: 1"), 0.05);
+    }
+}
+
+/// A ball of flint under a film that reflects a third of the light, and what it throws onto the floor: from the camera, from
+/// the lamp with wavelengths together, and with each wavelength led by itself.
+#[test]
+fn light_through_a_coated_ball_is_the_same_by_all_techniques() {
+    let scene = |techniques: &str| {
+        let text = format!(
+            "camera: {{origin: [0, 3, 5], target: [0, -1, 1.4], fov_deg: 25}}\nimage: {{width: 8, height: 8}}\n\
+             render: {{samples: 2048, techniques: {{{techniques}}}}}\nshapes:\n\
+             - rectangle: {{corner: [-3, -1, 4], edge_u: [6, 0, 0], edge_v: [0, 0, -6], material: {{diffuse: {{}}}}}}\n\
+             - sphere: {{radius: 0.8, material: {{dielectric: {{ior: {{glass: SF11}}, film: {{ior: 2.6, thickness_nm: 53}}}}}}}}\n\
+             - disk: {{center: [0, 3, -1.5], normal: [0, -1, 0.5], radius: 0.6, emission: 10}}\n"
+        );
+        render_with(&bench_with(&text, &[]), Filter::Box, 32)
+    };
+    let path = scene("light_tracing: off");
+    for techniques in ["light_tracing: on, packets: on", "light_tracing: on, packets: off"] {
+        let divided = scene(techniques);
+        assert!(divided.splats.is_some());
+        assert_agree(techniques, &divided, &path);
     }
 }
 

@@ -258,7 +258,7 @@ fn light_through_bodies_is_the_same_from_both_ends() {
          integrator: INTEGRATOR\nrender: {samples: 4096, techniques: {light_tracing: off}}\nshapes:\n\
          - rectangle: {corner: [-3, -1, 4], edge_u: [6, 0, 0], edge_v: [0, 0, -6], material: {diffuse: {reflectance: 0.7}}}\n\
          - cube: {center: [0, 0, 0.2], size: [1.4, 1, 1.4], material: {dielectric: {ior: 1.33, priority: 1}}, inside: tea}\n\
-         - sphere: {center: [0.2, 0.4, 0], radius: 0.6, material: {dielectric: {ior: 1.6, priority: 2}}}\n\
+         - sphere: {center: [0.2, 0.4, 0], radius: 0.6, material: {dielectric: {ior: {glass: SF11}, priority: 2}}}\n\
          - disk: {center: [0, 2.5, 0.5], normal: [0, -1, 0], radius: 0.5, emission: 10, material: {diffuse: {reflectance: 0}}}\n\
          media: {tea: {homogeneous: {absorption: 0.5}}}\n";
     let path = by(scene, "path");
