@@ -20,6 +20,7 @@ use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Form, Layer, LayerPlan, Quantity, Source};
 use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
+use crate::transport::trial;
 use frame::{Frame, FrameJob, Progress};
 use report::{Report, SceneReport, Status};
 use std::collections::HashSet;
@@ -113,8 +114,12 @@ pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
     let mut plan = EffectPlan::of(&Census::of(&scene), integrator, mode);
     plan.layers = layer_plan(&description, &scene, samples)?;
     let filter = FilterSampler::new(filter(&description.image.filter))?;
-    let seed = description.render.seed;
-    let (caustics, said) = pilot::decide(&scene, &plan, &filter, seed, samples, wishes(&description));
+    let (seed, wishes) = (description.render.seed, wishes(&description));
+    if let Some((packets, said)) = trial::packets(&scene, &plan, &filter, seed, samples, wishes.packets) {
+        plan.packets = packets;
+        plan.techniques.push(said);
+    }
+    let (caustics, said) = pilot::decide(&scene, &plan, &filter, seed, samples, wishes);
     plan.caustics = caustics;
     plan.techniques.extend(said);
     let hash = hash(&description, &scene.files);

@@ -198,7 +198,8 @@ impl Dielectric {
     }
 
     /// Reflects with the hero's reflectance, else refracts.
-    pub(super) fn sample(&self, wo: DVec3, u_lobe: f64) -> Option<BsdfSample> {
+    #[must_use]
+    pub fn sample(&self, wo: DVec3, u_lobe: f64) -> Option<BsdfSample> {
         if let Some(reflected) = self.film_reflects(wo) {
             return self.sample_filmed(reflected, wo, u_lobe);
         }

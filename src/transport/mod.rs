@@ -13,6 +13,7 @@ pub mod path;
 pub mod pilot;
 pub mod plan;
 mod shadow;
+pub mod trial;
 pub mod whitted;
 
 use crate::film::accumulate::REPLICATES;

@@ -10,21 +10,26 @@
 //! are the densities of the two techniques, each already summed over the lanes that could lead;
 //! they are combined by the power heuristic (Veach 1997, eq. 9.13).
 
+mod lights;
+mod parting;
+
 use super::Incoming;
 use super::merge::PhotonMap;
 use super::plan::{EffectPlan, PathSettings};
-use super::shadow::{MAX_BOUNDARIES, Shadow};
+use super::shadow::MAX_BOUNDARIES;
 use crate::math::Frame;
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
-use crate::optics::bsdf::{Bsdf, Chosen};
+use crate::optics::bsdf::{Bsdf, BsdfSample, Chosen};
 use crate::scene::ahead::Ahead;
 use crate::scene::compound::{Compound, Leaf, Slopes, Vertex};
 use crate::scene::material::{Kind, Material, Straight};
 use crate::scene::medium::Medium;
+use crate::scene::nested::Crossing;
 use crate::scene::{Hit, Inside, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
+use lights::{Scatterer, power_heuristic};
 
 /// Vertices up to which a path that has lost nothing goes on for sure: clear glass then shows what
 /// is behind it without the noise of roulette, in every sample.
@@ -105,6 +110,26 @@ struct Path {
     sharp: bool,
     /// Light of paths that are traced from the lights.
     left: Lanes,
+    /// The lane whose wavelength is in all lanes, after the others took other ways.
+    alone: Option<usize>,
+    /// Whether it goes on for all that parted.
+    chosen: bool,
+}
+
+/// Where a path leaves a surface.
+struct Leaving<'a> {
+    hit: &'a Hit,
+    surface: &'a SurfacePoint,
+    object: &'a Object,
+    frame: &'a Frame,
+    slopes: Option<&'a Slopes>,
+    crossing: Option<&'a Crossing<'a>>,
+    /// Toward where it came from.
+    wo: DVec3,
+    /// Shading normal, where lights were asked with one.
+    sided: Option<DVec3>,
+    /// For the roulette.
+    u: f64,
 }
 
 impl Path {
@@ -127,54 +152,6 @@ impl Path {
     }
 }
 
-/// The power heuristic for densities `a` and `b`, safe for any finite and infinite values.
-fn power_heuristic(a: f64, b: f64) -> f64 {
-    if a <= 0.0 {
-        return 0.0;
-    }
-    let r = b / a;
-    1.0 / r.mul_add(r, 1.0)
-}
-
-/// What scatters at a vertex.
-enum Scatterer<'a> {
-    Surface {
-        bsdf: &'a Bsdf<'a>,
-        frame: &'a Frame,
-        surface: &'a SurfacePoint,
-        object: &'a Object,
-        flip: bool,
-        slopes: Option<&'a Slopes>,
-    },
-    Medium {
-        medium: &'a Medium,
-        point: DVec3,
-    },
-}
-
-impl Scatterer<'_> {
-    /// f · |cos| and densities toward `wi` (world), given `wo` (local for surfaces, world for media).
-    fn eval(&self, wo: DVec3, wi_world: DVec3) -> (Lanes, Lanes) {
-        match self {
-            Scatterer::Surface { bsdf, frame, surface, flip, slopes, .. } => {
-                let wi = frame.to_local(wi_world);
-                let geometric = wi_world.dot(surface.normal) * if *flip { -1.0 } else { 1.0 };
-                // Light that the shading normal sees and the true one does not would leak through.
-                if geometric * wi.z <= 0.0 {
-                    return (Lanes::ZERO, Lanes::ZERO);
-                }
-                let e = bsdf.eval(wo, wi);
-                let cos = wi.z.abs() * slopes.map_or(1.0, |s| s.shadowing(wi_world));
-                (e.f * cos as f32, e.pdf)
-            }
-            Scatterer::Medium { medium, point } => {
-                let p = Lanes::splat(medium.phase.eval(*point, wo, wi_world) as f32);
-                (p, p)
-            }
-        }
-    }
-}
-
 impl Tracer<'_> {
     fn trace<const CHROMATIC: bool, const MEDIA: bool>(&self, ray: &Ray) -> Incoming {
         let scene = self.scene;
@@ -193,15 +170,24 @@ impl Tracer<'_> {
             mirrored: false,
             sharp: false,
             left: Lanes::ZERO,
+            alone: None,
+            chosen: false,
         };
+        // The camera does not see beyond its clipping plane; what it sees lies in everything's light.
+        let (alpha, depth) = self.follow::<CHROMATIC, MEDIA>(&mut path, scene.camera.reach(ray));
+        let events = path.vertices + path.crossings;
+        Incoming { radiance: path.radiance, alpha, depth, left: path.left, events, mirrored: path.mirrored }
+    }
+
+    /// Follows a path to its end, first no farther than `reach`; coverage and depth of what it meets first.
+    fn follow<const CHROMATIC: bool, const MEDIA: bool>(&self, path: &mut Path, mut reach: f64) -> (f32, f64) {
+        let scene = self.scene;
         let mut alpha = 0.0;
         let mut depth = f64::INFINITY;
         let mut first = true;
         // Crossings of boundaries have numbers of their own, so that every vertex of the path keeps
         // the same ones whether or not boundaries lie on the way.
         let mut crossings = 0u32;
-        // The camera does not see beyond its clipping plane; what it sees lies in everything's light.
-        let mut reach = scene.camera.reach(ray);
         let mut ahead = Ahead::UNKNOWN;
 
         loop {
@@ -243,7 +229,7 @@ impl Tracer<'_> {
                         depth = scene.camera.depth(point);
                         first = false;
                     }
-                    if !self.scatter_in_medium::<CHROMATIC, MEDIA>(&mut path, point, medium) {
+                    if !self.scatter_in_medium::<CHROMATIC, MEDIA>(path, point, medium) {
                         break;
                     }
                     crossings = 0;
@@ -252,7 +238,7 @@ impl Tracer<'_> {
             }
 
             let Some(hit) = hit else {
-                self.add_background::<CHROMATIC>(&mut path);
+                self.add_background::<CHROMATIC>(path);
                 if self.settings.opaque_sky && !self.settings.hide_emitters && !scene.backgrounds.is_empty() {
                     alpha = 1.0;
                 }
@@ -300,7 +286,7 @@ impl Tracer<'_> {
             }
 
             // Light that the surface itself sends out.
-            if let Some(light) = object.light.filter(|_| self.meets_lights(&path)) {
+            if let Some(light) = object.light.filter(|_| self.meets_lights(path)) {
                 let emitted = scene.lights[light as usize].emitted(&surface, &hit, wo_world, self.nm);
                 let weight = match &path.previous {
                     None => 1.0,
@@ -317,7 +303,7 @@ impl Tracer<'_> {
                         power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho)
                     }
                 };
-                if self.leaves(&path, light) {
+                if self.leaves(path, light) {
                     path.leave_out::<CHROMATIC>(emitted, weight);
                 } else {
                     path.add::<CHROMATIC>(emitted, weight);
@@ -329,7 +315,7 @@ impl Tracer<'_> {
                 && (boundary
                     || self.sampler.set(Set::Extra(path.vertices.wrapping_add(crossings << 16)))[1] < straight.share)
             {
-                if self.settings.count_crossings && self.is_last(&path) {
+                if self.settings.count_crossings && self.is_last(path) {
                     break;
                 }
                 crossings += 1;
@@ -357,7 +343,7 @@ impl Tracer<'_> {
                 ahead.go_on(hit.t);
                 continue;
             }
-            if self.is_last(&path) {
+            if self.is_last(path) {
                 break;
             }
 
@@ -387,7 +373,7 @@ impl Tracer<'_> {
                 let scatterer =
                     Scatterer::Surface { bsdf: &bsdf, frame: &frame, surface: &surface, object, flip, slopes };
                 self.add_light::<CHROMATIC, MEDIA>(
-                    &mut path,
+                    path,
                     &scatterer,
                     surface.point,
                     wo,
@@ -406,62 +392,103 @@ impl Tracer<'_> {
             {
                 let scatterer =
                     Scatterer::Surface { bsdf: &bsdf, frame: &frame, surface: &surface, object, flip, slopes };
-                path.radiance += path.beta * self.merge::<CHROMATIC>(map, &path, &scatterer, &surface, wo);
+                let light = path.beta * self.merge::<CHROMATIC>(map, path, &scatterer, &surface, wo);
+                path.radiance += path.alone.map_or(light, |lane| Lanes::splat(light.to_array()[lane]));
+            }
+
+            // Of wavelengths that parted one goes on from where all have been seen.
+            if !bsdf.is_discrete() && !path.goes_on() {
+                break;
             }
 
             // The last ray of a path only looks for light: there is none to meet.
-            if !scene.shines_on_rays && self.is_next_to_last(&path) {
+            if !scene.shines_on_rays && self.is_next_to_last(path) {
                 break;
             }
 
             // On along a direction of the material's choice.
             // A pane that did not let the path straight through reflects it.
             let u_lobe = if straight.is_some() { 0.0 } else { choice[1] };
-            let Some(sample) = bsdf.sample(wo, u_lobe, u_direction) else { break };
-            let wi = frame.to_world(sample.wi);
-            let side = wi.dot(surface.normal) * wo_world.dot(surface.normal);
-            if (side > 0.0) == sample.transmitted || side == 0.0 {
-                break;
-            }
-            path.previous = match sample.chosen {
-                Chosen::Density(density) if self.settings.light_samples > 0 => Some(Previous {
-                    point: surface.point,
-                    normal: sided,
-                    rho: path.rho_sum::<CHROMATIC>(),
-                    density,
-                    distance: 0.0,
-                }),
-                Chosen::Density(_) | Chosen::Discrete => None,
+            let leaving = Leaving {
+                hit: &hit,
+                surface: &surface,
+                object,
+                frame: &frame,
+                slopes,
+                crossing: crossing.as_ref(),
+                wo: wo_world,
+                sided,
+                u: choice[2],
             };
-            if let Some(caustics) = &self.plan.caustics {
-                path.mirrored |= path.sharp && path.vertices == 0;
-                if path.specular && !path.sharp && sample.chosen != Chosen::Discrete {
-                    path.specular = false;
-                    path.seen = path.vertices == 0 || caustics.merging.is_some();
+            if CHROMATIC
+                && self.plan.packets
+                && path.specular
+                && let Bsdf::Dielectric(glass) = &bsdf
+                && glass.parts()
+            {
+                match self.part::<MEDIA>(path, glass, wo, u_lobe, &leaving) {
+                    true => {
+                        crossings = 0;
+                        continue;
+                    }
+                    false => break,
                 }
             }
-            path.beta *= sample.weight;
-            if let Some(slopes) = slopes {
-                path.beta *= slopes.shadowing(wi) as f32;
-            }
-            if CHROMATIC {
-                path.rho *= sample.ratio;
-            }
-            path.eta2 *= sample.eta2;
-            if MEDIA && sample.transmitted {
-                path.inside = scene.beyond(object, &surface, wi, path.inside);
-            } else if let Some(crossing) = crossing {
-                path.inside.bodies = crossing.here;
-            }
-            path.ray = scene.leave(&surface, &hit, wi);
-            path.vertices += 1;
-            crossings = 0;
-            if !self.survives::<CHROMATIC>(&mut path, choice[2]) {
+            let Some(sample) = bsdf.sample(wo, u_lobe, u_direction) else { break };
+            if !self.leave::<CHROMATIC, MEDIA>(path, &sample, &leaving) {
                 break;
             }
+            crossings = 0;
         }
-        let events = path.vertices + path.crossings;
-        Incoming { radiance: path.radiance, alpha, depth, left: path.left, events, mirrored: path.mirrored }
+        (alpha, depth)
+    }
+
+    /// Sends the path on from a surface; false where it ends.
+    #[inline(always)]
+    fn leave<const CHROMATIC: bool, const MEDIA: bool>(
+        &self,
+        path: &mut Path,
+        sample: &BsdfSample,
+        at: &Leaving,
+    ) -> bool {
+        let Leaving { hit, surface, object, .. } = *at;
+        let wi = at.frame.to_world(sample.wi);
+        let side = wi.dot(surface.normal) * at.wo.dot(surface.normal);
+        if (side > 0.0) == sample.transmitted || side == 0.0 {
+            return false;
+        }
+        path.previous = match sample.chosen {
+            Chosen::Density(density) if self.settings.light_samples > 0 => Some(Previous {
+                point: surface.point,
+                normal: at.sided,
+                rho: path.rho_sum::<CHROMATIC>(),
+                density,
+                distance: 0.0,
+            }),
+            Chosen::Density(_) | Chosen::Discrete => None,
+        };
+        path.mirrored |= path.sharp && path.vertices == 0;
+        if path.specular && !path.sharp && sample.chosen != Chosen::Discrete {
+            path.specular = false;
+            let caustics = self.plan.caustics.as_ref();
+            path.seen = caustics.is_some_and(|c| path.vertices == 0 || c.merging.is_some());
+        }
+        path.beta *= sample.weight;
+        if let Some(slopes) = at.slopes {
+            path.beta *= slopes.shadowing(wi) as f32;
+        }
+        if CHROMATIC {
+            path.rho *= sample.ratio;
+        }
+        path.eta2 *= sample.eta2;
+        if MEDIA && sample.transmitted {
+            path.inside = self.scene.beyond(object, surface, wi, path.inside);
+        } else if let Some(crossing) = at.crossing {
+            path.inside.bodies = crossing.here;
+        }
+        path.ray = self.scene.leave(surface, hit, wi);
+        path.vertices += 1;
+        self.survives::<CHROMATIC>(path, at.u)
     }
 
     /// Light of the photons around a vertex behind mirrors and glass. A lane could lead both parts of the joined path
@@ -482,7 +509,7 @@ impl Tracer<'_> {
             }
             let cosine = photon.came.dot(surface.normal).abs();
             let f = scatterer.eval(wo, photon.came).0;
-            let led = if CHROMATIC { f64::from((path.rho * photon.rho).reduce_add()) } else { LANES as f64 };
+            let led = f64::from(if CHROMATIC { path.rho * photon.rho } else { photon.rho }.reduce_add());
             let share = LANES as f64 / (led * cosine);
             if share.is_finite() { f * share as f32 } else { Lanes::ZERO }
         })
@@ -552,6 +579,9 @@ impl Tracer<'_> {
                 |wi| Ray::new(point, wi),
             );
         }
+        if !path.goes_on() {
+            return false;
+        }
         let wi = medium.phase.sample(point, wo, u_direction);
         path.previous = next_event.then(|| Previous {
             point,
@@ -583,96 +613,6 @@ impl Tracer<'_> {
         }
         path.beta *= (1.0 / q) as f32;
         true
-    }
-
-    /// Whether light that the path meets is of the class that is traced from `light`; see [`super::caustics`].
-    fn leaves(&self, path: &Path, light: u32) -> bool {
-        path.seen && path.sharp && self.plan.caustics.as_ref().is_some_and(|c| c.traced[light as usize])
-    }
-
-    /// Whether light that the path meets counts: always for the camera, else where scattering is a technique.
-    fn meets_lights(&self, path: &Path) -> bool {
-        self.settings.scatter_samples > 0 || path.vertices == 0
-    }
-
-    /// Light from infinity along a ray that met nothing.
-    fn add_background<const CHROMATIC: bool>(&self, path: &mut Path) {
-        if !self.meets_lights(path) || self.settings.hide_emitters && path.vertices == 0 {
-            return;
-        }
-        for &i in &self.scene.backgrounds {
-            let light = &self.scene.lights[i as usize];
-            let (l, weight) = match &path.previous {
-                None => (light.background(path.ray.direction, self.nm), 1.0),
-                Some(p) => {
-                    let (l, pdf) = light.background_and_pdf(path.ray.direction, p.normal, self.nm);
-                    let q = self.scene.light_probability(i as usize) * pdf;
-                    (l, power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho))
-                }
-            };
-            if self.leaves(path, i) {
-                path.leave_out::<CHROMATIC>(l, weight);
-            } else {
-                path.add::<CHROMATIC>(l, weight);
-            }
-        }
-    }
-
-    /// Next-event estimation: light from one point of one light.
-    #[expect(clippy::too_many_arguments, reason = "the state of a vertex, split by borrow")]
-    fn add_light<const CHROMATIC: bool, const MEDIA: bool>(
-        &self,
-        path: &mut Path,
-        scatterer: &Scatterer,
-        point: DVec3,
-        wo: DVec3,
-        normal: Option<DVec3>,
-        u: DVec2,
-        u_light: f64,
-        leave: impl FnOnce(DVec3) -> Ray,
-    ) {
-        let scene = self.scene;
-        let Some((i, probability)) = scene.choose_light(u_light) else { return };
-        let Some(light) = scene.lights[i].arriving(&scene.objects, point, normal, u, self.nm) else { return };
-        let (f, pdf) = scatterer.eval(wo, light.wi);
-        if f.simd_eq(Lanes::ZERO).all() {
-            return;
-        }
-        let inside = match scatterer {
-            // Light from the other side comes through what is there.
-            Scatterer::Surface { surface, object, .. }
-                if MEDIA && light.wi.dot(surface.normal) * path.ray.direction.dot(surface.normal) > 0.0 =>
-            {
-                scene.beyond(object, surface, light.wi, path.inside)
-            }
-            _ => path.inside,
-        };
-        let shadow = Shadow {
-            scene,
-            sampler: self.sampler,
-            nm: self.nm,
-            vertex: path.vertices,
-            inside,
-            panes: self.panes(path),
-            target: light.target,
-        };
-        let Some((through, passing)) = shadow.cast::<MEDIA>(&leave(light.wi), light.distance) else { return };
-        let value = f * light.radiance * through;
-        let weight = match light.density {
-            None => 1.0 / probability,
-            Some(density) => {
-                let q = density * probability;
-                // B: what scattering, led by any lane, would have found this light with.
-                let led = if CHROMATIC { path.rho * pdf * passing } else { pdf * passing };
-                let scattering = if self.settings.scatter_samples > 0 { f64::from(led.reduce_add()) } else { 0.0 };
-                power_heuristic(q * path.rho_sum::<CHROMATIC>(), scattering) / q
-            }
-        };
-        if self.leaves(path, i as u32) {
-            path.leave_out::<CHROMATIC>(value, weight);
-        } else {
-            path.add::<CHROMATIC>(value, weight);
-        }
     }
 }
 

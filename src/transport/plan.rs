@@ -143,6 +143,8 @@ pub struct EffectPlan {
     pub nested: bool,
     /// Depth fog.
     pub depth_fog: bool,
+    /// Wavelengths that part at glass that the camera looks at are followed together.
+    pub packets: bool,
     /// Every glass is computed as if it were dispersive.
     pub all_dispersive: bool,
     /// Light of mirrors and glass that is traced from the lights.
@@ -299,6 +301,7 @@ impl EffectPlan {
             media: media && path,
             nested,
             depth_fog,
+            packets: path && !census.dispersive.is_empty(),
             all_dispersive: mode == EffectMode::All,
             caustics: None,
             layers: LayerPlan::default(),

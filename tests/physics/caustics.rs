@@ -187,8 +187,9 @@ fn no_light_is_lost_and_none_counted_twice() {
 #[test]
 fn wavelengths_that_part_are_all_there_with_and_without_packets() {
     let flint = Case { what: "flint", material: FLINT, ..AREA };
-    let off = render(&flint.bench("off", "auto", 1536));
+    let off = render(&flint.bench("off", "off", 1536));
     assert_agree("packets", &render(&flint.bench("on", "on", 96)), &off);
+    assert_agree("packets from the camera", &render(&flint.bench("off", "on", 512)), &off);
     assert_agree("single", &render(&flint.bench("on", "off", 96)), &off);
     // Lanes part at the edges of a mesh, and with normals of its own each has another factor.
     let mesh = Case { what: "flint mesh", caster: ROUND, ..flint };
