@@ -1,7 +1,7 @@
 //! A trial before the render: whether wavelengths that part at the glass before the camera are worth following together.
 //!
 //! Two ways to spend time are equal where variance times cost is. Both are rendered at places spread over the picture, with as
-//! many evenly spread samples as a replicate of the render has (up to [`MOST`]), because a hero's colours average out over its
+//! many evenly spread samples as a replicate of the render has (sixteen at the most), because a hero's colours average out over its
 //! samples; two replicates tell the variance. Costs are counted in rays, so that every machine decides alike.
 
 use super::plan::{Effect, EffectPlan, Integrator};
