@@ -188,3 +188,27 @@ fn what_mitsuba_lacks_is_told_by_name() {
     );
     assert_eq!(exported.files.len(), 1);
 }
+
+/// Films, absorption, priorities and indices from files come back by the lines that Mitsuba passes over.
+#[test]
+fn optical_materials_come_back() {
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    let metal = b"DATA:\n- type: tabulated nk\n  data: |\n    0.3 0.2 3\n    0.9 0.6 9\n";
+    common::write(&directory.path().join("m.yml"), metal);
+    common::write(&directory.path().join("w.csv"), b"wl,n,k\n0.3,1.4,1e-8\n0.9,1.3,2e-7\n");
+    common::write(
+        &yaml,
+        b"camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes:\n\
+        - sphere: {center: [-1, 0, 0], radius: 0.5, material: {conductor: {file: m.yml, film: {ior: 2.4, thickness_nm: 50}}}}\n\
+        - sphere: {radius: 0.4, material: {dielectric: {ior: {file: w.csv}, absorption: {color: 0.5, at: 0.3}, priority: 2}}}\n\
+        - sphere: {center: [0.3, 0, 0], radius: 0.4, material: {dielectric: {ior: 1.5, priority: 1, film: {ior: {formula: \
+          {number: 5, coefficients: [1.4, 0.003, -2]}}, thickness_nm: 300}}}}\n\
+        - sphere: {center: [1.2, 0, 0], radius: 0.4, material: {thin_dielectric: {ior: 1.33, thickness_nm: 300}}}\n\
+        lights: [{constant: {radiance: 0.8}}]\n",
+    );
+    let (_, exported) = prepared(&yaml, directory.path(), false);
+    let told = &exported.losses[1].instead;
+    assert!(told.contains("no absorption") && told.contains("no priority"), "{told}");
+    same_picture(&yaml);
+}

@@ -234,13 +234,20 @@ fn plain_shortfall(material: &Material) -> Option<String> {
             let film = film(m.film.is_some());
             highlight(m.highlight.is_some()).or(schlick(m.fresnel)).or(film).or(index).or(spectra(&[&m.tint]))
         }
-        Material::Dielectric(m) => highlight(m.highlight.is_some())
-            .or(schlick(m.fresnel))
-            .or(dispersive(&m.ior, &m.exterior_ior))
-            .or(film(m.film.is_some()))
-            .or(m.absorption.as_ref().map(|_| "no absorption inside, which Mitsuba has in media only".to_owned()))
-            .or(m.priority.map(|_| "no priority: in Mitsuba bodies that overlap are wrong".to_owned()))
-            .or(spectra(&[&m.reflection_tint, &m.transmission_tint])),
+        Material::Dielectric(m) => {
+            let said = |given: bool, what: &str| given.then(|| what.to_owned());
+            let all = [
+                highlight(m.highlight.is_some()),
+                schlick(m.fresnel),
+                film(m.film.is_some()),
+                dispersive(&m.ior, &m.exterior_ior),
+                said(m.absorption.is_some(), "no absorption inside, which Mitsuba has in media only"),
+                said(m.priority.is_some(), "no priority: in Mitsuba bodies that overlap are wrong"),
+                spectra(&[&m.reflection_tint, &m.transmission_tint]),
+            ];
+            let all: Vec<String> = all.into_iter().flatten().collect();
+            (!all.is_empty()).then(|| all.join("; "))
+        }
         Material::ThinDielectric(m) => film(m.thickness_nm.is_some())
             .or(dispersive(&m.ior, &m.exterior_ior))
             .or(spectra(&[&m.reflection_tint, &m.transmission_tint])),
