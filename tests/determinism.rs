@@ -225,7 +225,8 @@ fn a_scene_scaled_by_a_power_of_two_has_the_same_bits() {
             "camera: {{origin: [0, {}, {}], target: [0, {}, 0], fov_deg: 40}}\nimage: {{width: 20, height: 14}}\n\
              render: {{samples: 8}}\nlights: [{{constant: {{radiance: 0.3}}}}]\nshapes:\n\
              - plane: {{normal: [0, 1, 0]}}\n\
-             - sphere: {{center: [0, {s}, 0], radius: {s}, material: {{dielectric: {{ior: 1.5}}}}}}\n\
+             - sphere: {{center: [0, {s}, 0], radius: {s}, material: {{dielectric: {{ior: 1.5, priority: 2}}}}}}\n\
+             - sphere: {{center: [0, {}, 0], radius: {s}, material: {{dielectric: {{ior: 1.33, priority: 1}}}}}}\n\
              - cone: {{base: [{s}, 0, {s}], apex: [{s}, {s}, {s}], radius: {}}}\n\
              - cylinder: {{base: [-{s}, 0, {s}], top: [-{s}, {s}, {s}], radius: {}, material: {{conductor: {{metal: gold, roughness: 0.3}}}}}}\n\
              - cube: {{center: [0, {}, 0], size: {}}}\n\
@@ -233,6 +234,7 @@ fn a_scene_scaled_by_a_power_of_two_has_the_same_bits() {
             1.5 * s,
             6.0 * s,
             0.75 * s,
+            1.5 * s,
             0.5 * s,
             0.25 * s,
             2.5 * s,

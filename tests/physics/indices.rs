@@ -121,7 +121,10 @@ fn what_is_used_beyond_its_range_is_noted() {
         notes("{glass: SF11}")
             .ends_with("SF11: the formula is stated for 390 to 2500 nm and continued to 360 to 830 nm")
     );
-    assert!(notes("0.9").ends_with("an index of 0.9, below 1 and without k, is right as a ratio to another only"));
+    let below = "below 1 and without k, is right as a ratio to another only";
+    assert!(notes("0.9").ends_with(&format!("an index of 0.9 at 360 nm, {below}")));
+    // 1 + 0.1 (600 − nm)/300 falls below 1 beyond 600 nm.
+    assert!(notes("{table: [[300, 1.1], [900, 0.9]]}").contains("at 601 nm, below 1"));
     assert_eq!(notes("{glass: N-BK7}"), "");
     // What nothing shows needs no word.
     let unused = bench_with(&format!("{CAMERA}materials: {{m: {{dielectric: {{ior: 0.9}}}}}}\n"), &[]);

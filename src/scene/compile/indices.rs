@@ -23,15 +23,7 @@ impl<'a> Compiler<'a> {
     /// The index of something clear.
     pub(super) fn index(&mut self, at: &str, index: &written::Index) -> RefractiveIndex {
         let made = match index {
-            written::Index::Number(n) => {
-                if *n < 1.0 {
-                    self.note(
-                        at,
-                        &format!("an index of {n}, below 1 and without k, is right as a ratio to another only"),
-                    );
-                }
-                Ok(RefractiveIndex::Constant(*n))
-            }
+            written::Index::Number(n) => Ok(RefractiveIndex::Constant(*n)),
             written::Index::Glass(name) => catalogue::substance(name).map(|substance| {
                 if let Some(note) = substance.note() {
                     self.note(at, &note);
@@ -52,7 +44,14 @@ impl<'a> Compiler<'a> {
             }
         };
         let checked = made.and_then(|index| index.check_band().map(|()| index));
-        self.or(at, checked, RefractiveIndex::Constant(1.0))
+        let index = self.or(at, checked, RefractiveIndex::Constant(1.0));
+        if let Some(nm) = nanometres().find(|&nm| index.at(nm) < 1.0) {
+            let n = index.at(nm);
+            let message =
+                format!("an index of {n} at {nm} nm, below 1 and without k, is right as a ratio to another only");
+            self.note(at, &message);
+        }
+        index
     }
 
     /// What a file says.
