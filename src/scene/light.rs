@@ -225,7 +225,7 @@ impl Light {
                     Geometry::Mesh(mesh) => {
                         let (i, u_x) = mesh.areas.sample(u.x)?;
                         let b = warp::triangle(DVec2::new(u_x, u.y));
-                        let surface = mesh.mesh.surface(i, b.x, b.y);
+                        let surface = mesh.mesh.boundary(i, b.x, b.y);
                         let offset = surface.point - from;
                         let distance = offset.length();
                         let wi = offset / distance;
@@ -233,7 +233,13 @@ impl Light {
                         (cos > 0.0 && distance > 0.0).then(|| Arriving {
                             wi,
                             distance,
-                            radiance: radiance.eval(&TexturePoint::new(&surface, i, b.into()), nm),
+                            radiance: match radiance {
+                                Texture::Uniform(spectrum) => spectrum.eval(nm),
+                                varying => {
+                                    let surface = mesh.mesh.surface(i, b.x, b.y);
+                                    varying.eval(&TexturePoint::new(&surface, i, b.into()), nm)
+                                }
+                            },
                             density: Some(distance * distance / (mesh.areas.total() * cos)),
                             target: target(i),
                         })
