@@ -567,11 +567,16 @@ fn say(trial: &Trial, caustics: &Caustics, camera: &Camera, share: f64, seen: bo
             camera.met_mirrored,
             2 * camera.kept.len()
         ),
-        Some(radius) => format!(
-            "caustics seen in mirrors and through glass, blurred within {radius:.3} m at the first sample, {:.3} m at the last{}",
-            merge::radius(radius, trial.samples.div_ceil(REPLICATES as u32).max(1) - 1),
-            if plan.media { "; those in media are left to chance" } else { "" }
-        ),
+        Some(radius) => {
+            let samples = trial.samples.div_ceil(REPLICATES as u32).max(1);
+            let mean = merge::mean_radius(radius, samples);
+            format!(
+                "caustics seen in mirrors and through glass: photons within {radius:.3} m at the first sample and {:.3} m at the last{}; their light is blurred as by a disc of {mean:.3} m, {:.1} pixels where it is seen",
+                merge::radius(radius, samples - 1),
+                if plan.media { ", on surfaces, not in media" } else { "" },
+                seen::FIRST_RADIUS * mean / radius,
+            )
+        }
     };
     vec![
         technique("light tracing", true, tracing),

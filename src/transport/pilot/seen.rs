@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Pixels, as wide as they are at what is seen, that the first radius of merging spans.
-const FIRST_RADIUS: f64 = 2.5;
+pub(super) const FIRST_RADIUS: f64 = 2.5;
 
 /// What surfaces are taken to reflect.
 const ALBEDO: f64 = 0.5;
