@@ -30,7 +30,7 @@ pub(super) fn render_with(bench: &Bench, filter: Filter, tile: u32) -> Frame {
     frame::render(&job(bench, &filter, tile), &|_| {}, &AtomicBool::new(false)).unwrap()
 }
 
-fn render(yaml: &str) -> Frame {
+pub fn render(yaml: &str) -> Frame {
     render_with(&bench_with(yaml, &[]), Filter::Box, 32)
 }
 
