@@ -1,8 +1,9 @@
 //! Each wavelength bends by its own index: a prism against Snell's law by hand.
 
 use super::LAMP;
-use super::channels::render;
-use super::common::{Bench, bench, wavelengths};
+use super::channels::{render, render_with};
+use super::common::{Bench, bench, bench_with, wavelengths};
+use abbe::film::filter::Filter;
 use abbe::math::Ray;
 use abbe::math::sampler::Sampler;
 use abbe::math::statistics::Moments;
@@ -217,5 +218,112 @@ fn a_reflection_keeps_all_eight_wavelengths() {
         let (s, p) = ((cos - eta * cos_t) / (cos + eta * cos_t), (eta * cos - cos_t) / (eta * cos + cos_t));
         let expected = 0.5 * (s * s + p * p);
         assert!((sums[k] / expected - 1.0).abs() < 4.0 * 0.017, "{} nm: {} against {expected}", nm[k], sums[k]);
+    }
+}
+
+/// A parallel beam through the prism onto a wall, in sixteen bands of 20 nm: each band lies where Snell's law puts it and
+/// nowhere else, with the power that Fresnel's equations leave it.
+///
+/// Light of wavelength λ that enters s metres below the edge comes to the height y = s p_y + tan α (x − s p_x) on the wall at x,
+/// with p and α of [`through_the_prism`]; s runs over a beam of width w by w / cos i, evenly, so that the middle of its light is
+/// y at s = 1. A band has power Σ T(λ) over its wavelengths, and its middle is the mean of y with the weights T.
+#[test]
+fn each_band_behind_a_prism_lies_where_snells_law_puts_it() {
+    const BANDS: usize = 16;
+    const ROWS: usize = 256;
+    const COLUMNS: usize = 4;
+    let (incidence, wall, beam, depth) = (50f64.to_radians(), 3.0, 0.004, 0.001);
+    let ends = |k: usize| [400.0 + 20.0 * k as f64, 420.0 + 20.0 * k as f64];
+    let height = |nm: f64, s: f64| {
+        let passage = through_the_prism(bk7(nm), incidence);
+        s * passage.point[1] + passage.angle.tan() * (wall - s * passage.point[0])
+    };
+    let half = 30f64.to_radians();
+    let (x, y) = (2.0 * half.sin(), 2.0 * half.cos());
+    let Ray { origin, direction, .. } = entering(incidence);
+    // Across the beam, in the plane of the prism: the lamp's edges are this way and along z.
+    let across = DVec3::new(-direction.y, direction.x, 0.0);
+    let corner = origin - across * (0.5 * beam) - DVec3::Z * (0.5 * depth);
+    let (low, high) = (height(ends(0)[0], 1.0), height(ends(BANDS - 1)[1], 1.0));
+    let (middle, tall) = (0.5 * (low + high), 1.2 * (high - low));
+    let responses: String = (0..BANDS)
+        .map(|k| {
+            let [a, b] = ends(k);
+            format!("  - {{name: b{k}, response: {{table: [[{a}, 1], [{b}, 1]]}}}}\n")
+        })
+        .collect();
+    let scene = |seed: u32| {
+        bench_with(
+            &format!(
+                "camera: {{origin: [2.9, {middle}, 0], target: [3, {middle}, 0], orthographic_height: {tall}}}\n\
+                 image:\n  width: {COLUMNS}\n  height: {ROWS}\n  bands:\n{responses}\
+                 render: {{samples: 8, seed: {seed}, techniques: {{light_tracing: on}}}}\n\
+                 materials: {{glass: {{dielectric: {{ior: {{glass: N-BK7}}, exterior_ior: 1}}}}}}\nshapes:\n\
+                 - rectangle: {{corner: [0, 0, 1], edge_u: [0, 0, -2], edge_v: [-{x}, -{y}, 0], material: glass}}\n\
+                 - rectangle: {{corner: [0, 0, -1], edge_u: [0, 0, 2], edge_v: [{x}, -{y}, 0], material: glass}}\n\
+                 - rectangle: {{corner: [{wall}, -3, -1], edge_u: [0, 0, 2], edge_v: [0, 6, 0],\n   \
+                     material: {{diffuse: {{reflectance: 0.5}}}}}}\n\
+                 - rectangle: {{corner: [{}, {}, {}], edge_u: [{}, {}, 0], edge_v: [0, 0, {depth}], emission: 1,\n   \
+                     emission_direction: normal, material: {{diffuse: {{reflectance: 0}}}}}}\n",
+                corner.x,
+                corner.y,
+                corner.z,
+                beam * across.x,
+                beam * across.y,
+            ),
+            &[],
+        )
+    };
+    let mut power: [Moments; BANDS] = std::array::from_fn(|_| Moments::default());
+    let mut place: [Moments; BANDS] = std::array::from_fn(|_| Moments::default());
+    let pixel = tall / ROWS as f64;
+    for seed in 0..8 {
+        let bench = scene(seed);
+        assert!(bench.prepared.plan.caustics.is_some(), "light is traced");
+        let frame = render_with(&bench, Filter::Box, 32);
+        for k in 0..BANDS {
+            let plane = frame.layer(k);
+            let [a, b] = ends(k).map(|nm| height(nm, 1.0));
+            let spread = 0.5 * beam / incidence.cos();
+            let reach = [height(ends(k)[0], 1.0 + spread), height(ends(k)[1], 1.0 - spread)];
+            assert!(reach[0] < a && a < b && b < reach[1]);
+            let (mut sum, mut moment) = (0.0, 0.0);
+            for (row, pixels) in plane.chunks(COLUMNS).enumerate() {
+                let light: f64 = pixels.iter().map(|x| f64::from(*x)).sum();
+                let y = middle + (0.5 * ROWS as f64 - 0.5 - row as f64) * pixel;
+                // A row that the beam does not touch, by a hundredth of its height for the camera's rounding, is black.
+                if y + 0.51 * pixel < reach[0] || y - 0.51 * pixel > reach[1] {
+                    assert_eq!(light, 0.0, "band {k}, row {row}");
+                }
+                sum += light;
+                moment += light * y;
+            }
+            power[k].push(sum * pixel * pixel);
+            place[k].push(moment / sum);
+        }
+    }
+    for k in 0..BANDS {
+        let [a, b] = ends(k);
+        let (mut weight, mut moment) = (0.0, 0.0);
+        for i in 0..200 {
+            let nm = a + (b - a) * (f64::from(i) + 0.5) / 200.0;
+            let t = through_the_prism(bk7(nm), incidence).transmitted;
+            weight += t / 200.0;
+            moment += t / 200.0 * height(nm, 1.0);
+        }
+        // Radiance of a white wall of 0.5 under the beam, over all of its area: ρ / π · emission · area · Δλ · T.
+        let expected = 0.5 / std::f64::consts::PI * beam * depth * (b - a) * weight;
+        let (found, error) = (power[k].mean, power[k].standard_error());
+        assert!(
+            (found - expected).abs() < 4.0 * error && error < 5e-3 * expected,
+            "band {k}: {found} ± {error}, {expected}"
+        );
+        // Within a row light is spread evenly but for the slopes at the band's ends: a twentieth of a row.
+        let (found, error, expected) = (place[k].mean, place[k].standard_error(), moment / weight);
+        let off = (found - expected).abs();
+        assert!(
+            off < 4.0 * error + 0.05 * pixel && error < 0.05 * pixel,
+            "band {k}: {found} ± {error}, {expected}, row {pixel}"
+        );
     }
 }
