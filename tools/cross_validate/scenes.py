@@ -561,8 +561,8 @@ def cameras() -> list:
     ]
 
 
-# Lines of mercury, cadmium, hydrogen, helium and two at the ends of the visible band, nm.
-BANDS = (405, 436, 480, 508, 546, 588, 644, 700)
+# Sixteen bands over what the eye sees, among them lines of mercury, cadmium, hydrogen and helium, nm.
+BANDS = (405, 420, 436, 452, 468, 486, 508, 526, 546, 566, 588, 610, 632, 656, 678, 700)
 BAND_WIDTH = 4.0
 
 
