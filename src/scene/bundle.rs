@@ -7,7 +7,8 @@ use crate::spectrum::LANES;
 /// Objects up to which all are tried.
 const FEW: usize = 8;
 
-fn each(lanes: u8) -> impl Iterator<Item = usize> {
+/// The lanes whose bits are set.
+pub fn each(lanes: u8) -> impl Iterator<Item = usize> {
     (0..LANES).filter(move |lane| lanes >> lane & 1 == 1)
 }
 

@@ -6,7 +6,7 @@
 
 pub mod ahead;
 pub mod along_normal;
-mod bundle;
+pub mod bundle;
 pub mod bvh;
 pub mod camera;
 pub mod casters;

@@ -13,7 +13,7 @@ mod packet;
 
 use super::caustics::{Caustics, Target};
 use super::merge::Photon;
-use super::path::seen_normal;
+use super::path::{FOR_SURE, SURVIVAL, seen_normal};
 use super::plan::{EffectPlan, LightSettings};
 use super::shadow::{MAX_BOUNDARIES, Shadow};
 use crate::math::sampler::{Sampler, Set, pairs};
@@ -26,12 +26,6 @@ use crate::scene::nested::{Bodies, Crossing as Meeting};
 use crate::scene::{Hit, Inside, Medium, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
-
-/// Vertices up to which a path that has lost nothing goes on for sure, as in `path`.
-const FOR_SURE: u32 = 256;
-
-/// Longest survival of a path beyond that.
-const SURVIVAL: f64 = 0.999;
 
 /// The set that chooses which wavelength goes on: above every vertex's.
 const CHOSEN: u32 = 1 << 29;
@@ -379,17 +373,22 @@ impl<'a> Walk<'a, '_> {
     /// Russian roulette on the largest lane; false where the beam ends.
     fn survives(&self, beam: &mut Beam, u: f64) -> bool {
         let carried = largest(beam.power) * f64::from(LANES as f32 / beam.rho.reduce_add());
-        if carried.is_nan() || carried <= 0.0 {
-            return false;
-        }
-        if beam.vertex + 1 >= self.paths.settings.roulette_depth {
-            let q = (carried / self.start).min(if beam.vertex <= FOR_SURE { 1.0 } else { SURVIVAL });
-            if u >= q {
-                return false;
-            }
-            beam.power *= (1.0 / q) as f32;
-        }
+        let Some(worth) = self.survival(carried, beam.vertex, u) else { return false };
+        beam.power *= worth;
         true
+    }
+
+    /// Russian roulette at `vertex` of what has `carried` so much power there: how many times more it is worth if it goes
+    /// on; `None` where it ends.
+    fn survival(&self, carried: f64, vertex: u32, u: f64) -> Option<f32> {
+        if carried.is_nan() || carried <= 0.0 {
+            return None;
+        }
+        if vertex + 1 < self.paths.settings.roulette_depth {
+            return Some(1.0);
+        }
+        let q = (carried / self.start).min(if vertex <= FOR_SURE { 1.0 } else { SURVIVAL });
+        (u < q).then_some((1.0 / q) as f32)
     }
 
     /// Of wavelengths that parted, only one goes on from where all have been seen: beyond, their ways have nothing in

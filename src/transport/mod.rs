@@ -252,6 +252,12 @@ pub fn sample(
     begun.sample
 }
 
+/// A place in block `block` of the `side` × `side` that the picture is cut into, in pixels.
+fn place_in(scene: &Scene, side: usize, block: usize, u: DVec2) -> DVec2 {
+    let corner = DVec2::new((block % side) as f64, (block / side) as f64);
+    (corner + u) / side as f64 * DVec2::from(scene.camera.resolution.map(f64::from))
+}
+
 /// The light of sample `index` of `replicate` at `pixel` before fog, with what it left to paths from the lights.
 fn probe(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Incoming, SampledWavelengths) {
     let sampler = Sampler::new(shot.seed, pixel, replicate, index);

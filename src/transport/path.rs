@@ -33,11 +33,11 @@ use lights::{Scatterer, power_heuristic};
 
 /// Vertices up to which a path that has lost nothing goes on for sure: clear glass then shows what
 /// is behind it without the noise of roulette, in every sample.
-const FOR_SURE: u32 = 256;
+pub(super) const FOR_SURE: u32 = 256;
 
 /// Longest survival of a path beyond that: one in a thousand is ended at each vertex, so that light
 /// trapped between perfect mirrors costs some thousand vertices, not for ever.
-const SURVIVAL: f64 = 0.999;
+pub(super) const SURVIVAL: f64 = 0.999;
 
 /// Light that arrives along a camera ray.
 #[must_use]

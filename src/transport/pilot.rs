@@ -259,14 +259,12 @@ fn luminance(light: Lanes, wavelengths: &SampledWavelengths) -> f64 {
 
 /// Paths from the camera through all blocks.
 fn from_camera(shot: &Shot, pixels: u32) -> Camera {
-    let [width, height] = shot.scene.camera.resolution;
     let tried: Vec<_> = (0..BLOCKS * BLOCKS)
         .into_par_iter()
         .flat_map_iter(|block| (0..pixels).map(move |n| (block, n)))
         .map(|(block, n)| {
             let u = pairs(Sampler::new(shot.seed, [block as u32, n], 0, 0).set(Set::Lens)).0;
-            let corner = DVec2::new((block % BLOCKS) as f64, (block / BLOCKS) as f64);
-            let place = (corner + u) / BLOCKS as f64 * DVec2::new(f64::from(width), f64::from(height));
+            let place = super::place_in(shot.scene, BLOCKS, block, u);
             let pixel = [place.x as u32, place.y as u32];
             let pair = [0, 1].map(|replicate| {
                 let (light, wavelengths) = super::probe(shot, pixel, replicate, n);

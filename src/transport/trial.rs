@@ -12,7 +12,6 @@ use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::Scene;
 use crate::spectrum::{ColourSpace, observer};
 use crate::transport::pilot::Use;
-use glam::DVec2;
 use rayon::prelude::*;
 
 /// Pixels for each place that is tried, and the least and most places along a side of the picture.
@@ -75,13 +74,11 @@ pub fn packets(
 fn try_out(shot: &Shot, each: u32) -> Tried {
     let [width, height] = shot.scene.camera.resolution.map(f64::from);
     let side = (width * height / PIXELS).sqrt().clamp(SIDES.0, SIDES.1) as usize;
-    let matrix = ColourSpace::Rec709.matrix_from_xyz();
     let places: Vec<_> = (0..side * side)
         .into_par_iter()
         .map(|k| {
             let u = pairs(Sampler::new(shot.seed, [k as u32, 0], 0, 0).set(Set::Lens)).0;
-            let place =
-                (DVec2::new((k % side) as f64, (k / side) as f64) + u) / side as f64 * DVec2::new(width, height);
+            let place = super::place_in(shot.scene, side, k, u);
             let mut rays = 0.0;
             let colours = [0, 1].map(|replicate| {
                 let mut sum = [0.0; 3];
@@ -90,9 +87,9 @@ fn try_out(shot: &Shot, each: u32) -> Tried {
                     let Incoming { radiance, events, .. } = light;
                     // A ray to the next vertex and one to a light from each.
                     rays += f64::from(1 + 2 * events);
-                    let xyz = observer::xyz(radiance, &wavelengths).map(f64::from);
-                    for (sum, row) in sum.iter_mut().zip(&matrix) {
-                        *sum += row.iter().zip(xyz).map(|(m, x)| m * x).sum::<f64>() / f64::from(each);
+                    let rgb = ColourSpace::Rec709.from_xyz(observer::xyz(radiance, &wavelengths));
+                    for (sum, value) in sum.iter_mut().zip(rgb) {
+                        *sum += f64::from(value) / f64::from(each);
                     }
                 }
                 sum

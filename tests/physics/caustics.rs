@@ -1,6 +1,6 @@
 //! Light of mirrors and glass that is traced from the lights: none is lost, none counted twice.
 
-use super::channels::{job, render_with};
+use super::channels::{job, render_with, sums};
 use super::common::{Bench, bench_with, grey_png};
 use abbe::batch::frame::render_part;
 use abbe::film::filter::{Filter, FilterSampler};
@@ -292,14 +292,8 @@ fn merged_light_does_not_depend_on_tiles_threads_or_parts() {
     let case = Case { what: "flint", material: FLINT, ..AREA };
     let bench = case.bench("on", "auto", 12);
     assert!(bench.prepared.plan.caustics.as_ref().unwrap().merging.is_some());
-    let run = |threads: usize, tile: u32| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let frame = pool.install(|| render_with(&bench, Filter::Gaussian { stddev: 0.5 }, tile));
-        let splats = frame.splats.unwrap();
-        (frame.film, splats.film, splats.paths)
-    };
-    let whole = run(1, 32);
-    assert!(whole == run(3, 5), "the sums differ");
+    let whole = sums(&bench, 1, 32);
+    assert!(whole == sums(&bench, 3, 5), "the sums differ");
     let filter = FilterSampler::new(Filter::Gaussian { stddev: 0.5 }).unwrap();
     let parts = [5..12, 0..5].map(|samples| render_part(&job(&bench, &filter, 8), samples).unwrap());
     let [(mut film, splats), (second, more)] = parts;

@@ -2,6 +2,7 @@
 
 use super::common::{Bench, bench_with};
 use abbe::batch::frame::{self, Frame, FrameJob};
+use abbe::film::accumulate::{Film, REPLICATES};
 use abbe::film::filter::{Filter, FilterSampler};
 use abbe::film::resolve::Image;
 use abbe::math::statistics::Moments;
@@ -28,6 +29,15 @@ pub(super) fn job<'a>(bench: &'a Bench, filter: &'a FilterSampler, tile: u32) ->
 pub(super) fn render_with(bench: &Bench, filter: Filter, tile: u32) -> Frame {
     let filter = FilterSampler::new(filter).unwrap();
     frame::render(&job(bench, &filter, tile), &|_| {}, &AtomicBool::new(false)).unwrap()
+}
+
+/// What the paths of the camera and of the lights add up to on `threads` threads with tiles of `tile` pixels, and how many
+/// the latter are.
+pub(super) fn sums(bench: &Bench, threads: usize, tile: u32) -> (Film, Film, [u64; REPLICATES]) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let frame = pool.install(|| render_with(bench, Filter::Gaussian { stddev: 0.5 }, tile));
+    let splats = frame.splats.unwrap();
+    (frame.film, splats.film, splats.paths)
 }
 
 pub fn render(yaml: &str) -> Frame {
@@ -113,15 +123,9 @@ fn splats_do_not_depend_on_tiles_or_threads() {
     let light = "- disk: {center: [0.5, 2, 0.5], normal: [0, -1, 0], radius: 0.3, emission: 10}\n";
     let scene = corner("light_tracer", "", "{dielectric: {ior: 1.5}}", light).replace("128", "20");
     let bench = bench_with(&scene, &[]);
-    let run = |threads: usize, tile: u32| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let frame = pool.install(|| render_with(&bench, Filter::Gaussian { stddev: 0.5 }, tile));
-        let splats = frame.splats.unwrap();
-        (frame.film, splats.film, splats.paths)
-    };
-    let expected = run(1, 32);
+    let expected = sums(&bench, 1, 32);
     assert_eq!(expected.2, [960; 4]);
-    assert!(expected == run(3, 5), "the sums differ");
+    assert!(expected == sums(&bench, 3, 5), "the sums differ");
 }
 
 /// The sky along two techniques: by directions of the light, by directions of the surface, by both.

@@ -20,7 +20,8 @@ mod nested;
 mod techniques;
 mod volumes;
 
-use common::{Bench, bench_with, v};
+use abbe::math::sampler::Sampler;
+use common::{Bench, SPREAD_NM, bench_with, ray, v, wavelengths};
 use glam::DVec3;
 
 /// A lamp that reflects nothing, for shapes: fields of a flow map.
@@ -44,4 +45,17 @@ fn across_the_unit_sphere() -> impl Iterator<Item = (DVec3, DVec3)> {
         let b = f64::from(i) / 64.0;
         (v(b, 0.0, 5.0), v(b, 0.0, 0.0))
     })
+}
+
+/// Of each ray across shapes of glass in even light of 1, every sample sums to 8 over its lanes, whichever parted.
+fn assert_invisible_in_every_sample(shapes: &str) {
+    let scene = in_even_light(shapes);
+    for (from, to) in across_the_unit_sphere() {
+        for index in 0..32 {
+            let sampler = Sampler::new(3, [0, 0], 0, index);
+            let light = scene.incoming(&ray(from, to), &wavelengths(SPREAD_NM), &sampler).radiance;
+            let sum: f64 = light.to_array().iter().map(|x| f64::from(*x)).sum();
+            assert!((sum / 8.0 - 1.0).abs() < 2e-5, "{shapes} at {to}, sample {index}: {sum}");
+        }
+    }
 }

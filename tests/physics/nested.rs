@@ -2,7 +2,7 @@
 
 use super::channels::{assert_agree, render_with};
 use super::common::{CAMERA, SPREAD_NM, assert_close, bench, bench_with, ray, try_bench, v, wavelengths};
-use super::{LAMP, across_the_unit_sphere, in_even_light};
+use super::{LAMP, across_the_unit_sphere, assert_invisible_in_every_sample, in_even_light};
 use abbe::batch::frame::Frame;
 use abbe::film::filter::Filter;
 use abbe::math::Ray;
@@ -43,18 +43,10 @@ fn clear_bodies_that_overlap_are_invisible_in_even_light() {
 /// The same for indices that depend on wavelength, in every sample, as in `glass`.
 #[test]
 fn dispersive_bodies_that_overlap_are_invisible_in_even_light() {
-    let scene = in_even_light(
+    assert_invisible_in_every_sample(
         "[{sphere: {center: [-0.3, 0, 0], radius: 0.7, material: {dielectric: {ior: {glass: N-SF11}, priority: 2}}}}, \
           {sphere: {center: [0.3, 0, 0], radius: 0.7, material: {dielectric: {ior: {glass: water}, priority: 1}}}}]",
     );
-    for (from, to) in across_the_unit_sphere() {
-        for index in 0..32 {
-            let sampler = Sampler::new(3, [0, 0], 0, index);
-            let light = scene.incoming(&ray(from, to), &wavelengths(SPREAD_NM), &sampler).radiance;
-            let sum: f64 = light.to_array().iter().map(|x| f64::from(*x)).sum();
-            assert!((sum / 8.0 - 1.0).abs() < 2e-5, "at {to}, sample {index}: {sum}");
-        }
-    }
 }
 
 /// A camera in a place that two bodies share is in the stronger. Radiance is n² times that outside, as 1/n² is paid on

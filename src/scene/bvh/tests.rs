@@ -350,15 +350,22 @@ fn a_joined_tree_finds_what_one_of_all_finds() {
         let mut met = 0;
         for _ in 0..4000 {
             let ray = aimed(&mut numbers, &all, 1.0);
-            let found = visited(&joined, &ray, f64::INFINITY);
-            assert!(found.windows(2).all(|w| w[0] < w[1]), "visited twice");
-            for (i, _) in all.iter().enumerate().filter(|(_, b)| entry(&ray, b).is_some()) {
-                assert!(found.binary_search(&(i as u32)).is_ok(), "box {i} ray {ray:?}");
-                met += 1;
-            }
+            met += assert_none_is_lost(&joined, &all, &ray);
         }
         assert!(met >= 4000, "{met}");
     }
+}
+
+/// Every box that the ray meets is visited, and none twice; how many it meets.
+fn assert_none_is_lost(tree: &Bvh, boxes: &[Aabb], ray: &Ray) -> usize {
+    let found = visited(tree, ray, f64::INFINITY);
+    assert!(found.windows(2).all(|w| w[0] < w[1]), "visited twice");
+    let mut met = 0;
+    for (i, _) in boxes.iter().enumerate().filter(|(_, b)| entry(ray, b).is_some()) {
+        assert!(found.binary_search(&(i as u32)).is_ok(), "box {i} ray {ray:?}");
+        met += 1;
+    }
+    met
 }
 
 /// More boxes than one thread builds alone: on one thread and on three the same tree, and no box of it is lost.
@@ -375,11 +382,7 @@ fn a_large_tree_is_the_same_on_any_number_of_threads() {
     let mut numbers = Numbers(12);
     for _ in 0..200 {
         let ray = aimed(&mut numbers, &boxes, 1.0);
-        let found = visited(&three, &ray, f64::INFINITY);
-        assert!(found.windows(2).all(|w| w[0] < w[1]), "visited twice");
-        for (i, _) in boxes.iter().enumerate().filter(|(_, b)| entry(&ray, b).is_some()) {
-            assert!(found.binary_search(&(i as u32)).is_ok(), "box {i} ray {ray:?}");
-        }
+        assert_none_is_lost(&three, &boxes, &ray);
     }
 }
 

@@ -4,10 +4,11 @@
 //! and go the same way from there, what depends on neither place nor direction is found once: the numbers, the material,
 //! its indices. A lane that takes another way goes on with those that take it, too, or as a [`Beam`] alone.
 
-use super::{Beam, Crossing, FOR_SURE, SURVIVAL, Splat, Walk, adjoint};
+use super::{Beam, Crossing, Splat, Walk, adjoint};
 use crate::math::{Frame, Ray};
 use crate::optics::bsdf::Bsdf;
 use crate::optics::dielectric::{Dielectric, refract};
+use crate::scene::bundle::each;
 use crate::scene::material::{Kind, Material};
 use crate::scene::texture::Texture;
 use crate::scene::{Hit, SurfacePoint};
@@ -28,10 +29,6 @@ pub(super) struct Packet {
 
 /// Where each lane has come to; anything for lanes that are not there.
 type Places<'a> = [(&'a SurfacePoint, &'a Hit); LANES];
-
-fn each(lanes: u8) -> impl Iterator<Item = usize> {
-    (0..LANES).filter(move |lane| lanes >> lane & 1 == 1)
-}
 
 impl Packet {
     /// One of the wavelengths alone.
@@ -182,9 +179,8 @@ impl Walk<'_, '_> {
             let adjoint = adjoint(cos, went.dot(normal), true_came, true_went);
             let power = &mut packet.beam.power.as_mut_array()[lane];
             *power *= tint * adjoint as f32;
-            if !self.one_survives(power, vertex, roulette) {
-                continue;
-            }
+            let Some(worth) = self.survival(f64::from(*power), vertex, roulette) else { continue };
+            *power *= worth;
             packet.rays[lane] = scene.leave(surface, hit, went);
             if reflects {
                 reflected |= 1 << lane;
@@ -208,22 +204,6 @@ impl Walk<'_, '_> {
             self.together(few);
             *packet = most;
         }
-    }
-
-    /// Russian roulette of one lane with the number of all.
-    fn one_survives(&self, power: &mut f32, vertex: u32, u: f64) -> bool {
-        let carried = f64::from(*power);
-        if carried.is_nan() || carried <= 0.0 {
-            return false;
-        }
-        if vertex + 1 >= self.paths.settings.roulette_depth {
-            let q = (carried / self.start).min(if vertex <= FOR_SURE { 1.0 } else { SURVIVAL });
-            if u >= q {
-                return false;
-            }
-            *power *= (1.0 / q) as f32;
-        }
-        true
     }
 
     /// Light of each lane on a diffuse surface: seen by the camera, kept as photons, and of one lane followed on.

@@ -3,6 +3,7 @@
 use super::super::caustics::Caustics;
 use super::super::light::{Bounds, LightPaths, seen_in_sharp};
 use super::super::merge::{Photon, PhotonMap};
+use super::super::place_in;
 use super::super::plan::EffectPlan;
 use super::{BLOCKS, STREAM, Trial};
 use crate::math::sampler::{Sampler, Set, pairs};
@@ -52,8 +53,7 @@ impl Seen {
         let look = |block: usize, n: u32| {
             let sampler = Sampler::new(seed ^ STREAM, [block as u32, n], 1, 0);
             let (u_place, u) = pairs(sampler.set(Set::Camera));
-            let corner = DVec2::new((block % BLOCKS) as f64, (block / BLOCKS) as f64);
-            let place = (corner + u_place) / BLOCKS as f64 * size;
+            let place = place_in(scene, BLOCKS, block, u_place);
             let ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
             let seen = seen_in_sharp(&paths, &ray, &scene.wavelengths.sample(u.x), &sampler)?;
             Some(Photon { vertices: block as u32, ..seen })
