@@ -223,9 +223,11 @@ impl Mesh {
     pub fn boundary(&self, i: u32, b1: f64, b2: f64) -> SurfacePoint {
         let [a, b, c] = self.vertices(i);
         let (e1, e2) = (b - a, c - a);
-        let point = a + e1 * b1 + e2 * b2 + self.origin;
         let scale = a.abs().max(b.abs()).max(c.abs()).max(self.origin.abs()).max_element();
-        let normal = area_vector([a, b, c]).normalize();
+        let area = area_vector([a, b, c]);
+        let (b1, b2) = off_the_edges([b1, b2], [e1, e2], area, scale);
+        let point = a + e1 * b1 + e2 * b2 + self.origin;
+        let normal = area.normalize();
         SurfacePoint { point, scale, normal, shading_normal: normal, uv: DVec2::ZERO, tangent: e1 }
     }
 
@@ -235,10 +237,12 @@ impl Mesh {
     pub fn surface(&self, i: u32, b1: f64, b2: f64) -> SurfacePoint {
         let [a, b, c] = self.vertices(i);
         let (e1, e2) = (b - a, c - a);
+        let scale = a.abs().max(b.abs()).max(c.abs()).max(self.origin.abs()).max_element();
+        let area = area_vector([a, b, c]);
+        let (b1, b2) = off_the_edges([b1, b2], [e1, e2], area, scale);
         let b0 = 1.0 - b1 - b2;
         let point = a + e1 * b1 + e2 * b2 + self.origin;
-        let scale = a.abs().max(b.abs()).max(c.abs()).max(self.origin.abs()).max_element();
-        let normal = area_vector([a, b, c]).normalize();
+        let normal = area.normalize();
 
         let corners = self.triangles[i as usize].map(|v| v as usize);
         let shading_normal = if self.normals.is_empty() {
@@ -331,6 +335,32 @@ impl AreaTable {
         let low = if i == 0 { 0.0 } else { self.cumulative[i - 1] };
         Some((i as u32, ((x - low) / (self.cumulative[i] - low)).min(1.0f64.next_down())))
     }
+}
+
+/// Weights of the second and third corner, moved where the point is nearer to an edge than 64 steps of
+/// [`crate::math::Ray::leaving`], 2⁻⁴⁰ of `scale`. A step off one face of a wedge must not cross the other: 64 steps from
+/// the edge it does not, where the wedge is wider than a 64th, 0.9°. `area` is the normal times twice the area.
+#[inline(always)]
+fn off_the_edges([b1, b2]: [f64; 2], edges: [DVec3; 2], area: DVec3, scale: f64) -> (f64, f64) {
+    const DISTANCE: f64 = 1.0 / (1u64 << 40) as f64;
+    let least = b1.min(b2).min(1.0 - b1 - b2);
+    // A corner's height is twice the area over the edge across from it, which is at most √12 of the scale: both squared.
+    let bound = DISTANCE * scale * scale;
+    if least > 0.0 && least * least * area.length_squared() >= 12.0 * bound * bound {
+        return (b1, b2);
+    }
+    away_from_edges([b1, b2], edges, area.length(), DISTANCE * scale)
+}
+
+/// [`off_the_edges`] where it has something to do.
+#[cold]
+fn away_from_edges([b1, b2]: [f64; 2], [e1, e2]: [DVec3; 2], twice_area: f64, distance: f64) -> (f64, f64) {
+    // Across from the first corner, the second and the third. Of a sliver the middle is far enough.
+    let least = [e2 - e1, e2, e1].map(|edge| (distance * edge.length() / twice_area).min(0.25));
+    let b = [1.0 - b1 - b2, b1, b2];
+    let b: [f64; 3] = std::array::from_fn(|k| b[k].max(least[k]));
+    let sum = b[0] + b[1] + b[2];
+    (b[1] / sum, b[2] / sum)
 }
 
 /// Zero near the world's origin; else a point of a grid no finer than the mesh, near its centre.

@@ -260,7 +260,7 @@ fn the_tree_finds_what_brute_force_finds() {
 }
 
 /// A triangle of legs 3 and 4 m: area 6 m², normal +z; the middle of the opposite side at
-/// b = (½, ½) is (1.5, 2, 5).
+/// b = (½, ½) is (1.5, 2, 5). On an edge, points keep 2⁻⁴⁰ of the scale from it; their weights are normalised.
 #[test]
 fn a_surface_has_point_normal_area_and_tangent() {
     let source = MeshSource {
@@ -275,11 +275,14 @@ fn a_surface_has_point_normal_area_and_tangent() {
     let s = mesh.surface(0, 0.5, 0.5);
     let b = mesh.boundary(0, 0.5, 0.5);
     assert_eq!((b.point, b.scale, b.normal), (s.point, s.scale, s.normal));
-    assert_eq!(s.point, DVec3::new(1.5, 2.0, 5.0));
+    let near = (s.point - DVec3::new(1.5, 2.0, 5.0)).length() / 5.0;
+    assert!((0.99..4.0).contains(&(near * 2f64.powi(40))), "{}", s.point);
     assert_eq!(s.scale, 5.0);
     assert_eq!((s.normal, s.shading_normal), (DVec3::Z, DVec3::Z));
-    assert_eq!(s.uv, DVec2::new(1.0, 0.5));
+    assert!((s.uv - DVec2::new(1.0, 0.5)).length() < 4.0 * 2f64.powi(-40), "{}", s.uv);
     assert_eq!(s.tangent, DVec3::new(0.0, 2.0, 0.0));
+    // Farther from the edges than that nothing is moved.
+    assert_eq!(mesh.surface(0, 0.25, 0.5).point, DVec3::new(0.75, 2.0, 5.0));
     let hit =
         TriangleRay::new(&Ray::new(DVec3::new(1.0, 1.0, 9.0), DVec3::NEG_Z), mesh.origin).intersect(mesh.vertices(0));
     // x = 3 b1, y = 4 b2.

@@ -1,6 +1,6 @@
 //! Cones, closed or open.
 
-use super::cylinder::{BASE, Part, UNIT, WALL, cap_surface, disk_extent};
+use super::cylinder::{BASE, Part, WALL, cap_surface, disk_extent};
 use super::exact::{along, cone_form, cross, dot, rows_times};
 use super::span::{Exit, Faces, Span};
 use super::{
@@ -30,6 +30,10 @@ pub struct Cone {
     rows: [DVec3; 3],
     present: Faces,
     scale: f64,
+    /// How far from the apex the side is met, and how far its points lie, in heights: 1 but for an open base; as in
+    /// [`super::Cylinder`].
+    end: f64,
+    last: f64,
 }
 
 impl Cone {
@@ -43,6 +47,8 @@ impl Cone {
         check_length("radius", radius)?;
         let height = check_direction("apex - base", apex - base)?;
         let frame = Frame::from_normal((apex - base) / height);
+        let scale = largest(base).max(largest(apex)).max(height).max(radius);
+        let pad = |steps: f64| if cap { 0.0 } else { steps * f64::EPSILON * scale / height };
         Ok(Cone {
             base,
             apex,
@@ -52,7 +58,9 @@ impl Cone {
             rows: [frame.s / radius, frame.t / radius, -frame.n / height],
             frame,
             present: 1 << WALL | Faces::from(cap) << BASE,
-            scale: largest(base).max(largest(apex)).max(height).max(radius),
+            scale,
+            end: 1.0 + pad(16.0),
+            last: 1.0 - pad(4096.0).min(0.25),
         })
     }
 
@@ -75,7 +83,7 @@ impl Cone {
 
         let mut span = Span::LINE;
         // A hit on the apex plane is a hit of the apex, that is of the side.
-        if !span.clip_slab(o.z, d.z, UNIT, (WALL, BASE)) {
+        if !span.clip_slab(o.z, d.z, (0.0, self.end), (WALL, BASE)) {
             return None;
         }
         let (enter, exit) = Quadratic::of(o, d).inside(d.z)?;
@@ -111,7 +119,7 @@ impl Cone {
                 exit.clip(t, WALL);
             }
         }
-        exit.clip_slab(o.z, d.z, UNIT, (WALL, BASE));
+        exit.clip_slab(o.z, d.z, (0.0, self.end), (WALL, BASE));
         exit.hit(self.present, t_max)
     }
 
@@ -135,7 +143,7 @@ impl Cone {
         let outward = (self.frame.s * local.x + self.frame.t * local.y).normalize_or(self.frame.s);
         // Foot of the perpendicular on the generator.
         let f = (rho * self.radius - local.z * self.height) / (self.slant * self.slant);
-        let f = f.clamp(0.0, 1.0);
+        let f = f.clamp(0.0, self.last);
         let normal = self.side_normal(outward);
         SurfacePoint {
             point: self.side_point(outward, f),

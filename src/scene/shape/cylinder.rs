@@ -16,9 +16,6 @@ pub(super) const WALL: u8 = 0;
 pub(super) const BASE: u8 = 1;
 pub(super) const TOP: u8 = 2;
 
-/// Height of the unit solid.
-pub(super) const UNIT: (f64, f64) = (0.0, 1.0);
-
 /// A cylinder from `base` to `top`. Faces: wall 0, base cap 1, top cap 2.
 ///
 /// Solved as slab ∩ wall in the frame where radius and height are one, where the wall's
@@ -34,6 +31,10 @@ pub struct Cylinder {
     rows: [DVec3; 3],
     present: Faces,
     scale: f64,
+    /// Between which heights the wall is met, in lengths: 0 and 1 but for rounding at open ends.
+    ends: (f64, f64),
+    /// Between which heights points of the wall lie, as lengths.
+    heights: (f64, f64),
 }
 
 impl Cylinder {
@@ -47,6 +48,11 @@ impl Cylinder {
         check_length("radius", radius)?;
         let length = check_direction("top - base", top - base)?;
         let frame = Frame::from_normal((top - base) / length);
+        let scale = largest(base).max(largest(top)).max(length).max(radius);
+        // What closes an open end from without shares its rim but for a few roundings: the wall is longer by as much.
+        // Points of it keep 64 steps of `Ray::leaving` from there, so that the step does not lead out.
+        let pad = |capped: bool| if capped { 0.0 } else { 16.0 * f64::EPSILON * scale / length };
+        let margin = |capped: bool| if capped { 0.0 } else { (4096.0 * f64::EPSILON * scale).min(0.25 * length) };
         Ok(Cylinder {
             base,
             length,
@@ -54,7 +60,9 @@ impl Cylinder {
             rows: [frame.s / radius, frame.t / radius, frame.n / length],
             frame,
             present: 1 << WALL | Faces::from(cap_base) << BASE | Faces::from(cap_top) << TOP,
-            scale: largest(base).max(largest(top)).max(length).max(radius),
+            scale,
+            ends: (-pad(cap_base), 1.0 + pad(cap_top)),
+            heights: (margin(cap_base), length - margin(cap_top)),
         })
     }
 
@@ -92,7 +100,7 @@ impl Cylinder {
         let o = self.to_unit(along(oc, ray.direction, shift));
 
         let mut span = Span::LINE;
-        if !span.clip_slab(o.z, d.z, UNIT, (BASE, TOP)) {
+        if !span.clip_slab(o.z, d.z, self.ends, (BASE, TOP)) {
             return None;
         }
         match Chord::of(o, d) {
@@ -130,7 +138,7 @@ impl Cylinder {
                 exit.clip(chord.middle + chord.half(), WALL);
             }
         }
-        exit.clip_slab(o.z, d.z, UNIT, (BASE, TOP));
+        exit.clip_slab(o.z, d.z, self.ends, (BASE, TOP));
         exit.hit(self.present, t_max)
     }
 
@@ -146,7 +154,7 @@ impl Cylinder {
             return cap_surface(&self.frame, self.base, height, side, self.radius, local, self.scale);
         }
         let normal = (self.frame.s * local.x + self.frame.t * local.y).normalize_or(self.frame.s);
-        let height = local.z.clamp(0.0, self.length);
+        let height = local.z.clamp(self.heights.0, self.heights.1);
         SurfacePoint {
             point: self.wall_point(normal, height),
             scale: self.scale,

@@ -85,6 +85,10 @@ struct Patch {
     to_b: DVec3,
     /// |u × v|.
     jacobian: f64,
+    /// What a and b are off by where a neighbour shares the edge, see [`Patch::new`].
+    pad: DVec2,
+    /// How near to the edge a surface point may be.
+    margin: DVec2,
 }
 
 /// Coordinates on a patch, and how far along the ray.
@@ -107,7 +111,16 @@ impl Patch {
         }
         check_length("edges' area's root", jacobian.sqrt())?;
         let normal = cross / jacobian;
-        Ok(Patch { origin, u, v, normal, to_a: v.cross(normal) / jacobian, to_b: normal.cross(u) / jacobian, jacobian })
+        let (to_a, to_b) = (v.cross(normal) / jacobian, normal.cross(u) / jacobian);
+        // Corners that several patches share come out of the transforms of each off by a few roundings, and so does a ray
+        // that is moved near to each. Patches are larger by as much, so that no ray passes between them.
+        let scale = largest(origin).max(largest(u)).max(largest(v));
+        let heights = DVec2::new(to_a.length(), to_b.length());
+        let pad = heights * (16.0 * f64::EPSILON * scale);
+        // The step off a surface, 64 ε of its scale, must not lead through the neighbour at the edge: points keep 64
+        // steps from it, which is enough for wedges wider than a 64th.
+        let margin = (heights * (4096.0 * f64::EPSILON * scale)).min(DVec2::splat(0.25));
+        Ok(Patch { origin, u, v, normal, to_a, to_b, jacobian, pad, margin })
     }
 
     /// Where the ray's line meets the plane of the patch. Moves along the ray to near the patch
@@ -135,6 +148,11 @@ impl Patch {
         DVec2::new(dot(p, self.to_a), dot(p, self.to_b))
     }
 
+    /// The vector of coordinates `at`.
+    fn across(&self, at: DVec2) -> DVec3 {
+        self.u * at.x + self.v * at.y
+    }
+
     /// Surface point with texture coordinates and tangent left to the caller.
     fn surface(&self, point: DVec3, uv: DVec2, tangent: DVec3) -> SurfacePoint {
         SurfacePoint {
@@ -148,7 +166,7 @@ impl Patch {
     }
 
     fn sample(&self, at: DVec2, area: f64) -> AreaSample {
-        let point = self.origin + self.u * at.x + self.v * at.y;
+        let point = self.origin + self.across(at);
         let scale = largest(point).max(largest(self.origin));
         AreaSample { point, normal: self.normal, face: 0, scale, pdf_area: 1.0 / area }
     }
@@ -174,14 +192,22 @@ impl Disk {
             return None;
         }
         let PatchHit { t, a, b } = self.0.meet(ray)?;
-        (a * a + b * b <= 1.0 && t > 0.0 && t < t_max).then_some(ShapeHit { t, face: 0 })
+        let rim = 1.0 + self.0.pad.max_element();
+        (a * a + b * b <= rim * rim && t > 0.0 && t < t_max).then_some(ShapeHit { t, face: 0 })
     }
 
     pub(super) fn surface(&self, point: DVec3, detail: Detail) -> SurfacePoint {
-        let at = self.0.coordinates(point);
+        let mut at = self.0.coordinates(point);
+        let (radius, most) = (at.length(), 1.0 - self.0.margin.max_element());
+        let mut point = point;
+        if radius > most {
+            let inside = at * (most / radius);
+            point += self.0.across(inside - at);
+            at = inside;
+        }
         let outward = self.0.u * at.x + self.0.v * at.y;
         let outward = if outward == DVec3::ZERO { self.0.u } else { outward };
-        let uv = detail.uv(|| DVec2::new(at.length().min(1.0), turns(at.x, at.y)));
+        let uv = detail.uv(|| DVec2::new(at.length(), turns(at.x, at.y)));
         self.0.surface(point, uv, outward - self.0.normal * outward.dot(self.0.normal))
     }
 
@@ -219,13 +245,15 @@ impl Rectangle {
             return None;
         }
         let PatchHit { t, a, b } = self.0.meet(ray)?;
-        let inside = (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b);
+        let DVec2 { x, y } = self.0.pad;
+        let inside = (-x..=1.0 + x).contains(&a) && (-y..=1.0 + y).contains(&b);
         (inside && t > 0.0 && t < t_max).then_some(ShapeHit { t, face: 0 })
     }
 
     pub(super) fn surface(&self, point: DVec3) -> SurfacePoint {
-        // A hit at an edge may round to either side of it.
-        let uv = self.0.coordinates(point).clamp(DVec2::ZERO, DVec2::ONE);
+        let at = self.0.coordinates(point);
+        let uv = at.clamp(self.0.margin, 1.0 - self.0.margin);
+        let point = if uv == at { point } else { point + self.0.across(uv - at) };
         self.0.surface(point, uv, self.0.u)
     }
 

@@ -278,7 +278,9 @@ fn rectangle_edges_match_double_double() {
         let (a, b) = ((-moment.dot(v) / across).to_f64(), (moment.dot(u) / across).to_f64());
         let cos = across.to_f64().abs() / (size * size);
         let edge_distance = a.min(1.0 - a).min(b).min(1.0 - b);
-        if edge_distance.abs() < 64.0 * f64::EPSILON / cos {
+        // The rectangle is larger than its edges by 16 ε of its largest coordinate, √1.25 of that in a.
+        let pad = 18.0 * f64::EPSILON * (corner.abs().max_element() / size + 2.0);
+        if edge_distance.abs() < 64.0 * f64::EPSILON / cos + pad {
             continue;
         }
         inside += u32::from(edge_distance > 0.0);

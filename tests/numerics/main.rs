@@ -1,0 +1,12 @@
+//! Hard numbers: scenes and functions where a renderer loses digits, each with its answer derived.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod forms;
+mod lamps;
+mod meshes;
+mod rooms;
+mod spheres;
+mod surfaces;
+mod xml;
