@@ -7,6 +7,7 @@ mod forms;
 mod lamps;
 mod meshes;
 mod rooms;
+mod scale;
 mod spheres;
 mod surfaces;
 mod xml;
