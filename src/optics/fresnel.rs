@@ -36,9 +36,13 @@ const TOTAL: Split = Split { reflected: 1.0, transmitted: 0.0, cos_transmitted: 
 /// their relative accuracy for η near one, where (c − g) / (c + g) would cancel.
 #[must_use]
 pub fn dielectric(model: Model, cos: f64, eta: f64) -> Split {
-    // (η − 1)(η + 1) is exact to an ulp for η near one; η² − 1 is not.
-    let q = (eta - 1.0) * (eta + 1.0);
-    let g2 = cos.mul_add(cos, q);
+    // (η − 1)(η + 1) is exact to an ulp for η near one; η² − 1 is not. Near the critical angle c² takes nearly all of it
+    // away, and what its rounding left out, `missing`, would show: with it g² keeps its digits.
+    let (less, more) = (eta - 1.0, eta + 1.0);
+    let q = less * more;
+    let (less_missing, more_missing) = ((eta - (less + 1.0)), (eta - (more - 1.0)));
+    let missing = less.mul_add(more, -q) + less.mul_add(more_missing, less_missing * more);
+    let g2 = cos.mul_add(cos, q) + missing;
     if g2 <= 0.0 && q < 0.0 {
         return TOTAL;
     }

@@ -29,6 +29,8 @@
 //! v = 0 is the bottom of a picture throughout. Angles in turns and the sphere's u, v lie in [0, 1)
 //! and stay below one when rounded to f32.
 
+#[cfg(test)]
+mod checks;
 mod cone;
 mod cube;
 mod cylinder;
@@ -36,6 +38,8 @@ pub mod exact;
 mod flat;
 #[cfg(test)]
 mod light_tests;
+#[cfg(test)]
+mod reference;
 #[cfg(test)]
 mod reference_tests;
 mod span;

@@ -1,48 +1,12 @@
 //! Sweeps over random shapes and rays: self-hits, missed exits, parity, areas.
 
+use super::Shape;
+use super::checks::{cross, crossings, direction_at, leave, leaving, shape_anywhere};
 use super::testing::{KINDS, Random, random_shape};
-use super::{Shape, ShapeHit, SurfacePoint, largest};
-use crate::math::{Departure, Frame, Ray};
+use crate::math::{Frame, Ray};
 use glam::{DMat3, DVec2, DVec3};
 
 const FAR: f64 = f64::INFINITY;
-
-/// Size log-uniform over 12 decades, centre up to 1e6 sizes from the origin.
-fn shape_anywhere(kind: usize, random: &mut Random) -> (Shape, f64) {
-    let size = random.log_uniform(-6.0, 6.0);
-    let offset = if random.uniform() < 0.25 { 0.0 } else { size * random.log_uniform(-3.0, 6.0) };
-    let center = random.direction() * offset;
-    (random_shape(kind, center, size, random), size)
-}
-
-/// A unit direction at the given cosine to the normal.
-fn direction_at(cos: f64, normal: DVec3, random: &mut Random) -> DVec3 {
-    let frame = Frame::from_normal(normal);
-    let (sin_phi, cos_phi) = crate::math::trig::sin_cos_turn(random.uniform());
-    let sin = ((1.0 - cos) * (1.0 + cos)).sqrt();
-    frame.to_world(DVec3::new(sin * cos_phi, sin * sin_phi, cos)).normalize()
-}
-
-fn leaving(s: &SurfacePoint, face: u8, direction: DVec3) -> Ray {
-    Ray::leaving(s.point, s.scale, s.normal, direction, Departure::new(0, u32::from(face)))
-}
-
-fn is_in(point: DVec3, (low, high): (DVec3, DVec3)) -> bool {
-    point.cmpge(low).all() && point.cmple(high).all()
-}
-
-/// The least exit cosine for which the side of the surface that a direction is on is known: a point
-/// is rounded to a few ε of `scale`, which turns the normal by that over the radius of curvature.
-fn least_cosine(shape: &Shape, s: &SurfacePoint, size: f64) -> f64 {
-    let curvature_radius = match shape {
-        // Near the apex the side curves within its distance from the axis; v is clamped below one,
-        // so nearer than 2⁻²³ of the height that distance is not known here: nothing is asked.
-        Shape::Cone(_) if s.uv.y > 1.0 - 2.4e-7 => return f64::INFINITY,
-        Shape::Cone(_) if s.uv.y > 0.0 => size.min(size * (1.0 - s.uv.y)),
-        _ => size,
-    };
-    1e-6f64.max(8.0 * f64::EPSILON * s.scale / curvature_radius)
-}
 
 /// Case O14 and the bar of 0 self-hits and 0 missed exits: sizes 1e±6, offsets to 1e6 sizes, exit
 /// cosines from 1e-6. A ray that leaves a convex surface outward never meets it again; a ray that goes
@@ -51,33 +15,7 @@ fn least_cosine(shape: &Shape, s: &SurfacePoint, size: f64) -> f64 {
 fn no_shape_is_met_again_and_no_exit_is_missed() {
     let mut random = Random::new(14);
     for i in 0..500_000 {
-        let kind = i % KINDS;
-        let (shape, size) = shape_anywhere(kind, &mut random);
-        for _ in 0..4 {
-            let area = shape.sample_area(random.pair());
-            let s = shape.surface(area.point, area.face);
-            let least = least_cosine(&shape, &s, size);
-            if least > 1.0 {
-                continue;
-            }
-            let cos = random.log_uniform(least.log10(), 0.0).min(1.0);
-            let outward = leaving(&s, area.face, direction_at(cos, s.normal, &mut random));
-            let hit = shape.intersect(&outward, FAR, Some(area.face));
-            assert_eq!(hit, None, "self-hit: {shape:?} {s:?} {outward:?}");
-
-            let inward = leaving(&s, area.face, direction_at(-cos, s.normal, &mut random));
-            let hit = shape.intersect(&inward, FAR, Some(area.face));
-            if let Some(ShapeHit { t, face }) = hit {
-                let exit = shape.surface(inward.at(t), face);
-                assert!(t > 0.0 && is_in(exit.point, shape.bounds().unwrap()), "{shape:?} {exit:?}");
-            }
-            if shape.is_closed() {
-                assert!(hit.is_some(), "missed exit: {shape:?} {s:?} {inward:?} cos {cos}");
-            }
-            if matches!(shape, Shape::Plane(_) | Shape::Disk(_) | Shape::Rectangle(_)) {
-                assert_eq!(hit, None, "a flat face met itself");
-            }
-        }
+        leave(i % KINDS, 4, &mut random).unwrap();
     }
 }
 
@@ -145,27 +83,6 @@ fn a_neighbour_a_millionth_away_is_not_stepped_over() {
     }
 }
 
-/// Follows a ray through a shape; returns how many surfaces it crosses.
-fn crossings(shape: &Shape, ray: &Ray, size: f64) -> Result<u32, String> {
-    let mut ray = *ray;
-    let mut departing = None;
-    for count in 0..4 {
-        let Some(hit) = shape.intersect(&ray, FAR, departing) else { return Ok(count) };
-        let s = shape.surface(ray.at(hit.t), hit.face);
-        if shape.bounds().is_some_and(|b| !is_in(s.point, b)) {
-            return Err(format!("hit outside the bounds: {s:?}"));
-        }
-        // Hits nearer to edge-on than the point is rounded have no known side: not asked about.
-        let reach = s.scale.max(largest(ray.origin));
-        if s.normal.dot(ray.direction).abs() < least_cosine(shape, &s, size).max(64.0 * f64::EPSILON * reach / size) {
-            return Ok(u32::MAX);
-        }
-        ray = leaving(&s, hit.face, ray.direction);
-        departing = Some(hit.face);
-    }
-    Err("more than three crossings".into())
-}
-
 /// Rays at closed shapes: at random, near the axis or an edge direction, at rims, edges and the apex.
 /// Outside they cross none or two surfaces, from inside one.
 #[test]
@@ -173,34 +90,7 @@ fn closed_shapes_are_crossed_an_even_number_of_times() {
     let mut random = Random::new(2);
     let mut even = [0; 4];
     for i in 0..300_000 {
-        let kind = i % 4;
-        let size = random.log_uniform(-4.0, 4.0);
-        let center = random.direction() * size * random.log_uniform(-3.0, 4.0);
-        let shape = random_shape(kind, center, size, &mut random);
-        let on = shape.sample_area(random.pair());
-        let inside = center.lerp(on.point, 0.999 * random.uniform());
-        let target = match i / 4 % 3 {
-            0 => inside,
-            // Onto a rim, an edge or the apex, as near as bounds tell.
-            1 => on.point + random.direction() * size * random.log_uniform(-9.0, -1.0),
-            _ => shape.surface(on.point + random.direction() * 10.0 * size, on.face).point,
-        };
-        let direction = if i / 4 % 2 == 0 {
-            random.direction()
-        } else {
-            // Nearly along the surface.
-            direction_at(random.log_uniform(-6.0, 0.0), on.normal, &mut random)
-        };
-        let far = Ray::new(target - direction * size * random.log_uniform(2.0, 4.0), direction);
-        match crossings(&shape, &far, size) {
-            Ok(0) | Ok(u32::MAX) => {}
-            Ok(2) => even[kind] += 1,
-            found => panic!("{found:?} crossings: {shape:?} {far:?}"),
-        }
-        match crossings(&shape, &Ray::new(inside, direction), size) {
-            Ok(1) | Ok(u32::MAX) => {}
-            found => panic!("{found:?} crossings from inside: {shape:?} {inside} {direction}"),
-        }
+        even[i % 4] += u32::from(cross(i % 4, i as u64 / 4, &mut random).unwrap());
     }
     assert!(even.iter().all(|&n| n > 5000), "{even:?}");
 }

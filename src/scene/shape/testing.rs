@@ -1,8 +1,8 @@
-//! What the tests of this module share.
+//! What the tests of this module share, with those of `tests/numerics/sweep`, which compile this file too.
 
-use super::{Cone, Cube, Cylinder, Disk, Plane, Rectangle, Shape, Sphere};
 use crate::math::Frame;
 use crate::math::warp::uniform_sphere;
+use crate::scene::shape::{Cone, Cube, Cylinder, Disk, Plane, Rectangle, Shape, Sphere};
 use glam::{DMat3, DVec2, DVec3};
 
 /// A small generator (splitmix64) with a fixed seed.
