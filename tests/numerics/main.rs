@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod bsdfs;
 mod forms;
 mod lamps;
 mod meshes;
