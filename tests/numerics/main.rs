@@ -11,4 +11,5 @@ mod rooms;
 mod scale;
 mod spheres;
 mod surfaces;
+mod values;
 mod xml;
