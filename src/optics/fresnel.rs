@@ -94,7 +94,7 @@ pub fn dielectric_diffuse(eta: f64) -> f64 {
 /// Reflectance of a conductor with index `eta` + i`k` (relative to the medium outside), a lane a
 /// wavelength.
 ///
-/// Exact form of Born and Wolf 14.2 in f64, because a² + b² − 2 a cos θ cancels in f32 for weak
+/// Exact form of Born and Wolf 14.2 in f64, because a − cos θ cancels in f32 for weak
 /// absorbers. Schlick: R₀ from the complex index at normal incidence.
 #[must_use]
 pub fn conductor(model: Model, cos: f64, eta: Lanes, k: Lanes) -> Lanes {
@@ -119,22 +119,26 @@ pub fn conductor(model: Model, cos: f64, eta: Lanes, k: Lanes) -> Lanes {
     Lanes::new(out)
 }
 
+/// With √(η² − sin²θ) = a + ib: r_s = (cos θ − a − ib) / (cos θ + a + ib), and so on; sums of squares, which cannot come out
+/// below zero where nothing is reflected.
 fn conductor_exact(cos: f64, n: f64x4, k: f64x4) -> f64x4 {
-    let cos2 = cos * cos;
-    let sin2 = (1.0 - cos) * (1.0 + cos);
-    let (c, c2, s2) = (f64x4::splat(cos), f64x4::splat(cos2), f64x4::splat(sin2));
-    let two = f64x4::splat(2.0);
-    let nk = two * n * k;
+    let (c, s2) = (f64x4::splat(cos), f64x4::splat((1.0 - cos) * (1.0 + cos)));
+    let nk = n * k;
     let t0 = (n - k) * (n + k) - s2;
-    let a2b2 = (t0 * t0 + nk * nk).sqrt();
-    // a = √(½(√(t₀² + 4n²k²) + t₀)); for t₀ < 0 by way of b, which does not cancel.
-    let root = (f64x4::splat(0.5) * (a2b2 + t0.abs())).sqrt();
+    let length = (t0 * t0 + f64x4::splat(4.0) * nk * nk).sqrt();
+    // The larger of a and b by way of a² − b² = t₀ without cancellation, the other by ab = nk.
+    let large = (f64x4::splat(0.5) * (length + t0.abs())).sqrt();
+    let small = large.simd_gt(f64x4::ZERO).select(nk / large, f64x4::ZERO);
     let negative = t0.simd_lt(f64x4::ZERO);
-    let a = negative.select(f64x4::splat(0.5) * nk / root, root);
-    let ac = two * a * c;
-    let rs = (a2b2 + c2 - ac) / (a2b2 + c2 + ac);
-    let (u, v) = (c2 * a2b2 + s2 * s2, ac * s2);
-    let rp = rs * (u - v) / (u + v);
+    let (a, b) = (negative.select(small, large), negative.select(large, small));
+    let of = |minus: f64x4, plus: f64x4, rest: f64x4| {
+        let (rest, plus) = (rest * rest, plus * plus);
+        let below = plus + rest;
+        // Nothing over nothing is a ray along a surface that is not there.
+        below.simd_gt(f64x4::ZERO).select((minus * minus + rest) / below, f64x4::ZERO)
+    };
+    let rs = of(a - c, a + c, b);
+    let rp = rs * of(a * c - s2, a * c + s2, b * c);
     f64x4::splat(0.5) * (rs + rp)
 }
 

@@ -74,3 +74,103 @@ fn white_media_are_invisible_and_black_ones_follow_beer() {
     }
     hold(&cases);
 }
+
+/// Every surface at the ends of its parameters, as a ball in an even sky: nothing that is no number, nothing negative,
+/// and no more than comes in: at most `most` in every pixel, at least `least` in the mean.
+#[test]
+fn surfaces_at_the_ends_of_their_parameters_stay_within_bounds() {
+    let mut cases = Vec::new();
+    let mut ball = |name: String, bsdf: String, least: f64, most: f64| {
+        let body = camera([0.0, 0.0, 5.0], [0.0; 3], 15.0) + &sphere([0.0; 3], 1.0, &bsdf) + SKY;
+        cases.push(Case::new(name, body, Answer::Within(least, most)).samples(64).side(8));
+    };
+    let float = |name: &str, x: f64| format!("<float name=\"{name}\" value=\"{x:?}\"/>");
+    let ior = |int: f64, ext: f64| float("int_ior", int) + &float("ext_ior", ext);
+    let string = |name: &str, x: &str| format!("<string name=\"{name}\" value=\"{x}\"/>");
+    let bsdf = |kind: &str, inside: String| format!("<bsdf type=\"{kind}\">{inside}</bsdf>");
+    let even = |name: &str, x: f64| format!("<spectrum name=\"{name}\" value=\"{x:?}\"/>");
+    for d in ["ggx", "beckmann"] {
+        for (u, v) in [(0.0, 0.0), (1e-6, 1e-6), (1e-6, 1.0), (1.0, 1e-4), (1.0, 1.0), (5.0, 5.0)] {
+            let rough = string("distribution", d) + &float("alpha_u", u) + &float("alpha_v", v);
+            ball(format!("metal {d} {u} {v}"), bsdf("roughconductor", rough.clone()), 0.002, 1.1);
+            for (int, ext) in [(1.5, 1.0), (1.0, 1.5), (1.0, 1.0), (1.0000001, 1.0), (5.0, 1.0), (1.0, 10.0)] {
+                let glass = bsdf("roughdielectric", rough.clone() + &ior(int, ext));
+                ball(format!("glass {d} {u} {v} {int} {ext}"), glass, 0.002, 1.3);
+            }
+        }
+        for alpha in [1e-6, 0.1, 1.0] {
+            for (int, ext) in [(1.5, 1.0), (1.0, 1.0), (1.0000001, 1.0), (10.0, 1.0), (1.0, 1.5)] {
+                let inside = string("distribution", d)
+                    + &float("alpha", alpha)
+                    + &ior(int, ext)
+                    + &even("diffuse_reflectance", 1.0);
+                ball(format!("rough plastic {d} {alpha} {int} {ext}"), bsdf("roughplastic", inside), 0.1, 1.1);
+            }
+        }
+    }
+    for (int, ext) in [(1.5, 1.0), (1.0, 1.0), (1.0000001, 1.0), (10.0, 1.0), (1.0, 1.5), (1.0, 10.0)] {
+        for nonlinear in [false, true] {
+            let inside = format!("<boolean name=\"nonlinear\" value=\"{nonlinear}\"/>")
+                + &ior(int, ext)
+                + &even("diffuse_reflectance", 1.0);
+            ball(format!("plastic {int} {ext} {nonlinear}"), bsdf("plastic", inside), 0.1, 1.05);
+        }
+        ball(format!("pane {int} {ext}"), bsdf("thindielectric", ior(int, ext)), 1.0 - 2e-5, 1.0 + 2e-5);
+        ball(format!("clear {int} {ext}"), bsdf("dielectric", ior(int, ext)), 1.0 - 2e-3, 1.0 + 2e-5);
+    }
+    for (n, k, least, most) in [
+        (1.0, 0.0, 0.0, 1e-6),
+        (1e-6, 1e-6, 0.9, 1.0 + 1e-6),
+        (0.0, 1e6, 0.99, 1.0 + 1e-6),
+        (1e6, 1e6, 0.9, 1.0 + 1e-6),
+        (1.0, 1e-8, 0.0, 1e-3),
+    ] {
+        ball(format!("metal of {n} and {k}"), bsdf("conductor", even("eta", n) + &even("k", k)), least, most);
+        ball(
+            format!("rough metal of {n} and {k}"),
+            bsdf("roughconductor", even("eta", n) + &even("k", k) + &float("alpha", 0.2)),
+            0.8 * least,
+            1.1 * most,
+        );
+    }
+    for roughness in [0.0, 1e-6, 0.5, 1.0] {
+        for (metallic, spec_trans, clearcoat, sheen, aniso) in [
+            (0.0, 0.0, 0.0, 0.0, 0.0),
+            (1.0, 0.0, 0.0, 0.0, 1.0),
+            (0.0, 1.0, 0.0, 0.0, 0.0),
+            (0.0, 0.0, 1.0, 1.0, 1.0),
+            (0.5, 0.5, 1.0, 1.0, 0.9),
+        ] {
+            let inside = even("base_color", 1.0)
+                + &float("roughness", roughness)
+                + &float("metallic", metallic)
+                + &float("spec_trans", spec_trans)
+                + &float("clearcoat", clearcoat)
+                + &float("sheen", sheen)
+                + &float("anisotropic", aniso);
+            // Burley's dielectric with its sheen and coat sends out up to 1.7 at grazing angles.
+            ball(
+                format!("principled {roughness} {metallic} {spec_trans} {clearcoat}"),
+                bsdf("principled", inside),
+                0.1,
+                2.2,
+            );
+        }
+        for (spec_trans, diff_trans, eta) in
+            [(0.0, 0.0, 1.5), (1.0, 0.0, 1.5), (0.0, 2.0, 1.5), (0.5, 1.0, 1.01), (1.0, 2.0, 3.0)]
+        {
+            let inside = even("base_color", 1.0)
+                + &float("roughness", roughness)
+                + &float("spec_trans", spec_trans)
+                + &float("diff_trans", diff_trans)
+                + &float("eta", eta);
+            ball(
+                format!("thin principled {roughness} {spec_trans} {diff_trans}"),
+                bsdf("principledthin", inside),
+                0.05,
+                2.2,
+            );
+        }
+    }
+    hold(&cases);
+}
