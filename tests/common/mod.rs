@@ -2,12 +2,11 @@
 //! figures with their standard error.
 #![allow(dead_code, reason = "every test file uses its own part")]
 
-use abbe::batch::frame::{self, FrameJob};
+use abbe::batch::frame::{self, Frame, FrameJob};
 use abbe::batch::{self, Overrides, Prepared};
 use abbe::film::Window;
 use abbe::film::accumulate::{Film, REPLICATES};
 use abbe::film::filter::{Filter, FilterSampler};
-use abbe::film::resolve;
 use abbe::math::Ray;
 use abbe::math::sampler::{Sampler, Set, pairs};
 use abbe::math::statistics::Moments;
@@ -40,6 +39,8 @@ pub struct Picture {
     pub error: Vec<f64>,
     /// Linear Rec. 709 of each pixel.
     pub rgb: Vec<[f64; 3]>,
+    /// Samples that were dropped.
+    pub invalid: u64,
 }
 
 /// A mean with its standard error.
@@ -164,8 +165,13 @@ impl Bench {
         batch::window(&self.prepared.description)
     }
 
-    /// Renders the picture on the current threads.
+    /// Renders the picture on the current threads; what paths from the lights add is left out.
     pub fn film(&self) -> Film {
+        self.frame().film
+    }
+
+    /// Renders the picture on the current threads.
+    pub fn frame(&self) -> Frame {
         let Prepared { scene, plan, samples, description, .. } = &self.prepared;
         let job = FrameJob {
             scene,
@@ -176,14 +182,15 @@ impl Bench {
             seed: description.render.seed,
             tile: description.render.tile,
         };
-        frame::render(&job, &|_| {}, &AtomicBool::new(false)).unwrap().film
+        frame::render(&job, &|_| {}, &AtomicBool::new(false)).unwrap()
     }
 
     /// Renders the picture; the unit of `y` is that of a radiance of 1.
     pub fn picture(&self) -> Picture {
-        let film = self.film();
-        let xyz = resolve::resolve(&film, None, &ColourSpace::Xyz.matrix_from_xyz());
-        let rgb = resolve::resolve(&film, None, &ColourSpace::Rec709.matrix_from_xyz());
+        let frame = self.frame();
+        let film = &frame.film;
+        let xyz = frame.resolve(&ColourSpace::Xyz.matrix_from_xyz());
+        let rgb = frame.resolve(&ColourSpace::Rec709.matrix_from_xyz());
         let wavelengths = &self.prepared.scene.wavelengths;
         // Wavelengths that never change are a quadrature, under which a radiance of 1 has another Y.
         let unit = if wavelengths.describe().starts_with("fixed") {
@@ -193,6 +200,7 @@ impl Bench {
         };
         Picture {
             window: film.window(),
+            invalid: film.invalid.total(),
             y: xyz.rgb[1].iter().map(|y| f64::from(*y) / unit).collect(),
             error: xyz.standard_error[1].iter().map(|y| f64::from(*y) / unit).collect(),
             rgb: (0..film.window().pixels()).map(|i| rgb.rgb.each_ref().map(|c| f64::from(c[i]))).collect(),

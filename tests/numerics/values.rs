@@ -105,7 +105,7 @@ fn colours_come_back_from_their_spectra() {
                     assert!((0.0..=1.0).contains(&x), "{r} {g} {b} at {nm}: {x}");
                 }
                 let xyz = observer::tristimulus(&white.times(&spectrum)).map(|x| x / y);
-                let found: [f64; 3] = std::array::from_fn(|i| (0..3).map(|k| f64::from(matrix[i][k]) * xyz[k]).sum());
+                let found: [f64; 3] = std::array::from_fn(|i| (0..3).map(|k| matrix[i][k] * xyz[k]).sum());
                 for (found, expected) in found.iter().zip([r, g, b]) {
                     assert!((found - expected).abs() < 1e-3, "{r} {g} {b}: {found:?}");
                 }
@@ -274,4 +274,36 @@ fn light_in_pbrts_spheres_is_one() {
         let mean = bench_with(&format!("{camera}{rest}"), &[]).grey().picture().mean();
         assert!((mean.mean - 1.0).abs() < 1e-3 + 4.5 * mean.error && mean.error < 1e-3, "{mean:?}");
     }
+}
+
+/// Case O40: numbers that are none, lengths that are negative, matrices that flatten, a view along up and keys that stand
+/// twice are refused with file, line and field.
+#[test]
+fn what_is_no_length_matrix_or_key_is_refused_with_its_place() {
+    let camera = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n";
+    for (rest, line, field) in [
+        ("shapes: [{sphere: {radius: .nan}}]", 2, "radius"),
+        ("shapes: [{sphere: {radius: 1, center: [.inf, 0, 0]}}]", 2, "center"),
+        ("shapes: [{sphere: {radius: -1}}]", 2, "radius"),
+        ("shapes: [{sphere: {radius: 0}}]", 2, "radius"),
+        ("shapes: [{sphere: {radius: 1e70}}]", 2, "radius"),
+        ("shapes: [{cube: {size: 1, transform: [{scale: [1, 0, 1]}]}}]", 2, "transform"),
+        (
+            "groups: {g: [{sphere: {radius: 1}}]}\nshapes: [{instance: {group: g, transform: [{scale: [1, 0, 1]}]}}]",
+            3,
+            "transform",
+        ),
+        ("shapes: [{rectangle: {corner: [0, 0, 0], edge_u: [1, 0, 0], edge_v: [2, 0, 0]}}]", 2, "edge"),
+        ("shapes: [{cylinder: {base: [1, 1, 1], top: [1, 1, 1], radius: 1}}]", 2, "cylinder"),
+        ("shapes: [{sphere: {radius: 1, radius: 2}}]", 2, "radius"),
+        ("lights: [{spot: {position: [0, 0, 0], direction: [0, 0, 0], intensity: 1}}]", 2, "direction"),
+        ("media: {m: {homogeneous: {scattering: -1}}}", 2, "scattering"),
+        ("media: {m: {homogeneous: {scattering: 1, phase: {hg: 1}}}}", 2, "hg"),
+    ] {
+        let fault = try_bench(&format!("{camera}{rest}\n"), &[]).err().unwrap_or_else(|| panic!("{rest} is taken"));
+        assert!(fault.contains(&format!("scene.yaml:{line}:")) && fault.contains(field), "{rest}: {fault}");
+    }
+    let up = "camera: {origin: [0, 5, 0], target: [0, 0, 0], up: [0, 1, 0], fov_deg: 40}\n";
+    let fault = try_bench(up, &[]).err().unwrap();
+    assert!(fault.contains("scene.yaml:1:") && fault.contains("up"), "{fault}");
 }

@@ -11,6 +11,8 @@ pub enum Answer {
     Every(f64, f64),
     /// The mean of the pixels, within an absolute tolerance and four and a half standard errors.
     Mean(f64, f64),
+    /// The mean is at least the first, and no pixel is above the second by more than six standard errors.
+    Within(f64, f64),
 }
 
 /// A scene and its answer.
@@ -79,6 +81,9 @@ impl Case {
     /// Renders and compares; in words what is wrong.
     fn judge(&self) -> Result<(), String> {
         let picture = self.bench()?.grey().picture();
+        if picture.invalid != 0 {
+            return Err(format!("{} samples are invalid", picture.invalid));
+        }
         match self.answer {
             Answer::Every(expected, tolerance) => {
                 let off = |y: &f64| if y.is_nan() { f64::INFINITY } else { (y - expected).abs() };
@@ -89,6 +94,15 @@ impl Case {
                 }
                 (wrong == 0).then_some(()).ok_or_else(|| {
                     format!("{wrong} of {} pixels are not {expected} ± {tolerance}, the worst {worst}", picture.y.len())
+                })
+            }
+            Answer::Within(least, most) => {
+                let mean = picture.mean().mean;
+                let above = |(y, e): &(&f64, &f64)| !(**y >= 0.0 && **y <= most + 6.0 * **e);
+                let wrong = picture.y.iter().zip(&picture.error).filter(above).count();
+                (wrong == 0 && mean >= least).then_some(()).ok_or_else(|| {
+                    let largest = picture.y.iter().copied().fold(0.0, f64::max);
+                    format!("{wrong} pixels are not from 0 to {most}, the largest {largest}; the mean {mean}, expected {least} or more")
                 })
             }
             Answer::Mean(expected, tolerance) => {
