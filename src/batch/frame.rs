@@ -12,7 +12,7 @@ use crate::film::resolve::{self, ErrorEstimate, Image, Splats};
 use crate::film::run::{LONGEST, LayerRun, Run};
 use crate::math::sampler::Octet;
 use crate::scene::Scene;
-use crate::spectrum::{ColourSpace, LANES, Lanes, SampledWavelengths};
+use crate::spectrum::{ColourSpace, LANES, SampledWavelengths};
 use crate::transport::light::{Bounds, LightPaths, Splat};
 use crate::transport::merge::{self, Collection, Photon, PhotonMap};
 use crate::transport::plan::{EffectPlan, Integrator};
@@ -239,28 +239,14 @@ fn render_run(
 
 #[inline]
 fn record(tile: &mut TileBuffer, run: &mut Run, pixel: [i32; 2], replicate: u32, sample: &PixelSample) {
-    let r = sample.radiance;
-    let light = r.simd_ge(Lanes::ZERO) & r.simd_le(Lanes::splat(f32::MAX));
-    if !light.all() {
-        tile.drop_sample(pixel, replicate as usize, cause(r));
+    if let Some(cause) = Invalid::of(sample.radiance) {
+        tile.drop_sample(pixel, replicate as usize, cause);
         return;
     }
     let xyz = sample.xyz.map(|x| x * sample.weight);
     let alpha = sample.alpha * sample.weight;
     if !run.add(xyz, alpha) {
         tile.add(pixel, replicate as usize, xyz, alpha);
-    }
-}
-
-/// What is wrong with a radiance that has a lane light cannot have.
-fn cause(r: Lanes) -> Invalid {
-    let lanes = r.to_array();
-    if lanes.iter().any(|x| x.is_nan()) {
-        Invalid::Nan
-    } else if lanes.iter().any(|x| x.is_infinite()) {
-        Invalid::Infinite
-    } else {
-        Invalid::Negative
     }
 }
 
@@ -495,9 +481,8 @@ impl Landed {
         wavelengths: &SampledWavelengths,
         splat: &Splat,
     ) {
-        let light = splat.light.simd_ge(Lanes::ZERO) & splat.light.simd_le(Lanes::splat(f32::MAX));
-        if !light.all() {
-            self.invalid.record(cause(splat.light));
+        if let Some(cause) = Invalid::of(splat.light) {
+            self.invalid.record(cause);
             return;
         }
         let xyz = splat.xyz(wavelengths);

@@ -17,7 +17,7 @@ use crate::scene::Scene;
 use crate::scene::census::Census;
 use crate::scene::compile;
 use crate::spectrum::ColourSpace;
-use crate::transport::layers::{Form, Layer, LayerPlan, Quantity, Source};
+use crate::transport::layers::{Channel, Form, Layer, LayerPlan, Quantity, Source};
 use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
 use crate::transport::trial;
@@ -39,6 +39,8 @@ pub struct Overrides {
     pub output: Option<PathBuf>,
     /// Only the scenes with these names; all where empty.
     pub scenes: Vec<String>,
+    /// Count what robust arithmetic was needed for, and write it as a layer.
+    pub check_numerics: bool,
 }
 
 /// What a batch tells while it runs. All methods may be called from any thread.
@@ -99,7 +101,7 @@ pub fn entries(path: &Path, overrides: &Overrides) -> Result<Vec<BatchEntry>> {
 /// [`Error::Config`] and [`Error::Input`], as [`compile::compile`].
 pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
     let description = entry.scene(&overrides.set)?;
-    let scene = compile::compile(&description, &entry.name)?;
+    let mut scene = compile::compile(&description, &entry.name)?;
     let integrator = integrator(&description, &description.integrator)?;
     let samples = match &integrator {
         Integrator::Whitted(w) => w.samples(),
@@ -122,6 +124,17 @@ pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
     let (caustics, said) = pilot::decide(&scene, &plan, &filter, seed, samples, wishes);
     plan.caustics = caustics;
     plan.techniques.extend(said);
+    if overrides.check_numerics {
+        let name = "numerics";
+        let taken = |channel: &Channel| channel.name.split('.').next() == Some(name);
+        if plan.layers.channels().iter().any(taken) {
+            let hint = "--check-numerics writes a layer of that name: give yours another";
+            return Err(Error::Config(format!("{}: layer \"{name}\": {hint}", entry.name)));
+        }
+        // From here on: the pilot's paths are no part of the picture.
+        scene.watch = Some(Box::default());
+        plan.layers.layers.push(Layer { name: name.into(), source: Source::Numerics, squares: None });
+    }
     let hash = hash(&description, &scene.files);
     Ok(Prepared { description, scene, plan, samples, hash })
 }

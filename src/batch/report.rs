@@ -5,6 +5,7 @@ use super::frame::{Frame, Milestone};
 use crate::error::Error;
 use crate::film::accumulate::InvalidCounts;
 use crate::film::resolve::ErrorEstimate;
+use crate::scene::watch::Counts;
 use crate::transport::plan::{Effect, Integrator};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -99,6 +100,9 @@ pub struct SceneReport {
     pub convergence: Vec<ConvergencePoint>,
     /// Samples that were dropped, by cause.
     pub invalid: InvalidCounts,
+    /// What robust arithmetic was needed for, where `--check-numerics` asked for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub numerics: Option<Counts>,
     /// Each effect, on or off, with its reason.
     pub effects: Vec<Effect>,
     /// How they were computed.
@@ -168,6 +172,7 @@ impl SceneReport {
             halving_seconds: None,
             convergence: Vec::new(),
             invalid: InvalidCounts::default(),
+            numerics: None,
             effects: Vec::new(),
             techniques: Vec::new(),
             wavelengths: String::new(),
@@ -203,6 +208,7 @@ impl SceneReport {
         self.seconds.rendering = seconds;
         self.msamples_per_second = (counted + dropped) as f64 / seconds.max(1e-9) * 1e-6;
         self.invalid = frame.invalid();
+        self.numerics = prepared.scene.watch.as_ref().map(|watch| watch.counts());
         self.error = frame.milestones.last().and_then(|m| m.error);
         if self.error.is_some() {
             let factor = halving_factor(convergence_exponent(&frame.milestones));

@@ -78,6 +78,9 @@ struct RenderArguments {
     /// Write the report here as well
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
+    /// Count what robust arithmetic was needed for; the layer `numerics` has the counts of each pixel
+    #[arg(long)]
+    check_numerics: bool,
     /// How to tell of progress
     #[arg(long, value_enum, default_value_t = ProgressStyle::Auto)]
     progress: ProgressStyle,
@@ -169,7 +172,13 @@ impl SceneArguments {
         if let Some(seed) = self.seed {
             set.push(("render.seed".into(), seed.to_string()));
         }
-        crate::batch::Overrides { set, define: self.define.clone(), output, scenes: self.scenes.clone() }
+        crate::batch::Overrides {
+            set,
+            define: self.define.clone(),
+            output,
+            scenes: self.scenes.clone(),
+            check_numerics: false,
+        }
     }
 }
 

@@ -19,6 +19,7 @@ use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::layers::LayerSums;
 use crate::film::run::Run;
+use crate::spectrum::Lanes;
 use rayon::prelude::*;
 
 /// Independently scrambled sample sets of each pixel; their spread is the error bar.
@@ -52,6 +53,28 @@ pub enum Invalid {
     Negative,
     /// Beyond [`SAMPLE_LIMIT`], or one sample too many.
     Overflow,
+}
+
+impl Invalid {
+    /// What is wrong with a radiance, if anything: a lane that light cannot have.
+    #[must_use]
+    #[inline]
+    pub fn of(radiance: Lanes) -> Option<Invalid> {
+        let light = radiance.simd_ge(Lanes::ZERO) & radiance.simd_le(Lanes::splat(f32::MAX));
+        if light.all() { None } else { Some(Invalid::cause(radiance)) }
+    }
+
+    #[cold]
+    fn cause(radiance: Lanes) -> Invalid {
+        let lanes = radiance.to_array();
+        if lanes.iter().any(|x| x.is_nan()) {
+            Invalid::Nan
+        } else if lanes.iter().any(|x| x.is_infinite()) {
+            Invalid::Infinite
+        } else {
+            Invalid::Negative
+        }
+    }
 }
 
 /// How many samples were dropped, by cause.

@@ -296,6 +296,7 @@ impl<'a> Compiler<'a> {
             shines_on_rays,
             files: std::mem::take(&mut self.files),
             notes: self.told_notes(),
+            watch: None,
         };
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         self.note_overlaps(&mut scene);

@@ -33,6 +33,7 @@ pub mod shape;
 pub mod texture;
 pub mod through;
 pub mod volume;
+pub mod watch;
 
 use crate::math::{Departure, Ray};
 use crate::spectrum::{Spectrum, WavelengthDistribution};
@@ -54,6 +55,7 @@ use shape::Shape;
 pub use shape::SurfacePoint;
 use std::path::PathBuf;
 use texture::TexturePoint;
+use watch::Watch;
 
 /// A scene, ready to be rendered.
 #[derive(Debug)]
@@ -105,6 +107,8 @@ pub struct Scene {
     pub files: Vec<PathBuf>,
     /// What a person should know of the scene, with its place in the file.
     pub notes: Vec<String>,
+    /// Counts what robust arithmetic was needed for, where that is asked for.
+    pub watch: Option<Box<Watch>>,
 }
 
 /// A band of the spectrum.
@@ -357,6 +361,9 @@ impl Scene {
     /// The surface at a hit.
     #[must_use]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        if let Some(watch) = &self.watch {
+            watch.met(self, ray, hit);
+        }
         self.surface_with(ray, hit, self.objects[hit.object as usize].detail)
     }
 
@@ -385,7 +392,11 @@ impl Scene {
     /// The ray that leaves a surface in `direction`.
     #[must_use]
     pub fn leave(&self, surface: &SurfacePoint, hit: &Hit, direction: DVec3) -> Ray {
-        Ray::leaving(surface.point, surface.scale, surface.normal, direction, hit.departure())
+        let ray = Ray::leaving(surface.point, surface.scale, surface.normal, direction, hit.departure());
+        if let Some(watch) = &self.watch {
+            watch.left(self, &ray);
+        }
+        ray
     }
 
     /// A light chosen by `u` in [0, 1) and its probability.

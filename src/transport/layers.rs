@@ -4,10 +4,12 @@
 //! primaries of the file.
 
 use super::plan::{EffectPlan, Integrator};
+use crate::film::accumulate::{Invalid, SAMPLE_LIMIT};
 use crate::math::Ray;
 use crate::optics::bsdf::Bsdf;
 use crate::scene::compound::{Composition, Vertex, share};
 use crate::scene::material::Material;
+use crate::scene::watch::Counts;
 use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
@@ -79,7 +81,12 @@ pub enum Source {
     Light(Option<usize>, Form),
     /// A band of the scene.
     Band(usize),
+    /// What was counted on the way of the sample: [`NUMERICS`].
+    Numerics,
 }
+
+/// Components of [`Source::Numerics`], all a sample: of [`Counts`], and samples that light cannot make, by cause.
+pub const NUMERICS: [&str; 8] = ["surfaces", "robust", "rays", "selfHits", "nan", "infinite", "negative", "overflow"];
 
 /// A group of channels.
 #[derive(Clone, Debug)]
@@ -157,6 +164,9 @@ impl LayerPlan {
                         all.extend(components.iter().map(|c| Channel { name: format!("{name}.{c}"), light }));
                     }
                     Source::Band(_) => all.push(Channel { name: name.clone(), light }),
+                    Source::Numerics => {
+                        all.extend(NUMERICS.iter().map(|c| Channel { name: format!("{name}.{c}"), light: false }));
+                    }
                 }
             }
         }
@@ -173,6 +183,19 @@ pub struct Seen {
     pub xyz: [f32; 3],
     /// Coverage.
     pub alpha: f32,
+}
+
+impl Seen {
+    /// The numbers of [`NUMERICS`], which the film multiplies with the filter's `weight`: they are no light.
+    fn numerics(&self, counted: Counts, weight: f32) -> [f32; 8] {
+        let overflow = || self.xyz.iter().any(|x| (x * weight).abs() >= SAMPLE_LIMIT).then_some(Invalid::Overflow);
+        let invalid = Invalid::of(self.radiance).or_else(overflow);
+        let is = |cause| u64::from(invalid == Some(cause));
+        let Counts { surfaces, robust, rays, self_hits } = counted;
+        let causes = [Invalid::Nan, Invalid::Infinite, Invalid::Negative, Invalid::Overflow].map(is);
+        let [nan, infinite, negative, overflow] = causes;
+        [surfaces, robust, rays, self_hits, nan, infinite, negative, overflow].map(|n| n as f32 / weight)
+    }
 }
 
 /// The numbers of samples, each in the order of the channels.
@@ -204,7 +227,7 @@ impl Values {
         self.surface.clear();
         let quantities = plan.layers.layers.iter().filter_map(|layer| match layer.source {
             Source::Surface(quantity) => Some(quantity),
-            Source::Light(..) | Source::Band(_) => None,
+            Source::Light(..) | Source::Band(_) | Source::Numerics => None,
         });
         let mut first = None;
         for quantity in quantities {
@@ -218,7 +241,7 @@ impl Values {
     }
 
     /// Appends the numbers of one sample. `light` gives the light of an integrator, `neighbours` the ray of a sample
-    /// some pixels away.
+    /// some pixels away; `counted` is what was counted on its way, and the weight of the filter.
     #[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
     #[inline]
     pub fn append(
@@ -229,6 +252,7 @@ impl Values {
         ray: &Ray,
         neighbours: impl Fn(DVec2) -> Ray,
         own: Seen,
+        counted: (Counts, f32),
         light: impl Fn(&Integrator) -> Seen,
     ) {
         let layers = &plan.layers;
@@ -265,6 +289,7 @@ impl Values {
                     let counted = own.radiance * wavelengths.inv_pdf * scene.bands[i].response.eval(wavelengths.nm);
                     put(numbers, [counted.reduce_add() / LANES as f32], squares);
                 }
+                Source::Numerics => put(numbers, own.numerics(counted.0, counted.1), squares),
             }
         }
     }

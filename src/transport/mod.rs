@@ -21,6 +21,7 @@ use crate::film::filter::FilterSampler;
 use crate::math::Ray;
 use crate::math::sampler::{Octet, Sampler, Set, pairs};
 use crate::scene::Scene;
+use crate::scene::watch::{self, Counts};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
 use merge::Collection;
@@ -102,6 +103,8 @@ struct Begun {
     place: DVec2,
     ray: Ray,
     sample: PixelSample,
+    /// What was counted on its way, where that is asked for.
+    counted: Counts,
 }
 
 impl Begun {
@@ -113,6 +116,7 @@ impl Begun {
             place: DVec2::ZERO,
             ray: Ray::new(DVec3::ZERO, DVec3::Z),
             sample: PixelSample { radiance: zero, wavelengths, xyz: [0.0; 3], alpha: 0.0, weight: 1.0 },
+            counted: Counts::default(),
         }
     }
 
@@ -201,7 +205,15 @@ impl Begun {
     /// Follows the ray with the picture's own integrator.
     #[inline]
     fn follow(&mut self, shot: &Shot, sampler: &Sampler) {
+        let watched = shot.scene.watch.is_some();
+        if watched {
+            // What came before belongs to no sample.
+            let _ = watch::take();
+        }
         let light = self.light(shot, sampler, &shot.plan.integrator);
+        if watched {
+            self.counted = watch::take();
+        }
         self.sample.radiance = fogged(shot.scene, shot.plan, light, self.sample.wavelengths.nm);
         self.sample.alpha = light.alpha;
     }
@@ -215,7 +227,8 @@ impl Begun {
     /// Appends the numbers of the layers of the finished sample.
     #[inline]
     fn layers(&self, shot: &Shot, sampler: &Sampler, values: &mut layers::Values) {
-        let Begun { place, ray, sample: PixelSample { radiance, wavelengths, xyz, alpha, .. }, .. } = *self;
+        let Begun { place, ray, sample: PixelSample { radiance, wavelengths, xyz, alpha, weight }, counted, .. } =
+            *self;
         values.append(
             shot.scene,
             shot.plan,
@@ -223,6 +236,7 @@ impl Begun {
             &ray,
             |step| shot.scene.camera.ray(place + step, || pairs(sampler.set(Set::Lens)).0),
             layers::Seen { radiance, xyz, alpha },
+            (counted, weight),
             |integrator| {
                 let light = self.light(shot, sampler, integrator);
                 let xyz = observer::xyz(light.radiance, &wavelengths);

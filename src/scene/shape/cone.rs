@@ -2,6 +2,7 @@
 
 use super::cylinder::{BASE, Part, WALL, cap_surface, disk_extent};
 use super::exact::{along, cone_form, cross, dot, rows_times};
+use super::plain::Plain;
 use super::span::{Exit, Faces, Span};
 use super::{
     AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest,
@@ -62,6 +63,12 @@ impl Cone {
             end: 1.0 + pad(16.0),
             last: 1.0 - pad(4096.0).min(0.25),
         })
+    }
+
+    pub(super) fn plain(&self) -> Plain {
+        let caps = [false, self.present >> BASE & 1 == 1];
+        let rows = self.rows.map(|row| row.as_vec3());
+        Plain::Turned { base: self.apex.as_vec3(), rows, profile: [0.0, 1.0], caps }
     }
 
     #[inline]

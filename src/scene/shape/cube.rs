@@ -1,6 +1,7 @@
 //! Cubes, boxes and parallelepipeds.
 
 use super::exact::{along, dot};
+use super::plain::Plain;
 use super::span::{Exit, Span};
 use super::{AreaSample, Layout, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest};
 use crate::math::Ray;
@@ -97,6 +98,10 @@ impl Cube {
             Layout::YUp => self,
             Layout::ZUp => Cube { pictures: &PICTURES_Z_UP, ..self },
         }
+    }
+
+    pub(super) fn plain(&self) -> Plain {
+        Plain::Cube { center: self.center.as_vec3(), duals: self.duals.map(|dual| dual.as_vec3()) }
     }
 
     #[inline]

@@ -1,6 +1,7 @@
 //! Cylinders, closed or open at either end.
 
 use super::exact::{along, difference_of_products, dot, rows_times};
+use super::plain::Plain;
 use super::span::{Exit, Faces, Span};
 use super::{
     AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest,
@@ -80,6 +81,12 @@ impl Cylinder {
         let frame = Frame::from_normal_and_tangent(self.frame.n, unit);
         let rows = [frame.s / self.radius, frame.t / self.radius, self.rows[2]];
         Ok(Cylinder { frame, rows, ..self })
+    }
+
+    pub(super) fn plain(&self) -> Plain {
+        let caps = [BASE, TOP].map(|face| self.present >> face & 1 == 1);
+        let rows = self.rows.map(|row| row.as_vec3());
+        Plain::Turned { base: self.base.as_vec3(), rows, profile: [1.0, 0.0], caps }
     }
 
     #[inline]

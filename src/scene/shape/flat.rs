@@ -1,6 +1,7 @@
 //! Planes, disks and rectangles.
 
 use super::exact::{along, dot};
+use super::plain::Plain;
 use super::{AreaSample, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, largest, turns};
 use crate::math::warp::concentric_disk;
 use crate::math::{Frame, Ray};
@@ -49,6 +50,10 @@ impl Plane {
         }
         let t = dot(self.point - ray.origin, self.frame.n) / across;
         (t > 0.0 && t < t_max).then_some(ShapeHit { t, face: 0 })
+    }
+
+    pub(super) fn plain(&self) -> Plain {
+        Plain::Plane { point: self.point.as_vec3(), normal: self.frame.n.as_vec3() }
     }
 
     pub(super) fn surface(&self, point: DVec3) -> SurfacePoint {
@@ -143,6 +148,11 @@ impl Patch {
         Some(PatchHit { t: shift + t, a, b })
     }
 
+    fn plain(&self, round: bool) -> Plain {
+        let duals = [self.to_a, self.to_b].map(|dual| dual.as_vec3());
+        Plain::Patch { origin: self.origin.as_vec3(), normal: self.normal.as_vec3(), duals, round }
+    }
+
     fn coordinates(&self, point: DVec3) -> DVec2 {
         let p = point - self.origin;
         DVec2::new(dot(p, self.to_a), dot(p, self.to_b))
@@ -194,6 +204,10 @@ impl Disk {
         let PatchHit { t, a, b } = self.0.meet(ray)?;
         let rim = 1.0 + self.0.pad.max_element();
         (a * a + b * b <= rim * rim && t > 0.0 && t < t_max).then_some(ShapeHit { t, face: 0 })
+    }
+
+    pub(super) fn plain(&self) -> Plain {
+        self.0.plain(true)
     }
 
     pub(super) fn surface(&self, point: DVec3, detail: Detail) -> SurfacePoint {
@@ -248,6 +262,10 @@ impl Rectangle {
         let DVec2 { x, y } = self.0.pad;
         let inside = (-x..=1.0 + x).contains(&a) && (-y..=1.0 + y).contains(&b);
         (inside && t > 0.0 && t < t_max).then_some(ShapeHit { t, face: 0 })
+    }
+
+    pub(super) fn plain(&self) -> Plain {
+        self.0.plain(false)
     }
 
     pub(super) fn surface(&self, point: DVec3) -> SurfacePoint {

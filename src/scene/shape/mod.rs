@@ -38,6 +38,7 @@ pub mod exact;
 mod flat;
 #[cfg(test)]
 mod light_tests;
+pub mod plain;
 #[cfg(test)]
 mod reference;
 #[cfg(test)]

@@ -13,6 +13,7 @@
 //! as the frame gives u = u' and v = 1 − v'.
 
 use super::exact::{cross, dot};
+use super::plain::Plain;
 use super::{
     AreaSample, BELOW_ONE, Detail, Layout, ShapeHit, SurfacePoint, TowardSample, check_length, check_point, largest,
     solid_angle_density, toward_by_area,
@@ -89,6 +90,10 @@ impl Sphere {
             (if near > 0.0 { near } else { half - b }) / a
         };
         (t > 0.0 && t < t_max).then_some(ShapeHit { t, face: 0 })
+    }
+
+    pub(super) fn plain(&self) -> Plain {
+        Plain::Sphere { center: self.center.as_vec3(), radius: self.radius as f32 }
     }
 
     fn at_normal(&self, normal: DVec3) -> DVec3 {
