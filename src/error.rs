@@ -54,11 +54,21 @@ impl Error {
 
     /// An [`Error::Input`] about `path`.
     pub fn input(path: &Path, message: impl Into<String>) -> Error {
-        Error::Input { path: path.to_path_buf(), message: message.into() }
+        Error::Input { path: path.to_path_buf(), message: one_line(message.into()) }
     }
 
     /// An [`Error::Output`] about `path`.
     pub fn output(path: &Path, message: impl ToString) -> Error {
         Error::Output { path: path.to_path_buf(), message: message.to_string() }
     }
+}
+
+/// `text` with its control characters written out: what is quoted from a file stays on its line, and commands nothing of a
+/// terminal.
+#[must_use]
+pub fn one_line(text: String) -> String {
+    if !text.contains(char::is_control) {
+        return text;
+    }
+    text.chars().map(|c| if c.is_control() { c.escape_default().to_string() } else { c.to_string() }).collect()
 }

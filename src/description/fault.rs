@@ -10,7 +10,7 @@ use serde::de::{Expected, Unexpected};
 use super::material::Material;
 use super::node::{Node, Place, Sources, did_you_mean, enumerate, quote};
 use super::path::{self, At, Segment};
-use crate::error::Error;
+use crate::error::{Error, one_line};
 
 /// One thing wrong with a document.
 #[derive(Clone, Debug)]
@@ -95,7 +95,7 @@ impl Fault {
         let place = self.place.map_or(String::new(), |place| format!("{}: ", sources.describe(place)));
         let path = path::display(self.steps.iter().rev());
         let separator = if path.is_empty() { "" } else { ": " };
-        format!("{place}{path}{separator}{self}")
+        one_line(format!("{place}{path}{separator}{self}"))
     }
 
     /// The fault as the error that ends the reading.

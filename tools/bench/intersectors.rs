@@ -97,11 +97,15 @@ fn main() {
     }
     let corners = [-x - y, x - y, y * 2.0 + z];
     let small = corners.map(|v| v.as_vec3());
-    // A ray is made ready once for all triangles of a mesh.
+    let single = small.map(|v| v.to_array());
+    // A ray is made ready once for all triangles of a mesh, and those without area were sorted out.
     let ready: Vec<TriangleRay> = rays.iter().map(|ray| TriangleRay::new(ray, DVec3::ZERO)).collect();
     row(
         "triangle",
-        |i| ready[i].intersect(*black_box(&corners)).map_or(0.0, |hit| hit.t),
+        |i| {
+            let ray = &ready[i];
+            ray.meet(ray.axes.map(|k| black_box(&single).map(|corner| f64::from(corner[k])))).map_or(0.0, |hit| hit.t)
+        },
         |i| {
             let (origin, direction) = singles[i];
             plain::triangle(*black_box(&small), origin, direction, 1e-4, f32::INFINITY).map_or(0.0, f64::from)

@@ -24,7 +24,7 @@ pub struct TriangleHit {
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleRay {
     /// Axes of the sheared frame: the last is that of the largest component of the direction.
-    pub(super) axes: [usize; 3],
+    pub axes: [usize; 3],
     /// Relative to the origin of the vertices, in the order of `axes`.
     pub(super) origin: [f64; 3],
     /// Shear per unit of z along x and y, and 1 / direction along z.
@@ -60,8 +60,9 @@ impl TriangleRay {
     }
 
     /// [`TriangleRay::intersect`] with a triangle that has an area; its corners by axis, in the order of the ray's.
+    #[must_use]
     #[inline(always)]
-    pub(super) fn meet(&self, [x, y, z]: [[f64; 3]; 3]) -> Option<TriangleHit> {
+    pub fn meet(&self, [x, y, z]: [[f64; 3]; 3]) -> Option<TriangleHit> {
         let [ox, oy, oz] = self.origin;
         let [sx, sy, sz] = self.shear;
         // One by one: what is written as a map of arrays is not kept in registers.
