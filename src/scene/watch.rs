@@ -114,7 +114,7 @@ fn is_met_again(scene: &Scene, ray: &Ray, departure: Departure) -> bool {
             let met = shape.plain().intersect(origin, direction, 0.0, f32::INFINITY);
             let far = shape.intersect(ray, f64::INFINITY, Some(departure.part as u8));
             // The root at the origin is nothing but rounding; the far one is the same in both.
-            met.is_some_and(|t| far.is_none_or(|far| f64::from(t) < 0.5 * far.t))
+            met.is_some_and(|(t, _)| far.is_none_or(|far| f64::from(t) < 0.5 * far.t))
         }
         Geometry::Mesh(mesh) => {
             let corners = corners(mesh, departure.part).map(|v| v.as_vec3());

@@ -91,7 +91,7 @@ fn main() {
             |i| black_box(&shape).intersect(&rays[i], f64::INFINITY, None).map_or(0.0, |hit| hit.t),
             |i| {
                 let (origin, direction) = singles[i];
-                black_box(&plain).intersect(origin, direction, 1e-4, f32::INFINITY).map_or(0.0, f64::from)
+                black_box(&plain).intersect(origin, direction, 1e-4, f32::INFINITY).map_or(0.0, |(t, _)| t.into())
             },
         );
     }

@@ -55,7 +55,8 @@ impl Block {
     #[inline(always)]
     fn meet(&self, ray: &TriangleRay, lane: usize) -> Option<TriangleHit> {
         let [kx, ky, kz] = ray.axes;
-        ray.meet([self.axis(kx, lane), self.axis(ky, lane), self.axis(kz, lane)])
+        let corners = [self.axis(kx, lane), self.axis(ky, lane), self.axis(kz, lane)];
+        if cfg!(feature = "single_precision") { ray.meet_single(corners) } else { ray.meet(corners) }
     }
 }
 
@@ -288,7 +289,7 @@ impl Coarse {
     #[inline(always)]
     fn new(sheared: &TriangleRay, ray: &Ray, entry: f64, extent: f64) -> Coarse {
         /// 2 · 16u.
-        const SLACK: f64 = 1.0 / (1u64 << 19) as f64;
+        const SLACK: f64 = if cfg!(feature = "single_precision") { 0.0 } else { 1.0 / (1u64 << 19) as f64 };
         /// 2 · 2⁻⁵⁰.
         const ORIGIN: f64 = 1.0 / (1u64 << 49) as f64;
         const LARGE: f64 = (1u64 << 40) as f64;

@@ -7,6 +7,7 @@
 //! fallback to double precision at zero becomes needless.
 
 use crate::math::Ray;
+use crate::scene::shape::plain;
 use glam::DVec3;
 
 /// Where a ray meets a triangle.
@@ -83,6 +84,27 @@ impl TriangleRay {
             return None;
         }
         Some(TriangleHit { t, b1: e1 / det, b2: e2 / det })
+    }
+
+    /// [`TriangleRay::meet`] in single precision without exact signs, beyond [`plain::EPSILON`]: what the feature
+    /// `single_precision` measures.
+    #[must_use]
+    #[inline(always)]
+    pub fn meet_single(&self, corners: [[f64; 3]; 3]) -> Option<TriangleHit> {
+        let [x, y, z] = corners.map(|axis| axis.map(|v| v as f32));
+        let [ox, oy, oz] = self.origin.map(|v| v as f32);
+        let [sx, sy, sz] = self.shear.map(|v| v as f32);
+        let (az, bz, cz) = (z[0] - oz, z[1] - oz, z[2] - oz);
+        let (ax, bx, cx) = (x[0] - ox - sx * az, x[1] - ox - sx * bz, x[2] - ox - sx * cz);
+        let (ay, by, cy) = (y[0] - oy - sy * az, y[1] - oy - sy * bz, y[2] - oy - sy * cz);
+        let (e0, e1, e2) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
+        if !(e0.min(e1).min(e2) >= 0.0 || e0.max(e1).max(e2) <= 0.0) {
+            return None;
+        }
+        let det = e0 + e1 + e2;
+        let t = sz * (e0 * az + e1 * bz + e2 * cz) / det;
+        let hit = || TriangleHit { t: t.into(), b1: (e1 / det).into(), b2: (e2 / det).into() };
+        (t > plain::EPSILON && t < f32::INFINITY).then(hit)
     }
 }
 

@@ -66,7 +66,7 @@ impl Cone {
     }
 
     pub(super) fn plain(&self) -> Plain {
-        let caps = [false, self.present >> BASE & 1 == 1];
+        let caps = [None, (self.present >> BASE & 1 == 1).then_some(BASE)];
         let rows = self.rows.map(|row| row.as_vec3());
         Plain::Turned { base: self.apex.as_vec3(), rows, profile: [0.0, 1.0], caps }
     }

@@ -84,7 +84,7 @@ impl Cylinder {
     }
 
     pub(super) fn plain(&self) -> Plain {
-        let caps = [BASE, TOP].map(|face| self.present >> face & 1 == 1);
+        let caps = [BASE, TOP].map(|face| (self.present >> face & 1 == 1).then_some(face));
         let rows = self.rows.map(|row| row.as_vec3());
         Plain::Turned { base: self.base.as_vec3(), rows, profile: [1.0, 0.0], caps }
     }

@@ -195,6 +195,9 @@ impl Shape {
     #[inline]
     #[must_use]
     pub fn intersect(&self, ray: &Ray, t_max: f64, departing: Option<u8>) -> Option<ShapeHit> {
+        if cfg!(feature = "single_precision") {
+            return plain::instead(self, ray, t_max);
+        }
         each!(self, s => s.intersect(ray, t_max, departing))
     }
 

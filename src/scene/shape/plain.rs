@@ -1,7 +1,8 @@
 //! Textbook intersectors in single precision: what most renderers do, kept to measure against.
 //!
-//! Nothing is rendered with these. `abbe render --check-numerics` asks them whether a surface that was met would have been
-//! missed in f32, and `tools/bench/intersectors` what robustness costs beside them. They are the formulas of textbooks
+//! Nothing is rendered with these, unless the feature `single_precision` is compiled in, for measurements: then they take
+//! the place of the robust ones, with an epsilon of [`EPSILON`]. `abbe render --check-numerics` asks them whether a surface
+//! that was met would have been missed in f32, and `tools/bench/robustness` what robustness costs beside them. They are the formulas of textbooks
 //! (Glassner 1989, "An Introduction to Ray Tracing", chapter 2; Möller and Trumbore 1997, "Fast, Minimum Storage
 //! Ray/Triangle Intersection"), and have their faults: discriminants that cancel, edges that leak, walls and caps that
 //! disagree at a rim.
@@ -52,27 +53,30 @@ pub enum Plain {
         rows: [Vec3; 3],
         /// f and g.
         profile: [f32; 2],
-        /// At z = 0 and z = 1.
-        caps: [bool; 2],
+        /// Faces at z = 0 and z = 1, where they are closed.
+        caps: [Option<u8>; 2],
     },
 }
 
+/// How far a ray has to go before it meets anything, where no part is left out: scenes of some metres in size.
+pub const EPSILON: f32 = 1e-4;
+
 impl Plain {
-    /// The nearest hit with `t_min` < t < `t_max`.
+    /// The nearest hit with `t_min` < t < `t_max`, and its face.
     #[must_use]
     #[inline]
-    pub fn intersect(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<f32> {
-        let within = |t: f32| t > t_min && t < t_max;
+    pub fn intersect(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> Option<(f32, u8)> {
+        let within = |t: f32| (t > t_min && t < t_max).then_some((t, 0));
         match *self {
             Plain::Sphere { center, radius } => {
                 let oc = origin - center;
                 let [near, far] =
                     roots(direction.dot(direction), 2.0 * oc.dot(direction), oc.dot(oc) - radius * radius)?;
-                [near, far].into_iter().find(|t| within(*t))
+                [near, far].into_iter().find_map(within)
             }
             Plain::Plane { point, normal } => {
                 let t = (point - origin).dot(normal) / direction.dot(normal);
-                within(t).then_some(t)
+                within(t)
             }
             Plain::Patch { origin: corner, normal, duals, round } => {
                 let t = (corner - origin).dot(normal) / direction.dot(normal);
@@ -80,21 +84,22 @@ impl Plain {
                 let [a, b] = duals.map(|dual| dual.dot(p));
                 let inside =
                     if round { a * a + b * b <= 1.0 } else { (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b) };
-                (inside && within(t)).then_some(t)
+                if inside { within(t) } else { None }
             }
             Plain::Cube { center, duals } => {
                 let oc = origin - center;
-                let (mut enter, mut exit) = (f32::NEG_INFINITY, f32::INFINITY);
-                for dual in duals {
+                let (mut enter, mut exit) = ((f32::NEG_INFINITY, 0), (f32::INFINITY, 0));
+                for (dual, face) in duals.into_iter().zip([0, 2, 4]) {
                     let (o, d) = (dual.dot(oc), 1.0 / dual.dot(direction));
-                    let (a, b) = ((-1.0 - o) * d, (1.0 - o) * d);
-                    enter = enter.max(a.min(b));
-                    exit = exit.min(a.max(b));
+                    let (low, high) = (((-1.0 - o) * d, face), ((1.0 - o) * d, face + 1));
+                    let (near, far) = if low.0 < high.0 { (low, high) } else { (high, low) };
+                    enter = if near.0 > enter.0 { near } else { enter };
+                    exit = if far.0 < exit.0 { far } else { exit };
                 }
-                if enter > exit {
+                if enter.0 > exit.0 {
                     return None;
                 }
-                [enter, exit].into_iter().find(|t| within(*t))
+                [enter, exit].into_iter().find(|(t, _)| *t > t_min && *t < t_max)
             }
             Plain::Turned { base, rows, profile: [f, g], caps } => {
                 let oc = origin - base;
@@ -104,21 +109,22 @@ impl Plain {
                 let a = d[0] * d[0] + d[1] * d[1] - slope * slope;
                 let b = 2.0 * (o[0] * d[0] + o[1] * d[1] - radius * slope);
                 let c = o[0] * o[0] + o[1] * o[1] - radius * radius;
-                let mut nearest = t_max;
+                let mut nearest = (t_max, 0);
                 for t in roots(a, b, c).into_iter().flatten() {
                     let z = o[2] + t * d[2];
-                    if t > t_min && t < nearest && (0.0..=1.0).contains(&z) {
-                        nearest = t;
+                    if t > t_min && t < nearest.0 && (0.0..=1.0).contains(&z) {
+                        nearest = (t, 0);
                     }
                 }
-                for (present, z) in caps.into_iter().zip([0.0, 1.0]) {
+                for (cap, z) in caps.into_iter().zip([0.0, 1.0]) {
+                    let Some(face) = cap else { continue };
                     let t = (z - o[2]) / d[2];
                     let (x, y, r) = (o[0] + t * d[0], o[1] + t * d[1], f + g * z);
-                    if present && t > t_min && t < nearest && x * x + y * y <= r * r {
-                        nearest = t;
+                    if t > t_min && t < nearest.0 && x * x + y * y <= r * r {
+                        nearest = (t, face);
                     }
                 }
-                (nearest < t_max).then_some(nearest)
+                (nearest.0 < t_max).then_some(nearest)
             }
         }
     }
@@ -152,6 +158,14 @@ pub fn triangle([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3, t_min: f32,
     let v = direction.dot(q) / det;
     let t = e2.dot(q) / det;
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > t_min && t < t_max).then_some(t)
+}
+
+/// What takes the place of [`Shape::intersect`]. The shape is rounded for each ray, which costs some instructions.
+#[inline]
+pub(super) fn instead(shape: &Shape, ray: &crate::math::Ray, t_max: f64) -> Option<super::ShapeHit> {
+    let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
+    let (t, face) = shape.plain().intersect(origin, direction, EPSILON, t_max as f32)?;
+    Some(super::ShapeHit { t: t.into(), face })
 }
 
 impl Shape {
@@ -192,7 +206,9 @@ mod tests {
             let found = shape.plain().intersect(ray.origin.as_vec3(), ray.direction.as_vec3(), 0.0, f32::INFINITY);
             let expected = shape.intersect(&ray, f64::INFINITY, None);
             match (found, expected) {
-                (Some(t), Some(hit)) if (f64::from(t) - hit.t).abs() < 1e-3 => both[kind] += 1,
+                (Some((t, face)), Some(hit)) if (f64::from(t) - hit.t).abs() < 1e-3 && face == hit.face => {
+                    both[kind] += 1
+                }
                 (None, None) => {}
                 _ => differ[kind] += 1,
             }
