@@ -636,6 +636,45 @@ fn what_robust_arithmetic_was_needed_for_is_counted() {
     assert!(taken.code == 2 && taken.err.contains("give yours another"), "{}", taken.err);
 }
 
+/// Scenes of a batch that name the same files get the pictures that each gets by itself, also where one file changes its
+/// use, and the second turns the mesh and the sky.
+#[test]
+fn what_scenes_of_a_batch_share_is_the_same_for_each() {
+    let png = |r: u8| {
+        let image = image::RgbImage::from_fn(8, 4, |x, y| image::Rgb([r, 20 * x as u8, 60 * y as u8]));
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        bytes.into_inner()
+    };
+    let scene = |turn: u32, raw: bool| {
+        format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 8, height: 8}}\n\
+             render: {{samples: 4}}\ntextures: {{map: {{image: {{file: map.png, raw: {raw}}}}}}}\n\
+             shapes:\n- mesh: {{file: t.obj, material: {{diffuse: {{reflectance: {{texture: map}}}}}}, \
+             transform: [{{rotate: {{axis: [0, 0, 1], deg: {turn}}}}}]}}\n\
+             - sphere: {{radius: 0.5, material: {{conductor: {{metal: gold, roughness: {{texture: map}}}}}}}}\n\
+             lights: [environment: {{file: map.png, rotate_deg: {turn}}}]\n"
+        )
+    };
+    let batch = "scenes: [{file: a.yaml}, {file: b.yaml}, {file: a.yaml, name: c}]\n";
+    let place = Place::with(&[
+        ("a.yaml", &scene(0, false)),
+        ("b.yaml", &scene(40, true)),
+        ("batch.yaml", batch),
+        ("t.obj", "v -2 -2 -1\nv 2 -2 -1\nv 0 2 -1\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"),
+    ]);
+    std::fs::write(place.path("map.png"), png(200)).unwrap();
+    let hashes = |file: &str| -> Vec<String> {
+        let ran = place.run(&["render", file, "-q", "-o", "out", "--report", "r.json"]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        let report: Value = serde_json::from_slice(&std::fs::read(place.path("r.json")).unwrap()).unwrap();
+        report["scenes"].as_array().unwrap().iter().map(|s| s["pixel_hash"].as_str().unwrap().to_owned()).collect()
+    };
+    let (a, b) = (hashes("a.yaml").remove(0), hashes("b.yaml").remove(0));
+    assert_ne!(a, b);
+    assert_eq!(hashes("batch.yaml"), [a.clone(), b, a]);
+}
+
 /// Light beyond what f32 holds: samples are dropped, counted by cause, and the exit code says so. The
 /// picture is written all the same, and every pixel of it is finite.
 #[test]

@@ -16,6 +16,7 @@ use crate::film::resolve::Image;
 use crate::scene::Scene;
 use crate::scene::census::Census;
 use crate::scene::compile;
+use crate::scene::shelf::Shelf;
 use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Channel, Form, Layer, LayerPlan, Quantity, Source};
 use crate::transport::pilot::{self, Use, Wishes};
@@ -100,8 +101,13 @@ pub fn entries(path: &Path, overrides: &Overrides) -> Result<Vec<BatchEntry>> {
 /// # Errors
 /// [`Error::Config`] and [`Error::Input`], as [`compile::compile`].
 pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
+    prepare_with(entry, overrides, &mut Shelf::default())
+}
+
+/// [`prepare`] with what the scene before has read; see [`compile::compile_with`].
+fn prepare_with(entry: &BatchEntry, overrides: &Overrides, shelf: &mut Shelf) -> Result<Prepared> {
     let description = entry.scene(&overrides.set)?;
-    let mut scene = compile::compile(&description, &entry.name)?;
+    let mut scene = compile::compile_with(&description, &entry.name, shelf)?;
     let integrator = integrator(&description, &description.integrator)?;
     let samples = match &integrator {
         Integrator::Whitted(w) => w.samples(),
@@ -483,10 +489,16 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
     let start = Instant::now();
     let mut scenes = Vec::new();
     let mut report_dir: Option<PathBuf> = None;
+    let mut shelf = Shelf::default();
     for (i, entry) in entries.iter().enumerate() {
         watcher.scene_begins(i, entries.len(), &entry.name);
         let loading = Instant::now();
-        let report = match prepare(entry, overrides) {
+        let prepared = prepare_with(entry, overrides, &mut shelf);
+        if i + 1 == entries.len() {
+            // Nobody comes after the last one.
+            shelf = Shelf::default();
+        }
+        let report = match prepared {
             Ok(prepared) => {
                 let dir = output_path(&prepared, overrides);
                 report_dir.get_or_insert_with(|| dir.parent().unwrap_or(Path::new(".")).to_path_buf());

@@ -27,6 +27,7 @@ use super::mesh::MeshTree;
 use super::mesh::together::Together;
 use super::nested::{Inside, Nested};
 use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Layout, Plane, Rectangle, Shape, Sphere};
+use super::shelf::{Shelf, SkyKey};
 use super::texture::{Scalar, Texture};
 use super::volume::Volume;
 use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene};
@@ -52,6 +53,8 @@ struct Compiler<'a> {
     meshes: Meshes,
     /// Decoded before they are asked for.
     pictures: Pictures,
+    /// What the scene before has read.
+    shelf: Shelf,
     /// What textures lie on.
     surface: Surface,
     /// Whether a texture has asked for that.
@@ -93,21 +96,40 @@ pub fn ambient(description: &SceneDescription, ambient: &written::Spectrum) -> R
 /// # Errors
 /// [`Error::Config`] with every fault found; [`Error::Input`] where a file is missing or broken.
 pub fn compile(description: &SceneDescription, name: &str) -> Result<Scene> {
+    compile_with(description, name, &mut Shelf::default())
+}
+
+/// [`compile`] with what the scene before it has read. The shelf then holds what this one asked for.
+///
+/// # Errors
+/// As [`compile`].
+pub fn compile_with(description: &SceneDescription, name: &str, shelf: &mut Shelf) -> Result<Scene> {
     let mut c = Compiler::new(description);
+    c.shelf = std::mem::take(shelf);
     let scene = c.scene(name);
+    *shelf = std::mem::take(&mut c.shelf);
+    shelf.forget_unwanted();
     c.finish(scene)
 }
 
-/// The pictures that a scene names. What textures are used for shows later: without `raw` mostly as colours.
-fn pictures(d: &SceneDescription) -> impl Iterator<Item = (&Path, Wanted)> {
+/// Under what the sky of `sky` is kept.
+fn sky_key(sky: &written::EnvironmentLight) -> SkyKey {
+    let numbers = sky.world_from_map().to_cols_array().into_iter().chain([sky.scale]);
+    let mapping = u64::from(sky.mapping == written::EnvironmentMapping::Mitsuba);
+    (sky.file.to_path_buf(), numbers.map(f64::to_bits).chain([mapping]).collect())
+}
+
+/// The pictures that a scene names and `shelf` lacks. What textures are used for shows later: without `raw` mostly as
+/// colours.
+fn pictures<'a>(d: &'a SceneDescription, shelf: &Shelf) -> impl Iterator<Item = (&'a Path, Wanted)> {
     let textures = d.textures.values().filter_map(|texture| match texture {
-        written::Texture::Image(image) => {
+        written::Texture::Image(image) if !shelf.has_picture(&image.file, image.raw) => {
             Some((&*image.file, if image.raw { Wanted::Pixels } else { Wanted::Colours }))
         }
         _ => None,
     });
     let skies = d.lights.iter().filter_map(|light| match light {
-        written::Light::Environment(sky) => Some((&*sky.file, Wanted::Pixels)),
+        written::Light::Environment(sky) if !shelf.has_sky(&sky_key(sky)) => Some((&*sky.file, Wanted::Pixels)),
         _ => None,
     });
     textures.chain(skies)
@@ -127,6 +149,7 @@ impl<'a> Compiler<'a> {
             files: Vec::new(),
             meshes: Meshes::default(),
             pictures: Pictures::default(),
+            shelf: Shelf::default(),
             surface: Surface::Unknown,
             asks_for_surface: false,
             on_surface: BTreeSet::new(),
@@ -183,10 +206,11 @@ impl<'a> Compiler<'a> {
 
     fn scene(&mut self, name: &str) -> Result<Scene> {
         let d = self.description;
+        let known = Meshes::known(d, &mut self.shelf);
         let (meshes, made) = rayon::join(
-            || Meshes::of(d),
+            || Meshes::of(d, known),
             || {
-                self.pictures = Pictures::of(pictures(d));
+                self.pictures = Pictures::of(pictures(d, &self.shelf));
                 for (i, sky) in d.lights.iter().enumerate().filter(|(_, l)| matches!(l, written::Light::Environment(_)))
                 {
                     let light = self.light(&format!("lights[{i}].{}", sky.kind()), sky);
@@ -196,6 +220,7 @@ impl<'a> Compiler<'a> {
             },
         );
         made?;
+        meshes.keep(&mut self.shelf);
         self.meshes = meshes;
         let mut media = Vec::new();
         for (name, medium) in &d.media {

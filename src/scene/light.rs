@@ -11,6 +11,7 @@ use crate::math::warp;
 use crate::spectrum::{Lanes, Spectrum};
 use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// A light.
 #[derive(Clone, Debug)]
@@ -65,7 +66,7 @@ pub enum Light {
         radiance: Spectrum,
     },
     /// An image on the sphere at infinity.
-    Environment(Box<Environment>),
+    Environment(Arc<Environment>),
     /// A picture thrown from a point.
     Projector(Box<Projector>),
 }

@@ -30,6 +30,7 @@ pub mod principled;
 pub mod projector;
 pub mod sdf;
 pub mod shape;
+pub mod shelf;
 pub mod texture;
 pub mod through;
 pub mod volume;

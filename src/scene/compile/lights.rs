@@ -103,15 +103,17 @@ impl<'a> Compiler<'a> {
             }
             written::Light::Environment(l) => {
                 self.files.push(l.file.to_path_buf());
-                let picture = self.pictures.take(&l.file).and_then(|p| load::picture(&l.file, p));
-                let picture = picture.map_err(|e| self.asked(&format!("{at}.file"), e))?;
                 let mapping = match l.mapping {
                     written::EnvironmentMapping::Texels => Mapping::Texels,
                     written::EnvironmentMapping::Mitsuba => Mapping::Poles,
                 };
-                let load::Picture { pixels, width, height } = &picture;
-                let map = Environment::new(pixels, *width, *height, l.scale, mapping, l.world_from_map());
-                Light::Environment(Box::new(map))
+                let (shelf, pictures) = (&mut self.shelf, &mut self.pictures);
+                let map = shelf.sky(super::sky_key(l), || {
+                    let load::Picture { pixels, width, height } =
+                        pictures.take(&l.file).and_then(|p| load::picture(&l.file, p))?;
+                    Ok(Environment::new(&pixels, width, height, l.scale, mapping, l.world_from_map()))
+                });
+                Light::Environment(map.map_err(|e| self.asked(&format!("{at}.file"), e))?)
             }
             written::Light::Projector(l) => return Ok(self.projector(at, l)),
         }))

@@ -3,6 +3,7 @@
 use crate::description::{self as written, SceneDescription};
 use crate::scene::TriangleMesh;
 use crate::scene::mesh::{AreaTable, Mesh, MeshSource, MeshTree, NormalMode, Sources, Winding};
+use crate::scene::shelf::Shelf;
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
@@ -16,23 +17,36 @@ pub(super) struct Meshes {
     placed: HashMap<String, Result<TriangleMesh, String>>,
 }
 
+/// The meshes that a scene places, with where they stand in it: those of groups that are copied, too.
+fn wanted(description: &SceneDescription) -> Vec<(String, &written::Shape, &written::Mesh)> {
+    let copied: BTreeSet<&str> = description.shapes.iter().filter_map(|shape| shape.geometry.group()).collect();
+    let alone = description.shapes.iter().enumerate().map(|(i, shape)| (format!("shapes[{i}]"), shape));
+    let grouped =
+        description.groups.iter().filter(|(name, _)| copied.contains(name.as_str())).flat_map(|(name, shapes)| {
+            shapes.iter().enumerate().map(move |(i, shape)| (format!("groups.{name}[{i}]"), shape))
+        });
+    alone
+        .chain(grouped)
+        .filter_map(|(at, shape)| match &shape.geometry {
+            written::Geometry::Mesh(mesh) => Some((format!("{at}.{}", shape.geometry.kind()), shape, mesh)),
+            _ => None,
+        })
+        .collect()
+}
+
 impl Meshes {
-    /// All meshes that `description` places. A file that cannot be read is left to [`Meshes::source`].
-    pub(super) fn of(description: &SceneDescription) -> Meshes {
-        let copied: BTreeSet<&str> = description.shapes.iter().filter_map(|shape| shape.geometry.group()).collect();
-        let alone = description.shapes.iter().enumerate().map(|(i, shape)| (format!("shapes[{i}]"), shape));
-        let grouped =
-            description.groups.iter().filter(|(name, _)| copied.contains(name.as_str())).flat_map(|(name, shapes)| {
-                shapes.iter().enumerate().map(move |(i, shape)| (format!("groups.{name}[{i}]"), shape))
-            });
-        let wanted: Vec<(String, &written::Shape, &written::Mesh)> = alone
-            .chain(grouped)
-            .filter_map(|(at, shape)| match &shape.geometry {
-                written::Geometry::Mesh(mesh) => Some((format!("{at}.{}", shape.geometry.kind()), shape, mesh)),
-                _ => None,
-            })
-            .collect();
-        let sources = Sources::of(wanted.iter().map(|(_, _, mesh)| (&*mesh.file, mesh.index)));
+    /// What of the meshes of `description` is on the shelf.
+    pub(super) fn known(description: &SceneDescription, shelf: &mut Shelf) -> Sources {
+        let all = wanted(description);
+        let all = all.iter().map(|(_, _, mesh)| (&*mesh.file, mesh.index));
+        Sources::from_known(all.filter_map(|(path, index)| Some((path, index, shelf.mesh(path, index)?))))
+    }
+
+    /// All meshes that `description` places, of files of which some are `known`. A file that cannot be read is left to
+    /// [`Meshes::source`].
+    pub(super) fn of(description: &SceneDescription, known: Sources) -> Meshes {
+        let wanted = wanted(description);
+        let sources = known.and(wanted.iter().map(|(_, _, mesh)| (&*mesh.file, mesh.index)));
         let placed: Vec<Option<Result<Mesh, String>>> = wanted
             .par_iter()
             .map(|(_, shape, mesh)| {
@@ -80,6 +94,11 @@ impl Meshes {
             })
             .collect();
         Meshes { sources, placed }
+    }
+
+    /// Puts what was read on the shelf.
+    pub(super) fn keep(&self, shelf: &mut Shelf) {
+        self.sources.each(|path, index, source| shelf.keep_mesh(path, index, source));
     }
 
     /// What the file of `mesh` says.

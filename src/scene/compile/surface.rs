@@ -123,8 +123,10 @@ impl<'a> Compiler<'a> {
         Ok(match texture {
             written::Texture::Image(image) => {
                 self.files.push(image.file.to_path_buf());
-                let loaded =
-                    self.pictures.take(&image.file).and_then(|p| load::image_texture(&image.file, p, image.raw));
+                let (shelf, pictures) = (&mut self.shelf, &mut self.pictures);
+                let loaded = shelf.colours(&image.file, image.raw, || {
+                    pictures.take(&image.file).and_then(|p| load::image_texture(&image.file, p, image.raw))
+                });
                 let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
                 loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
                 Texture::Image(loaded)
@@ -145,7 +147,10 @@ impl<'a> Compiler<'a> {
         Ok(match texture {
             written::Texture::Image(image) => {
                 self.files.push(image.file.to_path_buf());
-                let loaded = self.pictures.take(&image.file).and_then(|p| load::data_image(&image.file, p, image.raw));
+                let (shelf, pictures) = (&mut self.shelf, &mut self.pictures);
+                let loaded = shelf.numbers(&image.file, image.raw, || {
+                    pictures.take(&image.file).and_then(|p| load::data_image(&image.file, p, image.raw))
+                });
                 let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
                 loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
                 Scalar::Image(loaded)

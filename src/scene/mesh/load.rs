@@ -43,16 +43,29 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// All of `wanted` that can be read, read on the current rayon pool.
+    /// What was read before.
     #[must_use]
-    pub fn of<'a>(wanted: impl Iterator<Item = (&'a Path, u32)>) -> Sources {
-        let distinct: BTreeSet<(&Path, u32)> = wanted.collect();
+    pub fn from_known<'a>(known: impl Iterator<Item = (&'a Path, u32, Arc<MeshSource>)>) -> Sources {
+        Sources { read: known.map(|(path, index, source)| ((path.to_path_buf(), index), source)).collect() }
+    }
+
+    /// These and all others of `wanted` that can be read, read on the current rayon pool.
+    #[must_use]
+    pub fn and<'a>(mut self, wanted: impl Iterator<Item = (&'a Path, u32)>) -> Sources {
+        let distinct: BTreeSet<(&Path, u32)> =
+            wanted.filter(|&(path, index)| self.known(path, index).is_none()).collect();
         let distinct: Vec<(&Path, u32)> = distinct.into_iter().collect();
-        let read = distinct
-            .into_par_iter()
+        let read = distinct.into_par_iter();
+        let read: Vec<_> = read
             .filter_map(|(path, index)| Some(((path.to_path_buf(), index), Arc::new(load(path, index).ok()?))))
             .collect();
-        Sources { read }
+        self.read.extend(read);
+        self
+    }
+
+    /// Shows each file and index with what was read.
+    pub fn each(&self, mut show: impl FnMut(&Path, u32, &Arc<MeshSource>)) {
+        self.read.iter().for_each(|((path, index), source)| show(path, *index, source));
     }
 
     /// What was read from mesh `index` of `path`, if it was.
