@@ -1,7 +1,7 @@
 //! Eight rays that lie close together: what one meets is tried with all.
 
 use super::{Geometry, Hit, Scene};
-use crate::math::Ray;
+use crate::math::{Departure, Ray};
 use crate::spectrum::LANES;
 
 /// Objects up to which all are tried.
@@ -40,25 +40,33 @@ impl Scene {
         best
     }
 
-    /// The rays among `lanes` in whose way anything stands before their `distances`; see [`Scene::occluded`].
+    /// The rays among `lanes` in whose way anything stands before their `distances`; see [`Scene::occluded`],
+    /// whose `target` is not to be of a shape that is turned inside out here.
     #[must_use]
-    pub fn occluded_of(&self, rays: &[Ray; LANES], distances: &[f64; LANES], lanes: u8) -> u8 {
+    pub fn occluded_of(
+        &self,
+        rays: &[Ray; LANES],
+        distances: &[f64; LANES],
+        lanes: u8,
+        target: Option<Departure>,
+    ) -> u8 {
         let mut hidden = 0;
         if self.bvh.order().len() > FEW {
             for lane in each(lanes) {
-                hidden |= u8::from(self.occluded(&rays[lane], distances[lane], None)) << lane;
+                hidden |= u8::from(self.occluded(&rays[lane], distances[lane], target)) << lane;
             }
             return hidden;
         }
         for &object in self.bvh.order() {
             let geometry = &self.objects[object as usize].geometry;
+            let part = target.filter(|t| t.object == object).map(|t| t.part);
             for lane in each(lanes & !hidden) {
                 let (ray, distance) = (&rays[lane], distances[lane]);
                 let blocked = match geometry {
                     Geometry::Instance(instance) => instance.blocks(&self.objects, object, ray, distance),
                     _ => {
                         let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
-                        geometry.blocks(ray, distance, departing, None)
+                        geometry.blocks(ray, distance, departing, part)
                     }
                 };
                 hidden |= u8::from(blocked) << lane;
@@ -66,7 +74,7 @@ impl Scene {
         }
         if let Some(together) = &self.together {
             for lane in each(lanes & !hidden) {
-                hidden |= u8::from(together.any(&rays[lane], distances[lane], None, |_| true)) << lane;
+                hidden |= u8::from(together.any(&rays[lane], distances[lane], target, |_| true)) << lane;
             }
         }
         hidden

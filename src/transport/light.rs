@@ -129,7 +129,17 @@ pub fn trace(
     if start.is_nan() || start <= 0.0 {
         return traced;
     }
-    let mut walk = Walk { paths, sampler: &sampler, wavelengths: &wavelengths, start, splat, photons, target, rays: 0 };
+    let mut walk = Walk {
+        paths,
+        sampler: &sampler,
+        wavelengths: &wavelengths,
+        start,
+        splat,
+        photons,
+        target,
+        rays: 0,
+        ahead: None,
+    };
     walk.follow(Beam {
         ray: emission.ray,
         power: emission.power,
@@ -156,7 +166,7 @@ pub(super) fn seen_in_sharp(
     let mut seen = Vec::new();
     let splat = &mut |_: &SampledWavelengths, _| {};
     let (start, target, photons) = (1.0, Target::Own, Some(&mut seen));
-    let mut walk = Walk { paths, sampler, wavelengths, start, splat, photons, target, rays: 0 };
+    let mut walk = Walk { paths, sampler, wavelengths, start, splat, photons, target, rays: 0, ahead: None };
     walk.follow(Beam {
         ray: *ray,
         power: Lanes::ONE,
@@ -183,7 +193,7 @@ struct Beam {
     nm: Lanes,
     /// The wavelength that goes alone, since the others took another way.
     alone: Option<usize>,
-    /// Whether it has been chosen to go on for all that parted.
+    /// Whether it goes on for all that parted.
     chosen: bool,
     /// What the beam is in: `None` while it is not known.
     medium: Option<Option<u32>>,
@@ -226,6 +236,8 @@ struct Walk<'a, 'b> {
     /// What it is aimed at.
     target: Target,
     rays: u32,
+    /// What the beam that is to be followed meets next, where that is known.
+    ahead: Option<Hit>,
 }
 
 /// What is drawn at a vertex.
@@ -251,12 +263,16 @@ impl<'a> Walk<'a, '_> {
         Set::Extra((vertex + 1).wrapping_add(crossings << 16))
     }
 
+    /// Whether nothing may be met beyond `vertex` vertices: the camera is one segment further than the next surface.
+    fn is_last(&self, vertex: u32) -> bool {
+        self.paths.settings.max_depth.is_some_and(|depth| vertex + 2 > depth)
+    }
+
     fn follow(&mut self, mut beam: Beam) {
-        let LightPaths { scene, plan, settings, caustics, .. } = *self.paths;
+        let LightPaths { scene, plan, caustics, .. } = *self.paths;
         loop {
             let vertex = beam.vertex;
-            // The camera is one segment further than the next surface.
-            if settings.max_depth.is_some_and(|depth| vertex + 2 > depth) {
+            if self.is_last(vertex) {
                 return;
             }
             let Numbers { flight: u_flight, lobe: u_lobe, roulette: u_roulette, lens: u_lens, scatter: u_scatter } =
@@ -326,6 +342,7 @@ impl<'a> Walk<'a, '_> {
             if let Bsdf::Dielectric(glass) = &bsdf
                 && caustics.is_some_and(|c| c.packets)
                 && beam.alone.is_none()
+                && !beam.chosen
                 && glass.parts()
             {
                 // Each wavelength decides for itself with the same random numbers: none leads.
@@ -413,8 +430,10 @@ impl<'a> Walk<'a, '_> {
         let scene = self.paths.scene;
         for crossings in 0..MAX_BOUNDARIES {
             let set = Walk::set_of_flight(beam.vertex, crossings);
-            self.rays += 1;
-            let hit = scene.closest(&beam.ray, f64::INFINITY);
+            let hit = self.ahead.take().or_else(|| {
+                self.rays += 1;
+                scene.closest(&beam.ray, f64::INFINITY)
+            });
             let surface = hit.map(|hit| scene.surface(&beam.ray, &hit));
             if self.paths.plan.media {
                 let known = beam.medium.unwrap_or_else(|| {

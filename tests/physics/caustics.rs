@@ -196,6 +196,24 @@ fn wavelengths_that_part_are_all_there_with_and_without_packets() {
     assert_agree(mesh.what, &render(&mesh.bench("on", "on", 96)), &render(&mesh.bench("off", "auto", 1536)));
 }
 
+/// A spot lamp shines on nothing but a ball that parts its colours over a floor, close to a block. The camera sees that side
+/// of the block alone: all light has scattered on the floor, at other distances for each colour. Wavelengths that are sent
+/// on together each bring as much as one that has been on its way alone.
+#[test]
+fn light_that_goes_on_after_its_wavelengths_have_parted_is_all_there() {
+    let light = "- cube: {center: [1.35, -0.7, -0.6], size: [0.6, 0.6, 0.6], material: floor}\n\
+        lights: [{spot: {position: [-1.5, 2, 1], target: [0.2, -0.2, 0], cutoff_deg: 11, intensity: 9}}]\n";
+    let wide = Case { what: "wide", material: "{dielectric: {ior: {cauchy: [1.4, 0.06]}}}", light, ..AREA };
+    let bench = |packets: &str, samples| {
+        let scene = wide.scene("path", "on", packets, samples).replace("packets:", "merging: off, packets:");
+        let from_above = "origin: [-1, 3, -2], target: [1.05, -0.6, -0.6], fov_deg: 5";
+        let scene = scene.replace("origin: [0, 1.2, 5], target: [0, 0.1, 0], fov_deg: 40", from_above);
+        assert!(scene.contains(from_above));
+        bench_with(&scene, &[])
+    };
+    assert_agree(wide.what, &render(&bench("on", 32)), &render(&bench("off", 64)));
+}
+
 fn techniques(bench: &Bench) -> (bool, bool, String) {
     let of = |name| bench.prepared.plan.techniques.iter().find(|t| t.name == name);
     let tracing = of("light tracing").expect("the plan speaks of light tracing");

@@ -4,14 +4,14 @@
 //! and go the same way from there, what depends on neither place nor direction is found once: the numbers, the material,
 //! its indices. A lane that takes another way goes on with those that take it, too, or as a [`Beam`] alone.
 
-use super::{Beam, Crossing, Splat, Walk, adjoint};
-use crate::math::{Frame, Ray};
+use super::{Beam, Crossing, LightPaths, Splat, Walk, adjoint};
+use crate::math::{Frame, Ray, warp};
 use crate::optics::bsdf::Bsdf;
 use crate::optics::dielectric::{Dielectric, refract};
 use crate::scene::bundle::each;
 use crate::scene::material::{Kind, Material};
 use crate::scene::texture::Texture;
-use crate::scene::{Hit, SurfacePoint};
+use crate::scene::{Geometry, Hit, SurfacePoint};
 use crate::spectrum::{LANES, Lanes};
 use crate::transport::path::seen_normal;
 use glam::{DVec2, DVec3};
@@ -59,7 +59,7 @@ impl Walk<'_, '_> {
                 return;
             }
             let vertex = packet.beam.vertex;
-            if self.paths.settings.max_depth.is_some_and(|depth| vertex + 2 > depth) {
+            if self.is_last(vertex) {
                 return;
             }
             let numbers = self.numbers(vertex);
@@ -215,7 +215,7 @@ impl Walk<'_, '_> {
         at: &Places,
         numbers: &super::Numbers,
     ) {
-        let scene = self.paths.scene;
+        let LightPaths { scene, plan, .. } = *self.paths;
         let nm = packet.beam.nm;
         let Some(first) = each(packet.lanes).next() else { return };
         let texture_point = |lane: usize| at[lane].1.texture_point(at[lane].0);
@@ -256,7 +256,7 @@ impl Walk<'_, '_> {
                 wanted |= 1 << lane;
             }
         }
-        if scene.has_boundaries || self.paths.plan.media {
+        if scene.has_boundaries || plan.media {
             for lane in each(wanted) {
                 let (surface, came) = (at[lane].0, -packet.rays[lane].direction);
                 let object = &scene.objects[at[lane].1.object as usize];
@@ -271,7 +271,7 @@ impl Walk<'_, '_> {
             }
         } else if wanted != 0 {
             self.rays += wanted.count_ones().div_ceil(2);
-            wanted &= !scene.occluded_of(&rays, &distances, wanted);
+            wanted &= !scene.occluded_of(&rays, &distances, wanted, None);
         }
         for lane in each(wanted) {
             let mut lanes = [0.0; LANES];
@@ -286,7 +286,18 @@ impl Walk<'_, '_> {
             }
         }
         let lane = self.chosen_lane();
-        if packet.lanes >> lane & 1 == 0 {
+        if packet.lanes >> lane & 1 == 0 || self.is_last(packet.beam.vertex + 1) {
+            return;
+        }
+        if !(plan.media || plan.nested || scene.has_boundaries) {
+            let reflected: [f32; LANES] = match &alike {
+                Some(all) => *all,
+                None => std::array::from_fn(|k| match packet.lanes >> k & 1 {
+                    1 => reflectance.eval(&texture_point(k), nm).to_array()[k],
+                    _ => 0.0,
+                }),
+            };
+            self.scatter_together(packet, lane, &reflected, &normals, at, numbers);
             return;
         }
         let ((surface, hit), came) = (at[lane], -packet.rays[lane].direction);
@@ -301,5 +312,100 @@ impl Walk<'_, '_> {
         if sample.is_some_and(|sample| self.cross(&mut beam, &sample, &crossing, wo)) {
             self.follow(beam);
         }
+    }
+
+    /// Sends light of all lanes on from where they have come to on a diffuse surface.
+    ///
+    /// Lane `chosen`, each with the same probability, draws a direction, which leads to a point y. If y is on a diffuse
+    /// surface, too, all lanes are sent there: each has come to y with the density with which some lane would have
+    /// found it, Σ_c p_c(y) / 8 (the balance heuristic over what could have been chosen), so that lane j carries
+    /// Φ_j ρ_j 8 p_j(y) / Σ_c p_c(y), at most 8 times what it had. From y they go on as one. Elsewhere, as on glass, the
+    /// chosen one goes on alone for all. Which of the two is done depends on y alone.
+    fn scatter_together(
+        &mut self,
+        packet: &Packet,
+        chosen: usize,
+        reflected: &[f32; LANES],
+        normals: &[DVec3; LANES],
+        at: &Places,
+        numbers: &super::Numbers,
+    ) {
+        let scene = self.paths.scene;
+        // Whether lane k, which comes from `came`, scatters into `went`; neither side of the surface is the other's.
+        let scatters = |k: usize, went: DVec3| {
+            let came = -packet.rays[k].direction;
+            let true_normal = at[k].0.normal;
+            let (from, to) = (came.dot(normals[k]), went.dot(normals[k]));
+            let (true_from, true_to) = (came.dot(true_normal), went.dot(true_normal));
+            (from > 0.0 && to > 0.0 && true_from * true_to > 0.0).then(|| (to, adjoint(from, to, true_from, true_to)))
+        };
+        let frame = Frame::from_normal_and_tangent(normals[chosen], at[chosen].0.tangent);
+        let went = frame.to_world(warp::cosine_hemisphere(numbers.scatter));
+        let Some((_, adjoint_alone)) = scatters(chosen, went) else { return };
+        let ray = scene.leave(at[chosen].0, at[chosen].1, went);
+        self.rays += 1;
+        let Some(hit) = scene.closest(&ray, f64::INFINITY) else { return };
+        let next = scene.surface(&ray, &hit);
+        let [power, nm] = [packet.beam.power, packet.beam.nm];
+        let mut beam = Beam { ray, chosen: true, vertex: packet.beam.vertex + 1, ..packet.beam };
+
+        if self.joins(&hit, &next, went) {
+            let mut rays = packet.rays;
+            let (mut distances, mut densities, mut adjoints) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+            let mut open = 0u8;
+            for k in each(packet.lanes) {
+                let offset = next.point - at[k].0.point;
+                let distance = offset.length();
+                let to_next = offset / distance;
+                let cos_next = -to_next.dot(next.normal);
+                if let Some((cos, adjoint)) = scatters(k, to_next)
+                    && cos_next > 0.0
+                {
+                    rays[k] = scene.leave(at[k].0, at[k].1, to_next);
+                    distances[k] = distance;
+                    adjoints[k] = adjoint;
+                    // Over π, as all of them are.
+                    densities[k] = cos * cos_next / (distance * distance);
+                    open |= 1 << k;
+                }
+            }
+            let others = open & !(1 << chosen);
+            self.rays += others.count_ones().div_ceil(2);
+            open &= !scene.occluded_of(&rays, &distances, others, Some(hit.departure()));
+            let found = each(open).map(|k| densities[k]).sum::<f64>() / LANES as f64;
+            let carried = std::array::from_fn(|k| match open >> k & 1 {
+                1 => power.to_array()[k] * reflected[k] * (densities[k] / found * adjoints[k]) as f32,
+                _ => 0.0,
+            });
+            beam.power = Lanes::new(carried);
+        } else {
+            let carried = power.to_array()[chosen] * reflected[chosen] * (LANES as f64 * adjoint_alone) as f32;
+            beam.power = Lanes::splat(carried);
+            beam.nm = Lanes::splat(nm.to_array()[chosen]);
+            beam.alone = Some(chosen);
+        }
+        if self.survives(&mut beam, numbers.roulette) {
+            self.ahead = Some(hit);
+            self.follow(beam);
+        }
+    }
+
+    /// Whether lanes can be sent to what a ray in `direction` has met: a diffuse surface that is seen from outside, as
+    /// that hides nothing of itself, with the normal that it has.
+    fn joins(&self, hit: &Hit, surface: &SurfacePoint, direction: DVec3) -> bool {
+        let LightPaths { scene, caustics, .. } = *self.paths;
+        let object = &scene.objects[hit.object as usize];
+        let diffuse = matches!(scene.materials[object.material as usize].kind, Kind::Diffuse { .. });
+        let outside = match &object.geometry {
+            Geometry::Shape(_) => !object.flipped,
+            Geometry::Mesh(_) => true,
+            Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
+        };
+        diffuse
+            && outside
+            && hit.instance.is_none()
+            && surface.shading_normal == surface.normal
+            && direction.dot(surface.normal) < 0.0
+            && !caustics.is_some_and(|c| c.is_sharp(hit.object))
     }
 }
