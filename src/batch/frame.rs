@@ -14,7 +14,7 @@ use crate::math::sampler::Octet;
 use crate::scene::Scene;
 use crate::spectrum::{ColourSpace, LANES, SampledWavelengths};
 use crate::transport::light::{Bounds, LightPaths, Splat};
-use crate::transport::merge::{self, Collection, Photon, PhotonMap};
+use crate::transport::merge::{self, Collection, Photon, PhotonMap, WavelengthCell};
 use crate::transport::plan::{EffectPlan, Integrator};
 use crate::transport::{self, PixelSample, Samples, Shot};
 use glam::DVec2;
@@ -455,7 +455,12 @@ fn from_lights_for(
 ) -> (PhotonMap, f64) {
     let (replicate, index) = (sample % REPLICATES as u32, sample / REPLICATES as u32);
     let wavelength = merge::shared_wavelength(job.seed, replicate, index);
-    let paths = LightPaths { wavelength: Some(wavelength), ..*light_paths };
+    let parts = light_paths.caustics.is_some_and(|c| c.parts);
+    let cell = match parts {
+        true => WavelengthCell::around(wavelength, job.samples.div_ceil(REPLICATES as u32)),
+        false => WavelengthCell::point(wavelength),
+    };
+    let paths = LightPaths { wavelength: Some(cell), ..*light_paths };
     let mut photons = Vec::new();
     from_lights(job, &paths, sample..sample + 1, splats, stop, Some(&mut photons));
     let [width, height] = job.scene.camera.resolution.map(u64::from);

@@ -40,6 +40,8 @@ pub struct Caustics {
     pub ratio: f64,
     /// Whether wavelengths that part in glass are followed together.
     pub packets: bool,
+    /// Whether any wavelengths part in what casts.
+    pub parts: bool,
     /// The first radius within which photons are collected where mirrors and glass are seen, metres.
     pub merging: Option<f64>,
     /// Whether something that stands in the scene has no end.

@@ -12,7 +12,7 @@
 mod packet;
 
 use super::caustics::{Caustics, Target};
-use super::merge::Photon;
+use super::merge::{Photon, WavelengthCell};
 use super::path::{FOR_SURE, SURVIVAL, seen_normal};
 use super::plan::{EffectPlan, LightSettings};
 use super::shadow::{MAX_BOUNDARIES, Shadow};
@@ -85,8 +85,8 @@ pub struct LightPaths<'a> {
     pub seed: u64,
     /// Where light is wanted.
     pub bounds: Bounds,
-    /// Chooses the wavelengths of all paths, where they share them.
-    pub wavelength: Option<f64>,
+    /// From where in [0, 1) wavelengths are chosen, where paths share them or nearly so.
+    pub wavelength: Option<WavelengthCell>,
 }
 
 /// What a path was.
@@ -113,7 +113,7 @@ pub fn trace(
     let sampler = Sampler::new(paths.seed ^ STREAM, [(index >> 32) as u32, 0], replicate, index as u32);
     let (u_choice, u_time) = pairs(sampler.set(Set::Camera));
     let (u_point, u_direction) = pairs(sampler.set(Set::Extra(0)));
-    let wavelengths = scene.wavelengths.sample(paths.wavelength.unwrap_or(u_time.x));
+    let wavelengths = scene.wavelengths.sample(paths.wavelength.map_or(u_time.x, |cell| cell.at(u_time.x)));
     let mut traced = Traced { wavelengths: Some(wavelengths), ..Traced::default() };
     let mut target = Target::Own;
     let emission = match paths.caustics {

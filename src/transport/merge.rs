@@ -6,7 +6,11 @@
 //! blurred by the radius, which shrinks from sample to sample so that the blur of the mean goes to zero while its noise
 //! does, too: r_i = r_0 i^(−1/6) (Knaus and Zwicker 2011, eq. 21 with α = 2/3). All other light stays unbiased.
 //!
-//! Photons of one sample are collected by that sample's paths of all pixels, so both share their wavelengths.
+//! Photons of one sample are collected by that sample's paths of all pixels, so both share their wavelengths. Where these
+//! part in glass, so few of them would make lines of a spectrum, also of the light that the camera sees itself: there each
+//! path has wavelengths of its own within a cell around the shared ones. The cells of all samples fill the band, so that
+//! light which is not merged stays as it was, and what is merged is blurred by one of them over wavelength; they are the
+//! narrower the more samples there are.
 
 use crate::math::sampler::{Sampler, Set, mix64};
 use crate::spectrum::{LANES, Lanes};
@@ -141,6 +145,40 @@ pub fn shared_wavelength(seed: u64, replicate: u32, index: u32) -> f64 {
     (u[0] + (u[1] * lanes).floor()) / lanes
 }
 
+/// The numbers in [0, 1) that choose wavelengths near to shared ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WavelengthCell {
+    /// The first of them.
+    pub start: f64,
+    /// How far they go.
+    pub width: f64,
+}
+
+/// Cells in an eighth of the band at the least.
+const CELLS: u32 = 4;
+
+impl WavelengthCell {
+    /// The one number `u`.
+    #[must_use]
+    pub fn point(u: f64) -> WavelengthCell {
+        WavelengthCell { start: u, width: 0.0 }
+    }
+
+    /// The cell that holds `u`, of as many as the largest power of two among the samples of a replicate in each eighth
+    /// of the band: [`shared_wavelength`] comes to each.
+    #[must_use]
+    pub fn around(u: f64, samples: u32) -> WavelengthCell {
+        let cells = f64::from(LANES as u32 * (1 << samples.max(CELLS).ilog2()));
+        WavelengthCell { start: (u * cells).floor() / cells, width: 1.0 / cells }
+    }
+
+    /// Its number at `u` of [0, 1).
+    #[must_use]
+    pub fn at(&self, u: f64) -> f64 {
+        self.start + self.width * u
+    }
+}
+
 /// Tells these numbers from all others.
 const STREAM: u64 = 0x7068_6f74_6f6e_7300;
 
@@ -224,6 +262,20 @@ mod tests {
                 assert_eq!(leads, [0, 1, 2, 3, 4, 5, 6, 7]);
             }
         }
+    }
+
+    /// Of 16 samples of a replicate, the cells around the eight lanes of each are the 128 of the band, once each.
+    #[test]
+    fn cells_around_shared_wavelengths_fill_the_band() {
+        for replicate in 0..4 {
+            let cells = (0..16).map(|i| WavelengthCell::around(shared_wavelength(3, replicate, i), 16 + 15));
+            let lanes = cells.flat_map(|cell| (0..8).map(move |k| (cell.at(0.5) + f64::from(k) / 8.0).fract()));
+            let mut parts: Vec<usize> = lanes.map(|u| (u * 128.0) as usize).collect();
+            parts.sort_unstable();
+            assert!(parts.iter().enumerate().all(|(i, part)| i == *part));
+        }
+        let cell = WavelengthCell::around(0.999, 1);
+        assert_eq!((cell.start, cell.at(0.5)), (31.0 / 32.0, 31.5 / 32.0));
     }
 
     #[test]

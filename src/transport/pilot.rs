@@ -230,7 +230,18 @@ impl Caustics {
         let stands = &scene.objects[..scene.bvh.order().len()];
         let endless = stands.iter().any(|o| !o.bounds().is_finite());
         let sums = Caustics::sums(&sources);
-        Caustics { casts, unending, traced, sources, sums, ratio: 1.0, packets, endless, merging: None }
+        Caustics {
+            casts,
+            unending,
+            traced,
+            sources,
+            sums,
+            ratio: 1.0,
+            packets,
+            parts: casters.parts,
+            endless,
+            merging: None,
+        }
     }
 }
 
