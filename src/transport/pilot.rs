@@ -5,12 +5,12 @@
 
 mod seen;
 
+use super::Shot;
 use super::caustics::{Caustics, Source, Target};
-use super::guide::{Guide, SIDE};
+use super::guide::{Find, Guide};
 use super::light::{Bounds, LightPaths, trace};
 use super::merge;
 use super::plan::{Effect, EffectPlan, Integrator, PathSettings};
-use super::{Incoming, Shot};
 use crate::film::accumulate::REPLICATES;
 use crate::film::filter::FilterSampler;
 use crate::math::sampler::{Sampler, Set, pairs};
@@ -19,9 +19,9 @@ use crate::scene::casters::Casters;
 use crate::scene::environment::Environment;
 use crate::scene::light::Light;
 use crate::scene::{Geometry, Scene};
-use crate::spectrum::{Lanes, SampledWavelengths, observer};
+use crate::spectrum::{ColourSpace, Lanes, observer};
 use crate::transport::layers::Source as Channel;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use seen::{Arrival, Seen};
 use std::f64::consts::PI;
@@ -51,20 +51,26 @@ pub struct Wishes {
     pub merging: Use,
 }
 
-/// Paths from the lights in each of two rounds, at least and at most: the second is aimed by what the first has learnt.
-const FROM_LIGHTS: [u64; 2] = [1 << 12, 1 << 15];
+/// Rounds of paths from the lights: each is aimed by what those before it have learnt.
+const ROUNDS: u32 = 4;
+
+/// Paths of a round at least and at most.
+const FROM_LIGHTS: [u64; 2] = [1 << 11, 1 << 14];
 
 /// Of that many are always as many followed as all.
 const AT_ONCE: u64 = 1 << 11;
 
 /// Share of the rays of the picture that a round may take beyond the least number of paths.
-const SHARE: f64 = 1.0 / 128.0;
+const SHARE: f64 = 1.0 / 256.0;
 
 /// Blocks of the picture along each side; each gets paths from the camera.
 const BLOCKS: usize = 32;
 
-/// Pixels of a block that are tried at the most, with two paths each.
+/// Pixels of a block that are tried at the most.
 const PIXELS: u32 = 4;
+
+/// Samples that are enough to tell how evenly spread ones do.
+const EVEN: u32 = 16;
 
 /// Tells the pilot's numbers from the picture's.
 const STREAM: u64 = 0x7069_6c6f_7470_696c;
@@ -146,10 +152,12 @@ impl Trial<'_> {
         width * height * f64::from(self.samples)
     }
 
-    /// Pixels of a block to try: two paths for each make no more than a hundredth of the picture's, or one pixel.
-    fn pixels(&self) -> u32 {
-        let wanted = 0.01 * self.paths() / (2 * BLOCKS * BLOCKS) as f64;
-        (wanted as u32).clamp(1, PIXELS)
+    /// Pixels of a block to try, and the samples of each of two replicates there: together no more than a hundredth of the
+    /// picture's, or one of each.
+    fn tries(&self) -> (u32, u32) {
+        let wanted = (0.01 * self.paths() / (2 * BLOCKS * BLOCKS) as f64) as u32;
+        let each = wanted.clamp(1, EVEN.min(self.samples / REPLICATES as u32).max(1));
+        ((wanted / each).clamp(1, PIXELS), each)
     }
 }
 
@@ -249,12 +257,14 @@ impl Caustics {
 struct Camera {
     /// Mean luminance of each block.
     means: Vec<f64>,
-    /// Variances of single samples: of what remains with the camera, and of all.
+    /// Variances, over those of single samples as evenly spread ones have them: of what remains with the camera, and of
+    /// all.
     kept: Vec<(usize, f64)>,
     all: Vec<(usize, f64)>,
     /// Of light of the class that is seen in mirrors and glass.
     mirrored: Vec<(usize, f64)>,
-    /// How many paths met light of the class, and how many in mirrors and glass.
+    /// How many paths there were, how many met light of the class, and how many in mirrors and glass.
+    paths: usize,
     met: usize,
     met_mirrored: usize,
     /// Rays of a path.
@@ -263,53 +273,103 @@ struct Camera {
     sharp: f64,
 }
 
-fn luminance(light: Lanes, wavelengths: &SampledWavelengths) -> f64 {
-    let y = f64::from(observer::xyz(light, wavelengths)[1]);
-    if y.is_finite() { y } else { 0.0 }
+/// A colour: luminance and linear Rec. 709, whose channels all count where errors are told.
+#[derive(Clone, Copy, Default)]
+struct Colour {
+    y: f64,
+    rgb: DVec3,
 }
 
-/// Paths from the camera through all blocks.
-fn from_camera(shot: &Shot, pixels: u32) -> Camera {
+impl Colour {
+    fn of(xyz: [f32; 3]) -> Colour {
+        let rgb = DVec3::from(ColourSpace::Rec709.from_xyz(xyz).map(f64::from));
+        let y = f64::from(xyz[1]);
+        if y.is_finite() && rgb.is_finite() { Colour { y, rgb } } else { Colour::default() }
+    }
+
+    /// The mean of the squares of the channels.
+    fn square(&self) -> f64 {
+        self.rgb.length_squared() / 3.0
+    }
+}
+
+impl std::ops::Add for Colour {
+    type Output = Colour;
+    fn add(self, other: Colour) -> Colour {
+        Colour { y: self.y + other.y, rgb: self.rgb + other.rgb }
+    }
+}
+
+/// What a replicate of a pixel showed, a sample.
+#[derive(Clone, Copy, Default)]
+struct Shown {
+    kept: Colour,
+    /// Light of the class that is seen in mirrors and glass, and other light of the class.
+    seen: Colour,
+    left: Colour,
+    met: usize,
+    met_seen: usize,
+    /// A ray to the next vertex and one to a light from each, of all samples.
+    rays: f64,
+    sharp: usize,
+}
+
+/// Paths from the camera through all blocks: `pixels` of each, two replicates of each with `each` samples. Evenly spread
+/// samples have less variance than their number says, as those of the picture have.
+fn from_camera(shot: &Shot, (pixels, each): (u32, u32)) -> Camera {
+    let show = |pixel: [u32; 2], replicate: u32| {
+        let mut shown = Shown::default();
+        let share = 1.0 / each as f32;
+        for index in 0..each {
+            let (light, wavelengths) = super::probe(shot, pixel, replicate, index);
+            let colour = |light: Lanes| Colour::of(observer::xyz(light * share, &wavelengths));
+            let left = colour(light.left);
+            let met = left.y > 0.0;
+            shown.kept = shown.kept + colour(light.radiance);
+            // Light of the class that is seen in mirrors and glass stays with the camera unless it is merged.
+            if light.mirrored {
+                shown.seen = shown.seen + left;
+                shown.met_seen += usize::from(met);
+            } else {
+                shown.left = shown.left + left;
+            }
+            shown.met += usize::from(met);
+            shown.rays += f64::from(1 + 2 * light.events);
+            shown.sharp += usize::from(light.mirrored);
+        }
+        shown
+    };
     let tried: Vec<_> = (0..BLOCKS * BLOCKS)
         .into_par_iter()
         .flat_map_iter(|block| (0..pixels).map(move |n| (block, n)))
         .map(|(block, n)| {
             let u = pairs(Sampler::new(shot.seed, [block as u32, n], 0, 0).set(Set::Lens)).0;
             let place = super::place_in(shot.scene, BLOCKS, block, u);
-            let pixel = [place.x as u32, place.y as u32];
-            let pair = [0, 1].map(|replicate| {
-                let (light, wavelengths) = super::probe(shot, pixel, replicate, n);
-                let (kept, left) = (luminance(light.radiance, &wavelengths), luminance(light.left, &wavelengths));
-                (kept, left, light)
-            });
-            (block, pair)
+            (block, [0, 1].map(|replicate| show([place.x as u32, place.y as u32], replicate)))
         })
         .collect();
+    let paths = 2 * each as usize * tried.len();
     let mut camera = Camera {
         means: vec![0.0; BLOCKS * BLOCKS],
         kept: Vec::new(),
         mirrored: Vec::new(),
         all: Vec::new(),
+        paths,
         met: 0,
         met_mirrored: 0,
         rays: 0.0,
         sharp: 0.0,
     };
-    for (block, pair) in &tried {
-        let variance = |a: f64, b: f64| 0.5 * (a - b) * (a - b);
-        let [(a, a_left, a_light), (b, b_left, b_light)] = *pair;
-        camera.means[*block] += 0.5 * (a + b) / f64::from(pixels);
-        // Light of the class that is seen in mirrors and glass stays with the camera unless it is merged.
-        let seen = |left: f64, light: &Incoming| if light.mirrored { (0.0, left) } else { (left, 0.0) };
-        let ((a_left, a_seen), (b_left, b_seen)) = (seen(a_left, &a_light), seen(b_left, &b_light));
-        camera.kept.push((*block, variance(a, b)));
-        camera.mirrored.push((*block, variance(a_seen, b_seen)));
-        camera.all.push((*block, variance(a + a_left, b + b_left)));
-        camera.met += usize::from(a_left > 0.0) + usize::from(b_left > 0.0);
-        camera.met_mirrored += usize::from(a_seen > 0.0) + usize::from(b_seen > 0.0);
-        // A ray to the next vertex and one to a light from each.
-        camera.rays += f64::from(2 + 2 * (a_light.events + b_light.events)) / (2 * tried.len()) as f64;
-        camera.sharp += f64::from(u32::from(a_light.mirrored) + u32::from(b_light.mirrored)) / (2 * tried.len()) as f64;
+    for (block, [a, b]) in &tried {
+        let variance = |a: Colour, b: Colour| 0.5 * f64::from(each) * (a.rgb - b.rgb).length_squared() / 3.0;
+        camera.means[*block] += 0.5 * (a.kept.y + b.kept.y) / f64::from(pixels);
+        camera.kept.push((*block, variance(a.kept, b.kept)));
+        camera.mirrored.push((*block, variance(a.seen, b.seen)));
+        camera.all.push((*block, variance(a.kept + a.seen + a.left, b.kept + b.seen + b.left)));
+        camera.met += a.met + b.met;
+        camera.met_mirrored += a.met_seen + b.met_seen;
+        camera.rays += (a.rays + b.rays) / paths as f64;
+        camera.sharp += (a.sharp + b.sharp) as f64 / paths as f64;
     }
     camera
 }
@@ -366,14 +426,23 @@ fn from_lights(paths: &LightPaths, seen: Option<&Seen>, round: u32, indices: Ran
     indices
         .into_par_iter()
         .map(|i| {
-            let (mut splats, mut collected) = (Vec::new(), Vec::new());
-            let mut photons = Vec::new();
+            let mut splats: Vec<(DVec2, Colour)> = Vec::new();
+            let (mut photons, mut collected) = (Vec::new(), Vec::new());
             let traced = trace(paths, round, i, seen.map(|_| &mut photons), &mut |wavelengths, splat| {
-                let y = f64::from(splat.xyz(wavelengths)[1]);
-                if y.is_finite() {
-                    splats.push(Arrival { block: block_of(splat.place), y, pixels: 1.0 });
+                let (pixel, colour) = (splat.place.floor(), Colour::of(splat.xyz(wavelengths)));
+                // Colours that come to one pixel together make up for each other.
+                match splats.iter_mut().find(|(p, _)| *p == pixel) {
+                    Some((_, sum)) => *sum = *sum + colour,
+                    None => splats.push((pixel, colour)),
                 }
             });
+            let arrival = |(pixel, colour): &(DVec2, Colour)| Arrival {
+                block: block_of(*pixel),
+                y: colour.y,
+                square: colour.square(),
+                pixels: 1.0,
+            };
+            let splats = splats.iter().map(arrival).collect();
             if let (Some(seen), Some(wavelengths)) = (seen, &traced.wavelengths) {
                 photons.iter().for_each(|photon| seen.collect(photon, wavelengths, &mut collected));
             }
@@ -421,7 +490,7 @@ impl Trial<'_> {
         number: u32,
         weights: &[f64],
         most_rays: f64,
-        learnt: &mut [[[f64; SIDE]; SIDE]],
+        learnt: &mut [Vec<Find>],
     ) -> Round {
         let Some(caustics) = paths.caustics else { return Round::default() };
         let mut round = Round { thrown: vec![0.0; BLOCKS * BLOCKS], ..Round::default() };
@@ -430,8 +499,7 @@ impl Trial<'_> {
         while round.paths < least || round.paths < most && round.rays < most_rays {
             for landed in from_lights(paths, seen, number, round.paths..round.paths + AT_ONCE) {
                 round.rays += f64::from(1 + landed.rays);
-                let squares =
-                    |all: &[Arrival]| all.iter().map(|a| weights[a.block] * a.pixels * a.y * a.y).sum::<f64>();
+                let squares = |all: &[Arrival]| all.iter().map(|a| weights[a.block] * a.pixels * a.square).sum::<f64>();
                 let (splatted, collected) = (squares(&landed.splats), squares(&landed.collected));
                 for arrival in landed.splats.iter().chain(&landed.collected) {
                     round.thrown[arrival.block] += arrival.pixels * arrival.y;
@@ -451,8 +519,7 @@ impl Trial<'_> {
             let cut = (most / a.squares()).min(1.0);
             round.splatted += a.splatted * cut;
             round.collected += a.collected * cut;
-            let (row, column) = Guide::cell(a.place);
-            learnt[a.source][row][column] += a.squares() * cut * a.density;
+            learnt[a.source].push(Find { place: a.place, square: a.squares() * cut * a.density });
         }
         let paths = round.paths as f64;
         let [width, height] = self.scene.camera.resolution.map(f64::from);
@@ -478,16 +545,16 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let wanted = Caustics { merging: Some(1.0), ..caustics.clone() };
     let with_all = EffectPlan { caustics: Some(Arc::new(wanted)), ..plan.clone() };
     let shot = Shot { scene, plan: &with_all, filter, seed: seed ^ STREAM, photons: None };
-    let camera = from_camera(&shot, trial.pixels());
+    let camera = from_camera(&shot, trial.tries());
     let [width, height] = scene.camera.resolution.map(f64::from);
     let pixels = width * height;
 
     let bounds = Bounds { low: DVec2::ZERO, high: DVec2::new(width, height) };
     let mut weights = relative(&camera.means);
-    let mut learnt = vec![[[0.0; SIDE]; SIDE]; caustics.sources.len()];
+    let mut learnt = vec![Vec::new(); caustics.sources.len()];
     let most_rays = SHARE * trial.paths() * camera.rays;
     let (mut found, mut followed) = (Round::default(), 0);
-    for number in 0..2 {
+    for number in 0..ROUNDS {
         let paths = LightPaths {
             scene,
             plan: &with_all,
@@ -499,10 +566,10 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
         };
         found = trial.round(&paths, seen.as_ref(), number, &weights, most_rays, &mut learnt);
         followed += found.paths;
-        caustics.learn(&learnt);
+        caustics.learn(&mut learnt);
         // What the lights send there is part of the picture that errors are relative to.
         let means: Vec<f64> = camera.means.iter().zip(&found.thrown).map(|(a, b)| a + b).collect();
-        if number == 0 {
+        if number + 1 < ROUNDS {
             weights = relative(&means);
         }
     }
@@ -531,7 +598,7 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let k = caustics.ratio;
     // Paths from the camera that find light of mean m with a probability p have a variance of m² / p, whether or not so
     // few paths met it; for a lamp without extent p is zero.
-    let tries = 2.0 * camera.kept.len() as f64;
+    let tries = camera.paths as f64;
     let chance = if endless_odds(scene, &caustics) { 0.0 } else { (camera.met as f64).max(1.0) / tries };
     let means = found.thrown.iter().zip(&weights);
     let by_chance = means.map(|(m, w)| w * m * m).sum::<f64>() / found.thrown.len() as f64 / chance;
@@ -573,8 +640,7 @@ fn say(trial: &Trial, caustics: &Caustics, camera: &Camera, share: f64, seen: bo
         None if !collected => "no light of mirrors and glass comes to what is seen in them".into(),
         None => format!(
             "paths from the camera find the caustics in mirrors and behind glass: {} of {}",
-            camera.met_mirrored,
-            2 * camera.kept.len()
+            camera.met_mirrored, camera.paths
         ),
         Some(radius) => {
             let samples = trial.samples.div_ceil(REPLICATES as u32).max(1);
@@ -608,20 +674,16 @@ fn lamps(scene: &Scene, caustics: &Caustics) -> String {
 impl Caustics {
     /// Chooses sources and cells by the root of what squares were found there, over the density that found them: the
     /// least variance, were they exact. Some go anywhere.
-    fn learn(&mut self, squares: &[[[f64; SIDE]; SIDE]]) {
-        let roots: Vec<[[f64; SIDE]; SIDE]> = squares.iter().map(|s| s.map(|row| row.map(f64::sqrt))).collect();
-        let totals: Vec<f64> = roots.iter().map(|r| r.iter().flatten().sum()).collect();
-        let total: f64 = totals.iter().sum();
+    fn learn(&mut self, finds: &mut [Vec<Find>]) {
+        let guides: Vec<(Guide, f64)> = finds.iter_mut().map(|finds| Guide::of(finds, ANYWHERE)).collect();
+        let total: f64 = guides.iter().map(|(_, worth)| worth).sum();
         if total.is_nan() || total <= 0.0 {
             return;
         }
         let even = ANYWHERE / self.sources.len() as f64;
-        for ((source, root), sum) in self.sources.iter_mut().zip(&roots).zip(&totals) {
-            source.probability = (1.0 - ANYWHERE) * sum / total + even;
-            if *sum > 0.0 {
-                let floor = ANYWHERE / (SIDE * SIDE) as f64;
-                source.guide = Guide::of(&root.map(|row| row.map(|x| (1.0 - ANYWHERE) * x / sum + floor)));
-            }
+        for (source, (guide, worth)) in self.sources.iter_mut().zip(guides) {
+            source.probability = (1.0 - ANYWHERE) * worth / total + even;
+            source.guide = guide;
         }
         self.sums = Caustics::sums(&self.sources);
     }

@@ -53,7 +53,8 @@ impl Walk<'_, '_> {
         loop {
             // One needs no company. What they are in is known but for light that has only been reflected so far, and where
             // bodies overlap each meets others.
-            let unknown = plan.nested || plan.media && packet.beam.medium.is_none();
+            let media = !scene.media.is_empty();
+            let unknown = !scene.nested.bodies().is_empty() || media && packet.beam.medium.is_none();
             if packet.lanes.count_ones() < 2 || unknown {
                 each(packet.lanes).for_each(|lane| self.follow(packet.alone(lane)));
                 return;
@@ -215,7 +216,7 @@ impl Walk<'_, '_> {
         at: &Places,
         numbers: &super::Numbers,
     ) {
-        let LightPaths { scene, plan, .. } = *self.paths;
+        let scene = self.paths.scene;
         let nm = packet.beam.nm;
         let Some(first) = each(packet.lanes).next() else { return };
         let texture_point = |lane: usize| at[lane].1.texture_point(at[lane].0);
@@ -256,7 +257,8 @@ impl Walk<'_, '_> {
                 wanted |= 1 << lane;
             }
         }
-        if scene.has_boundaries || plan.media {
+        let empty = scene.media.is_empty() && scene.nested.bodies().is_empty() && !scene.has_boundaries;
+        if !empty {
             for lane in each(wanted) {
                 let (surface, came) = (at[lane].0, -packet.rays[lane].direction);
                 let object = &scene.objects[at[lane].1.object as usize];
@@ -289,7 +291,7 @@ impl Walk<'_, '_> {
         if packet.lanes >> lane & 1 == 0 || self.is_last(packet.beam.vertex + 1) {
             return;
         }
-        if !(plan.media || plan.nested || scene.has_boundaries) {
+        if empty {
             let reflected: [f32; LANES] = match &alike {
                 Some(all) => *all,
                 None => std::array::from_fn(|k| match packet.lanes >> k & 1 {

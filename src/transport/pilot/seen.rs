@@ -5,10 +5,10 @@ use super::super::light::{Bounds, LightPaths, seen_in_sharp};
 use super::super::merge::{Photon, PhotonMap};
 use super::super::place_in;
 use super::super::plan::EffectPlan;
-use super::{BLOCKS, STREAM, Trial};
+use super::{BLOCKS, Colour, PIXELS, STREAM, Trial};
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::camera::Projection;
-use crate::spectrum::{LANES, SampledWavelengths};
+use crate::spectrum::{LANES, SampledWavelengths, observer};
 use glam::DVec2;
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -35,6 +35,8 @@ pub(super) struct Arrival {
     pub block: usize,
     /// Luminance, as that of a splat.
     pub y: f64,
+    /// The mean square of its colour's channels.
+    pub square: f64,
     /// Pixels that get it.
     pub pixels: f64,
 }
@@ -49,7 +51,8 @@ impl Seen {
         let settings = settings.of_light_paths();
         let paths = LightPaths { scene, plan, settings, caustics: Some(&caustics), seed, bounds, wavelength: None };
         let size = DVec2::from(scene.camera.resolution.map(f64::from));
-        let tries = trial.pixels() * 2;
+        let (pixels, each) = trial.tries();
+        let tries = (2 * pixels * each).min(2 * PIXELS);
         let look = |block: usize, n: u32| {
             let sampler = Sampler::new(seed ^ STREAM, [block as u32, n], 1, 0);
             let (u_place, u) = pairs(sampler.set(Set::Camera));
@@ -82,14 +85,21 @@ impl Seen {
     /// Where the light of a photon would come to.
     pub fn collect(&self, photon: &Photon, wavelengths: &SampledWavelengths, arrivals: &mut Vec<Arrival>) {
         let light = photon.power * (LANES as f32 / photon.rho.reduce_add());
-        let by_area = super::luminance(light, wavelengths) * ALBEDO / (PI * PI * self.radius * self.radius);
+        let scale = ALBEDO / (PI * PI * self.radius * self.radius);
+        let colour = Colour::of(observer::xyz(light, wavelengths));
+        let (by_area, square) = (colour.y * scale, colour.square() * scale * scale);
         if by_area <= 0.0 {
             return;
         }
         let pixels = self.pixels / (self.widened * self.widened);
         self.map.each_near(photon.point, photon.normal, |seen| {
             let share = f64::from(seen.power.reduce_add() / seen.rho.reduce_add());
-            arrivals.push(Arrival { block: seen.vertices as usize, y: by_area * share, pixels });
+            arrivals.push(Arrival {
+                block: seen.vertices as usize,
+                y: by_area * share,
+                square: square * share * share,
+                pixels,
+            });
         });
     }
 }
