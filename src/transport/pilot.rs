@@ -477,8 +477,9 @@ struct Round {
     /// Weighted squares of what came to pixels: by itself, and collected.
     splatted: f64,
     collected: f64,
-    /// Mean luminance of each block.
+    /// Mean luminance of each block, and the part of it that is collected.
     thrown: Vec<f64>,
+    gathered: Vec<f64>,
 }
 
 impl Trial<'_> {
@@ -493,7 +494,8 @@ impl Trial<'_> {
         learnt: &mut [Vec<Find>],
     ) -> Round {
         let Some(caustics) = paths.caustics else { return Round::default() };
-        let mut round = Round { thrown: vec![0.0; BLOCKS * BLOCKS], ..Round::default() };
+        let mut round =
+            Round { thrown: vec![0.0; BLOCKS * BLOCKS], gathered: vec![0.0; BLOCKS * BLOCKS], ..Round::default() };
         let mut arrived = Vec::new();
         let [least, most] = FROM_LIGHTS;
         while round.paths < least || round.paths < most && round.rays < most_rays {
@@ -503,6 +505,9 @@ impl Trial<'_> {
                 let (splatted, collected) = (squares(&landed.splats), squares(&landed.collected));
                 for arrival in landed.splats.iter().chain(&landed.collected) {
                     round.thrown[arrival.block] += arrival.pixels * arrival.y;
+                }
+                for arrival in &landed.collected {
+                    round.gathered[arrival.block] += arrival.pixels * arrival.y;
                 }
                 if splatted + collected > 0.0 {
                     let source = &caustics.sources[landed.source];
@@ -524,7 +529,7 @@ impl Trial<'_> {
         let paths = round.paths as f64;
         let [width, height] = self.scene.camera.resolution.map(f64::from);
         let share = (BLOCKS * BLOCKS) as f64 / (width * height * paths);
-        round.thrown.iter_mut().for_each(|y| *y *= share);
+        round.thrown.iter_mut().chain(&mut round.gathered).for_each(|y| *y *= share);
         Round {
             rays: round.rays / paths,
             splatted: round.splatted / paths,
@@ -577,11 +582,22 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
         return off(format!("of {followed} paths from the lights none came to the picture over {}", some(casters)));
     }
 
-    // Light that is seen in mirrors and glass: often met, it is known what it costs to leave it to chance; else chance
-    // will not do.
-    let mirrored = average(&camera.mirrored, &weights);
-    let kept = average(&camera.kept, &weights);
-    let counts = found.collected > 0.0 && (camera.met_mirrored < ENOUGH || mirrored > WORTH * kept);
+    // Paths from the camera that find light of mean m with a probability p have a variance of m² / p, whether or not so
+    // few paths met it; for a lamp without extent p is zero.
+    let endless = endless_odds(scene, &caustics);
+    let by_chance = |means: &[f64], met: usize| {
+        let squares: f64 = means.iter().zip(&weights).map(|(m, w)| w * m * m).sum();
+        let chance = if endless { 0.0 } else { met.max(1) as f64 / camera.paths as f64 };
+        if squares > 0.0 { squares / means.len() as f64 / chance } else { 0.0 }
+    };
+    // Light that is seen in mirrors and glass: often met, it is known what it costs to leave it to chance, else it is told
+    // from how bright it is.
+    let (kept, mirrored) = (trimmed(&camera.kept, &weights), average(&camera.mirrored, &weights));
+    let unmerged = match camera.met_mirrored {
+        ENOUGH.. => mirrored,
+        met => by_chance(&found.gathered, met),
+    };
+    let counts = found.collected > 0.0 && unmerged > WORTH * kept;
     let merging = match wishes.merging {
         Use::On => true,
         Use::Auto => counts,
@@ -593,19 +609,13 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     // Errors by sample and pixel: (A + B / k)(a + k b) is least for k = √(B a / (A b)).
     let (a, b) = (camera.rays, found.rays);
     let thrown = (found.splatted + if merges { found.collected } else { 0.0 }) / (pixels * pixels);
-    let ratio = (thrown * a / (trimmed(&camera.kept, &weights).max(f64::MIN_POSITIVE) * b)).sqrt();
+    let ratio = (thrown * a / (kept.max(f64::MIN_POSITIVE) * b)).sqrt();
     caustics.ratio = ratio.clamp(1.0 / 64.0, 16.0);
     let k = caustics.ratio;
-    // Paths from the camera that find light of mean m with a probability p have a variance of m² / p, whether or not so
-    // few paths met it; for a lamp without extent p is zero.
-    let tries = camera.paths as f64;
-    let chance = if endless_odds(scene, &caustics) { 0.0 } else { (camera.met as f64).max(1.0) / tries };
-    let means = found.thrown.iter().zip(&weights);
-    let by_chance = means.map(|(m, w)| w * m * m).sum::<f64>() / found.thrown.len() as f64 / chance;
     let (left, overhead) = if merges { (0.0, OVERHEAD) } else { (mirrored, 1.0) };
     let with = overhead * (kept + left + thrown / k) * (a + k * b);
     let measured = if camera.met >= ENOUGH { average(&camera.all, &weights) } else { f64::INFINITY };
-    let without = measured.min(kept + mirrored + by_chance) * a;
+    let without = measured.min(kept + mirrored + by_chance(&found.thrown, camera.met)) * a;
     if wishes.light_tracing == Use::Auto && without < with {
         let loss = with / without;
         return off(format!(
