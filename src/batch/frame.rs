@@ -216,6 +216,7 @@ fn render_run(
 ) {
     let index = tile.window().index(pixel).expect("the pixel lies in the tile");
     let channels = tile.layers.channels();
+    let unit = light_unit(shot.scene);
     let mut run = Run::default();
     layers.reset(channels);
     // Overscan makes negative coordinates; as addresses they wrap.
@@ -227,7 +228,7 @@ fn render_run(
             if channels > 0 && !layers.add(sample.weight, values) {
                 tile.layers.add(index, sample.weight, values);
             }
-            record(tile, &mut run, pixel, replicate, sample);
+            record(tile, &mut run, unit, pixel, replicate, sample);
         });
         start = next;
     }
@@ -238,16 +239,21 @@ fn render_run(
 }
 
 #[inline]
-fn record(tile: &mut TileBuffer, run: &mut Run, pixel: [i32; 2], replicate: u32, sample: &PixelSample) {
+fn record(tile: &mut TileBuffer, run: &mut Run, unit: f32, pixel: [i32; 2], replicate: u32, sample: &PixelSample) {
     if let Some(cause) = Invalid::of(sample.radiance) {
         tile.drop_sample(pixel, replicate as usize, cause);
         return;
     }
-    let xyz = sample.xyz.map(|x| x * sample.weight);
+    let xyz = sample.xyz.map(|x| x * unit * sample.weight);
     let alpha = sample.alpha * sample.weight;
     if !run.add(xyz, alpha) {
         tile.add(pixel, replicate as usize, xyz, alpha);
     }
+}
+
+/// What light is multiplied by on its way to the film; a power of two.
+fn light_unit(scene: &Scene) -> f32 {
+    f32::from_bits(((127 - scene.light_exponent) as u32) << 23)
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
@@ -277,7 +283,11 @@ struct Part<'a> {
 impl<'a> Part<'a> {
     fn new(job: &'a FrameJob<'a>) -> Result<Part<'a>> {
         let layers = job.plan.layers.channels().len();
-        let film = |layers| Ok(Film::new(job.scene.camera.resolution, job.window)?.with_layers(layers));
+        let exponent = job.scene.light_exponent;
+        let film = |layers| {
+            let film = Film::new(job.scene.camera.resolution, job.window)?;
+            Ok(film.with_layers(layers).with_exponent(exponent))
+        };
         let splats = match light_paths(job) {
             Some(paths) => {
                 let film = film(job.scene.bands.len())?;
@@ -490,7 +500,8 @@ impl Landed {
             self.invalid.record(cause);
             return;
         }
-        let xyz = splat.xyz(wavelengths);
+        let unit = light_unit(scene);
+        let xyz = splat.xyz(wavelengths).map(|x| x * unit);
         filter.deal(splat.place, |pixel, share| {
             if window.index(pixel).is_some() {
                 self.pixels.push((pixel, xyz.map(|x| x * share)));

@@ -8,7 +8,8 @@
 //! | X, Y, Z | 2⁻⁶⁴ | \|x\| < 2³⁸ | ≤ 2²⁵ | \|Σ\| < 2⁶³ = 2¹²⁷ units: i128 |
 //! | alpha | 2⁻³⁴ | \|a\| < 2⁴ | ≤ 2²⁵ | \|Σ\| < 2²⁹ = 2⁶³ units: i64 |
 //!
-//! So a sum cannot overflow. A sample is off by at most half a unit, which is nothing for
+//! A film counts light over 2^[`Film::exponent`]: 0 but in scenes that are darker or have brighter lamps than the table
+//! holds. So a sum cannot overflow. A sample is off by at most half a unit, which is nothing for
 //! |x| ≥ 2⁻⁴⁰ (the last bit of its 24-bit mantissa is then a multiple of 2⁻⁶⁴). Samples beyond the
 //! range, infinite or NaN are not added but counted by cause ([`InvalidCounts`]).
 //!
@@ -336,6 +337,7 @@ pub struct Film {
     frame: [u32; 2],
     window: Window,
     cells: Vec<PixelCells>,
+    exponent: i32,
     /// Samples that were dropped.
     pub invalid: InvalidCounts,
     /// Further channels.
@@ -357,7 +359,20 @@ impl Film {
             return Err(Error::Render(format!("film: {window} needs {megabytes} MB, more than there is")));
         }
         cells.resize(window.pixels(), PixelCells::default());
-        Ok(Film { frame, window, cells, invalid: InvalidCounts::default(), layers: LayerSums::default() })
+        let (invalid, layers) = (InvalidCounts::default(), LayerSums::default());
+        Ok(Film { frame, window, cells, exponent: 0, invalid, layers })
+    }
+
+    /// The film, of light over 2^`exponent`: what is added to it has been divided by that.
+    #[must_use]
+    pub fn with_exponent(self, exponent: i32) -> Film {
+        Film { exponent, ..self }
+    }
+
+    /// X, Y and Z are light over two to this power.
+    #[must_use]
+    pub fn exponent(&self) -> i32 {
+        self.exponent
     }
 
     /// The film with `channels` empty layers.
@@ -429,6 +444,10 @@ impl Film {
         if self.frame != other.frame {
             let [a, b, c, d] = [self.frame[0], self.frame[1], other.frame[0], other.frame[1]];
             return Err(Error::Config(format!("film: expected a part of a {a}x{b} frame, found one of {c}x{d}")));
+        }
+        if self.exponent != other.exponent {
+            let (a, b) = (self.exponent, other.exponent);
+            return Err(Error::Config(format!("film: expected a part with light over 2^{a}, found one over 2^{b}")));
         }
         if !self.window.contains(&other.window) {
             return Err(Error::Config(format!("film: the part {} reaches beyond {}", other.window, self.window)));
@@ -529,6 +548,11 @@ mod tests {
         let beyond = Film::new([4, 4], Window { x: 1, y: 0, width: 2, height: 2 }).unwrap();
         assert!(film.merge(&beyond).unwrap_err().to_string().contains("reaches beyond"));
         assert!(Film::new([4, 4], Window { x: 0, y: 0, width: 0, height: 2 }).is_err());
+        let dark = Film::new([4, 4], window).unwrap().with_exponent(-30);
+        assert_eq!(
+            film.merge(&dark).unwrap_err().to_string(),
+            "film: expected a part with light over 2^0, found one over 2^-30"
+        );
     }
 
     /// Samples of 16 × 12 pixels over 60 binary orders of magnitude, both signs, some invalid.

@@ -86,12 +86,13 @@ impl fmt::Display for NoEstimate {
 /// The picture that `film` holds, in the colour space of `rgb_from_xyz`, with `splats` added; on the current rayon pool.
 ///
 /// # Panics
-/// If the windows of film and splats differ.
+/// If the windows or units of film and splats differ.
 #[must_use]
 pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]) -> Image {
     let pixels = film.window().pixels();
     if let Some(splats) = &splats {
         assert_eq!(splats.film.window(), film.window(), "splats cover the window of the film");
+        assert_eq!(splats.film.exponent(), film.exponent(), "splats count light as the film does");
     }
     let resolved: Vec<Resolved> = (0..pixels)
         .into_par_iter()
@@ -108,11 +109,12 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
                     pixel.variance[c] += light.variance[c];
                 }
             }
+            let unit = 2f64.powi(film.exponent());
             let samples: u64 = counts.iter().sum();
             let alpha: f64 = cells.iter().map(Cell::alpha_sum).sum();
             Resolved {
-                rgb: pixel.rgb.map(|x| x as f32),
-                standard_error: pixel.variance.map(|v| v.sqrt() as f32),
+                rgb: pixel.rgb.map(|x| (x * unit) as f32),
+                standard_error: pixel.variance.map(|v| (v.sqrt() * unit) as f32),
                 alpha: if samples == 0 { 0.0 } else { (alpha / samples as f64) as f32 },
             }
         })

@@ -275,6 +275,7 @@ impl<'a> Compiler<'a> {
         media.append(&mut self.absorbing);
         let (center, radius) = extent(&boxes, &camera);
         let light_cdf = lights::light_cdf(&lights, &weights, &objects, radius);
+        let light_exponent = crate::scene::light::exponent(&lights, &objects, radius);
         let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
         let bands = self.bands();
         let wavelengths = match d.render.wavelengths {
@@ -311,6 +312,7 @@ impl<'a> Compiler<'a> {
             camera_inside: Inside::default(),
             lights,
             light_cdf,
+            light_exponent,
             backgrounds,
             fog,
             wavelengths,

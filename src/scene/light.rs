@@ -120,6 +120,24 @@ pub fn spot_falloff(cos: f64, beam: f64, cutoff: f64) -> f64 {
     }
 }
 
+/// The power of two by which a film divides the light of a scene, [`crate::film::accumulate::Film::exponent`]: 0 where the
+/// brightest of its `lights` lies between 2⁻²⁴ and 2³⁶. A darker scene is raised to one, with 2³⁸ left above; of brighter
+/// lamps the film just holds what they show, and what they light beside as finely as may be.
+#[must_use]
+pub fn exponent(lights: &[Light], objects: &[Object], radius: f64) -> i32 {
+    let brightest = lights.iter().map(|l| l.brightness(objects, radius)).filter(|b| b.is_finite()).fold(0.0, f64::max);
+    if brightest < f64::MIN_POSITIVE {
+        return 0;
+    }
+    // The exponent of the number.
+    let log2 = (brightest.to_bits() >> 52) as i32 - 1023;
+    match log2 {
+        ..-24 => log2.max(-100),
+        36.. => (log2 - 36).min(100),
+        _ => 0,
+    }
+}
+
 impl Light {
     /// True for light from infinity that a ray which meets nothing sees.
     #[must_use]
@@ -329,6 +347,15 @@ impl Light {
             Light::Constant { radiance } => 4.0 * PI * PI * radius * radius * radiance.luminance(),
             Light::Environment(map) => 4.0 * PI * PI * radius * radius * map.mean_luminance(),
             Light::Projector(projector) => projector.power(),
+        }
+    }
+
+    /// About how bright a white wall is that it lights, or the lamp itself where that is seen, in film units.
+    fn brightness(&self, objects: &[Object], radius: f64) -> f64 {
+        let power = self.power(objects, radius);
+        match self {
+            Light::Area { object, .. } => power / (PI * objects[*object as usize].geometry.area()),
+            _ => power / (4.0 * PI * PI * radius * radius),
         }
     }
 

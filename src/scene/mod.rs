@@ -88,6 +88,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// How lights are chosen: running sums of probabilities.
     pub light_cdf: Vec<f64>,
+    /// The film counts light over two to this power: see [`light::exponent`].
+    pub light_exponent: i32,
     /// Indices of lights from infinity.
     pub backgrounds: Vec<u32>,
     /// Depth fog of the picture.

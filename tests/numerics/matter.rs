@@ -157,14 +157,24 @@ fn many_lamps_of_all_strengths_add_up() {
         .integrator(DIRECT)]);
 }
 
-/// Radiances from 1e-12 to 1e11 come out as they are.
+/// Radiances from 1e-25 to 1e25 come out as they are, seen themselves and as what they light; and beside a lamp of 1e20 the
+/// dark side of a wall is as it is. f32 holds these; the film divides what it sums by a power of two that follows the lamps.
 #[test]
 fn radiances_of_many_decades_come_out_as_they_are() {
     let mut cases = Vec::new();
-    for l in [1e-12, 1e-6, 1.0, 1e6, 1e11] {
+    for l in [1e-25, 1e-12, 1e-6, 1.0, 1e6, 1e11, 1e13, 1e25] {
         let sky = SKY.replace("value=\"1\"", &format!("value=\"{l:?}\""));
         let body = camera([0.0, 0.0, 5.0], [0.0; 3], 10.0) + &sphere([0.0; 3], 1.0, GREY) + &sky;
         cases.push(Case::new(format!("sky of {l:e}"), body, Answer::Every(0.5 * l, 2e-6 * l)));
+        let body = camera([0.0, 0.0, 5.0], [0.0; 3], 10.0) + &sphere([0.0; 3], 1.0, &shining(l));
+        cases.push(Case::new(format!("lamp of {l:e}"), body, Answer::Every(l, 2e-6 * l)));
+    }
+    // L = 1/r² lights the floor with π, as elsewhere, from a lamp that the camera does not see.
+    for r in [1e-7, 1e-10, 1e-12] {
+        let floor = shape("rectangle", "<rotate x=\"1\" angle=\"-90\"/>", GREY);
+        let body =
+            camera([1.0, 1.0, 0.0], [0.0; 3], 0.01) + &sphere([0.0, 1.0, 0.0], r, &shining(1.0 / (r * r))) + &floor;
+        cases.push(Case::new(format!("lamp of radius {r:e}"), body, Answer::Every(0.5, 1e-5)).integrator(DIRECT));
     }
     let body = format!("<sensor type=\"perspective\">{FILM}</sensor>") + SKY;
     cases.push(Case::new("a sky and nothing else", body, Answer::Every(1.0, 2e-6)));
