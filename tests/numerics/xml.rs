@@ -135,6 +135,7 @@ pub fn hold(cases: &[Case]) {
             })
         })
         .collect();
+    eprintln!("{} scenes", cases.len());
     assert!(faults.is_empty(), "{} of {} are wrong\n{}", faults.len(), cases.len(), faults.join("\n"));
 }
 
