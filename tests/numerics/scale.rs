@@ -89,12 +89,14 @@ fn subjects() -> Vec<Subject> {
              - sphere: {{center: P(0.5, 0.4, 2), radius: L(0.4), material: {{dielectric: {{ior: 1.5, absorption: {{color: 0.5, at: L(0.3)}}}}}}}}\n"
             ),
         ),
+        // Rough, so that no light is traced from the lamp: a mesh that is moved has its vertices rounded to f32 anew, and which
+        // way the pilot aims follows single paths.
         scene(
             "meshes",
             eye,
             &format!(
                 "{sky}shapes:\n{floor}\
-             - mesh: {{{}, material: {{conductor: {{metal: silver}}}}}}\n\
+             - mesh: {{{}, material: {{conductor: {{metal: silver, roughness: 0.1}}}}}}\n\
              - mesh: {{{}, normals: face, emission: 1}}\n",
                 copy("m.obj"),
                 copy("n.obj")
