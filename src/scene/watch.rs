@@ -1,6 +1,6 @@
 //! What robust arithmetic was needed for, counted where `abbe render --check-numerics` asks for it.
 //!
-//! The textbook intersector in single precision ([`plain`](super::shape::plain)) is asked about the same rays. Where it
+//! The textbook intersector in single precision ([`plain`]) is asked about the same rays. Where it
 //! finds nothing of a surface that a path met, light would have leaked; where it finds the face that a ray leaves, ahead
 //! of anything that is there, the ray would have hit its own origin: what other renderers keep an epsilon for. Triangles
 //! and analytic shapes are judged, in place; children of instances, curves and distance grids are counted as met only.
