@@ -327,6 +327,12 @@ impl<'a> Walk<'a, '_> {
             }
             let wo = frame.to_local(came);
 
+            // What is black, or lit from behind, sends nothing on and leaves nothing to collect.
+            if let Bsdf::Diffuse { reflectance } = &bsdf
+                && (wo.z <= 0.0 || reflectance.simd_eq(Lanes::ZERO).all())
+            {
+                return;
+            }
             if !bsdf.is_discrete() && !sharp {
                 let at = Vertex { hit: &hit, surface: &surface, frame: &frame, came, local: wo, object };
                 self.connect(&beam, &bsdf, &at, u_lens);

@@ -394,6 +394,10 @@ fn endless_odds(scene: &Scene, caustics: &Caustics) -> bool {
         .any(|(light, traced)| *traced && !light.is_environment() && !matches!(light, Light::Area { .. }))
 }
 
+/// Square of the brightness of light in mirrors and glass, over the rest's variance in the picture, below which it is not
+/// worth merging.
+const FAINT: f64 = 0.1;
+
 /// Share of the rest's variance above which light that is met in mirrors and glass is worth merging.
 const WORTH: f64 = 0.3;
 
@@ -585,10 +589,10 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     // Paths from the camera that find light of mean m with a probability p have a variance of m² / p, whether or not so
     // few paths met it; for a lamp without extent p is zero.
     let endless = endless_odds(scene, &caustics);
-    let by_chance = |means: &[f64], met: usize| {
-        let squares: f64 = means.iter().zip(&weights).map(|(m, w)| w * m * m).sum();
-        let chance = if endless { 0.0 } else { met.max(1) as f64 / camera.paths as f64 };
-        if squares > 0.0 { squares / means.len() as f64 / chance } else { 0.0 }
+    let square = |means: &[f64]| means.iter().zip(&weights).map(|(m, w)| w * m * m).sum::<f64>() / means.len() as f64;
+    let by_chance = |means: &[f64], met: usize| match square(means) {
+        square if square > 0.0 && endless => f64::INFINITY,
+        square => square * camera.paths as f64 / met.max(1) as f64,
     };
     // Light that is seen in mirrors and glass: often met, it is known what it costs to leave it to chance, else it is told
     // from how bright it is.
@@ -597,7 +601,9 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
         ENOUGH.. => mirrored,
         met => by_chance(&found.gathered, met),
     };
-    let counts = found.collected > 0.0 && unmerged > WORTH * kept;
+    // What is as good as never found is missing; where that is less than the noise shows, nothing is gained.
+    let faint = !endless && square(&found.gathered) * f64::from(trial.samples) < FAINT * kept;
+    let counts = found.collected > 0.0 && !faint && unmerged > WORTH * kept;
     let merging = match wishes.merging {
         Use::On => true,
         Use::Auto => counts,
@@ -648,6 +654,9 @@ fn say(trial: &Trial, caustics: &Caustics, camera: &Camera, share: f64, seen: bo
         }
         None if !seen => "the camera sees nothing in mirrors and through glass".into(),
         None if !collected => "no light of mirrors and glass comes to what is seen in them".into(),
+        None if camera.met_mirrored < ENOUGH => {
+            "caustics in mirrors and behind glass are fainter than the noise of so many samples".into()
+        }
         None => format!(
             "paths from the camera find the caustics in mirrors and behind glass: {} of {}",
             camera.met_mirrored, camera.paths

@@ -221,6 +221,9 @@ impl Walk<'_, '_> {
         let Some(first) = each(packet.lanes).next() else { return };
         let texture_point = |lane: usize| at[lane].1.texture_point(at[lane].0);
         let alike = (!reflectance.varies()).then(|| reflectance.eval(&texture_point(first), nm).to_array());
+        if alike.is_some_and(|all| all == [0.0; LANES]) {
+            return;
+        }
         let normals: [DVec3; LANES] = std::array::from_fn(|lane| {
             let (surface, came) = (at[lane].0, -packet.rays[lane].direction);
             let normal = seen_normal(surface, came);
@@ -283,7 +286,8 @@ impl Walk<'_, '_> {
         }
 
         if self.photons.is_some() {
-            for lane in each(packet.lanes) {
+            let lit = |lane: &usize| packet.rays[*lane].direction.dot(normals[*lane]) < 0.0;
+            for lane in each(packet.lanes).filter(lit) {
                 self.leave_photon(&packet.alone(lane), at[lane].0);
             }
         }
