@@ -1,6 +1,6 @@
 //! Eight rays that lie close together: what one meets is tried with all.
 
-use super::{Geometry, Hit, Scene};
+use super::{Geometry, Hit, Nearest, Scene};
 use crate::math::{Departure, Ray};
 use crate::spectrum::LANES;
 
@@ -16,21 +16,20 @@ impl Scene {
     /// [`Scene::closest`] for the rays whose bits are in `lanes`; `None` for the others.
     #[must_use]
     pub fn closest_of(&self, rays: &[Ray; LANES], lanes: u8) -> [Option<Hit>; LANES] {
-        let mut best = [None; LANES];
         if self.bvh.order().len() > FEW {
+            let mut best = [None; LANES];
             for lane in each(lanes) {
                 best[lane] = self.closest(&rays[lane], f64::INFINITY);
             }
             return best;
         }
+        let mut nearest = [Nearest { hit: None, reach: f64::INFINITY }; LANES];
         for &object in self.bvh.order() {
             for lane in each(lanes) {
-                let t_max = best[lane].map_or(f64::INFINITY, |hit: Hit| hit.t);
-                if let Some(hit) = self.meet(&rays[lane], object, t_max) {
-                    best[lane] = Some(hit);
-                }
+                self.meet_nearer(&rays[lane], object, &mut nearest[lane]);
             }
         }
+        let mut best = nearest.map(|nearest| nearest.hit);
         if let Some(together) = &self.together {
             for lane in each(lanes) {
                 let t_max = best[lane].map_or(f64::INFINITY, |hit| hit.t);

@@ -18,6 +18,7 @@ mod surface;
 
 use super::bvh::{Aabb, Bvh};
 use super::camera::{self, Camera};
+use super::few::Few;
 use super::instance::{AffineMap, Group, Instance};
 use super::light::Light;
 use super::load::{self, Pictures, Wanted};
@@ -268,6 +269,7 @@ impl<'a> Compiler<'a> {
         let alone: Vec<u32> =
             (0..objects.len() as u32).filter(|&i| !together.as_ref().is_some_and(|t| t.holds(i))).collect();
         let bvh = Bvh::build(&alone.iter().map(|&i| boxes[i as usize]).collect::<Vec<Aabb>>()).named(&alone);
+        let few = Few::of(&objects, &alone, &boxes);
         objects.extend(children);
         let nested = Nested::of(&mut objects, boxes.len(), |object| {
             self.materials[object.material as usize].body().ok().flatten()
@@ -304,6 +306,7 @@ impl<'a> Compiler<'a> {
             objects,
             standing: boxes.len(),
             bvh,
+            few,
             together,
             materials: std::mem::take(&mut self.materials),
             media,

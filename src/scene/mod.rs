@@ -16,6 +16,7 @@ pub mod compound;
 pub mod curves;
 pub mod emission;
 pub mod environment;
+pub mod few;
 pub mod grid;
 pub mod instance;
 pub mod light;
@@ -41,6 +42,7 @@ use crate::spectrum::{Spectrum, WavelengthDistribution};
 use bvh::Bvh;
 use camera::Camera;
 use curves::Curves;
+use few::Few;
 use glam::DVec3;
 use instance::{AffineMap, Instance, PartHit};
 use light::Light;
@@ -72,6 +74,8 @@ pub struct Scene {
     pub standing: usize,
     /// Over the objects that stand in the scene itself, but for the meshes of [`Scene::together`].
     pub bvh: Bvh,
+    /// The same, where they are few: searched in place of the tree.
+    pub few: Option<Few>,
     /// The triangles of most meshes that stand in the scene itself: a ray is made ready for them once.
     pub together: Option<Together>,
     /// Materials, by index.
@@ -267,6 +271,21 @@ pub struct Hit {
     pub instance: Option<u32>,
 }
 
+/// What a search has found so far. Of things at the same distance the first in the scene counts, so that the order of a
+/// search decides nothing.
+#[derive(Clone, Copy, Debug)]
+struct Nearest {
+    hit: Option<Hit>,
+    /// What counts is nearer than this: as near as `hit` or nearer.
+    reach: f64,
+}
+
+impl Nearest {
+    fn of(hit: Hit) -> Nearest {
+        Nearest { reach: hit.t.next_up(), hit: Some(hit) }
+    }
+}
+
 impl Hit {
     /// The part that was met, as a ray that leaves it names it.
     #[must_use]
@@ -304,24 +323,32 @@ impl Scene {
     /// The nearest thing that `ray` meets closer than `t_max`.
     #[must_use]
     pub fn closest(&self, ray: &Ray, t_max: f64) -> Option<Hit> {
-        let mut best = self.closest_apart(ray, t_max);
-        if let Some(together) = &self.together {
-            let t_max = best.map_or(t_max, |hit| hit.t);
-            best = together.closest(ray, t_max).or(best);
-        }
-        best
+        let best = self.closest_apart(ray, t_max);
+        let Some(together) = &self.together else { return best };
+        together.closest(ray, best.map_or(t_max, |hit| hit.t)).or(best)
     }
 
     /// [`Scene::closest`] but for the triangles of [`Scene::together`].
     #[inline]
     fn closest_apart(&self, ray: &Ray, t_max: f64) -> Option<Hit> {
-        let mut best: Option<Hit> = None;
-        self.bvh.closest(ray, t_max, |object, t_max| {
-            let hit = self.meet(ray, object, t_max)?;
-            best = Some(hit);
-            Some(hit.t)
-        });
-        best
+        if let Some(few) = &self.few {
+            return few.closest(ray, t_max, |object, nearest| _ = self.meet_nearer(ray, object, nearest));
+        }
+        let mut nearest = Nearest { hit: None, reach: t_max };
+        self.bvh.closest(ray, t_max, |object, _| self.meet_nearer(ray, object, &mut nearest));
+        nearest.hit
+    }
+
+    /// Tries `object`. Answers its distance where it is what `ray` meets first of all that was tried.
+    #[inline]
+    fn meet_nearer(&self, ray: &Ray, object: u32, nearest: &mut Nearest) -> Option<f64> {
+        let hit = self.meet(ray, object, nearest.reach)?;
+        let order = |hit: &Hit| (hit.object, hit.instance);
+        if nearest.hit.is_some_and(|known| known.t == hit.t && order(&known) < order(&hit)) {
+            return None;
+        }
+        *nearest = Nearest::of(hit);
+        Some(hit.t)
     }
 
     /// True where anything stands between the ray's origin and `distance`. `target` is the face or
@@ -331,7 +358,7 @@ impl Scene {
     #[must_use]
     pub fn occluded(&self, ray: &Ray, distance: f64, target: Option<Departure>) -> bool {
         let by_triangles = || self.together.as_ref().is_some_and(|t| t.any(ray, distance, target, |_| true));
-        let by_others = self.bvh.any(ray, distance, |object| {
+        let blocked_by = |object: u32| {
             let geometry = &self.objects[object as usize].geometry;
             if let Geometry::Instance(instance) = geometry {
                 return instance.blocks(&self.objects, object, ray, distance);
@@ -345,8 +372,25 @@ impl Scene {
                 }
                 _ => geometry.blocks(ray, distance, departing, target),
             }
-        });
+        };
+        let by_others = match &self.few {
+            Some(few) => {
+                let aimed = self.aimed(target);
+                // A shape that shines outward does not hide itself.
+                let own = aimed.map(|object| (object, &self.objects[object as usize]));
+                let own = own.filter(|(_, o)| o.flipped || !matches!(o.geometry, Geometry::Shape(_)));
+                few.any(ray, distance, aimed, |object, met| met || blocked_by(object))
+                    || own.is_some_and(|(object, _)| blocked_by(object))
+            }
+            None => self.bvh.any(ray, distance, blocked_by),
+        };
         by_others || by_triangles()
+    }
+
+    /// The object of `target`, where it stands in the scene itself.
+    #[inline]
+    fn aimed(&self, target: Option<Departure>) -> Option<u32> {
+        target.map(|t| t.object).filter(|&object| (object as usize) < self.standing)
     }
 
     /// True where `hit` is what a shadow ray toward `target` was to reach: on it, and not on the outside of a

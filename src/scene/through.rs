@@ -42,7 +42,9 @@ impl Crossed {
             return false;
         }
         let mut at = self.count;
-        while at > 0 && self.hits[at - 1].t > hit.t {
+        // At the same distance as the objects stand in the scene, however they were found.
+        let place = |hit: &Hit| (hit.t, hit.object);
+        while at > 0 && place(&self.hits[at - 1]) > place(&hit) {
             self.hits[at] = self.hits[at - 1];
             at -= 1;
         }
@@ -69,44 +71,51 @@ impl Scene {
                 long
             })
         });
+        let mut visit = |object: u32| {
+            let geometry = &self.objects[object as usize].geometry;
+            let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
+            let aimed = target.filter(|t| t.object == object).map(|t| t.part);
+            match geometry {
+                Geometry::Instance(_) => {}
+                _ if !lets_through(object) => return geometry.blocks(ray, distance, departing, aimed),
+                Geometry::Mesh(mesh) => {
+                    let Some(tree) = &mesh.tree else { return false };
+                    return tree.any_of(ray, distance, [departing, aimed], |met| {
+                        let barycentric = [met.hit.b1, met.hit.b2];
+                        let hit = Hit { t: met.hit.t, object, part: met.triangle, barycentric, instance: None };
+                        long = !crossed.push(hit);
+                        long
+                    });
+                }
+                _ => {}
+            }
+            // From one surface of it to the next.
+            let (mut ray, mut gone) = (*ray, 0.0);
+            while let Some(hit) = self.meet(&ray, object, distance - gone) {
+                if hit.is_on(target) {
+                    break;
+                }
+                if !lets_through(hit.object) {
+                    return true;
+                }
+                let surface = self.surface_with(&ray, &hit, Detail::Geometry);
+                ray = self.leave(&surface, &hit, ray.direction);
+                gone += hit.t;
+                long = !crossed.push(Hit { t: gone, ..hit });
+                if long {
+                    return true;
+                }
+            }
+            false
+        };
         let stopped = by_triangles
-            || self.bvh.any(ray, distance, |object| {
-                let geometry = &self.objects[object as usize].geometry;
-                let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
-                let aimed = target.filter(|t| t.object == object).map(|t| t.part);
-                match geometry {
-                    Geometry::Instance(_) => {}
-                    _ if !lets_through(object) => return geometry.blocks(ray, distance, departing, aimed),
-                    Geometry::Mesh(mesh) => {
-                        let Some(tree) = &mesh.tree else { return false };
-                        return tree.any_of(ray, distance, [departing, aimed], |met| {
-                            let barycentric = [met.hit.b1, met.hit.b2];
-                            let hit = Hit { t: met.hit.t, object, part: met.triangle, barycentric, instance: None };
-                            long = !crossed.push(hit);
-                            long
-                        });
-                    }
-                    _ => {}
+            || match &self.few {
+                Some(few) => {
+                    let aimed = self.aimed(target);
+                    few.any(ray, distance, aimed, |object, _| visit(object)) || aimed.is_some_and(visit)
                 }
-                // From one surface of it to the next.
-                let (mut ray, mut gone) = (*ray, 0.0);
-                while let Some(hit) = self.meet(&ray, object, distance - gone) {
-                    if hit.is_on(target) {
-                        break;
-                    }
-                    if !lets_through(hit.object) {
-                        return true;
-                    }
-                    let surface = self.surface_with(&ray, &hit, Detail::Geometry);
-                    ray = self.leave(&surface, &hit, ray.direction);
-                    gone += hit.t;
-                    long = !crossed.push(Hit { t: gone, ..hit });
-                    if long {
-                        return true;
-                    }
-                }
-                false
-            });
+                None => self.bvh.any(ray, distance, visit),
+            };
         match (long, stopped) {
             (true, _) => Way::Long,
             (false, true) => Way::Blocked,

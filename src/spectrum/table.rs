@@ -127,7 +127,7 @@ impl Table {
             Knots::Uniform { inv_step, entries, .. } => {
                 let t = (nm - Lanes::splat(self.range[0] as f32)) * Lanes::splat(*inv_step);
                 let last = entries.len() - 1;
-                let t = t.fast_max(Lanes::splat(0.0)).fast_min(Lanes::splat(last as f32));
+                let t = t.fast_max(Lanes::splat(0.0)).fast_min(Lanes::splat(last as i32 as f32));
                 // t is not negative: truncation is the floor.
                 let row = t.fast_trunc_int();
                 let f = t - Lanes::from_i32x8(row);

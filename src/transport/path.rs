@@ -599,13 +599,13 @@ impl Tracer<'_> {
 
     /// Russian roulette on the largest lane; false where the path ends.
     fn survives<const CHROMATIC: bool>(&self, path: &mut Path, u: f64) -> bool {
-        let beta = path.beta.to_array().into_iter().fold(0.0f32, f32::max);
-        if beta.is_nan() || beta <= 0.0 {
+        if path.beta.simd_gt(Lanes::ZERO).none() {
             return false;
         }
         if path.vertices + 1 < self.settings.roulette_depth {
             return true;
         }
+        let beta = path.beta.to_array().into_iter().fold(0.0f32, f32::max);
         let carried = f64::from(beta) * LANES as f64 / path.rho_sum::<CHROMATIC>() * path.eta2;
         let q = carried.min(if path.vertices < FOR_SURE { 1.0 } else { SURVIVAL });
         if u >= q {

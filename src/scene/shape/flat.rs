@@ -11,8 +11,8 @@ use std::f64::consts::PI;
 /// An infinite plane.
 #[derive(Clone, Debug)]
 pub struct Plane {
-    point: DVec3,
-    frame: Frame,
+    pub(super) point: DVec3,
+    pub(super) frame: Frame,
 }
 
 impl Plane {
@@ -80,18 +80,18 @@ impl Plane {
 
 /// A patch of a plane with two edge vectors: points origin + a·u + b·v.
 #[derive(Clone, Debug)]
-struct Patch {
-    origin: DVec3,
+pub(super) struct Patch {
+    pub(super) origin: DVec3,
     u: DVec3,
     v: DVec3,
-    normal: DVec3,
+    pub(super) normal: DVec3,
     /// Dual vectors: a = `to_a` · (p − origin), b likewise.
-    to_a: DVec3,
-    to_b: DVec3,
+    pub(super) to_a: DVec3,
+    pub(super) to_b: DVec3,
     /// |u × v|.
     jacobian: f64,
     /// What a and b are off by where a neighbour shares the edge, see [`Patch::new`].
-    pad: DVec2,
+    pub(super) pad: DVec2,
     /// How near to the edge a surface point may be.
     margin: DVec2,
 }
@@ -184,7 +184,7 @@ impl Patch {
 
 /// A disk, or an ellipse: centre + a·u + b·v with a² + b² ≤ 1.
 #[derive(Clone, Debug)]
-pub struct Disk(Patch);
+pub struct Disk(pub(super) Patch);
 
 impl Disk {
     /// A disk whose rim passes through `center` ± `edge_u` and `center` ± `edge_v`; round if these
@@ -242,7 +242,7 @@ impl Disk {
 
 /// A rectangle, or a parallelogram: corner + a·u + b·v with 0 ≤ a, b ≤ 1.
 #[derive(Clone, Debug)]
-pub struct Rectangle(Patch);
+pub struct Rectangle(pub(super) Patch);
 
 impl Rectangle {
     /// A rectangle with `corner` at texture coordinates (0, 0). Normal along `edge_u` × `edge_v`.

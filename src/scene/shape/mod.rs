@@ -36,6 +36,7 @@ mod cube;
 mod cylinder;
 pub mod exact;
 mod flat;
+pub mod four;
 #[cfg(test)]
 mod light_tests;
 pub mod plain;

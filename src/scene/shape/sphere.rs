@@ -33,9 +33,9 @@ const FRAME_TOLERANCE: f64 = 4e-6;
 /// A sphere.
 #[derive(Clone, Debug)]
 pub struct Sphere {
-    center: DVec3,
+    pub(super) center: DVec3,
     radius: f64,
-    radius_squared: f64,
+    pub(super) radius_squared: f64,
     /// Rotation of the object frame, for texture coordinates only.
     world_from_object: DMat3,
     /// Whether v is counted from the pole at +y of that frame, not from the one at −y.
