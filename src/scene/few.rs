@@ -52,6 +52,10 @@ impl Few {
     /// most are met one by one, whose boxes a tree finds as fast.
     #[must_use]
     pub fn of(objects: &[Object], indices: &[u32], boxes: &[Aabb]) -> Option<Few> {
+        if cfg!(feature = "single_precision") {
+            // What is measured there are the shapes' own intersectors.
+            return None;
+        }
         let alone = |index: &&u32| match &objects[**index as usize].geometry {
             Geometry::Shape(shape) => matches!(shape, Shape::Cube(_) | Shape::Cylinder(_) | Shape::Cone(_)),
             _ => true,
