@@ -1,4 +1,4 @@
-"""Renders one scene with Mitsuba as often as it is asked to, in one process: tools/bench/equal_error drives it.
+"""Renders one scene with Mitsuba as often as it is asked to, in one process: tools/bench/peers drives it.
 
     mitsuba_render.py VARIANT SCENE.xml SAMPLER RES
 
