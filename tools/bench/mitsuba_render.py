@@ -1,9 +1,11 @@
-"""Renders one scene with Mitsuba as often as it is asked to, in one process: tools/bench/peers drives it.
+"""Renders one scene with Mitsuba as often as it is asked to, in one process, on two threads: tools/bench/peers drives it.
 
-    mitsuba_render.py VARIANT SCENE.xml SAMPLER RES
+    mitsuba_render.py VARIANT SCENE.xml SAMPLER INTEGRATOR RES
 
-Reads lines `SAMPLES SEED FILE.npy` and answers each with the seconds that the render took; the first answer, to an empty
-line, is what loading took. The first render of a number of samples compiles.
+INTEGRATOR takes the place of `volpath`; other integrators stay.
+
+Says first how long loading took, then reads lines `SAMPLES SEED FILE.npy` and answers each with the seconds that the render
+took. The first render of a number of samples compiles.
 """
 import pathlib
 import re
@@ -14,23 +16,20 @@ import numpy as np
 
 
 def main():
-    variant, scene, sampler, res = sys.argv[1:]
+    variant, scene, sampler, integrator, res = sys.argv[1:]
     start = time.perf_counter()
+    import drjit as dr
     import mitsuba as mi
 
     mi.set_variant(variant)
+    dr.set_thread_count(2)
     # Its answers go where its warnings would.
     mi.set_log_level(mi.LogLevel.Error)
-    # Two threads, as ours.
-    text = pathlib.Path(scene).read_text()
-    text = re.sub(r'<sampler type="\w+">', f'<sampler type="{sampler}">', text)
-    # Beside the original: its files are named from there.
-    copy = pathlib.Path(scene).with_name(f".{pathlib.Path(scene).stem}.{sampler}.{variant}.xml")
-    try:
-        copy.write_text(text)
-        loaded = mi.load_file(str(copy), res=int(res))
-    finally:
-        copy.unlink(missing_ok=True)
+    text = re.sub(r'<sampler type="\w+">', f'<sampler type="{sampler}">', pathlib.Path(scene).read_text())
+    text = text.replace('<integrator type="volpath">', f'<integrator type="{integrator}">')
+    # Files are named from where the scene lies.
+    mi.file_resolver().prepend(str(pathlib.Path(scene).resolve().parent))
+    loaded = mi.load_string(text, res=int(res))
     print(time.perf_counter() - start, flush=True)
     for line in sys.stdin:
         samples, seed, file = line.split()
