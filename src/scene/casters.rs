@@ -108,7 +108,7 @@ impl Casters {
                 _ => (sharp(i), i..i + 1),
             };
             // Children of groups are seen through their instances.
-            if !casts || i >= scene.bvh.order().len() {
+            if !casts || i >= scene.standing {
                 continue;
             }
             let ball = Ball::around(&object.bounds());
@@ -161,6 +161,8 @@ fn merge_nearest(balls: &mut Vec<Ball>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile;
 
     fn ball(x: f64, radius: f64) -> Ball {
         Ball { center: DVec3::new(x, 0.0, 0.0), radius }
@@ -185,5 +187,22 @@ mod tests {
             let held = |b: &Ball| (b.center - one.center).length() + one.radius <= b.radius * (1.0 + 1e-12);
             assert!(few.iter().any(held), "{one:?}");
         }
+    }
+
+    /// Triangles of several meshes are in a tree of their own, beside that of the other objects.
+    #[test]
+    fn a_glass_mesh_beside_another_mesh_is_found() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("floor.obj"), "v -4 0 -4\nv 4 0 -4\nv 0 0 4\nf 1 3 2\n").unwrap();
+        let tetrahedron = "v 0 1 0\nv 1 1 0\nv 0 2 0\nv 0 1 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+        std::fs::write(directory.path().join("glass.obj"), tetrahedron).unwrap();
+        let text = "camera: {origin: [0, 3, 9], target: [0, 0, 0], fov_deg: 40}\nshapes:\n\
+            - mesh: {file: floor.obj, material: {diffuse: {}}}\n\
+            - mesh: {file: glass.obj, material: {dielectric: {ior: 1.5}}}\n";
+        let description = SceneDescription::parse(text, &directory.path().join("s.yaml")).unwrap();
+        let scene = compile(&description, "s").unwrap();
+        assert!(scene.together.is_some());
+        let casters = Casters::of(&scene);
+        assert_eq!((casters.casts, casters.balls.len()), (vec![false, true], 1));
     }
 }

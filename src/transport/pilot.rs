@@ -235,7 +235,7 @@ impl Caustics {
         }
         let total: f64 = sources.iter().map(|s| s.probability).sum();
         sources.iter_mut().for_each(|s| s.probability /= total);
-        let stands = &scene.objects[..scene.bvh.order().len()];
+        let stands = &scene.objects[..scene.standing];
         let endless = stands.iter().any(|o| !o.bounds().is_finite());
         let sums = Caustics::sums(&sources);
         Caustics {
