@@ -93,12 +93,12 @@ fn damaged_files_are_read_or_refused_in_words() {
     }
 }
 
-/// Writes the seeds of each kind to `fuzz/corpus/KIND`, for libFuzzer: `tools/fuzz` calls it.
+/// Writes the seeds of each kind to `target/fuzz/corpus/KIND`, for libFuzzer: `tools/fuzz` calls it.
 #[test]
 #[ignore = "it tests nothing, but writes files"]
 fn corpus() {
     for target in &TARGETS {
-        let directory = std::path::Path::new("fuzz/corpus").join(target.name);
+        let directory = std::path::Path::new("target/fuzz/corpus").join(target.name);
         std::fs::create_dir_all(&directory).unwrap();
         for (i, seed) in (target.seeds)().iter().enumerate() {
             std::fs::write(directory.join(format!("seed{i}")), seed).unwrap();

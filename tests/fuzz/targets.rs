@@ -1,4 +1,4 @@
-//! One file of each kind that Abbe reads, and what reads it: for `tests/fuzz` and for libFuzzer (`fuzz/`).
+//! One file of each kind that Abbe reads, and what reads it: for `tests/fuzz` and for libFuzzer (`tests/fuzz/libfuzzer`).
 
 use abbe::batch::{self, Overrides};
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! libFuzzer over every kind of file that Abbe reads: `tools/fuzz` runs it once for each, named by `ABBE_FUZZ_TARGET`.
 #![no_main]
 
-#[path = "../../tests/fuzz/targets.rs"]
+#[path = "../targets.rs"]
 #[allow(dead_code, reason = "the pieces of scenes are for tests/fuzz")]
 mod targets;
 
