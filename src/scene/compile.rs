@@ -28,7 +28,7 @@ use super::mesh::MeshTree;
 use super::mesh::together::Together;
 use super::nested::{Inside, Nested};
 use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Layout, Plane, Rectangle, Shape, Sphere};
-use super::shelf::{Shelf, SkyKey};
+use super::shelf::Shelf;
 use super::texture::{Scalar, Texture};
 use super::volume::Volume;
 use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene};
@@ -113,24 +113,27 @@ pub fn compile_with(description: &SceneDescription, name: &str, shelf: &mut Shel
     c.finish(scene)
 }
 
-/// Under what the sky of `sky` is kept.
-fn sky_key(sky: &written::EnvironmentLight) -> SkyKey {
+/// What makes the sky of `sky` differ from others of its file.
+fn sky_key(sky: &written::EnvironmentLight) -> Vec<u64> {
     let numbers = sky.world_from_map().to_cols_array().into_iter().chain([sky.scale]);
     let mapping = u64::from(sky.mapping == written::EnvironmentMapping::Mitsuba);
-    (sky.file.to_path_buf(), numbers.map(f64::to_bits).chain([mapping]).collect())
+    numbers.map(f64::to_bits).chain([mapping]).collect()
 }
 
 /// The pictures that a scene names and `shelf` lacks. What textures are used for shows later: without `raw` mostly as
 /// colours.
 fn pictures<'a>(d: &'a SceneDescription, shelf: &Shelf) -> impl Iterator<Item = (&'a Path, Wanted)> {
-    let textures = d.textures.values().filter_map(|texture| match texture {
-        written::Texture::Image(image) if !shelf.has_picture(&image.file, image.raw) => {
+    let has = |file: &Path, raw| shelf.colours.has(file, raw) || shelf.numbers.has(file, raw);
+    let textures = d.textures.values().filter_map(move |texture| match texture {
+        written::Texture::Image(image) if !has(&image.file, image.raw) => {
             Some((&*image.file, if image.raw { Wanted::Pixels } else { Wanted::Colours }))
         }
         _ => None,
     });
     let skies = d.lights.iter().filter_map(|light| match light {
-        written::Light::Environment(sky) if !shelf.has_sky(&sky_key(sky)) => Some((&*sky.file, Wanted::Pixels)),
+        written::Light::Environment(sky) if !shelf.skies.has(&sky.file, sky_key(sky)) => {
+            Some((&*sky.file, Wanted::Pixels))
+        }
         _ => None,
     });
     textures.chain(skies)

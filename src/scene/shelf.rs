@@ -21,10 +21,10 @@ fn stamp(path: &Path) -> Option<Stamp> {
     Some((data.len(), data.modified().ok()))
 }
 
-/// Things that were made of files.
+/// Things that were made of files: of each file, of as many kinds as there are `K`.
 #[derive(Debug)]
-struct Kept<K, V> {
-    things: HashMap<K, Thing<V>>,
+pub struct Kept<K, V> {
+    things: HashMap<(PathBuf, K), Thing<V>>,
 }
 
 #[derive(Debug)]
@@ -43,23 +43,36 @@ impl<K, V> Default for Kept<K, V> {
 
 impl<K: Eq + Hash, V: Clone> Kept<K, V> {
     /// Whether `key` is here, made of `path` as it is now.
-    fn has(&self, key: &K, path: &Path) -> bool {
-        self.things.get(key).is_some_and(|thing| stamp(path) == Some(thing.of))
+    #[must_use]
+    pub fn has(&self, path: &Path, key: K) -> bool {
+        self.things.get(&(path.to_path_buf(), key)).is_some_and(|thing| stamp(path) == Some(thing.of))
     }
 
-    /// What is here, else what `make` gives.
-    fn get<E>(&mut self, key: K, path: &Path, make: impl FnOnce() -> Result<V, E>) -> Result<V, E> {
-        if self.has(&key, path)
-            && let Some(thing) = self.things.get_mut(&key)
-        {
+    /// What is here, made of `path` as it is now.
+    pub fn find(&mut self, path: &Path, key: K) -> Option<V> {
+        let thing = self.things.get_mut(&(path.to_path_buf(), key))?;
+        (stamp(path) == Some(thing.of)).then(|| {
             thing.wanted = true;
-            return Ok(thing.made.clone());
+            thing.made.clone()
+        })
+    }
+
+    /// What is here, else what `make` gives, which is kept.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn get<E>(&mut self, path: &Path, key: K, make: impl FnOnce() -> Result<V, E>) -> Result<V, E>
+    where
+        K: Clone,
+    {
+        if let Some(made) = self.find(path, key.clone()) {
+            return Ok(made);
         }
         // Before it is read: what changes meanwhile is read again.
         let of = stamp(path);
         let made = make()?;
         if let Some(of) = of {
-            self.things.insert(key, Thing { made: made.clone(), of, wanted: true });
+            self.things.insert((path.to_path_buf(), key), Thing { made: made.clone(), of, wanted: true });
         }
         Ok(made)
     }
@@ -69,83 +82,20 @@ impl<K: Eq + Hash, V: Clone> Kept<K, V> {
     }
 }
 
-/// What makes one map of light differ from another of the same file: scale, mapping and turns, as bits.
-pub type SkyKey = (PathBuf, Vec<u64>);
-
 /// Pictures, skies and meshes.
 #[derive(Debug, Default)]
 pub struct Shelf {
-    colours: Kept<(PathBuf, bool), ImageTexture>,
-    numbers: Kept<(PathBuf, bool), DataImage>,
-    skies: Kept<SkyKey, Arc<Environment>>,
-    meshes: Kept<(PathBuf, u32), Arc<MeshSource>>,
+    /// Pictures as colours, raw or not.
+    pub colours: Kept<bool, ImageTexture>,
+    /// Pictures as numbers, raw or not.
+    pub numbers: Kept<bool, DataImage>,
+    /// Maps of light, by what makes one differ from another of the same file: turns, scale and mapping, as bits.
+    pub skies: Kept<Vec<u64>, Arc<Environment>>,
+    /// Meshes, by their index in the file.
+    pub meshes: Kept<u32, Arc<MeshSource>>,
 }
 
 impl Shelf {
-    /// Whether a picture is here, in some form.
-    #[must_use]
-    pub fn has_picture(&self, path: &Path, raw: bool) -> bool {
-        let key = (path.to_path_buf(), raw);
-        self.colours.has(&key, path) || self.numbers.has(&key, path)
-    }
-
-    /// Whether a sky is here.
-    #[must_use]
-    pub fn has_sky(&self, key: &SkyKey) -> bool {
-        self.skies.has(key, &key.0)
-    }
-
-    /// The picture `path` as colours, made by `make` if it is not here.
-    ///
-    /// # Errors
-    /// Those of `make`.
-    pub fn colours<E>(
-        &mut self,
-        path: &Path,
-        raw: bool,
-        make: impl FnOnce() -> Result<ImageTexture, E>,
-    ) -> Result<ImageTexture, E> {
-        self.colours.get((path.to_path_buf(), raw), path, make)
-    }
-
-    /// The picture `path` as numbers, made by `make` if it is not here.
-    ///
-    /// # Errors
-    /// Those of `make`.
-    pub fn numbers<E>(
-        &mut self,
-        path: &Path,
-        raw: bool,
-        make: impl FnOnce() -> Result<DataImage, E>,
-    ) -> Result<DataImage, E> {
-        self.numbers.get((path.to_path_buf(), raw), path, make)
-    }
-
-    /// A sky, made by `make` if it is not here.
-    ///
-    /// # Errors
-    /// Those of `make`.
-    pub fn sky<E>(
-        &mut self,
-        key: SkyKey,
-        make: impl FnOnce() -> Result<Environment, E>,
-    ) -> Result<Arc<Environment>, E> {
-        let path = key.0.clone();
-        self.skies.get(key, &path, || make().map(Arc::new))
-    }
-
-    /// Mesh `index` of `path`, if it is here.
-    #[must_use]
-    pub fn mesh(&mut self, path: &Path, index: u32) -> Option<Arc<MeshSource>> {
-        self.meshes.get((path.to_path_buf(), index), path, || Err(())).ok()
-    }
-
-    /// Keeps a mesh.
-    pub fn keep_mesh(&mut self, path: &Path, index: u32, source: &Arc<MeshSource>) {
-        let kept: Result<_, ()> = self.meshes.get((path.to_path_buf(), index), path, || Ok(source.clone()));
-        let _ = kept;
-    }
-
     /// Forgets what was not asked for since the last call.
     pub fn forget_unwanted(&mut self) {
         self.colours.forget();
@@ -171,7 +121,7 @@ mod tests {
                 made += 1;
                 Ok(made)
             };
-            kept.get((), &path, make).unwrap()
+            kept.get(&path, (), make).unwrap()
         };
         assert_eq!([get(&mut kept), get(&mut kept)], [1, 1]);
         kept.forget();

@@ -12,6 +12,7 @@ use crate::error::Result;
 use crate::scene::camera::{self, Camera};
 use crate::spectrum::illuminant;
 use glam::DVec2;
+use std::sync::Arc;
 
 impl<'a> Compiler<'a> {
     /// A texture as light: the colours of a picture are lit by D65 or what it names.
@@ -108,10 +109,11 @@ impl<'a> Compiler<'a> {
                     written::EnvironmentMapping::Mitsuba => Mapping::Poles,
                 };
                 let (shelf, pictures) = (&mut self.shelf, &mut self.pictures);
-                let map = shelf.sky(super::sky_key(l), || {
+                let map = shelf.skies.get(&l.file, super::sky_key(l), || {
                     let load::Picture { pixels, width, height } =
                         pictures.take(&l.file).and_then(|p| load::picture(&l.file, p))?;
-                    Ok(Environment::new(&pixels, width, height, l.scale, mapping, l.world_from_map()))
+                    let map = Environment::new(&pixels, width, height, l.scale, mapping, l.world_from_map());
+                    Ok(Arc::new(map))
                 });
                 Light::Environment(map.map_err(|e| self.asked(&format!("{at}.file"), e))?)
             }

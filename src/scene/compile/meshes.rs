@@ -7,6 +7,7 @@ use crate::scene::shelf::Shelf;
 use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
+use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -39,7 +40,7 @@ impl Meshes {
     pub(super) fn known(description: &SceneDescription, shelf: &mut Shelf) -> Sources {
         let all = wanted(description);
         let all = all.iter().map(|(_, _, mesh)| (&*mesh.file, mesh.index));
-        Sources::from_known(all.filter_map(|(path, index)| Some((path, index, shelf.mesh(path, index)?))))
+        Sources::from_known(all.filter_map(|(path, index)| Some((path, index, shelf.meshes.find(path, index)?))))
     }
 
     /// All meshes that `description` places, of files of which some are `known`. A file that cannot be read is left to
@@ -98,7 +99,9 @@ impl Meshes {
 
     /// Puts what was read on the shelf.
     pub(super) fn keep(&self, shelf: &mut Shelf) {
-        self.sources.each(|path, index, source| shelf.keep_mesh(path, index, source));
+        self.sources.each(|path, index, source| {
+            let Ok(_) = shelf.meshes.get(path, index, || Ok::<_, Infallible>(source.clone()));
+        });
     }
 
     /// What the file of `mesh` says.

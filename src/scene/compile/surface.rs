@@ -124,7 +124,7 @@ impl<'a> Compiler<'a> {
             written::Texture::Image(image) => {
                 self.files.push(image.file.to_path_buf());
                 let (shelf, pictures) = (&mut self.shelf, &mut self.pictures);
-                let loaded = shelf.colours(&image.file, image.raw, || {
+                let loaded = shelf.colours.get(&image.file, image.raw, || {
                     pictures.take(&image.file).and_then(|p| load::image_texture(&image.file, p, image.raw))
                 });
                 let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
@@ -148,7 +148,7 @@ impl<'a> Compiler<'a> {
             written::Texture::Image(image) => {
                 self.files.push(image.file.to_path_buf());
                 let (shelf, pictures) = (&mut self.shelf, &mut self.pictures);
-                let loaded = shelf.numbers(&image.file, image.raw, || {
+                let loaded = shelf.numbers.get(&image.file, image.raw, || {
                     pictures.take(&image.file).and_then(|p| load::data_image(&image.file, p, image.raw))
                 });
                 let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
