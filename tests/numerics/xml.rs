@@ -160,14 +160,14 @@ pub const FILM: &str = "<sampler type=\"independent\"><integer name=\"sample_cou
     <film type=\"hdrfilm\"><integer name=\"width\" value=\"SIDE\"/><integer name=\"height\" value=\"SIDE\"/>\
     <string name=\"component_format\" value=\"float32\"/><rfilter type=\"box\"/></film>";
 
-/// A camera that sees from 1e-12 to 1e6 times the distance of its target.
-pub fn camera(origin: [f64; 3], target: [f64; 3], fov: f64) -> String {
+/// A camera that sees from 1e-12 to 1e6 times the distance of its target, with `inside`, and placed `before` it looks.
+fn sensor(plugin: &str, inside: &str, before: &str, [origin, target]: [[f64; 3]; 2]) -> String {
     let d = (0..3).map(|i| (origin[i] - target[i]).powi(2)).sum::<f64>().sqrt();
     let up = if (origin[1] - target[1]).abs() > 0.9 * d { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] };
     format!(
-        "<sensor type=\"perspective\"><float name=\"fov\" value=\"{fov:?}\"/>\
+        "<sensor type=\"{plugin}\">{inside}\
          <float name=\"near_clip\" value=\"{:?}\"/><float name=\"far_clip\" value=\"{:?}\"/>\
-         <transform name=\"to_world\"><lookat origin=\"{}\" target=\"{}\" up=\"{}\"/></transform>{FILM}</sensor>",
+         <transform name=\"to_world\">{before}<lookat origin=\"{}\" target=\"{}\" up=\"{}\"/></transform>{FILM}</sensor>",
         d * 1e-12,
         d * 1e6,
         list(origin),
@@ -176,20 +176,14 @@ pub fn camera(origin: [f64; 3], target: [f64; 3], fov: f64) -> String {
     )
 }
 
+/// A camera with an angle of view of `fov` degrees.
+pub fn camera(origin: [f64; 3], target: [f64; 3], fov: f64) -> String {
+    sensor("perspective", &format!("<float name=\"fov\" value=\"{fov:?}\"/>"), "", [origin, target])
+}
+
 /// A camera of parallel rays over a square of half side `half`.
 pub fn parallel(origin: [f64; 3], target: [f64; 3], half: f64) -> String {
-    let d = (0..3).map(|i| (origin[i] - target[i]).powi(2)).sum::<f64>().sqrt();
-    let up = if (origin[1] - target[1]).abs() > 0.9 * d { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] };
-    format!(
-        "<sensor type=\"orthographic\">\
-         <float name=\"near_clip\" value=\"{:?}\"/><float name=\"far_clip\" value=\"{:?}\"/>\
-         <transform name=\"to_world\"><scale x=\"{half:?}\" y=\"{half:?}\"/><lookat origin=\"{}\" target=\"{}\" up=\"{}\"/></transform>{FILM}</sensor>",
-        d * 1e-12,
-        d * 1e6,
-        list(origin),
-        list(target),
-        list(up)
-    )
+    sensor("orthographic", "", &format!("<scale x=\"{half:?}\" y=\"{half:?}\"/>"), [origin, target])
 }
 
 pub fn sphere(center: [f64; 3], radius: f64, inside: &str) -> String {
