@@ -4,7 +4,7 @@
 mod common;
 
 use abbe::batch::frame::{FrameJob, render_part};
-use abbe::batch::{self, Overrides, Prepared, Watcher};
+use abbe::batch::{self, Overrides, Prepared};
 use abbe::film::Window;
 use abbe::film::accumulate::Film;
 use abbe::film::exr::{ExrFile, read_exr};
@@ -251,17 +251,9 @@ fn a_scene_scaled_by_a_power_of_two_has_the_same_bits() {
     }
 }
 
-struct Silent;
-
-impl Watcher for Silent {
-    fn scene_begins(&self, _: usize, _: usize, _: &str) {}
-    fn progress(&self, _: batch::frame::Progress) {}
-    fn scene_ends(&self, _: &batch::report::SceneReport) {}
-}
-
 fn render_to(yaml: &Path, out: &Path) -> ExrFile {
     let overrides = Overrides { output: Some(out.to_path_buf()), ..Overrides::default() };
-    let report = batch::render_batch(yaml, &overrides, &Silent, &AtomicBool::new(false)).unwrap();
+    let report = batch::render_batch(yaml, &overrides, &(), &AtomicBool::new(false)).unwrap();
     assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
     read_exr(&out.join("scene.exr")).unwrap()
 }

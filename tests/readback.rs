@@ -2,7 +2,7 @@
 
 mod common;
 
-use abbe::batch::{self, Overrides, Watcher, report::Report};
+use abbe::batch::{self, Overrides, report::Report};
 use abbe::film::Window;
 use abbe::film::exr::{ExrFile, read_exr};
 use abbe::film::resolve;
@@ -12,14 +12,6 @@ use exr::meta::attribute::AttributeValue;
 use exr::meta::header::Header;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
-
-struct Silent;
-
-impl Watcher for Silent {
-    fn scene_begins(&self, _: usize, _: usize, _: &str) {}
-    fn progress(&self, _: batch::frame::Progress) {}
-    fn scene_ends(&self, _: &batch::report::SceneReport) {}
-}
 
 /// A red ball in front of a blue wall, 20 × 12 pixels, of which 7 × 5 are cropped.
 const SCENE: &str = "camera: {origin: [1, 2, 6], target: [0, 0.5, 0], fov_deg: 40}\n\
@@ -42,7 +34,7 @@ fn written(more: &str) -> Written {
     let out = bench.directory.path().join("out");
     let overrides = Overrides { output: Some(out.clone()), ..Overrides::default() };
     let yaml = bench.directory.path().join("scene.yaml");
-    let report = batch::render_batch(&yaml, &overrides, &Silent, &AtomicBool::new(false)).unwrap();
+    let report = batch::render_batch(&yaml, &overrides, &(), &AtomicBool::new(false)).unwrap();
     assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
     Written { bench, report, path: out.join("scene.exr") }
 }

@@ -54,6 +54,13 @@ pub trait Watcher: Sync {
     fn scene_ends(&self, report: &SceneReport);
 }
 
+/// Nobody watches.
+impl Watcher for () {
+    fn scene_begins(&self, _: usize, _: usize, _: &str) {}
+    fn progress(&self, _: Progress) {}
+    fn scene_ends(&self, _: &SceneReport) {}
+}
+
 /// A scene made ready: compiled and planned.
 #[derive(Debug)]
 pub struct Prepared {
