@@ -18,6 +18,7 @@ mod surface;
 
 use super::bvh::{Aabb, Bvh};
 use super::camera::{self, Camera};
+use super::choice::Choice;
 use super::few::Few;
 use super::instance::{AffineMap, Group, Instance};
 use super::light::Light;
@@ -280,6 +281,7 @@ impl<'a> Compiler<'a> {
         media.append(&mut self.absorbing);
         let (center, radius) = extent(&boxes, &camera);
         let light_cdf = lights::light_cdf(&lights, &weights, &objects, radius);
+        let choice = Choice::of(&lights, &weights, &objects, center, radius);
         let light_exponent = crate::scene::light::exponent(&lights, &objects, radius);
         let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
         let bands = self.bands();
@@ -318,6 +320,7 @@ impl<'a> Compiler<'a> {
             camera_inside: Inside::default(),
             lights,
             light_cdf,
+            choice,
             light_exponent,
             backgrounds,
             fog,

@@ -11,6 +11,7 @@ pub mod bvh;
 pub mod camera;
 pub mod casters;
 pub mod census;
+pub mod choice;
 pub mod compile;
 pub mod compound;
 pub mod curves;
@@ -41,6 +42,7 @@ use crate::math::{Departure, Ray};
 use crate::spectrum::{Spectrum, WavelengthDistribution};
 use bvh::Bvh;
 use camera::Camera;
+use choice::Choice;
 use curves::Curves;
 use few::Few;
 use glam::DVec3;
@@ -92,6 +94,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// How lights are chosen: running sums of probabilities.
     pub light_cdf: Vec<f64>,
+    /// How a point of the scene chooses among them; `None` where all choose alike.
+    pub choice: Option<Choice>,
     /// The film counts light over two to this power: see [`light::exponent`].
     pub light_exponent: i32,
     /// Indices of lights from infinity.

@@ -22,6 +22,19 @@ pub struct Projector {
     scale: f32,
 }
 
+/// A cone from a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Cone {
+    /// Where it begins.
+    pub apex: DVec3,
+    /// Its middle, unit.
+    pub axis: DVec3,
+    /// From the middle to what is farthest from it, radians.
+    pub half_angle: f64,
+    /// What is lit of it, sr.
+    pub solid_angle: f64,
+}
+
 impl Projector {
     /// A projector that throws a picture `half` wide and high, to each side, at distance one. With a negative
     /// height v grows downward.
@@ -71,6 +84,15 @@ impl Projector {
         let at = TexturePoint { uv: u, point: self.position + direction, ..TexturePoint::default() };
         let factor = PI * 4.0 * self.half.x * self.half.y;
         (Ray::new(self.position, direction), self.irradiance.eval(&at, nm) * (self.scale * factor as f32))
+    }
+
+    /// The cone that holds its light.
+    #[must_use]
+    pub fn cone(&self) -> Cone {
+        let half = self.half.abs();
+        // Of a rectangle seen from above its middle (Oosterom and Strackee 1983, four corners).
+        let solid_angle = 4.0 * libm::atan2(half.x * half.y, (1.0 + half.length_squared()).sqrt());
+        Cone { apex: self.position, axis: self.axes.z_axis, half_angle: libm::atan(half.length()), solid_angle }
     }
 
     /// Luminous power, film units times m²: that which falls on the screen.

@@ -292,7 +292,7 @@ impl Tracer<'_> {
                     None => 1.0,
                     Some(p) => {
                         let total = crate::scene::Hit { t: p.distance + hit.t, ..hit };
-                        let q = scene.light_probability(light as usize)
+                        let q = scene.light_probability_at(light as usize, p.point, p.normal)
                             * scene.lights[light as usize].area_pdf(
                                 &scene.objects,
                                 p.point,

@@ -176,7 +176,7 @@ fn path_techniques(census: &Census, chromatic: bool) -> Vec<Effect> {
         technique(
             "next-event estimation",
             lights > 0,
-            format!("of {lights} lights, chosen by power"),
+            format!("of {lights} lights, chosen by what each may give"),
             "there is no light",
         ),
         technique(

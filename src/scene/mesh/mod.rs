@@ -215,7 +215,13 @@ impl Mesh {
     /// The area of triangle `i`, m². Zero exactly for triangles that are never hit.
     #[must_use]
     pub fn area(&self, i: u32) -> f64 {
-        0.5 * area_vector(self.vertices(i)).length()
+        0.5 * self.area_vector(i).length()
+    }
+
+    /// The normal of triangle `i` times twice its area, m².
+    #[must_use]
+    pub fn area_vector(&self, i: u32) -> DVec3 {
+        area_vector(self.vertices(i))
     }
 
     /// Point and normal of [`Mesh::surface`], to the bit; the triangle's own normal and first side stand in for the rest.

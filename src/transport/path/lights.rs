@@ -79,7 +79,7 @@ impl Tracer<'_> {
                 None => (light.background(path.ray.direction, self.nm), 1.0),
                 Some(p) => {
                     let (l, pdf) = light.background_and_pdf(path.ray.direction, p.normal, self.nm);
-                    let q = self.scene.light_probability(i as usize) * pdf;
+                    let q = self.scene.light_probability_at(i as usize, p.point, p.normal) * pdf;
                     (l, power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho))
                 }
             };
@@ -105,7 +105,7 @@ impl Tracer<'_> {
         leave: impl FnOnce(DVec3) -> Ray,
     ) {
         let scene = self.scene;
-        let Some((i, probability)) = scene.choose_light(u_light) else { return };
+        let Some((i, probability)) = scene.choose_light_at(point, normal, u_light) else { return };
         let Some(light) = scene.lights[i].arriving(&scene.objects, point, normal, u, self.nm) else { return };
         let (f, pdf) = scatterer.eval(wo, light.wi);
         if f.simd_eq(Lanes::ZERO).all() {

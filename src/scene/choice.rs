@@ -1,0 +1,657 @@
+//! Which light a point asks: that which may give it the most.
+//!
+//! A light is chosen with a probability near to its share of the light that would arrive if nothing stood in the way
+//! (Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", without the
+//! splitting): intensity over squared distance, with the largest cosines that lamp and surface can have. Lights with a
+//! place hang in a tree of eight children a node, all judged at once; light from infinity is judged beside the root.
+//! Up to eight lamps are thus judged one by one.
+//!
+//! The judgement knows no shadows, so [`BY_POWER`] of the choices are made by power alone, as if the point were unknown.
+//! Any probabilities are right as long as they are known exactly; these are computed in f32 by the same operations
+//! whenever they are asked for.
+
+use super::bvh::Aabb;
+use super::light::Light;
+use super::shape::Shape;
+use super::{Geometry, Object, Scene};
+use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
+use wide::f32x8;
+
+/// The share of choices that are made without regard to the point.
+const BY_POWER: f64 = 1.0 / 16.0;
+
+/// Where a light, or several, may be seen, and how strong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Extent {
+    /// A ball around it.
+    center: DVec3,
+    radius: f64,
+    /// Luminous intensity in the direction where it is strongest, film units times m².
+    intensity: f64,
+    /// Middle of all normals, unit, and the largest angle of a normal with it, radians.
+    axis: DVec3,
+    spread: f64,
+    /// The largest angle from a normal into which light goes, radians.
+    reach: f64,
+    /// Whether it is as strong in all those directions, and does not fall with the cosine.
+    even: bool,
+}
+
+/// What lights have to give to a point, before anything stands in the way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Gift {
+    Near(Extent),
+    /// From infinity: on a surface that is turned to it, and on a point of a medium, in film units. `toward` where it
+    /// comes from one direction, unit.
+    Distant {
+        toward: Option<DVec3>,
+        surface: f64,
+        point: f64,
+    },
+}
+
+impl Gift {
+    fn of(light: &Light, objects: &[Object], scene_radius: f64) -> Gift {
+        let power = light.power(objects, scene_radius);
+        let from_point = |position: DVec3, intensity: f64, axis: DVec3, reach: f64| {
+            let spread = if reach >= PI { PI } else { 0.0 };
+            Gift::Near(Extent { center: position, radius: 0.0, intensity, axis, spread, reach, even: true })
+        };
+        match light {
+            Light::Area { object, .. } => Gift::Near(Extent::of_surface(&objects[*object as usize], power / PI)),
+            Light::AlongNormal { object, .. } => {
+                let extent = Extent::of_surface(&objects[*object as usize], power);
+                Gift::Near(Extent { spread: PI, ..extent })
+            }
+            Light::Point { position, .. } => from_point(*position, power / (4.0 * PI), DVec3::Z, PI),
+            Light::Spot { position, axis, beam, cutoff, .. } => {
+                let angle = 2.0 * PI * (1.0 - libm::cos(0.5 * (beam + cutoff)));
+                from_point(*position, power / angle, *axis, *cutoff)
+            }
+            Light::Projector(projector) => {
+                let cone = projector.cone();
+                from_point(cone.apex, power / cone.solid_angle, cone.axis, cone.half_angle)
+            }
+            Light::Directional { direction, irradiance } => {
+                let irradiance = irradiance.luminance();
+                Gift::Distant { toward: Some(-*direction), surface: irradiance, point: irradiance }
+            }
+            Light::Constant { radiance } => Gift::everywhere(radiance.luminance()),
+            Light::Environment(map) => Gift::everywhere(map.mean_luminance()),
+        }
+    }
+
+    fn everywhere(radiance: f64) -> Gift {
+        Gift::Distant { toward: None, surface: PI * radiance, point: 4.0 * PI * radiance }
+    }
+}
+
+impl Extent {
+    /// A surface with `strength`, its area times its radiance.
+    fn of_surface(object: &Object, strength: f64) -> Extent {
+        let Aabb { min, max } = object.bounds();
+        let (center, radius) = (0.5 * min + 0.5 * max, 0.5 * (max - min).length());
+        let (axis, spread) = match &object.geometry {
+            Geometry::Shape(shape @ (Shape::Disk(_) | Shape::Rectangle(_))) => {
+                (shape.sample_area(glam::DVec2::splat(0.5)).normal, 0.0)
+            }
+            Geometry::Mesh(mesh) => {
+                let normals = || (0..mesh.mesh.triangles.len() as u32).map(|i| mesh.mesh.area_vector(i));
+                let axis = normals().sum::<DVec3>().normalize_or_zero();
+                let least = normals().filter_map(DVec3::try_normalize).map(|n| n.dot(axis)).fold(1.0, f64::min);
+                (axis, if least > 0.0 { libm::acos(least.min(1.0)) } else { PI })
+            }
+            _ => (DVec3::Z, PI),
+        };
+        // A closed convex body shows a quarter of its surface, in the mean over all directions (Cauchy).
+        let seen = if spread < PI { 1.0 } else { 0.25 };
+        let radius = match &object.geometry {
+            Geometry::Shape(Shape::Sphere(_)) => 0.5 * (max - min).max_element(),
+            _ => radius,
+        };
+        let axis = axis * object.facing();
+        Extent { center, radius, intensity: seen * strength, axis, spread, reach: 0.5 * PI, even: false }
+    }
+
+    fn bounds(&self) -> Aabb {
+        Aabb { min: self.center - self.radius, max: self.center + self.radius }
+    }
+
+    /// Around all of `parts`, of which there is one at least.
+    fn around(parts: &[Extent]) -> Extent {
+        let all = parts.iter().fold(Aabb::EMPTY, |b, part| b.union(&part.bounds()));
+        let (mut axis, mut spread) = (parts[0].axis, parts[0].spread);
+        for part in &parts[1..] {
+            (axis, spread) = cone_around((axis, spread), (part.axis, part.spread));
+        }
+        Extent {
+            center: 0.5 * all.min + 0.5 * all.max,
+            radius: 0.5 * (all.max - all.min).length(),
+            intensity: parts.iter().map(|part| part.intensity).sum(),
+            axis,
+            spread,
+            reach: parts.iter().map(|part| part.reach).fold(0.0, f64::max),
+            even: parts.iter().any(|part| part.even),
+        }
+    }
+}
+
+/// A cone of directions that holds two.
+fn cone_around(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
+    let ((wide, spread), (narrow, other)) = if a.1 >= b.1 { (a, b) } else { (b, a) };
+    let between = libm::acos(wide.dot(narrow).clamp(-1.0, 1.0));
+    if (between + other).min(PI) <= spread {
+        return (wide, spread);
+    }
+    let all = 0.5 * (spread + between + other);
+    let across = (narrow - wide * wide.dot(narrow)).normalize_or_zero();
+    if all >= PI || across == DVec3::ZERO {
+        return (wide, PI);
+    }
+    let turn = all - spread;
+    (wide * libm::cos(turn) + across * libm::sin(turn), all)
+}
+
+/// Bit of a child word that marks a light.
+const LEAF: u32 = 1 << 31;
+
+/// Eight extents, in coordinates of the tree, and where they lead.
+#[derive(Clone, Debug)]
+struct Node {
+    center: [f32x8; 3],
+    radius2: f32x8,
+    intensity: f32x8,
+    axis: [f32x8; 3],
+    /// Cosine and sine of the spread.
+    spread: [f32x8; 2],
+    /// Cosine of the reach.
+    reach: f32x8,
+    /// 1 where the light is even, else 0.
+    even: f32x8,
+    /// A light with [`LEAF`], or a node.
+    children: [u32; 8],
+}
+
+/// Light from infinity.
+#[derive(Clone, Copy, Debug)]
+struct Distant {
+    light: u32,
+    toward: Option<Vec3>,
+    surface: f32,
+    point: f32,
+}
+
+/// Where a light is found.
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    Child { node: u32, lane: u32 },
+    Distant(u32),
+}
+
+/// The lights of a scene by what they have to give.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    nodes: Vec<Node>,
+    /// Of each node but the first, the node and lane that lead to it.
+    parents: Vec<(u32, u32)>,
+    distant: Vec<Distant>,
+    places: Vec<Place>,
+    center: DVec3,
+    /// Of lengths, a power of two.
+    scale: f64,
+}
+
+/// A point that asks, in coordinates of the tree, and the normal of the side that it asks for.
+struct Asking {
+    point: Vec3,
+    normal: Option<Vec3>,
+}
+
+/// The weights at the root: of eight children, of each light from infinity, and their sum.
+struct Root {
+    near: [f32; 8],
+    sum: f32,
+}
+
+impl Choice {
+    /// Of `lights`, which count as often as `weights` say. `None` where every point would choose alike.
+    #[must_use]
+    pub fn of(lights: &[Light], weights: &[f64], objects: &[Object], center: DVec3, radius: f64) -> Option<Choice> {
+        if lights.len() < 2 {
+            return None;
+        }
+        // A power of two, so that a scene times a power of two has the same tree.
+        let exponent = ((radius.to_bits() >> 52 & 0x7ff) as i64 - 1023).clamp(-500, 500);
+        let scale = f64::from_bits(((1023 - exponent) as u64) << 52);
+        let mut near = Vec::new();
+        let mut distant = Vec::new();
+        for (i, (light, &weight)) in (0u32..).zip(lights.iter().zip(weights)) {
+            match Gift::of(light, objects, radius) {
+                Gift::Near(extent) => {
+                    let intensity = weight * extent.intensity * scale * scale;
+                    let center = (extent.center - center) * scale;
+                    near.push((i, Extent { center, radius: extent.radius * scale, intensity, ..extent }));
+                }
+                Gift::Distant { toward, surface, point } => distant.push((i, toward, weight * surface, weight * point)),
+            }
+        }
+        if near.is_empty() && distant.iter().all(|(_, toward, ..)| toward.is_none()) {
+            return None;
+        }
+        let strongest = near.iter().map(|(_, e)| e.intensity).chain(distant.iter().map(|d| d.3)).fold(0.0, f64::max);
+        let per_unit = 1.0 / strongest;
+        if !(per_unit.is_finite() && per_unit > 0.0) || near.iter().any(|(_, e)| !e.bounds().is_finite()) {
+            return None;
+        }
+        near.iter_mut().for_each(|(_, extent)| extent.intensity *= per_unit);
+        let mut places = vec![Place::Distant(0); lights.len()];
+        let distant = distant.iter().map(|&(light, toward, surface, point)| Distant {
+            light,
+            toward: toward.map(|t| t.as_vec3()),
+            surface: (surface * per_unit) as f32,
+            point: (point * per_unit) as f32,
+        });
+        let distant: Vec<Distant> = distant.collect();
+        (0..).zip(&distant).for_each(|(k, d)| places[d.light as usize] = Place::Distant(k));
+        let mut choice = Choice { nodes: Vec::new(), parents: Vec::new(), distant, places, center, scale };
+        choice.build(&mut near, (0, 0));
+        Some(choice)
+    }
+
+    /// Adds a node over `all`, which `parent` leads to; its index.
+    fn build(&mut self, all: &mut [(u32, Extent)], parent: (u32, u32)) -> u32 {
+        let index = self.nodes.len() as u32;
+        self.nodes.push(Node::EMPTY);
+        self.parents.push(parent);
+        // The group that is widest for its strength is cut until there are eight.
+        let mut groups: Vec<&mut [(u32, Extent)]> = if all.is_empty() { vec![] } else { vec![all] };
+        while groups.len() < 8 {
+            let size = |group: &[(u32, Extent)]| {
+                let all = group.iter().fold(Aabb::EMPTY, |b, (_, e)| b.union(&e.bounds()));
+                (all.max - all.min).length_squared() * group.iter().map(|(_, e)| e.intensity).sum::<f64>()
+            };
+            let widest = (0..groups.len()).filter(|&i| groups[i].len() > 1);
+            let Some(widest) = widest.max_by(|&a, &b| size(groups[a]).total_cmp(&size(groups[b]))) else { break };
+            let (left, right) = halves(groups.swap_remove(widest));
+            groups.extend([left, right]);
+        }
+        for (lane, group) in groups.into_iter().enumerate() {
+            let extents: Vec<Extent> = group.iter().map(|(_, extent)| *extent).collect();
+            let child = match group {
+                [(light, _)] => {
+                    self.places[*light as usize] = Place::Child { node: index, lane: lane as u32 };
+                    *light | LEAF
+                }
+                group => self.build(group, (index, lane as u32)),
+            };
+            let extent = if extents.len() == 1 { extents[0] } else { Extent::around(&extents) };
+            self.nodes[index as usize].set(lane, &extent, child);
+        }
+        index
+    }
+
+    fn asking(&self, point: DVec3, normal: Option<DVec3>) -> Asking {
+        Asking { point: ((point - self.center) * self.scale).as_vec3(), normal: normal.map(|n| n.as_vec3()) }
+    }
+
+    fn root(&self, asking: &Asking) -> Option<Root> {
+        let near = self.nodes[0].weigh(asking).to_array();
+        let sum = near.iter().sum::<f32>() + self.distant.iter().map(|d| d.weigh(asking)).sum::<f32>();
+        (sum > 0.0 && sum.is_finite()).then_some(Root { near, sum })
+    }
+
+    /// A light by `u` in [0, 1), and its probability.
+    fn choose(&self, asking: &Asking, root: &Root, u: f64) -> Option<(u32, f64)> {
+        let mut rest = u * f64::from(root.sum);
+        let mut fallen = None;
+        for distant in &self.distant {
+            let weight = f64::from(distant.weigh(asking));
+            if weight == 0.0 {
+                continue;
+            }
+            fallen = Some((distant.light, weight / f64::from(root.sum)));
+            if rest < weight {
+                return fallen;
+            }
+            rest -= weight;
+        }
+        if root.near == [0.0; 8] {
+            return fallen;
+        }
+        let (mut node, mut weights, mut probability) = (0, root.near, 1.0 / f64::from(root.sum));
+        loop {
+            // The last that weighs anything takes what rounding leaves over.
+            let last = weights.iter().rposition(|&w| w > 0.0)?;
+            let mut lane = 0;
+            while lane < last && rest >= f64::from(weights[lane]) {
+                rest -= f64::from(weights[lane]);
+                lane += 1;
+            }
+            let weight = f64::from(weights[lane]);
+            if weight == 0.0 {
+                return None;
+            }
+            probability *= weight;
+            let child = self.nodes[node].children[lane];
+            if child & LEAF != 0 {
+                return Some((child & !LEAF, probability));
+            }
+            let part = (rest / weight).clamp(0.0, 1.0);
+            node = child as usize;
+            weights = self.nodes[node].weigh(asking).to_array();
+            let sum = f64::from(weights.iter().sum::<f32>());
+            if !(sum > 0.0 && sum.is_finite()) {
+                return None;
+            }
+            probability /= sum;
+            rest = part * sum;
+        }
+    }
+
+    /// The probability of [`Choice::choose`] for a light.
+    fn probability(&self, asking: &Asking, root: &Root, light: u32) -> f64 {
+        let (mut node, mut lane) = match self.places[light as usize] {
+            Place::Distant(k) => return f64::from(self.distant[k as usize].weigh(asking)) / f64::from(root.sum),
+            Place::Child { node, lane } => (node, lane),
+        };
+        let mut probability = 1.0 / f64::from(root.sum);
+        while node != 0 {
+            let weights = self.nodes[node as usize].weigh(asking).to_array();
+            let sum = f64::from(weights.iter().sum::<f32>());
+            if !(sum > 0.0 && sum.is_finite()) {
+                return 0.0;
+            }
+            probability *= f64::from(weights[lane as usize]) / sum;
+            (node, lane) = self.parents[node as usize];
+        }
+        probability * f64::from(root.near[lane as usize])
+    }
+}
+
+/// Cuts a group of two or more in two, along an axis, where the sum of intensity times size is least.
+fn halves(group: &mut [(u32, Extent)]) -> (&mut [(u32, Extent)], &mut [(u32, Extent)]) {
+    let cost = |bounds: &Aabb, intensity: f64| (bounds.max - bounds.min).length_squared() * intensity;
+    let by = |axis: usize| {
+        move |a: &(u32, Extent), b: &(u32, Extent)| a.1.center[axis].total_cmp(&b.1.center[axis]).then(a.0.cmp(&b.0))
+    };
+    let mut best = (f64::INFINITY, 0, group.len() / 2);
+    for axis in 0..3 {
+        group.sort_unstable_by(by(axis));
+        let sweep = |order: &mut dyn Iterator<Item = &(u32, Extent)>| -> Vec<f64> {
+            let (mut bounds, mut intensity) = (Aabb::EMPTY, 0.0);
+            let add = |(_, extent): &(u32, Extent)| {
+                bounds = bounds.union(&extent.bounds());
+                intensity += extent.intensity;
+                cost(&bounds, intensity)
+            };
+            order.map(add).collect()
+        };
+        let left = sweep(&mut group.iter());
+        let right = sweep(&mut group.iter().rev());
+        for at in 1..group.len() {
+            let all = left[at - 1] + right[group.len() - at - 1];
+            if all < best.0 {
+                best = (all, axis, at);
+            }
+        }
+    }
+    let (_, axis, at) = best;
+    group.sort_unstable_by(by(axis));
+    group.split_at_mut(at)
+}
+
+impl Distant {
+    fn weigh(&self, asking: &Asking) -> f32 {
+        match (asking.normal, self.toward) {
+            (Some(normal), Some(toward)) => self.surface * normal.dot(toward).max(0.0),
+            (Some(_), None) => self.surface,
+            (None, _) => self.point,
+        }
+    }
+}
+
+impl Node {
+    const EMPTY: Node = Node {
+        center: [f32x8::ZERO; 3],
+        radius2: f32x8::ONE,
+        intensity: f32x8::ZERO,
+        axis: [f32x8::ZERO; 3],
+        spread: [f32x8::ONE, f32x8::ZERO],
+        reach: f32x8::ZERO,
+        even: f32x8::ZERO,
+        children: [LEAF; 8],
+    };
+
+    fn set(&mut self, lane: usize, e: &Extent, child: u32) {
+        let put = |to: &mut f32x8, x: f64| to.as_mut_array()[lane] = x as f32;
+        for axis in 0..3 {
+            put(&mut self.center[axis], e.center[axis]);
+            put(&mut self.axis[axis], e.axis[axis]);
+        }
+        put(&mut self.radius2, e.radius * e.radius);
+        put(&mut self.intensity, e.intensity);
+        put(&mut self.spread[0], libm::cos(e.spread));
+        put(&mut self.spread[1], libm::sin(e.spread));
+        put(&mut self.reach, libm::cos(e.reach.min(PI)));
+        put(&mut self.even, f64::from(u8::from(e.even)));
+        self.children[lane] = child;
+    }
+
+    /// What each child may give, up to a factor.
+    ///
+    /// Sines are lengths of cross products, so that all is as well known as the coordinates: where a point lies to 2⁻²⁴
+    /// of the scene must not decide how it chooses. A point on a round lamp counts as outside of its ball.
+    #[inline]
+    fn weigh(&self, asking: &Asking) -> f32x8 {
+        /// Of the square of the radius: further inside nothing is known of directions.
+        const INSIDE: f32 = 0.998;
+        let (zero, one) = (f32x8::ZERO, f32x8::ONE);
+        let dot = |a: &[f32x8; 3], b: &[f32x8; 3]| a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]));
+        let [px, py, pz] = asking.point.to_array().map(f32x8::splat);
+        let v = [self.center[0] - px, self.center[1] - py, self.center[2] - pz];
+        let d2 = dot(&v, &v);
+        let within = d2.simd_lt(self.radius2 * f32x8::splat(INSIDE));
+        let inverse = one / d2.sqrt();
+        // Cosine and sine of the angle of a unit vector with the way to the ball.
+        let angle = |a: &[f32x8; 3]| {
+            let x = a[1].mul_sub(v[2], a[2] * v[1]);
+            let y = a[2].mul_sub(v[0], a[0] * v[2]);
+            let z = a[0].mul_sub(v[1], a[1] * v[0]);
+            (dot(a, &v) * inverse, dot(&[x, y, z], &[x, y, z]).sqrt() * inverse)
+        };
+        // The cosine of an angle less that in which the ball is seen.
+        let sin2_ball = (self.radius2 / d2).fast_min(one);
+        let (cos_ball, sin_ball) = ((one - sin2_ball).sqrt(), sin2_ball.sqrt());
+        let less_ball =
+            |c: f32x8, s: f32x8| c.simd_ge(cos_ball).select(one, c.mul_add(cos_ball, s * sin_ball).fast_max(zero));
+        // From the nearest normal to the nearest way from the ball to the point.
+        let (toward, sin) = angle(&self.axis);
+        let [cos_spread, sin_spread] = self.spread;
+        let spread = (-toward).simd_ge(cos_spread);
+        let c = spread.select(one, sin.mul_sub(sin_spread, toward * cos_spread));
+        let s = spread.select(zero, sin.mul_add(cos_spread, toward * sin_spread));
+        let c = less_ball(c, s);
+        let lit = within | c.simd_ge(self.reach);
+        let emitted = within.select(one, c.fast_max(self.even));
+        let falling = match asking.normal {
+            None => one,
+            Some(normal) => {
+                let (c, s) = angle(&normal.to_array().map(f32x8::splat));
+                within.select(one, less_ball(c, s))
+            }
+        };
+        lit.select(self.intensity * emitted * falling / d2.fast_max(self.radius2), zero)
+    }
+}
+
+impl Scene {
+    /// A light chosen by `u` in [0, 1) for `point`, and the probability of that. With `normal` light is wanted on that
+    /// side of a surface only.
+    #[must_use]
+    pub fn choose_light_at(&self, point: DVec3, normal: Option<DVec3>, u: f64) -> Option<(usize, f64)> {
+        let Some(choice) = &self.choice else { return self.choose_light(u) };
+        let asking = choice.asking(point, normal);
+        let Some(root) = choice.root(&asking) else { return self.choose_light(u) };
+        let mixed = |i: usize, there: f64| BY_POWER * self.light_probability(i) + (1.0 - BY_POWER) * there;
+        if u < BY_POWER {
+            let (i, _) = self.choose_light(u / BY_POWER)?;
+            return Some((i, mixed(i, choice.probability(&asking, &root, i as u32))));
+        }
+        let (i, there) = choice.choose(&asking, &root, (u - BY_POWER) / (1.0 - BY_POWER))?;
+        Some((i as usize, mixed(i as usize, there)))
+    }
+
+    /// The probability of [`Scene::choose_light_at`] for light `i`.
+    #[must_use]
+    pub fn light_probability_at(&self, i: usize, point: DVec3, normal: Option<DVec3>) -> f64 {
+        let alone = self.light_probability(i);
+        let Some(choice) = &self.choice else { return alone };
+        let asking = choice.asking(point, normal);
+        match choice.root(&asking) {
+            Some(root) => BY_POWER * alone + (1.0 - BY_POWER) * choice.probability(&asking, &root, i as u32),
+            None => alone,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile;
+    use crate::scene::shape::testing::Random;
+
+    fn scene(lights: &str, shapes: &str) -> Scene {
+        let text = format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nlights:\n{lights}shapes:\n\
+             - sphere: {{center: [0, 0, 0], radius: 1, material: {{diffuse: {{}}}}}}\n{shapes}"
+        );
+        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
+        compile(&description, "s").unwrap()
+    }
+
+    fn point(x: f64, y: f64, z: f64, intensity: f64) -> String {
+        format!("- point: {{position: [{x}, {y}, {z}], intensity: {intensity}}}\n")
+    }
+
+    /// One of each kind.
+    fn all_kinds() -> Scene {
+        let lights = "- point: {position: [0, 4, 1], intensity: 3}\n\
+            - spot: {position: [3, 3, 0], target: [0, 0, 0], cutoff_deg: 25, intensity: 20}\n\
+            - directional: {direction: [0, -1, 0.2], irradiance: 0.3}\n\
+            - projector: {origin: [-3, 1, 2], target: [0, 0, 0], up: [0, 1, 0], fov_deg: 30, irradiance: 2}\n\
+            - constant: {radiance: 0.1}\n";
+        let shapes = "- rectangle: {corner: [-1, 3, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2], material: {diffuse: {}}, \
+             emission: 2}\n\
+            - disk: {center: [4, 0, 0], normal: [-1, 0, 0], radius: 0.5, material: {diffuse: {}}, \
+             emission: 9}\n\
+            - sphere: {center: [-4, 1, -2], radius: 0.2, material: {diffuse: {}}, emission: 90}\n\
+            - cylinder: {base: [0, -3, 1], top: [1, -3, 1], radius: 0.1, material: {diffuse: {}}, \
+             emission: 30}\n";
+        scene(lights, shapes)
+    }
+
+    fn lamps_in_a_cube(count: usize) -> Scene {
+        let mut random = Random::new(3);
+        let mut lights = String::new();
+        for _ in 0..count {
+            let at = random.direction() * 8.0 * random.uniform();
+            lights += &point(at.x, at.y, at.z, 0.1 + random.uniform());
+        }
+        scene(&lights, "")
+    }
+
+    /// Numbers evenly spread over [0, 1) choose each light as often as its probability says, and the probabilities are
+    /// one together: whatever the point, with and without a normal. Some numbers choose none, where a group of lamps
+    /// turns out to be behind the surface. Each of `N` numbers stands for 1/N; a light is chosen on two intervals at
+    /// most, whose ends each count for one number too many or too few.
+    #[test]
+    fn lights_are_chosen_as_often_as_is_said() {
+        const N: u32 = 20_000;
+        let mut random = Random::new(11);
+        for scene in [all_kinds(), lamps_in_a_cube(40)] {
+            assert!(scene.choice.is_some());
+            for k in 0..20 {
+                let at = random.direction() * 6.0 * random.uniform();
+                let normal = (k % 2 == 0).then(|| random.direction());
+                let mut counts = vec![0u32; scene.lights.len()];
+                for j in 0..N {
+                    let u = (f64::from(j) + 0.5) / f64::from(N);
+                    let Some((i, p)) = scene.choose_light_at(at, normal, u) else { continue };
+                    let said = scene.light_probability_at(i, at, normal);
+                    assert!((p / said - 1.0).abs() < 1e-12, "{p} {said}");
+                    counts[i] += 1;
+                }
+                let probabilities: Vec<f64> =
+                    (0..scene.lights.len()).map(|i| scene.light_probability_at(i, at, normal)).collect();
+                let none = 1.0 - f64::from(counts.iter().sum::<u32>()) / f64::from(N);
+                let ends = 16.0 / f64::from(N);
+                assert!((probabilities.iter().sum::<f64>() + none - 1.0).abs() < ends, "{probabilities:?} {none}");
+                assert!(normal.is_some() || none == 0.0);
+                for (count, p) in counts.iter().zip(&probabilities) {
+                    assert!((f64::from(*count) / f64::from(N) - p).abs() < 5.0 / f64::from(N), "{count} {p}");
+                }
+            }
+        }
+    }
+
+    /// A light that can arrive at a point is never out of the choice's reach by more than the share by power: no weight
+    /// is zero where light arrives. Points all around, normals all around, points of the light all over.
+    #[test]
+    fn what_arrives_weighs_something() {
+        let scene = all_kinds();
+        let choice = scene.choice.as_ref().unwrap();
+        let mut random = Random::new(5);
+        let mut arrived = vec![0; scene.lights.len()];
+        for _ in 0..20_000 {
+            let at = random.direction() * 6.0 * random.uniform();
+            let normal = random.direction();
+            let (asking, nm) = (choice.asking(at, Some(normal)), crate::spectrum::Lanes::splat(550.0));
+            for (i, light) in scene.lights.iter().enumerate() {
+                let u = glam::DVec2::new(random.uniform(), random.uniform());
+                let Some(found) = light.arriving(&scene.objects, at, Some(normal), u, nm) else { continue };
+                // Further above the horizons than f32 is good to.
+                if found.wi.dot(normal) < 1e-3 || !found.radiance.simd_gt(crate::spectrum::Lanes::splat(1e-3)).all() {
+                    continue;
+                }
+                arrived[i] += 1;
+                let root = choice.root(&asking).unwrap();
+                assert!(choice.probability(&asking, &root, i as u32) > 0.0, "{i} {at} {normal}");
+            }
+        }
+        assert!(arrived.iter().all(|&n| n > 100), "{arrived:?}");
+    }
+
+    /// Two equal lamps at distances 1 and 3: nine to one, but for the share by power.
+    #[test]
+    fn the_nearer_of_two_equal_lamps_is_chosen_by_the_square_of_the_distance() {
+        let scene = scene(&(point(1.0, 3.0, 0.0, 1.0) + &point(-3.0, 3.0, 0.0, 1.0)), "");
+        let p = scene.light_probability_at(0, DVec3::new(0.0, 3.0, 0.0), None);
+        assert!((p - (BY_POWER * 0.5 + (1.0 - BY_POWER) * 0.9)).abs() < 1e-6, "{p}");
+    }
+
+    /// Of a thousand lamps in a cloud the mean over lamps of (share of the light / probability) · share, which is the
+    /// second moment of the estimate without shadows over the square of its mean, is within 2: choosing by power alone
+    /// it is more than 5.
+    #[test]
+    fn a_thousand_lamps_are_chosen_nearly_by_what_arrives() {
+        let scene = lamps_in_a_cube(1000);
+        let mut random = Random::new(17);
+        let (mut here, mut by_power) = (0.0, 0.0);
+        for _ in 0..50 {
+            let at = random.direction() * 8.0 * random.uniform();
+            let nm = crate::spectrum::Lanes::splat(550.0);
+            let arriving = |light: &Light| light.arriving(&scene.objects, at, None, glam::DVec2::ZERO, nm);
+            let light: Vec<f64> =
+                scene.lights.iter().map(|l| arriving(l).map_or(0.0, |a| a.radiance.to_array()[0].into())).collect();
+            let total: f64 = light.iter().sum();
+            for (i, x) in light.iter().enumerate() {
+                let share = x / total;
+                here += share * share / scene.light_probability_at(i, at, None) / 50.0;
+                by_power += share * share / scene.light_probability(i) / 50.0;
+            }
+        }
+        assert!(here < 2.0 && by_power > 5.0, "{here} {by_power}");
+    }
+}
