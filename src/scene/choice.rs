@@ -273,7 +273,8 @@ impl Choice {
             };
             let widest = (0..groups.len()).filter(|&i| groups[i].len() > 1);
             let Some(widest) = widest.max_by(|&a, &b| size(groups[a]).total_cmp(&size(groups[b]))) else { break };
-            let (left, right) = halves(groups.swap_remove(widest));
+            let group = groups.swap_remove(widest);
+            let (left, right) = group.split_at_mut(parting(group));
             groups.extend([left, right]);
         }
         for (lane, group) in groups.into_iter().enumerate() {
@@ -369,8 +370,9 @@ impl Choice {
     }
 }
 
-/// Cuts a group of two or more in two, along an axis, where the sum of intensity times size is least.
-fn halves(group: &mut [(u32, Extent)]) -> (&mut [(u32, Extent)], &mut [(u32, Extent)]) {
+/// Sorts a group of two or more along an axis; where it is best cut in two, so that the sum of intensity times size is
+/// least.
+fn parting(group: &mut [(u32, Extent)]) -> usize {
     let cost = |bounds: &Aabb, intensity: f64| (bounds.max - bounds.min).length_squared() * intensity;
     let by = |axis: usize| {
         move |a: &(u32, Extent), b: &(u32, Extent)| a.1.center[axis].total_cmp(&b.1.center[axis]).then(a.0.cmp(&b.0))
@@ -398,7 +400,7 @@ fn halves(group: &mut [(u32, Extent)]) -> (&mut [(u32, Extent)], &mut [(u32, Ext
     }
     let (_, axis, at) = best;
     group.sort_unstable_by(by(axis));
-    group.split_at_mut(at)
+    at
 }
 
 impl Distant {
