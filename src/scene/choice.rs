@@ -274,7 +274,8 @@ impl Choice {
             let widest = (0..groups.len()).filter(|&i| groups[i].len() > 1);
             let Some(widest) = widest.max_by(|&a, &b| size(groups[a]).total_cmp(&size(groups[b]))) else { break };
             let group = groups.swap_remove(widest);
-            let (left, right) = group.split_at_mut(parting(group));
+            let middle = parting(group);
+            let (left, right) = group.split_at_mut(middle);
             groups.extend([left, right]);
         }
         for (lane, group) in groups.into_iter().enumerate() {
