@@ -114,15 +114,23 @@ pub fn decide(
     if settings.scatter_samples == 0 || settings.max_depth.is_some_and(|depth| depth < 3) {
         return off("paths are too short for light of mirrors and glass");
     }
-    if settings.count_crossings {
+    if settings.count_crossings && settings.max_depth.is_some() && scene.has_boundaries {
         return off("panes count for the length of paths");
     }
     if plan.layers.layers.iter().any(|layer| matches!(layer.source, Channel::Light(..))) {
         return off("layers of light are measured path by path from the camera");
     }
-    let traced: Vec<bool> = (0..scene.lights.len()).map(|i| is_small(scene, i, &casters)).collect();
+    // Who counts panes, as scenes read from Mitsuba's XML do, knows only light that a path from the camera can meet.
+    let met =
+        |light: &Light| !settings.count_crossings || light.is_environment() || matches!(light, Light::Area { .. });
+    let traced: Vec<bool> =
+        scene.lights.iter().enumerate().map(|(i, l)| met(l) && is_small(scene, i, &casters)).collect();
     if !traced.contains(&true) {
-        return off("no light is small or has a sun");
+        return off(if settings.count_crossings {
+            "no light that a path from the camera can meet is small or has a sun"
+        } else {
+            "no light is small or has a sun"
+        });
     }
     let caustics = Caustics::untrained(scene, &casters, traced, wishes.packets != Use::Off && casters.parts);
     if caustics.sources.is_empty() {

@@ -43,6 +43,12 @@ const FLOOR: &str = "{diffuse: {reflectance: {rgb: [0.7, 0.5, 0.3]}}}";
 const AREA: Case =
     Case { what: "area", camera: "", material: GLASS, light: LAMP, depth: "null", caster: BALL, floor: FLOOR };
 
+/// The same lamp, and a pane.
+const PANE: &str = "\
+- sphere: {center: [-1.5, 2, 1], radius: 0.5, emission: {illuminant: {name: D65, scale: 10}}}
+- rectangle: {corner: [-1, 1, -1], edge_u: [0, 0, 1], edge_v: [1, 0, 0], material: {thin_dielectric: {ior: 1.5}}}
+";
+
 /// The same lamp, and a picture of hills and valleys.
 const WAVES: &str = "\
 - sphere: {center: [-1.5, 2, 1], radius: 0.5, emission: {illuminant: {name: D65, scale: 10}}}
@@ -244,6 +250,28 @@ fn a_sun_in_an_environment_is_traced_and_an_even_sky_is_not() {
     let large = "- sphere: {center: [-1.5, 2, 1], radius: 1.9, emission: 1}\n";
     let (tracing, _, reason) = techniques(&Case { what: "large", light: large, ..AREA }.bench("auto", "auto", 64));
     assert!(!tracing && reason == "no light is small or has a sun", "{reason}");
+}
+
+/// Where panes count for the length of a path, as in scenes read from Mitsuba's XML, paths from the lights cannot tell what
+/// they may still meet. Without a pane there is nothing to count: the picture is the same, traced or not. A point light is left
+/// to the camera, which never meets it behind glass.
+#[test]
+fn light_is_traced_where_panes_would_count_and_there_are_none() {
+    let counted = Case { what: "counted", depth: "5, count_crossings: true", ..AREA };
+    let (tracing, _, reason) = techniques(&counted.bench("on", "auto", 96));
+    assert!(tracing, "{reason}");
+    assert_agree(counted.what, &render(&counted.bench("on", "auto", 96)), &render(&counted.bench("off", "auto", 1536)));
+
+    let paned = Case { light: PANE, ..counted }.bench("on", "auto", 64);
+    let (tracing, _, reason) = techniques(&paned);
+    assert!(!tracing && reason == "panes count for the length of paths", "{reason}");
+    let endless = Case { light: PANE, depth: "null, count_crossings: true", ..counted }.bench("on", "auto", 64);
+    assert!(techniques(&endless).0, "{}", techniques(&endless).2);
+
+    let point = Case { light: "lights: [{point: {position: [-1.5, 2, 1], intensity: 9}}]\n", ..counted }
+        .bench("on", "auto", 64);
+    let (tracing, _, reason) = techniques(&point);
+    assert!(!tracing && reason.starts_with("no light that a path from the camera can meet"), "{reason}");
 }
 
 /// A camera behind a pane of solid glass sees the floor through it only: paths from the lights cannot be joined to it,
