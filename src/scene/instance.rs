@@ -77,7 +77,7 @@ impl AffineMap {
     /// `ray` in the group's space, of unit direction, and the length of its direction before that:
     /// local distances are the world's times it.
     #[inline]
-    fn enter(&self, ray: &Ray) -> (Ray, f64) {
+    pub(super) fn enter(&self, ray: &Ray) -> (Ray, f64) {
         let direction = self.object_from_world.transform_vector3(ray.direction);
         let length = direction.length();
         (Ray::new(self.object_from_world.transform_point3(ray.origin), direction / length), length)

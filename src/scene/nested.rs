@@ -13,7 +13,7 @@
 use super::bvh::Aabb;
 use super::{Geometry, Object, Scene, SurfacePoint};
 use crate::math::Ray;
-use crate::scene::shape::Shape;
+use crate::scene::shape::{Detail, Shape};
 use crate::spectrum::RefractiveIndex;
 use glam::DVec3;
 
@@ -43,8 +43,8 @@ pub struct Body {
 #[derive(Clone, Debug, Default)]
 pub struct Nested {
     bodies: Vec<Body>,
-    /// Around all of them.
-    bounds: Option<Aabb>,
+    /// Objects that stand in the scene itself and are such, or copy such, and their boxes.
+    holders: Vec<(u32, Aabb)>,
 }
 
 /// The bodies that a point is in: their ranks from 1, the strongest first; 0 for none.
@@ -137,8 +137,8 @@ impl Nested {
             }
             _ => object.body != 0,
         };
-        let boxes = objects[..alone].iter().filter(|object| holds(object)).map(Object::bounds);
-        nested.bounds = boxes.reduce(|a, b| a.union(&b));
+        let standing = objects[..alone].iter().zip(0u32..).filter(|(object, _)| holds(object));
+        nested.holders = standing.map(|(object, i)| (i, object.bounds())).collect();
         nested
     }
 
@@ -204,37 +204,62 @@ impl Scene {
 
     /// The bodies that hold `origin` of a ray.
     ///
-    /// Whoever leaves a body once more often than it enters it on its way out to infinity has begun inside. A plane is
-    /// left on one side only, and is asked itself.
+    /// Whoever leaves a body once more often than it enters it on its way out to infinity has begun inside. Each body is
+    /// asked by itself, so that surfaces in one place do not hide each other.
     #[must_use]
     pub fn bodies_around(&self, origin: &Ray) -> Bodies {
-        let point = origin.origin;
-        let near = self.nested.bounds.is_some_and(|b| point.cmpge(b.min).all() && point.cmple(b.max).all());
-        if !near {
-            return Bodies::NONE;
-        }
         // Along no axis, face or diagonal that a person would write.
         let direction = DVec3::new(0.359_814_2, 0.771_356_8, 0.525_127_9).normalize();
-        let mut ray = Ray { direction, ..*origin };
-        let mut depths = vec![0i64; self.nested.bodies.len()];
-        for _ in 0..MOST_SURFACES {
-            let Some(hit) = self.closest(&ray, f64::INFINITY) else { break };
-            let surface = self.surface(&ray, &hit);
-            let rank = self.objects[hit.object as usize].body;
-            if rank != 0 {
-                depths[rank as usize - 1] += if direction.dot(surface.normal) > 0.0 { 1 } else { -1 };
-            }
-            ray = self.leave(&surface, &hit, direction);
-        }
+        let ray = Ray { direction, ..*origin };
         let mut bodies = Bodies::NONE;
-        for ((body, depth), rank) in self.nested.bodies.iter().zip(depths).zip(1..) {
-            let times = match &self.objects[body.object as usize].geometry {
-                Geometry::Shape(Shape::Plane(plane)) => i64::from(plane.height(point) < 0.0),
-                _ => depth,
+        let mut add = |object: u32, depth: i64| {
+            let rank = self.objects[object as usize].body;
+            bodies = (0..depth.min(MOST as i64)).fold(bodies, |bodies, _| bodies.with(rank));
+        };
+        for &(index, bounds) in &self.nested.holders {
+            let object = &self.objects[index as usize];
+            if !(ray.origin.cmpge(bounds.min).all() && ray.origin.cmple(bounds.max).all()) {
+                continue;
+            }
+            let Geometry::Instance(instance) = &object.geometry else {
+                add(index, self.depth(index, &ray));
+                continue;
             };
-            bodies = (0..times.min(MOST as i64)).fold(bodies, |bodies, _| bodies.with(rank));
+            let (local, _) = instance.map.enter(&ray);
+            for child in instance.group.first..instance.group.first + instance.group.bvh.order().len() as u32 {
+                if self.objects[child as usize].body != 0 {
+                    add(child, self.depth(child, &local));
+                }
+            }
         }
         bodies
+    }
+
+    /// How often the origin of `ray` is in `object`: how much more often the ray leaves it than it enters it. A plane is
+    /// left on one side only, and is asked itself.
+    fn depth(&self, object: u32, ray: &Ray) -> i64 {
+        if let Geometry::Shape(Shape::Plane(plane)) = &self.objects[object as usize].geometry {
+            return i64::from(plane.height(ray.origin) < 0.0);
+        }
+        let side = |surface: &SurfacePoint| if ray.direction.dot(surface.normal) > 0.0 { 1 } else { -1 };
+        let mut depth = 0;
+        if let Some(together) = self.together.as_ref().filter(|together| together.holds(object)) {
+            together.any(ray, f64::INFINITY, None, |hit| {
+                if hit.object == object {
+                    depth += side(&self.surface_with(ray, &hit, Detail::Geometry));
+                }
+                false
+            });
+            return depth;
+        }
+        let mut at = *ray;
+        for _ in 0..MOST_SURFACES {
+            let Some(hit) = self.meet(&at, object, f64::INFINITY) else { break };
+            let surface = self.surface_with(&at, &hit, Detail::Geometry);
+            depth += side(&surface);
+            at = Ray::leaving(surface.point, surface.scale, surface.normal, ray.direction, hit.departure());
+        }
+        depth
     }
 
     /// What a path is in that begins in `bodies`, where there is `otherwise` in none of them.
@@ -255,6 +280,31 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile;
+
+    /// A scene of these shapes.
+    fn scene(shapes: &str) -> Scene {
+        let text = format!("camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n{shapes}");
+        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
+        compile(&description, "s").unwrap()
+    }
+
+    /// Two bodies in the very same place: whoever is in one is in both.
+    #[test]
+    fn bodies_with_the_same_surface_do_not_hide_each_other() {
+        for shape in [
+            "sphere: {radius: 1",
+            "cube: {size: 2",
+            "cylinder: {base: [0, -1, 0], top: [0, 1, 0], radius: 1, caps: both",
+        ] {
+            let body =
+                |priority: i32| format!("- {shape}, material: {{dielectric: {{ior: 1.5, priority: {priority}}}}}}}\n");
+            let scene = scene(&(body(1) + &body(2)));
+            let at = |x: f64| scene.bodies_around(&Ray::new(DVec3::new(x, 0.2, 0.1), DVec3::X));
+            assert_eq!((at(0.3), at(1.3)), (Bodies::NONE.with(1).with(2), Bodies::NONE), "{shape}");
+        }
+    }
 
     /// The list is the sorted multiset of what was put in and not taken out: against a plain list, for 10,000 random
     /// steps among twelve bodies, of which it may hold eight.
