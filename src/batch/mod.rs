@@ -485,6 +485,14 @@ fn attributes(prepared: &Prepared, frame: &Frame, report: &SceneReport) -> Vec<(
 /// What keeps the batch from beginning. What goes wrong in a scene is in the report.
 pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, stop: &AtomicBool) -> Result<Report> {
     let entries = entries(path, overrides)?;
+    const PICTURES: [&str; 7] = ["png", "jpg", "jpeg", "tif", "tiff", "hdr", "pfm"];
+    let pictured = |p: &&PathBuf| p.extension().is_some_and(|e| PICTURES.iter().any(|x| e.eq_ignore_ascii_case(x)));
+    if let Some(file) = overrides.output.as_ref().filter(pictured).filter(|file| !file.is_dir()) {
+        return Err(Error::Config(format!(
+            "-o {}: expected a directory or a file name that ends in .exr, beside which the PNG is written",
+            file.display()
+        )));
+    }
     let to_file = overrides.output.as_ref().filter(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")));
     if let (Some(file), true) = (to_file, entries.len() > 1) {
         return Err(Error::Config(format!(

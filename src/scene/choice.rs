@@ -6,7 +6,7 @@
 //! place hang in a tree of eight children a node, all judged at once; light from infinity is judged beside the root.
 //! Up to eight lamps are thus judged one by one.
 //!
-//! The judgement knows no shadows, so [`BY_POWER`] of the choices are made by power alone, as if the point were unknown.
+//! The judgement knows no shadows, so a sixteenth of the choices are made by power alone, as if the point were unknown.
 //! Any probabilities are right as long as they are known exactly; these are computed in f32 by the same operations
 //! whenever they are asked for.
 
