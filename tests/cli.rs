@@ -440,7 +440,8 @@ fn scenes_are_chosen_by_name() {
     assert_eq!(ran.err, "error: -o one.exr: expected a directory for 3 scenes, found the name of one file\n");
     assert_eq!(place.run(&["render", "batch.yaml", "--scene", "other", "-o", "sub/one.exr", "-q"]).code, 0);
     let ran = place.run(&["render", "scenes/good.yaml", "-o", "one.PNG"]);
-    let expected = "error: -o one.PNG: expected a directory or a file name that ends in .exr, beside which the PNG is written\n";
+    let expected =
+        "error: -o one.PNG: expected a directory or a file name that ends in .exr, beside which the PNG is written\n";
     assert_eq!((ran.code, ran.err.as_str()), (2, expected));
     assert_eq!(place.names("sub"), ["one.exr", "one.png", "report.json"]);
 }
