@@ -5,7 +5,7 @@
 
 use super::bvh::Aabb;
 use super::shape::Shape;
-use super::shape::four::{BoxRay, Boxes, FourRays, LANES, Patches, Planes, Spheres};
+use super::shape::four::{BoxRay, Boxes, FourRays, Patches, Planes, Spheres};
 use super::{Geometry, Hit, Nearest, Object};
 use crate::math::Ray;
 use wide::f64x4;
@@ -35,16 +35,17 @@ struct Block<T> {
     lanes: T,
 }
 
-/// The lane for `object`, in a new block where the last is full; `count` are in lanes already.
-fn lane<'a, T>(blocks: &'a mut Vec<Block<T>>, count: &mut usize, object: u32, empty: T) -> (usize, &'a mut T) {
-    let lane = *count % LANES;
-    if lane == 0 {
+/// Gives `object` the first free lane, in a new block where there is none, and lets `put` fill it.
+fn add<T>(blocks: &mut Vec<Block<T>>, object: u32, empty: T, put: impl FnOnce(&mut T, usize)) {
+    let free = |block: &Block<T>| block.objects.as_array().iter().position(|&object| object == NONE);
+    let lane = blocks.last().and_then(free).unwrap_or_else(|| {
         blocks.push(Block { objects: f64x4::splat(NONE), lanes: empty });
+        0
+    });
+    if let Some(block) = blocks.last_mut() {
+        block.objects.as_mut_array()[lane] = f64::from(object);
+        put(&mut block.lanes, lane);
     }
-    *count += 1;
-    let at = blocks.len() - 1;
-    blocks[at].objects.as_mut_array()[lane] = f64::from(object);
-    (lane, &mut blocks[at].lanes)
 }
 
 impl Few {
@@ -66,29 +67,23 @@ impl Few {
 
     fn new(objects: &[Object], indices: &[u32], boxes: &[Aabb]) -> Few {
         let mut few = Few::default();
-        let mut counts = [0; 4];
         for &index in indices {
-            let whole = &boxes[index as usize];
             match &objects[index as usize].geometry {
                 Geometry::Shape(Shape::Rectangle(shape)) => {
-                    let (lane, block) = lane(&mut few.patches, &mut counts[0], index, Patches::EMPTY);
-                    block.put_rectangle(lane, shape);
+                    add(&mut few.patches, index, Patches::EMPTY, |block, lane| block.put_rectangle(lane, shape));
                 }
                 Geometry::Shape(Shape::Disk(shape)) => {
-                    let (lane, block) = lane(&mut few.patches, &mut counts[0], index, Patches::EMPTY);
-                    block.put_disk(lane, shape);
+                    add(&mut few.patches, index, Patches::EMPTY, |block, lane| block.put_disk(lane, shape));
                 }
                 Geometry::Shape(Shape::Sphere(shape)) => {
-                    let (lane, block) = lane(&mut few.spheres, &mut counts[1], index, Spheres::EMPTY);
-                    block.put(lane, shape);
+                    add(&mut few.spheres, index, Spheres::EMPTY, |block, lane| block.put(lane, shape));
                 }
                 Geometry::Shape(Shape::Plane(shape)) => {
-                    let (lane, block) = lane(&mut few.planes, &mut counts[2], index, Planes::EMPTY);
-                    block.put(lane, shape);
+                    add(&mut few.planes, index, Planes::EMPTY, |block, lane| block.put(lane, shape));
                 }
                 _ => {
-                    let (lane, block) = lane(&mut few.boxes, &mut counts[3], index, Boxes::EMPTY);
-                    block.put(lane, whole.min, whole.max);
+                    let Aabb { min, max } = boxes[index as usize];
+                    add(&mut few.boxes, index, Boxes::EMPTY, |block, lane| block.put(lane, min, max));
                 }
             }
         }

@@ -10,9 +10,6 @@ use crate::scene::shape::flat::Patch;
 use glam::DVec3;
 use wide::f64x4;
 
-/// How many shapes a block holds.
-pub const LANES: usize = 4;
-
 type Vec4 = [f64x4; 3];
 
 /// A ray, the same in each lane.
