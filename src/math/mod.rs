@@ -13,5 +13,12 @@ pub mod statistics;
 pub mod trig;
 pub mod warp;
 
+/// The power of two that brings the size of a finite `x` into [1, 2); the largest or least that there is where none does.
+#[must_use]
+pub fn inverse_power_of_two(x: f64) -> f64 {
+    let exponent = (x.to_bits() >> 52 & 0x7ff) as i64 - 1023;
+    f64::from_bits(((1023 - exponent.clamp(-1022, 1022)) as u64) << 52)
+}
+
 pub use frame::Frame;
 pub use ray::{Departure, Ray};

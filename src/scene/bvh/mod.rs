@@ -29,7 +29,7 @@
 
 mod build;
 
-use crate::math::Ray;
+use crate::math::{Ray, inverse_power_of_two};
 use build::{Builder, DEPTH, LeafSize, MAX_POSITIONS, Primitive};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -295,8 +295,7 @@ impl Bvh {
         // Halve before adding: no overflow up to the largest f64.
         let centre = if all.is_finite() { 0.5 * all.min + 0.5 * all.max } else { DVec3::ZERO };
         let half_size = if all.is_finite() { (all.max - centre).max(centre - all.min).max_element() } else { 1.0 };
-        let exponent = (half_size.to_bits() >> 52 & 0x7ff) as i64 - 1023;
-        let scale = f64::from_bits(((1023 - exponent.clamp(-1022, 1022)) as u64) << 52);
+        let scale = inverse_power_of_two(half_size);
         let empty = Bvh {
             nodes: Vec::new(),
             order: Vec::new(),
