@@ -14,6 +14,7 @@ use super::bvh::Aabb;
 use super::light::Light;
 use super::shape::Shape;
 use super::{Geometry, Object, Scene};
+use crate::math::inverse_power_of_two;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 use wide::f32x8;
@@ -52,8 +53,7 @@ enum Gift {
 }
 
 impl Gift {
-    fn of(light: &Light, objects: &[Object], scene_radius: f64) -> Gift {
-        let power = light.power(objects, scene_radius);
+    fn of(light: &Light, power: f64, objects: &[Object]) -> Gift {
         let from_point = |position: DVec3, intensity: f64, axis: DVec3, reach: f64| {
             let spread = if reach >= PI { PI } else { 0.0 };
             Gift::Near(Extent { center: position, radius: 0.0, intensity, axis, spread, reach, even: true })
@@ -215,19 +215,26 @@ struct Root {
 }
 
 impl Choice {
-    /// Of `lights`, which count as often as `weights` say. `None` where every point would choose alike.
+    /// Of `lights` of [`Light::power`] `powers`, which count as often as `weights` say. `None` where every point would choose
+    /// alike.
     #[must_use]
-    pub fn of(lights: &[Light], weights: &[f64], objects: &[Object], center: DVec3, radius: f64) -> Option<Choice> {
+    pub fn of(
+        lights: &[Light],
+        powers: &[f64],
+        weights: &[f64],
+        objects: &[Object],
+        center: DVec3,
+        radius: f64,
+    ) -> Option<Choice> {
         if lights.len() < 2 {
             return None;
         }
-        // A power of two, so that a scene times a power of two has the same tree.
-        let exponent = ((radius.to_bits() >> 52 & 0x7ff) as i64 - 1023).clamp(-500, 500);
-        let scale = f64::from_bits(((1023 - exponent) as u64) << 52);
+        // A power of two, so that a scene times a power of two has the same tree; its square is finite.
+        let scale = inverse_power_of_two(radius.clamp(1e-150, 1e150));
         let mut near = Vec::new();
         let mut distant = Vec::new();
-        for (i, (light, &weight)) in (0u32..).zip(lights.iter().zip(weights)) {
-            match Gift::of(light, objects, radius) {
+        for (((i, light), &power), &weight) in (0u32..).zip(lights).zip(powers).zip(weights) {
+            match Gift::of(light, power, objects) {
                 Gift::Near(extent) => {
                     let intensity = weight * extent.intensity * scale * scale;
                     let center = (extent.center - center) * scale;

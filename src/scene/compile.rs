@@ -280,13 +280,14 @@ impl<'a> Compiler<'a> {
         });
         media.append(&mut self.absorbing);
         let (center, radius) = extent(&boxes, &camera);
-        let light_cdf = lights::light_cdf(&lights, &weights, &objects, radius);
-        let choice = Choice::of(&lights, &weights, &objects, center, radius);
-        let light_exponent = crate::scene::light::exponent(&lights, &objects, radius);
+        let powers: Vec<f64> = lights.iter().map(|light| light.power(&objects, radius)).collect();
+        let light_cdf = lights::light_cdf(&powers, &weights);
+        let choice = Choice::of(&lights, &powers, &weights, &objects, center, radius);
+        let light_exponent = crate::scene::light::exponent(&lights, &powers, &objects, radius);
         let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
         let bands = self.bands();
         let wavelengths = match d.render.wavelengths {
-            written::Wavelengths::Auto => self.wavelengths(&lights, &objects, radius, &bands),
+            written::Wavelengths::Auto => self.wavelengths(&lights, &powers, &objects, &bands),
             written::Wavelengths::Visible => WavelengthDistribution::visible(),
             written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
         };
@@ -509,11 +510,17 @@ impl<'a> Compiler<'a> {
     }
 
     /// Wavelengths by the scene's own lights and surfaces.
-    fn wavelengths(&self, lights: &[Light], objects: &[Object], radius: f64, bands: &[Band]) -> WavelengthDistribution {
+    fn wavelengths(
+        &self,
+        lights: &[Light],
+        powers: &[f64],
+        objects: &[Object],
+        bands: &[Band],
+    ) -> WavelengthDistribution {
         let mut emitters: Vec<(f64, Spectrum)> = Vec::new();
-        for light in lights {
+        for (light, power) in lights.iter().zip(powers) {
             let spectra = light.spectra();
-            let weight = light.power(objects, radius) / spectra.len() as f64;
+            let weight = power / spectra.len() as f64;
             emitters.extend(spectra.into_iter().map(|s| (weight, s)));
         }
         if !bands.is_empty() {

@@ -121,11 +121,12 @@ pub fn spot_falloff(cos: f64, beam: f64, cutoff: f64) -> f64 {
 }
 
 /// The power of two by which a film divides the light of a scene, [`crate::film::accumulate::Film::exponent`]: 0 where the
-/// brightest of its `lights` lies between 2⁻²⁴ and 2³⁶. A darker scene is raised to one, with 2³⁸ left above; of brighter
-/// lamps the film just holds what they show, and what they light beside as finely as may be.
+/// brightest of its `lights`, of [`Light::power`] `powers`, lies between 2⁻²⁴ and 2³⁶. A darker scene is raised to one,
+/// with 2³⁸ left above; of brighter lamps the film just holds what they show, and what they light beside as finely as may be.
 #[must_use]
-pub fn exponent(lights: &[Light], objects: &[Object], radius: f64) -> i32 {
-    let brightest = lights.iter().map(|l| l.brightness(objects, radius)).filter(|b| b.is_finite()).fold(0.0, f64::max);
+pub fn exponent(lights: &[Light], powers: &[f64], objects: &[Object], radius: f64) -> i32 {
+    let brightness = lights.iter().zip(powers).map(|(light, power)| light.brightness(*power, objects, radius));
+    let brightest = brightness.filter(|b| b.is_finite()).fold(0.0, f64::max);
     if brightest < f64::MIN_POSITIVE {
         return 0;
     }
@@ -350,9 +351,8 @@ impl Light {
         }
     }
 
-    /// About how bright a white wall is that it lights, or the lamp itself where that is seen, in film units.
-    fn brightness(&self, objects: &[Object], radius: f64) -> f64 {
-        let power = self.power(objects, radius);
+    /// About how bright a white wall is that it lights with `power`, or the lamp itself where that is seen, in film units.
+    fn brightness(&self, power: f64, objects: &[Object], radius: f64) -> f64 {
         match self {
             Light::Area { object, .. } => power / (PI * objects[*object as usize].geometry.area()),
             _ => power / (4.0 * PI * PI * radius * radius),

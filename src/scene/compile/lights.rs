@@ -5,7 +5,7 @@ use super::super::light::{Light, Slide};
 use super::super::projector::Projector;
 use super::super::shape::Shape;
 use super::super::texture::Texture;
-use super::super::{Geometry, Object, load};
+use super::super::{Geometry, load};
 use super::{Compiler, vec3};
 use crate::description as written;
 use crate::error::Result;
@@ -176,13 +176,13 @@ fn growth(v: written::Growth) -> f64 {
 
 /// Running sums of the probabilities with which lights are chosen: half by power, half evenly, so
 /// that no light is forgotten; both times the lights' weights.
-pub(super) fn light_cdf(lights: &[Light], weights: &[f64], objects: &[Object], radius: f64) -> Vec<f64> {
-    let powers: Vec<f64> = lights.iter().zip(weights).map(|(l, w)| w * l.power(objects, radius)).collect();
+pub(super) fn light_cdf(powers: &[f64], weights: &[f64]) -> Vec<f64> {
+    let powers: Vec<f64> = powers.iter().zip(weights).map(|(power, w)| w * power).collect();
     let total: f64 = powers.iter().sum();
     let n: f64 = weights.iter().sum();
     if n == 0.0 {
         // None is ever chosen: all sums are 0, below every random number.
-        return vec![0.0; lights.len()];
+        return vec![0.0; powers.len()];
     }
     let mut sum = 0.0;
     let mut cdf: Vec<f64> = powers
@@ -214,11 +214,11 @@ mod tests {
     /// Lights of power 1 and 3: half of ¼, ¾ and half of ½, ½. With weights 1 and 0 only the first.
     #[test]
     fn lights_are_chosen_by_power_and_weight() {
-        let lights = [point(1.0), point(3.0)];
-        let cdf = light_cdf(&lights, &[1.0, 1.0], &[], 1.0);
+        let powers = [point(1.0), point(3.0)].map(|light| light.power(&[], 1.0));
+        let cdf = light_cdf(&powers, &[1.0, 1.0]);
         assert!((cdf[0] - 0.375).abs() < 1e-12 && cdf[1] == 1.0);
-        assert_eq!(light_cdf(&lights, &[1.0, 0.0], &[], 1.0), [1.0, 1.0]);
-        assert_eq!(light_cdf(&lights, &[0.0, 2.0], &[], 1.0), [0.0, 1.0]);
-        assert_eq!(light_cdf(&lights, &[0.0, 0.0], &[], 1.0), [0.0, 0.0]);
+        assert_eq!(light_cdf(&powers, &[1.0, 0.0]), [1.0, 1.0]);
+        assert_eq!(light_cdf(&powers, &[0.0, 2.0]), [0.0, 1.0]);
+        assert_eq!(light_cdf(&powers, &[0.0, 0.0]), [0.0, 0.0]);
     }
 }
