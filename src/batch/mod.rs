@@ -316,11 +316,16 @@ fn colour_space(colour: description::Colour) -> ColourSpace {
     }
 }
 
+/// Whether the name of `path` ends in one of `extensions`, whose case does not matter.
+fn ends_in(path: &Path, extensions: &[&str]) -> bool {
+    path.extension().is_some_and(|e| extensions.iter().any(|x| e.eq_ignore_ascii_case(x)))
+}
+
 /// Where a scene's pictures go: `-o FILE.exr`, `-o DIR`, or the directory of the description.
 #[must_use]
 pub fn output_path(prepared: &Prepared, overrides: &Overrides) -> PathBuf {
     match &overrides.output {
-        Some(path) if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) => path.clone(),
+        Some(path) if ends_in(path, &["exr"]) => path.clone(),
         Some(dir) => dir.join(format!("{}.exr", prepared.scene.name)),
         None => prepared.description.output.dir.join(format!("{}.exr", prepared.scene.name)),
     }
@@ -485,16 +490,15 @@ fn attributes(prepared: &Prepared, frame: &Frame, report: &SceneReport) -> Vec<(
 /// What keeps the batch from beginning. What goes wrong in a scene is in the report.
 pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, stop: &AtomicBool) -> Result<Report> {
     let entries = entries(path, overrides)?;
-    const PICTURES: [&str; 7] = ["png", "jpg", "jpeg", "tif", "tiff", "hdr", "pfm"];
-    let pictured = |p: &&PathBuf| p.extension().is_some_and(|e| PICTURES.iter().any(|x| e.eq_ignore_ascii_case(x)));
-    if let Some(file) = overrides.output.as_ref().filter(pictured).filter(|file| !file.is_dir()) {
+    const OTHERS: [&str; 7] = ["png", "jpg", "jpeg", "tif", "tiff", "hdr", "pfm"];
+    let output = overrides.output.as_ref();
+    if let Some(file) = output.filter(|path| ends_in(path, &OTHERS) && !path.is_dir()) {
         return Err(Error::Config(format!(
             "-o {}: expected a directory or a file name that ends in .exr, beside which the PNG is written",
             file.display()
         )));
     }
-    let to_file = overrides.output.as_ref().filter(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")));
-    if let (Some(file), true) = (to_file, entries.len() > 1) {
+    if let (Some(file), true) = (output.filter(|path| ends_in(path, &["exr"])), entries.len() > 1) {
         return Err(Error::Config(format!(
             "-o {}: expected a directory for {} scenes, found the name of one file",
             file.display(),
