@@ -3,7 +3,8 @@
 
 mod common;
 
-use abbe::batch::frame::{FrameJob, render_part};
+use abbe::batch::frame::FrameJob;
+use abbe::batch::part::render_part;
 use abbe::batch::{self, Overrides, Prepared};
 use abbe::film::Window;
 use abbe::film::accumulate::Film;

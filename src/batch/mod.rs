@@ -3,6 +3,7 @@
 //! A batch goes on with the other scenes after one fails; what failed is told at the end.
 
 pub mod frame;
+pub mod part;
 pub mod report;
 
 use crate::description::{self, BatchEntry, LayerContent, SceneDescription};

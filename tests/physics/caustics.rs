@@ -2,7 +2,7 @@
 
 use super::channels::{job, render_with, sums};
 use super::common::{Bench, bench_with, grey_png};
-use abbe::batch::frame::render_part;
+use abbe::batch::part::render_part;
 use abbe::film::filter::{Filter, FilterSampler};
 use abbe::film::resolve::Image;
 use abbe::spectrum::ColourSpace;

@@ -1,0 +1,615 @@
+//! Part of a picture: some samples of some of its pixels, and their sums.
+//!
+//! What a part stands for are its [`Claims`]: samples of the pixels of windows, and samples of paths from the lights. Both
+//! are addressed, so a path gives the same light whoever follows it, and the film adds integers: parts that claim
+//! everything once add up to the picture, bit for bit.
+//!
+//! A picture is shared out by samples, by rows ([`Share`]), or both. Paths from the lights land anywhere, so that a part
+//! of `n` tiles adds the `n`-th of the paths of each of its samples, over the whole picture. Where photons are collected
+//! every tile needs all of them: it follows all paths and adds its own.
+//!
+//! A part can pause between two units of work and tell exactly what it has done: that is what a checkpoint holds.
+
+use super::frame::{FrameJob, Milestone, light_unit, lock, render_unit};
+use crate::error::{Error, Result};
+use crate::film::Window;
+use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, TileBuffer};
+use crate::film::filter::FilterSampler;
+use crate::scene::Scene;
+use crate::spectrum::{LANES, SampledWavelengths};
+use crate::transport;
+use crate::transport::light::{Bounds, LightPaths, Splat};
+use crate::transport::merge::{self, Collection, Photon, PhotonMap, WavelengthCell};
+use crate::transport::plan::Integrator;
+use glam::DVec2;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
+use std::ops::Range;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::time::Duration;
+
+/// Light that came from the lights to the camera.
+#[derive(Debug)]
+pub struct SplatFilm {
+    /// The sums, and of the bands of the spectrum.
+    pub film: Film,
+    /// Paths that began in each replicate.
+    pub paths: [u64; REPLICATES],
+}
+
+/// What one process does of a picture: all rows or some, all samples or some.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Share {
+    /// Which tile, from 0.
+    pub tile: u32,
+    /// Into how many tiles, bands of rows from the top, the picture is cut.
+    pub tiles: u32,
+    /// Samples of each pixel.
+    pub samples: Range<u32>,
+}
+
+impl Share {
+    /// All of a picture.
+    #[must_use]
+    pub fn all(samples: u32) -> Share {
+        Share { tile: 0, tiles: 1, samples: 0..samples }
+    }
+
+    /// The `tile`-th of `tiles` of the numbers below `n`.
+    fn of(&self, n: u64) -> Range<u64> {
+        let cut = |i: u32| (u128::from(n) * u128::from(i) / u128::from(self.tiles)) as u64;
+        cut(self.tile)..cut(self.tile + 1)
+    }
+
+    /// The rows of `window` that belong to the share.
+    #[must_use]
+    pub fn rows(&self, window: Window) -> Window {
+        let rows = self.of(u64::from(window.height));
+        Window { y: window.y + rows.start as i32, height: (rows.end - rows.start) as u32, ..window }
+    }
+}
+
+/// For what a part stands.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Claims {
+    /// Samples of all pixels of a window; one without samples names a tile that has not begun.
+    pub camera: Vec<(Window, Range<u32>)>,
+    /// Paths of a sample, and samples.
+    pub lights: Vec<(Range<u64>, Range<u32>)>,
+}
+
+/// What may come between two units of work: a checkpoint, a picture of what is there, the end.
+pub trait Breaks: Sync {
+    /// Whether work should pause. Asked before each unit, from any thread.
+    fn wanted(&self) -> bool;
+
+    /// Called while nothing is added; then work goes on.
+    ///
+    /// # Errors
+    /// Whatever it returns ends the render.
+    fn take(&self, part: &Part, milestones: &[Milestone], elapsed: Duration) -> Result<()>;
+}
+
+/// A flag that stops the render.
+impl Breaks for AtomicBool {
+    fn wanted(&self) -> bool {
+        self.load(Ordering::Relaxed)
+    }
+
+    fn take(&self, _: &Part, _: &[Milestone], _: Duration) -> Result<()> {
+        Err(Error::Render("stopped before the picture was finished; nothing was written".into()))
+    }
+}
+
+/// Samples of the camera that a thread takes before it asks whether to pause, about.
+const SAMPLES_OF_A_STEP: usize = 1 << 16;
+
+/// Paths of one work unit from the lights.
+const PATHS_OF_A_UNIT: u64 = 1 << 14;
+
+/// A tile and the sample up to which it is done.
+#[derive(Debug)]
+struct Tile {
+    window: Window,
+    done: AtomicU32,
+}
+
+/// Which paths of the share have been added.
+#[derive(Clone, Debug, Default)]
+struct LightsDone {
+    /// All of the samples below this.
+    below: u32,
+    /// Paths of later samples, disjoint.
+    more: Vec<(Range<u64>, u32)>,
+}
+
+/// Renders some of the samples of a picture, with their paths from the lights. What any split of the samples adds up to
+/// is the whole picture, bit for bit.
+///
+/// # Errors
+/// [`Error::Render`] if the memory cannot be had.
+pub fn render_part(job: &FrameJob, samples: Range<u32>) -> Result<(Film, Option<SplatFilm>)> {
+    let part = Part::new(job, Share::all(job.samples))?;
+    part.add(samples, &AtomicBool::new(false), &|_| {});
+    Ok(part.finish())
+}
+
+/// The sums of a part on the way.
+#[derive(Debug)]
+pub struct Part<'a> {
+    job: &'a FrameJob<'a>,
+    share: Share,
+    window: Window,
+    film: Mutex<Film>,
+    splats: Option<(LightPaths<'a>, Mutex<SplatFilm>)>,
+    tiles: Vec<Tile>,
+    lights: Mutex<LightsDone>,
+    layers: usize,
+}
+
+impl<'a> Part<'a> {
+    /// Nothing yet of `share`.
+    ///
+    /// # Errors
+    /// [`Error::Render`] if the memory cannot be had.
+    pub fn new(job: &'a FrameJob<'a>, share: Share) -> Result<Part<'a>> {
+        let layers = job.plan.layers.channels().len();
+        let exponent = job.scene.light_exponent;
+        let window = share.rows(job.window);
+        let film = |window, layers| {
+            let film = Film::new(job.scene.camera.resolution, window)?;
+            Ok(film.with_layers(layers).with_exponent(exponent))
+        };
+        let splats = match light_paths(job) {
+            Some(paths) => {
+                let film = film(job.window, job.scene.bands.len())?;
+                Some((paths, Mutex::new(SplatFilm { film, paths: [0; REPLICATES] })))
+            }
+            None => None,
+        };
+        let film = Mutex::new(film(window, layers)?);
+        let start = share.samples.start;
+        let tiles = shares(window, job.tile, rayon::current_num_threads());
+        let tiles = tiles.into_iter().map(|window| Tile { window, done: AtomicU32::new(start) }).collect();
+        let lights = Mutex::new(LightsDone { below: start, more: Vec::new() });
+        Ok(Part { job, share, window, film, splats, tiles, lights, layers })
+    }
+
+    /// A part whose `film` and `splats` hold what `claims` say; they are of this share.
+    ///
+    /// # Errors
+    /// As [`Part::new`].
+    pub fn resume(
+        job: &'a FrameJob<'a>,
+        share: Share,
+        claims: &Claims,
+        film: Film,
+        splats: Option<SplatFilm>,
+    ) -> Result<Part<'a>> {
+        let mut part = Part::new(job, share)?;
+        if let [(_, done)] = claims.camera.as_slice() {
+            part.tiles.iter_mut().for_each(|tile| tile.done = AtomicU32::new(done.end));
+        } else {
+            let tile = |(window, done): &(Window, Range<u32>)| Tile { window: *window, done: AtomicU32::new(done.end) };
+            part.tiles = claims.camera.iter().map(tile).collect();
+        }
+        part.film = Mutex::new(film);
+        if let (Some((_, own)), Some(splats)) = (&mut part.splats, splats) {
+            *own = Mutex::new(splats);
+        }
+        let own = part.own_paths();
+        let mut lights = LightsDone { below: part.share.samples.start, more: Vec::new() };
+        for (paths, samples) in &claims.lights {
+            if *paths == own && samples.start == lights.below {
+                lights.below = samples.end;
+            } else {
+                lights.more.extend(samples.clone().map(|sample| (paths.clone(), sample)));
+            }
+        }
+        part.lights = Mutex::new(lights);
+        Ok(part)
+    }
+
+    /// What is done.
+    #[must_use]
+    pub fn claims(&self) -> Claims {
+        let start = self.share.samples.start;
+        let done = |tile: &Tile| tile.done.load(Ordering::Relaxed);
+        let first = self.tiles.first().map_or(start, done);
+        let camera = if self.tiles.iter().all(|tile| done(tile) == first) {
+            vec![(self.window, start..first)]
+        } else {
+            self.tiles.iter().map(|tile| (tile.window, start..done(tile))).collect()
+        };
+        let mut lights = Vec::new();
+        if self.splats.is_some() {
+            let known = lock(&self.lights);
+            if known.below > start {
+                lights.push((self.own_paths(), start..known.below));
+            }
+            lights.extend(known.more.iter().map(|(paths, sample)| (paths.clone(), *sample..*sample + 1)));
+        }
+        Claims { camera, lights }
+    }
+
+    /// Samples of pixels that are done, and all of the share.
+    #[must_use]
+    pub fn progress(&self) -> (u64, u64) {
+        let start = self.share.samples.start;
+        let of = |tile: &Tile| tile.window.pixels() as u64 * u64::from(tile.done.load(Ordering::Relaxed) - start);
+        (self.tiles.iter().map(of).sum(), self.window.pixels() as u64 * self.share.samples.len() as u64)
+    }
+
+    /// The job of which this is a part.
+    #[must_use]
+    pub fn job(&self) -> &'a FrameJob<'a> {
+        self.job
+    }
+
+    /// What the part is to become.
+    #[must_use]
+    pub fn share(&self) -> &Share {
+        &self.share
+    }
+
+    /// Reads the sums while nothing is added.
+    pub fn look<T>(&self, read: impl FnOnce(&Film, Option<&SplatFilm>) -> T) -> T {
+        let film = lock(&self.film);
+        let splats = self.splats.as_ref().map(|(_, splats)| lock(splats));
+        read(&film, splats.as_deref())
+    }
+
+    /// The paths from the lights of each sample that belong to the share, where there are any.
+    fn own_paths(&self) -> Range<u64> {
+        self.splats.as_ref().map_or(0..0, |(paths, _)| self.share.of(paths_of_a_sample(self.job, paths)))
+    }
+
+    /// Adds `samples` of all pixels and their paths from the lights, but for what is there already. `finished` hears how
+    /// many samples were done with each tile. False if there was a pause, with some of it left to do.
+    pub fn add(&self, samples: Range<u32>, pause: &dyn Breaks, finished: &(dyn Fn(u64) + Sync)) -> bool {
+        let merging = self.job.plan.caustics.as_ref().and_then(|c| c.merging);
+        match (&self.splats, merging) {
+            (Some((paths, splats)), None) => {
+                let units = paths_of_a_sample(self.job, paths).div_ceil(PATHS_OF_A_UNIT).max(1);
+                let step = ((1 << 16) / units).max(1) as usize;
+                samples.clone().step_by(step).all(|start| {
+                    let end = start.saturating_add(step as u32).min(samples.end);
+                    self.from_lights(paths, start..end, splats, pause, None)
+                }) && self.add_tiles(samples, None, pause, finished)
+            }
+            // Photons are collected sample by sample.
+            (Some((paths, splats)), Some(first)) => samples.into_iter().all(|sample| {
+                self.has(sample)
+                    || match self.photons(paths, sample, first, splats, pause) {
+                        None => false,
+                        Some((map, wavelength)) => {
+                            let photons = Collection { map: &map, wavelength };
+                            self.add_tiles(sample..sample + 1, Some(photons), pause, finished)
+                        }
+                    }
+            }),
+            (None, _) => self.add_tiles(samples, None, pause, finished),
+        }
+    }
+
+    /// Whether all of `sample` is there.
+    fn has(&self, sample: u32) -> bool {
+        self.tiles.iter().all(|tile| tile.done.load(Ordering::Relaxed) > sample) && lock(&self.lights).below > sample
+    }
+
+    fn add_tiles(
+        &self,
+        samples: Range<u32>,
+        photons: Option<Collection>,
+        pause: &dyn Breaks,
+        finished: &(dyn Fn(u64) + Sync),
+    ) -> bool {
+        thread_local! {
+            static TILE: RefCell<Option<TileBuffer>> = const { RefCell::new(None) };
+        }
+        let done = |tile: &Tile| -> bool {
+            let window = tile.window;
+            let start = tile.done.load(Ordering::Relaxed).max(samples.start);
+            if start >= samples.end {
+                return true;
+            }
+            if pause.wanted() {
+                return false;
+            }
+            // Whole blocks of the sampler.
+            let step = (SAMPLES_OF_A_STEP / window.pixels().max(1)).next_multiple_of(32) as u32;
+            let mut at = start;
+            TILE.with_borrow_mut(|slot| {
+                let buffer = slot.get_or_insert_with(|| TileBuffer::new(window));
+                buffer.reset(window, self.layers);
+                while at < samples.end && (at == start || !pause.wanted()) {
+                    let next = (at - at % step).saturating_add(step).min(samples.end);
+                    render_unit(self.job, at..next, photons, buffer);
+                    at = next;
+                }
+                lock(&self.film).merge_tile(buffer);
+            });
+            tile.done.store(at, Ordering::Relaxed);
+            finished(window.pixels() as u64 * u64::from(at - start));
+            at == samples.end
+        };
+        self.tiles.par_iter().map(done).reduce(|| true, |a, b| a && b)
+    }
+
+    /// Follows paths from the lights for each sample of `samples`: as many as the frame has pixels, or the share of them
+    /// that the plan wants. A sample's replicate and number address its paths as they do for the camera, so the sums do
+    /// not depend on units or passes. Only paths of the share that are not there yet are added, and without `photons`
+    /// no other is followed. False if there was a pause.
+    fn from_lights(
+        &self,
+        light_paths: &LightPaths,
+        samples: Range<u32>,
+        splats: &Mutex<SplatFilm>,
+        pause: &dyn Breaks,
+        photons: Option<&mut Vec<Photon>>,
+    ) -> bool {
+        let FrameJob { scene, filter, window, .. } = *self.job;
+        let paths = paths_of_a_sample(self.job, light_paths);
+        let wanted = photons.is_some();
+        let own = self.own_paths();
+        let known = lock(&self.lights).clone();
+        let mut units: Vec<(u32, Range<u64>, bool)> = Vec::new();
+        for sample in samples.clone() {
+            let there: Vec<Range<u64>> = if sample < known.below {
+                vec![own.clone()]
+            } else {
+                known.more.iter().filter(|(_, s)| *s == sample).map(|(paths, _)| paths.clone()).collect()
+            };
+            let cuts = pieces(paths, &own, &there).into_iter().map(|(unit, add)| (sample, unit, add));
+            units.extend(cuts.filter(|(_, _, add)| *add || wanted));
+        }
+        let trace = |(sample, unit, add): (u32, Range<u64>, bool)| {
+            let mut left = Vec::new();
+            if pause.wanted() {
+                return (left, None);
+            }
+            let replicate = sample % REPLICATES as u32;
+            let base = u64::from(sample / REPLICATES as u32) * paths;
+            let mut landed = Landed::default();
+            for j in unit.clone() {
+                let photons = wanted.then_some(&mut left);
+                transport::light::trace(light_paths, replicate, base + j, photons, &mut |wavelengths, splat| {
+                    if add {
+                        landed.add(scene, filter, window, wavelengths, &splat);
+                    }
+                });
+            }
+            if add {
+                landed.add_to(&mut lock(splats), replicate, unit.end - unit.start);
+            }
+            (left, Some((unit, sample, add)))
+        };
+        // In the order of the paths, whoever follows them.
+        let followed: Vec<_> = units.into_par_iter().map(trace).collect();
+        let whole = followed.iter().all(|(_, unit)| unit.is_some());
+        let mut known = lock(&self.lights);
+        if whole {
+            known.below = known.below.max(samples.end);
+            known.more.retain(|(_, sample)| *sample >= samples.end);
+        } else {
+            for (unit, sample, _) in followed.iter().filter_map(|(_, unit)| unit.as_ref()).filter(|unit| unit.2) {
+                match known.more.last_mut() {
+                    Some((last, of)) if of == sample && last.end == unit.start => last.end = unit.end,
+                    _ => known.more.push((unit.clone(), *sample)),
+                }
+            }
+        }
+        if let Some(photons) = photons {
+            *photons = followed.into_iter().flat_map(|(left, _)| left).collect();
+        }
+        whole
+    }
+
+    /// [`Part::from_lights`] for one sample, with the photons for its paths from the camera and what chooses their
+    /// wavelengths; none if there was a pause.
+    fn photons(
+        &self,
+        light_paths: &LightPaths,
+        sample: u32,
+        first_radius: f64,
+        splats: &Mutex<SplatFilm>,
+        pause: &dyn Breaks,
+    ) -> Option<(PhotonMap, f64)> {
+        let job = self.job;
+        let (replicate, index) = (sample % REPLICATES as u32, sample / REPLICATES as u32);
+        let wavelength = merge::shared_wavelength(job.seed, replicate, index);
+        let parts = light_paths.caustics.is_some_and(|c| c.parts);
+        let cell = match parts {
+            true => WavelengthCell::around(wavelength, job.samples.div_ceil(REPLICATES as u32)),
+            false => WavelengthCell::point(wavelength),
+        };
+        let paths = LightPaths { wavelength: Some(cell), ..*light_paths };
+        let mut photons = Vec::new();
+        if !self.from_lights(&paths, sample..sample + 1, splats, pause, Some(&mut photons)) {
+            return None;
+        }
+        let [width, height] = job.scene.camera.resolution.map(u64::from);
+        let followed = light_paths.caustics.map_or(0, |c| c.paths(width * height));
+        Some((PhotonMap::new(&photons, followed, merge::radius(first_radius, index)), wavelength))
+    }
+
+    /// The sums.
+    #[must_use]
+    pub fn finish(self) -> (Film, Option<SplatFilm>) {
+        let film = self.film.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let splats = self.splats.map(|(_, s)| s.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner));
+        (film, splats)
+    }
+}
+
+/// The paths of a sample cut into units, each wholly in or out of what is to be added: `own` without `there`.
+fn pieces(paths: u64, own: &Range<u64>, there: &[Range<u64>]) -> Vec<(Range<u64>, bool)> {
+    let mut cuts: Vec<u64> = (0..paths).step_by(PATHS_OF_A_UNIT as usize).chain([own.start, own.end, paths]).collect();
+    cuts.extend(there.iter().flat_map(|r| [r.start, r.end]));
+    cuts.retain(|cut| *cut <= paths);
+    cuts.sort_unstable();
+    cuts.dedup();
+    let add = |at: u64| own.contains(&at) && !there.iter().any(|r| r.contains(&at));
+    cuts.windows(2).map(|pair| (pair[0]..pair[1], add(pair[0]))).collect()
+}
+
+/// The tiles that cover `window`, row by row, aligned to the frame so that a crop has the same ones.
+#[must_use]
+pub fn tiles(window: Window, side: u32) -> Vec<Window> {
+    let side_i = i64::from(side);
+    let starts = |start: i32, size: u32| -> Vec<(i32, u32)> {
+        let (start, end) = (i64::from(start), i64::from(start) + i64::from(size));
+        let mut all = Vec::new();
+        let mut at = start;
+        while at < end {
+            let next = ((at.div_euclid(side_i) + 1) * side_i).min(end);
+            all.push((at as i32, (next - at) as u32));
+            at = next;
+        }
+        all
+    };
+    let columns = starts(window.x, window.width);
+    starts(window.y, window.height)
+        .into_iter()
+        .flat_map(|(y, height)| columns.iter().map(move |&(x, width)| Window { x, y, width, height }))
+        .collect()
+}
+
+/// Tiles of at most `side` pixels, halved until every thread has 32 or they are 4 pixels wide: a
+/// small picture keeps all threads busy to its end. How it is cut changes no bit of it.
+fn shares(window: Window, side: u32, threads: usize) -> Vec<Window> {
+    let halves = std::iter::successors(Some(side), |side| (*side >= 8).then_some(side / 2));
+    let cuts = halves.map(|side| tiles(window, side));
+    let mut last = Vec::new();
+    for cut in cuts {
+        last = cut;
+        if last.len() >= 32 * threads {
+            break;
+        }
+    }
+    last
+}
+
+/// The paths from the lights that the plan calls for.
+fn light_paths<'a>(job: &FrameJob<'a>) -> Option<LightPaths<'a>> {
+    let FrameJob { scene, plan, filter, window, seed, .. } = *job;
+    let (settings, caustics) = match &plan.integrator {
+        Integrator::Light(settings) => (*settings, None),
+        Integrator::Path(settings) => (settings.of_light_paths(), Some(plan.caustics.as_deref()?)),
+        Integrator::Whitted(_) | Integrator::Depth | Integrator::Nothing => return None,
+    };
+    let radius = filter.radius() + 0.5;
+    let corner = DVec2::new(f64::from(window.x), f64::from(window.y));
+    let bounds = Bounds {
+        low: corner - radius,
+        high: corner + DVec2::new(f64::from(window.width), f64::from(window.height)) + radius,
+    };
+    Some(LightPaths { scene, plan, settings, caustics, seed, bounds, wavelength: None })
+}
+
+/// Paths from the lights for each sample of all pixels.
+fn paths_of_a_sample(job: &FrameJob, light_paths: &LightPaths) -> u64 {
+    let [width, height] = job.scene.camera.resolution.map(u64::from);
+    light_paths.caustics.map_or(width * height, |c| c.paths(width * height))
+}
+
+/// What the paths of one unit left on the picture.
+#[derive(Default)]
+struct Landed {
+    pixels: Vec<([i32; 2], [f32; 3])>,
+    /// The bands of each.
+    bands: Vec<f32>,
+    invalid: InvalidCounts,
+}
+
+impl Landed {
+    fn add(
+        &mut self,
+        scene: &Scene,
+        filter: &FilterSampler,
+        window: Window,
+        wavelengths: &SampledWavelengths,
+        splat: &Splat,
+    ) {
+        if let Some(cause) = Invalid::of(splat.light) {
+            self.invalid.record(cause);
+            return;
+        }
+        let unit = light_unit(scene);
+        let xyz = splat.xyz(wavelengths).map(|x| x * unit);
+        filter.deal(splat.place, |pixel, share| {
+            if window.index(pixel).is_some() {
+                self.pixels.push((pixel, xyz.map(|x| x * share)));
+                for band in &scene.bands {
+                    let counted = splat.light * wavelengths.inv_pdf * band.response.eval(wavelengths.nm);
+                    self.bands.push(counted.reduce_add() / LANES as f32 * share);
+                }
+            }
+        });
+    }
+
+    fn add_to(&self, splats: &mut SplatFilm, replicate: u32, paths: u64) {
+        splats.paths[replicate as usize] += paths;
+        splats.film.invalid += self.invalid;
+        let channels = splats.film.layers.channels();
+        let window = splats.film.window();
+        for (i, &(pixel, xyz)) in self.pixels.iter().enumerate() {
+            splats.film.add(pixel, replicate as usize, xyz, 0.0);
+            if let (Some(index), true) = (window.index(pixel), channels > 0) {
+                splats.film.layers.add(index, 1.0, &self.bands[i * channels..(i + 1) * channels]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_cover_rows_and_paths_once() {
+        let window = Window { x: 3, y: -2, width: 5, height: 14 };
+        for tiles in [1, 2, 3, 14] {
+            let (mut row, mut path) = (window.y, 0);
+            for tile in 0..tiles {
+                let share = Share { tile, tiles, samples: 0..4 };
+                let rows = share.rows(window);
+                assert!(rows.y == row && rows.height > 0 && window.contains(&rows));
+                row += rows.height as i32;
+                assert_eq!(share.of(1000).start, path);
+                path = share.of(1000).end;
+            }
+            assert_eq!((row, path), (12, 1000));
+        }
+    }
+
+    /// Own paths 10 to 40 000 of 50 000, of which 100 to 200 are there: every path once, and the right ones added.
+    #[test]
+    fn paths_are_cut_where_the_share_and_what_is_there_begin_and_end() {
+        let found = pieces(50_000, &(10..40_000), &[100..200]);
+        let added: Vec<_> = found.iter().filter(|(_, add)| *add).map(|(unit, _)| unit.clone()).collect();
+        assert_eq!(added, [10..100, 200..16_384, 16_384..32_768, 32_768..40_000]);
+        assert_eq!(found.iter().map(|(unit, _)| unit.end - unit.start).sum::<u64>(), 50_000);
+    }
+
+    #[test]
+    fn a_small_picture_is_cut_for_all_threads() {
+        let window = |side: u32| Window { x: 0, y: 0, width: side, height: side };
+        // 16 × 16 pixels make 16 tiles of 4 × 4, as small as they get; 1024 × 1024 stay whole tiles.
+        assert_eq!(shares(window(16), 32, 8).len(), 16);
+        assert_eq!(shares(window(48), 32, 2).len(), 144);
+        assert_eq!(shares(window(256), 32, 2).len(), 64);
+        assert_eq!(shares(window(1024), 32, 2).len(), 1024);
+    }
+
+    #[test]
+    fn tiles_cover_a_crop_once_and_are_those_of_the_frame() {
+        let window = Window { x: -5, y: 30, width: 70, height: 40 };
+        let all = tiles(window, 32);
+        assert_eq!(all.iter().map(Window::pixels).sum::<usize>(), window.pixels());
+        assert!(all.iter().all(|t| window.contains(t)));
+        assert!(all.contains(&Window { x: 0, y: 32, width: 32, height: 32 }));
+    }
+}
