@@ -2,6 +2,7 @@
 //!
 //! A batch goes on with the other scenes after one fails; what failed is told at the end.
 
+pub mod finish;
 pub mod frame;
 pub mod part;
 pub mod report;
@@ -9,11 +10,8 @@ pub mod report;
 use crate::description::{self, BatchEntry, LayerContent, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
-use crate::film::exr::{self, Attribute, ColourEncoding, LayerPlane};
 use crate::film::filter::{Filter, FilterSampler};
 use crate::film::output;
-use crate::film::png::{self, PngSettings};
-use crate::film::resolve::Image;
 use crate::scene::Scene;
 use crate::scene::census::Census;
 use crate::scene::compile;
@@ -23,7 +21,8 @@ use crate::transport::layers::{Channel, Form, Layer, LayerPlan, Quantity, Source
 use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
 use crate::transport::trial;
-use frame::{Frame, FrameJob, Progress};
+use finish::Finish;
+use frame::{FrameJob, Progress};
 use report::{Report, SceneReport, Status};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -226,21 +225,6 @@ fn layer_plan(description: &SceneDescription, scene: &Scene, samples: u32) -> Re
     Ok(plan)
 }
 
-/// What a pixel of the file holds: bands replace colour.
-fn base(description: &SceneDescription) -> exr::Base {
-    if !description.image.bands.is_empty() {
-        return exr::Base::Nothing;
-    }
-    match description.output.exr.channels {
-        description::Channels::Rgba => exr::Base::Rgba,
-        description::Channels::Rgb => exr::Base::Rgb,
-        description::Channels::Xyza => exr::Base::Xyza,
-        description::Channels::Xyz => exr::Base::Xyz,
-        description::Channels::LuminanceAlpha => exr::Base::LuminanceAlpha,
-        description::Channels::Luminance => exr::Base::Luminance,
-    }
-}
-
 fn quantity(quantity: description::Quantity) -> Quantity {
     match quantity {
         description::Quantity::Depth => Quantity::Depth,
@@ -279,18 +263,6 @@ fn hash(description: &SceneDescription, files: &[PathBuf]) -> String {
         {
             hasher.update(&bytes);
         }
-    }
-    hasher.finalize().to_hex()[..32].to_owned()
-}
-
-/// 128 bits of BLAKE3 over the numbers of a picture.
-fn pixel_hash(image: &Image) -> String {
-    let mut hasher = blake3::Hasher::new();
-    let mut bytes = Vec::new();
-    for plane in image.rgb.iter().chain([&image.alpha]) {
-        bytes.clear();
-        bytes.extend(plane.iter().flat_map(|x| x.to_le_bytes()));
-        hasher.update(&bytes);
     }
     hasher.finalize().to_hex()[..32].to_owned()
 }
@@ -354,7 +326,7 @@ pub fn render_scene(
     stop: &AtomicBool,
 ) -> (SceneReport, Result<()>) {
     let mut report = SceneReport::new(&prepared.scene.name);
-    report.describe(prepared, loading);
+    report.describe(&Finish::of(prepared), loading);
     let result = render_and_write(prepared, overrides, watcher, stop, &mut report);
     if let Err(e) = &result {
         report.fail(e);
@@ -384,105 +356,9 @@ fn render_and_write(
         tile: description.render.tile,
     };
     let frame = frame::render(&job, &|p| watcher.progress(p), stop)?;
-    report.measure(prepared, &frame);
-
-    let base = base(description);
-    let space = if base.is_xyz() { ColourSpace::Xyz } else { colour_space(description.output.colour) };
-    let sensitivity = description.image.sensitivity;
-    let image = frame.resolve(&space.matrix_from_xyz().map(|row| row.map(|x| x * sensitivity)));
-    report.pixel_hash = pixel_hash(&image);
-    let written = Instant::now();
-    let png_path = exr_path.with_extension("png");
-    let settings = PngSettings {
-        exposure_stops: description.output.png.exposure,
-        tonemap: match description.output.png.tonemap {
-            description::Tonemap::Aces => png::Tonemap::Aces,
-            description::Tonemap::Agx => png::Tonemap::Agx,
-            description::Tonemap::Reinhard => png::Tonemap::Reinhard,
-            description::Tonemap::None => png::Tonemap::None,
-        },
-        rec709_from_rgb: space.to_rec709(),
-        ..PngSettings::default()
-    };
-    // Packed together but written one after the other: where the first cannot be written, nothing of the picture is left.
-    let (written_exr, png) = rayon::join(
-        || write_exr(&exr_path, prepared, &frame, &image, base, space, report),
-        || png::encode_png(&image, &settings),
-    );
-    written_exr?;
-    png::write_encoded(&png_path, png)?;
-    report.files = vec![exr_path, png_path];
-    report.seconds.writing = written.elapsed().as_secs_f64();
-
-    let samples = job.window.pixels() as u64 * u64::from(job.samples);
-    frame::check_invalid(&frame.invalid(), samples)
-}
-
-fn write_exr(
-    path: &Path,
-    prepared: &Prepared,
-    frame: &Frame,
-    image: &Image,
-    base: exr::Base,
-    space: ColourSpace,
-    report: &mut SceneReport,
-) -> Result<()> {
-    let output = &prepared.description.output;
-    let colour = ColourEncoding { primaries: space.chromaticities(), interop_id: Some(space.interop_id().to_owned()) };
-    let precision = match output.exr.precision {
-        description::Precision::Half => exr::Precision::Half,
-        description::Precision::Float => exr::Precision::Float,
-    };
-    let compression = match output.exr.compression {
-        description::Compression::None => exr::Compression::None,
-        description::Compression::Zips => exr::Compression::Zips,
-        description::Compression::Zip => exr::Compression::Zip,
-        description::Compression::Piz => exr::Compression::Piz,
-    };
-    let error = if output.exr.stderr { exr::StandardError::Write } else { exr::StandardError::Leave };
-    let channels = prepared.plan.layers.channels();
-    let layers = channels
-        .into_iter()
-        .enumerate()
-        .map(|(i, channel)| LayerPlane { name: channel.name, plane: frame.layer(i), light: channel.light })
-        .collect();
-    let mut beauty = exr::beauty(image, base, layers, colour, precision, error, compression);
-    if frame.film.layers.invalid.total() > 0 {
-        report.notes.push(format!("{} samples of layers could not be added", frame.film.layers.invalid.total()));
-    }
-    report.notes.extend(beauty.note.take());
-    beauty.exr.attributes = attributes(prepared, frame, report);
-    exr::write_exr(path, &beauty.exr)
-}
-
-/// The header of a picture: what is needed to make it again, and how good it is.
-fn attributes(prepared: &Prepared, frame: &Frame, report: &SceneReport) -> Vec<(String, Attribute)> {
-    let text = |s: &str| Attribute::Text(s.to_owned());
-    let camera = &prepared.scene.camera;
-    let mut all = vec![
-        ("software".to_owned(), text(concat!("Abbe ", env!("CARGO_PKG_VERSION")))),
-        ("comments".to_owned(), text(&prepared.scene.name)),
-        ("worldToCamera".to_owned(), Attribute::Matrix4(camera.camera_from_world())),
-        ("worldToNDC".to_owned(), Attribute::Matrix4(camera.ndc_from_world())),
-        ("abbe/version".to_owned(), text(env!("CARGO_PKG_VERSION"))),
-        ("abbe/sceneHash".to_owned(), text(&prepared.hash)),
-        ("abbe/pixelHash".to_owned(), text(&report.pixel_hash)),
-        ("abbe/seed".to_owned(), text(&prepared.description.render.seed.to_string())),
-        ("abbe/samples".to_owned(), Attribute::Int(prepared.samples as i32)),
-        ("abbe/wavelengths".to_owned(), text(prepared.scene.wavelengths.describe())),
-        ("abbe/integrator".to_owned(), text(report.integrator)),
-        ("abbe/effects".to_owned(), text(&report.effects_in_force().join(", "))),
-        ("abbe/renderSeconds".to_owned(), Attribute::Double(frame.elapsed.as_secs_f64())),
-        ("abbe/invalidSamples".to_owned(), text(&frame.invalid().total().to_string())),
-    ];
-    if let Some(e) = &report.error {
-        all.push(("abbe/relativeError".to_owned(), Attribute::Double(e.rel_rmse)));
-        all.push(("abbe/relativeErrorInterval95".to_owned(), text(&format!("{:.3e} {:.3e}", e.low, e.high))));
-    }
-    if let Some(seconds) = report.halving_seconds {
-        all.push(("abbe/secondsToHalveError".to_owned(), Attribute::Double(seconds)));
-    }
-    all
+    let finish = Finish::of(prepared);
+    report.measure(&finish, &frame, prepared.scene.watch.as_ref().map(|watch| watch.counts()));
+    finish::write(&finish, &frame, &exr_path, report)
 }
 
 /// Renders all scenes of `path` that are asked for; a scene that fails does not stop the others.

@@ -1,12 +1,12 @@
 //! What a render cost and how good it is: for `report.json`, the terminal and the EXR header.
 
-use super::Prepared;
+use super::finish::Finish;
 use super::frame::{Frame, Milestone};
 use crate::error::Error;
 use crate::film::accumulate::InvalidCounts;
 use crate::film::resolve::ErrorEstimate;
 use crate::scene::watch::Counts;
-use crate::transport::plan::{Effect, Integrator};
+use crate::transport::plan::Effect;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -77,7 +77,7 @@ pub struct SceneReport {
     /// How it ended.
     pub status: Status,
     /// `path` or `whitted`.
-    pub integrator: &'static str,
+    pub integrator: String,
     /// Width and height in pixels.
     pub resolution: [u32; 2],
     /// Samples of a pixel.
@@ -160,7 +160,7 @@ impl SceneReport {
         SceneReport {
             name: name.to_owned(),
             status: Status::Done,
-            integrator: "",
+            integrator: String::new(),
             resolution: [0, 0],
             samples: 0,
             seed: 0,
@@ -182,33 +182,27 @@ impl SceneReport {
     }
 
     /// Notes what is to be rendered.
-    pub fn describe(&mut self, prepared: &Prepared, loading: Duration) {
-        self.notes.extend(prepared.scene.notes.iter().cloned());
-        self.integrator = match prepared.plan.integrator {
-            Integrator::Path(_) => "path",
-            Integrator::Whitted(_) => "whitted",
-            Integrator::Depth => "depth",
-            Integrator::Light(_) => "light_tracer",
-            Integrator::Nothing => "none",
-        };
-        self.resolution = prepared.scene.camera.resolution;
-        self.samples = prepared.samples;
-        self.seed = prepared.description.render.seed;
-        self.scene_hash.clone_from(&prepared.hash);
-        self.effects.clone_from(&prepared.plan.effects);
-        self.techniques.clone_from(&prepared.plan.techniques);
-        self.wavelengths = prepared.scene.wavelengths.describe().to_owned();
+    pub fn describe(&mut self, finish: &Finish, loading: Duration) {
+        self.notes.extend(finish.notes.iter().cloned());
+        self.integrator.clone_from(&finish.integrator);
+        self.resolution = finish.frame;
+        self.samples = finish.samples;
+        self.seed = finish.seed;
+        self.scene_hash.clone_from(&finish.scene_hash);
+        self.effects.clone_from(&finish.effects);
+        self.techniques.clone_from(&finish.techniques);
+        self.wavelengths.clone_from(&finish.wavelengths);
         self.seconds.loading = loading.as_secs_f64();
     }
 
     /// Notes what rendering gave.
-    pub fn measure(&mut self, prepared: &Prepared, frame: &Frame) {
+    pub fn measure(&mut self, finish: &Finish, frame: &Frame, numerics: Option<Counts>) {
         let seconds = frame.elapsed.as_secs_f64();
         let (counted, dropped) = frame.film.samples();
         self.seconds.rendering = seconds;
         self.msamples_per_second = (counted + dropped) as f64 / seconds.max(1e-9) * 1e-6;
         self.invalid = frame.invalid();
-        self.numerics = prepared.scene.watch.as_ref().map(|watch| watch.counts());
+        self.numerics = numerics;
         self.error = frame.milestones.last().and_then(|m| m.error);
         if self.error.is_some() {
             let factor = halving_factor(convergence_exponent(&frame.milestones));
@@ -223,7 +217,7 @@ impl SceneReport {
                 Some(ConvergencePoint { samples: m.samples, seconds, relative_error: e.rel_rmse })
             })
             .collect();
-        if self.error.is_none() && matches!(prepared.plan.integrator, Integrator::Path(_)) {
+        if self.error.is_none() && finish.integrator == "path" {
             self.notes.push("too few samples, or a black picture: the error cannot be estimated".into());
         }
     }
@@ -235,8 +229,8 @@ impl SceneReport {
 
     /// Names of the effects that are on.
     #[must_use]
-    pub fn effects_in_force(&self) -> Vec<&'static str> {
-        self.effects.iter().filter(|e| e.on).map(|e| e.name).collect()
+    pub fn effects_in_force(&self) -> Vec<&str> {
+        self.effects.iter().filter(|e| e.on).map(|e| e.name.as_ref()).collect()
     }
 }
 

@@ -96,7 +96,7 @@ fn with_share(part: u64, all: u64) -> String {
 const HEADINGS: [&str; 7] = ["scene", "samples", "time", "Msamples/s", "error (95 %)", "half the error", "invalid"];
 
 fn row(s: &SceneReport) -> [String; 7] {
-    let error = match (&s.error, s.integrator) {
+    let error = match (&s.error, s.integrator.as_str()) {
         (Some(e), _) => {
             format!("{} ({}-{})", per_cent(e.rel_rmse), per_cent(e.low).replace(" %", ""), per_cent(e.high))
         }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::fault::Checker;
 use super::light::nothing;
@@ -233,7 +233,7 @@ pub enum Wavelengths {
 }
 
 /// `output: {dir: out, colour: rec709}`
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
     /// Directory, relative to the working directory; default `out`.
@@ -261,7 +261,7 @@ impl Default for Output {
 }
 
 /// `exr: {precision: half, compression: zips}`
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exr {
     /// Of the colour channels; default `half`.
@@ -279,7 +279,7 @@ pub struct Exr {
 }
 
 /// What a pixel of the OpenEXR file holds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Channels {
     /// R, G, B and coverage A.
@@ -298,7 +298,7 @@ pub enum Channels {
 }
 
 /// Number format of the colour channels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Precision {
     /// 16 bits.
@@ -309,7 +309,7 @@ pub enum Precision {
 }
 
 /// Compression of an OpenEXR file; all are lossless.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Compression {
     /// None.
@@ -324,7 +324,7 @@ pub enum Compression {
 }
 
 /// `png: {exposure: 0, tonemap: aces}`
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Png {
     /// Stops; default 0.
@@ -336,7 +336,7 @@ pub struct Png {
 }
 
 /// How radiance becomes display values.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tonemap {
     /// The ACES curve.
@@ -351,7 +351,7 @@ pub enum Tonemap {
 }
 
 /// Colour space of the OpenEXR file; all are linear.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Colour {
     /// `rec709`
     #[default]

@@ -9,12 +9,12 @@ use super::shape::plain;
 use super::{Geometry, Hit, Scene};
 use crate::math::{Departure, Ray};
 use glam::DVec3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What was counted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Surfaces that were met.
     pub surfaces: u64,

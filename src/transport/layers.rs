@@ -127,7 +127,7 @@ impl Default for LayerPlan {
 }
 
 /// A channel and what kind of number it holds.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Channel {
     /// With the component, `nn.X`.
     pub name: String,

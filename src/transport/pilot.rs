@@ -89,7 +89,7 @@ const OVERHEAD: f64 = 1.2;
 
 /// A name and whether it holds, for people.
 fn technique(name: &'static str, on: bool, reason: String) -> Effect {
-    Effect { name, on, reason }
+    Effect { name: name.into(), on, reason }
 }
 
 /// Decides for a picture of `samples` a pixel, and returns what to trace and what to say of it.

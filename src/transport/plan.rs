@@ -9,7 +9,8 @@ use super::caustics::Caustics;
 use super::layers::LayerPlan;
 use crate::scene::census::Census;
 use crate::spectrum::Spectrum;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Which light transport is simulated.
@@ -118,10 +119,10 @@ pub enum EffectMode {
 }
 
 /// One effect or technique.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Effect {
     /// Its name.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// Whether it is simulated, or used.
     pub on: bool,
     /// Why.
@@ -170,8 +171,11 @@ pub(super) fn some_of(names: &[String]) -> String {
 fn path_techniques(census: &Census, chromatic: bool) -> Vec<Effect> {
     let extended = census.area_lights.len() + census.backgrounds;
     let lights = extended + census.delta_lights;
-    let technique =
-        |name, on, here: String, absent: &str| Effect { name, on, reason: if on { here } else { absent.to_owned() } };
+    let technique = |name: &'static str, on, here: String, absent: &str| Effect {
+        name: name.into(),
+        on,
+        reason: if on { here } else { absent.to_owned() },
+    };
     vec![
         technique(
             "next-event estimation",
@@ -203,14 +207,14 @@ impl EffectPlan {
         let from_camera = !matches!(integrator, Integrator::Light(_));
         let mut effects: Vec<Effect> = Vec::new();
         // An effect of the scene: on if the scene has it, or if everything is forced on.
-        let mut effect = |name, present: bool, here: String, absent: &str| {
+        let mut effect = |name: &'static str, present: bool, here: String, absent: &str| {
             let on = present || mode == EffectMode::All;
             let reason = match (present, mode) {
                 (true, _) => here,
                 (false, EffectMode::Auto) => absent.to_owned(),
                 (false, EffectMode::All) => format!("forced by effects: all ({absent})"),
             };
-            effects.push(Effect { name, on, reason });
+            effects.push(Effect { name: name.into(), on, reason });
             on
         };
         let count = |n: usize, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
@@ -322,7 +326,7 @@ mod tests {
     #[test]
     fn an_empty_scene_calls_for_nothing_but_light_over_surfaces() {
         let plan = EffectPlan::of(&Census::default(), path(), EffectMode::Auto);
-        let on: Vec<_> = plan.effects.iter().filter(|e| e.on).map(|e| e.name).collect();
+        let on: Vec<_> = plan.effects.iter().filter(|e| e.on).map(|e| e.name.as_ref()).collect();
         assert_eq!(on, ["indirect light"]);
         assert!(!plan.chromatic && !plan.media && !plan.depth_fog);
     }

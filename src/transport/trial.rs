@@ -48,7 +48,7 @@ pub fn packets(
     if !plan.packets {
         return None;
     }
-    let said = |on, reason| Some((on, Effect { name: "wavelength packets from the camera", on, reason }));
+    let said = |on, reason| Some((on, Effect { name: "wavelength packets from the camera".into(), on, reason }));
     match wish {
         Use::Auto => {}
         Use::On => return said(true, "the scene says so".into()),

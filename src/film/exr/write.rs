@@ -107,13 +107,18 @@ fn deflated_chunk(window: &Window, channels: &[Channel], rows: Range<usize>) -> 
     let differences: Vec<u8> = std::iter::once(parted[0])
         .chain(parted.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]).wrapping_add(128)))
         .collect();
+    pack(window.y + rows.start as i32, &differences, plain)
+}
+
+/// The chunk of the rows from `y` on: `bytes` deflated. What does not shrink is stored as it is, `plain`, and known by
+/// its length.
+pub(super) fn pack(y: i32, bytes: &[u8], plain: Vec<u8>) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::with_capacity(plain.len()), flate2::Compression::fast());
     // A vector takes all that it is given.
-    let packed = encoder.write_all(&differences).and_then(|()| encoder.finish());
-    // What does not shrink is stored as it is, and known by its length.
+    let packed = encoder.write_all(bytes).and_then(|()| encoder.finish());
     let pixels = packed.ok().filter(|packed| packed.len() < plain.len()).unwrap_or(plain);
     let mut chunk = Vec::with_capacity(8 + pixels.len());
-    chunk.extend_from_slice(&(window.y + rows.start as i32).to_le_bytes());
+    chunk.extend_from_slice(&y.to_le_bytes());
     chunk.extend_from_slice(&(pixels.len() as i32).to_le_bytes());
     chunk.extend_from_slice(&pixels);
     chunk
@@ -153,7 +158,7 @@ fn sorted_channels(image: &ExrImage) -> std::result::Result<Vec<Channel<'_>>, St
     Ok(channels)
 }
 
-fn check_name(what: &str, name: &str) -> std::result::Result<(), String> {
+pub(super) fn check_name(what: &str, name: &str) -> std::result::Result<(), String> {
     if name.is_empty() || name.len() > 255 || name.contains('\0') {
         return Err(format!("{what} name {name:?}: expected 1 to 255 bytes without a zero byte"));
     }
@@ -189,18 +194,53 @@ fn compressor_header(image: &ExrImage, channels: &[Channel]) -> Header {
 
 /// Magic number, version, and attributes sorted by name.
 fn header_bytes(image: &ExrImage, channels: &[Channel]) -> std::result::Result<Vec<u8>, String> {
+    let channels: Vec<(&str, i32)> = channels
+        .iter()
+        .map(|(name, data)| match data {
+            ChannelData::U32(_) => (*name, UINT),
+            ChannelData::F16(_) => (*name, 1),
+            ChannelData::F32(_) => (*name, 2),
+        })
+        .collect();
+    let compression = compression_code(image.compression);
+    header(image.frame, image.window, &channels, compression, image.colour.as_ref(), &image.attributes)
+}
+
+/// The header of a file of whole numbers in `channels`, whose names are sorted.
+pub(super) fn header_of(
+    frame: [u32; 2],
+    window: Window,
+    channels: &[&str],
+    compression: u8,
+    attributes: &[(String, Attribute)],
+) -> std::result::Result<Vec<u8>, String> {
+    let channels: Vec<(&str, i32)> = channels.iter().map(|name| (*name, UINT)).collect();
+    header(frame, window, &channels, compression, None, attributes)
+}
+
+/// The type of whole numbers.
+const UINT: i32 = 0;
+
+fn header(
+    frame: [u32; 2],
+    window: Window,
+    channels: &[(&str, i32)],
+    compression: u8,
+    colour: Option<&ColourEncoding>,
+    further: &[(String, Attribute)],
+) -> std::result::Result<Vec<u8>, String> {
     // (name, type, value)
     let mut attributes: Vec<(&str, &str, Vec<u8>)> = vec![
         ("channels", "chlist", channel_list(channels)),
-        ("compression", "compression", vec![compression_code(image.compression)]),
-        ("dataWindow", "box2i", window_bytes(image.window)),
-        ("displayWindow", "box2i", window_bytes(Window::full(image.frame[0], image.frame[1]))),
+        ("compression", "compression", vec![compression]),
+        ("dataWindow", "box2i", window_bytes(window)),
+        ("displayWindow", "box2i", window_bytes(Window::full(frame[0], frame[1]))),
         ("lineOrder", "lineOrder", vec![0]),
         ("pixelAspectRatio", "float", 1f32.to_le_bytes().to_vec()),
         ("screenWindowCenter", "v2f", vec![0; 8]),
         ("screenWindowWidth", "float", 1f32.to_le_bytes().to_vec()),
     ];
-    match &image.colour {
+    match colour {
         Some(ColourEncoding { primaries, interop_id }) => {
             attributes.push((
                 "chromaticities",
@@ -213,7 +253,7 @@ fn header_bytes(image: &ExrImage, channels: &[Channel]) -> std::result::Result<V
         }
         None => attributes.push(("colorInteropID", "string", b"data".to_vec())),
     }
-    for (name, value) in &image.attributes {
+    for (name, value) in further {
         check_name("attribute", name)?;
         // Names that say how the file is built; another value would make it unreadable.
         const STRUCTURE: [&str; 6] = ["tiles", "type", "version", "chunkCount", "maxSamplesPerPixel", "name"];
@@ -251,14 +291,9 @@ fn compression_code(compression: Compression) -> u8 {
     }
 }
 
-fn channel_list(channels: &[Channel]) -> Vec<u8> {
+fn channel_list(channels: &[(&str, i32)]) -> Vec<u8> {
     let mut out = Vec::new();
-    for (name, data) in channels {
-        let kind: i32 = match data {
-            ChannelData::U32(_) => 0,
-            ChannelData::F16(_) => 1,
-            ChannelData::F32(_) => 2,
-        };
+    for (name, kind) in channels {
         out.extend_from_slice(name.as_bytes());
         out.push(0);
         out.extend_from_slice(&kind.to_le_bytes());

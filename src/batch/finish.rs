@@ -1,0 +1,230 @@
+//! From sums to files: what a picture's files need besides its sums, and the writing of them.
+//!
+//! A part carries its [`Finish`], so that `abbe merge` needs no scene, and writes what the one process would have written.
+
+use super::frame::{self, Frame};
+use super::report::SceneReport;
+use super::{Prepared, colour_space, window};
+use crate::description::{self, Output};
+use crate::error::Result;
+use crate::film::Window;
+use crate::film::exr::{self, Attribute, ColourEncoding, LayerPlane};
+use crate::film::png::{self, PngSettings};
+use crate::film::resolve::Image;
+use crate::spectrum::ColourSpace;
+use crate::transport::layers::Channel;
+use crate::transport::plan::{Effect, Integrator};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::time::Instant;
+
+/// What the files of a picture need besides its sums.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Finish {
+    /// Name of the scene.
+    pub name: String,
+    /// Width and height of the frame in pixels.
+    pub frame: [u32; 2],
+    /// The pixels of the picture.
+    pub window: Window,
+    /// Samples of a pixel.
+    pub samples: u32,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Hash of the description and of the files it names.
+    pub scene_hash: String,
+    /// What computes the light.
+    pub integrator: String,
+    /// What is simulated.
+    pub effects: Vec<Effect>,
+    /// How.
+    pub techniques: Vec<Effect>,
+    /// From which wavelengths samples are drawn.
+    pub wavelengths: String,
+    /// What a person should know of the scene.
+    pub notes: Vec<String>,
+    /// The camera's place and view, as the header of an EXR file has them.
+    pub world_to_camera: [f32; 16],
+    /// And to the frame.
+    pub world_to_ndc: [f32; 16],
+    /// Files, colours and tone curve.
+    pub output: Output,
+    /// Factor on colours.
+    pub sensitivity: f64,
+    /// Whether bands of the spectrum stand in place of colour.
+    pub bands: bool,
+    /// Further channels.
+    pub layers: Vec<Channel>,
+}
+
+impl Finish {
+    /// What the files of `prepared` need.
+    #[must_use]
+    pub fn of(prepared: &Prepared) -> Finish {
+        let Prepared { description, scene, plan, samples, hash } = prepared;
+        Finish {
+            name: scene.name.clone(),
+            frame: scene.camera.resolution,
+            window: window(description),
+            samples: *samples,
+            seed: description.render.seed,
+            scene_hash: hash.clone(),
+            integrator: integrator(&plan.integrator).to_owned(),
+            effects: plan.effects.clone(),
+            techniques: plan.techniques.clone(),
+            wavelengths: scene.wavelengths.describe().to_owned(),
+            notes: scene.notes.clone(),
+            world_to_camera: scene.camera.camera_from_world(),
+            world_to_ndc: scene.camera.ndc_from_world(),
+            output: description.output.clone(),
+            sensitivity: description.image.sensitivity,
+            bands: !description.image.bands.is_empty(),
+            layers: plan.layers.channels(),
+        }
+    }
+
+    /// What a pixel of the file holds: bands replace colour.
+    fn base(&self) -> exr::Base {
+        if self.bands {
+            return exr::Base::Nothing;
+        }
+        match self.output.exr.channels {
+            description::Channels::Rgba => exr::Base::Rgba,
+            description::Channels::Rgb => exr::Base::Rgb,
+            description::Channels::Xyza => exr::Base::Xyza,
+            description::Channels::Xyz => exr::Base::Xyz,
+            description::Channels::LuminanceAlpha => exr::Base::LuminanceAlpha,
+            description::Channels::Luminance => exr::Base::Luminance,
+        }
+    }
+
+    /// The colour space of the file.
+    fn space(&self) -> ColourSpace {
+        if self.base().is_xyz() { ColourSpace::Xyz } else { colour_space(self.output.colour) }
+    }
+
+    /// The picture of `frame` in the colours of the file.
+    fn resolve(&self, frame: &Frame) -> Image {
+        frame.resolve(&self.space().matrix_from_xyz().map(|row| row.map(|x| x * self.sensitivity)))
+    }
+
+    fn png_settings(&self) -> PngSettings {
+        PngSettings {
+            exposure_stops: self.output.png.exposure,
+            tonemap: match self.output.png.tonemap {
+                description::Tonemap::Aces => png::Tonemap::Aces,
+                description::Tonemap::Agx => png::Tonemap::Agx,
+                description::Tonemap::Reinhard => png::Tonemap::Reinhard,
+                description::Tonemap::None => png::Tonemap::None,
+            },
+            rec709_from_rgb: self.space().to_rec709(),
+            ..PngSettings::default()
+        }
+    }
+}
+
+/// The name of an integrator.
+#[must_use]
+pub fn integrator(integrator: &Integrator) -> &'static str {
+    match integrator {
+        Integrator::Path(_) => "path",
+        Integrator::Whitted(_) => "whitted",
+        Integrator::Depth => "depth",
+        Integrator::Light(_) => "light_tracer",
+        Integrator::Nothing => "none",
+    }
+}
+
+/// Writes the EXR at `exr_path` and the PNG beside it, and notes them in the report, which has measured the frame.
+///
+/// # Errors
+/// [`Error::Output`](crate::error::Error::Output) where a file cannot be written, [`Error::Render`](crate::error::Error::Render)
+/// for invalid samples; the files are then written all the same.
+pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut SceneReport) -> Result<()> {
+    let image = finish.resolve(frame);
+    report.pixel_hash = pixel_hash(&image);
+    let written = Instant::now();
+    let png_path = exr_path.with_extension("png");
+    let settings = finish.png_settings();
+    // Packed together but written one after the other: where the first cannot be written, nothing of the picture is left.
+    let (written_exr, png) =
+        rayon::join(|| write_exr(exr_path, finish, frame, &image, report), || png::encode_png(&image, &settings));
+    written_exr?;
+    png::write_encoded(&png_path, png)?;
+    report.files = vec![exr_path.to_path_buf(), png_path];
+    report.seconds.writing = written.elapsed().as_secs_f64();
+
+    let samples = finish.window.pixels() as u64 * u64::from(finish.samples);
+    frame::check_invalid(&frame.invalid(), samples)
+}
+
+fn write_exr(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneReport) -> Result<()> {
+    let (output, space) = (&finish.output, finish.space());
+    let colour = ColourEncoding { primaries: space.chromaticities(), interop_id: Some(space.interop_id().to_owned()) };
+    let precision = match output.exr.precision {
+        description::Precision::Half => exr::Precision::Half,
+        description::Precision::Float => exr::Precision::Float,
+    };
+    let compression = match output.exr.compression {
+        description::Compression::None => exr::Compression::None,
+        description::Compression::Zips => exr::Compression::Zips,
+        description::Compression::Zip => exr::Compression::Zip,
+        description::Compression::Piz => exr::Compression::Piz,
+    };
+    let error = if output.exr.stderr { exr::StandardError::Write } else { exr::StandardError::Leave };
+    let layer = |(i, channel): (usize, &Channel)| LayerPlane {
+        name: channel.name.clone(),
+        plane: frame.layer(i),
+        light: channel.light,
+    };
+    let layers = finish.layers.iter().enumerate().map(layer).collect();
+    let mut beauty = exr::beauty(image, finish.base(), layers, colour, precision, error, compression);
+    if frame.film.layers.invalid.total() > 0 {
+        report.notes.push(format!("{} samples of layers could not be added", frame.film.layers.invalid.total()));
+    }
+    report.notes.extend(beauty.note.take());
+    beauty.exr.attributes = attributes(finish, frame, report);
+    exr::write_exr(path, &beauty.exr)
+}
+
+/// The header of a picture: what is needed to make it again, and how good it is.
+fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(String, Attribute)> {
+    let text = |s: &str| Attribute::Text(s.to_owned());
+    let mut all = vec![
+        ("software".to_owned(), text(concat!("Abbe ", env!("CARGO_PKG_VERSION")))),
+        ("comments".to_owned(), text(&finish.name)),
+        ("worldToCamera".to_owned(), Attribute::Matrix4(finish.world_to_camera)),
+        ("worldToNDC".to_owned(), Attribute::Matrix4(finish.world_to_ndc)),
+        ("abbe/version".to_owned(), text(env!("CARGO_PKG_VERSION"))),
+        ("abbe/sceneHash".to_owned(), text(&finish.scene_hash)),
+        ("abbe/pixelHash".to_owned(), text(&report.pixel_hash)),
+        ("abbe/seed".to_owned(), text(&finish.seed.to_string())),
+        ("abbe/samples".to_owned(), Attribute::Int(finish.samples as i32)),
+        ("abbe/wavelengths".to_owned(), text(&finish.wavelengths)),
+        ("abbe/integrator".to_owned(), text(&finish.integrator)),
+        ("abbe/effects".to_owned(), text(&report.effects_in_force().join(", "))),
+        ("abbe/renderSeconds".to_owned(), Attribute::Double(frame.elapsed.as_secs_f64())),
+        ("abbe/invalidSamples".to_owned(), text(&frame.invalid().total().to_string())),
+    ];
+    if let Some(e) = &report.error {
+        all.push(("abbe/relativeError".to_owned(), Attribute::Double(e.rel_rmse)));
+        all.push(("abbe/relativeErrorInterval95".to_owned(), text(&format!("{:.3e} {:.3e}", e.low, e.high))));
+    }
+    if let Some(seconds) = report.halving_seconds {
+        all.push(("abbe/secondsToHalveError".to_owned(), Attribute::Double(seconds)));
+    }
+    all
+}
+
+/// 128 bits of BLAKE3 over the numbers of a picture.
+fn pixel_hash(image: &Image) -> String {
+    let mut hasher = blake3::Hasher::new();
+    let mut bytes = Vec::new();
+    for plane in image.rgb.iter().chain([&image.alpha]) {
+        bytes.clear();
+        bytes.extend(plane.iter().flat_map(|x| x.to_le_bytes()));
+        hasher.update(&bytes);
+    }
+    hasher.finalize().to_hex()[..32].to_owned()
+}
