@@ -15,7 +15,7 @@ use crate::spectrum::ColourSpace;
 use crate::transport::layers::Channel;
 use crate::transport::plan::{Effect, Integrator};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// What the files of a picture need besides its sums.
@@ -62,7 +62,7 @@ impl Finish {
     /// What the files of `prepared` need.
     #[must_use]
     pub fn of(prepared: &Prepared) -> Finish {
-        let Prepared { description, scene, plan, samples, hash } = prepared;
+        let Prepared { description, scene, plan, samples, hash, .. } = prepared;
         Finish {
             name: scene.name.clone(),
             frame: scene.camera.resolution,
@@ -77,7 +77,8 @@ impl Finish {
             notes: scene.notes.clone(),
             world_to_camera: scene.camera.camera_from_world(),
             world_to_ndc: scene.camera.ndc_from_world(),
-            output: description.output.clone(),
+            // Where the files go is no matter of what is in them.
+            output: Output { dir: PathBuf::new(), ..description.output.clone() },
             sensitivity: description.image.sensitivity,
             bands: !description.image.bands.is_empty(),
             layers: plan.layers.channels(),

@@ -17,6 +17,7 @@ use crate::spectrum::ColourSpace;
 use crate::transport::merge::Collection;
 use crate::transport::plan::{EffectPlan, Integrator};
 use crate::transport::{PixelSample, Samples, Shot};
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -42,7 +43,7 @@ pub struct FrameJob<'a> {
 }
 
 /// The error after a pass.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Milestone {
     /// Samples of a pixel so far.
     pub samples: u32,
@@ -64,7 +65,7 @@ pub struct Frame {
     /// The error after each pass.
     pub milestones: Vec<Milestone>,
     /// The picture from which the last error was estimated, and its colour space.
-    resolved: Option<([[f64; 3]; 3], Image)>,
+    resolved: Option<Resolved>,
 }
 
 /// How far a frame is.
@@ -81,6 +82,19 @@ pub struct Progress {
 }
 
 impl Frame {
+    /// The frame of `samples` of each pixel that were added up elsewhere in `elapsed`; `random` if replicates differ.
+    #[must_use]
+    pub fn of(film: Film, splats: Option<SplatFilm>, samples: u32, elapsed: Duration, random: bool) -> Frame {
+        let (error, resolved) = if random {
+            let (error, image) = estimate(&film, splats.as_ref());
+            (error, Some(image))
+        } else {
+            (None, None)
+        };
+        let milestones = vec![Milestone { samples, elapsed, error }];
+        Frame { film, splats, elapsed, milestones, resolved }
+    }
+
     /// The picture in the colour space of `rgb_from_xyz`.
     #[must_use]
     pub fn resolve(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> Image {
@@ -222,6 +236,8 @@ pub struct Begun<'a> {
     pub milestones: Vec<Milestone>,
     /// Wall time so far.
     pub elapsed: Duration,
+    /// The picture from which the last error was estimated.
+    resolved: Option<Resolved>,
 }
 
 impl<'a> Begun<'a> {
@@ -230,7 +246,20 @@ impl<'a> Begun<'a> {
     /// # Errors
     /// As [`Part::new`].
     pub fn new(job: &'a FrameJob<'a>, share: Share) -> Result<Begun<'a>> {
-        Ok(Begun { part: Part::new(job, share)?, milestones: Vec::new(), elapsed: Duration::ZERO })
+        Ok(Begun::from(Part::new(job, share)?, Vec::new(), Duration::ZERO))
+    }
+
+    /// A picture whose first samples are in `part`.
+    #[must_use]
+    pub fn from(part: Part<'a>, milestones: Vec<Milestone>, elapsed: Duration) -> Begun<'a> {
+        Begun { part, milestones, elapsed, resolved: None }
+    }
+
+    /// The picture, when all is done.
+    #[must_use]
+    pub fn finish(self) -> Frame {
+        let (film, splats) = self.part.finish();
+        Frame { film, splats, elapsed: self.elapsed, milestones: self.milestones, resolved: self.resolved }
     }
 }
 
@@ -240,7 +269,7 @@ impl<'a> Begun<'a> {
 /// # Errors
 /// [`Error::Render`] if the memory cannot be had, or what `breaks` says.
 pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), breaks: &dyn Breaks) -> Result<Frame> {
-    go_on(Begun::new(job, Share::all(job.samples))?, watch, breaks)
+    Ok(go_on(Begun::new(job, Share::all(job.samples))?, watch, breaks)?.finish())
 }
 
 /// Renders what is left of a picture or of a part of one. After each pass of a picture the error is estimated; a part
@@ -248,44 +277,50 @@ pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), breaks: &dyn Br
 ///
 /// # Errors
 /// As [`render`].
-pub fn go_on(begun: Begun, watch: &(dyn Fn(Progress) + Sync), breaks: &dyn Breaks) -> Result<Frame> {
-    let Begun { part, mut milestones, elapsed: before } = begun;
+pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks: &dyn Breaks) -> Result<Begun<'a>> {
+    let before = begun.elapsed;
     let start = Instant::now();
+    let part = &begun.part;
     let (done, total) = part.progress();
     let done = AtomicU64::new(done);
-    let mut resolved = None;
     let job = part.job();
     let whole = *part.share() == Share::all(job.samples);
     let random = !matches!(job.plan.integrator, Integrator::Whitted(_));
 
     for pass in passes(part.share().samples.clone()) {
-        if milestones.last().is_some_and(|m| m.samples >= pass.end) {
+        if begun.milestones.last().is_some_and(|m| m.samples >= pass.end) {
             continue;
         }
-        let latest = milestones.last().and_then(|m| m.error);
+        let latest = begun.milestones.last().and_then(|m| m.error);
         let finished = |unit| {
             let done = done.fetch_add(unit, Ordering::Relaxed) + unit;
             watch(Progress { done, total, elapsed: before + start.elapsed(), error: latest });
         };
         while !part.add(pass.clone(), breaks, &finished) {
-            breaks.take(&part, &milestones, before + start.elapsed())?;
+            breaks.take(part, &begun.milestones, before + start.elapsed())?;
         }
         let error = if random && whole {
-            part.look(|film, splats| {
-                let photons = splats.map(|s| Splats { film: &s.film, photons: s.paths });
-                let space = ColourSpace::Rec709.matrix_from_xyz();
-                let image = resolve::resolve(film, photons, &space);
-                let error = image.relative_error().ok();
-                resolved = Some((space, image));
-                error
-            })
+            let (error, image) = part.look(estimate);
+            begun.resolved = Some(image);
+            error
         } else {
             None
         };
-        milestones.push(Milestone { samples: pass.end, elapsed: before + start.elapsed(), error });
+        begun.milestones.push(Milestone { samples: pass.end, elapsed: before + start.elapsed(), error });
     }
-    let (film, splats) = part.finish();
-    Ok(Frame { film, splats, elapsed: before + start.elapsed(), milestones, resolved })
+    begun.elapsed = before + start.elapsed();
+    Ok(begun)
+}
+
+/// A picture and the matrix from XYZ to its colours.
+type Resolved = ([[f64; 3]; 3], Image);
+
+/// The error of a picture, and the picture that it was estimated from.
+fn estimate(film: &Film, splats: Option<&SplatFilm>) -> (Option<ErrorEstimate>, Resolved) {
+    let photons = splats.map(|s| Splats { film: &s.film, photons: s.paths });
+    let space = ColourSpace::Rec709.matrix_from_xyz();
+    let image = resolve::resolve(film, photons, &space);
+    (image.relative_error().ok(), (space, image))
 }
 
 /// An error where too many samples were invalid to trust the picture.

@@ -4,7 +4,9 @@
 
 pub mod finish;
 pub mod frame;
+pub mod merge;
 pub mod part;
+pub mod part_file;
 pub mod report;
 
 use crate::description::{self, BatchEntry, LayerContent, SceneDescription};
@@ -22,7 +24,9 @@ use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
 use crate::transport::trial;
 use finish::Finish;
-use frame::{FrameJob, Progress};
+use frame::{Begun, FrameJob, Progress, go_on};
+use part::Share;
+use part_file::Identity;
 use report::{Report, SceneReport, Status};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -42,6 +46,55 @@ pub struct Overrides {
     pub scenes: Vec<String>,
     /// Count what robust arithmetic was needed for, and write it as a layer.
     pub check_numerics: bool,
+    /// Which part of each picture; all of it, and its files, by default.
+    pub portion: Portion,
+}
+
+/// A part of a picture as a person asks for it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Portion {
+    /// `--tile i/n`: the i-th, from 0, of n bands of rows.
+    pub tile: Option<[u32; 2]>,
+    /// `--samples a-b`: the first and the last sample.
+    pub samples: Option<[u32; 2]>,
+}
+
+impl Portion {
+    /// Whether all is asked for, and no part.
+    #[must_use]
+    pub fn is_all(&self) -> bool {
+        *self == Portion::default()
+    }
+
+    /// The share of a picture of `window` and `samples`.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a tile or samples that the picture does not have.
+    pub fn share(&self, window: Window, samples: u32) -> Result<Share> {
+        let [tile, tiles] = self.tile.unwrap_or([0, 1]);
+        if tiles == 0 || tiles > window.height || tile >= tiles {
+            let height = window.height;
+            return Err(Error::Config(format!(
+                "--tile {tile}/{tiles}: expected i/n with i from 0 to n - 1 and n at most {height}, the rows of the picture"
+            )));
+        }
+        let [first, last] = self.samples.unwrap_or([0, samples - 1]);
+        if first > last || last >= samples {
+            let most = samples - 1;
+            return Err(Error::Config(format!(
+                "--samples {first}-{last}: expected a-b with a not above b, from 0-0 to {most}-{most}: the scene has \
+                 {samples} samples a pixel"
+            )));
+        }
+        Ok(Share { tile, tiles, samples: first..last + 1 })
+    }
+
+    /// What tells the name of a part from that of the picture.
+    fn suffix(&self) -> String {
+        let tile = self.tile.map_or(String::new(), |[i, n]| format!(".tile{i}of{n}"));
+        let samples = self.samples.map_or(String::new(), |[a, b]| format!(".samples{a}-{b}"));
+        tile + &samples
+    }
 }
 
 /// What a batch tells while it runs. All methods may be called from any thread.
@@ -74,6 +127,8 @@ pub struct Prepared {
     pub samples: u32,
     /// Hash of the description and of the files it names.
     pub hash: String,
+    /// The file of the scene.
+    pub source: PathBuf,
 }
 
 /// The entries of `path`, filtered by name.
@@ -149,7 +204,7 @@ fn prepare_with(entry: &BatchEntry, overrides: &Overrides, shelf: &mut Shelf) ->
         plan.layers.layers.push(Layer { name: name.into(), source: Source::Numerics, squares: None });
     }
     let hash = hash(&description, &scene.files);
-    Ok(Prepared { description, scene, plan, samples, hash })
+    Ok(Prepared { description, scene, plan, samples, hash, source: entry.path.clone() })
 }
 
 /// Techniques that the description asks for or forbids.
@@ -294,13 +349,15 @@ fn ends_in(path: &Path, extensions: &[&str]) -> bool {
     path.extension().is_some_and(|e| extensions.iter().any(|x| e.eq_ignore_ascii_case(x)))
 }
 
-/// Where a scene's pictures go: `-o FILE.exr`, `-o DIR`, or the directory of the description.
+/// Where a scene's pictures go: `-o FILE.exr`, `-o DIR`, or the directory of the description. In a directory the name of
+/// a part says which it is.
 #[must_use]
 pub fn output_path(prepared: &Prepared, overrides: &Overrides) -> PathBuf {
+    let name = format!("{}{}.exr", prepared.scene.name, overrides.portion.suffix());
     match &overrides.output {
         Some(path) if ends_in(path, &["exr"]) => path.clone(),
-        Some(dir) => dir.join(format!("{}.exr", prepared.scene.name)),
-        None => prepared.description.output.dir.join(format!("{}.exr", prepared.scene.name)),
+        Some(dir) => dir.join(name),
+        None => prepared.description.output.dir.join(name),
     }
 }
 
@@ -345,7 +402,9 @@ fn render_and_write(
     let exr_path = output_path(prepared, overrides);
     // A place that cannot be written to is told before the work, not after.
     output::prepare_place(&exr_path)?;
-    output::prepare_place(&exr_path.with_extension("png"))?;
+    if overrides.portion.is_all() {
+        output::prepare_place(&exr_path.with_extension("png"))?;
+    }
     let job = FrameJob {
         scene: &prepared.scene,
         plan: &prepared.plan,
@@ -355,9 +414,21 @@ fn render_and_write(
         seed: description.render.seed,
         tile: description.render.tile,
     };
-    let frame = frame::render(&job, &|p| watcher.progress(p), stop)?;
     let finish = Finish::of(prepared);
-    report.measure(&finish, &frame, prepared.scene.watch.as_ref().map(|watch| watch.counts()));
+    let numerics = || prepared.scene.watch.as_ref().map(|watch| watch.counts());
+    if !overrides.portion.is_all() {
+        let share = overrides.portion.share(job.window, job.samples)?;
+        let begun = go_on(Begun::new(&job, share)?, &|p| watcher.progress(p), stop)?;
+        report.measure_part(&begun, numerics());
+        let written = Instant::now();
+        let identity = Identity::new(finish, &prepared.source, &prepared.plan);
+        part_file::write(&exr_path, &identity, &begun.part, &[], begun.elapsed, numerics())?;
+        report.files = vec![exr_path];
+        report.seconds.writing = written.elapsed().as_secs_f64();
+        return Ok(());
+    }
+    let frame = frame::render(&job, &|p| watcher.progress(p), stop)?;
+    report.measure(&finish, &frame, numerics());
     finish::write(&finish, &frame, &exr_path, report)
 }
 
@@ -414,14 +485,8 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
         }
     }
     let mut report = Report::new(path, scenes, start.elapsed());
-    // Where not even a directory could be made, the scenes have said so.
-    if let Some(file) = report_dir.map(|dir| dir.join("report.json")).filter(|f| output::directory_of(f).is_dir()) {
-        let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::output(&file, e))?;
-        match output::write_atomically(&file, &json) {
-            Ok(()) => report.file = Some(file),
-            // The pictures are there; a report that cannot be written is a failure of its own.
-            Err(e) => report.unwritten = Some(e),
-        }
+    if let Some(dir) = report_dir {
+        report.write(&dir.join("report.json"));
     }
     Ok(report)
 }

@@ -58,7 +58,7 @@ impl Share {
     }
 
     /// The `tile`-th of `tiles` of the numbers below `n`.
-    fn of(&self, n: u64) -> Range<u64> {
+    pub(super) fn of(&self, n: u64) -> Range<u64> {
         let cut = |i: u32| (u128::from(n) * u128::from(i) / u128::from(self.tiles)) as u64;
         cut(self.tile)..cut(self.tile + 1)
     }
@@ -73,11 +73,52 @@ impl Share {
 
 /// For what a part stands.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "WrittenClaims", try_from = "WrittenClaims")]
 pub struct Claims {
     /// Samples of all pixels of a window; one without samples names a tile that has not begun.
     pub camera: Vec<(Window, Range<u32>)>,
     /// Paths of a sample, and samples.
     pub lights: Vec<(Range<u64>, Range<u32>)>,
+}
+
+/// [`Claims`] in a file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenClaims {
+    /// x, y, width, height, first sample and the one after the last.
+    camera: Vec<[i64; 6]>,
+    /// First path and the one after the last, first sample and the one after the last.
+    lights: Vec<[u64; 4]>,
+}
+
+impl From<Claims> for WrittenClaims {
+    fn from(claims: Claims) -> WrittenClaims {
+        let camera = |(w, s): &(Window, Range<u32>)| {
+            [w.x.into(), w.y.into(), w.width.into(), w.height.into(), s.start.into(), s.end.into()]
+        };
+        let lights = |(p, s): &(Range<u64>, Range<u32>)| [p.start, p.end, s.start.into(), s.end.into()];
+        WrittenClaims {
+            camera: claims.camera.iter().map(camera).collect(),
+            lights: claims.lights.iter().map(lights).collect(),
+        }
+    }
+}
+
+impl TryFrom<WrittenClaims> for Claims {
+    type Error = std::num::TryFromIntError;
+
+    fn try_from(written: WrittenClaims) -> std::result::Result<Claims, Self::Error> {
+        let mut claims = Claims::default();
+        for [x, y, width, height, from, to] in written.camera {
+            let window =
+                Window { x: x.try_into()?, y: y.try_into()?, width: width.try_into()?, height: height.try_into()? };
+            claims.camera.push((window, from.try_into()?..to.try_into()?));
+        }
+        for [first, end, from, to] in written.lights {
+            claims.lights.push((first..end, from.try_into()?..to.try_into()?));
+        }
+        Ok(claims)
+    }
 }
 
 /// What may come between two units of work: a checkpoint, a picture of what is there, the end.
@@ -240,6 +281,12 @@ impl<'a> Part<'a> {
         let start = self.share.samples.start;
         let of = |tile: &Tile| tile.window.pixels() as u64 * u64::from(tile.done.load(Ordering::Relaxed) - start);
         (self.tiles.iter().map(of).sum(), self.window.pixels() as u64 * self.share.samples.len() as u64)
+    }
+
+    /// Paths from the lights that each sample of the whole picture has; none where there are no such paths.
+    #[must_use]
+    pub fn paths_of_a_sample(&self) -> Option<u64> {
+        self.splats.as_ref().map(|(paths, _)| paths_of_a_sample(self.job, paths))
     }
 
     /// The job of which this is a part.

@@ -1,9 +1,10 @@
 //! What a render cost and how good it is: for `report.json`, the terminal and the EXR header.
 
 use super::finish::Finish;
-use super::frame::{Frame, Milestone};
+use super::frame::{Begun, Frame, Milestone};
 use crate::error::Error;
 use crate::film::accumulate::InvalidCounts;
+use crate::film::output;
 use crate::film::resolve::ErrorEstimate;
 use crate::scene::watch::Counts;
 use crate::transport::plan::Effect;
@@ -129,6 +130,19 @@ impl Report {
             unwritten: None,
         }
     }
+
+    /// Writes the report. Where not even a directory could be made, the scenes have said so.
+    pub fn write(&mut self, file: &Path) {
+        if !output::directory_of(file).is_dir() {
+            return;
+        }
+        let json = serde_json::to_vec_pretty(self).map_err(|e| Error::output(file, e));
+        match json.and_then(|json| output::write_atomically(file, &json)) {
+            Ok(()) => self.file = Some(file.to_path_buf()),
+            // The pictures are there; a report that cannot be written is a failure of its own.
+            Err(e) => self.unwritten = Some(e),
+        }
+    }
 }
 
 /// The exponent b of variance ∝ samples^−b, from the last two milestones a doubling apart, kept to
@@ -220,6 +234,21 @@ impl SceneReport {
         if self.error.is_none() && finish.integrator == "path" {
             self.notes.push("too few samples, or a black picture: the error cannot be estimated".into());
         }
+    }
+
+    /// Notes what rendering a part gave, whose error nobody knows.
+    pub fn measure_part(&mut self, begun: &Begun, numerics: Option<Counts>) {
+        let seconds = begun.elapsed.as_secs_f64();
+        self.seconds.rendering = seconds;
+        self.msamples_per_second = begun.part.progress().1 as f64 / seconds.max(1e-9) * 1e-6;
+        self.invalid = begun.part.look(|film, splats| {
+            let mut all = film.invalid;
+            if let Some(splats) = splats {
+                all += splats.film.invalid;
+            }
+            all
+        });
+        self.numerics = numerics;
     }
 
     /// Notes an error.

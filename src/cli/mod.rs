@@ -5,6 +5,7 @@
 
 mod compare;
 mod convert;
+mod merge;
 mod plan;
 mod progress;
 mod render;
@@ -29,6 +30,9 @@ enum Verb {
         after_help = "Examples:\n  abbe render configs/gallery.yaml\n  abbe render configs/scenes/prism.yaml -o prism.exr --spp 1024\n  abbe render configs/gallery.yaml --scene diamond --set camera.fov_deg=25"
     )]
     Render(RenderArguments),
+    /// Add up the parts that `render --tile` and `--samples` made: the very pixels of one render
+    #[command(after_help = "Example:\n  abbe merge parts/ -o prism.exr")]
+    Merge(MergeArguments),
     /// Print what a scene calls for, each effect with its reason, and render nothing
     #[command(after_help = "Example:\n  abbe plan configs/gallery.yaml --scene prism --format json")]
     Plan(PlanArguments),
@@ -81,9 +85,34 @@ struct RenderArguments {
     /// Count what robust arithmetic was needed for; the layer `numerics` has the counts of each pixel
     #[arg(long)]
     check_numerics: bool,
+    /// Render a part: the i-th, from 0, of n bands of rows; `abbe merge` makes the picture
+    #[arg(long, value_name = "i/n", value_parser = tile)]
+    tile: Option<[u32; 2]>,
+    /// Render a part: samples a to b of each pixel, counted from 0, both included
+    #[arg(long, value_name = "a-b", value_parser = samples)]
+    samples: Option<[u32; 2]>,
     /// How to tell of progress
     #[arg(long, value_enum, default_value_t = ProgressStyle::Auto)]
     progress: ProgressStyle,
+    /// Print nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+#[derive(Debug, Args)]
+struct MergeArguments {
+    /// Parts, or directories of parts
+    #[arg(required = true)]
+    parts: Vec<PathBuf>,
+    /// The picture, or a directory for it
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Write the report here as well
+    #[arg(long, value_name = "FILE.json")]
+    report: Option<PathBuf>,
+    /// Threads; 0 takes every core that the process may use
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
     /// Print nothing but errors
     #[arg(short, long)]
     quiet: bool,
@@ -142,6 +171,21 @@ enum PlanFormat {
     Json,
 }
 
+/// Two whole numbers around a mark.
+fn pair(text: &str, mark: char) -> Option<[u32; 2]> {
+    let (a, b) = text.split_once(mark)?;
+    Some([a.trim().parse().ok()?, b.trim().parse().ok()?])
+}
+
+fn tile(text: &str) -> std::result::Result<[u32; 2], String> {
+    pair(text, '/').ok_or_else(|| "expected i/n, as 2/8: the third of eight tiles".into())
+}
+
+fn samples(text: &str) -> std::result::Result<[u32; 2], String> {
+    let one = || text.trim().parse().ok().map(|n| [n, n]);
+    pair(text, '-').or_else(one).ok_or_else(|| "expected a-b, as 0-63: the first 64 samples".into())
+}
+
 fn share(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if (0.0..1.0).contains(&x) => Ok(x),
@@ -178,6 +222,7 @@ impl SceneArguments {
             output,
             scenes: self.scenes.clone(),
             check_numerics: false,
+            portion: crate::batch::Portion::default(),
         }
     }
 }
@@ -220,6 +265,7 @@ pub fn run() -> i32 {
     };
     let result = check_cpu().and_then(|()| match &arguments.verb {
         Verb::Render(a) => render::run(a),
+        Verb::Merge(a) => merge::run(a),
         Verb::Plan(a) => plan::run(a),
         Verb::Import(a) => convert::import(a),
         Verb::Export(a) => convert::export(a),

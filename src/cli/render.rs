@@ -10,7 +10,7 @@ use std::fmt::Write;
 use std::sync::atomic::AtomicBool;
 
 /// Threads to use: those asked for, else what the farm grants, else every core of the cpuset.
-fn threads(asked: usize) -> usize {
+pub fn threads(asked: usize) -> usize {
     if asked > 0 {
         return asked;
     }
@@ -27,6 +27,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     let teller = Teller::new(style);
     let overrides = batch::Overrides {
         check_numerics: arguments.check_numerics,
+        portion: batch::Portion { tile: arguments.tile, samples: arguments.samples },
         ..arguments.scene.overrides(arguments.output.clone())
     };
     if let Some(file) = &arguments.report {

@@ -406,6 +406,11 @@ impl Film {
         &self.cells
     }
 
+    /// The cells, for sums that were read from a file.
+    pub fn cells_mut(&mut self) -> &mut [PixelCells] {
+        &mut self.cells
+    }
+
     /// Samples in the film, and samples that were dropped.
     #[must_use]
     pub fn samples(&self) -> (u64, u64) {

@@ -53,6 +53,17 @@ impl LayerSums {
         self.channels
     }
 
+    /// Sums pixel by pixel, the channels of one together, and the count of each pixel.
+    #[must_use]
+    pub fn parts(&self) -> (&[Sum], &[u32]) {
+        (&self.sums, &self.counts)
+    }
+
+    /// [`LayerSums::parts`], for sums that were read from a file.
+    pub fn parts_mut(&mut self) -> (&mut [Sum], &mut [u32]) {
+        (&mut self.sums, &mut self.counts)
+    }
+
     /// Adds a sample of the pixel at `index`: its numbers times the filter's `weight`.
     ///
     /// # Panics

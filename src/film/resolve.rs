@@ -43,7 +43,7 @@ pub struct Image {
 }
 
 /// The error of a whole picture: relative root mean square error with its interval.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ErrorEstimate {
     /// √relMSE.
     pub rel_rmse: f64,

@@ -1,0 +1,281 @@
+//! Parts of a picture add up to it, bit for bit, however it is cut; and what does not add up is refused.
+
+mod common;
+
+use abbe::batch::{self, Overrides, Portion, merge};
+use abbe::error::Error;
+use abbe::film::exr::{ExrFile, read_exr};
+use abbe::math::sampler::mix64;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use tempfile::TempDir;
+
+/// A picture of 20 × 14 pixels, 12 samples each.
+const FRAME: &str = "camera: {origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}\n\
+                     image: {width: 20, height: 14}\n\
+                     output: {exr: {precision: float, stderr: true}}\n";
+
+/// A ball of flint under a small lamp, behind a pane of glass.
+const CAUSTIC: &str = "shapes:\n\
+                       - plane: {normal: [0, 1, 0]}\n\
+                       - sphere: {center: [0, 1, 0], radius: 1, material: {dielectric: {ior: {glass: N-SF11}}}}\n\
+                       - sphere: {center: [1, 3, 1], radius: 0.2, emission: 20}\n";
+
+/// What is rendered, by name, and whether light comes from the lights.
+fn scenes() -> Vec<(&'static str, String)> {
+    let render = |text: &str| format!("render: {{samples: 12{text}}}\n");
+    let caustics = |merging: &str| render(&format!(", techniques: {{light_tracing: on, merging: {merging}}}"));
+    let layers = "layers:\n- {name: n, surface: shading_normal}\n- {name: a, squares: true}\n";
+    let cropped = CAUSTIC.replace("shapes:", "lights: [{constant: {radiance: 0.3}}]\nshapes:");
+    vec![
+        ("path", render("") + "lights: [{constant: {radiance: 0.3}}]\n" + CAUSTIC),
+        ("caustics", caustics("off") + CAUSTIC),
+        ("merging", caustics("on") + CAUSTIC),
+        ("light tracer", render("") + "integrator: light_tracer\n" + CAUSTIC),
+        ("whitted", render("") + "integrator: {whitted: {grid: 3}}\n" + &cropped),
+        ("layers", render("") + layers + &cropped),
+        ("bands", caustics("on") + CAUSTIC),
+    ]
+}
+
+/// The scene of [`scenes`] with this name.
+fn yaml(name: &str, text: &str) -> String {
+    let bands = "height: 14, bands: [{name: red, response: {table: [[600, 1], [700, 1]]}}, {name: all, response: 2}]";
+    let frame = if name == "bands" { FRAME.replace("height: 14", bands) } else { FRAME.to_owned() };
+    frame + text
+}
+
+/// A scene in a directory of its own.
+struct Place {
+    directory: TempDir,
+}
+
+impl Place {
+    fn with(scene: &str) -> Place {
+        let place = Place { directory: tempfile::tempdir().unwrap() };
+        std::fs::write(place.path("scene.yaml"), scene).unwrap();
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+
+    /// Renders into `out`, with further settings; all, or a part.
+    fn render(&self, out: &str, portion: Portion, set: &[(&str, &str)]) -> PathBuf {
+        let set = set.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+        let output = self.path(out);
+        let overrides = Overrides { output: Some(output.clone()), portion, set, ..Overrides::default() };
+        let yaml = self.path("scene.yaml");
+        let report = batch::render_batch(&yaml, &overrides, &(), &AtomicBool::new(false)).unwrap();
+        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+        output
+    }
+
+    fn report(&self, directory: &str) -> Value {
+        serde_json::from_slice(&std::fs::read(self.path(directory).join("report.json")).unwrap()).unwrap()
+    }
+}
+
+fn part(tile: [u32; 2], samples: [u32; 2]) -> Portion {
+    Portion { tile: Some(tile), samples: Some(samples) }
+}
+
+/// Numbers that follow from a seed.
+struct Draws(u64);
+
+impl Draws {
+    /// A number below `n`.
+    fn below(&mut self, n: u32) -> u32 {
+        self.0 = mix64(self.0.wrapping_add(0x9e37_79b9_7f4a_7c15));
+        (self.0 % u64::from(n)) as u32
+    }
+
+    /// 0 to n − 1 in ranges, the last included.
+    fn ranges(&mut self, n: u32) -> Vec<[u32; 2]> {
+        let mut all = Vec::new();
+        let mut start = 0;
+        while start < n {
+            let end = (start + 1 + self.below(n)).min(n);
+            all.push([start, end - 1]);
+            start = end;
+        }
+        all
+    }
+
+    /// Parts that make up a picture of `samples`: tiles of each range of samples, or ranges of each tile.
+    fn parts(&mut self, samples: u32) -> Vec<Portion> {
+        let mut all = Vec::new();
+        if self.below(2) == 0 {
+            for range in self.ranges(samples) {
+                let tiles = 1 + self.below(4);
+                all.extend((0..tiles).map(|tile| part([tile, tiles], range)));
+            }
+        } else {
+            let tiles = 1 + self.below(4);
+            for tile in 0..tiles {
+                all.extend(self.ranges(samples).into_iter().map(|range| part([tile, tiles], range)));
+            }
+        }
+        for i in (1..all.len()).rev() {
+            all.swap(i, self.below(i as u32 + 1) as usize);
+        }
+        all
+    }
+}
+
+/// Pixels by their bits, and what the header says but for the clock.
+fn content(file: &ExrFile) -> Vec<(String, Vec<u32>)> {
+    let part = &file.parts[0];
+    part.channels.iter().map(|(name, v)| (name.clone(), v.iter().map(|x| x.to_bits()).collect())).collect()
+}
+
+fn same(whole: &Path, merged: &Path, what: &str) {
+    let (a, b) = (read_exr(whole).unwrap(), read_exr(merged).unwrap());
+    assert!(content(&a) == content(&b), "{what}: the pixels differ");
+    assert_eq!(a.parts[0].texts, b.parts[0].texts, "{what}");
+    let png = |path: &Path| std::fs::read(path.with_extension("png")).unwrap();
+    assert!(png(whole) == png(merged), "{what}: the PNG files differ");
+}
+
+/// A report without what a clock says, how the error fell on the way, and names of files.
+fn timeless(mut report: Value) -> Value {
+    for field in ["seconds", "threads"] {
+        report[field] = Value::Null;
+    }
+    for field in ["seconds", "msamples_per_second", "halving_seconds", "convergence", "files"] {
+        report["scenes"][0][field] = Value::Null;
+    }
+    report
+}
+
+#[test]
+fn any_parts_add_up_to_the_picture_bit_for_bit() {
+    let seed: u64 = std::env::var("ABBE_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(1);
+    let draws_of_each = if std::env::var_os("ABBE_NIGHTLY").is_some() { 40 } else { 4 };
+    for (n, (name, text)) in scenes().into_iter().enumerate() {
+        let place = Place::with(&yaml(name, &text));
+        let whole = place.render("whole/scene.exr", Portion::default(), &[]);
+        let samples = if name == "whitted" { 9 } else { 12 };
+        for draw in 0..draws_of_each {
+            let mut draws = Draws(mix64(seed ^ (n as u64) << 32 ^ draw));
+            let parts = draws.parts(samples);
+            let what = format!("{name}, seed {seed}, draw {draw}: {parts:?}");
+            let paths: Vec<PathBuf> = parts
+                .into_iter()
+                .enumerate()
+                .map(|(i, portion)| place.render(&format!("{draw}/{i}.exr"), portion, &[("render.tile", "32")]))
+                .collect();
+            let merged = place.path(&format!("merged{draw}/scene.exr"));
+            let (_, written) = merge::merge(&paths, &merged).unwrap_or_else(|e| panic!("{what}: {e}"));
+            written.unwrap();
+            same(&whole, &merged, &what);
+            let (a, b) = (place.report("whole"), place.report(&format!("merged{draw}")));
+            assert_eq!(timeless(a), timeless(b), "{what}");
+        }
+    }
+}
+
+#[test]
+fn light_from_the_lights_is_in_the_scenes_of_this_file() {
+    let light = |name: &str| {
+        let (_, text) = scenes().into_iter().find(|(n, _)| *n == name).unwrap();
+        let bench = common::bench_with(&yaml(name, &text), &[]);
+        (bench.frame().splats.is_some(), bench.prepared.plan.caustics.as_ref().is_some_and(|c| c.merging.is_some()))
+    };
+    assert_eq!(["caustics", "merging", "light tracer"].map(light), [(true, false), (true, true), (true, false)]);
+    assert_eq!(light("bands"), (true, true));
+}
+
+/// The message of a merge that must fail with exit code 3 and write nothing.
+fn refusal(place: &Place, paths: &[PathBuf]) -> String {
+    let out = place.path("refused/scene.exr");
+    let error = merge::merge(paths, &out).unwrap_err();
+    assert!(matches!(error, Error::Input { .. }) && error.exit_code() == 3, "{error}");
+    assert!(!out.exists() && !out.with_extension("png").exists());
+    error.to_string()
+}
+
+#[test]
+fn parts_that_do_not_make_up_one_picture_are_refused() {
+    let (_, text) = scenes().swap_remove(1);
+    let place = Place::with(&format!("{FRAME}{text}"));
+    let one = |name: &str, portion, set: &[(&str, &str)]| place.render(name, portion, set);
+    let (a, b) = (one("a.exr", part([0, 2], [0, 11]), &[]), one("b.exr", part([1, 2], [0, 11]), &[]));
+    let name = |path: &Path| path.display().to_string();
+
+    let e = refusal(&place, std::slice::from_ref(&a));
+    assert!(
+        e.contains("cannot be merged from 1 parts: samples 0-11 of row 7 are missing: expected samples 0-11"),
+        "{e}"
+    );
+    let e = refusal(&place, &[a.clone(), b.clone(), a.clone()]);
+    assert!(e.contains(&name(&a)) && e.contains("overlap") && e.contains("samples 0-11"), "{e}");
+    let late = one("late.exr", part([1, 2], [4, 11]), &[]);
+    let e = refusal(&place, &[a.clone(), late.clone()]);
+    assert!(e.contains("samples 0-3 of row 7 are missing"), "{e}");
+    let e = refusal(&place, &[a.clone(), b.clone(), late]);
+    assert!(e.contains("overlap") && e.contains("samples 4-11"), "{e}");
+
+    for (key, value, field) in [
+        ("render.seed", "5", "seed: expected 0, found 5"),
+        ("render.samples", "16", "samples: expected 12, found 16"),
+        ("output.colour", "acescg", "output: expected {"),
+        ("image.sensitivity", "2", "sensitivity: expected 1.0, found 2.0"),
+        ("shapes[1].sphere.radius", "0.9", "scene with the hash: expected "),
+    ] {
+        let other = one("other.exr", part([1, 2], [0, 11]), &[(key, value)]);
+        let e = refusal(&place, &[a.clone(), other.clone()]);
+        assert!(e.contains(&name(&other)) && e.contains(field), "{key}: {e}");
+    }
+
+    let picture = one("picture.exr", Portion::default(), &[]);
+    let e = refusal(&place, &[a.clone(), picture]);
+    assert!(e.contains("picture.exr") && e.contains("found another OpenEXR file"), "{e}");
+    let e = refusal(&place, &[a.clone(), place.path("none.exr")]);
+    assert!(e.contains("none.exr: there is no such file"), "{e}");
+    let e = refusal(&place, &[a.clone(), place.path("scene.yaml")]);
+    assert!(e.contains("found no OpenEXR file"), "{e}");
+
+    // A byte among the last rows, half a file, and another version.
+    let whole = std::fs::read(&b).unwrap();
+    let mut bytes = whole.clone();
+    let last = bytes.len() - 9;
+    bytes[last] ^= 4;
+    let bad = place.path("bad.exr");
+    std::fs::write(&bad, &bytes).unwrap();
+    let e = refusal(&place, &[a.clone(), bad.clone()]);
+    assert!(e.contains("bad.exr: the part is damaged"), "{e}");
+    std::fs::write(&bad, &whole[..whole.len() / 2]).unwrap();
+    let e = refusal(&place, &[a.clone(), bad.clone()]);
+    assert!(e.contains("bad.exr: the part is damaged: it ends early"), "{e}");
+    let version = concat!("Abbe ", env!("CARGO_PKG_VERSION"));
+    let place_of =
+        |bytes: &[u8]| bytes.windows(9 + version.len()).position(|w| w == format!("\"build\":\"{version}").as_bytes());
+    let at = place_of(&whole).unwrap() + 9 + 5;
+    bytes.copy_from_slice(&whole);
+    bytes[at] = b'9';
+    std::fs::write(&bad, &bytes).unwrap();
+    let e = refusal(&place, &[a, bad]);
+    assert!(e.contains(&format!("expected a part by {version}")) && e.contains("found one by Abbe 9"), "{e}");
+}
+
+#[test]
+fn a_tile_or_samples_that_the_picture_lacks_are_a_fault_of_usage() {
+    let place = Place::with(&format!("{FRAME}render: {{samples: 12}}\nlights: [{{constant: {{radiance: 1}}}}]\n"));
+    let failure = |portion| {
+        let overrides = Overrides { output: Some(place.path("a.exr")), portion, ..Overrides::default() };
+        let report = batch::render_batch(&place.path("scene.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+        assert_eq!(report.exit_code(), 2);
+        format!("{:?}", report.scenes[0].status)
+    };
+    for tile in [[2, 2], [0, 15], [0, 0]] {
+        assert!(failure(Portion { tile: Some(tile), samples: None }).contains("n at most 14"), "{tile:?}");
+    }
+    for samples in [[0, 12], [5, 4], [12, 12]] {
+        let e = failure(Portion { tile: None, samples: Some(samples) });
+        assert!(e.contains("from 0-0 to 11-11: the scene has 12 samples"), "{e}");
+    }
+    assert!(!place.path("a.exr").exists());
+}
