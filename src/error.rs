@@ -35,6 +35,10 @@ pub enum Error {
     /// The render ran but its samples cannot be trusted: exit code 4.
     #[error("{0}")]
     Render(String),
+
+    /// The render was stopped before its end and can go on later: exit code 75.
+    #[error("{0}")]
+    Stopped(String),
 }
 
 /// `std::result::Result` with Abbe's [`Error`].
@@ -49,6 +53,7 @@ impl Error {
             Error::Config(_) => 2,
             Error::Input { .. } => 3,
             Error::Render(_) => 4,
+            Error::Stopped(_) => 75,
         }
     }
 

@@ -105,12 +105,15 @@ impl Finish {
         if self.base().is_xyz() { ColourSpace::Xyz } else { colour_space(self.output.colour) }
     }
 
-    /// The picture of `frame` in the colours of the file.
-    fn resolve(&self, frame: &Frame) -> Image {
-        frame.resolve(&self.space().matrix_from_xyz().map(|row| row.map(|x| x * self.sensitivity)))
+    /// From XYZ to the colours of the file.
+    #[must_use]
+    pub fn rgb_from_xyz(&self) -> [[f64; 3]; 3] {
+        self.space().matrix_from_xyz().map(|row| row.map(|x| x * self.sensitivity))
     }
 
-    fn png_settings(&self) -> PngSettings {
+    /// How the PNG is developed.
+    #[must_use]
+    pub fn png_settings(&self) -> PngSettings {
         PngSettings {
             exposure_stops: self.output.png.exposure,
             tonemap: match self.output.png.tonemap {
@@ -143,7 +146,7 @@ pub fn integrator(integrator: &Integrator) -> &'static str {
 /// [`Error::Output`](crate::error::Error::Output) where a file cannot be written, [`Error::Render`](crate::error::Error::Render)
 /// for invalid samples; the files are then written all the same.
 pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut SceneReport) -> Result<()> {
-    let image = finish.resolve(frame);
+    let image = frame.resolve(&finish.rgb_from_xyz());
     report.pixel_hash = pixel_hash(&image);
     let written = Instant::now();
     let png_path = exr_path.with_extension("png");
@@ -186,6 +189,8 @@ fn write_exr(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report:
     }
     report.notes.extend(beauty.note.take());
     beauty.exr.attributes = attributes(finish, frame, report);
+    let hash = Attribute::Text(beauty.exr.content_hash());
+    beauty.exr.attributes.push(("abbe/contentHash".to_owned(), hash));
     exr::write_exr(path, &beauty.exr)
 }
 
@@ -199,6 +204,7 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
         ("worldToNDC".to_owned(), Attribute::Matrix4(finish.world_to_ndc)),
         ("abbe/version".to_owned(), text(env!("CARGO_PKG_VERSION"))),
         ("abbe/sceneHash".to_owned(), text(&finish.scene_hash)),
+        ("abbe/settingsHash".to_owned(), text(&finish.settings_hash())),
         ("abbe/pixelHash".to_owned(), text(&report.pixel_hash)),
         ("abbe/seed".to_owned(), text(&finish.seed.to_string())),
         ("abbe/samples".to_owned(), Attribute::Int(finish.samples as i32)),

@@ -79,7 +79,7 @@ pub fn merge(paths: &[PathBuf], out: &Path) -> Result<(Report, Result<()>)> {
     let frame = Frame::of(film, splats, finish.samples, elapsed, finish.integrator != "whitted");
     let mut scene = SceneReport::new(&finish.name);
     scene.describe(finish, start.elapsed());
-    scene.measure(finish, &frame, numerics(parts.iter().map(|part| &part.header)));
+    scene.measure(finish, &frame, sum(parts.iter().filter_map(|part| part.header.numerics)));
     let written = finish::write(finish, &frame, &out, &mut scene);
     if let Err(e) = &written {
         scene.fail(e);
@@ -89,13 +89,14 @@ pub fn merge(paths: &[PathBuf], out: &Path) -> Result<(Report, Result<()>)> {
     Ok((report, written))
 }
 
-/// What all parts counted of robust arithmetic.
-fn numerics<'a>(headers: impl Iterator<Item = &'a Header>) -> Option<Counts> {
-    headers.filter_map(|header| header.numerics).reduce(|a, b| Counts {
-        surfaces: a.surfaces + b.surfaces,
-        robust: a.robust + b.robust,
-        rays: a.rays + b.rays,
-        self_hits: a.self_hits + b.self_hits,
+/// What several counted of robust arithmetic, if any did.
+#[must_use]
+pub fn sum(counts: impl IntoIterator<Item = Counts>) -> Option<Counts> {
+    counts.into_iter().reduce(|a, b| Counts {
+        surfaces: a.surfaces.saturating_add(b.surfaces),
+        robust: a.robust.saturating_add(b.robust),
+        rays: a.rays.saturating_add(b.rays),
+        self_hits: a.self_hits.saturating_add(b.self_hits),
     })
 }
 

@@ -2,6 +2,7 @@
 //!
 //! A batch goes on with the other scenes after one fails; what failed is told at the end.
 
+pub mod checkpoint;
 pub mod finish;
 pub mod frame;
 pub mod merge;
@@ -23,8 +24,9 @@ use crate::transport::layers::{Channel, Form, Layer, LayerPlan, Quantity, Source
 use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
 use crate::transport::trial;
+use checkpoint::{Keep, Keeper};
 use finish::Finish;
-use frame::{Begun, FrameJob, Progress, go_on};
+use frame::{FrameJob, Progress, go_on};
 use part::Share;
 use part_file::Identity;
 use report::{Report, SceneReport, Status};
@@ -48,6 +50,8 @@ pub struct Overrides {
     pub check_numerics: bool,
     /// Which part of each picture; all of it, and its files, by default.
     pub portion: Portion,
+    /// What is kept of a render that ends early.
+    pub keep: Keep,
 }
 
 /// A part of a picture as a person asks for it.
@@ -414,22 +418,36 @@ fn render_and_write(
         seed: description.render.seed,
         tile: description.render.tile,
     };
-    let finish = Finish::of(prepared);
-    let numerics = || prepared.scene.watch.as_ref().map(|watch| watch.counts());
-    if !overrides.portion.is_all() {
-        let share = overrides.portion.share(job.window, job.samples)?;
-        let begun = go_on(Begun::new(&job, share)?, &|p| watcher.progress(p), stop)?;
-        report.measure_part(&begun, numerics());
-        let written = Instant::now();
-        let identity = Identity::new(finish, &prepared.source, &prepared.plan);
-        part_file::write(&exr_path, &identity, &begun.part, &[], begun.elapsed, numerics())?;
+    let portion = &overrides.portion;
+    let share = portion.share(job.window, job.samples)?;
+    let identity = Identity::new(Finish::of(prepared), &prepared.source, &prepared.plan);
+    let finish = &identity.finish;
+    if checkpoint::is_there(&overrides.keep, &exr_path, &identity, (!portion.is_all()).then_some(&share)) {
+        report.status = Status::Skipped;
         report.files = vec![exr_path];
-        report.seconds.writing = written.elapsed().as_secs_f64();
         return Ok(());
     }
-    let frame = frame::render(&job, &|p| watcher.progress(p), stop)?;
-    report.measure(&finish, &frame, numerics());
-    finish::write(&finish, &frame, &exr_path, report)
+    let mut keeper = Keeper::new(&overrides.keep, stop, &exr_path, &identity, prepared.scene.watch.as_deref());
+    let begun = keeper.begin(&job, share)?;
+    let begun = go_on(begun, &|p| watcher.progress(p), &keeper)?;
+    if !portion.is_all() {
+        report.measure_part(&begun, keeper.numerics());
+        let written = Instant::now();
+        part_file::write(&exr_path, &identity, &begun.part, &[], begun.elapsed, keeper.numerics())?;
+        report.files = vec![exr_path.clone()];
+        report.seconds.writing = written.elapsed().as_secs_f64();
+        report.notes.extend(keeper.done()?);
+        return Ok(());
+    }
+    let frame = begun.finish();
+    report.measure(finish, &frame, keeper.numerics());
+    let written = finish::write(finish, &frame, &exr_path, report);
+    // What cannot be written can still be resumed.
+    if report.files.is_empty() {
+        return written;
+    }
+    report.notes.extend(keeper.done()?);
+    written
 }
 
 /// Renders all scenes of `path` that are asked for; a scene that fails does not stop the others.
@@ -481,6 +499,11 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
         let stopped = stop.load(std::sync::atomic::Ordering::Relaxed);
         scenes.push(report);
         if stopped {
+            if let Some(next) = entries.get(i + 1) {
+                let mut report = SceneReport::new(&next.name);
+                report.fail(&Error::Stopped("stopped before it began; --resume goes on from there".into()));
+                scenes.push(report);
+            }
             break;
         }
     }
@@ -496,17 +519,19 @@ impl Report {
     #[must_use]
     pub fn exit_code(&self) -> i32 {
         let codes = self.scenes.iter().filter_map(|s| match &s.status {
-            Status::Done => None,
+            Status::Done | Status::Skipped => None,
             Status::Failed { exit_code, .. } => Some(*exit_code),
         });
         let codes = codes.chain(self.unwritten.as_ref().map(Error::exit_code));
-        // A fault of the description outranks a missing file, which outranks what went wrong later.
+        // Where something can go on, it should. A fault of the description outranks a missing file, which outranks what
+        // went wrong later.
         codes
             .min_by_key(|code| match code {
-                2 => 0,
-                3 => 1,
-                4 => 2,
-                _ => 3,
+                75 => 0,
+                2 => 1,
+                3 => 2,
+                4 => 3,
+                _ => 4,
             })
             .unwrap_or(0)
     }

@@ -50,6 +50,13 @@ pub struct Share {
     pub samples: Range<u32>,
 }
 
+impl std::fmt::Display for Share {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Range { start, end } = self.samples;
+        write!(f, "tile {}/{}, samples {start}-{}", self.tile, self.tiles, i64::from(end) - 1)
+    }
+}
+
 impl Share {
     /// All of a picture.
     #[must_use]
@@ -126,6 +133,9 @@ pub trait Breaks: Sync {
     /// Whether work should pause. Asked before each unit, from any thread.
     fn wanted(&self) -> bool;
 
+    /// Whether the wish is to end: that waits for nothing, while a checkpoint may wait for the end of a sample.
+    fn ending(&self) -> bool;
+
     /// Called while nothing is added; then work goes on.
     ///
     /// # Errors
@@ -139,8 +149,29 @@ impl Breaks for AtomicBool {
         self.load(Ordering::Relaxed)
     }
 
+    fn ending(&self) -> bool {
+        self.load(Ordering::Relaxed)
+    }
+
     fn take(&self, _: &Part, _: &[Milestone], _: Duration) -> Result<()> {
         Err(Error::Render("stopped before the picture was finished; nothing was written".into()))
+    }
+}
+
+/// Breaks of which only the end counts.
+struct Ending<'a>(&'a dyn Breaks);
+
+impl Breaks for Ending<'_> {
+    fn wanted(&self) -> bool {
+        self.0.ending()
+    }
+
+    fn ending(&self) -> bool {
+        self.0.ending()
+    }
+
+    fn take(&self, part: &Part, milestones: &[Milestone], elapsed: Duration) -> Result<()> {
+        self.0.take(part, milestones, elapsed)
     }
 }
 
@@ -267,7 +298,7 @@ impl<'a> Part<'a> {
         let mut lights = Vec::new();
         if self.splats.is_some() {
             let known = lock(&self.lights);
-            if known.below > start {
+            if known.below > start && !self.own_paths().is_empty() {
                 lights.push((self.own_paths(), start..known.below));
             }
             lights.extend(known.more.iter().map(|(paths, sample)| (paths.clone(), *sample..*sample + 1)));
@@ -326,17 +357,21 @@ impl<'a> Part<'a> {
                     self.add_paths(paths, start..end, splats, pause, None)
                 }) && self.add_tiles(samples, None, pause, finished)
             }
-            // Photons are collected sample by sample.
-            (Some((paths, splats)), Some(first)) => samples.into_iter().all(|sample| {
-                self.has(sample)
-                    || match self.photons(paths, sample, first, splats, pause) {
-                        None => false,
-                        Some((map, wavelength)) => {
-                            let photons = Collection { map: &map, wavelength };
-                            self.add_tiles(sample..sample + 1, Some(photons), pause, finished)
-                        }
+            // Photons are collected sample by sample. A pause in the midst of one would cost its photons.
+            (Some((paths, splats)), Some(first)) => {
+                let ending = Ending(pause);
+                samples.clone().all(|sample| {
+                    if self.has(sample) {
+                        return true;
                     }
-            }),
+                    let Some((map, wavelength)) = self.photons(paths, sample, first, splats, &ending) else {
+                        return false;
+                    };
+                    let photons = Collection { map: &map, wavelength };
+                    let whole = self.add_tiles(sample..sample + 1, Some(photons), &ending, finished);
+                    whole && (sample + 1 == samples.end || !pause.wanted())
+                })
+            }
             (None, _) => self.add_tiles(samples, None, pause, finished),
         }
     }

@@ -426,6 +426,14 @@ impl Written {
         self.header.planes.iter().filter(|p| p.name.starts_with("lightsLayers.") && !p.name.ends_with(".n")).count()
     }
 
+    /// Reads all, and keeps nothing.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the file is damaged.
+    pub fn verify(&self) -> Result<()> {
+        self.file.read(&self.header.planes, &mut |_, _, _| Ok(()))
+    }
+
     /// Adds the sums to `film` and `splats`, which [`Written::empty`] made.
     ///
     /// # Errors

@@ -39,6 +39,8 @@ pub struct Report {
 pub enum Status {
     /// All files are written.
     Done,
+    /// All files were there already, whole and of the same scene and settings.
+    Skipped,
     /// It went wrong.
     Failed {
         /// The exit code that it calls for.

@@ -1,10 +1,11 @@
 //! The edge of the process: arguments in, exit code and messages out.
 //!
 //! Exit codes: 0 done, 1 internal or output error, 2 usage or description, 3 missing or broken input,
-//! 4 invalid samples, 130 interrupted.
+//! 4 invalid samples, 75 stopped and can be resumed, 130 and 143 stopped by a second signal.
 
 mod compare;
 mod convert;
+mod interrupts;
 mod merge;
 mod plan;
 mod progress;
@@ -91,6 +92,16 @@ struct RenderArguments {
     /// Render a part: samples a to b of each pixel, counted from 0, both included
     #[arg(long, value_name = "a-b", value_parser = samples)]
     samples: Option<[u32; 2]>,
+    /// Go on from the checkpoint beside the output, if there is one; what is finished is left alone
+    #[arg(long)]
+    resume: bool,
+    /// How often to write a checkpoint, as 90s, 10m or 2h; 0 for never. SIGTERM and Ctrl-C write one, too, and end
+    /// with exit code 75; SIGUSR1 writes a PNG of what is done
+    #[arg(long, value_name = "TIME", default_value = "10m", value_parser = duration)]
+    checkpoint_interval: std::time::Duration,
+    /// Leave alone pictures that are there, undamaged and of the same scene and settings
+    #[arg(long)]
+    skip_existing: bool,
     /// How to tell of progress
     #[arg(long, value_enum, default_value_t = ProgressStyle::Auto)]
     progress: ProgressStyle,
@@ -171,6 +182,20 @@ enum PlanFormat {
     Json,
 }
 
+fn duration(text: &str) -> std::result::Result<std::time::Duration, String> {
+    let text = text.trim();
+    let (number, unit) = match text.char_indices().next_back() {
+        Some((at, 's')) => (&text[..at], 1.0),
+        Some((at, 'm')) => (&text[..at], 60.0),
+        Some((at, 'h')) => (&text[..at], 3600.0),
+        _ => (text, 1.0),
+    };
+    let seconds = number.parse().ok().map(|x: f64| x * unit);
+    seconds
+        .and_then(|s| std::time::Duration::try_from_secs_f64(s).ok())
+        .ok_or_else(|| "expected a time, as 90s, 10m or 2h".into())
+}
+
 /// Two whole numbers around a mark.
 fn pair(text: &str, mark: char) -> Option<[u32; 2]> {
     let (a, b) = text.split_once(mark)?;
@@ -223,6 +248,7 @@ impl SceneArguments {
             scenes: self.scenes.clone(),
             check_numerics: false,
             portion: crate::batch::Portion::default(),
+            keep: crate::batch::checkpoint::Keep::default(),
         }
     }
 }

@@ -131,6 +131,7 @@ impl Watcher for Teller {
                     let error = report.error.map_or(String::new(), |e| format!(", error {:.2} %", e.rel_rmse * 100.0));
                     complain(&format!("  done in {}{error}", seconds(report.seconds.rendering)));
                 }
+                Status::Skipped => complain("  there already"),
                 Status::Failed { .. } => complain("  failed"),
             },
             Style::Json => line(&json!({"event": "done", "report": report})),

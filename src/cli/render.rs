@@ -1,5 +1,6 @@
 //! `abbe render`.
 
+use super::interrupts::Interrupts;
 use super::progress::Teller;
 use super::{ProgressStyle, RenderArguments};
 use crate::batch;
@@ -7,7 +8,6 @@ use crate::batch::report::{Report, SceneReport, Status};
 use crate::error::{Error, Result};
 use crate::film::output::{prepare_place, write_atomically};
 use std::fmt::Write;
-use std::sync::atomic::AtomicBool;
 
 /// Threads to use: those asked for, else what the farm grants, else every core of the cpuset.
 pub fn threads(asked: usize) -> usize {
@@ -25,15 +25,23 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads(arguments.threads)).build_global();
     let style = if arguments.quiet { ProgressStyle::None } else { arguments.progress };
     let teller = Teller::new(style);
+    let interrupts = Interrupts::listen()?;
     let overrides = batch::Overrides {
         check_numerics: arguments.check_numerics,
         portion: batch::Portion { tile: arguments.tile, samples: arguments.samples },
+        keep: batch::checkpoint::Keep {
+            on_stop: true,
+            every: Some(arguments.checkpoint_interval).filter(|interval| !interval.is_zero()),
+            resume: arguments.resume,
+            skip_existing: arguments.skip_existing,
+            snapshot: interrupts.snapshot.clone(),
+        },
         ..arguments.scene.overrides(arguments.output.clone())
     };
     if let Some(file) = &arguments.report {
         prepare_place(file)?;
     }
-    let report = batch::render_batch(&arguments.scene.file, &overrides, &teller, &AtomicBool::new(false))?;
+    let report = batch::render_batch(&arguments.scene.file, &overrides, &teller, &interrupts.stop)?;
     teller.finish();
     if let Some(file) = &arguments.report {
         let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::output(file, e))?;
@@ -53,6 +61,10 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
                 super::complain(&format!("error: {}: {line}", scene.name));
             }
         }
+    }
+    let there = report.scenes.iter().filter(|s| matches!(s.status, Status::Skipped)).count();
+    if there > 0 && !arguments.quiet && style != ProgressStyle::Json {
+        super::say(&format!("{there} of {} were there already\n", report.scenes.len()));
     }
     let failed = report.scenes.iter().filter(|s| matches!(s.status, Status::Failed { .. })).count();
     let all = report.scenes.len();

@@ -459,7 +459,7 @@ mod tests {
         match error {
             Error::Config(text) => text.lines().all(placed),
             Error::Input { .. } => true,
-            Error::Output { .. } | Error::Render(_) => false,
+            Error::Output { .. } | Error::Render(_) | Error::Stopped(_) => false,
         }
     }
 

@@ -68,6 +68,12 @@ impl Default for PngSettings {
     }
 }
 
+/// Whether `path` is a whole picture of that width and height.
+#[must_use]
+pub fn holds(path: &Path, size: [u32; 2]) -> bool {
+    image::open(path).is_ok_and(|image| [image.width(), image.height()] == size)
+}
+
 /// Writes the preview of `image` to `path`.
 ///
 /// # Errors

@@ -1,0 +1,228 @@
+//! Checkpoints: what is done of a picture, kept beside it, so that it is not lost when the process ends.
+//!
+//! A checkpoint is a part ([`super::part_file`]) named like the picture with `.checkpoint` behind, whole or not there. It is
+//! written when the render is asked to stop, which then ends with exit code 75, and from time to time, for those who are
+//! not asked. Work pauses between two units, so that it is exact: what is resumed gives the same bits.
+
+use super::finish::Finish;
+use super::frame::{Begun, FrameJob, Milestone, lock};
+use super::merge::sum;
+use super::part::{Breaks, Part, Share};
+use super::part_file::{self, Identity};
+use crate::error::{Error, Result};
+use crate::film::output;
+use crate::film::resolve::{self, Splats};
+use crate::film::{exr, png};
+use crate::scene::watch::{Counts, Watch};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// What is kept of a render that ends early, and what is made of files that are there.
+#[derive(Clone, Debug, Default)]
+pub struct Keep {
+    /// Write a checkpoint when the render is stopped.
+    pub on_stop: bool,
+    /// And as often as this.
+    pub every: Option<Duration>,
+    /// Go on from a checkpoint, if there is one.
+    pub resume: bool,
+    /// Leave alone what is there, whole and of the same scene and settings.
+    pub skip_existing: bool,
+    /// Set when a picture of what is done is wanted.
+    pub snapshot: Arc<AtomicBool>,
+}
+
+/// The checkpoint of the file at `path`.
+#[must_use]
+pub fn place(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".checkpoint");
+    name.into()
+}
+
+/// Keeps one render.
+pub struct Keeper<'a> {
+    keep: &'a Keep,
+    stop: &'a AtomicBool,
+    /// The file that is to be.
+    path: &'a Path,
+    identity: &'a Identity,
+    watch: Option<&'a Watch>,
+    /// Of the run that is resumed.
+    counted: Option<Counts>,
+    next: Mutex<Option<Instant>>,
+    /// What a person should know.
+    notes: Mutex<Vec<String>>,
+}
+
+impl<'a> Keeper<'a> {
+    /// For the render that makes `path`.
+    #[must_use]
+    pub fn new(
+        keep: &'a Keep,
+        stop: &'a AtomicBool,
+        path: &'a Path,
+        identity: &'a Identity,
+        watch: Option<&'a Watch>,
+    ) -> Keeper<'a> {
+        let next = Mutex::new(keep.every.and_then(|every| Instant::now().checked_add(every)));
+        Keeper { keep, stop, path, identity, watch, counted: None, next, notes: Mutex::default() }
+    }
+
+    /// The render from where a checkpoint left it, if one is to be resumed and there, else from the beginning.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a checkpoint that is damaged or of something else; [`Error::Render`] if the memory cannot be had.
+    pub fn begin<'j>(&mut self, job: &'j FrameJob<'j>, share: Share) -> Result<Begun<'j>> {
+        let file = place(self.path);
+        if !(self.keep.resume && file.exists()) {
+            return Begun::new(job, share);
+        }
+        let written = part_file::open(&file)?;
+        written.header.check_of(&file, self.identity)?;
+        let found = written.header.share();
+        if found != share {
+            return Err(Error::input(&file, format!("expected a checkpoint of {share}, found one of {found}")));
+        }
+        let (mut film, mut splats) = written.empty(share.rows(job.window))?;
+        written.add_to(&mut film, splats.as_mut())?;
+        let header = &written.header;
+        let part = Part::resume(job, share, &header.claims, film, splats)?;
+        let (done, total) = part.progress();
+        let per_cent = 100.0 * done as f64 / total.max(1) as f64;
+        lock(&self.notes).push(format!("resumed at {per_cent:.1} %"));
+        self.counted = header.numerics;
+        let elapsed = Duration::try_from_secs_f64(header.seconds).unwrap_or_default();
+        Ok(Begun::from(part, header.milestones.clone(), elapsed))
+    }
+
+    /// What was counted of robust arithmetic, in all runs.
+    #[must_use]
+    pub fn numerics(&self) -> Option<Counts> {
+        sum(self.counted.into_iter().chain(self.watch.map(Watch::counts)))
+    }
+
+    /// The files are there: nothing is left to resume. What a person should know is returned.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if the checkpoint cannot be removed.
+    pub fn done(&self) -> Result<Vec<String>> {
+        let file = place(self.path);
+        match std::fs::remove_file(&file) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::output(&file, e)),
+            _ => Ok(std::mem::take(&mut lock(&self.notes))),
+        }
+    }
+
+    fn write(&self, part: &Part, milestones: &[Milestone], elapsed: Duration) -> Result<()> {
+        part_file::write(&place(self.path), self.identity, part, milestones, elapsed, self.numerics())
+    }
+
+    /// A PNG of what is done.
+    fn snapshot(&self, part: &Part) -> Result<()> {
+        let finish = &self.identity.finish;
+        let image = part.look(|film, splats| {
+            // A tile's rows are less than what its light from the lights covers.
+            let splats = splats.filter(|s| s.film.window() == film.window());
+            let splats = splats.map(|s| Splats { film: &s.film, photons: s.paths });
+            resolve::resolve(film, splats, &finish.rgb_from_xyz())
+        });
+        png::write_png(&self.path.with_extension("snapshot.png"), &image, &finish.png_settings())
+    }
+
+    fn is_due(&self) -> bool {
+        self.keep.every.is_some() && lock(&self.next).is_some_and(|next| Instant::now() >= next)
+    }
+}
+
+impl Breaks for Keeper<'_> {
+    fn wanted(&self) -> bool {
+        self.stop.load(Ordering::Relaxed) || self.keep.snapshot.load(Ordering::Relaxed) || self.is_due()
+    }
+
+    fn ending(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    fn take(&self, part: &Part, milestones: &[Milestone], elapsed: Duration) -> Result<()> {
+        if self.stop.load(Ordering::Relaxed) {
+            if !self.keep.on_stop {
+                return self.stop.take(part, milestones, elapsed);
+            }
+            self.write(part, milestones, elapsed)?;
+            let (done, total) = part.progress();
+            let per_cent = 100.0 * done as f64 / total.max(1) as f64;
+            let file = place(self.path);
+            let message =
+                format!("stopped at {per_cent:.1} %, kept in {}; --resume goes on from there", file.display());
+            return Err(Error::Stopped(message));
+        }
+        // Neither is worth losing the render for.
+        if self.keep.snapshot.swap(false, Ordering::Relaxed)
+            && let Err(e) = self.snapshot(part)
+        {
+            lock(&self.notes).push(format!("no snapshot: {e}"));
+        }
+        if self.is_due() {
+            let start = Instant::now();
+            if let Err(e) = self.write(part, milestones, elapsed) {
+                let note = format!("no checkpoint: {e}");
+                let mut notes = lock(&self.notes);
+                if notes.last() != Some(&note) {
+                    notes.push(note);
+                }
+            }
+            // At most a fifth of the time goes into checkpoints.
+            let pause = self.keep.every.map(|every| every.max(4 * start.elapsed()));
+            *lock(&self.next) = pause.and_then(|pause| Instant::now().checked_add(pause));
+        }
+        Ok(())
+    }
+}
+
+/// Whether the part at `path` is there, whole, undamaged, and that `share` of the same picture.
+#[must_use]
+pub fn part_holds(path: &Path, identity: &Identity, share: &Share) -> bool {
+    part_file::open(path).is_ok_and(|written| {
+        let header = &written.header;
+        header.check_of(path, identity).is_ok()
+            && header.share() == *share
+            && header.is_whole()
+            && written.verify().is_ok()
+    })
+}
+
+/// Whether the picture at `path` and its PNG are there, undamaged, of the same scene and settings and by this version.
+#[must_use]
+pub fn picture_holds(path: &Path, finish: &Finish) -> bool {
+    // A file that is not there need not be read.
+    let png = path.with_extension("png");
+    if !(path.is_file() && png.is_file()) {
+        return false;
+    }
+    exr::read_exr(path).is_ok_and(|file| {
+        let [part] = file.parts.as_slice() else { return false };
+        let channels = part.channels.iter().map(|(name, plane)| (name.as_str(), plane.as_slice()));
+        let expected = [
+            ("abbe/version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("abbe/sceneHash", finish.scene_hash.clone()),
+            ("abbe/settingsHash", finish.settings_hash()),
+            ("abbe/contentHash", exr::content_hash(channels)),
+        ];
+        part.window == finish.window && expected.iter().all(|(name, value)| part.text(name) == Some(value.as_str()))
+    }) && png::holds(&png, [finish.window.width, finish.window.height])
+}
+
+/// Whether what is to be at `path` is there already.
+#[must_use]
+pub fn is_there(keep: &Keep, path: &Path, identity: &Identity, share: Option<&Share>) -> bool {
+    if !(keep.skip_existing || keep.resume) || !output::directory_of(path).is_dir() {
+        return false;
+    }
+    match share {
+        Some(share) => part_holds(path, identity, share),
+        None => picture_holds(path, &identity.finish),
+    }
+}

@@ -1,0 +1,266 @@
+//! Renders that are killed, stopped and resumed: the same pixels as in one go, and never half a file.
+#![cfg(unix)]
+
+use abbe::film::exr::read_exr;
+use abbe::math::sampler::mix64;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// Part of a second of light from the camera, and of merged photons.
+fn scene(merging: &str) -> String {
+    format!(
+        "camera: {{origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}}\n\
+         image: {{width: 64, height: 48}}\n\
+         render: {{samples: 64, techniques: {{light_tracing: {merging}, merging: {merging}}}}}\n\
+         output: {{exr: {{precision: float}}}}\n\
+         shapes:\n\
+         - plane: {{normal: [0, 1, 0]}}\n\
+         - sphere: {{center: [0, 1, 0], radius: 1, material: {{dielectric: {{ior: {{glass: N-SF11}}}}}}}}\n\
+         - sphere: {{center: [1, 3, 1], radius: 0.2, emission: 20}}\n"
+    )
+}
+
+struct Place {
+    directory: TempDir,
+}
+
+impl Place {
+    fn with(scene: &str) -> Place {
+        let place = Place { directory: tempfile::tempdir().unwrap() };
+        std::fs::write(place.path("scene.yaml"), scene).unwrap();
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+
+    fn command(&self, out: &str, further: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_abbe"));
+        command.current_dir(self.directory.path()).args(["render", "scene.yaml", "-q", "-o", out]).args(further);
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+    }
+
+    fn run(&self, out: &str, further: &[&str]) -> Output {
+        self.command(out, further).output().unwrap()
+    }
+}
+
+fn err(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Bits of all channels.
+fn pixels(path: &Path) -> Vec<(String, Vec<u32>)> {
+    let part = read_exr(path).unwrap().parts.swap_remove(0);
+    part.channels.into_iter().map(|(name, v)| (name, v.into_iter().map(f32::to_bits).collect())).collect()
+}
+
+fn nightly() -> bool {
+    std::env::var_os("ABBE_NIGHTLY").is_some()
+}
+
+fn signal(child: &Child, name: &str) {
+    let sent = Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+}
+
+/// Waits for a file; false if the process ended before.
+fn appears(child: &mut Child, file: &Path) -> bool {
+    let end = Instant::now() + Duration::from_secs(60);
+    while !file.exists() {
+        if child.try_wait().unwrap().is_some() || Instant::now() > end {
+            return file.exists();
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    true
+}
+
+/// Every file under its final name is whole: the picture, or the checkpoint, which `abbe merge` reads to its end before
+/// it says that samples are missing.
+fn nothing_is_half(place: &Place, out: &str) {
+    let picture = place.path(out);
+    if picture.exists() {
+        pixels(&picture);
+    }
+    let checkpoint = place.path(&format!("{out}.checkpoint"));
+    if checkpoint.exists() {
+        let part = abbe::batch::part_file::open(&checkpoint).unwrap();
+        part.verify().unwrap();
+    }
+}
+
+#[test]
+fn killed_at_any_moment_and_resumed_the_pixels_are_those_of_one_go() {
+    let seed: u64 = std::env::var("ABBE_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(1);
+    for merging in ["off", "on"] {
+        let place = Place::with(&scene(merging));
+        let start = Instant::now();
+        assert_eq!(place.run("whole.exr", &[]).status.code(), Some(0));
+        let span = start.elapsed();
+        let kills = if nightly() { 50 } else { 3 };
+        let mut resumed = 0;
+        for kill in 0..kills {
+            let out = format!("{kill}.exr");
+            // Kills until the render is through; each at a moment of its own.
+            for attempt in 0.. {
+                assert!(attempt < 200, "it does not come to an end");
+                let threads = ["1", "2", "3"][attempt % 3];
+                let further = ["--resume", "--checkpoint-interval", "0.02s", "--threads", threads];
+                let mut child = place.command(&out, &further).spawn().unwrap();
+                let draw = mix64(seed ^ mix64(kill << 16 | attempt as u64)) % 1000;
+                std::thread::sleep(span.mul_f64(0.1 + draw as f64 * 0.9e-3));
+                let _ = child.kill();
+                let done = child.wait_with_output().unwrap();
+                nothing_is_half(&place, &out);
+                resumed += u32::from(place.path(&format!("{out}.checkpoint")).exists());
+                if done.status.success() {
+                    break;
+                }
+            }
+            assert!(pixels(&place.path("whole.exr")) == pixels(&place.path(&out)), "merging {merging}, {kill}");
+            assert!(!place.path(&format!("{out}.checkpoint")).exists());
+        }
+        assert!(resumed > 0, "no checkpoint was ever there");
+    }
+}
+
+#[test]
+fn stopped_it_ends_with_75_and_goes_on_where_it_was() {
+    let place = Place::with(&scene("on"));
+    assert_eq!(place.run("whole.exr", &[]).status.code(), Some(0));
+    let checkpoint = place.path("a.exr.checkpoint");
+    let mut stops = 0;
+    loop {
+        let mut child = place.command("a.exr", &["--resume", "--checkpoint-interval", "0.02s"]).spawn().unwrap();
+        let before = std::fs::metadata(&checkpoint).ok().and_then(|m| m.modified().ok());
+        if before.is_none() {
+            appears(&mut child, &checkpoint);
+        } else {
+            std::thread::sleep(Duration::from_millis(150));
+        }
+        signal(&child, if stops % 2 == 0 { "TERM" } else { "INT" });
+        let done = child.wait_with_output().unwrap();
+        if done.status.success() {
+            break;
+        }
+        assert_eq!(done.status.code(), Some(75), "{}", err(&done));
+        assert!(
+            err(&done).contains("stopped at ") && err(&done).contains("a.exr.checkpoint; --resume"),
+            "{}",
+            err(&done)
+        );
+        assert!(!place.path("a.exr").exists());
+        stops += 1;
+        assert!(stops < 200);
+        if stops == 3 {
+            let done = place.run("a.exr", &["--resume", "--report", "r.json"]);
+            assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+            assert!(std::fs::read_to_string(place.path("r.json")).unwrap().contains("resumed at "));
+            break;
+        }
+    }
+    assert!(stops > 0);
+    assert!(pixels(&place.path("whole.exr")) == pixels(&place.path("a.exr")));
+    assert!(!checkpoint.exists());
+}
+
+#[test]
+fn a_part_is_stopped_and_resumed_like_a_picture() {
+    let place = Place::with(&scene("on"));
+    let portion = ["--tile", "1/2", "--samples", "5-60"];
+    assert_eq!(place.run("whole.exr", &portion).status.code(), Some(0));
+    let resumed = [&portion[..], &["--resume", "--checkpoint-interval", "0.02s"]].concat();
+    let mut child = place.command("a.exr", &resumed).spawn().unwrap();
+    assert!(appears(&mut child, &place.path("a.exr.checkpoint")));
+    signal(&child, "TERM");
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+    // Another part does not take it for its own.
+    let other = place.run("a.exr", &["--tile", "0/2", "--samples", "5-60", "--resume"]);
+    assert_eq!(other.status.code(), Some(3));
+    assert!(
+        err(&other).contains("expected a checkpoint of tile 0/2, samples 5-60, found one of tile 1/2"),
+        "{}",
+        err(&other)
+    );
+    assert_eq!(place.run("a.exr", &resumed).status.code(), Some(0));
+    assert!(pixels(&place.path("whole.exr")) == pixels(&place.path("a.exr")));
+    // And a finished one is done at once.
+    let written = std::fs::metadata(place.path("a.exr")).unwrap().modified().unwrap();
+    assert_eq!(place.run("a.exr", &resumed).status.code(), Some(0));
+    assert_eq!(std::fs::metadata(place.path("a.exr")).unwrap().modified().unwrap(), written);
+}
+
+#[test]
+fn a_checkpoint_of_another_scene_or_a_damaged_one_is_refused_and_left() {
+    let place = Place::with(&scene("off"));
+    let mut child = place.command("a.exr", &["--checkpoint-interval", "0.02s"]).spawn().unwrap();
+    let checkpoint = place.path("a.exr.checkpoint");
+    assert!(appears(&mut child, &checkpoint));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let bytes = std::fs::read(&checkpoint).unwrap();
+    for (set, words) in
+        [("render.seed=9", "seed: expected 9, found 0"), ("shapes[2].sphere.emission=3", "scene with the hash")]
+    {
+        let done = place.run("a.exr", &["--resume", "--set", set]);
+        assert_eq!(done.status.code(), Some(3), "{}", err(&done));
+        assert!(
+            err(&done).contains("a.exr.checkpoint: it is of another picture") && err(&done).contains(words),
+            "{}",
+            err(&done)
+        );
+    }
+    std::fs::write(&checkpoint, &bytes[..bytes.len() - 1]).unwrap();
+    let done = place.run("a.exr", &["--resume"]);
+    assert_eq!(done.status.code(), Some(3), "{}", err(&done));
+    assert!(err(&done).contains("a.exr.checkpoint: the part is damaged: it ends early"), "{}", err(&done));
+    assert!(!place.path("a.exr").exists() && checkpoint.exists());
+}
+
+#[test]
+fn what_is_there_is_skipped_only_if_it_holds() {
+    let place = Place::with(&scene("off"));
+    let skip = ["--skip-existing", "--spp", "8"];
+    let modified = || std::fs::metadata(place.path("a.exr")).unwrap().modified().unwrap();
+    let runs = |further: &[&str]| {
+        let before = modified();
+        let done = place.run("a.exr", further);
+        assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+        modified() != before
+    };
+    assert_eq!(place.run("a.exr", &skip).status.code(), Some(0));
+    assert!(!runs(&skip) && !runs(&["--resume", "--spp", "8"]));
+    assert!(runs(&["--skip-existing", "--spp", "12"]), "other samples");
+    assert!(runs(&skip), "samples of before");
+    assert!(runs(&[&skip[..], &["--set", "output.colour=acescg"]].concat()), "other colours");
+    assert!(runs(&skip), "colours of before");
+    // Damage in the middle of either file, half a file, none.
+    for name in ["a.exr", "a.png"] {
+        let whole = std::fs::read(place.path(name)).unwrap();
+        let mut bytes = whole.clone();
+        bytes[whole.len() * 3 / 4] ^= 16;
+        std::fs::write(place.path(name), &bytes).unwrap();
+        assert!(runs(&skip), "{name} damaged");
+        std::fs::write(place.path(name), &whole[..whole.len() / 2]).unwrap();
+        assert!(runs(&skip), "half of {name}");
+        std::fs::remove_file(place.path(name)).unwrap();
+        assert_eq!(place.run("a.exr", &skip).status.code(), Some(0));
+        assert!(std::fs::read(place.path("a.png")).unwrap().len() > 100 && !runs(&skip));
+    }
+}
+
+#[test]
+fn usr1_writes_a_picture_of_what_is_done_and_the_render_goes_on() {
+    let place = Place::with(&scene("off"));
+    let mut child = place.command("a.exr", &["--spp", "512", "--checkpoint-interval", "0.02s"]).spawn().unwrap();
+    assert!(appears(&mut child, &place.path("a.exr.checkpoint")));
+    signal(&child, "USR1");
+    assert!(appears(&mut child, &place.path("a.snapshot.png")));
+    signal(&child, "TERM");
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+}
