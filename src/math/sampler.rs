@@ -29,6 +29,7 @@ pub enum Set {
 }
 
 impl Set {
+    #[inline(always)]
     fn index(self) -> u32 {
         match self {
             Set::Camera => 0,
@@ -69,13 +70,15 @@ impl Sampler<'_> {
 
     /// Four numbers in [0, 1): multiples of 2⁻³², so never one.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn set(&self, set: Set) -> [f64; 4] {
         let bits = match self.octet {
             Some(octet) if set.index() < SHARED_SETS => octet.set(set, self.index),
             _ => points(self.stream, [self.index], set)[0],
         };
-        bits.map(|x| f64::from(x) * (1.0 / 4_294_967_296.0))
+        // Written out: `map` of an array calls a function for each element.
+        let unit = |x: u32| f64::from(x) * (1.0 / 4_294_967_296.0);
+        [unit(bits[0]), unit(bits[1]), unit(bits[2]), unit(bits[3])]
     }
 }
 
@@ -127,7 +130,7 @@ impl Octet {
         Sampler { stream: self.stream, index, octet: (!self.few).then_some(self) }
     }
 
-    #[inline]
+    #[inline(always)]
     fn set(&self, set: Set, index: u32) -> [u32; 4] {
         let place = set.index();
         if self.made.get() >> place & 1 == 0 {

@@ -31,12 +31,14 @@ pub fn sin_cos_turn(u: f64) -> (f64, f64) {
                         + z * (-1.0 / 3_628_800.0
                             + z * (1.0 / 479_001_600.0
                                 + z * (-1.0 / 87_178_291_200.0 + z * (1.0 / 20_922_789_888_000.0))))))));
-    match quarter as i64 & 3 {
-        0 => (sin, cos),
-        1 => (cos, -sin),
-        2 => (-sin, -cos),
-        _ => (-cos, sin),
-    }
+    // Quarter 0 has (sin, cos), 1 (cos, −sin), 2 (−sin, −cos), 3 (−cos, sin): by bits, for nobody can foretell which it is.
+    let quarter = quarter as i64 as u64;
+    let swapped = (sin.to_bits() ^ cos.to_bits()) & (quarter & 1).wrapping_neg();
+    let sign = |quarter: u64| (quarter & 2) << 62;
+    (
+        f64::from_bits(sin.to_bits() ^ swapped ^ sign(quarter)),
+        f64::from_bits(cos.to_bits() ^ swapped ^ sign(quarter.wrapping_add(1))),
+    )
 }
 
 #[cfg(test)]

@@ -12,8 +12,14 @@ pub fn concentric_disk(u: DVec2) -> DVec2 {
         return DVec2::ZERO;
     }
     // Angle in turns: 1/8 of a turn spans the ratio −1…1 of the smaller to the larger coordinate.
-    let (r, turn) = if a.abs() > b.abs() { (a, 0.125 * (b / a)) } else { (b, 0.25 - 0.125 * (a / b)) };
-    let (sin, cos) = sin_cos_turn(if turn < 0.0 { turn + 1.0 } else { turn });
+    // One or the other by bits: nobody can foretell which.
+    let wide = u64::from(a.abs() > b.abs()).wrapping_neg();
+    let either = |x: f64, y: f64| f64::from_bits(y.to_bits() ^ (x.to_bits() ^ y.to_bits()) & wide);
+    let r = either(a, b);
+    let share = 0.125 * (either(b, a) / r);
+    let turn = either(share, 0.25 - share);
+    let around = f64::from_bits(1f64.to_bits() & u64::from(turn < 0.0).wrapping_neg());
+    let (sin, cos) = sin_cos_turn(turn + around);
     DVec2::new(r * cos, r * sin)
 }
 
