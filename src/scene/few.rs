@@ -4,6 +4,7 @@
 //! ([`super::shape::four`]); of everything else the boxes are, and what is in them is met one by one.
 
 use super::bvh::Aabb;
+use super::several::Apart;
 use super::shape::Shape;
 use super::shape::four::{BoxRay, Boxes, FourRays, Patches, Planes, Spheres};
 use super::{Geometry, Hit, Nearest, Object};
@@ -14,9 +15,9 @@ use wide::f64x4;
 const MOST: usize = 16;
 
 /// Names no object: less than all.
-const NONE: f64 = -1.0;
+pub(super) const NONE: f64 = -1.0;
 /// Where a ray starts that leaves nothing; not equal to a lane of nothing.
-const NOWHERE: f64 = -2.0;
+pub(super) const NOWHERE: f64 = -2.0;
 
 /// What stands in a scene of few things.
 #[derive(Clone, Debug, Default)]
@@ -25,6 +26,8 @@ pub struct Few {
     spheres: Vec<Block<Spheres>>,
     planes: Vec<Block<Planes>>,
     boxes: Vec<Block<Boxes>>,
+    /// Each by itself, for four rays at once.
+    pub(super) apart: Apart,
 }
 
 /// Four of a kind.
@@ -66,7 +69,7 @@ impl Few {
     }
 
     fn new(objects: &[Object], indices: &[u32], boxes: &[Aabb]) -> Few {
-        let mut few = Few::default();
+        let mut few = Few { apart: Apart::new(objects, indices, boxes), ..Few::default() };
         for &index in indices {
             match &objects[index as usize].geometry {
                 Geometry::Shape(Shape::Rectangle(shape)) => {
@@ -139,7 +142,7 @@ impl Few {
         if !self.boxes.is_empty() {
             let ray = BoxRay::new(ray, &lanes);
             for block in &self.boxes {
-                let (_, near) = block.lanes.meet(&ray, best.reach);
+                let (_, near) = block.lanes.meet(&ray, f64x4::splat(best.reach));
                 for object in of_lanes(near.to_bitmask(), block.objects) {
                     meet(object, &mut best);
                 }
@@ -164,7 +167,7 @@ impl Few {
         if !self.boxes.is_empty() {
             let ray = BoxRay::new(ray, &lanes);
             for block in &self.boxes {
-                let (_, near) = block.lanes.meet(&ray, t_max);
+                let (_, near) = block.lanes.meet(&ray, f64x4::splat(t_max));
                 let near = near & block.objects.simd_ne(target);
                 if of_lanes(near.to_bitmask(), block.objects).any(|object| visit(object, false)) {
                     return true;
@@ -195,7 +198,7 @@ fn of_lanes(mut mask: u32, objects: f64x4) -> impl Iterator<Item = u32> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::description::SceneDescription;
     use crate::math::Departure;
@@ -208,7 +211,7 @@ mod tests {
     use std::path::Path;
 
     /// `count` shapes of all kinds that overlap, every third the same as the one before; half of them let light through.
-    fn scene(count: usize, random: &mut Random) -> Scene {
+    pub(in crate::scene) fn scene(count: usize, random: &mut Random) -> Scene {
         let mut text = String::from("camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes:\n");
         for i in 0..count {
             let material = if i / 3 % 2 == 0 { "diffuse" } else { "boundary" };
@@ -232,9 +235,9 @@ mod tests {
         scene
     }
 
-    type Bits = Option<(u64, u32, u32)>;
+    pub(in crate::scene) type Bits = Option<(u64, u32, u32)>;
 
-    fn bits(hit: Option<Hit>) -> Bits {
+    pub(in crate::scene) fn bits(hit: Option<Hit>) -> Bits {
         hit.map(|hit| (hit.t.to_bits(), hit.object, hit.part))
     }
 

@@ -31,6 +31,7 @@ pub mod partials;
 pub mod principled;
 pub mod projector;
 pub mod sdf;
+pub mod several;
 pub mod shape;
 pub mod shelf;
 pub mod texture;
@@ -362,21 +363,7 @@ impl Scene {
     #[must_use]
     pub fn occluded(&self, ray: &Ray, distance: f64, target: Option<Departure>) -> bool {
         let by_triangles = || self.together.as_ref().is_some_and(|t| t.any(ray, distance, target, |_| true));
-        let blocked_by = |object: u32| {
-            let geometry = &self.objects[object as usize].geometry;
-            if let Geometry::Instance(instance) = geometry {
-                return instance.blocks(&self.objects, object, ray, distance);
-            }
-            let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
-            let target = target.filter(|t| t.object == object).map(|t| t.part);
-            match geometry {
-                Geometry::Shape(shape) if target.is_some() && self.objects[object as usize].flipped => {
-                    let first = shape.intersect(ray, distance, departing.map(|face| face as u8));
-                    first.is_some_and(|hit| enters(shape, ray, hit.t, hit.face))
-                }
-                _ => geometry.blocks(ray, distance, departing, target),
-            }
-        };
+        let blocked_by = |object: u32| self.blocks(ray, object, distance, target);
         let by_others = match &self.few {
             Some(few) => {
                 let aimed = self.aimed(target);
@@ -389,6 +376,23 @@ impl Scene {
             None => self.bvh.any(ray, distance, blocked_by),
         };
         by_others || by_triangles()
+    }
+
+    /// Whether `object` stands between the ray's origin and `distance`.
+    fn blocks(&self, ray: &Ray, object: u32, distance: f64, target: Option<Departure>) -> bool {
+        let geometry = &self.objects[object as usize].geometry;
+        if let Geometry::Instance(instance) = geometry {
+            return instance.blocks(&self.objects, object, ray, distance);
+        }
+        let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part);
+        let target = target.filter(|t| t.object == object).map(|t| t.part);
+        match geometry {
+            Geometry::Shape(shape) if target.is_some() && self.objects[object as usize].flipped => {
+                let first = shape.intersect(ray, distance, departing.map(|face| face as u8));
+                first.is_some_and(|hit| enters(shape, ray, hit.t, hit.face))
+            }
+            _ => geometry.blocks(ray, distance, departing, target),
+        }
     }
 
     /// The object of `target`, where it stands in the scene itself.
@@ -411,6 +415,7 @@ impl Scene {
 
     /// The surface at a hit.
     #[must_use]
+    #[inline]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         if let Some(watch) = &self.watch {
             watch.met(self, ray, hit);
@@ -419,6 +424,7 @@ impl Scene {
     }
 
     /// The map of the instance that was met.
+    #[inline]
     fn instance_map(&self, hit: &Hit) -> Option<&AffineMap> {
         match &self.objects[hit.instance? as usize].geometry {
             Geometry::Instance(instance) => Some(&instance.map),
@@ -427,6 +433,7 @@ impl Scene {
     }
 
     /// [`Scene::surface`] with as much as is asked for.
+    #[inline]
     fn surface_with(&self, ray: &Ray, hit: &Hit, detail: Detail) -> SurfacePoint {
         let object = &self.objects[hit.object as usize];
         let mut surface = match self.instance_map(hit) {
@@ -442,6 +449,7 @@ impl Scene {
 
     /// The ray that leaves a surface in `direction`.
     #[must_use]
+    #[inline]
     pub fn leave(&self, surface: &SurfacePoint, hit: &Hit, direction: DVec3) -> Ray {
         let ray = Ray::leaving(surface.point, surface.scale, surface.normal, direction, hit.departure());
         if let Some(watch) = &self.watch {

@@ -60,6 +60,11 @@ pub struct Inside {
     pub bodies: Bodies,
 }
 
+impl Inside {
+    /// In no medium and no body.
+    pub const NOTHING: Inside = Inside { medium: None, bodies: Bodies([0; MOST]) };
+}
+
 /// How a path meets the surface of a body.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing<'a> {

@@ -12,10 +12,10 @@ use glam::{DVec2, DVec3};
 /// Face 2i is coordinate i at −1, face 2i + 1 at +1.
 #[derive(Clone, Debug)]
 pub struct Cube {
-    center: DVec3,
+    pub(super) center: DVec3,
     half_edges: [DVec3; 3],
     /// Dual vectors: coordinate i = dualᵢ · (p − centre). They point along the outward normals.
-    duals: [DVec3; 3],
+    pub(super) duals: [DVec3; 3],
     normals: [DVec3; 3],
     /// Areas of the faces of each pair.
     areas: [f64; 3],

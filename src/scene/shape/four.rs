@@ -4,7 +4,7 @@
 //! distance has the same bits either way. What decides whether there is a hit is a comparison that NaN fails, so that
 //! lanes without a shape need no care: they are made so that their distance is no number.
 
-use super::{Disk, Plane, Rectangle, Sphere};
+use super::{Cube, Disk, Plane, Rectangle, Sphere};
 use crate::math::Ray;
 use crate::scene::shape::flat::Patch;
 use glam::DVec3;
@@ -12,7 +12,7 @@ use wide::f64x4;
 
 type Vec4 = [f64x4; 3];
 
-/// A ray, the same in each lane.
+/// A ray in each lane: the same for four shapes, or four for a shape that is the same in each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct FourRays {
     origin: Vec4,
@@ -26,6 +26,19 @@ impl FourRays {
     pub fn new(ray: &Ray) -> FourRays {
         let splat = |v: DVec3| [f64x4::splat(v.x), f64x4::splat(v.y), f64x4::splat(v.z)];
         FourRays { origin: splat(ray.origin), direction: splat(ray.direction) }
+    }
+
+    /// A ray for each lane.
+    #[inline(always)]
+    #[must_use]
+    pub fn of([a, b, c, d]: [&Ray; 4]) -> FourRays {
+        let lanes = |a: DVec3, b: DVec3, c: DVec3, d: DVec3| {
+            [f64x4::new([a.x, b.x, c.x, d.x]), f64x4::new([a.y, b.y, c.y, d.y]), f64x4::new([a.z, b.z, c.z, d.z])]
+        };
+        FourRays {
+            origin: lanes(a.origin, b.origin, c.origin, d.origin),
+            direction: lanes(a.direction, b.direction, c.direction, d.direction),
+        }
     }
 }
 
@@ -187,6 +200,73 @@ impl Planes {
     }
 }
 
+impl FourRays {
+    /// One over the directions.
+    #[inline(always)]
+    #[must_use]
+    pub fn inverse(&self) -> Vec4 {
+        let [x, y, z] = self.direction;
+        let one = f64x4::splat(1.0);
+        [one / x, one / y, one / z]
+    }
+}
+
+/// Cubes.
+#[derive(Clone, Debug)]
+pub struct Cubes {
+    center: Vec4,
+    duals: [Vec4; 3],
+}
+
+impl Cubes {
+    /// A block of nothing.
+    pub const EMPTY: Cubes = Cubes { center: [f64x4::ZERO; 3], duals: [[f64x4::ZERO; 3]; 3] };
+
+    /// Puts a cube into a lane.
+    pub fn put(&mut self, lane: usize, cube: &Cube) {
+        set(&mut self.center, lane, cube.center);
+        for (lanes, dual) in self.duals.iter_mut().zip(cube.duals) {
+            set(lanes, lane, dual);
+        }
+    }
+
+    /// Distances along rays that do not start on the cubes, the faces that are met, and in which lanes one is, at any
+    /// distance: the steps of [`super::span::Span`].
+    #[inline(always)]
+    #[must_use]
+    pub fn meet(&self, ray: &FourRays) -> (f64x4, f64x4, f64x4) {
+        const ZERO: f64x4 = f64x4::ZERO;
+        const ONE: f64x4 = f64x4::splat(1.0);
+        let d = &ray.direction;
+        let oc = minus(&ray.origin, &self.center);
+        let shift = -dot(&oc, d);
+        let start = near(&oc, d, shift);
+        let (mut enter, mut exit) = (f64x4::splat(f64::NEG_INFINITY), f64x4::splat(f64::INFINITY));
+        let (mut enter_face, mut exit_face) = (ZERO, ZERO);
+        let mut within = enter.simd_lt(exit);
+        for (dual, face) in self.duals.iter().zip([0.0, 2.0, 4.0]) {
+            let (o, d) = (dot(dual, &start), dot(dual, d));
+            let (low, high) = ((-ONE - o) / d, (ONE - o) / d);
+            let (low_face, high_face) = (f64x4::splat(face), f64x4::splat(face + 1.0));
+            let (along, against) = (d.simd_gt(ZERO), d.simd_lt(ZERO));
+            // What runs beside a slab is in it all the way or never.
+            let moves = along | against;
+            within &= moves | (o.simd_ge(-ONE) & o.simd_le(ONE));
+            let first = against.select(high, low);
+            let later = moves & first.simd_gt(enter);
+            enter = later.select(first, enter);
+            enter_face = later.select(against.select(high_face, low_face), enter_face);
+            let last = against.select(low, high);
+            let earlier = moves & last.simd_lt(exit);
+            exit = earlier.select(last, exit);
+            exit_face = earlier.select(against.select(low_face, high_face), exit_face);
+        }
+        let entry = shift + enter;
+        let before = entry.simd_gt(ZERO);
+        (before.select(entry, shift + exit), before.select(enter_face, exit_face), within & enter.simd_le(exit))
+    }
+}
+
 /// Boxes around other things, which a ray is tried with one by one where it meets the box.
 #[derive(Clone, Debug)]
 pub struct Boxes {
@@ -241,12 +321,34 @@ impl Boxes {
     /// which counts as within.
     #[inline(always)]
     #[must_use]
-    pub fn meet(&self, ray: &BoxRay, t_max: f64) -> (f64x4, f64x4) {
+    pub fn meet(&self, ray: &BoxRay, t_max: f64x4) -> (f64x4, f64x4) {
+        let near = |axis: usize| (self.planes[ray.near[axis]], self.planes[ray.near[axis] ^ 1]);
+        Boxes::pass(&ray.origin, &ray.inverse, [near(0), near(1), near(2)], t_max)
+    }
+
+    /// [`Boxes::meet`] of four rays with the box of each lane.
+    #[inline(always)]
+    #[must_use]
+    pub fn meet_four(&self, rays: &FourRays, inverse: &Vec4, t_max: f64x4) -> (f64x4, f64x4) {
+        let near = |axis: usize| {
+            let (low, high) = (self.planes[2 * axis], self.planes[2 * axis + 1]);
+            let back = inverse[axis].simd_lt(f64x4::ZERO);
+            (back.select(high, low), back.select(low, high))
+        };
+        Boxes::pass(&rays.origin, inverse, [near(0), near(1), near(2)], t_max)
+    }
+
+    /// Where rays pass between the nearer and farther planes of each axis.
+    #[inline(always)]
+    fn pass(origin: &Vec4, inverse: &Vec4, planes: [(f64x4, f64x4); 3], t_max: f64x4) -> (f64x4, f64x4) {
         const SLACK: f64 = 1.0 + 1.0 / (1u64 << 40) as f64;
-        let to = |axis: usize, side: usize| (self.planes[ray.near[axis] ^ side] - ray.origin[axis]) * ray.inverse[axis];
+        let to = |axis: usize, side: usize| {
+            let (near, far) = planes[axis];
+            ((if side == 0 { near } else { far }) - origin[axis]) * inverse[axis]
+        };
         // Of a number and none the second operand is taken.
         let enter = to(0, 0).fast_max(to(1, 0).fast_max(to(2, 0).fast_max(f64x4::ZERO)));
-        let leave = to(0, 1).fast_min(to(1, 1).fast_min(to(2, 1).fast_min(f64x4::splat(t_max))));
+        let leave = to(0, 1).fast_min(to(1, 1).fast_min(to(2, 1).fast_min(t_max)));
         (enter, enter.simd_le(leave * f64x4::splat(SLACK)))
     }
 }
