@@ -181,6 +181,87 @@ pub(super) fn mirror(wo: DVec3) -> DVec3 {
     DVec3::new(-wo.x, -wo.y, wo.z)
 }
 
+/// What a path asks of a scattering function.
+pub trait Lobes {
+    /// As [`Bsdf::is_discrete`].
+    fn is_discrete(&self) -> bool;
+    /// As [`Bsdf::eval`].
+    fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation;
+    /// As [`Bsdf::sample`]; the number for the lobe is drawn where there are several.
+    fn sample_by(&self, wo: DVec3, u_lobe: impl FnOnce() -> f64, u: DVec2) -> Option<BsdfSample>;
+    /// Smooth glass.
+    fn glass(&self) -> Option<&Dielectric>;
+}
+
+/// Lambert: f = ρ/π on the side of the normal.
+#[derive(Clone, Copy, Debug)]
+pub struct Lambert {
+    /// Albedo ρ.
+    pub reflectance: Lanes,
+}
+
+impl Lobes for Lambert {
+    #[inline(always)]
+    fn is_discrete(&self) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return Evaluation::NONE;
+        }
+        Evaluation { f: self.reflectance * (1.0 / PI) as f32, pdf: Lanes::splat((wi.z / PI) as f32) }
+    }
+
+    #[inline(always)]
+    fn sample_by(&self, wo: DVec3, _: impl FnOnce() -> f64, u: DVec2) -> Option<BsdfSample> {
+        if wo.z <= 0.0 {
+            return None;
+        }
+        let wi = warp::cosine_hemisphere(u);
+        let pdf = wi.z / PI;
+        (pdf > 0.0).then_some(BsdfSample {
+            wi,
+            weight: self.reflectance,
+            ratio: Lanes::ONE,
+            chosen: Chosen::Density(pdf),
+            transmitted: false,
+            eta2: 1.0,
+        })
+    }
+
+    #[inline(always)]
+    fn glass(&self) -> Option<&Dielectric> {
+        None
+    }
+}
+
+impl Lobes for Bsdf<'_> {
+    #[inline]
+    fn is_discrete(&self) -> bool {
+        Bsdf::is_discrete(self)
+    }
+
+    #[inline]
+    fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
+        Bsdf::eval(self, wo, wi)
+    }
+
+    #[inline]
+    fn sample_by(&self, wo: DVec3, u_lobe: impl FnOnce() -> f64, u: DVec2) -> Option<BsdfSample> {
+        Bsdf::sample(self, wo, u_lobe(), u)
+    }
+
+    #[inline]
+    fn glass(&self) -> Option<&Dielectric> {
+        match self {
+            Bsdf::Dielectric(glass) => Some(glass),
+            _ => None,
+        }
+    }
+}
+
 impl Bsdf<'_> {
     /// True where every direction is one of finitely many: next-event estimation is pointless.
     #[must_use]
@@ -202,12 +283,7 @@ impl Bsdf<'_> {
     #[must_use]
     pub fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
         match self {
-            Bsdf::Diffuse { reflectance } => {
-                if wo.z <= 0.0 || wi.z <= 0.0 {
-                    return Evaluation::NONE;
-                }
-                Evaluation { f: *reflectance * (1.0 / PI) as f32, pdf: Lanes::splat((wi.z / PI) as f32) }
-            }
+            Bsdf::Diffuse { reflectance } => Lambert { reflectance: *reflectance }.eval(wo, wi),
             Bsdf::RoughConductor(metal, facets) => rough_conductor(metal, facets, wo, wi),
             Bsdf::RoughDielectric(glass) => glass.eval(wo, wi),
             Bsdf::Plastic(plastic) => plastic.eval(wo, wi),
@@ -225,21 +301,7 @@ impl Bsdf<'_> {
     #[must_use]
     pub fn sample(&self, wo: DVec3, u_lobe: f64, u: DVec2) -> Option<BsdfSample> {
         match self {
-            Bsdf::Diffuse { reflectance } => {
-                if wo.z <= 0.0 {
-                    return None;
-                }
-                let wi = warp::cosine_hemisphere(u);
-                let pdf = wi.z / PI;
-                (pdf > 0.0).then_some(BsdfSample {
-                    wi,
-                    weight: *reflectance,
-                    ratio: Lanes::ONE,
-                    chosen: Chosen::Density(pdf),
-                    transmitted: false,
-                    eta2: 1.0,
-                })
-            }
+            Bsdf::Diffuse { reflectance } => Lambert { reflectance: *reflectance }.sample_by(wo, || u_lobe, u),
             Bsdf::Mirror { reflectance } => (wo.z > 0.0).then(|| BsdfSample::discrete(mirror(wo), *reflectance)),
             Bsdf::Conductor(metal) => (wo.z > 0.0).then(|| BsdfSample::discrete(mirror(wo), metal.reflectance(wo.z))),
             Bsdf::RoughConductor(metal, facets) => {

@@ -499,7 +499,24 @@ impl Scene {
     /// A light chosen by `u` in [0, 1) for `point`, and the probability of that. With `normal` light is wanted on that
     /// side of a surface only.
     #[must_use]
-    pub fn choose_light_at(&self, point: DVec3, normal: Option<DVec3>, u: f64) -> Option<(usize, f64)> {
+    #[inline(always)]
+    pub fn choose_light_at(
+        &self,
+        point: DVec3,
+        normal: Option<DVec3>,
+        u: impl FnOnce() -> f64,
+    ) -> Option<(usize, f64)> {
+        // One alone needs no number.
+        if let [all] = self.light_cdf[..]
+            && all >= 1.0
+        {
+            return Some((0, all));
+        }
+        self.choose_among(point, normal, u())
+    }
+
+    #[inline(never)]
+    fn choose_among(&self, point: DVec3, normal: Option<DVec3>, u: f64) -> Option<(usize, f64)> {
         let Some(choice) = &self.choice else { return self.choose_light(u) };
         let asking = choice.asking(point, normal);
         let Some(root) = choice.root(&asking) else { return self.choose_light(u) };
@@ -588,7 +605,7 @@ mod tests {
                 let mut counts = vec![0u32; scene.lights.len()];
                 for j in 0..N {
                     let u = (f64::from(j) + 0.5) / f64::from(N);
-                    let Some((i, p)) = scene.choose_light_at(at, normal, u) else { continue };
+                    let Some((i, p)) = scene.choose_light_at(at, normal, || u) else { continue };
                     let said = scene.light_probability_at(i, at, normal);
                     assert!((p / said - 1.0).abs() < 1e-12, "{p} {said}");
                     counts[i] += 1;

@@ -3,6 +3,7 @@
 use super::along_normal;
 use super::environment::Environment;
 use super::projector::Projector;
+use super::shape::{Shape, TowardSample};
 use super::texture::{Texture, TexturePoint};
 use super::{Geometry, Hit, Object, SurfacePoint};
 use crate::math::Departure;
@@ -223,24 +224,13 @@ impl Light {
                 let facing = objects[*object as usize].facing();
                 match &objects[*object as usize].geometry {
                     Geometry::Shape(shape) => {
-                        let s = if facing < 0.0 { shape.sample_inward(from, u) } else { shape.sample_toward(from, u) }?;
-                        if s.direction.dot(s.normal) * facing >= 0.0 {
-                            return None;
+                        let lamp = Lamp { object: *object, shape, facing, radiance };
+                        match shape {
+                            _ if facing < 0.0 => lamp.arriving(shape.sample_inward(from, u)?, nm),
+                            // The most common lamp has code of its own.
+                            Shape::Rectangle(patch) => lamp.arriving(patch.sample_toward(from, u)?, nm),
+                            _ => lamp.arriving(shape.sample_toward(from, u)?, nm),
                         }
-                        let radiance = match radiance {
-                            Texture::Uniform(spectrum) => spectrum.eval(nm),
-                            varying => {
-                                let surface = shape.surface(s.point, s.face);
-                                varying.eval(&TexturePoint::new(&surface, u32::from(s.face), [0.0; 2]), nm)
-                            }
-                        };
-                        Some(Arriving {
-                            wi: s.direction,
-                            distance: s.distance,
-                            radiance,
-                            density: Some(s.pdf_solid_angle),
-                            target: target(u32::from(s.face)),
-                        })
                     }
                     Geometry::Mesh(mesh) => {
                         let (i, u_x) = mesh.areas.sample(u.x)?;
@@ -374,6 +364,38 @@ impl Light {
             Light::Environment(map) => map.representatives(),
             Light::Projector(projector) => projector.spectra(),
         }
+    }
+}
+
+/// A shape that shines.
+struct Lamp<'a> {
+    object: u32,
+    shape: &'a Shape,
+    facing: f64,
+    radiance: &'a Texture,
+}
+
+impl Lamp<'_> {
+    /// The light of one of its points; `None` from its back.
+    #[inline(always)]
+    fn arriving(&self, s: TowardSample, nm: Lanes) -> Option<Arriving> {
+        if s.direction.dot(s.normal) * self.facing >= 0.0 {
+            return None;
+        }
+        let radiance = match self.radiance {
+            Texture::Uniform(spectrum) => spectrum.eval(nm),
+            varying => {
+                let surface = self.shape.surface(s.point, s.face);
+                varying.eval(&TexturePoint::new(&surface, u32::from(s.face), [0.0; 2]), nm)
+            }
+        };
+        Some(Arriving {
+            wi: s.direction,
+            distance: s.distance,
+            radiance,
+            density: Some(s.pdf_solid_angle),
+            target: Some(Departure::new(self.object, u32::from(s.face))),
+        })
     }
 }
 

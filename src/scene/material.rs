@@ -477,6 +477,7 @@ impl Material {
 
     /// True where light can cross the surface.
     #[must_use]
+    #[inline]
     pub fn transmits(&self) -> bool {
         match &self.kind {
             Kind::Dielectric { .. }

@@ -374,7 +374,16 @@ impl Texture {
 
     /// The spectrum at a point.
     #[must_use]
+    #[inline]
     pub fn eval(&self, at: &TexturePoint, nm: Lanes) -> Lanes {
+        match self {
+            Texture::Uniform(spectrum) => spectrum.eval(nm),
+            varying => varying.eval_varying(at, nm),
+        }
+    }
+
+    #[inline(never)]
+    fn eval_varying(&self, at: &TexturePoint, nm: Lanes) -> Lanes {
         match self {
             Texture::Uniform(spectrum) => spectrum.eval(nm),
             Texture::Image(image) => image.eval(at.uv, nm),

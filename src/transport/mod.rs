@@ -25,6 +25,7 @@ use crate::scene::watch::{self, Counts};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
 use merge::Collection;
+use path::together::Wanted;
 use plan::{EffectPlan, Integrator, PathSettings};
 use std::ops::Range;
 
@@ -214,6 +215,12 @@ impl Begun {
         if watched {
             self.counted = watch::take();
         }
+        self.see(shot, light);
+    }
+
+    /// Takes what came of the ray.
+    #[inline]
+    fn see(&mut self, shot: &Shot, light: Incoming) {
         self.sample.radiance = fogged(shot.scene, shot.plan, light, self.sample.wavelengths.nm);
         self.sample.alpha = light.alpha;
     }
@@ -317,8 +324,11 @@ impl Samples {
         for (begun, index) in begun.iter_mut().zip(indices) {
             begun.begin(shot, Address { pixel, replicate, index }, &octet.sampler(index));
         }
-        for begun in begun.iter_mut() {
-            begun.follow(shot, &octet.sampler(begun.at.index));
+        match &shot.plan.integrator {
+            Integrator::Path(settings) if path::together::possible(shot, settings) && begun.len() > 1 => {
+                follow_together(begun, shot, settings, octet);
+            }
+            _ => begun.iter_mut().for_each(|begun| begun.follow(shot, &octet.sampler(begun.at.index))),
         }
         begun.iter_mut().for_each(Begun::finish);
         layers.numbers.clear();
@@ -331,6 +341,19 @@ impl Samples {
         for (i, begun) in begun.iter().enumerate() {
             give(&begun.sample, &layers.numbers[i * channels..(i + 1) * channels]);
         }
+    }
+}
+
+/// [`Begun::follow`] of several samples whose paths go together.
+fn follow_together(begun: &mut [Begun], shot: &Shot, settings: &PathSettings, octet: &Octet) {
+    let mut light = [Incoming::NONE; Octet::SAMPLES as usize];
+    let wanted = |i: usize| {
+        let Begun { at, ray, sample: PixelSample { wavelengths, .. }, .. } = &begun[i];
+        Wanted { sampler: octet.sampler(at.index), nm: wavelengths.nm, ray }
+    };
+    path::together::radiance(shot.scene, shot.plan, settings, begun.len(), wanted, |i, found| light[i] = found);
+    for (begun, light) in begun.iter_mut().zip(light) {
+        begun.see(shot, light);
     }
 }
 

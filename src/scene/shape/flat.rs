@@ -2,7 +2,10 @@
 
 use super::exact::{along, dot};
 use super::plain::Plain;
-use super::{AreaSample, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, largest, turns};
+use super::{
+    AreaSample, Detail, ShapeHit, SurfacePoint, TowardSample, check_direction, check_length, check_point, largest,
+    toward_by_area, turns,
+};
 use crate::math::warp::concentric_disk;
 use crate::math::{Frame, Ray};
 use glam::{DVec2, DVec3};
@@ -153,17 +156,20 @@ impl Patch {
         Plain::Patch { origin: self.origin.as_vec3(), normal: self.normal.as_vec3(), duals, round }
     }
 
+    #[inline]
     fn coordinates(&self, point: DVec3) -> DVec2 {
         let p = point - self.origin;
         DVec2::new(dot(p, self.to_a), dot(p, self.to_b))
     }
 
     /// The vector of coordinates `at`.
+    #[inline]
     fn across(&self, at: DVec2) -> DVec3 {
         self.u * at.x + self.v * at.y
     }
 
     /// Surface point with texture coordinates and tangent left to the caller.
+    #[inline]
     fn surface(&self, point: DVec3, uv: DVec2, tangent: DVec3) -> SurfacePoint {
         SurfacePoint {
             point: point - self.normal * dot(point - self.origin, self.normal),
@@ -175,6 +181,7 @@ impl Patch {
         }
     }
 
+    #[inline(always)]
     fn sample(&self, at: DVec2, area: f64) -> AreaSample {
         let point = self.origin + self.across(at);
         let scale = largest(point).max(largest(self.origin));
@@ -268,6 +275,7 @@ impl Rectangle {
         self.0.plain(false)
     }
 
+    #[inline]
     pub(super) fn surface(&self, point: DVec3) -> SurfacePoint {
         let at = self.0.coordinates(point);
         let uv = at.clamp(self.0.margin, 1.0 - self.0.margin);
@@ -284,10 +292,19 @@ impl Rectangle {
         )
     }
 
+    /// As [`super::Shape::sample_toward`].
+    #[inline(always)]
+    #[must_use]
+    pub fn sample_toward(&self, from: DVec3, u: DVec2) -> Option<TowardSample> {
+        toward_by_area(from, self.sample_area(u))
+    }
+
+    #[inline]
     pub(super) fn area(&self) -> f64 {
         self.0.jacobian
     }
 
+    #[inline(always)]
     pub(super) fn sample_area(&self, u: DVec2) -> AreaSample {
         self.0.sample(u, self.area())
     }

@@ -277,7 +277,7 @@ impl Shape {
             Shape::Sphere(s) => s.sample_toward(from, u),
             Shape::Plane(_) => None,
             Shape::Disk(s) => toward_by_area(from, s.sample_area(u)),
-            Shape::Rectangle(s) => toward_by_area(from, s.sample_area(u)),
+            Shape::Rectangle(s) => s.sample_toward(from, u),
             Shape::Cube(s) => toward_by_area(from, s.sample_visible(from, u)),
             Shape::Cylinder(s) => toward_by_area(from, s.sample_visible(from, u)),
             Shape::Cone(s) => toward_by_area(from, s.sample_visible(from, u)),
@@ -327,6 +327,7 @@ impl Shape {
 const BELOW_ONE: f64 = 1.0 - 1.0 / (1u64 << 24) as f64;
 
 /// The largest coordinate, as a length.
+#[inline]
 fn largest(v: DVec3) -> f64 {
     v.abs().max_element()
 }
@@ -345,6 +346,7 @@ fn solid_angle_density(pdf_area: f64, distance: f64, cos: f64) -> f64 {
 }
 
 /// An area sample as seen from `from`.
+#[inline(always)]
 fn toward_by_area(from: DVec3, sample: AreaSample) -> Option<TowardSample> {
     let offset = sample.point - from;
     let distance = offset.length();

@@ -1,10 +1,8 @@
 //! Light that a path finds: sent by what it meets, from infinity, and of lights that its vertices ask.
 
 use super::{Path, Tracer};
-use crate::math::{Frame, Ray};
-use crate::optics::bsdf::Bsdf;
-use crate::scene::compound::Slopes;
-use crate::scene::{Medium, Object, SurfacePoint};
+use crate::math::{Departure, Ray};
+use crate::scene::Inside;
 use crate::spectrum::Lanes;
 use crate::transport::shadow::Shadow;
 use glam::{DVec2, DVec3};
@@ -18,43 +16,17 @@ pub(super) fn power_heuristic(a: f64, b: f64) -> f64 {
     1.0 / r.mul_add(r, 1.0)
 }
 
-/// What scatters at a vertex.
-pub(super) enum Scatterer<'a> {
-    Surface {
-        bsdf: &'a Bsdf<'a>,
-        frame: &'a Frame,
-        surface: &'a SurfacePoint,
-        object: &'a Object,
-        flip: bool,
-        slopes: Option<&'a Slopes>,
-    },
-    Medium {
-        medium: &'a Medium,
-        point: DVec3,
-    },
-}
-
-impl Scatterer<'_> {
-    /// f · |cos| and densities toward `wi` (world), given `wo` (local for surfaces, world for media).
-    pub(super) fn eval(&self, wo: DVec3, wi_world: DVec3) -> (Lanes, Lanes) {
-        match self {
-            Scatterer::Surface { bsdf, frame, surface, flip, slopes, .. } => {
-                let wi = frame.to_local(wi_world);
-                let geometric = wi_world.dot(surface.normal) * if *flip { -1.0 } else { 1.0 };
-                // Light that the shading normal sees and the true one does not would leak through.
-                if geometric * wi.z <= 0.0 {
-                    return (Lanes::ZERO, Lanes::ZERO);
-                }
-                let e = bsdf.eval(wo, wi);
-                let cos = wi.z.abs() * slopes.map_or(1.0, |s| s.shadowing(wi_world));
-                (e.f * cos as f32, e.pdf)
-            }
-            Scatterer::Medium { medium, point } => {
-                let p = Lanes::splat(medium.phase.eval(*point, wo, wi_world) as f32);
-                (p, p)
-            }
-        }
-    }
+/// Light that a vertex has asked for, and that arrives if nothing stands in the way.
+#[derive(Clone, Copy)]
+pub(super) struct Asked {
+    pub(super) ray: Ray,
+    pub(super) distance: f64,
+    /// The face or triangle that the ray aims at.
+    pub(super) target: Option<Departure>,
+    /// What it adds to the path's radiance.
+    pub(super) light: Lanes,
+    /// Whether it is left to paths from the lights.
+    pub(super) traced: bool,
 }
 
 impl Tracer<'_> {
@@ -91,60 +63,64 @@ impl Tracer<'_> {
         }
     }
 
-    /// Next-event estimation: light from one point of one light.
+    /// Next-event estimation: light from one point of one light, at a point with the normal of the side that is asked
+    /// for. `eval` tells f · |cos| and densities toward a direction.
+    #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the state of a vertex, split by borrow")]
     pub(super) fn add_light<const CHROMATIC: bool, const MEDIA: bool>(
         &self,
         path: &mut Path,
-        scatterer: &Scatterer,
-        point: DVec3,
-        wo: DVec3,
-        normal: Option<DVec3>,
+        (point, normal): (DVec3, Option<DVec3>),
         u: DVec2,
-        u_light: f64,
+        u_light: impl FnOnce() -> f64,
+        eval: impl Fn(DVec3) -> (Lanes, Lanes),
+        inside: impl Fn(DVec3) -> Inside,
         leave: impl FnOnce(DVec3) -> Ray,
+        later: Option<&mut Option<Asked>>,
     ) {
         let scene = self.scene;
         let Some((i, probability)) = scene.choose_light_at(point, normal, u_light) else { return };
         let Some(light) = scene.lights[i].arriving(&scene.objects, point, normal, u, self.nm) else { return };
-        let (f, pdf) = scatterer.eval(wo, light.wi);
+        let (f, pdf) = eval(light.wi);
         if f.simd_eq(Lanes::ZERO).all() {
             return;
         }
-        let inside = match scatterer {
-            // Light from the other side comes through what is there.
-            Scatterer::Surface { surface, object, .. }
-                if MEDIA && light.wi.dot(surface.normal) * path.ray.direction.dot(surface.normal) > 0.0 =>
-            {
-                scene.beyond(object, surface, light.wi, path.inside)
-            }
-            _ => path.inside,
-        };
-        let shadow = Shadow {
-            scene,
-            sampler: self.sampler,
-            nm: self.nm,
-            vertex: path.vertices,
-            inside,
-            panes: self.panes(path),
-            target: light.target,
-        };
-        let Some((through, passing)) = shadow.cast::<MEDIA>(&leave(light.wi), light.distance) else { return };
-        let value = f * light.radiance * through;
-        let weight = match light.density {
+        let ray = leave(light.wi);
+        let traced = self.leaves(path, i as u32);
+        let value = f * light.radiance;
+        let led = if CHROMATIC { path.rho * pdf } else { pdf };
+        let weight = |passing: Option<Lanes>| match light.density {
             None => 1.0 / probability,
             Some(density) => {
                 let q = density * probability;
                 // B: what scattering, led by any lane, would have found this light with.
-                let led = if CHROMATIC { path.rho * pdf * passing } else { pdf * passing };
+                let led = passing.map_or(led, |passing| led * passing);
                 let scattering = if self.settings.scatter_samples > 0 { f64::from(led.reduce_add()) } else { 0.0 };
                 power_heuristic(q * path.rho_sum::<CHROMATIC>(), scattering) / q
             }
         };
-        if self.leaves(path, i as u32) {
-            path.leave_out::<CHROMATIC>(value, weight);
+        if let Some(later) = later
+            && !scene.has_boundaries
+        {
+            let light_found = path.share_of::<CHROMATIC>(value, weight(None));
+            *later = Some(Asked { ray, distance: light.distance, target: light.target, light: light_found, traced });
+            return;
+        }
+        let shadow = Shadow {
+            scene,
+            sampler: &self.sampler,
+            nm: self.nm,
+            vertex: path.vertices,
+            inside: inside(light.wi),
+            panes: self.panes(path),
+            target: light.target,
+        };
+        let Some((through, passing)) = shadow.cast::<MEDIA>(&ray, light.distance) else { return };
+        let weight = weight(Some(passing));
+        if traced {
+            path.leave_out::<CHROMATIC>(value * through, weight);
         } else {
-            path.add::<CHROMATIC>(value, weight);
+            path.add::<CHROMATIC>(value * through, weight);
         }
     }
 }

@@ -1,0 +1,130 @@
+//! The paths of several samples side by side: the nearest things that their rays meet are found together, and so is what
+//! stands before the lights that they ask. In between each goes its own way.
+//!
+//! What a path does is [`Tracer::meet`], as for one alone, with the same numbers in the same order: the bits are the same.
+
+use super::lights::Asked;
+use super::{Path, Step, Tracer, Walk};
+use crate::math::Ray;
+use crate::math::sampler::Sampler;
+use crate::scene::Scene;
+use crate::spectrum::Lanes;
+use crate::transport::plan::{EffectPlan, PathSettings};
+use crate::transport::{Incoming, Shot};
+
+/// How many paths go together at the most.
+pub const MOST: usize = 8;
+
+/// Whether paths can go together: what they meet is found side by side, they fly through no media, and no wavelengths
+/// part.
+#[must_use]
+pub fn possible(shot: &Shot, settings: &PathSettings) -> bool {
+    let Shot { scene, plan, photons, .. } = shot;
+    let one_way = !(plan.media || plan.nested || plan.packets);
+    let plain = photons.is_none() && scene.watch.is_none() && settings.light_samples.max(settings.scatter_samples) == 1;
+    scene.few.is_some() && one_way && plain
+}
+
+/// A sample whose light is wanted.
+pub struct Wanted<'a> {
+    /// Its numbers.
+    pub sampler: Sampler<'a>,
+    /// Its wavelengths, nm.
+    pub nm: Lanes,
+    /// Its ray.
+    pub ray: &'a Ray,
+}
+
+/// The light of `count` samples, at most [`MOST`]: of the `i`th, which `wanted` tells, `give` gets it.
+pub fn radiance<'a>(
+    scene: &'a Scene,
+    plan: &'a EffectPlan,
+    settings: &'a PathSettings,
+    count: usize,
+    wanted: impl Fn(usize) -> Wanted<'a>,
+    give: impl FnMut(usize, Incoming),
+) {
+    match plan.chromatic {
+        true => trace::<true>(scene, plan, settings, count, wanted, give),
+        false => trace::<false>(scene, plan, settings, count, wanted, give),
+    }
+}
+
+fn trace<'a, const CHROMATIC: bool>(
+    scene: &'a Scene,
+    plan: &'a EffectPlan,
+    settings: &'a PathSettings,
+    count: usize,
+    wanted: impl Fn(usize) -> Wanted<'a>,
+    mut give: impl FnMut(usize, Incoming),
+) {
+    let mut paths = [const { Path::BLANK }; MOST];
+    let mut walks = [const { Walk::NEW }; MOST];
+    let mut asked: [Option<Asked>; MOST] = [const { None }; MOST];
+    // The camera does not see beyond its clipping plane.
+    let mut reach = [f64::INFINITY; MOST];
+    for (i, path) in paths.iter_mut().enumerate().take(count) {
+        let ray = wanted(i).ray;
+        (path.ray.origin, path.ray.direction) = (ray.origin, ray.direction);
+        reach[i] = scene.camera.reach(ray);
+    }
+    // Those that go on, in order.
+    let mut on: [usize; MOST] = std::array::from_fn(|i| i);
+    let mut left = count;
+    while left > 0 {
+        let mut hits = [None; MOST];
+        for (group, hits) in on[..left].chunks(4).zip(hits.chunks_mut(4)) {
+            let rays = from_lanes(group, |i| &paths[i].ray);
+            scene.closest_of_four(rays, from_lanes(group, |i| reach[i]), group.len(), hits);
+        }
+        reach = [f64::INFINITY; MOST];
+
+        // Each its own way: it scatters, and asks a light.
+        let going = left;
+        left = 0;
+        let (mut asking, mut questions) = ([0; MOST], 0);
+        for k in 0..going {
+            let i = on[k];
+            let Wanted { sampler, nm, .. } = wanted(i);
+            let tracer = Tracer { scene, plan, settings, sampler, nm, photons: None };
+            let step = tracer.meet::<CHROMATIC, false>(&mut paths[i], &mut walks[i], hits[k], Some(&mut asked[i]));
+            if asked[i].is_some() {
+                asking[questions] = i;
+                questions += 1;
+            }
+            if !matches!(step, Step::Ended) {
+                on[left] = i;
+                left += 1;
+            }
+        }
+
+        for group in asking[..questions].chunks(4) {
+            let Some(toward) = all_of(from_lanes(group, |i| asked[i].as_ref())) else { break };
+            let (distances, targets) = (toward.map(|to| to.distance), toward.map(|to| to.target));
+            let hidden = scene.occluded_of_four(toward.map(|to| &to.ray), distances, targets, group.len());
+            for (lane, &i) in group.iter().enumerate() {
+                if let Some(Asked { light, traced, .. }) = asked[i].take()
+                    && hidden >> lane & 1 == 0
+                {
+                    let path = &mut paths[i];
+                    *(if traced { &mut path.left } else { &mut path.radiance }) += light;
+                }
+            }
+        }
+    }
+    for (i, (path, walk)) in paths.iter().zip(&walks).enumerate().take(count) {
+        give(i, path.incoming(walk.alpha, walk.depth));
+    }
+}
+
+/// What each of `group` has, and for the lanes beyond what the first has.
+#[inline(always)]
+fn from_lanes<T>(group: &[usize], of: impl Fn(usize) -> T) -> [T; 4] {
+    let at = |lane: usize| of(*group.get(lane).unwrap_or(&group[0]));
+    [at(0), at(1), at(2), at(3)]
+}
+
+#[inline(always)]
+fn all_of<T>([a, b, c, d]: [Option<T>; 4]) -> Option<[T; 4]> {
+    Some([a?, b?, c?, d?])
+}
