@@ -170,6 +170,8 @@ enum ProgressStyle {
     Plain,
     /// One JSON object a line
     Json,
+    /// Lines that Open Job Description reads, such as "openjd_progress: 42.0"
+    Openjd,
     /// Nothing
     None,
 }

@@ -19,6 +19,7 @@ enum Style {
     Bars { all: MultiProgress, batch: ProgressBar, scene: ProgressBar },
     Plain,
     Json,
+    OpenJd,
     Quiet,
 }
 
@@ -30,6 +31,8 @@ pub struct Teller {
 
 struct State {
     scene: String,
+    /// Number of the scene from 0, and how many there are.
+    place: [usize; 2],
     last_line: Instant,
 }
 
@@ -50,9 +53,10 @@ impl Teller {
             }
             ProgressStyle::Auto | ProgressStyle::Plain => Style::Plain,
             ProgressStyle::Json => Style::Json,
+            ProgressStyle::Openjd => Style::OpenJd,
             ProgressStyle::None => Style::Quiet,
         };
-        Teller { style, state: Mutex::new(State { scene: String::new(), last_line: Instant::now() }) }
+        Teller { style, state: Mutex::new(State { scene: String::new(), place: [0, 1], last_line: Instant::now() }) }
     }
 
     /// Takes the bars away.
@@ -83,6 +87,7 @@ impl Watcher for Teller {
     fn scene_begins(&self, index: usize, count: usize, name: &str) {
         let mut state = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         name.clone_into(&mut state.scene);
+        state.place = [index, count];
         state.last_line = Instant::now();
         match &self.style {
             Style::Bars { batch, scene, .. } => {
@@ -94,6 +99,9 @@ impl Watcher for Teller {
             }
             Style::Plain => complain(&format!("[{}/{count}] {name}", index + 1)),
             Style::Json => line(&json!({"event": "scene", "scene": name, "index": index, "count": count})),
+            Style::OpenJd => {
+                say(&format!("openjd_status: {name} ({} of {count})\n{}", index + 1, openjd(state.place, 0.0)));
+            }
             Style::Quiet => {}
         }
     }
@@ -105,14 +113,16 @@ impl Watcher for Teller {
                 scene.set_position(p.done);
                 scene.set_message(words(&p));
             }
-            Style::Plain | Style::Json => {
+            Style::Plain | Style::Json | Style::OpenJd => {
                 let mut state = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
                 if state.last_line.elapsed() < LINE_EVERY {
                     return;
                 }
                 state.last_line = Instant::now();
                 let share = p.done as f64 / p.total as f64;
-                if matches!(self.style, Style::Plain) {
+                if matches!(self.style, Style::OpenJd) {
+                    say(&openjd(state.place, share));
+                } else if matches!(self.style, Style::Plain) {
                     complain(&format!("Progress: {:.1}%  {}: {}", share * 100.0, state.scene, words(&p)));
                 } else {
                     let error = p.error.map(|e| e.rel_rmse);
@@ -135,9 +145,26 @@ impl Watcher for Teller {
                 Status::Failed { .. } => complain("  failed"),
             },
             Style::Json => line(&json!({"event": "done", "report": report})),
+            Style::OpenJd => {
+                let place = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner).place;
+                match &report.status {
+                    Status::Done | Status::Skipped => say(&openjd(place, 1.0)),
+                    // One line, whatever the message is.
+                    Status::Failed { message, .. } => {
+                        let message = message.lines().next().unwrap_or_default();
+                        say(&format!("openjd_fail: {}: {message}\n", report.name));
+                    }
+                }
+            }
             Style::Quiet => {}
         }
     }
+}
+
+/// What Open Job Description takes for progress: a number from 0 to 100 of the whole task.
+fn openjd([index, count]: [usize; 2], share: f64) -> String {
+    let done = (index as f64 + share) / count.max(1) as f64;
+    format!("openjd_progress: {:.1}\n", (100.0 * done).clamp(0.0, 100.0))
 }
 
 fn line(value: &serde_json::Value) {
@@ -147,6 +174,13 @@ fn line(value: &serde_json::Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn openjd_hears_of_the_whole_batch() {
+        assert_eq!(openjd([0, 1], 0.42), "openjd_progress: 42.0\n");
+        assert_eq!(openjd([2, 4], 0.5), "openjd_progress: 62.5\n");
+        assert_eq!(openjd([3, 4], 1.0 + 1e-9), "openjd_progress: 100.0\n");
+    }
 
     #[test]
     fn what_is_left_follows_from_the_rate() {
