@@ -8,8 +8,9 @@ use super::part::{Breaks, Part, Share, SplatFilm};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, TileBuffer};
+use crate::film::error::{self, ErrorEstimate};
 use crate::film::filter::FilterSampler;
-use crate::film::resolve::{self, ErrorEstimate, Image, Splats};
+use crate::film::resolve::{self, Image, Splats};
 use crate::film::run::{LONGEST, LayerRun, Run};
 use crate::math::sampler::Octet;
 use crate::scene::Scene;
@@ -320,7 +321,7 @@ fn estimate(film: &Film, splats: Option<&SplatFilm>) -> (Option<ErrorEstimate>, 
     let photons = splats.map(|s| Splats { film: &s.film, photons: s.paths });
     let space = ColourSpace::Rec709.matrix_from_xyz();
     let image = resolve::resolve(film, photons, &space);
-    (image.relative_error().ok(), (space, image))
+    (error::relative_error(film, photons, &space, &image).ok(), (space, image))
 }
 
 /// An error where too many samples were invalid to trust the picture.

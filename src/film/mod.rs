@@ -9,6 +9,7 @@
 
 pub mod accumulate;
 pub mod compare;
+pub mod error;
 pub mod exr;
 pub mod filter;
 pub mod layers;

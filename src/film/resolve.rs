@@ -13,9 +13,7 @@
 
 use crate::film::Window;
 use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES};
-use crate::math::statistics::{Moments, student_t_half_width};
 use rayon::prelude::*;
-use std::fmt;
 
 /// Light that was splatted from photons: sums that are divided by the photons emitted, not by the
 /// samples that arrived.
@@ -40,47 +38,6 @@ pub struct Image {
     pub alpha: Vec<f32>,
     /// Standard error of each value of `rgb`; NaN where fewer than two replicates have samples.
     pub standard_error: [Vec<f32>; 3],
-}
-
-/// The error of a whole picture: relative root mean square error with its interval.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct ErrorEstimate {
-    /// √relMSE.
-    pub rel_rmse: f64,
-    /// Lower end of the 95 % interval of `rel_rmse`.
-    pub low: f64,
-    /// Upper end of the 95 % interval of `rel_rmse`.
-    pub high: f64,
-    /// Pixels that took part: those with at least two replicates.
-    pub pixels: u64,
-    /// Whether the interval can be believed. False where so few pixels carry the error (fireflies, a tiny picture) that
-    /// the mean over pixels is not yet normal: fewer than [`EFFECTIVE_PIXELS`] equally noisy pixels would scatter as much.
-    pub valid: bool,
-}
-
-/// See [`ErrorEstimate::valid`]: 30 is where the central limit is commonly trusted; the mean over pixels then has a
-/// relative standard error of 18 %.
-pub const EFFECTIVE_PIXELS: f64 = 30.0;
-
-/// Why there is no error estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NoEstimate {
-    /// No pixel has samples in two replicates, so there is no spread to look at.
-    OneReplicate,
-    /// Fewer than two pixels have an estimate, so it has no interval.
-    OnePixel,
-    /// Every pixel is black: a relative error has nothing to relate to.
-    Black,
-}
-
-impl fmt::Display for NoEstimate {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            NoEstimate::OneReplicate => "no pixel has samples in at least two replicates",
-            NoEstimate::OnePixel => "fewer than two pixels have samples",
-            NoEstimate::Black => "the picture is black",
-        })
-    }
 }
 
 /// The picture that `film` holds, in the colour space of `rgb_from_xyz`, with `splats` added; on the current rayon pool.
@@ -174,67 +131,12 @@ fn mean_of(cells: &PixelCells, divisors: [u64; REPLICATES], rgb_from_xyz: &[[f64
     PixelMean { rgb, variance }
 }
 
-impl Image {
-    /// Mean of each channel over the pixels, and of the three together.
-    fn mean(&self) -> f64 {
-        let values: usize = self.rgb.iter().map(Vec::len).sum();
-        self.rgb.iter().flatten().map(|&v| f64::from(v)).sum::<f64>() / values.max(1) as f64
-    }
-
-    /// How noisy the picture is, judged from its own standard errors.
-    ///
-    /// relMSE is the mean, over pixels and the three channels, of var / (value² + 0.01·mean²) with the
-    /// mean of all values of the picture: a factor on all light changes nothing, and black pixels count
-    /// by a tenth of the mean instead of by nothing. The interval is Student's for the mean over pixels, whose errors
-    /// are independent since a sample touches one pixel; a pixel counts once, as its channels are not.
-    ///
-    /// # Errors
-    /// Why there is nothing to say.
-    pub fn relative_error(&self) -> Result<ErrorEstimate, NoEstimate> {
-        let mean = self.mean();
-        let floor = 0.01 * mean * mean;
-        let mut over_pixels = Moments::default();
-        for i in 0..self.window.pixels() {
-            if self.standard_error.iter().any(|plane| plane[i].is_nan()) {
-                continue;
-            }
-            let of_pixel: f64 = (0..3)
-                .map(|c| {
-                    let error = f64::from(self.standard_error[c][i]);
-                    let value = f64::from(self.rgb[c][i]);
-                    if error == 0.0 { 0.0 } else { error * error / (value * value + floor) }
-                })
-                .sum();
-            over_pixels.push(of_pixel / 3.0);
-        }
-        match over_pixels.count {
-            0 => return Err(NoEstimate::OneReplicate),
-            1 => return Err(NoEstimate::OnePixel),
-            _ => {}
-        }
-        if self.rgb.iter().flatten().all(|&v| v == 0.0) {
-            return Err(NoEstimate::Black);
-        }
-        let n = over_pixels.count as f64;
-        let half = student_t_half_width(0.95, n - 1.0) * over_pixels.standard_error();
-        // (Σt)²/Σt²: as many pixels of equal error would scatter as much.
-        let squares = over_pixels.squares + n * over_pixels.mean * over_pixels.mean;
-        let effective = n * n * over_pixels.mean * over_pixels.mean / squares;
-        Ok(ErrorEstimate {
-            rel_rmse: over_pixels.mean.sqrt(),
-            low: (over_pixels.mean - half).max(0.0).sqrt(),
-            high: (over_pixels.mean + half).sqrt(),
-            pixels: over_pixels.count,
-            valid: over_pixels.mean == 0.0 || effective >= EFFECTIVE_PIXELS,
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::film::accumulate::TileBuffer;
     use crate::math::sampler::mix64;
+    use crate::math::statistics::Moments;
 
     const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
@@ -281,54 +183,12 @@ mod tests {
         }
     }
 
-    /// True relMSE of a picture of constant mean m: v / (m² + 0.01 m²). The estimate divides by the noisy value²
-    /// instead, E[1/x²] ≈ (1 + 3v/m²)/m²: at v/m² = 0.01/3/16 = 2e-4 that shifts relMSE by 6e-4 of itself and the root by
-    /// 3e-4, against a half width of 3 % here. 400 intervals should hold the truth 95 % of the time: binomial standard
-    /// deviation 1.1 %, plus at most 1.5 % for the skew of t at P = 256; the bounds are 3 of the former and the latter.
     #[test]
-    fn the_interval_covers_the_true_error_in_95_of_100_pictures() {
-        let (runs, a) = (400, 0.1);
-        let truth = (a * a / 3.0 / 16.0 / 1.01f64).sqrt();
-        let mut covered = 0;
-        let mut ratio = Moments::default();
-        for run in 0..runs {
-            let image = resolve(&noisy(1000 + run, 16, 3.0, a, [4; 4]), None, &IDENTITY);
-            let e = image.relative_error().unwrap();
-            assert!(e.valid && e.pixels == 256);
-            covered += u64::from(e.low <= truth && truth <= e.high);
-            ratio.push((e.rel_rmse / truth).powi(2));
-        }
-        let coverage = covered as f64 / runs as f64;
-        assert!((coverage - 0.95).abs() < 3.0 * 0.011 + 0.015, "coverage {coverage}");
-        // Unbiased up to 6e-4: within 4 standard errors of that.
-        assert!((ratio.mean - 1.0).abs() < 6e-4 + 4.0 * ratio.standard_error(), "{ratio:?}");
-    }
-
-    /// Twice the light, twice the values and errors: the relative error has the same bits, as a factor of 2 is exact.
-    #[test]
-    fn the_relative_error_does_not_change_with_the_scale_of_the_light() {
-        let image = |mean| resolve(&noisy(5, 8, mean, 0.5, [2; 4]), None, &IDENTITY).relative_error().unwrap();
-        assert_eq!(image(1.0), image(1024.0));
-    }
-
-    #[test]
-    fn without_two_replicates_there_is_no_estimate() {
+    fn one_replicate_has_no_standard_error_and_no_samples_are_black() {
         let one = resolve(&noisy(5, 8, 1.0, 0.5, [9, 0, 0, 0]), None, &IDENTITY);
         assert!(one.standard_error[0][0].is_nan() && one.rgb[0][0] > 0.0);
-        assert_eq!(one.relative_error(), Err(NoEstimate::OneReplicate));
-        assert_eq!(one.relative_error().unwrap_err().to_string(), "no pixel has samples in at least two replicates");
-        let black = resolve(&noisy(5, 8, 0.0, 0.5, [2; 4]), None, &IDENTITY);
-        assert_eq!(black.relative_error(), Err(NoEstimate::Black));
         let empty = resolve(&noisy(5, 8, 1.0, 0.5, [0; 4]), None, &IDENTITY);
         assert_eq!((empty.rgb[0][0], empty.alpha[0]), (0.0, 0.0));
-    }
-
-    /// One pixel of 256 carries all of the variance: the interval says that it is not to be believed.
-    #[test]
-    fn a_firefly_makes_the_interval_invalid() {
-        let mut film = noisy(3, 16, 1.0, 0.0, [1; 4]);
-        film.add([3, 3], 2, [1e4; 3], 1.0);
-        assert!(!resolve(&film, None, &IDENTITY).relative_error().unwrap().valid);
     }
 
     /// Camera light 2 ± s₁ and splats of total 12 over 4·3 photons: 1 ± s₂. Means add, variances add.

@@ -1,0 +1,382 @@
+//! How far a picture is from the truth, told from its own replicates.
+//!
+//! The error of a picture x of truth μ is √relMSE, with
+//!
+//! ```text
+//! relMSE = mean over pixels and channels of (x − μ)² / (μ² + f),   f = 0.01 · (mean of all values)²
+//! ```
+//!
+//! so that a factor on all light changes nothing, and black pixels count by a tenth of the mean instead of by nothing.
+//!
+//! **Its size.** The variance v of a pixel comes from the spread of R = 4 replicates. Dividing it by x² + f instead of
+//! μ² + f is biased, as x is noisy and moves with v. With g(x) = 1 / (x² + f) and to second order
+//!
+//! ```text
+//! E[v g(x)] = σ² g(μ) + ½ g″(μ) σ⁴ + g′(μ) κ₃
+//! ```
+//!
+//! where κ₃ is the third cumulant of x; both further terms are taken off, with σ⁴ and κ₃ from the replicates.
+//!
+//! **Its interval** is of the error of this very picture, not of the mean over all pictures that might have been. With
+//! e = x − μ of covariance Σ over a block of pixels and their channels, W the weights g, and S the covariance from the
+//! replicates,
+//!
+//! ```text
+//! Var(tr WS − eᵀWe) = (2 / (R − 1) + 2) tr(WΣ)² = 8/3 tr(WΣ)²
+//! ```
+//!
+//! for any distribution of the samples: fourth cumulants enter both terms and their covariance alike, and cancel. The
+//! trace is that of single pixels, from S as for normal noise, A = tr(WS)² and B = (tr WS)², (A − B/3) · 9/10, which heavier
+//! tails make larger, so that the interval is rather too wide; and what neighbours share (one path from a light touches
+//! several pixels, collected photons many): two differences of replicates that have nothing in common, u = x₁ − x₂ and
+//! v = x₃ − x₄, have E (uᵀWv)² = 4R² tr(WΣ)², so that (Σ uᵀWv)² − Σ (uᵀWv)² over the pixels of a block, in the mean over the
+//! three ways to pair four, is that of different pixels. The next order of the size, about four times the square of
+//! what the second takes off, is allowed for.
+
+use super::accumulate::{Film, PixelCells, REPLICATES};
+use super::resolve::{Image, Splats};
+use crate::math::statistics::student_t_half_width;
+use rayon::prelude::*;
+use std::fmt;
+
+/// The error of a whole picture with its interval.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ErrorEstimate {
+    /// √relMSE.
+    pub rel_rmse: f64,
+    /// Lower end of the 95 % interval of the picture's own √relMSE.
+    pub low: f64,
+    /// Upper end of the 95 % interval of the picture's own √relMSE.
+    pub high: f64,
+    /// Pixels that took part: those with all replicates.
+    pub pixels: u64,
+    /// Whether the interval can be believed; where it is false the picture has not converged. False where so few pixels
+    /// carry the error that fewer than [`EFFECTIVE_PIXELS`] equally noisy ones would scatter as much, or where most of
+    /// it comes from single replicates ([`HEAVY_SHARE`]): rare paths that carry much light, of which others are yet to come; or
+    /// where pixels are so noisy that what they are divided by is not known ([`FURTHER_SHARE`]).
+    pub valid: bool,
+}
+
+/// See [`ErrorEstimate::valid`]: 30 is where the central limit is commonly trusted.
+pub const EFFECTIVE_PIXELS: f64 = 30.0;
+
+/// See [`ErrorEstimate::valid`]: half of the error in pixels of which one replicate has more than [`ONE_REPLICATE`] of the
+/// spread. Of normal noise 14 % is; of events that come 0.1 times a replicate 82 %, 0.3 times 56 %, once 23 %.
+pub const HEAVY_SHARE: f64 = 0.5;
+
+/// See [`HEAVY_SHARE`]. One outlier among four has 3/4.
+pub const ONE_REPLICATE: f64 = 0.7;
+
+/// See [`ErrorEstimate::valid`]: what the second order takes off or adds, at most, for the series to be believed.
+pub const FURTHER_SHARE: f64 = 0.1;
+
+/// The next order in units of the square of what the second takes off, which is what the interval allows for.
+const NEXT_ORDER: f64 = 4.0;
+
+/// About as many blocks are looked at for what neighbours share.
+const BLOCKS: usize = 64;
+
+/// Why there is no error estimate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoEstimate {
+    /// No pixel has samples in all replicates.
+    FewReplicates,
+    /// Fewer than two pixels have an estimate, so it has no interval.
+    OnePixel,
+    /// Every pixel is black: a relative error has nothing to relate to.
+    Black,
+}
+
+impl fmt::Display for NoEstimate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            NoEstimate::FewReplicates => "no pixel has four samples, one of each replicate",
+            NoEstimate::OnePixel => "fewer than two pixels have samples",
+            NoEstimate::Black => "the picture is black",
+        })
+    }
+}
+
+/// What some pixels add to the estimate.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    pixels: u64,
+    /// Σ q, q a pixel's expected relative squared error.
+    error: f64,
+    /// What is taken off for the noise of the values that variances are divided by.
+    further: f64,
+    /// Σ q².
+    squares: f64,
+    /// Σ q of pixels of which one replicate has most of the spread.
+    heavy: f64,
+    /// Σ tr(WΣ)² of single pixels.
+    own: f64,
+    /// Σ uᵀWv for each way to pair the replicates.
+    pairs: [f64; 3],
+    /// Σ (uᵀWv)² of single pixels, over the ways to pair.
+    pair_squares: f64,
+}
+
+/// The three ways to make two pairs of four.
+const PAIRINGS: [[usize; 4]; 3] = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2]];
+
+/// How noisy `image` is, the picture that `film` and `splats` hold in the colour space of `rgb_from_xyz`; on the current
+/// rayon pool.
+///
+/// # Errors
+/// Why there is nothing to say.
+pub fn relative_error(
+    film: &Film,
+    splats: Option<Splats>,
+    rgb_from_xyz: &[[f64; 3]; 3],
+    image: &Image,
+) -> Result<ErrorEstimate, NoEstimate> {
+    let window = film.window();
+    let pixels = window.pixels();
+    let values = image.rgb.iter().flatten();
+    let mean = values.clone().map(|&v| f64::from(v)).sum::<f64>() / (3 * pixels).max(1) as f64;
+    let black = image.rgb.iter().flatten().all(|&v| v == 0.0);
+    let floor = 0.01 * mean * mean;
+    let unit = 2f64.powi(film.exponent());
+    let of_pixel = |index: usize| -> Option<[[f64; 3]; REPLICATES]> {
+        let cells = &film.cells()[index];
+        let mut means = replicate_means(cells, cells.map(|cell| u64::from(cell.count)), rgb_from_xyz)?;
+        if let Some(splats) = &splats {
+            let light = replicate_means(&splats.film.cells()[index], splats.photons, rgb_from_xyz)?;
+            for (mean, light) in means.iter_mut().flatten().zip(light.iter().flatten()) {
+                *mean += light;
+            }
+        }
+        Some(means.map(|mean| mean.map(|x| x * unit)))
+    };
+    let side = ((pixels as f64 / BLOCKS as f64).sqrt() as u32).max(1);
+    let rows = window.height.div_ceil(side);
+    let columns = window.width.div_ceil(side);
+    let blocks: Vec<Sums> = (0..rows * columns)
+        .into_par_iter()
+        .map(|block| {
+            let mut sums = Sums::default();
+            let (row, column) = (block / columns * side, block % columns * side);
+            for y in row..(row + side).min(window.height) {
+                for x in column..(column + side).min(window.width) {
+                    let index = y as usize * window.width as usize + x as usize;
+                    if let Some(replicates) = of_pixel(index) {
+                        sums.add(&replicates, image.rgb.each_ref().map(|plane| f64::from(plane[index])), floor);
+                    }
+                }
+            }
+            sums
+        })
+        .collect();
+    let mut all = Sums::default();
+    let mut shared = 0.0;
+    for block in &blocks {
+        all.pixels += block.pixels;
+        all.error += block.error;
+        all.further += block.further;
+        all.squares += block.squares;
+        all.heavy += block.heavy;
+        all.own += block.own;
+        let together = block.pairs.iter().map(|pair| pair * pair).sum::<f64>();
+        shared += (together - block.pair_squares) / (3.0 * 64.0);
+    }
+    match all.pixels {
+        0 => return Err(NoEstimate::FewReplicates),
+        1 => return Err(NoEstimate::OnePixel),
+        _ if black => return Err(NoEstimate::Black),
+        _ => {}
+    }
+    let n = all.pixels as f64;
+    let rel_mse = (all.error / n).max(0.0);
+    let trace = all.own + f64::max(0.0, shared);
+    let share = if all.error == 0.0 { 0.0 } else { all.further / all.error };
+    let next = NEXT_ORDER * share * share * all.error;
+    let half = student_t_half_width(0.95, EFFECTIVE_PIXELS) * (8.0 / 3.0 * trace).sqrt().hypot(next) / n;
+    let effective = if all.squares > 0.0 { all.error * all.error / all.squares } else { n };
+    Ok(ErrorEstimate {
+        rel_rmse: rel_mse.sqrt(),
+        low: (rel_mse - half).max(0.0).sqrt(),
+        high: (rel_mse + half).sqrt(),
+        pixels: all.pixels,
+        valid: all.error == 0.0
+            || (effective >= EFFECTIVE_PIXELS && all.heavy <= HEAVY_SHARE * all.error && share.abs() <= FURTHER_SHARE),
+    })
+}
+
+/// The mean of each replicate; `None` where one has none.
+fn replicate_means(
+    cells: &PixelCells,
+    divisors: [u64; REPLICATES],
+    rgb_from_xyz: &[[f64; 3]; 3],
+) -> Option<[[f64; 3]; REPLICATES]> {
+    if divisors.contains(&0) {
+        return None;
+    }
+    Some(std::array::from_fn(|r| {
+        let xyz = cells[r].xyz.map(|sum| sum.value() / divisors[r] as f64);
+        rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
+    }))
+}
+
+impl Sums {
+    fn add(&mut self, replicates: &[[f64; 3]; REPLICATES], value: [f64; 3], floor: f64) {
+        self.pixels += 1;
+        let mut error = 0.0;
+        let mut shares = [0.0; REPLICATES];
+        let mut pairs = [0.0; 3];
+        let mut deviations = [[0.0; 3]; REPLICATES];
+        for c in 0..3 {
+            let x = replicates.map(|mean| mean[c]);
+            let mean = x.iter().sum::<f64>() / REPLICATES as f64;
+            let squares: f64 = x.iter().map(|x| (x - mean) * (x - mean)).sum();
+            if squares == 0.0 {
+                continue;
+            }
+            let value = value[c];
+            let size = value * value + floor;
+            let g = 1.0 / size;
+            // Derivatives of g.
+            let first = -2.0 * value * g * g;
+            let second = (6.0 * value * value - 2.0 * floor) * g * g * g;
+            let variance = squares / 12.0;
+            let third = x.iter().map(|x| (x - mean).powi(3)).sum::<f64>() / 24.0;
+            let mut fourth = 0.0;
+            for (pair, [i, j, k, l]) in pairs.iter_mut().zip(PAIRINGS) {
+                let product = (x[i] - x[j]) * (x[k] - x[l]);
+                *pair += product * g / 3.0;
+                fourth += product * product / 3.0 / 64.0;
+            }
+            self.further += (0.5 * second * fourth + first * third) / 3.0;
+            error += (variance * g - 0.5 * second * fourth - first * third) / 3.0;
+            for r in 0..REPLICATES {
+                shares[r] += (x[r] - mean) * (x[r] - mean) * g;
+                deviations[r][c] = (x[r] - mean) * (g / 3.0).sqrt();
+            }
+        }
+        self.error += error;
+        self.squares += error * error;
+        let largest = shares.iter().copied().fold(0.0, f64::max);
+        if largest > ONE_REPLICATE * shares.iter().sum::<f64>() {
+            self.heavy += error;
+        }
+        for (sum, pair) in self.pairs.iter_mut().zip(pairs) {
+            *sum += pair;
+            self.pair_squares += pair * pair;
+        }
+        // The Gram matrix of the replicates' deviations.
+        let mut gram = 0.0;
+        for a in &deviations {
+            for b in &deviations {
+                let product: f64 = (0..3).map(|c| a[c] * b[c]).sum();
+                gram += product * product;
+            }
+        }
+        let trace: f64 = deviations.iter().flatten().map(|x| x * x).sum::<f64>() / 12.0;
+        self.own += (gram / 144.0 - trace * trace / 3.0) * 0.9;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Window;
+    use crate::film::accumulate::TileBuffer;
+    use crate::film::resolve::resolve;
+    use crate::math::sampler::mix64;
+    use crate::math::statistics::Moments;
+
+    const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+    /// Uniform on [0, 1).
+    fn uniform(seed: u64, i: u64) -> f64 {
+        (mix64(seed ^ mix64(i)) >> 11) as f64 / 9_007_199_254_740_992.0
+    }
+
+    /// A film of `side` × `side` pixels whose samples are what `sample` makes of a pixel's number and a uniform number, the
+    /// same in all channels; `count` of them in each replicate.
+    fn film(seed: u64, side: u32, count: u64, sample: impl Fn(usize, f64) -> f64) -> Film {
+        let window = Window::full(side, side);
+        let mut tile = TileBuffer::new(window);
+        let mut i = 0;
+        for pixel in 0..window.pixels() {
+            let place = [(pixel % side as usize) as i32, (pixel / side as usize) as i32];
+            for replicate in 0..REPLICATES {
+                for _ in 0..count {
+                    i += 1;
+                    tile.add(place, replicate, [sample(pixel, uniform(seed, i)) as f32; 3], 1.0);
+                }
+            }
+        }
+        let mut film = Film::new([side, side], window).unwrap();
+        film.merge_tile(&tile);
+        film
+    }
+
+    fn estimate(film: &Film) -> Result<(Image, ErrorEstimate), NoEstimate> {
+        let image = resolve(film, None, &IDENTITY);
+        let error = relative_error(film, None, &IDENTITY, &image)?;
+        Ok((image, error))
+    }
+
+    /// The relMSE that `image` has where the truth is `truth`.
+    fn own(image: &Image, truth: impl Fn(usize) -> f64) -> f64 {
+        let n = image.window.pixels();
+        let mean = (0..n).map(&truth).sum::<f64>() / n as f64;
+        let of = |i: usize| (f64::from(image.rgb[0][i]) - truth(i)).powi(2) / (truth(i).powi(2) + 0.01 * mean * mean);
+        (0..n).map(of).sum::<f64>() / n as f64
+    }
+
+    /// Pictures of 16 × 16 pixels whose brightness and noise differ, with samples that are evenly spread, or a light
+    /// that is found one time in four (skewed: a pixel that looks dark looks even, too). 400 intervals hold the error of
+    /// the picture that they belong to 95 % of the time: binomial standard deviation 1.1 %, three of them. The mean of the
+    /// estimates is that of the errors within four standard errors of their difference.
+    #[test]
+    fn the_interval_holds_the_error_of_its_own_picture_95_times_of_100() {
+        let truth = |pixel: usize| 0.2 + (pixel % 16) as f64;
+        let even = |pixel: usize, u: f64| truth(pixel) * (1.0 + 0.6 * (2.0 * u - 1.0));
+        let skewed = |pixel: usize, u: f64| if u < 0.25 { 4.0 * truth(pixel) } else { 0.0 };
+        for (name, count, skew) in [("even", 4, false), ("skewed", 64, true)] {
+            let (mut covered, mut excess) = (0, Moments::default());
+            for run in 0..400 {
+                let seed = 1000 + run;
+                let film = if skew { film(seed, 16, count, skewed) } else { film(seed, 16, count, even) };
+                let (image, e) = estimate(&film).unwrap();
+                let own = own(&image, truth);
+                assert!(e.valid && e.pixels == 256);
+                covered += u64::from(e.low <= own.sqrt() && own.sqrt() <= e.high);
+                excess.push(e.rel_rmse * e.rel_rmse / own - 1.0);
+            }
+            let coverage = covered as f64 / 400.0;
+            assert!((coverage - 0.95).abs() < 3.0 * 0.011, "{name}: coverage {coverage}");
+            assert!(excess.mean.abs() < 4.0 * excess.standard_error(), "{name}: {excess:?}");
+        }
+    }
+
+    /// Twice the light, twice the values and errors: the relative error has the same bits, as a factor of 2 is exact.
+    #[test]
+    fn the_relative_error_does_not_change_with_the_scale_of_the_light() {
+        let noisy = |scale: f64| film(5, 8, 2, move |_, u| scale * (0.5 + u));
+        assert_eq!(estimate(&noisy(1.0)).unwrap().1, estimate(&noisy(1024.0)).unwrap().1);
+    }
+
+    #[test]
+    fn without_all_replicates_there_is_no_estimate() {
+        let mut one = Film::new([8, 8], Window::full(8, 8)).unwrap();
+        one.add([3, 3], 0, [1.0; 3], 1.0);
+        assert_eq!(estimate(&one).unwrap_err(), NoEstimate::FewReplicates);
+        assert_eq!(estimate(&film(5, 8, 2, |_, _| 0.0)).unwrap_err(), NoEstimate::Black);
+        assert_eq!(estimate(&film(5, 1, 2, |_, u| u)).unwrap_err(), NoEstimate::OnePixel);
+    }
+
+    /// One pixel of 256 carries all of the error; or every pixel has light that comes once in 200 samples, of which it has
+    /// 16: in both the picture is told to have not converged. Without noise there is nothing to doubt.
+    #[test]
+    fn rare_light_makes_the_interval_invalid() {
+        let mut firefly = film(3, 16, 1, |_, _| 1.0);
+        assert!(estimate(&firefly).unwrap().1.valid);
+        firefly.add([3, 3], 2, [1e4; 3], 1.0);
+        assert!(!estimate(&firefly).unwrap().1.valid);
+        let rare = film(3, 32, 4, |_, u| if u < 0.005 { 200.0 } else { 1.0 });
+        assert!(!estimate(&rare).unwrap().1.valid);
+    }
+}
