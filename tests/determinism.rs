@@ -5,7 +5,7 @@ mod common;
 
 use abbe::batch::frame::FrameJob;
 use abbe::batch::part::render_part;
-use abbe::batch::{self, Overrides, Prepared};
+use abbe::batch::{self, Overrides};
 use abbe::film::Window;
 use abbe::film::accumulate::Film;
 use abbe::film::exr::{ExrFile, read_exr};
@@ -115,17 +115,9 @@ fn threads_and_tiles_do_not_change_a_bit() {
 
 /// Renders `ranges` of samples in their order, each into a film of its own, and merges the films.
 fn in_parts(bench: &Bench, ranges: &[Range<u32>], side: u32) -> Film {
-    let Prepared { scene, plan, description, samples, .. } = &bench.prepared;
-    let job = FrameJob {
-        scene,
-        plan,
-        filter: &FilterSampler::new(Filter::Box).unwrap(),
-        window: bench.window(),
-        samples: *samples,
-        seed: description.render.seed,
-        tile: side,
-    };
-    let frame = scene.camera.resolution;
+    let filter = FilterSampler::new(Filter::Box).unwrap();
+    let job = FrameJob { tile: side, ..bench.prepared.job(&filter) };
+    let frame = job.scene.camera.resolution;
     let mut whole = Film::new(frame, job.window).unwrap();
     for range in ranges {
         let (part, _) = render_part(&job, range.clone()).unwrap();

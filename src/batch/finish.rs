@@ -159,7 +159,7 @@ pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut Scene
     report.files = vec![exr_path.to_path_buf(), png_path];
     report.seconds.writing = written.elapsed().as_secs_f64();
 
-    let samples = finish.window.pixels() as u64 * u64::from(finish.samples);
+    let samples = finish.window.pixels() as u64 * u64::from(frame.samples());
     frame::check_invalid(&frame.invalid(), samples)
 }
 
@@ -207,7 +207,7 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
         ("abbe/settingsHash".to_owned(), text(&finish.settings_hash())),
         ("abbe/pixelHash".to_owned(), text(&report.pixel_hash)),
         ("abbe/seed".to_owned(), text(&finish.seed.to_string())),
-        ("abbe/samples".to_owned(), Attribute::Int(finish.samples as i32)),
+        ("abbe/samples".to_owned(), Attribute::Int(frame.samples() as i32)),
         ("abbe/wavelengths".to_owned(), text(&finish.wavelengths)),
         ("abbe/integrator".to_owned(), text(&finish.integrator)),
         ("abbe/effects".to_owned(), text(&report.effects_in_force().join(", "))),
@@ -216,6 +216,8 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
     ];
     if let Some(e) = &report.error {
         all.push(("abbe/relativeError".to_owned(), Attribute::Double(e.rel_rmse)));
+        let state = if e.valid { "valid" } else { "not converged, interval not valid" };
+        all.push(("abbe/relativeErrorState".to_owned(), text(state)));
         all.push(("abbe/relativeErrorInterval95".to_owned(), text(&format!("{:.3e} {:.3e}", e.low, e.high))));
     }
     if let Some(seconds) = report.halving_seconds {

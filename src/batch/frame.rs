@@ -5,6 +5,7 @@
 //! and after each pass the error so far is known.
 
 use super::part::{Breaks, Part, Share, SplatFilm};
+use super::stop::{Forecast, Stop};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, TileBuffer};
@@ -35,8 +36,12 @@ pub struct FrameJob<'a> {
     pub filter: &'a FilterSampler,
     /// The pixels to render.
     pub window: Window,
-    /// Samples of a pixel.
+    /// Samples of a pixel; the most of them, where `stop` has other targets.
     pub samples: u32,
+    /// Samples of a pixel for which techniques are planned.
+    pub planned: u32,
+    /// What else ends the render.
+    pub stop: Stop,
     /// Seed of all random numbers.
     pub seed: u64,
     /// Side of a tile in pixels.
@@ -80,6 +85,10 @@ pub struct Progress {
     pub elapsed: Duration,
     /// The latest milestone's error.
     pub error: Option<ErrorEstimate>,
+    /// Where the render will end, from the latest milestone.
+    pub forecast: Option<Forecast>,
+    /// The error at which it is to end.
+    pub target: Option<f64>,
 }
 
 impl Frame {
@@ -94,6 +103,12 @@ impl Frame {
         };
         let milestones = vec![Milestone { samples, elapsed, error }];
         Frame { film, splats, elapsed, milestones, resolved }
+    }
+
+    /// Samples of a pixel.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.milestones.last().map_or(0, |m| m.samples)
     }
 
     /// The picture in the colour space of `rgb_from_xyz`.
@@ -133,20 +148,11 @@ impl Frame {
 /// Share of samples that may be invalid before the picture is refused: one in a million.
 pub const INVALID_LIMIT: f64 = 1e-6;
 
-/// Sample ranges of the passes of `samples`: up to 4, 8, 16, … and the last.
+/// The samples at which the pass ends that begins at sample `at`, of at most `most`: 4, 8, 16, …
 #[must_use]
-pub fn passes(samples: Range<u32>) -> Vec<Range<u32>> {
-    let mut all = Vec::new();
-    let mut start = samples.start;
-    let mut end = REPLICATES as u32;
-    while start < samples.end {
-        if end > start {
-            all.push(start..end.min(samples.end));
-            start = end.min(samples.end);
-        }
-        end = end.saturating_mul(2);
-    }
-    all
+pub fn pass_end(at: u32, most: u32) -> u32 {
+    let doublings = std::iter::successors(Some(REPLICATES as u32), |end| end.checked_mul(2));
+    doublings.into_iter().find(|end| *end > at).unwrap_or(most).min(most)
 }
 
 /// Renders one work unit into `tile`.
@@ -288,14 +294,29 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
     let whole = *part.share() == Share::all(job.samples);
     let random = !matches!(job.plan.integrator, Integrator::Whitted(_));
 
-    for pass in passes(part.share().samples.clone()) {
-        if begun.milestones.last().is_some_and(|m| m.samples >= pass.end) {
-            continue;
+    let Range { start: first, end: most } = part.share().samples;
+    let pixels = job.window.pixels() as f64;
+    loop {
+        let milestones = &begun.milestones;
+        let at = milestones.last().map_or(first, |m| m.samples);
+        if at >= most || job.stop.reached(milestones) {
+            break;
         }
-        let latest = begun.milestones.last().and_then(|m| m.error);
+        let end = if job.stop.is_open() { job.stop.pass_end(milestones, most) } else { Some(pass_end(at, most)) };
+        let Some(end) = end else { break };
+        // What a checkpoint holds beyond is kept.
+        let pass = at..end.max(part.reached());
+        let latest = milestones.last().and_then(|m| m.error);
+        let forecast = Forecast::of(milestones, &job.stop, most).filter(|_| whole);
+        let total = match forecast {
+            Some(forecast) if job.stop.is_open() => (forecast.samples * pixels) as u64,
+            _ => total,
+        };
         let finished = |unit| {
             let done = done.fetch_add(unit, Ordering::Relaxed) + unit;
-            watch(Progress { done, total, elapsed: before + start.elapsed(), error: latest });
+            let total = total.max(done);
+            let target = job.stop.error;
+            watch(Progress { done, total, elapsed: before + start.elapsed(), error: latest, forecast, target });
         };
         while !part.add(pass.clone(), breaks, &finished) {
             breaks.take(part, &begun.milestones, before + start.elapsed())?;
@@ -350,10 +371,19 @@ mod tests {
 
     #[test]
     fn passes_double_and_cover_every_sample_once() {
-        assert_eq!(passes(0..1), vec![0..1; 1]);
-        assert_eq!(passes(0..4), vec![0..4; 1]);
-        assert_eq!(passes(0..21), [0..4, 4..8, 8..16, 16..21]);
-        assert_eq!(passes(5..21), [5..8, 8..16, 16..21]);
-        assert_eq!(passes(16..21), vec![16..21; 1]);
+        let ends = |mut at: u32, most: u32| {
+            let mut ends = Vec::new();
+            while at < most {
+                at = pass_end(at, most);
+                ends.push(at);
+            }
+            ends
+        };
+        assert_eq!(ends(0, 1), [1]);
+        assert_eq!(ends(0, 4), [4]);
+        assert_eq!(ends(0, 21), [4, 8, 16, 21]);
+        assert_eq!(ends(5, 21), [8, 16, 21]);
+        assert_eq!(ends(16, 21), [21]);
+        assert_eq!(ends(1 << 31, u32::MAX), [u32::MAX]);
     }
 }

@@ -9,6 +9,7 @@ pub mod merge;
 pub mod part;
 pub mod part_file;
 pub mod report;
+pub mod stop;
 
 use crate::description::{self, BatchEntry, LayerContent, SceneDescription};
 use crate::error::{Error, Result};
@@ -34,6 +35,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
+use stop::{Forecast, Stop};
 
 /// What the command line says over the files.
 #[derive(Clone, Debug, Default)]
@@ -127,12 +129,35 @@ pub struct Prepared {
     pub scene: Scene,
     /// What is simulated.
     pub plan: EffectPlan,
-    /// Samples of a pixel.
+    /// Samples of a pixel; the most of them, where `stop` has other targets.
     pub samples: u32,
+    /// Samples of a pixel for which techniques are planned.
+    pub planned: u32,
+    /// What else ends the render.
+    pub stop: Stop,
     /// Hash of the description and of the files it names.
     pub hash: String,
     /// The file of the scene.
     pub source: PathBuf,
+}
+
+impl Prepared {
+    /// The whole picture, sampled by `filter`.
+    #[must_use]
+    pub fn job<'a>(&'a self, filter: &'a FilterSampler) -> FrameJob<'a> {
+        let Prepared { description, scene, plan, samples, planned, stop, .. } = self;
+        FrameJob {
+            scene,
+            plan,
+            filter,
+            window: window(description),
+            samples: *samples,
+            planned: *planned,
+            stop: *stop,
+            seed: description.render.seed,
+            tile: description.render.tile,
+        }
+    }
 }
 
 /// The entries of `path`, filtered by name.
@@ -175,25 +200,31 @@ fn prepare_with(entry: &BatchEntry, overrides: &Overrides, shelf: &mut Shelf) ->
     let description = entry.scene(&overrides.set)?;
     let mut scene = compile::compile_with(&description, &entry.name, shelf)?;
     let integrator = integrator(&description, &description.integrator)?;
+    let stop = stop(&description);
     let samples = match &integrator {
+        Integrator::Whitted(_) if stop.is_open() => {
+            let hint = "whitted has no noise: its time and its error are given";
+            return Err(Error::Config(format!("render.stop: {hint}")));
+        }
         Integrator::Whitted(w) => w.samples(),
         Integrator::Path(_) | Integrator::Depth | Integrator::Light(_) | Integrator::Nothing => {
-            description.render.samples
+            description.render.most_samples()
         }
     };
+    let planned = if stop.is_open() { description.render.samples.min(samples) } else { samples };
     let mode = match description.render.effects {
         description::Effects::Auto => EffectMode::Auto,
         description::Effects::All => EffectMode::All,
     };
     let mut plan = EffectPlan::of(&Census::of(&scene), integrator, mode);
-    plan.layers = layer_plan(&description, &scene, samples)?;
+    plan.layers = layer_plan(&description, &scene, planned)?;
     let filter = FilterSampler::new(filter(&description.image.filter))?;
     let (seed, wishes) = (description.render.seed, wishes(&description));
-    if let Some((packets, said)) = trial::packets(&scene, &plan, &filter, seed, samples, wishes.packets) {
+    if let Some((packets, said)) = trial::packets(&scene, &plan, &filter, seed, planned, wishes.packets) {
         plan.packets = packets;
         plan.techniques.push(said);
     }
-    let (caustics, said) = pilot::decide(&scene, &plan, &filter, seed, samples, wishes);
+    let (caustics, said) = pilot::decide(&scene, &plan, &filter, seed, planned, wishes);
     plan.caustics = caustics;
     plan.techniques.extend(said);
     if overrides.check_numerics {
@@ -208,7 +239,22 @@ fn prepare_with(entry: &BatchEntry, overrides: &Overrides, shelf: &mut Shelf) ->
         plan.layers.layers.push(Layer { name: name.into(), source: Source::Numerics, squares: None });
     }
     let hash = hash(&description, &scene.files);
-    Ok(Prepared { description, scene, plan, samples, hash, source: entry.path.clone() })
+    Ok(Prepared { description, scene, plan, samples, planned, stop, hash, source: entry.path.clone() })
+}
+
+/// What ends the render besides samples.
+fn stop(description: &SceneDescription) -> Stop {
+    let written = &description.render.stop;
+    let floor = match description.output.exr.precision {
+        description::Precision::Half => stop::rounding(11),
+        description::Precision::Float => stop::rounding(24),
+    };
+    Stop {
+        error: written.error,
+        time: written.time.as_ref().and_then(description::Time::duration),
+        samples_wanted: written.samples.is_some(),
+        floor,
+    }
 }
 
 /// Techniques that the description asks for or forbids.
@@ -409,16 +455,13 @@ fn render_and_write(
     if overrides.portion.is_all() {
         output::prepare_place(&exr_path.with_extension("png"))?;
     }
-    let job = FrameJob {
-        scene: &prepared.scene,
-        plan: &prepared.plan,
-        filter: &FilterSampler::new(filter(&description.image.filter))?,
-        window: window(description),
-        samples: prepared.samples,
-        seed: description.render.seed,
-        tile: description.render.tile,
-    };
+    let filter = FilterSampler::new(filter(&description.image.filter))?;
+    let job = prepared.job(&filter);
     let portion = &overrides.portion;
+    if prepared.stop.is_open() && !portion.is_all() {
+        let hint = "a part cannot know the error or the time of the whole picture; give it a number of samples";
+        return Err(Error::Config(format!("render.stop: {hint}")));
+    }
     let share = portion.share(job.window, job.samples)?;
     let identity = Identity::new(Finish::of(prepared), &prepared.source, &prepared.plan);
     let finish = &identity.finish;
@@ -441,13 +484,14 @@ fn render_and_write(
     }
     let frame = begun.finish();
     report.measure(finish, &frame, keeper.numerics());
+    report.forecast = Forecast::at_a_quarter(&frame.milestones, &prepared.stop, prepared.samples);
     let written = finish::write(finish, &frame, &exr_path, report);
     // What cannot be written can still be resumed.
     if report.files.is_empty() {
         return written;
     }
     report.notes.extend(keeper.done()?);
-    written
+    written.and_then(|()| prepared.stop.check(&frame.milestones))
 }
 
 /// Renders all scenes of `path` that are asked for; a scene that fails does not stop the others.

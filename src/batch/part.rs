@@ -320,6 +320,12 @@ impl<'a> Part<'a> {
         self.splats.as_ref().map(|(paths, _)| paths_of_a_sample(self.job, paths))
     }
 
+    /// The sample up to which some tile is done.
+    #[must_use]
+    pub fn reached(&self) -> u32 {
+        self.tiles.iter().map(|tile| tile.done.load(Ordering::Relaxed)).max().unwrap_or(0)
+    }
+
     /// The job of which this is a part.
     #[must_use]
     pub fn job(&self) -> &'a FrameJob<'a> {
@@ -504,7 +510,7 @@ impl<'a> Part<'a> {
         let wavelength = merge::shared_wavelength(job.seed, replicate, index);
         let parts = light_paths.caustics.is_some_and(|c| c.parts);
         let cell = match parts {
-            true => WavelengthCell::around(wavelength, job.samples.div_ceil(REPLICATES as u32)),
+            true => WavelengthCell::around(wavelength, job.planned.div_ceil(REPLICATES as u32)),
             false => WavelengthCell::point(wavelength),
         };
         let paths = LightPaths { wavelength: Some(cell), ..*light_paths };

@@ -1,7 +1,8 @@
 //! What a render cost and how good it is: for `report.json`, the terminal and the EXR header.
 
 use super::finish::Finish;
-use super::frame::{Begun, Frame, Milestone};
+use super::frame::{Begun, Frame};
+use super::stop::{Fit, Forecast};
 use crate::error::Error;
 use crate::film::accumulate::InvalidCounts;
 use crate::film::error::ErrorEstimate;
@@ -99,6 +100,8 @@ pub struct SceneReport {
     pub error: Option<ErrorEstimate>,
     /// Further seconds of rendering that would halve the error.
     pub halving_seconds: Option<f64>,
+    /// What was foretold at a quarter of the samples: to be held against `samples`, `seconds.rendering` and `error`.
+    pub forecast: Option<Forecast>,
     /// How the error fell.
     pub convergence: Vec<ConvergencePoint>,
     /// Samples that were dropped, by cause.
@@ -147,28 +150,6 @@ impl Report {
     }
 }
 
-/// The exponent b of variance ∝ samples^−b, from the last two milestones a doubling apart, kept to
-/// what sampling can do: 1 for independent samples, at most 2 here.
-fn convergence_exponent(milestones: &[Milestone]) -> f64 {
-    let last_two: Vec<(f64, f64)> = milestones
-        .iter()
-        .rev()
-        .filter_map(|m| m.error.as_ref().map(|e| (f64::from(m.samples), e.rel_rmse)))
-        .take(2)
-        .collect();
-    match last_two.as_slice() {
-        [(n1, e1), (n0, e0)] if *e1 > 0.0 && *e0 > 0.0 && n1 > n0 => {
-            (2.0 * (e0 / e1).ln() / (n1 / n0).ln()).clamp(1.0, 2.0)
-        }
-        _ => 1.0,
-    }
-}
-
-/// Factor on the samples that halves the error: 2^(2/b).
-fn halving_factor(exponent: f64) -> f64 {
-    libm::exp2(2.0 / exponent)
-}
-
 impl SceneReport {
     /// A scene that has not been rendered.
     #[must_use]
@@ -186,6 +167,7 @@ impl SceneReport {
             msamples_per_second: 0.0,
             error: None,
             halving_seconds: None,
+            forecast: None,
             convergence: Vec::new(),
             invalid: InvalidCounts::default(),
             numerics: None,
@@ -216,12 +198,13 @@ impl SceneReport {
         let seconds = frame.elapsed.as_secs_f64();
         let (counted, dropped) = frame.film.samples();
         self.seconds.rendering = seconds;
+        self.samples = frame.samples();
         self.msamples_per_second = (counted + dropped) as f64 / seconds.max(1e-9) * 1e-6;
         self.invalid = frame.invalid();
         self.numerics = numerics;
         self.error = frame.milestones.last().and_then(|m| m.error);
-        if self.error.is_some() {
-            let factor = halving_factor(convergence_exponent(&frame.milestones));
+        if let (Some(error), Some(fit)) = (&self.error, Fit::of(&frame.milestones)) {
+            let factor = fit.samples_for(0.5 * error.rel_rmse) / f64::from(frame.samples());
             self.halving_seconds = Some(seconds * (factor - 1.0));
         }
         self.convergence = frame
@@ -262,26 +245,5 @@ impl SceneReport {
     #[must_use]
     pub fn effects_in_force(&self) -> Vec<&str> {
         self.effects.iter().filter(|e| e.on).map(|e| e.name.as_ref()).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn milestone(samples: u32, rel_rmse: f64) -> Milestone {
-        let error = ErrorEstimate { rel_rmse, low: 0.0, high: 1.0, pixels: 100, valid: true };
-        Milestone { samples, elapsed: Duration::ZERO, error: Some(error) }
-    }
-
-    /// Independent samples: error ∝ N^−½, so four times the samples; stratified ones at N^−1: twice.
-    #[test]
-    fn halving_costs_what_the_convergence_says() {
-        let independent = [milestone(64, 0.1), milestone(256, 0.05)];
-        assert!((halving_factor(convergence_exponent(&independent)) - 4.0).abs() < 1e-12);
-        let stratified = [milestone(64, 0.1), milestone(128, 0.05)];
-        assert!((halving_factor(convergence_exponent(&stratified)) - 2.0).abs() < 1e-12);
-        // Noise in the estimate cannot make samples worse than independent.
-        assert_eq!(convergence_exponent(&[milestone(64, 0.1), milestone(128, 0.12)]), 1.0);
     }
 }

@@ -77,6 +77,12 @@ struct RenderArguments {
     /// Directory for the pictures; for one scene also a file name that ends in .exr
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
+    /// End at this relative error of the picture, as 0.01 or 1%; with --spp or --time at what is reached first
+    #[arg(long, value_name = "E", value_parser = relative_error)]
+    error: Option<f64>,
+    /// End after this time of rendering each scene, as 60s, 10m or 2h
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    time: Option<std::time::Duration>,
     /// Threads; 0 takes every core that the process may use
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
@@ -185,17 +191,17 @@ enum PlanFormat {
 }
 
 fn duration(text: &str) -> std::result::Result<std::time::Duration, String> {
-    let text = text.trim();
-    let (number, unit) = match text.char_indices().next_back() {
-        Some((at, 's')) => (&text[..at], 1.0),
-        Some((at, 'm')) => (&text[..at], 60.0),
-        Some((at, 'h')) => (&text[..at], 3600.0),
-        _ => (text, 1.0),
+    crate::description::duration(text).ok_or_else(|| "expected a time, as 90s, 10m or 2h".into())
+}
+
+/// A relative error, or per cent.
+fn relative_error(text: &str) -> std::result::Result<f64, String> {
+    let (number, unit) = match text.trim().strip_suffix('%') {
+        Some(number) => (number.trim(), 0.01),
+        None => (text.trim(), 1.0),
     };
-    let seconds = number.parse().ok().map(|x: f64| x * unit);
-    seconds
-        .and_then(|s| std::time::Duration::try_from_secs_f64(s).ok())
-        .ok_or_else(|| "expected a time, as 90s, 10m or 2h".into())
+    let share = number.parse::<f64>().ok().map(|x| x * unit).filter(|x| *x > 0.0 && x.is_finite());
+    share.ok_or_else(|| "expected an error above 0, as 0.01 or 1%".into())
 }
 
 /// Two whole numbers around a mark.

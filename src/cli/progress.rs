@@ -78,9 +78,21 @@ fn bar(template: &str) -> BarStyle {
 fn words(p: &Progress) -> String {
     let elapsed = p.elapsed.as_secs_f64().max(1e-9);
     let rate = p.done as f64 / elapsed;
-    let left = (p.total - p.done) as f64 / rate;
-    let error = p.error.map_or(String::new(), |e| format!(", error {:.2} %", e.rel_rmse * 100.0));
-    format!("{:.2} Msamples/s{error}, {} left", rate * 1e-6, seconds(left))
+    let left = match &p.forecast {
+        Some(f) => (f.seconds - elapsed).max(0.0),
+        None => (p.total - p.done) as f64 / rate,
+    };
+    let left = seconds(left);
+    let per_cent = |x: f64| format!("{:.2} %", x * 100.0);
+    let rate = format!("{:.2} Msamples/s", rate * 1e-6);
+    match (&p.error, &p.forecast) {
+        (Some(e), Some(f)) if p.target.is_some_and(|target| f.error <= target * 1.000_001) => {
+            format!("{rate}, error {}, {} in about {left}", per_cent(e.rel_rmse), per_cent(f.error))
+        }
+        (Some(e), Some(f)) => format!("{rate}, error {}, about {} in {left}", per_cent(e.rel_rmse), per_cent(f.error)),
+        (Some(e), None) => format!("{rate}, error {}, {left} left", per_cent(e.rel_rmse)),
+        (None, _) => format!("{rate}, {left} left"),
+    }
 }
 
 impl Watcher for Teller {
@@ -126,7 +138,9 @@ impl Watcher for Teller {
                     complain(&format!("Progress: {:.1}%  {}: {}", share * 100.0, state.scene, words(&p)));
                 } else {
                     let error = p.error.map(|e| e.rel_rmse);
-                    line(&json!({"event": "progress", "scene": state.scene, "done": share, "error": error}));
+                    line(
+                        &json!({"event": "progress", "scene": state.scene, "done": share, "error": error, "forecast": p.forecast}),
+                    );
                 }
             }
             Style::Quiet => {}
@@ -174,6 +188,8 @@ fn line(value: &serde_json::Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::batch::stop::Forecast;
+    use crate::film::error::ErrorEstimate;
 
     #[test]
     fn openjd_hears_of_the_whole_batch() {
@@ -184,7 +200,14 @@ mod tests {
 
     #[test]
     fn what_is_left_follows_from_the_rate() {
-        let p = Progress { done: 300_000, total: 1_200_000, elapsed: Duration::from_secs(10), error: None };
+        let elapsed = Duration::from_secs(10);
+        let p = Progress { done: 300_000, total: 1_200_000, elapsed, error: None, forecast: None, target: None };
         assert_eq!(words(&p), "0.03 Msamples/s, 30.0 s left");
+        let error = Some(ErrorEstimate { rel_rmse: 0.018, low: 0.017, high: 0.019, pixels: 100, valid: true });
+        let forecast = Some(Forecast { made_at: 8, samples: 40.0, seconds: 52.0, error: 0.01 });
+        let known = Progress { error, forecast, ..p };
+        assert_eq!(words(&known), "0.03 Msamples/s, error 1.80 %, about 1.00 % in 42.0 s");
+        let aimed = Progress { target: Some(0.01), ..known };
+        assert_eq!(words(&aimed), "0.03 Msamples/s, error 1.80 %, 1.00 % in about 42.0 s");
     }
 }

@@ -26,6 +26,16 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     let style = if arguments.quiet { ProgressStyle::None } else { arguments.progress };
     let teller = Teller::new(style);
     let interrupts = Interrupts::listen()?;
+    let mut scene = arguments.scene.overrides(arguments.output.clone());
+    if let Some(error) = arguments.error {
+        scene.set.push(("render.stop.error".into(), error.to_string()));
+    }
+    if let Some(time) = arguments.time {
+        scene.set.push(("render.stop.time".into(), time.as_secs_f64().to_string()));
+    }
+    if let (Some(spp), true) = (arguments.scene.spp, arguments.error.is_some() || arguments.time.is_some()) {
+        scene.set.push(("render.stop.samples".into(), spp.to_string()));
+    }
     let overrides = batch::Overrides {
         check_numerics: arguments.check_numerics,
         portion: batch::Portion { tile: arguments.tile, samples: arguments.samples },
@@ -36,7 +46,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
             skip_existing: arguments.skip_existing,
             snapshot: interrupts.snapshot.clone(),
         },
-        ..arguments.scene.overrides(arguments.output.clone())
+        ..scene
     };
     if let Some(file) = &arguments.report {
         prepare_place(file)?;
@@ -111,7 +121,8 @@ const HEADINGS: [&str; 7] = ["scene", "samples", "time", "Msamples/s", "error (9
 fn row(s: &SceneReport) -> [String; 7] {
     let error = match (&s.error, s.integrator.as_str()) {
         (Some(e), _) => {
-            format!("{} ({}-{})", per_cent(e.rel_rmse), per_cent(e.low).replace(" %", ""), per_cent(e.high))
+            let interval = format!("{}-{}", per_cent(e.low).replace(" %", ""), per_cent(e.high));
+            format!("{} ({})", per_cent(e.rel_rmse), if e.valid { &interval } else { "not converged" })
         }
         (None, "whitted") => "no noise".into(),
         (None, _) => "unknown".into(),
@@ -166,6 +177,23 @@ pub fn table(report: &Report) -> String {
                 with_share(n.self_hits, n.rays)
             );
         }
+    }
+    let foretold = done.iter().filter_map(|s| Some((s, s.forecast?, s.error?)));
+    for (i, (s, f, e)) in foretold.enumerate() {
+        if i == 0 {
+            let _ = writeln!(out, "\nforetold at a quarter of the samples, and how it came:");
+        }
+        let _ = writeln!(
+            out,
+            "  {}: {} and {} at {:.0} samples; {} and {} at {}",
+            s.name,
+            seconds(f.seconds),
+            per_cent(f.error),
+            f.samples,
+            seconds(s.seconds.rendering),
+            per_cent(e.rel_rmse),
+            s.samples
+        );
     }
     let _ = writeln!(out, "\neffects in force:");
     for s in &done {

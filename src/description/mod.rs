@@ -60,6 +60,9 @@
 //!                                   # of squares as m2_direct.R, …, or under squares_name
 //! render:                           # these are the defaults
 //!   samples: 64                     # paths per pixel
+//!   stop: {error: ~, time: ~, samples: ~}       # the first that is reached ends the render: relative RMSE of the picture,
+//!                                   # wall time of rendering (60, 90s, 10m, 2h), paths per pixel (65536 where another
+//!                                   # is given); without any: after `samples`, for which techniques are planned anyway
 //!   seed: 0
 //!   effects: auto                   # auto, all: the same picture
 //!   tile: 32                        # pixels
@@ -370,8 +373,9 @@ pub use principled::{Contrast, Luminance, Principled, PrincipledThin, Sampling, 
 pub use print::yaml;
 pub use scene::{Locator, SceneDescription};
 pub use settings::{
-    Channels, Colour, Compression, DepthIntegrator, Effects, Exr, Integrator, LightTracerIntegrator, NoIntegrator,
-    Output, PathIntegrator, Png, Precision, Render, Technique, Techniques, Tonemap, Wavelengths, WhittedIntegrator,
+    Channels, Colour, Compression, DepthIntegrator, Effects, Exr, Integrator, LightTracerIntegrator, MOST_SAMPLES,
+    NoIntegrator, Output, PathIntegrator, Png, Precision, Render, Stop, Technique, Techniques, Time, Tonemap,
+    Wavelengths, WhittedIntegrator, duration,
 };
 pub use shape::{
     Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Geometry, Instance, Layout, Mesh, Normals, Plane, Rectangle,

@@ -1,6 +1,7 @@
 //! How to render and what to write, as they are written.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
@@ -135,12 +136,15 @@ fn whitted_grid() -> u32 {
 }
 
 /// `render: {samples: 64, seed: 0}`
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Render {
-    /// Paths per pixel; default 64.
+    /// Paths per pixel, where [`Render::stop`] says nothing else; default 64.
     #[serde(default = "samples")]
     pub samples: u32,
+    /// When to end; default after `samples`.
+    #[serde(default)]
+    pub stop: Stop,
     /// Of the random numbers; default 0.
     #[serde(default)]
     pub seed: u64,
@@ -170,6 +174,7 @@ impl Default for Render {
     fn default() -> Render {
         Render {
             samples: samples(),
+            stop: Stop::default(),
             seed: 0,
             effects: Effects::default(),
             tile: tile(),
@@ -177,6 +182,65 @@ impl Default for Render {
             techniques: Techniques::default(),
         }
     }
+}
+
+/// `stop: {error: 0.01, time: 60s, samples: 4096}`: the first that is reached ends the render.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stop {
+    /// Relative RMSE of the picture.
+    pub error: Option<f64>,
+    /// Wall time of rendering.
+    pub time: Option<Time>,
+    /// Paths per pixel; default [`MOST_SAMPLES`] where there is another target, which it is then to reach.
+    pub samples: Option<u32>,
+}
+
+/// Paths per pixel after which a target counts as out of reach, where nothing else is said.
+pub const MOST_SAMPLES: u32 = 1 << 16;
+
+impl Render {
+    /// The most paths per pixel.
+    #[must_use]
+    pub fn most_samples(&self) -> u32 {
+        let open = self.stop.error.is_some() || self.stop.time.is_some();
+        self.stop.samples.unwrap_or(if open { MOST_SAMPLES } else { self.samples })
+    }
+}
+
+/// A time: seconds, or `90s`, `10m`, `2h`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Time {
+    /// Seconds.
+    Number(f64),
+    /// With its unit.
+    Name(String),
+}
+
+impl Time {
+    /// The time that is meant, if any is.
+    #[must_use]
+    pub fn duration(&self) -> Option<Duration> {
+        match self {
+            Time::Number(seconds) => Duration::try_from_secs_f64(*seconds).ok(),
+            Time::Name(text) => duration(text),
+        }
+    }
+}
+
+/// The time of `90s`, `10m` or `2h`; a number alone is seconds.
+#[must_use]
+pub fn duration(text: &str) -> Option<Duration> {
+    let text = text.trim();
+    let (number, unit) = match text.char_indices().next_back() {
+        Some((at, 's')) => (&text[..at], 1.0),
+        Some((at, 'm')) => (&text[..at], 60.0),
+        Some((at, 'h')) => (&text[..at], 3600.0),
+        _ => (text, 1.0),
+    };
+    let seconds: f64 = number.trim().parse().ok()?;
+    Duration::try_from_secs_f64(seconds * unit).ok()
 }
 
 /// `techniques: {light_tracing: auto, packets: auto, merging: auto}`
@@ -413,6 +477,19 @@ impl Render {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         checker.at_least_one(at.key("samples"), self.samples);
         checker.whole_between(at.key("tile"), self.tile, 1, super::camera::MAX_SIDE);
+        let stop = at.key("stop");
+        if let Some(error) = self.stop.error {
+            checker.positive(stop.key("error"), error);
+        }
+        if let Some(time) = &self.stop.time {
+            let found = match time {
+                Time::Number(seconds) => seconds.to_string(),
+                Time::Name(text) => format!("\"{text}\""),
+            };
+            let holds = time.duration().is_some_and(|time| !time.is_zero());
+            checker.require(holds, stop.key("time"), "a time above 0, as 60, 90s, 10m or 2h", found);
+        }
+        checker.at_least_one(stop.key("samples"), self.stop.samples.unwrap_or(1));
     }
 }
 
@@ -449,6 +526,21 @@ mod tests {
     }
 
     #[test]
+    fn targets_are_above_zero_and_times_have_units() {
+        assert_eq!(
+            faults("render: {stop: {error: 0, time: 5 days, samples: 0}}"),
+            "dir/s.yaml:2:24: render.stop.error: expected a number above 0, found 0\n\
+             dir/s.yaml:2:33: render.stop.time: expected a time above 0, as 60, 90s, 10m or 2h, found \"5 days\"\n\
+             dir/s.yaml:2:50: render.stop.samples: expected a whole number of 1 or more, found 0"
+        );
+        let render = |text: &str| scene(&format!("render: {text}")).render;
+        let stop = render("{stop: {time: 2m}}");
+        assert_eq!(stop.stop.time.clone().unwrap().duration(), Some(Duration::from_secs(120)));
+        assert_eq!((stop.most_samples(), render("{samples: 7}").most_samples()), (MOST_SAMPLES, 7));
+        assert_eq!(render("{samples: 7, stop: {error: 0.1, samples: 9}}").most_samples(), 9);
+    }
+
+    #[test]
     fn the_directory_of_the_output_has_a_name() {
         assert_eq!(
             faults("output: {dir: ''}"),
@@ -463,6 +555,7 @@ mod tests {
             scene.render,
             Render {
                 samples: 64,
+                stop: Stop::default(),
                 seed: 0,
                 effects: Effects::Auto,
                 tile: 32,

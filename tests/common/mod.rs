@@ -2,7 +2,7 @@
 //! figures with their standard error.
 #![allow(dead_code, reason = "every test file uses its own part")]
 
-use abbe::batch::frame::{self, Frame, FrameJob};
+use abbe::batch::frame::{self, Frame};
 use abbe::batch::{self, Overrides, Prepared};
 use abbe::film::Window;
 use abbe::film::accumulate::{Film, REPLICATES};
@@ -172,16 +172,8 @@ impl Bench {
 
     /// Renders the picture on the current threads.
     pub fn frame(&self) -> Frame {
-        let Prepared { scene, plan, samples, description, .. } = &self.prepared;
-        let job = FrameJob {
-            scene,
-            plan,
-            filter: &FilterSampler::new(Filter::Box).unwrap(),
-            window: self.window(),
-            samples: *samples,
-            seed: description.render.seed,
-            tile: description.render.tile,
-        };
+        let filter = FilterSampler::new(Filter::Box).unwrap();
+        let job = self.prepared.job(&filter);
         frame::render(&job, &|_| {}, &AtomicBool::new(false)).unwrap()
     }
 

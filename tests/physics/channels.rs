@@ -14,16 +14,7 @@ use std::sync::atomic::AtomicBool;
 const PARALLEL: &str = "camera: {origin: [0, 0, 5], target: [0, 0, 0], orthographic_height: 2}\n";
 
 pub(super) fn job<'a>(bench: &'a Bench, filter: &'a FilterSampler, tile: u32) -> FrameJob<'a> {
-    let prepared = &bench.prepared;
-    FrameJob {
-        scene: &prepared.scene,
-        plan: &prepared.plan,
-        filter,
-        window: bench.window(),
-        samples: prepared.samples,
-        seed: prepared.description.render.seed,
-        tile,
-    }
+    FrameJob { tile, ..bench.prepared.job(filter) }
 }
 
 pub(super) fn render_with(bench: &Bench, filter: Filter, tile: u32) -> Frame {

@@ -1,0 +1,311 @@
+//! When a render ends, and when it will.
+//!
+//! Variance falls as samples^−b, with b between 1 (independent samples) and 2 or so (evenly spread ones). The last passes,
+//! each of which doubles the samples, tell b; from it follow the samples that an error takes and, as a sample takes as long
+//! as those of the last pass, the time. Passes are cut short where the forecast says that the target lies before the next doubling.
+
+use super::frame::Milestone;
+use crate::error::{Error, Result};
+use crate::film::accumulate::REPLICATES;
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// Targets besides the number of samples; the first that is reached ends the render.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stop {
+    /// Relative RMSE of the picture.
+    pub error: Option<f64>,
+    /// Wall time of rendering.
+    pub time: Option<Duration>,
+    /// Whether the samples are a wish, too, or just a bound to what cannot be reached.
+    pub samples_wanted: bool,
+    /// What the file's own rounding makes, as relative RMSE: no picture in it has less.
+    pub floor: f64,
+}
+
+/// The relative RMSE of rounding to `bits` of mantissa, the leading one included, for values whose logarithms are even:
+/// a step is 2^(1−bits) of the power of two below, an even error has a twelfth of its square, and ⟨1/m²⟩ over m from 1 to 2
+/// is 3/(8 ln 2).
+#[must_use]
+pub fn rounding(bits: u32) -> f64 {
+    let step = libm::exp2(1.0 - f64::from(bits));
+    step * (3.0 / (8.0 * std::f64::consts::LN_2) / 12.0).sqrt()
+}
+
+/// Passes do not get shorter than this part of what is there: an error that is just missed is not paid for many times.
+const SHORTEST: f64 = 0.125;
+
+impl Stop {
+    /// Whether anything but samples may end the render.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.error.is_some() || self.time.is_some()
+    }
+
+    /// The error at which to end: what is asked for, or what the file can hold.
+    fn target(&self) -> Option<f64> {
+        self.error.map(|error| error.max(self.floor))
+    }
+
+    /// Whether a target is reached after `milestones`.
+    #[must_use]
+    pub fn reached(&self, milestones: &[Milestone]) -> bool {
+        let Some(last) = milestones.last() else { return false };
+        let error = self.target().zip(last.error).is_some_and(|(target, e)| e.rel_rmse <= target);
+        error || self.time.is_some_and(|time| last.elapsed >= time)
+    }
+
+    /// The samples at which the pass ends that begins after `milestones`, with at most `most` samples in all; none where
+    /// what is left of the time does not suffice for any.
+    #[must_use]
+    pub fn pass_end(&self, milestones: &[Milestone], most: u32) -> Option<u32> {
+        let replicates = REPLICATES as u32;
+        let Some(last) = milestones.last() else { return Some(replicates.min(most)) };
+        let mut end = f64::from(last.samples.saturating_mul(2));
+        if let (Some(target), Some(fit)) = (self.target(), Fit::of(milestones)) {
+            end = end.min(fit.samples_for(target).max(f64::from(last.samples) * (1.0 + SHORTEST)));
+        }
+        if let (Some(time), Some(rate)) = (self.time, seconds_a_sample(milestones)) {
+            let left = time.saturating_sub(last.elapsed).as_secs_f64();
+            end = end.min(f64::from(last.samples) + left / rate);
+            if end < f64::from(last.samples + replicates) {
+                return None;
+            }
+            // Rounded down: the time is a bound.
+            end -= f64::from(replicates - 1);
+        }
+        let end = (end.ceil() as u32).next_multiple_of(replicates).max(last.samples + replicates);
+        Some(end.min(most))
+    }
+
+    /// What keeps the targets from being met, if they are not.
+    ///
+    /// # Errors
+    /// [`Error::Render`] in words for whoever set the targets.
+    pub fn check(&self, milestones: &[Milestone]) -> Result<()> {
+        let Some(last) = milestones.last() else { return Ok(()) };
+        if let (Some(asked), Some(e)) = (self.error, last.error) {
+            let found = format!("the picture is written with an error of {:.3e}", e.rel_rmse);
+            if asked < self.floor && e.rel_rmse <= self.floor {
+                return Err(Error::Render(format!(
+                    "stop.error: {asked:e} is below {:.1e}, what rounding to the precision of the file makes; {found}; \
+                     output.exr.precision: float holds more",
+                    self.floor
+                )));
+            }
+            if e.rel_rmse > asked && !self.samples_wanted && self.time.is_none() {
+                return Err(Error::Render(format!(
+                    "stop.error: {asked:e} was not reached with {} samples a pixel; {found}",
+                    last.samples
+                )));
+            }
+        }
+        if let (Some(time), [first]) = (self.time, milestones)
+            && first.elapsed > time.mul_f64(1.0 + f64::from(u8::from(first.samples > 1)) * 0.5)
+        {
+            return Err(Error::Render(format!(
+                "stop.time: {:.3} s is too short for {} samples of each pixel, which took {:.3} s; they are written",
+                time.as_secs_f64(),
+                first.samples,
+                first.elapsed.as_secs_f64()
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// Seconds that a sample of all pixels takes: those of the last pass.
+fn seconds_a_sample(milestones: &[Milestone]) -> Option<f64> {
+    let last = milestones.last()?;
+    let before = milestones.len().checked_sub(2).map(|i| milestones[i]);
+    let (samples, seconds) = match before {
+        Some(m) => (last.samples - m.samples, (last.elapsed.saturating_sub(m.elapsed)).as_secs_f64()),
+        None => (last.samples, last.elapsed.as_secs_f64()),
+    };
+    (samples > 0 && seconds > 0.0).then(|| seconds / f64::from(samples))
+}
+
+/// How variance falls with samples: V = V₁ (N/N₁)^−b.
+#[derive(Clone, Copy, Debug)]
+pub struct Fit {
+    samples: f64,
+    error: f64,
+    /// b.
+    pub exponent: f64,
+}
+
+impl Fit {
+    /// Through the last milestone, with the slope of the last three that lie a doubling or so apart, by least squares over
+    /// logarithms, kept to what sampling does. One milestone alone has the slope of independent samples.
+    #[must_use]
+    pub fn of(milestones: &[Milestone]) -> Option<Fit> {
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for m in milestones.iter().rev() {
+            let Some(e) = m.error.filter(|e| e.rel_rmse > 0.0) else { continue };
+            let apart = points.last().is_none_or(|p| f64::from(m.samples) <= p.0 / 1.4);
+            if apart && points.len() < 3 {
+                points.push((f64::from(m.samples), e.rel_rmse));
+            }
+        }
+        let &(samples, error) = points.first()?;
+        let n = points.len() as f64;
+        let logs = points.iter().map(|p| (libm::log(p.0), 2.0 * libm::log(p.1)));
+        let (x, y) = logs.clone().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+        let (xy, xx) = logs.fold((0.0, 0.0), |(a, b), (u, v)| (a + (u - x) * (v - y), b + (u - x) * (u - x)));
+        let exponent = if xx > 0.0 { (-xy / xx).clamp(1.0, 2.0) } else { 1.0 };
+        Some(Fit { samples, error, exponent })
+    }
+
+    /// Samples at which the error is `error`.
+    #[must_use]
+    pub fn samples_for(&self, error: f64) -> f64 {
+        self.samples * libm::pow(self.error / error, 2.0 / self.exponent)
+    }
+
+    /// The error at `samples`.
+    #[must_use]
+    pub fn error_at(&self, samples: f64) -> f64 {
+        self.error * libm::pow(self.samples / samples, 0.5 * self.exponent)
+    }
+}
+
+/// Where a render will end.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Forecast {
+    /// Samples of a pixel when it was made.
+    pub made_at: u32,
+    /// Samples of a pixel at the end.
+    pub samples: f64,
+    /// Seconds of rendering in all.
+    pub seconds: f64,
+    /// Relative RMSE at the end.
+    pub error: f64,
+}
+
+impl Forecast {
+    /// From what is known after `milestones`, for a render of at most `most` samples.
+    #[must_use]
+    pub fn of(milestones: &[Milestone], stop: &Stop, most: u32) -> Option<Forecast> {
+        let last = milestones.last()?;
+        let fit = Fit::of(milestones)?;
+        let rate = seconds_a_sample(milestones)?;
+        let now = f64::from(last.samples);
+        let elapsed = last.elapsed.as_secs_f64();
+        let mut samples = f64::from(most);
+        if let Some(target) = stop.target() {
+            samples = samples.min(fit.samples_for(target).max(now));
+        }
+        if let Some(time) = stop.time {
+            samples = samples.min(now + (time.as_secs_f64() - elapsed).max(0.0) / rate);
+        }
+        let seconds = elapsed + (samples - now) * rate;
+        Some(Forecast { made_at: last.samples, samples, seconds, error: fit.error_at(samples) })
+    }
+
+    /// The forecast that was made at the last of `milestones` with at most a quarter of the samples: what to hold against
+    /// how it came.
+    #[must_use]
+    pub fn at_a_quarter(milestones: &[Milestone], stop: &Stop, most: u32) -> Option<Forecast> {
+        let end = milestones.last()?.samples;
+        let known = milestones.iter().take_while(|m| m.samples <= end / 4).count();
+        Forecast::of(&milestones[..known], stop, most)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::error::ErrorEstimate;
+
+    /// After `samples`, a millisecond each, an error of √(1/N^b).
+    fn milestones(samples: &[u32], b: f64) -> Vec<Milestone> {
+        let of = |&n: &u32| {
+            let rel_rmse = f64::from(n).powf(-0.5 * b);
+            let error = ErrorEstimate { rel_rmse, low: 0.0, high: 1.0, pixels: 100, valid: true };
+            Milestone { samples: n, elapsed: Duration::from_millis(n.into()), error: Some(error) }
+        };
+        samples.iter().map(of).collect()
+    }
+
+    const FREE: Stop = Stop { error: None, time: None, samples_wanted: true, floor: 0.0 };
+
+    #[test]
+    fn without_targets_passes_double_up_to_the_samples() {
+        let mut known: Vec<u32> = Vec::new();
+        while known.last() != Some(&21) {
+            known.push(FREE.pass_end(&milestones(&known, 1.0), 21).unwrap());
+        }
+        assert_eq!(known, [4, 8, 16, 21]);
+        assert_eq!(FREE.pass_end(&[], 3), Some(3));
+    }
+
+    /// An error of 0.1 takes 100 samples where b = 1, 22 where b = 1.5 (10^(4/3) = 21.5, in fours).
+    #[test]
+    fn the_last_pass_ends_where_the_error_is_forecast_to_be_reached() {
+        let stop = Stop { error: Some(0.1), ..FREE };
+        assert_eq!(stop.pass_end(&milestones(&[16, 32, 64], 1.0), 1 << 16), Some(100));
+        assert_eq!(stop.pass_end(&milestones(&[4, 8, 16], 1.5), 1 << 16), Some(24));
+        assert!(stop.reached(&milestones(&[32, 64, 100], 1.0)) && !stop.reached(&milestones(&[32, 64, 99], 1.0)));
+        // Just missed: an eighth more, not four samples.
+        assert_eq!(stop.pass_end(&milestones(&[32, 64, 96], 1.0), 1 << 16), Some(108));
+    }
+
+    /// A sample takes a millisecond: after 64 there is time for 30 more, of which 28 make whole rounds of the replicates.
+    #[test]
+    fn the_last_pass_fits_into_the_time() {
+        let stop = Stop { time: Some(Duration::from_millis(94)), ..FREE };
+        assert_eq!(stop.pass_end(&milestones(&[32, 64], 1.0), 1 << 16), Some(92));
+        assert_eq!(stop.pass_end(&milestones(&[32, 64, 92], 1.0), 1 << 16), None);
+        assert!(stop.check(&milestones(&[32, 64, 92], 1.0)).is_ok());
+        let short = Stop { time: Some(Duration::from_millis(1)), ..FREE };
+        assert!(short.check(&milestones(&[4], 1.0)).unwrap_err().to_string().contains("too short for 4 samples"));
+    }
+
+    #[test]
+    fn a_forecast_follows_the_slope_and_the_rate() {
+        let stop = Stop { error: Some(0.01), ..FREE };
+        let f = Forecast::of(&milestones(&[16, 32, 64], 1.0), &stop, 1 << 16).unwrap();
+        assert!((f.samples - 1e4).abs() < 1e-6 && (f.seconds - 10.0).abs() < 1e-9 && (f.error - 0.01).abs() < 1e-12);
+        let all = milestones(&[4, 8, 16, 32, 64], 1.2);
+        let quarter = Forecast::at_a_quarter(&all, &FREE, 64).unwrap();
+        assert_eq!(quarter.made_at, 16);
+        assert!((quarter.error - 64f64.powf(-0.6)).abs() < 1e-12);
+        assert!(Forecast::at_a_quarter(&all[..1], &FREE, 4).is_none());
+    }
+
+    /// Independent samples: error ∝ N^−½, so four times the samples; stratified ones at N^−1: twice. Noise in the estimates
+    /// cannot make samples worse than independent.
+    #[test]
+    fn halving_costs_what_the_convergence_says() {
+        for (b, factor) in [(1.0, 4.0), (2.0, 2.0), (0.5, 4.0)] {
+            let fit = Fit::of(&milestones(&[64, 128, 256], b)).unwrap();
+            assert!((fit.samples_for(0.5 * fit.error_at(256.0)) / 256.0 - factor).abs() < 1e-9, "{b}");
+        }
+    }
+
+    #[test]
+    fn targets_that_cannot_be_reached_are_told() {
+        let low = Stop { error: Some(1e-5), floor: rounding(11), samples_wanted: false, time: None };
+        let known = milestones(&[4, 100_000_000], 1.0);
+        assert!(low.reached(&known));
+        assert!(low.check(&known).unwrap_err().to_string().contains("output.exr.precision: float"));
+        let far = Stop { error: Some(0.01), samples_wanted: false, ..FREE };
+        assert!(far.check(&milestones(&[4, 64], 1.0)).unwrap_err().to_string().contains("was not reached with 64"));
+        assert!(Stop { samples_wanted: true, ..far }.check(&milestones(&[4, 64], 1.0)).is_ok());
+    }
+
+    /// All halves of even logarithm between 1 and 2: the root mean square of what rounding changes.
+    #[test]
+    fn rounding_makes_the_error_that_it_is_said_to_make() {
+        let n = 100_000;
+        let sum: f64 = (0..n)
+            .map(|i| {
+                let x = 2f64.powf((f64::from(i) + 0.5) / f64::from(n));
+                let rounded = (x * 1024.0).round() / 1024.0;
+                (rounded / x - 1.0).powi(2)
+            })
+            .sum();
+        let found = (sum / f64::from(n)).sqrt();
+        assert!((found / rounding(11) - 1.0).abs() < 0.01, "{found} {}", rounding(11));
+    }
+}

@@ -1,0 +1,151 @@
+//! What a picture says of its own error is true.
+
+mod common;
+
+use abbe::batch::frame::{self, FrameJob};
+use abbe::film::error::ErrorEstimate;
+use abbe::film::filter::{Filter, FilterSampler};
+use abbe::spectrum::ColourSpace;
+use common::{Bench, bench_with};
+use std::sync::atomic::AtomicBool;
+
+/// A floor, a wall and whatever stands and shines between them.
+const STAGE: &str = "\
+camera: {origin: [0, 1.2, 5], target: [0, 0.1, 0], fov_deg: 40}
+image: {width: 24, height: 24}
+render: {samples: SAMPLES}
+materials:
+  floor: {diffuse: {reflectance: {rgb: [0.7, 0.5, 0.3]}}}
+  red: {diffuse: {reflectance: {rgb: [0.8, 0.1, 0.1]}}}
+  glass: {dielectric: {ior: 1.5}}
+  flint: {dielectric: {ior: {glass: SF11}}}
+shapes:
+- rectangle: {corner: [-3, -1, -2], edge_u: [0, 0, 5], edge_v: [6, 0, 0], material: floor}
+- rectangle: {corner: [-3, -1, -2], edge_u: [6, 0, 0], edge_v: [0, 4, 0], material: floor}
+";
+
+/// Out of sight.
+const LAMP: &str = "- sphere: {center: [-1.5, 3.5, 2], radius: 0.5, emission: {illuminant: {name: D65, scale: 30}}}\n";
+
+/// No mirror shows it.
+const POINT: &str = "lights:\n- point: {position: [-1.5, 2, 1], intensity: {illuminant: {name: D65, scale: 10}}}\n";
+
+struct Kind {
+    name: &'static str,
+    samples: u32,
+    rest: String,
+}
+
+fn kinds() -> Vec<Kind> {
+    let kind = |name, samples, rest: &[&str]| Kind { name, samples, rest: rest.concat() };
+    let ball = |material: &str| {
+        format!("- sphere: {{name: ball, center: [0.2, -0.2, 0], radius: 0.7, material: {material}}}\n")
+    };
+    vec![
+        kind("direct", 64, &[LAMP, &ball("red"), "integrator: {path: {max_depth: 2}}\n"]),
+        kind(
+            "indirect",
+            64,
+            &[
+                // The lamp shines at the ceiling from a bowl: nothing in sight sees it.
+                "- disk: {center: [0, 1.4, 0], normal: [0, 1, 0], radius: 0.8, material: floor}\n",
+                "- disk: {center: [0, 1.6, 0], normal: [0, 1, 0], radius: 0.4, emission: {illuminant: {name: D65, scale: 40}}}\n",
+                "- rectangle: {corner: [-3, 3, -2], edge_u: [6, 0, 0], edge_v: [0, 0, 5], material: floor}\n",
+                &ball("red"),
+            ],
+        ),
+        kind("caustic", 64, &[&ball("glass"), POINT]),
+        kind(
+            "fog",
+            64,
+            &[
+                LAMP,
+                &ball("red"),
+                "media:\n  fog: {homogeneous: {scattering: {rgb: [0.15, 0.1, 0.05]}, absorption: 0.02, phase: {hg: 0.3}}}\n",
+                "medium: fog\n",
+            ],
+        ),
+        kind("dispersive", 128, &[&ball("flint"), POINT]),
+        kind("environment", 64, &[&ball("red"), "lights:\n- constant: {radiance: {rgb: [0.4, 0.6, 1.0]}}\n"]),
+    ]
+}
+
+/// A picture in linear Rec. 709, and what it says of its error.
+struct Picture {
+    rgb: Vec<f64>,
+    error: ErrorEstimate,
+}
+
+fn picture(bench: &Bench, seed: u64) -> Picture {
+    let filter = FilterSampler::new(Filter::Box).unwrap();
+    let job = FrameJob { seed, ..bench.prepared.job(&filter) };
+    let frame = frame::render(&job, &|_| {}, &AtomicBool::new(false)).unwrap();
+    let image = frame.resolve(&ColourSpace::Rec709.matrix_from_xyz());
+    let rgb = (0..image.window.pixels()).flat_map(|i| image.rgb.each_ref().map(|c| f64::from(c[i]))).collect();
+    Picture { rgb, error: frame.milestones.last().unwrap().error.unwrap() }
+}
+
+/// The relMSE of each picture, measured against the mean of the others, whose own noise is known from the spread of all and
+/// taken off.
+fn own_errors(pictures: &[Picture]) -> Vec<f64> {
+    let k = pictures.len() as f64;
+    let values = pictures[0].rgb.len();
+    let mut sums = vec![0.0; values];
+    let mut squares = vec![0.0; values];
+    for picture in pictures {
+        for (i, x) in picture.rgb.iter().enumerate() {
+            sums[i] += x;
+            squares[i] += x * x;
+        }
+    }
+    let mean = sums.iter().sum::<f64>() / k / values as f64;
+    let size: Vec<f64> = sums.iter().map(|s| (s / k).powi(2) + 0.01 * mean * mean).collect();
+    let variance = |i: usize| (squares[i] - sums[i] * sums[i] / k) / (k - 1.0);
+    let noise = (0..values).map(|i| variance(i) / (k - 1.0) / size[i]).sum::<f64>() / values as f64;
+    let own = |picture: &Picture| {
+        let of = |(i, x): (usize, &f64)| (x - (sums[i] - x) / (k - 1.0)).powi(2) / size[i];
+        picture.rgb.iter().enumerate().map(of).sum::<f64>() / values as f64 - noise
+    };
+    pictures.iter().map(own).collect()
+}
+
+/// Of six kinds of light, pictures of different seeds: the stated interval holds each picture's own error 95 times of 100.
+/// Of n pictures in all, the share that it holds has a standard deviation of √(0.95·0.05/n): three of them, and the 2 % that
+/// the normal limit may lack. A nightly run has 408 pictures and asks for 93 to 97 % by itself. What the direct light of
+/// a lamp lacks stands in a few pixels at edges, and fog has rare paths: that is said, and the interval holds all the same.
+#[test]
+fn the_stated_interval_holds_the_error_of_each_picture() {
+    let nightly = std::env::var_os("ABBE_NIGHTLY").is_some();
+    let each = if nightly { 68 } else { 20 };
+    let (mut held, mut valid, mut all) = (0, 0, 0);
+    for kind in kinds() {
+        let yaml = format!("{STAGE}{}", kind.rest).replace("SAMPLES", &kind.samples.to_string());
+        let bench = bench_with(&yaml, &[]);
+        let pictures: Vec<Picture> = (0..each).map(|seed| picture(&bench, seed)).collect();
+        let own = own_errors(&pictures);
+        let inside = |(p, own): &(&Picture, &f64)| {
+            let own = own.max(0.0).sqrt();
+            p.error.low <= own && own <= p.error.high
+        };
+        let count = pictures.iter().zip(&own).filter(inside).count();
+        let stated = pictures.iter().map(|p| p.error.rel_rmse.powi(2)).sum::<f64>() / each as f64;
+        let mean = own.iter().sum::<f64>() / each as f64;
+        println!("{}: {count} of {each}, error {:.4}, own {:.4}", kind.name, stated.sqrt(), mean.sqrt());
+        held += count;
+        valid += pictures.iter().filter(|p| p.error.valid).count();
+        all += pictures.len();
+    }
+    let share = held as f64 / all as f64;
+    let scatter = if nightly { 0.0 } else { 3.0 * (0.95 * 0.05 / all as f64).sqrt() };
+    assert!((share - 0.95).abs() < 0.02 + scatter, "{held} of {all}");
+    assert!(2 * valid > all, "{valid} of {all} can be believed");
+}
+
+/// Fog at eight samples a pixel: a few paths that come near the lamp carry the light.
+#[test]
+fn a_picture_that_has_not_converged_says_so() {
+    let kinds = kinds();
+    let fog = kinds.iter().find(|kind| kind.name == "fog").unwrap();
+    let bench = bench_with(&format!("{STAGE}{}", fog.rest).replace("SAMPLES", "8"), &[]);
+    assert!((0..10).all(|seed| !picture(&bench, seed).error.valid));
+}
