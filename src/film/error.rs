@@ -192,11 +192,13 @@ pub fn relative_error(
     let share = if all.error == 0.0 { 0.0 } else { all.further / all.error };
     let next = NEXT_ORDER * share * share * all.error;
     let half = student_t_half_width(0.95, EFFECTIVE_PIXELS) * (8.0 / 3.0 * trace).sqrt().hypot(next) / n;
+    // Of a sum of squares: symmetric in its logarithm, for few squares make it more skewed than a normal number.
+    let stretch = if rel_mse > 0.0 { libm::exp(0.5 * half / rel_mse) } else { 1.0 };
     let effective = if all.squares > 0.0 { all.error * all.error / all.squares } else { n };
     Ok(ErrorEstimate {
         rel_rmse: rel_mse.sqrt(),
-        low: (rel_mse - half).max(0.0).sqrt(),
-        high: (rel_mse + half).sqrt(),
+        low: rel_mse.sqrt() / stretch,
+        high: rel_mse.sqrt() * stretch,
         pixels: all.pixels,
         valid: all.error == 0.0
             || (effective >= EFFECTIVE_PIXELS && all.heavy <= HEAVY_SHARE * all.error && share.abs() <= FURTHER_SHARE),
