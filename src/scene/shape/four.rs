@@ -231,7 +231,7 @@ impl Cubes {
     }
 
     /// Distances along rays that do not start on the cubes, the faces that are met, and in which lanes one is, at any
-    /// distance: the steps of [`super::span::Span`].
+    /// distance: the steps of `shape::span::Span`.
     #[inline(always)]
     #[must_use]
     pub fn meet(&self, ray: &FourRays) -> (f64x4, f64x4, f64x4) {

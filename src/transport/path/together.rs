@@ -1,7 +1,7 @@
 //! The paths of several samples side by side: the nearest things that their rays meet are found together, and so is what
 //! stands before the lights that they ask. In between each goes its own way.
 //!
-//! What a path does is [`Tracer::meet`], as for one alone, with the same numbers in the same order: the bits are the same.
+//! What a path does is `Tracer::meet`, as for one alone, with the same numbers in the same order: the bits are the same.
 
 use super::lights::Asked;
 use super::{Path, Step, Tracer, Walk};
