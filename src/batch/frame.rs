@@ -121,6 +121,27 @@ impl Frame {
         resolve::resolve(&self.film, splats, rgb_from_xyz)
     }
 
+    /// The mean over all pixels of each replicate in the colour space of `rgb_from_xyz`.
+    #[must_use]
+    pub fn replicate_means(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> [[f64; 3]; REPLICATES] {
+        let unit = 2f64.powi(self.film.exponent());
+        let pixels = self.film.window().pixels() as f64;
+        std::array::from_fn(|r| {
+            let mut xyz = [0.0; 3];
+            for cells in self.film.cells().iter().filter(|cells| cells[r].count > 0) {
+                let share = unit / (pixels * f64::from(cells[r].count));
+                (0..3).for_each(|c| xyz[c] += cells[r].xyz[c].value() * share);
+            }
+            if let Some(splats) = self.splats.as_ref().filter(|s| s.paths[r] > 0) {
+                let share = unit / (pixels * splats.paths[r] as f64);
+                for cells in splats.film.cells() {
+                    (0..3).for_each(|c| xyz[c] += cells[r].xyz[c].value() * share);
+                }
+            }
+            rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
+        })
+    }
+
     /// The further channel `channel`; bands come first.
     #[must_use]
     pub fn layer(&self, channel: usize) -> Vec<f32> {

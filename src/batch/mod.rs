@@ -2,6 +2,8 @@
 //!
 //! A batch goes on with the other scenes after one fails; what failed is told at the end.
 
+pub mod accuracy;
+pub mod accuracy_page;
 pub mod checkpoint;
 pub mod finish;
 pub mod frame;

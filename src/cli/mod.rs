@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 internal or output error, 2 usage or description, 3 missing or broken input,
 //! 4 invalid samples, 75 stopped and can be resumed, 130 and 143 stopped by a second signal.
 
+mod accuracy;
 mod compare;
 mod convert;
 mod interrupts;
@@ -37,6 +38,11 @@ enum Verb {
     /// Print what a scene calls for, each effect with its reason, and render nothing
     #[command(after_help = "Example:\n  abbe plan configs/gallery.yaml --scene prism --format json")]
     Plan(PlanArguments),
+    /// Move each knob of a scene by itself, and tell what it costs and what it buys
+    #[command(
+        after_help = "Examples:\n  abbe accuracy configs/scenes/box.yaml -o out/accuracy\n  abbe accuracy configs/gallery.yaml --scene prism --error 2%"
+    )]
+    Accuracy(AccuracyArguments),
     /// Print a Mitsuba scene as YAML
     #[command(after_help = "Example:\n  abbe import cornell-box.xml -D res=256 -o cornell-box.yaml")]
     Import(ConvertArguments),
@@ -142,6 +148,30 @@ struct PlanArguments {
     /// How to print it
     #[arg(long, value_enum, default_value_t = PlanFormat::Text)]
     format: PlanFormat,
+}
+
+#[derive(Debug, Args)]
+struct AccuracyArguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Directory for accuracy.html, accuracy.json and accuracy.csv
+    #[arg(short, long, value_name = "DIR", default_value = "out/accuracy")]
+    output: PathBuf,
+    /// Pixels of the small copy of each scene, about
+    #[arg(long, value_name = "N", default_value_t = 9216, value_parser = clap::value_parser!(u32).range(64..=1 << 26))]
+    pixels: u32,
+    /// How often each setting is rendered, each time with another seed
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    rounds: u32,
+    /// The error that is wanted, as 0.01 or 1% [default: that of the scene as it is written]
+    #[arg(long, value_name = "E", value_parser = relative_error)]
+    error: Option<f64>,
+    /// Threads; 0 takes every core that the process may use
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Print nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
 }
 
 #[derive(Debug, Args)]
@@ -301,6 +331,7 @@ pub fn run() -> i32 {
         Verb::Render(a) => render::run(a),
         Verb::Merge(a) => merge::run(a),
         Verb::Plan(a) => plan::run(a),
+        Verb::Accuracy(a) => accuracy::run(a),
         Verb::Import(a) => convert::import(a),
         Verb::Export(a) => convert::export(a),
         Verb::Compare(a) => compare::run(a),

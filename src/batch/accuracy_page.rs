@@ -1,0 +1,272 @@
+//! The sheet as one page that needs nothing else: numbers, curves, pictures and what follows from them.
+
+use super::accuracy::{Row, Sheet};
+use std::fmt::Write;
+
+/// Style of the page. Colours are told apart without colour vision by their lightness, too.
+const STYLE: &str = "
+body { font: 15px/1.45 system-ui, sans-serif; color: #1b1d22; margin: 2rem auto; max-width: 68rem; padding: 0 1rem; }
+h1, h2, h3 { line-height: 1.2; } h2 { margin-top: 3rem; border-top: 1px solid #ccc; padding-top: 1.5rem; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 13px; }
+th, td { padding: .2rem .55rem; text-align: right; border-bottom: 1px solid #e4e4e8; white-space: nowrap; }
+th:first-child, td:first-child, th:nth-child(2), td:nth-child(2) { text-align: left; }
+tr.chosen { background: #fff6dd; font-weight: 600; }
+.plots, .crops { display: flex; flex-wrap: wrap; gap: 1rem; }
+figure { margin: 0; } figcaption { font-size: 12px; color: #555; }
+.crops img { image-rendering: pixelated; width: 256px; display: block; }
+svg text { font: 11px system-ui, sans-serif; fill: #444; }
+.note { color: #666; font-size: 13px; }
+";
+
+/// One colour for each value of a knob, the chosen setting first.
+const COLOURS: [&str; 7] = ["#1b1d22", "#c4372b", "#1f6fb4", "#2f8f4e", "#9a5bb5", "#d98a00", "#6b7280"];
+
+/// A page of `sheets`, and of the scenes that have none, with the reason.
+#[must_use]
+pub fn page(title: &str, command: &str, sheets: &[Sheet], without: &[(String, String)]) -> String {
+    let mut out = String::new();
+    let _ = write!(
+        out,
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>What accuracy costs: {0}</title>\n\
+         <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}</style></head><body>\n\
+         <h1>What accuracy costs: {0}</h1>\n<p>Made by <code>{1}</code> with Abbe {2}.</p>\n\
+         <p class=\"note\">Each knob is moved by itself around the chosen setting, on a small copy of the scene. Noise is √relMSE \
+         with its 95 % interval; bias is what is left of the distance to a reference of sixteen times the samples without \
+         the noise of both, given where it stands out by two standard errors. Efficiency is 1 / (noise² · time), \
+         over that of the chosen setting.</p>\n",
+        escaped(title),
+        escaped(command),
+        env!("CARGO_PKG_VERSION")
+    );
+    for sheet in sheets {
+        section(&mut out, sheet);
+    }
+    for (scene, why) in without {
+        let _ = writeln!(out, "<h2>{}</h2><p>{}.</p>", escaped(scene), escaped(why));
+    }
+    out.push_str("</body></html>\n");
+    out
+}
+
+fn section(out: &mut String, sheet: &Sheet) {
+    let [width, height] = sheet.size;
+    let _ = write!(
+        out,
+        "<h2>{}</h2>\n<p class=\"note\">{width} × {height} pixels; target {:.2} %; reference of {} samples a pixel, noise {:.2} %.</p>\n<ul>\n",
+        escaped(&sheet.scene),
+        100.0 * sheet.target,
+        sheet.reference.0,
+        100.0 * sheet.reference.1
+    );
+    for (_, sentence) in &sheet.advice {
+        let _ = writeln!(out, "<li>{}</li>", escaped(sentence));
+    }
+    out.push_str("</ul>\n<div class=\"plots\">\n");
+    let chosen = &sheet.rows[0];
+    for (knob, rows) in knobs(&sheet.rows) {
+        if knob != "file" {
+            let _ = writeln!(
+                out,
+                "<figure>{}<figcaption>{}</figcaption></figure>",
+                plot(chosen, rows, sheet.target),
+                escaped(knob)
+            );
+        }
+    }
+    out.push_str("</div>\n<table><thead><tr>");
+    for heading in HEADINGS {
+        let _ = write!(out, "<th>{heading}</th>");
+    }
+    out.push_str("</tr></thead><tbody>\n");
+    for row in &sheet.rows {
+        let class = if row.chosen { " class=\"chosen\"" } else { "" };
+        let _ = write!(out, "<tr{class}>");
+        for cell in cells(row) {
+            let _ = write!(out, "<td>{}</td>", escaped(&cell));
+        }
+        out.push_str("</tr>\n");
+    }
+    out.push_str("</tbody></table>\n<h3>How it looks</h3>\n<div class=\"crops\">\n");
+    for row in sheet.rows.iter().filter(|row| row.knob != "file") {
+        let _ = writeln!(
+            out,
+            "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><figcaption>{} {}: {:.2} s, noise {:.2} %</figcaption></figure>",
+            base64(&row.png),
+            escaped(row.knob),
+            escaped(&row.value),
+            row.seconds,
+            100.0 * row.noise[0]
+        );
+    }
+    out.push_str("</div>\n");
+}
+
+/// The columns of the table.
+pub const HEADINGS: [&str; 10] =
+    ["knob", "value", "samples", "time, s", "noise, %", "95 %", "bias, %", "R, G, B", "efficiency", "to target, s"];
+
+/// A row of the table.
+#[must_use]
+pub fn cells(row: &Row) -> [String; 10] {
+    let per_cent = |x: f64| format!("{:.2}", 100.0 * x);
+    let light: Vec<String> = row.light.iter().map(|f| format!("{:.3}", f.value)).collect();
+    [
+        row.knob.to_owned(),
+        row.value.clone(),
+        row.samples.to_string(),
+        format!("{:.3} ({:.3}-{:.3})", row.seconds, row.spread[0], row.spread[1]),
+        per_cent(row.noise[0]),
+        if row.converged {
+            format!("{}-{}", per_cent(row.noise[1]), per_cent(row.noise[2]))
+        } else {
+            "not converged".into()
+        },
+        row.bias().map_or("-".into(), |b| format!("{:.3}", 100.0 * b)),
+        light.join(" "),
+        format!("{:.2}", row.efficiency),
+        row.to_target.map_or("never".into(), |t| format!("{t:.2}")),
+    ]
+}
+
+/// The rows of each knob, without the chosen setting.
+fn knobs(rows: &[Row]) -> Vec<(&'static str, &[Row])> {
+    rows[1..].chunk_by(|a, b| a.knob == b.knob).map(|rows| (rows[0].knob, rows)).collect()
+}
+
+/// Error against time, both in powers of ten: a curve with its interval for each value, bias as a dashed line, the target dotted.
+fn plot(chosen: &Row, rows: &[Row], target: f64) -> String {
+    const SIZE: [f64; 2] = [330.0, 240.0];
+    const MARGIN: [f64; 4] = [44.0, 8.0, 10.0, 30.0]; // left, right, top, bottom
+    let all = || std::iter::once(chosen).chain(rows);
+    let points = || all().flat_map(|row| &row.curve);
+    let biases = || all().filter_map(Row::bias);
+    let ends = |values: &mut dyn Iterator<Item = f64>| {
+        let (low, high) = values
+            .filter(|x| *x > 0.0 && x.is_finite())
+            .map(libm::log10)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        if low < high { (low - 0.05, high + 0.05) } else { (low.min(0.0) - 1.0, high.max(0.0) + 1.0) }
+    };
+    let (x0, x1) = ends(&mut points().map(|p| p.seconds));
+    let (y0, y1) = ends(&mut points().flat_map(|p| p.noise).chain(biases()).chain([target]));
+    let x = |seconds: f64| MARGIN[0] + (libm::log10(seconds) - x0) / (x1 - x0) * (SIZE[0] - MARGIN[0] - MARGIN[1]);
+    let y = |error: f64| {
+        let at = ((libm::log10(error.max(1e-300)) - y0) / (y1 - y0)).max(0.0);
+        SIZE[1] - MARGIN[3] - at * (SIZE[1] - MARGIN[2] - MARGIN[3])
+    };
+    let mut svg = format!("<svg viewBox=\"0 0 {} {}\" width=\"{}\" height=\"{}\">", SIZE[0], SIZE[1], SIZE[0], SIZE[1]);
+    let (left, right) = (MARGIN[0], SIZE[0] - MARGIN[1]);
+    let (top, bottom) = (MARGIN[2], SIZE[1] - MARGIN[3]);
+    for (value, mark) in ticks(y0 + 2.0, y1 + 2.0) {
+        let at = y(value * 0.01);
+        let _ = write!(
+            svg,
+            "<path d=\"M{left} {at:.1}H{right}\" stroke=\"#e4e4e8\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{mark} %</text>",
+            left - 4.0,
+            at + 4.0
+        );
+    }
+    for (value, mark) in ticks(x0, x1) {
+        let at = x(value);
+        let _ = write!(
+            svg,
+            "<path d=\"M{at:.1} {top}V{bottom}\" stroke=\"#e4e4e8\"/><text x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{mark} s</text>",
+            bottom + 14.0
+        );
+    }
+    let _ = write!(svg, "<path d=\"M{left} {0:.1}H{right}\" stroke=\"#888\" stroke-dasharray=\"1 3\"/>", y(target));
+    for (i, row) in all().enumerate() {
+        let colour = COLOURS[i.min(COLOURS.len() - 1)];
+        let path = |of: usize, reverse: bool| {
+            let at = |p: &super::accuracy::Point| format!("{:.1} {:.1}", x(p.seconds), y(p.noise[of]));
+            let mut steps: Vec<String> = row.curve.iter().filter(|p| p.seconds > 0.0).map(at).collect();
+            if reverse {
+                steps.reverse();
+            }
+            steps.join("L")
+        };
+        if row.curve.is_empty() {
+            continue;
+        }
+        let _ = write!(
+            svg,
+            "<path d=\"M{}L{}Z\" fill=\"{colour}\" opacity=\"0.12\"/><path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.6\"/>",
+            path(1, false),
+            path(2, true),
+            path(0, false)
+        );
+        if let Some(bias) = row.bias() {
+            let _ = write!(
+                svg,
+                "<path d=\"M{left} {0:.1}H{right}\" stroke=\"{colour}\" stroke-dasharray=\"6 4\"/>",
+                y(bias)
+            );
+        }
+        let label = if row.chosen { "chosen" } else { &row.value };
+        let _ = write!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" style=\"fill:{colour}\">{}</text>",
+            right - 4.0,
+            top + 12.0 + 13.0 * i as f64,
+            escaped(label)
+        );
+    }
+    svg.push_str("</svg>");
+    svg
+}
+
+/// Powers of ten, twice and five times them, between 10^`low` and 10^`high`; powers alone where those are more than eight.
+fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
+    let (low, high) = (libm::exp10(low), libm::exp10(high));
+    let decades = libm::floor(libm::log10(low)) as i32..=libm::ceil(libm::log10(high)) as i32;
+    let of = |steps: &'static [f64]| {
+        let value = move |decade: i32| steps.iter().map(move |step| step * libm::exp10(f64::from(decade)));
+        decades.clone().flat_map(value).filter(|v| (low..=high).contains(v)).collect::<Vec<f64>>()
+    };
+    let fine = of(&[1.0, 2.0, 5.0]);
+    let values = if fine.len() <= 8 { fine } else { of(&[1.0]) };
+    values.into_iter().map(|v| (v, round(v))).collect()
+}
+
+fn round(x: f64) -> String {
+    if x >= 1.0 { format!("{x:.0}") } else { format!("{x:.3}").trim_end_matches('0').to_owned() }
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// RFC 4648, section 4.
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let byte = |i: usize| u32::from(three.get(i).copied().unwrap_or(0));
+        let all = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for i in 0..4 {
+            let letter = LETTERS[(all >> (18 - 6 * i) & 63) as usize];
+            out.push(if i <= three.len() { char::from(letter) } else { '=' });
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The vectors of RFC 4648, section 10.
+    #[test]
+    fn base64_is_that_of_the_rfc() {
+        for (text, code) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
+            assert_eq!(base64(text.as_bytes()), code);
+        }
+    }
+
+    #[test]
+    fn ticks_are_round_and_few() {
+        let marks: Vec<String> = ticks(0.0, 1.0).into_iter().map(|t| t.1).collect();
+        assert_eq!(marks, ["1", "2", "5", "10"]);
+        assert!(ticks(-6.0, 3.0).len() <= 10);
+    }
+}

@@ -1,0 +1,108 @@
+//! `abbe accuracy`.
+
+use super::AccuracyArguments;
+use super::interrupts::Interrupts;
+use super::render::threads;
+use crate::batch;
+use crate::batch::accuracy::{self, Settings, Sheet};
+use crate::batch::accuracy_page::{HEADINGS, cells, page};
+use crate::error::{Error, Result};
+use crate::film::output::{prepare_place, write_atomically};
+use std::fmt::Write;
+
+/// Samples of a pixel of a small copy, at most: what a scene asks for beyond takes long and says the same.
+const MOST_SAMPLES: u32 = 256;
+
+/// Makes the sheets, prints them and writes the page.
+pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads(arguments.threads)).build_global();
+    let interrupts = Interrupts::listen()?;
+    let overrides = arguments.scene.overrides(None);
+    let files = ["html", "json", "csv"].map(|ending| arguments.output.join(format!("accuracy.{ending}")));
+    for file in &files {
+        prepare_place(file)?;
+    }
+    let (mut sheets, mut without) = (Vec::new(), Vec::new());
+    let mut code = 0;
+    for entry in batch::entries(&arguments.scene.file, &overrides)? {
+        let told = |what: &str, done: usize, total: usize| {
+            if !arguments.quiet {
+                super::complain(&format!("{}: {done}/{total} {what}", entry.name));
+            }
+        };
+        let made = entry.scene(&overrides.set).and_then(|scene| {
+            let samples = scene.render.samples.clamp(16, MOST_SAMPLES);
+            let settings =
+                Settings { pixels: arguments.pixels, samples, rounds: arguments.rounds, target: arguments.error };
+            accuracy::sheet(&entry, &overrides, &settings, &told, &interrupts.stop)
+        });
+        match made {
+            Ok(Ok(sheet)) => {
+                if !arguments.quiet {
+                    super::say(&text(&sheet));
+                }
+                sheets.push(sheet);
+            }
+            Ok(Err(why)) => without.push((entry.name.clone(), why)),
+            Err(e) => {
+                super::complain(&format!("error: {}: {e}", entry.name));
+                code = e.exit_code();
+                if interrupts.stop.load(std::sync::atomic::Ordering::Relaxed) {
+                    break;
+                }
+            }
+        }
+    }
+    for (scene, why) in &without {
+        super::complain(&format!("note: {scene}: {why}"));
+    }
+    let title = arguments.scene.file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let command = std::env::args().skip(1).fold("abbe".to_owned(), |all, word| all + " " + &word);
+    let json = serde_json::to_vec_pretty(&sheets).map_err(|e| Error::output(&files[1], e))?;
+    write_atomically(&files[0], page(&title, &command, &sheets, &without).as_bytes())?;
+    write_atomically(&files[1], &json)?;
+    write_atomically(&files[2], csv(&sheets).as_bytes())?;
+    if !arguments.quiet {
+        super::say(&format!("{}, accuracy.json and accuracy.csv are written\n", files[0].display()));
+    }
+    Ok(code)
+}
+
+fn text(sheet: &Sheet) -> String {
+    let mut rows = vec![HEADINGS.map(String::from)];
+    rows.extend(sheet.rows.iter().map(cells));
+    let widths: [usize; 10] = std::array::from_fn(|c| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0));
+    let [width, height] = sheet.size;
+    let mut out = format!("{}, {width} x {height}, target {:.2} %\n", sheet.scene, 100.0 * sheet.target);
+    for row in &rows {
+        let mut line = String::new();
+        for (c, cell) in row.iter().enumerate() {
+            let pad = " ".repeat(widths[c] - cell.chars().count());
+            line += &if c < 2 { format!("{cell}{pad}  ") } else { format!("{pad}{cell}  ") };
+        }
+        let _ = writeln!(out, "{}", line.trim_end());
+    }
+    for (_, sentence) in &sheet.advice {
+        let _ = writeln!(out, "- {sentence}");
+    }
+    out + "\n"
+}
+
+fn csv(sheets: &[Sheet]) -> String {
+    let mut out = String::from(
+        "scene,knob,value,samples,seconds,seconds_least,seconds_most,noise,noise_low,noise_high,converged,bias_squared,\
+         bias_squared_error,red,red_error,green,green_error,blue,blue_error,efficiency,seconds_to_target\n",
+    );
+    for sheet in sheets {
+        for r in &sheet.rows {
+            let _ = write!(out, "\"{}\",{},{},{}", sheet.scene.replace('"', "\"\""), r.knob, r.value, r.samples);
+            let figures = [r.seconds, r.spread[0], r.spread[1], r.noise[0], r.noise[1], r.noise[2]];
+            figures.iter().for_each(|x| out += &format!(",{x:e}"));
+            let _ = write!(out, ",{},{:e},{:e}", r.converged, r.bias_squared.value, r.bias_squared.error);
+            r.light.iter().for_each(|f| out += &format!(",{:e},{:e}", f.value, f.error));
+            let target = r.to_target.map_or(String::new(), |t| format!("{t:e}"));
+            let _ = writeln!(out, ",{:e},{target}", r.efficiency);
+        }
+    }
+    out
+}
