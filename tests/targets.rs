@@ -1,0 +1,123 @@
+//! What a person asks of accuracy and time on the command line, and what comes of it.
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+use tempfile::TempDir;
+
+/// A ball under a lamp, in a white room without a ceiling.
+const SCENE: &str = "\
+camera: {origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}
+image: {width: 24, height: 24}
+render: {samples: 16}
+shapes:
+- sphere: {radius: 0.7}
+- rectangle: {corner: [-3, -1, -2], edge_u: [0, 0, 5], edge_v: [6, 0, 0]}
+- sphere: {center: [-1.5, 3.5, 2], radius: 0.5, emission: 30}
+";
+
+fn directory() -> TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("scene.yaml"), SCENE).unwrap();
+    directory
+}
+
+/// The exit code, and what was said on both outputs.
+fn abbe(directory: &Path, arguments: &str) -> (i32, String) {
+    let arguments = arguments.split_whitespace();
+    let run = Command::new(env!("CARGO_BIN_EXE_abbe")).args(arguments).current_dir(directory).output().unwrap();
+    let said = [run.stdout, run.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    (run.status.code().unwrap(), said.concat())
+}
+
+fn json(file: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()
+}
+
+/// The render ends below the error that was asked for, not far below, and what was foretold stands beside what came.
+#[test]
+fn a_render_ends_at_the_error_that_was_asked_for() {
+    let place = directory();
+    let (code, said) = abbe(place.path(), "render scene.yaml -o . --error 3%");
+    assert_eq!(code, 0, "{said}");
+    let scene = &json(&place.path().join("report.json"))["scenes"][0];
+    let error = scene["error"]["rel_rmse"].as_f64().unwrap();
+    // One pass adds an eighth of the samples or more: at worst a doubling that was not foretold.
+    assert!((0.02..=0.03).contains(&error), "{error}");
+    let samples = scene["samples"].as_u64().unwrap();
+    assert!(scene["forecast"]["made_at"].as_u64().unwrap() <= samples / 4);
+    assert!(said.contains("foretold at a quarter of the samples"), "{said}");
+    // The same picture as that of as many samples asked for as a number.
+    abbe(place.path(), &format!("render scene.yaml -o same.exr --spp {samples}"));
+    let same = &json(&place.path().join("report.json"))["scenes"][0];
+    assert_eq!(same["pixel_hash"], scene["pixel_hash"]);
+}
+
+#[test]
+fn targets_end_a_render_whichever_comes_first() {
+    let place = directory();
+    let samples = |arguments: &str| {
+        let (code, said) = abbe(place.path(), &format!("render scene.yaml -o . {arguments}"));
+        assert_eq!(code, 0, "{said}");
+        json(&place.path().join("report.json"))["scenes"][0]["samples"].as_u64().unwrap()
+    };
+    assert_eq!(samples("--error 0.001% --spp 8"), 8);
+    assert_eq!(samples("--time 1h --spp 12"), 12);
+    assert!(samples("--time 1h --error 20%") <= 32);
+    assert_eq!(samples("--set render.stop.samples=20"), 20);
+}
+
+#[test]
+fn a_target_out_of_reach_is_told_and_the_picture_is_there() {
+    let place = directory();
+    let (code, said) = abbe(place.path(), "render scene.yaml -q -o short.exr --time 0.000001s");
+    assert_eq!(code, 4, "{said}");
+    assert!(said.contains("is too short for 4 samples of each pixel"), "{said}");
+    assert!(place.path().join("short.exr").exists() && place.path().join("short.png").exists());
+}
+
+#[test]
+fn what_knows_no_error_refuses_one() {
+    let place = directory();
+    let part = abbe(place.path(), "render scene.yaml -q -o part.exr --error 1% --tile 0/2");
+    assert_eq!(part.0, 2);
+    assert!(part.1.contains("a part cannot know the error"), "{}", part.1);
+    let whitted = abbe(place.path(), "render scene.yaml -q -o w.exr --error 1% --set integrator=whitted");
+    assert_eq!(whitted.0, 2);
+    assert!(whitted.1.contains("whitted has no noise"), "{}", whitted.1);
+    assert_eq!(abbe(place.path(), "render scene.yaml --error=-1").0, 2);
+}
+
+/// The open room has two bounces and more: depth 2 misses them, and the sheet says so; without a bound nothing is missed.
+#[test]
+fn the_sheet_finds_what_a_bound_to_depth_costs() {
+    let place = directory();
+    let (code, said) =
+        abbe(place.path(), "accuracy scene.yaml -o sheet --rounds 2 --set image.width=48 --set image.height=48");
+    assert_eq!(code, 0, "{said}");
+    let sheet = &json(&place.path().join("sheet/accuracy.json"))[0];
+    let row = |knob: &str, value: &str| {
+        let rows = sheet["rows"].as_array().unwrap();
+        rows.iter().find(|r| r["knob"] == knob && r["value"] == value).unwrap().clone()
+    };
+    let bias =
+        |row: &Value| [&row["bias_squared"]["value"], &row["bias_squared"]["error"]].map(|x| x.as_f64().unwrap());
+    let [two, error] = bias(&row("depth", "2"));
+    assert!(two > 1e-3 && two > 2.0 * error, "{two} {error}");
+    assert!(row("depth", "2")["to_target"].is_null() && row("depth", "16")["to_target"].is_f64());
+    let green = |row: Value| row["light"][1]["value"].as_f64().unwrap();
+    assert!(green(row("depth", "2")) < 0.98 && (green(row("depth", "16")) - 1.0).abs() < 0.02);
+    let [none, error] = bias(&row("chosen", "as written"));
+    assert!(none.abs() < 4.0 * error, "{none} {error}");
+    // Four times the samples: half of the noise or less, as the samples are evenly spread.
+    let noise = |row: Value| row["noise"][0].as_f64().unwrap();
+    let ratio = noise(row("samples", "x 4")) / noise(row("chosen", "as written"));
+    assert!((0.2..0.6).contains(&ratio), "{ratio}");
+    let page = std::fs::read_to_string(place.path().join("sheet/accuracy.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("data:image/png;base64,") && !page.contains("http"));
+    let csv = std::fs::read_to_string(place.path().join("sheet/accuracy.csv")).unwrap();
+    let columns = csv.lines().next().unwrap().split(',').count();
+    assert!(csv.lines().all(|line| line.split(',').count() == columns), "{csv}");
+    let without = abbe(place.path(), "accuracy scene.yaml -o sheet --set integrator=whitted");
+    assert!(without.0 == 0 && without.1.contains("only `path` has knobs to weigh"), "{}", without.1);
+}
