@@ -109,8 +109,10 @@ fn the_sheet_finds_what_a_bound_to_depth_costs() {
     assert!(green(row("depth", "2")) < 0.98 && (green(row("depth", "16")) - 1.0).abs() < 0.02);
     let [none, error] = bias(&row("chosen", "as written"));
     assert!(none.abs() < 4.0 * error, "{none} {error}");
-    // Four times the samples: half of the noise or less, as the samples are evenly spread.
     let noise = |row: Value| row["noise"][0].as_f64().unwrap();
+    // Independent samples are noisier than evenly spread ones.
+    assert!(noise(row("sampler", "independent")) > 1.1 * noise(row("chosen", "as written")));
+    // Four times the samples: half of the noise or less, as the samples are evenly spread.
     let ratio = noise(row("samples", "x 4")) / noise(row("chosen", "as written"));
     assert!((0.2..0.6).contains(&ratio), "{ratio}");
     let page = std::fs::read_to_string(place.path().join("sheet/accuracy.html")).unwrap();

@@ -13,7 +13,7 @@
 //! * **to the target** is the time until noise and bias together are the target, by the convergence that was seen; none where
 //!   the bias is above it.
 
-use super::frame::{self, Milestone};
+use super::frame::{self, FrameJob, Milestone};
 use super::stop::Fit;
 use super::{BatchEntry, Overrides, Prepared, prepare_with};
 use crate::error::{Error, Result};
@@ -47,6 +47,8 @@ struct Trial {
     knob: &'static str,
     value: String,
     set: Vec<(String, String)>,
+    /// Samples that have nothing in common.
+    independent: bool,
 }
 
 /// A figure and the standard error of it.
@@ -162,11 +164,11 @@ pub fn sheet(
     ];
     base.retain(|(key, _)| key != "image.crop" || whole.description.image.crop.is_some());
     let trials = trials(&whole, path.max_depth, path.roulette_depth, settings.samples);
-    let shoot = |set: &[(String, String)], seed: u64, shelf: &mut Shelf| -> Result<Shot> {
+    let shoot = |set: &[(String, String)], independent: bool, seed: u64, shelf: &mut Shelf| -> Result<Shot> {
         let mut overrides = overrides.clone();
         overrides.set.extend(base.iter().chain(set).cloned());
         overrides.set.push(("render.seed".into(), seed.to_string()));
-        shot(&prepare_with(entry, &overrides, shelf)?, stop)
+        shot(&prepare_with(entry, &overrides, shelf)?, independent, stop)
     };
     let rounds = settings.rounds.max(1);
     let total = trials.len() * rounds as usize + 1;
@@ -185,12 +187,12 @@ pub fn sheet(
     .map(|(key, value)| (key.to_owned(), value))
     .into();
     let seed = whole.description.render.seed;
-    let reference = shoot(&full, seed ^ SEED_OF_THE_REFERENCE, &mut shelf)?;
+    let reference = shoot(&full, false, seed ^ SEED_OF_THE_REFERENCE, &mut shelf)?;
     let mut shots: Vec<Vec<Shot>> = trials.iter().map(|_| Vec::new()).collect();
     for round in 0..rounds {
         for (i, trial) in trials.iter().enumerate() {
             tell(&format!("{} {}", trial.knob, trial.value));
-            let shot = shoot(&trial.set, seed.wrapping_add(u64::from(round)), &mut shelf)?;
+            let shot = shoot(&trial.set, trial.independent, seed.wrapping_add(u64::from(round)), &mut shelf)?;
             shots[i].push(shot);
         }
     }
@@ -221,6 +223,7 @@ fn trials(whole: &Prepared, depth: Option<u32>, roulette: u32, samples: u32) -> 
         knob,
         value: value.to_owned(),
         set: set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect(),
+        independent: false,
     };
     let mut all = vec![trial("chosen", "as written", &[])];
     for (name, samples) in [("1/4", samples / 4), ("1/2", samples / 2), ("2", samples * 2), ("4", samples * 4)] {
@@ -235,6 +238,7 @@ fn trials(whole: &Prepared, depth: Option<u32>, roulette: u32, samples: u32) -> 
             all.push(trial("depth", &text, &[("integrator.path.max_depth", &written)]));
         }
     }
+    all.push(Trial { independent: true, ..trial("sampler", "independent", &[]) });
     for value in [1, 5, 1000] {
         if value != roulette {
             let text = if value == 1000 { "from 1000".to_owned() } else { format!("from {value}") };
@@ -266,9 +270,9 @@ fn trials(whole: &Prepared, depth: Option<u32>, roulette: u32, samples: u32) -> 
     all
 }
 
-fn shot(prepared: &Prepared, stop: &AtomicBool) -> Result<Shot> {
+fn shot(prepared: &Prepared, independent: bool, stop: &AtomicBool) -> Result<Shot> {
     let filter = FilterSampler::new(super::filter(&prepared.description.image.filter))?;
-    let job = prepared.job(&filter);
+    let job = FrameJob { independent, ..prepared.job(&filter) };
     let frame = frame::render(&job, &|_| {}, stop)?;
     if stop.load(Ordering::Relaxed) {
         return Err(Error::Render("stopped; nothing was written".into()));

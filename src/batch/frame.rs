@@ -46,6 +46,8 @@ pub struct FrameJob<'a> {
     pub seed: u64,
     /// Side of a tile in pixels.
     pub tile: u32,
+    /// Whether samples have nothing in common, in place of being spread evenly: to see what that gains.
+    pub independent: bool,
 }
 
 /// The error after a pass.
@@ -191,7 +193,15 @@ pub(super) fn render_unit(job: &FrameJob, samples: Range<u32>, photons: Option<C
                 let (mut start, end) = (turns(samples.start), turns(samples.end));
                 while start < end {
                     let next = (start - start % Octet::SAMPLES).saturating_add(LONGEST).min(end);
-                    render_run(&shot, tile, &mut memory, &mut layers, [x, y], replicate, start..next);
+                    let run = start..next;
+                    if job.independent {
+                        // A scrambling for each sample: of each sequence the first point alone.
+                        let first = run.map(|i| (replicate + REPLICATES as u32 * i, 0..1));
+                        render_run(&shot, tile, &mut memory, &mut layers, [x, y], replicate, first);
+                    } else {
+                        let octets = octets(run).map(|indices| (replicate, indices));
+                        render_run(&shot, tile, &mut memory, &mut layers, [x, y], replicate, octets);
+                    }
                     start = next;
                 }
             }
@@ -199,7 +209,18 @@ pub(super) fn render_unit(job: &FrameJob, samples: Range<u32>, photons: Option<C
     }
 }
 
-/// Renders samples of one replicate of `pixel`, at most [`LONGEST`].
+/// `indices`, cut where an [`Octet`] ends.
+fn octets(indices: Range<u32>) -> impl Iterator<Item = Range<u32>> {
+    let Range { mut start, end } = indices;
+    std::iter::from_fn(move || {
+        let next = (start - start % Octet::SAMPLES).saturating_add(Octet::SAMPLES).min(end);
+        let octet = start..next;
+        start = next;
+        (!octet.is_empty()).then_some(octet)
+    })
+}
+
+/// Renders samples of one `replicate` of `pixel`, at most [`LONGEST`]: those of `addresses`, a replicate and indices.
 fn render_run(
     shot: &Shot,
     tile: &mut TileBuffer,
@@ -207,7 +228,7 @@ fn render_run(
     layers: &mut LayerRun,
     pixel: [i32; 2],
     replicate: u32,
-    indices: Range<u32>,
+    addresses: impl Iterator<Item = (u32, Range<u32>)>,
 ) {
     let index = tile.window().index(pixel).expect("the pixel lies in the tile");
     let channels = tile.layers.channels();
@@ -216,16 +237,13 @@ fn render_run(
     layers.reset(channels);
     // Overscan makes negative coordinates; as addresses they wrap.
     let address = pixel.map(|x| x as u32);
-    let mut start = indices.start;
-    while start < indices.end {
-        let next = (start - start % Octet::SAMPLES).saturating_add(Octet::SAMPLES).min(indices.end);
-        memory.render(shot, address, replicate, start..next, |sample, values| {
+    for (stream, indices) in addresses {
+        memory.render(shot, address, stream, indices, |sample, values| {
             if channels > 0 && !layers.add(sample.weight, values) {
                 tile.layers.add(index, sample.weight, values);
             }
             record(tile, &mut run, unit, pixel, replicate, sample);
         });
-        start = next;
     }
     tile.add_run(pixel, replicate as usize, &run);
     if channels > 0 {

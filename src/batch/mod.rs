@@ -158,6 +158,7 @@ impl Prepared {
             stop: *stop,
             seed: description.render.seed,
             tile: description.render.tile,
+            independent: false,
         }
     }
 }
