@@ -123,3 +123,15 @@ fn the_sheet_finds_what_a_bound_to_depth_costs() {
     let without = abbe(place.path(), "accuracy scene.yaml -o sheet --set integrator=whitted");
     assert!(without.0 == 0 && without.1.contains("only `path` has knobs to weigh"), "{}", without.1);
 }
+
+/// A film of 4096 × 4096 pixels takes four gibibytes: the process ends by itself long before.
+#[test]
+fn a_memory_limit_ends_the_process_with_a_code_of_its_own() {
+    let place = directory();
+    let large = "render scene.yaml -q -o large.exr --set image.width=4096 --set image.height=4096 --spp 1";
+    let (code, said) = abbe(place.path(), &format!("{large} --memory-limit 300M"));
+    assert_eq!(code, 33, "{said}");
+    assert!(said.contains("more than --memory-limit, 300 MiB"), "{said}");
+    assert!(!place.path().join("large.exr").exists());
+    assert_eq!(abbe(place.path(), "render scene.yaml -q -o small.exr --memory-limit 4G").0, 0);
+}

@@ -7,6 +7,7 @@ mod accuracy;
 mod compare;
 mod convert;
 mod interrupts;
+mod memory_limit;
 mod merge;
 mod plan;
 mod progress;
@@ -92,6 +93,9 @@ struct RenderArguments {
     /// Threads; 0 takes every core that the process may use
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
+    /// End with exit code 33 before the process has more memory than this, as 8G or 500M
+    #[arg(long, value_name = "SIZE", value_parser = memory_limit::bytes)]
+    memory_limit: Option<u64>,
     /// Write the report here as well
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,

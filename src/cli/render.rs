@@ -25,6 +25,9 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads(arguments.threads)).build_global();
     let style = if arguments.quiet { ProgressStyle::None } else { arguments.progress };
     let teller = Teller::new(style);
+    if let Some(limit) = arguments.memory_limit {
+        super::memory_limit::watch(limit)?;
+    }
     let interrupts = Interrupts::listen()?;
     let mut scene = arguments.scene.overrides(arguments.output.clone());
     if let Some(error) = arguments.error {
