@@ -408,7 +408,7 @@ mod tests {
         with(&[("batch.yaml", batch), ("a.yaml", CAMERA)], |directory| {
             assert_eq!(
                 in_words(&load(&directory.join("batch.yaml")).unwrap().check(&[]).unwrap_err(), directory),
-                "DIR/batch.yaml:4:5: render.smaples: expected one of samples, seed, effects, tile, wavelengths, techniques, \
+                "DIR/batch.yaml:4:5: render.smaples: expected one of samples, stop, seed, effects, tile, wavelengths, techniques, \
                  found \"smaples\"; did you mean \"samples\"?\n\
                  DIR/batch.yaml:8:21: render.samples: expected a whole number of 1 or more, found 0"
             );

@@ -410,7 +410,7 @@ mod tests {
         let says = |key: &str, value: &str| set(&[(key, value)]).unwrap_err();
         assert_eq!(
             says("render.smaples", "3"),
-            "--set render.smaples=3: render.smaples: expected one of samples, seed, effects, tile, wavelengths, techniques, \
+            "--set render.smaples=3: render.smaples: expected one of samples, stop, seed, effects, tile, wavelengths, techniques, \
              found \"smaples\"; did you mean \"samples\"?"
         );
         assert_eq!(

@@ -487,7 +487,7 @@ impl Render {
                 Time::Name(text) => format!("\"{text}\""),
             };
             let holds = time.duration().is_some_and(|time| !time.is_zero());
-            checker.require(holds, stop.key("time"), "a time above 0, as 60, 90s, 10m or 2h", found);
+            checker.require(holds, stop.key("time"), "a time greater than 0, as 60, 90s, 10m or 2h", found);
         }
         checker.at_least_one(stop.key("samples"), self.stop.samples.unwrap_or(1));
     }
@@ -529,8 +529,8 @@ mod tests {
     fn targets_are_above_zero_and_times_have_units() {
         assert_eq!(
             faults("render: {stop: {error: 0, time: 5 days, samples: 0}}"),
-            "dir/s.yaml:2:24: render.stop.error: expected a number above 0, found 0\n\
-             dir/s.yaml:2:33: render.stop.time: expected a time above 0, as 60, 90s, 10m or 2h, found \"5 days\"\n\
+            "dir/s.yaml:2:24: render.stop.error: expected a number greater than 0, found 0\n\
+             dir/s.yaml:2:33: render.stop.time: expected a time greater than 0, as 60, 90s, 10m or 2h, found \"5 days\"\n\
              dir/s.yaml:2:50: render.stop.samples: expected a whole number of 1 or more, found 0"
         );
         let render = |text: &str| scene(&format!("render: {text}")).render;
