@@ -89,7 +89,7 @@ impl<'a> Keeper<'a> {
         let (mut film, mut splats) = written.empty(share.rows(job.window))?;
         written.add_to(&mut film, splats.as_mut())?;
         let header = &written.header;
-        let part = Part::resume(job, share, &header.claims, film, splats)?;
+        let part = Part::resume(job, share, &header.claims, header.allocation(), film, splats)?;
         let (done, total) = part.progress();
         let per_cent = 100.0 * done as f64 / total.max(1) as f64;
         lock(&self.notes).push(format!("resumed at {per_cent:.1} %"));

@@ -2,6 +2,7 @@
 //!
 //! A part carries its [`Finish`], so that `abbe merge` needs no scene, and writes what the one process would have written.
 
+use super::adaptive;
 use super::frame::{self, Frame};
 use super::report::SceneReport;
 use super::{Prepared, colour_space, window};
@@ -30,6 +31,8 @@ pub struct Finish {
     pub window: Window,
     /// Samples of a pixel.
     pub samples: u32,
+    /// Where samples are shared out by noise, how many all pixels have before; `samples` is then their mean.
+    pub adaptive: Option<u32>,
     /// Seed of all random numbers.
     pub seed: u64,
     /// Hash of the description and of the files it names.
@@ -68,6 +71,7 @@ impl Finish {
             frame: scene.camera.resolution,
             window: window(description),
             samples: *samples,
+            adaptive: plan.adaptive,
             seed: description.render.seed,
             scene_hash: hash.clone(),
             integrator: integrator(&plan.integrator).to_owned(),
@@ -83,6 +87,12 @@ impl Finish {
             bands: !description.image.bands.is_empty(),
             layers: plan.layers.channels(),
         }
+    }
+
+    /// Rows of the frame that no part cuts.
+    #[must_use]
+    pub fn rows(&self) -> u32 {
+        if self.adaptive.is_some() { adaptive::SIDE } else { 1 }
     }
 
     /// What a pixel of the file holds: bands replace colour.
@@ -159,7 +169,8 @@ pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut Scene
     report.files = vec![exr_path.to_path_buf(), png_path];
     report.seconds.writing = written.elapsed().as_secs_f64();
 
-    let samples = finish.window.pixels() as u64 * u64::from(frame.samples());
+    let (counted, dropped) = frame.film.samples();
+    let samples = counted + dropped;
     frame::check_invalid(&frame.invalid(), samples)
 }
 
@@ -214,6 +225,10 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
         ("abbe/renderSeconds".to_owned(), Attribute::Double(frame.elapsed.as_secs_f64())),
         ("abbe/invalidSamples".to_owned(), text(&frame.invalid().total().to_string())),
     ];
+    if let Some(counts) = &report.adaptive {
+        let counts = format!("least {}, mean {:.1}, most {}", counts.least, counts.mean, counts.most);
+        all.push(("abbe/adaptiveSamples".to_owned(), text(&counts)));
+    }
     if let Some(e) = &report.error {
         all.push(("abbe/relativeError".to_owned(), Attribute::Double(e.rel_rmse)));
         let state = if e.valid { "valid" } else { "not converged, interval not valid" };

@@ -4,6 +4,7 @@
 //! integers, so the picture does not depend on it. Samples come in passes that double their number,
 //! and after each pass the error so far is known.
 
+use super::adaptive::Allocation;
 use super::part::{Breaks, Part, Share, SplatFilm};
 use super::stop::{Forecast, Stop};
 use crate::error::{Error, Result};
@@ -178,8 +179,14 @@ pub fn pass_end(at: u32, most: u32) -> u32 {
     doublings.into_iter().find(|end| *end > at).unwrap_or(most).min(most)
 }
 
-/// Renders one work unit into `tile`.
-pub(super) fn render_unit(job: &FrameJob, samples: Range<u32>, photons: Option<Collection>, tile: &mut TileBuffer) {
+/// Renders one work unit into `tile`: `samples` of each pixel, or where they are shared out what that is for each.
+pub(super) fn render_unit(
+    job: &FrameJob,
+    samples: Range<u32>,
+    shares: Option<&Allocation>,
+    photons: Option<Collection>,
+    tile: &mut TileBuffer,
+) {
     let FrameJob { scene, plan, filter, seed, .. } = *job;
     let shot = Shot { scene, plan, filter, seed, photons };
     let window = tile.window();
@@ -190,7 +197,10 @@ pub(super) fn render_unit(job: &FrameJob, samples: Range<u32>, photons: Option<C
             for replicate in 0..REPLICATES as u32 {
                 // Samples take turns among the replicates.
                 let turns = |s: u32| s.saturating_sub(replicate).div_ceil(REPLICATES as u32);
-                let (mut start, end) = (turns(samples.start), turns(samples.end));
+                let Range { mut start, end } = match shares {
+                    Some(shares) => shares.turns([x, y], replicate, &samples),
+                    None => turns(samples.start)..turns(samples.end),
+                };
                 while start < end {
                     let next = (start - start % Octet::SAMPLES).saturating_add(LONGEST).min(end);
                     let run = start..next;

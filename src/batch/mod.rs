@@ -4,6 +4,7 @@
 
 pub mod accuracy;
 pub mod accuracy_page;
+pub mod adaptive;
 pub mod checkpoint;
 pub mod finish;
 pub mod frame;
@@ -74,16 +75,24 @@ impl Portion {
         *self == Portion::default()
     }
 
-    /// The share of a picture of `window` and `samples`.
+    /// The share of a picture of `window` and `samples`, of which `rows` of the frame stay together.
     ///
     /// # Errors
     /// [`Error::Config`] for a tile or samples that the picture does not have.
-    pub fn share(&self, window: Window, samples: u32) -> Result<Share> {
+    pub fn share(&self, window: Window, samples: u32, rows: u32) -> Result<Share> {
         let [tile, tiles] = self.tile.unwrap_or([0, 1]);
-        if tiles == 0 || tiles > window.height || tile >= tiles {
-            let height = window.height;
+        let most = part::bands(window, rows);
+        if tiles == 0 || u64::from(tiles) > most || tile >= tiles {
+            let cells = if rows > 1 { " of cells of adaptive sampling" } else { "" };
             return Err(Error::Config(format!(
-                "--tile {tile}/{tiles}: expected i/n with i from 0 to n - 1 and n at most {height}, the rows of the picture"
+                "--tile {tile}/{tiles}: expected i/n with i from 0 to n - 1 and n at most {most}, the rows{cells} of the \
+                 picture"
+            )));
+        }
+        if let (Some([first, last]), true) = (self.samples, rows > 1) {
+            return Err(Error::Config(format!(
+                "--samples {first}-{last}: expected --tile i/n or render.techniques.adaptive: off, found adaptive \
+                 sampling, which tells from all first samples where others go"
             )));
         }
         let [first, last] = self.samples.unwrap_or([0, samples - 1]);
@@ -94,7 +103,7 @@ impl Portion {
                  {samples} samples a pixel"
             )));
         }
-        Ok(Share { tile, tiles, samples: first..last + 1 })
+        Ok(Share { tile, tiles, samples: first..last + 1, rows })
     }
 
     /// What tells the name of a part from that of the picture.
@@ -241,6 +250,9 @@ fn prepare_with(entry: &BatchEntry, overrides: &Overrides, shelf: &mut Shelf) ->
         scene.watch = Some(Box::default());
         plan.layers.layers.push(Layer { name: name.into(), source: Source::Numerics, squares: None });
     }
+    let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
+    plan.adaptive = first;
+    plan.techniques.extend(said);
     let hash = hash(&description, &scene.files);
     Ok(Prepared { description, scene, plan, samples, planned, stop, hash, source: entry.path.clone() })
 }
@@ -260,15 +272,23 @@ fn stop(description: &SceneDescription) -> Stop {
     }
 }
 
-/// Techniques that the description asks for or forbids.
-fn wishes(description: &SceneDescription) -> Wishes {
-    let of = |technique| match technique {
+/// Whether a technique is used.
+fn wish(technique: description::Technique) -> Use {
+    match technique {
         description::Technique::Auto => Use::Auto,
         description::Technique::On => Use::On,
         description::Technique::Off => Use::Off,
-    };
+    }
+}
+
+/// Techniques that the description asks for or forbids.
+fn wishes(description: &SceneDescription) -> Wishes {
     let written = &description.render.techniques;
-    Wishes { light_tracing: of(written.light_tracing), packets: of(written.packets), merging: of(written.merging) }
+    Wishes {
+        light_tracing: wish(written.light_tracing),
+        packets: wish(written.packets),
+        merging: wish(written.merging),
+    }
 }
 
 /// What computes the light.
@@ -465,9 +485,9 @@ fn render_and_write(
         let hint = "a part cannot know the error or the time of the whole picture; give it a number of samples";
         return Err(Error::Config(format!("render.stop: {hint}")));
     }
-    let share = portion.share(job.window, job.samples)?;
     let identity = Identity::new(Finish::of(prepared), &prepared.source, &prepared.plan);
     let finish = &identity.finish;
+    let share = portion.share(job.window, job.samples, finish.rows())?;
     if checkpoint::is_there(&overrides.keep, &exr_path, &identity, (!portion.is_all()).then_some(&share)) {
         report.status = Status::Skipped;
         report.files = vec![exr_path];

@@ -10,6 +10,7 @@
 //!
 //! A part can pause between two units of work and tell exactly what it has done: that is what a checkpoint holds.
 
+use super::adaptive::{self, Allocation};
 use super::frame::{FrameJob, Milestone, light_unit, lock, render_unit};
 use crate::error::{Error, Result};
 use crate::film::Window;
@@ -26,8 +27,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::ops::Range;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Mutex, OnceLock};
 use std::time::Duration;
 
 /// Light that came from the lights to the camera.
@@ -48,6 +49,8 @@ pub struct Share {
     pub tiles: u32,
     /// Samples of each pixel.
     pub samples: Range<u32>,
+    /// Rows that are not parted: one, or those of a cell of adaptive sampling.
+    pub rows: u32,
 }
 
 impl std::fmt::Display for Share {
@@ -57,11 +60,19 @@ impl std::fmt::Display for Share {
     }
 }
 
+/// Rows of `window`, `rows` of the frame together.
+#[must_use]
+pub fn bands(window: Window, rows: u32) -> u64 {
+    let (start, end) = (i64::from(window.y), i64::from(window.y) + i64::from(window.height));
+    let side = i64::from(rows);
+    ((end + side - 1).div_euclid(side) - start.div_euclid(side)) as u64
+}
+
 impl Share {
     /// All of a picture.
     #[must_use]
     pub fn all(samples: u32) -> Share {
-        Share { tile: 0, tiles: 1, samples: 0..samples }
+        Share { tile: 0, tiles: 1, samples: 0..samples, rows: 1 }
     }
 
     /// The `tile`-th of `tiles` of the numbers below `n`.
@@ -73,8 +84,13 @@ impl Share {
     /// The rows of `window` that belong to the share.
     #[must_use]
     pub fn rows(&self, window: Window) -> Window {
-        let rows = self.of(u64::from(window.height));
-        Window { y: window.y + rows.start as i32, height: (rows.end - rows.start) as u32, ..window }
+        let side = i64::from(self.rows);
+        let (start, end) = (i64::from(window.y), i64::from(window.y) + i64::from(window.height));
+        let first = start.div_euclid(side);
+        let own = self.of(bands(window, self.rows));
+        let row = |band: u64| ((first + band as i64) * side).clamp(start, end);
+        let (from, to) = (row(own.start), row(own.end));
+        Window { y: from as i32, height: (to - from) as u32, ..window }
     }
 }
 
@@ -219,6 +235,8 @@ pub struct Part<'a> {
     tiles: Vec<Tile>,
     lights: Mutex<LightsDone>,
     layers: usize,
+    /// Once the samples that all pixels have are there.
+    allocation: OnceLock<Allocation>,
 }
 
 impl<'a> Part<'a> {
@@ -246,10 +264,11 @@ impl<'a> Part<'a> {
         let tiles = shares(window, job.tile, rayon::current_num_threads());
         let tiles = tiles.into_iter().map(|window| Tile { window, done: AtomicU32::new(start) }).collect();
         let lights = Mutex::new(LightsDone { below: start, more: Vec::new() });
-        Ok(Part { job, share, window, film, splats, tiles, lights, layers })
+        Ok(Part { job, share, window, film, splats, tiles, lights, layers, allocation: OnceLock::new() })
     }
 
-    /// A part whose `film` and `splats` hold what `claims` say; they are of this share.
+    /// A part whose `film` and `splats` hold what `claims` say, with samples shared out by `allocation`; they are of this
+    /// share.
     ///
     /// # Errors
     /// As [`Part::new`].
@@ -257,10 +276,14 @@ impl<'a> Part<'a> {
         job: &'a FrameJob<'a>,
         share: Share,
         claims: &Claims,
+        allocation: Option<Allocation>,
         film: Film,
         splats: Option<SplatFilm>,
     ) -> Result<Part<'a>> {
         let mut part = Part::new(job, share)?;
+        if let Some(allocation) = allocation {
+            part.allocation = OnceLock::from(allocation);
+        }
         if let [(_, done)] = claims.camera.as_slice() {
             part.tiles.iter_mut().for_each(|tile| tile.done = AtomicU32::new(done.end));
         } else {
@@ -345,6 +368,12 @@ impl<'a> Part<'a> {
         read(&film, splats.as_deref())
     }
 
+    /// How samples are shared out, once that is decided.
+    #[must_use]
+    pub fn allocation(&self) -> Option<&Allocation> {
+        self.allocation.get()
+    }
+
     /// The paths from the lights of each sample that belong to the share, where there are any.
     fn own_paths(&self) -> Range<u64> {
         self.splats.as_ref().map_or(0..0, |(paths, _)| self.share.of(paths_of_a_sample(self.job, paths)))
@@ -353,6 +382,9 @@ impl<'a> Part<'a> {
     /// Adds `samples` of all pixels and their paths from the lights, but for what is there already. `finished` hears how
     /// many samples were done with each tile. False if there was a pause, with some of it left to do.
     pub fn add(&self, samples: Range<u32>, pause: &dyn Breaks, finished: &(dyn Fn(u64) + Sync)) -> bool {
+        if let Some(first) = self.job.plan.adaptive.filter(|first| (samples.start + 1..samples.end).contains(first)) {
+            return self.add(samples.start..first, pause, finished) && self.add(first..samples.end, pause, finished);
+        }
         let merging = self.job.plan.caustics.as_ref().and_then(|c| c.merging);
         match (&self.splats, merging) {
             (Some((paths, splats)), None) => {
@@ -397,6 +429,13 @@ impl<'a> Part<'a> {
         thread_local! {
             static TILE: RefCell<Option<TileBuffer>> = const { RefCell::new(None) };
         }
+        let shares = match self.job.plan.adaptive {
+            Some(first) if first <= samples.start => match self.decide(first, pause) {
+                Some(shares) => Some(shares),
+                None => return false,
+            },
+            _ => None,
+        };
         let done = |tile: &Tile| -> bool {
             let window = tile.window;
             let start = tile.done.load(Ordering::Relaxed).max(samples.start);
@@ -414,7 +453,7 @@ impl<'a> Part<'a> {
                 buffer.reset(window, self.layers);
                 while at < samples.end && (at == start || !pause.wanted()) {
                     let next = (at - at % step).saturating_add(step).min(samples.end);
-                    render_unit(self.job, at..next, photons, buffer);
+                    render_unit(self.job, at..next, shares, photons, buffer);
                     at = next;
                 }
                 lock(&self.film).merge_tile(buffer);
@@ -424,6 +463,17 @@ impl<'a> Part<'a> {
             at == samples.end
         };
         self.tiles.par_iter().map(done).reduce(|| true, |a, b| a && b)
+    }
+
+    /// How samples are shared out, where each pixel has the `first` ones; none if there was a pause.
+    fn decide(&self, first: u32, pause: &dyn Breaks) -> Option<&Allocation> {
+        if self.allocation.get().is_none() {
+            let scale = adaptive::pilot(self.job, first, pause)?;
+            let allocation = adaptive::decide(self.job, first, &lock(&self.film), &scale);
+            // Nobody else decides meanwhile.
+            let _ = self.allocation.set(allocation);
+        }
+        self.allocation.get()
     }
 
     /// Follows paths from the lights for each sample of `samples`: as many as the frame has pixels, or the share of them
@@ -662,7 +712,7 @@ mod tests {
         for tiles in [1, 2, 3, 14] {
             let (mut row, mut path) = (window.y, 0);
             for tile in 0..tiles {
-                let share = Share { tile, tiles, samples: 0..4 };
+                let share = Share { tile, tiles, samples: 0..4, rows: 1 };
                 let rows = share.rows(window);
                 assert!(rows.y == row && rows.height > 0 && window.contains(&rows));
                 row += rows.height as i32;
@@ -671,6 +721,17 @@ mod tests {
             }
             assert_eq!((row, path), (12, 1000));
         }
+    }
+
+    /// Rows of the frame from 8 to 15, from 16 to 23 and so on stay together.
+    #[test]
+    fn shares_of_cells_begin_where_cells_do() {
+        let window = Window { x: 0, y: 13, width: 4, height: 30 };
+        assert_eq!(bands(window, 8), 5);
+        let share = |tile, tiles| Share { tile, tiles, samples: 0..4, rows: 8 }.rows(window);
+        let rows = |w: Window| (w.y, w.y + w.height as i32);
+        assert_eq!([0, 1].map(|i| rows(share(i, 2))), [(13, 24), (24, 43)]);
+        assert_eq!([0, 1, 2, 3, 4].map(|i| rows(share(i, 5))), [(13, 16), (16, 24), (24, 32), (32, 40), (40, 43)]);
     }
 
     /// Own paths 10 to 40 000 of 50 000, of which 100 to 200 are there: every path once, and the right ones added.

@@ -8,6 +8,7 @@
 //!
 //! The same file, with what is done so far in `claims`, is a checkpoint.
 
+use super::adaptive::{self, Allocation, HALVES};
 use super::finish::Finish;
 use super::frame::Milestone;
 use super::part::{Claims, Part, Share, SplatFilm};
@@ -25,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Version of the format; another one is refused.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// What the header of a part says, in the attribute `abbe/part`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -49,6 +50,8 @@ pub struct Header {
     pub samples: [u32; 2],
     /// What it has.
     pub claims: Claims,
+    /// How samples are shared out among cells, in a checkpoint where that is decided ([`super::adaptive`]).
+    pub shares: Option<Vec<[i16; HALVES]>>,
     /// Paths from the lights of each sample of the picture, where there are any.
     pub paths: Option<u64>,
     /// Those that are in the sums, by replicate.
@@ -224,6 +227,7 @@ pub fn write(
                 tile: [share.tile, share.tiles],
                 samples: [share.samples.start, share.samples.end],
                 claims: part.claims(),
+                shares: part.allocation().map(|a| a.shares().to_vec()),
                 paths: part.paths_of_a_sample(),
                 splat_paths: splats.map(|s| s.paths),
                 invalid: [a, b, c, d],
@@ -262,7 +266,30 @@ impl Header {
     /// What the part is to have of the picture.
     #[must_use]
     pub fn share(&self) -> Share {
-        Share { tile: self.tile[0], tiles: self.tile[1], samples: self.samples[0]..self.samples[1] }
+        let samples = self.samples[0]..self.samples[1];
+        Share { tile: self.tile[0], tiles: self.tile[1], samples, rows: self.finish.rows() }
+    }
+
+    /// How samples are shared out, where that is decided.
+    #[must_use]
+    pub fn allocation(&self) -> Option<Allocation> {
+        Allocation::from(self.share().rows(self.finish.window), self.finish.adaptive?, self.shares.clone()?)
+    }
+
+    /// Whether what is said of adaptive sampling agrees with the rest: all samples of the first pass are there before
+    /// shares are known, and no others.
+    fn shares_agree(&self) -> bool {
+        match (self.finish.adaptive, &self.shares) {
+            (None, None) => true,
+            (None, Some(_)) => false,
+            (Some(first), None) => first >= 4 && self.claims.camera.iter().all(|(_, samples)| samples.end <= first),
+            (Some(first), Some(shares)) => {
+                first >= 4
+                    && first.is_power_of_two()
+                    && shares.len() == adaptive::cells(self.share().rows(self.finish.window))
+                    && self.claims.camera.iter().all(|(_, samples)| samples.end >= first)
+            }
+        }
     }
 
     /// Whether the part has all that it is to have.
@@ -396,7 +423,8 @@ pub fn open(path: &Path) -> Result<Written> {
         && header.paths.is_some() == header.splat_paths.is_some()
         && header.seconds >= 0.0
         && header.claims.camera.iter().all(inside)
-        && header.claims.lights.iter().all(followed);
+        && header.claims.lights.iter().all(followed)
+        && header.shares_agree();
     if !sound {
         return Err(damaged(&"it does not hold together"));
     }

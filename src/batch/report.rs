@@ -4,7 +4,7 @@ use super::finish::Finish;
 use super::frame::{Begun, Frame};
 use super::stop::{Fit, Forecast};
 use crate::error::Error;
-use crate::film::accumulate::InvalidCounts;
+use crate::film::accumulate::{Film, InvalidCounts, PixelCells};
 use crate::film::error::ErrorEstimate;
 use crate::film::output;
 use crate::scene::watch::Counts;
@@ -73,6 +73,30 @@ pub struct ConvergencePoint {
     pub relative_error: f64,
 }
 
+/// Samples of the pixels of a picture.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct SampleCounts {
+    /// The fewest.
+    pub least: u64,
+    /// In the mean.
+    pub mean: f64,
+    /// The most.
+    pub most: u64,
+}
+
+impl SampleCounts {
+    /// Those of `film`, dropped ones with them.
+    fn of(film: &Film) -> SampleCounts {
+        let of_pixel =
+            |cells: &PixelCells| cells.iter().map(|cell| u64::from(cell.count) + u64::from(cell.dropped)).sum::<u64>();
+        let (mut least, mut most, mut all) = (u64::MAX, 0, 0);
+        for count in film.cells().iter().map(of_pixel) {
+            (least, most, all) = (least.min(count), most.max(count), all + count);
+        }
+        SampleCounts { least, mean: all as f64 / film.cells().len().max(1) as f64, most }
+    }
+}
+
 /// One scene.
 #[derive(Debug, Serialize)]
 pub struct SceneReport {
@@ -96,6 +120,9 @@ pub struct SceneReport {
     pub seconds: Seconds,
     /// Million samples a second.
     pub msamples_per_second: f64,
+    /// Samples of a pixel where they were shared out by noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adaptive: Option<SampleCounts>,
     /// Relative RMSE of the picture with its 95 % interval; none for `whitted`, which has no noise.
     pub error: Option<ErrorEstimate>,
     /// Further seconds of rendering that would halve the error.
@@ -165,6 +192,7 @@ impl SceneReport {
             pixel_hash: String::new(),
             seconds: Seconds::default(),
             msamples_per_second: 0.0,
+            adaptive: None,
             error: None,
             halving_seconds: None,
             forecast: None,
@@ -201,6 +229,7 @@ impl SceneReport {
         self.samples = frame.samples();
         self.msamples_per_second = (counted + dropped) as f64 / seconds.max(1e-9) * 1e-6;
         self.invalid = frame.invalid();
+        self.adaptive = finish.adaptive.map(|_| SampleCounts::of(&frame.film));
         self.numerics = numerics;
         self.error = frame.milestones.last().and_then(|m| m.error);
         if let (Some(error), Some(fit)) = (&self.error, Fit::of(&frame.milestones)) {

@@ -67,9 +67,10 @@
 //!   effects: auto                   # auto, all: the same picture
 //!   tile: 32                        # pixels
 //!   wavelengths: auto               # auto, visible, uniform
-//!   techniques: {light_tracing: auto, packets: auto, merging: auto}  # auto, on, off: light of mirrors and glass traced
-//!                                   # from the lights, wavelengths that part followed together, photons collected where
-//!                                   # that light is seen in mirrors and through glass
+//!   techniques: {light_tracing: auto, packets: auto, merging: auto, adaptive: auto}  # auto, on, off: light of mirrors
+//!                                   # and glass traced from the lights, wavelengths that part followed together, photons
+//!                                   # collected where that light is seen in mirrors and through glass, more samples where
+//!                                   # the picture is noisier at the same mean (auto: off)
 //! output:                           # these are the defaults
 //!   dir: out                        # from the working directory
 //!   exr: {precision: half, compression: zips, stderr: false, channels: rgba}   # half, float; none, zips, zip, piz;

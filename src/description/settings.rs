@@ -243,7 +243,7 @@ pub fn duration(text: &str) -> Option<Duration> {
     Duration::try_from_secs_f64(seconds * unit).ok()
 }
 
-/// `techniques: {light_tracing: auto, packets: auto, merging: auto}`
+/// `techniques: {light_tracing: auto, packets: auto, merging: auto, adaptive: auto}`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Techniques {
@@ -257,6 +257,9 @@ pub struct Techniques {
     /// it that light is left to chance; with it, it is blurred a little.
     #[serde(default)]
     pub merging: Technique,
+    /// Whether pixels get more samples where the picture is noisier, at the same mean.
+    #[serde(default)]
+    pub adaptive: Technique,
 }
 
 /// Whether a technique is used; the picture is the same but for its noise.

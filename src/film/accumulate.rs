@@ -289,6 +289,12 @@ impl TileBuffer {
         self.window
     }
 
+    /// The cells of the window in raster order.
+    #[must_use]
+    pub fn cells(&self) -> &[PixelCells] {
+        &self.cells
+    }
+
     /// Empties the buffer and moves it to `window`, keeping its memory; `layers` further channels.
     pub fn reset(&mut self, window: Window, layers: usize) {
         self.window = window;

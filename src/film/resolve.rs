@@ -10,6 +10,9 @@
 //!
 //! unbiased where var(mᵣ) is proportional to 1/nᵣ, and for equal nᵣ in any case. It has R − 1 = 3 degrees of freedom:
 //! coarse in one pixel, sharp in the sum over many.
+//!
+//! Where samples were shared out by noise, replicates 0 and 1 of a pixel may have other counts than 2 and 3. The value is
+//! then the mean of the means of the two halves, its variance Σᵣ (mᵣ − m)² / (R(R − 1)): unbiased whatever the counts.
 
 use crate::film::Window;
 use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES};
@@ -57,7 +60,11 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
         .map(|index| {
             let cells = &film.cells()[index];
             let counts = cells.map(|cell| u64::from(cell.count));
-            let mut pixel = mean_of(cells, counts, rgb_from_xyz);
+            let halves = in_halves(cells);
+            let mut pixel = match halves {
+                true => mean_of_halves(cells, counts, rgb_from_xyz),
+                false => mean_of(cells, counts, rgb_from_xyz),
+            };
             if let Some(splats) = &splats {
                 // Two independent estimates of two parts of the light: means and variances add.
                 let light = mean_of(&splats.film.cells()[index], splats.photons, rgb_from_xyz);
@@ -67,12 +74,19 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
                 }
             }
             let unit = 2f64.powi(film.exponent());
-            let samples: u64 = counts.iter().sum();
-            let alpha: f64 = cells.iter().map(Cell::alpha_sum).sum();
+            let alpha = |cells: &[Cell]| {
+                let samples: u64 = cells.iter().map(|cell| u64::from(cell.count)).sum();
+                let alpha: f64 = cells.iter().map(Cell::alpha_sum).sum();
+                if samples == 0 { 0.0 } else { alpha / samples as f64 }
+            };
+            let alpha = match halves {
+                true => 0.5 * (alpha(&cells[..HALF]) + alpha(&cells[HALF..])),
+                false => alpha(cells),
+            };
             Resolved {
                 rgb: pixel.rgb.map(|x| (x * unit) as f32),
                 standard_error: pixel.variance.map(|v| (v.sqrt() * unit) as f32),
-                alpha: if samples == 0 { 0.0 } else { (alpha / samples as f64) as f32 },
+                alpha: alpha as f32,
             }
         })
         .collect();
@@ -99,6 +113,44 @@ struct PixelMean {
     rgb: [f64; 3],
     /// Of the mean; NaN where fewer than two replicates have samples.
     variance: [f64; 3],
+}
+
+/// Replicates of a half.
+const HALF: usize = REPLICATES / 2;
+
+/// Whether one half of the replicates had other samples than the other: replicates in turn differ by one.
+fn in_halves(cells: &PixelCells) -> bool {
+    let of = |cells: &[Cell]| cells.iter().map(|cell| u64::from(cell.count) + u64::from(cell.dropped)).sum::<u64>();
+    of(&cells[..HALF]).abs_diff(of(&cells[HALF..])) > HALF as u64
+}
+
+/// As [`mean_of`], where the halves weigh alike: how far one went on was for the other to say, so that it is no measure
+/// of how much it should count.
+fn mean_of_halves(cells: &PixelCells, counts: [u64; REPLICATES], rgb_from_xyz: &[[f64; 3]; 3]) -> PixelMean {
+    if counts.contains(&0) {
+        return mean_of(cells, counts, rgb_from_xyz);
+    }
+    let to_rgb = |xyz: [f64; 3]| rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2]);
+    let half = |start: usize| {
+        let samples: u64 = counts[start..start + HALF].iter().sum();
+        let mut sums = [crate::film::accumulate::Sum::default(); 3];
+        for cell in &cells[start..start + HALF] {
+            for (sum, &part) in sums.iter_mut().zip(&cell.xyz) {
+                *sum += part;
+            }
+        }
+        to_rgb(sums.map(|sum| sum.value() / samples as f64))
+    };
+    let (a, b) = (half(0), half(HALF));
+    let rgb = [0, 1, 2].map(|c| 0.5 * (a[c] + b[c]));
+    let mut variance = [0.0; 3];
+    for (cell, n) in cells.iter().zip(counts) {
+        let own = to_rgb(cell.xyz.map(|sum| sum.value() / n as f64));
+        for c in 0..3 {
+            variance[c] += (own[c] - rgb[c]) * (own[c] - rgb[c]) / (REPLICATES * (REPLICATES - 1)) as f64;
+        }
+    }
+    PixelMean { rgb, variance }
 }
 
 /// Mean and variance of the mean of a pixel whose replicates are divided by `divisors`.
@@ -189,6 +241,24 @@ mod tests {
         assert!(one.standard_error[0][0].is_nan() && one.rgb[0][0] > 0.0);
         let empty = resolve(&noisy(5, 8, 1.0, 0.5, [0; 4]), None, &IDENTITY);
         assert_eq!((empty.rgb[0][0], empty.alpha[0]), (0.0, 0.0));
+    }
+
+    /// Two replicates of 2 samples around 1 and 3, two of 8 around 6 and 10: the mean of 2 and 8, not that of all
+    /// samples, and the squares 16, 4, 1 and 25 of what is around it over 12. Where halves have as many, all samples count alike.
+    #[test]
+    fn halves_that_went_on_for_longer_count_no_more() {
+        let film = |counts: [usize; 4]| {
+            let mut film = Film::new([1, 1], Window::full(1, 1)).unwrap();
+            for (replicate, (x, n)) in [1.0, 3.0, 6.0, 10.0].into_iter().zip(counts).enumerate() {
+                (0..n).for_each(|_| film.add([0, 0], replicate, [x; 3], x / 10.0));
+            }
+            resolve(&film, None, &IDENTITY)
+        };
+        let image = film([2, 2, 8, 8]);
+        assert_eq!((image.rgb[1][0], image.alpha[0]), (5.0, 0.5));
+        assert!((f64::from(image.standard_error[1][0]) - (46.0f64 / 12.0).sqrt()).abs() < 1e-6);
+        let image = film([2, 3, 3, 3]);
+        assert!((f64::from(image.rgb[1][0]) - 59.0 / 11.0).abs() < 1e-6);
     }
 
     /// Camera light 2 ± s₁ and splats of total 12 over 4·3 photons: 1 ± s₂. Means add, variances add.

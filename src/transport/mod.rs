@@ -253,6 +253,18 @@ impl Begun {
     }
 }
 
+/// Renders sample `index` of `replicate` at `pixel`, and says how many events its path had.
+#[must_use]
+pub fn sample_with_events(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (PixelSample, u32) {
+    let sampler = Sampler::new(shot.seed, pixel, replicate, index);
+    let mut begun = Begun::blank();
+    begun.begin(shot, Address { pixel, replicate, index }, &sampler);
+    let light = begun.light(shot, &sampler, &shot.plan.integrator);
+    begun.see(shot, light);
+    begun.finish();
+    (begun.sample, light.events)
+}
+
 /// Renders sample `index` of `replicate` at `pixel`.
 #[must_use]
 pub fn sample(

@@ -150,6 +150,8 @@ pub struct EffectPlan {
     pub all_dispersive: bool,
     /// Light of mirrors and glass that is traced from the lights.
     pub caustics: Option<Arc<Caustics>>,
+    /// Where samples are shared out by noise: how many all pixels have before.
+    pub adaptive: Option<u32>,
     /// Further channels of the picture.
     pub layers: LayerPlan,
     /// What is simulated, for people.
@@ -308,6 +310,7 @@ impl EffectPlan {
             packets: path && !census.dispersive.is_empty(),
             all_dispersive: mode == EffectMode::All,
             caustics: None,
+            adaptive: None,
             layers: LayerPlan::default(),
             effects,
             techniques,

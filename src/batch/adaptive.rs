@@ -1,0 +1,428 @@
+//! Adaptive sampling: more samples where the picture is noisier, at the same mean number.
+//!
+//! The picture is cut into cells of [`SIDE`] × [`SIDE`] pixels, aligned to the frame, and the replicates into two halves,
+//! 0 with 1 and 2 with 3. All pixels first get the same few samples. Then each half of each cell is given its number
+//! once, from what the **other** half shows so far: what a half averages has no part in how long it goes on, so that the
+//! mean of each half is unbiased, and so is the mean of the two (`film/resolve.rs`). Dark pixels that have not met
+//! their light yet would stop early else.
+//!
+//! To decide again at later counts would let the halves talk: how far one of them has come depends on the other, and so
+//! would what it then shows.
+//!
+//! **How many.** With v the relative variance of a sample, the mean over pixels and channels of var / (value² + f) with
+//! f = 0.01 · (mean of the picture)², as the picture's error counts it, and c what a sample costs, the error after a given time is
+//! least where a cell has ∝ √(v/c) samples. So the share of a cell, the number of its samples over the mean one, is
+//! w = max(¼, λ√(v/c)).
+//!
+//! **Without the rest of the picture**, f, c and λ come from a pilot: one pixel of each quarter of each cell, with random
+//! numbers of its own. It is a pure function of scene and settings, so that parts of a picture agree. Costs are counted in
+//! rays, not in seconds.
+
+use super::frame::{FrameJob, light_unit};
+use super::part::Breaks;
+use crate::film::Window;
+use crate::film::accumulate::{Film, Invalid, PixelCells, REPLICATES, SAMPLES_LIMIT};
+use crate::math::sampler::mix64;
+use crate::spectrum::ColourSpace;
+use crate::transport::layers::Source;
+use crate::transport::pilot::Use;
+use crate::transport::plan::{Effect, EffectPlan, Integrator};
+use crate::transport::{self, Shot};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Side of a cell in pixels.
+pub const SIDE: u32 = 8;
+
+/// Halves of the replicates.
+pub const HALVES: usize = 2;
+
+/// The fewest samples of all pixels before anything is decided.
+const FIRST: u32 = 8;
+
+/// The most that a render with an open end takes for that.
+const FIRST_OF_MANY: u32 = 64;
+
+/// The fewest samples of a pixel that can be shared out.
+const FEWEST: u32 = 16;
+
+/// The least share of a cell: what noise has not shown yet is looked for everywhere.
+const LEAST: f64 = 0.25;
+
+/// The largest share of a cell.
+const MOST: f64 = 64.0;
+
+/// Shares are powers of 2 to a whole number of these.
+const STEPS: f64 = 16.0;
+
+/// What a sample costs besides its vertices, in rays: its own ray, its random numbers, the film.
+const OVERHEAD: u32 = 2;
+
+/// Tells the pilot's numbers from the picture's.
+const STREAM: u64 = 0x6164_6170_7469_7665;
+
+/// Decides whether a picture of `samples` a pixel is sampled adaptively, and from how many samples it is told where; and
+/// what to say of it. `open` where an error or a time may end the render before.
+#[must_use]
+pub fn choose(wish: Use, open: bool, plan: &EffectPlan, samples: u32) -> (Option<u32>, Option<Effect>) {
+    if !matches!(plan.integrator, Integrator::Path(_)) {
+        return (None, None);
+    }
+    let say = |first: Option<u32>, reason: String| {
+        (first, Some(Effect { name: "adaptive sampling".into(), on: first.is_some(), reason }))
+    };
+    let off = |reason: &str| say(None, reason.to_owned());
+    let surface = |source: &Source| matches!(source, Source::Surface(_));
+    match wish {
+        Use::Off => return off("the scene says so"),
+        // It saves a tenth of the time in most scenes and costs some in others; forecasts do not know of it yet.
+        Use::Auto => return off("nobody asks for it"),
+        Use::On => {}
+    }
+    if plan.caustics.as_ref().is_some_and(|c| c.merging.is_some()) {
+        return off("photons are collected, and every sample needs its own");
+    }
+    if plan.layers.layers.iter().any(|layer| !surface(&layer.source)) {
+        return off("bands and layers of light are summed over all samples of a pixel");
+    }
+    if samples < FEWEST {
+        return off("there are fewer than 16 samples");
+    }
+    let quarter = 1 << (samples / 4).ilog2();
+    let first = if open { quarter.min(FIRST_OF_MANY) } else { quarter }.max(FIRST);
+    say(Some(first), format!("cells of {SIDE} x {SIDE} pixels, told by {first} samples"))
+}
+
+/// The cells of a window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Grid {
+    window: Window,
+    /// Column and row of the first cell in the frame.
+    first: [i32; 2],
+    columns: usize,
+    rows: usize,
+}
+
+impl Grid {
+    fn of(window: Window) -> Grid {
+        let side = i64::from(SIDE);
+        let span = |start: i32, size: u32| {
+            let first = i64::from(start).div_euclid(side);
+            let end = (i64::from(start) + i64::from(size)).div_euclid(side)
+                + i64::from((i64::from(start) + i64::from(size)).rem_euclid(side) != 0);
+            (first as i32, (end - first) as usize)
+        };
+        let ((x, columns), (y, rows)) = (span(window.x, window.width), span(window.y, window.height));
+        Grid { window, first: [x, y], columns, rows }
+    }
+
+    fn cells(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// The cell of a pixel of the window.
+    fn index(&self, [x, y]: [i32; 2]) -> usize {
+        let side = SIDE as i32;
+        let column = (x.div_euclid(side) - self.first[0]) as usize;
+        let row = (y.div_euclid(side) - self.first[1]) as usize;
+        row * self.columns + column
+    }
+
+    /// The first pixel of a cell, which may lie beyond the window.
+    fn corner(&self, cell: usize) -> [i32; 2] {
+        let side = SIDE as i32;
+        let (column, row) = (cell % self.columns, cell / self.columns);
+        [(self.first[0] + column as i32) * side, (self.first[1] + row as i32) * side]
+    }
+}
+
+/// The cells of `window`.
+#[must_use]
+pub fn cells(window: Window) -> usize {
+    Grid::of(window).cells()
+}
+
+/// How samples are shared out among the cells of a window.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Allocation {
+    grid: Grid,
+    /// Samples of all pixels alike.
+    first: u32,
+    /// Share of each half of each cell: its number of samples over the mean is 2 to this over [`STEPS`].
+    shares: Vec<[i16; HALVES]>,
+}
+
+impl Allocation {
+    /// The cells of `window`, where all pixels have `first` samples, with their shares as [`Allocation::shares`] gave them;
+    /// none if they are not those of the window.
+    #[must_use]
+    pub fn from(window: Window, first: u32, shares: Vec<[i16; HALVES]>) -> Option<Allocation> {
+        let grid = Grid::of(window);
+        (shares.len() == grid.cells()).then_some(Allocation { grid, first, shares })
+    }
+
+    /// The share of each half of each cell.
+    #[must_use]
+    pub fn shares(&self) -> &[[i16; HALVES]] {
+        &self.shares
+    }
+
+    /// Which samples of `replicate` of `pixel` belong to `samples` of the mean of all pixels, as numbers within the
+    /// replicate.
+    #[must_use]
+    pub fn turns(&self, pixel: [i32; 2], replicate: u32, samples: &Range<u32>) -> Range<u32> {
+        let share = self.shares[self.grid.index(pixel)][replicate as usize * HALVES / REPLICATES];
+        let of = |mean: u32| match mean.checked_sub(self.first) {
+            None | Some(0) => mean.saturating_sub(replicate).div_ceil(REPLICATES as u32),
+            Some(_) => count(self.first, share, mean) / REPLICATES as u32,
+        };
+        of(samples.start)..of(samples.end)
+    }
+}
+
+/// Samples of a pixel both of whose halves have `share`, at `mean` samples, more than `first`, of the mean of all pixels: `first`
+/// times a power of two, which is what the sampler spreads evenly, and never fewer at a higher mean.
+fn count(first: u32, share: i16, mean: u32) -> u32 {
+    let times = f64::from(mean) / f64::from(first);
+    let doublings = (libm::log2(times) + f64::from(share) / STEPS).round().max(0.0);
+    let most = SAMPLES_LIMIT * REPLICATES as u32;
+    let wanted = f64::from(first) * libm::exp2(doublings);
+    if wanted < f64::from(most) { wanted as u32 } else { 1 << most.ilog2() }
+}
+
+/// What all cells of a picture have in common, told by the pilot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scale {
+    /// Added to the square of a value: a hundredth of that of the mean.
+    floor: f64,
+    /// A share over what a cell wishes.
+    shares: f64,
+    /// Of a sample of each cell of the picture, over that of all.
+    costs: Vec<f64>,
+}
+
+/// Means of the replicates of a pixel, in red, green and blue; none where one has no samples.
+fn means(cells: &PixelCells, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
+    if cells.iter().any(|cell| cell.count == 0) {
+        return None;
+    }
+    Some(cells.each_ref().map(|cell| {
+        let xyz = cell.xyz.map(|sum| sum.value() / f64::from(cell.count));
+        rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
+    }))
+}
+
+/// Relative variance of the mean of one replicate in some pixels, as their half `half` shows it.
+fn variance(pixels: &[[[f64; 3]; REPLICATES]], half: usize, floor: f64) -> f64 {
+    let of = |means: &[[f64; 3]; REPLICATES]| -> f64 {
+        let (a, b) = (means[2 * half], means[2 * half + 1]);
+        let channel = |c: usize| {
+            let (difference, value) = (a[c] - b[c], 0.5 * (a[c] + b[c]));
+            if difference == 0.0 { 0.0 } else { 0.5 * difference * difference / (value * value + floor) }
+        };
+        (channel(0) + channel(1) + channel(2)) / 3.0
+    };
+    pixels.iter().map(of).sum::<f64>() / pixels.len().max(1) as f64
+}
+
+/// λ with which the mean of max(least, λs) over `deviations` s is one; 0 where there is no noise.
+fn scale(deviations: &[f64], least: f64) -> f64 {
+    let mean = |factor: f64| {
+        let share = |s: &f64| (factor * s).clamp(least, MOST);
+        deviations.iter().map(share).sum::<f64>() / deviations.len().max(1) as f64
+    };
+    let noisy = deviations.iter().copied().filter(|s| *s > 0.0);
+    let (low, high) = noisy.fold((f64::INFINITY, 0f64), |(low, high), s| (low.min(s), high.max(s)));
+    if high == 0.0 {
+        return 0.0;
+    }
+    // At the first all shares are the least, at the other the noisy ones the largest.
+    let (mut below, mut above) = (libm::log2(least / high), libm::log2(MOST / low));
+    for _ in 0..64 {
+        let middle = 0.5 * (below + above);
+        if mean(libm::exp2(middle)) < 1.0 {
+            below = middle;
+        } else {
+            above = middle;
+        }
+    }
+    libm::exp2(below)
+}
+
+/// What the pilot has seen of a cell.
+#[derive(Clone, Debug, Default)]
+struct Tried {
+    /// Means of the replicates of each pixel.
+    pixels: Vec<[[f64; 3]; REPLICATES]>,
+    /// Of a sample, in rays.
+    cost: f64,
+}
+
+/// One pixel of each quarter of each cell, with `first` samples; none if the render is to pause.
+#[must_use]
+pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
+    let seed = mix64(job.seed ^ STREAM);
+    let shot = Shot { scene: job.scene, plan: job.plan, filter: job.filter, seed, photons: None };
+    let unit = light_unit(job.scene);
+    let grid = Grid::of(job.window);
+    let half = SIDE / 2;
+    let each = first / REPLICATES as u32;
+    let of_cell = |cell: usize| -> Option<Tried> {
+        if pause.wanted() {
+            return None;
+        }
+        let [x, y] = grid.corner(cell);
+        let mut tried = Tried::default();
+        let mut rays = 0;
+        for quarter in 0..4u32 {
+            // Which pixel of a quarter is a matter of chance, lest a pattern of the picture agree with it.
+            let draw = mix64(seed ^ mix64((cell as u64) << 2 | u64::from(quarter)));
+            let (dx, dy) = (draw as u32 % half, (draw >> 32) as u32 % half);
+            let place = [x + (quarter % 2 * half + dx) as i32, y + (quarter / 2 * half + dy) as i32];
+            if job.window.index(place).is_none() {
+                continue;
+            }
+            let mut means = [[0.0; 3]; REPLICATES];
+            for (replicate, mean) in means.iter_mut().enumerate() {
+                for index in 0..each {
+                    let (sample, events) =
+                        transport::sample_with_events(&shot, place.map(|x| x as u32), replicate as u32, index);
+                    rays += u64::from(OVERHEAD + 2 * events);
+                    if Invalid::of(sample.radiance).is_none() {
+                        let rgb = ColourSpace::Rec709.from_xyz(sample.xyz.map(|x| x * unit * sample.weight));
+                        for (sum, x) in mean.iter_mut().zip(rgb) {
+                            *sum += f64::from(x) / f64::from(each);
+                        }
+                    }
+                }
+            }
+            tried.pixels.push(means);
+        }
+        tried.cost = rays as f64 / (tried.pixels.len() as f64 * f64::from(first)).max(1.0);
+        Some(tried)
+    };
+    let tried: Option<Vec<Tried>> = (0..grid.cells()).into_par_iter().map(of_cell).collect();
+    let tried = tried?;
+    let values = || tried.iter().flat_map(|tried| &tried.pixels).flatten().flatten();
+    let mean = values().sum::<f64>() / values().count().max(1) as f64;
+    let floor = 0.01 * mean * mean;
+    let all: f64 = tried.iter().map(|tried| tried.cost).sum();
+    let cost = all / tried.iter().filter(|tried| !tried.pixels.is_empty()).count().max(1) as f64;
+    // Slivers that the pilot has missed cost as much as others.
+    let costs = tried.iter().map(|tried| if tried.pixels.is_empty() { 1.0 } else { tried.cost / cost }).collect();
+    // With its neighbours a cell has about as many pixels here as it has by itself in the picture: a few would miss the
+    // rare and bright, and all cells would be promised too much.
+    let wish = |cell: usize| {
+        let (row, column) = (cell / grid.columns, cell % grid.columns);
+        let near = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
+        let around = near(row, grid.rows).flat_map(|r| near(column, grid.columns).map(move |c| r * grid.columns + c));
+        let pixels: Vec<_> = around.flat_map(|cell| &tried[cell].pixels).copied().collect();
+        let variance = 0.5 * (variance(&pixels, 0, floor) + variance(&pixels, 1, floor));
+        wish(variance, tried[cell].cost / cost)
+    };
+    let wishes: Vec<f64> = (0..grid.cells()).filter(|cell| !tried[*cell].pixels.is_empty()).map(wish).collect();
+    let least = LEAST.max(f64::from(first) / f64::from(job.samples));
+    Some(Scale { floor, shares: scale(&wishes, least), costs })
+}
+
+/// Share of a cell up to a factor that all have in common.
+fn wish(variance: f64, cost: f64) -> f64 {
+    (variance / cost).sqrt()
+}
+
+/// Shares out the samples of the picture among the cells of `film`, the rows of a part, whose pixels have `first` samples each.
+#[must_use]
+pub fn decide(job: &FrameJob, first: u32, film: &Film, scale: &Scale) -> Allocation {
+    let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
+    let window = film.window();
+    let grid = Grid::of(window);
+    // A part has all columns, and some rows.
+    let offset = (grid.first[1] - Grid::of(job.window).first[1]) as usize * grid.columns;
+    let of_cell = |cell: usize| -> [i16; HALVES] {
+        let [x, y] = grid.corner(cell);
+        let cost = scale.costs[offset + cell];
+        let mut pixels = Vec::with_capacity((SIDE * SIDE) as usize);
+        for dy in 0..SIDE as i32 {
+            for dx in 0..SIDE as i32 {
+                if let Some(index) = window.index([x + dx, y + dy]) {
+                    pixels.extend(means(&film.cells()[index], &rgb_from_xyz));
+                }
+            }
+        }
+        [1, 0].map(|other| {
+            let share = (scale.shares * wish(variance(&pixels, other, scale.floor), cost)).clamp(LEAST, MOST);
+            (libm::log2(share) * STEPS).round() as i16
+        })
+    };
+    let shares = (0..grid.cells()).into_par_iter().map(of_cell).collect();
+    Allocation { grid, first, shares }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A crop whose corner lies left of the frame: every pixel in one cell, whose corner is at a multiple of eight.
+    #[test]
+    fn cells_are_those_of_the_frame() {
+        let window = Window { x: -5, y: 13, width: 22, height: 4 };
+        let grid = Grid::of(window);
+        assert_eq!((grid.columns, grid.rows, cells(window)), (4, 2, 8));
+        let mut pixels = vec![0; grid.cells()];
+        for y in 13..17 {
+            for x in -5..17 {
+                let cell = grid.index([x, y]);
+                let [left, top] = grid.corner(cell);
+                assert!((left..left + 8).contains(&x) && (top..top + 8).contains(&y) && left % 8 == 0 && top % 8 == 0);
+                pixels[cell] += 1;
+            }
+        }
+        assert_eq!(pixels, [15, 24, 24, 3, 5, 8, 8, 1]);
+    }
+
+    /// However the mean is cut into ranges, each sample comes once, in order, and the first ones are those of a uniform render.
+    #[test]
+    fn samples_come_once_in_whole_powers_of_two() {
+        let window = Window::full(8, 8);
+        for share in [-32, -7, 0, 5, 40, 96] {
+            let allocation = Allocation::from(window, 16, vec![[share, 0]]).unwrap();
+            for replicate in 0..4 {
+                let mut at = 0;
+                for mean in 0..300 {
+                    let turns = allocation.turns([3, 4], replicate, &(mean..mean + 1));
+                    assert_eq!(turns.start, at);
+                    assert!(turns.end >= at);
+                    if mean < 16 {
+                        assert_eq!(turns.len() == 1, mean % 4 == replicate);
+                    } else {
+                        assert!(turns.end.is_power_of_two());
+                    }
+                    at = turns.end;
+                }
+            }
+        }
+        // Half a share of 64 is 32 samples, of 100 the nearer of 32 and 64 by ratio; a fourth of 64 the first 16.
+        assert_eq!([(-16, 64), (-16, 100), (-32, 64), (16, 64)].map(|(s, n)| count(16, s, n)), [32, 64, 16, 128]);
+        assert_eq!(count(16, 96, u32::MAX), 1 << 27);
+        assert!(Allocation::from(window, 16, Vec::new()).is_none());
+    }
+
+    /// Two cells, one without noise and one with: the quiet one has the least share and the other what is left. All alike:
+    /// one each, whatever the unit of noise. None noisy: nothing to share out.
+    #[test]
+    fn the_mean_share_is_one() {
+        assert!((scale(&[0.0, 3.0], LEAST) * 3.0 - 1.75).abs() < 1e-9);
+        assert!((scale(&[1e-20; 5], LEAST) * 1e-20 - 1.0).abs() < 1e-9);
+        assert_eq!((scale(&[0.0; 4], LEAST), scale(&[], LEAST)), (0.0, 0.0));
+    }
+
+    /// Replicates 1 and 3 of half 0, values of 2 in the mean: variance of one 2; of half 1 none.
+    #[test]
+    fn a_half_shows_its_own_variance() {
+        let pixel = [[1.0; 3], [3.0; 3], [5.0; 3], [5.0; 3]];
+        assert_eq!(variance(&[pixel, pixel], 0, 0.0), 0.5);
+        assert_eq!(variance(&[pixel, pixel], 1, 0.0), 0.0);
+        assert_eq!(variance(&[[[0.0; 3]; REPLICATES]], 0, 0.0), 0.0);
+        assert_eq!(variance(&[], 0, 1.0), 0.0);
+    }
+}

@@ -1,0 +1,231 @@
+//! Samples go where the noise is, and nothing else changes: the same bits however the work is cut, and the same mean.
+
+mod common;
+
+use abbe::batch::checkpoint::Keep;
+use abbe::batch::frame::Progress;
+use abbe::batch::report::{SceneReport, Status};
+use abbe::batch::{self, Overrides, Portion, Watcher, merge};
+use abbe::film::accumulate::Film;
+use abbe::film::exr::read_exr;
+use abbe::math::statistics::Moments;
+use abbe::spectrum::ColourSpace;
+use common::{Bench, bench_with};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use tempfile::TempDir;
+
+/// A picture of 44 × 30 pixels, which cells do not divide: a bright floor, a ball of glass, light from the lights.
+fn scene(render: &str) -> String {
+    format!(
+        "camera: {{origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}}\n\
+         image: {{width: 44, height: 30}}\n\
+         output: {{exr: {{precision: float, stderr: true}}}}\n\
+         layers:\n- {{name: n, surface: shading_normal}}\n\
+         render: {{samples: 64, techniques: {{adaptive: on, merging: off, light_tracing: on}}, {render}}}\n\
+         shapes:\n\
+         - plane: {{normal: [0, 1, 0]}}\n\
+         - sphere: {{center: [0, 1, 0], radius: 1, material: {{dielectric: {{ior: {{glass: N-SF11}}}}}}}}\n\
+         - sphere: {{center: [1, 3, 1], radius: 0.2, emission: 20}}\n"
+    )
+}
+
+/// The bits of all sums of a film.
+fn sums(film: &Film) -> Vec<([i128; 3], i64, u32, u32)> {
+    let cells = film.cells().iter().flatten();
+    cells.map(|c| (c.xyz.each_ref().map(|s| s.0), c.alpha, c.count, c.dropped)).collect()
+}
+
+fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+}
+
+#[test]
+fn threads_tiles_and_all_effects_do_not_change_a_bit() {
+    let film = |threads, render: &str| on_threads(threads, || bench_with(&scene(render), &[]).film());
+    let reference = film(1, "tile: 32");
+    let counts: Vec<u32> = reference.cells().iter().map(|c| c.iter().map(|c| c.count + c.dropped).sum()).collect();
+    let (least, most) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
+    assert!(*least == 16 && *most >= 128, "{least} to {most} samples");
+    assert!(reference.cells().iter().any(|c| c[0].count != c[3].count), "halves differ somewhere");
+    for (threads, render) in [(2, "tile: 8"), (1, "tile: 5"), (2, "tile: 1"), (2, "effects: all")] {
+        assert!(sums(&film(threads, render)) == sums(&reference), "{threads} threads, {render}");
+    }
+}
+
+struct Place {
+    directory: TempDir,
+}
+
+impl Place {
+    fn with(scene: &str) -> Place {
+        let place = Place { directory: tempfile::tempdir().unwrap() };
+        std::fs::write(place.path("scene.yaml"), scene).unwrap();
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+
+    fn render(&self, out: &str, portion: Portion, keep: Keep, watcher: &dyn Watcher, stop: &AtomicBool) -> SceneReport {
+        let overrides = Overrides { output: Some(self.path(out)), portion, keep, ..Overrides::default() };
+        let mut report = batch::render_batch(&self.path("scene.yaml"), &overrides, watcher, stop).unwrap();
+        report.scenes.swap_remove(0)
+    }
+
+    fn whole(&self) -> PathBuf {
+        let report = self.render("whole.exr", Portion::default(), Keep::default(), &(), &AtomicBool::new(false));
+        assert!(matches!(report.status, Status::Done), "{:?}", report.status);
+        let counts = report.adaptive.unwrap();
+        assert!(counts.least == 16 && counts.most > 64 && (40.0..100.0).contains(&counts.mean), "{counts:?}");
+        let file = read_exr(&self.path("whole.exr")).unwrap();
+        let written = file.parts[0].text("abbe/adaptiveSamples").unwrap();
+        assert!(written.starts_with("least 16, mean "), "{written}");
+        self.path("whole.exr")
+    }
+}
+
+/// Bits of all channels.
+fn pixels(path: &Path) -> Vec<(String, Vec<u32>)> {
+    let part = read_exr(path).unwrap().parts.swap_remove(0);
+    part.channels.into_iter().map(|(name, v)| (name, v.into_iter().map(f32::to_bits).collect())).collect()
+}
+
+#[test]
+fn parts_by_rows_of_cells_are_the_picture_bit_for_bit() {
+    let place = Place::with(&scene("seed: 3"));
+    let whole = place.whole();
+    let tile = |i, n| Portion { tile: Some([i, n]), samples: None };
+    let go = AtomicBool::new(false);
+    for n in [1, 3, 4] {
+        let parts: Vec<PathBuf> = (0..n)
+            .map(|i| {
+                let name = format!("{i}of{n}.exr");
+                let report = place.render(&name, tile(i, n), Keep::default(), &(), &go);
+                assert!(matches!(report.status, Status::Done), "{:?}", report.status);
+                place.path(&name)
+            })
+            .collect();
+        let merged = place.path(&format!("merged{n}.exr"));
+        merge::merge(&parts, &merged).unwrap().1.unwrap();
+        assert!(pixels(&merged) == pixels(&whole), "{n} parts");
+    }
+    let refused = |portion| match place.render("x.exr", portion, Keep::default(), &(), &go).status {
+        Status::Failed { exit_code: 2, message } => message,
+        other => panic!("{other:?}"),
+    };
+    let message = refused(tile(0, 5));
+    assert!(message.contains("n at most 4, the rows of cells of adaptive sampling"), "{message}");
+    let message = refused(Portion { tile: None, samples: Some([0, 31]) });
+    assert!(message.contains("--samples 0-31: expected --tile i/n or render.techniques.adaptive: off"), "{message}");
+}
+
+/// Stops the render after so many units of work.
+struct StopAfter<'a>(AtomicU64, &'a AtomicBool);
+
+impl Watcher for StopAfter<'_> {
+    fn scene_begins(&self, _: usize, _: usize, _: &str) {}
+    fn progress(&self, _: Progress) {
+        if self.0.fetch_sub(1, Ordering::Relaxed) == 1 {
+            self.1.store(true, Ordering::Relaxed);
+        }
+    }
+    fn scene_ends(&self, _: &SceneReport) {}
+}
+
+/// Stopped after every 37 units, which is before the samples are shared out, at once after, and in the midst.
+#[test]
+fn stopped_anywhere_and_resumed_the_pixels_are_those_of_one_go() {
+    let place = Place::with(&scene("tile: 8"));
+    let whole = place.whole();
+    let keep = || Keep { on_stop: true, resume: true, ..Keep::default() };
+    for units in [37, 48] {
+        let out = format!("{units}.exr");
+        let stops = (0..1000).position(|_| {
+            let stop = AtomicBool::new(false);
+            let report =
+                place.render(&out, Portion::default(), keep(), &StopAfter(AtomicU64::new(units), &stop), &stop);
+            matches!(report.status, Status::Done)
+        });
+        assert!(stops.unwrap() >= 4, "stopped {stops:?} times");
+        assert!(pixels(&place.path(&out)) == pixels(&whole), "stopped after every {units} units");
+    }
+}
+
+/// Where it cannot be, it is off and says why.
+#[test]
+fn adaptive_sampling_is_off_where_it_would_not_be_exact() {
+    let said = |change: &[(&str, &str)]| {
+        let mut text = scene("seed: 1");
+        for (from, to) in change {
+            assert!(text.contains(from), "{from}");
+            text = text.replace(from, to);
+        }
+        let bench = bench_with(&text, &[]);
+        let plan = &bench.prepared.plan;
+        let said = plan.techniques.iter().find(|t| t.name == "adaptive sampling");
+        assert_eq!(plan.adaptive.is_some(), said.is_some_and(|t| t.on));
+        said.map_or(String::new(), |t| t.reason.clone())
+    };
+    assert_eq!(said(&[]), "cells of 8 x 8 pixels, told by 16 samples");
+    assert!(said(&[("adaptive: on", "adaptive: off")]).contains("the scene says so"));
+    assert!(said(&[("adaptive: on", "adaptive: auto")]).contains("nobody asks"));
+    assert!(said(&[("seed: 1", "stop: {error: 0.1}")]).contains("told by 64"));
+    assert!(said(&[("merging: off", "merging: on")]).contains("photons are collected"));
+    assert!(said(&[("samples: 64", "samples: 15")]).contains("fewer than 16 samples"));
+    assert!(said(&[("surface: shading_normal", "light: depth")]).contains("layers of light"));
+    assert_eq!(said(&[("shapes:", "integrator: whitted\nshapes:")]), "");
+    let no_layers = ("layers:\n- {name: n, surface: shading_normal}\n", "");
+    assert_eq!(said(&[no_layers, ("shapes:", "integrator: light_tracer\nshapes:")]), "");
+}
+
+/// A floor lit by a lamp that is met by chance alone: in a pixel one path in some hundred brings nearly all of the light.
+/// The mean of many adaptive renders is that of uniform ones within four standard errors, over all pixels; the squares
+/// of the deviations of single pixels over theirs have the mean one: means of heavy tails are nearly normal after so many
+/// renders, so that the mean over 256 pixels scatters by √(2/256), and four times that is 0.35.
+///
+/// With each half's number told by what it shows itself the test fails: z −4.4 and 1.41, and −9.1 and 1.67 for 1000 renders of
+/// 16 samples, where halves told by each other have 0.7 and 0.97.
+#[test]
+fn the_mean_of_adaptive_renders_is_that_of_uniform_ones() {
+    let renders: u64 = if std::env::var_os("ABBE_NIGHTLY").is_some() { 1000 } else { 400 };
+    let text = |adaptive: &str| {
+        format!(
+            "camera: {{origin: [0, 3, 4], target: [0, 0, 0], fov_deg: 40}}\n\
+             image: {{width: 16, height: 16}}\n\
+             integrator: {{path: {{max_depth: 2, light_samples: 0}}}}\n\
+             render: {{samples: 32, techniques: {{adaptive: {adaptive}}}}}\n\
+             shapes:\n\
+             - plane: {{normal: [0, 1, 0]}}\n\
+             - sphere: {{center: [0.5, 2, 0], radius: 0.3, emission: 20}}\n"
+        )
+    };
+    let values = |bench: &mut Bench, seed: u64| -> Vec<f64> {
+        bench.prepared.description.render.seed = seed;
+        let image = bench.frame().resolve(&ColourSpace::Rec709.matrix_from_xyz());
+        image.rgb[1].iter().map(|x| f64::from(*x)).collect()
+    };
+    let of = |adaptive: &str, first: u64, renders: u64| -> (Vec<Moments>, Moments) {
+        let mut bench = bench_with(&text(adaptive), &[]);
+        assert_eq!(bench.prepared.plan.adaptive.is_some(), adaptive == "on");
+        let (mut pixels, mut all) = (vec![Moments::default(); 256], Moments::default());
+        for seed in first..first + renders {
+            let values = values(&mut bench, seed);
+            all.push(values.iter().sum::<f64>() / 256.0);
+            pixels.iter_mut().zip(values).for_each(|(moments, x)| moments.push(x));
+        }
+        (pixels, all)
+    };
+    let (uniform, uniform_mean) = of("off", 1 << 32, 2 * renders);
+    let (adaptive, adaptive_mean) = of("on", 0, renders);
+    let z = |a: &Moments, b: &Moments| (a.mean - b.mean) / a.standard_error().hypot(b.standard_error());
+    let global = z(&adaptive_mean, &uniform_mean);
+    let squares: f64 = adaptive.iter().zip(&uniform).map(|(a, b)| z(a, b).powi(2)).sum::<f64>() / 256.0;
+    assert!(
+        global.abs() < 4.0 && (squares - 1.0).abs() < 0.35,
+        "z {global:.2}, squares {squares:.3}; means {} and {}",
+        adaptive_mean.mean,
+        uniform_mean.mean
+    );
+}
