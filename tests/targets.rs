@@ -135,3 +135,18 @@ fn a_memory_limit_ends_the_process_with_a_code_of_its_own() {
     assert!(!place.path().join("large.exr").exists());
     assert_eq!(abbe(place.path(), "render scene.yaml -q -o small.exr --memory-limit 4G").0, 0);
 }
+
+/// Samples that are shared out by noise leave a picture that knows its error, and may end at one.
+#[test]
+fn adaptive_sampling_knows_its_error() {
+    let place = directory();
+    let run = |arguments: &str| {
+        let adaptive = "render scene.yaml -o . --set render.techniques.adaptive=on";
+        let (code, said) = abbe(place.path(), &format!("{adaptive} {arguments}"));
+        assert_eq!(code, 0, "{said}");
+        json(&place.path().join("report.json"))["scenes"][0]["error"]["rel_rmse"].as_f64().unwrap()
+    };
+    let error = run("--spp 64");
+    assert!((0.001..0.1).contains(&error), "{error}");
+    assert!(run("--error 2%") <= 0.02);
+}

@@ -340,7 +340,7 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
     let (done, total) = part.progress();
     let done = AtomicU64::new(done);
     let job = part.job();
-    let whole = *part.share() == Share::all(job.samples);
+    let whole = part.share().tiles == 1 && part.share().samples == (0..job.samples);
     let random = !matches!(job.plan.integrator, Integrator::Whitted(_));
 
     let Range { start: first, end: most } = part.share().samples;
