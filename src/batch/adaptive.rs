@@ -21,7 +21,8 @@
 use super::frame::{FrameJob, light_unit};
 use super::part::Breaks;
 use crate::film::Window;
-use crate::film::accumulate::{Film, Invalid, PixelCells, REPLICATES, SAMPLES_LIMIT};
+use crate::film::accumulate::{Film, Invalid, REPLICATES, SAMPLES_LIMIT};
+use crate::film::resolve::{counts, replicate_means};
 use crate::math::sampler::mix64;
 use crate::spectrum::ColourSpace;
 use crate::transport::layers::Source;
@@ -201,17 +202,6 @@ pub struct Scale {
     costs: Vec<f64>,
 }
 
-/// Means of the replicates of a pixel, in red, green and blue; none where one has no samples.
-fn means(cells: &PixelCells, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
-    if cells.iter().any(|cell| cell.count == 0) {
-        return None;
-    }
-    Some(cells.each_ref().map(|cell| {
-        let xyz = cell.xyz.map(|sum| sum.value() / f64::from(cell.count));
-        rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
-    }))
-}
-
 /// Relative variance of the mean of one replicate in some pixels, as their half `half` shows it.
 fn variance(pixels: &[[[f64; 3]; REPLICATES]], half: usize, floor: f64) -> f64 {
     let of = |means: &[[f64; 3]; REPLICATES]| -> f64 {
@@ -345,7 +335,8 @@ pub fn decide(job: &FrameJob, first: u32, film: &Film, scale: &Scale) -> Allocat
         for dy in 0..SIDE as i32 {
             for dx in 0..SIDE as i32 {
                 if let Some(index) = window.index([x + dx, y + dy]) {
-                    pixels.extend(means(&film.cells()[index], &rgb_from_xyz));
+                    let cells = &film.cells()[index];
+                    pixels.extend(replicate_means(cells, counts(cells), &rgb_from_xyz));
                 }
             }
         }

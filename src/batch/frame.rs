@@ -120,29 +120,25 @@ impl Frame {
         if let Some((_, image)) = self.resolved.as_ref().filter(|(space, _)| space == rgb_from_xyz) {
             return image.clone();
         }
-        let splats = self.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
-        resolve::resolve(&self.film, splats, rgb_from_xyz)
+        resolve::resolve(&self.film, self.splats(), rgb_from_xyz)
     }
 
     /// The mean over all pixels of each replicate in the colour space of `rgb_from_xyz`.
     #[must_use]
     pub fn replicate_means(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> [[f64; 3]; REPLICATES] {
-        let unit = 2f64.powi(self.film.exponent());
-        let pixels = self.film.window().pixels() as f64;
-        std::array::from_fn(|r| {
-            let mut xyz = [0.0; 3];
-            for cells in self.film.cells().iter().filter(|cells| cells[r].count > 0) {
-                let share = unit / (pixels * f64::from(cells[r].count));
-                (0..3).for_each(|c| xyz[c] += cells[r].xyz[c].value() * share);
+        let (pixels, splats) = (self.film.window().pixels(), self.splats());
+        let mut means = [[0.0; 3]; REPLICATES];
+        for index in 0..pixels {
+            let light = resolve::replicate_light(&self.film, splats.as_ref(), index, rgb_from_xyz);
+            for (mean, light) in means.iter_mut().flatten().zip(light.iter().flatten().flatten()) {
+                *mean += light / pixels as f64;
             }
-            if let Some(splats) = self.splats.as_ref().filter(|s| s.paths[r] > 0) {
-                let share = unit / (pixels * splats.paths[r] as f64);
-                for cells in splats.film.cells() {
-                    (0..3).for_each(|c| xyz[c] += cells[r].xyz[c].value() * share);
-                }
-            }
-            rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
-        })
+        }
+        means
+    }
+
+    fn splats(&self) -> Option<Splats<'_>> {
+        self.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths })
     }
 
     /// The further channel `channel`; bands come first.

@@ -33,8 +33,8 @@
 //! three ways to pair four, is that of different pixels. The next order of the size, about four times the square of
 //! what the second takes off, is allowed for.
 
-use super::accumulate::{Film, PixelCells, REPLICATES};
-use super::resolve::{Image, Splats};
+use super::accumulate::{Film, REPLICATES};
+use super::resolve::{Image, Splats, replicate_light};
 use crate::math::statistics::student_t_half_width;
 use rayon::prelude::*;
 use std::fmt;
@@ -137,18 +137,6 @@ pub fn relative_error(
     let mean = values.clone().map(|&v| f64::from(v)).sum::<f64>() / (3 * pixels).max(1) as f64;
     let black = image.rgb.iter().flatten().all(|&v| v == 0.0);
     let floor = 0.01 * mean * mean;
-    let unit = 2f64.powi(film.exponent());
-    let of_pixel = |index: usize| -> Option<[[f64; 3]; REPLICATES]> {
-        let cells = &film.cells()[index];
-        let mut means = replicate_means(cells, cells.map(|cell| u64::from(cell.count)), rgb_from_xyz)?;
-        if let Some(splats) = &splats {
-            let light = replicate_means(&splats.film.cells()[index], splats.photons, rgb_from_xyz)?;
-            for (mean, light) in means.iter_mut().flatten().zip(light.iter().flatten()) {
-                *mean += light;
-            }
-        }
-        Some(means.map(|mean| mean.map(|x| x * unit)))
-    };
     let side = ((pixels as f64 / BLOCKS as f64).sqrt() as u32).max(1);
     let rows = window.height.div_ceil(side);
     let columns = window.width.div_ceil(side);
@@ -160,7 +148,7 @@ pub fn relative_error(
             for y in row..(row + side).min(window.height) {
                 for x in column..(column + side).min(window.width) {
                     let index = y as usize * window.width as usize + x as usize;
-                    if let Some(replicates) = of_pixel(index) {
+                    if let Some(replicates) = replicate_light(film, splats.as_ref(), index, rgb_from_xyz) {
                         sums.add(&replicates, image.rgb.each_ref().map(|plane| f64::from(plane[index])), floor);
                     }
                 }
@@ -203,21 +191,6 @@ pub fn relative_error(
         valid: all.error == 0.0
             || (effective >= EFFECTIVE_PIXELS && all.heavy <= HEAVY_SHARE * all.error && share.abs() <= FURTHER_SHARE),
     })
-}
-
-/// The mean of each replicate; `None` where one has none.
-fn replicate_means(
-    cells: &PixelCells,
-    divisors: [u64; REPLICATES],
-    rgb_from_xyz: &[[f64; 3]; 3],
-) -> Option<[[f64; 3]; REPLICATES]> {
-    if divisors.contains(&0) {
-        return None;
-    }
-    Some(std::array::from_fn(|r| {
-        let xyz = cells[r].xyz.map(|sum| sum.value() / divisors[r] as f64);
-        rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
-    }))
 }
 
 impl Sums {

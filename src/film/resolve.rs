@@ -15,8 +15,9 @@
 //! then the mean of the means of the two halves, its variance Σᵣ (mᵣ − m)² / (R(R − 1)): unbiased whatever the counts.
 
 use crate::film::Window;
-use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES};
+use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES, Sum};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Light that was splatted from photons: sums that are divided by the photons emitted, not by the
 /// samples that arrived.
@@ -59,7 +60,7 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
         .with_min_len(1024)
         .map(|index| {
             let cells = &film.cells()[index];
-            let counts = cells.map(|cell| u64::from(cell.count));
+            let counts = counts(cells);
             let halves = in_halves(cells);
             let mut pixel = match halves {
                 true => mean_of_halves(cells, counts, rgb_from_xyz),
@@ -127,25 +128,14 @@ fn in_halves(cells: &PixelCells) -> bool {
 /// As [`mean_of`], where the halves weigh alike: how far one went on was for the other to say, so that it is no measure
 /// of how much it should count.
 fn mean_of_halves(cells: &PixelCells, counts: [u64; REPLICATES], rgb_from_xyz: &[[f64; 3]; 3]) -> PixelMean {
-    if counts.contains(&0) {
+    let Some(means) = replicate_means(cells, counts, rgb_from_xyz) else {
         return mean_of(cells, counts, rgb_from_xyz);
-    }
-    let to_rgb = |xyz: [f64; 3]| rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2]);
-    let half = |start: usize| {
-        let samples: u64 = counts[start..start + HALF].iter().sum();
-        let mut sums = [crate::film::accumulate::Sum::default(); 3];
-        for cell in &cells[start..start + HALF] {
-            for (sum, &part) in sums.iter_mut().zip(&cell.xyz) {
-                *sum += part;
-            }
-        }
-        to_rgb(sums.map(|sum| sum.value() / samples as f64))
     };
-    let (a, b) = (half(0), half(HALF));
+    let half = |of: Range<usize>| colours(&cells[of.clone()], counts[of].iter().sum(), rgb_from_xyz);
+    let (a, b) = (half(0..HALF), half(HALF..REPLICATES));
     let rgb = [0, 1, 2].map(|c| 0.5 * (a[c] + b[c]));
     let mut variance = [0.0; 3];
-    for (cell, n) in cells.iter().zip(counts) {
-        let own = to_rgb(cell.xyz.map(|sum| sum.value() / n as f64));
+    for own in means {
         for c in 0..3 {
             variance[c] += (own[c] - rgb[c]) * (own[c] - rgb[c]) / (REPLICATES * (REPLICATES - 1)) as f64;
         }
@@ -160,19 +150,11 @@ fn mean_of(cells: &PixelCells, divisors: [u64; REPLICATES], rgb_from_xyz: &[[f64
     if total == 0 {
         return PixelMean { rgb: [0.0; 3], variance: [f64::NAN; 3] };
     }
-    let to_rgb = |xyz: [f64; 3]| rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2]);
-    // The sum over replicates is exact; it is rounded once.
-    let mut sums = [crate::film::accumulate::Sum::default(); 3];
-    for cell in cells {
-        for (sum, &part) in sums.iter_mut().zip(&cell.xyz) {
-            *sum += part;
-        }
-    }
-    let rgb = to_rgb(sums.map(|sum| sum.value() / total as f64));
+    let rgb = colours(cells, total, rgb_from_xyz);
     let mut variance = [0.0; 3];
     for (cell, &n) in cells.iter().zip(&divisors) {
         if n > 0 {
-            let own = to_rgb(cell.xyz.map(|sum| sum.value() / n as f64));
+            let own = colours(std::slice::from_ref(cell), n, rgb_from_xyz);
             for c in 0..3 {
                 variance[c] += n as f64 * (own[c] - rgb[c]) * (own[c] - rgb[c]);
             }
@@ -181,6 +163,55 @@ fn mean_of(cells: &PixelCells, divisors: [u64; REPLICATES], rgb_from_xyz: &[[f64
     let variance = variance
         .map(|squares| if replicates < 2 { f64::NAN } else { squares / ((replicates - 1) as f64 * total as f64) });
     PixelMean { rgb, variance }
+}
+
+/// The sum of `cells`, which is exact and rounded once, over `divisor`.
+fn colours(cells: &[Cell], divisor: u64, rgb_from_xyz: &[[f64; 3]; 3]) -> [f64; 3] {
+    let mut sums = [Sum::default(); 3];
+    for cell in cells {
+        for (sum, &part) in sums.iter_mut().zip(&cell.xyz) {
+            *sum += part;
+        }
+    }
+    let xyz = sums.map(|sum| sum.value() / divisor as f64);
+    rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
+}
+
+/// Samples of each replicate of a pixel.
+#[must_use]
+pub fn counts(cells: &PixelCells) -> [u64; REPLICATES] {
+    cells.each_ref().map(|cell| u64::from(cell.count))
+}
+
+/// The mean of each replicate of a pixel, its sums over `divisors`, in the units of the film; `None` where one has none.
+#[must_use]
+pub fn replicate_means(
+    cells: &PixelCells,
+    divisors: [u64; REPLICATES],
+    rgb_from_xyz: &[[f64; 3]; 3],
+) -> Option<[[f64; 3]; REPLICATES]> {
+    let mean = |r: usize| colours(&cells[r..=r], divisors[r], rgb_from_xyz);
+    (!divisors.contains(&0)).then(|| std::array::from_fn(mean))
+}
+
+/// The light of each replicate of a pixel of `film` and `splats`, in the scene's units; `None` where one has none.
+#[must_use]
+pub fn replicate_light(
+    film: &Film,
+    splats: Option<&Splats>,
+    index: usize,
+    rgb_from_xyz: &[[f64; 3]; 3],
+) -> Option<[[f64; 3]; REPLICATES]> {
+    let cells = &film.cells()[index];
+    let mut means = replicate_means(cells, counts(cells), rgb_from_xyz)?;
+    if let Some(splats) = splats {
+        let light = replicate_means(&splats.film.cells()[index], splats.photons, rgb_from_xyz)?;
+        for (mean, light) in means.iter_mut().flatten().zip(light.iter().flatten()) {
+            *mean += light;
+        }
+    }
+    let unit = 2f64.powi(film.exponent());
+    Some(means.map(|mean| mean.map(|x| x * unit)))
 }
 
 #[cfg(test)]
