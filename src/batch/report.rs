@@ -168,8 +168,7 @@ impl Report {
         if !output::directory_of(file).is_dir() {
             return;
         }
-        let json = serde_json::to_vec_pretty(self).map_err(|e| Error::output(file, e));
-        match json.and_then(|json| output::write_atomically(file, &json)) {
+        match output::write_json(file, self) {
             Ok(()) => self.file = Some(file.to_path_buf()),
             // The pictures are there; a report that cannot be written is a failure of its own.
             Err(e) => self.unwritten = Some(e),

@@ -1,13 +1,13 @@
 //! `abbe accuracy`.
 
-use super::AccuracyArguments;
 use super::interrupts::Interrupts;
-use super::render::threads;
+use super::text::columns;
+use super::{AccuracyArguments, use_threads};
 use crate::batch;
 use crate::batch::accuracy::{self, Settings, Sheet};
 use crate::batch::accuracy_page::{HEADINGS, cells, page};
-use crate::error::{Error, Result};
-use crate::film::output::{prepare_place, write_atomically};
+use crate::error::Result;
+use crate::film::output::{prepare_place, write_atomically, write_json};
 use std::fmt::Write;
 
 /// Samples of a pixel of a small copy, at most: what a scene asks for beyond takes long and says the same.
@@ -15,7 +15,7 @@ const MOST_SAMPLES: u32 = 256;
 
 /// Makes the sheets, prints them and writes the page.
 pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
-    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads(arguments.threads)).build_global();
+    use_threads(arguments.threads);
     let interrupts = Interrupts::listen()?;
     let overrides = arguments.scene.overrides(None);
     let files = ["html", "json", "csv"].map(|ending| arguments.output.join(format!("accuracy.{ending}")));
@@ -58,9 +58,8 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
     }
     let title = arguments.scene.file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let command = std::env::args().skip(1).fold("abbe".to_owned(), |all, word| all + " " + &word);
-    let json = serde_json::to_vec_pretty(&sheets).map_err(|e| Error::output(&files[1], e))?;
     write_atomically(&files[0], page(&title, &command, &sheets, &without).as_bytes())?;
-    write_atomically(&files[1], &json)?;
+    write_json(&files[1], &sheets)?;
     write_atomically(&files[2], csv(&sheets).as_bytes())?;
     if !arguments.quiet {
         super::say(&format!("{}, accuracy.json and accuracy.csv are written\n", files[0].display()));
@@ -71,17 +70,9 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
 fn text(sheet: &Sheet) -> String {
     let mut rows = vec![HEADINGS.map(String::from)];
     rows.extend(sheet.rows.iter().map(cells));
-    let widths: [usize; 10] = std::array::from_fn(|c| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0));
     let [width, height] = sheet.size;
     let mut out = format!("{}, {width} x {height}, target {:.2} %\n", sheet.scene, 100.0 * sheet.target);
-    for row in &rows {
-        let mut line = String::new();
-        for (c, cell) in row.iter().enumerate() {
-            let pad = " ".repeat(widths[c] - cell.chars().count());
-            line += &if c < 2 { format!("{cell}{pad}  ") } else { format!("{pad}{cell}  ") };
-        }
-        let _ = writeln!(out, "{}", line.trim_end());
-    }
+    out += &columns(&rows, 2);
     for (_, sentence) in &sheet.advice {
         let _ = writeln!(out, "- {sentence}");
     }

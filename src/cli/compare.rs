@@ -1,10 +1,10 @@
 //! `abbe compare`.
 
 use super::CompareArguments;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::film::compare::{self, CompareOptions, Verdict};
 use crate::film::exr::read_exr;
-use crate::film::output::write_atomically;
+use crate::film::output::write_json;
 
 /// Prints figures and a verdict.
 pub fn run(arguments: &CompareArguments) -> Result<i32> {
@@ -14,8 +14,7 @@ pub fn run(arguments: &CompareArguments) -> Result<i32> {
     let comparison = compare::compare(&a, &b, &options);
     super::say(&comparison.table());
     if let Some(file) = &arguments.json {
-        let json = serde_json::to_vec_pretty(&comparison).map_err(|e| Error::output(file, e))?;
-        write_atomically(file, &json)?;
+        write_json(file, &comparison)?;
     }
     Ok(match comparison.verdict {
         Verdict::Same => 0,

@@ -1,22 +1,20 @@
 //! `abbe merge`.
 
-use super::MergeArguments;
-use super::render::{table, threads};
+use super::render::table;
+use super::{MergeArguments, use_threads};
 use crate::batch::merge;
-use crate::error::{Error, Result};
-use crate::film::output::{prepare_place, write_atomically};
+use crate::error::Result;
+use crate::film::output::{prepare_place, write_json};
 
 /// Merges, and prints the table of the picture.
 pub fn run(arguments: &MergeArguments) -> Result<i32> {
-    // A second call in one process keeps the pool.
-    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads(arguments.threads)).build_global();
+    use_threads(arguments.threads);
     if let Some(file) = &arguments.report {
         prepare_place(file)?;
     }
     let (report, written) = merge::merge(&arguments.parts, &arguments.output)?;
     if let Some(file) = &arguments.report {
-        let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::output(file, e))?;
-        write_atomically(file, &json)?;
+        write_json(file, &report)?;
     }
     if !arguments.quiet {
         super::say(&table(&report));

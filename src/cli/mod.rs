@@ -12,6 +12,7 @@ mod merge;
 mod plan;
 mod progress;
 mod render;
+mod text;
 
 use crate::error::{Error, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -347,6 +348,16 @@ pub fn run() -> i32 {
             e.exit_code()
         }
     }
+}
+
+/// Makes the pool of as many threads as were asked for, else as the farm grants, else as the cpuset has cores. Renders do
+/// not block, so the pool may be the global one; a second call in one process keeps it.
+fn use_threads(asked: usize) {
+    let granted = ["SLURM_CPUS_PER_TASK", "CUE_THREADS", "OMP_NUM_THREADS"];
+    let granted = || granted.iter().find_map(|v| std::env::var(v).ok()?.parse::<usize>().ok().filter(|&n| n > 0));
+    let asked = Some(asked).filter(|&n| n > 0).or_else(granted);
+    let threads = asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
 }
 
 /// Writes to the standard output. A reader that went away, as in `abbe plan … | head`, is no fault.

@@ -2,27 +2,17 @@
 
 use super::interrupts::Interrupts;
 use super::progress::Teller;
-use super::{ProgressStyle, RenderArguments};
+use super::text::columns;
+use super::{ProgressStyle, RenderArguments, use_threads};
 use crate::batch;
 use crate::batch::report::{Report, SceneReport, Status};
-use crate::error::{Error, Result};
-use crate::film::output::{prepare_place, write_atomically};
+use crate::error::Result;
+use crate::film::output::{prepare_place, write_json};
 use std::fmt::Write;
-
-/// Threads to use: those asked for, else what the farm grants, else every core of the cpuset.
-pub fn threads(asked: usize) -> usize {
-    if asked > 0 {
-        return asked;
-    }
-    let granted = ["SLURM_CPUS_PER_TASK", "CUE_THREADS", "OMP_NUM_THREADS"];
-    let granted = granted.iter().find_map(|v| std::env::var(v).ok()?.parse::<usize>().ok().filter(|&n| n > 0));
-    granted.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
-}
 
 /// Renders, and prints a table at the end.
 pub fn run(arguments: &RenderArguments) -> Result<i32> {
-    // Renders do not block, so the pool may be the global one; a second call in one process keeps it.
-    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads(arguments.threads)).build_global();
+    use_threads(arguments.threads);
     let style = if arguments.quiet { ProgressStyle::None } else { arguments.progress };
     let teller = Teller::new(style);
     if let Some(limit) = arguments.memory_limit {
@@ -57,8 +47,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     let report = batch::render_batch(&arguments.scene.file, &overrides, &teller, &interrupts.stop)?;
     teller.finish();
     if let Some(file) = &arguments.report {
-        let json = serde_json::to_vec_pretty(&report).map_err(|e| Error::output(file, e))?;
-        write_atomically(file, &json)?;
+        write_json(file, &report)?;
     }
     if !arguments.quiet && style != ProgressStyle::Json {
         super::say(&table(&report));
@@ -151,18 +140,7 @@ pub fn table(report: &Report) -> String {
     }
     let mut rows = vec![HEADINGS.map(String::from)];
     rows.extend(done.iter().map(|s| row(s)));
-    let widths: [usize; 7] = std::array::from_fn(|c| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0));
-    for r in &rows {
-        let cells: Vec<String> = r
-            .iter()
-            .enumerate()
-            .map(|(c, text)| {
-                let pad = " ".repeat(widths[c] - text.chars().count());
-                if c == 0 { format!("{text}{pad}") } else { format!("{pad}{text}") }
-            })
-            .collect();
-        let _ = writeln!(out, "{}", cells.join("  ").trim_end());
-    }
+    out += &columns(&rows, 1);
     for s in &done {
         for note in &s.notes {
             let _ = writeln!(out, "note: {}: {note}", s.name);

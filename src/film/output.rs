@@ -5,6 +5,7 @@
 
 use crate::error::{Error, Result};
 use atomic_write_file::AtomicWriteFile;
+use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
@@ -20,6 +21,15 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut file = AtomicWriteFile::open(path).map_err(fail)?;
     file.write_all(bytes).map_err(fail)?;
     file.commit().map_err(fail)
+}
+
+/// Writes `value` to `path` as JSON for people, replacing what stands there.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let json = serde_json::to_vec_pretty(value).map_err(|e| Error::output(path, e))?;
+    write_atomically(path, &json)
 }
 
 /// The directory in which `file` lies.
