@@ -1,0 +1,239 @@
+//! Paths from the lights of a part: which of them, and what they leave on the picture.
+
+use super::{Breaks, Part};
+use crate::batch::frame::{FrameJob, light_unit, lock};
+use crate::film::Window;
+use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES};
+use crate::film::filter::FilterSampler;
+use crate::scene::Scene;
+use crate::spectrum::{LANES, SampledWavelengths};
+use crate::transport;
+use crate::transport::light::{Bounds, LightPaths, Splat};
+use crate::transport::merge::{self, Photon, PhotonMap, WavelengthCell};
+use crate::transport::plan::Integrator;
+use glam::DVec2;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Mutex;
+
+/// Light that came from the lights to the camera.
+#[derive(Debug)]
+pub struct SplatFilm {
+    /// The sums, and of the bands of the spectrum.
+    pub film: Film,
+    /// Paths that began in each replicate.
+    pub paths: [u64; REPLICATES],
+}
+
+/// Paths of one work unit from the lights.
+pub(super) const PATHS_OF_A_UNIT: u64 = 1 << 14;
+
+/// Which paths of the share have been added.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LightsDone {
+    /// All of the samples below this.
+    pub(super) below: u32,
+    /// Paths of later samples, disjoint.
+    pub(super) more: Vec<(Range<u64>, u32)>,
+}
+
+impl Part<'_> {
+    /// The paths from the lights of each sample that belong to the share, where there are any.
+    pub(super) fn own_paths(&self) -> Range<u64> {
+        self.splats.as_ref().map_or(0..0, |(paths, _)| self.share.of(paths_of_a_sample(self.job, paths)))
+    }
+
+    /// Follows paths from the lights for each sample of `samples`: as many as the frame has pixels, or the share of them
+    /// that the plan wants. A sample's replicate and number address its paths as they do for the camera, so the sums do
+    /// not depend on units or passes. Only paths of the share that are not there yet are added, and without `photons`
+    /// no other is followed. False if there was a pause.
+    pub(super) fn add_paths(
+        &self,
+        light_paths: &LightPaths,
+        samples: Range<u32>,
+        splats: &Mutex<SplatFilm>,
+        pause: &dyn Breaks,
+        photons: Option<&mut Vec<Photon>>,
+    ) -> bool {
+        let FrameJob { scene, filter, window, .. } = *self.job;
+        let paths = paths_of_a_sample(self.job, light_paths);
+        let wanted = photons.is_some();
+        let own = self.own_paths();
+        let known = lock(&self.lights).clone();
+        let mut units: Vec<(u32, Range<u64>, bool)> = Vec::new();
+        for sample in samples.clone() {
+            let there: Vec<Range<u64>> = if sample < known.below {
+                vec![own.clone()]
+            } else {
+                known.more.iter().filter(|(_, s)| *s == sample).map(|(paths, _)| paths.clone()).collect()
+            };
+            let cuts = pieces(paths, &own, &there).into_iter().map(|(unit, add)| (sample, unit, add));
+            units.extend(cuts.filter(|(_, _, add)| *add || wanted));
+        }
+        let trace = |(sample, unit, add): (u32, Range<u64>, bool)| {
+            let mut left = Vec::new();
+            if pause.wanted() {
+                return (left, None);
+            }
+            let replicate = sample % REPLICATES as u32;
+            let base = u64::from(sample / REPLICATES as u32) * paths;
+            let mut landed = Landed::default();
+            for j in unit.clone() {
+                let photons = wanted.then_some(&mut left);
+                transport::light::trace(light_paths, replicate, base + j, photons, &mut |wavelengths, splat| {
+                    if add {
+                        landed.add(scene, filter, window, wavelengths, &splat);
+                    }
+                });
+            }
+            if add {
+                landed.add_to(&mut lock(splats), replicate, unit.end - unit.start);
+            }
+            (left, Some((unit, sample, add)))
+        };
+        // In the order of the paths, whoever follows them.
+        let followed: Vec<_> = units.into_par_iter().map(trace).collect();
+        let whole = followed.iter().all(|(_, unit)| unit.is_some());
+        let mut known = lock(&self.lights);
+        if whole {
+            known.below = known.below.max(samples.end);
+            known.more.retain(|(_, sample)| *sample >= samples.end);
+        } else {
+            for (unit, sample, _) in followed.iter().filter_map(|(_, unit)| unit.as_ref()).filter(|unit| unit.2) {
+                match known.more.last_mut() {
+                    Some((last, of)) if of == sample && last.end == unit.start => last.end = unit.end,
+                    _ => known.more.push((unit.clone(), *sample)),
+                }
+            }
+        }
+        if let Some(photons) = photons {
+            *photons = followed.into_iter().flat_map(|(left, _)| left).collect();
+        }
+        whole
+    }
+
+    /// [`Part::add_paths`] for one sample, with the photons for its paths from the camera and what chooses their
+    /// wavelengths; none if there was a pause.
+    pub(super) fn photons(
+        &self,
+        light_paths: &LightPaths,
+        sample: u32,
+        first_radius: f64,
+        splats: &Mutex<SplatFilm>,
+        pause: &dyn Breaks,
+    ) -> Option<(PhotonMap, f64)> {
+        let job = self.job;
+        let (replicate, index) = (sample % REPLICATES as u32, sample / REPLICATES as u32);
+        let wavelength = merge::shared_wavelength(job.seed, replicate, index);
+        let parts = light_paths.caustics.is_some_and(|c| c.parts);
+        let cell = match parts {
+            true => WavelengthCell::around(wavelength, job.planned.div_ceil(REPLICATES as u32)),
+            false => WavelengthCell::point(wavelength),
+        };
+        let paths = LightPaths { wavelength: Some(cell), ..*light_paths };
+        let mut photons = Vec::new();
+        if !self.add_paths(&paths, sample..sample + 1, splats, pause, Some(&mut photons)) {
+            return None;
+        }
+        let [width, height] = job.scene.camera.resolution.map(u64::from);
+        let followed = light_paths.caustics.map_or(0, |c| c.paths(width * height));
+        Some((PhotonMap::new(&photons, followed, merge::radius(first_radius, index)), wavelength))
+    }
+}
+
+/// The paths of a sample cut into units, each wholly in or out of what is to be added: `own` without `there`.
+fn pieces(paths: u64, own: &Range<u64>, there: &[Range<u64>]) -> Vec<(Range<u64>, bool)> {
+    let mut cuts: Vec<u64> = (0..paths).step_by(PATHS_OF_A_UNIT as usize).chain([own.start, own.end, paths]).collect();
+    cuts.extend(there.iter().flat_map(|r| [r.start, r.end]));
+    cuts.retain(|cut| *cut <= paths);
+    cuts.sort_unstable();
+    cuts.dedup();
+    let add = |at: u64| own.contains(&at) && !there.iter().any(|r| r.contains(&at));
+    cuts.windows(2).map(|pair| (pair[0]..pair[1], add(pair[0]))).collect()
+}
+
+/// The paths from the lights that the plan calls for.
+pub(super) fn light_paths<'a>(job: &FrameJob<'a>) -> Option<LightPaths<'a>> {
+    let FrameJob { scene, plan, filter, window, seed, .. } = *job;
+    let (settings, caustics) = match &plan.integrator {
+        Integrator::Light(settings) => (*settings, None),
+        Integrator::Path(settings) => (settings.of_light_paths(), Some(plan.caustics.as_deref()?)),
+        Integrator::Whitted(_) | Integrator::Depth | Integrator::Nothing => return None,
+    };
+    let radius = filter.radius() + 0.5;
+    let corner = DVec2::new(f64::from(window.x), f64::from(window.y));
+    let bounds = Bounds {
+        low: corner - radius,
+        high: corner + DVec2::new(f64::from(window.width), f64::from(window.height)) + radius,
+    };
+    Some(LightPaths { scene, plan, settings, caustics, seed, bounds, wavelength: None })
+}
+
+/// Paths from the lights for each sample of all pixels.
+pub(super) fn paths_of_a_sample(job: &FrameJob, light_paths: &LightPaths) -> u64 {
+    let [width, height] = job.scene.camera.resolution.map(u64::from);
+    light_paths.caustics.map_or(width * height, |c| c.paths(width * height))
+}
+
+/// What the paths of one unit left on the picture.
+#[derive(Default)]
+struct Landed {
+    pixels: Vec<([i32; 2], [f32; 3])>,
+    /// The bands of each.
+    bands: Vec<f32>,
+    invalid: InvalidCounts,
+}
+
+impl Landed {
+    fn add(
+        &mut self,
+        scene: &Scene,
+        filter: &FilterSampler,
+        window: Window,
+        wavelengths: &SampledWavelengths,
+        splat: &Splat,
+    ) {
+        if let Some(cause) = Invalid::of(splat.light) {
+            self.invalid.record(cause);
+            return;
+        }
+        let unit = light_unit(scene);
+        let xyz = splat.xyz(wavelengths).map(|x| x * unit);
+        filter.deal(splat.place, |pixel, share| {
+            if window.index(pixel).is_some() {
+                self.pixels.push((pixel, xyz.map(|x| x * share)));
+                for band in &scene.bands {
+                    let counted = splat.light * wavelengths.inv_pdf * band.response.eval(wavelengths.nm);
+                    self.bands.push(counted.reduce_add() / LANES as f32 * share);
+                }
+            }
+        });
+    }
+
+    fn add_to(&self, splats: &mut SplatFilm, replicate: u32, paths: u64) {
+        splats.paths[replicate as usize] += paths;
+        splats.film.invalid += self.invalid;
+        let channels = splats.film.layers.channels();
+        let window = splats.film.window();
+        for (i, &(pixel, xyz)) in self.pixels.iter().enumerate() {
+            splats.film.add(pixel, replicate as usize, xyz, 0.0);
+            if let (Some(index), true) = (window.index(pixel), channels > 0) {
+                splats.film.layers.add(index, 1.0, &self.bands[i * channels..(i + 1) * channels]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Own paths 10 to 40 000 of 50 000, of which 100 to 200 are there: every path once, and the right ones added.
+    #[test]
+    fn paths_are_cut_where_the_share_and_what_is_there_begin_and_end() {
+        let found = pieces(50_000, &(10..40_000), &[100..150, 150..200]);
+        let added: Vec<_> = found.iter().filter(|(_, add)| *add).map(|(unit, _)| unit.clone()).collect();
+        assert_eq!(added, [10..100, 200..16_384, 16_384..32_768, 32_768..40_000]);
+        assert_eq!(found.iter().map(|(unit, _)| unit.end - unit.start).sum::<u64>(), 50_000);
+    }
+}
