@@ -275,8 +275,7 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
             let mut means = [[0.0; 3]; REPLICATES];
             for (replicate, mean) in means.iter_mut().enumerate() {
                 for index in 0..each {
-                    let (sample, events) =
-                        transport::sample_with_events(&shot, place.map(|x| x as u32), replicate as u32, index);
+                    let (sample, events) = transport::sample(&shot, place.map(|x| x as u32), replicate as u32, index);
                     rays += u64::from(OVERHEAD + 2 * events);
                     if Invalid::of(sample.radiance).is_none() {
                         let rgb = ColourSpace::Rec709.from_xyz(sample.xyz.map(|x| x * unit * sample.weight));

@@ -255,7 +255,7 @@ impl Begun {
 
 /// Renders sample `index` of `replicate` at `pixel`, and says how many events its path had.
 #[must_use]
-pub fn sample_with_events(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (PixelSample, u32) {
+pub fn sample(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (PixelSample, u32) {
     let sampler = Sampler::new(shot.seed, pixel, replicate, index);
     let mut begun = Begun::blank();
     begun.begin(shot, Address { pixel, replicate, index }, &sampler);
@@ -263,26 +263,6 @@ pub fn sample_with_events(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u
     begun.see(shot, light);
     begun.finish();
     (begun.sample, light.events)
-}
-
-/// Renders sample `index` of `replicate` at `pixel`.
-#[must_use]
-pub fn sample(
-    scene: &Scene,
-    plan: &EffectPlan,
-    filter: &FilterSampler,
-    seed: u64,
-    pixel: [u32; 2],
-    replicate: u32,
-    index: u32,
-) -> PixelSample {
-    let shot = Shot { scene, plan, filter, seed, photons: None };
-    let sampler = Sampler::new(seed, pixel, replicate, index);
-    let mut begun = Begun::blank();
-    begun.begin(&shot, Address { pixel, replicate, index }, &sampler);
-    begun.follow(&shot, &sampler);
-    begun.finish();
-    begun.sample
 }
 
 /// A place in block `block` of the `side` × `side` that the picture is cut into, in pixels.

@@ -204,7 +204,8 @@ impl Bench {
         let Prepared { scene, plan, .. } = &self.prepared;
         let filter = FilterSampler::new(Filter::Box).unwrap();
         let replicates = REPLICATES as u32;
-        transport::sample(scene, plan, &filter, 0, pixel, index % replicates, index / replicates)
+        let shot = transport::Shot { scene, plan, filter: &filter, seed: 0, photons: None };
+        transport::sample(&shot, pixel, index % replicates, index / replicates).0
     }
 
     /// The ray through a place of the picture in pixels.
