@@ -157,12 +157,18 @@ impl Frame {
     /// Samples that were dropped.
     #[must_use]
     pub fn invalid(&self) -> InvalidCounts {
-        let mut all = self.film.invalid;
-        if let Some(splats) = &self.splats {
-            all += splats.film.invalid;
-        }
-        all
+        invalid(&self.film, self.splats.as_ref())
     }
+}
+
+/// Samples that were dropped on both films.
+#[must_use]
+pub fn invalid(film: &Film, splats: Option<&SplatFilm>) -> InvalidCounts {
+    let mut all = film.invalid;
+    if let Some(splats) = splats {
+        all += splats.film.invalid;
+    }
+    all
 }
 
 /// Share of samples that may be invalid before the picture is refused: one in a million.
@@ -336,7 +342,7 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
     let (done, total) = part.progress();
     let done = AtomicU64::new(done);
     let job = part.job();
-    let whole = part.share().tiles == 1 && part.share().samples == (0..job.samples);
+    let whole = part.share().is_all(job.samples);
     let random = !matches!(job.plan.integrator, Integrator::Whitted(_));
 
     let Range { start: first, end: most } = part.share().samples;

@@ -64,6 +64,12 @@ impl Share {
         Share { tile: 0, tiles: 1, samples: 0..samples, rows: 1 }
     }
 
+    /// Whether this is all of a picture of `samples` a pixel.
+    #[must_use]
+    pub fn is_all(&self, samples: u32) -> bool {
+        self.tiles == 1 && self.samples == (0..samples)
+    }
+
     /// The `tile`-th of `tiles` of the numbers below `n`.
     pub(super) fn of(&self, n: u64) -> Range<u64> {
         let cut = |i: u32| (u128::from(n) * u128::from(i) / u128::from(self.tiles)) as u64;

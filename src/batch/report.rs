@@ -1,7 +1,7 @@
 //! What a render cost and how good it is: for `report.json`, the terminal and the EXR header.
 
 use super::finish::Finish;
-use super::frame::{Begun, Frame};
+use super::frame::{self, Begun, Frame};
 use super::stop::{Fit, Forecast};
 use crate::error::Error;
 use crate::film::accumulate::{Film, InvalidCounts, PixelCells};
@@ -254,13 +254,7 @@ impl SceneReport {
         let seconds = begun.elapsed.as_secs_f64();
         self.seconds.rendering = seconds;
         self.msamples_per_second = begun.part.progress().1 as f64 / seconds.max(1e-9) * 1e-6;
-        self.invalid = begun.part.look(|film, splats| {
-            let mut all = film.invalid;
-            if let Some(splats) = splats {
-                all += splats.film.invalid;
-            }
-            all
-        });
+        self.invalid = begun.part.look(frame::invalid);
         self.numerics = numerics;
     }
 

@@ -135,8 +135,7 @@ impl Part<'_> {
         if !self.add_paths(&paths, sample..sample + 1, splats, pause, Some(&mut photons)) {
             return None;
         }
-        let [width, height] = job.scene.camera.resolution.map(u64::from);
-        let followed = light_paths.caustics.map_or(0, |c| c.paths(width * height));
+        let followed = paths_of_a_sample(job, light_paths);
         Some((PhotonMap::new(&photons, followed, merge::radius(first_radius, index)), wavelength))
     }
 }
