@@ -58,7 +58,11 @@ pub fn prepare_place(file: &Path) -> Result<()> {
     }
     let probe = directory.join(format!(".abbe-{}", std::process::id()));
     std::fs::File::create(&probe).map_err(fail)?;
-    std::fs::remove_file(&probe).map_err(fail)
+    match std::fs::remove_file(&probe) {
+        // Another machine, whose process has the same number, was faster.
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(fail(e)),
+        _ => Ok(()),
+    }
 }
 
 /// What an I/O error means for a file that was to be written.
