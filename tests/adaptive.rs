@@ -5,7 +5,7 @@ mod common;
 use abbe::batch::checkpoint::Keep;
 use abbe::batch::frame::Progress;
 use abbe::batch::report::{SceneReport, Status};
-use abbe::batch::{self, Overrides, Portion, Watcher, merge};
+use abbe::batch::{self, Overrides, Portion, Turn, Watcher, merge};
 use abbe::film::accumulate::Film;
 use abbe::film::exr::read_exr;
 use abbe::math::statistics::Moments;
@@ -125,7 +125,7 @@ fn parts_by_rows_of_cells_are_the_picture_bit_for_bit() {
 struct StopAfter<'a>(AtomicU64, &'a AtomicBool);
 
 impl Watcher for StopAfter<'_> {
-    fn scene_begins(&self, _: usize, _: usize, _: &str) {}
+    fn scene_begins(&self, _: Turn, _: &str) {}
     fn progress(&self, _: Progress) {
         if self.0.fetch_sub(1, Ordering::Relaxed) == 1 {
             self.1.store(true, Ordering::Relaxed);

@@ -437,7 +437,10 @@ fn scenes_are_chosen_by_name() {
     assert_eq!(place.run(&["render", "batch.yaml", "--scene", "other"]).code, 0);
     assert_eq!(place.names("out"), ["other.exr", "other.png", "report.json"]);
     let ran = place.run(&["render", "batch.yaml", "-o", "one.exr"]);
-    assert_eq!(ran.err, "error: -o one.exr: expected a directory for 3 scenes, found the name of one file\n");
+    assert_eq!(
+        ran.err,
+        "error: -o one.exr: expected a directory for 3 scenes, or a pattern with {scene}, found the name of one file\n"
+    );
     assert_eq!(place.run(&["render", "batch.yaml", "--scene", "other", "-o", "sub/one.exr", "-q"]).code, 0);
     let ran = place.run(&["render", "scenes/good.yaml", "-o", "one.PNG"]);
     let expected =

@@ -25,6 +25,12 @@ use std::time::Instant;
 pub struct Finish {
     /// Name of the scene.
     pub name: String,
+    /// Which frame of it, where it has frames.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_number: Option<i32>,
+    /// Frames a second, where it is said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frames_per_second: Option<f64>,
     /// Width and height of the frame in pixels.
     pub frame: [u32; 2],
     /// The pixels of the picture.
@@ -68,6 +74,8 @@ impl Finish {
         let Prepared { description, scene, plan, samples, hash, .. } = prepared;
         Finish {
             name: scene.name.clone(),
+            frame_number: description.frame,
+            frames_per_second: description.render.frames_per_second,
             frame: scene.camera.resolution,
             window: window(description),
             samples: *samples,
@@ -225,6 +233,14 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
         ("abbe/renderSeconds".to_owned(), Attribute::Double(frame.elapsed.as_secs_f64())),
         ("abbe/invalidSamples".to_owned(), text(&frame.invalid().total().to_string())),
     ];
+    if let Some(number) = finish.frame_number {
+        all.push(("abbe/frame".to_owned(), Attribute::Int(number)));
+        all.push(("imageCounter".to_owned(), Attribute::Int(number)));
+    }
+    if let Some(rate) = finish.frames_per_second {
+        let [frames, seconds] = rational_rate(rate);
+        all.push(("framesPerSecond".to_owned(), Attribute::Rational(frames as i32, seconds)));
+    }
     if let Some(counts) = &report.adaptive {
         let counts = format!("least {}, mean {:.1}, most {}", counts.least, counts.mean, counts.most);
         all.push(("abbe/adaptiveSamples".to_owned(), text(&counts)));
@@ -241,6 +257,21 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
     all
 }
 
+/// Frames and seconds of a rate: whole ones a second, those of television (24000 in 1001 seconds, written 23.976 or 23.98),
+/// else to the nearest thousandth, which the description keeps from 0.001 to 10⁶ frames a second.
+fn rational_rate(rate: f64) -> [u32; 2] {
+    let whole = (rate * 1.001).round();
+    // 23.98 for 23.976…: digits are left out beyond the second.
+    let television = (whole / 1.001 - rate).abs() <= 0.005 && rate.fract() != 0.0 && whole % 6.0 == 0.0;
+    if television {
+        [whole as u32 * 1000, 1001]
+    } else if rate.fract() == 0.0 {
+        [rate as u32, 1]
+    } else {
+        [(rate * 1000.0).round() as u32, 1000]
+    }
+}
+
 /// 128 bits of BLAKE3 over the numbers of a picture.
 fn pixel_hash(image: &Image) -> String {
     let mut hasher = blake3::Hasher::new();
@@ -251,4 +282,19 @@ fn pixel_hash(image: &Image) -> String {
         hasher.update(&bytes);
     }
     hasher.finalize().to_hex()[..32].to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_of_television_are_over_1001() {
+        let rates = [(24.0, [24, 1]), (23.976, [24_000, 1001]), (29.97, [30_000, 1001]), (59.94, [60_000, 1001])];
+        for (rate, rational) in
+            rates.into_iter().chain([(23.98, [24_000, 1001]), (12.5, [12_500, 1000]), (1e6, [1_000_000, 1])])
+        {
+            assert_eq!(rational_rate(rate), rational, "{rate}");
+        }
+    }
 }

@@ -5,6 +5,7 @@
 
 use super::finish;
 use super::frame::{Frame, lock};
+use super::names;
 use super::part_file::{self, Header, Written};
 use super::report::{Report, SceneReport};
 use crate::error::{Error, Result};
@@ -55,7 +56,9 @@ pub fn merge(paths: &[PathBuf], out: &Path) -> Result<(Report, Result<()>)> {
         part.header.check_like(&part.path, &first.header)?;
     }
     let finish = &first.header.finish;
-    let out = if super::ends_in(out, &["exr"]) { out.to_path_buf() } else { out.join(format!("{}.exr", finish.name)) };
+    let filled = names::fill(out, &finish.name, finish.frame_number);
+    let in_directory = || filled.join(format!("{}.exr", names::label(&finish.name, finish.frame_number)));
+    let out = if super::ends_in(out, &["exr"]) { filled } else { in_directory() };
     check_cover(&parts, &out)?;
     output::prepare_place(&out)?;
     output::prepare_place(&out.with_extension("png"))?;
@@ -77,7 +80,7 @@ pub fn merge(paths: &[PathBuf], out: &Path) -> Result<(Report, Result<()>)> {
     let seconds: f64 = parts.iter().map(|part| part.header.seconds).sum();
     let elapsed = Duration::try_from_secs_f64(seconds).unwrap_or_default();
     let frame = Frame::of(film, splats, finish.samples, elapsed, finish.integrator != "whitted");
-    let mut scene = SceneReport::new(&finish.name);
+    let mut scene = SceneReport::new(&finish.name, finish.frame_number);
     scene.describe(finish, start.elapsed());
     scene.measure(finish, &frame, sum(parts.iter().filter_map(|part| part.header.numerics)));
     let written = finish::write(finish, &frame, &out, &mut scene);

@@ -9,6 +9,7 @@ pub mod checkpoint;
 pub mod finish;
 pub mod frame;
 pub mod merge;
+pub mod names;
 pub mod part;
 pub mod part_file;
 pub mod report;
@@ -36,7 +37,7 @@ use part_file::Identity;
 use report::{Report, SceneReport, Status};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use stop::{Forecast, Stop};
 
@@ -114,19 +115,28 @@ impl Portion {
     }
 }
 
+/// Whose turn it is in a batch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Turn {
+    /// Number of the scene from 0, and how many there are.
+    pub scene: [usize; 2],
+    /// Number of its frame from 0, and how many it has.
+    pub frame: [usize; 2],
+}
+
 /// What a batch tells while it runs. All methods may be called from any thread.
 pub trait Watcher: Sync {
-    /// A scene begins: its number from 0, how many there are, its name.
-    fn scene_begins(&self, index: usize, count: usize, name: &str);
+    /// A picture begins, whose name is [`names::label`].
+    fn scene_begins(&self, turn: Turn, name: &str);
     /// Samples were done.
     fn progress(&self, progress: Progress);
-    /// A scene ended.
+    /// A picture ended.
     fn scene_ends(&self, report: &SceneReport);
 }
 
 /// Nobody watches.
 impl Watcher for () {
-    fn scene_begins(&self, _: usize, _: usize, _: &str) {}
+    fn scene_begins(&self, _: Turn, _: &str) {}
     fn progress(&self, _: Progress) {}
     fn scene_ends(&self, _: &SceneReport) {}
 }
@@ -209,7 +219,16 @@ pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
 
 /// [`prepare`] with what the scene before has read; see [`compile::compile_with`].
 fn prepare_with(entry: &BatchEntry, overrides: &Overrides, shelf: &mut Shelf) -> Result<Prepared> {
-    let description = entry.scene(&overrides.set)?;
+    prepare_scene(entry, entry.scene(&overrides.set)?, overrides, shelf)
+}
+
+/// Compiles and plans a scene that has been read.
+fn prepare_scene(
+    entry: &BatchEntry,
+    description: SceneDescription,
+    overrides: &Overrides,
+    shelf: &mut Shelf,
+) -> Result<Prepared> {
     let mut scene = compile::compile_with(&description, &entry.name, shelf)?;
     let integrator = integrator(&description, &description.integrator)?;
     let stop = stop(&description);
@@ -378,6 +397,9 @@ fn hash(description: &SceneDescription, files: &[PathBuf]) -> String {
     content.locator = description::Locator::default();
     content.directory = PathBuf::new();
     content.output = description::Output::default();
+    // What is written for a frame says more than its number.
+    content.frame = None;
+    content.render.frames_per_second = None;
     let mut text = format!("{content:?}");
     if description.directory != Path::new("") {
         text = text.replace(&format!("{}/", description.directory.display()), "");
@@ -422,15 +444,16 @@ fn ends_in(path: &Path, extensions: &[&str]) -> bool {
     path.extension().is_some_and(|e| extensions.iter().any(|x| e.eq_ignore_ascii_case(x)))
 }
 
-/// Where a scene's pictures go: `-o FILE.exr`, `-o DIR`, or the directory of the description. In a directory the name of
-/// a part says which it is.
+/// Where a picture goes: `-o FILE.exr`, `-o DIR`, or the directory of the description, each of which may be a pattern
+/// ([`names::fill`]). In a directory the name of a part says which it is.
 #[must_use]
 pub fn output_path(prepared: &Prepared, overrides: &Overrides) -> PathBuf {
-    let name = format!("{}{}.exr", prepared.scene.name, overrides.portion.suffix());
+    let Prepared { description, scene, .. } = prepared;
+    let output = overrides.output.as_ref().unwrap_or(&description.output.dir);
+    let filled = names::fill(output, &scene.name, description.frame);
     match &overrides.output {
-        Some(path) if ends_in(path, &["exr"]) => path.clone(),
-        Some(dir) => dir.join(name),
-        None => prepared.description.output.dir.join(name),
+        Some(path) if ends_in(path, &["exr"]) => filled,
+        _ => filled.join(format!("{}{}.exr", names::label(&scene.name, description.frame), overrides.portion.suffix())),
     }
 }
 
@@ -455,7 +478,7 @@ pub fn render_scene(
     watcher: &dyn Watcher,
     stop: &AtomicBool,
 ) -> (SceneReport, Result<()>) {
-    let mut report = SceneReport::new(&prepared.scene.name);
+    let mut report = SceneReport::new(&prepared.scene.name, prepared.description.frame);
     report.describe(&Finish::of(prepared), loading);
     let result = render_and_write(prepared, overrides, watcher, stop, &mut report);
     if let Err(e) = &result {
@@ -517,61 +540,91 @@ fn render_and_write(
     written.and_then(|()| prepared.stop.check(&frame.milestones))
 }
 
-/// Renders all scenes of `path` that are asked for; a scene that fails does not stop the others.
+/// The place of `-o` for `scenes` scenes.
 ///
 /// # Errors
-/// What keeps the batch from beginning. What goes wrong in a scene is in the report.
-pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, stop: &AtomicBool) -> Result<Report> {
-    let entries = entries(path, overrides)?;
+/// [`Error::Config`] for the name of another kind of file, and for one file for all scenes.
+fn check_output(output: Option<&PathBuf>, scenes: usize) -> Result<()> {
     const OTHERS: [&str; 7] = ["png", "jpg", "jpeg", "tif", "tiff", "hdr", "pfm"];
-    let output = overrides.output.as_ref();
     if let Some(file) = output.filter(|path| ends_in(path, &OTHERS) && !path.is_dir()) {
         return Err(Error::Config(format!(
             "-o {}: expected a directory or a file name that ends in .exr, beside which the PNG is written",
             file.display()
         )));
     }
-    if let (Some(file), true) = (output.filter(|path| ends_in(path, &["exr"])), entries.len() > 1) {
-        return Err(Error::Config(format!(
-            "-o {}: expected a directory for {} scenes, found the name of one file",
-            file.display(),
-            entries.len()
-        )));
+    let file = output.filter(|path| ends_in(path, &["exr"]));
+    match file.filter(|file| scenes > 1 && !names::tells(file).scenes) {
+        Some(file) => Err(Error::Config(format!(
+            "-o {}: expected a directory for {scenes} scenes, or a pattern with {{scene}}, found the name of one file",
+            file.display()
+        ))),
+        None => Ok(()),
     }
+}
+
+/// [`check_output`] for the frames of a scene.
+fn check_frames(output: Option<&PathBuf>, frames: usize) -> Result<()> {
+    let file = output.filter(|path| ends_in(path, &["exr"]));
+    match file.filter(|file| frames > 1 && !names::tells(file).frames) {
+        Some(file) => Err(Error::Config(format!(
+            "-o {}: expected a directory for {frames} frames, or a pattern as a.####.exr, a.%04d.exr or \
+             {{scene}}.{{frame:04}}.exr, found the name of one file",
+            file.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Renders all frames of all scenes of `path` that are asked for; one that fails does not stop the others.
+///
+/// # Errors
+/// What keeps the batch from beginning. What goes wrong in a scene is in the report.
+pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, stop: &AtomicBool) -> Result<Report> {
+    let entries = entries(path, overrides)?;
+    check_output(overrides.output.as_ref(), entries.len())?;
     let start = Instant::now();
     let mut scenes = Vec::new();
     let mut report_dir: Option<PathBuf> = None;
     let mut shelf = Shelf::default();
-    for (i, entry) in entries.iter().enumerate() {
-        watcher.scene_begins(i, entries.len(), &entry.name);
-        let loading = Instant::now();
-        let prepared = prepare_with(entry, overrides, &mut shelf);
-        if i + 1 == entries.len() {
-            // Nobody comes after the last one.
-            shelf = Shelf::default();
-        }
-        let report = match prepared {
-            Ok(prepared) => {
-                let dir = output_path(&prepared, overrides);
-                report_dir.get_or_insert_with(|| dir.parent().unwrap_or(Path::new(".")).to_path_buf());
-                render_scene(&prepared, overrides, loading.elapsed(), watcher, stop).0
-            }
-            Err(e) => {
-                let mut report = SceneReport::new(&entry.name);
-                report.fail(&e);
-                report
-            }
+    'batch: for (i, entry) in entries.iter().enumerate() {
+        let mut loading = Instant::now();
+        let animation = entry.animation(&overrides.set);
+        let frames = animation.as_ref().map_or(1, |animation| animation.frames().len().max(1));
+        let animation = animation.and_then(|a| check_frames(overrides.output.as_ref(), frames).map(|()| a));
+        // One that cannot be read is a picture that fails.
+        let pictures: Box<dyn Iterator<Item = (Option<i32>, Result<SceneDescription>)>> = match animation {
+            Ok(animation) => Box::new(animation.into_scenes()),
+            Err(e) => Box::new(std::iter::once((None, Err(e)))),
         };
-        watcher.scene_ends(&report);
-        let stopped = stop.load(std::sync::atomic::Ordering::Relaxed);
-        scenes.push(report);
-        if stopped {
-            if let Some(next) = entries.get(i + 1) {
-                let mut report = SceneReport::new(&next.name);
+        for (n, (frame, description)) in pictures.enumerate() {
+            let label = names::label(&entry.name, frame);
+            if !scenes.is_empty() && stop.load(Ordering::Relaxed) {
+                let mut report = SceneReport::new(&entry.name, frame);
                 report.fail(&Error::Stopped("stopped before it began; --resume goes on from there".into()));
                 scenes.push(report);
+                break 'batch;
             }
-            break;
+            watcher.scene_begins(Turn { scene: [i, entries.len()], frame: [n, frames] }, &label);
+            let prepared = description.and_then(|d| prepare_scene(entry, d, overrides, &mut shelf));
+            if i + 1 == entries.len() && n + 1 == frames {
+                // Nobody comes after the last one.
+                shelf = Shelf::default();
+            }
+            let report = match prepared {
+                Ok(prepared) => {
+                    let dir = output_path(&prepared, overrides);
+                    report_dir.get_or_insert_with(|| dir.parent().unwrap_or(Path::new(".")).to_path_buf());
+                    render_scene(&prepared, overrides, loading.elapsed(), watcher, stop).0
+                }
+                Err(e) => {
+                    let mut report = SceneReport::new(&entry.name, frame);
+                    report.fail(&e);
+                    report
+                }
+            };
+            watcher.scene_ends(&report);
+            scenes.push(report);
+            loading = Instant::now();
         }
     }
     let mut report = Report::new(path, scenes, start.elapsed());

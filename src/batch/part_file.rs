@@ -20,6 +20,7 @@ use crate::film::exr::part::{Numbers, PartFile, Plane, write_part};
 use crate::scene::watch::Counts;
 use crate::transport::plan::EffectPlan;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -258,6 +259,7 @@ impl Header {
             text("abbe/settingsHash", &self.settings_hash),
             text("abbe/planHash", &self.plan_hash),
             text("abbe/seed", &self.finish.seed.to_string()),
+            text("abbe/frame", &self.finish.frame_number.map_or("none".into(), |frame| frame.to_string())),
             text("abbe/tile", &format!("{tile}/{tiles}")),
             text("abbe/samples", &format!("{from}-{}", i64::from(to) - 1)),
         ]
@@ -341,11 +343,12 @@ impl Header {
         let (own, others) = (fields(&self.finish), fields(finish));
         // These follow from the scene and the plan.
         const CONSEQUENCES: [&str; 5] = ["notes", "scene_hash", "effects", "techniques", "wavelengths"];
-        let settings = own.iter().filter(|(name, _)| !CONSEQUENCES.contains(&name.as_str()));
-        for (name, found) in settings {
-            let expected = &others[name];
+        let names: BTreeSet<&String> = own.keys().chain(others.keys()).collect();
+        for name in names.into_iter().filter(|name| !CONSEQUENCES.contains(&name.as_str())) {
+            let word = |value: Option<&serde_json::Value>| value.map_or("none".to_owned(), ToString::to_string);
+            let (found, expected) = (own.get(name), others.get(name));
             if found != expected {
-                return Err(differs(path, name, &expected.to_string(), &found.to_string()));
+                return Err(differs(path, name, &word(expected), &word(found)));
             }
         }
         if self.finish.scene_hash != finish.scene_hash {

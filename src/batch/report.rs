@@ -2,6 +2,7 @@
 
 use super::finish::Finish;
 use super::frame::{self, Begun, Frame};
+use super::names;
 use super::stop::{Fit, Forecast};
 use crate::error::Error;
 use crate::film::accumulate::{Film, InvalidCounts, PixelCells};
@@ -102,6 +103,9 @@ impl SampleCounts {
 pub struct SceneReport {
     /// Its name.
     pub name: String,
+    /// Which frame of it, where it has frames.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame: Option<i32>,
     /// How it ended.
     pub status: Status,
     /// `path` or `whitted`.
@@ -179,9 +183,10 @@ impl Report {
 impl SceneReport {
     /// A scene that has not been rendered.
     #[must_use]
-    pub fn new(name: &str) -> SceneReport {
+    pub fn new(name: &str, frame: Option<i32>) -> SceneReport {
         SceneReport {
             name: name.to_owned(),
+            frame,
             status: Status::Done,
             integrator: String::new(),
             resolution: [0, 0],
@@ -204,6 +209,12 @@ impl SceneReport {
             notes: Vec::new(),
             files: Vec::new(),
         }
+    }
+
+    /// What people call it.
+    #[must_use]
+    pub fn label(&self) -> String {
+        names::label(&self.name, self.frame)
     }
 
     /// Notes what is to be rendered.

@@ -76,13 +76,17 @@ struct SceneArguments {
     /// Seed of all random numbers
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Frames, as 12, 1-100, 1-100x5 (or 1-100:5) or 1-10,20,30-40; all verbs but `render` take the first
+    #[arg(long, value_name = "FRAMES", value_parser = frames, allow_hyphen_values = true)]
+    frames: Option<String>,
 }
 
 #[derive(Debug, Args)]
 struct RenderArguments {
     #[command(flatten)]
     scene: SceneArguments,
-    /// Directory for the pictures; for one scene also a file name that ends in .exr
+    /// Directory for the pictures, or a file name that ends in .exr; {scene}, and {frame:04}, %04d or #### stand for the
+    /// scene and the frame
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
     /// End at this relative error of the picture, as 0.01 or 1%; with --spp or --time at what is reached first
@@ -229,6 +233,11 @@ fn duration(text: &str) -> std::result::Result<std::time::Duration, String> {
     crate::description::duration(text).ok_or_else(|| "expected a time, as 90s, 10m or 2h".into())
 }
 
+/// Frames, which are read again where they belong.
+fn frames(text: &str) -> std::result::Result<String, String> {
+    crate::description::frames(text).map(|_| text.to_owned())
+}
+
 /// A relative error, or per cent.
 fn relative_error(text: &str) -> std::result::Result<f64, String> {
     let (number, unit) = match text.trim().strip_suffix('%') {
@@ -283,6 +292,9 @@ impl SceneArguments {
         }
         if let Some(seed) = self.seed {
             set.push(("render.seed".into(), seed.to_string()));
+        }
+        if let Some(frames) = &self.frames {
+            set.push(("render.frames".into(), format!("\"{frames}\"")));
         }
         crate::batch::Overrides {
             set,

@@ -3,9 +3,9 @@
 use super::ProgressStyle;
 use super::render::seconds;
 use super::{complain, say};
-use crate::batch::Watcher;
 use crate::batch::frame::Progress;
 use crate::batch::report::{SceneReport, Status};
+use crate::batch::{Turn, Watcher};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
 use serde_json::json;
 use std::io::IsTerminal;
@@ -31,8 +31,7 @@ pub struct Teller {
 
 struct State {
     scene: String,
-    /// Number of the scene from 0, and how many there are.
-    place: [usize; 2],
+    turn: Turn,
     last_line: Instant,
 }
 
@@ -56,7 +55,10 @@ impl Teller {
             ProgressStyle::Openjd => Style::OpenJd,
             ProgressStyle::None => Style::Quiet,
         };
-        Teller { style, state: Mutex::new(State { scene: String::new(), place: [0, 1], last_line: Instant::now() }) }
+        Teller {
+            style,
+            state: Mutex::new(State { scene: String::new(), turn: Turn::default(), last_line: Instant::now() }),
+        }
     }
 
     /// Takes the bars away.
@@ -96,10 +98,11 @@ fn words(p: &Progress) -> String {
 }
 
 impl Watcher for Teller {
-    fn scene_begins(&self, index: usize, count: usize, name: &str) {
+    fn scene_begins(&self, turn: Turn, name: &str) {
+        let Turn { scene: [index, count], frame: [frame, frames] } = turn;
         let mut state = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         name.clone_into(&mut state.scene);
-        state.place = [index, count];
+        state.turn = turn;
         state.last_line = Instant::now();
         match &self.style {
             Style::Bars { batch, scene, .. } => {
@@ -109,10 +112,20 @@ impl Watcher for Teller {
                 scene.set_position(0);
                 scene.set_message("loading");
             }
-            Style::Plain => complain(&format!("[{}/{count}] {name}", index + 1)),
-            Style::Json => line(&json!({"event": "scene", "scene": name, "index": index, "count": count})),
+            Style::Plain => {
+                let frames = if frames > 1 { format!(" (frame {} of {frames})", frame + 1) } else { String::new() };
+                complain(&format!("[{}/{count}] {name}{frames}", index + 1));
+            }
+            Style::Json => {
+                let mut event = json!({"event": "scene", "scene": name, "index": index, "count": count});
+                if frames > 1 {
+                    event["frame"] = json!({"index": frame, "count": frames});
+                }
+                line(&event);
+            }
             Style::OpenJd => {
-                say(&format!("openjd_status: {name} ({} of {count})\n{}", index + 1, openjd(state.place, 0.0)));
+                let [nth, all] = if frames > 1 { [frame, frames] } else { [index, count] };
+                say(&format!("openjd_status: {name} ({} of {all})\n{}", nth + 1, openjd(turn, 0.0)));
             }
             Style::Quiet => {}
         }
@@ -133,7 +146,7 @@ impl Watcher for Teller {
                 state.last_line = Instant::now();
                 let share = p.done as f64 / p.total as f64;
                 if matches!(self.style, Style::OpenJd) {
-                    say(&openjd(state.place, share));
+                    say(&openjd(state.turn, share));
                 } else if matches!(self.style, Style::Plain) {
                     complain(&format!("Progress: {:.1}%  {}: {}", share * 100.0, state.scene, words(&p)));
                 } else {
@@ -160,13 +173,13 @@ impl Watcher for Teller {
             },
             Style::Json => line(&json!({"event": "done", "report": report})),
             Style::OpenJd => {
-                let place = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner).place;
+                let turn = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner).turn;
                 match &report.status {
-                    Status::Done | Status::Skipped => say(&openjd(place, 1.0)),
+                    Status::Done | Status::Skipped => say(&openjd(turn, 1.0)),
                     // One line, whatever the message is.
                     Status::Failed { message, .. } => {
                         let message = message.lines().next().unwrap_or_default();
-                        say(&format!("openjd_fail: {}: {message}\n", report.name));
+                        say(&format!("openjd_fail: {}: {message}\n", report.label()));
                     }
                 }
             }
@@ -176,8 +189,9 @@ impl Watcher for Teller {
 }
 
 /// What Open Job Description takes for progress: a number from 0 to 100 of the whole task.
-fn openjd([index, count]: [usize; 2], share: f64) -> String {
-    let done = (index as f64 + share) / count.max(1) as f64;
+fn openjd(turn: Turn, share: f64) -> String {
+    let within = |[nth, all]: [usize; 2], share: f64| (nth as f64 + share) / all.max(1) as f64;
+    let done = within(turn.scene, within(turn.frame, share));
     format!("openjd_progress: {:.1}\n", (100.0 * done).clamp(0.0, 100.0))
 }
 
@@ -193,9 +207,11 @@ mod tests {
 
     #[test]
     fn openjd_hears_of_the_whole_batch() {
-        assert_eq!(openjd([0, 1], 0.42), "openjd_progress: 42.0\n");
-        assert_eq!(openjd([2, 4], 0.5), "openjd_progress: 62.5\n");
-        assert_eq!(openjd([3, 4], 1.0 + 1e-9), "openjd_progress: 100.0\n");
+        let openjd = |scene, frame, share| openjd(Turn { scene, frame }, share);
+        assert_eq!(openjd([0, 1], [0, 1], 0.42), "openjd_progress: 42.0\n");
+        assert_eq!(openjd([2, 4], [0, 1], 0.5), "openjd_progress: 62.5\n");
+        assert_eq!(openjd([1, 2], [3, 5], 0.5), "openjd_progress: 85.0\n");
+        assert_eq!(openjd([3, 4], [4, 5], 1.0 + 1e-9), "openjd_progress: 100.0\n");
     }
 
     #[test]

@@ -54,14 +54,21 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     }
     if arguments.quiet || style == ProgressStyle::Json {
         for (scene, note) in report.scenes.iter().flat_map(|s| s.notes.iter().map(move |note| (s, note))) {
-            super::complain(&format!("note: {}: {note}", scene.name));
+            super::complain(&format!("note: {}: {note}", scene.label()));
         }
     }
-    for scene in &report.scenes {
-        if let Status::Failed { message, .. } = &scene.status {
-            for line in message.lines() {
-                super::complain(&format!("error: {}: {line}", scene.name));
-            }
+    let failures = report.scenes.iter().filter_map(|scene| match &scene.status {
+        Status::Failed { message, .. } => Some((scene, message)),
+        Status::Done | Status::Skipped => None,
+    });
+    // What is wrong with every frame of a scene is told once.
+    let mut told: Option<(&str, &str)> = None;
+    for (scene, message) in failures {
+        if told.replace((&scene.name, message)) == Some((&scene.name, message)) {
+            continue;
+        }
+        for line in message.lines() {
+            super::complain(&format!("error: {}: {line}", scene.label()));
         }
     }
     let there = report.scenes.iter().filter(|s| matches!(s.status, Status::Skipped)).count();
@@ -72,7 +79,8 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     let all = report.scenes.len();
     if failed > 0 && all > 1 {
         let rest = if failed < all { "; the others are written" } else { "" };
-        super::complain(&format!("error: {failed} of {all} scenes failed{rest}"));
+        let what = if report.scenes.iter().any(|s| s.frame.is_some()) { "pictures" } else { "scenes" };
+        super::complain(&format!("error: {failed} of {all} {what} failed{rest}"));
     }
     if let Some(e) = &report.unwritten {
         super::complain(&super::prefixed(e));
@@ -121,7 +129,7 @@ fn row(s: &SceneReport) -> [String; 7] {
     };
     let half = s.halving_seconds.map_or("-".into(), |t| format!("+{}", seconds(t)));
     [
-        s.name.clone(),
+        s.label(),
         s.samples.to_string(),
         seconds(s.seconds.rendering),
         format!("{:.2}", s.msamples_per_second),
@@ -143,7 +151,7 @@ pub fn table(report: &Report) -> String {
     out += &columns(&rows, 1);
     for s in &done {
         for note in &s.notes {
-            let _ = writeln!(out, "note: {}: {note}", s.name);
+            let _ = writeln!(out, "note: {}: {note}", s.label());
         }
     }
     for s in &done {
@@ -151,7 +159,7 @@ pub fn table(report: &Report) -> String {
             let _ = writeln!(
                 out,
                 "numerics: {}: of {} surfaces met textbook f32 misses {}; of {} rays that left one it meets the same again with {}",
-                s.name,
+                s.label(),
                 n.surfaces,
                 with_share(n.robust, n.surfaces),
                 n.rays,
@@ -167,7 +175,7 @@ pub fn table(report: &Report) -> String {
         let _ = writeln!(
             out,
             "  {}: {} and {} at {:.0} samples; {} and {} at {}",
-            s.name,
+            s.label(),
             seconds(f.seconds),
             per_cent(f.error),
             f.samples,
@@ -178,7 +186,7 @@ pub fn table(report: &Report) -> String {
     }
     let _ = writeln!(out, "\neffects in force:");
     for s in &done {
-        let _ = writeln!(out, "  {}: {}", s.name, s.effects_in_force().join(", "));
+        let _ = writeln!(out, "  {}: {}", s.label(), s.effects_in_force().join(", "));
     }
     let mut dirs: Vec<String> =
         done.iter().flat_map(|s| &s.files).filter_map(|f| f.parent()).map(|d| d.display().to_string()).collect();

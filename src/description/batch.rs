@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
+use super::animation::Animation;
 use super::decode::decode;
 use super::edit::{self, Setting};
 use super::fault::Checker;
@@ -254,14 +255,23 @@ impl BatchEntry {
         Ok(())
     }
 
-    /// Reads the scene, with what the batch and then the command line change in it.
+    /// Reads the scene, with what the batch and then the command line change in it; the first of its frames, where it
+    /// has any.
+    ///
+    /// # Errors
+    /// As [`BatchEntry::animation`] and [`Animation::scene`].
+    pub fn scene(&self, overrides: &[(String, String)]) -> Result<SceneDescription> {
+        self.animation(overrides)?.into_first()
+    }
+
+    /// Reads the scene, with what the batch and then the command line change in it, for all of its frames.
     ///
     /// `overrides` are the key and value of each `--set KEY=VALUE`; the value is YAML.
     ///
     /// # Errors
     /// [`Error::Input`] if the scene's file or one that it includes cannot be read;
-    /// [`Error::Config`] with every fault of the description.
-    pub fn scene(&self, overrides: &[(String, String)]) -> Result<SceneDescription> {
+    /// [`Error::Config`] if it is not YAML or cannot be changed so.
+    pub fn animation(&self, overrides: &[(String, String)]) -> Result<Animation> {
         let mut sources = self.sources.clone();
         let read = match mitsuba::is_xml(&self.path) {
             true => mitsuba::read(&self.path, &self.defines, &mut sources),
@@ -289,7 +299,7 @@ impl BatchEntry {
                 setting.apply(&mut root).map_err(|fault| fault.into_error(&sources))?;
             }
         }
-        SceneDescription::of_tree(root, &self.path, sources)
+        Animation::new(root, &self.path, sources)
     }
 }
 
@@ -409,6 +419,7 @@ mod tests {
             assert_eq!(
                 in_words(&load(&directory.join("batch.yaml")).unwrap().check(&[]).unwrap_err(), directory),
                 "DIR/batch.yaml:4:5: render.smaples: expected one of samples, stop, seed, effects, tile, wavelengths, techniques, \
+                frames, seed_per_frame, frames_per_second, \
                  found \"smaples\"; did you mean \"samples\"?\n\
                  DIR/batch.yaml:8:21: render.samples: expected a whole number of 1 or more, found 0"
             );

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::decode::decode;
 use super::fault::Fault;
+use super::keyed;
 use super::node::{Entry, Node, Place, Sources, Value, quote};
 use super::path::{self, Segment};
 use super::spectrum::FilePath;
@@ -139,9 +140,11 @@ fn graft(root: &mut Node, tree: Node, names: &mut Names, sources: &Sources) -> s
 
 /// Lays `over` on `base`: maps field by field, all else as a whole; null changes nothing.
 pub(crate) fn overlay(base: &mut Node, over: &Node) {
+    // What changes over frames is one value.
+    let whole = keyed::is_keyed(base) || keyed::is_keyed(over);
     match (&mut base.value, &over.value) {
         (_, Value::Null) => {}
-        (Value::Map(_), Value::Map(entries)) => {
+        (Value::Map(_), Value::Map(entries)) if !whole => {
             for entry in entries {
                 if let Ok(into) = child(base, &entry.key, entry.key_place) {
                     overlay(into, &entry.node);
@@ -411,6 +414,7 @@ mod tests {
         assert_eq!(
             says("render.smaples", "3"),
             "--set render.smaples=3: render.smaples: expected one of samples, stop, seed, effects, tile, wavelengths, techniques, \
+                frames, seed_per_frame, frames_per_second, \
              found \"smaples\"; did you mean \"samples\"?"
         );
         assert_eq!(

@@ -79,6 +79,11 @@ impl Fault {
         self
     }
 
+    /// Another word on the same field.
+    pub(crate) fn saying(self, message: impl Into<String>) -> Fault {
+        Fault { message: Message::Text(message.into()), ..self }
+    }
+
     /// For a choice between forms: a fault at the choice itself could also have been cured by
     /// one of `others`.
     pub(crate) fn or_one_of<'a>(mut self, others: impl IntoIterator<Item = &'a str>) -> Fault {

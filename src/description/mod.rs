@@ -71,6 +71,9 @@
 //!                                   # and glass traced from the lights, wavelengths that part followed together, photons
 //!                                   # collected where that light is seen in mirrors and through glass, more samples where
 //!                                   # the picture is noisier at the same mean (auto: off)
+//!   frames: ~                       # which, where values change over frames: 12, 1-100, 1-100x5, 1-10,20,30-40
+//!   seed_per_frame: true            # the frame is added to the seed, so that noise does not stand still
+//!   frames_per_second: ~            # for those who show the pictures
 //! output:                           # these are the defaults
 //!   dir: out                        # from the working directory
 //!   exr: {precision: half, compression: zips, stderr: false, channels: rgba}   # half, float; none, zips, zip, piz;
@@ -258,6 +261,26 @@
 //! at each wavelength. Its thickness is a number, or follows a texture of numbers: `{texture: name, from: 100, to: 800}`,
 //! nm where they are 0 and 1; ~ 0 and 1, for a texture of nanometres.
 //!
+//! # Frames
+//! In the place of any number, or list of numbers, a map may stand whose keys are frames: the value changes over them.
+//! ```yaml
+//! # frames
+//! - {0: 1.0, 48: 2.5}                                     # straight from key to key; 1.0 before, 2.5 after
+//! - {0: 1, 24: 3, 48: 2.5, interpolation: smooth}         # ~ linear; smooth, step
+//! - {keys: [[0, 1.0], [48, 2.5]]}                         # the same as a table; and interpolation
+//! - {keys: {file: radius.csv}}                            # the same in a file: frame and value, or values
+//! ```
+//! So a camera moves (`origin: {0: [0, 1, 5], 100: [2, 1, 5]}`), a lamp fades, a shape turns
+//! (`rotate: {axis: [0, 1, 0], deg: {0: 0, 100: 360}}`). Lists run number by number: a matrix between two turned ones is no
+//! turn, and what turns is better written as `rotate`. Frames increase, and may have fractions; all values have the same
+//! length. `smooth` is a monotone cubic (Steffen 1990): its slope has no jumps, it is still at its first and last key, and it
+//! leaves the range of no two keys, so that what is valid at the keys is so between them. Numbers that must be whole have to
+//! come out whole; names, files, true and false do not change.
+//!
+//! Which frames are rendered says `render.frames`, of the scene or of the batch, or `--frames`; a scene that changes and says
+//! nothing of frames is refused. Frame 12 is the very picture of a scene in which the values at 12 are written, with the
+//! seed `render.seed` + 12 unless `seed_per_frame: false`.
+//!
 //! # Spectra
 //! ```yaml
 //! # spectra
@@ -325,6 +348,7 @@
 //! with aliases written out.
 
 mod absorption;
+mod animation;
 mod batch;
 mod camera;
 mod coating;
@@ -333,7 +357,9 @@ mod decode;
 mod edit;
 mod emitter;
 mod fault;
+mod frames;
 mod hair;
+mod keyed;
 mod layer;
 mod light;
 mod material;
@@ -354,11 +380,13 @@ mod volume;
 mod yaml;
 
 pub use absorption::{Absorption, ColorAt};
+pub use animation::Animation;
 pub use batch::{Batch, BatchEntry, Document, load};
 pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection};
 pub use coating::{Film, TexturedThickness, Thickness};
 pub use compound::{Blend, Brushed, Bump, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided};
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, Growth, ProjectorLight};
+pub use frames::{Frames, frames};
 pub use hair::{Hair, HairColour};
 pub use layer::{Layer, LayerContent, LightForm, Quantity};
 pub use light::{Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, Light, PointLight, SpotLight};
@@ -450,6 +478,17 @@ mod tests {
         for line in reference("spectra").lines().skip(1) {
             let spectrum = line.strip_prefix("- ").unwrap();
             scene(&format!("lights:\n- constant:\n    radiance: {spectrum}\n"));
+        }
+    }
+
+    #[test]
+    fn the_reference_frames_are_values() {
+        let written = reference("frames");
+        let lines: Vec<&str> = written.lines().skip(1).map(|line| line.strip_prefix("- ").unwrap()).collect();
+        for (line, radius) in lines.iter().zip([1.75, 3.0, 1.75]) {
+            let scene = scene(&format!("render: {{frames: 24}}\nshapes:\n- sphere:\n    radius: {line}\n"));
+            let Geometry::Sphere(sphere) = &scene.shapes[0].geometry else { panic!("a sphere") };
+            assert_eq!((sphere.radius, scene.frame, scene.render.seed), (radius, Some(24), 24));
         }
     }
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
+use super::animation::Animation;
 use super::camera::{Camera, Image};
 use super::decode::decode;
 use super::edit;
@@ -76,6 +77,9 @@ pub struct SceneDescription {
     pub medium: Option<String>,
     /// Depth fog; default none.
     pub fog: Option<Fog>,
+    /// Which frame this is of, where the scene has frames.
+    #[serde(skip)]
+    pub frame: Option<i32>,
     /// The directory of the scene's file, relative to the working directory. Paths in the
     /// description are joined to it already.
     #[serde(skip)]
@@ -114,7 +118,7 @@ impl SceneDescription {
         let mut sources = Sources::default();
         let mut root = edit::read_bytes_as(text.as_bytes(), path, &mut sources)?;
         edit::include(&mut root, path, &mut sources)?;
-        SceneDescription::of_tree(root, path, sources)
+        Animation::new(root, path, sources)?.into_first()
     }
 
     /// Decodes and validates a complete tree.

@@ -6,6 +6,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::fault::Checker;
+use super::frames::Frames;
 use super::light::nothing;
 use super::path::At;
 use super::spectrum::{Role, Spectrum};
@@ -160,6 +161,18 @@ pub struct Render {
     /// How light is found; default each where it pays.
     #[serde(default)]
     pub techniques: Techniques,
+    /// Which frames, where values change over them; none in the description of one frame, which says
+    /// [`SceneDescription::frame`](super::SceneDescription::frame).
+    pub frames: Option<Frames>,
+    /// Whether the frame is added to the seed, so that noise does not stand still before what moves; default true.
+    #[serde(default = "yes")]
+    pub seed_per_frame: bool,
+    /// Frames a second, for those who show the pictures; default none.
+    pub frames_per_second: Option<f64>,
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn samples() -> u32 {
@@ -180,6 +193,9 @@ impl Default for Render {
             tile: tile(),
             wavelengths: Wavelengths::default(),
             techniques: Techniques::default(),
+            frames: None,
+            seed_per_frame: yes(),
+            frames_per_second: None,
         }
     }
 }
@@ -493,6 +509,13 @@ impl Render {
             checker.require(holds, stop.key("time"), "a time greater than 0, as 60, 90s, 10m or 2h", found);
         }
         checker.at_least_one(stop.key("samples"), self.stop.samples.unwrap_or(1));
+        if let Some(Err(message)) = self.frames.as_ref().map(Frames::list) {
+            checker.fault(at.key("frames"), message);
+        }
+        if let Some(rate) = self.frames_per_second {
+            let found = (1e-3..=1e6).contains(&rate);
+            checker.require(found, at.key("frames_per_second"), "a number from 0.001 to 1000000", rate);
+        }
     }
 }
 
@@ -563,7 +586,10 @@ mod tests {
                 effects: Effects::Auto,
                 tile: 32,
                 wavelengths: Wavelengths::Auto,
-                techniques: Techniques::default()
+                techniques: Techniques::default(),
+                frames: None,
+                seed_per_frame: true,
+                frames_per_second: None,
             }
         );
         assert_eq!(scene.integrator, Integrator::Path(PathIntegrator::default()));
