@@ -15,11 +15,11 @@
 
 use super::frame::{self, FrameJob, Milestone};
 use super::stop::Fit;
-use super::{BatchEntry, Overrides, Prepared, prepare_with};
+use super::{BatchEntry, Overrides, Prepared, develop, prepare_with};
 use crate::error::{Error, Result};
 use crate::film::accumulate::REPLICATES;
 use crate::film::filter::FilterSampler;
-use crate::film::png::{self, PngSettings};
+use crate::film::png;
 use crate::film::resolve::Image;
 use crate::math::statistics::Moments;
 use crate::scene::shelf::Shelf;
@@ -280,7 +280,11 @@ fn shot(prepared: &Prepared, independent: bool, stop: &AtomicBool) -> Result<Sho
     let image = frame.resolve(&ColourSpace::Rec709.matrix_from_xyz());
     let error = frame.milestones.last().and_then(|m| m.error);
     let noise = error.map_or([f64::NAN; 3], |e| [e.rel_rmse, e.low, e.high]);
-    let png = png::encode_png(&image, &settings_of_png(prepared)).map_err(Error::Render)?;
+    let png = {
+        let finish = super::finish::Finish::of(prepared);
+        let settings = develop::settings(&finish.output.png, finish.white, &image, ColourSpace::Rec709);
+        png::encode_png(&image, &settings).map_err(Error::Render)?
+    };
     Ok(Shot {
         seconds: frame.elapsed.as_secs_f64(),
         converged: error.is_some_and(|e| e.valid),
@@ -290,13 +294,6 @@ fn shot(prepared: &Prepared, independent: bool, stop: &AtomicBool) -> Result<Sho
         noise,
         png,
     })
-}
-
-fn settings_of_png(prepared: &Prepared) -> PngSettings {
-    PngSettings {
-        rec709_from_rgb: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        ..super::finish::Finish::of(prepared).png_settings()
-    }
 }
 
 /// relMSE of a file of half precision against `image`: the same samples, so nothing of it is noise.

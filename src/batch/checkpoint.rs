@@ -129,7 +129,7 @@ impl<'a> Keeper<'a> {
             let splats = splats.map(|s| Splats { film: &s.film, photons: s.paths });
             resolve::resolve(film, splats, &finish.rgb_from_xyz())
         });
-        png::write_png(&self.path.with_extension("snapshot.png"), &image, &finish.png_settings())
+        png::write_png(&self.path.with_extension("snapshot.png"), &image, &finish.png_settings(&image))
     }
 
     fn is_due(&self) -> bool {

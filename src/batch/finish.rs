@@ -4,8 +4,8 @@
 
 use super::adaptive;
 use super::frame::{self, Frame};
-use super::report::SceneReport;
-use super::{Prepared, colour_space, window};
+use super::report::{Developed, SceneReport};
+use super::{Prepared, colour_space, develop, window};
 use crate::description::{self, Output};
 use crate::error::Result;
 use crate::film::Window;
@@ -59,6 +59,8 @@ pub struct Finish {
     pub world_to_ndc: [f32; 16],
     /// Files, colours and tone curve.
     pub output: Output,
+    /// The chromaticity that is shown white.
+    pub white: Option<[f64; 2]>,
     /// Factor on colours.
     pub sensitivity: f64,
     /// Whether bands of the spectrum stand in place of colour.
@@ -72,6 +74,7 @@ impl Finish {
     #[must_use]
     pub fn of(prepared: &Prepared) -> Finish {
         let Prepared { description, scene, plan, samples, hash, .. } = prepared;
+        let (white, note) = develop::white(&description.output.png, scene);
         Finish {
             name: scene.name.clone(),
             frame_number: description.frame,
@@ -86,11 +89,12 @@ impl Finish {
             effects: plan.effects.clone(),
             techniques: plan.techniques.clone(),
             wavelengths: scene.wavelengths.describe().to_owned(),
-            notes: scene.notes.clone(),
+            notes: scene.notes.iter().cloned().chain(note).collect(),
             world_to_camera: scene.camera.camera_from_world(),
             world_to_ndc: scene.camera.ndc_from_world(),
             // Where the files go is no matter of what is in them.
             output: Output { dir: PathBuf::new(), ..description.output.clone() },
+            white,
             sensitivity: description.image.sensitivity,
             bands: !description.image.bands.is_empty(),
             layers: plan.layers.channels(),
@@ -129,20 +133,10 @@ impl Finish {
         self.space().matrix_from_xyz().map(|row| row.map(|x| x * self.sensitivity))
     }
 
-    /// How the PNG is developed.
+    /// How the PNG of `image` is developed, whose colours are those of the file.
     #[must_use]
-    pub fn png_settings(&self) -> PngSettings {
-        PngSettings {
-            exposure_stops: self.output.png.exposure,
-            tonemap: match self.output.png.tonemap {
-                description::Tonemap::Aces => png::Tonemap::Aces,
-                description::Tonemap::Agx => png::Tonemap::Agx,
-                description::Tonemap::Reinhard => png::Tonemap::Reinhard,
-                description::Tonemap::None => png::Tonemap::None,
-            },
-            rec709_from_rgb: self.space().to_rec709(),
-            ..PngSettings::default()
-        }
+    pub fn png_settings(&self, image: &Image) -> PngSettings {
+        develop::settings(&self.output.png, self.white, image, self.space())
     }
 }
 
@@ -168,7 +162,12 @@ pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut Scene
     report.pixel_hash = pixel_hash(&image);
     let written = Instant::now();
     let png_path = exr_path.with_extension("png");
-    let settings = finish.png_settings();
+    let settings = finish.png_settings(&image);
+    report.png = Some(Developed {
+        exposure_stops: settings.exposure_stops,
+        metered: finish.output.png.exposure == description::Exposure::Auto,
+        white: finish.white,
+    });
     // Packed together but written one after the other: where the first cannot be written, nothing of the picture is left.
     let (written_exr, png) =
         rayon::join(|| write_exr(exr_path, finish, frame, &image, report), || png::encode_png(&image, &settings));

@@ -6,6 +6,7 @@ pub mod accuracy;
 pub mod accuracy_page;
 pub mod adaptive;
 pub mod checkpoint;
+pub mod develop;
 pub mod finish;
 pub mod frame;
 pub mod merge;

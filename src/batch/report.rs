@@ -74,6 +74,17 @@ pub struct ConvergencePoint {
     pub relative_error: f64,
 }
 
+/// How the PNG was developed, where that was not written down.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Developed {
+    /// Stops.
+    pub exposure_stops: f64,
+    /// Whether the picture itself says how many.
+    pub metered: bool,
+    /// The chromaticity x, y that is shown white; none for that of the display, D65.
+    pub white: Option<[f64; 2]>,
+}
+
 /// Samples of the pixels of a picture.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct SampleCounts {
@@ -129,6 +140,8 @@ pub struct SceneReport {
     pub adaptive: Option<SampleCounts>,
     /// Relative RMSE of the picture with its 95 % interval; none for `whitted`, which has no noise.
     pub error: Option<ErrorEstimate>,
+    /// How the PNG was developed.
+    pub png: Option<Developed>,
     /// Further seconds of rendering that would halve the error.
     pub halving_seconds: Option<f64>,
     /// What was foretold at a quarter of the samples: to be held against `samples`, `seconds.rendering` and `error`.
@@ -198,6 +211,7 @@ impl SceneReport {
             msamples_per_second: 0.0,
             adaptive: None,
             error: None,
+            png: None,
             halving_seconds: None,
             forecast: None,
             convergence: Vec::new(),

@@ -155,6 +155,14 @@ pub fn table(report: &Report) -> String {
         }
     }
     for s in &done {
+        if let Some(png) = s.png.filter(|png| png.metered || png.white.is_some()) {
+            let metered = if png.metered { ", metered" } else { "" };
+            let white =
+                png.white.map_or(String::new(), |[x, y]| format!("; light of x {x:.4}, y {y:.4} is shown white"));
+            let _ = writeln!(out, "PNG: {}: exposure {:+} stops{metered}{white}", s.name, png.exposure_stops);
+        }
+    }
+    for s in &done {
         if let Some(n) = &s.numerics {
             let _ = writeln!(
                 out,

@@ -358,7 +358,8 @@ mod tests {
             // The batch over the scene over the default.
             assert_eq!((first.render.samples, first.render.tile, first.render.seed), (2, 16, 7));
             assert_eq!(first.output.dir, PathBuf::from("pictures"));
-            assert_eq!((first.output.png.exposure, first.output.png.tonemap), (1.0, super::super::Tonemap::Agx));
+            assert_eq!(first.output.png.exposure, super::super::Exposure::Number(1.0));
+            assert_eq!(first.output.png.tonemap, super::super::Tonemap::Agx);
             assert!(first.fog.is_some());
 
             // The entry over the batch; the command line over all.

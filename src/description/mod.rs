@@ -78,7 +78,16 @@
 //!   dir: out                        # from the working directory
 //!   exr: {precision: half, compression: zips, stderr: false, channels: rgba}   # half, float; none, zips, zip, piz;
 //!                                   # rgba, rgb, xyza, xyz, luminance_alpha, luminance
-//!   png: {exposure: 0, tonemap: aces}           # stops; aces, agx, reinhard, none
+//!   png:
+//!     exposure: 0                   # stops, or auto: the log-average luminance of the picture, without its darkest 20 and
+//!                                   # brightest 2 %, is shown as 0.18; the report and the PNG say how many stops that are
+//!     tonemap: aces                 # aces, agx, reinhard: with colours that the display lacks brought within its gamut;
+//!                                   # none: numbers of the OpenEXR file, cut
+//!     white_balance: none           # the light that is shown white, by Bradford adaptation: {illuminant: A}, 2850 (K, of a
+//!                                   # black body), [0.44, 0.41] (x, y), auto: all lights together, by their power
+//!     space: srgb                   # srgb, display_p3
+//!     bits: 8                       # 8, 16
+//!     dither: hash                  # hash, ordered, none
 //!   colour: rec709                  # rec709, acescg, aces2065-1, rec2020, p3, xyz
 //! textures:
 //!   earth: {image: {file: earth.jpg, wrap: repeat, filter: bilinear, scale: [1, 1], offset: [0, 0], raw: false}}
@@ -402,9 +411,9 @@ pub use principled::{Contrast, Luminance, Principled, PrincipledThin, Sampling, 
 pub use print::yaml;
 pub use scene::{Locator, SceneDescription};
 pub use settings::{
-    Channels, Colour, Compression, DepthIntegrator, Effects, Exr, Integrator, LightTracerIntegrator, MOST_SAMPLES,
-    NoIntegrator, Output, PathIntegrator, Png, Precision, Render, Stop, Technique, Techniques, Time, Tonemap,
-    Wavelengths, WhittedIntegrator, duration,
+    Channels, Colour, Compression, DepthIntegrator, Effects, Exposure, Exr, Integrator, LightTracerIntegrator,
+    MOST_SAMPLES, NoIntegrator, Output, PathIntegrator, Png, PngDither, PngSpace, Precision, Render, Stop, Technique,
+    Techniques, Time, Tonemap, Wavelengths, WhiteBalance, WhittedIntegrator, duration,
 };
 pub use shape::{
     Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Geometry, Instance, Layout, Mesh, Normals, Plane, Rectangle,

@@ -10,6 +10,8 @@ use super::frames::Frames;
 use super::light::nothing;
 use super::path::At;
 use super::spectrum::{Role, Spectrum};
+use crate::spectrum::illuminant;
+use crate::spectrum::observer::tristimulus;
 
 /// `integrator: path` or `integrator: {path: {max_depth: 8}}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -407,15 +409,141 @@ pub enum Compression {
 }
 
 /// `png: {exposure: 0, tonemap: aces}`
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Png {
-    /// Stops; default 0.
+    /// Default 0 stops.
     #[serde(default)]
-    pub exposure: f64,
+    pub exposure: Exposure,
     /// Default `aces`.
     #[serde(default)]
     pub tonemap: Tonemap,
+    /// Which light is to look white; default none: D65, the white of the display.
+    #[serde(default)]
+    pub white_balance: WhiteBalance,
+    /// The display; default `srgb`.
+    #[serde(default)]
+    pub space: PngSpace,
+    /// Of a channel, 8 or 16; default 8.
+    #[serde(default = "eight")]
+    pub bits: u32,
+    /// Default `hash`.
+    #[serde(default)]
+    pub dither: PngDither,
+}
+
+fn eight() -> u32 {
+    8
+}
+
+impl Default for Png {
+    fn default() -> Png {
+        Png {
+            exposure: Exposure::default(),
+            tonemap: Tonemap::default(),
+            white_balance: WhiteBalance::default(),
+            space: PngSpace::default(),
+            bits: eight(),
+            dither: PngDither::default(),
+        }
+    }
+}
+
+/// How bright a picture is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Exposure {
+    /// Stops.
+    Number(f64),
+    /// By the picture itself.
+    Auto,
+}
+
+impl Default for Exposure {
+    fn default() -> Exposure {
+        Exposure::Number(0.0)
+    }
+}
+
+/// The light that is shown white.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WhiteBalance {
+    /// D65: nothing changes.
+    #[default]
+    None,
+    /// That of the scene's lights together.
+    Auto,
+    /// A black body of so many kelvins.
+    Number(f64),
+    /// CIE 1931 x, y.
+    List([f64; 2]),
+    /// `{illuminant: A}`: a CIE illuminant.
+    Illuminant(String),
+}
+
+impl WhiteBalance {
+    /// The chromaticity of that light, where it is not the scene's to say.
+    ///
+    /// # Errors
+    /// Why there is no such light.
+    pub fn chromaticity(&self) -> std::result::Result<Option<[f64; 2]>, String> {
+        let of = |spectrum: &crate::spectrum::Spectrum| {
+            let [x, y, z] = tristimulus(spectrum);
+            [x / (x + y + z), y / (x + y + z)]
+        };
+        Ok(match self {
+            WhiteBalance::None | WhiteBalance::Auto => None,
+            WhiteBalance::Number(kelvin) => Some(of(&illuminant::blackbody_normalised(*kelvin)?)),
+            WhiteBalance::List(xy) => Some(*xy),
+            WhiteBalance::Illuminant(name) => Some(of(&illuminant::illuminant(name)?)),
+        })
+    }
+
+    fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
+        match self {
+            WhiteBalance::Number(kelvin) => {
+                let expected = "a temperature from 1000 to 40000 K";
+                checker.require((1000.0..=40_000.0).contains(kelvin), at, expected, kelvin);
+            }
+            WhiteBalance::List([x, y]) => {
+                let expected = "the chromaticity x, y of a light that can be made white";
+                let white = crate::spectrum::colour::adapted_to_d65([*x, *y]).is_some();
+                checker.require(white, at, expected, format_args!("[{x}, {y}]"));
+            }
+            WhiteBalance::Illuminant(name) => {
+                if let Err(message) = illuminant::illuminant(name) {
+                    checker.fault(at.key("illuminant"), message);
+                }
+            }
+            WhiteBalance::None | WhiteBalance::Auto => {}
+        }
+    }
+}
+
+/// The display that a PNG is for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PngSpace {
+    /// sRGB.
+    #[default]
+    Srgb,
+    /// Display P3.
+    #[serde(rename = "display_p3")]
+    DisplayP3,
+}
+
+/// How a value between two levels of a PNG is placed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PngDither {
+    /// To the nearest.
+    None,
+    /// By a regular pattern.
+    Ordered,
+    /// By a noise that is the same in every picture.
+    #[default]
+    Hash,
 }
 
 /// How radiance becomes display values.
@@ -523,6 +651,14 @@ impl Output {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         let named = !self.dir.as_os_str().is_empty();
         checker.require(named, at.key("dir"), "the path of a directory", "empty text");
+        let png = at.key("png");
+        if let Exposure::Number(stops) = self.png.exposure {
+            let expected = "a number of stops from -64 to 64, or auto";
+            checker.require(stops.abs() <= 64.0, png.key("exposure"), expected, stops);
+        }
+        let bits = self.png.bits;
+        checker.require(bits == 8 || bits == 16, png.key("bits"), "8 or 16", bits);
+        self.png.white_balance.check(png.key("white_balance"), checker);
     }
 }
 
@@ -598,8 +734,56 @@ mod tests {
             scene.output.exr,
             Exr { precision: Precision::Half, compression: Compression::Zips, stderr: false, channels: Channels::Rgba }
         );
-        assert_eq!(scene.output.png, Png { exposure: 0.0, tonemap: Tonemap::Aces });
+        assert_eq!(
+            scene.output.png,
+            Png {
+                exposure: Exposure::Number(0.0),
+                tonemap: Tonemap::Aces,
+                white_balance: WhiteBalance::None,
+                space: PngSpace::Srgb,
+                bits: 8,
+                dither: PngDither::Hash
+            }
+        );
         assert_eq!(scene.output.colour, Colour::Rec709);
+    }
+
+    #[test]
+    fn the_png_is_developed_as_it_is_written() {
+        let png = |text: &str| scene(&format!("output: {{png: {{{text}}}}}")).output.png;
+        assert_eq!(png("exposure: auto").exposure, Exposure::Auto);
+        let all = [
+            ("none", WhiteBalance::None, None),
+            ("auto", WhiteBalance::Auto, None),
+            ("[0.4, 0.41]", WhiteBalance::List([0.4, 0.41]), Some([0.4, 0.41])),
+            ("{illuminant: A}", WhiteBalance::Illuminant("A".into()), Some([0.44758, 0.40745])),
+            // Illuminant A is a black body of 2848 K in today's constants: c₂ was 1.435e-2 m·K.
+            ("2855.5", WhiteBalance::Number(2855.5), Some([0.44758, 0.40745])),
+        ];
+        for (text, expected, white) in all {
+            let found = png(&format!("white_balance: {text}")).white_balance;
+            let chromaticity = found.chromaticity().unwrap();
+            assert_eq!((found, chromaticity.is_some()), (expected, white.is_some()));
+            for (a, b) in chromaticity.into_iter().flatten().zip(white.into_iter().flatten()) {
+                assert!((a - b).abs() < 1e-4, "{text}: {a} {b}");
+            }
+        }
+        assert_eq!(
+            faults("output: {png: {exposure: 65, bits: 12, white_balance: 500}}"),
+            "dir/s.yaml:2:26: output.png.exposure: expected a number of stops from -64 to 64, or auto, found 65\n\
+             dir/s.yaml:2:36: output.png.bits: expected 8 or 16, found 12\n\
+             dir/s.yaml:2:55: output.png.white_balance: expected a temperature from 1000 to 40000 K, found 500"
+        );
+        // Low-pressure sodium.
+        assert_eq!(
+            faults("output: {png: {white_balance: [0.569, 0.43]}}"),
+            "dir/s.yaml:2:31: output.png.white_balance: expected the chromaticity x, y of a light that can be made white, \
+             found [0.569, 0.43]"
+        );
+        let unknown = faults("output: {png: {white_balance: {illuminant: D66}}}");
+        assert!(unknown.contains("output.png.white_balance.illuminant: ") && unknown.contains("\"D65\""), "{unknown}");
+        let unknown = faults("output: {png: {exposure: metered}}");
+        assert_eq!(unknown, "dir/s.yaml:2:26: output.png.exposure: expected one of a number, auto, found \"metered\"");
     }
 
     #[test]

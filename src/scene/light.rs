@@ -9,6 +9,7 @@ use super::{Geometry, Hit, Object, SurfacePoint};
 use crate::math::Departure;
 use crate::math::frame::Frame;
 use crate::math::warp;
+use crate::spectrum::observer::tristimulus;
 use crate::spectrum::{Lanes, Spectrum};
 use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::PI;
@@ -138,6 +139,25 @@ pub fn exponent(lights: &[Light], powers: &[f64], objects: &[Object], radius: f6
         36.. => (log2 - 36).min(100),
         _ => 0,
     }
+}
+
+/// CIE x, y of all `lights` together, each by its luminous power; `None` where none shines.
+#[must_use]
+pub fn chromaticity(lights: &[Light], objects: &[Object], radius: f64) -> Option<[f64; 2]> {
+    let mut sum = [0.0; 3];
+    for light in lights {
+        let mut xyz = [0.0; 3];
+        for spectrum in light.spectra() {
+            let own = tristimulus(&spectrum);
+            xyz = [0, 1, 2].map(|c| xyz[c] + own[c]);
+        }
+        let power = light.power(objects, radius);
+        if xyz[1] > 0.0 && power > 0.0 {
+            sum = [0, 1, 2].map(|c| sum[c] + xyz[c] * (power / xyz[1]));
+        }
+    }
+    let total = sum[0] + sum[1] + sum[2];
+    (total > 0.0 && total.is_finite()).then(|| [sum[0] / total, sum[1] / total])
 }
 
 impl Light {

@@ -8,7 +8,8 @@ use crate::math::elementary::{exp_down, log};
 
 /// Chromaticities (x, y).
 type Xy = [f64; 2];
-type Matrix = [[f64; 3]; 3];
+/// Rows of a matrix.
+pub type Matrix = [[f64; 3]; 3];
 
 /// D65 as Rec.709, Rec.2020 and P3-D65 print it.
 const D65: Xy = [0.3127, 0.3290];
@@ -109,7 +110,9 @@ fn apply(m: &Matrix, v: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|i| (m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2]) as f32)
 }
 
-const fn multiply(a: Matrix, b: Matrix) -> Matrix {
+/// The matrix that does `b`, then `a`.
+#[must_use]
+pub const fn multiply(a: Matrix, b: Matrix) -> Matrix {
     let mut m = [[0.0; 3]; 3];
     let mut i = 0;
     while i < 3 {
@@ -123,7 +126,9 @@ const fn multiply(a: Matrix, b: Matrix) -> Matrix {
     m
 }
 
-const fn times(m: Matrix, v: [f64; 3]) -> [f64; 3] {
+/// The vector `m` v.
+#[must_use]
+pub const fn times(m: Matrix, v: [f64; 3]) -> [f64; 3] {
     [
         m[0][0] * v[0] + m[0][1] * v[1] + m[0][2] * v[2],
         m[1][0] * v[0] + m[1][1] * v[1] + m[1][2] * v[2],
@@ -132,7 +137,8 @@ const fn times(m: Matrix, v: [f64; 3]) -> [f64; 3] {
 }
 
 /// The inverse by cofactors.
-const fn inverse(m: Matrix) -> Matrix {
+#[must_use]
+pub const fn inverse(m: Matrix) -> Matrix {
     let [[a, b, c], [d, e, f], [g, h, i]] = m;
     let determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g);
     let r = 1.0 / determinant;
@@ -166,6 +172,23 @@ const fn adaptation(from: Xy, to: Xy) -> Matrix {
     let b = times(BRADFORD, xyz_of(to));
     let scale = [[b[0] / a[0], 0.0, 0.0], [0.0, b[1] / a[1], 0.0], [0.0, 0.0, b[2] / a[2]]];
     multiply(inverse(BRADFORD), multiply(scale, BRADFORD))
+}
+
+/// The matrix from XYZ under the light of chromaticity `white` to XYZ under D65, as Bradford has it: that light becomes
+/// white. `None` where a cone's response to it is not above zero: of light that pure no white can be made.
+#[must_use]
+pub fn adapted_to_d65(white: [f64; 2]) -> Option<Matrix> {
+    let [x, y] = white;
+    let real = x > 0.0 && y > 0.0 && x + y < 1.0;
+    (real && times(BRADFORD, xyz_of(white)).iter().all(|response| *response > 0.0)).then(|| adaptation(white, D65))
+}
+
+/// The matrix from XYZ under D65 to XYZ under D50, the white of ICC profiles.
+#[must_use]
+pub fn d50_from_d65() -> Matrix {
+    // The D50 of profiles, ICC.1:2022 section 7.2.16: X 0.9642, Y 1, Z 0.8249.
+    const SUM: f64 = 0.9642 + 1.0 + 0.8249;
+    adaptation(D65, [0.9642 / SUM, 1.0 / SUM])
 }
 
 const fn to_xyz_matrices() -> [Matrix; 6] {
@@ -256,6 +279,19 @@ mod tests {
         ];
         let own = multiply(adaptation(D65, ACES_WHITE), ColourSpace::Aces2065_1.matrix_to_xyz());
         assert!(close(own, ap0, 1e-9), "{own:?}");
+    }
+
+    /// Illuminant A becomes white, sodium light cannot: its response of the third cone is negative.
+    #[test]
+    fn a_lamp_is_made_white_unless_it_is_too_pure() {
+        let a = [0.447_58, 0.407_45];
+        let white = times(adapted_to_d65(a).unwrap(), xyz_of(a));
+        for (found, expected) in white.iter().zip(xyz_of(D65)) {
+            assert!((found - expected).abs() < 1e-14, "{white:?}");
+        }
+        assert_eq!(adapted_to_d65([0.569, 0.430]), None);
+        assert_eq!(adapted_to_d65([0.0, 0.5]), None);
+        assert_eq!(adapted_to_d65([f64::NAN, 0.5]), None);
     }
 
     /// (1, 1, 1) is D65 in every space, adapted or not, but in XYZ, where it is equal energy.
