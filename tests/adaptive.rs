@@ -10,10 +10,10 @@ use abbe::film::accumulate::Film;
 use abbe::film::exr::read_exr;
 use abbe::math::statistics::Moments;
 use abbe::spectrum::ColourSpace;
+use common::place::{Place, pixels};
 use common::{Bench, bench_with};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use tempfile::TempDir;
 
 /// A picture of 44 × 30 pixels, which cells do not divide: a bright floor, a ball of glass, light from the lights.
 fn scene(render: &str) -> String {
@@ -53,56 +53,41 @@ fn threads_tiles_and_all_effects_do_not_change_a_bit() {
     }
 }
 
-struct Place {
-    directory: TempDir,
+fn render(
+    place: &Place,
+    out: &str,
+    portion: Portion,
+    keep: Keep,
+    watcher: &dyn Watcher,
+    stop: &AtomicBool,
+) -> SceneReport {
+    let overrides = Overrides { output: Some(place.path(out)), portion, keep, ..Overrides::default() };
+    let mut report = batch::render_batch(&place.path("scene.yaml"), &overrides, watcher, stop).unwrap();
+    report.scenes.swap_remove(0)
 }
 
-impl Place {
-    fn with(scene: &str) -> Place {
-        let place = Place { directory: tempfile::tempdir().unwrap() };
-        std::fs::write(place.path("scene.yaml"), scene).unwrap();
-        place
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.directory.path().join(name)
-    }
-
-    fn render(&self, out: &str, portion: Portion, keep: Keep, watcher: &dyn Watcher, stop: &AtomicBool) -> SceneReport {
-        let overrides = Overrides { output: Some(self.path(out)), portion, keep, ..Overrides::default() };
-        let mut report = batch::render_batch(&self.path("scene.yaml"), &overrides, watcher, stop).unwrap();
-        report.scenes.swap_remove(0)
-    }
-
-    fn whole(&self) -> PathBuf {
-        let report = self.render("whole.exr", Portion::default(), Keep::default(), &(), &AtomicBool::new(false));
-        assert!(matches!(report.status, Status::Done), "{:?}", report.status);
-        let counts = report.adaptive.unwrap();
-        assert!(counts.least == 16 && counts.most > 64 && (40.0..100.0).contains(&counts.mean), "{counts:?}");
-        let file = read_exr(&self.path("whole.exr")).unwrap();
-        let written = file.parts[0].text("abbe/adaptiveSamples").unwrap();
-        assert!(written.starts_with("least 16, mean "), "{written}");
-        self.path("whole.exr")
-    }
-}
-
-/// Bits of all channels.
-fn pixels(path: &Path) -> Vec<(String, Vec<u32>)> {
-    let part = read_exr(path).unwrap().parts.swap_remove(0);
-    part.channels.into_iter().map(|(name, v)| (name, v.into_iter().map(f32::to_bits).collect())).collect()
+fn whole(place: &Place) -> PathBuf {
+    let report = render(place, "whole.exr", Portion::default(), Keep::default(), &(), &AtomicBool::new(false));
+    assert!(matches!(report.status, Status::Done), "{:?}", report.status);
+    let counts = report.adaptive.unwrap();
+    assert!(counts.least == 16 && counts.most > 64 && (40.0..100.0).contains(&counts.mean), "{counts:?}");
+    let file = read_exr(&place.path("whole.exr")).unwrap();
+    let written = file.parts[0].text("abbe/adaptiveSamples").unwrap();
+    assert!(written.starts_with("least 16, mean "), "{written}");
+    place.path("whole.exr")
 }
 
 #[test]
 fn parts_by_rows_of_cells_are_the_picture_bit_for_bit() {
-    let place = Place::with(&scene("seed: 3"));
-    let whole = place.whole();
+    let place = Place::of(&scene("seed: 3"));
+    let whole = whole(&place);
     let tile = |i, n| Portion { tile: Some([i, n]), samples: None };
     let go = AtomicBool::new(false);
     for n in [1, 3, 4] {
         let parts: Vec<PathBuf> = (0..n)
             .map(|i| {
                 let name = format!("{i}of{n}.exr");
-                let report = place.render(&name, tile(i, n), Keep::default(), &(), &go);
+                let report = render(&place, &name, tile(i, n), Keep::default(), &(), &go);
                 assert!(matches!(report.status, Status::Done), "{:?}", report.status);
                 place.path(&name)
             })
@@ -111,7 +96,7 @@ fn parts_by_rows_of_cells_are_the_picture_bit_for_bit() {
         merge::merge(&parts, &merged).unwrap().1.unwrap();
         assert!(pixels(&merged) == pixels(&whole), "{n} parts");
     }
-    let refused = |portion| match place.render("x.exr", portion, Keep::default(), &(), &go).status {
+    let refused = |portion| match render(&place, "x.exr", portion, Keep::default(), &(), &go).status {
         Status::Failed { exit_code: 2, message } => message,
         other => panic!("{other:?}"),
     };
@@ -137,15 +122,15 @@ impl Watcher for StopAfter<'_> {
 /// Stopped after every 37 units, which is before the samples are shared out, at once after, and in the midst.
 #[test]
 fn stopped_anywhere_and_resumed_the_pixels_are_those_of_one_go() {
-    let place = Place::with(&scene("tile: 8"));
-    let whole = place.whole();
+    let place = Place::of(&scene("tile: 8"));
+    let whole = whole(&place);
     let keep = || Keep { on_stop: true, resume: true, ..Keep::default() };
     for units in [37, 48] {
         let out = format!("{units}.exr");
         let stops = (0..1000).position(|_| {
             let stop = AtomicBool::new(false);
             let report =
-                place.render(&out, Portion::default(), keep(), &StopAfter(AtomicU64::new(units), &stop), &stop);
+                render(&place, &out, Portion::default(), keep(), &StopAfter(AtomicU64::new(units), &stop), &stop);
             matches!(report.status, Status::Done)
         });
         assert!(stops.unwrap() >= 4, "stopped {stops:?} times");

@@ -1,9 +1,10 @@
 //! The command as a person meets it: what it says about bad input, how it ends, what it leaves behind.
 
+mod common;
+
+use common::place::Place;
 use serde_json::Value;
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
-use tempfile::TempDir;
+use std::process::Command;
 
 /// The smallest picture; two lines.
 const SMALL: &str = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n\
@@ -11,56 +12,6 @@ const SMALL: &str = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}
 
 /// A lit ball, on lines 3 to 5.
 const BALL: &str = "render: {samples: 4}\nlights: [{constant: {radiance: 1}}]\nshapes: [{sphere: {radius: 1}}]\n";
-
-/// What a run of the command left.
-struct Ran {
-    code: i32,
-    out: String,
-    err: String,
-}
-
-/// A directory with files, in which the command is run.
-struct Place {
-    directory: TempDir,
-}
-
-impl Place {
-    fn with(files: &[(&str, &str)]) -> Place {
-        let place = Place { directory: tempfile::tempdir().unwrap() };
-        for (name, text) in files {
-            let path = place.path(name);
-            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-            std::fs::write(path, text).unwrap();
-        }
-        place
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.directory.path().join(name)
-    }
-
-    fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_abbe"));
-        command.current_dir(self.directory.path()).args(arguments).env_remove("RUST_BACKTRACE");
-        command
-    }
-
-    fn run(&self, arguments: &[&str]) -> Ran {
-        let output = self.command(arguments).stdin(Stdio::null()).output().unwrap();
-        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-        let ran = Ran { code: output.status.code().unwrap(), out: text(output.stdout), err: text(output.stderr) };
-        assert!(!ran.err.contains("panicked"), "{}", ran.err);
-        ran
-    }
-
-    /// Names in a directory, sorted; none where there is no directory.
-    fn names(&self, directory: &str) -> Vec<String> {
-        let Ok(entries) = std::fs::read_dir(self.path(directory)) else { return Vec::new() };
-        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    }
-}
 
 /// Renders the scene of [`SMALL`] and, from line 3, `text`, as `s.yaml`: the error lines and the exit code.
 fn faults(text: &str) -> (Vec<String>, i32) {

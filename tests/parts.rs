@@ -6,10 +6,10 @@ use abbe::batch::{self, Overrides, Portion, merge};
 use abbe::error::Error;
 use abbe::film::exr::{ExrFile, read_exr};
 use abbe::math::sampler::mix64;
+use common::place::Place;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
-use tempfile::TempDir;
 
 /// A picture of 20 × 14 pixels, 12 samples each.
 const FRAME: &str = "camera: {origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}\n\
@@ -46,36 +46,15 @@ fn yaml(name: &str, text: &str) -> String {
     frame + text
 }
 
-/// A scene in a directory of its own.
-struct Place {
-    directory: TempDir,
-}
-
-impl Place {
-    fn with(scene: &str) -> Place {
-        let place = Place { directory: tempfile::tempdir().unwrap() };
-        std::fs::write(place.path("scene.yaml"), scene).unwrap();
-        place
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.directory.path().join(name)
-    }
-
-    /// Renders into `out`, with further settings; all, or a part.
-    fn render(&self, out: &str, portion: Portion, set: &[(&str, &str)]) -> PathBuf {
-        let set = set.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
-        let output = self.path(out);
-        let overrides = Overrides { output: Some(output.clone()), portion, set, ..Overrides::default() };
-        let yaml = self.path("scene.yaml");
-        let report = batch::render_batch(&yaml, &overrides, &(), &AtomicBool::new(false)).unwrap();
-        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
-        output
-    }
-
-    fn report(&self, directory: &str) -> Value {
-        serde_json::from_slice(&std::fs::read(self.path(directory).join("report.json")).unwrap()).unwrap()
-    }
+/// Renders into `out`, with further settings; all, or a part.
+fn render(place: &Place, out: &str, portion: Portion, set: &[(&str, &str)]) -> PathBuf {
+    let set = set.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    let output = place.path(out);
+    let overrides = Overrides { output: Some(output.clone()), portion, set, ..Overrides::default() };
+    let yaml = place.path("scene.yaml");
+    let report = batch::render_batch(&yaml, &overrides, &(), &AtomicBool::new(false)).unwrap();
+    assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+    output
 }
 
 fn part(tile: [u32; 2], samples: [u32; 2]) -> Portion {
@@ -155,8 +134,8 @@ fn any_parts_add_up_to_the_picture_bit_for_bit() {
     let seed: u64 = std::env::var("ABBE_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(1);
     let draws_of_each = if std::env::var_os("ABBE_NIGHTLY").is_some() { 40 } else { 4 };
     for (n, (name, text)) in scenes().into_iter().enumerate() {
-        let place = Place::with(&yaml(name, &text));
-        let whole = place.render("whole/scene.exr", Portion::default(), &[]);
+        let place = Place::of(&yaml(name, &text));
+        let whole = render(&place, "whole/scene.exr", Portion::default(), &[]);
         let samples = if name == "whitted" { 9 } else { 12 };
         for draw in 0..draws_of_each {
             let mut draws = Draws(mix64(seed ^ (n as u64) << 32 ^ draw));
@@ -165,13 +144,13 @@ fn any_parts_add_up_to_the_picture_bit_for_bit() {
             let paths: Vec<PathBuf> = parts
                 .into_iter()
                 .enumerate()
-                .map(|(i, portion)| place.render(&format!("{draw}/{i}.exr"), portion, &[("render.tile", "32")]))
+                .map(|(i, portion)| render(&place, &format!("{draw}/{i}.exr"), portion, &[("render.tile", "32")]))
                 .collect();
             let merged = place.path(&format!("merged{draw}/scene.exr"));
             let (_, written) = merge::merge(&paths, &merged).unwrap_or_else(|e| panic!("{what}: {e}"));
             written.unwrap();
             same(&whole, &merged, &what);
-            let (a, b) = (place.report("whole"), place.report(&format!("merged{draw}")));
+            let (a, b) = (place.json("whole/report.json"), place.json(&format!("merged{draw}/report.json")));
             assert_eq!(timeless(a), timeless(b), "{what}");
         }
     }
@@ -200,8 +179,8 @@ fn refusal(place: &Place, paths: &[PathBuf]) -> String {
 #[test]
 fn parts_that_do_not_make_up_one_picture_are_refused() {
     let (_, text) = scenes().swap_remove(1);
-    let place = Place::with(&format!("{FRAME}{text}"));
-    let one = |name: &str, portion, set: &[(&str, &str)]| place.render(name, portion, set);
+    let place = Place::of(&format!("{FRAME}{text}"));
+    let one = |name: &str, portion, set: &[(&str, &str)]| render(&place, name, portion, set);
     let (a, b) = (one("a.exr", part([0, 2], [0, 11]), &[]), one("b.exr", part([1, 2], [0, 11]), &[]));
     let name = |path: &Path| path.display().to_string();
 
@@ -263,7 +242,7 @@ fn parts_that_do_not_make_up_one_picture_are_refused() {
 
 #[test]
 fn a_tile_or_samples_that_the_picture_lacks_are_a_fault_of_usage() {
-    let place = Place::with(&format!("{FRAME}render: {{samples: 12}}\nlights: [{{constant: {{radiance: 1}}}}]\n"));
+    let place = Place::of(&format!("{FRAME}render: {{samples: 12}}\nlights: [{{constant: {{radiance: 1}}}}]\n"));
     let failure = |portion| {
         let overrides = Overrides { output: Some(place.path("a.exr")), portion, ..Overrides::default() };
         let report = batch::render_batch(&place.path("scene.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();

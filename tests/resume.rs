@@ -1,12 +1,13 @@
 //! Renders that are killed, stopped and resumed: the same pixels as in one go, and never half a file.
 #![cfg(unix)]
 
-use abbe::film::exr::read_exr;
+mod common;
+
 use abbe::math::sampler::mix64;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use common::place::{Place, Ran, pixels};
+use std::path::Path;
+use std::process::{Child, Command};
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
 
 /// Part of a second of light from the camera, and of merged photons.
 fn scene(merging: &str) -> String {
@@ -22,41 +23,14 @@ fn scene(merging: &str) -> String {
     )
 }
 
-struct Place {
-    directory: TempDir,
+fn command(place: &Place, out: &str, further: &[&str]) -> Command {
+    let mut command = place.command(&["render", "scene.yaml", "-q", "-o", out]);
+    command.args(further);
+    command
 }
 
-impl Place {
-    fn with(scene: &str) -> Place {
-        let place = Place { directory: tempfile::tempdir().unwrap() };
-        std::fs::write(place.path("scene.yaml"), scene).unwrap();
-        place
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.directory.path().join(name)
-    }
-
-    fn command(&self, out: &str, further: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_abbe"));
-        command.current_dir(self.directory.path()).args(["render", "scene.yaml", "-q", "-o", out]).args(further);
-        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        command
-    }
-
-    fn run(&self, out: &str, further: &[&str]) -> Output {
-        self.command(out, further).output().unwrap()
-    }
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-/// Bits of all channels.
-fn pixels(path: &Path) -> Vec<(String, Vec<u32>)> {
-    let part = read_exr(path).unwrap().parts.swap_remove(0);
-    part.channels.into_iter().map(|(name, v)| (name, v.into_iter().map(f32::to_bits).collect())).collect()
+fn run(place: &Place, out: &str, further: &[&str]) -> Ran {
+    place.run(&[&["render", "scene.yaml", "-q", "-o", out], further].concat())
 }
 
 fn nightly() -> bool {
@@ -98,9 +72,9 @@ fn nothing_is_half(place: &Place, out: &str) {
 fn killed_at_any_moment_and_resumed_the_pixels_are_those_of_one_go() {
     let seed: u64 = std::env::var("ABBE_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(1);
     for merging in ["off", "on"] {
-        let place = Place::with(&scene(merging));
+        let place = Place::of(&scene(merging));
         let start = Instant::now();
-        assert_eq!(place.run("whole.exr", &[]).status.code(), Some(0));
+        assert_eq!(run(&place, "whole.exr", &[]).code, 0);
         let span = start.elapsed();
         let kills = if nightly() { 50 } else { 3 };
         let mut resumed = 0;
@@ -111,7 +85,7 @@ fn killed_at_any_moment_and_resumed_the_pixels_are_those_of_one_go() {
                 assert!(attempt < 200, "it does not come to an end");
                 let threads = ["1", "2", "3"][attempt % 3];
                 let further = ["--resume", "--checkpoint-interval", "0.02s", "--threads", threads];
-                let mut child = place.command(&out, &further).spawn().unwrap();
+                let mut child = command(&place, &out, &further).spawn().unwrap();
                 let draw = mix64(seed ^ mix64(kill << 16 | attempt as u64)) % 1000;
                 std::thread::sleep(span.mul_f64(0.1 + draw as f64 * 0.9e-3));
                 let _ = child.kill();
@@ -131,12 +105,12 @@ fn killed_at_any_moment_and_resumed_the_pixels_are_those_of_one_go() {
 
 #[test]
 fn stopped_it_ends_with_75_and_goes_on_where_it_was() {
-    let place = Place::with(&scene("on"));
-    assert_eq!(place.run("whole.exr", &[]).status.code(), Some(0));
+    let place = Place::of(&scene("on"));
+    assert_eq!(run(&place, "whole.exr", &[]).code, 0);
     let checkpoint = place.path("a.exr.checkpoint");
     let mut stops = 0;
     loop {
-        let mut child = place.command("a.exr", &["--resume", "--checkpoint-interval", "0.02s"]).spawn().unwrap();
+        let mut child = command(&place, "a.exr", &["--resume", "--checkpoint-interval", "0.02s"]).spawn().unwrap();
         let before = std::fs::metadata(&checkpoint).ok().and_then(|m| m.modified().ok());
         if before.is_none() {
             appears(&mut child, &checkpoint);
@@ -144,22 +118,18 @@ fn stopped_it_ends_with_75_and_goes_on_where_it_was() {
             std::thread::sleep(Duration::from_millis(150));
         }
         signal(&child, if stops % 2 == 0 { "TERM" } else { "INT" });
-        let done = child.wait_with_output().unwrap();
-        if done.status.success() {
+        let done = Ran::of(child.wait_with_output().unwrap());
+        if done.code == 0 {
             break;
         }
-        assert_eq!(done.status.code(), Some(75), "{}", err(&done));
-        assert!(
-            err(&done).contains("stopped at ") && err(&done).contains("a.exr.checkpoint; --resume"),
-            "{}",
-            err(&done)
-        );
+        assert_eq!(done.code, 75, "{}", done.err);
+        assert!(done.err.contains("stopped at ") && done.err.contains("a.exr.checkpoint; --resume"), "{}", done.err);
         assert!(!place.path("a.exr").exists());
         stops += 1;
         assert!(stops < 200);
         if stops == 3 {
-            let done = place.run("a.exr", &["--resume", "--report", "r.json"]);
-            assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+            let done = run(&place, "a.exr", &["--resume", "--report", "r.json"]);
+            assert_eq!(done.code, 0, "{}", done.err);
             assert!(std::fs::read_to_string(place.path("r.json")).unwrap().contains("resumed at "));
             break;
         }
@@ -171,34 +141,34 @@ fn stopped_it_ends_with_75_and_goes_on_where_it_was() {
 
 #[test]
 fn a_part_is_stopped_and_resumed_like_a_picture() {
-    let place = Place::with(&scene("on"));
+    let place = Place::of(&scene("on"));
     let portion = ["--tile", "1/2", "--samples", "5-60"];
-    assert_eq!(place.run("whole.exr", &portion).status.code(), Some(0));
+    assert_eq!(run(&place, "whole.exr", &portion).code, 0);
     let resumed = [&portion[..], &["--resume", "--checkpoint-interval", "0.02s"]].concat();
-    let mut child = place.command("a.exr", &resumed).spawn().unwrap();
+    let mut child = command(&place, "a.exr", &resumed).spawn().unwrap();
     assert!(appears(&mut child, &place.path("a.exr.checkpoint")));
     signal(&child, "TERM");
     assert_eq!(child.wait().unwrap().code(), Some(75));
     // Another part does not take it for its own.
-    let other = place.run("a.exr", &["--tile", "0/2", "--samples", "5-60", "--resume"]);
-    assert_eq!(other.status.code(), Some(3));
+    let other = run(&place, "a.exr", &["--tile", "0/2", "--samples", "5-60", "--resume"]);
+    assert_eq!(other.code, 3);
     assert!(
-        err(&other).contains("expected a checkpoint of tile 0/2, samples 5-60, found one of tile 1/2"),
+        other.err.contains("expected a checkpoint of tile 0/2, samples 5-60, found one of tile 1/2"),
         "{}",
-        err(&other)
+        other.err
     );
-    assert_eq!(place.run("a.exr", &resumed).status.code(), Some(0));
+    assert_eq!(run(&place, "a.exr", &resumed).code, 0);
     assert!(pixels(&place.path("whole.exr")) == pixels(&place.path("a.exr")));
     // And a finished one is done at once.
     let written = std::fs::metadata(place.path("a.exr")).unwrap().modified().unwrap();
-    assert_eq!(place.run("a.exr", &resumed).status.code(), Some(0));
+    assert_eq!(run(&place, "a.exr", &resumed).code, 0);
     assert_eq!(std::fs::metadata(place.path("a.exr")).unwrap().modified().unwrap(), written);
 }
 
 #[test]
 fn a_checkpoint_of_another_scene_or_a_damaged_one_is_refused_and_left() {
-    let place = Place::with(&scene("off"));
-    let mut child = place.command("a.exr", &["--checkpoint-interval", "0.02s"]).spawn().unwrap();
+    let place = Place::of(&scene("off"));
+    let mut child = command(&place, "a.exr", &["--checkpoint-interval", "0.02s"]).spawn().unwrap();
     let checkpoint = place.path("a.exr.checkpoint");
     assert!(appears(&mut child, &checkpoint));
     child.kill().unwrap();
@@ -207,33 +177,33 @@ fn a_checkpoint_of_another_scene_or_a_damaged_one_is_refused_and_left() {
     for (set, words) in
         [("render.seed=9", "seed: expected 9, found 0"), ("shapes[2].sphere.emission=3", "scene with the hash")]
     {
-        let done = place.run("a.exr", &["--resume", "--set", set]);
-        assert_eq!(done.status.code(), Some(3), "{}", err(&done));
+        let done = run(&place, "a.exr", &["--resume", "--set", set]);
+        assert_eq!(done.code, 3, "{}", done.err);
         assert!(
-            err(&done).contains("a.exr.checkpoint: it is of another picture") && err(&done).contains(words),
+            done.err.contains("a.exr.checkpoint: it is of another picture") && done.err.contains(words),
             "{}",
-            err(&done)
+            done.err
         );
     }
     std::fs::write(&checkpoint, &bytes[..bytes.len() - 1]).unwrap();
-    let done = place.run("a.exr", &["--resume"]);
-    assert_eq!(done.status.code(), Some(3), "{}", err(&done));
-    assert!(err(&done).contains("a.exr.checkpoint: the part is damaged: it ends early"), "{}", err(&done));
+    let done = run(&place, "a.exr", &["--resume"]);
+    assert_eq!(done.code, 3, "{}", done.err);
+    assert!(done.err.contains("a.exr.checkpoint: the part is damaged: it ends early"), "{}", done.err);
     assert!(!place.path("a.exr").exists() && checkpoint.exists());
 }
 
 #[test]
 fn what_is_there_is_skipped_only_if_it_holds() {
-    let place = Place::with(&scene("off"));
+    let place = Place::of(&scene("off"));
     let skip = ["--skip-existing", "--spp", "8"];
     let modified = || std::fs::metadata(place.path("a.exr")).unwrap().modified().unwrap();
     let runs = |further: &[&str]| {
         let before = modified();
-        let done = place.run("a.exr", further);
-        assert_eq!(done.status.code(), Some(0), "{}", err(&done));
+        let done = run(&place, "a.exr", further);
+        assert_eq!(done.code, 0, "{}", done.err);
         modified() != before
     };
-    assert_eq!(place.run("a.exr", &skip).status.code(), Some(0));
+    assert_eq!(run(&place, "a.exr", &skip).code, 0);
     assert!(!runs(&skip) && !runs(&["--resume", "--spp", "8"]));
     assert!(runs(&["--skip-existing", "--spp", "12"]), "other samples");
     assert!(runs(&skip), "samples of before");
@@ -249,15 +219,15 @@ fn what_is_there_is_skipped_only_if_it_holds() {
         std::fs::write(place.path(name), &whole[..whole.len() / 2]).unwrap();
         assert!(runs(&skip), "half of {name}");
         std::fs::remove_file(place.path(name)).unwrap();
-        assert_eq!(place.run("a.exr", &skip).status.code(), Some(0));
+        assert_eq!(run(&place, "a.exr", &skip).code, 0);
         assert!(std::fs::read(place.path("a.png")).unwrap().len() > 100 && !runs(&skip));
     }
 }
 
 #[test]
 fn usr1_writes_a_picture_of_what_is_done_and_the_render_goes_on() {
-    let place = Place::with(&scene("off"));
-    let mut child = place.command("a.exr", &["--spp", "512", "--checkpoint-interval", "0.02s"]).spawn().unwrap();
+    let place = Place::of(&scene("off"));
+    let mut child = command(&place, "a.exr", &["--spp", "512", "--checkpoint-interval", "0.02s"]).spawn().unwrap();
     assert!(appears(&mut child, &place.path("a.exr.checkpoint")));
     signal(&child, "USR1");
     assert!(appears(&mut child, &place.path("a.snapshot.png")));

@@ -1,9 +1,9 @@
 //! What a person asks of accuracy and time on the command line, and what comes of it.
 
+mod common;
+
+use common::place::Place;
 use serde_json::Value;
-use std::path::Path;
-use std::process::Command;
-use tempfile::TempDir;
 
 /// A ball under a lamp, in a white room without a ceiling.
 const SCENE: &str = "\
@@ -16,31 +16,19 @@ shapes:
 - sphere: {center: [-1.5, 3.5, 2], radius: 0.5, emission: 30}
 ";
 
-fn directory() -> TempDir {
-    let directory = tempfile::tempdir().unwrap();
-    std::fs::write(directory.path().join("scene.yaml"), SCENE).unwrap();
-    directory
-}
-
 /// The exit code, and what was said on both outputs.
-fn abbe(directory: &Path, arguments: &str) -> (i32, String) {
-    let arguments = arguments.split_whitespace();
-    let run = Command::new(env!("CARGO_BIN_EXE_abbe")).args(arguments).current_dir(directory).output().unwrap();
-    let said = [run.stdout, run.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
-    (run.status.code().unwrap(), said.concat())
-}
-
-fn json(file: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()
+fn abbe(place: &Place, arguments: &str) -> (i32, String) {
+    let ran = place.run(&arguments.split_whitespace().collect::<Vec<_>>());
+    (ran.code, ran.out + &ran.err)
 }
 
 /// The render ends below the error that was asked for, not far below, and what was foretold stands beside what came.
 #[test]
 fn a_render_ends_at_the_error_that_was_asked_for() {
-    let place = directory();
-    let (code, said) = abbe(place.path(), "render scene.yaml -o . --error 3%");
+    let place = Place::of(SCENE);
+    let (code, said) = abbe(&place, "render scene.yaml -o . --error 3%");
     assert_eq!(code, 0, "{said}");
-    let scene = &json(&place.path().join("report.json"))["scenes"][0];
+    let scene = &place.json("report.json")["scenes"][0];
     let error = scene["error"]["rel_rmse"].as_f64().unwrap();
     // One pass adds an eighth of the samples or more: at worst a doubling that was not foretold.
     assert!((0.02..=0.03).contains(&error), "{error}");
@@ -48,18 +36,18 @@ fn a_render_ends_at_the_error_that_was_asked_for() {
     assert!(scene["forecast"]["made_at"].as_u64().unwrap() <= samples / 4);
     assert!(said.contains("foretold at a quarter of the samples"), "{said}");
     // The same picture as that of as many samples asked for as a number.
-    abbe(place.path(), &format!("render scene.yaml -o same.exr --spp {samples}"));
-    let same = &json(&place.path().join("report.json"))["scenes"][0];
+    abbe(&place, &format!("render scene.yaml -o same.exr --spp {samples}"));
+    let same = &place.json("report.json")["scenes"][0];
     assert_eq!(same["pixel_hash"], scene["pixel_hash"]);
 }
 
 #[test]
 fn targets_end_a_render_whichever_comes_first() {
-    let place = directory();
+    let place = Place::of(SCENE);
     let samples = |arguments: &str| {
-        let (code, said) = abbe(place.path(), &format!("render scene.yaml -o . {arguments}"));
+        let (code, said) = abbe(&place, &format!("render scene.yaml -o . {arguments}"));
         assert_eq!(code, 0, "{said}");
-        json(&place.path().join("report.json"))["scenes"][0]["samples"].as_u64().unwrap()
+        place.json("report.json")["scenes"][0]["samples"].as_u64().unwrap()
     };
     assert_eq!(samples("--error 0.001% --spp 8"), 8);
     assert_eq!(samples("--time 1h --spp 12"), 12);
@@ -69,33 +57,33 @@ fn targets_end_a_render_whichever_comes_first() {
 
 #[test]
 fn a_target_out_of_reach_is_told_and_the_picture_is_there() {
-    let place = directory();
-    let (code, said) = abbe(place.path(), "render scene.yaml -q -o short.exr --time 0.000001s");
+    let place = Place::of(SCENE);
+    let (code, said) = abbe(&place, "render scene.yaml -q -o short.exr --time 0.000001s");
     assert_eq!(code, 4, "{said}");
     assert!(said.contains("is too short for 4 samples of each pixel"), "{said}");
-    assert!(place.path().join("short.exr").exists() && place.path().join("short.png").exists());
+    assert!(place.path("short.exr").exists() && place.path("short.png").exists());
 }
 
 #[test]
 fn what_knows_no_error_refuses_one() {
-    let place = directory();
-    let part = abbe(place.path(), "render scene.yaml -q -o part.exr --error 1% --tile 0/2");
+    let place = Place::of(SCENE);
+    let part = abbe(&place, "render scene.yaml -q -o part.exr --error 1% --tile 0/2");
     assert_eq!(part.0, 2);
     assert!(part.1.contains("a part cannot know the error"), "{}", part.1);
-    let whitted = abbe(place.path(), "render scene.yaml -q -o w.exr --error 1% --set integrator=whitted");
+    let whitted = abbe(&place, "render scene.yaml -q -o w.exr --error 1% --set integrator=whitted");
     assert_eq!(whitted.0, 2);
     assert!(whitted.1.contains("whitted has no noise"), "{}", whitted.1);
-    assert_eq!(abbe(place.path(), "render scene.yaml --error=-1").0, 2);
+    assert_eq!(abbe(&place, "render scene.yaml --error=-1").0, 2);
 }
 
 /// The open room has two bounces and more: depth 2 misses them, and the sheet says so; without a bound nothing is missed.
 #[test]
 fn the_sheet_finds_what_a_bound_to_depth_costs() {
-    let place = directory();
+    let place = Place::of(SCENE);
     let (code, said) =
-        abbe(place.path(), "accuracy scene.yaml -o sheet --rounds 2 --set image.width=48 --set image.height=48");
+        abbe(&place, "accuracy scene.yaml -o sheet --rounds 2 --set image.width=48 --set image.height=48");
     assert_eq!(code, 0, "{said}");
-    let sheet = &json(&place.path().join("sheet/accuracy.json"))[0];
+    let sheet = &place.json("sheet/accuracy.json")[0];
     let row = |knob: &str, value: &str| {
         let rows = sheet["rows"].as_array().unwrap();
         rows.iter().find(|r| r["knob"] == knob && r["value"] == value).unwrap().clone()
@@ -115,36 +103,36 @@ fn the_sheet_finds_what_a_bound_to_depth_costs() {
     // Four times the samples: half of the noise or less, as the samples are evenly spread.
     let ratio = noise(row("samples", "x 4")) / noise(row("chosen", "as written"));
     assert!((0.2..0.6).contains(&ratio), "{ratio}");
-    let page = std::fs::read_to_string(place.path().join("sheet/accuracy.html")).unwrap();
+    let page = std::fs::read_to_string(place.path("sheet/accuracy.html")).unwrap();
     assert!(page.contains("<svg") && page.contains("data:image/png;base64,") && !page.contains("http"));
-    let csv = std::fs::read_to_string(place.path().join("sheet/accuracy.csv")).unwrap();
+    let csv = std::fs::read_to_string(place.path("sheet/accuracy.csv")).unwrap();
     let columns = csv.lines().next().unwrap().split(',').count();
     assert!(csv.lines().all(|line| line.split(',').count() == columns), "{csv}");
-    let without = abbe(place.path(), "accuracy scene.yaml -o sheet --set integrator=whitted");
+    let without = abbe(&place, "accuracy scene.yaml -o sheet --set integrator=whitted");
     assert!(without.0 == 0 && without.1.contains("only `path` has knobs to weigh"), "{}", without.1);
 }
 
 /// A film of 4096 × 4096 pixels takes four gibibytes: the process ends by itself long before.
 #[test]
 fn a_memory_limit_ends_the_process_with_a_code_of_its_own() {
-    let place = directory();
+    let place = Place::of(SCENE);
     let large = "render scene.yaml -q -o large.exr --set image.width=4096 --set image.height=4096 --spp 1";
-    let (code, said) = abbe(place.path(), &format!("{large} --memory-limit 300M"));
+    let (code, said) = abbe(&place, &format!("{large} --memory-limit 300M"));
     assert_eq!(code, 33, "{said}");
     assert!(said.contains("more than --memory-limit, 300 MiB"), "{said}");
-    assert!(!place.path().join("large.exr").exists());
-    assert_eq!(abbe(place.path(), "render scene.yaml -q -o small.exr --memory-limit 4G").0, 0);
+    assert!(!place.path("large.exr").exists());
+    assert_eq!(abbe(&place, "render scene.yaml -q -o small.exr --memory-limit 4G").0, 0);
 }
 
 /// Samples that are shared out by noise leave a picture that knows its error, and may end at one.
 #[test]
 fn adaptive_sampling_knows_its_error() {
-    let place = directory();
+    let place = Place::of(SCENE);
     let run = |arguments: &str| {
         let adaptive = "render scene.yaml -o . --set render.techniques.adaptive=on";
-        let (code, said) = abbe(place.path(), &format!("{adaptive} {arguments}"));
+        let (code, said) = abbe(&place, &format!("{adaptive} {arguments}"));
         assert_eq!(code, 0, "{said}");
-        json(&place.path().join("report.json"))["scenes"][0]["error"]["rel_rmse"].as_f64().unwrap()
+        place.json("report.json")["scenes"][0]["error"]["rel_rmse"].as_f64().unwrap()
     };
     let error = run("--spp 64");
     assert!((0.001..0.1).contains(&error), "{error}");

@@ -2,6 +2,8 @@
 //! figures with their standard error.
 #![allow(dead_code, reason = "every test file uses its own part")]
 
+pub mod place;
+
 use abbe::batch::frame::{self, Frame};
 use abbe::batch::{self, Overrides, Prepared};
 use abbe::film::Window;
