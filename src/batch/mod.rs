@@ -3,7 +3,6 @@
 //! A batch goes on with the other scenes after one fails; what failed is told at the end.
 
 pub mod accuracy;
-pub mod accuracy_page;
 pub mod adaptive;
 pub mod checkpoint;
 pub mod develop;
@@ -215,22 +214,20 @@ pub fn entries(path: &Path, overrides: &Overrides) -> Result<Vec<BatchEntry>> {
 /// # Errors
 /// [`Error::Config`] and [`Error::Input`], as [`compile::compile`].
 pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
-    prepare_with(entry, overrides, &mut Shelf::default())
+    prepare_scene(entry, entry.scene(&overrides.set)?, overrides, &mut Shelf::default(), |_| {})
 }
 
-/// [`prepare`] with what the scene before has read; see [`compile::compile_with`].
-fn prepare_with(entry: &BatchEntry, overrides: &Overrides, shelf: &mut Shelf) -> Result<Prepared> {
-    prepare_scene(entry, entry.scene(&overrides.set)?, overrides, shelf)
-}
-
-/// Compiles and plans a scene that has been read.
+/// Compiles a scene that has been read, with what the scene before has read (see [`compile::compile_with`]), has `alter`
+/// change it, and plans it.
 fn prepare_scene(
     entry: &BatchEntry,
     description: SceneDescription,
     overrides: &Overrides,
     shelf: &mut Shelf,
+    alter: impl FnOnce(&mut Scene),
 ) -> Result<Prepared> {
     let mut scene = compile::compile_with(&description, &entry.name, shelf)?;
+    alter(&mut scene);
     let integrator = integrator(&description, &description.integrator)?;
     let stop = stop(&description);
     let samples = match &integrator {
@@ -606,7 +603,7 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                 break 'batch;
             }
             watcher.scene_begins(Turn { scene: [i, entries.len()], frame: [n, frames] }, &label);
-            let prepared = description.and_then(|d| prepare_scene(entry, d, overrides, &mut shelf));
+            let prepared = description.and_then(|d| prepare_scene(entry, d, overrides, &mut shelf, |_| {}));
             if i + 1 == entries.len() && n + 1 == frames {
                 // Nobody comes after the last one.
                 shelf = Shelf::default();

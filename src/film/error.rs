@@ -120,6 +120,14 @@ struct Sums {
 /// The three ways to make two pairs of four.
 const PAIRINGS: [[usize; 4]; 3] = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2]];
 
+/// What is added to the square of a value that an error is divided by: f, a hundredth of the square of the mean of all.
+#[must_use]
+pub fn floor(image: &Image) -> f64 {
+    let mean =
+        image.rgb.iter().flatten().map(|&v| f64::from(v)).sum::<f64>() / (3 * image.window.pixels()).max(1) as f64;
+    0.01 * mean * mean
+}
+
 /// How noisy `image` is, the picture that `film` and `splats` hold in the colour space of `rgb_from_xyz`; on the current
 /// rayon pool.
 ///
@@ -133,10 +141,8 @@ pub fn relative_error(
 ) -> Result<ErrorEstimate, NoEstimate> {
     let window = film.window();
     let pixels = window.pixels();
-    let values = image.rgb.iter().flatten();
-    let mean = values.clone().map(|&v| f64::from(v)).sum::<f64>() / (3 * pixels).max(1) as f64;
     let black = image.rgb.iter().flatten().all(|&v| v == 0.0);
-    let floor = 0.01 * mean * mean;
+    let floor = floor(image);
     let side = ((pixels as f64 / BLOCKS as f64).sqrt() as u32).max(1);
     let rows = window.height.div_ceil(side);
     let columns = window.width.div_ceil(side);

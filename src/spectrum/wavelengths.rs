@@ -26,7 +26,7 @@ pub struct SampledWavelengths {
     pub inv_pdf: Lanes,
 }
 
-/// Intervals of P⁻¹: a multiple of [`LANES`], so that all lanes sit at the same place of theirs.
+/// Intervals of P⁻¹: a power of two, a multiple of [`LANES`], so that all lanes sit at the same place of theirs.
 const KNOTS: usize = 2048;
 /// Intervals between one lane and the next.
 const ROWS: usize = KNOTS / LANES;
@@ -37,6 +37,10 @@ pub struct WavelengthDistribution {
     /// For each row r, twice the sequence over k of the knot r + k · ROWS, nm: a lattice that starts in any
     /// lane is 8 neighbours. The row after it holds the ends of its intervals.
     rows: Vec<[f32; 2 * LANES]>,
+    /// Rows but for the last: 2 to this.
+    rows_log2: u32,
+    /// Intervals by which all lanes are turned.
+    turn: usize,
     /// Always these wavelengths, whatever u.
     fixed: Option<SampledWavelengths>,
     description: String,
@@ -75,7 +79,28 @@ impl WavelengthDistribution {
             nm: Lanes::new(nm.map(|x| x as f32)),
             inv_pdf: Lanes::splat((BAND_NM[1] - BAND_NM[0]) as f32),
         };
-        Ok(WavelengthDistribution { rows: Vec::new(), fixed: Some(sample), description: format!("fixed: {nm:?} nm") })
+        let description = format!("fixed: {nm:?} nm");
+        Ok(WavelengthDistribution { rows: Vec::new(), rows_log2: 0, turn: 0, fixed: Some(sample), description })
+    }
+
+    /// The same density with `count` wavelengths a path, evenly turned, each in as many lanes: to see what eight buy.
+    /// Lanes of one wavelength share its way, so that whatever is unbiased with eight is with fewer.
+    ///
+    /// # Panics
+    /// If the wavelengths are fixed, or `count` is not 1, 2, 4 or 8.
+    #[must_use]
+    pub fn with_count(&self, count: usize) -> WavelengthDistribution {
+        assert!(self.fixed.is_none() && LANES.is_multiple_of(count), "{count} of {self:?}");
+        let knots: Vec<f32> =
+            (0..KNOTS).map(|j| self.rows[j % ROWS][j / ROWS]).chain([self.rows[ROWS][LANES - 1]]).collect();
+        let description = format!("{}; {count} a path", self.description);
+        WavelengthDistribution { turn: self.turn, ..WavelengthDistribution::of_knots(&knots, count, description) }
+    }
+
+    /// The same, half a step on: its eight wavelengths and those of `self` at the same u are sixteen, evenly turned.
+    #[must_use]
+    pub fn half_a_step_on(&self) -> WavelengthDistribution {
+        WavelengthDistribution { turn: (self.turn + ROWS / 2) % KNOTS, ..self.clone() }
     }
 
     /// The density that leaves the least colour noise in a scene with these emitters (each with the
@@ -169,6 +194,13 @@ impl WavelengthDistribution {
         )
     }
 
+    /// `count` wavelengths a path with these knots.
+    fn of_knots(knots: &[f32], count: usize, description: String) -> WavelengthDistribution {
+        let between = KNOTS / count;
+        let rows = (0..=between).map(|r| std::array::from_fn(|k| knots[r + k % count * between])).collect();
+        WavelengthDistribution { rows, rows_log2: between.ilog2(), turn: 0, fixed: None, description }
+    }
+
     /// The wavelengths of `u` in [0, 1): all of them within the band.
     #[must_use]
     #[inline]
@@ -181,11 +213,12 @@ impl WavelengthDistribution {
         let at = u * KNOTS as f64;
         let knot = (at as u32 as usize).min(KNOTS - 1);
         let place = Lanes::splat((at - knot as f64) as f32);
-        let first = knot / ROWS;
+        let knot = (knot + self.turn) % KNOTS;
+        let (first, row) = (knot >> self.rows_log2, knot & ((1 << self.rows_log2) - 1));
         let eight = |row: usize| Lanes::new(std::array::from_fn(|k| self.rows[row][first + k]));
-        let begin = eight(knot % ROWS);
+        let begin = eight(row);
         // Exact (`distribution`), so that begin + width is the end, and rounding is monotonic: never beyond.
-        let width = eight(knot % ROWS + 1) - begin;
+        let width = eight(row + 1) - begin;
         SampledWavelengths { nm: place.mul_add(width, begin), inv_pdf: width * Lanes::splat(KNOTS as f32) }
     }
 
@@ -276,8 +309,7 @@ impl Density {
         knots[KNOTS] = BAND_NM[1] as f32;
         // Neighbours lie well within a factor of two of each other (a 2048th of a density that is at least a
         // tenth of `vis` spans 21 nm at most), so their difference is exact in f32 (Sterbenz).
-        let rows = (0..=ROWS).map(|r| std::array::from_fn(|k| knots[r + k % LANES * ROWS])).collect();
-        WavelengthDistribution { rows, fixed: None, description }
+        WavelengthDistribution::of_knots(&knots, LANES, description)
     }
 }
 
@@ -411,6 +443,36 @@ mod tests {
                     assert!((sum[c] / expected[c] - 1.0).abs() < tolerance, "{distribution:?} {sum:?} {expected:?}");
                 }
             }
+        }
+    }
+
+    /// Lane k of `count` is the hero of u + k/count; a turn of half a step takes u on by a sixteenth; and ∫ dλ over all u is
+    /// 470 nm in any lane.
+    #[test]
+    fn fewer_wavelengths_and_a_turn_are_of_the_same_density() {
+        for distribution in all() {
+            let hero = |u: f64| {
+                let s = distribution.sample(u.fract());
+                (s.nm.to_array()[0], s.inv_pdf.to_array()[0])
+            };
+            // u and its sums with eighths and sixteenths are exact.
+            for i in 0..64 {
+                let u = (f64::from(i) + 0.25) / 64.0;
+                for count in [1, 2, 4, 8] {
+                    let s = distribution.with_count(count).sample(u);
+                    for k in 0..LANES {
+                        let found = (s.nm.to_array()[k], s.inv_pdf.to_array()[k]);
+                        assert_eq!(found, hero(u + (k % count) as f64 / count as f64), "{count} at {u}, lane {k}");
+                    }
+                }
+                let on = distribution.half_a_step_on();
+                assert_eq!(on.sample(u), distribution.sample((u + 1.0 / 16.0).fract()));
+                assert_eq!(on.with_count(1).sample(u).nm, Lanes::splat(hero(u + 1.0 / 16.0).0));
+            }
+            let one = distribution.with_count(1);
+            let width: f64 =
+                (0..4096).map(|i| f64::from(one.sample((f64::from(i) + 0.5) / 4096.0).inv_pdf.to_array()[5])).sum();
+            assert!((width / 4096.0 - 470.0).abs() < 1e-3, "{width}");
         }
     }
 

@@ -2,12 +2,12 @@
 
 use super::LAMP;
 use super::channels::{render, render_with};
-use super::common::{Bench, bench, bench_with, wavelengths};
+use super::common::{Bench, Estimate, bench, bench_with, wavelengths};
 use abbe::film::filter::Filter;
 use abbe::math::Ray;
 use abbe::math::sampler::Sampler;
 use abbe::math::statistics::Moments;
-use abbe::spectrum::{RefractiveIndex, catalogue};
+use abbe::spectrum::{ColourSpace, RefractiveIndex, WavelengthDistribution, catalogue};
 use glam::DVec3;
 
 /// N-BK7 by the three terms that Schott publishes, λ in µm.
@@ -147,7 +147,7 @@ fn ground_flint_is_in_each_band_the_glass_of_its_index() {
     const BANDS: [f64; 4] = [450.0, 520.0, 590.0, 680.0];
     let means = |ior: &str| -> Vec<Moments> {
         let mut all = vec![Vec::new(); BANDS.len()];
-        for seed in 0..8 {
+        for seed in 0..6 {
             let bands: String = (0..)
                 .zip(BANDS)
                 .map(|(i, nm)| {
@@ -277,7 +277,7 @@ fn each_band_behind_a_prism_lies_where_snells_law_puts_it() {
     let mut power: [Moments; BANDS] = std::array::from_fn(|_| Moments::default());
     let mut place: [Moments; BANDS] = std::array::from_fn(|_| Moments::default());
     let pixel = tall / ROWS as f64;
-    for seed in 0..8 {
+    for seed in 0..6 {
         let bench = scene(seed);
         assert!(bench.prepared.plan.caustics.is_some(), "light is traced");
         let frame = render_with(&bench, Filter::Box, 32);
@@ -325,5 +325,49 @@ fn each_band_behind_a_prism_lies_where_snells_law_puts_it() {
             off < 4.0 * error + 0.05 * pixel && error < 0.05 * pixel,
             "band {k}: {found} ± {error}, {expected}, row {pixel}"
         );
+    }
+}
+
+/// How many wavelengths go together changes the noise, never the mean: a ball of flint before a lamp and a diffuse floor under
+/// it, from the camera with and without packets, with light traced from the lamp, and with merged photons. Red and blue by
+/// themselves: a lane that counts too much shows there first. Merging blurs alike, whatever the wavelengths.
+#[test]
+fn any_number_of_wavelengths_a_path_finds_the_same_light() {
+    let scene = |techniques: &str, seed: u64| {
+        format!(
+            "camera: {{origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}}\nimage: {{width: 8, height: 8}}\n\
+             render: {{samples: 256, seed: {seed}, techniques: {{{techniques}}}}}\nshapes:\n\
+             - plane: {{normal: [0, 1, 0], material: {{diffuse: {{reflectance: {{rgb: [0.7, 0.5, 0.2]}}}}}}}}\n\
+             - sphere: {{center: [0, 1, 0], radius: 1, material: {{dielectric: {{ior: {{glass: N-SF11}}}}}}}}\n\
+             - sphere: {{center: [1, 3, -1], radius: 0.7, emission: {{illuminant: D65}}}}\n"
+        )
+    };
+    let light = |techniques: &str, change: &dyn Fn(&WavelengthDistribution) -> WavelengthDistribution| {
+        let mut all = [Moments::default(); 2];
+        for seed in 0..6 {
+            let mut bench = bench_with(&scene(techniques, seed), &[]);
+            bench.prepared.scene.wavelengths = change(&bench.prepared.scene.wavelengths);
+            for rgb in bench.frame().replicate_means(&ColourSpace::Rec709.matrix_from_xyz()) {
+                all[0].push(rgb[0]);
+                all[1].push(rgb[2]);
+            }
+        }
+        all.map(|m| Estimate { mean: m.mean, error: m.standard_error() })
+    };
+    for techniques in [
+        "packets: off, light_tracing: off",
+        "packets: on, light_tracing: off",
+        "packets: on, light_tracing: on, merging: off",
+        "packets: off, light_tracing: on, merging: on",
+    ] {
+        let eight = light(techniques, &|w| w.clone());
+        let one = light(techniques, &|w| w.with_count(1));
+        let four = light(techniques, &|w| w.with_count(4));
+        let turned = light(techniques, &|w| w.half_a_step_on());
+        for (c, eight) in eight.iter().enumerate() {
+            one[c].assert_agrees(eight, 0.035);
+            four[c].assert_agrees(eight, 0.035);
+            turned[c].assert_agrees(eight, 0.035);
+        }
     }
 }

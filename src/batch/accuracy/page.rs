@@ -1,6 +1,6 @@
 //! The sheet as one page that needs nothing else: numbers, curves, pictures and what follows from them.
 
-use super::accuracy::{Row, Sheet};
+use super::{Row, Sheet};
 use std::fmt::Write;
 
 /// Style of the page. Colours are told apart without colour vision by their lightness, too.
@@ -178,7 +178,7 @@ fn plot(chosen: &Row, rows: &[Row], target: f64) -> String {
     for (i, row) in all().enumerate() {
         let colour = COLOURS[i.min(COLOURS.len() - 1)];
         let path = |of: usize, reverse: bool| {
-            let at = |p: &super::accuracy::Point| format!("{:.1} {:.1}", x(p.seconds), y(p.noise[of]));
+            let at = |p: &super::Point| format!("{:.1} {:.1}", x(p.seconds), y(p.noise[of]));
             let mut steps: Vec<String> = row.curve.iter().filter(|p| p.seconds > 0.0).map(at).collect();
             if reverse {
                 steps.reverse();

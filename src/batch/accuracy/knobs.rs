@@ -1,0 +1,97 @@
+//! Which knobs a sheet moves, and to what.
+
+use super::super::{Prepared, adaptive};
+use crate::film::accumulate::REPLICATES;
+use crate::transport::pilot::Use;
+use crate::transport::plan::PathSettings;
+
+/// A value of a knob.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// What is moved.
+    pub knob: &'static str,
+    /// To what.
+    pub value: String,
+    /// Settings of the scene that do it.
+    pub set: Vec<(String, String)>,
+    /// What no setting does.
+    pub way: Way,
+}
+
+/// How a scene is rendered beyond what its settings say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// Not at all.
+    AsSet,
+    /// With samples that have nothing in common.
+    Independent,
+    /// With so many wavelengths a path: 1, 2, 4 or 8; or 16, by two renders.
+    Wavelengths(usize),
+}
+
+/// What a reader has to know of a knob to take its figures for what they are.
+#[must_use]
+pub fn note(knob: &str) -> Option<&'static str> {
+    match knob {
+        "wavelengths per path" => Some(
+            "lanes are eight wide: one wavelength and four take the time of eight, sixteen are two renders of eight, half a \
+             step apart, on the same paths",
+        ),
+        _ => None,
+    }
+}
+
+/// The chosen setting, then each knob at other values.
+#[must_use]
+pub fn trials(chosen: &Prepared, path: &PathSettings) -> Vec<Trial> {
+    let samples = chosen.samples;
+    let trial = |knob, value: &str, set: &[(&str, &str)]| Trial {
+        knob,
+        value: value.to_owned(),
+        set: set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect(),
+        way: Way::AsSet,
+    };
+    let mut all = vec![trial("chosen", "as written", &[])];
+    for (name, samples) in [("1/4", samples / 4), ("1/2", samples / 2), ("2", samples * 2), ("4", samples * 4)] {
+        if samples >= REPLICATES as u32 {
+            all.push(trial("samples", &format!("x {name}"), &[("render.samples", &samples.to_string())]));
+        }
+    }
+    for value in [Some(2), Some(4), Some(8), Some(16), None] {
+        if value != path.max_depth {
+            let text = value.map_or("no bound".to_owned(), |d| d.to_string());
+            let written = value.map_or("null".to_owned(), |d: u32| d.to_string());
+            all.push(trial("depth", &text, &[("integrator.path.max_depth", &written)]));
+        }
+    }
+    all.push(Trial { way: Way::Independent, ..trial("sampler", "independent", &[]) });
+    for value in [1, 5, 1000] {
+        if value != path.roulette_depth {
+            let text = if value == 1000 { "from 1000".to_owned() } else { format!("from {value}") };
+            all.push(trial("roulette", &text, &[("integrator.path.roulette_depth", &value.to_string())]));
+        }
+    }
+    for count in [1, 4, 16] {
+        all.push(Trial { way: Way::Wavelengths(count), ..trial("wavelengths per path", &count.to_string(), &[]) });
+    }
+    for value in ["visible", "uniform"] {
+        all.push(trial("wavelengths", value, &[("render.wavelengths", value)]));
+    }
+    // What is on is turned off; what was left off, although there is cause for it, is turned on.
+    let caustics = chosen.plan.caustics.as_deref();
+    let about = |words: &str| chosen.plan.techniques.iter().any(|t| t.name.contains(words));
+    let shared = adaptive::choose(Use::On, false, &chosen.plan, samples).0.is_some();
+    for (knob, key, on, cause) in [
+        ("light tracing", "light_tracing", caustics.is_some(), about("light tracing")),
+        ("packets", "packets", chosen.plan.packets || caustics.is_some(), about("packets")),
+        ("merging", "merging", caustics.is_some_and(|c| c.merging.is_some()), about("merging")),
+        ("adaptive", "adaptive", chosen.plan.adaptive.is_some(), shared),
+    ] {
+        if cause {
+            let value = if on { "off" } else { "on" };
+            all.push(trial(knob, value, &[(&format!("render.techniques.{key}"), value)]));
+        }
+    }
+    all.push(trial("effects", "all", &[("render.effects", "all")]));
+    all
+}
