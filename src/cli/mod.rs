@@ -6,6 +6,7 @@
 mod accuracy;
 mod compare;
 mod convert;
+mod info;
 mod interrupts;
 mod memory_limit;
 mod merge;
@@ -54,6 +55,9 @@ enum Verb {
     /// Say whether two EXR files show the same picture, within their noise (exit 0 same, 1 different, 2 cannot compare)
     #[command(after_help = "Example:\n  abbe compare ours.exr theirs.exr --json figures.json")]
     Compare(CompareArguments),
+    /// Say what is in a picture: size, colours, layers and their numbers, error, camera, scene
+    #[command(after_help = "Example:\n  abbe info out/prism.exr out/prism.png")]
+    Info(InfoArguments),
 }
 
 /// What both `render` and `plan` take.
@@ -206,6 +210,16 @@ struct CompareArguments {
     json: Option<PathBuf>,
 }
 
+#[derive(Debug, Args)]
+struct InfoArguments {
+    /// OpenEXR or PNG files, of Abbe or of others
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// As JSON, with all attributes
+    #[arg(long)]
+    json: bool,
+}
+
 /// How progress is told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum ProgressStyle {
@@ -352,6 +366,7 @@ pub fn run() -> i32 {
         Verb::Import(a) => convert::import(a),
         Verb::Export(a) => convert::export(a),
         Verb::Compare(a) => compare::run(a),
+        Verb::Info(a) => info::run(a),
     });
     match result {
         Ok(code) => code,

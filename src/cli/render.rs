@@ -101,7 +101,8 @@ pub fn seconds(s: f64) -> String {
     }
 }
 
-fn per_cent(x: f64) -> String {
+/// A share as a person says it.
+pub fn per_cent(x: f64) -> String {
     if x < 0.1 { format!("{:.2} %", x * 100.0) } else { format!("{:.1} %", x * 100.0) }
 }
 

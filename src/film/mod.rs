@@ -11,6 +11,7 @@ pub mod accumulate;
 pub mod compare;
 pub mod error;
 pub mod exr;
+pub mod facts;
 pub mod filter;
 pub mod layers;
 pub mod output;

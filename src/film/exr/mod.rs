@@ -9,6 +9,7 @@
 //!
 //! Source: "OpenEXR File Layout", openexr.com (technical documentation), and its list of standard attributes.
 
+pub mod header;
 pub mod part;
 mod read;
 mod write;

@@ -1,5 +1,6 @@
 //! Reads any flat OpenEXR file that the `exr` crate can decode.
 
+use super::header::{Header, read_headers};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use ::exr::image::FlatSamples;
@@ -53,13 +54,14 @@ impl ExrPart {
 ///
 /// # Errors
 /// [`Error::Input`]: the file is missing, is no OpenEXR file, is damaged, or holds what cannot be read (deep data,
-/// subsampled channels, an unknown compression).
+/// channels with fewer samples than pixels, an unknown compression).
 pub fn read_exr(path: &Path) -> Result<ExrFile> {
     let fail = |e: ::exr::error::Error| Error::input(path, words(e));
-    let file = std::fs::File::open(path).map_err(|e| {
-        let missing = e.kind() == std::io::ErrorKind::NotFound;
-        Error::input(path, if missing { "there is no such file".to_string() } else { e.to_string() })
-    })?;
+    let headers = read_headers(path)?;
+    if let Some(why) = headers.parts.iter().find_map(Header::unreadable) {
+        return Err(Error::input(path, why));
+    }
+    let file = std::fs::File::open(path).map_err(|e| Error::input(path, e.to_string()))?;
     let mut reader = std::io::BufReader::new(file);
     let meta = MetaData::read_from_buffered(&mut reader, false).map_err(fail)?;
     check_size(path, &meta)?;
@@ -82,9 +84,6 @@ pub fn read_exr(path: &Path) -> Result<ExrFile> {
         let mut channels = Vec::new();
         for channel in layer.channel_data.list {
             let name = text(&channel.name);
-            if channel.sampling.x() != 1 || channel.sampling.y() != 1 {
-                return Err(Error::input(path, format!("channel `{name}` is subsampled, which is not supported")));
-            }
             let samples = match channel.sample_data {
                 FlatSamples::F16(samples) => samples.into_iter().map(half::f16::to_f32).collect(),
                 FlatSamples::F32(samples) => samples,

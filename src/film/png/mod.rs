@@ -6,6 +6,7 @@
 //! Alpha is not written: the picture stands on black, as its premultiplied colours are.
 
 mod gamut;
+pub mod inspect;
 pub mod meter;
 mod tags;
 mod tone;
