@@ -5,7 +5,7 @@ mod common;
 use abbe::batch::checkpoint::Keep;
 use abbe::batch::frame::Progress;
 use abbe::batch::report::{SceneReport, Status};
-use abbe::batch::{self, Overrides, Portion, Turn, Watcher, merge};
+use abbe::batch::{self, Overrides, Portion, Samples, Turn, Watcher, merge};
 use abbe::film::accumulate::Film;
 use abbe::film::exr::read_exr;
 use abbe::math::statistics::Moments;
@@ -102,7 +102,7 @@ fn parts_by_rows_of_cells_are_the_picture_bit_for_bit() {
     };
     let message = refused(tile(0, 5));
     assert!(message.contains("n at most 4, the rows of cells of adaptive sampling"), "{message}");
-    let message = refused(Portion { tile: None, samples: Some([0, 31]) });
+    let message = refused(Portion { tile: None, samples: Some(Samples::Range([0, 31])) });
     assert!(message.contains("--samples 0-31: expected --tile i/n or render.techniques.adaptive: off"), "{message}");
 }
 

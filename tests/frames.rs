@@ -1,11 +1,10 @@
 //! Scenes that change over frames: each frame is the picture of a scene that stands still, and has a name of its own.
 
+mod common;
+
 use abbe::batch::merge;
-use abbe::film::exr::read_exr;
+use common::place::{Place, pixels};
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-use tempfile::TempDir;
 
 /// A picture of a few milliseconds, without what moves.
 const STILL: &str = "image: {width: 20, height: 14}\n\
@@ -34,49 +33,16 @@ const AT_4: &str = "camera: {origin: [1, 1, 6], target: [0, 0.5, 0], fov_deg: 40
                     - cube: {size: 1, transform: [{rotate: {axis: [0, 1, 0], deg: 45}}, {translate: [2, 0.5, 0]}]}\n\
                     - sphere: {center: [0, 4, 2], radius: 0.5, emission: 6}\n";
 
-struct Place {
-    directory: TempDir,
+/// Renders, and reads the report.
+fn render(place: &Place, arguments: &[&str]) -> Value {
+    let ran = place.run(&[&["render", "-q", "--report", "r.json"], arguments].concat());
+    assert_eq!(ran.code, 0, "{arguments:?}: {}", ran.err);
+    place.json("r.json")
 }
 
-impl Place {
-    fn with(files: &[(&str, String)]) -> Place {
-        let place = Place { directory: tempfile::tempdir().unwrap() };
-        for (name, text) in files {
-            std::fs::write(place.path(name), text).unwrap();
-        }
-        place
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.directory.path().join(name)
-    }
-
-    fn abbe(&self, arguments: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_abbe"));
-        command.current_dir(self.directory.path()).args(arguments).output().unwrap()
-    }
-
-    /// Renders, and reads the report.
-    fn render(&self, arguments: &[&str]) -> Value {
-        let arguments = [&["render", "-q", "--report", "r.json"], arguments].concat();
-        let done = self.abbe(&arguments);
-        assert!(done.status.success(), "{arguments:?}: {}", err(&done));
-        serde_json::from_slice(&std::fs::read(self.path("r.json")).unwrap()).unwrap()
-    }
-
-    /// The files in a directory, in order.
-    fn files(&self, directory: &str) -> Vec<String> {
-        let mut all: Vec<String> = std::fs::read_dir(self.path(directory))
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
-            .collect();
-        all.sort();
-        all
-    }
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+/// Files of scenes, each a name and what it says.
+fn with(files: &[(&str, String)]) -> Place {
+    Place::with(&files.iter().map(|(name, text)| (*name, text.as_str())).collect::<Vec<_>>())
 }
 
 fn hashes(report: &Value) -> Vec<(String, String)> {
@@ -84,38 +50,32 @@ fn hashes(report: &Value) -> Vec<(String, String)> {
     report["scenes"].as_array().unwrap().iter().map(|s| (text(s, "pixel_hash"), text(s, "scene_hash"))).collect()
 }
 
-/// Bits of all channels.
-fn pixels(path: &Path) -> Vec<(String, Vec<u32>)> {
-    let part = read_exr(path).unwrap().parts.swap_remove(0);
-    part.channels.into_iter().map(|(name, v)| (name, v.into_iter().map(f32::to_bits).collect())).collect()
-}
-
 #[test]
 fn a_frame_is_the_picture_of_a_scene_with_its_values_written_in() {
-    let render = "render: {samples: 8, seed: 100, frames: '0-8:4'}\n";
+    let settings = "render: {samples: 8, seed: 100, frames: '0-8:4'}\n";
     let still = "render: {samples: 8, seed: 104}\n";
-    let files = [("a.yaml", format!("{render}{STILL}{MOVING}")), ("b.yaml", format!("{still}{STILL}{AT_4}"))];
-    let place = Place::with(&files);
-    let moving = place.render(&["a.yaml"]);
+    let files = [("a.yaml", format!("{settings}{STILL}{MOVING}")), ("b.yaml", format!("{still}{STILL}{AT_4}"))];
+    let place = with(&files);
+    let moving = render(&place, &["a.yaml"]);
     let frames: Vec<i64> = moving["scenes"].as_array().unwrap().iter().map(|s| s["frame"].as_i64().unwrap()).collect();
     assert_eq!(frames, [0, 4, 8]);
     let moving = hashes(&moving);
-    assert_eq!(moving[1], hashes(&place.render(&["b.yaml"]))[0]);
+    assert_eq!(moving[1], hashes(&render(&place, &["b.yaml"]))[0]);
     assert!(moving[0].0 != moving[1].0 && moving[1].0 != moving[2].0);
     assert!(place.path("out/a.0004.exr").is_file() && place.path("out/a.0008.png").is_file());
     // In any company.
-    assert_eq!(hashes(&place.render(&["a.yaml", "--frames", "4"]))[0], moving[1]);
+    assert_eq!(hashes(&render(&place, &["a.yaml", "--frames", "4"]))[0], moving[1]);
 }
 
 #[test]
 fn a_scene_that_does_not_change_is_the_same_with_frames_but_for_its_seed() {
-    let place = Place::with(&[("a.yaml", format!("{STILL}{AT_4}"))]);
-    let still = hashes(&place.render(&["a.yaml", "--spp", "4", "--seed", "7"]));
-    assert_eq!(hashes(&place.render(&["a.yaml", "--spp", "4", "--frames", "7"])), still);
+    let place = with(&[("a.yaml", format!("{STILL}{AT_4}"))]);
+    let still = hashes(&render(&place, &["a.yaml", "--spp", "4", "--seed", "7"]));
+    assert_eq!(hashes(&render(&place, &["a.yaml", "--spp", "4", "--frames", "7"])), still);
     let held = ["a.yaml", "--spp", "4", "--seed", "7", "--frames", "-3,12", "--set", "render.seed_per_frame=false"];
-    assert_eq!(hashes(&place.render(&held)), [still[0].clone(), still[0].clone()]);
+    assert_eq!(hashes(&render(&place, &held)), [still[0].clone(), still[0].clone()]);
     assert_eq!(
-        place.files("out").iter().filter(|f| f.ends_with("exr")).collect::<Vec<_>>(),
+        place.names("out").iter().filter(|f| f.ends_with("exr")).collect::<Vec<_>>(),
         ["a.-003.exr", "a.0007.exr", "a.0012.exr", "a.exr"]
     );
 }
@@ -123,7 +83,7 @@ fn a_scene_that_does_not_change_is_the_same_with_frames_but_for_its_seed() {
 #[test]
 fn names_follow_the_pattern() {
     let batch = "render: {samples: 1, frames: 3-4}\nscenes: [{file: a.yaml}, {file: a.yaml, name: b}]\n";
-    let place = Place::with(&[("a.yaml", format!("{STILL}{MOVING}")), ("batch.yaml", batch.to_owned())]);
+    let place = with(&[("a.yaml", format!("{STILL}{MOVING}")), ("batch.yaml", batch.to_owned())]);
     let one = ["batch.yaml", "--scene", "b", "-o"];
     for (output, directory, first) in [
         ("p", "p", "b.0003.exr"),
@@ -132,41 +92,41 @@ fn names_follow_the_pattern() {
         ("{scene}/{frame:06}.exr", "b", "000003.exr"),
         ("s-{frame}", "s-3", "b.0003.exr"),
     ] {
-        place.render(&[&one[..], &[output]].concat());
-        assert!(place.path(directory).join(first).is_file(), "{output}: {:?}", place.files(directory));
+        render(&place, &[&one[..], &[output]].concat());
+        assert!(place.path(directory).join(first).is_file(), "{output}: {:?}", place.names(directory));
     }
-    place.render(&["batch.yaml", "-o", "all/{scene}.####.exr"]);
-    let exr: Vec<String> = place.files("all").into_iter().filter(|name| name.ends_with("exr")).collect();
+    render(&place, &["batch.yaml", "-o", "all/{scene}.####.exr"]);
+    let exr: Vec<String> = place.names("all").into_iter().filter(|name| name.ends_with("exr")).collect();
     assert_eq!(exr, ["a.0003.exr", "a.0004.exr", "b.0003.exr", "b.0004.exr"]);
 }
 
 #[test]
 fn what_is_there_of_an_animation_is_left_alone() {
-    let place = Place::with(&[("a.yaml", format!("{STILL}{MOVING}"))]);
+    let place = with(&[("a.yaml", format!("{STILL}{MOVING}"))]);
     let common = ["a.yaml", "--spp", "2", "--skip-existing", "--frames"];
-    place.render(&[&common[..], &["1-2"]].concat());
-    let report = place.render(&[&common[..], &["1-3"]].concat());
+    render(&place, &[&common[..], &["1-2"]].concat());
+    let report = render(&place, &[&common[..], &["1-3"]].concat());
     let status: Vec<&str> =
         report["scenes"].as_array().unwrap().iter().map(|s| s["status"].as_str().unwrap()).collect();
     assert_eq!(status, ["skipped", "skipped", "done"]);
     // Frame 2 under the name of frame 1 is not frame 1.
     std::fs::rename(place.path("out/a.0002.exr"), place.path("out/a.0001.exr")).unwrap();
-    let report = place.render(&[&common[..], &["1"]].concat());
+    let report = render(&place, &[&common[..], &["1"]].concat());
     assert_eq!(report["scenes"][0]["status"], "done");
 }
 
 #[test]
 fn parts_of_a_frame_make_it_up_and_those_of_two_are_refused() {
-    let place = Place::with(&[("a.yaml", format!("{STILL}{MOVING}")), ("still.yaml", format!("{STILL}{AT_4}"))]);
+    let place = with(&[("a.yaml", format!("{STILL}{MOVING}")), ("still.yaml", format!("{STILL}{AT_4}"))]);
     let common = ["a.yaml", "--spp", "8", "--frames", "3-4"];
-    place.render(&common);
+    render(&place, &common);
     for tile in ["0/2", "1/2"] {
-        place.render(&[&common[..], &["--tile", tile, "-o", "parts/{frame}"]].concat());
+        render(&place, &[&common[..], &["--tile", tile, "-o", "parts/{frame}"]].concat());
     }
-    assert_eq!(place.files("parts/4")[..2], ["a.0004.tile0of2.exr", "a.0004.tile1of2.exr"]);
+    assert_eq!(place.names("parts/4")[..2], ["a.0004.tile0of2.exr", "a.0004.tile1of2.exr"]);
     for frame in ["3", "4"] {
-        let done = place.abbe(&["merge", &format!("parts/{frame}"), "-o", "merged", "-q"]);
-        assert!(done.status.success(), "{}", err(&done));
+        let ran = place.run(&["merge", &format!("parts/{frame}"), "-o", "merged", "-q"]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
         let name = format!("a.000{frame}.exr");
         assert!(pixels(&place.path("merged").join(&name)) == pixels(&place.path("out").join(&name)));
     }
@@ -178,7 +138,7 @@ fn parts_of_a_frame_make_it_up_and_those_of_two_are_refused() {
     // Even where nothing changes, and with a picture that has no frame.
     let still = |out: &str, further: &[&str]| {
         let common = ["still.yaml", "--spp", "2", "--tile", "0/1", "--set", "render.seed_per_frame=false", "-o", out];
-        place.render(&[&common[..], further].concat());
+        render(&place, &[&common[..], further].concat());
         place.path(out)
     };
     let parts = [still("one.exr", &["--frames", "1"]), still("none.exr", &[])];
@@ -193,11 +153,11 @@ fn parts_of_a_frame_make_it_up_and_those_of_two_are_refused() {
 #[test]
 fn a_frame_is_exported_as_it_stands() {
     let still = format!("render: {{samples: 2, seed: 4}}\n{STILL}{AT_4}");
-    let place = Place::with(&[("a.yaml", format!("{STILL}{MOVING}")), ("b.yaml", still)]);
+    let place = with(&[("a.yaml", format!("{STILL}{MOVING}")), ("b.yaml", still)]);
     let exported = |arguments: &[&str]| {
-        let done = place.abbe(&[&["export"], arguments].concat());
-        assert!(done.status.success(), "{}", err(&done));
-        let text = String::from_utf8(done.stdout).unwrap();
+        let ran = place.run(&[&["export"], arguments].concat());
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        let text = ran.out;
         // One scene writes `render` first, the other last.
         let (render, rest) = text.lines().partition::<Vec<&str>, _>(|line| line.contains("<?abbe set"));
         (
@@ -213,7 +173,7 @@ fn a_frame_is_exported_as_it_stands() {
 
 #[test]
 fn what_is_wrong_with_frames_is_said_once() {
-    let place = Place::with(&[
+    let place = with(&[
         ("a.yaml", format!("{STILL}{MOVING}")),
         (
             "bad.yaml",
@@ -223,9 +183,9 @@ fn what_is_wrong_with_frames_is_said_once() {
         ("batch.yaml", "scenes: [{file: a.yaml}, {file: a.yaml, name: b}]\n".to_owned()),
     ]);
     let says = |arguments: &[&str], code: i32| {
-        let done = place.abbe(&[&["render", "-q"], arguments].concat());
-        assert_eq!(done.status.code(), Some(code), "{arguments:?}");
-        err(&done)
+        let ran = place.run(&[&["render", "-q"], arguments].concat());
+        assert_eq!(ran.code, code, "{arguments:?}: {}", ran.err);
+        ran.err
     };
     let message = says(&["a.yaml"], 2);
     assert!(message.starts_with("error: a: a.yaml:4:18: camera.origin: expected render.frames or --frames, since this changes over frames, found none\n"), "{message}");

@@ -2,7 +2,7 @@
 
 mod common;
 
-use abbe::batch::{self, Overrides, Portion, merge};
+use abbe::batch::{self, Overrides, Portion, Samples, merge};
 use abbe::error::Error;
 use abbe::film::exr::{ExrFile, read_exr};
 use abbe::math::sampler::mix64;
@@ -58,7 +58,7 @@ fn render(place: &Place, out: &str, portion: Portion, set: &[(&str, &str)]) -> P
 }
 
 fn part(tile: [u32; 2], samples: [u32; 2]) -> Portion {
-    Portion { tile: Some(tile), samples: Some(samples) }
+    Portion { tile: Some(tile), samples: Some(Samples::Range(samples)) }
 }
 
 /// Numbers that follow from a seed.
@@ -253,7 +253,7 @@ fn a_tile_or_samples_that_the_picture_lacks_are_a_fault_of_usage() {
         assert!(failure(Portion { tile: Some(tile), samples: None }).contains("n at most 14"), "{tile:?}");
     }
     for samples in [[0, 12], [5, 4], [12, 12]] {
-        let e = failure(Portion { tile: None, samples: Some(samples) });
+        let e = failure(Portion { tile: None, samples: Some(Samples::Range(samples)) });
         assert!(e.contains("from 0-0 to 11-11: the scene has 12 samples"), "{e}");
     }
     assert!(!place.path("a.exr").exists());

@@ -6,16 +6,18 @@ pub mod accuracy;
 pub mod adaptive;
 pub mod checkpoint;
 pub mod develop;
+pub mod farm;
 pub mod finish;
 pub mod frame;
 pub mod merge;
 pub mod names;
 pub mod part;
 pub mod part_file;
+mod portion;
 pub mod report;
 pub mod stop;
 
-use crate::description::{self, BatchEntry, LayerContent, SceneDescription};
+use crate::description::{self, BatchEntry, LayerContent, PathMap, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::filter::{Filter, FilterSampler};
@@ -32,8 +34,8 @@ use crate::transport::trial;
 use checkpoint::{Keep, Keeper};
 use finish::Finish;
 use frame::{FrameJob, Progress, go_on};
-use part::Share;
 use part_file::Identity;
+pub use portion::{Portion, Samples};
 use report::{Report, SceneReport, Status};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -48,6 +50,8 @@ pub struct Overrides {
     pub set: Vec<(String, String)>,
     /// `-D NAME=VALUE`: parameters of Mitsuba scenes.
     pub define: Vec<(String, String)>,
+    /// Where files lie that the scenes name.
+    pub paths: PathMap,
     /// Where pictures go: a directory, or for a single scene a file name that ends in `.exr`.
     pub output: Option<PathBuf>,
     /// Only the scenes with these names; all where empty.
@@ -58,61 +62,6 @@ pub struct Overrides {
     pub portion: Portion,
     /// What is kept of a render that ends early.
     pub keep: Keep,
-}
-
-/// A part of a picture as a person asks for it.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Portion {
-    /// `--tile i/n`: the i-th, from 0, of n bands of rows.
-    pub tile: Option<[u32; 2]>,
-    /// `--samples a-b`: the first and the last sample.
-    pub samples: Option<[u32; 2]>,
-}
-
-impl Portion {
-    /// Whether all is asked for, and no part.
-    #[must_use]
-    pub fn is_all(&self) -> bool {
-        *self == Portion::default()
-    }
-
-    /// The share of a picture of `window` and `samples`, of which `rows` of the frame stay together.
-    ///
-    /// # Errors
-    /// [`Error::Config`] for a tile or samples that the picture does not have.
-    pub fn share(&self, window: Window, samples: u32, rows: u32) -> Result<Share> {
-        let [tile, tiles] = self.tile.unwrap_or([0, 1]);
-        let most = part::bands(window, rows);
-        if tiles == 0 || u64::from(tiles) > most || tile >= tiles {
-            let cells = if rows > 1 { " of cells of adaptive sampling" } else { "" };
-            return Err(Error::Config(format!(
-                "--tile {tile}/{tiles}: expected i/n with i from 0 to n - 1 and n at most {most}, the rows{cells} of the \
-                 picture"
-            )));
-        }
-        if let (Some([first, last]), true) = (self.samples, rows > 1) {
-            return Err(Error::Config(format!(
-                "--samples {first}-{last}: expected --tile i/n or render.techniques.adaptive: off, found adaptive \
-                 sampling, which tells from all first samples where others go"
-            )));
-        }
-        let [first, last] = self.samples.unwrap_or([0, samples - 1]);
-        if first > last || last >= samples {
-            let most = samples - 1;
-            return Err(Error::Config(format!(
-                "--samples {first}-{last}: expected a-b with a not above b, from 0-0 to {most}-{most}: the scene has \
-                 {samples} samples a pixel"
-            )));
-        }
-        Ok(Share { tile, tiles, samples: first..last + 1, rows })
-    }
-
-    /// What tells the name of a part from that of the picture.
-    fn suffix(&self) -> String {
-        let tile = self.tile.map_or(String::new(), |[i, n]| format!(".tile{i}of{n}"));
-        let samples = self.samples.map_or(String::new(), |[a, b]| format!(".samples{a}-{b}"));
-        tile + &samples
-    }
 }
 
 /// Whose turn it is in a batch.
@@ -188,7 +137,7 @@ impl Prepared {
 /// [`Error::Config`] for a batch that cannot be read or a name that no scene has; [`Error::Input`] for
 /// a missing file.
 pub fn entries(path: &Path, overrides: &Overrides) -> Result<Vec<BatchEntry>> {
-    let document = description::load(path)?;
+    let document = description::load_mapped(path, overrides.paths.clone())?;
     let all = document.entries();
     for wanted in &overrides.scenes {
         if !all.iter().any(|e| &e.name == wanted) {
@@ -270,7 +219,7 @@ fn prepare_scene(
     let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
     plan.adaptive = first;
     plan.techniques.extend(said);
-    let hash = hash(&description, &scene.files);
+    let hash = hash(&description, &scene.files, &overrides.paths);
     Ok(Prepared { description, scene, plan, samples, planned, stop, hash, source: entry.path.clone() })
 }
 
@@ -388,7 +337,7 @@ fn quantity(quantity: description::Quantity) -> Quantity {
 }
 
 /// 128 bits of BLAKE3 over what was written, with every default, and over the files that it names.
-fn hash(description: &SceneDescription, files: &[PathBuf]) -> String {
+fn hash(description: &SceneDescription, files: &[PathBuf], paths: &PathMap) -> String {
     let mut hasher = blake3::Hasher::new();
     // Where the scene lies, and where its pictures go, does not change them.
     let mut content = description.clone();
@@ -402,7 +351,8 @@ fn hash(description: &SceneDescription, files: &[PathBuf]) -> String {
     if description.directory != Path::new("") {
         text = text.replace(&format!("{}/", description.directory.display()), "");
     }
-    hasher.update(text.as_bytes());
+    // Two machines have one scene in two places.
+    hasher.update(paths.undo(text).as_bytes());
     // A file that is named several times counts once: where else it is named stands in the text.
     let mut read: HashSet<&Path> = HashSet::new();
     for file in files {

@@ -17,7 +17,7 @@ const MOST_SAMPLES: u32 = 256;
 pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
     use_threads(arguments.threads);
     let interrupts = Interrupts::listen()?;
-    let overrides = arguments.scene.overrides(None);
+    let overrides = arguments.scene.overrides(None)?;
     let files = ["html", "json", "csv"].map(|ending| arguments.output.join(format!("accuracy.{ending}")));
     for file in &files {
         prepare_place(file)?;

@@ -44,7 +44,7 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
 /// The one scene that is asked for.
 fn read(arguments: &ConvertArguments) -> Result<SceneDescription> {
     let file = &arguments.scene.file;
-    let overrides = arguments.scene.overrides(None);
+    let overrides = arguments.scene.overrides(None)?;
     match &batch::entries(file, &overrides)?[..] {
         [entry] => entry.scene(&overrides.set),
         entries => Err(Error::Config(format!(

@@ -6,6 +6,7 @@
 mod accuracy;
 mod compare;
 mod convert;
+mod farm;
 mod info;
 mod interrupts;
 mod memory_limit;
@@ -41,6 +42,11 @@ enum Verb {
     /// Print what a scene calls for, each effect with its reason, and render nothing
     #[command(after_help = "Example:\n  abbe plan configs/gallery.yaml --scene prism --format json")]
     Plan(PlanArguments),
+    /// Write the job of a batch for a render farm
+    #[command(
+        after_help = "Examples:\n  abbe farm batch.yaml --format slurm -o job && job/submit.sh -p render --cpus-per-task=8\n  abbe farm batch.yaml --format openjd --frames 1-100 --tiles 2 -o job && deadline bundle submit job"
+    )]
+    Farm(FarmArguments),
     /// Move each knob of a scene by itself, and tell what it costs and what it buys
     #[command(
         after_help = "Examples:\n  abbe accuracy configs/scenes/box.yaml -o out/accuracy\n  abbe accuracy configs/gallery.yaml --scene prism --error 2%"
@@ -80,9 +86,15 @@ struct SceneArguments {
     /// Seed of all random numbers
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Frames, as 12, 1-100, 1-100x5 (or 1-100:5) or 1-10,20,30-40; all verbs but `render` take the first
+    /// Frames, as 12, 1-100, 1-100x5 (or 1-100:5) or 1-10,20,30-40; all verbs but `render` and `farm` take the first
     #[arg(long, value_name = "FRAMES", value_parser = frames, allow_hyphen_values = true)]
     frames: Option<String>,
+    /// Take files whose path begins with FROM from TO instead (may be repeated)
+    #[arg(long, value_name = "FROM=TO", value_parser = path_map)]
+    path_map: Vec<String>,
+    /// The same by the rules of a session of Open Job Description, a file of JSON
+    #[arg(long, value_name = "FILE.json")]
+    path_map_file: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -114,9 +126,9 @@ struct RenderArguments {
     /// Render a part: the i-th, from 0, of n bands of rows; `abbe merge` makes the picture
     #[arg(long, value_name = "i/n", value_parser = tile)]
     tile: Option<[u32; 2]>,
-    /// Render a part: samples a to b of each pixel, counted from 0, both included
-    #[arg(long, value_name = "a-b", value_parser = samples)]
-    samples: Option<[u32; 2]>,
+    /// Render a part: samples a to b of each pixel, counted from 0, both included; or the i-th, from 0, of n even ranges
+    #[arg(long, value_name = "a-b|i/n", value_parser = samples)]
+    samples: Option<crate::batch::Samples>,
     /// Go on from the checkpoint beside the output, if there is one; what is finished is left alone
     #[arg(long)]
     resume: bool,
@@ -152,6 +164,47 @@ struct MergeArguments {
     /// Print nothing but errors
     #[arg(short, long)]
     quiet: bool,
+}
+
+#[derive(Debug, Args)]
+struct FarmArguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// For which engine: an array of Slurm, or a bundle of Open Job Description, which Deadline Cloud runs
+    #[arg(long, value_enum)]
+    format: FarmFormat,
+    /// Directory for the job
+    #[arg(short, long, value_name = "DIR", default_value = "out/farm")]
+    output: PathBuf,
+    /// Directory for the pictures, which all machines see [default: pictures, in that of the job]
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
+    /// Cut each picture into this many bands of rows
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    tiles: u32,
+    /// Cut the samples of each picture into this many ranges
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    sample_ranges: u32,
+    /// Frames that one task renders; they share what they load
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    frames_per_task: u32,
+    /// Threads of a task; 0 for what the engine grants
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// The program, as the machines of the farm call it
+    #[arg(long, value_name = "PATH", default_value = "abbe")]
+    program: String,
+    /// Print nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum FarmFormat {
+    /// template.yaml with its parameters and files
+    Openjd,
+    /// render.sbatch, merge.sbatch and submit.sh
+    Slurm,
 }
 
 #[derive(Debug, Args)]
@@ -252,6 +305,10 @@ fn frames(text: &str) -> std::result::Result<String, String> {
     crate::description::frames(text).map(|_| text.to_owned())
 }
 
+fn path_map(text: &str) -> std::result::Result<String, String> {
+    crate::description::PathMap::default().add(text).map(|()| text.to_owned())
+}
+
 /// A relative error, or per cent.
 fn relative_error(text: &str) -> std::result::Result<f64, String> {
     let (number, unit) = match text.trim().strip_suffix('%') {
@@ -272,9 +329,12 @@ fn tile(text: &str) -> std::result::Result<[u32; 2], String> {
     pair(text, '/').ok_or_else(|| "expected i/n, as 2/8: the third of eight tiles".into())
 }
 
-fn samples(text: &str) -> std::result::Result<[u32; 2], String> {
+fn samples(text: &str) -> std::result::Result<crate::batch::Samples, String> {
+    use crate::batch::Samples;
     let one = || text.trim().parse().ok().map(|n| [n, n]);
-    pair(text, '-').or_else(one).ok_or_else(|| "expected a-b, as 0-63: the first 64 samples".into())
+    let range = || pair(text, '-').or_else(one).map(Samples::Range);
+    let expected = "expected a-b, as 0-63: the first 64 samples; or i/n, as 2/8: the third of eight ranges";
+    pair(text, '/').map(Samples::Nth).or_else(range).ok_or_else(|| expected.into())
 }
 
 fn share(text: &str) -> std::result::Result<f64, String> {
@@ -299,7 +359,19 @@ fn name_value(text: &str) -> std::result::Result<(String, String), String> {
 }
 
 impl SceneArguments {
-    fn overrides(&self, output: Option<PathBuf>) -> crate::batch::Overrides {
+    /// What the arguments say over the files.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for rules that cannot be read.
+    fn overrides(&self, output: Option<PathBuf>) -> Result<crate::batch::Overrides> {
+        let mut paths = crate::description::PathMap::default();
+        for rule in &self.path_map {
+            paths.add(rule).map_err(Error::Config)?;
+        }
+        if let Some(file) = &self.path_map_file {
+            let rules = std::fs::read(file).map_err(|e| Error::input(file, format!("cannot be read: {e}")))?;
+            paths.add_rules(&rules).map_err(|message| Error::input(file, message))?;
+        }
         let mut set = self.set.clone();
         if let Some(spp) = self.spp {
             set.push(("render.samples".into(), spp.to_string()));
@@ -310,15 +382,16 @@ impl SceneArguments {
         if let Some(frames) = &self.frames {
             set.push(("render.frames".into(), format!("\"{frames}\"")));
         }
-        crate::batch::Overrides {
+        Ok(crate::batch::Overrides {
             set,
             define: self.define.clone(),
+            paths,
             output,
             scenes: self.scenes.clone(),
             check_numerics: false,
             portion: crate::batch::Portion::default(),
             keep: crate::batch::checkpoint::Keep::default(),
-        }
+        })
     }
 }
 
@@ -361,6 +434,7 @@ pub fn run() -> i32 {
     let result = check_cpu().and_then(|()| match &arguments.verb {
         Verb::Render(a) => render::run(a),
         Verb::Merge(a) => merge::run(a),
+        Verb::Farm(a) => farm::run(a),
         Verb::Plan(a) => plan::run(a),
         Verb::Accuracy(a) => accuracy::run(a),
         Verb::Import(a) => convert::import(a),

@@ -8,7 +8,7 @@ use std::fmt::Write;
 
 /// Prints the effects of each scene.
 pub fn run(arguments: &PlanArguments) -> Result<i32> {
-    let overrides = arguments.scene.overrides(None);
+    let overrides = arguments.scene.overrides(None)?;
     let mut all = Vec::new();
     let mut code = 0;
     for entry in batch::entries(&arguments.scene.file, &overrides)? {

@@ -19,7 +19,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
         super::memory_limit::watch(limit)?;
     }
     let interrupts = Interrupts::listen()?;
-    let mut scene = arguments.scene.overrides(arguments.output.clone());
+    let mut scene = arguments.scene.overrides(arguments.output.clone())?;
     if let Some(error) = arguments.error {
         scene.set.push(("render.stop.error".into(), error.to_string()));
     }

@@ -57,6 +57,12 @@ impl Animation {
         self.clone().into_scene(frame)
     }
 
+    /// The files that were read so far: of the scene, of what it includes, of its tables and of the batch.
+    #[must_use]
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.sources.files()
+    }
+
     /// All pictures in order, each with its frame.
     pub fn into_scenes(self) -> impl Iterator<Item = (Option<i32>, Result<SceneDescription>)> {
         let mut frames = self.frames.clone().into_iter();

@@ -13,6 +13,7 @@ use super::fault::Checker;
 use super::mitsuba;
 use super::node::{Entry, Node, Place, Sources, Value, quote};
 use super::path::At;
+use super::path_map::PathMap;
 use super::scene::SceneDescription;
 use super::settings::{Output, Render};
 use super::spectrum::FilePath;
@@ -99,15 +100,24 @@ pub struct BatchEntry {
 /// # Errors
 /// [`Error::Input`] if the file cannot be read, [`Error::Config`] if it is not YAML or not a batch.
 pub fn load(path: &Path) -> Result<Document> {
-    let mut sources = Sources::default();
+    load_mapped(path, PathMap::default())
+}
+
+/// [`load`] where files lie elsewhere than they are written.
+///
+/// # Errors
+/// As there.
+pub fn load_mapped(path: &Path, map: PathMap) -> Result<Document> {
+    let mut sources = Sources::mapped(map);
     if mitsuba::is_xml(path) {
-        return Ok(Document::Scene(BatchEntry::alone(path)?));
+        return Ok(Document::Scene(BatchEntry::alone(path, sources)?));
     }
+    let nothing_read = sources.clone();
     let root = edit::read_file(path, &mut sources)?;
     if root.get("scenes").is_some() {
         return Ok(Document::Batch(Batch::of_tree(&root, &sources)?));
     }
-    Ok(Document::Scene(BatchEntry::alone(path)?))
+    Ok(Document::Scene(BatchEntry::alone(path, nothing_read)?))
 }
 
 fn stem(path: &Path) -> Option<String> {
@@ -225,7 +235,7 @@ fn check_name(name: &str, at: At<'_>, checker: &mut Checker<'_>) {
 
 impl BatchEntry {
     /// A scene that no batch names.
-    fn alone(path: &Path) -> Result<BatchEntry> {
+    fn alone(path: &Path, sources: Sources) -> Result<BatchEntry> {
         let name = stem(path).ok_or_else(|| Error::Config(format!("{}: expected a file name", path.display())))?;
         Ok(BatchEntry {
             name,
@@ -234,7 +244,7 @@ impl BatchEntry {
             layers: Vec::new(),
             settings: Vec::new(),
             defines: Vec::new(),
-            sources: Sources::default(),
+            sources,
         })
     }
 

@@ -159,7 +159,7 @@ impl<'de> Deserializer<'de> for De<'_> {
             }
             Value::Text(text) => {
                 // Directories need not be UTF-8, so the path travels as bytes.
-                let path = self.sources.directory(self.node.place).join(text);
+                let path = self.sources.file(self.node.place, text);
                 visitor.visit_newtype_struct(BytesDeserializer::new(path.as_os_str().as_encoded_bytes()))
             }
             _ => Err(Fault::expected(self.node, "the path of a file")),

@@ -61,6 +61,28 @@ pub fn frames(text: &str) -> Result<Vec<i32>, String> {
     }
 }
 
+/// [`frames`], the other way: runs of even steps, `1-96:5,200`.
+#[must_use]
+pub fn frames_in_short(frames: &[i32]) -> String {
+    let mut pieces = Vec::new();
+    let mut rest = frames;
+    while let [first, after @ ..] = rest {
+        let gap = |a: i32, b: i32| i64::from(b) - i64::from(a);
+        let step = after.first().map_or(0, |next| gap(*first, *next));
+        let even = rest.windows(2).take_while(|pair| step > 0 && gap(pair[0], pair[1]) == step).count();
+        // Two that are far apart are no run.
+        let run = if even == 1 && step > 1 { 0 } else { even };
+        let last = rest[run];
+        pieces.push(match (run, step) {
+            (0, _) => first.to_string(),
+            (_, 1) => format!("{first}-{last}"),
+            _ => format!("{first}-{last}:{step}"),
+        });
+        rest = &rest[run + 1..];
+    }
+    pieces.join(",")
+}
+
 /// First, last and step of `a`, `a-b`, `a-bxs` or `a-b:s`.
 fn range(piece: &str) -> Option<[i64; 3]> {
     let (first, rest) = number(piece)?;
@@ -98,6 +120,14 @@ mod tests {
         assert_eq!(frames("-3--1,0-2").unwrap(), [-3, -2, -1, 0, 1, 2]);
         assert_eq!(frames("7-7x3").unwrap(), [7]);
         assert_eq!(frames("1-1000000").unwrap().len(), MOST);
+    }
+
+    #[test]
+    fn frames_are_written_in_short() {
+        for text in ["12", "1-5", "1-96:5,200", "8-10,20,3,5", "-10--5,0", "1,100", "-2147483648,2147483647"] {
+            assert_eq!(frames_in_short(&frames(text).unwrap()), text);
+        }
+        assert_eq!(frames_in_short(&frames("1-3,4,6-7").unwrap()), "1-4,6-7");
     }
 
     #[test]

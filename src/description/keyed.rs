@@ -94,7 +94,7 @@ pub(crate) fn read_tables(root: &mut Node, sources: &mut Sources) -> Result<bool
         found = true;
         let Some(file) = node.get_mut(KEYS).filter(|keys| keys.get(FILE).is_some()) else { return Ok(()) };
         let Some(Node { place, value: Value::Text(name) }) = file.get(FILE) else { return Ok(()) };
-        let (path, at) = (sources.directory(*place).join(name), sources.describe(*place));
+        let (path, at) = (sources.file(*place, name), sources.describe(*place));
         match table(&path, sources) {
             Ok(rows) => file.value = Value::List(rows),
             Err(message) => {

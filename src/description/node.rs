@@ -5,8 +5,10 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::path::Segment;
+use super::path_map::{self, PathMap};
 
 /// Where a node was written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -21,45 +23,65 @@ pub(crate) struct Place {
 
 /// What the nodes of one tree were read from.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sources(Vec<Source>);
+pub(crate) struct Sources {
+    sources: Vec<Source>,
+    /// Where files lie that are named in them.
+    map: Arc<PathMap>,
+}
 
 #[derive(Clone, Debug)]
 struct Source {
     label: String,
     directory: PathBuf,
+    argument: bool,
 }
 
 impl Sources {
+    /// None yet, whose files lie where `map` says.
+    pub(crate) fn mapped(map: PathMap) -> Sources {
+        Sources { sources: Vec::new(), map: Arc::new(map) }
+    }
+
+    /// The file that `written`, at `place`, means.
+    pub(crate) fn file(&self, place: Place, written: &str) -> PathBuf {
+        path_map::place(&self.map, self.directory(place), written)
+    }
+
     /// Adds a file; relative paths written in it start from its directory.
     pub(crate) fn add_file(&mut self, path: &Path) -> u32 {
-        self.add(path.display().to_string(), path.parent().unwrap_or(Path::new("")).to_path_buf())
+        self.add(path.display().to_string(), path.parent().unwrap_or(Path::new("")).to_path_buf(), false)
     }
 
     /// Adds a file whose reader has found the files that it names already: relative paths in its
     /// nodes start from the working directory.
     pub(crate) fn add_resolved_file(&mut self, path: &Path) -> u32 {
-        self.add(path.display().to_string(), PathBuf::new())
+        self.add(path.display().to_string(), PathBuf::new(), false)
+    }
+
+    /// The files among them.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        self.sources.iter().filter(|source| !source.argument).map(|source| source.label.clone().into()).collect()
     }
 
     /// Adds an argument of the command line; relative paths in it start from the working directory.
     pub(crate) fn add_argument(&mut self, argument: String) -> u32 {
-        self.add(argument, PathBuf::new())
+        self.add(argument, PathBuf::new(), true)
     }
 
-    fn add(&mut self, label: String, directory: PathBuf) -> u32 {
-        self.0.push(Source { label, directory });
+    fn add(&mut self, label: String, directory: PathBuf, argument: bool) -> u32 {
+        self.sources.push(Source { label, directory, argument });
         // Sources are files and arguments that a person named one by one.
-        u32::try_from(self.0.len() - 1).expect("fewer than 2^32 sources")
+        u32::try_from(self.sources.len() - 1).expect("fewer than 2^32 sources")
     }
 
     /// The directory from which a path written at `place` starts.
     pub(crate) fn directory(&self, place: Place) -> &Path {
-        self.0.get(place.source as usize).map_or(Path::new(""), |source| &source.directory)
+        self.sources.get(place.source as usize).map_or(Path::new(""), |source| &source.directory)
     }
 
     /// `file:line:column`.
     pub(crate) fn describe(&self, place: Place) -> String {
-        let label = self.0.get(place.source as usize).map_or("", |source| source.label.as_str());
+        let label = self.sources.get(place.source as usize).map_or("", |source| source.label.as_str());
         match place.line {
             0 => label.to_owned(),
             line => format!("{label}:{line}:{}", place.column),

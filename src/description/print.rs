@@ -101,7 +101,7 @@ impl Printer<'_> {
     fn flow_of(&self, key: &str, node: &Node) -> String {
         match &node.value {
             Value::Text(file) if key == "file" => {
-                let path = self.sources.directory(node.place).join(file);
+                let path = self.sources.file(node.place, file);
                 scalar(&relative(&path, self.directory).to_string_lossy())
             }
             _ => self.flow(node),

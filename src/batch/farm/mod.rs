@@ -1,0 +1,208 @@
+//! Jobs for engines that farms have: what the tasks of a batch are, written down for one of them. There is no scheduler here.
+//!
+//! A task renders some frames of a scene, and where pictures are cut, one part of each; tasks know nothing of each other. A
+//! part of frame 12 of `prism` is in `parts/prism/12`, whatever task made it, and a task for each picture adds them up,
+//! which verifies that all are there. Every task may be run again at any time: it goes on where it was stopped, and what is
+//! finished it leaves alone.
+
+pub mod openjd;
+pub mod slurm;
+
+use super::part::bands;
+use super::{Overrides, entries, window};
+use crate::description::{self, SceneDescription};
+use crate::error::{Error, Result};
+use crate::scene::compile;
+use crate::scene::shelf::Shelf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// How pictures and frames are shared out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cut {
+    /// Bands of rows of a picture.
+    pub tiles: u32,
+    /// Ranges of its samples.
+    pub ranges: u32,
+    /// Frames in a row that one task renders.
+    pub frames: usize,
+}
+
+impl Cut {
+    /// Whether pictures are cut, and parts are to be added up.
+    #[must_use]
+    pub fn parts(&self) -> bool {
+        self.tiles > 1 || self.ranges > 1
+    }
+
+    /// The arguments of each part of a picture: values of `--tile` and `--samples`.
+    pub fn each(&self) -> impl Iterator<Item = [String; 2]> + use<> {
+        let Cut { tiles, ranges, .. } = *self;
+        (0..tiles).flat_map(move |t| (0..ranges).map(move |r| [format!("{t}/{tiles}"), format!("{r}/{ranges}")]))
+    }
+}
+
+/// Scenes of which the same frames are rendered; none where they are one picture each.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Their names.
+    pub scenes: Vec<String>,
+    /// Their frames.
+    pub frames: Vec<i32>,
+}
+
+/// All that is to be done.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// What it is called.
+    pub name: String,
+    /// The batch or scene file.
+    pub source: PathBuf,
+    /// Where the pictures go.
+    pub pictures: PathBuf,
+    /// The program.
+    pub program: String,
+    /// Further arguments of `render`.
+    pub arguments: Vec<String>,
+    /// What is rendered.
+    pub groups: Vec<Group>,
+    /// How it is shared out.
+    pub cut: Cut,
+    /// Threads of a task; 0 for what the engine grants.
+    pub threads: usize,
+    /// The files that it reads.
+    pub files: Vec<PathBuf>,
+}
+
+/// A file of a bundle.
+#[derive(Clone, Debug)]
+pub struct BundleFile {
+    /// Its name.
+    pub name: &'static str,
+    /// What it says.
+    pub text: String,
+    /// Whether it is a program.
+    pub executable: bool,
+}
+
+impl Job {
+    /// Reads each scene at its first frame, and finds what there is to do.
+    ///
+    /// # Errors
+    /// [`Error::Config`] and [`Error::Input`] with the faults of all scenes, or for a cut that one of them does not have.
+    pub fn of(source: &Path, overrides: &Overrides, cut: Cut) -> Result<Job> {
+        let mut groups: Vec<Group> = Vec::new();
+        let mut files = BTreeSet::from([source.to_path_buf()]);
+        let mut shelf = Shelf::default();
+        let mut faults: Vec<Error> = Vec::new();
+        for entry in entries(source, overrides)? {
+            let mut look = || -> Result<Vec<i32>> {
+                let animation = entry.animation(&overrides.set)?;
+                let frames = animation.frames().to_vec();
+                files.extend(animation.files());
+                let description = animation.into_first()?;
+                files.extend(compile::compile_with(&description, &entry.name, &mut shelf)?.files);
+                check_cut(&description, cut).map_err(|message| Error::Config(format!("{}: {message}", entry.name)))?;
+                if entry.name.contains("{{") {
+                    return Err(Error::Config(format!("{}: expected a name without {{{{, found one", entry.name)));
+                }
+                Ok(frames)
+            };
+            match look() {
+                Ok(frames) => match groups.iter_mut().find(|group| group.frames == frames) {
+                    Some(group) => group.scenes.push(entry.name),
+                    None => groups.push(Group { scenes: vec![entry.name], frames }),
+                },
+                Err(e) => faults.push(e),
+            }
+        }
+        if !faults.is_empty() {
+            let mut lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
+            lines.dedup();
+            return match (faults.pop(), lines.len()) {
+                (Some(only), 1) => Err(only),
+                _ => Err(Error::Config(lines.join("\n"))),
+            };
+        }
+        let absolute = |path: PathBuf| std::path::absolute(&path).map_err(|e| Error::input(&path, e.to_string()));
+        let name = source.file_stem().map_or("abbe".into(), |stem| stem.to_string_lossy().into_owned());
+        Ok(Job {
+            name,
+            source: absolute(source.to_path_buf())?,
+            pictures: PathBuf::from("pictures"),
+            program: "abbe".into(),
+            arguments: Vec::new(),
+            groups,
+            cut,
+            threads: 0,
+            files: files.into_iter().map(absolute).collect::<Result<_>>()?,
+        })
+    }
+
+    /// Pictures, all frames counted.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.groups.iter().map(|group| group.scenes.len() * group.frames.len().max(1)).sum()
+    }
+}
+
+/// Whether pictures of `scene` can be cut so.
+fn check_cut(scene: &SceneDescription, cut: Cut) -> std::result::Result<(), String> {
+    let rows = bands(window(scene), 1);
+    if u64::from(cut.tiles) > rows {
+        return Err(format!("--tiles {}: expected at most {rows}, the rows of the picture", cut.tiles));
+    }
+    let samples = match &scene.integrator {
+        description::Integrator::Whitted(whitted) => whitted.grid.saturating_mul(whitted.grid),
+        _ => scene.render.most_samples(),
+    };
+    if cut.ranges > samples {
+        return Err(format!("--sample-ranges {}: expected at most {samples}, the samples of a pixel", cut.ranges));
+    }
+    let stop = &scene.render.stop;
+    if cut.parts() && (stop.error.is_some() || stop.time.is_some()) {
+        return Err(
+            "render.stop: a part cannot know the error or the time of the whole picture; give it a number of samples"
+                .into(),
+        );
+    }
+    if cut.parts() && scene.render.techniques.adaptive == description::Technique::On && cut.ranges > 1 {
+        return Err(
+            "--sample-ranges: expected --tiles alone, found adaptive sampling, which is decided by all first samples"
+                .into(),
+        );
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A job without files.
+    pub(super) fn job(cut: Cut) -> Job {
+        let group = |scenes: &[&str], frames: &[i32]| Group {
+            scenes: scenes.iter().map(|s| (*s).to_owned()).collect(),
+            frames: frames.to_vec(),
+        };
+        Job {
+            name: "it's".into(),
+            source: "/in/it's.yaml".into(),
+            pictures: "/out".into(),
+            program: "abbe".into(),
+            arguments: vec!["--set".into(), "render.seed='x y'".into()],
+            groups: vec![group(&["a", "b c"], &[1, 6, 11]), group(&["still"], &[])],
+            cut,
+            threads: 2,
+            files: vec!["/in/it's.yaml".into()],
+        }
+    }
+
+    #[test]
+    fn all_parts_of_a_picture_are_cut_once() {
+        let cut = Cut { tiles: 2, ranges: 3, frames: 1 };
+        let all: Vec<String> = cut.each().map(|part| part.join(" ")).collect();
+        assert_eq!(all, ["0/2 0/3", "0/2 1/3", "0/2 2/3", "1/2 0/3", "1/2 1/3", "1/2 2/3"]);
+        assert_eq!(job(cut).count(), 7);
+    }
+}

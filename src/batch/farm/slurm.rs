@@ -1,0 +1,202 @@
+//! Scripts for Slurm: an array of tasks, and one that adds up the parts of each picture.
+//!
+//! What the scripts rest on: a step (`srun`) is told of a pre-emption when its time of grace begins, the script around it when it
+//! ends; `scontrol requeue` works where the administrator has not named our exit codes in `RequeueExit`; and the merge
+//! waits with `afterany`, since an array remembers the worst exit code of tasks that were well in the end. So the merge has to
+//! find out by itself whether all parts are there, which it does.
+
+use super::{BundleFile, Job};
+use crate::description::frames_in_short;
+use std::fmt::Write;
+
+/// How often a task begins again before it is given up.
+const RESTARTS: u32 = 20;
+
+/// The files of the bundle.
+#[must_use]
+pub fn files(job: &Job) -> Vec<BundleFile> {
+    let (tasks, pictures) = tables(job);
+    let count = |table: &str| table.lines().count().max(1) - 1;
+    let (last_task, last_picture) = (count(&tasks), count(&pictures));
+    let mut all = vec![
+        BundleFile { name: "tasks.tsv", text: tasks, executable: false },
+        BundleFile { name: "render.sbatch", text: render(job), executable: true },
+    ];
+    if job.cut.parts() {
+        all.push(BundleFile { name: "pictures.tsv", text: pictures, executable: false });
+        all.push(BundleFile { name: "merge.sbatch", text: merge(job), executable: true });
+    }
+    all.push(BundleFile { name: "submit.sh", text: submit(job, last_task, last_picture), executable: true });
+    all
+}
+
+/// The lines of tasks: scene, frames, tile, samples; and of pictures: scene, frame. Names of scenes have no tabs.
+fn tables(job: &Job) -> (String, String) {
+    let (mut tasks, mut pictures) = (String::new(), String::new());
+    for group in &job.groups {
+        for scene in &group.scenes {
+            let chunks: Vec<String> = match group.frames.is_empty() {
+                true => vec!["-".into()],
+                false => group.frames.chunks(job.cut.frames.max(1)).map(frames_in_short).collect(),
+            };
+            for frames in &chunks {
+                for [tile, samples] in job.cut.each() {
+                    let _ = writeln!(tasks, "{scene}\t{frames}\t{tile}\t{samples}");
+                }
+            }
+            match group.frames.is_empty() {
+                true => pictures += &format!("{scene}\t-\n"),
+                false => group.frames.iter().for_each(|frame| pictures += &format!("{scene}\t{frame}\n")),
+            }
+        }
+    }
+    (tasks, pictures)
+}
+
+/// A word of the shell.
+fn word(text: &str) -> String {
+    format!("'{}'", text.replace('\'', "'\\''"))
+}
+
+/// The head of both scripts.
+fn head(job: &Job, name: &str, directives: &str) -> String {
+    let job_name: String = job.name.chars().filter(|c| c.is_alphanumeric() || "-_.".contains(*c)).collect();
+    format!(
+        "#!/bin/bash\n\
+         #SBATCH --job-name={name}-{job_name}\n\
+         #SBATCH --requeue\n\
+         #SBATCH --open-mode=append\n\
+         #SBATCH --output=log/%x_%A_%a.log\n\
+         #SBATCH --ntasks=1\n\
+         {directives}\
+         # abbe farm --format slurm: started by submit.sh, in the directory of the bundle\n\
+         set -uo pipefail\n\
+         abbe=\"${{ABBE:-{}}}\"\n\
+         pictures=\"${{ABBE_PICTURES:-{}}}\"\n",
+        inner(&job.program),
+        inner(&job.pictures.display().to_string())
+    )
+}
+
+/// Text within double quotes of the shell.
+fn inner(text: &str) -> String {
+    text.chars().fold(String::new(), |mut out, c| {
+        if "\\\"$`".contains(c) {
+            out.push('\\');
+        }
+        out.push(c);
+        out
+    })
+}
+
+fn render(job: &Job) -> String {
+    let threads = match job.threads {
+        0 => String::new(),
+        n => format!("#SBATCH --cpus-per-task={n}\n"),
+    };
+    // Time to write a checkpoint before the limit of the partition.
+    let directives = threads + "#SBATCH --signal=TERM@90\n";
+    let mut command = format!(
+        "srun --ntasks=1 --kill-on-bad-exit=1 \"$abbe\" render {} --scene \"$scene\" \"${{what[@]}}\" \\\n    \
+         --resume --progress plain",
+        word(&job.source.display().to_string())
+    );
+    for argument in &job.arguments {
+        command += " ";
+        command += &word(argument);
+    }
+    let parts = if job.cut.parts() {
+        "what+=(--tile \"$tile\" --samples \"$samples\")\n\
+         place=\"$pictures/parts/$scene\"\n\
+         [ \"$frames\" = - ] || place=\"$place/{frame}\"\n"
+    } else {
+        "place=\"$pictures\"\n"
+    };
+    head(job, "render", &directives)
+        + &format!(
+            "line=$(sed -n \"$((SLURM_ARRAY_TASK_ID + 1))p\" tasks.tsv)\n\
+             IFS=$'\\t' read -r scene frames tile samples <<<\"$line\"\n\
+             what=()\n\
+             [ \"$frames\" = - ] || what+=(--frames \"$frames\")\n\
+             {parts}\
+             what+=(-o \"$place\")\n\
+             # The process ends by itself before the kernel kills it.\n\
+             [ -z \"${{SLURM_MEM_PER_NODE:-}}\" ] || what+=(--memory-limit \"${{SLURM_MEM_PER_NODE}}M\")\n\
+             restarts=${{SLURM_RESTART_COUNT:-0}}\n\
+             echo \"task $SLURM_ARRAY_TASK_ID: $line: on ${{SLURMD_NODENAME:-?}}, begun again $restarts times\"\n\
+             {command}\n\
+             code=$?\n\
+             # 75: stopped, and kept in a checkpoint; 137: killed. Both go on elsewhere, but not for ever.\n\
+             if [[ $code == 75 || $code == 137 ]]; then\n    \
+                 if ((restarts >= {RESTARTS})); then\n        \
+                     echo \"given up after $restarts restarts\" >&2\n        \
+                     exit 4\n    \
+                 fi\n    \
+                 # It ends this script, too.\n    \
+                 scontrol requeue \"$SLURM_JOB_ID\" && sleep 60\n\
+             fi\n\
+             exit $code\n"
+        )
+}
+
+fn merge(job: &Job) -> String {
+    head(job, "merge", "")
+        + "IFS=$'\\t' read -r scene frame <<<\"$(sed -n \"$((SLURM_ARRAY_TASK_ID + 1))p\" pictures.tsv)\"\n\
+           place=\"$pictures/parts/$scene\"\n\
+           [ \"$frame\" = - ] || place=\"$place/$frame\"\n\
+           # 3: a part is missing, damaged or of another picture.\n\
+           srun --ntasks=1 \"$abbe\" merge \"$place\" -o \"$pictures\"\n"
+}
+
+fn submit(job: &Job, last_task: usize, last_picture: usize) -> String {
+    let mut out = format!(
+        "#!/bin/bash\n\
+         # submit.sh [options of sbatch, as -p spot --mem=4G --cpus-per-task=8]: {} pictures in {} tasks\n\
+         set -euo pipefail\n\
+         cd \"$(dirname \"${{BASH_SOURCE[0]}}\")\"\n\
+         mkdir -p log\n\
+         render=$(sbatch --parsable --array=0-{last_task} \"$@\" render.sbatch)\n\
+         echo \"render: job $render\"\n",
+        job.count(),
+        last_task + 1
+    );
+    if job.cut.parts() {
+        let _ = write!(
+            out,
+            "merge=$(sbatch --parsable --array=0-{last_picture} -d afterany:\"$render\" \"$@\" merge.sbatch)\n\
+             echo \"merge: job $merge\"\n"
+        );
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Cut;
+    use super::super::tests::job;
+    use super::*;
+
+    #[test]
+    fn each_part_of_each_chunk_is_a_task_and_each_frame_a_picture() {
+        let (tasks, pictures) = tables(&job(Cut { tiles: 2, ranges: 1, frames: 2 }));
+        assert_eq!(
+            tasks,
+            "a\t1,6\t0/2\t0/1\na\t1,6\t1/2\t0/1\na\t11\t0/2\t0/1\na\t11\t1/2\t0/1\n\
+             b c\t1,6\t0/2\t0/1\nb c\t1,6\t1/2\t0/1\nb c\t11\t0/2\t0/1\nb c\t11\t1/2\t0/1\n\
+             still\t-\t0/2\t0/1\nstill\t-\t1/2\t0/1\n"
+        );
+        assert_eq!(pictures, "a\t1\na\t6\na\t11\nb c\t1\nb c\t6\nb c\t11\nstill\t-\n");
+    }
+
+    /// bash reads what is written, with quotes in names.
+    #[cfg(unix)]
+    #[test]
+    fn the_scripts_are_bash() {
+        for file in files(&job(Cut { tiles: 2, ranges: 2, frames: 1 })).iter().filter(|file| file.executable) {
+            let done = std::process::Command::new("bash").args(["-n", "-c", &file.text]).output().unwrap();
+            assert!(done.status.success(), "{}: {}", file.name, String::from_utf8_lossy(&done.stderr));
+        }
+        assert_eq!(word("it's"), "'it'\\''s'");
+        assert_eq!(inner("a\"$b"), "a\\\"\\$b");
+    }
+}

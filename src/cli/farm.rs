@@ -1,0 +1,64 @@
+//! `abbe farm`.
+
+use super::{FarmArguments, FarmFormat};
+use crate::batch::farm::{Cut, Job, openjd, slurm};
+use crate::error::{Error, Result};
+use crate::film::output::{prepare_place, write_atomically};
+
+/// Writes the bundle, and says how to start it.
+pub fn run(arguments: &FarmArguments) -> Result<i32> {
+    let cut =
+        Cut { tiles: arguments.tiles, ranges: arguments.sample_ranges, frames: arguments.frames_per_task as usize };
+    let overrides = arguments.scene.overrides(None)?;
+    let bundle = std::path::absolute(&arguments.output).map_err(|e| Error::output(&arguments.output, e))?;
+    let pictures = arguments.pictures.clone().unwrap_or_else(|| bundle.join("pictures"));
+    let job = Job {
+        pictures: std::path::absolute(&pictures).map_err(|e| Error::output(&pictures, e))?,
+        program: arguments.program.clone(),
+        arguments: further(arguments),
+        threads: arguments.threads,
+        ..Job::of(&arguments.scene.file, &overrides, cut)?
+    };
+    let files = match arguments.format {
+        FarmFormat::Openjd => openjd::files(&job),
+        FarmFormat::Slurm => slurm::files(&job),
+    };
+    for file in &files {
+        let path = bundle.join(file.name);
+        prepare_place(&path)?;
+        write_atomically(&path, file.text.as_bytes())?;
+        #[cfg(unix)]
+        if file.executable {
+            use std::os::unix::fs::PermissionsExt;
+            let all = std::fs::Permissions::from_mode(0o755);
+            std::fs::set_permissions(&path, all).map_err(|e| Error::output(&path, e))?;
+        }
+    }
+    let bundle = bundle.display();
+    let start = match arguments.format {
+        FarmFormat::Openjd => {
+            let step = if cut.parts() { "Merge --run-dependencies" } else { "Render" };
+            format!(
+                "openjd run {bundle}/template.yaml --step {step} -p file://{bundle}/parameters.json\n\
+                 deadline bundle submit {bundle}\n"
+            )
+        }
+        FarmFormat::Slurm => format!("{bundle}/submit.sh\n"),
+    };
+    if !arguments.quiet {
+        super::say(&format!("{} pictures; start with\n{start}", job.count()));
+    }
+    Ok(0)
+}
+
+/// What every task is told besides its part of the work.
+fn further(arguments: &FarmArguments) -> Vec<String> {
+    let scene = &arguments.scene;
+    let set = scene.set.iter().map(|(key, value)| ["--set".to_owned(), format!("{key}={value}")]);
+    let define = scene.define.iter().map(|(name, value)| ["-D".to_owned(), format!("{name}={value}")]);
+    let mut all: Vec<String> = set.chain(define).flatten().collect();
+    let numbers = [("--spp", scene.spp.map(u64::from)), ("--seed", scene.seed)];
+    all.extend(numbers.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value?.to_string()])).flatten());
+    all.extend(scene.path_map.iter().flat_map(|rule| ["--path-map".to_owned(), rule.clone()]));
+    all
+}

@@ -1,0 +1,161 @@
+//! Files that lie elsewhere on the machine that renders than where the scene was written.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::node::quote;
+
+/// Directories and where they are on this machine.
+#[derive(Clone, Debug, Default)]
+pub struct PathMap {
+    rules: Vec<Rule>,
+}
+
+/// What begins with `from` is in `to`.
+#[derive(Clone, Debug)]
+struct Rule {
+    from: String,
+    windows: bool,
+    to: PathBuf,
+}
+
+/// The rules of a session of Open Job Description, `pathmapping-1.0`.
+#[derive(Deserialize)]
+struct Rules {
+    #[serde(default)]
+    path_mapping_rules: Vec<WrittenRule>,
+}
+
+#[derive(Deserialize)]
+struct WrittenRule {
+    source_path_format: String,
+    source_path: String,
+    destination_path: PathBuf,
+}
+
+impl PathMap {
+    /// Adds `FROM=TO`. A FROM with a drive or a backslash is a path of Windows.
+    ///
+    /// # Errors
+    /// What was expected and found, in words.
+    pub fn add(&mut self, text: &str) -> Result<(), String> {
+        match text.split_once('=') {
+            Some((from, to)) if !from.is_empty() && !to.is_empty() => {
+                let windows = from.contains('\\') || from.as_bytes().get(1) == Some(&b':');
+                self.rules.push(Rule { from: from.to_owned(), windows, to: to.into() });
+                Ok(())
+            }
+            _ => Err(format!("expected FROM=TO, two directories, found {}", quote(text))),
+        }
+    }
+
+    /// Adds the rules of a session of Open Job Description, which are JSON.
+    ///
+    /// # Errors
+    /// What was expected and found, in words.
+    pub fn add_rules(&mut self, json: &[u8]) -> Result<(), String> {
+        let rules: Rules =
+            serde_json::from_slice(json).map_err(|e| format!("expected rules as of pathmapping-1.0, found {e}"))?;
+        for rule in rules.path_mapping_rules {
+            let windows = match rule.source_path_format.to_ascii_uppercase().as_str() {
+                "WINDOWS" => true,
+                "POSIX" => false,
+                other => {
+                    let message = "expected the source_path_format POSIX or WINDOWS, found";
+                    return Err(format!("{message} {}", quote(other)));
+                }
+            };
+            self.rules.push(Rule { from: rule.source_path, windows, to: rule.destination_path });
+        }
+        Ok(())
+    }
+
+    /// Where `path` is, as far as a rule says so; of several the one with the longest beginning.
+    #[must_use]
+    pub fn find(&self, path: &str) -> Option<PathBuf> {
+        let fits = self.rules.iter().filter_map(|rule| Some((rule.from.len(), rule.rest(path)?, &rule.to)));
+        let (_, rest, to) = fits.max_by_key(|(length, _, _)| *length)?;
+        Some(rest.iter().fold(to.clone(), |path, step| path.join(step)))
+    }
+
+    /// `text` with the directories of this machine called as they were written.
+    #[must_use]
+    pub fn undo(&self, text: String) -> String {
+        self.rules.iter().fold(text, |text, rule| {
+            let with_end = |path: &str| path.trim_end_matches('/').to_owned() + "/";
+            match rule.to.to_str() {
+                Some(to) if text.contains(to) => text.replace(&with_end(to), &with_end(&rule.from)),
+                _ => text,
+            }
+        })
+    }
+}
+
+impl Rule {
+    /// The steps of `path` below `from`, if it lies there.
+    fn rest<'a>(&self, path: &'a str) -> Option<Vec<&'a str>> {
+        let slash = |c: char| c == '/' || self.windows && c == '\\';
+        let steps = |path: &'a str| path.split(slash).filter(|step| !step.is_empty());
+        let same = |a: &str, b: &str| if self.windows { a.eq_ignore_ascii_case(b) } else { a == b };
+        let rooted = |path: &str| path.starts_with(slash);
+        let mut rest = steps(path);
+        let from: Vec<&str> = self.from.split(slash).filter(|step| !step.is_empty()).collect();
+        let below = rooted(path) == rooted(&self.from)
+            && from.into_iter().all(|step| rest.next().is_some_and(|own| same(own, step)));
+        below.then(|| rest.collect())
+    }
+}
+
+/// The place of a path that was written in `directory`.
+pub(crate) fn place(map: &PathMap, directory: &Path, written: &str) -> PathBuf {
+    if map.rules.is_empty() {
+        return directory.join(written);
+    }
+    let joined = directory.join(written);
+    let mapped = map.find(written).or_else(|| joined.to_str().and_then(|joined| map.find(joined)));
+    mapped.unwrap_or(joined)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map(rules: &[&str]) -> PathMap {
+        let mut map = PathMap::default();
+        rules.iter().for_each(|rule| map.add(rule).unwrap());
+        map
+    }
+
+    #[test]
+    fn what_begins_with_a_directory_is_elsewhere() {
+        let map = map(&["/mnt/a=/b", "/mnt/a/deep=/c", "Z:\\show=/mnt/show"]);
+        let at = |path: &str| place(&map, Path::new("dir"), path).to_string_lossy().into_owned();
+        assert_eq!(at("/mnt/a/x.ply"), "/b/x.ply");
+        assert_eq!(at("/mnt/a/deep/x.ply"), "/c/x.ply");
+        assert_eq!(at("/mnt/ab/x.ply"), "/mnt/ab/x.ply");
+        assert_eq!(at("z:/Show\\tex/a.jpg"), "/mnt/show/tex/a.jpg");
+        assert_eq!(at("x.ply"), "dir/x.ply");
+        assert_eq!(at("mnt/a/x.ply"), "dir/mnt/a/x.ply");
+        assert_eq!(place(&map, Path::new("/mnt/a"), "x.ply"), Path::new("/b/x.ply"));
+        assert_eq!(map.undo("file: /b/x.ply, /bc/y".into()), "file: /mnt/a/x.ply, /bc/y");
+    }
+
+    #[test]
+    fn rules_of_a_session_are_read() {
+        let mut map = PathMap::default();
+        map.add_rules(
+            br#"{"version": "pathmapping-1.0", "path_mapping_rules": [
+            {"source_path_format": "WINDOWS", "source_path": "C:\\a", "destination_path": "/a"}]}"#,
+        )
+        .unwrap();
+        map.add_rules(b"{}").unwrap();
+        assert_eq!(map.find("C:/a/b"), Some("/a/b".into()));
+        let says = |json: &str| PathMap::default().add_rules(json.as_bytes()).unwrap_err();
+        assert!(says("[").starts_with("expected rules as of pathmapping-1.0, found EOF"));
+        let rule =
+            r#"{"path_mapping_rules": [{"source_path_format": "x", "source_path": "", "destination_path": ""}]}"#;
+        assert_eq!(says(rule), "expected the source_path_format POSIX or WINDOWS, found \"X\"");
+        assert_eq!(map.add("a").unwrap_err(), "expected FROM=TO, two directories, found \"a\"");
+    }
+}
