@@ -76,6 +76,7 @@ fn words(path: &Path, e: &std::io::Error) -> String {
         ErrorKind::NotADirectory => format!("{directory} is not a directory"),
         ErrorKind::StorageFull => format!("the disk that holds {directory} is full"),
         ErrorKind::QuotaExceeded => format!("the quota of the disk that holds {directory} is used up"),
+        ErrorKind::FileTooLarge => format!("the file is larger than this process may write in {directory}"),
         ErrorKind::ReadOnlyFilesystem => format!("{directory} is on a read-only disk"),
         _ => e.to_string(),
     }

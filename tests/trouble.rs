@@ -1,0 +1,143 @@
+//! Files that cannot be written: one error, its exit code, nothing half, and nothing lost.
+#![cfg(unix)]
+
+mod common;
+
+use common::place::{Place, Ran, pixels};
+use std::process::Command;
+
+/// Pictures, parts and checkpoints of more than ten kilobytes.
+const SCENE: &str = "camera: {origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}\n\
+                     image: {width: 80, height: 60}\n\
+                     render: {samples: 4, seed: 3}\n\
+                     output: {exr: {precision: float}}\n\
+                     lights: [{constant: {radiance: 0.3}}]\n\
+                     shapes: [{plane: {normal: [0, 1, 0]}}, {sphere: {center: [0, 1, 0], radius: 1}}]\n";
+
+/// Runs the command where no file may have more than a few kilobytes: to it, that is a disk that fills while a file is
+/// written. The signal that would end the process is passed over, so that it sees the error.
+fn cramped(place: &Place, arguments: &[&str]) -> Ran {
+    let script = "ulimit -f 8; trap '' XFSZ; exec \"$0\" \"$@\"";
+    let mut command = Command::new("bash");
+    command.args(["-c", script, env!("CARGO_BIN_EXE_abbe")]).args(arguments);
+    Ran::of(command.current_dir(place.directory.path()).output().unwrap())
+}
+
+#[test]
+fn a_disk_that_fills_leaves_no_half_picture_and_the_next_run_makes_it() {
+    let place = Place::of(SCENE);
+    let ran = cramped(&place, &["render", "scene.yaml", "-q", "-o", "out"]);
+    assert_eq!(ran.code, 1, "{}", ran.err);
+    assert!(ran.err.starts_with("error: scene: out/scene.exr: cannot write: "), "{}", ran.err);
+    assert_eq!((ran.err.lines().count(), place.names("out")), (1, vec!["report.json".to_owned()]));
+    assert_eq!(place.run(&["render", "scene.yaml", "-q", "-o", "out", "--resume"]).code, 0);
+    assert_eq!(place.run(&["render", "scene.yaml", "-q", "-o", "whole"]).code, 0);
+    assert!(pixels(&place.path("out/scene.exr")) == pixels(&place.path("whole/scene.exr")));
+}
+
+#[test]
+fn a_disk_that_fills_leaves_the_old_picture_alone() {
+    let place = Place::of(SCENE);
+    assert_eq!(place.run(&["render", "scene.yaml", "-q", "-o", "out"]).code, 0);
+    let before = std::fs::read(place.path("out/scene.exr")).unwrap();
+    assert_eq!(cramped(&place, &["render", "scene.yaml", "-q", "-o", "out", "--seed", "9"]).code, 1);
+    assert!(std::fs::read(place.path("out/scene.exr")).unwrap() == before);
+}
+
+#[test]
+fn a_disk_that_fills_leaves_no_half_part_and_all_parts_when_they_are_merged() {
+    let place = Place::of(SCENE);
+    let part = ["render", "scene.yaml", "-q", "-o", "parts", "--tile"];
+    let ran = cramped(&place, &[&part[..], &["0/2"]].concat());
+    assert!(ran.code == 1 && ran.err.contains("parts/scene.tile0of2.exr: cannot write: "), "{}", ran.err);
+    assert_eq!(place.names("parts"), ["report.json"]);
+    for tile in ["0/2", "1/2"] {
+        assert_eq!(place.run(&[&part[..], &[tile]].concat()).code, 0);
+    }
+    let merge = ["merge", "parts", "-q", "-o", "merged"];
+    let ran = cramped(&place, &merge);
+    assert!(ran.code == 1 && ran.err.contains("merged/scene.exr: cannot write: "), "{}", ran.err);
+    assert_eq!(place.names("merged"), ["report.json"]);
+    assert_eq!(place.run(&merge).code, 0);
+    assert_eq!(place.run(&["render", "scene.yaml", "-q", "-o", "whole"]).code, 0);
+    assert!(pixels(&place.path("merged/scene.exr")) == pixels(&place.path("whole/scene.exr")));
+}
+
+/// A checkpoint for which there is no room is a note; the picture is made all the same, if it fits.
+#[test]
+fn a_checkpoint_for_which_there_is_no_room_costs_nothing() {
+    let place = Place::of(SCENE);
+    let small = ["render", "scene.yaml", "-q", "-o", "out", "--checkpoint-interval", "0.001s", "--spp", "256"];
+    let ran = cramped(
+        &place,
+        &[&small[..], &["--set", "image.width=40", "--set", "image.height=20", "--set", "output.exr.precision=half"]]
+            .concat(),
+    );
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert!(ran.err.starts_with("note: scene: no checkpoint: out/scene.exr.checkpoint: cannot write: "), "{}", ran.err);
+    assert_eq!(place.names("out"), ["report.json", "scene.exr", "scene.png"]);
+}
+
+#[test]
+fn rules_for_paths_that_cannot_be_read_are_an_input_error() {
+    let place = Place::with(&[("scene.yaml", SCENE), ("rules.json", "{\"path_mapping_rules\": 3}")]);
+    let says = |arguments: &[&str], code: i32| {
+        let ran = place.run(&[&["render", "scene.yaml", "-q"], arguments].concat());
+        assert_eq!(ran.code, code, "{}", ran.err);
+        ran.err
+    };
+    assert!(says(&["--path-map-file", "none.json"], 3).starts_with("error: none.json: cannot be read: No such file"));
+    assert!(
+        says(&["--path-map-file", "rules.json"], 3)
+            .starts_with("error: rules.json: expected rules as of pathmapping-1.0, found")
+    );
+    assert!(says(&["--path-map", "x"], 2).contains("expected FROM=TO, two directories, found \"x\""));
+}
+
+#[test]
+fn a_job_for_a_farm_is_refused_where_its_tasks_would_be() {
+    let keyed = format!("{SCENE}fog: {{colour: {{0: 0, 9: 1}}, density: 0.1}}\n");
+    let stop = SCENE.replace("samples: 4", "stop: {error: 0.1}");
+    let batch = "scenes: [{file: scene.yaml}, {file: keyed.yaml}, {file: none.yaml}]\n";
+    let place =
+        Place::with(&[("scene.yaml", SCENE), ("keyed.yaml", &keyed), ("stop.yaml", &stop), ("batch.yaml", batch)]);
+    let says = |arguments: &[&str]| {
+        let ran = place.run(&[&["farm", "--format", "slurm", "-o", "job"], arguments].concat());
+        assert_eq!((ran.code, place.names("job").len()), (2, 0), "{}", ran.err);
+        ran.err
+    };
+    assert_eq!(
+        says(&["scene.yaml", "--tiles", "61"]),
+        "error: scene: --tiles 61: expected at most 60, the rows of the picture\n"
+    );
+    assert_eq!(
+        says(&["scene.yaml", "--sample-ranges", "5"]),
+        "error: scene: --sample-ranges 5: expected at most 4, the samples of a pixel\n"
+    );
+    assert!(says(&["stop.yaml", "--tiles", "2"]).contains("render.stop: a part cannot know the error or the time"));
+    // All that is wrong is told at once.
+    let message = says(&["batch.yaml"]);
+    assert!(message.contains("keyed.yaml:7:15: fog.colour: expected render.frames or --frames"), "{message}");
+    assert!(message.contains("none.yaml: cannot be read") && message.lines().count() == 2, "{message}");
+}
+
+/// Even ranges cover all samples once, however many there are.
+#[test]
+fn samples_may_be_cut_into_even_ranges() {
+    let place = Place::of(SCENE);
+    let common = ["render", "scene.yaml", "-q", "--spp", "7"];
+    for i in 0..3 {
+        let samples = format!("{i}/3");
+        assert_eq!(place.run(&[&common[..], &["-o", "parts", "--samples", &samples]].concat()).code, 0);
+    }
+    assert_eq!(place.names("parts")[1], "scene.samples0of3.exr");
+    assert_eq!(place.run(&["merge", "parts", "-q", "-o", "merged"]).code, 0);
+    assert_eq!(place.run(&[&common[..], &["-o", "whole"]].concat()).code, 0);
+    assert!(pixels(&place.path("merged/scene.exr")) == pixels(&place.path("whole/scene.exr")));
+    let ran = place.run(&[&common[..], &["-o", "parts", "--samples", "0/8"]].concat());
+    assert!(
+        ran.code == 2 && ran.err.contains("--samples 0/8: expected i/n with i from 0 to n - 1 and n at most 7"),
+        "{}",
+        ran.err
+    );
+}
