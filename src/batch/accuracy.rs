@@ -4,38 +4,36 @@
 //! of their own, one setting after the other, so that what else the machine does falls on all alike. Against them stands a
 //! reference: the full setting (no bound to depth, merging off) with more samples.
 //!
-//! * **time** is the median over the rounds;
-//! * **noise** is √relMSE ([`crate::film::error`]), over the rounds in the mean square;
-//! * **bias** is what is left of the distance to the reference without the noise of both: of each block of pixels, and its
-//!   standard error from how the blocks differ;
-//! * **light** is the mean of red, green and blue over the reference's, with the standard error of replicates and rounds;
+//! * **time** is the least of the rounds: what else the machine does adds to it;
+//! * **noise** and **bias** are √relMSE against the reference, **light** the mean of red, green and blue over the reference's
+//!   ([`figures`]);
 //! * **efficiency** is 1 / (noise² · time), over that of the chosen setting;
 //! * **to the target** is the time until noise and bias together are the target, by the convergence that was seen; none where
 //!   the bias is above it.
 
 mod advice;
+mod desk;
+mod figures;
 mod knobs;
 pub mod page;
 
-use super::frame::{self, Frame, FrameJob, Milestone};
-use super::stop::Fit;
-use super::{BatchEntry, Overrides, Prepared, develop, prepare_scene};
+use super::finish::Finish;
+use super::{BatchEntry, Overrides, develop};
+use crate::description;
 use crate::error::{Error, Result};
-use crate::film::accumulate::REPLICATES;
 use crate::film::error;
-use crate::film::filter::FilterSampler;
 use crate::film::png;
 use crate::film::resolve::Image;
 use crate::math::statistics::Moments;
-use crate::scene::Scene;
-use crate::scene::shelf::Shelf;
 use crate::spectrum::ColourSpace;
-use crate::transport::plan::Integrator;
+use desk::Desk;
+use figures::{Reference, SIGNIFICANT, Tally};
 use half::f16;
 use knobs::{Trial, Way};
 use serde::Serialize;
 use std::cell::RefCell;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// How a sheet is made.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +46,12 @@ pub struct Settings {
     pub rounds: u32,
     /// The error that is wanted; that of the chosen setting if none.
     pub target: Option<f64>,
+    /// About how long all of it may take: samples are cut to that, to [`FEWEST`] at the least.
+    pub time: Option<Duration>,
 }
+
+/// See [`Settings::time`].
+pub const FEWEST: u32 = 16;
 
 /// A figure and the standard error of it.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -81,25 +84,23 @@ pub struct Row {
     pub chosen: bool,
     /// Samples of a pixel.
     pub samples: u32,
-    /// Seconds of rendering, median of the rounds.
+    /// Seconds of rendering, the least of the rounds.
     pub seconds: f64,
-    /// Least and most of the rounds.
-    pub spread: [f64; 2],
+    /// The most of the rounds.
+    pub most_seconds: f64,
     /// √relMSE of the noise, with its interval of 95 %.
     pub noise: [f64; 3],
-    /// Whether the noise can be believed.
-    pub converged: bool,
     /// relMSE of what is not noise.
     pub bias_squared: Figure,
     /// Red, green and blue over those of the reference.
     pub light: [Figure; 3],
     /// 1 / (noise² · time) over that of the chosen setting.
-    pub efficiency: f64,
+    pub efficiency: Figure,
     /// Seconds to the target; none where it cannot be reached.
     pub to_target: Option<f64>,
     /// How noise fell.
     pub curve: Vec<Point>,
-    /// A PNG of the last round.
+    /// A PNG of the first round.
     #[serde(skip)]
     pub png: Vec<u8>,
 }
@@ -115,37 +116,19 @@ pub struct Sheet {
     pub target: f64,
     /// Samples of a pixel of the reference, and its noise.
     pub reference: (u32, f64),
+    /// A PNG of the reference.
+    #[serde(skip)]
+    pub png: Vec<u8>,
     /// The settings, knob by knob.
     pub rows: Vec<Row>,
     /// A sentence for each knob.
     pub advice: Vec<(&'static str, String)>,
 }
 
-/// What came of one render.
-struct Outcome {
-    seconds: f64,
-    image: Image,
-    noise: [f64; 3],
-    converged: bool,
-    milestones: Vec<Milestone>,
-    /// Mean red, green and blue of each replicate.
-    means: [[f64; 3]; REPLICATES],
-    png: Vec<u8>,
-}
-
-/// What all renders of a sheet share.
-struct Desk<'a> {
-    entry: &'a BatchEntry,
-    /// With what makes the small copy.
-    overrides: Overrides,
-    stop: &'a AtomicBool,
-    shelf: RefCell<Shelf>,
-}
-
 /// The sheet of a scene, or why there is none: what has no noise has nothing to weigh.
 ///
 /// # Errors
-/// As [`super::prepare`] and [`frame::render`].
+/// As [`super::prepare`], and where it was stopped.
 pub fn sheet(
     entry: &BatchEntry,
     overrides: &Overrides,
@@ -162,20 +145,21 @@ pub fn sheet(
         ("image.width".to_owned(), size[0].to_string()),
         ("image.height".to_owned(), size[1].to_string()),
         ("render.stop".to_owned(), "{}".to_owned()),
-        ("render.samples".to_owned(), settings.samples.to_string()),
     ]);
     if written.image.crop.is_some() {
         overrides.set.push(("image.crop".to_owned(), "null".to_owned()));
     }
-    let desk = Desk { entry, overrides, stop, shelf: RefCell::default() };
-    let chosen = desk.prepare(&[], |_| {})?;
-    let Integrator::Path(path) = &chosen.plan.integrator else {
+    if !matches!(written.integrator, description::Integrator::Path(_)) {
         return Ok(Err(
             "only `path` has knobs to weigh; whatever else computes the light has no noise, or no choice".into()
         ));
-    };
-    let trials = knobs::trials(&chosen, path);
+    }
     let rounds = settings.rounds.max(1);
+    let mut desk = Desk { entry, overrides, stop, shelf: RefCell::default() };
+    let samples = desk.samples(settings)?;
+    desk.overrides.set.push(("render.samples".to_owned(), samples.to_string()));
+    let chosen = desk.prepare(&[], |_| {})?;
+    let trials = knobs::trials(&chosen);
     let total = trials.len() * rounds as usize + 1;
     let mut done = 0;
     let mut tell = |what: &str| {
@@ -183,7 +167,7 @@ pub fn sheet(
         done += 1;
     };
     tell("reference");
-    let more = settings.samples.saturating_mul(REFERENCE);
+    let more = samples.saturating_mul(REFERENCE);
     let full = Trial {
         knob: "reference",
         value: String::new(),
@@ -197,97 +181,35 @@ pub fn sheet(
         way: Way::AsSet,
     };
     let seed = chosen.description.render.seed;
-    let reference = desk.render(&full, seed ^ SEED_OF_THE_REFERENCE)?;
-    let mut outcomes: Vec<Vec<Outcome>> = trials.iter().map(|_| Vec::new()).collect();
+    let full = desk.render(&full, seed ^ SEED_OF_THE_REFERENCE, None)?;
+    let reference = Reference::new(&full.image, full.replicates);
+    let mut tallies: Vec<Tally> = trials.iter().map(|_| Tally::default()).collect();
+    let mut images: Vec<Image> = Vec::new();
     for round in 0..rounds {
-        for (trial, outcomes) in trials.iter().zip(&mut outcomes) {
+        for (trial, tally) in trials.iter().zip(&mut tallies) {
             tell(&format!("{} {}", trial.knob, trial.value));
-            outcomes.push(desk.render(trial, seed.wrapping_add(u64::from(round)))?);
+            let outcome = desk.render(trial, seed.wrapping_add(u64::from(round)), Some(&reference))?;
+            if round == 0 {
+                images.push(outcome.image.clone());
+            }
+            tally.add(outcome);
         }
     }
-    let mut rows: Vec<Row> = trials.iter().zip(&mut outcomes).map(|(t, o)| row(t, o, &reference)).collect();
-    let half = outcomes[0].last().map_or(0.0, |outcome| rounding(&outcome.image));
-    let target = settings.target.unwrap_or(rows[0].noise[0]);
-    let own = rows[0].noise[0].powi(2) * rows[0].seconds;
-    for (row, outcomes) in rows.iter_mut().zip(&outcomes) {
-        row.efficiency = own / (row.noise[0].powi(2) * row.seconds);
-        row.to_target = to_target(row, outcomes, target);
+    // All pictures are developed as the reference is: else a meter would hide what is lost.
+    let finish = Finish::of(&chosen);
+    let settings_of_png = develop::settings(&finish.output.png, finish.white, &full.image, ColourSpace::Rec709);
+    let target = settings.target.unwrap_or(tallies[0].noise()[0]);
+    let mut rows: Vec<Row> = Vec::new();
+    for ((trial, tally), image) in trials.iter().zip(&tallies).zip(&images) {
+        let png = png::encode_png(image, &settings_of_png).map_err(Error::Render)?;
+        rows.push(row(trial, tally, &tallies[0], &reference, target, png));
     }
-    let bias_squared = Figure { value: half, error: 0.0 };
+    let bias_squared = Figure { value: rounding(&images[0]), error: 0.0 };
     rows.push(Row { knob: "file", value: "half".into(), chosen: false, bias_squared, ..rows[0].clone() });
     let advice = advice::sentences(&rows);
-    let reference = (more, reference.noise[0]);
-    Ok(Ok(Sheet { scene: chosen.scene.name, size, target, reference, rows, advice }))
-}
-
-impl Desk<'_> {
-    /// The small copy with further settings.
-    fn prepare(&self, set: &[(String, String)], alter: impl FnOnce(&mut Scene)) -> Result<Prepared> {
-        let mut overrides = self.overrides.clone();
-        overrides.set.extend(set.iter().cloned());
-        let description = self.entry.scene(&overrides.set)?;
-        prepare_scene(self.entry, description, &overrides, &mut self.shelf.borrow_mut(), alter)
-    }
-
-    fn render(&self, trial: &Trial, seed: u64) -> Result<Outcome> {
-        let mut set = trial.set.clone();
-        set.push(("render.seed".into(), seed.to_string()));
-        let one = |alter: &dyn Fn(&mut Scene)| -> Result<(Prepared, Frame)> {
-            let prepared = self.prepare(&set, alter)?;
-            let frame = self.frame(&prepared, trial.way == Way::Independent)?;
-            Ok((prepared, frame))
-        };
-        let (prepared, frame) = match trial.way {
-            Way::AsSet | Way::Independent => one(&|_| {})?,
-            Way::Wavelengths(16) => {
-                let (prepared, eight) = one(&|_| {})?;
-                let (_, further) = one(&|scene| scene.wavelengths = scene.wavelengths.half_a_step_on())?;
-                (prepared, both(eight, further)?)
-            }
-            Way::Wavelengths(count) => one(&|scene| scene.wavelengths = scene.wavelengths.with_count(count))?,
-        };
-        outcome(&prepared, frame)
-    }
-
-    fn frame(&self, prepared: &Prepared, independent: bool) -> Result<Frame> {
-        let filter = FilterSampler::new(super::filter(&prepared.description.image.filter))?;
-        let job = FrameJob { independent, ..prepared.job(&filter) };
-        let frame = frame::render(&job, &|_| {}, self.stop)?;
-        if self.stop.load(Ordering::Relaxed) {
-            return Err(Error::Render("stopped; nothing was written".into()));
-        }
-        Ok(frame)
-    }
-}
-
-/// The samples of two frames as those of one: replicate by replicate, so that the spread of replicates is still that of
-/// independent means, whatever the frames have in common.
-fn both(a: Frame, b: Frame) -> Result<Frame> {
-    let (samples, elapsed) = (a.samples(), a.elapsed + b.elapsed);
-    let (mut film, mut splats) = (a.film, a.splats);
-    film.merge(&b.film)?;
-    if let (Some(a), Some(b)) = (&mut splats, b.splats) {
-        a.film.merge(&b.film)?;
-        a.paths.iter_mut().zip(b.paths).for_each(|(a, b)| *a += b);
-    }
-    Ok(Frame::of(film, splats, samples, elapsed, true))
-}
-
-fn outcome(prepared: &Prepared, frame: Frame) -> Result<Outcome> {
-    let space = ColourSpace::Rec709.matrix_from_xyz();
-    let image = frame.resolve(&space);
-    let error = frame.milestones.last().and_then(|m| m.error);
-    let finish = super::finish::Finish::of(prepared);
-    let settings = develop::settings(&finish.output.png, finish.white, &image, ColourSpace::Rec709);
-    Ok(Outcome {
-        seconds: frame.elapsed.as_secs_f64(),
-        converged: error.is_some_and(|e| e.valid),
-        noise: error.map_or([f64::NAN; 3], |e| [e.rel_rmse, e.low, e.high]),
-        means: frame.replicate_means(&space),
-        png: png::encode_png(&image, &settings).map_err(Error::Render)?,
-        milestones: frame.milestones,
-        image,
-    })
+    let reference = (more, reference.noise);
+    let png = png::encode_png(&full.image, &settings_of_png).map_err(Error::Render)?;
+    Ok(Ok(Sheet { scene: chosen.scene.name, size, target, reference, png, rows, advice }))
 }
 
 /// The reference has as many times the samples.
@@ -304,87 +226,65 @@ fn rounding(image: &Image) -> f64 {
     all.mean
 }
 
-/// Blocks along the longer side over which distances to the reference are gathered.
-const BLOCKS: u32 = 8;
-
-/// What of relMSE between the pictures and the reference is no noise.
-fn bias_squared(outcomes: &[Outcome], reference: &Image) -> Figure {
-    let window = reference.window;
-    let floor = error::floor(reference);
-    let side = window.width.max(window.height).div_ceil(BLOCKS).max(1);
-    let columns = window.width.div_ceil(side);
-    let mut blocks = vec![Moments::default(); (columns * window.height.div_ceil(side)) as usize];
-    let rounds = outcomes.len() as f64;
-    for i in 0..window.pixels() {
-        let [x, y] = [i as u32 % window.width, i as u32 / window.width];
-        let block = &mut blocks[(y / side * columns + x / side) as usize];
-        for c in 0..3 {
-            let truth = f64::from(reference.rgb[c][i]);
-            let square = |e: f32| f64::from(e) * f64::from(e);
-            let value = outcomes.iter().map(|s| f64::from(s.image.rgb[c][i])).sum::<f64>() / rounds;
-            let noise = outcomes.iter().map(|s| square(s.image.standard_error[c][i])).sum::<f64>() / (rounds * rounds);
-            let noise = noise + square(reference.standard_error[c][i]);
-            let excess = (value - truth) * (value - truth) - noise;
-            if excess.is_finite() {
-                block.push(excess / (truth * truth + floor));
-            }
-        }
-    }
-    let over: Moments = blocks.iter().filter(|b| b.count > 0).map(|b| b.mean).collect();
-    Figure { value: over.mean, error: over.standard_error() }
-}
-
-fn row(trial: &Trial, outcomes: &mut [Outcome], reference: &Outcome) -> Row {
-    let mut seconds: Vec<f64> = outcomes.iter().map(|o| o.seconds).collect();
-    seconds.sort_by(f64::total_cmp);
-    let n = outcomes.len() as f64;
-    let square = |i: usize| (outcomes.iter().map(|o| o.noise[i] * o.noise[i]).sum::<f64>() / n).sqrt();
-    let light = std::array::from_fn(|c| {
-        let truth: Moments = reference.means.iter().map(|m| m[c]).collect();
-        let all: Moments = outcomes.iter().flat_map(|o| o.means.iter().map(|m| m[c])).collect();
-        let value = all.mean / truth.mean;
-        let relative = (all.standard_error() / all.mean).hypot(truth.standard_error() / truth.mean);
-        Figure { value, error: value * relative }
-    });
-    let noise = [0, 1, 2].map(square);
-    let converged = outcomes.iter().all(|o| o.converged);
-    let bias_squared = bias_squared(outcomes, &reference.image);
-    let last = &mut outcomes[outcomes.len() - 1];
-    let curve = last.milestones.iter().filter_map(|m| {
-        let e = m.error?;
-        Some(Point { samples: m.samples, seconds: m.elapsed.as_secs_f64(), noise: [e.rel_rmse, e.low, e.high] })
-    });
-    let curve = curve.collect();
-    let samples = last.milestones.last().map_or(0, |m| m.samples);
-    Row {
+fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, target: f64, png: Vec<u8>) -> Row {
+    let curve: Vec<Point> = tally.curve();
+    let end = curve[curve.len() - 1];
+    let cost = |tally: &Tally| {
+        let Figure { value, error } = tally.noise_squared();
+        (value * tally.seconds(), error / value)
+    };
+    let ((own, own_error), (cost, error)) = (cost(chosen), cost(tally));
+    let mut row = Row {
         knob: trial.knob,
         value: trial.value.clone(),
         chosen: trial.knob == "chosen",
-        samples,
-        seconds: seconds[seconds.len() / 2],
-        spread: [seconds[0], seconds[seconds.len() - 1]],
-        noise,
-        converged,
-        bias_squared,
-        light,
-        efficiency: f64::NAN,
+        samples: end.samples,
+        seconds: end.seconds,
+        most_seconds: tally.most_seconds(),
+        noise: end.noise,
+        bias_squared: tally.bias_squared(reference),
+        light: tally.light(reference),
+        efficiency: Figure { value: own / cost, error: own / cost * own_error.hypot(error) },
         to_target: None,
         curve,
-        png: std::mem::take(&mut last.png),
-    }
+        png,
+    };
+    let left = target * target - row.bias().unwrap_or(0.0).powi(2);
+    row.to_target =
+        (left > 0.0).then(|| end.seconds * libm::pow(end.noise[0] * end.noise[0] / left, 1.0 / row.exponent()));
+    row
 }
 
 impl Row {
-    /// √relMSE of the bias, where it stands out of its own noise by two standard errors.
+    /// b of variance that falls as samples^−b from a quarter of the samples on, kept to what sampling does.
+    #[must_use]
+    pub fn exponent(&self) -> f64 {
+        let [.., end] = self.curve.as_slice() else { return 1.0 };
+        let before = self.curve.iter().rev().find(|p| p.samples <= end.samples / 4);
+        before.map_or(1.0, |p| {
+            let fallen = 2.0 * libm::log(p.noise[0] / end.noise[0]);
+            (fallen / libm::log(f64::from(end.samples) / f64::from(p.samples))).clamp(1.0, 2.0)
+        })
+    }
+
+    /// √relMSE of the bias, where it stands out.
     #[must_use]
     pub fn bias(&self) -> Option<f64> {
         let Figure { value, error } = self.bias_squared;
-        (value > 2.0 * error && value > 0.0).then(|| value.sqrt())
+        (value > SIGNIFICANT * error && value > 0.0).then(|| value.sqrt())
     }
-}
 
-fn to_target(row: &Row, outcomes: &[Outcome], target: f64) -> Option<f64> {
-    let left = target * target - row.bias().unwrap_or(0.0).powi(2);
-    let fit = Fit::of(&outcomes.last()?.milestones)?;
-    (left > 0.0).then(|| row.seconds * fit.samples_for(left.sqrt()) / f64::from(row.samples))
+    /// √relMSE that the bias is below, by as many standard errors as it takes to stand out.
+    #[must_use]
+    pub fn bias_bound(&self) -> f64 {
+        (self.bias_squared.value.max(0.0) + SIGNIFICANT * self.bias_squared.error).sqrt()
+    }
+
+    /// What is more or less of red, green and blue, where that stands out and is half a per cent or more.
+    #[must_use]
+    pub fn colour_shift(&self) -> Vec<(&'static str, f64)> {
+        let all = ["red", "green", "blue"].into_iter().zip(&self.light);
+        let stands_out = |f: &Figure| (f.value - 1.0).abs() > (SIGNIFICANT * f.error).max(0.005);
+        all.filter(|(_, f)| stands_out(f)).map(|(name, f)| (name, f.value - 1.0)).collect()
+    }
 }

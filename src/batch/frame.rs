@@ -120,25 +120,8 @@ impl Frame {
         if let Some((_, image)) = self.resolved.as_ref().filter(|(space, _)| space == rgb_from_xyz) {
             return image.clone();
         }
-        resolve::resolve(&self.film, self.splats(), rgb_from_xyz)
-    }
-
-    /// The mean over all pixels of each replicate in the colour space of `rgb_from_xyz`.
-    #[must_use]
-    pub fn replicate_means(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> [[f64; 3]; REPLICATES] {
-        let (pixels, splats) = (self.film.window().pixels(), self.splats());
-        let mut means = [[0.0; 3]; REPLICATES];
-        for index in 0..pixels {
-            let light = resolve::replicate_light(&self.film, splats.as_ref(), index, rgb_from_xyz);
-            for (mean, light) in means.iter_mut().flatten().zip(light.iter().flatten().flatten()) {
-                *mean += light / pixels as f64;
-            }
-        }
-        means
-    }
-
-    fn splats(&self) -> Option<Splats<'_>> {
-        self.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths })
+        let splats = self.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
+        resolve::resolve(&self.film, splats, rgb_from_xyz)
     }
 
     /// The further channel `channel`; bands come first.

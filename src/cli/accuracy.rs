@@ -5,7 +5,7 @@ use super::text::columns;
 use super::{AccuracyArguments, use_threads};
 use crate::batch;
 use crate::batch::accuracy::page::{HEADINGS, cells, page};
-use crate::batch::accuracy::{self, Settings, Sheet};
+use crate::batch::accuracy::{self, FEWEST, Settings, Sheet};
 use crate::error::Result;
 use crate::film::output::{prepare_place, write_atomically, write_json};
 use std::fmt::Write;
@@ -31,9 +31,9 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
             }
         };
         let made = entry.scene(&overrides.set).and_then(|scene| {
-            let samples = scene.render.samples.clamp(16, MOST_SAMPLES);
-            let settings =
-                Settings { pixels: arguments.pixels, samples, rounds: arguments.rounds, target: arguments.error };
+            let samples = scene.render.samples.clamp(FEWEST, MOST_SAMPLES);
+            let AccuracyArguments { pixels, rounds, error: target, time, .. } = *arguments;
+            let settings = Settings { pixels, samples, rounds, target, time };
             accuracy::sheet(&entry, &overrides, &settings, &told, &interrupts.stop)
         });
         match made {
@@ -73,26 +73,26 @@ fn text(sheet: &Sheet) -> String {
     let [width, height] = sheet.size;
     let mut out = format!("{}, {width} x {height}, target {:.2} %\n", sheet.scene, 100.0 * sheet.target);
     out += &columns(&rows, 2);
-    for (_, sentence) in &sheet.advice {
-        let _ = writeln!(out, "- {sentence}");
+    for (knob, sentence) in &sheet.advice {
+        let _ = writeln!(out, "{knob}: {sentence}");
     }
     out + "\n"
 }
 
 fn csv(sheets: &[Sheet]) -> String {
     let mut out = String::from(
-        "scene,knob,value,samples,seconds,seconds_least,seconds_most,noise,noise_low,noise_high,converged,bias_squared,\
-         bias_squared_error,red,red_error,green,green_error,blue,blue_error,efficiency,seconds_to_target\n",
+        "scene,knob,value,samples,seconds,most_seconds,noise,noise_low,noise_high,bias_squared,bias_squared_error,red,\
+         red_error,green,green_error,blue,blue_error,efficiency,efficiency_error,seconds_to_target\n",
     );
     for sheet in sheets {
         for r in &sheet.rows {
             let _ = write!(out, "\"{}\",{},{},{}", sheet.scene.replace('"', "\"\""), r.knob, r.value, r.samples);
-            let figures = [r.seconds, r.spread[0], r.spread[1], r.noise[0], r.noise[1], r.noise[2]];
+            let figures = [r.seconds, r.most_seconds, r.noise[0], r.noise[1], r.noise[2]];
             figures.iter().for_each(|x| out += &format!(",{x:e}"));
-            let _ = write!(out, ",{},{:e},{:e}", r.converged, r.bias_squared.value, r.bias_squared.error);
+            let _ = write!(out, ",{:e},{:e}", r.bias_squared.value, r.bias_squared.error);
             r.light.iter().for_each(|f| out += &format!(",{:e},{:e}", f.value, f.error));
             let target = r.to_target.map_or(String::new(), |t| format!("{t:e}"));
-            let _ = writeln!(out, ",{:e},{target}", r.efficiency);
+            let _ = writeln!(out, ",{:e},{:e},{target}", r.efficiency.value, r.efficiency.error);
         }
     }
     out

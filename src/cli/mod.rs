@@ -226,6 +226,9 @@ struct AccuracyArguments {
     /// Pixels of the small copy of each scene, about
     #[arg(long, value_name = "N", default_value_t = 9216, value_parser = clap::value_parser!(u32).range(64..=1 << 26))]
     pixels: u32,
+    /// About how long each scene may take, as 30s or 5m: its samples are cut to that, to 16 at the least
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    time: Option<std::time::Duration>,
     /// How often each setting is rendered, each time with another seed
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,

@@ -118,7 +118,7 @@ struct Sums {
 }
 
 /// The three ways to make two pairs of four.
-const PAIRINGS: [[usize; 4]; 3] = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2]];
+pub const PAIRINGS: [[usize; 4]; 3] = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2]];
 
 /// What is added to the square of a value that an error is divided by: f, a hundredth of the square of the mean of all.
 #[must_use]

@@ -214,6 +214,16 @@ pub fn replicate_light(
     Some(means.map(|mean| mean.map(|x| x * unit)))
 }
 
+/// [`replicate_light`] of every pixel.
+#[must_use]
+pub fn replicates(
+    film: &Film,
+    splats: Option<Splats>,
+    rgb_from_xyz: &[[f64; 3]; 3],
+) -> Vec<Option<[[f64; 3]; REPLICATES]>> {
+    (0..film.window().pixels()).map(|index| replicate_light(film, splats.as_ref(), index, rgb_from_xyz)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

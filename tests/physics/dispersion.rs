@@ -3,7 +3,9 @@
 use super::LAMP;
 use super::channels::{render, render_with};
 use super::common::{Bench, Estimate, bench, bench_with, wavelengths};
+use abbe::film::accumulate::REPLICATES;
 use abbe::film::filter::Filter;
+use abbe::film::resolve::{self, Splats};
 use abbe::math::Ray;
 use abbe::math::sampler::Sampler;
 use abbe::math::statistics::Moments;
@@ -347,9 +349,13 @@ fn any_number_of_wavelengths_a_path_finds_the_same_light() {
         for seed in 0..6 {
             let mut bench = bench_with(&scene(techniques, seed), &[]);
             bench.prepared.scene.wavelengths = change(&bench.prepared.scene.wavelengths);
-            for rgb in bench.frame().replicate_means(&ColourSpace::Rec709.matrix_from_xyz()) {
-                all[0].push(rgb[0]);
-                all[1].push(rgb[2]);
+            let frame = bench.frame();
+            let splats = frame.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
+            let pixels = resolve::replicates(&frame.film, splats, &ColourSpace::Rec709.matrix_from_xyz());
+            for replicate in 0..REPLICATES {
+                for (c, sum) in [0, 2].into_iter().zip(&mut all) {
+                    sum.push(pixels.iter().flatten().map(|p| p[replicate][c]).sum::<f64>() / pixels.len() as f64);
+                }
             }
         }
         all.map(|m| Estimate { mean: m.mean, error: m.standard_error() })

@@ -1,6 +1,24 @@
 //! What the figures of a sheet say in words.
 
+use super::figures::SIGNIFICANT;
 use super::{Row, knobs};
+
+/// What each knob buys, in a sentence.
+#[must_use]
+pub fn sentences(rows: &[Row]) -> Vec<(&'static str, String)> {
+    let chosen = &rows[0];
+    let of = |rows: &[Row]| {
+        let knob = rows[0].knob;
+        let words = match knob {
+            "file" => format!("half precision adds an error of {:.3} %", 100.0 * rows[0].bias_squared.value.sqrt()),
+            "samples" => convergence(chosen, rows),
+            _ => trade(chosen, rows),
+        };
+        let note = knobs::note(knob).map_or(String::new(), |note| format!(" ({note})"));
+        (knob, format!("{words}{note}."))
+    };
+    rows[1..].chunk_by(|a, b| a.knob == b.knob).map(of).collect()
+}
 
 /// A number to two or three figures.
 fn figures(x: f64) -> String {
@@ -13,49 +31,123 @@ fn figures(x: f64) -> String {
     }
 }
 
-/// What each knob buys, in a sentence.
-#[must_use]
-pub fn sentences(rows: &[Row]) -> Vec<(&'static str, String)> {
-    let chosen = &rows[0];
-    let mut knobs: Vec<&'static str> = rows[1..].iter().map(|r| r.knob).collect();
-    knobs.dedup();
-    let sentence = |knob: &'static str| {
-        let parts: Vec<String> = rows.iter().filter(|r| r.knob == knob).map(|r| phrase(chosen, r)).collect();
-        let note = knobs::note(knob).map_or(String::new(), |note| format!(" ({note})"));
-        (knob, format!("{}{note}.", parts.join("; ")))
-    };
-    knobs.into_iter().map(sentence).collect()
+/// "a", "a and b", "a, b and c".
+fn list(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
 }
 
-fn phrase(chosen: &Row, row: &Row) -> String {
-    let time = figures(row.seconds / chosen.seconds);
-    let noise = figures(row.noise[0] / chosen.noise[0]);
-    let what = format!("{} {}", row.knob, row.value);
-    let lost: Vec<String> = ["red", "green", "blue"]
-        .iter()
-        .zip(&row.light)
-        .filter(|(_, f)| (f.value - 1.0).abs() > 2.0 * f.error && (f.value - 1.0).abs() >= 0.005)
-        .map(|(name, f)| {
-            let less = if f.value < 1.0 { "less" } else { "more" };
-            format!("{:.1} % {less} {name}", 100.0 * (f.value - 1.0).abs())
-        })
-        .collect();
-    let light = match (row.knob, lost.is_empty(), row.bias()) {
-        ("file", ..) => {
-            return format!("{what} precision adds an error of {:.3} %", 100.0 * row.bias_squared.value.sqrt());
+/// How noise falls with samples: from the fewest to the most.
+fn convergence(chosen: &Row, rows: &[Row]) -> String {
+    let all = || rows.iter().chain([chosen]);
+    let (Some(few), Some(many)) = (all().min_by_key(|r| r.samples), all().max_by_key(|r| r.samples)) else {
+        return String::new();
+    };
+    let ratio = f64::from(many.samples) / f64::from(few.samples);
+    format!(
+        "{} times the samples take {} of the time for {} of the noise: variance falls as samples^-{:.2}",
+        figures(ratio).trim_end_matches(".00"),
+        figures(many.seconds / few.seconds),
+        figures(many.noise[0] / few.noise[0]),
+        2.0 * libm::log(few.noise[0] / many.noise[0]) / libm::log(ratio)
+    )
+}
+
+/// What is lost, what is the same, and what comes to the same noise sooner or later.
+fn trade(chosen: &Row, rows: &[Row]) -> String {
+    let mut parts: Vec<String> = Vec::new();
+    let mut same: Vec<String> = Vec::new();
+    let mut speed: Vec<String> = Vec::new();
+    for row in rows {
+        let shift = row.colour_shift();
+        let time = figures(row.seconds / chosen.seconds);
+        let shifts: Vec<String> = shift
+            .iter()
+            .map(|(name, x)| format!("{:.1} % {} {name}", 100.0 * x.abs(), if *x < 0.0 { "less" } else { "more" }))
+            .collect();
+        match (shift.is_empty(), row.bias()) {
+            (false, Some(bias)) => {
+                let (value, shifts) = (&row.value, list(&shifts));
+                parts.push(format!("{value} finds {shifts} (bias {:.1} %) in {time} of the time", 100.0 * bias));
+            }
+            (false, None) => parts.push(format!("{} finds {} in {time} of the time", row.value, list(&shifts))),
+            (true, Some(bias)) => {
+                parts.push(format!("{} has a bias of {:.1} % in {time} of the time", row.value, 100.0 * bias));
+            }
+            (true, None) => {
+                same.push(row.value.clone());
+                if (row.efficiency.value - 1.0).abs() > SIGNIFICANT * row.efficiency.error {
+                    speed.push(format!("{} takes {} of the time", row.value, figures(1.0 / row.efficiency.value)));
+                }
+            }
         }
-        ("samples", ..) => String::new(),
-        (_, false, Some(bias)) => format!(", and finds {} (bias {:.2} %)", lost.join(", "), 100.0 * bias),
-        (_, false, None) => format!(", and finds {}", lost.join(", ")),
-        (_, true, Some(bias)) => format!(", with a bias of {:.2} %", 100.0 * bias),
-        (_, true, None) => ", and finds the same light".into(),
-    };
-    let price = match row.to_target {
-        Some(t) if row.knob != "samples" => chosen
-            .to_target
-            .map_or(String::new(), |own| format!("; to the target it takes {} of the time", figures(t / own))),
-        Some(_) => String::new(),
-        None => "; the target is below its bias".into(),
-    };
-    format!("{what} takes {time} of the time for {noise} of the noise{light}{price}")
+    }
+    if !same.is_empty() {
+        let verb = if same.len() == 1 { "finds" } else { "find" };
+        parts.push(format!("{} {verb} the same light", list(&same)));
+        parts.push(match speed.as_slice() {
+            [] => "what that takes to the same noise cannot be told from the chosen setting".to_owned(),
+            told => format!("to the same noise {}", list(told)),
+        });
+    }
+    parts.join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::batch::accuracy::Figure;
+
+    fn row(knob: &'static str, value: &str, seconds: f64, noise: f64, bias_squared: f64, green: f64) -> Row {
+        let light = [1.0, green, 1.0].map(|value| Figure { value, error: 0.001 });
+        Row {
+            knob,
+            value: value.into(),
+            chosen: knob == "chosen",
+            samples: 64,
+            seconds,
+            most_seconds: seconds,
+            noise: [noise; 3],
+            bias_squared: Figure { value: bias_squared, error: 1e-6 },
+            light,
+            efficiency: Figure { value: 1.0 / (seconds * noise * noise), error: 0.05 },
+            to_target: None,
+            curve: Vec::new(),
+            png: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_sentence_tells_what_is_lost_what_is_the_same_and_what_it_takes() {
+        let rows = [
+            row("chosen", "as written", 1.0, 1.0, 0.0, 1.0),
+            row("depth", "2", 0.25, 0.5, 0.04, 0.7),
+            row("depth", "8", 0.8, 1.0, 0.0, 1.001),
+            row("depth", "16", 0.99, 1.0, 0.0, 1.0),
+            row("effects", "all", 1.01, 1.0, 0.0, 1.0),
+        ];
+        let sentences = sentences(&rows);
+        assert_eq!(
+            sentences[0].1,
+            "2 finds 30.0 % less green (bias 20.0 %) in 0.25 of the time; 8 and 16 find the same light; to the same \
+             noise 8 takes 0.80 of the time."
+        );
+        assert_eq!(
+            sentences[1].1,
+            "all finds the same light; what that takes to the same noise cannot be told from the chosen setting."
+        );
+    }
+
+    #[test]
+    fn samples_tell_how_variance_falls() {
+        let many = Row { samples: 256, ..row("samples", "x 4", 4.0, 0.5, 0.0, 1.0) };
+        let [(_, sentence)] = &sentences(&[row("chosen", "as written", 1.0, 1.0, 0.0, 1.0), many])[..] else {
+            panic!()
+        };
+        assert!(sentence.starts_with("4 times the samples take 4.00 of the time for 0.50 of the noise"), "{sentence}");
+        assert!(sentence.ends_with("samples^-1.00."), "{sentence}");
+    }
 }

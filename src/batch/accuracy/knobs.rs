@@ -3,7 +3,7 @@
 use super::super::{Prepared, adaptive};
 use crate::film::accumulate::REPLICATES;
 use crate::transport::pilot::Use;
-use crate::transport::plan::PathSettings;
+use crate::transport::plan::Integrator;
 
 /// A value of a knob.
 #[derive(Clone, Debug)]
@@ -16,6 +16,20 @@ pub struct Trial {
     pub set: Vec<(String, String)>,
     /// What no setting does.
     pub way: Way,
+}
+
+impl Trial {
+    /// What it takes, about, over what the chosen setting takes.
+    #[must_use]
+    pub fn work(&self) -> f64 {
+        match (self.knob, self.value.as_str(), self.way) {
+            ("samples", "x 1/4", _) => 0.25,
+            ("samples", "x 1/2", _) => 0.5,
+            ("samples", "x 2", _) | (.., Way::Wavelengths(16)) => 2.0,
+            ("samples", "x 4", _) => 4.0,
+            _ => 1.0,
+        }
+    }
 }
 
 /// How a scene is rendered beyond what its settings say.
@@ -43,7 +57,8 @@ pub fn note(knob: &str) -> Option<&'static str> {
 
 /// The chosen setting, then each knob at other values.
 #[must_use]
-pub fn trials(chosen: &Prepared, path: &PathSettings) -> Vec<Trial> {
+pub fn trials(chosen: &Prepared) -> Vec<Trial> {
+    let Integrator::Path(path) = &chosen.plan.integrator else { return Vec::new() };
     let samples = chosen.samples;
     let trial = |knob, value: &str, set: &[(&str, &str)]| Trial {
         knob,

@@ -13,7 +13,8 @@ th:first-child, td:first-child, th:nth-child(2), td:nth-child(2) { text-align: l
 tr.chosen { background: #fff6dd; font-weight: 600; }
 .plots, .crops { display: flex; flex-wrap: wrap; gap: 1rem; }
 figure { margin: 0; } figcaption { font-size: 12px; color: #555; }
-.crops img { image-rendering: pixelated; width: 256px; display: block; }
+.crops figure { width: 190px; } .crops img { image-rendering: pixelated; width: 190px; display: block; }
+.contents td:nth-last-child(-n+2) { text-align: left; }
 svg text { font: 11px system-ui, sans-serif; fill: #444; }
 .note { color: #666; font-size: 13px; }
 ";
@@ -31,15 +32,19 @@ pub fn page(title: &str, command: &str, sheets: &[Sheet], without: &[(String, St
          <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}</style></head><body>\n\
          <h1>What accuracy costs: {0}</h1>\n<p>Made by <code>{1}</code> with Abbe {2}.</p>\n\
          <p class=\"note\">Each knob is moved by itself around the chosen setting, on a small copy of the scene. Noise is √relMSE \
-         with its 95 % interval; bias is what is left of the distance to a reference of sixteen times the samples without \
-         the noise of both, given where it stands out by two standard errors. Efficiency is 1 / (noise² · time), \
-         over that of the chosen setting.</p>\n",
+         with its 95 % interval; bias is √relMSE of what several renders have in common against a reference of sixteen times the \
+         samples, given where it stands out by three standard errors, else what it is below by as many. Time is the least \
+         of the renders (the most in brackets). Efficiency is 1 / (noise² · time) over that of the chosen setting, \
+         with its standard error. In the plots bands are intervals, dashed lines biases, the dotted line the target.</p>\n",
         escaped(title),
         escaped(command),
         env!("CARGO_PKG_VERSION")
     );
-    for sheet in sheets {
-        section(&mut out, sheet);
+    if sheets.len() > 1 {
+        contents(&mut out, sheets);
+    }
+    for (number, sheet) in sheets.iter().enumerate() {
+        section(&mut out, number, sheet);
     }
     for (scene, why) in without {
         let _ = writeln!(out, "<h2>{}</h2><p>{}.</p>", escaped(scene), escaped(why));
@@ -48,18 +53,45 @@ pub fn page(title: &str, command: &str, sheets: &[Sheet], without: &[(String, St
     out
 }
 
-fn section(out: &mut String, sheet: &Sheet) {
+/// A line for each scene: what it takes, and what of its settings would do better or loses light.
+fn contents(out: &mut String, sheets: &[Sheet]) {
+    out.push_str(
+        "<table class=\"contents\"><thead><tr><th>scene</th><th>time, s</th><th>noise, %</th><th>reference, %</th>\
+         <th>soonest without bias</th><th>largest bias</th></tr></thead><tbody>\n",
+    );
+    for (number, sheet) in sheets.iter().enumerate() {
+        let chosen = &sheet.rows[0];
+        let moved = || sheet.rows[1..].iter().filter(|row| row.knob != "samples" && row.knob != "file");
+        let name = |row: &Row| escaped(&format!("{} {}", row.knob, row.value));
+        let sooner = |row: &&Row| row.bias().is_none() && row.efficiency.value - 3.0 * row.efficiency.error > 1.0;
+        let best = moved().filter(sooner).max_by(|a, b| a.efficiency.value.total_cmp(&b.efficiency.value));
+        let best = best.map_or("as chosen".into(), |row| format!("{}: {:.2}", name(row), 1.0 / row.efficiency.value));
+        let worst = moved().filter_map(|row| Some((row, row.bias()?))).max_by(|a, b| a.1.total_cmp(&b.1));
+        let worst = worst.map_or("none".into(), |(row, bias)| format!("{}: {:.1} %", name(row), 100.0 * bias));
+        let _ = writeln!(
+            out,
+            "<tr><td><a href=\"#scene-{number}\">{}</a></td><td>{:.2}</td><td>{:.2}</td><td>{:.2}</td><td>{best}</td><td>{worst}</td></tr>",
+            escaped(&sheet.scene),
+            chosen.seconds,
+            100.0 * chosen.noise[0],
+            100.0 * sheet.reference.1
+        );
+    }
+    out.push_str("</tbody></table>\n");
+}
+
+fn section(out: &mut String, number: usize, sheet: &Sheet) {
     let [width, height] = sheet.size;
     let _ = write!(
         out,
-        "<h2>{}</h2>\n<p class=\"note\">{width} × {height} pixels; target {:.2} %; reference of {} samples a pixel, noise {:.2} %.</p>\n<ul>\n",
+        "<h2 id=\"scene-{number}\">{}</h2>\n<p class=\"note\">{width} × {height} pixels; target {:.2} %; reference of {} samples a pixel, noise {:.2} %.</p>\n<ul>\n",
         escaped(&sheet.scene),
         100.0 * sheet.target,
         sheet.reference.0,
         100.0 * sheet.reference.1
     );
-    for (_, sentence) in &sheet.advice {
-        let _ = writeln!(out, "<li>{}</li>", escaped(sentence));
+    for (knob, sentence) in &sheet.advice {
+        let _ = writeln!(out, "<li><b>{}</b>: {}</li>", escaped(knob), escaped(sentence));
     }
     out.push_str("</ul>\n<div class=\"plots\">\n");
     let chosen = &sheet.rows[0];
@@ -87,6 +119,12 @@ fn section(out: &mut String, sheet: &Sheet) {
         out.push_str("</tr>\n");
     }
     out.push_str("</tbody></table>\n<h3>How it looks</h3>\n<div class=\"crops\">\n");
+    let _ = writeln!(
+        out,
+        "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><figcaption>reference: noise {:.2} %</figcaption></figure>",
+        base64(&sheet.png),
+        100.0 * sheet.reference.1
+    );
     for row in sheet.rows.iter().filter(|row| row.knob != "file") {
         let _ = writeln!(
             out,
@@ -114,16 +152,12 @@ pub fn cells(row: &Row) -> [String; 10] {
         row.knob.to_owned(),
         row.value.clone(),
         row.samples.to_string(),
-        format!("{:.3} ({:.3}-{:.3})", row.seconds, row.spread[0], row.spread[1]),
+        format!("{:.3} ({:.3})", row.seconds, row.most_seconds),
         per_cent(row.noise[0]),
-        if row.converged {
-            format!("{}-{}", per_cent(row.noise[1]), per_cent(row.noise[2]))
-        } else {
-            "not converged".into()
-        },
-        row.bias().map_or("-".into(), |b| format!("{:.3}", 100.0 * b)),
+        format!("{}-{}", per_cent(row.noise[1]), per_cent(row.noise[2])),
+        row.bias().map_or(format!("<{}", per_cent(row.bias_bound())), per_cent),
         light.join(" "),
-        format!("{:.2}", row.efficiency),
+        format!("{:.2} ± {:.2}", row.efficiency.value, row.efficiency.error),
         row.to_target.map_or("never".into(), |t| format!("{t:.2}")),
     ]
 }
@@ -195,6 +229,14 @@ fn plot(chosen: &Row, rows: &[Row], target: f64) -> String {
             path(2, true),
             path(0, false)
         );
+        for p in row.curve.iter().filter(|p| p.seconds > 0.0) {
+            let _ = write!(
+                svg,
+                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2\" fill=\"{colour}\"/>",
+                x(p.seconds),
+                y(p.noise[0])
+            );
+        }
         if let Some(bias) = row.bias() {
             let _ = write!(
                 svg,

@@ -1,0 +1,308 @@
+//! What is known of a setting after some rounds: noise, bias and light against a reference.
+//!
+//! With w = 1 / (μ² + f), μ the reference and f as in [`crate::film::error`], so that a noisy value is never divided by itself:
+//!
+//! * **noise**² is the mean over pixels, channels and rounds of w v, v the variance of a pixel's mean by its four replicates;
+//!   its interval comes from how that differs between rounds, block by block of pixels;
+//! * **bias**² is the mean of w times what the differences Yᵢ of the R = 4 replicates to those of the reference, which are
+//!   independent, have in common: the mean over i ≠ j of YᵢYⱼ, whose expectation is the square of the difference of the
+//!   means, whatever the distribution, so that no variance need be known and taken off. Where there is no bias its variance
+//!   is tr(WΣ)² / 6, Σ the covariance of a Y over pixels and channels; and as E (uᵀWv)² = 4 tr(WΣ)² for u = Y₁ − Y₂ and
+//!   v = Y₃ − Y₄, and so for the two other ways to pair, that is the mean of (uᵀWv)² over the three, over 24, with pixels
+//!   gathered in blocks within which they may share light;
+//! * **light** is the mean of red, green and blue over the reference's.
+
+use super::desk::{self, Outcome, Pass};
+use super::{Figure, Point};
+use crate::film::Window;
+use crate::film::accumulate::REPLICATES;
+use crate::film::error::{self, PAIRINGS};
+use crate::film::resolve::Image;
+use crate::math::statistics::{Moments, normal_two_sided_p, student_t_half_width};
+
+/// Blocks along the longer side.
+const BLOCKS: u32 = 8;
+
+/// What stands out by less is taken for chance: of forty settings one in ten scenes or so stands out by chance.
+pub const SIGNIFICANT: f64 = 3.0;
+
+/// Red, green and blue of the replicates of a pixel.
+pub type Replicates = [[f64; 3]; REPLICATES];
+
+/// What a picture is held against.
+#[derive(Debug)]
+pub struct Reference {
+    replicates: Vec<Option<Replicates>>,
+    /// w of each value over the number of them; zero where there is nothing.
+    weights: Vec<[f64; 3]>,
+    window: Window,
+    /// √relMSE of its own noise.
+    pub noise: f64,
+}
+
+/// What the rounds of a setting add up to.
+#[derive(Debug, Default)]
+pub struct Tally {
+    /// Over the rounds.
+    replicates: Vec<Option<Replicates>>,
+    /// Those of each round.
+    passes: Vec<Vec<Pass>>,
+    /// Mean light of each replicate of each round.
+    light: Vec<[f64; 3]>,
+}
+
+impl Reference {
+    /// Of a picture and its replicates.
+    #[must_use]
+    pub fn new(image: &Image, replicates: Vec<Option<Replicates>>) -> Reference {
+        let floor = error::floor(image);
+        let values = 3.0 * replicates.iter().flatten().count().max(1) as f64;
+        let weight = |i: usize| {
+            image.rgb.each_ref().map(|plane| {
+                let size = f64::from(plane[i]) * f64::from(plane[i]) + floor;
+                if replicates[i].is_some() && size > 0.0 { 1.0 / (size * values) } else { 0.0 }
+            })
+        };
+        let weights: Vec<[f64; 3]> = (0..image.window.pixels()).map(weight).collect();
+        let mut reference = Reference { replicates, weights, window: image.window, noise: 0.0 };
+        let noise: f64 = reference.noise_of(&reference.replicates).iter().sum();
+        reference.noise = noise.sqrt();
+        reference
+    }
+
+    /// The block of each pixel, and how many there are.
+    fn blocks(&self) -> (impl Fn(usize) -> usize, usize) {
+        let Window { width, height, .. } = self.window;
+        let side = width.max(height).div_ceil(BLOCKS).max(1);
+        let columns = width.div_ceil(side);
+        let block = move |i: usize| (i as u32 / width / side * columns + i as u32 % width / side) as usize;
+        (block, (columns * height.div_ceil(side)) as usize)
+    }
+
+    /// noise² of each block.
+    #[must_use]
+    pub fn noise_of(&self, replicates: &[Option<Replicates>]) -> Vec<f64> {
+        let (block, count) = self.blocks();
+        let mut sums = vec![0.0; count];
+        for (i, pixel) in replicates.iter().enumerate() {
+            let Some(pixel) = pixel else { continue };
+            for c in 0..3 {
+                let mean = pixel.iter().map(|x| x[c]).sum::<f64>() / REPLICATES as f64;
+                let squares: f64 = pixel.iter().map(|x| (x[c] - mean) * (x[c] - mean)).sum();
+                sums[block(i)] += self.weights[i][c] * squares / (REPLICATES * (REPLICATES - 1)) as f64;
+            }
+        }
+        sums
+    }
+}
+
+impl Tally {
+    /// Adds a round.
+    pub fn add(&mut self, outcome: Outcome) {
+        self.light.extend(means(&outcome.replicates));
+        self.passes.push(outcome.passes);
+        self.replicates = match self.passes.len() {
+            1 => outcome.replicates,
+            _ => desk::sum(std::mem::take(&mut self.replicates), &outcome.replicates),
+        };
+    }
+
+    /// noise² of one picture after `pass`. Of a single round the blocks tell the error, which is then too large by how
+    /// they differ.
+    fn noise_after(&self, pass: usize) -> Figure {
+        let all: Vec<&[f64]> = self.passes.iter().map(|round| round[pass].noise.as_slice()).collect();
+        let rounds = all.len() as f64;
+        let value = all.iter().copied().flatten().sum::<f64>() / rounds;
+        let blocks = all[0].len();
+        let variance = if all.len() > 1 {
+            let of = |block: usize| all.iter().map(|round| round[block]).collect::<Moments>();
+            (0..blocks).map(|block| of(block).variance()).sum::<f64>() / rounds
+        } else {
+            all[0].iter().copied().collect::<Moments>().variance() * blocks as f64
+        };
+        Figure { value, error: variance.sqrt() }
+    }
+
+    /// noise² of one picture.
+    #[must_use]
+    pub fn noise_squared(&self) -> Figure {
+        self.noise_after(self.passes[0].len() - 1)
+    }
+
+    /// Its root with the interval of 95 %, even in its logarithm.
+    #[must_use]
+    pub fn noise(&self) -> [f64; 3] {
+        self.interval(self.noise_squared())
+    }
+
+    fn interval(&self, Figure { value, error }: Figure) -> [f64; 3] {
+        let degrees = (self.passes.len().max(2) - 1) * self.passes[0][0].noise.len();
+        let half = student_t_half_width(0.95, degrees.max(2) as f64) * error;
+        let stretch = if value > 0.0 { libm::exp(0.5 * half / value) } else { 1.0 };
+        [value.sqrt(), value.sqrt() / stretch, value.sqrt() * stretch]
+    }
+
+    /// Seconds of a render, the least of the rounds.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.all_seconds().fold(f64::INFINITY, f64::min)
+    }
+
+    /// The most of the rounds.
+    #[must_use]
+    pub fn most_seconds(&self) -> f64 {
+        self.all_seconds().fold(0.0, f64::max)
+    }
+
+    fn all_seconds(&self) -> impl Iterator<Item = f64> {
+        self.passes.iter().filter_map(|round| Some(round.last()?.seconds))
+    }
+
+    /// How noise fell with time.
+    #[must_use]
+    pub fn curve(&self) -> Vec<Point> {
+        let point = |pass: usize| {
+            let seconds = self.passes.iter().map(|round| round[pass].seconds).fold(f64::INFINITY, f64::min);
+            Point { samples: self.passes[0][pass].samples, seconds, noise: self.interval(self.noise_after(pass)) }
+        };
+        (0..self.passes[0].len()).map(point).collect()
+    }
+
+    /// bias².
+    #[must_use]
+    pub fn bias_squared(&self, reference: &Reference) -> Figure {
+        let rounds = self.passes.len() as f64;
+        let (block, count) = reference.blocks();
+        let mut value = 0.0;
+        let mut pairs = vec![[0.0; 3]; count];
+        for (i, (pixel, truth)) in self.replicates.iter().zip(&reference.replicates).enumerate() {
+            let (Some(pixel), Some(truth)) = (pixel, truth) else { continue };
+            for c in 0..3 {
+                let y: [f64; REPLICATES] = std::array::from_fn(|r| pixel[r][c] / rounds - truth[r][c]);
+                let (sum, squares) = y.iter().fold((0.0, 0.0), |(a, b), y| (a + y, b + y * y));
+                let weight = reference.weights[i][c];
+                value += weight * (sum * sum - squares) / (REPLICATES * (REPLICATES - 1)) as f64;
+                for (pair, [a, b, p, q]) in pairs[block(i)].iter_mut().zip(PAIRINGS) {
+                    *pair += weight * (y[a] - y[b]) * (y[p] - y[q]);
+                }
+            }
+        }
+        let squares: f64 = pairs.iter().flatten().map(|pair| pair * pair).sum();
+        Figure { value, error: (squares / 3.0 / 24.0).sqrt() }
+    }
+
+    /// Red, green and blue over those of the reference.
+    #[must_use]
+    pub fn light(&self, reference: &Reference) -> [Figure; 3] {
+        let truth = means(&reference.replicates);
+        std::array::from_fn(|c| {
+            let [own, truth] = [self.light.as_slice(), &truth].map(|all| all.iter().map(|m| m[c]).collect::<Moments>());
+            let value = own.mean / truth.mean;
+            let relative = |m: &Moments| wide(m) / m.mean;
+            Figure { value, error: value * relative(&own).hypot(relative(&truth)) }
+        })
+    }
+}
+
+/// Mean light of each replicate.
+fn means(pixels: &[Option<Replicates>]) -> [[f64; 3]; REPLICATES] {
+    let mut sums = [[0.0; 3]; REPLICATES];
+    for pixel in pixels.iter().flatten() {
+        for (sum, x) in sums.iter_mut().flatten().zip(pixel.iter().flatten()) {
+            *sum += x;
+        }
+    }
+    sums.map(|sum| sum.map(|x| x / pixels.len().max(1) as f64))
+}
+
+/// The standard error, made wider for few numbers: [`SIGNIFICANT`] of it are passed by chance as rarely as of a normal number.
+fn wide(m: &Moments) -> f64 {
+    let confidence = 1.0 - normal_two_sided_p(SIGNIFICANT);
+    m.standard_error() * student_t_half_width(confidence, m.count as f64 - 1.0) / SIGNIFICANT
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::sampler::mix64;
+
+    const SIDE: u32 = 24;
+
+    /// Sum of three uniform numbers on [−1, 1): mean 0, variance 1.
+    fn noise(seed: u64, i: u64) -> f64 {
+        let u = |k: u64| (mix64(mix64(seed) ^ mix64(i * 3 + k)) >> 11) as f64 / (1u64 << 53) as f64;
+        2.0 * (u(0) + u(1) + u(2)) - 3.0
+    }
+
+    /// Replicates of light `light` with noise of standard deviation `sigma`.
+    fn outcome(seed: u64, light: impl Fn(usize) -> f64, sigma: f64) -> Outcome {
+        let of = |i: usize| -> Replicates {
+            std::array::from_fn(|r| {
+                std::array::from_fn(|c| light(i) + sigma * noise(seed, (i * 12 + r * 3 + c) as u64))
+            })
+        };
+        let window = Window::full(SIDE, SIDE);
+        let replicates = (0..window.pixels()).map(|i| Some(of(i))).collect();
+        Outcome { replicates, passes: Vec::new(), image: flat(1.0) }
+    }
+
+    fn flat(value: f32) -> Image {
+        let window = Window::full(SIDE, SIDE);
+        let plane = vec![value; window.pixels()];
+        Image {
+            frame: [SIDE; 2],
+            window,
+            rgb: [0; 3].map(|_| plane.clone()),
+            alpha: plane.clone(),
+            standard_error: [0; 3].map(|_| plane.clone()),
+        }
+    }
+
+    fn tally(reference: &Reference, rounds: u64, seed: u64, light: impl Fn(usize) -> f64 + Copy, sigma: f64) -> Tally {
+        let mut tally = Tally::default();
+        for round in 0..rounds {
+            let outcome = outcome(seed * 100 + round, light, sigma);
+            let noise = reference.noise_of(&outcome.replicates);
+            tally.add(Outcome { passes: vec![Pass { samples: 4, seconds: 1.0, noise }], ..outcome });
+        }
+        tally
+    }
+
+    /// Light of 1, w = 1/1.01, replicates of variance 0.04: noise² of a picture is 0.01/1.01. Over 200 tallies the interval
+    /// holds it 95 % of the time: binomial standard deviation 1.5 %, four of them.
+    #[test]
+    fn noise_is_that_of_one_picture_and_lies_in_its_interval() {
+        let reference = Reference::new(&flat(1.0), outcome(1, |_| 1.0, 0.01).replicates);
+        let truth = (0.01f64 / 1.01).sqrt();
+        let held = (0..200).filter(|&seed| {
+            let [_, low, high] = tally(&reference, 3, seed + 7, |_| 1.0, 0.2).noise();
+            (low..=high).contains(&truth)
+        });
+        let held = held.count();
+        assert!((178..=200).contains(&held), "{held}");
+    }
+
+    /// Without bias the figure over its error is even about 0 with a standard deviation of one; 300 of them: 6 % each, four of
+    /// those. A fifth more light in a block of 9 pixels of 576 adds 0.04/1.01/64 (all weights are those of a light of 1).
+    #[test]
+    fn bias_is_found_where_it_is_and_nowhere_else() {
+        let reference = Reference::new(&flat(1.0), outcome(1, |_| 1.0, 0.05).replicates);
+        let of =
+            |seed: u64, light: &dyn Fn(usize) -> f64| tally(&reference, 2, seed, light, 0.2).bias_squared(&reference);
+        let scores: Moments = (0..300).map(|s| of(s, &|_| 1.0)).map(|f| f.value / f.error).collect();
+        // The reference is the same for all: its own noise, a sixteenth of theirs here, shows in all alike.
+        assert!(scores.mean.abs() < 0.5, "{scores:?}");
+        assert!((0.75..1.25).contains(&scores.variance().sqrt()), "{scores:?}");
+        let block = |i: usize| if i / 24 < 3 && i % 24 < 3 { 1.2 } else { 1.0 };
+        let found: Moments = (0..100).map(|s| of(s, &block).value).collect();
+        let expected = 0.04 / 1.01 / 64.0;
+        assert!((found.mean - expected).abs() < 4.0 * found.standard_error() + 0.1 * expected, "{found:?} {expected}");
+    }
+
+    #[test]
+    fn light_is_a_ratio_with_both_errors() {
+        let reference = Reference::new(&flat(1.0), outcome(1, |_| 1.0, 0.05).replicates);
+        let [red, ..] = tally(&reference, 2, 5, |_| 1.5, 0.2).light(&reference);
+        assert!((red.value - 1.5).abs() < 4.0 * red.error && red.error < 0.02, "{red:?}");
+    }
+}
