@@ -36,6 +36,10 @@ fn scenes() -> Vec<(&'static str, String)> {
         ("whitted", render("") + "integrator: {whitted: {grid: 3}}\n" + &cropped),
         ("layers", render("") + layers + &cropped),
         ("bands", caustics("on") + CAUSTIC),
+        (
+            "ways",
+            caustics("on") + "layers: [direct, caustic, light_groups, Z, P, sampleCount, crypto_object]\n" + CAUSTIC,
+        ),
     ]
 }
 

@@ -6,16 +6,22 @@ use super::adaptive;
 use super::frame::{self, Frame};
 use super::report::{Developed, SceneReport};
 use super::{Prepared, colour_space, develop, window};
-use crate::description::{self, Output};
+use crate::description::{self, HeaderValue, LayerContent, Output, SceneDescription};
 use crate::error::Result;
 use crate::film::Window;
-use crate::film::exr::{self, Attribute, ColourEncoding, LayerPlane};
+use crate::film::accumulate::PixelCells;
+use crate::film::cryptomatte::Matte;
+use crate::film::exr::{self, Attribute, ChannelData, ColourEncoding, ExrImage, LayerPlane};
 use crate::film::png::{self, PngSettings};
 use crate::film::resolve::Image;
-use crate::spectrum::ColourSpace;
+use crate::scene::Scene;
+use crate::scene::camera::{Camera, Projection};
+use crate::spectrum::{ColourSpace, observer};
 use crate::transport::layers::Channel;
 use crate::transport::plan::{Effect, Integrator};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -67,7 +73,46 @@ pub struct Finish {
     pub bands: bool,
     /// Further channels.
     pub layers: Vec<Channel>,
+    /// Whether the variance of each pixel's mean is one.
+    pub variance: bool,
+    /// Whether the number of samples of each pixel is one.
+    pub sample_count: bool,
+    /// Mattes.
+    pub mattes: Vec<Matte>,
+    /// What a photographer would say of the camera.
+    pub lens: Lens,
 }
+
+/// The lens of a camera whose picture were on film 36 mm wide.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lens {
+    /// Focal length, mm; none of an orthographic camera.
+    pub focal_length_mm: Option<f64>,
+    /// f-number: focal length over the diameter of the lens, where that has one.
+    pub aperture: Option<f64>,
+    /// Distance in focus, metres, where the lens has a diameter.
+    pub focus: Option<f64>,
+}
+
+impl Lens {
+    fn of(camera: &Camera) -> Lens {
+        let Projection::Perspective { half_width } = camera.projection else { return Lens::default() };
+        let focal_length = 18.0 / half_width;
+        let wide = camera.lens.as_ref().filter(|lens| lens.radius > 0.0);
+        Lens {
+            focal_length_mm: Some(focal_length),
+            aperture: wide.map(|lens| focal_length / 1000.0 / (2.0 * lens.radius)),
+            focus: wide.map(|lens| lens.focus_distance),
+        }
+    }
+}
+
+/// How the names of the bands of a spectral file begin.
+pub(super) const SPECTRAL: &str = "S0.";
+
+/// Of light at 555 nm, lm/W.
+const LUMENS_PER_WATT: f64 = 683.002;
 
 impl Finish {
     /// What the files of `prepared` need.
@@ -75,6 +120,10 @@ impl Finish {
     pub fn of(prepared: &Prepared) -> Finish {
         let Prepared { description, scene, plan, samples, hash, .. } = prepared;
         let (white, note) = develop::white(&description.output.png, scene);
+        let asked = |content: &LayerContent| description.layers.iter().any(|layer| layer.content == *content);
+        // Where the files go is no matter of what is in them.
+        let mut output = Output { dir: PathBuf::new(), ..description.output.clone() };
+        output.exr.stderr |= asked(&LayerContent::StandardError);
         Finish {
             name: scene.name.clone(),
             frame_number: description.frame,
@@ -92,13 +141,46 @@ impl Finish {
             notes: scene.notes.iter().cloned().chain(note).collect(),
             world_to_camera: scene.camera.camera_from_world(),
             world_to_ndc: scene.camera.ndc_from_world(),
-            // Where the files go is no matter of what is in them.
-            output: Output { dir: PathBuf::new(), ..description.output.clone() },
             white,
+            output,
             sensitivity: description.image.sensitivity,
             bands: !description.image.bands.is_empty(),
             layers: plan.layers.channels(),
+            variance: asked(&LayerContent::Variance),
+            sample_count: asked(&LayerContent::SampleCount),
+            mattes: mattes(description, scene),
+            lens: Lens::of(&scene.camera),
         }
+    }
+
+    /// Of the layers, the bands of the spectral file.
+    fn spectral_channels(&self) -> Range<usize> {
+        let bands = self.output.spectral.map_or(0, |spectral| spectral.bands as usize);
+        let start = self.layers.iter().position(|channel| channel.name.starts_with(SPECTRAL)).unwrap_or(0);
+        start..start + bands
+    }
+
+    /// What the colours of the file mean.
+    fn colour(&self) -> ColourEncoding {
+        let space = self.space();
+        ColourEncoding { primaries: space.chromaticities(), interop_id: Some(space.interop_id().to_owned()) }
+    }
+
+    /// Luminance of what is one in red, green and blue, cd·m⁻²: Y is ∫ L ȳ dλ over that of ȳ, times the sensitivity.
+    fn white_luminance(&self) -> Option<f64> {
+        let unit = LUMENS_PER_WATT * observer::Y_INTEGRAL;
+        (self.sensitivity > 0.0 && !self.bands).then(|| unit / self.sensitivity)
+    }
+
+    /// The time code of the frame, where that of frame 0 is `start`.
+    fn time_code(&self, start: [u32; 4]) -> [u32; 4] {
+        let (Some(number), Some(rate)) = (self.frame_number, self.frames_per_second) else { return start };
+        let rate = i64::from((rate.round() as u32).clamp(1, 60));
+        let [hours, minutes, seconds, frames] = start.map(i64::from);
+        let all = ((hours * 60 + minutes) * 60 + seconds) * rate + frames + i64::from(number);
+        let all = all.rem_euclid(24 * 3600 * rate);
+        let (seconds, frames) = (all / rate, all % rate);
+        [seconds / 3600, seconds / 60 % 60, seconds % 60, frames].map(|n| n as u32)
     }
 
     /// Rows of the frame that no part cuts.
@@ -140,6 +222,30 @@ impl Finish {
     }
 }
 
+/// The mattes that are asked for, with the names of what the scene's objects are part of.
+fn mattes(description: &SceneDescription, scene: &Scene) -> Vec<Matte> {
+    let asset = |i: usize| {
+        let own = &scene.objects[i].name;
+        let named = description.assets.iter().find(|(_, shapes)| shapes.contains(own)).map(|(asset, _)| asset.as_str());
+        let group = || description.shapes.get(i).and_then(|shape| shape.geometry.group());
+        named.or_else(group).unwrap_or(own).to_owned()
+    };
+    let wanted = description.layers.iter().filter_map(|layer| match layer.content {
+        LayerContent::Matte(matte) => Some(matte),
+        _ => None,
+    });
+    let matte = |matte: description::Matte| Matte {
+        layer: matte.layer().to_owned(),
+        of_parts: matte == description::Matte::Material,
+        names: match matte {
+            description::Matte::Object => scene.objects.iter().map(|object| object.name.clone()).collect(),
+            description::Matte::Material => scene.material_names.clone(),
+            description::Matte::Asset => (0..scene.objects.len()).map(asset).collect(),
+        },
+    };
+    wanted.map(matte).collect()
+}
+
 /// The name of an integrator.
 #[must_use]
 pub fn integrator(integrator: &Integrator) -> &'static str {
@@ -168,12 +274,15 @@ pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut Scene
         metered: finish.output.png.exposure == description::Exposure::Auto,
         white: finish.white,
     });
+    let spectral = spectral_path(exr_path);
+    write_spectral(&spectral, finish, frame, &image, report)?;
     // Packed together but written one after the other: where the first cannot be written, nothing of the picture is left.
     let (written_exr, png) =
         rayon::join(|| write_exr(exr_path, finish, frame, &image, report), || png::encode_png(&image, &settings));
     written_exr?;
     png::write_encoded(&png_path, png)?;
     report.files = vec![exr_path.to_path_buf(), png_path];
+    report.files.extend((!finish.spectral_channels().is_empty()).then_some(spectral));
     report.seconds.writing = written.elapsed().as_secs_f64();
 
     let (counted, dropped) = frame.film.samples();
@@ -182,34 +291,111 @@ pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut Scene
 }
 
 fn write_exr(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneReport) -> Result<()> {
-    let (output, space) = (&finish.output, finish.space());
-    let colour = ColourEncoding { primaries: space.chromaticities(), interop_id: Some(space.interop_id().to_owned()) };
-    let precision = match output.exr.precision {
+    let exr = &finish.output.exr;
+    let precision = match exr.precision {
         description::Precision::Half => exr::Precision::Half,
         description::Precision::Float => exr::Precision::Float,
     };
-    let compression = match output.exr.compression {
+    let compression = match exr.compression {
         description::Compression::None => exr::Compression::None,
         description::Compression::Zips => exr::Compression::Zips,
         description::Compression::Zip => exr::Compression::Zip,
         description::Compression::Piz => exr::Compression::Piz,
+        description::Compression::Dwaa => exr::Compression::Dwaa(exr.dwa_level as f32),
+        description::Compression::Dwab => exr::Compression::Dwab(exr.dwa_level as f32),
     };
-    let error = if output.exr.stderr { exr::StandardError::Write } else { exr::StandardError::Leave };
+    let error = if exr.stderr { exr::StandardError::Write } else { exr::StandardError::Leave };
     let layer = |(i, channel): (usize, &Channel)| LayerPlane {
         name: channel.name.clone(),
-        plane: frame.layer(i),
+        plane: if channel.once { frame.layer_once(i) } else { frame.layer(i) },
         light: channel.light,
     };
-    let layers = finish.layers.iter().enumerate().map(layer).collect();
-    let mut beauty = exr::beauty(image, finish.base(), layers, colour, precision, error, compression);
+    let own = finish.layers.iter().enumerate().filter(|(i, _)| !finish.spectral_channels().contains(i));
+    let mut beauty =
+        exr::beauty(image, finish.base(), own.map(layer).collect(), finish.colour(), precision, error, compression);
     if frame.film.layers.invalid.total() > 0 {
         report.notes.push(format!("{} samples of layers could not be added", frame.film.layers.invalid.total()));
     }
+    let wide = beauty.note.is_some();
     report.notes.extend(beauty.note.take());
-    beauty.exr.attributes = attributes(finish, frame, report);
-    let hash = Attribute::Text(beauty.exr.content_hash());
-    beauty.exr.attributes.push(("abbe/contentHash".to_owned(), hash));
-    exr::write_exr(path, &beauty.exr)
+    let mut file = beauty.exr;
+    file.layout = match exr.layout {
+        description::FileLayout::Single => exr::Layout::Single,
+        description::FileLayout::Multipart => exr::Layout::Multipart,
+    };
+    file.attributes = attributes(finish, frame, report);
+    if exr.aces_container && !wide {
+        file.attributes.push(("acesImageContainerFlag".to_owned(), Attribute::Int(1)));
+    } else if exr.aces_container {
+        report.notes.push("an ACES container holds half floats only: the file is none".to_owned());
+    }
+    if finish.variance {
+        for (name, plane) in ["R", "G", "B"].iter().zip(&image.standard_error) {
+            let variance = plane.iter().map(|x| x * x).collect();
+            file.push_data(format!("variance.{name}"), ChannelData::F32(variance));
+        }
+    }
+    if finish.sample_count {
+        let count = |cells: &PixelCells| cells.iter().map(|cell| cell.count).sum();
+        let counts = frame.film.cells().iter().map(count).collect();
+        file.push_data("sampleCount".to_owned(), ChannelData::U32(counts));
+    }
+    for matte in &finish.mattes {
+        let (channels, attributes) = matte.write(&frame.film);
+        channels.into_iter().for_each(|(name, samples)| file.push_data(name, samples));
+        file.attributes.extend(attributes);
+    }
+    let hash = Attribute::Text(file.content_hash());
+    file.attributes.push(("abbe/contentHash".to_owned(), hash));
+    exr::write_exr(path, &file)?;
+    if matches!(compression, exr::Compression::Dwaa(_) | exr::Compression::Dwab(_)) {
+        let loss = exr::loss(path, &file)?;
+        report.notes.push(format!(
+            "DWA compression of level {} changes values by {:.2e} in the root mean square, at most {:.2e}; their mean is {:.2e}",
+            exr.dwa_level, loss.root_mean_square, loss.most, loss.mean
+        ));
+    }
+    Ok(())
+}
+
+/// The path of the spectral file beside the EXR at `path`: `name.spectral.exr`, and before the number of a frame.
+#[must_use]
+pub fn spectral_path(path: &Path) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let number = stem.rsplit_once('.').filter(|(_, n)| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    path.with_file_name(match number {
+        Some((name, number)) => format!("{name}.spectral.{number}.exr"),
+        None => format!("{stem}.spectral.exr"),
+    })
+}
+
+/// Writes bands of the spectrum as Fichet, Pacanowski and Wilkie have them ("An OpenEXR Layout for Spectral Images", JCGT
+/// 10(3), 2021, layout 1.0): `S0.<nm>nm` is the mean spectral radiance of a band around that wavelength, W·m⁻²·sr⁻¹·nm⁻¹;
+/// R, G and B show them.
+fn write_spectral(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report: &SceneReport) -> Result<()> {
+    let channels = finish.spectral_channels();
+    if channels.is_empty() {
+        return Ok(());
+    }
+    let plane = |i: usize| (finish.layers[i].name.clone(), ChannelData::F32(frame.layer(i)));
+    let preview = ["R", "G", "B"].iter().zip(&image.rgb);
+    let preview = preview.map(|(name, plane)| ((*name).to_owned(), ChannelData::F32(plane.clone())));
+    let mut attributes = attributes(finish, frame, report);
+    let text = |name: &str, value: &str| (name.to_owned(), Attribute::Text(value.to_owned()));
+    attributes.extend([text("spectralLayoutVersion", "1.0"), text("emissiveUnits", "W.m^-2.sr^-1")]);
+    let mut file = ExrImage {
+        frame: image.frame,
+        window: image.window,
+        channels: channels.map(plane).chain(preview).collect(),
+        colour: Some(finish.colour()),
+        attributes,
+        data: BTreeSet::new(),
+        compression: exr::Compression::Zip,
+        layout: exr::Layout::Single,
+    };
+    let hash = Attribute::Text(file.content_hash());
+    file.attributes.push(("abbe/contentHash".to_owned(), hash));
+    exr::write_exr(path, &file)
 }
 
 /// The header of a picture: what is needed to make it again, and how good it is.
@@ -217,7 +403,6 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
     let text = |s: &str| Attribute::Text(s.to_owned());
     let mut all = vec![
         ("software".to_owned(), text(concat!("Abbe ", env!("CARGO_PKG_VERSION")))),
-        ("comments".to_owned(), text(&finish.name)),
         ("worldToCamera".to_owned(), Attribute::Matrix4(finish.world_to_camera)),
         ("worldToNDC".to_owned(), Attribute::Matrix4(finish.world_to_ndc)),
         ("abbe/version".to_owned(), text(env!("CARGO_PKG_VERSION"))),
@@ -239,6 +424,30 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
     if let Some(rate) = finish.frames_per_second {
         let [frames, seconds] = rational_rate(rate);
         all.push(("framesPerSecond".to_owned(), Attribute::Rational(frames as i32, seconds)));
+    }
+    let lens = &finish.lens;
+    for (name, value) in [
+        ("nominalFocalLength", lens.focal_length_mm),
+        ("aperture", lens.aperture),
+        ("focus", lens.focus),
+        ("whiteLuminance", finish.white_luminance()),
+    ] {
+        all.extend(value.map(|value| (name.to_owned(), Attribute::Float(value as f32))));
+    }
+    let written = &finish.output.exr.attributes;
+    if !written.contains_key("comments") {
+        all.push(("comments".to_owned(), text(&finish.name)));
+    }
+    for (name, value) in written {
+        all.retain(|(other, _)| other != name);
+        let value = match value {
+            HeaderValue::Number(number) => Attribute::Float(*number as f32),
+            HeaderValue::Name(written) => match description::time_code(written).filter(|_| name == "timeCode") {
+                Some(code) => Attribute::TimeCode(finish.time_code(code)),
+                None => text(written),
+            },
+        };
+        all.push((name.clone(), value));
     }
     if let Some(counts) = &report.adaptive {
         let counts = format!("least {}, mean {:.1}, most {}", counts.least, counts.mean, counts.most);

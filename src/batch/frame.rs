@@ -17,6 +17,7 @@ use crate::film::run::{LONGEST, LayerRun, Run};
 use crate::math::sampler::Octet;
 use crate::scene::Scene;
 use crate::spectrum::ColourSpace;
+use crate::transport::layers::{self, Source};
 use crate::transport::merge::Collection;
 use crate::transport::plan::{EffectPlan, Integrator};
 use crate::transport::{PixelSample, Samples, Shot};
@@ -124,7 +125,13 @@ impl Frame {
         resolve::resolve(&self.film, splats, rgb_from_xyz)
     }
 
-    /// The further channel `channel`; bands come first.
+    /// The further channel `channel` where its values stand once, not samples.
+    #[must_use]
+    pub fn layer_once(&self, channel: usize) -> Vec<f32> {
+        self.film.layers.sums_of(channel).map(|x| x as f32).collect()
+    }
+
+    /// The further channel `channel`, its mean over samples; bands and light by its ways come first.
     #[must_use]
     pub fn layer(&self, channel: usize) -> Vec<f32> {
         let mut plane = self.film.layers.plane(channel);
@@ -176,9 +183,14 @@ pub(super) fn render_unit(
     let shot = Shot { scene, plan, filter, seed, photons };
     let window = tile.window();
     let mut memory = Samples::default();
-    let mut layers = LayerRun::default();
+    let mut layer_run = LayerRun::default();
+    let middles = plan.layers.layers.iter().any(|layer| matches!(layer.source, Source::Middle(_)));
     for y in window.y..window.y + window.height as i32 {
         for x in window.x..window.x + window.width as i32 {
+            // Who renders the first sample adds what stands in the pixel once.
+            if let (true, 0, Some(index)) = (middles, samples.start, window.index([x, y])) {
+                layers::middle(scene, plan, [x, y], |channel, value| tile.layers.add_once(index, [(channel, value)]));
+            }
             for replicate in 0..REPLICATES as u32 {
                 // Samples take turns among the replicates.
                 let turns = |s: u32| s.saturating_sub(replicate).div_ceil(REPLICATES as u32);
@@ -192,10 +204,10 @@ pub(super) fn render_unit(
                     if job.independent {
                         // A scrambling for each sample: of each sequence the first point alone.
                         let first = run.map(|i| (replicate + REPLICATES as u32 * i, 0..1));
-                        render_run(&shot, tile, &mut memory, &mut layers, [x, y], replicate, first);
+                        render_run(&shot, tile, &mut memory, &mut layer_run, [x, y], replicate, first);
                     } else {
                         let octets = octets(run).map(|indices| (replicate, indices));
-                        render_run(&shot, tile, &mut memory, &mut layers, [x, y], replicate, octets);
+                        render_run(&shot, tile, &mut memory, &mut layer_run, [x, y], replicate, octets);
                     }
                     start = next;
                 }
@@ -233,7 +245,11 @@ fn render_run(
     // Overscan makes negative coordinates; as addresses they wrap.
     let address = pixel.map(|x| x as u32);
     for (stream, indices) in addresses {
-        memory.render(shot, address, stream, indices, |sample, values| {
+        memory.render(shot, address, stream, indices, |sample, values, covered| {
+            if let Some(number) = covered {
+                let pixels = tile.window().pixels();
+                tile.layers.mattes.add(index, pixels, number, 1);
+            }
             if channels > 0 && !layers.add(sample.weight, values) {
                 tile.layers.add(index, sample.weight, values);
             }

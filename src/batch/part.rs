@@ -237,7 +237,7 @@ impl<'a> Part<'a> {
         };
         let splats = match light_paths(job) {
             Some(paths) => {
-                let film = film(job.window, job.scene.bands.len())?;
+                let film = film(job.window, job.plan.layers.light_channels())?;
                 Some((paths, Mutex::new(SplatFilm { film, paths: [0; REPLICATES] })))
             }
             None => None,

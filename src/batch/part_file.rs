@@ -3,7 +3,8 @@
 //! [`crate::film::exr::part`] says how sums become channels. Their names: `camera0.X` is the sum of X in replicate 0, in
 //! units of 2⁻⁶⁴ of light over 2^`exponent`; `camera0.A` that of coverage, in 2⁻³⁴; `camera0.n` counts its samples,
 //! `camera0.dropped` those that were dropped; `lights0.X` … are the same of paths from the lights. `cameraLayers.3` is
-//! the sum of the fourth further channel, `cameraLayers.n` its samples. A value is the sum over replicates over the count
+//! the sum of the fourth further channel, `cameraLayers.n` its samples; `cameraMattes.0` is the number of what covers the
+//! pixel, times 2³², and how many samples met it, `cameraMattes.1` of the next. A value is the sum over replicates over the count
 //! over replicates; of paths from the lights over `splat_paths` instead.
 //!
 //! The same file, with what is done so far in `claims`, is a checkpoint.
@@ -27,7 +28,10 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Version of the format; another one is refused.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
+
+/// Of the planes of mattes, before their rank.
+const MATTES: &str = "cameraMattes.";
 
 /// What the header of a part says, in the attribute `abbe/part`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -128,6 +132,7 @@ enum Kind {
     Dropped(usize),
     Layer(usize),
     LayerCount,
+    Matte(usize),
 }
 
 /// The planes of one film, with their names.
@@ -149,8 +154,9 @@ fn kinds(prefix: &str, layers: usize) -> Vec<(Kind, String)> {
 }
 
 /// The planes of a part: those of the lights follow those of the camera.
-fn all_kinds(camera_layers: usize, light_layers: Option<usize>) -> (usize, Vec<(Kind, String)>) {
+fn all_kinds(camera_layers: usize, mattes: usize, light_layers: Option<usize>) -> (usize, Vec<(Kind, String)>) {
     let mut all = kinds("camera", camera_layers);
+    all.extend((0..mattes).map(|i| (Kind::Matte(i), format!("{MATTES}{i}"))));
     let own = all.len();
     if let Some(layers) = light_layers {
         all.extend(kinds("lights", layers));
@@ -190,6 +196,10 @@ impl Numbers for Sums<'_> {
                 Kind::Dropped(r) => cells[i][r].dropped.into(),
                 Kind::Layer(c) => sums[(start + i) * channels + c].0,
                 Kind::LayerCount => counts[start + i].into(),
+                Kind::Matte(rank) => {
+                    let of = film.layers.mattes.of(start + i).get(rank);
+                    of.map_or(0, |&(number, count)| i128::from(number) << 32 | i128::from(count))
+                }
             };
         }
     }
@@ -210,7 +220,7 @@ pub fn write(
     let share = part.share();
     part.look(|film, splats| {
         let layers = splats.map(|s| s.film.layers.channels());
-        let (own, kinds) = all_kinds(film.layers.channels(), layers);
+        let (own, kinds) = all_kinds(film.layers.channels(), film.layers.mattes.most(), layers);
         let window = splats.map_or(film.window(), |s| s.film.window());
         let sums = Sums { window, film, splats: splats.map(|s| &s.film), own, kinds };
         let none = InvalidCounts::default();
@@ -452,7 +462,7 @@ impl Written {
         Ok((film(window, finish.layers.len())?, splats))
     }
 
-    /// Channels of bands come first among the layers, and paths from the lights have those alone.
+    /// Channels of bands and of light by its ways come first among the layers, and paths from the lights have those alone.
     fn light_layers(&self) -> usize {
         self.header.planes.iter().filter(|p| p.name.starts_with("lightsLayers.") && !p.name.ends_with(".n")).count()
     }
@@ -473,7 +483,8 @@ impl Written {
         let header = &self.header;
         let damaged = |what: &str| Error::input(&self.path, format!("the part is damaged: {what}"));
         let light_layers = header.splat_paths.map(|_| self.light_layers());
-        let (own, kinds) = all_kinds(header.finish.layers.len(), light_layers);
+        let mattes = header.planes.iter().filter(|p| p.name.starts_with(MATTES)).count();
+        let (own, kinds) = all_kinds(header.finish.layers.len(), mattes, light_layers);
         if !kinds.iter().map(|(_, name)| name).eq(header.planes.iter().map(|plane| &plane.name)) {
             return Err(damaged("its planes are not those of the sums"));
         }
@@ -515,6 +526,13 @@ fn add_row(film: &mut Film, kind: Kind, start: usize, row: &[i128]) -> Option<()
                 *sum = sum.checked_add(*x)?;
             }
         }
+        Kind::Matte(_) => {
+            let pixels = film.window().pixels();
+            for (i, x) in row.iter().enumerate().filter(|(_, x)| **x != 0) {
+                let (number, count) = (u64::try_from(x >> 32).ok()?, *x as u32);
+                film.layers.mattes.add(start + i, pixels, number, count);
+            }
+        }
         Kind::LayerCount => {
             let (_, counts) = film.layers.parts_mut();
             for (count, x) in counts[start..].iter_mut().zip(row) {
@@ -528,7 +546,7 @@ fn add_row(film: &mut Film, kind: Kind, start: usize, row: &[i128]) -> Option<()
                     Kind::Alpha(_) => cell.alpha = cell.alpha.checked_add(i64::try_from(x).ok()?)?,
                     Kind::Count(_) => cell.count = count_of(cell.count, x)?,
                     Kind::Dropped(_) => cell.dropped = cell.dropped.saturating_add(u32::try_from(x).ok()?),
-                    Kind::Layer(_) | Kind::LayerCount => {}
+                    Kind::Layer(_) | Kind::LayerCount | Kind::Matte(_) => {}
                 }
                 Some(())
             };

@@ -298,6 +298,14 @@ impl<'a> Checker<'a> {
         }
     }
 
+    /// `name` is among `names` of things of this kind.
+    pub(crate) fn known(&mut self, at: At<'_>, kind: &str, name: &str, names: &[String]) {
+        let names = names.iter().map(String::as_str).collect();
+        if let Some(hint) = unknown(name, &names, self.untold) {
+            self.fault(at, format!("unknown {kind} {}{hint}", quote(name)));
+        }
+    }
+
     /// Nothing, or all faults in the order of the text.
     ///
     /// # Errors

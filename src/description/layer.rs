@@ -5,10 +5,12 @@ use serde::Deserialize;
 use super::camera::check_channel;
 use super::fault::Checker;
 use super::material::given_fields;
+use super::node::{did_you_mean, quote};
 use super::path::At;
 use super::settings::Integrator;
 
-/// `{name: nn, surface: shading_normal}` or `{name: direct, light: {path: {max_depth: 2}}, form: xyz}`
+/// `diffuse`, `{name: nn, surface: shading_normal}`, `{name: key, ways: [diffuse, glossy], light_group: key}` or
+/// `{name: direct, light: {path: {max_depth: 2}}, form: xyz}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "WrittenLayer")]
 pub struct Layer {
@@ -23,7 +25,7 @@ pub struct Layer {
 /// What a layer holds.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LayerContent {
-    /// Something of the first surface that the camera sees.
+    /// Something of the first surface that the camera sees, mean over the pixel.
     Surface(Quantity),
     /// Light.
     Light {
@@ -32,6 +34,98 @@ pub enum LayerContent {
         /// Default `rgba`.
         form: LightForm,
     },
+    /// The part of the picture's light that came certain ways.
+    Ways {
+        /// Which; the layers of all ways add up to the picture.
+        ways: Vec<LightWay>,
+        /// From lamps of one group; default from all.
+        group: Option<String>,
+    },
+    /// A layer of light for each light group, and one for lamps that are in none.
+    LightGroups,
+    /// What the ray through the middle of the pixel meets, not filtered.
+    Middle(Data),
+    /// Mattes: who covers how much of the pixel.
+    Matte(Matte),
+    /// Variance of each pixel's mean.
+    Variance,
+    /// Standard error of each pixel's mean.
+    StandardError,
+    /// Samples of each pixel.
+    SampleCount,
+}
+
+/// The way that light came to the camera, by what scattered it first, seen from there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LightWay {
+    /// By nothing: the camera sees the lamp.
+    Emission,
+    /// Thrown by a mirror or smooth glass onto something else; in no other way.
+    Caustic,
+    /// Scattered once.
+    Direct,
+    /// Scattered more often.
+    Indirect,
+    /// By a diffuse surface.
+    Diffuse,
+    /// By a mirror or a gloss.
+    Glossy,
+    /// Through a surface.
+    Transmission,
+    /// In a medium.
+    Media,
+    /// Both.
+    DiffuseDirect,
+    /// Both.
+    DiffuseIndirect,
+    /// Both.
+    GlossyDirect,
+    /// Both.
+    GlossyIndirect,
+    /// Both.
+    TransmissionDirect,
+    /// Both.
+    TransmissionIndirect,
+    /// Both.
+    MediaDirect,
+    /// Both.
+    MediaIndirect,
+}
+
+/// What the middle of a pixel shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Data {
+    /// `Z`: the depth along the line of sight.
+    Depth,
+    /// `P.X`, `P.Y`, `P.Z`: the place.
+    Position,
+    /// `uv.U`, `uv.V`: texture coordinates.
+    Uv,
+}
+
+/// By what mattes are parted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Matte {
+    /// The shapes of the scene.
+    Object,
+    /// Their materials.
+    Material,
+    /// The assets that they are part of.
+    Asset,
+}
+
+impl Matte {
+    /// The layer of it, without the number of a channel group.
+    #[must_use]
+    pub fn layer(self) -> &'static str {
+        match self {
+            Matte::Object => "CryptoObject",
+            Matte::Material => "CryptoMaterial",
+            Matte::Asset => "CryptoAsset",
+        }
+    }
 }
 
 /// Something of a surface.
@@ -75,33 +169,134 @@ pub enum LightForm {
     Xyz,
 }
 
+/// As it stands in YAML: a name that says all, or fields.
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum WrittenLayer {
+    Name(String),
+    Inline(WrittenFields),
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct WrittenLayer {
+struct WrittenFields {
     name: String,
     surface: Option<Quantity>,
     light: Option<Integrator>,
     form: Option<LightForm>,
+    ways: Option<Vec<LightWay>>,
+    light_group: Option<String>,
     #[serde(default)]
     squares: bool,
     squares_name: Option<String>,
 }
 
+/// Layers that a name says all of, with the names of their channels.
+const NAMED: [(&str, &str, LayerContent); 12] = [
+    ("Z", "Z", LayerContent::Middle(Data::Depth)),
+    ("P", "P", LayerContent::Middle(Data::Position)),
+    ("uv", "uv", LayerContent::Middle(Data::Uv)),
+    ("normal", "normal", LayerContent::Surface(Quantity::ShadingNormal)),
+    ("albedo", "albedo", LayerContent::Surface(Quantity::Albedo)),
+    ("light_groups", "light_groups", LayerContent::LightGroups),
+    ("variance", "variance", LayerContent::Variance),
+    ("stderr", "stderr", LayerContent::StandardError),
+    ("sampleCount", "sampleCount", LayerContent::SampleCount),
+    ("crypto_object", "CryptoObject", LayerContent::Matte(Matte::Object)),
+    ("crypto_material", "CryptoMaterial", LayerContent::Matte(Matte::Material)),
+    ("crypto_asset", "CryptoAsset", LayerContent::Matte(Matte::Asset)),
+];
+
+/// The ways that are layers by their names.
+const WAYS: [(&str, LightWay); 16] = [
+    ("emission", LightWay::Emission),
+    ("caustic", LightWay::Caustic),
+    ("direct", LightWay::Direct),
+    ("indirect", LightWay::Indirect),
+    ("diffuse", LightWay::Diffuse),
+    ("glossy", LightWay::Glossy),
+    ("transmission", LightWay::Transmission),
+    ("media", LightWay::Media),
+    ("diffuse_direct", LightWay::DiffuseDirect),
+    ("diffuse_indirect", LightWay::DiffuseIndirect),
+    ("glossy_direct", LightWay::GlossyDirect),
+    ("glossy_indirect", LightWay::GlossyIndirect),
+    ("transmission_direct", LightWay::TransmissionDirect),
+    ("transmission_indirect", LightWay::TransmissionIndirect),
+    ("media_direct", LightWay::MediaDirect),
+    ("media_indirect", LightWay::MediaIndirect),
+];
+
 impl TryFrom<WrittenLayer> for Layer {
     type Error = String;
 
     fn try_from(written: WrittenLayer) -> Result<Layer, String> {
-        let WrittenLayer { name, surface, light, form, squares, squares_name } = written;
-        let content = match (surface, light, form) {
-            (Some(quantity), None, None) => LayerContent::Surface(quantity),
-            (None, of, form) => LayerContent::Light { of, form: form.unwrap_or_default() },
-            (surface, light, form) => {
-                let given = [("surface", surface.is_some()), ("light", light.is_some()), ("form", form.is_some())];
-                return Err(format!("expected either surface, or light and form, found {}", given_fields(&given)));
+        let written = match written {
+            WrittenLayer::Name(name) => return Layer::named(&name),
+            WrittenLayer::Inline(fields) => fields,
+        };
+        let WrittenFields { name, surface, light, form, ways, light_group, squares, squares_name } = written;
+        let given = [
+            ("surface", surface.is_some()),
+            ("light", light.is_some()),
+            ("form", form.is_some()),
+            ("ways", ways.is_some()),
+            ("light_group", light_group.is_some()),
+        ];
+        let content = match (surface, light, form, ways, light_group) {
+            (Some(quantity), None, None, None, None) => LayerContent::Surface(quantity),
+            (None, None, None, Some(ways), group) => LayerContent::Ways { ways, group },
+            (None, None, None, None, Some(group)) => LayerContent::Ways { ways: EVERY.to_vec(), group: Some(group) },
+            (None, of, form, None, None) => LayerContent::Light { of, form: form.unwrap_or_default() },
+            _ => {
+                let found = given_fields(&given);
+                return Err(format!(
+                    "expected either surface, or light and form, or ways and light_group, found {found}"
+                ));
             }
         };
+        if squares && matches!(content, LayerContent::Ways { .. }) {
+            return Err("expected squares of a surface or of light by an integrator, found ways".to_owned());
+        }
         let squares = squares.then(|| squares_name.unwrap_or_else(|| format!("m2_{name}")));
         Ok(Layer { name, content, squares })
+    }
+}
+
+/// Ways that hold every path of light once.
+const EVERY: [LightWay; 4] = [LightWay::Emission, LightWay::Caustic, LightWay::Direct, LightWay::Indirect];
+
+impl Layer {
+    /// Whether it holds other things than light.
+    #[must_use]
+    pub fn is_data(&self) -> bool {
+        match &self.content {
+            LayerContent::Surface(quantity) => *quantity != Quantity::Albedo || self.squares.is_some(),
+            LayerContent::Light { .. } => self.squares.is_some(),
+            LayerContent::Ways { .. } | LayerContent::LightGroups => false,
+            LayerContent::Middle(_)
+            | LayerContent::Matte(_)
+            | LayerContent::Variance
+            | LayerContent::StandardError
+            | LayerContent::SampleCount => true,
+        }
+    }
+
+    fn named(text: &str) -> Result<Layer, String> {
+        let ways = WAYS.iter().find(|(name, _)| *name == text);
+        let found = ways.map(|(name, way)| (*name, LayerContent::Ways { ways: vec![*way], group: None }));
+        let named = NAMED.iter().find(|(name, ..)| *name == text).map(|(_, name, content)| (*name, content.clone()));
+        let Some((name, content)) = found.or(named) else {
+            let known: Vec<&str> =
+                NAMED.iter().map(|(name, ..)| *name).chain(WAYS.iter().map(|(name, _)| *name)).collect();
+            let hint = did_you_mean(text, known.iter().copied());
+            return Err(format!(
+                "expected a map of fields, or one of {}, found {}{hint}",
+                known.join(", "),
+                quote(text)
+            ));
+        };
+        Ok(Layer { name: name.to_owned(), content, squares: None })
     }
 }
 
@@ -129,7 +324,41 @@ mod tests {
         assert_eq!(layers[1].content, LayerContent::Light { of: None, form: LightForm::Rgba });
         assert_eq!(
             faults("layers:\n- {name: nn, surface: depth, form: xyz}\n"),
-            "dir/s.yaml:3:3: layers[0]: expected either surface, or light and form, found surface and form"
+            "dir/s.yaml:3:3: layers[0]: expected either surface, or light and form, or ways and light_group, found surface \
+             and form"
+        );
+    }
+
+    #[test]
+    fn a_layer_may_be_a_name_that_says_all() {
+        let layers = scene("layers: [Z, diffuse_direct, crypto_object, sampleCount]\n").layers;
+        let names: Vec<&str> = layers.iter().map(|layer| layer.name.as_str()).collect();
+        assert_eq!(names, ["Z", "diffuse_direct", "CryptoObject", "sampleCount"]);
+        assert_eq!(layers[1].content, LayerContent::Ways { ways: vec![LightWay::DiffuseDirect], group: None });
+        let found = faults("layers: [difuse]\n");
+        assert!(
+            found.starts_with("dir/s.yaml:2:10: layers[0]: expected a map of fields, or one of Z, P, uv, "),
+            "{found}"
+        );
+        assert!(found.ends_with("found \"difuse\"; did you mean \"diffuse\"?"), "{found}");
+    }
+
+    #[test]
+    fn ways_belong_to_paths_and_groups_to_lamps() {
+        let text = "lights: [{point: {position: [0, 1, 0], intensity: 1}}]\nlight_groups: {key: [point0]}\n";
+        let layers = scene(&format!("{text}layers: [{{name: k, light_group: key}}, light_groups]\n")).layers;
+        assert!(matches!(&layers[0].content, LayerContent::Ways { ways, group } if ways.len() == 4 && group.is_some()));
+        assert_eq!(
+            faults(&format!("{text}integrator: whitted\nlayers: [{{name: k, ways: [diffuse], light_group: kex}}]\n")),
+            "dir/s.yaml:5:10: layers[0]: expected the integrator path, which knows the ways of light, found another\n\
+             dir/s.yaml:5:50: layers[0].light_group: unknown light group \"kex\"; did you mean \"key\"?"
+        );
+        assert_eq!(
+            faults(
+                "lights: [{point: {position: [0, 1, 0], intensity: 1}}]\nlight_groups: {a: [point0], b: [point0, x]}\n"
+            ),
+            "dir/s.yaml:3:33: light_groups.b[0]: expected each name once, found \"point0\"\n\
+             dir/s.yaml:3:41: light_groups.b[1]: unknown lamp \"x\"; known: point0"
         );
     }
 

@@ -263,6 +263,20 @@ impl Light {
         }
     }
 
+    /// Its name, given or made from kind and number.
+    #[must_use]
+    pub fn name_or_kind(&self, number: usize) -> String {
+        let name = match self {
+            Light::Point(light) => &light.name,
+            Light::Spot(light) => &light.name,
+            Light::Directional(light) => &light.name,
+            Light::Constant(light) => &light.name,
+            Light::Environment(light) => &light.name,
+            Light::Projector(light) => &light.name,
+        };
+        name.clone().unwrap_or_else(|| format!("{}{number}", self.kind()))
+    }
+
     /// How often the light is chosen, relative to its power.
     #[must_use]
     pub fn sampling_weight(&self) -> f64 {

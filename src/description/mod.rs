@@ -58,6 +58,17 @@
 //! - {name: direct, light: {path: {max_depth: 2}}, form: rgba, squares: false}
 //!                                   # light: ~ of the picture, path, depth, none; ~ form rgba, xyz; ~ squares: the mean
 //!                                   # of squares as m2_direct.R, …, or under squares_name
+//! - {name: key_diffuse, ways: [diffuse], light_group: key}      # of the light of `path` what came these ways (~ all)
+//!                                   # from lamps of this group (~ all). Emission: the camera sees the lamp; caustic: a
+//!                                   # mirror or smooth glass threw it onto something else; other light direct (scattered
+//!                                   # once) or indirect, by what the camera sees: diffuse, glossy, transmission, media;
+//!                                   # both: diffuse_direct, … . emission, caustic, direct, indirect add up to the picture,
+//!                                   # and so do emission, caustic, diffuse, glossy, transmission, media
+//! - diffuse                         # or a name that says all: a way; light_groups: light_key, …, and light_default of
+//!                                   # lamps in no group; Z (depth along the line of sight, 1e10 where there is nothing),
+//!                                   # P, uv: of the ray through the middle of the pixel, not filtered; normal, albedo:
+//!                                   # means over the pixel; variance, stderr: of the pixel's mean; sampleCount;
+//!                                   # crypto_object, crypto_material, crypto_asset: Cryptomatte
 //! render:                           # these are the defaults
 //!   samples: 64                     # paths per pixel
 //!   stop: {error: ~, time: ~, samples: ~}       # the first that is reached ends the render: relative RMSE of the picture,
@@ -76,8 +87,13 @@
 //!   frames_per_second: ~            # for those who show the pictures
 //! output:                           # these are the defaults
 //!   dir: out                        # from the working directory
-//!   exr: {precision: half, compression: zips, stderr: false, channels: rgba}   # half, float; none, zips, zip, piz;
-//!                                   # rgba, rgb, xyza, xyz, luminance_alpha, luminance
+//!   exr: {precision: half, compression: zips, stderr: false, channels: rgba, layout: single, dwa_level: 45,
+//!         attributes: {}, aces_container: false}     # half, float; none, zips, zip, piz, and with loss dwaa, dwab;
+//!                                   # rgba, rgb, xyza, xyz, luminance_alpha, luminance; single, multipart: each layer in
+//!                                   # a part of its own; attributes of the header by name, text or numbers, such as
+//!                                   # {owner: us, timeCode: "01:00:00:00"} (of frame 0)
+//!   spectral: ~                     # or {bands: 31, from_nm: 400, to_nm: 700}: a further file, NAME.spectral.exr, of mean
+//!                                   # radiance in bands (layout 1.0 of Fichet, Pacanowski and Wilkie); ~ from 400 to 700
 //!   png:
 //!     exposure: 0                   # stops, or auto: the log-average luminance of the picture, without its darkest 20 and
 //!                                   # brightest 2 %, is shown as 0.18; the report and the PNG say how many stops that are
@@ -183,6 +199,8 @@
 //!                                                #   {blend: {weight: 0.3, of: [isotropic, {hg: 0.8}]}}
 //!   milk: {homogeneous: {extinction: 5, albedo: 0.99, scale: 1, shadow_rays: true}}    # ~ scale, shadow_rays
 //!   cloud: {heterogeneous: {extinction: {volume: haze}, albedo: 0.9, scale: 1}}        # and phase, shadow_rays
+//! light_groups: {key: [ball]}       # lamps by group, for layers; names as given or made of kind and number (point0)
+//! assets: {toys: [ball]}            # shapes by what they are part of, for mattes; ~ the group of an instance, or itself
 //! medium: smoke                     # what the camera is in; default none
 //! fog: {colour: 0.8, start: 5, end: 40}
 //!                                   # or {colour, density: 0.1, falloff: exp}: exp (default), exp2
@@ -365,6 +383,7 @@ mod compound;
 mod decode;
 mod edit;
 mod emitter;
+mod exr_file;
 mod fault;
 mod frames;
 mod hair;
@@ -396,9 +415,10 @@ pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SID
 pub use coating::{Film, TexturedThickness, Thickness};
 pub use compound::{Blend, Brushed, Bump, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided};
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, Growth, ProjectorLight};
+pub use exr_file::{FileLayout, HeaderValue, HeaderValues, SpectralFile, time_code};
 pub use frames::{Frames, frames, frames_in_short};
 pub use hair::{Hair, HairColour};
-pub use layer::{Layer, LayerContent, LightForm, Quantity};
+pub use layer::{Data, Layer, LayerContent, LightForm, LightWay, Matte, Quantity};
 pub use light::{Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, Light, PointLight, SpotLight};
 pub use material::{
     Boundary, Conductor, ConductorIndex, Dielectric, Diffuse, DiffuseMean, Distribution, Fresnel, Highlight,
@@ -516,7 +536,8 @@ mod tests {
         assert_eq!(
             parse("scens: []").unwrap_err().to_string(),
             "dir/s.yaml:1:1: scens: expected one of include, camera, image, integrator, layers, render, output, textures, \
-             volumes, materials, media, groups, shapes, lights, medium, fog, scenes, found \"scens\"; did you mean \"scenes\"?"
+             volumes, materials, media, groups, shapes, lights, light_groups, assets, medium, fog, \
+             scenes, found \"scens\"; did you mean \"scenes\"?"
         );
         assert_eq!(faults("scens: []").matches("scenes").count(), 0);
     }

@@ -7,15 +7,16 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use super::animation::Animation;
-use super::camera::{Camera, Image};
+use super::camera::{Camera, Image, check_channel};
 use super::decode::decode;
 use super::edit;
+use super::exr_file;
 use super::fault::{Checker, Fault};
-use super::layer::Layer;
+use super::layer::{Layer, LayerContent};
 use super::light::{Fog, Light};
 use super::material::Material;
 use super::medium::{Medium, UNCHANGED, VACUUM};
-use super::node::{Node, Sources};
+use super::node::{Node, Sources, quote};
 use super::path::{self, At};
 use super::settings::{Integrator, Output, Render};
 use super::shape::Shape;
@@ -73,6 +74,13 @@ pub struct SceneDescription {
     /// In the order of the text.
     #[serde(default)]
     pub lights: Vec<Light>,
+    /// Names of lamps by the group that they are in, for layers: of lights and of shapes that shine, given or made from
+    /// kind and number (`point0`).
+    #[serde(default)]
+    pub light_groups: BTreeMap<String, Vec<String>>,
+    /// Names of shapes by the asset that they are part of, for mattes.
+    #[serde(default)]
+    pub assets: BTreeMap<String, Vec<String>>,
     /// Name of the medium that the camera is in; default none.
     pub medium: Option<String>,
     /// Depth fog; default none.
@@ -158,6 +166,33 @@ impl SceneDescription {
         }
     }
 
+    /// Light groups and assets name what is there, each thing once.
+    fn check_names(&self, checker: &mut Checker<'_>) {
+        let shapes = |shining: bool| {
+            let all = self.shapes.iter().enumerate().filter(move |(_, shape)| !shining || shape.emission.is_some());
+            all.map(|(i, shape)| shape.name_or_kind(i))
+        };
+        let lamps: Vec<String> =
+            shapes(true).chain(self.lights.iter().enumerate().map(|(i, light)| light.name_or_kind(i))).collect();
+        let shapes: Vec<String> = shapes(false).collect();
+        let all = [("light_groups", "lamp", &self.light_groups, lamps), ("assets", "shape", &self.assets, shapes)];
+        for (field, kind, groups, known) in all {
+            let most = usize::from(u8::MAX) - 1;
+            checker.require(groups.len() <= most, At::ROOT.key(field), "at most 254 names", groups.len());
+            let mut taken: Vec<&str> = Vec::new();
+            for (group, names) in groups {
+                let field = At::ROOT.key(field);
+                let at = field.key(group);
+                check_channel(group, false, at, checker);
+                for (i, name) in names.iter().enumerate() {
+                    checker.known(at.index(i), kind, name, &known);
+                    checker.require(!taken.contains(&name.as_str()), at.index(i), "each name once", quote(name));
+                    taken.push(name);
+                }
+            }
+        }
+    }
+
     fn check(&self, root: &Node, sources: &Sources) -> Result<()> {
         let mut checker = Checker::new(root);
         checker.materials = self.materials.keys().map(String::as_str).collect();
@@ -176,10 +211,20 @@ impl SceneDescription {
         }
         for (i, layer) in self.layers.iter().enumerate() {
             let taken = self.layers[..i].iter().any(|other| other.name == layer.name);
-            layer.check(taken, at.key("layers").index(i), &mut checker);
+            let at = at.key("layers");
+            layer.check(taken, at.index(i), &mut checker);
+            if let LayerContent::Ways { group, .. } = &layer.content {
+                let path = matches!(self.integrator, Integrator::Path(_));
+                checker.require(path, at.index(i), "the integrator path, which knows the ways of light", "another");
+                if let Some(group) = group {
+                    let groups: Vec<String> = self.light_groups.keys().cloned().collect();
+                    checker.known(at.index(i).key("light_group"), "light group", group, &groups);
+                }
+            }
         }
         self.render.check(at.key("render"), &mut checker);
         self.output.check(at.key("output"), &mut checker);
+        exr_file::check_layers(&self.output, &self.layers, &mut checker);
         for (name, material) in &self.materials {
             material.check(at.key("materials").key(name), &mut checker);
         }
@@ -199,6 +244,7 @@ impl SceneDescription {
         for (i, light) in self.lights.iter().enumerate() {
             light.check(at.key("lights").index(i), &mut checker);
         }
+        self.check_names(&mut checker);
         for (name, medium) in &self.media {
             let media = at.key("media");
             let at = media.key(name);

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::exr_file::{self, DWA_LEVEL, FileLayout, HeaderValues, SpectralFile};
 use super::fault::Checker;
 use super::frames::Frames;
 use super::light::nothing;
@@ -333,6 +334,8 @@ pub struct Output {
     /// Colour space of the OpenEXR file; default `rec709`.
     #[serde(default)]
     pub colour: Colour,
+    /// A further file of bands of the spectrum; default none.
+    pub spectral: Option<SpectralFile>,
 }
 
 fn dir() -> PathBuf {
@@ -341,12 +344,12 @@ fn dir() -> PathBuf {
 
 impl Default for Output {
     fn default() -> Output {
-        Output { dir: dir(), exr: Exr::default(), png: Png::default(), colour: Colour::default() }
+        Output { dir: dir(), exr: Exr::default(), png: Png::default(), colour: Colour::default(), spectral: None }
     }
 }
 
 /// `exr: {precision: half, compression: zips}`
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exr {
     /// Of the colour channels; default `half`.
@@ -361,6 +364,37 @@ pub struct Exr {
     /// What a pixel holds; default `rgba`.
     #[serde(default)]
     pub channels: Channels,
+    /// Default `single`.
+    #[serde(default)]
+    pub layout: FileLayout,
+    /// What DWA compression may lose, from 0; default 45.
+    #[serde(default = "dwa_level")]
+    pub dwa_level: f64,
+    /// Further attributes of the header; default none.
+    #[serde(default)]
+    pub attributes: HeaderValues,
+    /// Whether the file is an ACES container (SMPTE ST 2065-4); default false.
+    #[serde(default)]
+    pub aces_container: bool,
+}
+
+fn dwa_level() -> f64 {
+    DWA_LEVEL
+}
+
+impl Default for Exr {
+    fn default() -> Exr {
+        Exr {
+            precision: Precision::default(),
+            compression: Compression::default(),
+            stderr: false,
+            channels: Channels::default(),
+            layout: FileLayout::default(),
+            dwa_level: DWA_LEVEL,
+            attributes: HeaderValues::default(),
+            aces_container: false,
+        }
+    }
 }
 
 /// What a pixel of the OpenEXR file holds.
@@ -393,7 +427,7 @@ pub enum Precision {
     Float,
 }
 
-/// Compression of an OpenEXR file; all are lossless.
+/// Compression of an OpenEXR file; all but `dwaa` and `dwab` are lossless.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Compression {
@@ -406,6 +440,10 @@ pub enum Compression {
     Zip,
     /// Wavelets.
     Piz,
+    /// Cosines, 32 lines together: loses up to `dwa_level`, of colour alone.
+    Dwaa,
+    /// The same, 256 lines together.
+    Dwab,
 }
 
 /// `png: {exposure: 0, tonemap: aces}`
@@ -651,6 +689,7 @@ impl Output {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         let named = !self.dir.as_os_str().is_empty();
         checker.require(named, at.key("dir"), "the path of a directory", "empty text");
+        exr_file::check(self, at, checker);
         let png = at.key("png");
         if let Exposure::Number(stops) = self.png.exposure {
             let expected = "a number of stops from -64 to 64, or auto";
@@ -732,7 +771,7 @@ mod tests {
         assert_eq!(scene.output.dir, PathBuf::from("out"));
         assert_eq!(
             scene.output.exr,
-            Exr { precision: Precision::Half, compression: Compression::Zips, stderr: false, channels: Channels::Rgba }
+            Exr { precision: Precision::Half, compression: Compression::Zips, ..Exr::default() }
         );
         assert_eq!(
             scene.output.png,

@@ -38,6 +38,23 @@ pub struct Shape {
     pub geometry: Geometry,
 }
 
+impl Shape {
+    /// The name of its material, or `own` where that stands in the shape.
+    #[must_use]
+    pub fn material_name(&self, own: &str) -> String {
+        match &self.material {
+            MaterialRef::Name(name) => name.clone(),
+            MaterialRef::Inline(_) => own.to_owned(),
+        }
+    }
+
+    /// Its name, given or made from kind and number.
+    #[must_use]
+    pub fn name_or_kind(&self, number: usize) -> String {
+        self.name.clone().unwrap_or_else(|| format!("{}{number}", self.geometry.kind()))
+    }
+}
+
 /// Writes each form as a struct of its own fields, and beside it the struct that stands in YAML,
 /// which has the common fields too.
 macro_rules! forms {

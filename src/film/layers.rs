@@ -7,6 +7,7 @@
 
 use super::Window;
 use super::accumulate::{Invalid, InvalidCounts, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum};
+use super::mattes::Mattes;
 use super::run::LayerRun;
 
 /// Sums of all layers of a window, pixel by pixel in raster order.
@@ -15,6 +16,8 @@ pub struct LayerSums {
     channels: usize,
     sums: Vec<Sum>,
     counts: Vec<u32>,
+    /// Who covers the pixels.
+    pub mattes: Mattes,
     /// Samples that were left out.
     pub invalid: InvalidCounts,
 }
@@ -33,6 +36,7 @@ impl LayerSums {
         self.channels = channels;
         self.sums.clear();
         self.counts.clear();
+        self.mattes.clear();
         self.invalid = InvalidCounts::default();
         if channels > 0 {
             self.sums.resize(channels * pixels, Sum::default());
@@ -89,6 +93,18 @@ impl LayerSums {
         self.counts[index] += 1;
     }
 
+    /// Adds what stands in a pixel once, however many samples it has: the number of each of `channels`.
+    pub fn add_once(&mut self, index: usize, values: impl IntoIterator<Item = (usize, f32)>) {
+        for (channel, x) in values {
+            match fault(x) {
+                Some(cause) => self.invalid.record(cause),
+                None => {
+                    let _ = self.sums[index * self.channels + channel].add(x);
+                }
+            }
+        }
+    }
+
     /// Adds the samples of a run to the pixel at `index`.
     ///
     /// # Panics
@@ -112,6 +128,7 @@ impl LayerSums {
     pub fn merge(&mut self, window: Window, part: &LayerSums, inner: Window) {
         assert_eq!(self.channels, part.channels, "sums of the same layers");
         self.invalid += part.invalid;
+        self.mattes.merge(window, &part.mattes, inner);
         if self.channels == 0 {
             return;
         }

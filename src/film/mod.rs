@@ -9,11 +9,13 @@
 
 pub mod accumulate;
 pub mod compare;
+pub mod cryptomatte;
 pub mod error;
 pub mod exr;
 pub mod facts;
 pub mod filter;
 pub mod layers;
+pub mod mattes;
 pub mod output;
 pub mod png;
 pub mod resolve;

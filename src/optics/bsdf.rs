@@ -191,6 +191,8 @@ pub trait Lobes {
     fn sample_by(&self, wo: DVec3, u_lobe: impl FnOnce() -> f64, u: DVec2) -> Option<BsdfSample>;
     /// Smooth glass.
     fn glass(&self) -> Option<&Dielectric>;
+    /// As [`Bsdf::diffuse_share`].
+    fn diffuse_share(&self, wo: DVec3, wi: DVec3) -> Lanes;
 }
 
 /// Lambert: f = ρ/π on the side of the normal.
@@ -235,6 +237,11 @@ impl Lobes for Lambert {
     fn glass(&self) -> Option<&Dielectric> {
         None
     }
+
+    #[inline(always)]
+    fn diffuse_share(&self, _: DVec3, _: DVec3) -> Lanes {
+        Lanes::ONE
+    }
 }
 
 impl Lobes for Bsdf<'_> {
@@ -259,6 +266,11 @@ impl Lobes for Bsdf<'_> {
             Bsdf::Dielectric(glass) => Some(glass),
             _ => None,
         }
+    }
+
+    #[inline]
+    fn diffuse_share(&self, wo: DVec3, wi: DVec3) -> Lanes {
+        Bsdf::diffuse_share(self, wo, wi)
     }
 }
 
@@ -295,6 +307,28 @@ impl Bsdf<'_> {
                 Evaluation::NONE
             }
         }
+    }
+
+    /// Of f, for a pair of directions on one side, the share of a diffuse base, from 0 to 1.
+    #[must_use]
+    pub fn diffuse_share(&self, wo: DVec3, wi: DVec3) -> Lanes {
+        let part = match self {
+            Bsdf::Diffuse { .. } | Bsdf::Plastic(_) => return Lanes::ONE,
+            Bsdf::RoughPlastic(plastic) => plastic.diffuse_part(wo, wi),
+            Bsdf::Principled(surface) => surface.diffuse_part(wo, wi),
+            Bsdf::PrincipledThin(sheet) => sheet.diffuse_part(wo, wi),
+            Bsdf::Mirror { .. }
+            | Bsdf::Conductor(_)
+            | Bsdf::RoughConductor(..)
+            | Bsdf::Dielectric(_)
+            | Bsdf::RoughDielectric(_)
+            | Bsdf::Thin { .. }
+            | Bsdf::Hair(_)
+            | Bsdf::Null => return Lanes::ZERO,
+        };
+        let (part, whole) = (part.to_array(), self.eval(wo, wi).f.to_array());
+        let share = |k: usize| if whole[k] > 0.0 { (part[k] / whole[k]).clamp(0.0, 1.0) } else { 0.0 };
+        Lanes::new(std::array::from_fn(share))
     }
 
     /// A direction for the path to go on in; `None` ends it. `u_lobe` chooses among lobes.

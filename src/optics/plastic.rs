@@ -328,11 +328,19 @@ impl RoughPlastic<'_> {
         let Terms { flow, pdf } = self.facets.terms(wo, wi, m);
         let into = self.transmission(wo.z);
         let p = self.coat_share(into);
-        let base = self.base.albedo() * into * self.transmission(wi.z) * (1.0 / PI) as f32;
+        let base = self.diffuse_part(wo, wi);
         Evaluation {
             f: base + self.base.tint * reflected * (0.25 * flow) as f32,
             pdf: Lanes::splat((p * pdf / (4.0 * cos) + (1.0 - p) * wi.z / PI) as f32),
         }
+    }
+
+    /// The part of f that the base gives.
+    pub(super) fn diffuse_part(&self, wo: DVec3, wi: DVec3) -> Lanes {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return Lanes::ZERO;
+        }
+        self.base.albedo() * self.transmission(wo.z) * self.transmission(wi.z) * (1.0 / PI) as f32
     }
 
     pub(super) fn sample(&self, wo: DVec3, u_lobe: f64, u: DVec2) -> Option<BsdfSample> {

@@ -238,16 +238,20 @@ impl<'a> Compiler<'a> {
         let mut objects: Vec<Object> = Vec::new();
         let mut lights: Vec<Light> = Vec::new();
         let mut weights: Vec<f64> = Vec::new();
+        let mut light_names: Vec<String> = Vec::new();
         // Children of groups come after everything that stands in the scene itself.
-        let children = self.groups(camera_medium)?;
+        let (children, names_of_children) = self.groups(camera_medium)?;
+        let mut material_names: Vec<String> = Vec::new();
         for (i, shape) in d.shapes.iter().enumerate() {
             let at = format!("shapes[{i}].{}", shape.geometry.kind());
-            let name = shape.name.clone().unwrap_or_else(|| format!("{}{i}", shape.geometry.kind()));
+            let name = shape.name_or_kind(i);
             let index = objects.len() as u32;
             if let Some(object) = self.object(&at, name, shape, camera_medium, index, &mut lights)? {
                 if object.light.is_some() {
+                    light_names.push(object.name.clone());
                     weights.push(shape.sampling_weight.unwrap_or(1.0));
                 }
+                material_names.push(shape.material_name(&object.name));
                 objects.push(object);
             }
         }
@@ -258,6 +262,7 @@ impl<'a> Compiler<'a> {
             let made = self.skies.remove(&i).unwrap_or_else(|| self.light(&at, light));
             if let Some(light) = made? {
                 lights.push(light);
+                light_names.push(d.lights[i].name_or_kind(i));
                 weights.push(weight);
             }
         }
@@ -275,6 +280,7 @@ impl<'a> Compiler<'a> {
         let bvh = Bvh::build(&alone.iter().map(|&i| boxes[i as usize]).collect::<Vec<Aabb>>()).named(&alone);
         let few = Few::of(&objects, &alone, &boxes);
         objects.extend(children);
+        material_names.extend(names_of_children);
         let nested = Nested::of(&mut objects, boxes.len(), |object| {
             self.materials[object.material as usize].body().ok().flatten()
         });
@@ -310,6 +316,7 @@ impl<'a> Compiler<'a> {
             name: name.to_owned(),
             camera,
             objects,
+            material_names,
             standing: boxes.len(),
             bvh,
             few,
@@ -324,6 +331,7 @@ impl<'a> Compiler<'a> {
             choice,
             light_exponent,
             backgrounds,
+            light_groups: lights::groups(d, &light_names),
             fog,
             wavelengths,
             bands,
@@ -358,11 +366,13 @@ impl<'a> Compiler<'a> {
         Ok(())
     }
 
-    /// The children of all groups that are copied somewhere; each group knows where its own will lie.
-    fn groups(&mut self, camera_medium: Option<u32>) -> Result<Vec<Object>> {
+    /// The children of all groups that are copied somewhere, and the names of their materials; each group knows where its
+    /// own will lie.
+    fn groups(&mut self, camera_medium: Option<u32>) -> Result<(Vec<Object>, Vec<String>)> {
         let d = self.description;
         let copied: BTreeSet<&str> = d.shapes.iter().filter_map(|shape| shape.geometry.group()).collect();
         let mut children: Vec<Object> = Vec::new();
+        let mut materials = Vec::new();
         for (group, shapes) in d.groups.iter().filter(|(name, _)| copied.contains(name.as_str())) {
             let first = (d.shapes.len() + children.len()) as u32;
             let start = children.len();
@@ -371,13 +381,16 @@ impl<'a> Compiler<'a> {
                 let name = shape.name.clone().unwrap_or_else(|| format!("{group}.{kind}{i}"));
                 let at = format!("groups.{group}[{i}].{kind}");
                 // No child shines, by the checks of the description.
-                children.extend(self.object(&at, name, shape, camera_medium, first, &mut Vec::new())?);
+                if let Some(child) = self.object(&at, name, shape, camera_medium, first, &mut Vec::new())? {
+                    materials.push(shape.material_name(&child.name));
+                    children.push(child);
+                }
             }
             let boxes: Vec<Aabb> = children[start..].iter().map(Object::bounds).collect();
             let material = children.get(start).map_or(0, |child| child.material);
             self.groups.insert(group, (Arc::new(Group { first, bvh: Bvh::build(&boxes) }), material));
         }
-        Ok(children)
+        Ok((children, materials))
     }
 
     /// The object that `shape` is; `index` is the one that it will have. Its light goes to `lights`.
@@ -505,6 +518,15 @@ impl<'a> Compiler<'a> {
                 self.fault(&at, "expected a response within 360 to 830 nm, found none");
             }
             all.push(Band { name: band.name.clone(), response });
+        }
+        if let Some(spectral) = &self.description.output.spectral {
+            for [from, to] in spectral.edges() {
+                // The mean over the band; the name has its middle, with a comma.
+                let height = 1.0 / (to - from);
+                let response = Spectrum::from_samples(&[(from, height), (to, height)], Outside::Zero);
+                let name = format!("S0.{:.6}nm", 0.5 * (from + to)).replace('.', ",").replacen(',', ".", 1);
+                all.extend(response.map(|response| Band { name, response }));
+            }
         }
         all
     }

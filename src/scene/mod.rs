@@ -73,6 +73,8 @@ pub struct Scene {
     /// What was written: first what stands in the scene itself, then the children of groups, which are
     /// seen through instances.
     pub objects: Vec<Object>,
+    /// Of each object the name of its material, or its own where it has one of its own.
+    pub material_names: Vec<String>,
     /// How many of them stand in the scene itself.
     pub standing: usize,
     /// Over the objects that stand in the scene itself, but for the meshes of [`Scene::together`].
@@ -101,6 +103,8 @@ pub struct Scene {
     pub light_exponent: i32,
     /// Indices of lights from infinity.
     pub backgrounds: Vec<u32>,
+    /// The groups that lights are in.
+    pub light_groups: LightGroups,
     /// Depth fog of the picture.
     pub fog: Option<DepthFog>,
     /// From which wavelengths are drawn.
@@ -121,6 +125,24 @@ pub struct Scene {
     pub notes: Vec<String>,
     /// Counts what robust arithmetic was needed for, where that is asked for.
     pub watch: Option<Box<Watch>>,
+}
+
+/// Groups of lights, for layers.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LightGroups {
+    /// Names of those after the first, which has the lights that are in none.
+    pub names: Vec<String>,
+    /// The group of each light.
+    pub of: Vec<u8>,
+}
+
+impl LightGroups {
+    /// Number of groups, the nameless first one included.
+    #[must_use]
+    pub fn count(&self) -> u8 {
+        // No more names than that pass the check of a description.
+        self.names.len() as u8 + 1
+    }
 }
 
 /// A band of the spectrum.

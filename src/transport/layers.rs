@@ -3,12 +3,15 @@
 //! Names of channels are those of OpenEXR layers: `name.R`, `name.X`, …; components of colour are linear in the
 //! primaries of the file.
 
+use super::path::seen_normal;
 use super::plan::{EffectPlan, Integrator};
+use super::shadow::MAX_BOUNDARIES;
+use super::ways::{Ledger, Way, Ways};
 use crate::film::accumulate::{Invalid, SAMPLE_LIMIT};
 use crate::math::Ray;
 use crate::optics::bsdf::Bsdf;
 use crate::scene::compound::{Composition, Vertex, share};
-use crate::scene::material::Material;
+use crate::scene::material::{Kind, Material};
 use crate::scene::watch::Counts;
 use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
@@ -83,6 +86,34 @@ pub enum Source {
     Band(usize),
     /// What was counted on the way of the sample: [`NUMERICS`].
     Numerics,
+    /// The part of the picture's light that came certain ways, of one group of lamps or all: red, green, blue.
+    Ways(Ways, Option<u8>),
+    /// What the ray through the middle of the pixel meets, once a pixel.
+    Middle(Middle),
+}
+
+/// What the ray through the middle of a pixel, from the middle of the lens, meets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Middle {
+    /// Depth along the line of sight, metres; [`FAR`] where there is nothing.
+    Depth,
+    /// The place, metres; 0 where there is nothing.
+    Position,
+    /// Texture coordinates.
+    Uv,
+}
+
+/// The depth of what is not there: beyond every scene, and finite, so that nothing that is computed with it is NaN.
+pub const FAR: f32 = 1e10;
+
+impl Middle {
+    fn components(self) -> &'static [&'static str] {
+        match self {
+            Middle::Depth => &[""],
+            Middle::Position => &["X", "Y", "Z"],
+            Middle::Uv => &["U", "V"],
+        }
+    }
 }
 
 /// Components of [`Source::Numerics`], all a sample: of [`Counts`], and samples that light cannot make, by cause.
@@ -99,6 +130,21 @@ pub struct Layer {
     pub squares: Option<String>,
 }
 
+impl Layer {
+    /// How many channels it has.
+    fn channels(&self) -> usize {
+        let count = match self.source {
+            Source::Surface(quantity) => quantity.components().len(),
+            Source::Light(_, Form::Rgba) => 4,
+            Source::Light(_, Form::Xyz) | Source::Ways(..) => 3,
+            Source::Band(_) => 1,
+            Source::Numerics => NUMERICS.len(),
+            Source::Middle(middle) => middle.components().len(),
+        };
+        count * if self.squares.is_some() { 2 } else { 1 }
+    }
+}
+
 /// All further channels of a picture.
 #[derive(Clone, Debug)]
 pub struct LayerPlan {
@@ -112,6 +158,8 @@ pub struct LayerPlan {
     pub sensitivity: f64,
     /// How far apart samples of a pixel stand, in pixels: 1/√n.
     pub sample_distance: f64,
+    /// Whether it is noted who covers the pixels.
+    pub mattes: bool,
 }
 
 impl Default for LayerPlan {
@@ -122,6 +170,7 @@ impl Default for LayerPlan {
             rgb_from_xyz: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             sensitivity: 1.0,
             sample_distance: 1.0,
+            mattes: false,
         }
     }
 }
@@ -133,6 +182,8 @@ pub struct Channel {
     pub name: String,
     /// True for light, false for data.
     pub light: bool,
+    /// True for what stands in a pixel once, false for the mean of its samples.
+    pub once: bool,
 }
 
 impl LayerPlan {
@@ -140,6 +191,46 @@ impl LayerPlan {
     fn own_light_only(&self) -> bool {
         let own = |layer: &Layer| !matches!(layer.source, Source::Surface(_));
         self.integrators.is_empty() && self.layers.iter().all(own)
+    }
+
+    /// Whether light is parted by the way it came.
+    #[must_use]
+    pub fn parts_light(&self) -> bool {
+        self.layers.iter().any(|layer| matches!(layer.source, Source::Ways(..)))
+    }
+
+    /// The first channels, to which paths from the lights add: bands, and light by its ways.
+    #[must_use]
+    pub fn light_channels(&self) -> usize {
+        let count = |layer: &Layer| match layer.source {
+            Source::Band(_) => 1,
+            Source::Ways(..) => 3,
+            Source::Surface(_) | Source::Light(..) | Source::Numerics | Source::Middle(_) => 0,
+        };
+        self.layers.iter().map(count).sum()
+    }
+
+    /// What `light` that paths from the lights bring from a lamp of `group` adds to these channels.
+    pub fn append_traced(
+        &self,
+        scene: &Scene,
+        wavelengths: &SampledWavelengths,
+        light: Lanes,
+        xyz: [f32; 3],
+        group: u8,
+        numbers: &mut Vec<f32>,
+    ) {
+        for layer in &self.layers {
+            match layer.source {
+                Source::Band(i) => numbers.push(in_band(scene, i, wavelengths, light)),
+                Source::Ways(ways, of) => {
+                    let counts = ways.holds(Way::Caustic) && of.is_none_or(|of| of == group);
+                    let light = xyz.map(|x| x * self.sensitivity as f32);
+                    numbers.extend(if counts { rgb(&self.rgb_from_xyz, light) } else { [0.0; 3] });
+                }
+                Source::Surface(_) | Source::Light(..) | Source::Numerics | Source::Middle(_) => {}
+            }
+        }
     }
 
     /// The channels in the order of the sums.
@@ -154,24 +245,32 @@ impl LayerPlan {
                     Source::Surface(quantity) => {
                         let names = quantity.components().iter().map(|c| format!("{name}.{c}"));
                         let light = light && quantity == Quantity::Albedo;
-                        all.extend(names.map(|name| Channel { name, light }));
+                        all.extend(names.map(|name| Channel { name, light, once: false }));
                     }
                     Source::Light(_, form) => {
                         let components: &[&str] = match form {
                             Form::Rgba => &["R", "G", "B", "A"],
                             Form::Xyz => &["X", "Y", "Z"],
                         };
-                        all.extend(components.iter().map(|c| Channel { name: format!("{name}.{c}"), light }));
+                        all.extend(channels(name, components, light, false));
                     }
-                    Source::Band(_) => all.push(Channel { name: name.clone(), light }),
-                    Source::Numerics => {
-                        all.extend(NUMERICS.iter().map(|c| Channel { name: format!("{name}.{c}"), light: false }));
-                    }
+                    Source::Band(_) => all.push(Channel { name: name.clone(), light, once: false }),
+                    Source::Numerics => all.extend(channels(name, &NUMERICS, false, false)),
+                    Source::Ways(..) => all.extend(channels(name, &["R", "G", "B"], true, false)),
+                    Source::Middle(middle) => all.extend(channels(name, middle.components(), false, true)),
                 }
             }
         }
         all
     }
+}
+
+/// Channels of the layer `name`; a component without a name is the layer itself.
+fn channels(name: &str, components: &[&str], light: bool, once: bool) -> impl Iterator<Item = Channel> {
+    components.iter().map(move |c| {
+        let name = if c.is_empty() { name.to_owned() } else { format!("{name}.{c}") };
+        Channel { name, light, once }
+    })
 }
 
 /// One sample of light, for layers.
@@ -227,7 +326,7 @@ impl Values {
         self.surface.clear();
         let quantities = plan.layers.layers.iter().filter_map(|layer| match layer.source {
             Source::Surface(quantity) => Some(quantity),
-            Source::Light(..) | Source::Band(_) | Source::Numerics => None,
+            _ => None,
         });
         let mut first = None;
         for quantity in quantities {
@@ -253,6 +352,7 @@ impl Values {
         neighbours: impl Fn(DVec2) -> Ray,
         own: Seen,
         counted: (Counts, f32),
+        ledger: Option<&Ledger>,
         light: impl Fn(&Integrator) -> Seen,
     ) {
         let layers = &plan.layers;
@@ -286,13 +386,25 @@ impl Values {
                     }
                 }
                 Source::Band(i) => {
-                    let counted = own.radiance * wavelengths.inv_pdf * scene.bands[i].response.eval(wavelengths.nm);
-                    put(numbers, [counted.reduce_add() / LANES as f32], squares);
+                    put(numbers, [in_band(scene, i, wavelengths, own.radiance)], squares);
                 }
+                Source::Ways(ways, group) => {
+                    let light = ledger.map_or(Lanes::ZERO, |ledger| ledger.light(ways, group));
+                    let xyz = observer::xyz(light, wavelengths).map(|x| x * sensitivity);
+                    numbers.extend(rgb(&layers.rgb_from_xyz, xyz));
+                }
+                // These stand in the pixel once.
+                Source::Middle(middle) => numbers.extend(middle.components().iter().map(|_| 0.0)),
                 Source::Numerics => put(numbers, own.numerics(counted.0, counted.1), squares),
             }
         }
     }
+}
+
+/// What `light` adds to a band.
+fn in_band(scene: &Scene, band: usize, wavelengths: &SampledWavelengths, light: Lanes) -> f32 {
+    let counted = light * wavelengths.inv_pdf * scene.bands[band].response.eval(wavelengths.nm);
+    counted.reduce_add() / LANES as f32
 }
 
 /// Appends `values`, and their squares if they are wanted.
@@ -307,6 +419,68 @@ fn put<const N: usize>(numbers: &mut Vec<f32>, values: [f32; N], squares: bool) 
 fn rgb(matrix: &[[f64; 3]; 3], xyz: [f32; 3]) -> [f32; 3] {
     let xyz = xyz.map(f64::from);
     matrix.map(|row| (row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2]) as f32)
+}
+
+/// What stands in a pixel once: each channel's number and value.
+pub fn middle(scene: &Scene, plan: &EffectPlan, pixel: [i32; 2], mut put: impl FnMut(usize, f32)) {
+    let mut channel = 0;
+    let mut met = None;
+    for layer in &plan.layers.layers {
+        let next = channel + layer.channels();
+        if let Source::Middle(middle) = layer.source {
+            let met = met.get_or_insert_with(|| {
+                let place = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5;
+                let ray = scene.camera.ray(place, || DVec2::splat(0.5));
+                // What is half there counts.
+                first_covering(scene, plan, &ray, |_| 0.5)
+            });
+            let values = match (middle, met) {
+                (Middle::Depth, Some((_, surface))) => [scene.camera.depth(surface.point) as f32, 0.0, 0.0],
+                (Middle::Depth, None) => [FAR, 0.0, 0.0],
+                (Middle::Position, Some((_, surface))) => surface.point.to_array().map(|x| x as f32),
+                (Middle::Uv, Some((_, surface))) => [surface.uv.x as f32, surface.uv.y as f32, 0.0],
+                (Middle::Position | Middle::Uv, None) => [0.0; 3],
+            };
+            (channel..next).zip(values).for_each(|(channel, value)| put(channel, value));
+        }
+        channel = next;
+    }
+}
+
+/// The number of what covers a sample: above 2³² the object that stands in the scene, below the child of a group that it
+/// shows, or the object itself.
+#[must_use]
+pub fn covered(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<u64> {
+    let (hit, _) = first_covering(scene, plan, ray, u)?;
+    Some(u64::from(hit.instance.unwrap_or(hit.object)) << 32 | u64::from(hit.object))
+}
+
+/// The first surface that a camera ray meets and that is really there: no hole of a mask, which `u` decides at the
+/// crossing of that number, no boundary of a medium alone, no hidden lamp.
+fn first_covering(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<(Hit, SurfacePoint)> {
+    let hides = matches!(&plan.integrator, Integrator::Path(settings) if settings.hide_emitters);
+    let (mut ray, mut reach) = (*ray, scene.camera.reach(ray));
+    for crossing in 0..=MAX_BOUNDARIES {
+        let hit = scene.closest(&ray, reach)?;
+        let surface = scene.surface_with_texture(&ray, &hit);
+        let object = &scene.objects[hit.object as usize];
+        let open = match &scene.materials[object.material as usize].kind {
+            _ if hides && object.light.is_some() => true,
+            Kind::Boundary => true,
+            Kind::Compound(compound) => {
+                let (wo, at) = (-ray.direction, &hit.texture_point(&surface));
+                let vertex = Vertex { scene, hit: &hit, surface: &surface, at, wo };
+                compound.resolve(&vertex, seen_normal(&surface, wo), u(crossing)).is_none()
+            }
+            _ => false,
+        };
+        if !open {
+            return Some((hit, surface));
+        }
+        ray = scene.leave(&surface, &hit, ray.direction);
+        reach = f64::INFINITY;
+    }
+    None
 }
 
 /// The first surface that a camera ray meets.

@@ -42,6 +42,8 @@ pub struct Splat {
     pub light: Lanes,
     /// The one lane that is not dark, where wavelengths have parted.
     pub alone: Option<usize>,
+    /// The group of its lamp.
+    pub group: u8,
 }
 
 impl Splat {
@@ -115,12 +117,13 @@ pub fn trace(
     let (u_point, u_direction) = pairs(sampler.set(Set::Extra(0)));
     let wavelengths = scene.wavelengths.sample(paths.wavelength.map_or(u_time.x, |cell| cell.at(u_time.x)));
     let mut traced = Traced { wavelengths: Some(wavelengths), ..Traced::default() };
-    let mut target = Target::Own;
+    let (mut target, mut group) = (Target::Own, 0);
     let emission = match paths.caustics {
         None => scene.emit(u_choice.x, u_point, u_direction, wavelengths.nm),
         Some(caustics) => caustics.begin(scene, u_choice.x, u_point, u_direction, wavelengths.nm).map(|aimed| {
             traced.began = Some((aimed.source, aimed.cell));
             target = aimed.target;
+            group = scene.light_groups.of[caustics.sources[aimed.source].light as usize];
             aimed.emission
         }),
     };
@@ -137,6 +140,7 @@ pub fn trace(
         splat,
         photons,
         target,
+        group,
         rays: 0,
         ahead: None,
     };
@@ -166,7 +170,7 @@ pub(super) fn seen_in_sharp(
     let mut seen = Vec::new();
     let splat = &mut |_: &SampledWavelengths, _| {};
     let (start, target, photons) = (1.0, Target::Own, Some(&mut seen));
-    let mut walk = Walk { paths, sampler, wavelengths, start, splat, photons, target, rays: 0, ahead: None };
+    let mut walk = Walk { paths, sampler, wavelengths, start, splat, photons, target, group: 0, rays: 0, ahead: None };
     walk.follow(Beam {
         ray: *ray,
         power: Lanes::ONE,
@@ -235,6 +239,8 @@ struct Walk<'a, 'b> {
     photons: Option<&'b mut Vec<Photon>>,
     /// What it is aimed at.
     target: Target,
+    /// The group of the lamp.
+    group: u8,
     rays: u32,
     /// What the beam that is to be followed meets next, where that is known.
     ahead: Option<Hit>,
@@ -503,7 +509,7 @@ impl<'a> Walk<'a, '_> {
             Some(_) => (beam.only(beam.power * (LANES as f32 / beam.rho.reduce_add())), Lanes::ONE),
         };
         let (point, came, normal) = (surface.point, -beam.ray.direction, surface.normal);
-        photons.push(Photon { point, came, normal, power, rho, vertices: beam.vertex });
+        photons.push(Photon { point, came, normal, power, rho, vertices: beam.vertex, group: self.group });
     }
 
     /// Light that a surface sends into the camera.
@@ -548,7 +554,7 @@ impl<'a> Walk<'a, '_> {
         let Some(through) = self.open(ray, entry.distance, inside, beam) else { return };
         let share = LANES as f32 / beam.rho.reduce_add();
         let light = beam.only(beam.power * light * through * share) * self.clear(point);
-        (self.splat)(self.wavelengths, Splat { place: entry.pixel, light, alone: beam.alone });
+        (self.splat)(self.wavelengths, Splat { place: entry.pixel, light, alone: beam.alone, group: self.group });
     }
 
     /// What depth fog leaves of light from a point.

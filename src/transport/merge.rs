@@ -31,6 +31,8 @@ pub struct Photon {
     pub rho: Lanes,
     /// Vertices of its path before.
     pub vertices: u32,
+    /// The group of its lamp.
+    pub group: u8,
 }
 
 /// The photons of one sample.
@@ -212,6 +214,7 @@ mod tests {
                     power: Lanes::splat(1.0 + u[2] as f32),
                     rho: Lanes::ONE,
                     vertices: 1,
+                    group: 0,
                 }
             })
             .collect()

@@ -14,6 +14,7 @@ pub mod pilot;
 pub mod plan;
 mod shadow;
 pub mod trial;
+pub mod ways;
 pub mod whitted;
 
 use crate::film::accumulate::REPLICATES;
@@ -22,12 +23,13 @@ use crate::math::Ray;
 use crate::math::sampler::{Octet, Sampler, Set, pairs};
 use crate::scene::Scene;
 use crate::scene::watch::{self, Counts};
-use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
+use crate::spectrum::{LANES, Lanes, SampledWavelengths, Spectrum, observer};
 use glam::{DVec2, DVec3};
 use merge::Collection;
 use path::together::Wanted;
 use plan::{EffectPlan, Integrator, PathSettings};
 use std::ops::Range;
+use ways::Ledger;
 
 /// Light that a camera ray brings, before fog.
 #[derive(Clone, Copy, Debug)]
@@ -153,9 +155,9 @@ impl Begun {
         (self.ray.origin, self.ray.direction) = (ray.origin, ray.direction);
     }
 
-    /// What `integrator` makes of the ray.
+    /// What `integrator` makes of the ray, entered in a `ledger` if there is one.
     #[inline]
-    fn light(&self, shot: &Shot, sampler: &Sampler, integrator: &Integrator) -> Incoming {
+    fn light(&self, shot: &Shot, sampler: &Sampler, integrator: &Integrator, ledger: Option<&Ledger>) -> Incoming {
         let Begun { at, ray, sample: PixelSample { wavelengths, .. }, .. } = self;
         let Shot { scene, plan, .. } = shot;
         let map = shot.photons.map(|p| p.map);
@@ -163,14 +165,14 @@ impl Begun {
             Integrator::Path(settings) => {
                 let rays = settings.light_samples.max(settings.scatter_samples);
                 if rays == 1 {
-                    return path::radiance(scene, plan, settings, sampler, wavelengths, ray, map);
+                    return path::radiance(scene, plan, settings, sampler, wavelengths, ray, map, ledger);
                 }
                 // Several paths from one camera ray, each with numbers of its own.
                 let mut sum = Incoming::NONE;
                 for i in 0..rays {
                     let index = at.index.wrapping_mul(rays).wrapping_add(i);
                     let sampler = Sampler::new(shot.seed, at.pixel, at.replicate, index);
-                    let one = path::radiance(scene, plan, settings, &sampler, wavelengths, ray, map);
+                    let one = path::radiance(scene, plan, settings, &sampler, wavelengths, ray, map, ledger);
                     sum.radiance += one.radiance;
                     sum.alpha += one.alpha;
                     sum.depth = one.depth;
@@ -178,6 +180,9 @@ impl Begun {
                     sum.events += one.events;
                 }
                 let share = 1.0 / rays as f32;
+                if let Some(ledger) = ledger {
+                    ledger.scale(share);
+                }
                 Incoming { radiance: sum.radiance * share, alpha: sum.alpha * share, left: sum.left * share, ..sum }
             }
             Integrator::Whitted(settings) => whitted::radiance(scene, plan, settings, wavelengths, ray),
@@ -197,7 +202,7 @@ impl Begun {
                     hide_emitters: settings.hide_emitters,
                     ..PathSettings::default()
                 };
-                path::radiance(scene, plan, &direct, sampler, wavelengths, ray, None)
+                path::radiance(scene, plan, &direct, sampler, wavelengths, ray, None, None)
             }
             Integrator::Nothing => Incoming::NONE,
         }
@@ -205,17 +210,20 @@ impl Begun {
 
     /// Follows the ray with the picture's own integrator.
     #[inline]
-    fn follow(&mut self, shot: &Shot, sampler: &Sampler) {
+    fn follow(&mut self, shot: &Shot, sampler: &Sampler, ledger: Option<&Ledger>) {
         let watched = shot.scene.watch.is_some();
         if watched {
             // What came before belongs to no sample.
             let _ = watch::take();
         }
-        let light = self.light(shot, sampler, &shot.plan.integrator);
+        let light = self.light(shot, sampler, &shot.plan.integrator, ledger);
         if watched {
             self.counted = watch::take();
         }
         self.see(shot, light);
+        if let (Some(ledger), Some((amount, veil))) = (ledger, veil(shot.scene, shot.plan, light.depth)) {
+            ledger.veil(1.0 - amount, veil.eval(self.sample.wavelengths.nm) * amount);
+        }
     }
 
     /// Takes what came of the ray.
@@ -233,7 +241,7 @@ impl Begun {
 
     /// Appends the numbers of the layers of the finished sample.
     #[inline]
-    fn layers(&self, shot: &Shot, sampler: &Sampler, values: &mut layers::Values) {
+    fn layers(&self, shot: &Shot, sampler: &Sampler, ledger: Option<&Ledger>, values: &mut layers::Values) {
         let Begun { place, ray, sample: PixelSample { radiance, wavelengths, xyz, alpha, weight }, counted, .. } =
             *self;
         values.append(
@@ -244,8 +252,9 @@ impl Begun {
             |step| shot.scene.camera.ray(place + step, || pairs(sampler.set(Set::Lens)).0),
             layers::Seen { radiance, xyz, alpha },
             (counted, weight),
+            ledger,
             |integrator| {
-                let light = self.light(shot, sampler, integrator);
+                let light = self.light(shot, sampler, integrator, None);
                 let xyz = observer::xyz(light.radiance, &wavelengths);
                 layers::Seen { radiance: light.radiance, xyz, alpha: light.alpha }
             },
@@ -259,7 +268,7 @@ pub fn sample(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Pixe
     let sampler = Sampler::new(shot.seed, pixel, replicate, index);
     let mut begun = Begun::blank();
     begun.begin(shot, Address { pixel, replicate, index }, &sampler);
-    let light = begun.light(shot, &sampler, &shot.plan.integrator);
+    let light = begun.light(shot, &sampler, &shot.plan.integrator, None);
     begun.see(shot, light);
     begun.finish();
     (begun.sample, light.events)
@@ -276,7 +285,7 @@ fn probe(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Incoming,
     let sampler = Sampler::new(shot.seed, pixel, replicate, index);
     let mut begun = Begun::blank();
     begun.begin(shot, Address { pixel, replicate, index }, &sampler);
-    (begun.light(shot, &sampler, &shot.plan.integrator), begun.sample.wavelengths)
+    (begun.light(shot, &sampler, &shot.plan.integrator, None), begun.sample.wavelengths)
 }
 
 /// The memory of samples that are rendered one after the other.
@@ -284,6 +293,8 @@ pub struct Samples {
     octet: Octet,
     begun: [Begun; Octet::SAMPLES as usize],
     layers: layers::Values,
+    /// One for each, where light is parted.
+    ledgers: Vec<Ledger>,
 }
 
 impl Default for Samples {
@@ -292,12 +303,14 @@ impl Default for Samples {
             octet: Octet::default(),
             begun: std::array::from_fn(|_| Begun::blank()),
             layers: layers::Values::default(),
+            ledgers: Vec::new(),
         }
     }
 }
 
 impl Samples {
-    /// Renders the samples `indices` of `replicate` at `pixel`, and gives each with the numbers of its layers.
+    /// Renders the samples `indices` of `replicate` at `pixel`, and gives each with the numbers of its layers and what
+    /// covers it, where there are mattes.
     ///
     /// # Panics
     /// If the indices are not of one [`Octet`].
@@ -307,9 +320,9 @@ impl Samples {
         pixel: [u32; 2],
         replicate: u32,
         indices: Range<u32>,
-        mut give: impl FnMut(&PixelSample, &[f32]),
+        mut give: impl FnMut(&PixelSample, &[f32], Option<u64>),
     ) {
-        let Samples { octet, begun, layers } = self;
+        let Samples { octet, begun, layers, ledgers } = self;
         let begun = &mut begun[..indices.len()];
         octet.reset(shot.seed, pixel, replicate, &indices);
         // Step by step: in all but the second no sample waits for the one before, so that they overlap.
@@ -320,18 +333,33 @@ impl Samples {
             Integrator::Path(settings) if path::together::possible(shot, settings) && begun.len() > 1 => {
                 follow_together(begun, shot, settings, octet);
             }
-            _ => begun.iter_mut().for_each(|begun| begun.follow(shot, &octet.sampler(begun.at.index))),
+            _ => {
+                if shot.plan.layers.parts_light() && ledgers.is_empty() {
+                    let ledger = |_| Ledger::new(shot.scene.light_groups.count().into());
+                    ledgers.extend((0..Octet::SAMPLES).map(ledger));
+                }
+                ledgers.iter().for_each(Ledger::clear);
+                for (i, begun) in begun.iter_mut().enumerate() {
+                    begun.follow(shot, &octet.sampler(begun.at.index), ledgers.get(i));
+                }
+            }
         }
         begun.iter_mut().for_each(Begun::finish);
         layers.numbers.clear();
         if !shot.plan.layers.layers.is_empty() {
-            for begun in begun.iter() {
-                begun.layers(shot, &octet.sampler(begun.at.index), layers);
+            for (i, begun) in begun.iter().enumerate() {
+                begun.layers(shot, &octet.sampler(begun.at.index), ledgers.get(i), layers);
             }
         }
         let channels = layers.numbers.len() / begun.len().max(1);
         for (i, begun) in begun.iter().enumerate() {
-            give(&begun.sample, &layers.numbers[i * channels..(i + 1) * channels]);
+            let covered = shot.plan.layers.mattes.then(|| {
+                let sampler = octet.sampler(begun.at.index);
+                layers::covered(shot.scene, shot.plan, &begun.ray, |crossing| {
+                    sampler.set(Set::Extra(crossing << 16))[2]
+                })
+            });
+            give(&begun.sample, &layers.numbers[i * channels..(i + 1) * channels], covered.flatten());
         }
     }
 }
@@ -351,11 +379,14 @@ fn follow_together(begun: &mut [Begun], shot: &Shot, settings: &PathSettings, oc
 
 /// Depth fog over what the camera sees.
 fn fogged(scene: &Scene, plan: &EffectPlan, light: Incoming, nm: Lanes) -> Lanes {
-    match &scene.fog {
-        Some(fog) if plan.depth_fog => {
-            let amount = fog.falloff.amount(light.depth) as f32;
-            light.radiance * (1.0 - amount) + fog.colour.eval(nm) * amount
-        }
-        _ => light.radiance,
+    match veil(scene, plan, light.depth) {
+        Some((amount, colour)) => light.radiance * (1.0 - amount) + colour.eval(nm) * amount,
+        None => light.radiance,
     }
+}
+
+/// How much depth fog hides at `depth`, and its light.
+fn veil<'a>(scene: &'a Scene, plan: &EffectPlan, depth: f64) -> Option<(f32, &'a Spectrum)> {
+    let fog = scene.fog.as_ref().filter(|_| plan.depth_fog)?;
+    Some((fog.falloff.amount(depth) as f32, &fog.colour))
 }

@@ -19,6 +19,7 @@ use super::Incoming;
 use super::merge::PhotonMap;
 use super::plan::{EffectPlan, PathSettings};
 use super::shadow::MAX_BOUNDARIES;
+use super::ways::{First, Found, Ledger};
 use crate::math::Frame;
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
@@ -42,8 +43,9 @@ pub(super) const FOR_SURE: u32 = 256;
 /// trapped between perfect mirrors costs some thousand vertices, not for ever.
 pub(super) const SURVIVAL: f64 = 0.999;
 
-/// Light that arrives along a camera ray.
+/// Light that arrives along a camera ray, entered in a `ledger` if there is one.
 #[must_use]
+#[expect(clippy::too_many_arguments, reason = "all that a path is made of")]
 pub fn radiance(
     scene: &Scene,
     plan: &EffectPlan,
@@ -52,8 +54,9 @@ pub fn radiance(
     wavelengths: &SampledWavelengths,
     ray: &Ray,
     photons: Option<&PhotonMap>,
+    ledger: Option<&Ledger>,
 ) -> Incoming {
-    let tracer = Tracer { scene, plan, settings, sampler: *sampler, nm: wavelengths.nm, photons };
+    let tracer = Tracer { scene, plan, settings, sampler: *sampler, nm: wavelengths.nm, photons, ledger };
     // The plan chooses the kernel: what a scene lacks is not in the code that runs.
     match (plan.chromatic, plan.media || plan.nested) {
         (false, false) => tracer.trace::<false, false>(ray),
@@ -70,6 +73,8 @@ struct Tracer<'a> {
     sampler: Sampler<'a>,
     nm: Lanes,
     photons: Option<&'a PhotonMap>,
+    /// Where light is parted by the way it came.
+    ledger: Option<&'a Ledger>,
 }
 
 impl Tracer<'_> {
@@ -215,11 +220,7 @@ impl Tracer<'_> {
                     power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho)
                 }
             };
-            if self.leaves(path, light) {
-                path.leave_out::<CHROMATIC>(emitted, weight);
-            } else {
-                path.add::<CHROMATIC>(emitted, weight);
-            }
+            self.meet_light::<CHROMATIC>(path, light, emitted, weight);
         }
 
         // What goes straight on has no vertex there: a lamp behind is also found from the vertex before.
@@ -328,6 +329,10 @@ impl Tracer<'_> {
                 u_light,
                 || at.choice.draw(0),
                 |wi| at.eval(bsdf, wo, wi),
+                |wi| match wi.dot(surface.normal) * toward > 0.0 {
+                    true => First::Transmitted,
+                    false => First::Reflected(bsdf.diffuse_share(wo, frame.to_local(wi))),
+                },
                 // Light from the other side comes through what is there.
                 |wi| match MEDIA && wi.dot(surface.normal) * toward > 0.0 {
                     true => scene.beyond(object, surface, wi, inside),
@@ -344,8 +349,16 @@ impl Tracer<'_> {
             && !bsdf.is_discrete()
             && !path.sharp
         {
-            let light = path.beta * self.merge::<CHROMATIC>(map, path, surface, |wi| at.eval(bsdf, wo, wi).0);
-            path.radiance += path.alone.map_or(light, |lane| Lanes::splat(light.to_array()[lane]));
+            let of_own = |light: Lanes| path.alone.map_or(light, |lane| Lanes::splat(light.to_array()[lane]));
+            let scatter = |wi| at.eval(bsdf, wo, wi).0;
+            let light = of_own(path.beta * self.merge::<CHROMATIC>(map, path, surface, None, scatter));
+            path.radiance += light;
+            if let Some(ledger) = self.ledger {
+                for group in 0..scene.light_groups.count() {
+                    let light = of_own(path.beta * self.merge::<CHROMATIC>(map, path, surface, Some(group), scatter));
+                    ledger.caustic(Found { light, group, alone: path.alone });
+                }
+            }
         }
 
         // Of wavelengths that parted one goes on from where all have been seen.
@@ -370,17 +383,24 @@ impl Tracer<'_> {
             return self.part::<MEDIA>(path, glass, wo, u_lobe(), at);
         }
         match bsdf.sample_by(wo, u_lobe, u_direction) {
-            Some(sample) => self.leave::<CHROMATIC, MEDIA>(path, &sample, at),
+            Some(sample) => {
+                let share = || match sample.chosen {
+                    Chosen::Discrete => Lanes::ZERO,
+                    Chosen::Density(_) => bsdf.diffuse_share(wo, sample.wi),
+                };
+                self.leave::<CHROMATIC, MEDIA>(path, &sample, share, at)
+            }
             None => false,
         }
     }
 
-    /// Sends the path on from a surface; false where it ends.
+    /// Sends the path on from a surface; false where it ends. `diffuse` is the share of f that is diffuse.
     #[inline(always)]
     fn leave<const CHROMATIC: bool, const MEDIA: bool>(
         &self,
         path: &mut Path,
         sample: &BsdfSample,
+        diffuse: impl FnOnce() -> Lanes,
         at: &Leaving,
     ) -> bool {
         let Leaving { hit, surface, object, .. } = *at;
@@ -399,6 +419,10 @@ impl Tracer<'_> {
             }),
             Chosen::Density(_) | Chosen::Discrete => None,
         };
+        if let Some(ledger) = self.ledger {
+            let first = || if sample.transmitted { First::Transmitted } else { First::Reflected(diffuse()) };
+            ledger.leave(path.vertices, first, sample.chosen == Chosen::Discrete);
+        }
         path.mirrored |= path.sharp && path.vertices == 0;
         if path.specular && !path.sharp && sample.chosen != Chosen::Discrete {
             path.specular = false;
@@ -423,7 +447,7 @@ impl Tracer<'_> {
         self.survives::<CHROMATIC>(path, || at.choice.draw(2))
     }
 
-    /// Light of the photons around a vertex behind mirrors and glass. A lane could lead both parts of the joined path
+    /// Light of the photons around a vertex behind mirrors and glass, of lamps of one group or all. A lane could lead both parts of the joined path
     /// with the product of its densities.
     #[inline(never)]
     fn merge<const CHROMATIC: bool>(
@@ -431,9 +455,13 @@ impl Tracer<'_> {
         map: &PhotonMap,
         path: &Path,
         surface: &SurfacePoint,
+        group: Option<u8>,
         f: impl Fn(DVec3) -> Lanes,
     ) -> Lanes {
         map.gather(surface.point, surface.normal, |photon| {
+            if group.is_some_and(|group| photon.group != group) {
+                return Lanes::ZERO;
+            }
             // The camera's segments and the light's.
             if self.settings.max_depth.is_some_and(|most| path.vertices + photon.vertices + 2 > most) {
                 return Lanes::ZERO;
@@ -510,6 +538,7 @@ impl Tracer<'_> {
                 u_light,
                 || choice[0],
                 eval,
+                |_| First::Media,
                 |_| inside,
                 |wi| Ray::new(point, wi),
                 None,
@@ -519,6 +548,9 @@ impl Tracer<'_> {
             return false;
         }
         let wi = medium.phase.sample(point, wo, u_direction);
+        if let Some(ledger) = self.ledger {
+            ledger.leave(path.vertices, || First::Media, false);
+        }
         path.previous = next_event.then(|| Previous {
             point,
             normal: None,

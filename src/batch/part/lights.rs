@@ -2,11 +2,8 @@
 
 use super::{Breaks, Part};
 use crate::batch::frame::{FrameJob, light_unit, lock};
-use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES};
-use crate::film::filter::FilterSampler;
-use crate::scene::Scene;
-use crate::spectrum::{LANES, SampledWavelengths};
+use crate::spectrum::SampledWavelengths;
 use crate::transport;
 use crate::transport::light::{Bounds, LightPaths, Splat};
 use crate::transport::merge::{self, Photon, PhotonMap, WavelengthCell};
@@ -19,7 +16,7 @@ use std::sync::Mutex;
 /// Light that came from the lights to the camera.
 #[derive(Debug)]
 pub struct SplatFilm {
-    /// The sums, and of the bands of the spectrum.
+    /// The sums, and those of the layers that they add to.
     pub film: Film,
     /// Paths that began in each replicate.
     pub paths: [u64; REPLICATES],
@@ -55,7 +52,6 @@ impl Part<'_> {
         pause: &dyn Breaks,
         photons: Option<&mut Vec<Photon>>,
     ) -> bool {
-        let FrameJob { scene, filter, window, .. } = *self.job;
         let paths = paths_of_a_sample(self.job, light_paths);
         let wanted = photons.is_some();
         let own = self.own_paths();
@@ -82,7 +78,7 @@ impl Part<'_> {
                 let photons = wanted.then_some(&mut left);
                 transport::light::trace(light_paths, replicate, base + j, photons, &mut |wavelengths, splat| {
                     if add {
-                        landed.add(scene, filter, window, wavelengths, &splat);
+                        landed.add(self.job, wavelengths, &splat);
                     }
                 });
             }
@@ -178,17 +174,15 @@ pub(super) fn paths_of_a_sample(job: &FrameJob, light_paths: &LightPaths) -> u64
 #[derive(Default)]
 struct Landed {
     pixels: Vec<([i32; 2], [f32; 3])>,
-    /// The bands of each.
-    bands: Vec<f32>,
+    /// The numbers of the layers of each.
+    numbers: Vec<f32>,
     invalid: InvalidCounts,
 }
 
 impl Landed {
     fn add(
         &mut self,
-        scene: &Scene,
-        filter: &FilterSampler,
-        window: Window,
+        FrameJob { scene, plan, filter, window, .. }: &FrameJob,
         wavelengths: &SampledWavelengths,
         splat: &Splat,
     ) {
@@ -197,14 +191,14 @@ impl Landed {
             return;
         }
         let unit = light_unit(scene);
-        let xyz = splat.xyz(wavelengths).map(|x| x * unit);
+        let light = splat.xyz(wavelengths);
+        let xyz = light.map(|x| x * unit);
+        let mut numbers = Vec::new();
+        plan.layers.append_traced(scene, wavelengths, splat.light, light, splat.group, &mut numbers);
         filter.deal(splat.place, |pixel, share| {
             if window.index(pixel).is_some() {
                 self.pixels.push((pixel, xyz.map(|x| x * share)));
-                for band in &scene.bands {
-                    let counted = splat.light * wavelengths.inv_pdf * band.response.eval(wavelengths.nm);
-                    self.bands.push(counted.reduce_add() / LANES as f32 * share);
-                }
+                self.numbers.extend(numbers.iter().map(|x| x * share));
             }
         });
     }
@@ -217,7 +211,7 @@ impl Landed {
         for (i, &(pixel, xyz)) in self.pixels.iter().enumerate() {
             splats.film.add(pixel, replicate as usize, xyz, 0.0);
             if let (Some(index), true) = (window.index(pixel), channels > 0) {
-                splats.film.layers.add(index, 1.0, &self.bands[i * channels..(i + 1) * channels]);
+                splats.film.layers.add(index, 1.0, &self.numbers[i * channels..(i + 1) * channels]);
             }
         }
     }

@@ -19,7 +19,7 @@
 mod noise;
 
 use crate::film::Window;
-use crate::film::exr::{ChannelData, Compression, ExrFile, ExrImage, ExrPart};
+use crate::film::exr::{ChannelData, Compression, ExrFile, ExrImage, ExrPart, Layout};
 use noise::Pair;
 use std::fmt::Write as _;
 
@@ -414,6 +414,8 @@ pub fn difference_map(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Res
     // The reader's windows may start anywhere; a frame here starts at the origin and holds at least the window's end.
     let end = |start: i32, size: u32| u32::try_from(i64::from(start) + i64::from(size)).unwrap_or(size).max(1);
     Ok(ExrImage {
+        data: std::collections::BTreeSet::new(),
+        layout: Layout::Single,
         frame: [end(a.display.x, a.display.width), end(a.display.y, a.display.height)],
         window: a.parts[0].window,
         channels,

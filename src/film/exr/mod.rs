@@ -17,13 +17,15 @@ mod write;
 pub use read::{ExrFile, ExrPart, read_exr};
 pub use write::{encode_exr, write_exr};
 
+use crate::error::Result;
 use crate::film::Window;
 use crate::film::resolve::Image;
 use half::f16;
+use std::collections::BTreeSet;
+use std::path::Path;
 
-/// How pixels are packed; all lossless.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
+/// How pixels are packed; without loss but for DWA.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Compression {
     /// Not at all.
     None,
@@ -34,6 +36,20 @@ pub enum Compression {
     Zip,
     /// Wavelets and Huffman codes of 32 rows: good for noise.
     Piz,
+    /// Cosines of 32 rows, which lose up to so much; light only.
+    Dwaa(f32),
+    /// The same of 256 rows.
+    Dwab(f32),
+}
+
+/// How channels lie in a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Layout {
+    /// In one part.
+    #[default]
+    Single,
+    /// Each layer in one of its own, named like it, the picture itself in `rgba`.
+    Multipart,
 }
 
 /// The samples of a channel, in raster order of the data window.
@@ -89,11 +105,13 @@ pub enum Attribute {
     Rational(i32, u32),
     /// `v2f`.
     Vec2([f32; 2]),
+    /// `timecode`: hours, minutes, seconds, frames; no frames are dropped.
+    TimeCode([u32; 4]),
     /// `m44f`, row by row for row vectors (v·M), as Imath holds it: `(matrix for column vectors).to_cols_array()`.
     Matrix4([f32; 16]),
 }
 
-/// A picture to be written: one part, scan lines.
+/// A picture to be written, in scan lines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExrImage {
     /// Width and height of the frame: the display window.
@@ -106,11 +124,21 @@ pub struct ExrImage {
     pub colour: Option<ColourEncoding>,
     /// Further attributes by name: `owner`, `comments`, `software`, `capDate`, `worldToCamera`, `worldToNDC`, … and one's own.
     pub attributes: Vec<(String, Attribute)>,
+    /// Channels that hold other things than light, by name: they are never packed with loss.
+    pub data: BTreeSet<String>,
     /// How pixels are packed.
     pub compression: Compression,
+    /// How channels lie in the file.
+    pub layout: Layout,
 }
 
 impl ExrImage {
+    /// Adds a channel of data.
+    pub fn push_data(&mut self, name: String, samples: ChannelData) {
+        self.data.insert(name.clone());
+        self.channels.push((name, samples));
+    }
+
     /// [`content_hash`] of the channels.
     #[must_use]
     pub fn content_hash(&self) -> String {
@@ -207,6 +235,41 @@ pub struct LayerPlane {
     pub light: bool,
 }
 
+/// What packing with loss changed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Loss {
+    /// Root of the mean of squared changes.
+    pub root_mean_square: f64,
+    /// The largest change.
+    pub most: f64,
+    /// Mean of the values' sizes.
+    pub mean: f64,
+}
+
+/// What the file at `path` lost of the light of `image`.
+///
+/// # Errors
+/// As [`read_exr`].
+pub fn loss(path: &Path, image: &ExrImage) -> Result<Loss> {
+    let file = read_exr(path)?;
+    let (mut count, mut squares, mut most, mut sizes) = (0u64, 0.0, 0.0f64, 0.0);
+    for (name, data) in image.channels.iter().filter(|(name, _)| !image.data.contains(name)) {
+        let Some(found) = file.parts.iter().find_map(|part| part.channel(name)) else { continue };
+        let written: Vec<f32> = match data {
+            ChannelData::F16(samples) => samples.iter().map(|x| x.to_f32()).collect(),
+            ChannelData::F32(samples) => samples.clone(),
+            ChannelData::U32(_) => continue,
+        };
+        for (a, b) in written.iter().zip(found).filter(|(a, b)| a.is_finite() && b.is_finite()) {
+            let change = f64::from(a - b).abs();
+            (count, squares, most) = (count + 1, squares + change * change, most.max(change));
+            sizes += f64::from(a.abs());
+        }
+    }
+    let n = count.max(1) as f64;
+    Ok(Loss { root_mean_square: (squares / n).sqrt(), most, mean: sizes / n })
+}
+
 /// Whether a beauty file says how noisy it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StandardError {
@@ -260,13 +323,21 @@ pub fn beauty(
     if base.has_alpha() {
         channels.push(("A".to_string(), data(&image.alpha)));
     }
+    let mut data_channels = BTreeSet::new();
     if error == StandardError::Write {
         for &(name, i) in base.colours() {
-            channels.push((format!("stderr.{name}"), ChannelData::F32(image.standard_error[i].clone())));
+            let name = format!("stderr.{name}");
+            data_channels.insert(name.clone());
+            channels.push((name, ChannelData::F32(image.standard_error[i].clone())));
         }
     }
     for layer in layers {
-        let samples = if layer.light { data(&layer.plane) } else { ChannelData::F32(layer.plane) };
+        let samples = if layer.light {
+            data(&layer.plane)
+        } else {
+            data_channels.insert(layer.name.clone());
+            ChannelData::F32(layer.plane)
+        };
         channels.push((layer.name, samples));
     }
     let exr = ExrImage {
@@ -275,7 +346,9 @@ pub fn beauty(
         channels,
         colour: (base != Base::Nothing).then_some(colour),
         attributes: Vec::new(),
+        data: data_channels,
         compression,
+        layout: Layout::Single,
     };
     Beauty { exr, note }
 }

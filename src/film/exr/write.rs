@@ -1,9 +1,9 @@
 //! Writes the header; the `exr` crate packs the rows.
 
-use super::{Attribute, ChannelData, ColourEncoding, Compression, ExrImage};
+use super::{Attribute, ChannelData, ColourEncoding, Compression, ExrImage, Layout};
 use crate::error::{Error, Result};
-use crate::film::Window;
 use crate::film::output::write_atomically;
+use crate::film::{Window, cryptomatte};
 use ::exr::block::{BlockIndex, UncompressedBlock, enumerate_ordered_header_block_indices};
 use ::exr::math::Vec2;
 use ::exr::meta::BlockDescription;
@@ -34,21 +34,103 @@ pub fn write_exr(path: &Path, image: &ExrImage) -> Result<()> {
 /// # Errors
 /// What in the picture cannot be written.
 pub fn encode_exr(image: &ExrImage) -> std::result::Result<Vec<u8>, String> {
-    let channels = sorted_channels(image)?;
-    let header = compressor_header(image, &channels);
+    let parts = parts_of(image, sorted_channels(image)?);
+    let several = image.layout == Layout::Multipart;
+    let chunks = parts.iter().map(|part| chunks_of(image, part)).collect::<std::result::Result<Vec<_>, String>>()?;
+
+    let mut file = vec![0x76, 0x2f, 0x31, 0x01];
+    file.extend_from_slice(&[0; 4]);
+    let mut long = false;
+    for (part, chunks) in parts.iter().zip(&chunks) {
+        let (bytes, long_names) = header_bytes(image, part, several.then_some(chunks.len()))?;
+        long |= long_names;
+        file.extend_from_slice(&bytes);
+    }
+    // Version 2, names of more than 31 bytes, several parts.
+    let version = 2u32 | u32::from(long) << 10 | u32::from(several) << 12;
+    file[4..8].copy_from_slice(&version.to_le_bytes());
+    if several {
+        // An empty header ends the list.
+        file.push(0);
+    }
+    let own = if several { 4 } else { 0 };
+    let all = chunks.iter().flatten();
+    let mut place = (file.len() + 8 * all.clone().count()) as u64;
+    for chunk in all {
+        file.extend_from_slice(&place.to_le_bytes());
+        place += (chunk.len() + own) as u64;
+    }
+    for (number, chunks) in chunks.iter().enumerate() {
+        for chunk in chunks {
+            if several {
+                file.extend_from_slice(&(number as i32).to_le_bytes());
+            }
+            file.extend_from_slice(chunk);
+        }
+    }
+    Ok(file)
+}
+
+/// A part of a file.
+struct Part<'a> {
+    /// Where there are several.
+    name: Option<String>,
+    channels: Vec<Channel<'a>>,
+    /// Whether it holds light.
+    light: bool,
+    /// Whether it is the one with the attributes of the picture.
+    first: bool,
+}
+
+/// The parts of `image`: all `channels` together, or one part for each layer, that of the picture itself first.
+fn parts_of<'a>(image: &ExrImage, channels: Vec<Channel<'a>>) -> Vec<Part<'a>> {
+    let is_light = |name: &str| image.colour.is_some() && !image.data.contains(name);
+    if image.layout == Layout::Single {
+        let light = channels.iter().any(|(name, _)| is_light(name));
+        return vec![Part { name: None, channels, light, first: true }];
+    }
+    let layer_of = |name: &str| match name.rsplit_once('.') {
+        // The channels of one Cryptomatte are numbered.
+        Some((layer, _)) if cryptomatte::is_layer(layer) => {
+            layer.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned()
+        }
+        Some((layer, _)) => layer.to_owned(),
+        None if is_light(name) => "rgba".to_owned(),
+        None => name.to_owned(),
+    };
+    let mut parts: Vec<Part> = Vec::new();
+    for channel in channels {
+        let (name, light) = (layer_of(channel.0), is_light(channel.0));
+        match parts.iter_mut().find(|part| part.name.as_ref() == Some(&name)) {
+            Some(part) => part.channels.push(channel),
+            None => parts.push(Part { name: Some(name), channels: vec![channel], light, first: false }),
+        }
+    }
+    parts.sort_by_key(|part| part.name.as_deref() != Some("rgba"));
+    if let Some(part) = parts.first_mut() {
+        part.first = true;
+    }
+    parts
+}
+
+/// The packed rows of a part, in their order.
+fn chunks_of(image: &ExrImage, part: &Part) -> std::result::Result<Vec<Vec<u8>>, String> {
+    let channels = &part.channels;
+    let compression = part_compression(image, part);
+    let header = compressor_header(image, channels, compression);
     let headers = [header];
     let blocks: Vec<(usize, BlockIndex)> = enumerate_ordered_header_block_indices(&headers).collect();
-    let deflated = match image.compression {
+    let deflated = match compression {
         Compression::Zips => Some(1),
         Compression::Zip => Some(16),
-        Compression::None | Compression::Piz => None,
+        Compression::None | Compression::Piz | Compression::Dwaa(_) | Compression::Dwab(_) => None,
     };
-    let packed = blocks
+    blocks
         .par_iter()
         .map(|&(_, index)| {
             if let Some(rows) = deflated {
                 let first = index.pixel_position.y();
-                return Ok(deflated_chunk(&image.window, &channels, first..first + rows));
+                return Ok(deflated_chunk(&image.window, channels, first..first + rows));
             }
             let block = UncompressedBlock::from_lines(&headers[0].channels, index, |line| {
                 let place = line.location;
@@ -67,18 +149,16 @@ pub fn encode_exr(image: &ExrImage) -> std::result::Result<Vec<u8>, String> {
             Ok(bytes)
         })
         .collect::<::exr::error::Result<Vec<Vec<u8>>>>()
-        .map_err(|e| format!("packing the pixels failed: {e}"))?;
+        .map_err(|e| format!("packing the pixels failed: {e}"))
+}
 
-    let mut file = header_bytes(image, &channels)?;
-    let mut place = (file.len() + 8 * packed.len()) as u64;
-    for chunk in &packed {
-        file.extend_from_slice(&place.to_le_bytes());
-        place += chunk.len() as u64;
+/// How a part is packed: data without loss.
+fn part_compression(image: &ExrImage, part: &Part) -> Compression {
+    let data = part.channels.iter().any(|(name, _)| image.data.contains(*name)) || !part.light;
+    match image.compression {
+        Compression::Dwaa(_) | Compression::Dwab(_) if data => Compression::Zips,
+        compression => compression,
     }
-    for chunk in &packed {
-        file.extend_from_slice(chunk);
-    }
-    Ok(file)
 }
 
 /// A chunk of up to 16 rows, counted from the window's first, packed as ZIP and ZIPS have it.
@@ -166,7 +246,7 @@ pub(super) fn check_name(what: &str, name: &str) -> std::result::Result<(), Stri
 }
 
 /// What the packer has to know. This header is not the one that is written.
-fn compressor_header(image: &ExrImage, channels: &[Channel]) -> Header {
+fn compressor_header(image: &ExrImage, channels: &[Channel], compression: Compression) -> Header {
     let list: SmallVec<[ChannelDescription; 5]> = channels
         .iter()
         .map(|(name, data)| {
@@ -178,11 +258,13 @@ fn compressor_header(image: &ExrImage, channels: &[Channel]) -> Header {
             ChannelDescription::new(Text::from_slice_unchecked(name.as_bytes()), kind, false)
         })
         .collect();
-    let compression = match image.compression {
+    let compression = match compression {
         Compression::None => ::exr::compression::Compression::Uncompressed,
         Compression::Zips => ::exr::compression::Compression::ZIP1,
         Compression::Zip => ::exr::compression::Compression::ZIP16,
         Compression::Piz => ::exr::compression::Compression::PIZ,
+        Compression::Dwaa(level) => ::exr::compression::Compression::DWAA(Some(level)),
+        Compression::Dwab(level) => ::exr::compression::Compression::DWAB(Some(level)),
     };
     let size = Vec2(image.window.width as usize, image.window.height as usize);
     let frame = Vec2(image.frame[0] as usize, image.frame[1] as usize);
@@ -192,9 +274,10 @@ fn compressor_header(image: &ExrImage, channels: &[Channel]) -> Header {
         .with_encoding(compression, BlockDescription::ScanLines, LineOrder::Increasing)
 }
 
-/// Magic number, version, and attributes sorted by name.
-fn header_bytes(image: &ExrImage, channels: &[Channel]) -> std::result::Result<Vec<u8>, String> {
-    let channels: Vec<(&str, i32)> = channels
+/// The attributes of a part, sorted by name, and whether a name is long; `chunks` of one among several.
+fn header_bytes(image: &ExrImage, part: &Part, chunks: Option<usize>) -> std::result::Result<(Vec<u8>, bool), String> {
+    let channels: Vec<(&str, i32)> = part
+        .channels
         .iter()
         .map(|(name, data)| match data {
             ChannelData::U32(_) => (*name, UINT),
@@ -202,11 +285,28 @@ fn header_bytes(image: &ExrImage, channels: &[Channel]) -> std::result::Result<V
             ChannelData::F32(_) => (*name, 2),
         })
         .collect();
-    let compression = compression_code(image.compression);
-    header(image.frame, image.window, &channels, compression, image.colour.as_ref(), &image.attributes)
+    let compression = part_compression(image, part);
+    let colour = image.colour.as_ref().filter(|_| part.light);
+    let mut structure = Vec::new();
+    if let (Some(name), Some(chunks)) = (&part.name, chunks) {
+        check_name("part", name)?;
+        structure.push(("name", "string", name.as_bytes().to_vec()));
+        structure.push(("type", "string", b"scanlineimage".to_vec()));
+        structure.push(("chunkCount", "int", (chunks as i32).to_le_bytes().to_vec()));
+    }
+    if let Compression::Dwaa(level) | Compression::Dwab(level) = compression {
+        structure.push(("dwaCompressionLevel", "float", level.to_le_bytes().to_vec()));
+    }
+    // A manifest stands beside its channels, all else in the first part.
+    let here = |name: &str| match (name.strip_prefix(cryptomatte::PREFIX), &part.name) {
+        (None, _) | (_, None) => part.first,
+        (Some(rest), Some(layer)) => rest.starts_with(&cryptomatte::key(layer)),
+    };
+    let further: Vec<&(String, Attribute)> = image.attributes.iter().filter(|(name, _)| here(name)).collect();
+    header(image.frame, image.window, &channels, compression_code(compression), colour, structure, &further)
 }
 
-/// The header of a file of whole numbers in `channels`, whose names are sorted.
+/// The beginning of a file of whole numbers in `channels`, whose names are sorted: magic number, version and header.
 pub(super) fn header_of(
     frame: [u32; 2],
     window: Window,
@@ -215,7 +315,12 @@ pub(super) fn header_of(
     attributes: &[(String, Attribute)],
 ) -> std::result::Result<Vec<u8>, String> {
     let channels: Vec<(&str, i32)> = channels.iter().map(|name| (*name, UINT)).collect();
-    header(frame, window, &channels, compression, None, attributes)
+    let attributes: Vec<&(String, Attribute)> = attributes.iter().collect();
+    let (header, long) = header(frame, window, &channels, compression, None, Vec::new(), &attributes)?;
+    let mut out = vec![0x76, 0x2f, 0x31, 0x01];
+    out.extend_from_slice(&(2u32 | u32::from(long) << 10).to_le_bytes());
+    out.extend_from_slice(&header);
+    Ok(out)
 }
 
 /// The type of whole numbers.
@@ -227,8 +332,9 @@ fn header(
     channels: &[(&str, i32)],
     compression: u8,
     colour: Option<&ColourEncoding>,
-    further: &[(String, Attribute)],
-) -> std::result::Result<Vec<u8>, String> {
+    structure: Vec<(&'static str, &'static str, Vec<u8>)>,
+    further: &[&(String, Attribute)],
+) -> std::result::Result<(Vec<u8>, bool), String> {
     // (name, type, value)
     let mut attributes: Vec<(&str, &str, Vec<u8>)> = vec![
         ("channels", "chlist", channel_list(channels)),
@@ -240,6 +346,7 @@ fn header(
         ("screenWindowCenter", "v2f", vec![0; 8]),
         ("screenWindowWidth", "float", 1f32.to_le_bytes().to_vec()),
     ];
+    attributes.extend(structure);
     match colour {
         Some(ColourEncoding { primaries, interop_id }) => {
             attributes.push((
@@ -267,8 +374,7 @@ fn header(
 
     let long = |name: &str| name.len() > 31;
     let long_names = attributes.iter().any(|a| long(a.0)) || channels.iter().any(|c| long(c.0));
-    let mut out = vec![0x76, 0x2f, 0x31, 0x01];
-    out.extend_from_slice(&(2u32 | u32::from(long_names) << 10).to_le_bytes());
+    let mut out = Vec::new();
     for (name, kind, value) in attributes {
         let size = i32::try_from(value.len()).map_err(|_| format!("the attribute `{name}` exceeds 2 GiB"))?;
         for text in [name, kind] {
@@ -279,7 +385,7 @@ fn header(
         out.extend_from_slice(&value);
     }
     out.push(0);
-    Ok(out)
+    Ok((out, long_names))
 }
 
 fn compression_code(compression: Compression) -> u8 {
@@ -288,6 +394,8 @@ fn compression_code(compression: Compression) -> u8 {
         Compression::Zips => 2,
         Compression::Zip => 3,
         Compression::Piz => 4,
+        Compression::Dwaa(_) => 8,
+        Compression::Dwab(_) => 9,
     }
 }
 
@@ -319,6 +427,11 @@ fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
     values.into_iter().flat_map(f32::to_le_bytes).collect()
 }
 
+/// A time code as SMPTE ST 12 packs it: decimal digits of frames, seconds, minutes and hours, a byte each.
+fn time_bits([hours, minutes, seconds, frames]: [u32; 4]) -> u32 {
+    [frames, seconds, minutes, hours].iter().rev().fold(0, |bits, n| bits << 8 | (n / 10) << 4 | (n % 10))
+}
+
 /// Type name and bytes of a value.
 fn attribute_bytes(value: &Attribute) -> (&'static str, Vec<u8>) {
     match value {
@@ -328,6 +441,7 @@ fn attribute_bytes(value: &Attribute) -> (&'static str, Vec<u8>) {
         Attribute::Double(v) => ("double", v.to_le_bytes().to_vec()),
         Attribute::Rational(n, d) => ("rational", [n.to_le_bytes(), d.to_le_bytes()].concat()),
         Attribute::Vec2(v) => ("v2f", floats(*v)),
+        Attribute::TimeCode(code) => ("timecode", [time_bits(*code).to_le_bytes(), [0; 4]].concat()),
         Attribute::Matrix4(m) => ("m44f", floats(*m)),
     }
 }

@@ -192,7 +192,22 @@ impl Principled {
         self.eval_by(wo, wi, &choice, &self.facet(&choice, m, wo.dot(m) * side, front), &self.facets())
     }
 
-    /// The same by the facet between the directions; neither lies in the surface.
+    /// The part of f that the diffuse lobe gives, of directions before the surface.
+    pub(crate) fn diffuse_part(&self, wo: DVec3, wi: DVec3) -> Lanes {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return Lanes::ZERO;
+        }
+        self.diffuse(wo, wi, wi.dot((wo + wi).normalize()))
+    }
+
+    /// The same, by the cosine at the facet between them.
+    #[inline]
+    fn diffuse(&self, wo: DVec3, wi: DVec3, cos_i: f64) -> Lanes {
+        let (roughness, flatness) = (f64::from(self.roughness), f64::from(self.flatness));
+        self.base * (self.matte() / PI * lobes::diffusion(roughness, flatness, wo.z, wi.z, cos_i)) as f32
+    }
+
+    /// f and densities by the facet between the directions; neither lies in the surface.
     #[inline]
     fn eval_by(&self, wo: DVec3, wi: DVec3, choice: &Choice, facet: &Facet, facets: &Microfacets) -> Evaluation {
         let Facet { m, split, .. } = *facet;
@@ -237,10 +252,8 @@ impl Principled {
                 f += Lanes::splat((0.25 * f64::from(self.clearcoat) * fresnel * density * masking) as f32);
                 pdf += choice.clearcoat * density * m.z / (4.0 * cos_i);
             }
-            let matte = self.matte();
-            if matte > 0.0 {
-                let (roughness, flatness) = (f64::from(self.roughness), f64::from(self.flatness));
-                f += self.base * (matte / PI * lobes::diffusion(roughness, flatness, wo.z, wi.z, cos_i)) as f32;
+            if self.matte() > 0.0 {
+                f += self.diffuse(wo, wi, cos_i);
             }
             if self.sheen > 0.0 {
                 let strength = (1.0 - self.metallic) * self.sheen * lobes::schlick_weight(cos_i.abs()) as f32;

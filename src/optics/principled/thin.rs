@@ -121,6 +121,22 @@ impl PrincipledThin {
         }
     }
 
+    /// The part of f that the diffuse lobe gives, of directions on one side.
+    pub(crate) fn diffuse_part(&self, wo: DVec3, wi: DVec3) -> Lanes {
+        let (wo, wi) = (wo * wo.z.signum(), wi * wo.z.signum());
+        let back = (1.0 - f64::from(self.transmission)) * (1.0 - self.crossing());
+        if wi.z <= 0.0 || wo.z <= 0.0 || back <= 0.0 {
+            return Lanes::ZERO;
+        }
+        self.diffuse(back, wo, wi, wo.dot((wo + wi).normalize()))
+    }
+
+    #[inline]
+    fn diffuse(&self, back: f64, wo: DVec3, wi: DVec3, cos_i: f64) -> Lanes {
+        let (roughness, flatness) = (f64::from(self.roughness), f64::from(self.flatness));
+        self.base * (back / PI * lobes::diffusion(roughness, flatness, wo.z, wi.z, cos_i)) as f32
+    }
+
     pub(crate) fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
         if wo.z == 0.0 || wi.z == 0.0 {
             return Evaluation::NONE;
@@ -157,9 +173,7 @@ impl PrincipledThin {
         if reflect {
             let back = matte * (1.0 - self.crossing());
             if back > 0.0 {
-                let (roughness, flatness) = (f64::from(self.roughness), f64::from(self.flatness));
-                let factor = lobes::diffusion(roughness, flatness, wo.z, wi.z, cos_i);
-                f += self.base * (back / PI * factor) as f32;
+                f += self.diffuse(back, wo, wi, cos_i);
                 if self.sheen > 0.0 {
                     let strength = self.sheen * (back * lobes::schlick_weight(cos_i)) as f32;
                     f += (Lanes::ONE + (self.hue - Lanes::ONE) * self.sheen_tint) * strength;

@@ -5,7 +5,7 @@ use super::super::light::{Light, Slide};
 use super::super::projector::Projector;
 use super::super::shape::Shape;
 use super::super::texture::Texture;
-use super::super::{Geometry, load};
+use super::super::{Geometry, LightGroups, load};
 use super::{Compiler, vec3};
 use crate::description as written;
 use crate::error::Result;
@@ -172,6 +172,13 @@ fn growth(v: written::Growth) -> f64 {
         written::Growth::Up => 1.0,
         written::Growth::Down => -1.0,
     }
+}
+
+/// The groups that the lights of these names are in.
+pub(super) fn groups(d: &written::SceneDescription, lights: &[String]) -> LightGroups {
+    let of =
+        |light: &String| d.light_groups.values().position(|names| names.contains(light)).map_or(0, |i| i as u8 + 1);
+    LightGroups { names: d.light_groups.keys().cloned().collect(), of: lights.iter().map(of).collect() }
 }
 
 /// Running sums of the probabilities with which lights are chosen: half by power, half evenly, so

@@ -281,7 +281,8 @@ impl Walk<'_, '_> {
         for lane in each(wanted) {
             let mut lanes = [0.0; LANES];
             lanes[lane] = light[lane];
-            let splat = Splat { place: places[lane], light: Lanes::new(lanes), alone: Some(lane) };
+            let (place, light, group) = (places[lane], Lanes::new(lanes), self.group);
+            let splat = Splat { place, light, alone: Some(lane), group };
             (self.splat)(self.wavelengths, splat);
         }
 

@@ -5,6 +5,7 @@ use crate::math::{Departure, Ray};
 use crate::scene::Inside;
 use crate::spectrum::Lanes;
 use crate::transport::shadow::Shadow;
+use crate::transport::ways::{First, Found};
 use glam::{DVec2, DVec3};
 
 /// The power heuristic for densities `a` and `b`, safe for any finite and infinite values.
@@ -35,6 +36,29 @@ impl Tracer<'_> {
         path.seen && path.sharp && self.plan.caustics.as_ref().is_some_and(|c| c.traced[light as usize])
     }
 
+    /// Adds light `l` of a lamp that the path has met, found with weight `w`, or leaves it out.
+    #[inline(always)]
+    pub(super) fn meet_light<const CHROMATIC: bool>(&self, path: &mut Path, light: u32, l: Lanes, w: f64) {
+        if self.leaves(path, light) {
+            path.leave_out::<CHROMATIC>(l, w);
+            return;
+        }
+        let share = path.share_of::<CHROMATIC>(l, w);
+        path.radiance += share;
+        if let Some(ledger) = self.ledger {
+            let found = self.found(path, share, light);
+            match path.vertices {
+                0 => ledger.emitted(found),
+                _ if !path.specular && (path.sharp || ledger.is_sharp()) => ledger.caustic(found),
+                times => ledger.scattered(found, times),
+            }
+        }
+    }
+
+    fn found(&self, path: &Path, share: Lanes, light: u32) -> Found {
+        Found { light: share, group: self.scene.light_groups.of[light as usize], alone: path.alone }
+    }
+
     /// Whether light that the path meets counts: always for the camera, else where scattering is a technique.
     pub(super) fn meets_lights(&self, path: &Path) -> bool {
         self.settings.scatter_samples > 0 || path.vertices == 0
@@ -55,16 +79,12 @@ impl Tracer<'_> {
                     (l, power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho))
                 }
             };
-            if self.leaves(path, i) {
-                path.leave_out::<CHROMATIC>(l, weight);
-            } else {
-                path.add::<CHROMATIC>(l, weight);
-            }
+            self.meet_light::<CHROMATIC>(path, i, l, weight);
         }
     }
 
     /// Next-event estimation: light from one point of one light, at a point with the normal of the side that is asked
-    /// for. `eval` tells f · |cos| and densities toward a direction.
+    /// for. `eval` tells f · |cos| and densities toward a direction, `first` what scatters light from there.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the state of a vertex, split by borrow")]
     pub(super) fn add_light<const CHROMATIC: bool, const MEDIA: bool>(
@@ -74,6 +94,7 @@ impl Tracer<'_> {
         u: DVec2,
         u_light: impl FnOnce() -> f64,
         eval: impl Fn(DVec3) -> (Lanes, Lanes),
+        first: impl Fn(DVec3) -> First,
         inside: impl Fn(DVec3) -> Inside,
         leave: impl FnOnce(DVec3) -> Ray,
         later: Option<&mut Option<Asked>>,
@@ -119,8 +140,17 @@ impl Tracer<'_> {
         let weight = weight(Some(passing));
         if traced {
             path.leave_out::<CHROMATIC>(value * through, weight);
-        } else {
-            path.add::<CHROMATIC>(value * through, weight);
+            return;
+        }
+        let share = path.share_of::<CHROMATIC>(value * through, weight);
+        path.radiance += share;
+        if let Some(ledger) = self.ledger {
+            let found = self.found(path, share, i as u32);
+            match path.vertices {
+                0 => ledger.scattered_by(first(light.wi), found, 1),
+                _ if !path.specular && path.sharp => ledger.caustic(found),
+                vertices => ledger.scattered(found, vertices + 1),
+            }
         }
     }
 }

@@ -24,7 +24,7 @@ impl Tracer<'_> {
         path.beta *= LANES as f32 / path.rho.reduce_add();
         path.rho = Lanes::ONE;
         if let Some(sample) = glass.reflects_all(wo, u_lobe) {
-            return self.leave::<true, MEDIA>(path, &sample, at);
+            return self.leave::<true, MEDIA>(path, &sample, || Lanes::ZERO, at);
         }
         let (nm, beta) = (self.nm.to_array(), path.beta.to_array());
         let (mut radiance, mut left) = (path.radiance.to_array(), path.left.to_array());
@@ -40,7 +40,7 @@ impl Tracer<'_> {
             };
             // One wavelength in all lanes: nothing depends on which of them leads.
             let tracer = Tracer { nm: Lanes::splat(nm[lane]), ..*self };
-            if tracer.leave::<false, MEDIA>(&mut alone, &sample, at) {
+            if tracer.leave::<false, MEDIA>(&mut alone, &sample, || Lanes::ZERO, at) {
                 tracer.follow::<false, MEDIA>(&mut alone, f64::INFINITY);
             }
             radiance[lane] += alone.radiance.to_array()[0];

@@ -177,11 +177,6 @@ impl Path {
         self.beta * l * share as f32
     }
 
-    /// Adds light `l` found with weight `w`.
-    pub(super) fn add<const CHROMATIC: bool>(&mut self, l: Lanes, w: f64) {
-        self.radiance += self.share_of::<CHROMATIC>(l, w);
-    }
-
     /// Notes light `l`, found with weight `w`, that paths from the lights add.
     #[cold]
     pub(super) fn leave_out<const CHROMATIC: bool>(&mut self, l: Lanes, w: f64) {

@@ -21,8 +21,9 @@ pub const MOST: usize = 8;
 pub fn possible(shot: &Shot, settings: &PathSettings) -> bool {
     let Shot { scene, plan, photons, .. } = shot;
     let one_way = !(plan.media || plan.nested || plan.packets);
+    let parted = plan.layers.parts_light();
     let plain = photons.is_none() && scene.watch.is_none() && settings.light_samples.max(settings.scatter_samples) == 1;
-    scene.few.is_some() && one_way && plain
+    scene.few.is_some() && one_way && plain && !parted
 }
 
 /// A sample whose light is wanted.
@@ -86,7 +87,7 @@ fn trace<'a, const CHROMATIC: bool>(
         for k in 0..going {
             let i = on[k];
             let Wanted { sampler, nm, .. } = wanted(i);
-            let tracer = Tracer { scene, plan, settings, sampler, nm, photons: None };
+            let tracer = Tracer { scene, plan, settings, sampler, nm, photons: None, ledger: None };
             let step = tracer.meet::<CHROMATIC, false>(&mut paths[i], &mut walks[i], hits[k], Some(&mut asked[i]));
             if asked[i].is_some() {
                 asking[questions] = i;

@@ -94,7 +94,7 @@ struct Export<'a> {
 
 /// Settings that are about the work and the files, not about the light: Mitsuba has other words for
 /// some, but the same ones mean other things.
-const SETTINGS: [&str; 4] = ["render", "output", "fog", "layers"];
+const SETTINGS: [&str; 6] = ["render", "output", "fog", "layers", "light_groups", "assets"];
 
 /// The path of a field.
 fn field(keys: &[&str]) -> String {

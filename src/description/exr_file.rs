@@ -1,0 +1,233 @@
+//! What an OpenEXR file is made of besides its channels, as it is written.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::fault::Checker;
+use super::layer::Layer;
+use super::path::At;
+use super::settings::{Channels, Colour, Compression, Output, Precision};
+
+/// How channels lie in a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FileLayout {
+    /// All in one part: what every reader knows.
+    #[default]
+    Single,
+    /// Each layer in a part of its own, which is read without the others.
+    Multipart,
+}
+
+/// The value of a header attribute of one's own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HeaderValue {
+    /// A number.
+    Number(f64),
+    /// Text.
+    Name(String),
+}
+
+/// Header attributes by name.
+pub type HeaderValues = BTreeMap<String, HeaderValue>;
+
+/// `spectral: {bands: 16, from_nm: 400, to_nm: 700}`: a further file of bands of the spectrum.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpectralFile {
+    /// How many, 1 to 512.
+    pub bands: u32,
+    /// Lower end of the first, nm; default 400.
+    #[serde(default = "from_nm")]
+    pub from_nm: f64,
+    /// Upper end of the last, nm; default 700.
+    #[serde(default = "to_nm")]
+    pub to_nm: f64,
+}
+
+fn from_nm() -> f64 {
+    400.0
+}
+
+fn to_nm() -> f64 {
+    700.0
+}
+
+/// What DWA compression is allowed to lose, by default and at most: 45 is what its makers call visually lossless.
+pub(crate) const DWA_LEVEL: f64 = 45.0;
+
+/// Names that the renderer itself writes, or that say how a file is built.
+const OWN: [&str; 21] = [
+    "channels",
+    "chromaticities",
+    "chunkCount",
+    "colorInteropID",
+    "compression",
+    "dataWindow",
+    "displayWindow",
+    "framesPerSecond",
+    "imageCounter",
+    "lineOrder",
+    "maxSamplesPerPixel",
+    "name",
+    "pixelAspectRatio",
+    "screenWindowCenter",
+    "screenWindowWidth",
+    "software",
+    "tiles",
+    "type",
+    "version",
+    "worldToCamera",
+    "worldToNDC",
+];
+
+/// Attributes whose value is a number.
+pub(crate) const NUMBERS: [&str; 9] = [
+    "altitude",
+    "expTime",
+    "isoSpeed",
+    "latitude",
+    "longitude",
+    "shutterAngle",
+    "tStop",
+    "utcOffset",
+    "whiteLuminance",
+];
+
+impl SpectralFile {
+    /// The ends of each band, nm.
+    #[must_use]
+    pub fn edges(&self) -> Vec<[f64; 2]> {
+        let at = |i: u32| self.from_nm + (self.to_nm - self.from_nm) * f64::from(i) / f64::from(self.bands);
+        (0..self.bands).map(|i| [at(i), at(i + 1)]).collect()
+    }
+}
+
+/// Hours, minutes, seconds and frames of `01:02:03:04`.
+#[must_use]
+pub fn time_code(text: &str) -> Option<[u32; 4]> {
+    let fields: Vec<u32> = text.split(':').map(|field| field.parse().ok()).collect::<Option<_>>()?;
+    let [hours, minutes, seconds, frames] = fields[..] else { return None };
+    (hours < 24 && minutes < 60 && seconds < 60 && frames < 60).then_some([hours, minutes, seconds, frames])
+}
+
+/// What a file with these layers may not have, beside what each field says of itself.
+pub(crate) fn check_layers(output: &Output, layers: &[Layer], checker: &mut Checker<'_>) {
+    let at = At::ROOT.key("output");
+    let exr = at.key("exr");
+    let lossy = matches!(output.exr.compression, Compression::Dwaa | Compression::Dwab);
+    if lossy && output.exr.layout == FileLayout::Single && layers.iter().any(Layer::is_data) {
+        let expected = "no loss in layers of data, found dwa; layout: multipart keeps them apart";
+        checker.fault(exr.key("compression"), format!("expected {expected}"));
+    }
+    if output.exr.aces_container {
+        checker.require(layers.is_empty(), exr.key("aces_container"), "no layers", format_args!("{}", layers.len()));
+    }
+    let xyz = matches!(output.exr.channels, Channels::Xyz | Channels::Xyza);
+    if xyz && layers.iter().any(|layer| layer.name == "Z") {
+        checker.fault(exr.key("channels"), "expected no channel Z of colour where Z is a layer, found xyz");
+    }
+}
+
+/// What a file may not have, beside what each field says of itself.
+pub(crate) fn check(output: &Output, at: At<'_>, checker: &mut Checker<'_>) {
+    let exr = &output.exr;
+    let file = at.key("exr");
+    let level = file.key("dwa_level");
+    checker.not_negative(level, exr.dwa_level);
+    let lossy = matches!(exr.compression, Compression::Dwaa | Compression::Dwab);
+    for (name, value) in &exr.attributes {
+        let attributes = file.key("attributes");
+        let at = attributes.key(name);
+        let own = OWN.contains(&name.as_str()) || name.starts_with("abbe/") || name.starts_with("cryptomatte/");
+        checker.require(!own, at, "a name that the renderer does not give itself", format_args!("{name:?}"));
+        checker.require((1..256).contains(&name.len()), at, "a name of 1 to 255 bytes", name.len());
+        let number = matches!(value, HeaderValue::Number(_));
+        match name.as_str() {
+            "timeCode" => {
+                let fits = matches!(value, HeaderValue::Name(text) if time_code(text).is_some());
+                checker.require(fits, at, "a time code, as \"01:02:03:04\"", "another value");
+            }
+            name if NUMBERS.contains(&name) => checker.require(number, at, "a number", "text"),
+            _ => {}
+        }
+    }
+    if exr.aces_container {
+        let holds = output.colour == Colour::Aces2065
+            && exr.precision == Precision::Half
+            && exr.compression == Compression::None
+            && exr.layout == FileLayout::Single
+            && matches!(exr.channels, Channels::Rgba | Channels::Rgb)
+            && !exr.stderr;
+        checker.require(
+            holds,
+            file.key("aces_container"),
+            "colour aces2065-1, precision half, compression none, channels rgb or rgba, one part and no stderr \
+             (SMPTE ST 2065-4)",
+            "others",
+        );
+    }
+    if lossy && exr.stderr && exr.layout == FileLayout::Single {
+        checker.fault(
+            file.key("compression"),
+            "expected no loss in stderr, found dwa; layout: multipart keeps data apart",
+        );
+    }
+    if let Some(spectral) = &output.spectral {
+        let at = at.key("spectral");
+        checker.whole_between(at.key("bands"), spectral.bands, 1, 512);
+        let inside = spectral.from_nm >= 360.0 && spectral.to_nm <= 830.0 && spectral.from_nm < spectral.to_nm;
+        let found = format_args!("{} to {}", spectral.from_nm, spectral.to_nm);
+        checker.require(inside, at.key("to_nm"), "a range within 360 to 830 nm", found);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{faults, scene};
+    use super::*;
+
+    #[test]
+    fn time_codes_have_four_fields() {
+        assert_eq!(time_code("01:02:03:04"), Some([1, 2, 3, 4]));
+        assert_eq!(["1:2:3", "25:00:00:00", "00:00:00:x", "00:60:00:00"].map(time_code), [None; 4]);
+    }
+
+    #[test]
+    fn bands_share_the_range_evenly() {
+        let file = scene("output: {spectral: {bands: 3}}").output.spectral.unwrap();
+        assert_eq!(file.edges(), [[400.0, 500.0], [500.0, 600.0], [600.0, 700.0]]);
+        assert_eq!(
+            faults("output: {spectral: {bands: 0, from_nm: 300}}"),
+            "dir/s.yaml:2:28: output.spectral.bands: expected a whole number from 1 to 512, found 0\n\
+             dir/s.yaml:2:20: output.spectral.to_nm: expected a range within 360 to 830 nm, found 300 to 700"
+                .split('\n')
+                .rev()
+                .collect::<Vec<_>>()
+                .join("\n")
+        );
+    }
+
+    #[test]
+    fn attributes_have_the_types_of_the_format() {
+        assert_eq!(
+            faults("output: {exr: {attributes: {compression: 3, timeCode: 7, expTime: long, shot: '010'}}}"),
+            "dir/s.yaml:2:42: output.exr.attributes.compression: expected a name that the renderer does not give itself, \
+             found \"compression\"\n\
+             dir/s.yaml:2:55: output.exr.attributes.timeCode: expected a time code, as \"01:02:03:04\", found another value\n\
+             dir/s.yaml:2:67: output.exr.attributes.expTime: expected a number, found text"
+        );
+    }
+
+    #[test]
+    fn an_aces_container_holds_nothing_else() {
+        let found = faults("output: {exr: {aces_container: true}}");
+        assert!(
+            found.starts_with("dir/s.yaml:2:32: output.exr.aces_container: expected colour aces2065-1,"),
+            "{found}"
+        );
+        scene("output: {colour: aces2065-1, exr: {aces_container: true, compression: none}}");
+    }
+}

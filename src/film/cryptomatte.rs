@@ -1,0 +1,164 @@
+//! Cryptomatte: mattes of everything in one set of channels, by the hash of its name.
+//!
+//! A layer has pairs of channels, `CryptoObject00.R` an id and `.G` its coverage, `.B` and `.A` the next; further pairs in
+//! `CryptoObject01` and so on, by falling coverage. An id is a name's 32-bit MurmurHash3 taken for the bits of a float, and
+//! the header has a manifest of names and ids. Source: Friedman and Jones, "Fully automatic ID mattes with support for
+//! motion blur and transparency", SIGGRAPH 2015; Psyop's Cryptomatte specification 1.2.0; Appleby's MurmurHash3_x86_32.
+
+use super::accumulate::{Film, PixelCells};
+use super::exr::{Attribute, ChannelData};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// One matte layer: what the numbers of the film's [`Mattes`](super::mattes::Mattes) are called in it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Matte {
+    /// Of the channels, without a number.
+    pub layer: String,
+    /// Whether the lower half of a number counts, what is seen of an object, and not the upper one, the object.
+    pub of_parts: bool,
+    /// By that half.
+    pub names: Vec<String>,
+}
+
+/// Pairs of id and coverage that every file has.
+const PAIRS: usize = 6;
+
+/// Channels by name, and attributes.
+pub type Written = (Vec<(String, ChannelData)>, Vec<(String, Attribute)>);
+
+impl Matte {
+    /// The channels and attributes of the layer over the window of `film`. There are as many pairs as some pixel needs, at
+    /// least six, so that coverage adds up to that of the samples.
+    #[must_use]
+    pub fn write(&self, film: &Film) -> Written {
+        let ids: Vec<f32> = self.names.iter().map(|name| id_of(name)).collect();
+        let pixel = |(i, cells): (usize, &PixelCells)| {
+            let samples: u64 = cells.iter().map(|cell| u64::from(cell.count) + u64::from(cell.dropped)).sum();
+            let mut counts: BTreeMap<u32, u64> = BTreeMap::new();
+            for &(number, count) in film.layers.mattes.of(i) {
+                let half = if self.of_parts { number as u32 } else { (number >> 32) as u32 };
+                let id = ids.get(half as usize).copied().unwrap_or_default();
+                *counts.entry(id.to_bits()).or_default() += u64::from(count);
+            }
+            let mut pairs: Vec<(u64, u32)> = counts.into_iter().map(|(id, count)| (count, id)).collect();
+            // Of equal coverage by rising id.
+            pairs.sort_by_key(|&(count, id)| (std::cmp::Reverse(count), id));
+            let pair = |(count, id): (u64, u32)| (f32::from_bits(id), count as f32 / samples.max(1) as f32);
+            pairs.into_iter().map(pair).collect::<Vec<(f32, f32)>>()
+        };
+        let pixels: Vec<Vec<(f32, f32)>> = film.cells().par_iter().enumerate().map(pixel).collect();
+        let pairs = pixels.iter().map(Vec::len).max().unwrap_or(0).max(PAIRS).next_multiple_of(2);
+        let mut channels = Vec::new();
+        for pair in 0..pairs {
+            let layer = format!("{}{:02}", self.layer, pair / 2);
+            let [id, coverage] = if pair % 2 == 0 { ["R", "G"] } else { ["B", "A"] };
+            let plane = |of: &dyn Fn(&(f32, f32)) -> f32| {
+                ChannelData::F32(pixels.iter().map(|pixel| pixel.get(pair).map_or(0.0, of)).collect())
+            };
+            channels.push((format!("{layer}.{id}"), plane(&|pair| pair.0)));
+            channels.push((format!("{layer}.{coverage}"), plane(&|pair| pair.1)));
+        }
+        (channels, self.attributes())
+    }
+
+    fn attributes(&self) -> Vec<(String, Attribute)> {
+        // Names are sorted, each once.
+        let manifest: BTreeMap<&str, String> =
+            self.names.iter().map(|name| (name.as_str(), format!("{:08x}", id_of(name).to_bits()))).collect();
+        // A map of texts always is JSON.
+        let manifest = serde_json::to_string(&manifest).unwrap_or_default();
+        let key = key(&self.layer);
+        let entry = |name: &str, value: &str| (format!("{PREFIX}{key}/{name}"), Attribute::Text(value.to_owned()));
+        vec![
+            entry("name", &self.layer),
+            entry("hash", "MurmurHash3_32"),
+            entry("conversion", "uint32_to_float32"),
+            entry("manifest", &manifest),
+        ]
+    }
+}
+
+/// How the names of all attributes begin.
+pub const PREFIX: &str = "cryptomatte/";
+
+/// Whether a channel group with this name is one of a layer of mattes that is written here.
+#[must_use]
+pub fn is_layer(name: &str) -> bool {
+    name.starts_with("Crypto")
+}
+
+/// What tells the attributes of one layer from those of another.
+#[must_use]
+pub fn key(layer: &str) -> String {
+    format!("{:08x}", id_of(layer).to_bits())[..7].to_owned()
+}
+
+/// The id of a name: its hash as the bits of a float that is neither subnormal nor infinite nor none.
+#[must_use]
+pub fn id_of(name: &str) -> f32 {
+    let hash = murmur3(name.as_bytes());
+    let exponent = hash >> 23 & 0xff;
+    f32::from_bits(if exponent == 0 || exponent == 255 { hash ^ 1 << 23 } else { hash })
+}
+
+/// MurmurHash3_x86_32 with seed 0.
+fn murmur3(bytes: &[u8]) -> u32 {
+    let scramble = |k: u32| k.wrapping_mul(0xcc9e_2d51).rotate_left(15).wrapping_mul(0x1b87_3593);
+    let (blocks, rest) = bytes.as_chunks::<4>();
+    let mut hash = 0u32;
+    for block in blocks {
+        hash ^= scramble(u32::from_le_bytes(*block));
+        hash = hash.rotate_left(13).wrapping_mul(5).wrapping_add(0xe654_6b64);
+    }
+    let mut last = [0; 4];
+    last[..rest.len()].copy_from_slice(rest);
+    hash ^= scramble(u32::from_le_bytes(last));
+    // The length counts modulo 2³².
+    hash ^= bytes.len() as u32;
+    hash = (hash ^ hash >> 16).wrapping_mul(0x85eb_ca6b);
+    hash = (hash ^ hash >> 13).wrapping_mul(0xc2b2_ae35);
+    hash ^ hash >> 16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Window;
+
+    /// The published values of MurmurHash3_x86_32 with seed 0, and the key of `CryptoObject` that other programs write.
+    #[test]
+    fn hashes_are_those_of_the_specification() {
+        assert_eq!(["", "test", "Hello, world!"].map(|text| murmur3(text.as_bytes())), [0, 0xba6b_d213, 0xc036_3e43]);
+        assert_eq!(&format!("{:08x}", id_of("CryptoObject").to_bits())[..7], "3ae39a5");
+        // The hash of nothing is 0, a subnormal number.
+        assert_eq!(id_of("").to_bits(), 1 << 23);
+    }
+
+    /// Of eight samples of a pixel three met the child 2 of the object 0, one the child 3, two the object 1, two nothing.
+    #[test]
+    fn ids_come_by_falling_coverage_and_parts_of_one_name_together() {
+        let mut film = Film::new([1, 1], Window::full(1, 1)).unwrap();
+        film.cells_mut()[0][0].count = 8;
+        for (number, count) in [(2, 3), (3, 1), (1 << 32 | 1, 2)] {
+            film.layers.mattes.add(0, 1, number, count);
+        }
+        let names = ["a", "b", "x", "y"].map(str::to_owned).to_vec();
+        let of = |matte: &Matte| -> Vec<f32> {
+            let (channels, _) = matte.write(&film);
+            let names: Vec<&str> = channels.iter().map(|(name, _)| name.as_str()).collect();
+            assert_eq!(names[..5], ["M00.R", "M00.G", "M00.B", "M00.A", "M01.R"]);
+            let value = |data: &ChannelData| match data {
+                ChannelData::F32(plane) => plane[0],
+                _ => f32::NAN,
+            };
+            channels.iter().map(|(_, data)| value(data)).collect()
+        };
+        let objects = of(&Matte { layer: "M".into(), of_parts: false, names: names.clone() });
+        assert_eq!(objects[..6], [id_of("a"), 0.5, id_of("b"), 0.25, 0.0, 0.0]);
+        let parts = of(&Matte { layer: "M".into(), of_parts: true, names });
+        assert_eq!(parts[..6], [id_of("x"), 0.375, id_of("b"), 0.25, id_of("y"), 0.125]);
+    }
+}
