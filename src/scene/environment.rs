@@ -5,6 +5,7 @@
 
 mod table;
 
+use super::bands::{self, Bands};
 use super::texture::Texel;
 use crate::math::elementary::atan2;
 use crate::math::trig::sin_cos_turn;
@@ -38,6 +39,8 @@ pub struct Environment {
     illuminant: Spectrum,
     mean_luminance: f64,
     table: Table,
+    /// Measured spectra in place of the texels' own, which then say how bright they are.
+    bands: Option<Bands>,
 }
 
 /// The density of directions over the unit square (longitude, colatitude).
@@ -78,6 +81,8 @@ struct Place {
 /// Four texels around a direction and how far it is beyond the first, in columns and rows.
 struct Corners<'a> {
     texels: [&'a Texel; 4],
+    /// Their numbers.
+    numbers: [usize; 4],
     /// Row of the first texel.
     row: usize,
     x: f64,
@@ -86,7 +91,10 @@ struct Corners<'a> {
 
 impl Corners<'_> {
     fn mix(&self, f: impl Fn(&Texel) -> Lanes) -> Lanes {
-        let [a, b, c, d] = self.texels.map(f);
+        self.between(self.texels.map(f))
+    }
+
+    fn between(&self, [a, b, c, d]: [Lanes; 4]) -> Lanes {
         let (x, y) = (Lanes::splat(self.x as f32), Lanes::splat(self.y as f32));
         let row = |l: Lanes, r: Lanes| (r - l).mul_add(x, l);
         let (upper, lower) = (row(a, b), row(c, d));
@@ -134,7 +142,27 @@ impl Environment {
             weight += sin * width as f64;
         }
         let mean_luminance = if weight > 0.0 { sum / weight * illuminant.luminance() } else { 0.0 };
-        Environment { texels, width, height, mapping, world_from_map, illuminant, mean_luminance, table }
+        Environment { texels, width, height, mapping, world_from_map, illuminant, mean_luminance, table, bands: None }
+    }
+
+    /// A map of measured radiance, row 0 at the top, times `scale`.
+    ///
+    /// # Errors
+    /// In words, where the bands are no radiance.
+    pub fn of_bands(
+        bands: Bands,
+        [width, height]: [usize; 2],
+        scale: f64,
+        mapping: Mapping,
+        world_from_map: DMat3,
+    ) -> Result<Environment, String> {
+        if bands.quantity != bands::Quantity::Radiance {
+            return Err("expected radiance (channels S0), found reflectances (T)".into());
+        }
+        // Directions are chosen by the mean over the bands.
+        let grey: Vec<[f32; 3]> = bands.means().into_iter().map(|x| [x; 3]).collect();
+        let map = Environment::new(&grey, width, height, scale, mapping, world_from_map);
+        Ok(Environment { bands: Some(bands.scaled(scale as f32)), ..map })
     }
 
     fn place(&self, direction: DVec3) -> Place {
@@ -157,9 +185,8 @@ impl Environment {
         let right = if left + 1 == w { 0 } else { left + 1 };
         let upper = (y0.max(0.0) as i64 as usize).min(h - 1);
         let lower = if y0 < 0.0 { 0 } else { (upper + 1).min(h - 1) };
-        let texel = |x: usize, y: usize| &self.texels[y * w + x];
-        let texels = [texel(left, upper), texel(right, upper), texel(left, lower), texel(right, lower)];
-        Corners { texels, row: upper, x: x - x0, y: y - y0 }
+        let numbers = [(left, upper), (right, upper), (left, lower), (right, lower)].map(|(x, y)| y * w + x);
+        Corners { texels: numbers.map(|i| &self.texels[i]), numbers, row: upper, x: x - x0, y: y - y0 }
     }
 
     /// Rows from the centres of the first to a colatitude in half turns.
@@ -183,6 +210,11 @@ impl Environment {
     }
 
     fn light(&self, corners: &Corners, nm: Lanes) -> Lanes {
+        if let Some(bands) = &self.bands {
+            // A single row stands for both poles.
+            let texel = |i: usize| bands.eval(if i < bands.len() { i } else { i - bands.len() }, nm);
+            return corners.between(corners.numbers.map(texel));
+        }
         let value = match self.mapping {
             Mapping::Texels => corners.mix(|t| upsample::eval_sigmoid(t.coefficients, nm) * t.scale),
             Mapping::Poles => corners.mix(|t| upsample::eval_sigmoid(t.coefficients, nm)) * corners.scale() as f32,
@@ -265,6 +297,9 @@ impl Environment {
     /// Some 16 spectra of the map, for the choice of wavelengths.
     #[must_use]
     pub fn representatives(&self) -> Vec<Spectrum> {
+        if let Some(bands) = &self.bands {
+            return bands.representatives();
+        }
         let step = (self.texels.len() / 16).max(1);
         let texels = self.texels.iter().step_by(step);
         texels.map(|t| Spectrum::Sigmoid { c: t.coefficients, scale: t.scale }.times(&self.illuminant)).collect()

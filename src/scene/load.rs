@@ -1,8 +1,9 @@
 //! Pictures and tables from files.
 
+use super::bands::Bands;
 use super::texture::{DataImage, Grid, ImageTexture, Numbers, Texel, Texels};
 use crate::error::{Error, Result};
-use crate::film::exr;
+use crate::film::{Window, exr};
 use crate::spectrum::{colour, upsample};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
@@ -174,8 +175,8 @@ fn is_linear(decoded: &image::DynamicImage) -> bool {
     matches!(decoded, image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_))
 }
 
-/// A picture of reflectances from the file `path`, upsampled texel by texel; `raw` takes 8- and 16-bit values as
-/// linear.
+/// A picture of reflectances from the file `path`, upsampled texel by texel, or of the spectra of a spectral EXR; `raw`
+/// takes 8- and 16-bit values as linear.
 ///
 /// # Errors
 /// As [`picture`]; values above one are refused.
@@ -184,7 +185,15 @@ pub fn image_texture(path: &Path, decoded: Decoded, raw: bool) -> Result<ImageTe
         texels,
         grid: Grid::new(width, height),
         illuminant: None,
+        bands: None,
     };
+    if let Decoded::Exr(file) = &decoded
+        && let Some(bands) = Bands::of(path, &file.parts[0])?
+    {
+        let Window { width, height, .. } = file.parts[0].window;
+        let none = make(Texels::each(Vec::new()), width as usize, height as usize);
+        return Ok(ImageTexture { bands: Some(bands), ..none });
+    }
     match decoded {
         Decoded::Bytes { rgb, width, height, counted } => {
             let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };

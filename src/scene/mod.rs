@@ -6,6 +6,7 @@
 
 pub mod ahead;
 pub mod along_normal;
+pub mod bands;
 pub mod bundle;
 pub mod bvh;
 pub mod camera;

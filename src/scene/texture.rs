@@ -1,6 +1,7 @@
 //! Spectra that vary over a surface.
 
 use super::SurfacePoint;
+use super::bands::Bands;
 use super::mesh::attribute::AttributeTexture;
 use super::volume::Volume;
 use crate::spectrum::{Lanes, Spectrum, upsample};
@@ -207,6 +208,8 @@ pub struct ImageTexture {
     pub grid: Grid,
     /// A spectrum that multiplies every texel: one for reflectances, D65 for light.
     pub illuminant: Option<Spectrum>,
+    /// Measured spectra in place of the above.
+    pub bands: Option<Bands>,
 }
 
 impl ImageTexture {
@@ -214,6 +217,9 @@ impl ImageTexture {
     #[must_use]
     pub fn eval(&self, uv: DVec2, nm: Lanes) -> Lanes {
         let value = self.grid.value(uv, |i| {
+            if let Some(bands) = &self.bands {
+                return bands.eval(i, nm);
+            }
             let texel = self.texels.at(i);
             upsample::eval_sigmoid(texel.coefficients, nm) * texel.scale
         });
@@ -405,6 +411,10 @@ impl Texture {
     pub fn representatives(&self) -> Vec<Spectrum> {
         match self {
             Texture::Uniform(spectrum) => vec![spectrum.clone()],
+            Texture::Image(ImageTexture { bands: Some(bands), illuminant, .. }) => {
+                let lit = |s: Spectrum| illuminant.as_ref().map_or(s.clone(), |i| s.times(i));
+                bands.representatives().into_iter().map(lit).collect()
+            }
             Texture::Image(image) => {
                 let step = (image.texels.len() / 16).max(1);
                 (0..image.texels.len())
@@ -439,6 +449,7 @@ mod tests {
             texels: Texels::each(vec![texel(0.2), texel(0.8), texel(0.8), texel(0.2)]),
             grid: Grid { wrap: [wrap; 2], interpolation, ..Grid::new(2, 2) },
             illuminant: None,
+            bands: None,
         }
     }
 

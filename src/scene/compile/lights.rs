@@ -1,5 +1,6 @@
 //! Lights, and how often each is looked for.
 
+use super::super::bands::{self, Bands};
 use super::super::environment::{Environment, Mapping};
 use super::super::light::{Light, Slide};
 use super::super::projector::Projector;
@@ -8,7 +9,7 @@ use super::super::texture::Texture;
 use super::super::{Geometry, LightGroups, load};
 use super::{Compiler, vec3};
 use crate::description as written;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::scene::camera::{self, Camera};
 use crate::spectrum::illuminant;
 use glam::DVec2;
@@ -32,6 +33,10 @@ impl<'a> Compiler<'a> {
         let description = self.description;
         match (&description.textures[name], texture) {
             (written::Texture::Image(written), Texture::Image(image)) => {
+                // Light that was measured is as it is.
+                if image.bands.as_ref().is_some_and(|bands| bands.quantity == bands::Quantity::Radiance) {
+                    return;
+                }
                 let lit = written.illuminant.clone().map_or_else(illuminant::d65, |i| {
                     let at = format!("textures.{name}.image.illuminant");
                     self.light_spectrum(&at, &written::Spectrum::Illuminant(i))
@@ -110,8 +115,15 @@ impl<'a> Compiler<'a> {
                 };
                 let (shelf, pictures) = (&mut self.shelf, &mut self.pictures);
                 let map = shelf.skies.get(&l.file, super::sky_key(l), || {
-                    let load::Picture { pixels, width, height } =
-                        pictures.take(&l.file).and_then(|p| load::picture(&l.file, p))?;
+                    let decoded = pictures.take(&l.file)?;
+                    if let load::Decoded::Exr(file) = &decoded
+                        && let Some(bands) = Bands::of(&l.file, &file.parts[0])?
+                    {
+                        let size = [file.parts[0].window.width, file.parts[0].window.height].map(|n| n as usize);
+                        let map = Environment::of_bands(bands, size, l.scale, mapping, l.world_from_map());
+                        return map.map(Arc::new).map_err(|message| Error::input(&l.file, message));
+                    }
+                    let load::Picture { pixels, width, height } = load::picture(&l.file, decoded)?;
                     let map = Environment::new(&pixels, width, height, l.scale, mapping, l.world_from_map());
                     Ok(Arc::new(map))
                 });

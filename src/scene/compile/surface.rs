@@ -7,9 +7,9 @@ use crate::optics::fresnel::Model;
 use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::optics::plastic::DiffuseMean;
 use crate::scene::compound::{Composition, Compound, MOST_PARTS, MOST_RELIEFS, Relief, ReliefForm};
-use crate::scene::load;
 use crate::scene::material::{Coat, Highlight, HighlightModel, Kind, Material, Roughness, TexturedRoughness, Tints};
-use crate::scene::texture::{Grid, Interpolation, Scalar, Texture, Wrap};
+use crate::scene::texture::{Grid, ImageTexture, Interpolation, Scalar, Texture, Wrap};
+use crate::scene::{bands, load};
 use crate::spectrum::{Outside, RefractiveIndex, Spectrum, catalogue};
 use glam::{DAffine2, DMat2, DVec2};
 use std::sync::Arc;
@@ -24,7 +24,15 @@ const DEEPEST: usize = 64;
 impl<'a> Compiler<'a> {
     pub(super) fn reflectance_texture(&mut self, at: &str, s: &'a written::SpectrumOrTexture) -> Texture {
         match s {
-            written::SpectrumOrTexture::Texture(name) => self.named_texture(&format!("{at}.texture"), name),
+            written::SpectrumOrTexture::Texture(name) => {
+                let texture = self.named_texture(&format!("{at}.texture"), name);
+                if let Texture::Image(ImageTexture { bands: Some(bands), .. }) = &texture
+                    && bands.quantity == bands::Quantity::Radiance
+                {
+                    self.fault(&format!("{at}.texture"), "expected reflectances (channels T), found radiance (S0)");
+                }
+                texture
+            }
             written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.reflectance(at, s)),
         }
     }

@@ -1,0 +1,280 @@
+//! Layers and mattes for compositing: parts of the light that add up to the picture, data of the middle of a pixel, and
+//! who covers it.
+
+mod common;
+
+use abbe::batch::{self, Overrides};
+use abbe::film::cryptomatte::id_of;
+use abbe::film::exr::{ExrPart, read_exr};
+use std::sync::atomic::AtomicBool;
+use tempfile::TempDir;
+
+/// 24 × 16 pixels in 32-bit floats, 16 samples each.
+const FRAME: &str = "camera: {origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}\n\
+                     image: {width: 24, height: 16}\n\
+                     render: {samples: 16}\n\
+                     output: {exr: {precision: float}}\n";
+
+/// Everything that scatters light, under lamps of two groups and one of none.
+const STAGE: &str = "light_groups: {key: [lamp], fill: [sky]}\n\
+    lights: [{constant: {name: sky, radiance: 0.2}}, {point: {position: [-2, 3, 2], intensity: 3}}]\n\
+    shapes:\n\
+    - plane: {normal: [0, 1, 0], material: {plastic: {reflectance: 0.5, roughness: 0.1}}}\n\
+    - sphere: {name: lamp, center: [1.2, 1.7, 0.5], radius: 0.25, emission: 20}\n\
+    - sphere: {name: glass, center: [-0.8, 0.6, 1], radius: 0.6, material: {dielectric: {ior: {glass: N-SF11}}}}\n\
+    - sphere: {center: [0.8, 0.6, 0], radius: 0.6, material: {conductor: {metal: gold, roughness: 0.3}}}\n\
+    - sphere: {center: [0, 0.4, 2], radius: 0.4, material: {principled: {base_color: 0.6, metallic: 0.3}}}\n\
+    - sphere: {center: [0, 2, -1], radius: 0.5, material: {mirror: {reflectance: 0.9}}}\n";
+
+const LAYERS: &str =
+    "layers: [emission, caustic, direct, indirect, diffuse, glossy, transmission, media, light_groups]\n";
+
+/// The picture of `yaml`.
+fn render(yaml: &str) -> ExrPart {
+    let place = TempDir::new().unwrap();
+    let (scene, out) = (place.path().join("scene.yaml"), place.path().join("scene.exr"));
+    common::write(&scene, yaml.as_bytes());
+    let overrides = Overrides { output: Some(out.clone()), ..Overrides::default() };
+    let report = batch::render_batch(&scene, &overrides, &(), &AtomicBool::new(false)).unwrap();
+    assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+    read_exr(&out).unwrap().parts.remove(0)
+}
+
+fn plane<'a>(part: &'a ExrPart, name: &str) -> &'a [f32] {
+    part.channel(name).unwrap_or_else(|| panic!("no channel {name}"))
+}
+
+/// Numbers of a sample are rounded to f32 some dozen times on their way: sums over the path, over eight lanes, the matrix
+/// to the file's colours, the file itself. Each is off by at most 2⁻²⁴ of what is added, whose size is that of all three
+/// colours, as X, Y and Z mix them; 16 of them cover all.
+#[test]
+fn light_by_its_ways_and_by_its_lamps_adds_up_to_the_picture() {
+    let medium = "media: {haze: {homogeneous: {extinction: 0.3, albedo: 0.8}}}\n";
+    let cloud = "- sphere: {center: [0, 1, 0], radius: 4, inside: haze, material: {boundary: {}}}\n";
+    let frame = |light: &str, merging: &str| {
+        let techniques = format!("samples: 16, techniques: {{light_tracing: {light}, merging: {merging}}}");
+        FRAME.replace("samples: 16", &techniques)
+    };
+    let scenes = [
+        ("paths alone", frame("off", "off") + STAGE),
+        ("paths from the lights", frame("on", "off") + STAGE),
+        ("photons", frame("on", "on") + STAGE),
+        ("haze", FRAME.to_owned() + medium + STAGE + cloud),
+        ("depth fog", FRAME.to_owned() + "fog: {colour: 0.3, density: 0.1}\n" + STAGE),
+        ("rays", FRAME.to_owned() + "integrator: {path: {light_samples: 2, scatter_samples: 2}}\n" + STAGE),
+    ];
+    let families: [&[&str]; 3] = [
+        &["emission", "caustic", "direct", "indirect"],
+        &["emission", "caustic", "diffuse", "glossy", "transmission", "media"],
+        &["light_key", "light_fill", "light_default"],
+    ];
+    for (name, yaml) in scenes {
+        let (plain, layered) = (render(&yaml), render(&format!("{yaml}{LAYERS}")));
+        for colour in ["R", "G", "B", "A"] {
+            assert_eq!(plane(&plain, colour), plane(&layered, colour), "{name}: layers change {colour}");
+        }
+        for family in families {
+            for colour in ["R", "G", "B"] {
+                let beauty = plane(&layered, colour);
+                for (i, whole) in beauty.iter().enumerate() {
+                    let of = |layer: &&str| f64::from(plane(&layered, &format!("{layer}.{colour}"))[i]);
+                    let sum: f64 = family.iter().map(of).sum();
+                    let size: f64 = ["R", "G", "B"].iter().map(|c| f64::from(plane(&layered, c)[i].abs())).sum();
+                    let off = (sum - f64::from(*whole)).abs();
+                    assert!(
+                        off <= 16.0 * size * 2f64.powi(-24),
+                        "{name}: {family:?} {colour} of pixel {i}: off by {off}"
+                    );
+                }
+            }
+        }
+        // No layer is empty where its light is in the scene.
+        let total = |layer: &str| plane(&layered, &format!("{layer}.G")).iter().sum::<f32>();
+        for layer in families.concat().iter().filter(|layer| **layer != "media") {
+            assert!(total(layer) > 0.0, "{name}: {layer} is black");
+        }
+        assert_eq!(total("media") > 0.0, ["haze", "depth fog"].contains(&name), "{name}");
+    }
+}
+
+/// A lamp over a diffuse floor in an empty world: all light is diffuse and direct, as the closed form of E · ρ/π says; a
+/// floor that only mirrors a lamp is glossy.
+#[test]
+fn ways_are_what_their_names_say() {
+    let floor = |material: &str| {
+        format!(
+            "{FRAME}lights: [{{constant: {{radiance: 1}}}}]\nshapes: [{{plane: {{normal: [0, 0, 1], point: [0, 0, -1], \
+             material: {material}}}}}]\n{LAYERS}"
+        )
+    };
+    for (material, way) in [
+        ("{diffuse: {reflectance: 0.5}}", "diffuse"),
+        ("{mirror: {reflectance: 0.5}}", "glossy"),
+        ("{conductor: {metal: gold, roughness: 0.4}}", "glossy"),
+    ] {
+        let part = render(&floor(material));
+        for layer in ["diffuse", "glossy", "transmission", "media", "indirect", "caustic", "emission"] {
+            let lit = plane(&part, &format!("{layer}.G")).iter().all(|x| *x > 0.0);
+            assert_eq!(lit, layer == way, "{material}: {layer}");
+        }
+        assert_eq!(plane(&part, "direct.G"), plane(&part, &format!("{way}.G")));
+    }
+}
+
+/// The plane z = −1 seen by a camera at z = 6: its depth is 7 in every pixel, whatever the filter; the place of the pixel
+/// in column x is 7 · tan 20° · (2 (x + 1/2)/24 − 1) to the right. A sphere that covers half of a pixel is all or nothing.
+#[test]
+fn data_are_those_of_the_middle_of_the_pixel() {
+    let camera = FRAME.replace("origin: [0, 1.5, 6], target: [0, 0.7, 0]", "origin: [0, 0, 6], target: [0, 0, 0]");
+    let text = "lights: [{constant: {radiance: 1}}]\nlayers: [Z, P, uv, sampleCount, variance, stderr]\nshapes:\n";
+    let wall = "- plane: {normal: [0, 0, 1], point: [0, 0, -1]}\n";
+    let part =
+        render(&format!("{camera}{text}{wall}").replace("height: 16", "height: 16, filter: {gaussian: {stddev: 0.7}}"));
+    assert!(plane(&part, "Z").iter().all(|z| (z - 7.0).abs() <= f32::EPSILON * 7.0));
+    let half = 7.0 * 20f64.to_radians().tan();
+    for (i, x) in plane(&part, "P.X").iter().enumerate() {
+        let expected = half * (2.0 * ((i % 24) as f64 + 0.5) / 24.0 - 1.0);
+        assert!((f64::from(*x) - expected).abs() < 1e-6, "{x} against {expected}");
+    }
+    assert!(plane(&part, "sampleCount").iter().all(|n| *n == 16.0));
+    for (variance, error) in plane(&part, "variance.G").iter().zip(plane(&part, "stderr.G")) {
+        assert_eq!(*variance, error * error);
+    }
+
+    let part = render(&format!("{camera}{text}- sphere: {{radius: 1}}\n"));
+    let (sphere, nothing): (Vec<f32>, Vec<f32>) = plane(&part, "Z").iter().partition(|z| **z < 1e9);
+    assert!(sphere.iter().all(|z| (5.0..6.0).contains(z)) && !sphere.is_empty());
+    assert!(nothing.iter().all(|z| *z == 1e10) && !nothing.is_empty());
+}
+
+/// Two spheres that share a material before nothing; the second is an asset. Coverage of objects adds up to alpha.
+#[test]
+fn mattes_know_objects_materials_and_assets() {
+    let text = "materials: {clay: {diffuse: {reflectance: 0.4}}}\nlights: [{constant: {radiance: 1}}]\n\
+                assets: {hero: [right]}\nlayers: [crypto_object, crypto_material, crypto_asset]\nshapes:\n\
+                - sphere: {name: left, center: [-0.6, 0.7, 0], radius: 0.7, material: clay}\n\
+                - sphere: {name: right, center: [0.6, 0.7, 0], radius: 0.7, material: clay}\n";
+    let part = render(&format!("{FRAME}{text}"));
+    let alpha = plane(&part, "A");
+    for (layer, names) in
+        [("CryptoObject", ["left", "right"]), ("CryptoMaterial", ["clay", "clay"]), ("CryptoAsset", ["left", "hero"])]
+    {
+        let pair = |i: usize| {
+            let channels = if i.is_multiple_of(2) { ["R", "G"] } else { ["B", "A"] };
+            channels.map(|c| plane(&part, &format!("{layer}{:02}.{c}", i / 2)))
+        };
+        let pairs: Vec<[&[f32]; 2]> = (0..6).map(pair).collect();
+        let ids = names.map(|name| id_of(name).to_bits());
+        let mut seen = [false; 2];
+        for i in 0..alpha.len() {
+            let covered: f32 = pairs.iter().map(|[_, coverage]| coverage[i]).sum();
+            assert!((covered - alpha[i]).abs() <= 2.0 * f32::EPSILON, "{layer}: {covered} against {}", alpha[i]);
+            for [id, coverage] in &pairs {
+                let known = ids.iter().position(|known| *known == id[i].to_bits());
+                assert_eq!(known.is_some(), coverage[i] > 0.0, "{layer}: an id without a name");
+                known.into_iter().for_each(|k| seen[k] = true);
+            }
+        }
+        assert!(seen[0] && (seen[1] || names[0] == names[1]), "{layer}: {seen:?}");
+        let key = &format!("{:08x}", id_of(layer).to_bits())[..7];
+        let text = |name: &str| part.text(&format!("cryptomatte/{key}/{name}")).unwrap();
+        assert_eq!((text("name"), text("hash"), text("conversion")), (layer, "MurmurHash3_32", "uint32_to_float32"));
+        let manifest: serde_json::Value = serde_json::from_str(text("manifest")).unwrap();
+        assert_eq!(manifest[names[0]], format!("{:08x}", ids[0]));
+    }
+}
+
+/// A mask lets a third through: the matte of what is before covers two thirds, as alpha of a picture without a background.
+#[test]
+fn holes_of_a_mask_are_holes_of_its_matte() {
+    let text = "lights: [{constant: {radiance: 1}}]\nlayers: [crypto_object]\nshapes:\n\
+                - plane: {name: veil, normal: [0, 0, 1], material: {mask: {opacity: 0.6667, material: {diffuse: {}}}}}\n";
+    let part = render(&format!("{FRAME}{text}"));
+    let (coverage, alpha) = (plane(&part, "CryptoObject00.G"), plane(&part, "A"));
+    assert!(coverage.iter().zip(alpha).all(|(c, a)| (c - a).abs() <= f32::EPSILON), "{coverage:?} {alpha:?}");
+    let mean = coverage.iter().sum::<f32>() / coverage.len() as f32;
+    // 384 pixels of 16 samples: four standard errors of a share of 2/3 are 4·√(2/9/6144).
+    assert!((mean - 0.6667).abs() < 4.0 * (2.0f32 / 9.0 / 6144.0).sqrt(), "{mean}");
+}
+
+/// A spectral file that was rendered is a sky again. The first falls from 2 at 400 nm to 1 at 700 nm; its bands of 100 nm
+/// have the means 11/6, 3/2 and 7/6. Between their middles the second is as the first, beyond it stays: its first band has
+/// (11/6 + (11/6 + 5/3)/2)/2 = 43/24, its last (7/6 + (7/6 + 4/3)/2)/2 = 29/24.
+#[test]
+fn a_spectral_file_is_light_again() {
+    let place = TempDir::new().unwrap();
+    let path = |name: &str| place.path().join(name);
+    let file = |scene: &str, text: &str| {
+        common::write(&path(scene), text.as_bytes());
+        let overrides = Overrides { output: Some(path("out.exr")), ..Overrides::default() };
+        let report = batch::render_batch(&path(scene), &overrides, &(), &AtomicBool::new(false)).unwrap();
+        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+        read_exr(&path("out.spectral.exr")).unwrap().parts.remove(0)
+    };
+    let frame = FRAME.replace("float}", "float}, spectral: {bands: 3}").replace("samples: 16", "samples: 256");
+    let means = |part: &ExrPart| -> Vec<f32> {
+        let names = ["S0.450,000000nm", "S0.550,000000nm", "S0.650,000000nm"];
+        names.map(|name| plane(part, name).iter().sum::<f32>() / 384.0).to_vec()
+    };
+    let sky = "lights: [{constant: {radiance: {table: [[400, 2], [700, 1]]}}}]\n";
+    let first = means(&file("sky.yaml", &format!("{frame}{sky}")));
+    // 384 pixels of 2048 wavelengths each, evenly spread: 1e-3 is far above their noise.
+    for (found, expected) in first.iter().zip([11.0 / 6.0, 1.5, 7.0 / 6.0]) {
+        assert!((found / expected - 1.0).abs() < 2e-3, "{first:?}");
+    }
+    std::fs::rename(path("out.spectral.exr"), path("sky.exr")).unwrap();
+    let again = means(&file("again.yaml", &format!("{frame}lights: [{{environment: {{file: sky.exr}}}}]\n")));
+    for (found, expected) in again.iter().zip([43.0 / 24.0, 1.5, 29.0 / 24.0]) {
+        assert!((found / expected - 1.0).abs() < 2e-3, "{again:?}");
+    }
+}
+
+/// A wall of measured reflectance under a white sky, in the bands of the measurement.
+#[test]
+fn a_spectral_file_is_paint() {
+    use abbe::film::Window;
+    use abbe::film::exr::{ChannelData, Compression, ExrImage, Layout, write_exr};
+    let place = TempDir::new().unwrap();
+    let path = |name: &str| place.path().join(name);
+    let paint = [("T.450,0nm", 0.25), ("T.550,0nm", 0.75), ("T.650,0nm", 0.5)];
+    let image = ExrImage {
+        frame: [2, 2],
+        window: Window::full(2, 2),
+        channels: paint.iter().map(|(name, r)| ((*name).to_owned(), ChannelData::F32(vec![*r; 4]))).collect(),
+        colour: None,
+        attributes: Vec::new(),
+        data: std::collections::BTreeSet::new(),
+        compression: Compression::Zip,
+        layout: Layout::Single,
+    };
+    write_exr(&path("paint.exr"), &image).unwrap();
+    let frame = FRAME.replace("float}", "float}, spectral: {bands: 3}").replace("samples: 16", "samples: 256");
+    let wall = "lights: [{constant: {radiance: 1}}]\ntextures: {paint: {image: {file: paint.exr}}}\n\
+                shapes: [{plane: {normal: [0, 0, 1], point: [0, 0, -1], material: {diffuse: {reflectance: {texture: paint}}}}}]\n";
+    common::write(&path("wall.yaml"), format!("{frame}{wall}").as_bytes());
+    let overrides = Overrides { output: Some(path("wall.exr")), ..Overrides::default() };
+    let report = batch::render_batch(&path("wall.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+    assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+    let part = read_exr(&path("wall.spectral.exr")).unwrap().parts.remove(0);
+    // Linear between 0.25, 0.75 and 0.5, and held beyond: means over 400 to 500, 500 to 600 and 600 to 700 nm.
+    let expected = [
+        (0.25 + (0.25 + 0.5) / 2.0) / 2.0,
+        ((0.5 + 0.75) / 2.0 + (0.75 + 0.625) / 2.0) / 2.0,
+        (0.5 + (0.625 + 0.5) / 2.0) / 2.0,
+    ];
+    for (name, expected) in ["S0.450,000000nm", "S0.550,000000nm", "S0.650,000000nm"].iter().zip(expected) {
+        let mean = plane(&part, name).iter().sum::<f32>() / 384.0;
+        assert!((mean / expected - 1.0).abs() < 5e-3, "{name}: {mean} against {expected}");
+    }
+
+    // What is radiance is no paint.
+    let radiance = ExrImage {
+        channels: ["S0.450nm", "S0.550nm"].map(|name| (name.to_owned(), ChannelData::F32(vec![0.5; 4]))).to_vec(),
+        ..image
+    };
+    write_exr(&path("paint.exr"), &radiance).unwrap();
+    let report = batch::render_batch(&path("wall.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+    assert_eq!(report.exit_code(), 2);
+    let said = format!("{:?}", report.scenes[0].status);
+    assert!(said.contains("expected reflectances (channels T), found radiance (S0)"), "{said}");
+}
