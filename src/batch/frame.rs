@@ -20,7 +20,7 @@ use crate::spectrum::ColourSpace;
 use crate::transport::layers::{self, Source};
 use crate::transport::merge::Collection;
 use crate::transport::plan::{EffectPlan, Integrator};
-use crate::transport::{PixelSample, Samples, Shot};
+use crate::transport::{PixelSample, Samples, Shot, moment};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Mutex;
@@ -34,6 +34,8 @@ pub struct FrameJob<'a> {
     pub scene: &'a Scene,
     /// What is simulated.
     pub plan: &'a EffectPlan,
+    /// The scene while the shutter is open, of which each sample sees one; none where nothing is blurred.
+    pub moments: &'a [Scene],
     /// Reconstruction filter (for `path`).
     pub filter: &'a FilterSampler,
     /// The pixels to render.
@@ -179,7 +181,7 @@ pub(super) fn render_unit(
     photons: Option<Collection>,
     tile: &mut TileBuffer,
 ) {
-    let FrameJob { scene, plan, filter, seed, .. } = *job;
+    let FrameJob { scene, moments, plan, filter, seed, .. } = *job;
     let shot = Shot { scene, plan, filter, seed, photons };
     let window = tile.window();
     let mut memory = Samples::default();
@@ -204,10 +206,10 @@ pub(super) fn render_unit(
                     if job.independent {
                         // A scrambling for each sample: of each sequence the first point alone.
                         let first = run.map(|i| (replicate + REPLICATES as u32 * i, 0..1));
-                        render_run(&shot, tile, &mut memory, &mut layer_run, [x, y], replicate, first);
+                        render_run((&shot, moments), tile, &mut memory, &mut layer_run, [x, y], replicate, first);
                     } else {
                         let octets = octets(run).map(|indices| (replicate, indices));
-                        render_run(&shot, tile, &mut memory, &mut layer_run, [x, y], replicate, octets);
+                        render_run((&shot, moments), tile, &mut memory, &mut layer_run, [x, y], replicate, octets);
                     }
                     start = next;
                 }
@@ -227,9 +229,10 @@ fn octets(indices: Range<u32>) -> impl Iterator<Item = Range<u32>> {
     })
 }
 
-/// Renders samples of one `replicate` of `pixel`, at most [`LONGEST`]: those of `addresses`, a replicate and indices.
+/// Renders samples of one `replicate` of `pixel`, at most [`LONGEST`]: those of `addresses`, a replicate and indices; each at
+/// its own of `moments`, if there are any.
 fn render_run(
-    shot: &Shot,
+    (shot, moments): (&Shot, &[Scene]),
     tile: &mut TileBuffer,
     memory: &mut Samples,
     layers: &mut LayerRun,
@@ -245,7 +248,7 @@ fn render_run(
     // Overscan makes negative coordinates; as addresses they wrap.
     let address = pixel.map(|x| x as u32);
     for (stream, indices) in addresses {
-        memory.render(shot, address, stream, indices, |sample, values, covered| {
+        let mut give = |sample: &PixelSample, values: &[f32], covered: Option<u64>| {
             if let Some(number) = covered {
                 let pixels = tile.window().pixels();
                 tile.layers.mattes.add(index, pixels, number, 1);
@@ -254,7 +257,15 @@ fn render_run(
                 tile.layers.add(index, sample.weight, values);
             }
             record(tile, &mut run, unit, pixel, replicate, sample);
-        });
+        };
+        if moments.is_empty() {
+            memory.render(shot, address, stream, indices, give);
+            continue;
+        }
+        for i in indices {
+            let scene = &moments[moment(shot.seed, address, stream, i, moments.len())];
+            memory.render(&Shot { scene, ..*shot }, address, stream, i..i + 1, &mut give);
+        }
     }
     tile.add_run(pixel, replicate as usize, &run);
     if channels > 0 {

@@ -5,12 +5,12 @@
 pub mod accuracy;
 pub mod adaptive;
 pub mod checkpoint;
-pub mod contact;
 pub mod develop;
 pub mod farm;
 pub mod finish;
 pub mod frame;
 pub mod merge;
+pub mod motion;
 pub mod names;
 pub mod part;
 pub mod part_file;
@@ -24,7 +24,6 @@ use crate::film::Window;
 use crate::film::filter::{Filter, FilterSampler};
 use crate::film::output;
 use crate::scene::Scene;
-use crate::scene::census::Census;
 use crate::scene::compile;
 use crate::scene::shelf::Shelf;
 use crate::spectrum::ColourSpace;
@@ -34,7 +33,6 @@ use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, 
 use crate::transport::trial;
 use crate::transport::ways::{Way, Ways};
 use checkpoint::{Keep, Keeper};
-use contact::Contact;
 use finish::Finish;
 use frame::{FrameJob, Progress, go_on};
 use part_file::Identity;
@@ -100,6 +98,8 @@ pub struct Prepared {
     pub description: SceneDescription,
     /// What rays meet.
     pub scene: Scene,
+    /// The same while the shutter is open, where that is not always the same.
+    pub moments: Vec<Scene>,
     /// What is simulated.
     pub plan: EffectPlan,
     /// Samples of a pixel; the most of them, where `stop` has other targets.
@@ -118,9 +118,10 @@ impl Prepared {
     /// The whole picture, sampled by `filter`.
     #[must_use]
     pub fn job<'a>(&'a self, filter: &'a FilterSampler) -> FrameJob<'a> {
-        let Prepared { description, scene, plan, samples, planned, stop, .. } = self;
+        let Prepared { description, scene, moments, plan, samples, planned, stop, .. } = self;
         FrameJob {
             scene,
+            moments,
             plan,
             filter,
             window: window(description),
@@ -197,7 +198,14 @@ fn prepare_scene(
         description::Effects::Auto => EffectMode::Auto,
         description::Effects::All => EffectMode::All,
     };
-    let mut plan = EffectPlan::of(&Census::of(&scene), integrator, mode);
+    let blur = motion::moments(&entry.name, &description, &scene, &integrator, shelf)?;
+    let mut moments = blur.scenes;
+    // One film counts the light of all.
+    let exponents = moments.iter().map(|moment| moment.light_exponent);
+    scene.light_exponent = exponents.fold(scene.light_exponent, i32::max);
+    moments.iter_mut().for_each(|moment| moment.light_exponent = scene.light_exponent);
+    let mut plan = EffectPlan::of(&motion::census(&scene, &moments), integrator, mode);
+    plan.effects.extend(blur.said);
     plan.layers = layer_plan(&description, &scene, planned)?;
     let filter = FilterSampler::new(filter(&description.image.filter))?;
     let (seed, wishes) = (description.render.seed, wishes(&description));
@@ -205,9 +213,16 @@ fn prepare_scene(
         plan.packets = packets;
         plan.techniques.push(said);
     }
-    let (caustics, said) = pilot::decide(&scene, &plan, &filter, seed, planned, wishes);
+    let (caustics, said) = match moments.is_empty() {
+        true => pilot::decide(&scene, &plan, &filter, seed, planned, wishes),
+        false => pilot::left_off("lamps and what bends their light move while the shutter is open"),
+    };
     plan.caustics = caustics;
     plan.techniques.extend(said);
+    if overrides.check_numerics && !moments.is_empty() {
+        let expected = "--check-numerics: expected a scene in which nothing moves, or --set camera.shutter=null";
+        return Err(Error::Config(format!("{expected}, found motion blur")));
+    }
     if overrides.check_numerics {
         let name = "numerics";
         let taken = |channel: &Channel| channel.name.split('.').next() == Some(name);
@@ -222,8 +237,8 @@ fn prepare_scene(
     let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
     plan.adaptive = first;
     plan.techniques.extend(said);
-    let hash = hash(&description, &scene.files, &overrides.paths);
-    Ok(Prepared { description, scene, plan, samples, planned, stop, hash, source: entry.path.clone() })
+    let hash = hash(&description, &blur.texts, &scene.files, &overrides.paths);
+    Ok(Prepared { description, scene, moments, plan, samples, planned, stop, hash, source: entry.path.clone() })
 }
 
 /// What ends the render besides samples.
@@ -399,22 +414,12 @@ fn quantity(quantity: description::Quantity) -> Quantity {
 }
 
 /// 128 bits of BLAKE3 over what was written, with every default, and over the files that it names.
-fn hash(description: &SceneDescription, files: &[PathBuf], paths: &PathMap) -> String {
+fn hash(description: &SceneDescription, moments: &[String], files: &[PathBuf], paths: &PathMap) -> String {
     let mut hasher = blake3::Hasher::new();
-    // Where the scene lies, and where its pictures go, does not change them.
-    let mut content = description.clone();
-    content.locator = description::Locator::default();
-    content.directory = PathBuf::new();
-    content.output = description::Output::default();
-    // What is written for a frame says more than its number.
-    content.frame = None;
-    content.render.frames_per_second = None;
-    let mut text = format!("{content:?}");
-    if description.directory != Path::new("") {
-        text = text.replace(&format!("{}/", description.directory.display()), "");
-    }
     // Two machines have one scene in two places.
-    hasher.update(paths.undo(text).as_bytes());
+    for text in [hash_text(description)].iter().chain(moments) {
+        hasher.update(paths.undo(text.clone()).as_bytes());
+    }
     // A file that is named several times counts once: where else it is named stands in the text.
     let mut read: HashSet<&Path> = HashSet::new();
     for file in files {
@@ -425,6 +430,24 @@ fn hash(description: &SceneDescription, files: &[PathBuf], paths: &PathMap) -> S
         }
     }
     hasher.finalize().to_hex()[..32].to_owned()
+}
+
+/// What was written, as far as it decides about the picture.
+fn hash_text(description: &SceneDescription) -> String {
+    // Where the scene lies, and where its pictures go, does not change them.
+    let mut content = description.clone();
+    content.locator = description::Locator::default();
+    content.directory = PathBuf::new();
+    content.output = description::Output::default();
+    // What is written for a frame says more than its number.
+    content.frame = None;
+    content.motion = None;
+    content.render.frames_per_second = None;
+    let mut text = format!("{content:?}");
+    if description.directory != Path::new("") {
+        text = text.replace(&format!("{}/", description.directory.display()), "");
+    }
+    text
 }
 
 fn filter(filter: &description::Filter) -> Filter {
@@ -596,7 +619,6 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
     let mut scenes = Vec::new();
     let mut report_dir: Option<PathBuf> = None;
     let mut shelf = Shelf::default();
-    let mut contact = Contact::default();
     'batch: for (i, entry) in entries.iter().enumerate() {
         let mut loading = Instant::now();
         let animation = entry.animation(&overrides.set);
@@ -621,15 +643,11 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                 // Nobody comes after the last one.
                 shelf = Shelf::default();
             }
-            let mut report = match prepared {
+            let report = match prepared {
                 Ok(prepared) => {
                     let dir = output_path(&prepared, overrides);
                     report_dir.get_or_insert_with(|| dir.parent().unwrap_or(Path::new(".")).to_path_buf());
-                    let mut report = render_scene(&prepared, overrides, loading.elapsed(), watcher, stop).0;
-                    if prepared.description.output.contact_sheet && overrides.portion.is_all() {
-                        contact.add(scenes.len(), &mut report);
-                    }
-                    report
+                    render_scene(&prepared, overrides, loading.elapsed(), watcher, stop).0
                 }
                 Err(e) => {
                     let mut report = SceneReport::new(&entry.name, frame);
@@ -637,7 +655,6 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                     report
                 }
             };
-            report.error_map = None;
             watcher.scene_ends(&report);
             scenes.push(report);
             loading = Instant::now();
@@ -645,10 +662,6 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
     }
     let mut report = Report::new(path, scenes, start.elapsed());
     if let Some(dir) = report_dir {
-        match contact.write(output::directory_of(&dir.join("report.json")), &report) {
-            Ok(page) => report.contact_sheet = page,
-            Err(e) => report.unwritten = Some(e),
-        }
         report.write(&dir.join("report.json"));
     }
     Ok(report)

@@ -210,8 +210,5 @@ pub fn table(report: &Report) -> String {
         report.threads,
         report.file.as_ref().map_or(String::new(), |f| format!("; figures in {}", f.display()))
     );
-    if let Some(page) = &report.contact_sheet {
-        let _ = writeln!(out, "all of them side by side: {}", page.display());
-    }
     out
 }

@@ -18,6 +18,32 @@ pub struct Animation {
     path: PathBuf,
     sources: Sources,
     frames: Vec<i32>,
+    /// Whether anything changes over frames.
+    changes: bool,
+}
+
+/// A scene around one of its frames.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    animation: Animation,
+    frame: i32,
+}
+
+impl Motion {
+    /// The scene `time` frames after its frame.
+    ///
+    /// # Errors
+    /// As [`Animation::scene`].
+    pub fn at(&self, time: f64) -> Result<SceneDescription> {
+        let Animation { mut root, path, sources, .. } = self.animation.clone();
+        let frame = f64::from(self.frame);
+        keyed::evaluate_within(&mut root, frame, frame + time)
+            .and_then(|()| settle(&mut root, self.frame, &sources))
+            .map_err(|fault| fault.into_error(&sources))?;
+        let mut scene = SceneDescription::of_tree(root, &path, sources)?;
+        scene.frame = Some(self.frame);
+        Ok(scene)
+    }
 }
 
 impl Animation {
@@ -40,7 +66,7 @@ impl Animation {
             let expected = "expected render.frames or --frames, since this changes over frames, found none";
             return Err(fault.saying(expected).into_error(&sources));
         }
-        Ok(Animation { root, path: path.to_path_buf(), sources, frames })
+        Ok(Animation { root, path: path.to_path_buf(), sources, frames, changes })
     }
 
     /// The frames to render, in order; none where the scene has no frames, and is one picture.
@@ -93,12 +119,16 @@ impl Animation {
     /// # Errors
     /// As there.
     pub fn into_scene(mut self, frame: Option<i32>) -> Result<SceneDescription> {
+        let shutter = self.root.get("camera").and_then(|camera| camera.get("shutter"));
+        let open = self.changes && shutter.is_some_and(|node| !matches!(node.value, Value::Null));
+        let motion = frame.filter(|_| open).map(|frame| Box::new(Motion { animation: self.clone(), frame }));
         if let Some(frame) = frame {
             keyed::evaluate(&mut self.root, f64::from(frame)).map_err(|fault| fault.into_error(&self.sources))?;
             settle(&mut self.root, frame, &self.sources).map_err(|fault| fault.into_error(&self.sources))?;
         }
         let mut scene = SceneDescription::of_tree(self.root, &self.path, self.sources)?;
         scene.frame = frame;
+        scene.motion = motion;
         Ok(scene)
     }
 }

@@ -409,7 +409,7 @@ mod tests {
             assert_eq!(
                 in_words(&error, directory),
                 "DIR/bad.yaml:1:9: camera: expected a map with fields among origin, target, up, to_world, fov_deg, fov_axis, \
-                 orthographic_height, lens, clip, principal_point, found 3\n\
+                 orthographic_height, lens, clip, principal_point, shutter, found 3\n\
                  DIR/none.yaml: cannot be read: No such file or directory (os error 2); it is named at DIR/batch.yaml:1:54"
             );
         });

@@ -24,6 +24,55 @@ pub struct Camera {
     /// Where the line of sight meets the picture, from its middle to the right and down, in widths and heights;
     /// default `[0, 0]`.
     pub principal_point: [f64; 2],
+    /// When it is open; default at one moment.
+    pub shutter: Option<Shutter>,
+}
+
+/// `shutter: 0.5`, or `shutter: {open: -0.25, close: 0.25}`: when light is taken, in frames from the frame.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shutter {
+    /// For so much of a frame, around the frame: 0.5 is a shutter of 180°.
+    Number(f64),
+    /// From when to when.
+    Inline(ShutterTimes),
+}
+
+/// When a shutter opens and closes, in frames from the frame.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShutterTimes {
+    /// When it opens.
+    pub open: f64,
+    /// When it closes.
+    pub close: f64,
+    /// At how many moments in between the scene is looked at; default by what moves.
+    pub moments: Option<u32>,
+}
+
+/// The most moments at which a scene is looked at.
+const MOST_MOMENTS: u32 = 256;
+
+impl Shutter {
+    /// When it opens and closes.
+    #[must_use]
+    pub fn times(&self) -> ShutterTimes {
+        match *self {
+            Shutter::Number(share) => ShutterTimes { open: -0.5 * share, close: 0.5 * share, moments: None },
+            Shutter::Inline(times) => times,
+        }
+    }
+
+    fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
+        match self {
+            Shutter::Number(share) => checker.positive(at, *share),
+            Shutter::Inline(times) => {
+                let found = format!("{} and {}", times.open, times.close);
+                checker.require(times.open < times.close, at, "open before close", found);
+                checker.whole_between(at.key("moments"), times.moments.unwrap_or(2), 2, MOST_MOMENTS);
+            }
+        }
+    }
 }
 
 /// Distances along the line of sight between which the camera sees, metres.
@@ -125,6 +174,7 @@ struct WrittenCamera {
     clip: Clip,
     #[serde(default)]
     principal_point: [f64; 2],
+    shutter: Option<Shutter>,
 }
 
 impl TryFrom<WrittenCamera> for Camera {
@@ -142,6 +192,7 @@ impl TryFrom<WrittenCamera> for Camera {
             lens,
             clip,
             principal_point,
+            shutter,
         } = written;
         let pose = match (origin, target, to_world) {
             (Some(origin), Some(target), None) => Pose::LookAt { origin, target, up: up.unwrap_or([0.0, 1.0, 0.0]) },
@@ -170,7 +221,7 @@ impl TryFrom<WrittenCamera> for Camera {
                 return Err(format!("expected either fov_deg or orthographic_height, found {}", given_fields(&given)));
             }
         };
-        Ok(Camera { pose, projection, lens, clip, principal_point })
+        Ok(Camera { pose, projection, lens, clip, principal_point, shutter })
     }
 }
 
@@ -347,6 +398,9 @@ impl Camera {
             let at = at.key("lens");
             checker.not_negative(at.key("radius"), lens.radius);
             checker.positive(at.key("focus_distance"), lens.focus_distance);
+        }
+        if let Some(shutter) = &self.shutter {
+            shutter.check(at.key("shutter"), checker);
         }
         let clip = at.key("clip");
         checker.not_negative(clip.key("near"), self.clip.near);

@@ -153,11 +153,32 @@ pub(crate) fn first(root: &mut Node) -> Option<Fault> {
 /// # Errors
 /// The first keyed value that is none, with its place.
 pub(crate) fn evaluate(root: &mut Node, frame: f64) -> Result<(), Fault> {
-    each(root, &mut |node| {
-        let value = Track::of(node)?.at(frame);
-        *node = value;
-        Ok(())
-    })
+    each(root, &mut |node| put(node, frame))
+}
+
+/// What is at `frame` in the sections of a scene that say how it is rendered, and at `time` in those that say what it is.
+///
+/// # Errors
+/// As [`evaluate`].
+pub(crate) fn evaluate_within(root: &mut Node, frame: f64, time: f64) -> Result<(), Fault> {
+    const STILL: [&str; 5] = ["image", "integrator", "layers", "render", "output"];
+    let Value::Map(entries) = &mut root.value else { return Ok(()) };
+    for entry in entries.iter_mut().filter(|entry| STILL.contains(&entry.key.as_str())) {
+        // As a tree of its own, with the path of its faults.
+        let mut alone = Node::new(entry.node.place, Value::Map(vec![entry.clone()]));
+        evaluate(&mut alone, frame)?;
+        if let Value::Map(mut alone) = alone.value {
+            entry.node = alone.remove(0).node;
+        }
+    }
+    evaluate(root, time)
+}
+
+/// The value at `frame` of one keyed node.
+fn put(node: &mut Node, frame: f64) -> Result<(), Fault> {
+    let value = Track::of(node)?.at(frame);
+    *node = value;
+    Ok(())
 }
 
 /// A keyed value.

@@ -29,6 +29,9 @@
 //!   clip: {near: 0}                 # ~ near 0, far without end; along the line of sight, m; rays begin at near
 //!   principal_point: [0, 0]         # default; where the line of sight meets the picture, from its middle to the
 //!                                   # right and down, in widths and heights
+//!   shutter: ~                      # for how much of a frame light is taken, around the frame: 0.5; or
+//!                                   # {open: -0.25, close: 0.25, moments: ~}: in frames, and at how many moments the scene
+//!                                   # is looked at, ~ by what moves
 //! image:
 //!   width: 600                      # default; 1 to 65536
 //!   height: 600                     # default
@@ -105,8 +108,6 @@
 //!     bits: 8                       # 8, 16
 //!     dither: hash                  # hash, ordered, none
 //!   colour: rec709                  # rec709, acescg, aces2065-1, rec2020, p3, xyz
-//!   contact_sheet: true             # whether the picture is on the contact sheet of its batch, contact-sheet.png and
-//!                                   # contact-sheet.html, which two pictures or more have
 //! textures:
 //!   earth: {image: {file: earth.jpg, wrap: repeat, filter: bilinear, scale: [1, 1], offset: [0, 0], raw: false}}
 //!                                   # repeat, mirror, clamp, and wrap_v where it differs; bilinear, nearest; all but
@@ -306,6 +307,10 @@
 //! leaves the range of no two keys, so that what is valid at the keys is so between them. Numbers that must be whole have to
 //! come out whole; names, files, true and false do not change.
 //!
+//! With a `shutter` of the camera all that changes while it is open is blurred, cameras, shapes, lights and materials alike:
+//! each sample sees the scene at one of a number of evenly spaced moments. `image`, `integrator`, `layers`, `render` and
+//! `output` stay as at the frame. Light of mirrors and glass is then not traced from the lamps.
+//!
 //! Which frames are rendered says `render.frames`, of the scene or of the batch, or `--frames`; a scene that changes and says
 //! nothing of frames is refused. Frame 12 is the very picture of a scene in which the values at 12 are written, with the
 //! seed `render.seed` + 12 unless `seed_per_frame: false`.
@@ -411,9 +416,11 @@ mod volume;
 mod yaml;
 
 pub use absorption::{Absorption, ColorAt};
-pub use animation::Animation;
+pub use animation::{Animation, Motion};
 pub use batch::{Batch, BatchEntry, Document, load, load_mapped};
-pub use camera::{Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection};
+pub use camera::{
+    Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection, Shutter, ShutterTimes,
+};
 pub use coating::{Film, TexturedThickness, Thickness};
 pub use compound::{Blend, Brushed, Bump, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided};
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, Growth, ProjectorLight};

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
-use super::animation::Animation;
+use super::animation::{Animation, Motion};
 use super::camera::{Camera, Image, check_channel};
 use super::decode::decode;
 use super::edit;
@@ -88,6 +88,9 @@ pub struct SceneDescription {
     /// Which frame this is of, where the scene has frames.
     #[serde(skip)]
     pub frame: Option<i32>,
+    /// The scene at other times, where the camera has a shutter and something changes.
+    #[serde(skip)]
+    pub motion: Option<Box<Motion>>,
     /// The directory of the scene's file, relative to the working directory. Paths in the
     /// description are joined to it already.
     #[serde(skip)]
@@ -299,6 +302,7 @@ mod tests {
                 lens: Some(Lens { radius: 0.05, focus_distance: 10.0 }),
                 clip: Clip::default(),
                 principal_point: [0.0, 0.0],
+                shutter: None,
             }
         );
         assert_eq!(scene.image.crop, Some(Crop { x: 0, y: 0, width: 10, height: 10 }));

@@ -336,9 +336,6 @@ pub struct Output {
     pub colour: Colour,
     /// A further file of bands of the spectrum; default none.
     pub spectral: Option<SpectralFile>,
-    /// Whether the picture is on the contact sheet of its batch; default true.
-    #[serde(default = "yes")]
-    pub contact_sheet: bool,
 }
 
 fn dir() -> PathBuf {
@@ -347,14 +344,7 @@ fn dir() -> PathBuf {
 
 impl Default for Output {
     fn default() -> Output {
-        Output {
-            dir: dir(),
-            exr: Exr::default(),
-            png: Png::default(),
-            colour: Colour::default(),
-            spectral: None,
-            contact_sheet: true,
-        }
+        Output { dir: dir(), exr: Exr::default(), png: Png::default(), colour: Colour::default(), spectral: None }
     }
 }
 

@@ -46,6 +46,36 @@ pub struct Census {
 }
 
 impl Census {
+    /// What two scenes call for together, of which one is the other at another time.
+    #[must_use]
+    pub fn join(self, other: Census) -> Census {
+        let all = |mut a: Vec<String>, b: Vec<String>| {
+            let new: Vec<String> = b.into_iter().filter(|name| !a.contains(name)).collect();
+            a.extend(new);
+            a
+        };
+        Census {
+            shapes: self.shapes.max(other.shapes),
+            triangles: self.triangles.max(other.triangles),
+            instances: self.instances.max(other.instances),
+            dispersive: all(self.dispersive, other.dispersive),
+            rough_dispersive: all(self.rough_dispersive, other.rough_dispersive),
+            coloured_coats: all(self.coloured_coats, other.coloured_coats),
+            refractive: all(self.refractive, other.refractive),
+            textured: all(self.textured, other.textured),
+            reflective: all(self.reflective, other.reflective),
+            area_lights: all(self.area_lights, other.area_lights),
+            delta_lights: self.delta_lights.max(other.delta_lights),
+            backgrounds: self.backgrounds.max(other.backgrounds),
+            media: self.media.max(other.media),
+            chromatic_media: self.chromatic_media.max(other.chromatic_media),
+            films: all(self.films, other.films),
+            nested: all(self.nested, other.nested),
+            lens: self.lens || other.lens,
+            fog: self.fog || other.fog,
+        }
+    }
+
     /// Takes the census of `scene`.
     #[must_use]
     pub fn of(scene: &Scene) -> Census {

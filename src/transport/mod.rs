@@ -99,6 +99,14 @@ struct Address {
     index: u32,
 }
 
+/// Which of `moments` a sample sees, by the number of it that is spread evenly together with its place and wavelengths.
+#[must_use]
+pub fn moment(seed: u64, pixel: [u32; 2], replicate: u32, index: u32, moments: usize) -> usize {
+    let u = pairs(Sampler::new(seed, pixel, replicate, index).set(Set::Camera)).1.y;
+    // A number next to 1 may become it.
+    ((u * moments as f64) as usize).min(moments - 1)
+}
+
 /// A sample on its way.
 struct Begun {
     at: Address,

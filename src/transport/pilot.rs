@@ -92,6 +92,12 @@ fn technique(name: &'static str, on: bool, reason: String) -> Effect {
     Effect { name: name.into(), on, reason }
 }
 
+/// Nothing traced from the lights, for a reason that is not the pilot's.
+#[must_use]
+pub fn left_off(reason: &str) -> (Option<Arc<Caustics>>, Vec<Effect>) {
+    (None, vec![technique("light tracing", false, reason.to_owned())])
+}
+
 /// Decides for a picture of `samples` a pixel, and returns what to trace and what to say of it.
 #[must_use]
 pub fn decide(

@@ -269,7 +269,10 @@ impl<'a> Export<'a> {
     }
 
     fn sensor(&mut self) {
-        let Camera { pose, projection, lens, clip, principal_point } = &self.scene.camera;
+        let Camera { pose, projection, lens, clip, principal_point, shutter: _ } = &self.scene.camera;
+        if self.scene.motion.is_some() {
+            self.lose("camera.shutter", "the scene at its frame: what is exported does not move");
+        }
         let Image { width, height, filter, crop, sensitivity, .. } = &self.scene.image;
         // The film's unit is theirs.
         let yaml = Node::new(self.root.place, Value::Float(*sensitivity));

@@ -1,0 +1,113 @@
+//! Motion blur: the scene at moments while the shutter of the camera is open.
+//!
+//! Every sample sees one moment, drawn by a number of its own ([`crate::transport::moment`]), so that the picture is the mean
+//! over the moments, whatever changes: the estimate is unbiased for those moments, which stand at the middles of
+//! equal times. What the eye would see of their distance is bounded by their number: as many as the pixels that the
+//! fastest thing travels, [`LEAST`] to [`MOST`].
+
+use super::hash_text;
+use crate::description::{SceneDescription, ShutterTimes};
+use crate::error::Result;
+use crate::scene::Scene;
+use crate::scene::bvh::Aabb;
+use crate::scene::census::Census;
+use crate::scene::compile;
+use crate::scene::shelf::Shelf;
+use crate::transport::plan::{Effect, Integrator};
+use glam::{DMat4, DVec2, DVec3, DVec4};
+
+/// Moments where little moves: what turns in its place moves by no more than this tells.
+const LEAST: u32 = 16;
+/// Moments where much does.
+const MOST: u32 = 64;
+/// Triangles of all moments, each of which has its own: 180 bytes each.
+const TRIANGLES: usize = 16_000_000;
+
+/// The scene while the shutter is open.
+#[derive(Debug, Default)]
+pub struct Moments {
+    /// At evenly spaced times; none where nothing is blurred.
+    pub scenes: Vec<Scene>,
+    /// What was written at each, to be hashed.
+    pub texts: Vec<String>,
+    /// What to say of it; nothing where there is no shutter.
+    pub said: Option<Effect>,
+}
+
+impl Moments {
+    fn none(reason: &str) -> Moments {
+        let said = Effect { name: "motion blur".into(), on: false, reason: reason.into() };
+        Moments { said: Some(said), ..Moments::default() }
+    }
+}
+
+/// The moments of `description`, which is `still` at its frame.
+///
+/// # Errors
+/// Those of its description, or of compiling it, at a moment.
+pub fn moments(
+    name: &str,
+    description: &SceneDescription,
+    still: &Scene,
+    integrator: &Integrator,
+    shelf: &mut Shelf,
+) -> Result<Moments> {
+    let Some(shutter) = &description.camera.shutter else { return Ok(Moments::default()) };
+    let Some(motion) = &description.motion else { return Ok(Moments::none("nothing changes over frames")) };
+    match integrator {
+        Integrator::Path(_) | Integrator::Depth | Integrator::Nothing => {}
+        Integrator::Whitted(_) => return Ok(Moments::none("whitted draws no times")),
+        Integrator::Light(_) => return Ok(Moments::none("light_tracer draws no times")),
+    }
+    let ShutterTimes { open, close, moments: wanted } = shutter.times();
+    let (count, why) = match wanted {
+        Some(count) => (count, "as the scene says".to_owned()),
+        None => {
+            let mut at = |time| compile::compile_with(&motion.at(time)?, name, shelf);
+            let way = travelled(&at(open)?, &at(close)?);
+            let triangles = Census::of(still).triangles.max(1);
+            let count = (way.round() as u32).clamp(LEAST, MOST);
+            let fits = (TRIANGLES / triangles).clamp(2, MOST as usize) as u32;
+            let what = format!("what moves travels {way:.0} pixels");
+            if count > fits { (fits, format!("{what}; each has {triangles} triangles")) } else { (count, what) }
+        }
+    };
+    let time = |k: u32| open + (close - open) * (f64::from(k) + 0.5) / f64::from(count);
+    let described: Vec<SceneDescription> = (0..count).map(|k| motion.at(time(k))).collect::<Result<_>>()?;
+    let texts: Vec<String> = described.iter().map(hash_text).collect();
+    if texts.iter().all(|text| *text == texts[0]) && texts[0] == hash_text(description) {
+        return Ok(Moments::none("nothing changes while the shutter is open"));
+    }
+    let scenes = described.iter().map(|d| compile::compile_with(d, name, shelf)).collect::<Result<Vec<_>>>()?;
+    let reason = format!("camera.shutter, {} of a frame at {count} moments: {why}", close - open);
+    Ok(Moments { scenes, texts, said: Some(Effect { name: "motion blur".into(), on: true, reason }) })
+}
+
+/// What all moments call for together.
+#[must_use]
+pub fn census(still: &Scene, moments: &[Scene]) -> Census {
+    moments.iter().map(Census::of).fold(Census::of(still), Census::join)
+}
+
+/// The longest way of the corner of a box between two moments, pixels. What has no end or is behind the camera does not
+/// count, nor what is there at one of them only.
+fn travelled(open: &Scene, close: &Scene) -> f64 {
+    let places = |scene: &Scene, bounds: &Aabb| -> Vec<Option<DVec2>> {
+        let ndc_from_world = DMat4::from_cols_array(&scene.camera.ndc_from_world().map(f64::from));
+        let size = DVec2::from(scene.camera.resolution.map(f64::from));
+        let corner = |i: u32| {
+            let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+            let at = ndc_from_world * DVec4::from((DVec3::new(pick(0), pick(1), pick(2)), 1.0));
+            (at.w > 0.0 && at.is_finite()).then(|| DVec2::new(at.x, at.y) / at.w * size)
+        };
+        (0..8).map(corner).collect()
+    };
+    // No further than across the picture: beyond it nobody looks.
+    let across = DVec2::from(open.camera.resolution.map(f64::from)).length();
+    let pairs = open.objects.iter().zip(&close.objects);
+    let ways = pairs.flat_map(|(a, b)| {
+        let (from, to) = (places(open, &a.bounds()), places(close, &b.bounds()));
+        from.into_iter().zip(to).filter_map(|(from, to)| Some((to? - from?).length())).collect::<Vec<_>>()
+    });
+    ways.fold(0.0, f64::max).min(across)
+}

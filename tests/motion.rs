@@ -1,0 +1,158 @@
+//! Motion blur: the mean of a scene over the time for which the shutter is open.
+
+mod common;
+
+use common::place::{Place, pixels};
+use serde_json::Value;
+
+/// A camera that looks down on 16 × 4 pixels of 1 m at frame 4.
+const FRAME: &str = "image: {width: 16, height: 4}\n\
+                     output: {exr: {precision: float, channels: luminance}}\n\
+                     render: {samples: 1024, frames: 4}\n";
+
+/// Looks along −z from `x`, which may be keyed; the right of the picture is +x.
+fn ortho(x: &str, shutter: &str) -> String {
+    let to_world = format!("[[1, 0, 0, {x}], [0, 1, 0, 0], [0, 0, -1, 5], [0, 0, 0, 1]]");
+    format!("camera: {{to_world: {to_world}, orthographic_height: 4, shutter: {shutter}}}\n")
+}
+
+/// Renders a scene, and gives the luminance of its pixels, with the report.
+fn render(scene: &str, further: &[&str]) -> (Vec<f64>, Value) {
+    let place = Place::of(scene);
+    let ran = place.run(&[&["render", "scene.yaml", "-q", "-o", "out.exr", "--report", "r.json"], further].concat());
+    assert_eq!(ran.code, 0, "{}\n{scene}", ran.err);
+    let channels = pixels(&place.path("out.exr"));
+    let (_, luminance) = channels.into_iter().find(|(name, _)| name == "Y").unwrap();
+    let luminance = luminance.into_iter().map(|bits| f64::from(f32::from_bits(bits))).collect();
+    (luminance, place.json("r.json")["scenes"][0].clone())
+}
+
+fn effect(report: &Value) -> String {
+    let effects = report["effects"].as_array().unwrap();
+    let blur = effects.iter().find(|e| e["name"] == "motion blur").unwrap();
+    format!("{} {}", blur["on"], blur["reason"].as_str().unwrap())
+}
+
+/// A lit half-plane, x < 0, before a camera that goes four pixels to the right while the shutter is open, from −2 to 2. At
+/// 16 moments it stands at x = −1.875, −1.625, … 1.875, and a pixel from a to a + 1 sees the share of it that is lit, min(1, max(0,
+/// −(a + x))). Of a sample, lit or not, the variance is at most 1/4: of 1024 the deviation is below 1/64, were they not
+/// even spread. Four of those for 64 pixels.
+#[test]
+fn an_edge_is_blurred_into_a_ramp() {
+    let half_plane =
+        "shapes: [{rectangle: {corner: [-100, -100, 0], edge_u: [100, 0, 0], edge_v: [0, 200, 0], emission: 1}}]\n";
+    for (what, scene) in [
+        ("camera", ortho("{0: -16, 8: 16}", "{open: -0.5, close: 0.5, moments: 16}") + half_plane),
+        (
+            "shape",
+            ortho("0", "{open: -0.5, close: 0.5, moments: 16}")
+                + &half_plane.replace("emission: 1", "emission: 1, transform: [{translate: [{0: 16, 8: -16}, 0, 0]}]"),
+        ),
+    ] {
+        let (found, report) = render(&(scene + FRAME + "integrator: {path: {max_depth: 1}}\n"), &[]);
+        assert_eq!(effect(&report), "true camera.shutter, 1 of a frame at 16 moments: as the scene says");
+        for (i, found) in found.iter().enumerate() {
+            let left = (i % 16) as f64 - 8.0;
+            let moments = (0..16).map(|k| -1.875 + 0.25 * f64::from(k));
+            let expected = moments.map(|x| (-(left + x)).clamp(0.0, 1.0)).sum::<f64>() / 16.0;
+            assert!((found - expected).abs() < 4.0 / 64.0, "{what}, pixel {i}: expected {expected}, found {found}");
+        }
+        let mean = found.iter().sum::<f64>() / 64.0;
+        // Even spread of 65,536 samples; half of the picture is lit.
+        assert!((mean - 0.5).abs() < 0.005, "{what}: {mean}");
+    }
+}
+
+/// A sky that brightens evenly from 0 to 2 has the mean 1, a floor below it of albedo 1/2 that of 1/2; and the moments,
+/// being in the middles of equal times, have just that mean.
+#[test]
+fn lights_and_materials_are_blurred_too() {
+    let sky = "{3: 0, 5: 2}";
+    let scene = |of: &str| ortho("0", "2") + FRAME + of;
+    let (found, report) = render(&scene(&format!("lights: [{{constant: {{radiance: {sky}}}}}]\n")), &[]);
+    assert_eq!(effect(&report), "true camera.shutter, 2 of a frame at 16 moments: what moves travels 0 pixels");
+    let mean = |found: &[f64]| found.iter().sum::<f64>() / found.len() as f64;
+    // One sample: uniform over 0 to 2, variance 1/3; of 65,536, five deviations.
+    assert!((mean(&found) - 1.0).abs() < 5.0 * (1.0 / 3.0 / 65_536f64).sqrt(), "{}", mean(&found));
+    let floor = "shapes: [{rectangle: {corner: [-50, -50, 0], edge_u: [100, 0, 0], edge_v: [0, 100, 0], material: {diffuse: {reflectance: {3: 0, 5: 1}}}}}]\n";
+    let (found, _) = render(&scene(&format!("{floor}lights: [{{constant: {{radiance: 1}}}}]\n")), &[]);
+    assert!((mean(&found) - 0.5).abs() < 5.0 * (1.0 / 12.0 / 65_536f64).sqrt(), "{}", mean(&found));
+}
+
+/// What does not change while the shutter is open is the very picture without one.
+#[test]
+fn a_shutter_before_what_stands_still_changes_nothing() {
+    let scene = |shutter: &str| {
+        ortho("{0: 0, 3: 1, 5: 1, 6: 0}", shutter)
+            + FRAME
+            + "shapes: [{sphere: {radius: 1.5}}]\nlights: [{constant: {radiance: 1}}]\n"
+    };
+    let (_, still) = render(&scene("null"), &["--spp", "16"]);
+    let (_, open) = render(&scene("1.5"), &["--spp", "16"]);
+    assert_eq!(open["pixel_hash"], still["pixel_hash"]);
+    assert_eq!(effect(&open), "false nothing changes while the shutter is open");
+    assert!(!still["effects"].to_string().contains("motion blur"));
+    let (_, longer) = render(&scene("3"), &["--spp", "16"]);
+    assert!(longer["pixel_hash"] != still["pixel_hash"] && effect(&longer).starts_with("true"));
+    // The scene at its frame is the same, and the picture is not: what it is on the way counts.
+    let (_, faster) = render(&scene("3").replace("6: 0", "6: 9"), &["--spp", "16"]);
+    assert!(faster["scene_hash"] != longer["scene_hash"]);
+    let (_, whitted) = render(&scene("3"), &["--set", "integrator=whitted"]);
+    assert_eq!(effect(&whitted), "false whitted draws no times");
+}
+
+/// As many moments as the fastest thing travels pixels, 16 to 64.
+#[test]
+fn moments_are_as_many_as_pixels_that_are_travelled() {
+    let scene = |way: u32| {
+        ortho("0", "1")
+            + FRAME
+            + "lights: [{constant: {radiance: 1}}]\nimage: {width: 160, height: 40}\n"
+            + &format!("shapes: [{{sphere: {{radius: 1, center: [{{3: 0, 4: {way}}}, 0, 0]}}}}]\n")
+    };
+    for (way, said) in [(1, "16 moments: what moves travels 5 pixels"), (8, "40 moments: what moves travels 40 pixels")]
+    {
+        let scene = scene(way).replacen("image: {width: 16, height: 4}\n", "", 1);
+        let (_, report) = render(&scene, &["--spp", "1"]);
+        assert!(effect(&report).ends_with(said), "{}", effect(&report));
+    }
+}
+
+#[test]
+fn parts_of_a_blurred_picture_make_it_up() {
+    let scene = ortho("{0: -16, 8: 16}", "0.5")
+        + FRAME
+        + "shapes: [{sphere: {radius: 1.5, material: {dielectric: {ior: 1.5}}}}]\nlights: [{constant: {radiance: 1}}]\n";
+    let place = Place::of(&scene);
+    let run = |arguments: &[&str]| {
+        let ran = place.run(arguments);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+    };
+    let common = ["render", "scene.yaml", "-q", "--spp", "12", "-o"];
+    run(&[&common[..], &["whole.exr", "--threads", "1"]].concat());
+    for (i, samples) in ["0-4", "5-11"].iter().enumerate() {
+        for tile in ["0/2", "1/2"] {
+            let name = format!("parts/{i}-{}.exr", &tile[..1]);
+            run(&[&common[..], &[&name, "--tile", tile, "--samples", samples, "--threads", "2"]].concat());
+        }
+    }
+    run(&["merge", "parts", "-q", "-o", "merged.exr"]);
+    assert!(pixels(&place.path("merged.exr")) == pixels(&place.path("whole.exr")));
+}
+
+#[test]
+fn a_shutter_that_cannot_be_is_refused() {
+    let says = |shutter: &str| {
+        let place = Place::of(&format!("{}lights: []\n", ortho("0", shutter)));
+        let ran = place.run(&["render", "scene.yaml", "-q"]);
+        assert_eq!(ran.code, 2, "{}", ran.err);
+        ran.err
+    };
+    assert!(says("0").contains("camera.shutter: expected a number greater than 0, found 0"));
+    assert!(says("{open: 1, close: 0}").contains("camera.shutter: expected open before close, found 1 and 0"));
+    assert!(
+        says("{open: 0, close: 1, moments: 1}")
+            .contains("camera.shutter.moments: expected a whole number from 2 to 256, found 1")
+    );
+    assert!(says("half").contains("camera.shutter: expected"), "{}", says("half"));
+}
