@@ -236,7 +236,10 @@ fn a_batch_goes_on_after_a_scene_that_fails_and_says_so_at_the_end() {
     let place = batch();
     let ran = place.run(&["render", "batch.yaml"]);
     assert_eq!(ran.code, 2);
-    assert_eq!(place.names("out"), ["good.exr", "good.png", "other.exr", "other.png", "report.json"]);
+    assert_eq!(
+        place.names("out"),
+        ["contact-sheet.html", "contact-sheet.png", "good.exr", "good.png", "other.exr", "other.png", "report.json"]
+    );
     let last: Vec<&str> = ran.err.lines().rev().take(2).collect();
     assert_eq!(
         last,

@@ -5,13 +5,14 @@
 use super::adaptive;
 use super::frame::{self, Frame};
 use super::report::{Developed, SceneReport};
-use super::{Prepared, colour_space, develop, window};
+use super::{Prepared, colour_space, contact, develop, window};
 use crate::description::{self, HeaderValue, LayerContent, Output, SceneDescription};
 use crate::error::Result;
 use crate::film::Window;
 use crate::film::accumulate::PixelCells;
 use crate::film::cryptomatte::Matte;
 use crate::film::exr::{self, Attribute, ChannelData, ColourEncoding, ExrImage, LayerPlane};
+use crate::film::heat;
 use crate::film::png::{self, PngSettings};
 use crate::film::resolve::Image;
 use crate::scene::Scene;
@@ -122,7 +123,7 @@ impl Finish {
         let (white, note) = develop::white(&description.output.png, scene);
         let asked = |content: &LayerContent| description.layers.iter().any(|layer| layer.content == *content);
         // Where the files go is no matter of what is in them.
-        let mut output = Output { dir: PathBuf::new(), ..description.output.clone() };
+        let mut output = Output { dir: PathBuf::new(), contact_sheet: true, ..description.output.clone() };
         output.exr.stderr |= asked(&LayerContent::StandardError);
         Finish {
             name: scene.name.clone(),
@@ -274,6 +275,10 @@ pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut Scene
         metered: finish.output.png.exposure == description::Exposure::Auto,
         white: finish.white,
     });
+    // Rays on a grid differ from each other, but not by chance.
+    if report.error.is_some() {
+        report.error_map = heat::error_map(&image, finish.space().matrix_to_xyz()[1], contact::SIDE);
+    }
     let spectral = spectral_path(exr_path);
     write_spectral(&spectral, finish, frame, &image, report)?;
     // Packed together but written one after the other: where the first cannot be written, nothing of the picture is left.

@@ -5,6 +5,7 @@
 pub mod accuracy;
 pub mod adaptive;
 pub mod checkpoint;
+pub mod contact;
 pub mod develop;
 pub mod farm;
 pub mod finish;
@@ -33,6 +34,7 @@ use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, 
 use crate::transport::trial;
 use crate::transport::ways::{Way, Ways};
 use checkpoint::{Keep, Keeper};
+use contact::Contact;
 use finish::Finish;
 use frame::{FrameJob, Progress, go_on};
 use part_file::Identity;
@@ -619,6 +621,7 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
     let mut scenes = Vec::new();
     let mut report_dir: Option<PathBuf> = None;
     let mut shelf = Shelf::default();
+    let mut contact = Contact::default();
     'batch: for (i, entry) in entries.iter().enumerate() {
         let mut loading = Instant::now();
         let animation = entry.animation(&overrides.set);
@@ -643,11 +646,15 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                 // Nobody comes after the last one.
                 shelf = Shelf::default();
             }
-            let report = match prepared {
+            let mut report = match prepared {
                 Ok(prepared) => {
                     let dir = output_path(&prepared, overrides);
                     report_dir.get_or_insert_with(|| dir.parent().unwrap_or(Path::new(".")).to_path_buf());
-                    render_scene(&prepared, overrides, loading.elapsed(), watcher, stop).0
+                    let mut report = render_scene(&prepared, overrides, loading.elapsed(), watcher, stop).0;
+                    if prepared.description.output.contact_sheet && overrides.portion.is_all() {
+                        contact.add(scenes.len(), &mut report);
+                    }
+                    report
                 }
                 Err(e) => {
                     let mut report = SceneReport::new(&entry.name, frame);
@@ -655,6 +662,7 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                     report
                 }
             };
+            report.error_map = None;
             watcher.scene_ends(&report);
             scenes.push(report);
             loading = Instant::now();
@@ -662,6 +670,10 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
     }
     let mut report = Report::new(path, scenes, start.elapsed());
     if let Some(dir) = report_dir {
+        match contact.write(output::directory_of(&dir.join("report.json")), &report) {
+            Ok(page) => report.contact_sheet = page,
+            Err(e) => report.unwritten = Some(e),
+        }
         report.write(&dir.join("report.json"));
     }
     Ok(report)

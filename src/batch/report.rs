@@ -7,6 +7,7 @@ use super::stop::{Fit, Forecast};
 use crate::error::Error;
 use crate::film::accumulate::{Film, InvalidCounts, PixelCells};
 use crate::film::error::ErrorEstimate;
+use crate::film::heat::Small;
 use crate::film::output;
 use crate::scene::watch::Counts;
 use crate::transport::plan::Effect;
@@ -27,6 +28,9 @@ pub struct Report {
     pub threads: usize,
     /// Each scene.
     pub scenes: Vec<SceneReport>,
+    /// The page of the contact sheet.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact_sheet: Option<PathBuf>,
     /// Where this report is written.
     #[serde(skip)]
     pub file: Option<PathBuf>,
@@ -142,6 +146,9 @@ pub struct SceneReport {
     pub error: Option<ErrorEstimate>,
     /// How the PNG was developed.
     pub png: Option<Developed>,
+    /// The error of its pixels, for the contact sheet.
+    #[serde(skip)]
+    pub error_map: Option<Small>,
     /// Further seconds of rendering that would halve the error.
     pub halving_seconds: Option<f64>,
     /// What was foretold at a quarter of the samples: to be held against `samples`, `seconds.rendering` and `error`.
@@ -175,6 +182,7 @@ impl Report {
             seconds: elapsed.as_secs_f64(),
             threads: rayon::current_num_threads(),
             scenes,
+            contact_sheet: None,
             file: None,
             unwritten: None,
         }
@@ -212,6 +220,7 @@ impl SceneReport {
             adaptive: None,
             error: None,
             png: None,
+            error_map: None,
             halving_seconds: None,
             forecast: None,
             convergence: Vec::new(),

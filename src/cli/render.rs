@@ -210,5 +210,8 @@ pub fn table(report: &Report) -> String {
         report.threads,
         report.file.as_ref().map_or(String::new(), |f| format!("; figures in {}", f.display()))
     );
+    if let Some(page) = &report.contact_sheet {
+        let _ = writeln!(out, "all of them side by side: {}", page.display());
+    }
     out
 }

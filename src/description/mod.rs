@@ -108,6 +108,8 @@
 //!     bits: 8                       # 8, 16
 //!     dither: hash                  # hash, ordered, none
 //!   colour: rec709                  # rec709, acescg, aces2065-1, rec2020, p3, xyz
+//!   contact_sheet: true             # whether the picture is on the contact sheet of its batch, contact-sheet.png and
+//!                                   # contact-sheet.html, which two pictures or more have
 //! textures:
 //!   earth: {image: {file: earth.jpg, wrap: repeat, filter: bilinear, scale: [1, 1], offset: [0, 0], raw: false}}
 //!                                   # repeat, mirror, clamp, and wrap_v where it differs; bilinear, nearest; all but

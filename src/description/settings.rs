@@ -336,6 +336,9 @@ pub struct Output {
     pub colour: Colour,
     /// A further file of bands of the spectrum; default none.
     pub spectral: Option<SpectralFile>,
+    /// Whether the picture is on the contact sheet of its batch; default true.
+    #[serde(default = "yes")]
+    pub contact_sheet: bool,
 }
 
 fn dir() -> PathBuf {
@@ -344,7 +347,14 @@ fn dir() -> PathBuf {
 
 impl Default for Output {
     fn default() -> Output {
-        Output { dir: dir(), exr: Exr::default(), png: Png::default(), colour: Colour::default(), spectral: None }
+        Output {
+            dir: dir(),
+            exr: Exr::default(),
+            png: Png::default(),
+            colour: Colour::default(),
+            spectral: None,
+            contact_sheet: true,
+        }
     }
 }
 

@@ -14,6 +14,7 @@ pub mod error;
 pub mod exr;
 pub mod facts;
 pub mod filter;
+pub mod heat;
 pub mod layers;
 pub mod mattes;
 pub mod output;

@@ -1,0 +1,259 @@
+//! The page of a contact sheet: one file of HTML that opens from disk.
+
+use super::{Card, EMBEDDED, encode, link};
+use crate::batch::accuracy::page::base64;
+use crate::batch::report::{Report, SceneReport, Status};
+use crate::film::heat::Small;
+use crate::transport::plan::Effect;
+use std::fmt::Write;
+use std::path::Path;
+
+/// Figures of a picture, from its report or, where it was there already, from its header.
+pub(super) struct Figures {
+    samples: f64,
+    seconds: f64,
+    /// The error and the ends of its interval.
+    error: Option<[f64; 3]>,
+    valid: bool,
+    halving_seconds: Option<f64>,
+}
+
+impl Figures {
+    pub(super) fn of(card: &Card, scene: &SceneReport) -> Figures {
+        match &card.past {
+            Some(past) => Figures {
+                samples: past.samples,
+                seconds: past.seconds,
+                error: past.error,
+                valid: past.valid,
+                halving_seconds: past.halving_seconds.filter(|_| past.valid),
+            },
+            None => Figures {
+                samples: f64::from(scene.samples),
+                seconds: scene.seconds.rendering,
+                error: scene.error.map(|e| [e.rel_rmse, e.low, e.high]),
+                valid: scene.error.is_some_and(|e| e.valid),
+                halving_seconds: scene
+                    .halving_seconds
+                    .filter(|s| s.is_finite() && scene.error.is_some_and(|e| e.valid)),
+            },
+        }
+    }
+
+    /// One short line.
+    pub(super) fn short(&self) -> String {
+        let error = match self.error {
+            Some([error, ..]) if self.valid => format!(", {}", share(error)),
+            Some(_) => ", noisy".to_owned(),
+            None => String::new(),
+        };
+        format!("{} spp{error}, {}", self.samples, time(self.seconds))
+    }
+
+    /// The error in words.
+    fn error(&self, scene: &SceneReport) -> String {
+        match (self.error, scene.integrator.as_str()) {
+            (Some([error, low, high]), _) if self.valid => {
+                format!("{} ({} to {})", share(error), share(low), share(high))
+            }
+            (Some(_), _) => "not converged".to_owned(),
+            (None, "whitted") => "no noise".to_owned(),
+            (None, _) => "unknown".to_owned(),
+        }
+    }
+
+    /// How much the eye will see of it: below 2 % little, above 10 % much.
+    fn class(&self, scene: &SceneReport) -> &'static str {
+        match self.error {
+            Some([error, ..]) if self.valid && error <= 0.02 => "good",
+            Some([error, ..]) if self.valid && error <= 0.1 => "fair",
+            Some(_) => "poor",
+            None if scene.integrator == "whitted" => "good",
+            None => "",
+        }
+    }
+}
+
+fn share(x: f64) -> String {
+    let per_cent = 100.0 * x;
+    if per_cent < 1.0 { format!("{per_cent:.2} %") } else { format!("{per_cent:.1} %") }
+}
+
+fn time(s: f64) -> String {
+    match s {
+        s if s < 0.1 => format!("{:.0} ms", 1e3 * s),
+        s if s < 100.0 => format!("{s:.1} s"),
+        s if s < 6000.0 => format!("{:.1} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}
+
+/// Text in HTML, also within quotes.
+fn html(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+fn plural(n: usize, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+}
+
+/// The page of `cards`, for the directory `dir`.
+pub(super) fn page(cards: &[Card], dir: &Path, report: &Report) -> String {
+    let title = report.source.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let there = cards.iter().filter(|card| card.past.is_some()).count();
+    let mut about = vec![
+        plural(cards.len(), "picture"),
+        format!("{} on {}", time(report.seconds), plural(report.threads, "thread")),
+        format!("Abbe {}", report.version),
+    ];
+    if there > 0 {
+        about.insert(1, format!("{there} of them were there already"));
+    }
+    let failed: Vec<&SceneReport> =
+        report.scenes.iter().filter(|scene| matches!(scene.status, Status::Failed { .. })).collect();
+    let mut faults = String::new();
+    for scene in &failed {
+        if let Status::Failed { message, .. } = &scene.status {
+            let _ = writeln!(faults, "<li><b>{}</b> {}</li>", html(&scene.label()), html(message));
+        }
+    }
+    if !failed.is_empty() {
+        faults = format!("<ul class=\"faults\" aria-label=\"What failed\">\n{faults}</ul>");
+    }
+    let (mut figures, mut rows, mut options) = (String::new(), String::new(), String::new());
+    let embed = cards.len() <= EMBEDDED;
+    for (i, card) in cards.iter().enumerate() {
+        let scene = &report.scenes[card.scene];
+        figures += &figure(i, card, scene, dir, embed);
+        rows += &row(i, card, scene);
+        let _ = write!(options, "<option value=\"{i}\">{}</option>", html(&scene.label()));
+    }
+    let maps = cards.iter().any(|card| card.error_map.is_some());
+    let sums = summary(cards, report);
+    let scale = if maps {
+        "<p class=\"scale\"><span>0.1 %</span><i></i><span>100 %</span> relative standard error of a pixel, grey where unknown</p>"
+    } else {
+        ""
+    };
+    let switch =
+        if maps { "<label class=\"switch\"><input type=\"checkbox\" id=\"maps\"> error maps</label>" } else { "" };
+    include_str!("page.html")
+        .replace("{{title}}", &html(&title))
+        .replace("{{about}}", &html(&about.join(" · ")))
+        .replace("{{summary}}", &sums)
+        .replace("{{faults}}", &faults)
+        .replace("{{switch}}", switch)
+        .replace("{{scale}}", scale)
+        .replace("{{options}}", &options)
+        .replace("{{rows}}", &rows)
+        .replace("{{figures}}", &figures)
+}
+
+/// What the figures say together: which picture is the noisiest, and what it would cost to halve all errors.
+fn summary(cards: &[Card], report: &Report) -> String {
+    let all: Vec<(String, Figures)> = cards
+        .iter()
+        .map(|card| (report.scenes[card.scene].label(), Figures::of(card, &report.scenes[card.scene])))
+        .collect();
+    let mut sentences = Vec::new();
+    let known = || all.iter().filter_map(|(name, f)| Some((name, f.error.filter(|_| f.valid)?[0])));
+    let by_error = |a: &(&String, f64), b: &(&String, f64)| a.1.total_cmp(&b.1);
+    if let (Some(best), Some(worst)) = (known().min_by(by_error), known().max_by(by_error))
+        && best.0 != worst.0
+    {
+        sentences.push(format!(
+            "Errors go from {} (<b>{}</b>) to {} (<b>{}</b>).",
+            share(best.1),
+            html(best.0),
+            share(worst.1),
+            html(worst.0)
+        ));
+    }
+    let halving: f64 = all.iter().filter_map(|(_, f)| f.halving_seconds).sum();
+    if halving > 0.0 {
+        let costliest = all.iter().filter_map(|(name, f)| Some((name, f.halving_seconds?)));
+        if let Some((name, seconds)) = costliest.max_by(|a, b| a.1.total_cmp(&b.1)) {
+            sentences.push(format!(
+                "To halve every error would take {} more, {} of it for <b>{}</b>.",
+                time(halving),
+                time(seconds),
+                html(name)
+            ));
+        }
+    }
+    let doubtful = all.iter().filter(|(_, f)| f.error.is_some() && !f.valid).count();
+    if doubtful > 0 {
+        sentences.push(format!(
+            "{} not converged: more samples are needed before an error can be stated.",
+            match doubtful {
+                1 => "One has".to_owned(),
+                n => format!("{n} have"),
+            }
+        ));
+    }
+    sentences.join(" ")
+}
+
+fn data(small: &Small) -> String {
+    encode(small).map_or_else(|_| String::new(), |bytes| format!("data:image/png;base64,{}", base64(&bytes)))
+}
+
+fn figure(i: usize, card: &Card, scene: &SceneReport, dir: &Path, embed: bool) -> String {
+    let figures = Figures::of(card, scene);
+    let name = html(&scene.label());
+    let full = html(&link(dir, &card.png));
+    let source = if embed { data(&card.thumbnail) } else { full.clone() };
+    let map = match &card.error_map {
+        Some(map) => format!(" data-map=\"{}\"", data(map)),
+        None => String::new(),
+    };
+    let [width, height] = scene.resolution;
+    let half = figures.halving_seconds.map_or(String::new(), |s| format!(", half of it in {} more", time(s)));
+    let chip = |e: &Effect| format!("<li title=\"{}\">{}</li>", html(&e.reason), html(&e.name));
+    let chips: String = scene.effects.iter().filter(|e| e.on).map(chip).collect();
+    let developed = scene
+        .png
+        .filter(|png| png.metered)
+        .map_or(String::new(), |png| format!("<p>exposure {:+} stops, metered</p>", png.exposure_stops));
+    let plan: String = scene
+        .effects
+        .iter()
+        .chain(&scene.techniques)
+        .map(|e| {
+            let state = if e.on { "on" } else { "off" };
+            format!("<tr class=\"{state}\"><td>{}<td>{state}<td>{}", html(&e.name), html(&e.reason))
+        })
+        .collect();
+    let notes: String = scene.notes.iter().map(|note| format!("<p class=\"note\">{}</p>", html(note))).collect();
+    format!(
+        "<figure id=\"f{i}\"><a href=\"{full}\"><img loading=\"lazy\" alt=\"{name}\" src=\"{source}\" data-full=\"{full}\"{map}></a>\
+         <figcaption><h3>{name}</h3><p>{width} × {height} · {} samples · {}</p>\
+         <p class=\"error {}\">{}{half}</p>{developed}<ul class=\"chips\">{chips}</ul>\
+         <p class=\"pick\"><button data-pick=\"a\" data-i=\"{i}\">before</button>\
+         <button data-pick=\"b\" data-i=\"{i}\">after</button> <a href=\"{}\">EXR</a></p>\
+         <details><summary>Plan{}</summary><table>{plan}</table>{notes}</details></figcaption></figure>\n",
+        figures.samples,
+        time(figures.seconds),
+        figures.class(scene),
+        html(&figures.error(scene)),
+        html(&link(dir, &card.exr)),
+        if scene.notes.is_empty() { String::new() } else { format!(", {}", plural(scene.notes.len(), "note")) },
+    )
+}
+
+/// A line of the table; numbers to sort by stand in `data-v`.
+fn row(i: usize, card: &Card, scene: &SceneReport) -> String {
+    let figures = Figures::of(card, scene);
+    let [width, height] = scene.resolution;
+    let pixels = f64::from(width) * f64::from(height);
+    let cell = |value: f64, text: &str| format!("<td data-v=\"{value}\">{text}");
+    let on: Vec<&str> = scene.effects_in_force();
+    let mut out = format!("<tr><td data-v=\"{i}\"><a href=\"#f{i}\">{}</a>", html(&scene.label()));
+    out += &cell(pixels, &format!("{width} × {height}"));
+    out += &cell(figures.samples, &figures.samples.to_string());
+    out += &cell(figures.seconds, &time(figures.seconds));
+    out += &cell(figures.error.map_or(-1.0, |e| e[0]), &html(&figures.error(scene)));
+    let half = figures.halving_seconds;
+    out += &cell(half.unwrap_or(-1.0), &half.map_or("-".to_owned(), |s| format!("+{}", time(s))));
+    out + &format!("<td>{}\n", html(&on.join(", ")))
+}
