@@ -36,21 +36,33 @@ def test_layers_are_read_and_add_up(render, precision):
         assert (np.abs(total - channels[c]) <= bound + 16 * colours * 2.0**-24).all(), c
 
 
-@pytest.mark.parametrize("layout", ["single", "multipart"])
-def test_mattes_are_decoded(render, layout):
-    names = ["crypto_object", "crypto_material", "crypto_asset"]
-    path = render("mattes", layers=names, assets={"balls": ["sphere1", "sphere2"]}, output={"exr": {"layout": layout}})
+MATTES = ["crypto_object", "crypto_material", "crypto_asset"]
+
+
+def test_mattes_are_decoded(render):
+    path = render("mattes", layers=MATTES, assets={"balls": ["sphere1", "sphere2"]})
     mattes = {matte.metadata().name(): matte for matte in cryptomatte_api.Cryptomatte.load(str(path))}
     assert set(mattes) == {"CryptoObject", "CryptoMaterial", "CryptoAsset"}
     objects = mattes["CryptoObject"].masks()
     assert {"rectangle0", "sphere1", "sphere2"} <= set(objects)
-    with OpenEXR.File(str(path), separate_channels=True) as file:
-        alpha = next(part.channels["A"].pixels for part in file.parts if "A" in part.channels).astype(np.float32)
+    alpha = official(path)[0]["A"].astype(np.float32)
     total = sum(np.asarray(mask).reshape(alpha.shape) for mask in objects.values())
     assert np.abs(total - alpha).max() <= 2.0**-11, "coverage of all objects is that of the picture"
     balls = np.asarray(mattes["CryptoAsset"].mask("balls")).reshape(alpha.shape)
     assert np.allclose(balls, sum(np.asarray(objects[n]).reshape(alpha.shape) for n in ["sphere1", "sphere2"]), atol=1e-6)
     assert balls[15, 8] == 1 and balls[0, 0] == 0
+
+
+def test_mattes_in_parts_have_their_manifests_beside_them(render):
+    """The reader above takes the first part alone; what it would need of the others stands in them."""
+    single, header = official(render("one", layers=MATTES))
+    path = render("parts", layers=MATTES, output={"exr": {"layout": "multipart"}})
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        for part in file.parts[1:]:
+            assert all(np.array_equal(c.pixels, single[name]) for name, c in part.channels.items())
+            own = {name for name in part.header if name.startswith("cryptomatte/")}
+            assert len(own) == 4 and [part.header[n] for n in own if n.endswith("/name")] == [part.name()]
+            assert all(part.header[name] == header[name] for name in own)
 
 
 def test_parts_have_the_layers_and_the_same_pixels(render):
