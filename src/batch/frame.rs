@@ -17,8 +17,9 @@ use crate::film::run::{LONGEST, LayerRun, Run};
 use crate::math::sampler::Octet;
 use crate::scene::Scene;
 use crate::spectrum::ColourSpace;
-use crate::transport::layers::{self, Source};
+use crate::transport::layers::Source;
 use crate::transport::merge::Collection;
+use crate::transport::middle;
 use crate::transport::plan::{EffectPlan, Integrator};
 use crate::transport::{PixelSample, Samples, Shot, moment};
 use serde::{Deserialize, Serialize};
@@ -32,6 +33,8 @@ use std::time::{Duration, Instant};
 pub struct FrameJob<'a> {
     /// The scene.
     pub scene: &'a Scene,
+    /// The same one frame later, where it is known.
+    pub next: Option<&'a Scene>,
     /// What is simulated.
     pub plan: &'a EffectPlan,
     /// The scene while the shutter is open, of which each sample sees one; none where nothing is blurred.
@@ -191,7 +194,9 @@ pub(super) fn render_unit(
         for x in window.x..window.x + window.width as i32 {
             // Who renders the first sample adds what stands in the pixel once.
             if let (true, 0, Some(index)) = (middles, samples.start, window.index([x, y])) {
-                layers::middle(scene, plan, [x, y], |channel, value| tile.layers.add_once(index, [(channel, value)]));
+                middle::middle(scene, job.next, plan, [x, y], |channel, value| {
+                    tile.layers.add_once(index, [(channel, value)])
+                });
             }
             for replicate in 0..REPLICATES as u32 {
                 // Samples take turns among the replicates.

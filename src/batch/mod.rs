@@ -28,7 +28,8 @@ use crate::scene::Scene;
 use crate::scene::compile;
 use crate::scene::shelf::Shelf;
 use crate::spectrum::ColourSpace;
-use crate::transport::layers::{Channel, Form, Layer, LayerPlan, Middle, Quantity, Source};
+use crate::transport::layers::{Channel, Form, Layer, LayerPlan, Quantity, Source};
+use crate::transport::middle::Middle;
 use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
 use crate::transport::trial;
@@ -114,16 +115,19 @@ pub struct Prepared {
     pub hash: String,
     /// The file of the scene.
     pub source: PathBuf,
+    /// The scene one frame later, where the picture says how things move.
+    pub next: Option<Box<Scene>>,
 }
 
 impl Prepared {
     /// The whole picture, sampled by `filter`.
     #[must_use]
     pub fn job<'a>(&'a self, filter: &'a FilterSampler) -> FrameJob<'a> {
-        let Prepared { description, scene, moments, plan, samples, planned, stop, .. } = self;
+        let Prepared { description, scene, moments, plan, samples, planned, stop, next, .. } = self;
         FrameJob {
             scene,
             moments,
+            next: next.as_deref(),
             plan,
             filter,
             window: window(description),
@@ -239,8 +243,22 @@ fn prepare_scene(
     let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
     plan.adaptive = first;
     plan.techniques.extend(said);
-    let hash = hash(&description, &blur.texts, &scene.files, &overrides.paths);
-    Ok(Prepared { description, scene, moments, plan, samples, planned, stop, hash, source: entry.path.clone() })
+    let moving =
+        description.layers.iter().any(|layer| layer.content == LayerContent::Middle(description::Data::Motion));
+    let mut hash = hash(&description, &blur.texts, &scene.files, &overrides.paths);
+    let next = match description.frame.filter(|_| moving) {
+        None => None,
+        Some(frame) => {
+            let later = entry.animation(&overrides.set)?.into_scene(Some(frame.saturating_add(1)))?;
+            let scene = compile::compile_with(&later, &entry.name, shelf)?;
+            // It is part of the picture.
+            let both = hash + &self::hash(&later, &[], &scene.files, &overrides.paths);
+            hash = blake3::hash(both.as_bytes()).to_hex()[..32].to_owned();
+            Some(Box::new(scene))
+        }
+    };
+    let source = entry.path.clone();
+    Ok(Prepared { description, scene, moments, plan, samples, planned, stop, hash, source, next })
 }
 
 /// What ends the render besides samples.
@@ -343,6 +361,7 @@ fn layer_plan(description: &SceneDescription, scene: &Scene, samples: u32) -> Re
                 description::Data::Depth => Middle::Depth,
                 description::Data::Position => Middle::Position,
                 description::Data::Uv => Middle::Uv,
+                description::Data::Motion => Middle::Motion,
             }),
             // Of ways above; the others are no sums.
             LayerContent::Ways { .. }

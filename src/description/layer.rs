@@ -102,6 +102,8 @@ pub enum Data {
     Position,
     /// `uv.U`, `uv.V`: texture coordinates.
     Uv,
+    /// `motion.X`, `motion.Y`: how far it moves on the picture until the next frame.
+    Motion,
 }
 
 /// By what mattes are parted.
@@ -192,10 +194,11 @@ struct WrittenFields {
 }
 
 /// Layers that a name says all of, with the names of their channels.
-const NAMED: [(&str, &str, LayerContent); 12] = [
+const NAMED: [(&str, &str, LayerContent); 13] = [
     ("Z", "Z", LayerContent::Middle(Data::Depth)),
     ("P", "P", LayerContent::Middle(Data::Position)),
     ("uv", "uv", LayerContent::Middle(Data::Uv)),
+    ("motion", "motion", LayerContent::Middle(Data::Motion)),
     ("normal", "normal", LayerContent::Surface(Quantity::ShadingNormal)),
     ("albedo", "albedo", LayerContent::Surface(Quantity::Albedo)),
     ("light_groups", "light_groups", LayerContent::LightGroups),

@@ -69,8 +69,8 @@
 //!                                   # and so do emission, caustic, diffuse, glossy, transmission, media
 //! - diffuse                         # or a name that says all: a way; light_groups: light_key, …, and light_default of
 //!                                   # lamps in no group; Z (depth along the line of sight, 1e10 where there is nothing),
-//!                                   # P, uv: of the ray through the middle of the pixel, not filtered; normal, albedo:
-//!                                   # means over the pixel; variance, stderr: of the pixel's mean; sampleCount;
+//!                                   # P, uv, motion (X to the right, Y up, in pixels, until the next frame): of the ray
+//!                                   # through the middle of the pixel, not filtered; normal, albedo: means over it; variance, stderr: of the pixel's mean; sampleCount;
 //!                                   # crypto_object, crypto_material, crypto_asset: Cryptomatte
 //! render:                           # these are the defaults
 //!   samples: 64                     # paths per pixel

@@ -3,15 +3,14 @@
 //! Names of channels are those of OpenEXR layers: `name.R`, `name.X`, …; components of colour are linear in the
 //! primaries of the file.
 
-use super::path::seen_normal;
+use super::middle::Middle;
 use super::plan::{EffectPlan, Integrator};
-use super::shadow::MAX_BOUNDARIES;
 use super::ways::{Ledger, Way, Ways};
 use crate::film::accumulate::{Invalid, SAMPLE_LIMIT};
 use crate::math::Ray;
 use crate::optics::bsdf::Bsdf;
 use crate::scene::compound::{Composition, Vertex, share};
-use crate::scene::material::{Kind, Material};
+use crate::scene::material::Material;
 use crate::scene::watch::Counts;
 use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
@@ -92,30 +91,6 @@ pub enum Source {
     Middle(Middle),
 }
 
-/// What the ray through the middle of a pixel, from the middle of the lens, meets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Middle {
-    /// Depth along the line of sight, metres; [`FAR`] where there is nothing.
-    Depth,
-    /// The place, metres; 0 where there is nothing.
-    Position,
-    /// Texture coordinates.
-    Uv,
-}
-
-/// The depth of what is not there: beyond every scene, and finite, so that nothing that is computed with it is NaN.
-pub const FAR: f32 = 1e10;
-
-impl Middle {
-    fn components(self) -> &'static [&'static str] {
-        match self {
-            Middle::Depth => &[""],
-            Middle::Position => &["X", "Y", "Z"],
-            Middle::Uv => &["U", "V"],
-        }
-    }
-}
-
 /// Components of [`Source::Numerics`], all a sample: of [`Counts`], and samples that light cannot make, by cause.
 pub const NUMERICS: [&str; 8] = ["surfaces", "robust", "rays", "selfHits", "nan", "infinite", "negative", "overflow"];
 
@@ -132,7 +107,7 @@ pub struct Layer {
 
 impl Layer {
     /// How many channels it has.
-    fn channels(&self) -> usize {
+    pub(super) fn channels(&self) -> usize {
         let count = match self.source {
             Source::Surface(quantity) => quantity.components().len(),
             Source::Light(_, Form::Rgba) => 4,
@@ -419,68 +394,6 @@ fn put<const N: usize>(numbers: &mut Vec<f32>, values: [f32; N], squares: bool) 
 fn rgb(matrix: &[[f64; 3]; 3], xyz: [f32; 3]) -> [f32; 3] {
     let xyz = xyz.map(f64::from);
     matrix.map(|row| (row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2]) as f32)
-}
-
-/// What stands in a pixel once: each channel's number and value.
-pub fn middle(scene: &Scene, plan: &EffectPlan, pixel: [i32; 2], mut put: impl FnMut(usize, f32)) {
-    let mut channel = 0;
-    let mut met = None;
-    for layer in &plan.layers.layers {
-        let next = channel + layer.channels();
-        if let Source::Middle(middle) = layer.source {
-            let met = met.get_or_insert_with(|| {
-                let place = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5;
-                let ray = scene.camera.ray(place, || DVec2::splat(0.5));
-                // What is half there counts.
-                first_covering(scene, plan, &ray, |_| 0.5)
-            });
-            let values = match (middle, met) {
-                (Middle::Depth, Some((_, surface))) => [scene.camera.depth(surface.point) as f32, 0.0, 0.0],
-                (Middle::Depth, None) => [FAR, 0.0, 0.0],
-                (Middle::Position, Some((_, surface))) => surface.point.to_array().map(|x| x as f32),
-                (Middle::Uv, Some((_, surface))) => [surface.uv.x as f32, surface.uv.y as f32, 0.0],
-                (Middle::Position | Middle::Uv, None) => [0.0; 3],
-            };
-            (channel..next).zip(values).for_each(|(channel, value)| put(channel, value));
-        }
-        channel = next;
-    }
-}
-
-/// The number of what covers a sample: above 2³² the object that stands in the scene, below the child of a group that it
-/// shows, or the object itself.
-#[must_use]
-pub fn covered(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<u64> {
-    let (hit, _) = first_covering(scene, plan, ray, u)?;
-    Some(u64::from(hit.instance.unwrap_or(hit.object)) << 32 | u64::from(hit.object))
-}
-
-/// The first surface that a camera ray meets and that is really there: no hole of a mask, which `u` decides at the
-/// crossing of that number, no boundary of a medium alone, no hidden lamp.
-fn first_covering(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<(Hit, SurfacePoint)> {
-    let hides = matches!(&plan.integrator, Integrator::Path(settings) if settings.hide_emitters);
-    let (mut ray, mut reach) = (*ray, scene.camera.reach(ray));
-    for crossing in 0..=MAX_BOUNDARIES {
-        let hit = scene.closest(&ray, reach)?;
-        let surface = scene.surface_with_texture(&ray, &hit);
-        let object = &scene.objects[hit.object as usize];
-        let open = match &scene.materials[object.material as usize].kind {
-            _ if hides && object.light.is_some() => true,
-            Kind::Boundary => true,
-            Kind::Compound(compound) => {
-                let (wo, at) = (-ray.direction, &hit.texture_point(&surface));
-                let vertex = Vertex { scene, hit: &hit, surface: &surface, at, wo };
-                compound.resolve(&vertex, seen_normal(&surface, wo), u(crossing)).is_none()
-            }
-            _ => false,
-        };
-        if !open {
-            return Some((hit, surface));
-        }
-        ray = scene.leave(&surface, &hit, ray.direction);
-        reach = f64::INFINITY;
-    }
-    None
 }
 
 /// The first surface that a camera ray meets.

@@ -9,6 +9,7 @@ pub mod guide;
 pub mod layers;
 pub mod light;
 pub mod merge;
+pub mod middle;
 pub mod path;
 pub mod pilot;
 pub mod plan;
@@ -363,7 +364,7 @@ impl Samples {
         for (i, begun) in begun.iter().enumerate() {
             let covered = shot.plan.layers.mattes.then(|| {
                 let sampler = octet.sampler(begun.at.index);
-                layers::covered(shot.scene, shot.plan, &begun.ray, |crossing| {
+                middle::covered(shot.scene, shot.plan, &begun.ray, |crossing| {
                     sampler.set(Set::Extra(crossing << 16))[2]
                 })
             });

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::math::warp::concentric_disk;
 use crate::math::{Frame, Ray};
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 use std::f64::consts::PI;
 
 /// A cone from `base` to `apex`. Faces: side 0, base cap 1.
@@ -38,6 +38,11 @@ pub struct Cone {
 }
 
 impl Cone {
+    pub(super) fn placement(&self) -> DAffine3 {
+        let Frame { s, t, n } = self.frame;
+        DAffine3::from_cols(s * self.radius, t * self.radius, n * self.height, self.base)
+    }
+
     /// A cone; without a cap the base is open and the inside of the side shows.
     ///
     /// # Errors

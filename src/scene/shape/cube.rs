@@ -5,7 +5,7 @@ use super::plain::Plain;
 use super::span::{Exit, Span};
 use super::{AreaSample, Layout, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest};
 use crate::math::Ray;
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 
 /// A parallelepiped: centre + x·e₀ + y·e₁ + z·e₂ with |x|, |y|, |z| ≤ 1.
 ///
@@ -61,6 +61,11 @@ const PICTURES_Z_UP: [Picture; 6] = [
 ];
 
 impl Cube {
+    pub(super) fn placement(&self) -> DAffine3 {
+        let [x, y, z] = self.half_edges;
+        DAffine3::from_cols(x, y, z, self.center)
+    }
+
     /// A cube from its centre and the three vectors from there to the middles of faces +x, +y, +z.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use super::{
 use crate::math::trig::sin_cos_turn;
 use crate::math::warp::concentric_disk;
 use crate::math::{Frame, Ray};
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
 pub(super) const WALL: u8 = 0;
@@ -39,6 +39,11 @@ pub struct Cylinder {
 }
 
 impl Cylinder {
+    pub(super) fn placement(&self) -> DAffine3 {
+        let Frame { s, t, n } = self.frame;
+        DAffine3::from_cols(s * self.radius, t * self.radius, n * self.length, self.base)
+    }
+
     /// A cylinder; without a cap the end is open and the inside of the wall shows.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::math::warp::concentric_disk;
 use crate::math::{Frame, Ray};
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 use std::f64::consts::PI;
 
 /// An infinite plane.
@@ -19,6 +19,11 @@ pub struct Plane {
 }
 
 impl Plane {
+    pub(super) fn placement(&self) -> DAffine3 {
+        let Frame { s, t, n } = self.frame;
+        DAffine3::from_cols(s, t, n, self.point)
+    }
+
     /// How far `point` lies on the side of the normal, metres.
     #[must_use]
     pub fn height(&self, point: DVec3) -> f64 {
@@ -107,6 +112,10 @@ struct PatchHit {
 }
 
 impl Patch {
+    pub(super) fn placement(&self) -> DAffine3 {
+        DAffine3::from_cols(self.u, self.v, self.normal, self.origin)
+    }
+
     fn new(place: &str, origin: DVec3, u: DVec3, v: DVec3) -> Result<Patch, String> {
         check_point(place, origin)?;
         let length_u = check_direction("edge_u", u)?;
@@ -194,6 +203,10 @@ impl Patch {
 pub struct Disk(pub(super) Patch);
 
 impl Disk {
+    pub(super) fn placement(&self) -> DAffine3 {
+        self.0.placement()
+    }
+
     /// A disk whose rim passes through `center` ± `edge_u` and `center` ± `edge_v`; round if these
     /// are perpendicular and of equal length. Normal along `edge_u` × `edge_v`.
     ///
@@ -252,6 +265,10 @@ impl Disk {
 pub struct Rectangle(pub(super) Patch);
 
 impl Rectangle {
+    pub(super) fn placement(&self) -> DAffine3 {
+        self.0.placement()
+    }
+
     /// A rectangle with `corner` at texture coordinates (0, 0). Normal along `edge_u` × `edge_v`.
     ///
     /// # Errors

@@ -52,7 +52,7 @@ mod sweeps;
 pub(super) mod testing;
 
 use crate::math::Ray;
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 
 pub use cone::Cone;
 pub use cube::Cube;
@@ -191,6 +191,13 @@ macro_rules! each {
 }
 
 impl Shape {
+    /// How the form lies in the world: from a frame in which it is of unit size, so that what changes place, size or
+    /// turning keeps the coordinates of its points.
+    #[must_use]
+    pub fn placement(&self) -> DAffine3 {
+        each!(self, s => s.placement())
+    }
+
     /// The nearest hit with 0 < t < `t_max`, from inside or outside. `departing` is the face of
     /// this very shape that the ray starts on.
     #[inline]

@@ -20,7 +20,7 @@ use super::{
 };
 use crate::math::warp::{uniform_cone, uniform_sphere};
 use crate::math::{Frame, Ray};
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
 /// The frame in which texture coordinates have their pole at +z and u = φ/2π with φ from +x
@@ -43,6 +43,10 @@ pub struct Sphere {
 }
 
 impl Sphere {
+    pub(super) fn placement(&self) -> DAffine3 {
+        DAffine3::from_mat3_translation(self.world_from_object * self.radius, self.center)
+    }
+
     /// A sphere; `world_from_object` turns its texture (see the module page).
     ///
     /// # Errors

@@ -1,0 +1,160 @@
+//! What stands in a pixel once: data of the ray through its middle, from the middle of the lens, which no filter mixes; and
+//! what covers a sample.
+
+use super::layers::Source;
+use super::path::seen_normal;
+use super::plan::{EffectPlan, Integrator};
+use super::shadow::MAX_BOUNDARIES;
+use crate::math::Ray;
+use crate::scene::compound::Vertex;
+use crate::scene::material::Kind;
+use crate::scene::{Geometry, Hit, Scene, SurfacePoint};
+use glam::{DVec2, DVec3};
+
+/// A datum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Middle {
+    /// Depth along the line of sight, metres; [`FAR`] where there is nothing.
+    Depth,
+    /// The place, metres; 0 where there is nothing.
+    Position,
+    /// Texture coordinates.
+    Uv,
+    /// How far what is seen moves on the picture until the next frame, pixels, to the right and up; 0 where it leaves the
+    /// camera's view, and without frames.
+    Motion,
+}
+
+/// The depth of what is not there: beyond every scene, and finite, so that nothing that is computed with it is NaN.
+pub const FAR: f32 = 1e10;
+
+impl Middle {
+    /// Names of its components; an empty one is the layer itself.
+    #[must_use]
+    pub fn components(self) -> &'static [&'static str] {
+        match self {
+            Middle::Depth => &[""],
+            Middle::Position => &["X", "Y", "Z"],
+            Middle::Uv => &["U", "V"],
+            Middle::Motion => &["X", "Y"],
+        }
+    }
+}
+
+/// The data of a pixel: each channel's number and value. `next` is the scene one frame later.
+pub fn middle(
+    scene: &Scene,
+    next: Option<&Scene>,
+    plan: &EffectPlan,
+    pixel: [i32; 2],
+    mut put: impl FnMut(usize, f32),
+) {
+    let place = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5;
+    let mut channel = 0;
+    let mut met = None;
+    for layer in &plan.layers.layers {
+        let end = channel + layer.channels();
+        if let Source::Middle(middle) = layer.source {
+            let (ray, met) = met.get_or_insert_with(|| {
+                let ray = scene.camera.ray(place, || DVec2::splat(0.5));
+                // What is half there counts.
+                (ray, first_covering(scene, plan, &ray, |_| 0.5))
+            });
+            let values = match (middle, met) {
+                (Middle::Depth, Some((_, surface))) => [scene.camera.depth(surface.point) as f32, 0.0, 0.0],
+                (Middle::Depth, None) => [FAR, 0.0, 0.0],
+                (Middle::Position, Some((_, surface))) => surface.point.to_array().map(|x| x as f32),
+                (Middle::Uv, Some((_, surface))) => [surface.uv.x as f32, surface.uv.y as f32, 0.0],
+                (Middle::Position | Middle::Uv, None) => [0.0; 3],
+                (Middle::Motion, met) => {
+                    let [x, y] = next.map_or([0.0; 2], |next| motion(scene, next, place, ray, met.as_ref()));
+                    [x, y, 0.0]
+                }
+            };
+            (channel..end).zip(values).for_each(|(channel, value)| put(channel, value));
+        }
+        channel = end;
+    }
+}
+
+/// How far what is seen at `place` moves until the scene is `next`, pixels, to the right and up.
+fn motion(scene: &Scene, next: &Scene, place: DVec2, ray: &Ray, met: Option<&(Hit, SurfacePoint)>) -> [f32; 2] {
+    let point = match met {
+        Some((hit, surface)) => moved(scene, next, hit, surface.point),
+        // What is infinitely far keeps its direction.
+        None => next.camera.eye() + ray.direction,
+    };
+    let Some(entry) = next.camera.entry(point, || DVec2::splat(0.5)) else { return [0.0; 2] };
+    let shift = entry.pixel - place;
+    [shift.x as f32, -shift.y as f32]
+}
+
+/// Where the point that was hit is in the scene `next`: at the same place of the same triangle, or of the same form. What
+/// has no such place there is taken to stand still.
+fn moved(scene: &Scene, next: &Scene, hit: &Hit, point: DVec3) -> DVec3 {
+    let map = |scene: &Scene, object: u32| match &scene.objects.get(object as usize)?.geometry {
+        Geometry::Instance(instance) => Some(*instance.map.world_from_object()),
+        _ => None,
+    };
+    // Of a copy first into the space of its group, and at last out of it.
+    let (into, out) = match hit.instance {
+        None => (None, None),
+        Some(instance) => match (map(scene, instance), map(next, instance)) {
+            (Some(before), Some(after)) => (Some(before.inverse()), Some(after)),
+            _ => return point,
+        },
+    };
+    let local = into.map_or(point, |into| into.transform_point3(point));
+    let (Some(before), Some(after)) = (scene.objects.get(hit.object as usize), next.objects.get(hit.object as usize))
+    else {
+        return point;
+    };
+    let local = match (&before.geometry, &after.geometry) {
+        (Geometry::Shape(before), Geometry::Shape(after)) => {
+            let own = before.placement().inverse().transform_point3(local);
+            after.placement().transform_point3(own)
+        }
+        (Geometry::Mesh(_), Geometry::Mesh(after)) if (hit.part as usize) < after.mesh.triangles.len() => {
+            after.mesh.surface(hit.part, hit.barycentric[0], hit.barycentric[1]).point
+        }
+        _ => local,
+    };
+    let moved = out.map_or(local, |out| out.transform_point3(local));
+    if moved.is_finite() { moved } else { point }
+}
+
+/// The number of what covers a sample: above 2³² the object that stands in the scene, below the child of a group that it
+/// shows, or the object itself.
+#[must_use]
+pub fn covered(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<u64> {
+    let (hit, _) = first_covering(scene, plan, ray, u)?;
+    Some(u64::from(hit.instance.unwrap_or(hit.object)) << 32 | u64::from(hit.object))
+}
+
+/// The first surface that a camera ray meets and that is really there: no hole of a mask, which `u` decides at the
+/// crossing of that number, no boundary of a medium alone, no hidden lamp.
+fn first_covering(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<(Hit, SurfacePoint)> {
+    let hides = matches!(&plan.integrator, Integrator::Path(settings) if settings.hide_emitters);
+    let (mut ray, mut reach) = (*ray, scene.camera.reach(ray));
+    for crossing in 0..=MAX_BOUNDARIES {
+        let hit = scene.closest(&ray, reach)?;
+        let surface = scene.surface_with_texture(&ray, &hit);
+        let object = &scene.objects[hit.object as usize];
+        let open = match &scene.materials[object.material as usize].kind {
+            _ if hides && object.light.is_some() => true,
+            Kind::Boundary => true,
+            Kind::Compound(compound) => {
+                let (wo, at) = (-ray.direction, &hit.texture_point(&surface));
+                let vertex = Vertex { scene, hit: &hit, surface: &surface, at, wo };
+                compound.resolve(&vertex, seen_normal(&surface, wo), u(crossing)).is_none()
+            }
+            _ => false,
+        };
+        if !open {
+            return Some((hit, surface));
+        }
+        ray = scene.leave(&surface, &hit, ray.direction);
+        reach = f64::INFINITY;
+    }
+    None
+}
