@@ -2,16 +2,19 @@
 //!
 //! A checkpoint is a part ([`super::part_file`]) named like the picture with `.checkpoint` behind, whole or not there. It is
 //! written when the render is asked to stop, which then ends with exit code 75, and from time to time, for those who are
-//! not asked. Work pauses between two units, so that it is exact: what is resumed gives the same bits.
+//! not asked. Work pauses between two units, so that it is exact: what is resumed gives the same bits. The same pauses show
+//! the picture to a viewer ([`super::tev`]).
 
 use super::finish::Finish;
 use super::frame::{Begun, FrameJob, Milestone, lock};
 use super::merge::sum;
+use super::names;
 use super::part::{Breaks, Part, Share};
 use super::part_file::{self, Identity};
+use super::tev::{self, Viewer};
 use crate::error::{Error, Result};
 use crate::film::output;
-use crate::film::resolve::{self, Splats};
+use crate::film::resolve::{self, Image, Splats};
 use crate::film::{exr, png};
 use crate::scene::watch::{Counts, Watch};
 use std::path::{Path, PathBuf};
@@ -32,6 +35,8 @@ pub struct Keep {
     pub skip_existing: bool,
     /// Set when a picture of what is done is wanted.
     pub snapshot: Arc<AtomicBool>,
+    /// Who looks on.
+    pub viewer: Option<Arc<Viewer>>,
 }
 
 /// The checkpoint of the file at `path`.
@@ -53,6 +58,8 @@ pub struct Keeper<'a> {
     /// Of the run that is resumed.
     counted: Option<Counts>,
     next: Mutex<Option<Instant>>,
+    /// When a viewer is shown the picture again.
+    next_look: Mutex<Instant>,
     /// What a person should know.
     notes: Mutex<Vec<String>>,
 }
@@ -68,7 +75,17 @@ impl<'a> Keeper<'a> {
         watch: Option<&'a Watch>,
     ) -> Keeper<'a> {
         let next = Mutex::new(keep.every.and_then(|every| Instant::now().checked_add(every)));
-        Keeper { keep, stop, path, identity, watch, counted: None, next, notes: Mutex::default() }
+        Keeper {
+            keep,
+            stop,
+            path,
+            identity,
+            watch,
+            counted: None,
+            next,
+            next_look: Mutex::new(Instant::now()),
+            notes: Mutex::default(),
+        }
     }
 
     /// The render from where a checkpoint left it, if one is to be resumed and there, else from the beginning.
@@ -120,15 +137,26 @@ impl<'a> Keeper<'a> {
         part_file::write(&place(self.path), self.identity, part, milestones, elapsed, self.numerics())
     }
 
-    /// A PNG of what is done.
-    fn snapshot(&self, part: &Part) -> Result<()> {
-        let finish = &self.identity.finish;
-        let image = part.look(|film, splats| {
+    /// What is done.
+    fn look(&self, part: &Part, rgb_from_xyz: &[[f64; 3]; 3]) -> Image {
+        part.look(|film, splats| {
             // A tile's rows are less than what its light from the lights covers.
             let splats = splats.filter(|s| s.film.window() == film.window());
             let splats = splats.map(|s| Splats { film: &s.film, photons: s.paths });
-            resolve::resolve(film, splats, &finish.rgb_from_xyz())
-        });
+            resolve::resolve(film, splats, rgb_from_xyz)
+        })
+    }
+
+    /// The viewer, where it would take a picture now.
+    fn looking_on(&self) -> Option<&Viewer> {
+        let viewer = self.keep.viewer.as_deref()?;
+        (viewer.is_ready() && Instant::now() >= *lock(&self.next_look)).then_some(viewer)
+    }
+
+    /// A PNG of what is done.
+    fn snapshot(&self, part: &Part) -> Result<()> {
+        let finish = &self.identity.finish;
+        let image = self.look(part, &finish.rgb_from_xyz());
         png::write_png(&self.path.with_extension("snapshot.png"), &image, &finish.png_settings(&image))
     }
 
@@ -139,7 +167,10 @@ impl<'a> Keeper<'a> {
 
 impl Breaks for Keeper<'_> {
     fn wanted(&self) -> bool {
-        self.stop.load(Ordering::Relaxed) || self.keep.snapshot.load(Ordering::Relaxed) || self.is_due()
+        self.stop.load(Ordering::Relaxed)
+            || self.keep.snapshot.load(Ordering::Relaxed)
+            || self.is_due()
+            || self.looking_on().is_some()
     }
 
     fn ending(&self) -> bool {
@@ -164,6 +195,13 @@ impl Breaks for Keeper<'_> {
             && let Err(e) = self.snapshot(part)
         {
             lock(&self.notes).push(format!("no snapshot: {e}"));
+        }
+        if let Some(viewer) = self.looking_on() {
+            let start = Instant::now();
+            let name = names::label(&self.identity.finish.name, self.identity.finish.frame_number);
+            viewer.show(&name, self.look(part, &self.identity.finish.rec709_from_xyz()));
+            // At most a twentieth of the time goes into looking.
+            *lock(&self.next_look) = Instant::now() + tev::EVERY.max(20 * start.elapsed());
         }
         if self.is_due() {
             let start = Instant::now();

@@ -216,6 +216,12 @@ impl Finish {
         self.space().matrix_from_xyz().map(|row| row.map(|x| x * self.sensitivity))
     }
 
+    /// From XYZ to linear Rec.709, which viewers expect.
+    #[must_use]
+    pub fn rec709_from_xyz(&self) -> [[f64; 3]; 3] {
+        ColourSpace::Rec709.matrix_from_xyz().map(|row| row.map(|x| x * self.sensitivity))
+    }
+
     /// How the PNG of `image` is developed, whose colours are those of the file.
     #[must_use]
     pub fn png_settings(&self, image: &Image) -> PngSettings {

@@ -18,6 +18,7 @@ pub mod part_file;
 mod portion;
 pub mod report;
 pub mod stop;
+pub mod tev;
 
 use crate::description::{self, BatchEntry, LayerContent, PathMap, SceneDescription};
 use crate::error::{Error, Result};
@@ -583,6 +584,9 @@ fn render_and_write(
         return Ok(());
     }
     let frame = begun.finish();
+    if let Some(viewer) = &overrides.keep.viewer {
+        viewer.show_last(&report.label(), frame.resolve(&finish.rec709_from_xyz()));
+    }
     report.measure(finish, &frame, keeper.numerics());
     report.forecast = Forecast::at_a_quarter(&frame.milestones, &prepared.stop, prepared.samples);
     let written = finish::write(finish, &frame, &exr_path, report);

@@ -139,6 +139,9 @@ struct RenderArguments {
     /// Leave alone pictures that are there, undamaged and of the same scene and settings
     #[arg(long)]
     skip_existing: bool,
+    /// Show each picture as it grows in the tev viewer at this place, as localhost:14158
+    #[arg(long, value_name = "HOST:PORT", value_parser = host_and_port)]
+    tev: Option<String>,
     /// How to tell of progress
     #[arg(long, value_enum, default_value_t = ProgressStyle::Auto)]
     progress: ProgressStyle,
@@ -297,6 +300,14 @@ enum PlanFormat {
     Text,
     /// JSON
     Json,
+}
+
+fn host_and_port(text: &str) -> std::result::Result<String, String> {
+    let named = |(host, port): &(&str, &str)| !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0);
+    match text.rsplit_once(':').filter(named) {
+        Some(_) => Ok(text.to_owned()),
+        None => Err("expected HOST:PORT, as localhost:14158".into()),
+    }
 }
 
 fn duration(text: &str) -> std::result::Result<std::time::Duration, String> {

@@ -6,9 +6,11 @@ use super::text::columns;
 use super::{ProgressStyle, RenderArguments, use_threads};
 use crate::batch;
 use crate::batch::report::{Report, SceneReport, Status};
+use crate::batch::tev::Viewer;
 use crate::error::Result;
 use crate::film::output::{prepare_place, write_json};
 use std::fmt::Write;
+use std::sync::Arc;
 
 /// Renders, and prints a table at the end.
 pub fn run(arguments: &RenderArguments) -> Result<i32> {
@@ -38,6 +40,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
             resume: arguments.resume,
             skip_existing: arguments.skip_existing,
             snapshot: interrupts.snapshot.clone(),
+            viewer: arguments.tev.as_deref().map(|place| Arc::new(Viewer::new(place))),
         },
         ..scene
     };
@@ -46,6 +49,9 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     }
     let report = batch::render_batch(&arguments.scene.file, &overrides, &teller, &interrupts.stop)?;
     teller.finish();
+    if let Some(gone) = overrides.keep.viewer.as_ref().and_then(|viewer| viewer.close()) {
+        super::complain(&format!("warning: {gone}"));
+    }
     if let Some(file) = &arguments.report {
         write_json(file, &report)?;
     }
