@@ -112,6 +112,44 @@ fn the_sheet_finds_what_a_bound_to_depth_costs() {
     assert!(without.0 == 0 && without.1.contains("only `path` has knobs to weigh"), "{}", without.1);
 }
 
+/// In a room whose walls glow with 1 and give half back the light is 1 + 1/2 + 1/4 + … = 2, and 3/2 with one bounce: of
+/// √relMSE |3/2 − 2| / √(2² + f), where f is a hundredth of the square of the mean of all values, 1.02 × 2 in white of equal
+/// energy (the mean of 1.205, 0.948 and 0.909): the mean over channels of 1 / (4 + f/c²) is 0.2475 to a hundredth, so the bias is
+/// 0.2487. Samples of the full setting have none.
+#[test]
+fn against_a_closed_form_the_sheet_finds_the_bias_that_is_there() {
+    let walls = [
+        ("[-1, -1, -1]", "[0, 0, 2]", "[2, 0, 0]"),
+        ("[-1, 1, -1]", "[2, 0, 0]", "[0, 0, 2]"),
+        ("[-1, -1, -1]", "[2, 0, 0]", "[0, 2, 0]"),
+        ("[-1, -1, 1]", "[0, 2, 0]", "[2, 0, 0]"),
+        ("[-1, -1, -1]", "[0, 2, 0]", "[0, 0, 2]"),
+        ("[1, -1, -1]", "[0, 0, 2]", "[0, 2, 0]"),
+    ];
+    let glow = "emission: 1, material: {diffuse: {reflectance: 0.5}}";
+    let wall = |(c, u, v)| format!("- rectangle: {{corner: {c}, edge_u: {u}, edge_v: {v}, {glow}}}\n");
+    let furnace = "camera: {origin: [0.1, 0.2, 0.3], target: [0, 0, -1], fov_deg: 60}\nimage: {width: 16, height: 16}\n\
+                   render: {samples: 64}\nintegrator: {path: {max_depth: null}}\nshapes:\n";
+    let place = Place::of(&(furnace.to_owned() + &walls.map(wall).concat()));
+    let (code, said) = abbe(&place, "accuracy scene.yaml -o sheet --rounds 2 --truth 2");
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("the truth is known in closed form"), "{said}");
+    let sheet = &place.json("sheet/accuracy.json")[0];
+    let rows = sheet["rows"].as_array().unwrap();
+    for row in rows.iter().filter(|row| row["knob"] != "file") {
+        let figure = |of: &Value| [of["value"].as_f64().unwrap(), of["error"].as_f64().unwrap()];
+        let [bias, error] = figure(&row["bias_squared"]);
+        if row["knob"] == "depth" && row["value"] == "2" {
+            assert!((bias.sqrt() - 0.2487).abs() < 0.003, "{row}");
+            let [green, _] = figure(&row["light"][1]);
+            assert!((green - 0.75).abs() < 0.005, "{row}");
+        } else if row["knob"] != "depth" {
+            assert!(bias.abs() < 4.0 * error, "{row}");
+        }
+    }
+    assert_eq!(abbe(&place, "accuracy scene.yaml --truth 0").0, 2);
+}
+
 /// A film of 4096 × 4096 pixels takes four gibibytes: the process ends by itself long before.
 #[test]
 fn a_memory_limit_ends_the_process_with_a_code_of_its_own() {

@@ -48,6 +48,8 @@ pub struct Settings {
     pub target: Option<f64>,
     /// About how long all of it may take: samples are cut to that, to [`FEWEST`] at the least.
     pub time: Option<Duration>,
+    /// What every pixel is known to be, radiance at all wavelengths alike: in place of a reference.
+    pub truth: Option<f64>,
 }
 
 /// See [`Settings::time`].
@@ -114,8 +116,8 @@ pub struct Sheet {
     pub size: [u32; 2],
     /// The error that is wanted.
     pub target: f64,
-    /// Samples of a pixel of the reference, and its noise.
-    pub reference: (u32, f64),
+    /// Samples of a pixel of the reference, and its noise; none where the truth is known.
+    pub reference: Option<(u32, f64)>,
     /// A PNG of the reference.
     #[serde(skip)]
     pub png: Vec<u8>,
@@ -182,7 +184,10 @@ pub fn sheet(
     };
     let seed = chosen.description.render.seed;
     let full = desk.render(&full, seed ^ SEED_OF_THE_REFERENCE, None)?;
-    let reference = Reference::new(&full.image, full.replicates);
+    let reference = match settings.truth {
+        Some(radiance) => Reference::known(&full.image, radiance),
+        None => Reference::new(&full.image, full.replicates),
+    };
     let mut tallies: Vec<Tally> = trials.iter().map(|_| Tally::default()).collect();
     let mut images: Vec<Image> = Vec::new();
     for round in 0..rounds {
@@ -207,7 +212,7 @@ pub fn sheet(
     let bias_squared = Figure { value: rounding(&images[0]), error: 0.0 };
     rows.push(Row { knob: "file", value: "half".into(), chosen: false, bias_squared, ..rows[0].clone() });
     let advice = advice::sentences(&rows);
-    let reference = (more, reference.noise);
+    let reference = settings.truth.is_none().then_some((more, reference.noise));
     let png = png::encode_png(&full.image, &settings_of_png).map_err(Error::Render)?;
     Ok(Ok(Sheet { scene: chosen.scene.name, size, target, reference, png, rows, advice }))
 }
@@ -231,7 +236,9 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
     let end = curve[curve.len() - 1];
     let cost = |tally: &Tally| {
         let Figure { value, error } = tally.noise_squared();
-        (value * tally.seconds(), error / value)
+        // Of the least of a few times nobody knows the error: half of how far they lie apart.
+        let time = 0.5 * (tally.most_seconds() / tally.seconds() - 1.0);
+        (value * tally.seconds(), (error / value).hypot(time))
     };
     let ((own, own_error), (cost, error)) = (cost(chosen), cost(tally));
     let mut row = Row {

@@ -4,7 +4,7 @@ use super::interrupts::Interrupts;
 use super::text::columns;
 use super::{AccuracyArguments, use_threads};
 use crate::batch;
-use crate::batch::accuracy::page::{HEADINGS, cells, page};
+use crate::batch::accuracy::page::{HEADINGS, cells, held_against, page};
 use crate::batch::accuracy::{self, FEWEST, Settings, Sheet};
 use crate::error::Result;
 use crate::film::output::{prepare_place, write_atomically, write_json};
@@ -32,8 +32,8 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
         };
         let made = entry.scene(&overrides.set).and_then(|scene| {
             let samples = scene.render.samples.clamp(FEWEST, MOST_SAMPLES);
-            let AccuracyArguments { pixels, rounds, error: target, time, .. } = *arguments;
-            let settings = Settings { pixels, samples, rounds, target, time };
+            let AccuracyArguments { pixels, rounds, error: target, time, truth, .. } = *arguments;
+            let settings = Settings { pixels, samples, rounds, target, time, truth };
             accuracy::sheet(&entry, &overrides, &settings, &told, &interrupts.stop)
         });
         match made {
@@ -71,7 +71,8 @@ fn text(sheet: &Sheet) -> String {
     let mut rows = vec![HEADINGS.map(String::from)];
     rows.extend(sheet.rows.iter().map(cells));
     let [width, height] = sheet.size;
-    let mut out = format!("{}, {width} x {height}, target {:.2} %\n", sheet.scene, 100.0 * sheet.target);
+    let against = held_against(sheet);
+    let mut out = format!("{}, {width} x {height}, target {:.2} %; {against}\n", sheet.scene, 100.0 * sheet.target);
     out += &columns(&rows, 2);
     for (knob, sentence) in &sheet.advice {
         let _ = writeln!(out, "{knob}: {sentence}");

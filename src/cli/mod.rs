@@ -232,6 +232,9 @@ struct AccuracyArguments {
     /// About how long each scene may take, as 30s or 5m: its samples are cut to that, to 16 at the least
     #[arg(long, value_name = "TIME", value_parser = duration)]
     time: Option<std::time::Duration>,
+    /// The radiance that every pixel is known to have at all wavelengths, in place of a reference
+    #[arg(long, value_name = "L", value_parser = radiance)]
+    truth: Option<f64>,
     /// How often each setting is rendered, each time with another seed
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
@@ -349,6 +352,13 @@ fn samples(text: &str) -> std::result::Result<crate::batch::Samples, String> {
     let range = || pair(text, '-').or_else(one).map(Samples::Range);
     let expected = "expected a-b, as 0-63: the first 64 samples; or i/n, as 2/8: the third of eight ranges";
     pair(text, '/').map(Samples::Nth).or_else(range).ok_or_else(|| expected.into())
+}
+
+fn radiance(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("expected a number above zero, as 0.8".into()),
+    }
 }
 
 fn share(text: &str) -> std::result::Result<f64, String> {

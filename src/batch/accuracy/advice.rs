@@ -49,7 +49,7 @@ fn convergence(chosen: &Row, rows: &[Row]) -> String {
     let ratio = f64::from(many.samples) / f64::from(few.samples);
     format!(
         "{} times the samples take {} of the time for {} of the noise: variance falls as samples^-{:.2}",
-        figures(ratio).trim_end_matches(".00"),
+        ratio.round(),
         figures(many.seconds / few.seconds),
         figures(many.noise[0] / few.noise[0]),
         2.0 * libm::log(few.noise[0] / many.noise[0]) / libm::log(ratio)
