@@ -17,6 +17,9 @@ use crate::scene::shelf::Shelf;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+/// A task has a share of the pictures: a sheet of those alone would stand in the place of another task's.
+const NO_SHEET: [&str; 2] = ["--set", "output.contact_sheet=false"];
+
 /// How pictures and frames are shared out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {

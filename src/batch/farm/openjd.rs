@@ -3,6 +3,7 @@
 //! No shell stands between the engine and `abbe`: that a task is to end reaches it as SIGTERM, it writes a checkpoint and
 //! ends with 75. To the engine that is a task that failed; run again it goes on from there.
 
+use super::NO_SHEET;
 use super::{BundleFile, Group, Job};
 use crate::description::frames_in_short;
 use serde_json::json;
@@ -143,6 +144,7 @@ fn render(job: &Job, group: &Group, mark: &str, out: &mut String) {
     }
     arguments.extend(["-o", place, "--threads", "{{Param.Threads}}", "--resume", "--progress", "openjd"]);
     arguments.extend(["--path-map-file", "{{Session.PathMappingRulesFile}}"]);
+    arguments.extend(NO_SHEET);
     arguments.extend(job.arguments.iter().map(String::as_str));
     action(&arguments, out);
 }

@@ -5,6 +5,7 @@
 //! waits with `afterany`, since an array remembers the worst exit code of tasks that were well in the end. So the merge has to
 //! find out by itself whether all parts are there, which it does.
 
+use super::NO_SHEET;
 use super::{BundleFile, Job};
 use crate::description::frames_in_short;
 use std::fmt::Write;
@@ -101,7 +102,7 @@ fn render(job: &Job) -> String {
          --resume --progress plain",
         word(&job.source.display().to_string())
     );
-    for argument in &job.arguments {
+    for argument in NO_SHEET.into_iter().chain(job.arguments.iter().map(String::as_str)) {
         command += " ";
         command += &word(argument);
     }
