@@ -6,7 +6,7 @@ use super::adaptive;
 use super::frame::{self, Frame};
 use super::report::{Developed, SceneReport};
 use super::{Prepared, colour_space, contact, develop, window};
-use crate::description::{self, HeaderValue, LayerContent, Output, SceneDescription};
+use crate::description::{self, HeaderValue, LayerContent, Output, SceneDescription, Shutter};
 use crate::error::Result;
 use crate::film::Window;
 use crate::film::accumulate::PixelCells;
@@ -94,17 +94,23 @@ pub struct Lens {
     pub aperture: Option<f64>,
     /// Distance in focus, metres, where the lens has a diameter.
     pub focus: Option<f64>,
+    /// How much of a frame the shutter is open, where it has one.
+    pub shutter: Option<f64>,
 }
 
 impl Lens {
-    fn of(camera: &Camera) -> Lens {
-        let Projection::Perspective { half_width } = camera.projection else { return Lens::default() };
+    fn of(camera: &Camera, shutter: Option<&Shutter>) -> Lens {
+        let shutter = shutter.map(Shutter::times).map(|times| times.close - times.open);
+        let Projection::Perspective { half_width } = camera.projection else {
+            return Lens { shutter, ..Lens::default() };
+        };
         let focal_length = 18.0 / half_width;
         let wide = camera.lens.as_ref().filter(|lens| lens.radius > 0.0);
         Lens {
             focal_length_mm: Some(focal_length),
             aperture: wide.map(|lens| focal_length / 1000.0 / (2.0 * lens.radius)),
             focus: wide.map(|lens| lens.focus_distance),
+            shutter,
         }
     }
 }
@@ -150,7 +156,7 @@ impl Finish {
             variance: asked(&LayerContent::Variance),
             sample_count: asked(&LayerContent::SampleCount),
             mattes: mattes(description, scene),
-            lens: Lens::of(&scene.camera),
+            lens: Lens::of(&scene.camera, description.camera.shutter.as_ref()),
         }
     }
 
@@ -441,6 +447,9 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
         ("nominalFocalLength", lens.focal_length_mm),
         ("aperture", lens.aperture),
         ("focus", lens.focus),
+        // A shutter that turns with the film: degrees, and seconds.
+        ("shutterAngle", lens.shutter.map(|share| 360.0 * share)),
+        ("expTime", lens.shutter.zip(finish.frames_per_second).map(|(share, rate)| share / rate)),
         ("whiteLuminance", finish.white_luminance()),
     ] {
         all.extend(value.map(|value| (name.to_owned(), Attribute::Float(value as f32))));

@@ -512,12 +512,16 @@ pub fn output_path(prepared: &Prepared, overrides: &Overrides) -> PathBuf {
     }
 }
 
-/// The data window: the crop or the whole frame.
+/// The data window: the crop, or the whole frame and what is rendered beyond it.
 #[must_use]
 pub fn window(description: &SceneDescription) -> Window {
     match &description.image.crop {
         Some(c) => Window { x: c.x as i32, y: c.y as i32, width: c.width, height: c.height },
-        None => Window::full(description.image.width, description.image.height),
+        None => {
+            let description::Image { width, height, overscan, .. } = description.image;
+            let (x, y) = (-(overscan as i32), -(overscan as i32));
+            Window { x, y, width: width + 2 * overscan, height: height + 2 * overscan }
+        }
     }
 }
 

@@ -240,6 +240,9 @@ pub struct Image {
     pub filter: Filter,
     /// The part that is rendered; default all.
     pub crop: Option<Crop>,
+    /// Pixels that are rendered beyond each edge of the frame, for what moves the picture later; 0 to 16384, default 0.
+    #[serde(default)]
+    pub overscan: u32,
     /// Factor on the picture; default 1.
     #[serde(default = "one")]
     pub sensitivity: f64,
@@ -269,6 +272,7 @@ impl Default for Image {
             height: side(),
             filter: Filter::default(),
             crop: None,
+            overscan: 0,
             sensitivity: 1.0,
             bands: Vec::new(),
         }
@@ -426,7 +430,9 @@ impl Image {
             check_channel(&band.name, self.bands[..i].iter().any(|b| b.name == band.name), at.key("name"), checker);
             band.response.check(Role::Emission, at.key("response"), checker);
         }
+        checker.whole_between(at.key("overscan"), self.overscan, 0, MAX_SIDE / 4);
         if let Some(crop) = self.crop {
+            checker.require(self.overscan == 0, at.key("overscan"), "no overscan beside a crop", self.overscan);
             let at = at.key("crop");
             let fits = |start: u32, length: u32, whole: u32| u64::from(start) + u64::from(length) <= u64::from(whole);
             checker.at_least_one(at.key("width"), crop.width);
@@ -514,6 +520,18 @@ mod tests {
             camera("origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 9, lens: {radius: -1, focus_distance: 0}"),
             "dir/s.yaml:1:75: camera.lens.radius: expected a number of 0 or more, found -1\n\
              dir/s.yaml:1:95: camera.lens.focus_distance: expected a number greater than 0, found 0"
+        );
+    }
+
+    #[test]
+    fn what_lies_beyond_the_frame_is_bounded_and_beside_no_crop() {
+        assert_eq!(
+            faults("image: {overscan: 16385}"),
+            "dir/s.yaml:2:19: image.overscan: expected a whole number from 0 to 16384, found 16385"
+        );
+        assert_eq!(
+            faults("image: {overscan: 4, crop: {width: 10, height: 10}}"),
+            "dir/s.yaml:2:19: image.overscan: expected no overscan beside a crop, found 4"
         );
     }
 

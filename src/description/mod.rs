@@ -39,6 +39,7 @@
 //!                                   #   {tent: {radius: 1}}, {gaussian: {stddev: 0.5}}, mitchell (b and c
 //!                                   #   default 1/3), catmull_rom, {lanczos: {radius: 3}}
 //!   crop: {x: 0, y: 0, width: 10, height: 10}   # default all; x and y default 0
+//!   overscan: 0                     # default; pixels that are rendered beyond each edge of the frame, without a crop
 //!   bands: []                       # ~ the OpenEXR file holds bands of the spectrum instead of colour:
 //!                                   #   {name: blue, response: SPECTRUM}: ∫ radiance · response dλ, nm
 //!   sensitivity: 1                  # default; factor on the picture

@@ -1,6 +1,9 @@
 """Layers, mattes and spectral files, read by programs that are not Abbe's."""
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import colour
 import cryptomatte_api
@@ -130,6 +133,41 @@ def test_attributes_have_their_types(render):
     assert header["aperture"] == pytest.approx(focal / 20, rel=1e-6)
     assert header["focus"] == 5
     assert spec.get_string_attribute("Copyright") == "us" or spec.get_string_attribute("owner") == "us"
+
+
+def test_overscan_lies_around_the_same_frame(render):
+    plain, _ = official(render("frame"))
+    path = render("beyond", image={"width": 40, "height": 30, "overscan": 6}, layers=["Z", "crypto_object"])
+    assert check(str(path)) == []
+    wide, header = official(path)
+    assert [tuple(map(int, corner)) for corner in header["dataWindow"]] == [(-6, -6), (45, 35)]
+    assert [tuple(map(int, corner)) for corner in header["displayWindow"]] == [(0, 0), (39, 29)]
+    for name in "RGBA":
+        assert np.array_equal(wide[name][6:-6, 6:-6], plain[name]), name
+    assert wide["Z"].shape == (42, 52)
+
+
+def test_a_shutter_is_said_in_degrees_and_seconds(render):
+    camera = {"origin": {1: [0, 1.5, 5], 2: [1, 1.5, 5]}, "target": [0, 0.8, 0], "fov_deg": 36, "shutter": 0.5}
+    # The fixture names the file of a still picture.
+    moving = {"frames": 1, "frames_per_second": 24}
+    path = render("shutter", camera=camera, render=moving)
+    _, header = official(path)
+    assert header["shutterAngle"] == 180 and header["expTime"] == pytest.approx(1 / 48)
+    assert header["imageCounter"] == 1
+
+
+def test_the_tools_of_openimageio_open_all_of_it(render):
+    """oiiotool and idiff of the wheel: the same picture in two compressions has no difference."""
+    tools = Path(sys.executable).parent
+    layers = ["Z", "diffuse", "crypto_object", "sampleCount"]
+    paths = [render(c, layers=layers, output={"exr": {"compression": c, "layout": l}, "spectral": {"bands": 4}})
+             for c, l in [("zips", "single"), ("piz", "single"), ("zip", "multipart")]]
+    for path in [*paths, paths[0].with_name("zips.spectral.exr")]:
+        said = subprocess.run([tools / "oiiotool", "--info", "-v", path], capture_output=True, text=True)
+        assert said.returncode == 0 and "40 x   30" in said.stdout and not said.stderr, said.stdout + said.stderr
+    said = subprocess.run([tools / "idiff", *paths[:2]], capture_output=True, text=True)
+    assert said.returncode == 0 and "PASS" in said.stdout, said.stdout
 
 
 def test_bands_are_a_file_that_colour_science_reads(render):

@@ -273,7 +273,11 @@ impl<'a> Export<'a> {
         if self.scene.motion.is_some() {
             self.lose("camera.shutter", "the scene at its frame: what is exported does not move");
         }
-        let Image { width, height, filter, crop, sensitivity, .. } = &self.scene.image;
+        let Image { width, height, filter, crop, overscan, sensitivity, .. } = &self.scene.image;
+        if *overscan > 0 {
+            self.lose("image.overscan", "the frame: Mitsuba's film ends at its edge");
+            self.xml.instruction(&format!("set image.overscan: {overscan}"));
+        }
         // The film's unit is theirs.
         let yaml = Node::new(self.root.place, Value::Float(*sensitivity));
         let yaml = self.yaml(&yaml);
