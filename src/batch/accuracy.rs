@@ -6,7 +6,7 @@
 //!
 //! * **time** is the least of the rounds: what else the machine does adds to it;
 //! * **noise** and **bias** are √relMSE against the reference, **light** the mean of red, green and blue over the reference's
-//!   ([`figures`]);
+//!   (`figures`);
 //! * **efficiency** is 1 / (noise² · time), over that of the chosen setting;
 //! * **to the target** is the time until noise and bias together are the target, by the convergence that was seen; none where
 //!   the bias is above it.

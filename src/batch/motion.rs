@@ -3,7 +3,7 @@
 //! Every sample sees one moment, drawn by a number of its own ([`crate::transport::moment`]), so that the picture is the mean
 //! over the moments, whatever changes: the estimate is unbiased for those moments, which stand at the middles of
 //! equal times. What the eye would see of their distance is bounded by their number: as many as the pixels that the
-//! fastest thing travels, [`LEAST`] to [`MOST`].
+//! fastest thing travels, 16 to 64.
 
 use super::hash_text;
 use crate::description::{SceneDescription, ShutterTimes};
