@@ -279,7 +279,9 @@ impl SceneReport {
             })
             .collect();
         if self.error.is_none() && finish.integrator == "path" {
-            self.notes.push("too few samples, or a black picture: the error cannot be estimated".into());
+            self.notes.push(
+                "too few samples, light that they have hardly met, or black: the error cannot be estimated".into(),
+            );
         }
     }
 

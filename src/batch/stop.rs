@@ -51,8 +51,7 @@ impl Stop {
     #[must_use]
     pub fn reached(&self, milestones: &[Milestone]) -> bool {
         let Some(last) = milestones.last() else { return false };
-        let below =
-            |m: &Milestone, target: f64| m.error.is_some_and(|e| e.rel_rmse <= target && (e.valid || e.rel_rmse > 0.0));
+        let below = |m: &Milestone, target: f64| m.error.is_some_and(|e| e.rel_rmse <= target);
         // A few samples that have not met the light yet look even: an error that cannot be believed has to be there twice.
         let believed = last.error.is_some_and(|e| e.valid);
         let twice = |target| milestones.iter().nth_back(1).is_some_and(|m| below(m, target));
@@ -89,16 +88,18 @@ impl Stop {
     /// [`Error::Render`] in words for whoever set the targets.
     pub fn check(&self, milestones: &[Milestone]) -> Result<()> {
         let Some(last) = milestones.last() else { return Ok(()) };
-        if let (Some(asked), Some(e)) = (self.error, last.error) {
-            let found = format!("the picture is written with an error of {:.3e}", e.rel_rmse);
-            if asked < self.floor && e.rel_rmse <= self.floor {
+        if let Some(asked) = self.error {
+            let found = last.error.map_or("the picture is written, its error is unknown".to_owned(), |e| {
+                format!("the picture is written with an error of {:.3e}", e.rel_rmse)
+            });
+            if asked < self.floor && last.error.is_some_and(|e| e.rel_rmse <= self.floor) {
                 return Err(Error::Render(format!(
                     "stop.error: {asked:e} is below {:.1e}, what rounding to the precision of the file makes; {found}; \
                      output.exr.precision: float holds more",
                     self.floor
                 )));
             }
-            if e.rel_rmse > asked && !self.samples_wanted && self.time.is_none() {
+            if last.error.is_none_or(|e| e.rel_rmse > asked) && !self.samples_wanted && self.time.is_none() {
                 return Err(Error::Render(format!(
                     "stop.error: {asked:e} was not reached with {} samples a pixel; {found}",
                     last.samples
@@ -233,7 +234,7 @@ mod tests {
     }
 
     /// A picture that has not converged may look better than it is: errors of 1/2, 0.35, 0.25, the last two not to be
-    /// believed, and none at all, which is nothing to believe in either.
+    /// believed, and one that is unknown.
     #[test]
     fn an_error_that_cannot_be_believed_has_to_be_there_twice() {
         let stop = |error| Stop { error: Some(error), ..FREE };
@@ -242,7 +243,7 @@ mod tests {
         known[1..].iter_mut().for_each(|m| m.error.as_mut().unwrap().valid = false);
         assert!(!stop(0.3).reached(&known) && stop(0.4).reached(&known));
         assert_eq!(stop(0.3).pass_end(&known, 1000), Some(20));
-        known[2].error.as_mut().unwrap().rel_rmse = 0.0;
+        known[2].error = None;
         assert!(!stop(0.4).reached(&known));
     }
 

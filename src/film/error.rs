@@ -32,6 +32,10 @@
 //! v = x₃ − x₄, have E (uᵀWv)² = 4R² tr(WΣ)², so that (Σ uᵀWv)² − Σ (uᵀWv)² over the pixels of a block, in the mean over the
 //! three ways to pair four, is that of different pixels. The next order of the size, about four times the square of
 //! what the second takes off, is allowed for.
+//!
+//! **Where it is unknown.** What is taken off can be more than there is, where light is so rare that its pixels have it in
+//! half of the replicates: the sum then says nothing of the error, least of all that there is none. And replicates that agree
+//! everywhere show that there is no noise only where they agree on light: a black pixel may be one whose light nobody has met.
 
 use super::accumulate::{Film, REPLICATES};
 use super::resolve::{Image, Splats, replicate_light};
@@ -85,6 +89,10 @@ pub enum NoEstimate {
     OnePixel,
     /// Every pixel is black: a relative error has nothing to relate to.
     Black,
+    /// Pixels are so noisy that what they are divided by takes off more than there is.
+    Noisy,
+    /// Nothing differs between replicates, and some pixels are black: without noise, or of light that was not met.
+    Unmet,
 }
 
 impl fmt::Display for NoEstimate {
@@ -93,6 +101,8 @@ impl fmt::Display for NoEstimate {
             NoEstimate::FewReplicates => "no pixel has four samples, one of each replicate",
             NoEstimate::OnePixel => "fewer than two pixels have samples",
             NoEstimate::Black => "the picture is black",
+            NoEstimate::Noisy => "the light of most pixels is too rare to tell how bright they are",
+            NoEstimate::Unmet => "no pixel is noisy, but those that are black may have light that was not met",
         })
     }
 }
@@ -101,6 +111,10 @@ impl fmt::Display for NoEstimate {
 #[derive(Clone, Copy, Default)]
 struct Sums {
     pixels: u64,
+    /// Pixels whose replicates differ.
+    noisy: u64,
+    /// Pixels without any light.
+    black: u64,
     /// Σ q, q a pixel's expected relative squared error.
     error: f64,
     /// What is taken off for the noise of the values that variances are divided by.
@@ -141,7 +155,6 @@ pub fn relative_error(
 ) -> Result<ErrorEstimate, NoEstimate> {
     let window = film.window();
     let pixels = window.pixels();
-    let black = image.rgb.iter().flatten().all(|&v| v == 0.0);
     let floor = floor(image);
     let side = ((pixels as f64 / BLOCKS as f64).sqrt() as u32).max(1);
     let rows = window.height.div_ceil(side);
@@ -166,6 +179,8 @@ pub fn relative_error(
     let mut shared = 0.0;
     for block in &blocks {
         all.pixels += block.pixels;
+        all.noisy += block.noisy;
+        all.black += block.black;
         all.error += block.error;
         all.further += block.further;
         all.squares += block.squares;
@@ -177,11 +192,13 @@ pub fn relative_error(
     match all.pixels {
         0 => return Err(NoEstimate::FewReplicates),
         1 => return Err(NoEstimate::OnePixel),
-        _ if black => return Err(NoEstimate::Black),
+        n if n == all.black => return Err(NoEstimate::Black),
+        _ if all.noisy == 0 && all.black > 0 => return Err(NoEstimate::Unmet),
+        _ if all.noisy > 0 && all.error <= 0.0 => return Err(NoEstimate::Noisy),
         _ => {}
     }
     let n = all.pixels as f64;
-    let rel_mse = (all.error / n).max(0.0);
+    let rel_mse = all.error / n;
     let trace = all.own + f64::max(0.0, shared);
     let share = if all.error == 0.0 { 0.0 } else { all.further / all.error };
     let next = NEXT_ORDER * share * share * all.error;
@@ -202,6 +219,8 @@ pub fn relative_error(
 impl Sums {
     fn add(&mut self, replicates: &[[f64; 3]; REPLICATES], value: [f64; 3], floor: f64) {
         self.pixels += 1;
+        self.noisy += u64::from(replicates.iter().any(|r| *r != replicates[0]));
+        self.black += u64::from(value == [0.0; 3]);
         let mut error = 0.0;
         let mut shares = [0.0; REPLICATES];
         let mut pairs = [0.0; 3];
@@ -347,6 +366,40 @@ mod tests {
         assert_eq!(estimate(&one).unwrap_err(), NoEstimate::FewReplicates);
         assert_eq!(estimate(&film(5, 8, 2, |_, _| 0.0)).unwrap_err(), NoEstimate::Black);
         assert_eq!(estimate(&film(5, 1, 2, |_, u| u)).unwrap_err(), NoEstimate::OnePixel);
+    }
+
+    /// A film of 8 × 8 pixels with one sample in each replicate.
+    fn film_of(light: impl Fn(usize, usize) -> f32) -> Film {
+        let window = Window::full(8, 8);
+        let mut tile = TileBuffer::new(window);
+        for pixel in 0..window.pixels() {
+            for replicate in 0..REPLICATES {
+                tile.add([(pixel % 8) as i32, (pixel / 8) as i32], replicate, [light(pixel, replicate); 3], 1.0);
+            }
+        }
+        let mut film = Film::new([8, 8], window).unwrap();
+        film.merge_tile(&tile);
+        film
+    }
+
+    /// Each pixel has light X in two of four replicates: x = X/2, v = X²/12, σ⁴ by the pairs that differ 2/3 X⁴/64 = X⁴/96 and
+    /// κ₃ = 0; with f = 0.01 x² it is v g = 0.330, and ½ g″ σ⁴ = 0.483 is taken off: less than nothing is left.
+    #[test]
+    fn an_estimate_below_nothing_is_unknown() {
+        let rare = film_of(|pixel, replicate| if (pixel + replicate) % 4 < 2 { 3.0 } else { 0.0 });
+        assert_eq!(estimate(&rare).unwrap_err(), NoEstimate::Noisy);
+    }
+
+    /// Light that is the same in all replicates is without noise; if a part is black, its light may be yet to come. One
+    /// pixel that differs is noise that can be told.
+    #[test]
+    fn no_noise_is_told_only_of_light_that_was_met() {
+        let (_, even) = estimate(&film_of(|pixel, _| 1.0 + pixel as f32)).unwrap();
+        assert!(even.valid && [even.rel_rmse, even.low, even.high] == [0.0; 3], "{even:?}");
+        let half = film_of(|pixel, _| if pixel < 32 { 1.0 } else { 0.0 });
+        assert_eq!(estimate(&half).unwrap_err(), NoEstimate::Unmet);
+        let noisy = film_of(|pixel, replicate| if pixel == 5 { 1.0 + replicate as f32 } else { 1.0 });
+        assert!(estimate(&noisy).unwrap().1.rel_rmse > 0.0);
     }
 
     /// One pixel of 256 carries all of the error; or every pixel has light that comes once in 200 samples, of which it has
