@@ -2,6 +2,8 @@
 
 mod common;
 
+use abbe::film::exr::read_exr;
+use abbe::spectrum::{ColourSpace, Spectrum, observer, upsample};
 use common::place::Place;
 use serde_json::Value;
 
@@ -98,6 +100,9 @@ fn the_sheet_finds_what_a_bound_to_depth_costs() {
     let [none, error] = bias(&row("chosen", "as written"));
     assert!(none.abs() < 4.0 * error, "{none} {error}");
     let noise = |row: Value| row["noise"][0].as_f64().unwrap();
+    // Nothing here has a colour: three numbers carry all that eight wavelengths do.
+    let [colours, error] = bias(&row("transport", "RGB"));
+    assert!(colours.abs() < 4.0 * error, "{colours} {error}");
     // Independent samples are noisier than evenly spread ones.
     assert!(noise(row("sampler", "independent")) > 1.1 * noise(row("chosen", "as written")));
     // Four times the samples: half of the noise or less, as the samples are evenly spread.
@@ -148,6 +153,97 @@ fn against_a_closed_form_the_sheet_finds_the_bias_that_is_there() {
         }
     }
     assert_eq!(abbe(&place, "accuracy scene.yaml --truth 0").0, 2);
+}
+
+/// A coloured wall that fills the view, in coloured light that is the same from everywhere: its radiance is that of the
+/// light times its reflectance, wavelength by wavelength; three numbers are multiplied instead. Both colours are those of
+/// smooth spectra, so both products are known. Errors are four of the sheet's, and 2e-4 of what upsampling is off by.
+#[test]
+fn transport_of_three_numbers_errs_as_products_of_colours_do() {
+    let (wall, light) = ([0.8, 0.3, 0.05], [0.1, 0.5, 1.0]);
+    let scene = format!(
+        "camera: {{origin: [0, 0, 1], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 16, height: 16}}\n\
+         render: {{samples: 64}}\nlights:\n- constant: {{radiance: {{rgb: {light:?}}}}}\nshapes:\n\
+         - rectangle: {{corner: [-2, -2, 0], edge_u: [4, 0, 0], edge_v: [0, 4, 0], \
+         material: {{diffuse: {{reflectance: {{rgb: {wall:?}}}}}}}}}\n"
+    );
+    let place = Place::of(&scene);
+    let (code, said) = abbe(&place, "accuracy scene.yaml -o sheet --rounds 2");
+    assert_eq!(code, 0, "{said}");
+    let sheet = &place.json("sheet/accuracy.json")[0];
+    let rows = sheet["rows"].as_array().unwrap();
+    let row = rows.iter().find(|row| row["knob"] == "transport").unwrap();
+    let rgb = |s: &Spectrum| {
+        let xyz = observer::tristimulus(s);
+        ColourSpace::Rec709.matrix_from_xyz().map(|r| r[0] * xyz[0] + r[1] * xyz[1] + r[2] * xyz[2])
+    };
+    let spectral = rgb(&upsample::emission(light).unwrap().times(&upsample::reflectance(wall).unwrap()));
+    let of_light = rgb(&upsample::emission(light).unwrap());
+    let expected: [f64; 3] = std::array::from_fn(|c| of_light[c] * wall[c] / spectral[c]);
+    for (c, expected) in expected.into_iter().enumerate() {
+        let [found, error] = ["value", "error"].map(|key| row["light"][c][key].as_f64().unwrap());
+        assert!((found - expected).abs() < 4.0 * error + 2e-4 * expected, "{c}: {found} ± {error}, {expected}");
+    }
+    // Far from one in two of them, or little would be told.
+    assert!(expected.iter().filter(|x| (*x - 1.0).abs() > 0.02).count() >= 2, "{expected:?}");
+    assert!(said.contains("RGB finds"), "{said}");
+}
+
+/// The scenes of `configs/closed_form` have the light that stands in them, whatever a knob is moved to: no bias of any
+/// setting stands out by four of its errors, and the error that a picture states of itself is the one that it has.
+#[test]
+fn shipped_scenes_of_known_light_have_it() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/closed_form");
+    for (name, truth) in [("slab", libm::exp(-1.0)), ("disk", 1.0)] {
+        let place = Place::with(&[]);
+        let scene = format!("{folder}/{name}.yaml");
+        let (code, said) = abbe(&place, &format!("accuracy {scene} -o sheet --rounds 2 --truth {truth}"));
+        assert_eq!(code, 0, "{said}");
+        let sheet = &place.json("sheet/accuracy.json")[0];
+        for row in sheet["rows"].as_array().unwrap().iter().filter(|row| row["knob"] != "file") {
+            let [bias, error] = ["value", "error"].map(|key| row["bias_squared"][key].as_f64().unwrap());
+            // What has no noise at all is off by sums in f32 and by the inverse of a matrix: 1e-5.
+            assert!(bias.abs() < 4.0 * error + 1e-10, "{name}: {row}");
+        }
+        assert_eq!(abbe(&place, &format!("render {scene} -q -o p.exr")).0, 0);
+        let white = observer::tristimulus(&Spectrum::constant(truth));
+        let white = ColourSpace::Rec709.matrix_from_xyz().map(|r| r[0] * white[0] + r[1] * white[1] + r[2] * white[2]);
+        let floor = 0.01 * (white.iter().sum::<f64>() / 3.0).powi(2);
+        let image = read_exr(&place.path("p.exr")).unwrap();
+        let square = |c: usize| {
+            let values = image.parts[0].channel(["R", "G", "B"][c]).unwrap();
+            let sum: f64 = values.iter().map(|&x| (f64::from(x) - white[c]).powi(2)).sum();
+            sum / values.len() as f64 / (white[c] * white[c] + floor)
+        };
+        let own = ((0..3).map(square).sum::<f64>() / 3.0).sqrt();
+        let stated = &place.json("report.json")["scenes"][0]["error"];
+        let [low, high] = ["low", "high"].map(|key| stated[key].as_f64().unwrap());
+        assert!(stated["valid"] == true && (low..=high).contains(&own), "{name}: {own}, {stated}");
+    }
+}
+
+/// This very program beside itself finds the same picture: as much light, and no bias; and what is no build or no knob is
+/// told.
+#[test]
+fn another_build_has_a_row_of_its_own() {
+    let place = Place::of(SCENE);
+    let program = env!("CARGO_BIN_EXE_abbe");
+    let (code, said) =
+        abbe(&place, &format!("accuracy scene.yaml -o sheet --rounds 2 --knob depth --beside {program}"));
+    assert_eq!(code, 0, "{said}");
+    let sheet = &place.json("sheet/accuracy.json")[0];
+    let rows = sheet["rows"].as_array().unwrap();
+    let knobs: Vec<&str> = rows.iter().map(|row| row["knob"].as_str().unwrap()).collect();
+    assert_eq!(knobs, ["chosen", "depth", "depth", "depth", "depth", "build", "file"]);
+    for key in ["samples", "light", "noise", "bias_squared"] {
+        // The same samples in one sum or after several passes.
+        assert_eq!(rows[5][key], rows[0][key], "{key}");
+    }
+    assert_eq!(rows[5]["value"], program);
+    let (code, said) = abbe(&place, "accuracy scene.yaml --knob depht");
+    assert!(code == 2 && said.contains("expected one of samples, depth, sampler"), "{code} {said}");
+    let (code, said) = abbe(&place, "accuracy scene.yaml -o sheet --knob depth --beside ./nothing");
+    assert!(code == 4 && said.contains("./nothing: "), "{code} {said}");
 }
 
 /// A film of 4096 × 4096 pixels takes four gibibytes: the process ends by itself long before.

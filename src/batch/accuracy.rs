@@ -12,6 +12,7 @@
 //!   the bias is above it.
 
 mod advice;
+pub mod beside;
 mod desk;
 mod figures;
 mod knobs;
@@ -26,18 +27,18 @@ use crate::film::png;
 use crate::film::resolve::Image;
 use crate::math::statistics::Moments;
 use crate::spectrum::ColourSpace;
+use beside::Beside;
 use desk::Desk;
 use figures::{Reference, SIGNIFICANT, Tally};
 use half::f16;
 use knobs::{Trial, Way};
 use serde::Serialize;
-use std::cell::RefCell;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// How a sheet is made.
-#[derive(Clone, Copy, Debug)]
-pub struct Settings {
+#[derive(Clone, Debug)]
+pub struct Settings<'a> {
     /// About as many pixels as the copy has.
     pub pixels: u32,
     /// Samples of a pixel of the chosen setting.
@@ -50,6 +51,10 @@ pub struct Settings {
     pub time: Option<Duration>,
     /// What every pixel is known to be, radiance at all wavelengths alike: in place of a reference.
     pub truth: Option<f64>,
+    /// The knobs that are moved; all where empty.
+    pub knobs: &'a [String],
+    /// Another build that renders the chosen setting, too.
+    pub beside: Option<Beside<'a>>,
 }
 
 /// See [`Settings::time`].
@@ -134,7 +139,7 @@ pub struct Sheet {
 pub fn sheet(
     entry: &BatchEntry,
     overrides: &Overrides,
-    settings: &Settings,
+    settings: &Settings<'_>,
     told: &dyn Fn(&str, usize, usize),
     stop: &AtomicBool,
 ) -> Result<std::result::Result<Sheet, String>> {
@@ -157,11 +162,11 @@ pub fn sheet(
         ));
     }
     let rounds = settings.rounds.max(1);
-    let mut desk = Desk { entry, overrides, stop, shelf: RefCell::default() };
+    let mut desk = Desk::new(entry, overrides, stop);
     let samples = desk.samples(settings)?;
     desk.overrides.set.push(("render.samples".to_owned(), samples.to_string()));
-    let chosen = desk.prepare(&[], |_| {})?;
-    let trials = knobs::trials(&chosen);
+    let chosen = desk.prepare(&[])?;
+    let trials = knobs::wanted(&chosen, settings)?;
     let total = trials.len() * rounds as usize + 1;
     let mut done = 0;
     let mut tell = |what: &str| {
@@ -193,7 +198,14 @@ pub fn sheet(
     for round in 0..rounds {
         for (trial, tally) in trials.iter().zip(&mut tallies) {
             tell(&format!("{} {}", trial.knob, trial.value));
-            let outcome = desk.render(trial, seed.wrapping_add(u64::from(round)), Some(&reference))?;
+            let seed = seed.wrapping_add(u64::from(round));
+            let outcome = match settings.beside.filter(|_| trial.way == Way::Beside) {
+                Some(build) => {
+                    let seed = ("render.seed".to_owned(), seed.to_string());
+                    build.render(&entry.name, &desk.overrides, &[seed], Some(&reference))?
+                }
+                None => desk.render(trial, seed, Some(&reference))?,
+            };
             if round == 0 {
                 images.push(outcome.image.clone());
             }
@@ -244,14 +256,18 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
     let mut row = Row {
         knob: trial.knob,
         value: trial.value.clone(),
-        chosen: trial.knob == "chosen",
+        chosen: trial.knob == knobs::CHOSEN,
         samples: end.samples,
         seconds: end.seconds,
         most_seconds: tally.most_seconds(),
         noise: end.noise,
         bias_squared: tally.bias_squared(reference),
         light: tally.light(reference),
-        efficiency: Figure { value: own / cost, error: own / cost * own_error.hypot(error) },
+        efficiency: match own / cost {
+            value if value.is_finite() => Figure { value, error: value * own_error.hypot(error) },
+            // Without noise: nothing to weigh.
+            _ => Figure { value: f64::INFINITY, error: 0.0 },
+        },
         to_target: None,
         curve,
         png,
@@ -266,7 +282,7 @@ impl Row {
     /// b of variance that falls as samples^−b from a quarter of the samples on, kept to what sampling does.
     #[must_use]
     pub fn exponent(&self) -> f64 {
-        let [.., end] = self.curve.as_slice() else { return 1.0 };
+        let Some(end) = self.curve.last().filter(|end| end.noise[0] > 0.0) else { return 1.0 };
         let before = self.curve.iter().rev().find(|p| p.samples <= end.samples / 4);
         before.map_or(1.0, |p| {
             let fallen = 2.0 * libm::log(p.noise[0] / end.noise[0]);

@@ -109,7 +109,8 @@ impl Identity {
 #[must_use]
 pub fn build() -> String {
     let precision = if cfg!(feature = "single_precision") { " single precision" } else { "" };
-    format!("Abbe {} {}{precision}", env!("CARGO_PKG_VERSION"), std::env::consts::ARCH)
+    let lanes = if cfg!(feature = "four_lanes") { " four lanes" } else { "" };
+    format!("Abbe {} {}{precision}{lanes}", env!("CARGO_PKG_VERSION"), std::env::consts::ARCH)
 }
 
 impl Finish {
@@ -395,6 +396,18 @@ pub struct Written {
 /// # Errors
 /// [`Error::Input`] if it is missing, damaged, no part, or of another version.
 pub fn open(path: &Path) -> Result<Written> {
+    open_if(path, |found| found == build())
+}
+
+/// [`open`], whichever build wrote it: to look at, not to add to what this one renders.
+///
+/// # Errors
+/// [`Error::Input`] if it is missing, damaged, no part, or of another format.
+pub fn open_of_any_build(path: &Path) -> Result<Written> {
+    open_if(path, |_| true)
+}
+
+fn open_if(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<Written> {
     /// What is looked at first: another version has other fields.
     #[derive(Deserialize)]
     struct Version {
@@ -404,7 +417,7 @@ pub fn open(path: &Path) -> Result<Written> {
     let file = PartFile::open(path)?;
     let damaged = |e: &dyn std::fmt::Display| Error::input(path, format!("the part is damaged: its header: {e}"));
     let version: Version = serde_json::from_str(&file.json).map_err(|e| damaged(&e))?;
-    if (version.format, version.build.as_str()) != (FORMAT, build().as_str()) {
+    if version.format != FORMAT || !wanted(&version.build) {
         let (own, found) = (build(), version.build);
         let message =
             format!("expected a part by {own}, format {FORMAT}, found one by {found}, format {}", version.format);

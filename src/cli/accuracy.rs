@@ -4,6 +4,7 @@ use super::interrupts::Interrupts;
 use super::text::columns;
 use super::{AccuracyArguments, use_threads};
 use crate::batch;
+use crate::batch::accuracy::beside::Beside;
 use crate::batch::accuracy::page::{HEADINGS, cells, held_against, page};
 use crate::batch::accuracy::{self, FEWEST, Settings, Sheet};
 use crate::error::Result;
@@ -33,7 +34,9 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
         let made = entry.scene(&overrides.set).and_then(|scene| {
             let samples = scene.render.samples.clamp(FEWEST, MOST_SAMPLES);
             let AccuracyArguments { pixels, rounds, error: target, time, truth, .. } = *arguments;
-            let settings = Settings { pixels, samples, rounds, target, time, truth };
+            let knobs = &arguments.knobs;
+            let beside = arguments.beside.as_deref().map(|binary| Beside { binary, file: &arguments.scene.file });
+            let settings = Settings { pixels, samples, rounds, target, time, truth, knobs, beside };
             accuracy::sheet(&entry, &overrides, &settings, &told, &interrupts.stop)
         });
         match made {
@@ -87,7 +90,7 @@ fn csv(sheets: &[Sheet]) -> String {
     );
     for sheet in sheets {
         for r in &sheet.rows {
-            let _ = write!(out, "\"{}\",{},{},{}", sheet.scene.replace('"', "\"\""), r.knob, r.value, r.samples);
+            let _ = write!(out, "{},{},{},{}", quoted(&sheet.scene), r.knob, quoted(&r.value), r.samples);
             let figures = [r.seconds, r.most_seconds, r.noise[0], r.noise[1], r.noise[2]];
             figures.iter().for_each(|x| out += &format!(",{x:e}"));
             let _ = write!(out, ",{:e},{:e}", r.bias_squared.value, r.bias_squared.error);
@@ -97,4 +100,8 @@ fn csv(sheets: &[Sheet]) -> String {
         }
     }
     out
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
 }

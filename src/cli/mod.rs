@@ -235,6 +235,12 @@ struct AccuracyArguments {
     /// The radiance that every pixel is known to have at all wavelengths, in place of a reference
     #[arg(long, value_name = "L", value_parser = radiance)]
     truth: Option<f64>,
+    /// Move this knob alone, as in the first column of the table (may be repeated)
+    #[arg(long = "knob", value_name = "KNOB")]
+    knobs: Vec<String>,
+    /// Have another build of Abbe render the chosen setting, too, and give it a row
+    #[arg(long, value_name = "PROGRAM")]
+    beside: Option<PathBuf>,
     /// How often each setting is rendered, each time with another seed
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,

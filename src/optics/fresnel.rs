@@ -100,7 +100,7 @@ pub fn dielectric_diffuse(eta: f64) -> f64 {
 pub fn conductor(model: Model, cos: f64, eta: Lanes, k: Lanes) -> Lanes {
     let (eta, k) = (eta.to_array(), k.to_array());
     let mut out = [0.0f32; LANES];
-    for half in 0..2 {
+    for half in 0..LANES / 4 {
         let at = |x: &[f32; LANES]| f64x4::new(std::array::from_fn(|i| f64::from(x[4 * half + i])));
         let (n, k) = (at(&eta), at(&k));
         let r = match model {

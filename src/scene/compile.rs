@@ -292,11 +292,11 @@ impl<'a> Compiler<'a> {
         let light_exponent = crate::scene::light::exponent(&lights, &powers, &objects, radius);
         let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
         let bands = self.bands();
-        let wavelengths = match d.render.wavelengths {
+        let wavelengths = self.shelf.carried.wavelengths().unwrap_or_else(|| match d.render.wavelengths {
             written::Wavelengths::Auto => self.wavelengths(&lights, &powers, &objects, &bands),
             written::Wavelengths::Visible => WavelengthDistribution::visible(),
             written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
-        };
+        });
         let fog = d.fog.as_ref().map(|fog| DepthFog {
             colour: self.spectrum("fog.colour", &fog.colour, Outside::Zero, Role::Light),
             falloff: match fog.law {
@@ -513,7 +513,7 @@ impl<'a> Compiler<'a> {
         let mut all = Vec::new();
         for (i, band) in self.description.image.bands.iter().enumerate() {
             let at = format!("image.bands[{i}].response");
-            let response = self.spectrum(&at, &band.response, Outside::Zero, Role::Coefficient);
+            let response = self.written_spectrum(&at, &band.response, Outside::Zero, Role::Coefficient);
             if response.is_black() {
                 self.fault(&at, "expected a response within 360 to 830 nm, found none");
             }
@@ -571,7 +571,18 @@ impl<'a> Compiler<'a> {
         WavelengthDistribution::for_scene(&emitters, &reflectances)
     }
 
+    /// What `s` is carried as.
     fn spectrum(&mut self, at: &str, s: &written::Spectrum, outside: Outside, role: Role) -> Spectrum {
+        let spectrum = self.written_spectrum(at, s, outside, role);
+        let carried = self.shelf.carried;
+        match role {
+            Role::Reflectance => carried.reflectance(spectrum),
+            Role::Light => carried.light(spectrum),
+            Role::Coefficient => carried.coefficient(spectrum),
+        }
+    }
+
+    fn written_spectrum(&mut self, at: &str, s: &written::Spectrum, outside: Outside, role: Role) -> Spectrum {
         let black = Spectrum::Constant(0.0);
         match s {
             written::Spectrum::Number(x) => Spectrum::constant(*x),
@@ -607,9 +618,11 @@ impl<'a> Compiler<'a> {
                 let lines: Vec<(f64, f64, f64)> = lines.iter().map(|l| (l.nm, l.power, l.width_nm)).collect();
                 self.or(at, Spectrum::lines(&lines), black)
             }
-            written::Spectrum::ZeroOutside(s) => self.spectrum(&format!("{at}.zero_outside"), s, Outside::Zero, role),
+            written::Spectrum::ZeroOutside(s) => {
+                self.written_spectrum(&format!("{at}.zero_outside"), s, Outside::Zero, role)
+            }
             written::Spectrum::Scaled(s) => {
-                self.spectrum(&format!("{at}.scaled.of"), &s.of, outside, role).scaled(s.by)
+                self.written_spectrum(&format!("{at}.scaled.of"), &s.of, outside, role).scaled(s.by)
             }
         }
     }

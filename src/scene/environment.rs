@@ -9,7 +9,7 @@ use super::bands::{self, Bands};
 use super::texture::Texel;
 use crate::math::elementary::atan2;
 use crate::math::trig::sin_cos_turn;
-use crate::spectrum::{Lanes, Spectrum, illuminant, upsample};
+use crate::spectrum::{Carried, Lanes, Spectrum, illuminant, upsample};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -115,11 +115,11 @@ impl Environment {
     #[must_use]
     pub fn new(
         pixels: &[[f32; 3]],
-        width: usize,
-        height: usize,
+        [width, height]: [usize; 2],
         scale: f64,
         mapping: Mapping,
         world_from_map: DMat3,
+        carried: Carried,
     ) -> Environment {
         let row_angle = |y: usize| match mapping {
             Mapping::Texels => PI * (y as f64 + 0.5) / height as f64,
@@ -128,12 +128,12 @@ impl Environment {
         // A single row stands for both poles.
         let doubled = mapping == Mapping::Poles && height == 1;
         let (pixels, height) = if doubled { (&[pixels, pixels].concat()[..], 2) } else { (pixels, height) };
-        let texels = upsampled(pixels, scale as f32, mapping);
+        let texels = upsampled(pixels, scale as f32, mapping, carried);
         let table = match mapping {
             Mapping::Texels => Table::Constant(neighbourhood(pixels, width, height)),
             Mapping::Poles => bilinear(&texels, width, height),
         };
-        let illuminant = illuminant::d65();
+        let illuminant = carried.light(illuminant::d65());
         let (mut sum, mut weight) = (0.0, 0.0);
         for (y, row) in texels.chunks_exact(width).enumerate() {
             let sin = libm::sin(row_angle(y));
@@ -161,7 +161,7 @@ impl Environment {
         }
         // Directions are chosen by the mean over the bands.
         let grey: Vec<[f32; 3]> = bands.means().into_iter().map(|x| [x; 3]).collect();
-        let map = Environment::new(&grey, width, height, scale, mapping, world_from_map);
+        let map = Environment::new(&grey, [width, height], scale, mapping, world_from_map, Carried::Spectra);
         Ok(Environment { bands: Some(bands.scaled(scale as f32)), ..map })
     }
 
@@ -307,9 +307,9 @@ impl Environment {
 }
 
 /// Texels of light: a colour, and twice the greatest channel.
-fn upsampled(pixels: &[[f32; 3]], scale: f32, mapping: Mapping) -> Vec<Texel> {
+fn upsampled(pixels: &[[f32; 3]], scale: f32, mapping: Mapping, carried: Carried) -> Vec<Texel> {
     let texel = |&rgb: &[f32; 3]| {
-        let (coefficients, s) = upsample::emission_coefficients(rgb);
+        let (coefficients, s) = carried.emission_coefficients(rgb);
         // Where colours are mixed by themselves, that of black counts: it is black.
         let black = s == 0.0 && mapping == Mapping::Poles;
         Texel { coefficients: if black { upsample::coefficients([0.0; 3]) } else { coefficients }, scale: s * scale }
@@ -379,7 +379,7 @@ mod tests {
         let (w, h) = (16, 8);
         let pixels: Vec<[f32; 3]> =
             (0..w * h).map(|i| if i == 3 * w + 11 { [50.0; 3] } else { [0.1 + 0.01 * (i % 7) as f32; 3] }).collect();
-        Environment::new(&pixels, w, h, 1.0, mapping, DMat3::from_rotation_y(0.7))
+        Environment::new(&pixels, [w, h], 1.0, mapping, DMat3::from_rotation_y(0.7), Carried::Spectra)
     }
 
     fn grid(n: u32) -> impl Iterator<Item = DVec2> {
@@ -436,7 +436,7 @@ mod tests {
         let mut pixels = vec![[0.0; 3]; w * h];
         pixels[..w].fill([1.0; 3]);
         pixels[2 * w + 4] = [4.0; 3];
-        let map = Environment::new(&pixels, w, h, 1.0, Mapping::Texels, DMat3::IDENTITY);
+        let map = Environment::new(&pixels, [w, h], 1.0, Mapping::Texels, DMat3::IDENTITY, Carried::Spectra);
         assert!(green(&map, DVec3::Y) > 0.5 && green(&map, -DVec3::Y) < 1e-6);
         // The centre of column 4 of 8 lies half a column (22.5°) to the right of −z.
         let (s, c) = (PI / 8.0).sin_cos();
@@ -454,7 +454,8 @@ mod tests {
         grey[..4].fill(3.0);
         grey[8..].fill(5.0);
         (grey[4], grey[7]) = (2.0, 4.0);
-        let map = Environment::new(&grey.map(|g| [g; 3]), w, h, 1.0, Mapping::Poles, DMat3::IDENTITY);
+        let map =
+            Environment::new(&grey.map(|g| [g; 3]), [w, h], 1.0, Mapping::Poles, DMat3::IDENTITY, Carried::Spectra);
         let unit = map.illuminant.at(550.0);
         let find = |d: DVec3| green(&map, d) / unit;
         let cases = [
@@ -477,7 +478,9 @@ mod tests {
     fn colour_and_brightness_are_mixed_apart_where_mitsuba_does() {
         let mut pixels = [[0.0; 3]; 6];
         (pixels[0], pixels[2], pixels[4]) = ([1.0; 3], [1.0; 3], [1.0; 3]);
-        let at = |mapping| green(&Environment::new(&pixels, 2, 3, 1.0, mapping, DMat3::IDENTITY), -DVec3::Z);
+        let at = |mapping| {
+            green(&Environment::new(&pixels, [2, 3], 1.0, mapping, DMat3::IDENTITY, Carried::Spectra), -DVec3::Z)
+        };
         let unit = illuminant::d65().at(550.0);
         assert!((at(Mapping::Poles) / unit - 0.25).abs() < 1e-5);
         assert!((at(Mapping::Texels) / unit - 0.5).abs() < 1e-5);
@@ -486,7 +489,7 @@ mod tests {
     #[test]
     fn a_black_map_is_never_sampled() {
         for mapping in [Mapping::Texels, Mapping::Poles] {
-            let map = Environment::new(&[[0.0; 3]; 8], 4, 2, 1.0, mapping, DMat3::IDENTITY);
+            let map = Environment::new(&[[0.0; 3]; 8], [4, 2], 1.0, mapping, DMat3::IDENTITY, Carried::Spectra);
             assert!(map.sample(DVec2::splat(0.5)).is_none());
         }
     }

@@ -4,7 +4,7 @@ use super::bands::Bands;
 use super::texture::{DataImage, Grid, ImageTexture, Numbers, Texel, Texels};
 use crate::error::{Error, Result};
 use crate::film::{Window, exr};
-use crate::spectrum::{colour, upsample};
+use crate::spectrum::{Carried, colour};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -180,7 +180,8 @@ fn is_linear(decoded: &image::DynamicImage) -> bool {
 ///
 /// # Errors
 /// As [`picture`]; values above one are refused.
-pub fn image_texture(path: &Path, decoded: Decoded, raw: bool) -> Result<ImageTexture> {
+pub fn image_texture(path: &Path, decoded: Decoded, raw: bool, carried: Carried) -> Result<ImageTexture> {
+    let reflectance_texel = |rgb: [f32; 3]| Texel { coefficients: carried.coefficients(rgb), scale: 1.0 };
     let make = |texels: Texels, width: usize, height: usize| ImageTexture {
         texels,
         grid: Grid::new(width, height),
@@ -197,7 +198,7 @@ pub fn image_texture(path: &Path, decoded: Decoded, raw: bool) -> Result<ImageTe
     match decoded {
         Decoded::Bytes { rgb, width, height, counted } => {
             let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };
-            Ok(make(upsampled_bytes(counted.unwrap_or_else(|| count(&rgb)), &level), width, height))
+            Ok(make(upsampled_bytes(counted.unwrap_or_else(|| count(&rgb)), &level, reflectance_texel), width, height))
         }
         Decoded::Other(decoded) if !is_linear(&decoded) => {
             let (width, height) = (decoded.width() as usize, decoded.height() as usize);
@@ -225,10 +226,6 @@ pub fn image_texture(path: &Path, decoded: Decoded, raw: bool) -> Result<ImageTe
     }
 }
 
-fn reflectance_texel(rgb: [f32; 3]) -> Texel {
-    Texel { coefficients: upsample::coefficients(rgb), scale: 1.0 }
-}
-
 /// The colours of pixels (red, green, blue in turn).
 fn count(pixels: &[u8]) -> Counted {
     // For each of the 2²⁴ colours its number among those met so far, from 1; only the pages that hold a colour
@@ -250,8 +247,8 @@ fn count(pixels: &[u8]) -> Counted {
 }
 
 /// Texels of pixels of the given levels. Many share a colour: each is upsampled once.
-fn upsampled_bytes(counted: Counted, level: &[f32; 256]) -> Texels {
-    let texel = |c: &[u8; 3]| reflectance_texel(c.map(|x| level[usize::from(x)]));
+fn upsampled_bytes(counted: Counted, level: &[f32; 256], upsampled: impl Fn([f32; 3]) -> Texel + Sync) -> Texels {
+    let texel = |c: &[u8; 3]| upsampled(c.map(|x| level[usize::from(x)]));
     let colours = counted.colours.par_iter().with_min_len(256).map(texel).collect();
     Texels { colours: Arc::new(colours), numbers: Some(Arc::new(counted.numbers)) }
 }
@@ -322,6 +319,7 @@ pub fn samples(path: &Path) -> std::result::Result<Vec<(f64, f64)>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spectrum::upsample;
 
     #[test]
     fn curves_are_read_with_headings_comments_and_any_separator() {
@@ -339,7 +337,10 @@ mod tests {
     fn colours_of_eight_bits_are_upsampled_once_each() {
         let pixels = [255, 255, 255, 10, 20, 30, 0, 0, 0, 10, 20, 30, 200, 10, 99];
         let level = colour::srgb8_table();
-        let texels = upsampled_bytes(count(&pixels), &level);
+        let texels = upsampled_bytes(count(&pixels), &level, |rgb| Texel {
+            coefficients: upsample::coefficients(rgb),
+            scale: 1.0,
+        });
         for (i, p) in pixels.chunks_exact(3).enumerate() {
             let texel = texels.at(i);
             let rgb = [0, 1, 2].map(|k| colour::srgb_decode(f32::from(p[k]) / 255.0));

@@ -337,6 +337,7 @@ mod tests {
     use crate::math::sampler::{Sampler, Set};
     use crate::scene::texture::Wrap;
     use crate::scene::volume::{Between, GridVolume, Voxels};
+    use crate::spectrum::Carried;
     use glam::DAffine3;
     use std::f64::consts::PI;
     use std::sync::Arc;
@@ -432,7 +433,7 @@ mod tests {
         let colours = vec![[0.9f32, 0.3, 0.1]; 8];
         let volume = Volume::Grid(Arc::new(GridVolume {
             size: [2, 2, 2],
-            values: Voxels::upsampled(&colours),
+            values: Voxels::upsampled(&colours, Carried::Spectra),
             local_from_world: DAffine3::IDENTITY,
             between: Between::Trilinear,
             wrap: Wrap::Clamp,

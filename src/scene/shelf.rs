@@ -7,6 +7,7 @@
 use super::environment::Environment;
 use super::mesh::MeshSource;
 use super::texture::{DataImage, ImageTexture};
+use crate::spectrum::Carried;
 use std::collections::HashMap;
 use std::hash::Hash;
 use std::path::{Path, PathBuf};
@@ -85,6 +86,8 @@ impl<K: Eq + Hash, V: Clone> Kept<K, V> {
 /// Pictures, skies and meshes.
 #[derive(Debug, Default)]
 pub struct Shelf {
+    /// What they are made for: others have a shelf of their own.
+    pub carried: Carried,
     /// Pictures as colours, raw or not.
     pub colours: Kept<bool, ImageTexture>,
     /// Pictures as numbers, raw or not.

@@ -10,7 +10,7 @@
 
 use super::texture::Wrap;
 use crate::math::Ray;
-use crate::spectrum::{Lanes, Spectrum, upsample};
+use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -68,11 +68,11 @@ pub enum Voxels {
 impl Voxels {
     /// Colours as spectra.
     #[must_use]
-    pub fn upsampled(colours: &[[f32; 3]]) -> Voxels {
+    pub fn upsampled(colours: &[[f32; 3]], carried: Carried) -> Voxels {
         let voxel = |&rgb: &[f32; 3]| {
             let scale = 2.0 * rgb[0].max(rgb[1]).max(rgb[2]);
             // Black is a spectrum of zero, not one of grey times zero: its neighbours are mixed with it.
-            let [a, b, c] = upsample::coefficients(if scale > 0.0 { rgb.map(|v| v / scale) } else { [0.0; 3] });
+            let [a, b, c] = carried.coefficients(if scale > 0.0 { rgb.map(|v| v / scale) } else { [0.0; 3] });
             [a, b, c, scale]
         };
         Voxels::Coloured(colours.par_iter().map(voxel).collect())
@@ -551,7 +551,7 @@ mod tests {
     #[test]
     fn colours_are_mixed_as_sigmoids_and_scales() {
         let colours = [[0.2f32, 0.5, 0.1], [4.0, 1.0, 2.0]];
-        let grid = grid([2, 1, 1], Voxels::upsampled(&colours));
+        let grid = grid([2, 1, 1], Voxels::upsampled(&colours, Carried::Spectra));
         let nm = Lanes::new([400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 700.0, 750.0]);
         let both = colours.map(|c| upsample::unbounded(c.map(f64::from)).unwrap().eval(nm).to_array());
         let found = [0.25, 0.75].map(|x| grid.eval(DVec3::new(x, 0.5, 0.5), nm).to_array());
@@ -573,7 +573,7 @@ mod tests {
         let colours: Vec<[f32; 3]> = noise(3 * 7 * 9 * 5).chunks_exact(3).map(|c| [c[0], c[1], 3.0 * c[2]]).collect();
         let turned =
             DAffine3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7) * DAffine3::from_scale(DVec3::new(0.5, 1.0, 2.0));
-        for values in [Voxels::Grey(noise(7 * 9 * 5)), Voxels::upsampled(&colours)] {
+        for values in [Voxels::Grey(noise(7 * 9 * 5)), Voxels::upsampled(&colours, Carried::Spectra)] {
             for wrap in [Wrap::Clamp, Wrap::Mirror, Wrap::Repeat] {
                 for (between, local_from_world) in [
                     (Between::Trilinear, DAffine3::IDENTITY),

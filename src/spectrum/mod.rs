@@ -13,6 +13,7 @@
 //! Every function that reaches pixels is free of the platform's mathematics library, so that
 //! results are the same bits on every machine of one architecture.
 
+pub mod carried;
 pub mod catalogue;
 pub mod colour;
 pub mod illuminant;
@@ -24,16 +25,36 @@ mod table;
 pub mod upsample;
 mod wavelengths;
 
+pub use carried::Carried;
 pub use colour::ColourSpace;
 pub use index::RefractiveIndex;
 pub use spectra::Spectrum;
 pub use table::{Outside, Table};
 pub use wavelengths::{SampledWavelengths, WavelengthDistribution};
 /// One number for each of the eight wavelengths of a path.
+#[cfg(not(feature = "four_lanes"))]
 pub use wide::f32x8 as Lanes;
 
+/// One number for each of four wavelengths of a path.
+#[cfg(feature = "four_lanes")]
+pub use wide::f32x4 as Lanes;
+
+/// Whole numbers as lanes.
+#[cfg(not(feature = "four_lanes"))]
+#[inline]
+pub(crate) fn whole(numbers: wide::i32x8) -> Lanes {
+    Lanes::from_i32x8(numbers)
+}
+
+/// Whole numbers as lanes.
+#[cfg(feature = "four_lanes")]
+#[inline]
+pub(crate) fn whole(numbers: wide::i32x4) -> Lanes {
+    Lanes::from_i32x4(numbers)
+}
+
 /// How many wavelengths a path carries.
-pub const LANES: usize = 8;
+pub const LANES: usize = if cfg!(feature = "four_lanes") { 4 } else { 8 };
 
 /// The wavelengths that are rendered, in nm: the range of the observer's table.
 pub const BAND_NM: [f64; 2] = [360.0, 830.0];

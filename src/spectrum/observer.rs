@@ -3,8 +3,9 @@
 //! The table has a row each nanometre from 360 to 830 and is linear between them. XYZ is scaled
 //! such that radiance 1 at every wavelength has Y = 1.
 
-use crate::spectrum::{LANES, Lanes, SampledWavelengths, Spectrum};
+use crate::spectrum::{LANES, Lanes, SampledWavelengths, Spectrum, whole};
 use std::sync::LazyLock;
+use wide::f32x8;
 
 /// ∫ ȳ dλ over the band in nm, of the interpolated table: its column sum 106.85691710 less half
 /// of the two end values.
@@ -16,7 +17,7 @@ struct Observer {
     /// x̄, ȳ, z̄ at 360 + i nm.
     rows: Vec<[f64; 3]>,
     /// x̄, ȳ, z̄, 0 at 360 + i nm, then what each grows by up to the next row: one load a lane.
-    packed: Vec<Lanes>,
+    packed: Vec<f32x8>,
 }
 
 static OBSERVER: LazyLock<Observer> = LazyLock::new(|| {
@@ -26,7 +27,7 @@ static OBSERVER: LazyLock<Observer> = LazyLock::new(|| {
             let a = rows[i];
             let b = rows[(i + 1).min(rows.len() - 1)];
             let d = |c: usize| (b[c] - a[c]) as f32;
-            Lanes::new([a[0] as f32, a[1] as f32, a[2] as f32, 0.0, d(0), d(1), d(2), 0.0])
+            f32x8::new([a[0] as f32, a[1] as f32, a[2] as f32, 0.0, d(0), d(1), d(2), 0.0])
         })
         .collect();
     Observer { rows, packed }
@@ -69,16 +70,16 @@ pub fn xyz(radiance: Lanes, wavelengths: &SampledWavelengths) -> [f32; 3] {
     let t = wavelengths.nm - Lanes::splat(360.0);
     let row = t.fast_trunc_int();
     let weight = radiance * wavelengths.inv_pdf;
-    let slope_weight = (weight * (t - Lanes::from_i32x8(row))).to_array();
+    let slope_weight = (weight * (t - whole(row))).to_array();
     let weight = weight.to_array();
     let row = row.to_array();
     // Two sums, so that an addition need not wait for the one before.
-    let mut sum = [Lanes::splat(0.0); 2];
+    let mut sum = [f32x8::splat(0.0); 2];
     for k in 0..LANES {
         let (w, d) = (weight[k], slope_weight[k]);
         // A wavelength outside the band cannot be drawn; it would meet an end row.
         let entry = packed[(row[k] as u32 as usize).min(ROWS - 1)];
-        sum[k % 2] = Lanes::new([w, w, w, w, d, d, d, d]).mul_add(entry, sum[k % 2]);
+        sum[k % 2] = f32x8::new([w, w, w, w, d, d, d, d]).mul_add(entry, sum[k % 2]);
     }
     let sum = sum[0] + sum[1];
     let s = sum.to_array();

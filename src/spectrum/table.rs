@@ -1,6 +1,6 @@
 //! Tabulated functions of wavelength, linear between their knots.
 
-use crate::spectrum::{BAND_NM, LANES, Lanes};
+use crate::spectrum::{BAND_NM, LANES, Lanes, whole};
 
 /// What a table is worth beyond its first and last knot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -130,7 +130,7 @@ impl Table {
                 let t = t.fast_max(Lanes::splat(0.0)).fast_min(Lanes::splat(last as i32 as f32));
                 // t is not negative: truncation is the floor.
                 let row = t.fast_trunc_int();
-                let f = t - Lanes::from_i32x8(row);
+                let f = t - whole(row);
                 let row = row.to_array();
                 // A wavelength that is not a number would meet the last row, and stay none.
                 let entry = |k: usize| entries[(row[k] as u32 as usize).min(last)];

@@ -142,6 +142,24 @@ pub fn coefficients(rgb: [f32; 3]) -> [f32; 3] {
     fast::solve(rgb)
 }
 
+/// Coefficients of the smooth colour that has the values `values` at the wavelengths `nm`, each kept from 0 and 1 by 2⁻¹⁶.
+///
+/// The quadratic is at most 128 there, and its terms, with wavelengths 60 nm apart or more, below 2¹⁰: four roundings to f32
+/// put it off by 2⁻¹², and the sigmoid by half of that: 1.4e-4 with the bound.
+#[must_use]
+pub fn through(nm: [f64; 3], values: [f32; 3]) -> [f32; 3] {
+    if values[0] == values[1] && values[1] == values[2] {
+        return flat(values[0]);
+    }
+    const LEAST: f64 = 1.0 / 65536.0;
+    let t = nm.map(|nm| (nm - CENTRE) / HALF);
+    let x = values.map(|v| inverse_sigmoid(f64::from(v).max(0.0).clamp(LEAST, 1.0 - LEAST)));
+    // Newton's divided differences, multiplied out.
+    let first = (x[1] - x[0]) / (t[1] - t[0]);
+    let second = ((x[2] - x[1]) / (t[2] - t[1]) - first) / (t[2] - t[0]);
+    [second, first - second * (t[0] + t[1]), x[0] - t[0] * (first - second * t[1])].map(|c| c as f32)
+}
+
 /// Coefficients and scale of the emission that has the linear Rec.709 colour `rgb`, for each
 /// texel of an environment; the emission is scale · sigmoid · D65 ([`illuminant::d65`]). Negative
 /// channels count as zero.

@@ -41,8 +41,8 @@ pub struct WavelengthDistribution {
     rows_log2: u32,
     /// Intervals by which all lanes are turned.
     turn: usize,
-    /// Always these wavelengths, whatever u.
-    fixed: Option<SampledWavelengths>,
+    /// Always one of these, alike likely.
+    fixed: Option<Box<[SampledWavelengths]>>,
     description: String,
 }
 
@@ -80,7 +80,38 @@ impl WavelengthDistribution {
             inv_pdf: Lanes::splat((BAND_NM[1] - BAND_NM[0]) as f32),
         };
         let description = format!("fixed: {nm:?} nm");
-        Ok(WavelengthDistribution { rows: Vec::new(), rows_log2: 0, turn: 0, fixed: Some(sample), description })
+        Ok(WavelengthDistribution {
+            rows: Vec::new(),
+            rows_log2: 0,
+            turn: 0,
+            fixed: Some([sample].into()),
+            description,
+        })
+    }
+
+    /// Always the wavelengths `nm`, each standing for as much of the band as any other: for comparisons. A path carries
+    /// them over and over in its lanes, from a lane on that is drawn, so that each lane leads as often as any other.
+    ///
+    /// # Panics
+    /// If there are none, more than [`LANES`], or one outside 360 to 830 nm.
+    #[must_use]
+    pub fn in_turn(nm: &[f64]) -> WavelengthDistribution {
+        let within = |nm: &f64| (BAND_NM[0]..=BAND_NM[1]).contains(nm);
+        assert!((1..=LANES).contains(&nm.len()) && nm.iter().all(within), "{nm:?}");
+        let width = (BAND_NM[1] - BAND_NM[0]) / nm.len() as f64;
+        let place = |lane: usize| lane % nm.len();
+        let lanes_of = |i: usize| (0..LANES).filter(|&lane| place(lane) == i).count();
+        let turned = |turn: usize| {
+            let lanes: [usize; LANES] = std::array::from_fn(|lane| place((lane + turn) % LANES));
+            SampledWavelengths {
+                nm: Lanes::new(lanes.map(|i| nm[i] as f32)),
+                // The mean over eight lanes is to be the sum over the wavelengths, times their width.
+                inv_pdf: Lanes::new(lanes.map(|i| (width * LANES as f64 / lanes_of(i) as f64) as f32)),
+            }
+        };
+        let fixed = Some((0..LANES).map(turned).collect());
+        let description = format!("in turn: {nm:?} nm");
+        WavelengthDistribution { rows: Vec::new(), rows_log2: 0, turn: 0, fixed, description }
     }
 
     /// The same density with `count` wavelengths a path, evenly turned, each in as many lanes: to see what eight buy.
@@ -205,8 +236,8 @@ impl WavelengthDistribution {
     #[must_use]
     #[inline]
     pub fn sample(&self, u: f64) -> SampledWavelengths {
-        if let Some(fixed) = self.fixed {
-            return fixed;
+        if let Some(fixed) = &self.fixed {
+            return fixed[((u * fixed.len() as f64) as usize).min(fixed.len() - 1)];
         }
         // The lanes are whole rows apart, so they share the place within their intervals. The product
         // with a power of two is exact.

@@ -79,7 +79,9 @@ fn trade(chosen: &Row, rows: &[Row]) -> String {
             }
             (true, None) => {
                 same.push(row.value.clone());
-                if (row.efficiency.value - 1.0).abs() > SIGNIFICANT * row.efficiency.error {
+                if !row.efficiency.value.is_finite() {
+                    speed.push(format!("{} has no noise", row.value));
+                } else if (row.efficiency.value - 1.0).abs() > SIGNIFICANT * row.efficiency.error {
                     speed.push(format!("{} takes {} of the time", row.value, figures(1.0 / row.efficiency.value)));
                 }
             }

@@ -11,7 +11,7 @@ use crate::film::filter::FilterSampler;
 use crate::film::resolve::{self, Image, Splats};
 use crate::scene::Scene;
 use crate::scene::shelf::Shelf;
-use crate::spectrum::ColourSpace;
+use crate::spectrum::Carried;
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -26,6 +26,8 @@ pub struct Desk<'a> {
     pub stop: &'a AtomicBool,
     /// What the renders have read.
     pub shelf: RefCell<Shelf>,
+    /// The same for renders of three numbers.
+    pub shelf_of_colours: RefCell<Shelf>,
 }
 
 /// What came of one render.
@@ -50,17 +52,24 @@ pub struct Pass {
     pub noise: Vec<f64>,
 }
 
-impl Desk<'_> {
+impl<'a> Desk<'a> {
+    /// Where `entry` is rendered until `stop`.
+    #[must_use]
+    pub fn new(entry: &'a BatchEntry, overrides: Overrides, stop: &'a AtomicBool) -> Desk<'a> {
+        let shelf_of_colours = RefCell::new(Shelf { carried: Carried::Colours, ..Shelf::default() });
+        Desk { entry, overrides, stop, shelf: RefCell::default(), shelf_of_colours }
+    }
+
     /// Samples of a pixel for which the time suffices, as a first render tells it.
     ///
     /// # Errors
     /// As [`Desk::render`].
-    pub fn samples(&self, settings: &Settings) -> Result<u32> {
+    pub fn samples(&self, settings: &Settings<'_>) -> Result<u32> {
         let Some(time) = settings.time.filter(|_| settings.samples > FEWEST) else { return Ok(settings.samples) };
         let start = Instant::now();
-        let few = self.prepare(&[("render.samples".into(), FEWEST.to_string())], |_| {})?;
-        let (trials, ready) = (knobs::trials(&few), start.elapsed());
-        let passes = self.follow(&[few], false, None)?.passes;
+        let few = self.prepare(&[("render.samples".into(), FEWEST.to_string())])?;
+        let (trials, ready) = (knobs::wanted(&few, settings)?, start.elapsed());
+        let passes = self.follow(&[few], Way::AsSet, None)?.passes;
         let each = passes.last().map_or(0.0, |p| p.seconds) / f64::from(FEWEST);
         let work: f64 = trials.iter().map(Trial::work).sum();
         let rounds = f64::from(settings.rounds.max(1));
@@ -69,15 +78,25 @@ impl Desk<'_> {
         Ok(1 << (samples.clamp(f64::from(FEWEST), f64::from(settings.samples)) as u32).ilog2())
     }
 
-    /// The small copy with further settings, altered before it is planned.
+    /// The small copy with further settings.
     ///
     /// # Errors
     /// As [`super::super::prepare`].
-    pub fn prepare(&self, set: &[(String, String)], alter: impl FnOnce(&mut Scene)) -> Result<Prepared> {
+    pub fn prepare(&self, set: &[(String, String)]) -> Result<Prepared> {
+        self.prepare_with(set, &self.shelf, |_| {})
+    }
+
+    /// The small copy with further settings, with what is on `shelf`, altered before it is planned.
+    fn prepare_with(
+        &self,
+        set: &[(String, String)],
+        shelf: &RefCell<Shelf>,
+        alter: impl FnOnce(&mut Scene),
+    ) -> Result<Prepared> {
         let mut overrides = self.overrides.clone();
         overrides.set.extend(set.iter().cloned());
         let description = self.entry.scene(&overrides.set)?;
-        prepare_scene(self.entry, description, &overrides, &mut self.shelf.borrow_mut(), alter)
+        prepare_scene(self.entry, description, &overrides, &mut shelf.borrow_mut(), alter)
     }
 
     /// Renders a setting; with a reference the noise of each pass is known.
@@ -87,28 +106,29 @@ impl Desk<'_> {
     pub fn render(&self, trial: &Trial, seed: u64, reference: Option<&Reference>) -> Result<Outcome> {
         let mut set = trial.set.clone();
         set.push(("render.seed".into(), seed.to_string()));
-        let as_set = || self.prepare(&set, |_| {});
+        let altered = |alter: &dyn Fn(&mut Scene)| self.prepare_with(&set, &self.shelf, alter);
         let prepared = match trial.way {
-            Way::AsSet | Way::Independent => vec![as_set()?],
+            Way::AsSet | Way::Independent | Way::Beside => vec![self.prepare(&set)?],
+            Way::Colours => vec![self.prepare_with(&set, &self.shelf_of_colours, |_| {})?],
             Way::Wavelengths(16) => {
-                let further = self.prepare(&set, |s| s.wavelengths = s.wavelengths.half_a_step_on())?;
-                vec![as_set()?, further]
+                let further = altered(&|s| s.wavelengths = s.wavelengths.half_a_step_on())?;
+                vec![self.prepare(&set)?, further]
             }
-            Way::Wavelengths(count) => {
-                vec![self.prepare(&set, |s| s.wavelengths = s.wavelengths.with_count(count))?]
-            }
+            Way::Wavelengths(count) => vec![altered(&|s| s.wavelengths = s.wavelengths.with_count(count))?],
         };
-        self.follow(&prepared, trial.way == Way::Independent, reference)
+        self.follow(&prepared, trial.way, reference)
     }
 
     /// Renders copies of the scene side by side, pass by pass, and takes their mean: replicate by replicate, so that the
     /// spread of replicates is that of independent means, whatever the copies have in common.
-    fn follow(&self, prepared: &[Prepared], independent: bool, reference: Option<&Reference>) -> Result<Outcome> {
+    fn follow(&self, prepared: &[Prepared], way: Way, reference: Option<&Reference>) -> Result<Outcome> {
+        let independent = way == Way::Independent;
+        let carried = if way == Way::Colours { Carried::Colours } else { Carried::Spectra };
         let filter = FilterSampler::new(batch::filter(&prepared[0].description.image.filter))?;
         let jobs: Vec<FrameJob> = prepared.iter().map(|p| FrameJob { independent, ..p.job(&filter) }).collect();
         let samples = jobs[0].samples;
         let parts = jobs.iter().map(|job| Part::new(job, Share::all(samples))).collect::<Result<Vec<Part>>>()?;
-        let space = ColourSpace::Rec709.matrix_from_xyz();
+        let space = carried.rgb_from_film();
         let replicates = || {
             let of = |part: &Part| {
                 part.look(|film, splats| {

@@ -1,6 +1,8 @@
 //! Which knobs a sheet moves, and to what.
 
 use super::super::{Prepared, adaptive};
+use super::Settings;
+use crate::error::{Error, Result};
 use crate::film::accumulate::REPLICATES;
 use crate::transport::pilot::Use;
 use crate::transport::plan::Integrator;
@@ -39,6 +41,10 @@ pub enum Way {
     AsSet,
     /// With samples that have nothing in common.
     Independent,
+    /// By another build.
+    Beside,
+    /// With red, green and blue in place of spectra.
+    Colours,
     /// With so many wavelengths a path: 1, 2, 4 or 8; or 16, by two renders.
     Wavelengths(usize),
 }
@@ -51,9 +57,36 @@ pub fn note(knob: &str) -> Option<&'static str> {
             "lanes are eight wide: one wavelength and four take the time of eight, sixteen are two renders of eight, half a \
              step apart, on the same paths",
         ),
+        "transport" => Some(
+            "as a renderer of three numbers has it: reflectances have their colour under D65, metals theirs at normal \
+             incidence, lights theirs within Rec. 709, glass bends all alike; thin films and pictures of measured spectra are \
+             taken at 611, 549 and 464 nm; lanes stay eight wide, so that the time is not such a renderer's",
+        ),
         _ => None,
     }
 }
+
+/// Those of [`trials`] that are asked for, and the chosen setting by another build.
+///
+/// # Errors
+/// [`Error::Config`] for a knob that the scene does not have.
+pub fn wanted(chosen: &Prepared, settings: &Settings<'_>) -> Result<Vec<Trial>> {
+    let mut all = trials(chosen);
+    if let Some(unknown) = settings.knobs.iter().find(|name| all.iter().all(|t| t.knob != name.as_str())) {
+        let mut names: Vec<&str> = all[1..].iter().map(|t| t.knob).collect();
+        names.dedup();
+        return Err(Error::Config(format!("--knob: expected one of {}; found \"{unknown}\"", names.join(", "))));
+    }
+    all.retain(|t| t.knob == CHOSEN || settings.knobs.is_empty() || settings.knobs.iter().any(|name| name == t.knob));
+    if let Some(build) = settings.beside {
+        let value = build.binary.display().to_string();
+        all.push(Trial { knob: "build", value, set: Vec::new(), way: Way::Beside });
+    }
+    Ok(all)
+}
+
+/// The name of no knob: nothing is moved.
+pub const CHOSEN: &str = "chosen";
 
 /// The chosen setting, then each knob at other values.
 #[must_use]
@@ -66,7 +99,7 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
         set: set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect(),
         way: Way::AsSet,
     };
-    let mut all = vec![trial("chosen", "as written", &[])];
+    let mut all = vec![trial(CHOSEN, "as written", &[])];
     for (name, samples) in [("1/4", samples / 4), ("1/2", samples / 2), ("2", samples * 2), ("4", samples * 4)] {
         if samples >= REPLICATES as u32 {
             all.push(trial("samples", &format!("x {name}"), &[("render.samples", &samples.to_string())]));
@@ -88,6 +121,10 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
     }
     for count in [1, 4, 16] {
         all.push(Trial { way: Way::Wavelengths(count), ..trial("wavelengths per path", &count.to_string(), &[]) });
+    }
+    // Of bands three numbers know nothing.
+    if chosen.scene.bands.is_empty() {
+        all.push(Trial { way: Way::Colours, ..trial("transport", "RGB", &[]) });
     }
     for value in ["visible", "uniform"] {
         all.push(trial("wavelengths", value, &[("render.wavelengths", value)]));

@@ -1,6 +1,6 @@
 //! The sheet as one page that needs nothing else: numbers, curves, pictures and what follows from them.
 
-use super::{Row, Sheet};
+use super::{Figure, Row, Sheet};
 use std::fmt::Write;
 
 /// Style of the page. Colours are told apart without colour vision by their lightness, too.
@@ -50,8 +50,8 @@ pub fn page(title: &str, command: &str, sheets: &[Sheet], without: &[(String, St
         let _ = writeln!(out, "<h2>{}</h2><p>{}.</p>", escaped(scene), escaped(why));
     }
     out.push_str(
-        "<p class=\"note\">Not on the sheet: transport of three colours, which Abbe does not have, and geometry in f32: \
-         <code>tools/bench/robustness</code> measures that with a build of its own.</p>\n</body></html>\n",
+        "<p class=\"note\">Geometry in f32 takes another build, made with the feature \
+         <code>single_precision</code>: <code>--beside</code> gives its row.</p>\n</body></html>\n",
     );
     out
 }
@@ -66,7 +66,11 @@ fn contents(out: &mut String, sheets: &[Sheet]) {
         let chosen = &sheet.rows[0];
         let moved = || sheet.rows[1..].iter().filter(|row| row.knob != "samples" && row.knob != "file");
         let name = |row: &Row| escaped(&format!("{} {}", row.knob, row.value));
-        let sooner = |row: &&Row| row.bias().is_none() && row.efficiency.value - 3.0 * row.efficiency.error > 1.0;
+        // Three numbers and other builds are no settings of a scene.
+        let is_setting = |row: &Row| row.knob != "transport" && row.knob != "build";
+        let sooner = |row: &&Row| {
+            is_setting(row) && row.bias().is_none() && row.efficiency.value - 3.0 * row.efficiency.error > 1.0
+        };
         let best = moved().filter(sooner).max_by(|a, b| a.efficiency.value.total_cmp(&b.efficiency.value));
         let best = best.map_or("as chosen".into(), |row| format!("{}: {:.2}", name(row), 1.0 / row.efficiency.value));
         let worst = moved().filter_map(|row| Some((row, row.bias()?))).max_by(|a, b| a.1.total_cmp(&b.1));
@@ -167,7 +171,10 @@ pub fn cells(row: &Row) -> [String; 10] {
         format!("{}-{}", per_cent(row.noise[1]), per_cent(row.noise[2])),
         row.bias().map_or(format!("<{}", per_cent(row.bias_bound())), per_cent),
         light.join(" "),
-        format!("{:.2} ± {:.2}", row.efficiency.value, row.efficiency.error),
+        match row.efficiency {
+            Figure { value, error } if value.is_finite() => format!("{value:.2} ± {error:.2}"),
+            _ => "no noise".to_owned(),
+        },
         row.to_target.map_or("never".into(), |t| format!("{t:.2}")),
     ]
 }

@@ -55,7 +55,9 @@ impl<'a> Compiler<'a> {
                 let attributes = &mesh.source.attributes;
                 match attributes.iter().find(|a| a.name == name) {
                     Some(a) => match a.values.iter().find(|x| a.channels == 3 && !(0.0..=1.0).contains(*x)) {
-                        None => return Some(AttributeTexture::new(a, &mesh.triangles, texture.scale)),
+                        None => {
+                            return Some(AttributeTexture::new(a, &mesh.triangles, texture.scale, self.shelf.carried));
+                        }
                         Some(x) => format!("expected colours from 0 to 1 in the attribute {name}, found {x}"),
                     },
                     None if attributes.is_empty() => {

@@ -20,7 +20,8 @@ impl Compiler<'_> {
             }
             written::HairColour::Pigments { eumelanin, pheomelanin } => {
                 let mut pigment = |concentration: f64, rgb: [f64; 3]| {
-                    self.or(place, upsample::unbounded(rgb), Spectrum::Constant(0.0)).scaled(concentration)
+                    let spectrum = self.or(place, upsample::unbounded(rgb), Spectrum::Constant(0.0));
+                    self.shelf.carried.coefficient(spectrum).scaled(concentration)
                 };
                 vec![pigment(*eumelanin, EUMELANIN), pigment(*pheomelanin, PHEOMELANIN)]
             }

@@ -14,6 +14,9 @@ use std::f64::consts::PI;
 /// no light comes through a hair of it.
 const MOST_K: f64 = 0.1;
 
+/// The least share of light that a colour of absorption leaves: of three numbers one can be zero, and its logarithm none.
+const DARKEST: f64 = f32::MIN_POSITIVE as f64;
+
 /// The whole nanometres of the band.
 fn nanometres() -> impl Iterator<Item = f64> {
     (BAND_NM[0] as u32..=BAND_NM[1] as u32).map(f64::from)
@@ -38,7 +41,10 @@ impl<'a> Compiler<'a> {
             written::Index::Formula(f) => RefractiveIndex::formula(f.number, &f.coefficients),
             written::Index::File(path) => {
                 return match self.optical_data(&format!("{at}.file"), path) {
-                    Some(data) => self.clear_index(&format!("{at}.file"), data),
+                    Some(data) => {
+                        let index = self.clear_index(&format!("{at}.file"), data);
+                        self.shelf.carried.index(index)
+                    }
                     None => RefractiveIndex::Constant(1.0),
                 };
             }
@@ -51,7 +57,7 @@ impl<'a> Compiler<'a> {
                 format!("an index of {n} at {nm} nm, below 1 and without k, is right as a ratio to another only");
             self.note(at, &message);
         }
-        index
+        self.shelf.carried.index(index)
     }
 
     /// What a file says.
@@ -130,7 +136,8 @@ impl<'a> Compiler<'a> {
             // σ = 4πk/λ, with λ in metres.
             let sigma = |nm: f64| (nm, 4.0 * PI * data.k_at(nm) / (nm * 1e-9));
             let made = Spectrum::from_samples(&nanometres().map(sigma).collect::<Vec<_>>(), Outside::Hold);
-            Some(c.or(at, made, Spectrum::Constant(0.0)))
+            let absorption = c.or(at, made, Spectrum::Constant(0.0));
+            Some(c.shelf.carried.coefficient(absorption))
         };
         let at = |field: &str| format!("{at}.{field}");
         match (&m.absorption, &m.ior) {
@@ -138,7 +145,7 @@ impl<'a> Compiler<'a> {
             (Some(written::Absorption::File(path)), _) => by_k(self, &at("absorption.file"), path, true),
             (Some(written::Absorption::Color(c)), _) => {
                 let at = at("absorption.color");
-                let color = self.spectrum(&at, &c.color, Outside::Hold, Role::Reflectance);
+                let color = self.written_spectrum(&at, &c.color, Outside::Hold, Role::Reflectance);
                 if let Some(nm) = nanometres().find(|&nm| color.at(nm) <= 0.0) {
                     self.fault(
                         &at,
@@ -146,7 +153,8 @@ impl<'a> Compiler<'a> {
                     );
                     return None;
                 }
-                let sigma = |nm: f64| (nm, -libm::log(color.at(nm)).min(0.0) / c.at);
+                let color = self.shelf.carried.reflectance(color);
+                let sigma = |nm: f64| (nm, -libm::log(color.at(nm).max(DARKEST)).min(0.0) / c.at);
                 let made = Spectrum::from_samples(&nanometres().map(sigma).collect::<Vec<_>>(), Outside::Hold);
                 Some(self.or(&at, made, Spectrum::Constant(0.0)))
             }

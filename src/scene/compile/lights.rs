@@ -37,7 +37,9 @@ impl<'a> Compiler<'a> {
                 if image.bands.as_ref().is_some_and(|bands| bands.quantity == bands::Quantity::Radiance) {
                     return;
                 }
-                let lit = written.illuminant.clone().map_or_else(illuminant::d65, |i| {
+                let carried = self.shelf.carried;
+                let daylight = || carried.light(illuminant::d65());
+                let lit = written.illuminant.clone().map_or_else(daylight, |i| {
                     let at = format!("textures.{name}.image.illuminant");
                     self.light_spectrum(&at, &written::Spectrum::Illuminant(i))
                 });
@@ -114,6 +116,7 @@ impl<'a> Compiler<'a> {
                     written::EnvironmentMapping::Mitsuba => Mapping::Poles,
                 };
                 let (shelf, pictures) = (&mut self.shelf, &mut self.pictures);
+                let carried = shelf.carried;
                 let map = shelf.skies.get(&l.file, super::sky_key(l), || {
                     let decoded = pictures.take(&l.file)?;
                     if let load::Decoded::Exr(file) = &decoded
@@ -124,7 +127,7 @@ impl<'a> Compiler<'a> {
                         return map.map(Arc::new).map_err(|message| Error::input(&l.file, message));
                     }
                     let load::Picture { pixels, width, height } = load::picture(&l.file, decoded)?;
-                    let map = Environment::new(&pixels, width, height, l.scale, mapping, l.world_from_map());
+                    let map = Environment::new(&pixels, [width, height], l.scale, mapping, l.world_from_map(), carried);
                     Ok(Arc::new(map))
                 });
                 Light::Environment(map.map_err(|e| self.asked(&format!("{at}.file"), e))?)

@@ -8,7 +8,7 @@ use crate::scene::grid::Grid;
 use crate::scene::medium::{Filling, Medium, PhaseBlend, PhaseFunction, Varying};
 use crate::scene::texture::Wrap;
 use crate::scene::volume::{Between, GridVolume, Volume, Voxels};
-use crate::spectrum::{Outside, Spectrum};
+use crate::spectrum::{Carried, Outside, Spectrum};
 use glam::{DAffine3, DVec3};
 use std::path::Path;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ impl Compiler<'_> {
             }),
             written::Volume::Grid(grid) => {
                 self.files.push(grid.file.to_path_buf());
-                let loaded = grid_volume(grid, world_from_local);
+                let loaded = grid_volume(grid, world_from_local, self.shelf.carried);
                 Ok(Volume::Grid(Arc::new(loaded.map_err(|e| self.asked(&format!("{at}.grid.file"), e))?)))
             }
         }
@@ -144,7 +144,7 @@ impl Compiler<'_> {
 /// # Errors
 /// [`Error::Input`] where the file is missing or broken, holds numbers below zero, or has neither one channel
 /// nor three.
-fn grid_volume(written: &written::GridVolume, world_from_local: DAffine3) -> Result<GridVolume> {
+fn grid_volume(written: &written::GridVolume, world_from_local: DAffine3, carried: Carried) -> Result<GridVolume> {
     let path: &Path = &written.file;
     let grid = Grid::load(path)?;
     if let Some(i) = grid.values.iter().position(|v| *v < 0.0) {
@@ -155,7 +155,7 @@ fn grid_volume(written: &written::GridVolume, world_from_local: DAffine3) -> Res
     let values = match (grid.channels, written.raw) {
         (1, _) => Voxels::Grey(grid.values),
         (3, true) => Voxels::Raw(triples()),
-        (3, false) => Voxels::upsampled(&triples()),
+        (3, false) => Voxels::upsampled(&triples(), carried),
         (n, _) => return Err(Error::input(path, format!("expected 1 channel or 3, found {n}"))),
     };
     let mut local_from_world = world_from_local.inverse();

@@ -132,8 +132,9 @@ impl<'a> Compiler<'a> {
             written::Texture::Image(image) => {
                 self.files.push(image.file.to_path_buf());
                 let (shelf, pictures) = (&mut self.shelf, &mut self.pictures);
+                let carried = shelf.carried;
                 let loaded = shelf.colours.get(&image.file, image.raw, || {
-                    pictures.take(&image.file).and_then(|p| load::image_texture(&image.file, p, image.raw))
+                    pictures.take(&image.file).and_then(|p| load::image_texture(&image.file, p, image.raw, carried))
                 });
                 let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
                 loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
@@ -229,17 +230,18 @@ impl<'a> Compiler<'a> {
                 (Kind::Mirror { reflectance: self.reflectance(&at("reflectance"), &m.reflectance) }, true, m.highlight)
             }
             written::Material::Conductor(m) => {
-                let (eta, k) = match &m.index {
+                let metal = match &m.index {
                     written::ConductorIndex::Metal(name) => {
                         let none = (Spectrum::Constant(1.0), Spectrum::Constant(0.0));
-                        self.or(&at("metal"), catalogue::metal(name), none)
+                        self.or(&at("metal"), catalogue::metal(name), none).into()
                     }
-                    written::ConductorIndex::File(file) => self.metal_file(&at("file"), file),
-                    written::ConductorIndex::Written { eta, k } => (
-                        self.spectrum(&at("eta"), eta, Outside::Hold, Role::Coefficient),
-                        self.spectrum(&at("k"), k, Outside::Hold, Role::Coefficient),
-                    ),
+                    written::ConductorIndex::File(file) => self.metal_file(&at("file"), file).into(),
+                    written::ConductorIndex::Written { eta, k } => [
+                        self.written_spectrum(&at("eta"), eta, Outside::Hold, Role::Coefficient),
+                        self.written_spectrum(&at("k"), k, Outside::Hold, Role::Coefficient),
+                    ],
                 };
+                let [eta, k] = self.shelf.carried.metal(metal);
                 let tint = self.reflectance_texture(&at("tint"), &m.tint);
                 let facets = self.roughness(&at("roughness"), &m.roughness, m.distribution);
                 let film = self.film(&at("film"), m.film.as_ref());

@@ -10,7 +10,7 @@
 //! greatest of their type. An attribute has one number or three; other properties are passed over.
 
 use crate::scene::texture::TexturePoint;
-use crate::spectrum::{Lanes, Spectrum, upsample};
+use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -59,13 +59,13 @@ struct Field {
 impl AttributeTexture {
     /// The attribute of a mesh with these triangles.
     #[must_use]
-    pub fn new(attribute: &Attribute, triangles: &[[u32; 3]], scale: f64) -> AttributeTexture {
+    pub fn new(attribute: &Attribute, triangles: &[[u32; 3]], scale: f64, carried: Carried) -> AttributeTexture {
         let three = attribute.channels == 3;
         let values: Vec<[f32; 3]> = match attribute.channels {
             3 => attribute.values.as_chunks().0.to_vec(),
             _ => attribute.values.iter().map(|&x| [x; 3]).collect(),
         };
-        let sigmoids = if three { values.iter().map(|&rgb| upsample::coefficients(rgb)).collect() } else { Vec::new() };
+        let sigmoids = if three { values.iter().map(|&rgb| carried.coefficients(rgb)).collect() } else { Vec::new() };
         let triangles = if attribute.element == Element::Vertex { triangles.to_vec() } else { Vec::new() };
         AttributeTexture { field: Arc::new(Field { element: attribute.element, values, sigmoids, triangles }), scale }
     }
