@@ -14,6 +14,7 @@ mod media;
 mod meshes;
 mod notes;
 mod principled;
+mod spectra;
 mod surface;
 
 use super::bvh::{Aabb, Bvh};
@@ -22,7 +23,7 @@ use super::choice::Choice;
 use super::few::Few;
 use super::instance::{AffineMap, Group, Instance};
 use super::light::Light;
-use super::load::{self, Pictures, Wanted};
+use super::load::{Pictures, Wanted};
 use super::material::{Kind, Material};
 use super::medium::Medium;
 use super::mesh::MeshTree;
@@ -36,10 +37,11 @@ use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene};
 use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
 use crate::math::Ray;
-use crate::spectrum::{Outside, Spectrum, WavelengthDistribution, illuminant, upsample};
+use crate::spectrum::{Outside, Spectrum, WavelengthDistribution};
 use attributes::{OfMesh, Surface};
 use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3};
 use meshes::Meshes;
+use spectra::Role;
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -508,29 +510,6 @@ impl<'a> Compiler<'a> {
         Camera::new(world_from_camera, projection, resolution, lens, clip, principal_point)
     }
 
-    /// Bands of the spectrum; a response must lie in what is rendered.
-    fn bands(&mut self) -> Vec<Band> {
-        let mut all = Vec::new();
-        for (i, band) in self.description.image.bands.iter().enumerate() {
-            let at = format!("image.bands[{i}].response");
-            let response = self.written_spectrum(&at, &band.response, Outside::Zero, Role::Coefficient);
-            if response.is_black() {
-                self.fault(&at, "expected a response within 360 to 830 nm, found none");
-            }
-            all.push(Band { name: band.name.clone(), response });
-        }
-        if let Some(spectral) = &self.description.output.spectral {
-            for [from, to] in spectral.edges() {
-                // The mean over the band; the name has its middle, with a comma.
-                let height = 1.0 / (to - from);
-                let response = Spectrum::from_samples(&[(from, height), (to, height)], Outside::Zero);
-                let name = format!("S0.{:.6}nm", 0.5 * (from + to)).replace('.', ",").replacen(',', ".", 1);
-                all.extend(response.map(|response| Band { name, response }));
-            }
-        }
-        all
-    }
-
     /// Wavelengths by the scene's own lights and surfaces.
     fn wavelengths(
         &self,
@@ -569,70 +548,6 @@ impl<'a> Compiler<'a> {
             }
         }
         WavelengthDistribution::for_scene(&emitters, &reflectances)
-    }
-
-    /// What `s` is carried as.
-    fn spectrum(&mut self, at: &str, s: &written::Spectrum, outside: Outside, role: Role) -> Spectrum {
-        let spectrum = self.written_spectrum(at, s, outside, role);
-        let carried = self.shelf.carried;
-        match role {
-            Role::Reflectance => carried.reflectance(spectrum),
-            Role::Light => carried.light(spectrum),
-            Role::Coefficient => carried.coefficient(spectrum),
-        }
-    }
-
-    fn written_spectrum(&mut self, at: &str, s: &written::Spectrum, outside: Outside, role: Role) -> Spectrum {
-        let black = Spectrum::Constant(0.0);
-        match s {
-            written::Spectrum::Number(x) => Spectrum::constant(*x),
-            written::Spectrum::Rgb(rgb) => match role {
-                Role::Reflectance => self.or(at, upsample::reflectance(*rgb), black),
-                Role::Light => self.or(at, upsample::emission(*rgb), black),
-                Role::Coefficient => self.or(at, upsample::unbounded(*rgb), black),
-            },
-            written::Spectrum::Table(samples) => {
-                let samples: Vec<(f64, f64)> = samples.iter().map(|s| (s[0], s[1])).collect();
-                self.or(at, Spectrum::from_samples(&samples, outside), black)
-            }
-            written::Spectrum::File(path) => {
-                self.files.push(path.to_path_buf());
-                let samples = load::samples(path);
-                let spectrum = samples.and_then(|samples| Spectrum::from_samples(&samples, outside));
-                spectrum.unwrap_or_else(|message| {
-                    let error = self.asked(at, Error::input(path, message));
-                    self.unread.get_or_insert(error);
-                    black
-                })
-            }
-            written::Spectrum::Blackbody(b) => {
-                let spectrum = if b.normalised {
-                    illuminant::blackbody_normalised(b.kelvin)
-                } else {
-                    illuminant::blackbody(b.kelvin)
-                };
-                self.or(at, spectrum, black).scaled(b.scale)
-            }
-            written::Spectrum::Illuminant(i) => self.or(at, illuminant::illuminant(&i.name), black).scaled(i.scale),
-            written::Spectrum::Lines(lines) => {
-                let lines: Vec<(f64, f64, f64)> = lines.iter().map(|l| (l.nm, l.power, l.width_nm)).collect();
-                self.or(at, Spectrum::lines(&lines), black)
-            }
-            written::Spectrum::ZeroOutside(s) => {
-                self.written_spectrum(&format!("{at}.zero_outside"), s, Outside::Zero, role)
-            }
-            written::Spectrum::Scaled(s) => {
-                self.written_spectrum(&format!("{at}.scaled.of"), &s.of, outside, role).scaled(s.by)
-            }
-        }
-    }
-
-    fn reflectance(&mut self, at: &str, s: &written::Spectrum) -> Spectrum {
-        self.spectrum(at, s, Outside::Hold, Role::Reflectance)
-    }
-
-    fn light_spectrum(&mut self, at: &str, s: &written::Spectrum) -> Spectrum {
-        self.spectrum(at, s, Outside::Zero, Role::Light)
     }
 
     fn geometry(&mut self, at: &str, shape: &written::Shape) -> Result<Option<Geometry>> {
@@ -719,14 +634,6 @@ impl<'a> Compiler<'a> {
             }
         })
     }
-}
-
-/// What a spectrum stands for, which decides how a colour becomes one.
-#[derive(Clone, Copy)]
-enum Role {
-    Reflectance,
-    Light,
-    Coefficient,
 }
 
 fn layout(layout: written::Layout) -> Layout {

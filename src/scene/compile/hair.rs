@@ -1,6 +1,7 @@
 //! Hair, from what a person wrote.
 
-use super::{Compiler, Role};
+use super::Compiler;
+use super::spectra::Role;
 use crate::description as written;
 use crate::optics::hair::Fibre;
 use crate::scene::material::Kind;

@@ -1,6 +1,7 @@
 //! Refractive indices, and what absorbs by them.
 
-use super::{Compiler, Role};
+use super::Compiler;
+use super::spectra::Role;
 use crate::description::{self as written, OpticalData};
 use crate::error::Error;
 use crate::optics::phase::Phase;

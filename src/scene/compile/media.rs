@@ -1,6 +1,7 @@
 //! Volumes, media and phase functions.
 
-use super::{Compiler, Role};
+use super::Compiler;
+use super::spectra::Role;
 use crate::description as written;
 use crate::error::{Error, Result};
 use crate::optics::phase::{Phase, PhaseTable};

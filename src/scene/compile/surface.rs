@@ -1,6 +1,7 @@
 //! Materials and textures, from what a person wrote.
 
-use super::{Compiler, Role};
+use super::Compiler;
+use super::spectra::Role;
 use crate::description as written;
 use crate::error::Result;
 use crate::optics::fresnel::Model;
