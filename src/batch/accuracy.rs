@@ -229,6 +229,9 @@ pub fn sheet(
     Ok(Ok(Sheet { scene: chosen.scene.name, size, target, reference, png, rows, advice }))
 }
 
+/// relMSE of what has no noise and no bias, at most: sums in f32 and the inverse of a matrix are off by 1e-5.
+const ROUNDING: f64 = 1e-10;
+
 /// The reference has as many times the samples.
 const REFERENCE: u32 = 16;
 
@@ -294,7 +297,7 @@ impl Row {
     #[must_use]
     pub fn bias(&self) -> Option<f64> {
         let Figure { value, error } = self.bias_squared;
-        (value > SIGNIFICANT * error && value > 0.0).then(|| value.sqrt())
+        (value > SIGNIFICANT * error && value > ROUNDING).then(|| value.sqrt())
     }
 
     /// √relMSE that the bias is below, by as many standard errors as it takes to stand out.
