@@ -27,7 +27,13 @@ impl Compiler<'_> {
     }
 
     /// What is written, whatever it is carried as.
-    pub(super) fn written_spectrum(&mut self, at: &str, s: &written::Spectrum, outside: Outside, role: Role) -> Spectrum {
+    pub(super) fn written_spectrum(
+        &mut self,
+        at: &str,
+        s: &written::Spectrum,
+        outside: Outside,
+        role: Role,
+    ) -> Spectrum {
         let black = Spectrum::Constant(0.0);
         match s {
             written::Spectrum::Number(x) => Spectrum::constant(*x),
