@@ -48,6 +48,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use stop::{Forecast, Stop};
 
+/// Scenes whose reports are put in one place at a time.
+const GATHERED: usize = 64;
+
 /// What the command line says over the files.
 #[derive(Clone, Debug, Default)]
 pub struct Overrides {
@@ -161,8 +164,8 @@ pub fn entries(path: &Path, overrides: &Overrides) -> Result<Vec<BatchEntry>> {
             return Err(Error::Config(format!("{}: no scene is named \"{wanted}\"{nearest}", path.display())));
         }
     }
-    let wanted = |e: &&BatchEntry| overrides.scenes.is_empty() || overrides.scenes.contains(&e.name);
-    let mut entries: Vec<BatchEntry> = all.iter().filter(wanted).cloned().collect();
+    let mut entries = document.into_entries();
+    entries.retain(|e| overrides.scenes.is_empty() || overrides.scenes.contains(&e.name));
     for entry in &mut entries {
         entry.define(&overrides.define)?;
     }
@@ -692,6 +695,11 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
             report.error_map = None;
             watcher.scene_ends(&report);
             scenes.push(report);
+            if scenes.len() % GATHERED == 0 {
+                let gathered = scenes.len() - GATHERED;
+                let (before, latest) = scenes.split_at_mut(gathered);
+                report::gather(before.last(), latest);
+            }
             loading = Instant::now();
         }
     }

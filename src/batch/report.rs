@@ -11,8 +11,9 @@ use crate::film::heat::Small;
 use crate::film::output;
 use crate::scene::watch::Counts;
 use crate::transport::plan::Effect;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// A batch.
@@ -40,7 +41,7 @@ pub struct Report {
 }
 
 /// How a scene ended.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// All files are written.
@@ -57,7 +58,7 @@ pub enum Status {
 }
 
 /// Wall times in seconds.
-#[derive(Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Seconds {
     /// Reading and compiling the scene.
     pub loading: f64,
@@ -68,7 +69,7 @@ pub struct Seconds {
 }
 
 /// The error after a number of samples.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct ConvergencePoint {
     /// Samples of a pixel.
     pub samples: u32,
@@ -114,7 +115,7 @@ impl SampleCounts {
 }
 
 /// One scene.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct SceneReport {
     /// Its name.
     pub name: String,
@@ -161,15 +162,44 @@ pub struct SceneReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub numerics: Option<Counts>,
     /// Each effect, on or off, with its reason.
-    pub effects: Vec<Effect>,
+    #[serde(serialize_with = "all")]
+    pub effects: Arc<[Effect]>,
     /// How they were computed.
-    pub techniques: Vec<Effect>,
+    #[serde(serialize_with = "all")]
+    pub techniques: Arc<[Effect]>,
     /// From which wavelengths samples were drawn.
     pub wavelengths: String,
     /// What a person should know.
     pub notes: Vec<String>,
     /// Files written.
     pub files: Vec<PathBuf>,
+}
+
+fn all<S: Serializer>(effects: &Arc<[Effect]>, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(effects.iter())
+}
+
+/// Moves what reports hold to one place; effects and techniques, most of a report, are one for all in a row that have the
+/// same. `before` is the report before the first.
+///
+/// Reports are made piece by piece beside scenes and films. A piece that stays cuts the room that these leave, and what is
+/// made for the next scene, as large as that of the last, does not fit in again: memory would grow by the bulk of a scene
+/// for each piece.
+pub fn gather(before: Option<&SceneReport>, reports: &mut [SceneReport]) {
+    let mut copies: Vec<SceneReport> = Vec::with_capacity(reports.len());
+    for report in &*reports {
+        let like = copies.last().or(before);
+        let shared = |own: &Arc<[Effect]>, other: Option<&Arc<[Effect]>>| match other {
+            Some(other) if other == own => Arc::clone(other),
+            _ => own.iter().cloned().collect(),
+        };
+        let effects = shared(&report.effects, like.map(|like| &like.effects));
+        let techniques = shared(&report.techniques, like.map(|like| &like.techniques));
+        copies.push(SceneReport { effects, techniques, ..report.clone() });
+    }
+    for (report, copy) in reports.iter_mut().zip(copies) {
+        *report = copy;
+    }
 }
 
 impl Report {
@@ -226,8 +256,8 @@ impl SceneReport {
             convergence: Vec::new(),
             invalid: InvalidCounts::default(),
             numerics: None,
-            effects: Vec::new(),
-            techniques: Vec::new(),
+            effects: Arc::default(),
+            techniques: Arc::default(),
             wavelengths: String::new(),
             notes: Vec::new(),
             files: Vec::new(),
@@ -248,8 +278,8 @@ impl SceneReport {
         self.samples = finish.samples;
         self.seed = finish.seed;
         self.scene_hash.clone_from(&finish.scene_hash);
-        self.effects.clone_from(&finish.effects);
-        self.techniques.clone_from(&finish.techniques);
+        self.effects = finish.effects.as_slice().into();
+        self.techniques = finish.techniques.as_slice().into();
         self.wavelengths.clone_from(&finish.wavelengths);
         self.seconds.loading = loading.as_secs_f64();
     }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -35,6 +36,15 @@ impl Document {
         match self {
             Document::Scene(entry) => std::slice::from_ref(entry),
             Document::Batch(batch) => &batch.entries,
+        }
+    }
+
+    /// [`Document::entries`], to keep.
+    #[must_use]
+    pub fn into_entries(self) -> Vec<BatchEntry> {
+        match self {
+            Document::Scene(entry) => vec![entry],
+            Document::Batch(batch) => batch.entries,
         }
     }
 
@@ -85,12 +95,12 @@ pub struct BatchEntry {
     /// Where the batch names the file; `None` for a scene on its own.
     place: Option<Place>,
     /// The batch's `output` and `render`, laid over the scene's.
-    layers: Vec<(&'static str, Node)>,
+    layers: Arc<[(&'static str, Node)]>,
     settings: Vec<Setting>,
     /// Parameters of a Mitsuba scene, by name.
     defines: Vec<(String, String)>,
     /// What the places of the above refer to.
-    sources: Sources,
+    sources: Arc<Sources>,
 }
 
 /// Reads a batch, or a scene, which is a batch of one.
@@ -175,8 +185,9 @@ impl Batch {
             Some(Value::List(nodes)) => nodes.as_slice(),
             _ => &[],
         };
-        let layers: Vec<(&'static str, Node)> =
+        let layers: Arc<[(&'static str, Node)]> =
             ["output", "render"].into_iter().filter_map(|key| Some((key, root.get(key)?.clone()))).collect();
+        let shared = Arc::new(sources.clone());
         let mut entries = Vec::with_capacity(nodes.len());
         let mut names: HashMap<String, Place> = HashMap::new();
         for (i, (entry, node)) in written.scenes.into_iter().zip(nodes).enumerate() {
@@ -214,9 +225,9 @@ impl Batch {
                 defines: entry.define.into_iter().map(|(name, value)| (name, value.text())).collect(),
                 path: entry.file.0,
                 place: node.get("file").map(|file| file.place),
-                layers: layers.clone(),
+                layers: Arc::clone(&layers),
                 settings,
-                sources: sources.clone(),
+                sources: Arc::clone(&shared),
             });
         }
         checker.finish(sources)?;
@@ -241,10 +252,10 @@ impl BatchEntry {
             name,
             path: path.to_path_buf(),
             place: None,
-            layers: Vec::new(),
+            layers: Arc::default(),
             settings: Vec::new(),
             defines: Vec::new(),
-            sources,
+            sources: Arc::new(sources),
         })
     }
 
@@ -282,7 +293,7 @@ impl BatchEntry {
     /// [`Error::Input`] if the scene's file or one that it includes cannot be read;
     /// [`Error::Config`] if it is not YAML or cannot be changed so.
     pub fn animation(&self, overrides: &[(String, String)]) -> Result<Animation> {
-        let mut sources = self.sources.clone();
+        let mut sources = Sources::clone(&self.sources);
         let read = match mitsuba::is_xml(&self.path) {
             true => mitsuba::read(&self.path, &self.defines, &mut sources),
             false => edit::read_file(&self.path, &mut sources),
@@ -297,7 +308,7 @@ impl BatchEntry {
 
         // Over what is no map nothing can be laid; the decoder says so.
         if let Value::Map(_) = root.value {
-            for (key, over) in &self.layers {
+            for (key, over) in self.layers.iter() {
                 edit::overlay(&mut root, &wrap(key, over));
             }
             for setting in &self.settings {

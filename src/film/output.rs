@@ -6,7 +6,7 @@
 use crate::error::{Error, Result};
 use atomic_write_file::AtomicWriteFile;
 use serde::Serialize;
-use std::io::{ErrorKind, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::Path;
 
 /// Writes `bytes` to `path`, replacing what stands there.
@@ -14,13 +14,21 @@ use std::path::Path;
 /// # Errors
 /// [`Error::Output`] that says what is wrong with the place; the file is then as it was before.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_pieces(path, |file| file.write_all(bytes))
+}
+
+/// Writes to `path` what `write` writes piece by piece, for what is too long to lie in memory, replacing what stands there.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn write_pieces(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let fail = |e: std::io::Error| Error::output(path, words(path, &e));
     if path.is_dir() {
         return Err(Error::output(path, "it is a directory"));
     }
-    let mut file = AtomicWriteFile::open(path).map_err(fail)?;
-    file.write_all(bytes).map_err(fail)?;
-    file.commit().map_err(fail)
+    let mut file = BufWriter::new(AtomicWriteFile::open(path).map_err(fail)?);
+    write(&mut file).map_err(fail)?;
+    file.into_inner().map_err(|e| fail(e.into_error()))?.commit().map_err(fail)
 }
 
 /// Writes `value` to `path` as JSON for people, replacing what stands there.
@@ -28,8 +36,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
 /// # Errors
 /// As [`write_atomically`].
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let json = serde_json::to_vec_pretty(value).map_err(|e| Error::output(path, e))?;
-    write_atomically(path, &json)
+    write_pieces(path, |file| Ok(serde_json::to_writer_pretty(file, value)?))
 }
 
 /// The directory in which `file` lies.

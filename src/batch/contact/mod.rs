@@ -11,7 +11,7 @@ use super::report::{Report, SceneReport, Status};
 use crate::error::{Error, Result};
 use crate::film::exr::header::{Header, read_headers};
 use crate::film::heat::{Small, blocks};
-use crate::film::output::{directory_of, write_atomically};
+use crate::film::output::{directory_of, write_atomically, write_pieces};
 use crate::film::png::inspect;
 use crate::spectrum::ColourSpace;
 use crate::spectrum::colour::{srgb_encode, srgb8_table};
@@ -97,7 +97,7 @@ impl Contact {
         let [png, html] = ["png", "html"].map(|ending| dir.join("contact-sheet").with_extension(ending));
         let sheet = encode(&self.sheet(report)).map_err(|e| Error::output(&png, e))?;
         write_atomically(&png, &sheet)?;
-        write_atomically(&html, page::page(&self.cards, dir, report).as_bytes())?;
+        write_pieces(&html, |out| page::write(out, &self.cards, dir, report))?;
         Ok(Some(html))
     }
 

@@ -5,7 +5,7 @@ use crate::batch::accuracy::page::base64;
 use crate::batch::report::{Report, SceneReport, Status};
 use crate::film::heat::Small;
 use crate::transport::plan::Effect;
-use std::fmt::Write;
+use std::io::Write;
 use std::path::Path;
 
 /// Figures of a picture, from its report or, where it was there already, from its header.
@@ -97,9 +97,54 @@ fn plural(n: usize, what: &str) -> String {
     if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }
 
-/// The page of `cards`, for the directory `dir`.
-pub(super) fn page(cards: &[Card], dir: &Path, report: &Report) -> String {
-    let title = report.source.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+/// Writes the page of `cards`, for the directory `dir`, figure by figure: all of a long batch together are large.
+pub(super) fn write(out: &mut dyn Write, cards: &[Card], dir: &Path, report: &Report) -> std::io::Result<()> {
+    let embed = cards.len() <= EMBEDDED;
+    let maps = cards.iter().any(|card| card.error_map.is_some());
+    let scene = |card: &Card| &report.scenes[card.scene];
+    let mut pieces = include_str!("page.html").split("{{");
+    out.write_all(pieces.next().unwrap_or_default().as_bytes())?;
+    for piece in pieces {
+        let (field, text) = piece.split_once("}}").unwrap_or_default();
+        match field {
+            "title" => {
+                let title = report.source.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+                out.write_all(html(&title).as_bytes())?;
+            }
+            "about" => out.write_all(html(&about(cards, report)).as_bytes())?,
+            "summary" => out.write_all(summary(cards, report).as_bytes())?,
+            "faults" => out.write_all(faults(report).as_bytes())?,
+            "switch" if maps => {
+                out.write_all(b"<label class=\"switch\"><input type=\"checkbox\" id=\"maps\"> error maps</label>")?;
+            }
+            "scale" if maps => out.write_all(
+                b"<p class=\"scale\"><span>0.1 %</span><i></i><span>100 %</span> relative standard error of a pixel, grey where \
+                  unknown</p>",
+            )?,
+            "options" => {
+                for (i, card) in cards.iter().enumerate() {
+                    write!(out, "<option value=\"{i}\">{}</option>", html(&scene(card).label()))?;
+                }
+            }
+            "rows" => {
+                for (i, card) in cards.iter().enumerate() {
+                    out.write_all(row(i, card, scene(card)).as_bytes())?;
+                }
+            }
+            "figures" => {
+                for (i, card) in cards.iter().enumerate() {
+                    out.write_all(figure(i, card, scene(card), dir, embed).as_bytes())?;
+                }
+            }
+            _ => {}
+        }
+        out.write_all(text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// How many pictures, in what time, and of which version.
+fn about(cards: &[Card], report: &Report) -> String {
     let there = cards.iter().filter(|card| card.past.is_some()).count();
     let mut about = vec![
         plural(cards.len(), "picture"),
@@ -109,44 +154,20 @@ pub(super) fn page(cards: &[Card], dir: &Path, report: &Report) -> String {
     if there > 0 {
         about.insert(1, format!("{there} of them were there already"));
     }
-    let failed: Vec<&SceneReport> =
-        report.scenes.iter().filter(|scene| matches!(scene.status, Status::Failed { .. })).collect();
-    let mut faults = String::new();
-    for scene in &failed {
-        if let Status::Failed { message, .. } = &scene.status {
-            let _ = writeln!(faults, "<li><b>{}</b> {}</li>", html(&scene.label()), html(message));
-        }
-    }
-    if !failed.is_empty() {
-        faults = format!("<ul class=\"faults\" aria-label=\"What failed\">\n{faults}</ul>");
-    }
-    let (mut figures, mut rows, mut options) = (String::new(), String::new(), String::new());
-    let embed = cards.len() <= EMBEDDED;
-    for (i, card) in cards.iter().enumerate() {
-        let scene = &report.scenes[card.scene];
-        figures += &figure(i, card, scene, dir, embed);
-        rows += &row(i, card, scene);
-        let _ = write!(options, "<option value=\"{i}\">{}</option>", html(&scene.label()));
-    }
-    let maps = cards.iter().any(|card| card.error_map.is_some());
-    let sums = summary(cards, report);
-    let scale = if maps {
-        "<p class=\"scale\"><span>0.1 %</span><i></i><span>100 %</span> relative standard error of a pixel, grey where unknown</p>"
-    } else {
-        ""
+    about.join(" · ")
+}
+
+/// A list of what failed, if anything did.
+fn faults(report: &Report) -> String {
+    let fault = |scene: &SceneReport| match &scene.status {
+        Status::Failed { message, .. } => Some(format!("<li><b>{}</b> {}</li>\n", html(&scene.label()), html(message))),
+        Status::Done | Status::Skipped => None,
     };
-    let switch =
-        if maps { "<label class=\"switch\"><input type=\"checkbox\" id=\"maps\"> error maps</label>" } else { "" };
-    include_str!("page.html")
-        .replace("{{title}}", &html(&title))
-        .replace("{{about}}", &html(&about.join(" · ")))
-        .replace("{{summary}}", &sums)
-        .replace("{{faults}}", &faults)
-        .replace("{{switch}}", switch)
-        .replace("{{scale}}", scale)
-        .replace("{{options}}", &options)
-        .replace("{{rows}}", &rows)
-        .replace("{{figures}}", &figures)
+    let faults: String = report.scenes.iter().filter_map(fault).collect();
+    if faults.is_empty() {
+        return faults;
+    }
+    format!("<ul class=\"faults\" aria-label=\"What failed\">\n{faults}</ul>")
 }
 
 /// What the figures say together: which picture is the noisiest, and what it would cost to halve all errors.
@@ -218,7 +239,7 @@ fn figure(i: usize, card: &Card, scene: &SceneReport, dir: &Path, embed: bool) -
     let plan: String = scene
         .effects
         .iter()
-        .chain(&scene.techniques)
+        .chain(scene.techniques.iter())
         .map(|e| {
             let state = if e.on { "on" } else { "off" };
             format!("<tr class=\"{state}\"><td>{}<td>{state}<td>{}", html(&e.name), html(&e.reason))
