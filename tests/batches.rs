@@ -47,3 +47,39 @@ fn a_batch_holds_little_of_each_scene_that_is_done() {
     assert!(child.wait().unwrap().success());
     assert!(early > 0 && late < early + 600 * 5, "{early} kB after 200 to 300 scenes, {late} kB after 800 to 900");
 }
+
+/// Six tasks and two merges in one directory, whose reports tell of all that was done.
+#[test]
+fn tasks_that_share_a_directory_keep_a_report_each() {
+    let batch = "output: {contact_sheet: false}\nscenes: [{file: scene.yaml, name: a}, {file: scene.yaml, name: b}]\n";
+    let place = Place::with(&[("scene.yaml", SCENE), ("batch.yaml", batch)]);
+    let render = |what: &[&str]| {
+        let ran = place.run(&[&["render", "batch.yaml", "-q"], what].concat());
+        assert_eq!(ran.code, 0, "{what:?}: {}", ran.err);
+    };
+    for frames in ["1-2", "3"] {
+        render(&["--frames", frames, "-o", "out"]);
+    }
+    for tile in ["0/2", "1/2"] {
+        for scene in ["a", "b"] {
+            render(&["--scene", scene, "--frames", "7", "--tile", tile, "-o", &format!("out/{scene}")]);
+        }
+    }
+    for scene in ["a", "b"] {
+        assert_eq!(place.run(&["merge", &format!("out/{scene}"), "-o", "out", "-q"]).code, 0);
+    }
+    let tells = |file: &str| -> Vec<String> {
+        let scenes = place.json(file)["scenes"].take();
+        let label = |s: &Value| format!("{} {}", s["name"].as_str().unwrap(), s["frame"]);
+        scenes.as_array().unwrap().iter().map(label).collect()
+    };
+    let reports = |directory: &str| -> Vec<String> {
+        place.names(directory).into_iter().filter(|name| name.starts_with("report")).collect()
+    };
+    assert_eq!(reports("out"), ["report.1-2.json", "report.3.json", "report.a.0007.json", "report.b.0007.json"]);
+    assert_eq!(tells("out/report.1-2.json"), ["a 1", "a 2", "b 1", "b 2"]);
+    assert_eq!(tells("out/report.3.json"), ["a 3", "b 3"]);
+    assert_eq!(tells("out/report.b.0007.json"), ["b 7"]);
+    assert_eq!(reports("out/b"), ["report.b.7.tile0of2.json", "report.b.7.tile1of2.json"]);
+    assert_eq!(tells("out/b/report.b.7.tile1of2.json"), ["b 7"]);
+}

@@ -389,7 +389,7 @@ fn scenes_are_chosen_by_name() {
     assert_eq!(ran.err, "error: batch.yaml: no scene is named \"othr\"; did you mean \"other\"?\n");
     assert_eq!(ran.code, 2);
     assert_eq!(place.run(&["render", "batch.yaml", "--scene", "other"]).code, 0);
-    assert_eq!(place.names("out"), ["other.exr", "other.png", "report.json"]);
+    assert_eq!(place.names("out"), ["other.exr", "other.png", "report.other.json"]);
     let ran = place.run(&["render", "batch.yaml", "-o", "one.exr"]);
     assert_eq!(
         ran.err,
@@ -400,7 +400,7 @@ fn scenes_are_chosen_by_name() {
     let expected =
         "error: -o one.PNG: expected a directory or a file name that ends in .exr, beside which the PNG is written\n";
     assert_eq!((ran.code, ran.err.as_str()), (2, expected));
-    assert_eq!(place.names("sub"), ["one.exr", "one.png", "report.json"]);
+    assert_eq!(place.names("sub"), ["one.exr", "one.png", "report.other.json"]);
 }
 
 #[test]

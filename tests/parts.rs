@@ -154,7 +154,7 @@ fn any_parts_add_up_to_the_picture_bit_for_bit() {
             let (_, written) = merge::merge(&paths, &merged).unwrap_or_else(|e| panic!("{what}: {e}"));
             written.unwrap();
             same(&whole, &merged, &what);
-            let (a, b) = (place.json("whole/report.json"), place.json(&format!("merged{draw}/report.json")));
+            let (a, b) = (place.json("whole/report.json"), place.json(&format!("merged{draw}/report.scene.json")));
             assert_eq!(timeless(a), timeless(b), "{what}");
         }
     }

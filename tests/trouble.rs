@@ -50,14 +50,14 @@ fn a_disk_that_fills_leaves_no_half_part_and_all_parts_when_they_are_merged() {
     let part = ["render", "scene.yaml", "-q", "-o", "parts", "--tile"];
     let ran = cramped(&place, &[&part[..], &["0/2"]].concat());
     assert!(ran.code == 1 && ran.err.contains("parts/scene.tile0of2.exr: cannot write: "), "{}", ran.err);
-    assert_eq!(place.names("parts"), ["report.json"]);
+    assert_eq!(place.names("parts"), ["report.tile0of2.json"]);
     for tile in ["0/2", "1/2"] {
         assert_eq!(place.run(&[&part[..], &[tile]].concat()).code, 0);
     }
     let merge = ["merge", "parts", "-q", "-o", "merged"];
     let ran = cramped(&place, &merge);
     assert!(ran.code == 1 && ran.err.contains("merged/scene.exr: cannot write: "), "{}", ran.err);
-    assert_eq!(place.names("merged"), ["report.json"]);
+    assert_eq!(place.names("merged"), ["report.scene.json"]);
     assert_eq!(place.run(&merge).code, 0);
     assert_eq!(place.run(&["render", "scene.yaml", "-q", "-o", "whole"]).code, 0);
     assert!(pixels(&place.path("merged/scene.exr")) == pixels(&place.path("whole/scene.exr")));

@@ -88,7 +88,9 @@ pub fn merge(paths: &[PathBuf], out: &Path) -> Result<(Report, Result<()>)> {
         scene.fail(e);
     }
     let mut report = Report::new(&first.header.source, vec![scene], start.elapsed());
-    report.write(&output::directory_of(&out).join("report.json"));
+    // Many pictures may be merged into one directory.
+    let picture = out.file_stem().unwrap_or_default().to_string_lossy();
+    report.write(&out.with_file_name(format!("report.{picture}.json")));
     Ok((report, written))
 }
 

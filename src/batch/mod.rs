@@ -709,7 +709,7 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
             Ok(page) => report.contact_sheet = page,
             Err(e) => report.unwritten = Some(e),
         }
-        report.write(&dir.join("report.json"));
+        report.write(&dir.join(names::report(overrides)));
     }
     Ok(report)
 }

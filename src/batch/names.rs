@@ -1,6 +1,10 @@
 //! Names of files: of scenes, of their frames, and patterns that people write for both.
 
+use super::Overrides;
 use std::path::{Path, PathBuf};
+
+/// What a part of the work may add to the name of its report, in bytes: file systems take names of 255.
+const LONGEST: usize = 150;
 
 /// What a picture is called, without ending: `prism`, or `prism.0012` for a frame.
 #[must_use]
@@ -9,6 +13,27 @@ pub fn label(scene: &str, frame: Option<i32>) -> String {
         None => scene.to_owned(),
         Some(frame) => format!("{scene}.{frame:04}"),
     }
+}
+
+/// The name of the report on the work that is asked for: `report.json` on all of it; on scenes, frames, rows or samples of
+/// it a name that says which, so that tasks that share a directory keep a report each.
+#[must_use]
+pub fn report(work: &Overrides) -> String {
+    let frames = work.set.iter().rfind(|(key, _)| key == "render.frames").map_or("", |(_, frames)| frames);
+    // The step of `1-9:2` is no part of a file's name everywhere; `1-9x2` says the same.
+    let frames: String =
+        frames.replace(':', "x").chars().filter(|c| c.is_ascii_alphanumeric() || "-,".contains(*c)).collect();
+    let mut which = String::new();
+    for piece in [work.scenes.join("+"), frames].iter().filter(|piece| !piece.is_empty()) {
+        which = which + "." + piece;
+    }
+    which += &work.portion.suffix();
+    if which.len() > LONGEST {
+        let hash = &blake3::hash(which.as_bytes()).to_hex()[..16];
+        let end = which.floor_char_boundary(LONGEST - 1 - hash.len());
+        which = format!("{}~{hash}", &which[..end]);
+    }
+    format!("report{which}.json")
 }
 
 /// A piece of a pattern.
@@ -111,6 +136,24 @@ mod tests {
         assert_eq!(tells("x/{scene}.exr"), Tells { scenes: true, frames: false });
         assert_eq!(tells("x/%03d.exr"), Tells { scenes: false, frames: true });
         assert_eq!(tells("x/{scen}.{frme}.exr"), Tells::default());
+    }
+
+    #[test]
+    fn a_report_is_named_after_its_part_of_the_work() {
+        use crate::batch::{Portion, Samples};
+        let name = |scenes: &[&str], frames: Option<&str>, portion: Portion| {
+            let set = frames.map(|frames| ("render.frames".to_owned(), format!("\"{frames}\"")));
+            let scenes = scenes.iter().map(|s| (*s).to_owned()).collect();
+            report(&Overrides { scenes, set: set.into_iter().collect(), portion, ..Overrides::default() })
+        };
+        let part = || Portion { tile: Some([0, 4]), samples: Some(Samples::Range([8, 15])) };
+        assert_eq!(name(&[], None, Portion::default()), "report.json");
+        assert_eq!(name(&[], Some("1-9:2, 12"), Portion::default()), "report.1-9x2,12.json");
+        assert_eq!(name(&["a", "b c"], None, Portion::default()), "report.a+b c.json");
+        assert_eq!(name(&["a"], Some("-5--1"), part()), "report.a.-5--1.tile0of4.samples8-15.json");
+        // Long ones are cut, and still differ.
+        let long = |last: &str| name(&["é".repeat(90).as_str(), last], None, part());
+        assert!(long("x").len() <= 255 && long("x").starts_with("report.ééé") && long("x") != long("y"));
     }
 
     #[test]
