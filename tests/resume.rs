@@ -103,6 +103,25 @@ fn killed_at_any_moment_and_resumed_the_pixels_are_those_of_one_go() {
     }
 }
 
+/// A process may be killed after it has written the picture and before it has removed the checkpoint: the next one does.
+#[test]
+fn a_checkpoint_of_a_picture_that_is_there_is_removed() {
+    let place = Place::of(&scene("off"));
+    let checkpoint = place.path("a.exr.checkpoint");
+    let mut child = command(&place, "a.exr", &["--spp", "512", "--checkpoint-interval", "0.02s"]).spawn().unwrap();
+    assert!(appears(&mut child, &checkpoint));
+    let left = std::fs::read(&checkpoint).unwrap();
+    assert!(child.wait().unwrap().success() && !checkpoint.exists());
+    std::fs::write(&checkpoint, &left).unwrap();
+    assert_eq!(run(&place, "a.exr", &["--spp", "512", "--resume"]).code, 0);
+    assert!(!checkpoint.exists());
+    // One of another picture is nobody else's to remove.
+    assert_eq!(run(&place, "a.exr", &["--spp", "8"]).code, 0);
+    std::fs::write(&checkpoint, &left).unwrap();
+    assert_eq!(run(&place, "a.exr", &["--spp", "8", "--skip-existing"]).code, 0);
+    assert!(checkpoint.exists());
+}
+
 #[test]
 fn stopped_it_ends_with_75_and_goes_on_where_it_was() {
     let place = Place::of(&scene("on"));

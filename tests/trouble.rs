@@ -130,7 +130,7 @@ fn samples_may_be_cut_into_even_ranges() {
         let samples = format!("{i}/3");
         assert_eq!(place.run(&[&common[..], &["-o", "parts", "--samples", &samples]].concat()).code, 0);
     }
-    assert_eq!(place.names("parts")[1], "scene.samples0of3.exr");
+    assert!(place.path("parts/scene.samples0of3.exr").is_file());
     assert_eq!(place.run(&["merge", "parts", "-q", "-o", "merged"]).code, 0);
     assert_eq!(place.run(&[&common[..], &["-o", "whole"]].concat()).code, 0);
     assert!(pixels(&place.path("merged/scene.exr")) == pixels(&place.path("whole/scene.exr")));

@@ -253,6 +253,19 @@ pub fn picture_holds(path: &Path, finish: &Finish) -> bool {
     }) && png::holds(&png, [finish.window.width, finish.window.height])
 }
 
+/// Removes the checkpoint of what is at `path` already: a process that was killed after it had written the one and before it
+/// removed the other left it. One of something else stays.
+///
+/// # Errors
+/// [`Error::Output`] if it cannot be removed.
+pub fn remove_left_over(path: &Path, identity: &Identity) -> Result<()> {
+    let file = place(path);
+    if file.is_file() && part_file::open(&file).is_ok_and(|written| written.header.check_of(&file, identity).is_ok()) {
+        return std::fs::remove_file(&file).map_err(|e| Error::output(&file, e));
+    }
+    Ok(())
+}
+
 /// Whether what is to be at `path` is there already.
 #[must_use]
 pub fn is_there(keep: &Keep, path: &Path, identity: &Identity, share: Option<&Share>) -> bool {

@@ -574,6 +574,7 @@ fn render_and_write(
     let finish = &identity.finish;
     let share = portion.share(job.window, job.samples, finish.rows())?;
     if checkpoint::is_there(&overrides.keep, &exr_path, &identity, (!portion.is_all()).then_some(&share)) {
+        checkpoint::remove_left_over(&exr_path, &identity)?;
         report.status = Status::Skipped;
         report.files = vec![exr_path];
         return Ok(());
