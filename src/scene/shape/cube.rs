@@ -1,11 +1,11 @@
 //! Cubes, boxes and parallelepipeds.
 
-use super::exact::{along, dot};
+use super::exact::along;
 use super::plain::Plain;
-use super::span::{Exit, Span};
 use super::{AreaSample, Layout, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest};
 use crate::math::Ray;
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
+use wide::f64x4;
 
 /// A parallelepiped: centre + x·e₀ + y·e₁ + z·e₂ with |x|, |y|, |z| ≤ 1.
 ///
@@ -14,8 +14,9 @@ use glam::{DAffine3, DVec2, DVec3};
 pub struct Cube {
     pub(super) center: DVec3,
     half_edges: [DVec3; 3],
-    /// Dual vectors: coordinate i = dualᵢ · (p − centre). They point along the outward normals.
-    pub(super) duals: [DVec3; 3],
+    /// Dual vectors: coordinate i = dualᵢ · (p − centre). They point along the outward normals. By axis of space, one in each
+    /// lane; the last lane is zero.
+    duals: [f64x4; 3],
     normals: [DVec3; 3],
     /// Areas of the faces of each pair.
     areas: [f64; 3],
@@ -23,9 +24,6 @@ pub struct Cube {
     /// How u and v lie on the faces.
     pictures: &'static [Picture; 6],
 }
-
-const SLAB: (f64, f64) = (-1.0, 1.0);
-const ALL_FACES: u8 = 0b11_1111;
 
 /// −1 for the face where its coordinate is −1, else +1.
 #[inline]
@@ -88,7 +86,10 @@ impl Cube {
         Ok(Cube {
             center,
             half_edges,
-            duals,
+            duals: DMat3::from_cols_array_2d(&duals.map(|dual| dual.to_array()))
+                .transpose()
+                .to_cols_array_2d()
+                .map(|[a, b, c]| f64x4::new([a, b, c, 0.0])),
             normals: duals.map(DVec3::normalize),
             areas: crosses.map(|c| 4.0 * c.length()),
             scale: largest(center).max(largest(e0.abs() + e1.abs() + e2.abs())),
@@ -106,12 +107,44 @@ impl Cube {
     }
 
     pub(super) fn plain(&self) -> Plain {
-        Plain::Cube { center: self.center.as_vec3(), duals: self.duals.map(|dual| dual.as_vec3()) }
+        Plain::Cube { center: self.center.as_vec3(), duals: self.duals().map(|dual| dual.as_vec3()) }
     }
 
-    #[inline]
-    fn coordinates(&self, v: DVec3) -> [f64; 3] {
-        self.duals.map(|dual| dot(dual, v))
+    pub(super) fn duals(&self) -> [DVec3; 3] {
+        [0, 1, 2].map(|i| DVec3::from_array(self.duals.map(|axis| axis.to_array()[i])))
+    }
+
+    /// The coordinates, and a zero; each rounded as [`super::exact::dot`] rounds.
+    #[inline(always)]
+    fn coordinates(&self, v: DVec3) -> f64x4 {
+        let [x, y, z] = self.duals;
+        x.mul_add(f64x4::splat(v.x), y.mul_add(f64x4::splat(v.y), z * f64x4::splat(v.z)))
+    }
+
+    /// A line at coordinates `o` that moves by `d` is between a pair of faces from here to there, pair by pair. None where it
+    /// runs beside a pair.
+    ///
+    /// Divides rather than multiplies by a reciprocal: 0/d is 0 even where 1/d overflows.
+    #[inline(always)]
+    fn slabs(o: f64x4, d: f64x4) -> Option<[f64x4; 2]> {
+        let one = f64x4::ONE;
+        let along = d.simd_eq(f64x4::ZERO);
+        if (along & o.abs().simd_gt(one)).any() {
+            return None;
+        }
+        let (low, high) = ((-one - o) / d, (one - o) / d);
+        let backward = d.simd_lt(f64x4::ZERO);
+        let (enter, exit) = (backward.select(high, low), backward.select(low, high));
+        let forever = f64x4::splat(f64::INFINITY);
+        Some([along.select(-forever, enter), along.select(forever, exit)])
+    }
+
+    /// The first of the lanes where `of` is `at`, and there the face that a line enters by, which moves by `d`.
+    #[inline(always)]
+    fn face(of: f64x4, at: f64, d: f64x4) -> u8 {
+        let axis = of.simd_eq(f64x4::splat(at)).to_bitmask().trailing_zeros();
+        let backward = d.simd_lt(f64x4::ZERO).to_bitmask();
+        (2 * axis + (backward >> axis & 1)) as u8
     }
 
     #[inline]
@@ -119,42 +152,50 @@ impl Cube {
         let oc = ray.origin - self.center;
         let d = self.coordinates(ray.direction);
         if let Some(face) = departing {
-            return self.leave(self.coordinates(oc), d, t_max, face);
+            return Cube::leave(self.coordinates(oc), d, t_max, face);
         }
         // Move along the ray to near the cube, each coordinate rounded once.
-        let shift = -dot(oc, ray.direction);
+        let shift = -super::exact::dot(oc, ray.direction);
         let o = self.coordinates(along(oc, ray.direction, shift));
-        let mut span = Span::LINE;
-        for i in 0..3 {
-            let face = 2 * i as u8;
-            if !span.clip_slab(o[i], d[i], SLAB, (face, face + 1)) {
-                return None;
-            }
+        let [enter, exit] = Cube::slabs(o, d)?;
+        let [a, b, c, _] = enter.to_array();
+        let first = a.max(b).max(c);
+        let [a, b, c, _] = exit.to_array();
+        let last = a.min(b).min(c);
+        if first > last {
+            return None;
         }
-        span.first(ALL_FACES, shift, t_max)
+        let t = shift + first;
+        if t > 0.0 {
+            return (t < t_max).then(|| ShapeHit { t, face: Cube::face(enter, first, d) });
+        }
+        let t = shift + last;
+        // What is entered by one face is left by the other.
+        (t > 0.0 && t < t_max).then(|| ShapeHit { t, face: Cube::face(exit, last, d) ^ 1 })
     }
 
-    /// The exit of a ray that starts on `face` and goes in.
+    /// The exit of a ray that starts on `face` and goes in: there is exactly one. Where rounding puts it at or behind the
+    /// origin (a start at an edge) it is at the least positive parameter, for the ray must not stay inside.
     #[inline]
-    fn leave(&self, o: [f64; 3], d: [f64; 3], t_max: f64, face: u8) -> Option<ShapeHit> {
-        let across = d[usize::from(face / 2) % 3];
+    fn leave(o: f64x4, d: f64x4, t_max: f64, face: u8) -> Option<ShapeHit> {
+        let across = d.to_array()[usize::from(face / 2) % 3];
         if across * side(face) >= 0.0 {
             return None;
         }
-        let mut exit = Exit::NEVER;
-        for i in 0..3 {
-            let face = 2 * i as u8;
-            exit.clip_slab(o[i], d[i], SLAB, (face, face + 1));
-        }
-        exit.hit(ALL_FACES, t_max)
+        let far = f64x4::ONE.copysign(d);
+        let exit = d.simd_eq(f64x4::ZERO).select(f64x4::splat(f64::INFINITY), (far - o) / d);
+        let [a, b, c, _] = exit.to_array();
+        let last = a.min(b).min(c);
+        let t = last.max(f64::MIN_POSITIVE);
+        (t < t_max).then(|| ShapeHit { t, face: Cube::face(exit, last, d) ^ 1 })
     }
 
     pub(super) fn surface(&self, point: DVec3, face: u8) -> SurfacePoint {
-        let mut at = self.coordinates(point - self.center);
+        let [x, y, z, _] = self.coordinates(point - self.center).to_array();
         let axis = usize::from(face / 2) % 3;
         let side = side(face);
         // A hit at an edge may round to either side of it.
-        at = at.map(|x| x.clamp(-1.0, 1.0));
+        let mut at = [x, y, z].map(|x| x.clamp(-1.0, 1.0));
         at[axis] = side;
         let [e0, e1, e2] = self.half_edges;
         let normal = self.normals[axis] * side;
@@ -206,7 +247,7 @@ impl Cube {
 
     /// The areas of the faces that face `from`; of all faces from inside.
     fn visible(&self, from: DVec3) -> [f64; 6] {
-        let at = self.coordinates(from - self.center);
+        let at = self.coordinates(from - self.center).to_array();
         let mut areas = [0.0; 6];
         for i in 0..3 {
             if at[i] < -1.0 {

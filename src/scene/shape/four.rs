@@ -225,7 +225,7 @@ impl Cubes {
     /// Puts a cube into a lane.
     pub fn put(&mut self, lane: usize, cube: &Cube) {
         set(&mut self.center, lane, cube.center);
-        for (lanes, dual) in self.duals.iter_mut().zip(cube.duals) {
+        for (lanes, dual) in self.duals.iter_mut().zip(cube.duals()) {
             set(lanes, lane, dual);
         }
     }
