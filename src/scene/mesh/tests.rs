@@ -259,6 +259,36 @@ fn the_tree_finds_what_brute_force_finds() {
     assert!(hits > 5000, "{hits}");
 }
 
+/// So it is with meshes of up to sixteen triangles, which have no tree, from a thousandth of their size away to 1e9 times
+/// it: rays through vertices, edges and the inside of triangles of any shape, and of any length.
+#[test]
+fn a_small_mesh_shows_what_brute_force_finds() {
+    let mut numbers = Numbers::new(13);
+    let (mut hits, mut far) = (0, 0);
+    for case in 0..400 {
+        let size = 10f64.powf(20.0 * numbers.next() - 10.0);
+        let count = 1 + case % 16;
+        let positions = (0..3 * count).map(|_| numbers.direction() * (size * numbers.next())).collect();
+        let soup = mesh(positions, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect());
+        let tree = MeshTree::build(&soup);
+        for k in 0..250 {
+            let [a, b, c] = soup.vertices((numbers.next() * f64::from(count)) as u32);
+            let (v, w) = (numbers.next(), numbers.next());
+            let target = [a, a + (b - a) * v, a + (b - a) * (v * w) + (c - a) * (v * (1.0 - w))][k % 3] + soup.origin;
+            let distance = 10f64.powf(12.0 * numbers.next() - 3.0);
+            let origin = target + numbers.direction() * (size * distance);
+            let ray = Ray::new(origin, (target - origin) * if k % 2 == 0 { 1.0 } else { 10.0 / (size * distance) });
+            let expected = brute_force(&soup, &ray, f64::INFINITY, None);
+            let found = tree.closest(&ray, f64::INFINITY, None);
+            assert_eq!(found.map(|f| f.hit.t), expected, "{ray:?}");
+            assert_eq!(tree.any(&ray, f64::INFINITY, [None; 2]), expected.is_some(), "{ray:?}");
+            hits += u32::from(found.is_some());
+            far += u32::from(found.is_some() && distance > 1e6);
+        }
+    }
+    assert!(hits > 50_000 && far > 10_000, "{hits} {far}");
+}
+
 /// A triangle of legs 3 and 4 m: area 6 m², normal +z; the middle of the opposite side at
 /// b = (½, ½) is (1.5, 2, 5). On an edge, points keep 2⁻⁴⁰ of the scale from it; their weights are normalised.
 #[test]

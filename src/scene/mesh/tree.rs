@@ -9,6 +9,10 @@
 //! δ(|C.x| + |C.y| + |B.x| + |B.y|) + 2δ² for the coordinates, and 3u(|C.x B.y| + |C.y B.x|) for the arithmetic. No
 //! coordinate exceeds 4B, so that the latter is at most 12uB(|B.x| + |B.y|), less than the δ once more. Twice the first
 //! bound covers both, and the rounding of the bound.
+//!
+//! A mesh of one or two blocks needs no tree. There the point is the one nearest to the mesh's origin, or where the ray
+//! begins beyond it. If the ray hits the mesh, that point is no farther away than what it hits, √3 B: the errors above are
+//! at most √3 times as large, and δ is taken twice as large.
 
 use super::Mesh;
 use super::triangle::{TriangleHit, TriangleRay, area_vector};
@@ -20,6 +24,8 @@ use wide::f32x8;
 
 /// Triangles a block.
 const LANES: usize = 8;
+/// The most blocks that are tried one after the other.
+const FEW: usize = 2;
 /// The most triangles of one mesh: 2²⁶.
 pub const MAX_TRIANGLES: usize = 1 << 26;
 
@@ -180,32 +186,34 @@ impl MeshTree {
         skip: Option<u32>,
         mut met: impl FnMut(MeshHit) -> Option<f64>,
     ) {
-        let local = self.local(ray);
-        let Some(entering) = self.bvh.enter(&local) else { return };
-        let (sheared, coarse) = self.ready(&local, &entering);
-        let soon = |i| prefetch(&self.blocks, i as usize / LANES);
-        self.bvh.descend::<true>(&entering, t_max, soon, |leaf, mut t_max| {
-            let first = leaf.start as usize;
-            let block = &self.blocks[first / LANES];
+        let mut visit = |ready: &Ready, first: usize, mut t_max: f64| {
             let mut next = Next::Go;
-            let mut mask = coarse.may_hit(block);
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize % LANES;
-                mask &= mask - 1;
-                if let Some(hit) = block.meet(&sheared, lane)
-                    && hit.t < t_max
+            self.hits_of(ready, first, |hit| {
+                if hit.hit.t < t_max
+                    && Some(hit.triangle) != skip
+                    && let Some(t) = met(hit)
                 {
-                    let triangle = self.bvh.order()[first + lane];
-                    if Some(triangle) != skip
-                        && let Some(t) = met(MeshHit { triangle, hit })
-                    {
-                        t_max = t;
-                        next = Next::Shorten(t_max);
-                    }
+                    t_max = t;
+                    next = Next::Shorten(t);
+                }
+                false
+            });
+            next
+        };
+        let local = self.local(ray);
+        if self.is_small() {
+            let (ready, mut t_max) = (Ready::small(&local, self.extent), t_max);
+            for block in 0..self.blocks.len() {
+                if let Next::Shorten(t) = visit(&ready, block * LANES, t_max) {
+                    t_max = t_max.min(t);
                 }
             }
-            next
-        });
+            return;
+        }
+        let Some(entering) = self.bvh.enter(&local) else { return };
+        let ready = Ready::entering(&local, &entering, self.extent);
+        let soon = |i| prefetch(&self.blocks, i as usize / LANES);
+        self.bvh.descend::<true>(&entering, t_max, soon, |leaf, t_max| visit(&ready, leaf.start as usize, t_max));
     }
 
     /// Whether `ray` hits any triangle at 0 < t < `t_max`, other than those in `skip`.
@@ -217,28 +225,44 @@ impl MeshTree {
     /// Shows `met` the triangles that `ray` hits at 0 < t < `t_max`, other than those in `skip`, in any order, until
     /// it says stop; true if it did. A hit on the edge of two triangles is one on both.
     pub fn any_of(&self, ray: &Ray, t_max: f64, skip: [Option<u32>; 2], mut met: impl FnMut(MeshHit) -> bool) -> bool {
+        let mut visit = |ready: &Ready, first: usize| {
+            self.hits_of(ready, first, |hit| hit.hit.t < t_max && !skip.contains(&Some(hit.triangle)) && met(hit))
+        };
         let local = self.local(ray);
+        if self.is_small() {
+            let ready = Ready::small(&local, self.extent);
+            return (0..self.blocks.len()).any(|block| visit(&ready, block * LANES));
+        }
         let Some(entering) = self.bvh.enter(&local) else { return false };
-        let (sheared, coarse) = self.ready(&local, &entering);
+        let ready = Ready::entering(&local, &entering, self.extent);
         let soon = |i| prefetch(&self.blocks, i as usize / LANES);
-        self.bvh.descend::<false>(&entering, t_max, soon, |leaf, t_max| {
-            let first = leaf.start as usize;
-            let block = &self.blocks[first / LANES];
-            let mut mask = coarse.may_hit(block);
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize % LANES;
-                mask &= mask - 1;
-                if let Some(hit) = block.meet(&sheared, lane)
-                    && hit.t < t_max
-                {
-                    let triangle = self.bvh.order()[first + lane];
-                    if !skip.contains(&Some(triangle)) && met(MeshHit { triangle, hit }) {
-                        return Next::Stop;
-                    }
-                }
-            }
-            Next::Go
+        self.bvh.descend::<false>(&entering, t_max, soon, |leaf, _| {
+            if visit(&ready, leaf.start as usize) { Next::Stop } else { Next::Go }
         })
+    }
+
+    /// Shows `met` where a ray meets the triangles of the block that starts at position `first`, at t > 0, until it says
+    /// stop; true if it did.
+    #[inline(always)]
+    fn hits_of(&self, ready: &Ready, first: usize, mut met: impl FnMut(MeshHit) -> bool) -> bool {
+        let block = &self.blocks[first / LANES];
+        let mut mask = ready.coarse.may_hit(block);
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize % LANES;
+            mask &= mask - 1;
+            if let Some(hit) = block.meet(&ready.exact, lane)
+                && met(MeshHit { triangle: self.bvh.order()[first + lane], hit })
+            {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Whether its blocks are so few that a way down to them costs more than it saves.
+    #[inline(always)]
+    fn is_small(&self) -> bool {
+        self.blocks.len() <= FEW
     }
 
     /// The box of the mesh in world space.
@@ -257,13 +281,30 @@ impl MeshTree {
     fn local(&self, ray: &Ray) -> Ray {
         Ray::new(ray.origin - self.origin, ray.direction)
     }
+}
 
-    /// `local` in the frame of the exact test and in that of the coarse one.
+/// A ray in the frame of the exact test and in that of the coarse one.
+struct Ready {
+    exact: TriangleRay,
+    coarse: Coarse,
+}
+
+impl Ready {
+    /// For the leaves of a tree that it enters.
     #[inline(always)]
-    fn ready(&self, local: &Ray, entering: &TreeRay) -> (TriangleRay, Coarse) {
-        let sheared = TriangleRay::new(local, DVec3::ZERO);
-        let coarse = Coarse::new(&sheared, local, entering.entry(), self.extent);
-        (sheared, coarse)
+    fn entering(local: &Ray, entering: &TreeRay, extent: f64) -> Ready {
+        let exact = TriangleRay::new(local, DVec3::ZERO);
+        Ready { coarse: Coarse::new(&exact, local, entering.entry(), extent), exact }
+    }
+
+    /// For all triangles of a mesh: from where it is nearest to the mesh's origin.
+    #[inline(always)]
+    fn small(local: &Ray, extent: f64) -> Ready {
+        let exact = TriangleRay::new(local, DVec3::ZERO);
+        let d = local.direction;
+        let nearest = (-local.origin.dot(d) / d.length_squared()).max(0.0);
+        // Twice the slack: see the page of the module.
+        Ready { coarse: Coarse::new(&exact, local, nearest, 2.0 * extent), exact }
     }
 }
 
