@@ -10,6 +10,7 @@ pub mod develop;
 pub mod farm;
 pub mod finish;
 pub mod frame;
+mod layers;
 pub mod merge;
 pub mod motion;
 pub mod names;
@@ -29,12 +30,10 @@ use crate::scene::Scene;
 use crate::scene::compile;
 use crate::scene::shelf::Shelf;
 use crate::spectrum::ColourSpace;
-use crate::transport::layers::{Channel, Form, Layer, LayerPlan, Quantity, Source};
-use crate::transport::middle::Middle;
+use crate::transport::layers::{Channel, Layer, Source};
 use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
 use crate::transport::trial;
-use crate::transport::ways::{Way, Ways};
 use checkpoint::{Keep, Keeper};
 use contact::Contact;
 use finish::Finish;
@@ -216,7 +215,7 @@ fn prepare_scene(
     moments.iter_mut().for_each(|moment| moment.light_exponent = scene.light_exponent);
     let mut plan = EffectPlan::of(&motion::census(&scene, &moments), integrator, mode);
     plan.effects.extend(blur.said);
-    plan.layers = layer_plan(&description, &scene, planned)?;
+    plan.layers = layers::plan(&description, &scene, planned)?;
     let filter = FilterSampler::new(filter(&description.image.filter))?;
     let (seed, wishes) = (description.render.seed, wishes(&description));
     if let Some((packets, said)) = trial::packets(&scene, &plan, &filter, seed, planned, wishes.packets) {
@@ -325,117 +324,6 @@ fn integrator(description: &SceneDescription, written: &description::Integrator)
         }),
         description::Integrator::None(_) => Integrator::Nothing,
     })
-}
-
-/// The further channels of the picture.
-fn layer_plan(description: &SceneDescription, scene: &Scene, samples: u32) -> Result<LayerPlan> {
-    let mut plan = LayerPlan {
-        rgb_from_xyz: colour_space(description.output.colour).matrix_from_xyz(),
-        sensitivity: description.image.sensitivity,
-        sample_distance: 1.0 / f64::from(samples).sqrt(),
-        ..LayerPlan::default()
-    };
-    for (i, band) in scene.bands.iter().enumerate() {
-        plan.layers.push(Layer { name: band.name.clone(), source: Source::Band(i), squares: None });
-    }
-    let group = |name: &String| description.light_groups.keys().position(|key| key == name).map(|i| i as u8 + 1);
-    // Those to which paths from the lights add come first.
-    for layer in &description.layers {
-        match &layer.content {
-            LayerContent::Ways { ways, group: of } => {
-                let source = Source::Ways(self::ways(ways), of.as_ref().and_then(group));
-                plan.layers.push(Layer { name: layer.name.clone(), source, squares: None });
-            }
-            LayerContent::LightGroups => {
-                let groups = &scene.light_groups;
-                let rest = groups.of.contains(&0).then(|| "default".to_owned());
-                let numbers = if rest.is_some() { 0 } else { 1 }..groups.count();
-                for (name, i) in rest.iter().chain(&groups.names).zip(numbers) {
-                    let source = Source::Ways(Ways::ALL, Some(i));
-                    plan.layers.push(Layer { name: format!("light_{name}"), source, squares: None });
-                }
-            }
-            _ => {}
-        }
-    }
-    plan.mattes = description.layers.iter().any(|layer| matches!(layer.content, LayerContent::Matte(_)));
-    for layer in &description.layers {
-        let source = match &layer.content {
-            LayerContent::Middle(data) => Source::Middle(match data {
-                description::Data::Depth => Middle::Depth,
-                description::Data::Position => Middle::Position,
-                description::Data::Uv => Middle::Uv,
-                description::Data::Motion => Middle::Motion,
-            }),
-            // Of ways above; the others are no sums.
-            LayerContent::Ways { .. }
-            | LayerContent::LightGroups
-            | LayerContent::Matte(_)
-            | LayerContent::Variance
-            | LayerContent::StandardError
-            | LayerContent::SampleCount => continue,
-            LayerContent::Surface(quantity) => Source::Surface(self::quantity(*quantity)),
-            LayerContent::Light { of, form } => {
-                let form = match form {
-                    description::LightForm::Rgba => Form::Rgba,
-                    description::LightForm::Xyz => Form::Xyz,
-                };
-                let of = match of {
-                    Some(other) if *other != description.integrator => {
-                        plan.integrators.push(integrator(description, other)?);
-                        Some(plan.integrators.len() - 1)
-                    }
-                    Some(_) | None => None,
-                };
-                Source::Light(of, form)
-            }
-        };
-        plan.layers.push(Layer { name: layer.name.clone(), source, squares: layer.squares.clone() });
-    }
-    Ok(plan)
-}
-
-fn ways(ways: &[description::LightWay]) -> Ways {
-    use description::LightWay as Written;
-    const DIRECT: [Way; 4] = [Way::DiffuseDirect, Way::GlossyDirect, Way::TransmissionDirect, Way::MediaDirect];
-    const INDIRECT: [Way; 4] =
-        [Way::DiffuseIndirect, Way::GlossyIndirect, Way::TransmissionIndirect, Way::MediaIndirect];
-    let one = |way: &Written| match way {
-        Written::Emission => Ways::of(&[Way::Emission]),
-        Written::Caustic => Ways::of(&[Way::Caustic]),
-        Written::Direct => Ways::of(&DIRECT),
-        Written::Indirect => Ways::of(&INDIRECT),
-        Written::Diffuse => Ways::of(&[Way::DiffuseDirect, Way::DiffuseIndirect]),
-        Written::Glossy => Ways::of(&[Way::GlossyDirect, Way::GlossyIndirect]),
-        Written::Transmission => Ways::of(&[Way::TransmissionDirect, Way::TransmissionIndirect]),
-        Written::Media => Ways::of(&[Way::MediaDirect, Way::MediaIndirect]),
-        Written::DiffuseDirect => Ways::of(&[Way::DiffuseDirect]),
-        Written::DiffuseIndirect => Ways::of(&[Way::DiffuseIndirect]),
-        Written::GlossyDirect => Ways::of(&[Way::GlossyDirect]),
-        Written::GlossyIndirect => Ways::of(&[Way::GlossyIndirect]),
-        Written::TransmissionDirect => Ways::of(&[Way::TransmissionDirect]),
-        Written::TransmissionIndirect => Ways::of(&[Way::TransmissionIndirect]),
-        Written::MediaDirect => Ways::of(&[Way::MediaDirect]),
-        Written::MediaIndirect => Ways::of(&[Way::MediaIndirect]),
-    };
-    ways.iter().map(one).fold(Ways::of(&[]), Ways::or)
-}
-
-fn quantity(quantity: description::Quantity) -> Quantity {
-    match quantity {
-        description::Quantity::Depth => Quantity::Depth,
-        description::Quantity::Position => Quantity::Position,
-        description::Quantity::Uv => Quantity::Uv,
-        description::Quantity::GeometricNormal => Quantity::GeometricNormal,
-        description::Quantity::ShadingNormal => Quantity::ShadingNormal,
-        description::Quantity::DpDu => Quantity::DpDu,
-        description::Quantity::DpDv => Quantity::DpDv,
-        description::Quantity::DuvDx => Quantity::DuvDx,
-        description::Quantity::DuvDy => Quantity::DuvDy,
-        description::Quantity::Albedo => Quantity::Albedo,
-        description::Quantity::Primitive => Quantity::Primitive,
-        description::Quantity::Shape => Quantity::Shape,
-    }
 }
 
 /// 128 bits of BLAKE3 over what was written, with every default, and over the files that it names.
