@@ -123,19 +123,10 @@ fn the_sheet_finds_what_a_bound_to_depth_costs() {
 /// 0.2487. Samples of the full setting have none.
 #[test]
 fn against_a_closed_form_the_sheet_finds_the_bias_that_is_there() {
-    let walls = [
-        ("[-1, -1, -1]", "[0, 0, 2]", "[2, 0, 0]"),
-        ("[-1, 1, -1]", "[2, 0, 0]", "[0, 0, 2]"),
-        ("[-1, -1, -1]", "[2, 0, 0]", "[0, 2, 0]"),
-        ("[-1, -1, 1]", "[0, 2, 0]", "[2, 0, 0]"),
-        ("[-1, -1, -1]", "[0, 2, 0]", "[0, 0, 2]"),
-        ("[1, -1, -1]", "[0, 0, 2]", "[0, 2, 0]"),
-    ];
-    let glow = "emission: 1, material: {diffuse: {reflectance: 0.5}}";
-    let wall = |(c, u, v)| format!("- rectangle: {{corner: {c}, edge_u: {u}, edge_v: {v}, {glow}}}\n");
     let furnace = "camera: {origin: [0.1, 0.2, 0.3], target: [0, 0, -1], fov_deg: 60}\nimage: {width: 16, height: 16}\n\
-                   render: {samples: 64}\nintegrator: {path: {max_depth: null}}\nshapes:\n";
-    let place = Place::of(&(furnace.to_owned() + &walls.map(wall).concat()));
+                   render: {samples: 64}\nintegrator: {path: {max_depth: null}}\n";
+    let walls = common::room("emission: 1, material: {diffuse: {reflectance: 0.5}}");
+    let place = Place::of(&(furnace.to_owned() + &walls));
     let (code, said) = abbe(&place, "accuracy scene.yaml -o sheet --rounds 2 --truth 2");
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("the truth is known in closed form"), "{said}");

@@ -52,6 +52,20 @@ pub struct Estimate {
     pub error: f64,
 }
 
+/// A closed room from −1 to 1 with inward normals.
+pub fn room(fields: &str) -> String {
+    let walls = [
+        ("[-1, -1, -1]", "[0, 0, 2]", "[2, 0, 0]"),
+        ("[-1, 1, -1]", "[2, 0, 0]", "[0, 0, 2]"),
+        ("[-1, -1, -1]", "[2, 0, 0]", "[0, 2, 0]"),
+        ("[-1, -1, 1]", "[0, 2, 0]", "[2, 0, 0]"),
+        ("[-1, -1, -1]", "[0, 2, 0]", "[0, 0, 2]"),
+        ("[1, -1, -1]", "[0, 0, 2]", "[0, 2, 0]"),
+    ];
+    let walls = walls.map(|(c, u, v)| format!("- rectangle: {{corner: {c}, edge_u: {u}, edge_v: {v}, {fields}}}\n"));
+    format!("shapes:\n{}", walls.concat())
+}
+
 /// The scene of [`CAMERA`] and `text`.
 pub fn bench(text: &str) -> Bench {
     bench_with(&format!("{CAMERA}{text}"), &[])

@@ -1,6 +1,6 @@
 //! Energy: in even light nothing may show but what it keeps for itself.
 
-use super::common::{Bench, assert_close, bench, bench_with, mean, ray, v};
+use super::common::{Bench, assert_close, bench, bench_with, mean, ray, room, v};
 use super::in_even_light;
 use abbe::optics::fresnel::{self, Model};
 use abbe::scene::material::Kind;
@@ -8,20 +8,6 @@ use abbe::scene::texture::TexturePoint;
 use abbe::spectrum::Lanes;
 use glam::DVec3;
 use std::f64::consts::PI;
-
-/// A closed room from −1 to 1 with inward normals.
-fn room(fields: &str) -> String {
-    let walls = [
-        ("[-1, -1, -1]", "[0, 0, 2]", "[2, 0, 0]"),
-        ("[-1, 1, -1]", "[2, 0, 0]", "[0, 0, 2]"),
-        ("[-1, -1, -1]", "[2, 0, 0]", "[0, 2, 0]"),
-        ("[-1, -1, 1]", "[0, 2, 0]", "[2, 0, 0]"),
-        ("[-1, -1, -1]", "[0, 2, 0]", "[0, 0, 2]"),
-        ("[1, -1, -1]", "[0, 0, 2]", "[0, 2, 0]"),
-    ];
-    let walls = walls.map(|(c, u, v)| format!("- rectangle: {{corner: {c}, edge_u: {u}, edge_v: {v}, {fields}}}\n"));
-    format!("shapes:\n{}", walls.concat())
-}
 
 fn inside(text: &str) -> Bench {
     bench_with(
