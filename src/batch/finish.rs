@@ -362,10 +362,8 @@ fn write_exr(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report:
         channels.into_iter().for_each(|(name, samples)| file.push_data(name, samples));
         file.attributes.extend(attributes);
     }
-    let hash = Attribute::Text(file.content_hash());
-    file.attributes.push(("abbe/contentHash".to_owned(), hash));
-    exr::write_exr(path, &file)?;
-    if matches!(compression, exr::Compression::Dwaa(_) | exr::Compression::Dwab(_)) {
+    write_sealed(path, &mut file)?;
+    if exr.compression.loses() {
         let loss = exr::loss(path, &file)?;
         report.notes.push(format!(
             "DWA compression of level {} changes values by {:.2e} in the root mean square, at most {:.2e}; their mean is {:.2e}",
@@ -410,9 +408,14 @@ fn write_spectral(path: &Path, finish: &Finish, frame: &Frame, image: &Image, re
         compression: exr::Compression::Zip,
         layout: exr::Layout::Single,
     };
+    write_sealed(path, &mut file)
+}
+
+/// Writes a file that says what its channels add up to, so that damage shows.
+fn write_sealed(path: &Path, file: &mut ExrImage) -> Result<()> {
     let hash = Attribute::Text(file.content_hash());
     file.attributes.push(("abbe/contentHash".to_owned(), hash));
-    exr::write_exr(path, &file)
+    exr::write_exr(path, file)
 }
 
 /// The header of a picture: what is needed to make it again, and how good it is.

@@ -13,10 +13,11 @@ use super::edit::{self, Setting};
 use super::fault::Checker;
 use super::mitsuba;
 use super::node::{Entry, Node, Place, Sources, Value, quote};
+use super::output::Output;
 use super::path::At;
 use super::path_map::PathMap;
 use super::scene::SceneDescription;
-use super::settings::{Output, Render};
+use super::settings::Render;
 use super::spectrum::FilePath;
 use crate::error::{Error, Result};
 

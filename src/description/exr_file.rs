@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::fault::Checker;
 use super::layer::Layer;
+use super::output::{Channels, Colour, Compression, Output, Precision};
 use super::path::At;
-use super::settings::{Channels, Colour, Compression, Output, Precision};
 
 /// How channels lie in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,7 +55,7 @@ fn to_nm() -> f64 {
     700.0
 }
 
-/// What DWA compression is allowed to lose, by default and at most: 45 is what its makers call visually lossless.
+/// What DWA compression is allowed to lose, by default: 45 is what its makers call visually lossless.
 pub(crate) const DWA_LEVEL: f64 = 45.0;
 
 /// Names that the renderer itself writes, or that say how a file is built.
@@ -84,7 +84,7 @@ const OWN: [&str; 21] = [
 ];
 
 /// Attributes whose value is a number.
-pub(crate) const NUMBERS: [&str; 9] = [
+const NUMBERS: [&str; 9] = [
     "altitude",
     "expTime",
     "isoSpeed",
@@ -117,8 +117,7 @@ pub fn time_code(text: &str) -> Option<[u32; 4]> {
 pub(crate) fn check_layers(output: &Output, layers: &[Layer], checker: &mut Checker<'_>) {
     let at = At::ROOT.key("output");
     let exr = at.key("exr");
-    let lossy = matches!(output.exr.compression, Compression::Dwaa | Compression::Dwab);
-    if lossy && output.exr.layout == FileLayout::Single && layers.iter().any(Layer::is_data) {
+    if output.exr.compression.loses() && output.exr.layout == FileLayout::Single && layers.iter().any(Layer::is_data) {
         let expected = "no loss in layers of data, found dwa; layout: multipart keeps them apart";
         checker.fault(exr.key("compression"), format!("expected {expected}"));
     }
@@ -137,7 +136,7 @@ pub(crate) fn check(output: &Output, at: At<'_>, checker: &mut Checker<'_>) {
     let file = at.key("exr");
     let level = file.key("dwa_level");
     checker.not_negative(level, exr.dwa_level);
-    let lossy = matches!(exr.compression, Compression::Dwaa | Compression::Dwab);
+    let lossy = exr.compression.loses();
     for (name, value) in &exr.attributes {
         let attributes = file.key("attributes");
         let at = attributes.key(name);

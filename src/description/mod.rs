@@ -405,6 +405,7 @@ mod medium;
 mod mitsuba;
 mod node;
 mod optical_data;
+mod output;
 mod path;
 mod path_map;
 mod principled;
@@ -440,14 +441,16 @@ pub use medium::{Coefficients, HeterogeneousMedium, HomogeneousMedium, Medium, P
 pub(crate) use medium::{UNCHANGED, VACUUM};
 pub use mitsuba::export::{Exported, Loss, export};
 pub use optical_data::{OpticalData, optical_data};
+pub use output::{
+    Channels, Colour, Compression, Exposure, Exr, Output, Png, PngDither, PngSpace, Precision, Tonemap, WhiteBalance,
+};
 pub use path_map::PathMap;
 pub use principled::{Contrast, Luminance, Principled, PrincipledThin, Sampling, ThinSampling};
 pub use print::yaml;
 pub use scene::{Locator, SceneDescription};
 pub use settings::{
-    Channels, Colour, Compression, DepthIntegrator, Effects, Exposure, Exr, Integrator, LightTracerIntegrator,
-    MOST_SAMPLES, NoIntegrator, Output, PathIntegrator, Png, PngDither, PngSpace, Precision, Render, Stop, Technique,
-    Techniques, Time, Tonemap, Wavelengths, WhiteBalance, WhittedIntegrator, duration,
+    DepthIntegrator, Effects, Integrator, LightTracerIntegrator, MOST_SAMPLES, NoIntegrator, PathIntegrator, Render,
+    Stop, Technique, Techniques, Time, Wavelengths, WhittedIntegrator, duration,
 };
 pub use shape::{
     Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Geometry, Instance, Layout, Mesh, Normals, Plane, Rectangle,

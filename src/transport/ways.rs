@@ -15,7 +15,7 @@ use std::cell::{Cell, RefCell};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Way {
-    /// From the lamp, or through mirrors of no kind: the camera sees the light itself.
+    /// Straight from the lamp: the camera sees the light itself.
     Emission,
     /// Over a mirror or smooth glass onto something else, and on.
     Caustic,
