@@ -2,7 +2,7 @@
 //!
 //! A renderer of red, green and blue multiplies colours where light multiplies spectra. To have that computed by lanes that
 //! are made for wavelengths, red, green and blue are each given a wavelength ([`PLACES_NM`]); each spectrum of the scene is
-//! replaced by one that has there the values of its linear Rec. 709 colour; and [`rgb_from_film`] takes the sums of the film,
+//! replaced by one that has there the values of its linear Rec. 709 colour; and [`Carried::rgb_from_film`] takes the sums of the film,
 //! which are linear in the three, back. What is left is the error of the three numbers themselves:
 //!
 //! * a reflectance is its colour under D65, kept to [0, 1]; a coefficient (absorption, scattering) likewise, without the bound;
