@@ -51,7 +51,7 @@ fn a_batch_holds_little_of_each_scene_that_is_done() {
 /// Six tasks and two merges in one directory, whose reports tell of all that was done.
 #[test]
 fn tasks_that_share_a_directory_keep_a_report_each() {
-    let batch = "output: {contact_sheet: false}\nscenes: [{file: scene.yaml, name: a}, {file: scene.yaml, name: b}]\n";
+    let batch = "scenes: [{file: scene.yaml, name: a}, {file: scene.yaml, name: b}]\n";
     let place = Place::with(&[("scene.yaml", SCENE), ("batch.yaml", batch)]);
     let render = |what: &[&str]| {
         let ran = place.run(&[&["render", "batch.yaml", "-q"], what].concat());
@@ -73,9 +73,12 @@ fn tasks_that_share_a_directory_keep_a_report_each() {
         let label = |s: &Value| format!("{} {}", s["name"].as_str().unwrap(), s["frame"]);
         scenes.as_array().unwrap().iter().map(label).collect()
     };
-    let reports = |directory: &str| -> Vec<String> {
-        place.names(directory).into_iter().filter(|name| name.starts_with("report")).collect()
+    let named = |stem: &str, directory: &str| -> Vec<String> {
+        place.names(directory).into_iter().filter(|name| name.starts_with(stem)).collect()
     };
+    let reports = |directory: &str| named("report", directory);
+    let sheets = ["1-2.html", "1-2.png", "3.html", "3.png"].map(|end| format!("contact-sheet.{end}"));
+    assert_eq!(named("contact", "out"), sheets);
     assert_eq!(reports("out"), ["report.1-2.json", "report.3.json", "report.a.0007.json", "report.b.0007.json"]);
     assert_eq!(tells("out/report.1-2.json"), ["a 1", "a 2", "b 1", "b 2"]);
     assert_eq!(tells("out/report.3.json"), ["a 3", "b 3"]);

@@ -570,7 +570,8 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                     let dir = output_path(&prepared, overrides);
                     report_dir.get_or_insert_with(|| dir.parent().unwrap_or(Path::new(".")).to_path_buf());
                     let mut report = render_scene(&prepared, overrides, loading.elapsed(), watcher, stop).0;
-                    if prepared.description.output.contact_sheet && overrides.portion.is_all() {
+                    let several = entries.len() > 1 || frames > 1;
+                    if several && prepared.description.output.contact_sheet && overrides.portion.is_all() {
                         contact.add(scenes.len(), &mut report);
                     }
                     report
@@ -594,11 +595,12 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
     }
     let mut report = Report::new(path, scenes, start.elapsed());
     if let Some(dir) = report_dir {
-        match contact.write(output::directory_of(&dir.join("report.json")), &report) {
+        let sheet = ["png", "html"].map(|ending| dir.join(names::about(overrides, "contact-sheet", ending)));
+        match contact.write(&sheet, &report) {
             Ok(page) => report.contact_sheet = page,
             Err(e) => report.unwritten = Some(e),
         }
-        report.write(&dir.join(names::report(overrides)));
+        report.write(&dir.join(names::about(overrides, "report", "json")));
     }
     Ok(report)
 }

@@ -15,10 +15,10 @@ pub fn label(scene: &str, frame: Option<i32>) -> String {
     }
 }
 
-/// The name of the report on the work that is asked for: `report.json` on all of it; on scenes, frames, rows or samples of
-/// it a name that says which, so that tasks that share a directory keep a report each.
+/// The name of a file about the work that is asked for: `report.json` about all of it; about scenes, frames, rows or samples
+/// of it a name that says which, so that tasks that share a directory keep a report each.
 #[must_use]
-pub fn report(work: &Overrides) -> String {
+pub fn about(work: &Overrides, stem: &str, ending: &str) -> String {
     let frames = work.set.iter().rfind(|(key, _)| key == "render.frames").map_or("", |(_, frames)| frames);
     // The step of `1-9:2` is no part of a file's name everywhere; `1-9x2` says the same.
     let frames: String =
@@ -33,7 +33,7 @@ pub fn report(work: &Overrides) -> String {
         let end = which.floor_char_boundary(LONGEST - 1 - hash.len());
         which = format!("{}~{hash}", &which[..end]);
     }
-    format!("report{which}.json")
+    format!("{stem}{which}.{ending}")
 }
 
 /// A piece of a pattern.
@@ -144,7 +144,8 @@ mod tests {
         let name = |scenes: &[&str], frames: Option<&str>, portion: Portion| {
             let set = frames.map(|frames| ("render.frames".to_owned(), format!("\"{frames}\"")));
             let scenes = scenes.iter().map(|s| (*s).to_owned()).collect();
-            report(&Overrides { scenes, set: set.into_iter().collect(), portion, ..Overrides::default() })
+            let work = Overrides { scenes, set: set.into_iter().collect(), portion, ..Overrides::default() };
+            about(&work, "report", "json")
         };
         let part = || Portion { tile: Some([0, 4]), samples: Some(Samples::Range([8, 15])) };
         assert_eq!(name(&[], None, Portion::default()), "report.json");

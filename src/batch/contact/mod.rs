@@ -86,19 +86,18 @@ impl Contact {
         }
     }
 
-    /// Writes `contact-sheet.png` and `contact-sheet.html` into `dir`, where there are two pictures or more; gives the page.
+    /// Writes the picture and the page of these names, where there are two pictures or more; gives the page.
     ///
     /// # Errors
     /// [`Error::Output`].
-    pub fn write(&self, dir: &Path, report: &Report) -> Result<Option<PathBuf>> {
+    pub fn write(&self, [png, html]: &[PathBuf; 2], report: &Report) -> Result<Option<PathBuf>> {
         if self.cards.len() < 2 {
             return Ok(None);
         }
-        let [png, html] = ["png", "html"].map(|ending| dir.join("contact-sheet").with_extension(ending));
-        let sheet = encode(&self.sheet(report)).map_err(|e| Error::output(&png, e))?;
-        write_atomically(&png, &sheet)?;
-        write_pieces(&html, |out| page::write(out, &self.cards, dir, report))?;
-        Ok(Some(html))
+        let sheet = encode(&self.sheet(report)).map_err(|e| Error::output(png, e))?;
+        write_atomically(png, &sheet)?;
+        write_pieces(html, |out| page::write(out, &self.cards, directory_of(html), report))?;
+        Ok(Some(html.clone()))
     }
 
     /// All thumbnails in rows, with name and figures below where there is room.
@@ -278,7 +277,8 @@ mod tests {
             scenes.push(report);
         }
         let report = Report::new(Path::new("batch.yaml"), scenes, std::time::Duration::from_secs(1));
-        let page = contact.write(dir.path(), &report).unwrap().unwrap();
+        let names = ["png", "html"].map(|ending| dir.path().join("sheet").with_extension(ending));
+        let page = contact.write(&names, &report).unwrap().unwrap();
         assert_eq!(contact.side, 64);
         assert!(contact.cards.iter().all(|card| card.thumbnail.width <= 64));
         let sheet = image::open(page.with_extension("png")).unwrap();
