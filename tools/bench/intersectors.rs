@@ -103,8 +103,11 @@ fn main() {
     row(
         "triangle",
         |i| {
-            let ray = &ready[i];
-            ray.meet(ray.axes.map(|k| black_box(&single).map(|corner| f64::from(corner[k])))).map_or(0.0, |hit| hit.t)
+            let (ray, [a, b, c]) = (&ready[i], black_box(&single));
+            // One by one, as a mesh has it.
+            let axis = |k: usize| [f64::from(a[k]), f64::from(b[k]), f64::from(c[k])];
+            let [x, y, z] = ray.axes;
+            ray.meet([axis(x), axis(y), axis(z)]).map_or(0.0, |hit| hit.t)
         },
         |i| {
             let (origin, direction) = singles[i];
