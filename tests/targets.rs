@@ -233,8 +233,13 @@ fn another_build_has_a_row_of_its_own() {
     assert_eq!(rows[5]["value"], program);
     let (code, said) = abbe(&place, "accuracy scene.yaml --knob depht");
     assert!(code == 2 && said.contains("expected one of samples, depth, sampler"), "{code} {said}");
-    let (code, said) = abbe(&place, "accuracy scene.yaml -o sheet --knob depth --beside ./nothing");
-    assert!(code == 4 && said.contains("./nothing: "), "{code} {said}");
+    // A program that is not Abbe is told before anything is rendered, and the sheet that is there stays.
+    for (program, found) in [("./nothing", "./nothing: "), ("/bin/sh", "/bin/sh: another program")] {
+        let (code, said) = abbe(&place, &format!("accuracy scene.yaml -o sheet --knob depth --beside {program}"));
+        assert!(code == 2 && said.contains("--beside: expected a build of Abbe, found "), "{code} {said}");
+        assert!(said.contains(found) && !said.contains("reference") && !said.contains("written"), "{said}");
+    }
+    assert_eq!(place.json("sheet/accuracy.json").as_array().unwrap().len(), 1);
 }
 
 /// A film of 4096 × 4096 pixels takes four gibibytes: the process ends by itself long before.

@@ -22,6 +22,19 @@ pub struct Beside<'a> {
 }
 
 impl Beside<'_> {
+    /// Whether there is such a program: asked before hours are spent.
+    ///
+    /// # Errors
+    /// [`Error::Config`].
+    pub fn check(&self) -> Result<()> {
+        let found = match Command::new(self.binary).arg("--version").output() {
+            Ok(said) if said.stdout.starts_with(b"abbe ") => return Ok(()),
+            Ok(_) => "another program".to_owned(),
+            Err(e) => e.to_string(),
+        };
+        Err(Error::Config(format!("--beside: expected a build of Abbe, found {}: {found}", self.binary.display())))
+    }
+
     /// Renders `scene` with the settings of `overrides` and then `set`.
     ///
     /// # Errors

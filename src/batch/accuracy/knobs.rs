@@ -79,6 +79,7 @@ pub fn wanted(chosen: &Prepared, settings: &Settings<'_>) -> Result<Vec<Trial>> 
     }
     all.retain(|t| t.knob == CHOSEN || settings.knobs.is_empty() || settings.knobs.iter().any(|name| name == t.knob));
     if let Some(build) = settings.beside {
+        build.check()?;
         let value = build.binary.display().to_string();
         all.push(Trial { knob: "build", value, set: Vec::new(), way: Way::Beside });
     }
