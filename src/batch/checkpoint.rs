@@ -126,11 +126,8 @@ impl<'a> Keeper<'a> {
     /// # Errors
     /// [`Error::Output`] if the checkpoint cannot be removed.
     pub fn done(&self) -> Result<Vec<String>> {
-        let file = place(self.path);
-        match std::fs::remove_file(&file) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::output(&file, e)),
-            _ => Ok(std::mem::take(&mut lock(&self.notes))),
-        }
+        remove(&place(self.path))?;
+        Ok(std::mem::take(&mut lock(&self.notes)))
     }
 
     fn write(&self, part: &Part, milestones: &[Milestone], elapsed: Duration) -> Result<()> {
@@ -260,10 +257,15 @@ pub fn picture_holds(path: &Path, finish: &Finish) -> bool {
 /// [`Error::Output`] if it cannot be removed.
 pub fn remove_left_over(path: &Path, identity: &Identity) -> Result<()> {
     let file = place(path);
-    if file.is_file() && part_file::open(&file).is_ok_and(|written| written.header.check_of(&file, identity).is_ok()) {
-        return std::fs::remove_file(&file).map_err(|e| Error::output(&file, e));
+    let is_of_it = || part_file::open(&file).is_ok_and(|written| written.header.check_of(&file, identity).is_ok());
+    if file.is_file() && is_of_it() { remove(&file) } else { Ok(()) }
+}
+
+fn remove(file: &Path) -> Result<()> {
+    match std::fs::remove_file(file) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::output(file, e)),
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// Whether what is to be at `path` is there already.

@@ -19,6 +19,10 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
     use_threads(arguments.threads);
     let interrupts = Interrupts::listen()?;
     let overrides = arguments.scene.overrides(None)?;
+    let beside = arguments.beside.as_deref().map(|binary| Beside { binary, file: &arguments.scene.file });
+    if let Some(build) = beside {
+        build.check()?;
+    }
     let files = ["html", "json", "csv"].map(|ending| arguments.output.join(format!("accuracy.{ending}")));
     for file in &files {
         prepare_place(file)?;
@@ -35,7 +39,6 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
             let samples = scene.render.samples.clamp(FEWEST, MOST_SAMPLES);
             let AccuracyArguments { pixels, rounds, error: target, time, truth, .. } = *arguments;
             let knobs = &arguments.knobs;
-            let beside = arguments.beside.as_deref().map(|binary| Beside { binary, file: &arguments.scene.file });
             let settings = Settings { pixels, samples, rounds, target, time, truth, knobs, beside };
             accuracy::sheet(&entry, &overrides, &settings, &told, &interrupts.stop)
         });

@@ -47,7 +47,7 @@ impl Beside<'_> {
         reference: Option<&Reference>,
     ) -> Result<Outcome> {
         let place = std::env::temp_dir().join(format!("abbe-beside-{}", std::process::id()));
-        std::fs::create_dir_all(&place).map_err(|e| Error::Output { path: place.clone(), message: e.to_string() })?;
+        std::fs::create_dir_all(&place).map_err(|e| Error::output(&place, e))?;
         let part = place.join("part.exr");
         let mut command = Command::new(self.binary);
         command.arg("render").arg(self.file).args(["--scene", scene, "--samples", "0/1", "-q", "-o"]).arg(&part);

@@ -24,10 +24,8 @@ pub struct Desk<'a> {
     pub overrides: Overrides,
     /// Ends it.
     pub stop: &'a AtomicBool,
-    /// What the renders have read.
-    pub shelf: RefCell<Shelf>,
-    /// The same for renders of three numbers.
-    pub shelf_of_colours: RefCell<Shelf>,
+    /// What the renders have read: those of spectra, and those of three numbers.
+    shelves: [RefCell<Shelf>; 2],
 }
 
 /// What came of one render.
@@ -56,8 +54,9 @@ impl<'a> Desk<'a> {
     /// Where `entry` is rendered until `stop`.
     #[must_use]
     pub fn new(entry: &'a BatchEntry, overrides: Overrides, stop: &'a AtomicBool) -> Desk<'a> {
-        let shelf_of_colours = RefCell::new(Shelf { carried: Carried::Colours, ..Shelf::default() });
-        Desk { entry, overrides, stop, shelf: RefCell::default(), shelf_of_colours }
+        let shelves =
+            [Carried::Spectra, Carried::Colours].map(|carried| RefCell::new(Shelf { carried, ..Shelf::default() }));
+        Desk { entry, overrides, stop, shelves }
     }
 
     /// Samples of a pixel for which the time suffices, as a first render tells it.
@@ -83,20 +82,20 @@ impl<'a> Desk<'a> {
     /// # Errors
     /// As [`super::super::prepare`].
     pub fn prepare(&self, set: &[(String, String)]) -> Result<Prepared> {
-        self.prepare_with(set, &self.shelf, |_| {})
+        self.prepare_with(set, Carried::Spectra, |_| {})
     }
 
-    /// The small copy with further settings, with what is on `shelf`, altered before it is planned.
+    /// The small copy with further settings and what light is to carry, altered before it is planned.
     fn prepare_with(
         &self,
         set: &[(String, String)],
-        shelf: &RefCell<Shelf>,
+        carried: Carried,
         alter: impl FnOnce(&mut Scene),
     ) -> Result<Prepared> {
         let mut overrides = self.overrides.clone();
         overrides.set.extend(set.iter().cloned());
         let description = self.entry.scene(&overrides.set)?;
-        prepare_scene(self.entry, description, &overrides, &mut shelf.borrow_mut(), alter)
+        prepare_scene(self.entry, description, &overrides, &mut self.shelves[carried as usize].borrow_mut(), alter)
     }
 
     /// Renders a setting; with a reference the noise of each pass is known.
@@ -106,13 +105,12 @@ impl<'a> Desk<'a> {
     pub fn render(&self, trial: &Trial, seed: u64, reference: Option<&Reference>) -> Result<Outcome> {
         let mut set = trial.set.clone();
         set.push(("render.seed".into(), seed.to_string()));
-        let altered = |alter: &dyn Fn(&mut Scene)| self.prepare_with(&set, &self.shelf, alter);
+        let altered = |alter: &dyn Fn(&mut Scene)| self.prepare_with(&set, trial.way.carried(), alter);
         let prepared = match trial.way {
-            Way::AsSet | Way::Independent | Way::Beside => vec![self.prepare(&set)?],
-            Way::Colours => vec![self.prepare_with(&set, &self.shelf_of_colours, |_| {})?],
+            Way::AsSet | Way::Independent | Way::Beside | Way::Colours => vec![altered(&|_| {})?],
             Way::Wavelengths(16) => {
                 let further = altered(&|s| s.wavelengths = s.wavelengths.half_a_step_on())?;
-                vec![self.prepare(&set)?, further]
+                vec![altered(&|_| {})?, further]
             }
             Way::Wavelengths(count) => vec![altered(&|s| s.wavelengths = s.wavelengths.with_count(count))?],
         };
@@ -123,12 +121,11 @@ impl<'a> Desk<'a> {
     /// spread of replicates is that of independent means, whatever the copies have in common.
     fn follow(&self, prepared: &[Prepared], way: Way, reference: Option<&Reference>) -> Result<Outcome> {
         let independent = way == Way::Independent;
-        let carried = if way == Way::Colours { Carried::Colours } else { Carried::Spectra };
         let filter = FilterSampler::new(batch::filter(&prepared[0].description.image.filter))?;
         let jobs: Vec<FrameJob> = prepared.iter().map(|p| FrameJob { independent, ..p.job(&filter) }).collect();
         let samples = jobs[0].samples;
         let parts = jobs.iter().map(|job| Part::new(job, Share::all(samples))).collect::<Result<Vec<Part>>>()?;
-        let space = carried.rgb_from_film();
+        let space = way.carried().rgb_from_film();
         let replicates = || {
             let of = |part: &Part| {
                 part.look(|film, splats| {

@@ -4,6 +4,7 @@ use super::super::{Prepared, adaptive};
 use super::Settings;
 use crate::error::{Error, Result};
 use crate::film::accumulate::REPLICATES;
+use crate::spectrum::Carried;
 use crate::transport::pilot::Use;
 use crate::transport::plan::Integrator;
 
@@ -49,6 +50,17 @@ pub enum Way {
     Wavelengths(usize),
 }
 
+impl Way {
+    /// What light is carried as.
+    #[must_use]
+    pub fn carried(self) -> Carried {
+        match self {
+            Way::Colours => Carried::Colours,
+            Way::AsSet | Way::Independent | Way::Beside | Way::Wavelengths(_) => Carried::Spectra,
+        }
+    }
+}
+
 /// What a reader has to know of a knob to take its figures for what they are.
 #[must_use]
 pub fn note(knob: &str) -> Option<&'static str> {
@@ -79,7 +91,6 @@ pub fn wanted(chosen: &Prepared, settings: &Settings<'_>) -> Result<Vec<Trial>> 
     }
     all.retain(|t| t.knob == CHOSEN || settings.knobs.is_empty() || settings.knobs.iter().any(|name| name == t.knob));
     if let Some(build) = settings.beside {
-        build.check()?;
         let value = build.binary.display().to_string();
         all.push(Trial { knob: "build", value, set: Vec::new(), way: Way::Beside });
     }

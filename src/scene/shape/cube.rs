@@ -122,9 +122,7 @@ impl Cube {
     }
 
     /// A line at coordinates `o` that moves by `d` is between a pair of faces from here to there, pair by pair. None where it
-    /// runs beside a pair.
-    ///
-    /// Divides rather than multiplies by a reciprocal: 0/d is 0 even where 1/d overflows.
+    /// runs beside a pair. It divides as [`super::span::Span::clip_slab`] does.
     #[inline(always)]
     fn slabs(o: f64x4, d: f64x4) -> Option<[f64x4; 2]> {
         let one = f64x4::ONE;
