@@ -1,0 +1,126 @@
+//! Which lights are traced, at what their paths are aimed, and what finds change about that.
+
+use super::STREAM;
+use crate::math::sampler::{Sampler, Set, pairs};
+use crate::scene::bvh::Aabb;
+use crate::scene::casters::Casters;
+use crate::scene::environment::Environment;
+use crate::scene::light::Light;
+use crate::scene::{Geometry, Scene};
+use crate::transport::caustics::{Caustics, Source, Target};
+use crate::transport::guide::{Find, Guide};
+use std::f64::consts::PI;
+
+/// Share of the paths that go where the pilot found nothing: it may have missed something.
+const ANYWHERE: f64 = 0.2;
+
+/// Half of the solid angle of a hemisphere in which light counts as coming from one place, over 2π.
+const SMALL: f64 = 0.3;
+
+/// Whether light `i` comes from so small a part of the sphere, seen from what casts, that chance finds it seldom.
+pub(super) fn is_small(scene: &Scene, i: usize, casters: &Casters) -> bool {
+    match &scene.lights[i] {
+        Light::Point { .. }
+        | Light::Spot { .. }
+        | Light::Directional { .. }
+        | Light::Projector(_)
+        | Light::AlongNormal { .. } => true,
+        Light::Constant { .. } => false,
+        Light::Environment(map) => has_sun(map),
+        Light::Area { object, .. } => {
+            let lamp = &scene.objects[*object as usize];
+            let b: Aabb = lamp.bounds();
+            let centre = 0.5 * b.min + 0.5 * b.max;
+            let radius = match &lamp.geometry {
+                // Of a flat or curved surface the half diagonal of its box is the radius at most.
+                Geometry::Shape(_) | Geometry::Mesh(_) => 0.5 * (b.max - b.min).length(),
+                Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => return false,
+            };
+            // How near to a mirror without end it is does not bound how it is seen there.
+            !casters.endless.is_empty()
+                || casters.balls.iter().any(|ball| {
+                    let distance = (ball.center - centre).length();
+                    let sine = radius / distance;
+                    // 1 − cos of the half angle: its solid angle over 2π.
+                    sine < 1.0 && 1.0 - (1.0 - sine * sine).sqrt() < SMALL
+                })
+        }
+    }
+}
+
+/// Whether a fifth of an environment's light comes from less than a two-hundredth of the sphere.
+fn has_sun(map: &Environment) -> bool {
+    const DRAWS: u32 = 4096;
+    let sampler = |i| Sampler::new(STREAM, [0, 0], 0, i);
+    let mut densities: Vec<f64> = (0..DRAWS)
+        .filter_map(|i| map.sample(pairs(sampler(i).set(Set::Camera)).0).map(|s| s.pdf_solid_angle))
+        .collect();
+    densities.sort_by(|a, b| b.total_cmp(a));
+    let mut angle = 0.0;
+    let bright = densities.iter().take_while(|&&density| {
+        angle += 1.0 / (density * f64::from(DRAWS));
+        angle < 4.0 * PI * 0.005
+    });
+    bright.count() > DRAWS as usize / 5
+}
+
+impl Caustics {
+    /// Aimed at everything alike.
+    pub(super) fn untrained(scene: &Scene, casters: &Casters, traced: Vec<bool>, packets: bool) -> Caustics {
+        let infinite = |light: &Light| light.is_environment() || matches!(light, Light::Directional { .. });
+        // Light from infinity meets what has no end everywhere: neither is aimed at the other.
+        let bounded = scene.lights.iter().zip(&traced).any(|(light, traced)| *traced && infinite(light));
+        let (mut casts, mut unending) = (casters.casts.clone(), casters.unending.clone());
+        if bounded {
+            casts.iter_mut().zip(&mut unending).for_each(|(casts, unending)| *casts &= !std::mem::take(unending));
+        }
+        let mut targets: Vec<Target> = casters.balls.iter().map(|ball| Target::Ball(*ball)).collect();
+        if unending.contains(&true) {
+            targets.push(Target::Endless);
+        }
+        let mut sources = Vec::new();
+        for (i, light) in scene.lights.iter().enumerate().filter(|(i, _)| traced[*i]) {
+            let probability = scene.light_probability(i);
+            let source = |target, probability| Source { light: i as u32, target, probability, guide: Guide::uniform() };
+            if matches!(light, Light::AlongNormal { .. } | Light::Projector(_)) {
+                sources.push(source(Target::Own, probability));
+            } else {
+                let each = probability / targets.len() as f64;
+                sources.extend(targets.iter().map(|target| source(*target, each)));
+            }
+        }
+        let total: f64 = sources.iter().map(|s| s.probability).sum();
+        sources.iter_mut().for_each(|s| s.probability /= total);
+        let stands = &scene.objects[..scene.standing];
+        let endless = stands.iter().any(|o| !o.bounds().is_finite());
+        let sums = Caustics::sums(&sources);
+        Caustics {
+            casts,
+            unending,
+            traced,
+            sources,
+            sums,
+            ratio: 1.0,
+            packets,
+            parts: casters.parts,
+            endless,
+            merging: None,
+        }
+    }
+
+    /// Chooses sources and cells by the root of what squares were found there, over the density that found them: the
+    /// least variance, were they exact. Some go anywhere.
+    pub(super) fn learn(&mut self, finds: &mut [Vec<Find>]) {
+        let guides: Vec<(Guide, f64)> = finds.iter_mut().map(|finds| Guide::of(finds, ANYWHERE)).collect();
+        let total: f64 = guides.iter().map(|(_, worth)| worth).sum();
+        if total.is_nan() || total <= 0.0 {
+            return;
+        }
+        let even = ANYWHERE / self.sources.len() as f64;
+        for (source, (guide, worth)) in self.sources.iter_mut().zip(guides) {
+            source.probability = (1.0 - ANYWHERE) * worth / total + even;
+            source.guide = guide;
+        }
+        self.sums = Caustics::sums(&self.sources);
+    }
+}
