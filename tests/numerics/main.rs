@@ -44,7 +44,7 @@
 //! | O37 | a million samples | `a_film_of_a_million_samples_is_the_mean` |
 //! | O38 | what is no number | `invalid_samples_are_counted_and_end_with_code_4`, `samples_that_cannot_be_added_are_counted_by_cause` |
 //! | O39 | sizes 2^k | `scenes_of_every_kind_have_the_same_bits_at_sizes_of_powers_of_two` |
-//! | O40 | bad input | `what_is_no_length_matrix_or_key_is_refused_with_its_place`, tests/cli.rs |
+//! | O40 | bad input | `what_is_no_length_matrix_or_key_is_refused_with_its_place`, tests/cli/faults.rs |
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,0 +1,107 @@
+//! Batches: what goes on after a failure, what the report tells, what scenes share.
+
+use super::batch;
+use crate::common::place::Place;
+use serde_json::Value;
+
+#[test]
+fn a_batch_goes_on_after_a_scene_that_fails_and_says_so_at_the_end() {
+    let place = batch();
+    let ran = place.run(&["render", "batch.yaml"]);
+    assert_eq!(ran.code, 2);
+    assert_eq!(
+        place.names("out"),
+        ["contact-sheet.html", "contact-sheet.png", "good.exr", "good.png", "other.exr", "other.png", "report.json"]
+    );
+    let last: Vec<&str> = ran.err.lines().rev().take(2).collect();
+    assert_eq!(
+        last,
+        [
+            "error: 1 of 3 scenes failed; the others are written",
+            "error: bad: scenes/bad.yaml:3:28: shapes[0].sphere.radius: expected a number greater than 0, found -1",
+        ]
+    );
+    // The table shows what was made.
+    assert!(ran.out.contains("4 pictures in out/") && ran.out.lines().any(|l| l.starts_with("other ")), "{}", ran.out);
+}
+
+#[test]
+fn the_report_tells_what_was_made_and_what_it_cost() {
+    let place = batch();
+    place.run(&["render", "batch.yaml", "--threads", "2", "--report", "figures/r.json"]);
+    let read = |name: &str| -> Value { serde_json::from_slice(&std::fs::read(place.path(name)).unwrap()).unwrap() };
+    let report = read("out/report.json");
+    assert_eq!(report, read("figures/r.json"));
+    assert_eq!(report["version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(report["source"], "batch.yaml");
+    assert_eq!(report["threads"], 2);
+    assert!(report["seconds"].as_f64().unwrap() > 0.0);
+    let [good, bad, other] = report["scenes"].as_array().unwrap().as_slice() else { panic!("{report:#}") };
+    assert_eq!(good["name"], "good");
+    assert_eq!(good["status"], "done");
+    assert_eq!(good["integrator"], "path");
+    assert_eq!(good["resolution"], serde_json::json!([4, 4]));
+    assert_eq!((good["samples"].as_u64(), good["seed"].as_u64(), other["seed"].as_u64()), (Some(4), Some(0), Some(3)));
+    assert_eq!(good["scene_hash"].as_str().unwrap().len(), 32);
+    assert_ne!(good["scene_hash"], other["scene_hash"]);
+    for clock in ["loading", "rendering", "writing"] {
+        assert!(good["seconds"][clock].as_f64().unwrap() > 0.0, "{clock}");
+    }
+    assert!(good["msamples_per_second"].as_f64().unwrap() > 0.0);
+    for figure in ["rel_rmse", "low", "high"] {
+        assert!(good["error"][figure].as_f64().unwrap() >= 0.0, "{figure}");
+    }
+    assert_eq!(good["convergence"][0]["samples"], 4);
+    for cause in ["nan", "infinite", "negative", "overflow"] {
+        assert_eq!(good["invalid"][cause], 0, "{cause}");
+    }
+    let effects = good["effects"].as_array().unwrap();
+    let effect = |name: &str| effects.iter().find(|e| e["name"] == name).unwrap();
+    assert_eq!(
+        (effect("environment")["on"].as_bool(), effect("dispersion")["on"].as_bool()),
+        (Some(true), Some(false))
+    );
+    assert!(effects.iter().all(|e| !e["reason"].as_str().unwrap().is_empty()));
+    assert_eq!(good["files"], serde_json::json!(["out/good.exr", "out/good.png"]));
+    assert_eq!(bad["status"]["failed"]["exit_code"], 2);
+    assert!(bad["status"]["failed"]["message"].as_str().unwrap().contains("scenes/bad.yaml:3:28"));
+}
+
+/// Scenes of a batch that name the same files get the pictures that each gets by itself, also where one file changes its
+/// use, and the second turns the mesh and the sky.
+#[test]
+fn what_scenes_of_a_batch_share_is_the_same_for_each() {
+    let png = |r: u8| {
+        let image = image::RgbImage::from_fn(8, 4, |x, y| image::Rgb([r, 20 * x as u8, 60 * y as u8]));
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        bytes.into_inner()
+    };
+    let scene = |turn: u32, raw: bool| {
+        format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 8, height: 8}}\n\
+             render: {{samples: 4}}\ntextures: {{map: {{image: {{file: map.png, raw: {raw}}}}}}}\n\
+             shapes:\n- mesh: {{file: t.obj, material: {{diffuse: {{reflectance: {{texture: map}}}}}}, \
+             transform: [{{rotate: {{axis: [0, 0, 1], deg: {turn}}}}}]}}\n\
+             - sphere: {{radius: 0.5, material: {{conductor: {{metal: gold, roughness: {{texture: map}}}}}}}}\n\
+             lights: [environment: {{file: map.png, rotate_deg: {turn}}}]\n"
+        )
+    };
+    let batch = "scenes: [{file: a.yaml}, {file: b.yaml}, {file: a.yaml, name: c}]\n";
+    let place = Place::with(&[
+        ("a.yaml", &scene(0, false)),
+        ("b.yaml", &scene(40, true)),
+        ("batch.yaml", batch),
+        ("t.obj", "v -2 -2 -1\nv 2 -2 -1\nv 0 2 -1\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"),
+    ]);
+    std::fs::write(place.path("map.png"), png(200)).unwrap();
+    let hashes = |file: &str| -> Vec<String> {
+        let ran = place.run(&["render", file, "-q", "-o", "out", "--report", "r.json"]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        let report: Value = serde_json::from_slice(&std::fs::read(place.path("r.json")).unwrap()).unwrap();
+        report["scenes"].as_array().unwrap().iter().map(|s| s["pixel_hash"].as_str().unwrap().to_owned()).collect()
+    };
+    let (a, b) = (hashes("a.yaml").remove(0), hashes("b.yaml").remove(0));
+    assert_ne!(a, b);
+    assert_eq!(hashes("batch.yaml"), [a.clone(), b, a]);
+}

@@ -1,0 +1,211 @@
+//! Bad input: each fault with its place, its field and what was expected.
+
+use super::SMALL;
+use crate::common::place::Place;
+
+/// Renders the scene of [`SMALL`] and, from line 3, `text`, as `s.yaml`: the error lines and the exit code.
+fn faults(text: &str) -> (Vec<String>, i32) {
+    let place =
+        Place::with(&[("s.yaml", &format!("{SMALL}{text}\n")), ("no_picture.png", "words"), ("odd.ply", "ply\nno")]);
+    let ran = place.run(&["render", "s.yaml", "-o", "out"]);
+    assert_eq!(ran.out, "", "nothing was made");
+    assert!(place.names("out").iter().all(|n| n == "report.json"), "{:?}", place.names("out"));
+    let errors =
+        ran.err.lines().filter_map(|l| l.strip_prefix("error: ")).map(|l| l.trim_start_matches("s: ").to_owned());
+    (errors.collect(), ran.code)
+}
+
+/// Each kind of bad input: the text from line 3, the whole message, the exit code.
+#[test]
+fn each_fault_is_told_with_its_place_its_field_and_what_was_expected() {
+    let cases = [
+        (
+            "materials: {m: {diffuse: {reflectence: 0.3}}}",
+            "s.yaml:3:27: materials.m.diffuse.reflectence: expected one of reflectance, highlight, two_sided, \
+             found \"reflectence\"; did you mean \"reflectance\"?",
+            2,
+        ),
+        (
+            "shapes: [{sphere: {radius: big}}]",
+            "s.yaml:3:28: shapes[0].sphere.radius: expected a number, found the text \"big\"",
+            2,
+        ),
+        (
+            "shapes: [{sphere: {radius: .nan}}]",
+            "s.yaml:3:28: shapes[0].sphere.radius: expected a finite number, found NaN",
+            2,
+        ),
+        (
+            "shapes: [{sphere: {radius: .inf}}]",
+            "s.yaml:3:28: shapes[0].sphere.radius: expected a finite number, found inf",
+            2,
+        ),
+        (
+            "shapes: [{sphere: {radius: -1}}]",
+            "s.yaml:3:28: shapes[0].sphere.radius: expected a number greater than 0, found -1",
+            2,
+        ),
+        (
+            "materials: {flint: {mirror: {}}}\nshapes: [{sphere: {radius: 1, material: flnt}}]",
+            "s.yaml:4:41: shapes[0].sphere.material: unknown material \"flnt\"; did you mean \"flint\"?",
+            2,
+        ),
+        (
+            "materials: {m: {diffuse: {reflectance: {texture: erth}}}}\ntextures: {earth: {checkerboard: {a: 0, b: 1}}}",
+            "s.yaml:3:50: materials.m.diffuse.reflectance.texture: unknown texture \"erth\"; did you mean \"earth\"?",
+            2,
+        ),
+        (
+            "materials: {m: {conductor: {metal: golf}}}",
+            "s.yaml:3:36: materials.m.conductor.metal: unknown metal \"golf\"; did you mean \"gold\"?",
+            2,
+        ),
+        (
+            "shapes: [{cube: {size: 1, transform: [{matrix: [[1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]}}]",
+            "s.yaml:3:48: shapes[0].cube.transform[0].matrix: expected a matrix that can be inverted, \
+             found one with determinant 0",
+            2,
+        ),
+        (
+            "fog: {colour: 1, density: 1}\nfog: {colour: 2, density: 1}",
+            "s.yaml:4:1: fog: expected each key once, found \"fog\" again; it is first at line 3, column 1",
+            2,
+        ),
+        (
+            "lights: [{directional: {direction: [0, 0, 0], irradiance: 1}}]",
+            "s.yaml:3:36: lights[0].directional.direction: expected a vector with a direction, found [0, 0, 0]",
+            2,
+        ),
+        (
+            "materials: {m: {dielectric: {ior: {sellmeier: {b: [1, 2], c: [1, 2, 3]}}}}}",
+            "s.yaml:3:51: materials.m.dielectric.ior.sellmeier.b: expected 3 values, found 2",
+            2,
+        ),
+        (
+            "shapes: [{sphere: {radius: 1}",
+            "s.yaml:3:10: shapes[0]: expected YAML, found a fault of syntax: unclosed bracket '{'",
+            2,
+        ),
+        (
+            "textures: {t: {image: {file: none.png}}}",
+            "none.png: expected a file, found none; it is named at s.yaml:3:30: textures.t.image.file",
+            3,
+        ),
+        (
+            "lights: [{environment: {file: none.hdr}}]",
+            "none.hdr: expected a file, found none; it is named at s.yaml:3:31: lights[0].environment.file",
+            3,
+        ),
+        (
+            "shapes: [{mesh: {file: none.obj}}]",
+            "none.obj: cannot read: No such file or directory (os error 2); it is named at \
+             s.yaml:3:24: shapes[0].mesh.file",
+            3,
+        ),
+    ];
+    for (text, message, code) in cases {
+        let (errors, found) = faults(text);
+        assert_eq!((errors.iter().map(String::as_str).collect::<Vec<_>>(), found), (vec![message], code), "{text}");
+    }
+}
+
+/// Messages that end in another package's words, or list near misses.
+#[test]
+fn faults_with_words_of_others_begin_with_ours() {
+    let cases = [
+        (
+            "materials: {m: {dielectric: {ior: {glass: N-BK8}}}}",
+            "s.yaml:3:35: materials.m.dielectric.ior: unknown glass \"N-BK8\"; did you mean \"N-BK7\"",
+            2,
+        ),
+        (
+            "textures: {t: {image: {file: no_picture.png}}}",
+            "no_picture.png: expected a PNG, JPEG, HDR or EXR picture: ",
+            3,
+        ),
+        (
+            "shapes: [{mesh: {file: no_picture.png}}]",
+            "no_picture.png: expected a mesh (.obj, .ply or .serialized), found extension \"png\"",
+            3,
+        ),
+        ("shapes: [{mesh: {file: odd.ply}}]", "odd.ply: ", 3),
+        (
+            "lights: [{environment: {file: no_picture.png}}]",
+            "no_picture.png: expected a PNG, JPEG, HDR or EXR picture: ",
+            3,
+        ),
+    ];
+    for (text, beginning, code) in cases {
+        let (errors, found) = faults(text);
+        assert!(errors.len() == 1 && errors[0].starts_with(beginning) && found == code, "{text}: {errors:?}, {found}");
+    }
+}
+
+#[test]
+fn all_faults_of_a_scene_come_at_once() {
+    let (errors, code) = faults(
+        "shapes: [{sphere: {radius: -1}}, {sphere: {radius: 1, material: clay}}]\n\
+         lights: [{point: {position: [0, 0, 0], intensity: -3}}]",
+    );
+    assert_eq!(errors.len(), 3, "{errors:?}");
+    assert_eq!(code, 2);
+}
+
+/// The camera and the picture themselves: these are lines 1 and 2.
+#[test]
+fn a_camera_that_sees_nothing_is_refused() {
+    let cases = [
+        (
+            "camera: {origin: [0, 5, 0], target: [0, 0, 0], fov_deg: 40}",
+            "s.yaml:1:9: camera.up: expected a direction across the line of sight, found [0.0, 1.0, 0.0], which is parallel to it",
+        ),
+        ("camera: {origin: [0, 5, 0], target: [0, 5, 0], fov_deg: 40}", "s.yaml:1:37: camera.target: "),
+        ("camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 180}", "s.yaml:1:57: camera.fov_deg: "),
+        (
+            "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nimage: {width: 0, height: 10}",
+            "s.yaml:2:16: image.width: expected a whole number from 1 to 65536, found 0",
+        ),
+        (
+            "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nimage: {width: 8, height: 8, crop: {x: 4, y: 0, width: 5, height: 8}}",
+            "s.yaml:2:",
+        ),
+        ("image: {width: 8, height: 8}", "s.yaml:1:1: expected the field \"camera\", found none"),
+        ("", "s.yaml:1:1: "),
+    ];
+    for (text, beginning) in cases {
+        let place = Place::with(&[("s.yaml", text)]);
+        let ran = place.run(&["render", "s.yaml"]);
+        let said = ran.err.lines().filter_map(|l| l.strip_prefix("error: ")).next().unwrap().trim_start_matches("s: ");
+        assert!(said.starts_with(beginning) && ran.code == 2, "{text}: {said}, {}", ran.code);
+        assert!(place.names("out").is_empty());
+    }
+}
+
+/// Ten aliases of ten aliases, nine deep: a billion numbers if written out. Refused within a moment.
+#[test]
+fn a_yaml_bomb_does_not_go_off() {
+    let mut text = String::from("a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n");
+    for pair in ["ab", "bc", "cd", "de", "ef", "fg", "gh", "hi", "ij"] {
+        let (from, to) = pair.split_at(1);
+        text += &format!("{to}: &{to} [{}]\n", vec![format!("*{from}"); 10].join(", "));
+    }
+    let place = Place::with(&[("bomb.yaml", &text)]);
+    let start = std::time::Instant::now();
+    let ran = place.run(&["render", "bomb.yaml"]);
+    assert_eq!(ran.code, 2);
+    assert!(ran.err.contains("expected at most 4000000 values in all, found more"), "{}", ran.err);
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+}
+
+#[test]
+fn a_missing_scene_file_and_a_missing_argument_are_told_apart() {
+    let place = Place::with(&[]);
+    let ran = place.run(&["render", "none.yaml"]);
+    assert_eq!(ran.err, "error: none.yaml: cannot be read: No such file or directory (os error 2)\n");
+    assert_eq!(ran.code, 3);
+    assert_eq!(place.run(&["render"]).code, 2);
+    let ran = place.run(&["rendr", "none.yaml"]);
+    assert!(ran.err.contains("a similar subcommand exists: 'render'") && ran.code == 2, "{}", ran.err);
+    assert_eq!(place.run(&["render", "s.yaml", "--spp", "0"]).code, 2);
+    assert_eq!(place.run(&["render", "s.yaml", "--set", "fog"]).code, 2);
+}

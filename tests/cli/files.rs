@@ -1,0 +1,117 @@
+//! What is left on the disk: whole files or none, also where none can be written.
+
+use super::batch;
+use std::process::Command;
+
+/// A place that cannot be written to is told at once: the scene would take minutes.
+#[test]
+fn an_unwritable_place_is_told_before_the_work() {
+    let place = batch();
+    std::fs::create_dir_all(place.path("taken/good.exr")).unwrap();
+    std::fs::create_dir_all(place.path("taken_too/good.png")).unwrap();
+    let slow = ["--spp", "1000000", "--set", "image.width=2000", "--set", "image.height=2000"];
+    for (more, message) in [
+        // Below a regular file: even root cannot.
+        (
+            ["-o", "batch.yaml/deep"],
+            "error: good: batch.yaml/deep/good.exr: cannot write: batch.yaml/deep is not a directory",
+        ),
+        (["-o", "batch.yaml"], "error: good: batch.yaml/good.exr: cannot write: batch.yaml is not a directory"),
+        (["-o", "taken"], "error: good: taken/good.exr: cannot write: it is a directory"),
+        (["-o", "taken_too"], "error: good: taken_too/good.png: cannot write: it is a directory"),
+        (["--report", "batch.yaml/r.json"], "error: batch.yaml/r.json: cannot write: batch.yaml is not a directory"),
+    ] {
+        let start = std::time::Instant::now();
+        let mut all = vec!["render", "scenes/good.yaml", "-q"];
+        all.extend(slow);
+        all.extend(more);
+        let ran = place.run(&all);
+        assert_eq!((ran.err.lines().collect::<Vec<_>>(), ran.code), (vec![message], 1), "{more:?}");
+        assert!(start.elapsed().as_secs() < 20, "{more:?}: {:?}", start.elapsed());
+    }
+    assert_eq!(place.names("taken"), ["good.exr", "report.json"]);
+    assert_eq!(place.names("out"), Vec::<String>::new());
+}
+
+/// Permissions do not bind root, who is told so and let off.
+#[test]
+fn a_directory_without_permission_is_named() {
+    use std::os::unix::fs::PermissionsExt;
+    let place = batch();
+    std::fs::create_dir(place.path("locked")).unwrap();
+    std::fs::set_permissions(place.path("locked"), std::fs::Permissions::from_mode(0o555)).unwrap();
+    if std::fs::write(place.path("locked/probe"), "").is_ok() {
+        eprintln!("skipped: this user may write anywhere");
+        return;
+    }
+    let ran = place.run(&["render", "scenes/good.yaml", "-q", "-o", "locked"]);
+    assert!(ran.err.contains("no permission to write in locked") && ran.code == 1, "{}", ran.err);
+}
+
+/// A disk of 16 KiB, mounted where only this command sees it; skipped where that is not allowed.
+#[test]
+fn a_full_disk_is_named_and_leaves_no_half_file() {
+    let place = batch();
+    std::fs::create_dir(place.path("disk")).unwrap();
+    let script = "mount -t tmpfs -o size=16k tmpfs disk || exit 99\n\
+                  \"$0\" render scenes/good.yaml -q -o disk --set image.width=100 --set image.height=100\n\
+                  code=$?\nls -A disk >&2\nexit $code";
+    let unshare = Command::new("unshare")
+        .args(["-m", "sh", "-c", script, env!("CARGO_BIN_EXE_abbe")])
+        .current_dir(place.directory.path())
+        .output();
+    let Ok(output) = unshare else {
+        eprintln!("skipped: there is no unshare");
+        return;
+    };
+    let said = String::from_utf8(output.stderr).unwrap();
+    if output.status.code() == Some(99) || said.contains("unshare") {
+        eprintln!("skipped: no disk may be mounted here: {said}");
+        return;
+    }
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.starts_with("error: good: disk/good.exr: cannot write: the disk that holds disk is full\n"), "{said}");
+    assert!(!said.lines().any(|l| l.starts_with("good") || l.starts_with('.')), "half a file is left: {said}");
+}
+
+/// A picture that stood there stays as it was when a later render fails.
+#[test]
+fn a_failed_render_leaves_the_old_picture_alone() {
+    let place = batch();
+    assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "out"]).code, 0);
+    let before = std::fs::read(place.path("out/good.exr")).unwrap();
+    let ran = place.run(&["render", "scenes/good.yaml", "-q", "-o", "out", "--set", "shapes[0].sphere.radius=-1"]);
+    assert_eq!(ran.code, 2);
+    assert_eq!(std::fs::read(place.path("out/good.exr")).unwrap(), before);
+    assert_eq!(place.names("out"), ["good.exr", "good.png", "report.json"]);
+}
+
+/// Killed in the middle of its work, the command leaves no file under the final name.
+#[test]
+fn a_killed_render_leaves_nothing_behind() {
+    let place = batch();
+    let mut child = place
+        .command(&[
+            "render",
+            "scenes/good.yaml",
+            "-q",
+            "-o",
+            "out",
+            "--spp",
+            "1000000",
+            "--set",
+            "image.width=500",
+            "--set",
+            "image.height=500",
+        ])
+        .spawn()
+        .unwrap();
+    while !place.path("out").is_dir() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        assert!(child.try_wait().unwrap().is_none(), "it should be at work");
+    }
+    std::thread::sleep(std::time::Duration::from_millis(50));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(place.names("out").iter().all(|n| n.starts_with('.')), "{:?}", place.names("out"));
+}

@@ -1,0 +1,100 @@
+//! Options of `render`, and from where it runs.
+
+use super::{BALL, SMALL, batch};
+use crate::common::place::Place;
+use serde_json::Value;
+use std::process::Command;
+
+#[test]
+fn quiet_prints_nothing_but_errors() {
+    let place = batch();
+    let ran = place.run(&["render", "scenes/good.yaml", "-q", "-o", "out"]);
+    assert_eq!((ran.out.as_str(), ran.err.as_str(), ran.code), ("", "", 0));
+    let ran = place.run(&["render", "batch.yaml", "-q"]);
+    assert_eq!(ran.out, "");
+    assert!(ran.err.lines().all(|l| l.starts_with("error: ")) && ran.code == 2, "{}", ran.err);
+}
+
+#[test]
+fn progress_is_lines_json_or_nothing() {
+    let place = batch();
+    let run = |style: &str| place.run(&["render", "scenes/good.yaml", "-o", "out", "--progress", style]);
+    let plain = run("plain");
+    assert!(plain.err.starts_with("[1/1] good\n  done in "), "{}", plain.err);
+    // No terminal, no bars: automatic is plain.
+    assert!(run("auto").err.starts_with("[1/1] good\n"), "no escape codes in a log");
+    let events: Vec<Value> = run("json").out.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    assert_eq!(events[0], serde_json::json!({"event": "scene", "scene": "good", "index": 0, "count": 1}));
+    assert_eq!(events.last().unwrap()["event"], "done");
+    assert_eq!(run("none").err, "");
+}
+
+#[test]
+fn settings_of_the_command_line_reach_the_scene_and_are_checked() {
+    let place = batch();
+    let seed = |arguments: &[&str]| -> u64 {
+        let mut all = vec!["render", "scenes/good.yaml", "-q", "-o", "set"];
+        all.extend(arguments);
+        assert_eq!(place.run(&all).code, 0);
+        let report: Value = serde_json::from_slice(&std::fs::read(place.path("set/report.json")).unwrap()).unwrap();
+        report["scenes"][0]["seed"].as_u64().unwrap()
+    };
+    assert_eq!(seed(&["--set", "render.seed=7"]), 7);
+    assert_eq!(seed(&["--set", "render.seed=7", "--seed", "9"]), 9);
+    let ran = place.run(&["render", "scenes/good.yaml", "--set", "camera.fov_dg=3"]);
+    assert!(
+        ran.err.contains("--set camera.fov_dg=3: camera.fov_dg: expected one of ")
+            && ran.err.contains("did you mean \"fov_deg\"?"),
+        "{}",
+        ran.err
+    );
+    assert_eq!(ran.code, 2);
+}
+
+#[test]
+fn scenes_are_chosen_by_name() {
+    let place = batch();
+    let ran = place.run(&["render", "batch.yaml", "--scene", "othr"]);
+    assert_eq!(ran.err, "error: batch.yaml: no scene is named \"othr\"; did you mean \"other\"?\n");
+    assert_eq!(ran.code, 2);
+    assert_eq!(place.run(&["render", "batch.yaml", "--scene", "other"]).code, 0);
+    assert_eq!(place.names("out"), ["other.exr", "other.png", "report.other.json"]);
+    let ran = place.run(&["render", "batch.yaml", "-o", "one.exr"]);
+    assert_eq!(
+        ran.err,
+        "error: -o one.exr: expected a directory for 3 scenes, or a pattern with {scene}, found the name of one file\n"
+    );
+    assert_eq!(place.run(&["render", "batch.yaml", "--scene", "other", "-o", "sub/one.exr", "-q"]).code, 0);
+    let ran = place.run(&["render", "scenes/good.yaml", "-o", "one.PNG"]);
+    let expected =
+        "error: -o one.PNG: expected a directory or a file name that ends in .exr, beside which the PNG is written\n";
+    assert_eq!((ran.code, ran.err.as_str()), (2, expected));
+    assert_eq!(place.names("sub"), ["one.exr", "one.png", "report.other.json"]);
+}
+
+/// Paths in a scene start from its file, outputs from where the command runs.
+#[test]
+fn a_scene_is_the_same_from_any_directory() {
+    let place = Place::with(&[
+        ("deep/s.yaml", &format!("{SMALL}{BALL}textures: {{t: {{image: {{file: maps/t.png}}}}}}\n")),
+        ("elsewhere/x", ""),
+    ]);
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::GrayImage::new(2, 2).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    std::fs::create_dir_all(place.path("deep/maps")).unwrap();
+    std::fs::write(place.path("deep/maps/t.png"), png.into_inner()).unwrap();
+    let hash = |directory: &str, file: &str| {
+        let output = Command::new(env!("CARGO_BIN_EXE_abbe"))
+            .current_dir(place.path(directory))
+            .args(["plan", file, "--format", "json"])
+            .output()
+            .unwrap();
+        let plan: Value = serde_json::from_slice(&output.stdout).unwrap();
+        plan[0]["scene_hash"].as_str().unwrap().to_owned()
+    };
+    let here = hash("deep", "s.yaml");
+    assert_eq!(here, hash(".", "deep/s.yaml"));
+    assert_eq!(here, hash("elsewhere", "../deep/s.yaml"));
+    let absolute = place.path("deep/s.yaml");
+    assert_eq!(here, hash("elsewhere", absolute.to_str().unwrap()));
+}

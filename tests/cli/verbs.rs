@@ -1,0 +1,115 @@
+//! What the verbs say: help, `plan`, `compare`; and to whom.
+
+use super::{BALL, SMALL, batch};
+use crate::common::place::Place;
+use serde_json::Value;
+
+#[test]
+fn help_of_every_verb_shows_an_example() {
+    let place = Place::with(&[]);
+    let general = place.run(&["--help"]);
+    assert_eq!(general.code, 0);
+    let verbs = general.out.lines().skip_while(|l| *l != "Commands:").skip(1).take_while(|l| !l.is_empty());
+    let verbs: Vec<String> = verbs.map(|l| l.split_whitespace().next().unwrap().to_owned()).collect();
+    assert!(["render", "plan", "compare"].iter().all(|v| verbs.iter().any(|w| w == v)), "{verbs:?}");
+    for verb in verbs.iter().filter(|v| *v != "help") {
+        for flag in ["--help", "-h"] {
+            let ran = place.run(&[verb, flag]);
+            let example = format!("\n  abbe {verb} ");
+            assert!(
+                ran.out.contains("Example") && ran.out.contains(&example) && ran.code == 0,
+                "{verb} {flag}: {}",
+                ran.out
+            );
+        }
+    }
+    assert_eq!(place.run(&["--version"]).out, concat!("abbe ", env!("CARGO_PKG_VERSION"), "\n"));
+}
+
+#[test]
+fn plan_says_what_is_simulated_and_why_and_renders_nothing() {
+    let prism = format!("{SMALL}{BALL}")
+        .replace("radius: 1", "radius: 1, name: prism, material: {dielectric: {ior: {glass: N-SF11}}}");
+    let place = Place::with(&[("prism.yaml", &prism)]);
+    let text = place.run(&["plan", "prism.yaml"]);
+    assert_eq!((text.err.as_str(), text.code), ("", 0));
+    assert!(text.out.starts_with("prism\n"), "{}", text.out);
+    let line = |name: &str| text.out.lines().find(|l| l.contains(name)).unwrap().trim().to_owned();
+    assert!(line("dispersion").starts_with("on ") && line("dispersion").contains("prism"), "the culprit is named");
+    assert!(line("depth fog").starts_with("off ") && line("depth fog").ends_with("the scene has none"));
+    let json = place.run(&["plan", "prism.yaml", "--format", "json", "--spp", "9"]);
+    let plan: Value = serde_json::from_str(&json.out).unwrap();
+    assert_eq!((&plan[0]["scene"], &plan[0]["samples"]), (&Value::from("prism"), &Value::from(9)));
+    let effects = plan[0]["effects"].as_array().unwrap();
+    assert!(effects.iter().any(|e| e["name"] == "dispersion" && e["on"] == true));
+    assert!(plan[0]["wavelengths"].as_str().unwrap().contains("colour noise"));
+    assert_eq!(place.names("."), ["prism.yaml"]);
+}
+
+#[test]
+fn compare_ends_with_its_verdict() {
+    let place = batch();
+    for (name, seed, extra) in [
+        ("a", "1", "shapes[0].sphere.radius=1"),
+        ("b", "2", "shapes[0].sphere.radius=1"),
+        ("c", "1", "shapes[0].sphere.material={diffuse: {reflectance: 0.9}}"),
+    ] {
+        let file = format!("{name}.exr");
+        let ran = place.run(&[
+            "render",
+            "scenes/good.yaml",
+            "-q",
+            "-o",
+            &file,
+            "--seed",
+            seed,
+            "--spp",
+            "64",
+            "--set",
+            extra,
+            "--set",
+            "output.exr.stderr=true",
+        ]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+    }
+    let size = ["render", "scenes/good.yaml", "-q", "-o", "large.exr", "--set", "image.width=5"];
+    assert_eq!(place.run(&size).code, 0);
+    let compare = |a: &str, b: &str| place.run(&["compare", a, b, "--json", "figures.json"]);
+    let figures = || -> Value { serde_json::from_slice(&std::fs::read(place.path("figures.json")).unwrap()).unwrap() };
+    let same = compare("a.exr", "a.exr");
+    assert!(same.code == 0 && same.out.contains("verdict: same: all compared values are identical"), "{}", same.out);
+    assert_eq!(figures()["identical"], true);
+    // Another seed: another noise, the same picture.
+    let noise = compare("a.exr", "b.exr");
+    assert_eq!(noise.code, 0, "{}", noise.out);
+    assert_eq!(figures()["identical"], false);
+    let different = compare("a.exr", "c.exr");
+    assert!(different.code == 1 && different.out.contains("verdict: different"), "{}", different.out);
+    let sizes = compare("a.exr", "large.exr");
+    assert!(sizes.code == 2 && sizes.out.contains("verdict: cannot compare"), "{} {}", sizes.code, sizes.out);
+    // No file, or no EXR: bad input, code 3.
+    let missing = compare("a.exr", "none.exr");
+    assert_eq!((missing.err.as_str(), missing.code), ("error: none.exr: there is no such file\n", 3));
+    assert_eq!(compare("a.exr", "scenes/good.yaml").code, 3);
+}
+
+/// `abbe plan … | true`: the reader is gone before the first word.
+#[test]
+fn a_reader_that_goes_away_is_no_fault() {
+    let place = batch();
+    let picture = ["render", "scenes/good.yaml", "-q", "-o", "out"];
+    assert_eq!(place.run(&picture).code, 0);
+    for arguments in [
+        &["plan", "scenes/good.yaml"][..],
+        &["plan", "scenes/good.yaml", "--format", "json"],
+        &["compare", "out/good.exr", "out/good.exr"],
+        &["render", "scenes/good.yaml", "-o", "out"],
+        &["render", "scenes/good.yaml", "-o", "out", "--progress", "json"],
+    ] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        let (reader_too, writer_too) = std::io::pipe().unwrap();
+        drop((reader, reader_too));
+        let mut child = place.command(arguments).stdout(writer).stderr(writer_too).spawn().unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(0), "{arguments:?}");
+    }
+}
