@@ -5,6 +5,7 @@
 
 mod attributes;
 mod bodies;
+mod camera;
 mod files;
 mod films;
 mod hair;
@@ -14,14 +15,15 @@ mod media;
 mod meshes;
 mod notes;
 mod principled;
+mod shapes;
 mod spectra;
 mod surface;
 
 use super::bvh::{Aabb, Bvh};
-use super::camera::{self, Camera};
+use super::camera::Camera;
 use super::choice::Choice;
 use super::few::Few;
-use super::instance::{AffineMap, Group, Instance};
+use super::instance::Group;
 use super::light::Light;
 use super::load::{Pictures, Wanted};
 use super::material::{Kind, Material};
@@ -29,7 +31,7 @@ use super::medium::Medium;
 use super::mesh::MeshTree;
 use super::mesh::together::Together;
 use super::nested::{Inside, Nested};
-use super::shape::{Cone, Cube, Cylinder, Detail, Disk, Layout, Plane, Rectangle, Shape, Sphere};
+use super::shape::{Detail, Shape};
 use super::shelf::Shelf;
 use super::texture::{Scalar, Texture};
 use super::volume::Volume;
@@ -38,8 +40,8 @@ use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
 use crate::math::Ray;
 use crate::spectrum::{Outside, Spectrum, WavelengthDistribution};
-use attributes::{OfMesh, Surface};
-use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3};
+use attributes::Surface;
+use glam::DVec3;
 use meshes::Meshes;
 use spectra::Role;
 use std::collections::{BTreeSet, HashMap};
@@ -485,31 +487,6 @@ impl<'a> Compiler<'a> {
         }))
     }
 
-    fn camera(&mut self) -> Camera {
-        let d = &self.description.camera;
-        let resolution = [self.description.image.width, self.description.image.height];
-        let world_from_camera = match d.pose {
-            written::Pose::LookAt { origin, target, up } => Camera::look_at(vec3(origin), vec3(target), vec3(up)),
-            written::Pose::ToWorld(rows) => Some(DAffine3::from_mat4(written::TransformStep::Matrix(rows).matrix())),
-        };
-        let world_from_camera = world_from_camera.unwrap_or_else(|| {
-            self.fault("camera.up", "expected a direction that is not along the line of sight");
-            DAffine3::IDENTITY
-        });
-        let projection = match d.projection {
-            written::Projection::Perspective { fov_deg, fov_axis } => {
-                camera::Projection::perspective(fov_deg.to_radians(), self::fov_axis(fov_axis), resolution)
-            }
-            written::Projection::Orthographic { height } => camera::Projection::Orthographic {
-                half_width: 0.5 * height * f64::from(resolution[0]) / f64::from(resolution[1]),
-            },
-        };
-        let lens = d.lens.as_ref().map(|l| camera::Lens { radius: l.radius, focus_distance: l.focus_distance });
-        let clip = [d.clip.near, d.clip.far];
-        let principal_point = DVec2::from(d.principal_point);
-        Camera::new(world_from_camera, projection, resolution, lens, clip, principal_point)
-    }
-
     /// Wavelengths by the scene's own lights and surfaces.
     fn wavelengths(
         &self,
@@ -548,112 +525,6 @@ impl<'a> Compiler<'a> {
             }
         }
         WavelengthDistribution::for_scene(&emitters, &reflectances)
-    }
-
-    fn geometry(&mut self, at: &str, shape: &written::Shape) -> Result<Option<Geometry>> {
-        let m = shape.world_from_object();
-        let point = |p: [f64; 3]| m.transform_point3(vec3(p));
-        let vector = |v: [f64; 3]| m.transform_vector3(vec3(v));
-        // Uniform by the checks of the description for shapes that need it.
-        let scale = libm::cbrt(DMat3::from_mat4(m).determinant().abs());
-        let made: std::result::Result<Shape, String> = match &shape.geometry {
-            written::Geometry::Sphere(s) => {
-                let rotation = DMat3::from_mat4(m) * (1.0 / scale);
-                let made = Sphere::new(point(s.center), s.radius * scale, rotation);
-                made.map(|sphere| Shape::Sphere(sphere.with_layout(layout(s.layout))))
-            }
-            written::Geometry::Plane(p) => {
-                let tangent = p.tangent.map_or(DVec3::ZERO, vector);
-                Plane::new(point(p.point), normal_transform(m, vec3(p.normal)), tangent).map(Shape::Plane)
-            }
-            written::Geometry::Disk(d) => {
-                let frame = match vec3(d.normal).try_normalize() {
-                    Some(n) => crate::math::Frame::from_normal(n),
-                    None => {
-                        self.fault(&format!("{at}.normal"), "expected a direction, found one of length zero");
-                        return Ok(None);
-                    }
-                };
-                let (u, v) = (vector((frame.s * d.radius).into()), vector((frame.t * d.radius).into()));
-                Disk::new(point(d.center), u, v).map(Shape::Disk)
-            }
-            written::Geometry::Rectangle(r) => {
-                Rectangle::new(point(r.corner), vector(r.edge_u), vector(r.edge_v)).map(Shape::Rectangle)
-            }
-            written::Geometry::Cube(c) => {
-                let [x, y, z] = c.size.xyz();
-                let half = [[0.5 * x, 0.0, 0.0], [0.0, 0.5 * y, 0.0], [0.0, 0.0, 0.5 * z]].map(vector);
-                Cube::new(point(c.center), half).map(|cube| Shape::Cube(cube.with_layout(layout(c.layout))))
-            }
-            written::Geometry::Cylinder(c) => {
-                let (base, top) = match c.caps {
-                    written::Caps::Both => (true, true),
-                    written::Caps::None => (false, false),
-                    written::Caps::Base => (true, false),
-                    written::Caps::Top => (false, true),
-                };
-                let made = Cylinder::new(point(c.base), point(c.top), c.radius * scale, base, top);
-                let made = match c.seam {
-                    Some(seam) => made.and_then(|cylinder| cylinder.with_seam(vector(seam))),
-                    None => made,
-                };
-                made.map(Shape::Cylinder)
-            }
-            written::Geometry::Cone(c) => {
-                Cone::new(point(c.base), point(c.apex), c.radius * scale, c.cap).map(Shape::Cone)
-            }
-            written::Geometry::SdfGrid(grid) => return self.sdf_grid(at, grid, &DAffine3::from_mat4(m)),
-            written::Geometry::Curves(curves) => return self.curves(at, curves, &DAffine3::from_mat4(m)),
-            written::Geometry::Mesh(mesh) => {
-                self.files.push(mesh.file.to_path_buf());
-                let place = format!("{at}.file");
-                let source = self.meshes.source(mesh).map_err(|e| self.asked(&place, e))?;
-                let made = self
-                    .meshes
-                    .take(at, &source, mesh, &DAffine3::from_mat4(m))
-                    .map_err(|message| self.asked(&place, Error::input(&mesh.file, message)))?;
-                self.surface = Surface::Mesh(OfMesh::new(source, &made.mesh));
-                return Ok(Some(Geometry::Mesh(Box::new(made))));
-            }
-            written::Geometry::Instance(instance) => {
-                let group = self.groups[instance.group.as_str()].0.clone();
-                return Ok(match AffineMap::new(DAffine3::from_mat4(m)) {
-                    Ok(map) => Some(Geometry::Instance(Box::new(Instance { group, map }))),
-                    Err(message) => {
-                        self.fault(&format!("{at}.transform"), message);
-                        None
-                    }
-                });
-            }
-        };
-        Ok(match made {
-            Ok(shape) => Some(Geometry::Shape(shape)),
-            Err(message) => {
-                self.fault(at, message);
-                None
-            }
-        })
-    }
-}
-
-fn layout(layout: written::Layout) -> Layout {
-    match layout {
-        written::Layout::YUp => Layout::YUp,
-        written::Layout::ZUp => Layout::ZUp,
-    }
-}
-
-fn normal_transform(m: DMat4, n: DVec3) -> DVec3 {
-    DMat3::from_mat4(m).inverse().transpose() * n
-}
-
-fn fov_axis(axis: written::FovAxis) -> camera::FovAxis {
-    match axis {
-        written::FovAxis::X => camera::FovAxis::X,
-        written::FovAxis::Y => camera::FovAxis::Y,
-        written::FovAxis::Smaller => camera::FovAxis::Smaller,
-        written::FovAxis::Larger => camera::FovAxis::Larger,
-        written::FovAxis::Diagonal => camera::FovAxis::Diagonal,
     }
 }
 

@@ -171,7 +171,7 @@ impl<'a> Compiler<'a> {
             _ => [1, 1],
         };
         let camera::Projection::Perspective { half_width } =
-            camera::Projection::perspective(l.fov_deg.to_radians(), super::fov_axis(l.fov_axis), resolution)
+            camera::Projection::perspective(l.fov_deg.to_radians(), super::camera::fov_axis(l.fov_axis), resolution)
         else {
             return None;
         };
