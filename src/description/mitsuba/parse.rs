@@ -1,21 +1,23 @@
-//! Elements to objects: parameters, includes, references, transforms.
+//! Elements to objects: parameters, includes, old spellings.
 
+mod references;
 mod text;
 mod transform;
+mod values;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat4, DVec3};
 
-use self::text::{major_version, spectrum_value, underscored};
+use self::text::{major_version, underscored};
 pub(crate) use self::text::{number, tokens};
 use super::super::edit::{Setting, read_bytes};
 use super::super::fault::Fault;
 use super::super::node::{Node, Place, Sources, Value as NodeValue, did_you_mean, quote};
 use super::super::yaml::{self, MAX_NODES};
-use super::object::{Document, Family, Object, Property, SpectrumValue, Value};
-use super::xml::{self, Attribute, Element, MAX_DEPTH};
+use super::object::{Document, Family, Object, Property, Value};
+use super::xml::{self, Attribute, Element};
 use crate::error::{Error, Result};
 
 /// The deepest nesting of includes, as in Mitsuba.
@@ -425,110 +427,6 @@ impl Parser<'_> {
         Ok(())
     }
 
-    // ---------------------------------------------------------------------------------------------
-    // Values.
-
-    /// The value of an attribute with its parameters filled in.
-    fn text(&mut self, attribute: &Attribute) -> std::result::Result<String, Fault> {
-        let (text, used) = self.substituted(attribute)?;
-        for index in used {
-            self.parameters[index].used = true;
-        }
-        Ok(text)
-    }
-
-    fn peek(&self, attribute: &Attribute) -> std::result::Result<String, Fault> {
-        self.substituted(attribute).map(|(text, _)| text)
-    }
-
-    /// `$name` stands for the parameter with the longest name that fits; `\$` for a dollar.
-    fn substituted(&self, attribute: &Attribute) -> std::result::Result<(String, Vec<usize>), Fault> {
-        let mut text = String::new();
-        let mut used = Vec::new();
-        let mut rest = attribute.value.as_str();
-        while let Some(at) = rest.find('$') {
-            let (before, after) = (&rest[..at], &rest[at + 1..]);
-            if let Some(before) = before.strip_suffix('\\') {
-                text.push_str(before);
-                text.push('$');
-                rest = after;
-                continue;
-            }
-            text.push_str(before);
-            let fits = |(_, parameter): &(usize, &Parameter)| after.starts_with(&parameter.name);
-            let longest = self.parameters.iter().enumerate().filter(fits).max_by_key(|(_, p)| p.name.len());
-            let Some((index, parameter)) = longest else {
-                let end = after.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(after.len());
-                let name = &after[..end];
-                let hint = did_you_mean(name, self.parameters.iter().map(|parameter| parameter.name.as_str()));
-                let message =
-                    format!("expected a parameter with a <default> or -D {name}=…, found ${name} without either{hint}");
-                return Err(Fault::at_place(attribute.place, message));
-            };
-            text.push_str(&parameter.value);
-            used.push(index);
-            rest = &after[parameter.name.len()..];
-        }
-        text.push_str(rest);
-        Ok((text, used))
-    }
-
-    fn number(&mut self, attribute: &Attribute) -> std::result::Result<f64, Fault> {
-        let text = self.text(attribute)?;
-        number(&text, attribute.place)
-    }
-
-    /// Numbers between blanks and commas.
-    fn numbers(&mut self, attribute: &Attribute) -> std::result::Result<Vec<f64>, Fault> {
-        let text = self.text(attribute)?;
-        tokens(&text).map(|token| number(token, attribute.place)).collect()
-    }
-
-    /// `value="1 2 3"`, `value="1"` or `x y z`, of which those that are not written are `default`.
-    fn vector(&mut self, element: &Element, default: f64) -> std::result::Result<[f64; 3], Fault> {
-        if let Some(value) = element.attribute("value") {
-            if let Some(other) = ["x", "y", "z"].iter().find_map(|key| element.attribute(key)) {
-                let message = format!("expected either value or x, y, z, found value and {}", other.name);
-                return Err(Fault::at_place(other.place, message));
-            }
-            return match self.numbers(value)?[..] {
-                [all] => Ok([all; 3]),
-                [x, y, z] => Ok([x, y, z]),
-                ref other => {
-                    Err(Fault::at_place(value.place, format!("expected 1 or 3 numbers, found {}", other.len())))
-                }
-            };
-        }
-        let mut vector = [default; 3];
-        for (number, key) in vector.iter_mut().zip(["x", "y", "z"]) {
-            if let Some(attribute) = element.attribute(key) {
-                *number = self.number(attribute)?;
-            }
-        }
-        Ok(vector)
-    }
-
-    /// `<spectrum name="…" value="…"/>` or with `filename`.
-    fn spectrum(&mut self, element: &Element, in_file: InFile) -> std::result::Result<Value, Fault> {
-        check_attributes(element, &["name"], &["value", "filename"])?;
-        let value = match (element.attribute("value"), element.attribute("filename")) {
-            (Some(value), None) => {
-                let text = self.text(value)?;
-                return spectrum_value(&text, value.place).map(Value::Spectrum);
-            }
-            (None, Some(file)) => file,
-            _ => {
-                let message = "expected either value or filename in <spectrum>, found neither or both";
-                return Err(Fault::at_place(element.place, message));
-            }
-        };
-        let name = self.text(value)?;
-        Ok(Value::Spectrum(SpectrumValue::File(self.document.find(&name, in_file.source))))
-    }
-
-    // ---------------------------------------------------------------------------------------------
-    // Files and old spellings.
-
     /// A file or directory that an element of `source` names: first beside that file, then where all
     /// files are looked for.
     fn find_from(&self, name: &str, source: u32) -> PathBuf {
@@ -576,65 +474,6 @@ impl Parser<'_> {
             let to_uv =
                 DMat4::from_scale(DVec3::new(scale_u, scale_v, 1.0)) * DMat4::from_translation(DVec3::new(u, v, 0.0));
             self.set(index, "to_uv".to_owned(), place, Value::Transform(to_uv))?;
-        }
-        Ok(())
-    }
-
-    // ---------------------------------------------------------------------------------------------
-    // References.
-
-    /// Fills in what references name, and checks that nothing holds itself.
-    fn resolve(&mut self) -> std::result::Result<(), Fault> {
-        for reference in &self.references {
-            let Some(&index) = self.ids.get(&reference.id) else {
-                let hint = did_you_mean(&reference.id, self.ids.keys().map(String::as_str));
-                let message = format!("expected the id of an object, found {}{hint}", quote(&reference.id));
-                return Err(Fault::at_place(reference.place, message));
-            };
-            self.document.objects[reference.object].properties[reference.property].value = Value::Object(index);
-        }
-
-        // How deep each object reaches, by a walk that does not recurse.
-        struct Visit {
-            object: usize,
-            next: usize,
-            depth: usize,
-        }
-        #[derive(Clone, Copy)]
-        enum State {
-            New,
-            Open,
-            Done(usize),
-        }
-        let objects = &self.document.objects;
-        let mut states = vec![State::New; objects.len()];
-        let mut stack = vec![Visit { object: 0, next: 0, depth: 0 }];
-        while let Some(visit) = stack.last_mut() {
-            let object = &objects[visit.object];
-            states[visit.object] = State::Open;
-            let Some(property) = object.properties.get(visit.next) else {
-                if visit.depth > MAX_DEPTH {
-                    let message = format!("expected at most {MAX_DEPTH} objects within one another, found more");
-                    return Err(Fault::at_place(object.place, message));
-                }
-                states[visit.object] = State::Done(visit.depth);
-                stack.pop();
-                continue;
-            };
-            if let Value::Object(inner) = property.value {
-                match states[inner] {
-                    State::Done(below) => visit.depth = visit.depth.max(below + 1),
-                    State::Open => {
-                        let message = "expected an object that does not hold itself, found a circle of references";
-                        return Err(Fault::at_place(property.place, message));
-                    }
-                    State::New => {
-                        stack.push(Visit { object: inner, next: 0, depth: 0 });
-                        continue;
-                    }
-                }
-            }
-            visit.next += 1;
         }
         Ok(())
     }
