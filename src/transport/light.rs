@@ -12,8 +12,9 @@
 mod packet;
 
 use super::caustics::{Caustics, Target};
-use super::merge::{Photon, WavelengthCell};
+use super::merge::WavelengthCell;
 use super::path::{FOR_SURE, SURVIVAL, seen_normal};
+use super::photons::{Alone, Photon, Photons, Together};
 use super::plan::{EffectPlan, LightSettings};
 use super::shadow::{MAX_BOUNDARIES, Shadow};
 use crate::math::sampler::{Sampler, Set, pairs};
@@ -107,7 +108,7 @@ pub fn trace(
     paths: &LightPaths,
     replicate: u32,
     index: u64,
-    photons: Option<&mut Vec<Photon>>,
+    photons: Option<&mut Photons>,
     splat: &mut dyn FnMut(&SampledWavelengths, Splat),
 ) -> Traced {
     let scene = paths.scene;
@@ -166,8 +167,8 @@ pub(super) fn seen_in_sharp(
     ray: &Ray,
     wavelengths: &SampledWavelengths,
     sampler: &Sampler,
-) -> Option<Photon> {
-    let mut seen = Vec::new();
+) -> Option<Photon<Together>> {
+    let mut seen = Photons::default();
     let splat = &mut |_: &SampledWavelengths, _| {};
     let (start, target, photons) = (1.0, Target::Own, Some(&mut seen));
     let mut walk = Walk { paths, sampler, wavelengths, start, splat, photons, target, group: 0, rays: 0, ahead: None };
@@ -182,7 +183,7 @@ pub(super) fn seen_in_sharp(
         bodies: paths.scene.camera_inside.bodies,
         vertex: 0,
     });
-    seen.first().copied()
+    seen.iter().next()
 }
 
 /// Light on its way.
@@ -236,7 +237,7 @@ struct Walk<'a, 'b> {
     start: f64,
     splat: &'b mut dyn FnMut(&SampledWavelengths, Splat),
     /// Where photons are left, if they are wanted.
-    photons: Option<&'b mut Vec<Photon>>,
+    photons: Option<&'b mut Photons>,
     /// What it is aimed at.
     target: Target,
     /// The group of the lamp.
@@ -503,13 +504,19 @@ impl<'a> Walk<'a, '_> {
     /// Leaves a photon where the beam has come to, if photons are wanted.
     fn leave_photon(&mut self, beam: &Beam, surface: &SurfacePoint) {
         let Some(photons) = &mut self.photons else { return };
-        // Of wavelengths that parted each has a photon of its own: none led the others.
-        let (power, rho) = match beam.alone {
-            None => (beam.power, beam.rho),
-            Some(_) => (beam.only(beam.power * (LANES as f32 / beam.rho.reduce_add())), Lanes::ONE),
-        };
-        let (point, came, normal) = (surface.point, -beam.ray.direction, surface.normal);
-        photons.push(Photon { point, came, normal, power, rho, vertices: beam.vertex, group: self.group });
+        let (point, came, normal) = (surface.point, -beam.ray.direction.as_vec3(), surface.normal.as_vec3());
+        let (vertices, group) = (beam.vertex, self.group);
+        match beam.alone {
+            None => {
+                let light = Together { power: beam.power, rho: beam.rho };
+                photons.together.push(Photon { point, came, normal, light, vertices, group });
+            }
+            Some(lane) => {
+                let power = beam.power.to_array()[0] * (LANES as f32 / beam.rho.reduce_add());
+                let light = Alone { power, lane: lane as u8 };
+                photons.alone.push(Photon { point, came, normal, light, vertices, group });
+            }
+        }
     }
 
     /// Light that a surface sends into the camera.

@@ -11,6 +11,7 @@ pub mod light;
 pub mod merge;
 pub mod middle;
 pub mod path;
+pub mod photons;
 pub mod pilot;
 pub mod plan;
 mod shadow;

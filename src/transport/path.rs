@@ -16,7 +16,7 @@ mod state;
 pub mod together;
 
 use super::Incoming;
-use super::merge::PhotonMap;
+use super::photons::PhotonMap;
 use super::plan::{EffectPlan, PathSettings};
 use super::shadow::MAX_BOUNDARIES;
 use super::ways::{First, Found, Ledger};
@@ -466,9 +466,10 @@ impl Tracer<'_> {
             if self.settings.max_depth.is_some_and(|most| path.vertices + photon.vertices + 2 > most) {
                 return Lanes::ZERO;
             }
-            let cosine = photon.came.dot(surface.normal).abs();
-            let f = f(photon.came);
-            let led = f64::from(if CHROMATIC { path.rho * photon.rho } else { photon.rho }.reduce_add());
+            let (came, rho) = (photon.came.as_dvec3(), photon.light.rho);
+            let cosine = came.dot(surface.normal).abs();
+            let f = f(came);
+            let led = f64::from(if CHROMATIC { path.rho * rho } else { rho }.reduce_add());
             let share = LANES as f64 / (led * cosine);
             if share.is_finite() { f * share as f32 } else { Lanes::ZERO }
         })

@@ -6,7 +6,8 @@ use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES};
 use crate::spectrum::SampledWavelengths;
 use crate::transport;
 use crate::transport::light::{Bounds, LightPaths, Splat};
-use crate::transport::merge::{self, Photon, PhotonMap, WavelengthCell};
+use crate::transport::merge::{self, WavelengthCell};
+use crate::transport::photons::{PhotonMap, Photons};
 use crate::transport::plan::Integrator;
 use glam::DVec2;
 use rayon::prelude::*;
@@ -22,8 +23,8 @@ pub struct SplatFilm {
     pub paths: [u64; REPLICATES],
 }
 
-/// Paths of one work unit from the lights.
-pub(super) const PATHS_OF_A_UNIT: u64 = 1 << 14;
+/// Paths of one work unit from the lights: some milliseconds, so that threads end together where a sample has few.
+pub(super) const PATHS_OF_A_UNIT: u64 = 1 << 10;
 
 /// Which paths of the share have been added.
 #[derive(Clone, Debug, Default)]
@@ -50,7 +51,7 @@ impl Part<'_> {
         samples: Range<u32>,
         splats: &Mutex<SplatFilm>,
         pause: &dyn Breaks,
-        photons: Option<&mut Vec<Photon>>,
+        photons: Option<&mut Vec<Photons>>,
     ) -> bool {
         let paths = paths_of_a_sample(self.job, light_paths);
         let wanted = photons.is_some();
@@ -67,7 +68,7 @@ impl Part<'_> {
             units.extend(cuts.filter(|(_, _, add)| *add || wanted));
         }
         let trace = |(sample, unit, add): (u32, Range<u64>, bool)| {
-            let mut left = Vec::new();
+            let mut left = Photons::default();
             if pause.wanted() {
                 return (left, None);
             }
@@ -103,7 +104,7 @@ impl Part<'_> {
             }
         }
         if let Some(photons) = photons {
-            *photons = followed.into_iter().flat_map(|(left, _)| left).collect();
+            *photons = followed.into_iter().map(|(left, _)| left).collect();
         }
         whole
     }
@@ -221,12 +222,12 @@ impl Landed {
 mod tests {
     use super::*;
 
-    /// Own paths 10 to 40 000 of 50 000, of which 100 to 200 are there: every path once, and the right ones added.
+    /// Own paths 10 to 2 500 of 3 000, of which 100 to 200 are there: every path once, and the right ones added.
     #[test]
     fn paths_are_cut_where_the_share_and_what_is_there_begin_and_end() {
-        let found = pieces(50_000, &(10..40_000), &[100..150, 150..200]);
+        let found = pieces(3_000, &(10..2_500), &[100..150, 150..200]);
         let added: Vec<_> = found.iter().filter(|(_, add)| *add).map(|(unit, _)| unit.clone()).collect();
-        assert_eq!(added, [10..100, 200..16_384, 16_384..32_768, 32_768..40_000]);
-        assert_eq!(found.iter().map(|(unit, _)| unit.end - unit.start).sum::<u64>(), 50_000);
+        assert_eq!(added, [10..100, 200..1024, 1024..2048, 2048..2_500]);
+        assert_eq!(found.iter().map(|(unit, _)| unit.end - unit.start).sum::<u64>(), 3_000);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::super::caustics::Caustics;
 use super::super::light::{Bounds, LightPaths, seen_in_sharp};
-use super::super::merge::{Photon, PhotonMap};
+use super::super::photons::{Photon, PhotonMap, Photons, Together};
 use super::super::place_in;
 use super::super::plan::EffectPlan;
 use super::camera::Colour;
@@ -62,7 +62,7 @@ impl Seen {
             let seen = seen_in_sharp(&paths, &ray, &scene.wavelengths.sample(u.x), &sampler)?;
             Some(Photon { vertices: block as u32, ..seen })
         };
-        let places: Vec<Photon> = (0..BLOCKS * BLOCKS)
+        let places: Vec<Photon<Together>> = (0..BLOCKS * BLOCKS)
             .into_par_iter()
             .flat_map_iter(|block| (0..tries).filter_map(move |n| look(block, n)))
             .collect();
@@ -80,12 +80,13 @@ impl Seen {
         let radius = FIRST_RADIUS * pixel;
         let pixels = size.x * size.y / (BLOCKS * BLOCKS * tries as usize) as f64;
         let widened = pixels.sqrt().max(1.0);
+        let places = [Photons { together: places, ..Photons::default() }];
         (radius > 0.0).then(|| Seen { map: PhotonMap::new(&places, 1, radius * widened), pixels, widened, radius })
     }
 
     /// Where the light of a photon would come to.
-    pub fn collect(&self, photon: &Photon, wavelengths: &SampledWavelengths, arrivals: &mut Vec<Arrival>) {
-        let light = photon.power * (LANES as f32 / photon.rho.reduce_add());
+    pub fn collect(&self, photon: &Photon<Together>, wavelengths: &SampledWavelengths, arrivals: &mut Vec<Arrival>) {
+        let light = photon.light.power * (LANES as f32 / photon.light.rho.reduce_add());
         let scale = ALBEDO / (PI * PI * self.radius * self.radius);
         let colour = Colour::of(observer::xyz(light, wavelengths));
         let (by_area, square) = (colour.y * scale, colour.square() * scale * scale);
@@ -93,8 +94,8 @@ impl Seen {
             return;
         }
         let pixels = self.pixels / (self.widened * self.widened);
-        self.map.each_near(photon.point, photon.normal, |seen| {
-            let share = f64::from(seen.power.reduce_add() / seen.rho.reduce_add());
+        self.map.each_near(photon.point, photon.normal.as_dvec3(), |seen| {
+            let share = f64::from(seen.light.power.reduce_add() / seen.light.rho.reduce_add());
             arrivals.push(Arrival {
                 block: seen.vertices as usize,
                 y: by_area * share,
