@@ -81,7 +81,7 @@ const FAINT: f64 = 0.1;
 /// Share of the rest's variance above which light that is met in mirrors and glass is worth merging.
 const WORTH: f64 = 0.3;
 
-/// Nothing traced from the lights, for a reason that is not the pilot's.
+/// Nothing traced from the lights, for this reason.
 #[must_use]
 pub fn left_off(reason: &str) -> (Option<Arc<Caustics>>, Vec<Effect>) {
     (None, vec![technique("light tracing", false, reason.to_owned())])
@@ -97,23 +97,22 @@ pub fn decide(
     samples: u32,
     wishes: Wishes,
 ) -> (Option<Arc<Caustics>>, Vec<Effect>) {
-    let off = |reason: &str| (None, vec![technique("light tracing", false, reason.to_owned())]);
     let Integrator::Path(settings) = &plan.integrator else { return (None, Vec::new()) };
     if wishes.light_tracing == Use::Off {
-        return off("the scene says so");
+        return left_off("the scene says so");
     }
     let casters = Casters::of(scene);
     if casters.balls.is_empty() && casters.endless.is_empty() {
-        return off("nothing mirrors or refracts sharply");
+        return left_off("nothing mirrors or refracts sharply");
     }
     if settings.scatter_samples == 0 || settings.max_depth.is_some_and(|depth| depth < 3) {
-        return off("paths are too short for light of mirrors and glass");
+        return left_off("paths are too short for light of mirrors and glass");
     }
     if settings.count_crossings && settings.max_depth.is_some() && scene.has_boundaries {
-        return off("panes count for the length of paths");
+        return left_off("panes count for the length of paths");
     }
     if plan.layers.layers.iter().any(|layer| matches!(layer.source, Channel::Light(..))) {
-        return off("layers of light are measured path by path from the camera");
+        return left_off("layers of light are measured path by path from the camera");
     }
     // Who counts panes, as scenes read from Mitsuba's XML do, knows only light that a path from the camera can meet.
     let met =
@@ -121,7 +120,7 @@ pub fn decide(
     let traced: Vec<bool> =
         scene.lights.iter().enumerate().map(|(i, l)| met(l) && is_small(scene, i, &casters)).collect();
     if !traced.contains(&true) {
-        return off(if settings.count_crossings {
+        return left_off(if settings.count_crossings {
             "no light that a path from the camera can meet is small or has a sun"
         } else {
             "no light is small or has a sun"
@@ -130,7 +129,7 @@ pub fn decide(
     let caustics = Caustics::untrained(scene, &casters, traced, wishes.packets != Use::Off && casters.parts);
     if caustics.sources.is_empty() {
         let name = casters.endless.first().map_or("", String::as_str);
-        return off(&format!("light from infinity cannot be aimed at what has no end: {name}"));
+        return left_off(&format!("light from infinity cannot be aimed at what has no end: {name}"));
     }
     run(&Trial { scene, plan, settings, filter, seed, samples, wishes, casters: &casters }, caustics)
 }
@@ -194,7 +193,6 @@ fn trimmed(values: &[(usize, f64)], weights: &[f64]) -> f64 {
 
 fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Effect>) {
     let Trial { scene, plan, settings, filter, seed, wishes, casters, .. } = *trial;
-    let off = |reason: String| (None, vec![technique("light tracing", false, reason)]);
     let seen = match wishes.merging {
         Use::Off => None,
         Use::Auto | Use::On => Seen::of(trial, plan, &caustics),
@@ -232,7 +230,10 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
         }
     }
     if found.splatted + found.collected <= 0.0 && wishes.light_tracing == Use::Auto {
-        return off(format!("of {followed} paths from the lights none came to the picture over {}", some(casters)));
+        return left_off(&format!(
+            "of {followed} paths from the lights none came to the picture over {}",
+            some(casters)
+        ));
     }
 
     // Paths from the camera that find light of mean m with a probability p have a variance of m² / p, whether or not so
@@ -273,7 +274,7 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let without = measured.min(kept + mirrored + by_chance(&found.thrown, camera.met)) * a;
     if wishes.light_tracing == Use::Auto && without < with {
         let loss = with / without;
-        return off(format!(
+        return left_off(&format!(
             "the pilot expects it to cost {loss:.1} times as much: paths from the camera find the light over {}, or it hardly counts",
             some(casters)
         ));

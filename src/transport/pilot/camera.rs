@@ -23,8 +23,6 @@ pub(super) struct Camera {
     pub met_mirrored: usize,
     /// Rays of a path.
     pub rays: f64,
-    /// Share of the paths that begin on something sharp.
-    sharp: f64,
 }
 
 /// A colour: luminance and linear Rec. 709, whose channels all count where errors are told.
@@ -65,7 +63,6 @@ struct Shown {
     met_seen: usize,
     /// A ray to the next vertex and one to a light from each, of all samples.
     rays: f64,
-    sharp: usize,
 }
 
 /// Paths from the camera through all blocks: `pixels` of each, two replicates of each with `each` samples. Evenly spread
@@ -89,7 +86,6 @@ pub(super) fn from_camera(shot: &Shot, (pixels, each): (u32, u32)) -> Camera {
             }
             shown.met += usize::from(met);
             shown.rays += f64::from(1 + 2 * light.events);
-            shown.sharp += usize::from(light.mirrored);
         }
         shown
     };
@@ -112,7 +108,6 @@ pub(super) fn from_camera(shot: &Shot, (pixels, each): (u32, u32)) -> Camera {
         met: 0,
         met_mirrored: 0,
         rays: 0.0,
-        sharp: 0.0,
     };
     for (block, [a, b]) in &tried {
         let variance = |a: Colour, b: Colour| 0.5 * f64::from(each) * (a.rgb - b.rgb).length_squared() / 3.0;
@@ -123,7 +118,6 @@ pub(super) fn from_camera(shot: &Shot, (pixels, each): (u32, u32)) -> Camera {
         camera.met += a.met + b.met;
         camera.met_mirrored += a.met_seen + b.met_seen;
         camera.rays += (a.rays + b.rays) / paths as f64;
-        camera.sharp += (a.sharp + b.sharp) as f64 / paths as f64;
     }
     camera
 }
