@@ -1,16 +1,18 @@
 //! What light is carried as: spectra, or for comparison the three numbers that many renderers carry.
 //!
 //! A renderer of red, green and blue multiplies colours where light multiplies spectra. To have that computed by lanes that
-//! are made for wavelengths, red, green and blue are each given a wavelength ([`PLACES_NM`]); each spectrum of the scene is
-//! replaced by one that has there the values of its linear Rec. 709 colour; and [`Carried::rgb_from_film`] takes the sums of the film,
-//! which are linear in the three, back. What is left is the error of the three numbers themselves:
+//! are made for wavelengths, red, green and blue are each given a wavelength ([`PLACES_NM`]). Each spectrum of the scene is
+//! replaced by one that has there the values of its linear Rec. 709 colour. The sums of the film are linear in the three:
+//! [`Carried::rgb_from_film`] takes them back. What is left is the error of the three numbers themselves:
 //!
-//! * a reflectance is its colour under D65, kept to [0, 1]; a coefficient (absorption, scattering) likewise, without the bound;
+//! * a reflectance is its colour under D65, kept to [0, 1];
+//! * a coefficient (absorption, scattering) is its colour under D65, kept from below zero;
 //! * a light is its colour, kept from below zero: what lies outside the gamut of Rec. 709 cannot be carried;
-//! * a metal has its colour at normal incidence: n is taken as a coefficient is, and k such that the colour comes out;
+//! * a metal has its colour at normal incidence: n is its colour under D65, and k such that the metal's comes out. Where no k
+//!   does that, k is zero and n does;
 //! * a refractive index is that of the sodium line: no dispersion.
 //!
-//! Thin films are computed at the three wavelengths, and so are pictures of measured spectra: no colour is made of them first.
+//! Thin films and pictures of measured spectra are computed at the three wavelengths: no colour is made of them first.
 
 use crate::spectrum::colour::{ColourSpace, Matrix, inverse, times};
 use crate::spectrum::illuminant::d65;
@@ -69,7 +71,7 @@ impl Carried {
         let both = [eta.breakpoints(), k.breakpoints()].concat();
         let colour = colour_under_d65(reflectance, &both).map(|r| r.clamp(0.0, BRIGHTEST));
         let n = under_d65(&eta);
-        // R = ((n − 1)² + k²) / ((n + 1)² + k²), solved for k²; where it is below zero for n, without k.
+        // R = ((n − 1)² + k²) / ((n + 1)² + k²), solved for k²; where that is below zero, for n without k.
         let pairs: [[f64; 2]; 3] = std::array::from_fn(|c| {
             let (n, r) = (n[c], colour[c]);
             let squared = (r * (n + 1.0).powi(2) - (n - 1.0).powi(2)) / (1.0 - r);
@@ -129,6 +131,7 @@ impl Carried {
         }
     }
 
+    /// Steps of `values`; a constant stays as it is.
     fn replaced(self, s: Spectrum, values: impl Fn(&Spectrum) -> [f64; 3]) -> Spectrum {
         match self {
             Carried::Colours if !s.is_constant() => steps(values(&s)),
@@ -137,9 +140,10 @@ impl Carried {
     }
 }
 
-/// A reflectance of one would need an infinite k.
+/// The largest reflectance of a metal in a channel: one would need an infinite k.
 const BRIGHTEST: f64 = 0.9999;
 
+/// The colour of light in linear Rec. 709.
 fn rgb(s: &Spectrum) -> [f64; 3] {
     times(ColourSpace::Rec709.matrix_from_xyz(), tristimulus(s))
 }
@@ -164,7 +168,7 @@ fn colour_under_d65(factor: impl Fn(f64) -> f64, breakpoints: &[f64]) -> [f64; 3
     std::array::from_fn(|c| sum[c] / white[c])
 }
 
-/// Where blue ends and where red begins, nm: such that under D65 each has its share of the luminance of Rec. 709, so that the
+/// Where blue ends and where red begins, nm. Under D65 each has its share of the luminance of Rec. 709 there, so that the
 /// luminance of steps is that of their colour.
 static BORDERS_NM: LazyLock<[f64; 2]> = LazyLock::new(|| {
     let light = d65();
@@ -202,19 +206,19 @@ fn steps([red, green, blue]: [f64; 3]) -> Spectrum {
 mod tests {
     use super::*;
     use crate::spectrum::observer::xyz;
-    use crate::spectrum::{Lanes, catalogue};
+    use crate::spectrum::{LANES, Lanes, catalogue};
 
     const RED: [f64; 3] = [0.7, 0.1, 0.05];
 
-    /// The mean over a path's turns is what a film gathers: the three come back, to the rounding of f32.
+    /// From whichever lane the turn begins, the film gives the three back. Upsampling is exact to 1e-5. A value, its weight,
+    /// their product and the sum of eight are ten roundings to f32 of 6e-8, which the matrix, of condition 3.4, makes 2e-6.
     #[test]
     fn three_numbers_go_through_lanes_and_film_unchanged() {
         let wavelengths = Carried::Colours.wavelengths().unwrap();
         let s = Carried::Colours.reflectance(upsample::reflectance(RED).unwrap());
-        for turn in 0..8 {
-            let drawn = wavelengths.sample((f64::from(turn) + 0.5) / 8.0);
+        for turn in 0..LANES {
+            let drawn = wavelengths.sample((turn as f64 + 0.5) / LANES as f64);
             let found = times(Carried::Colours.rgb_from_film(), xyz(s.eval(drawn.nm), &drawn).map(f64::from));
-            // Upsampling is exact to 1e-5, and the inverse of the matrix is of condition 20.
             assert!(found.iter().zip(RED).all(|(a, b)| (a - b).abs() < 2e-5), "{turn}: {found:?}");
         }
     }
@@ -244,17 +248,17 @@ mod tests {
     #[test]
     fn a_metal_has_its_colour_at_normal_incidence() {
         let (eta, k) = catalogue::metal("Au").unwrap();
-        let [n, k] = Carried::Colours.metal([eta.clone(), k.clone()]).map(|s| PLACES_NM.map(|nm| s.at(nm)));
-        let curve = |nm: f64| {
-            let (n, k) = (eta.at(nm), catalogue::metal("Au").unwrap().1.at(nm));
+        let reflectance = |[eta, k]: [&Spectrum; 2], nm: f64| {
+            let (n, k) = (eta.at(nm), k.at(nm));
             ((n - 1.0).powi(2) + k * k) / ((n + 1.0).powi(2) + k * k)
         };
-        let samples: Vec<(f64, f64)> =
-            (0..=4700).map(|i| 360.0 + 0.1 * f64::from(i)).map(|nm| (nm, curve(nm))).collect();
+        let curve = |nm: f64| (nm, reflectance([&eta, &k], nm));
+        let samples: Vec<(f64, f64)> = (0..=4700).map(|i| curve(360.0 + 0.1 * f64::from(i))).collect();
         let colour = rgb(&Spectrum::from_samples(&samples, Outside::Hold).unwrap().times(&d65()));
         let white = rgb(&d65());
+        let [eta, k] = Carried::Colours.metal([eta.clone(), k.clone()]);
         for c in 0..3 {
-            let found = ((n[c] - 1.0).powi(2) + k[c] * k[c]) / ((n[c] + 1.0).powi(2) + k[c] * k[c]);
+            let found = reflectance([&eta, &k], PLACES_NM[c]);
             let expected = (colour[c] / white[c]).min(BRIGHTEST);
             assert!((found - expected).abs() < 1e-4, "{c}: {found} {expected}");
         }

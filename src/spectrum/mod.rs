@@ -31,6 +31,7 @@ pub use index::RefractiveIndex;
 pub use spectra::Spectrum;
 pub use table::{Outside, Table};
 pub use wavelengths::{SampledWavelengths, WavelengthDistribution};
+
 /// One number for each of the eight wavelengths of a path.
 #[cfg(not(feature = "four_lanes"))]
 pub use wide::f32x8 as Lanes;
