@@ -181,7 +181,6 @@ fn is_linear(decoded: &image::DynamicImage) -> bool {
 /// # Errors
 /// As [`picture`]; values above one are refused.
 pub fn image_texture(path: &Path, decoded: Decoded, raw: bool, carried: Carried) -> Result<ImageTexture> {
-    let reflectance_texel = |rgb: [f32; 3]| Texel { coefficients: carried.coefficients(rgb), scale: 1.0 };
     let make = |texels: Texels, width: usize, height: usize| ImageTexture {
         texels,
         grid: Grid::new(width, height),
@@ -198,7 +197,7 @@ pub fn image_texture(path: &Path, decoded: Decoded, raw: bool, carried: Carried)
     match decoded {
         Decoded::Bytes { rgb, width, height, counted } => {
             let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };
-            Ok(make(upsampled_bytes(counted.unwrap_or_else(|| count(&rgb)), &level, reflectance_texel), width, height))
+            Ok(make(upsampled_bytes(counted.unwrap_or_else(|| count(&rgb)), &level, carried), width, height))
         }
         Decoded::Other(decoded) if !is_linear(&decoded) => {
             let (width, height) = (decoded.width() as usize, decoded.height() as usize);
@@ -207,7 +206,7 @@ pub fn image_texture(path: &Path, decoded: Decoded, raw: bool, carried: Carried)
                 if raw { x } else { colour::srgb_decode(x) }
             };
             let rgb = decoded.into_rgb16();
-            let texel = |p: &[u16]| reflectance_texel([level(p[0]), level(p[1]), level(p[2])]);
+            let texel = |p: &[u16]| reflectance_texel([level(p[0]), level(p[1]), level(p[2])], carried);
             Ok(make(Texels::each(rgb.as_raw().par_chunks_exact(3).map(texel).collect()), width, height))
         }
         decoded => {
@@ -220,10 +219,14 @@ pub fn image_texture(path: &Path, decoded: Decoded, raw: bool, carried: Carried)
                     format!("expected reflectances from 0 to 1, found {found:?} at ({x}, {y})"),
                 ));
             }
-            let texels = picture.pixels.par_iter().map(|&rgb| reflectance_texel(rgb)).collect();
+            let texels = picture.pixels.par_iter().map(|&rgb| reflectance_texel(rgb, carried)).collect();
             Ok(make(Texels::each(texels), picture.width, picture.height))
         }
     }
+}
+
+fn reflectance_texel(rgb: [f32; 3], carried: Carried) -> Texel {
+    Texel { coefficients: carried.coefficients(rgb), scale: 1.0 }
 }
 
 /// The colours of pixels (red, green, blue in turn).
@@ -247,8 +250,8 @@ fn count(pixels: &[u8]) -> Counted {
 }
 
 /// Texels of pixels of the given levels. Many share a colour: each is upsampled once.
-fn upsampled_bytes(counted: Counted, level: &[f32; 256], upsampled: impl Fn([f32; 3]) -> Texel + Sync) -> Texels {
-    let texel = |c: &[u8; 3]| upsampled(c.map(|x| level[usize::from(x)]));
+fn upsampled_bytes(counted: Counted, level: &[f32; 256], carried: Carried) -> Texels {
+    let texel = |c: &[u8; 3]| reflectance_texel(c.map(|x| level[usize::from(x)]), carried);
     let colours = counted.colours.par_iter().with_min_len(256).map(texel).collect();
     Texels { colours: Arc::new(colours), numbers: Some(Arc::new(counted.numbers)) }
 }
@@ -337,10 +340,7 @@ mod tests {
     fn colours_of_eight_bits_are_upsampled_once_each() {
         let pixels = [255, 255, 255, 10, 20, 30, 0, 0, 0, 10, 20, 30, 200, 10, 99];
         let level = colour::srgb8_table();
-        let texels = upsampled_bytes(count(&pixels), &level, |rgb| Texel {
-            coefficients: upsample::coefficients(rgb),
-            scale: 1.0,
-        });
+        let texels = upsampled_bytes(count(&pixels), &level, Carried::Spectra);
         for (i, p) in pixels.chunks_exact(3).enumerate() {
             let texel = texels.at(i);
             let rgb = [0, 1, 2].map(|k| colour::srgb_decode(f32::from(p[k]) / 255.0));
