@@ -9,7 +9,7 @@ mod page;
 
 use super::report::{Report, SceneReport, Status};
 use crate::error::{Error, Result};
-use crate::film::exr::header::{Header, read_headers};
+use crate::film::exr::header::read_headers;
 use crate::film::heat::{Small, blocks};
 use crate::film::output::{directory_of, write_atomically, write_pieces};
 use crate::film::png::inspect;
@@ -17,6 +17,7 @@ use crate::spectrum::ColourSpace;
 use crate::spectrum::colour::{srgb_encode, srgb8_table};
 use font8x8::UnicodeFonts;
 use image::ImageEncoder;
+use page::Figures;
 use std::path::{Path, PathBuf};
 
 /// The largest side of a thumbnail and of an error map.
@@ -35,16 +36,7 @@ struct Card {
     thumbnail: Small,
     error_map: Option<Small>,
     /// What the header of a picture that was there already says.
-    past: Option<Past>,
-}
-
-/// Figures of a picture that was there already, from its header.
-struct Past {
-    samples: f64,
-    seconds: f64,
-    error: Option<[f64; 3]>,
-    valid: bool,
-    halving_seconds: Option<f64>,
+    past: Option<Figures>,
 }
 
 /// Gathers what a sheet needs while a batch is rendered.
@@ -69,8 +61,11 @@ impl Contact {
         let png = exr.with_extension("png");
         // A picture that someone has taken away meanwhile is not on the sheet.
         let Some(thumbnail) = thumbnail(&png, self.side) else { return };
-        let past = matches!(report.status, Status::Skipped).then(|| read_headers(exr).ok().map(|h| past(&h.parts[0])));
-        self.cards.push(Card { scene, exr: exr.clone(), png, thumbnail, error_map, past: past.flatten() });
+        let past = match report.status {
+            Status::Skipped => read_headers(exr).ok().map(|headers| Figures::past(&headers.parts[0])),
+            Status::Done | Status::Failed { .. } => None,
+        };
+        self.cards.push(Card { scene, exr: exr.clone(), png, thumbnail, error_map, past });
         let most = EMBEDDED * (SIDE / self.side) * (SIDE / self.side);
         if self.cards.len() > most && self.side > LEAST_SIDE {
             self.side /= 2;
@@ -131,7 +126,7 @@ impl Contact {
                 out.rgb[start..start + line.len()].copy_from_slice(line);
             }
             if labelled {
-                let facts = page::Figures::of(card, &report.scenes[card.scene]);
+                let facts = Figures::of(card, &report.scenes[card.scene]);
                 write_text(&mut out, [x, y + tallest + 4], cell[0], &report.scenes[card.scene].label(), 225);
                 write_text(&mut out, [x, y + tallest + 4 + LINE], cell[0], &facts.short(), 150);
             }
@@ -208,21 +203,6 @@ fn encode(small: &Small) -> std::result::Result<Vec<u8>, String> {
         .write_image(&small.rgb, small.width as u32, small.height as u32, image::ExtendedColorType::Rgb8)
         .map_err(|e| e.to_string())?;
     Ok(bytes)
-}
-
-fn past(header: &Header) -> Past {
-    let interval = header.text("abbe/relativeErrorInterval95").unwrap_or("");
-    let ends: Vec<f64> = interval.split(' ').filter_map(|end| end.parse().ok()).collect();
-    Past {
-        samples: header.number("abbe/samples").unwrap_or(0.0),
-        seconds: header.number("abbe/renderSeconds").unwrap_or(0.0),
-        error: match (header.number("abbe/relativeError"), ends.as_slice()) {
-            (Some(error), [low, high]) => Some([error, *low, *high]),
-            _ => None,
-        },
-        valid: header.text("abbe/relativeErrorState") == Some("valid"),
-        halving_seconds: header.number("abbe/secondsToHalveError").filter(|s| s.is_finite()),
-    }
 }
 
 /// The way from `dir` to `file`, as a link has it.

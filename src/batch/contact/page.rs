@@ -3,12 +3,14 @@
 use super::{Card, EMBEDDED, encode, link};
 use crate::batch::accuracy::page::base64;
 use crate::batch::report::{Report, SceneReport, Status};
+use crate::film::exr::header::Header;
 use crate::film::heat::Small;
 use crate::transport::plan::Effect;
 use std::io::Write;
 use std::path::Path;
 
 /// Figures of a picture, from its report or, where it was there already, from its header.
+#[derive(Clone, Copy)]
 pub(super) struct Figures {
     samples: f64,
     seconds: f64,
@@ -20,23 +22,30 @@ pub(super) struct Figures {
 
 impl Figures {
     pub(super) fn of(card: &Card, scene: &SceneReport) -> Figures {
-        match &card.past {
-            Some(past) => Figures {
-                samples: past.samples,
-                seconds: past.seconds,
-                error: past.error,
-                valid: past.valid,
-                halving_seconds: past.halving_seconds.filter(|_| past.valid),
+        let valid = scene.error.is_some_and(|e| e.valid);
+        card.past.unwrap_or_else(|| Figures {
+            samples: f64::from(scene.samples),
+            seconds: scene.seconds.rendering,
+            error: scene.error.map(|e| [e.rel_rmse, e.low, e.high]),
+            valid,
+            halving_seconds: scene.halving_seconds.filter(|s| s.is_finite() && valid),
+        })
+    }
+
+    /// Of a picture that was there already.
+    pub(super) fn past(header: &Header) -> Figures {
+        let interval = header.text("abbe/relativeErrorInterval95").unwrap_or("");
+        let ends: Vec<f64> = interval.split(' ').filter_map(|end| end.parse().ok()).collect();
+        let valid = header.text("abbe/relativeErrorState") == Some("valid");
+        Figures {
+            samples: header.number("abbe/samples").unwrap_or(0.0),
+            seconds: header.number("abbe/renderSeconds").unwrap_or(0.0),
+            error: match (header.number("abbe/relativeError"), ends.as_slice()) {
+                (Some(error), [low, high]) => Some([error, *low, *high]),
+                _ => None,
             },
-            None => Figures {
-                samples: f64::from(scene.samples),
-                seconds: scene.seconds.rendering,
-                error: scene.error.map(|e| [e.rel_rmse, e.low, e.high]),
-                valid: scene.error.is_some_and(|e| e.valid),
-                halving_seconds: scene
-                    .halving_seconds
-                    .filter(|s| s.is_finite() && scene.error.is_some_and(|e| e.valid)),
-            },
+            valid,
+            halving_seconds: header.number("abbe/secondsToHalveError").filter(|s| s.is_finite() && valid),
         }
     }
 
@@ -97,7 +106,7 @@ fn plural(n: usize, what: &str) -> String {
     if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }
 
-/// Writes the page of `cards`, for the directory `dir`, figure by figure: all of a long batch together are large.
+/// Writes the page of `cards` for the directory `dir`, figure by figure: those of a long batch are large together.
 pub(super) fn write(out: &mut dyn Write, cards: &[Card], dir: &Path, report: &Report) -> std::io::Result<()> {
     let embed = cards.len() <= EMBEDDED;
     let maps = cards.iter().any(|card| card.error_map.is_some());
@@ -105,7 +114,7 @@ pub(super) fn write(out: &mut dyn Write, cards: &[Card], dir: &Path, report: &Re
     let mut pieces = include_str!("page.html").split("{{");
     out.write_all(pieces.next().unwrap_or_default().as_bytes())?;
     for piece in pieces {
-        let (field, text) = piece.split_once("}}").unwrap_or_default();
+        let (field, text) = piece.split_once("}}").expect("each field of page.html is closed");
         match field {
             "title" => {
                 let title = report.source.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -136,7 +145,8 @@ pub(super) fn write(out: &mut dyn Write, cards: &[Card], dir: &Path, report: &Re
                     out.write_all(figure(i, card, scene(card), dir, embed).as_bytes())?;
                 }
             }
-            _ => {}
+            "switch" | "scale" => {}
+            other => unreachable!("page.html asks for {other}"),
         }
         out.write_all(text.as_bytes())?;
     }
