@@ -162,10 +162,10 @@ pub struct SceneReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub numerics: Option<Counts>,
     /// Each effect, on or off, with its reason.
-    #[serde(serialize_with = "all")]
+    #[serde(serialize_with = "shared")]
     pub effects: Arc<[Effect]>,
     /// How they were computed.
-    #[serde(serialize_with = "all")]
+    #[serde(serialize_with = "shared")]
     pub techniques: Arc<[Effect]>,
     /// From which wavelengths samples were drawn.
     pub wavelengths: String,
@@ -175,26 +175,27 @@ pub struct SceneReport {
     pub files: Vec<PathBuf>,
 }
 
-fn all<S: Serializer>(effects: &Arc<[Effect]>, serializer: S) -> Result<S::Ok, S::Error> {
+/// What `serde` does for an [`Arc`] only with its feature `rc`.
+fn shared<S: Serializer>(effects: &Arc<[Effect]>, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(effects.iter())
 }
 
-/// Moves what reports hold to one place; effects and techniques, most of a report, are one for all in a row that have the
+/// Copies what reports hold to one place. Effects and techniques, most of a report, are one for all in a row that have the
 /// same. `before` is the report before the first.
 ///
 /// Reports are made piece by piece beside scenes and films. A piece that stays cuts the room that these leave, and what is
-/// made for the next scene, as large as that of the last, does not fit in again: memory would grow by the bulk of a scene
+/// made for the next scene, as large as that of the last, does not fit in again. Memory would grow by the bulk of a scene
 /// for each piece.
 pub fn gather(before: Option<&SceneReport>, reports: &mut [SceneReport]) {
     let mut copies: Vec<SceneReport> = Vec::with_capacity(reports.len());
     for report in &*reports {
-        let like = copies.last().or(before);
-        let shared = |own: &Arc<[Effect]>, other: Option<&Arc<[Effect]>>| match other {
-            Some(other) if other == own => Arc::clone(other),
+        let last = copies.last().or(before);
+        let copy = |own: &Arc<[Effect]>, last: Option<&Arc<[Effect]>>| match last {
+            Some(last) if last == own => Arc::clone(last),
             _ => own.iter().cloned().collect(),
         };
-        let effects = shared(&report.effects, like.map(|like| &like.effects));
-        let techniques = shared(&report.techniques, like.map(|like| &like.techniques));
+        let effects = copy(&report.effects, last.map(|last| &last.effects));
+        let techniques = copy(&report.techniques, last.map(|last| &last.techniques));
         copies.push(SceneReport { effects, techniques, ..report.clone() });
     }
     for (report, copy) in reports.iter_mut().zip(copies) {
