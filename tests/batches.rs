@@ -20,9 +20,8 @@ fn resident(process: u32) -> u64 {
     line.trim().trim_end_matches(" kB").parse().unwrap()
 }
 
-/// What is kept of a scene: 0.7 kB of a report with three to eight strings and paths of 16 to 112 bytes, 0.5 kB of the
-/// entry of the batch; so that 2 kB are enough, and 5 kB leave room for the allocator's own. Scenes whose bulk stayed
-/// would be 65 kB each.
+/// What is kept of a scene: 0.7 kB of a report, three to eight strings and paths of 16 to 112 bytes, 0.5 kB of the entry of
+/// the batch. 2 kB are enough, and 5 kB leave room for the allocator's own. Scenes whose bulk stayed would be 65 kB each.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_batch_holds_little_of_each_scene_that_is_done() {
@@ -82,7 +81,13 @@ fn tasks_that_share_a_directory_keep_a_report_each() {
     assert_eq!(reports("out"), ["report.1-2.json", "report.3.json", "report.a.0007.json", "report.b.0007.json"]);
     assert_eq!(tells("out/report.1-2.json"), ["a 1", "a 2", "b 1", "b 2"]);
     assert_eq!(tells("out/report.3.json"), ["a 3", "b 3"]);
-    assert_eq!(tells("out/report.b.0007.json"), ["b 7"]);
-    assert_eq!(reports("out/b"), ["report.b.7.tile0of2.json", "report.b.7.tile1of2.json"]);
-    assert_eq!(tells("out/b/report.b.7.tile1of2.json"), ["b 7"]);
+    for scene in ["a", "b"] {
+        let told = [format!("{scene} 7")];
+        assert_eq!(tells(&format!("out/report.{scene}.0007.json")), told);
+        let tiles = ["tile0of2", "tile1of2"].map(|tile| format!("report.{scene}.7.{tile}.json"));
+        assert_eq!(reports(&format!("out/{scene}")), tiles);
+        for tile in tiles {
+            assert_eq!(tells(&format!("out/{scene}/{tile}")), told);
+        }
+    }
 }

@@ -3,7 +3,7 @@
 mod common;
 
 use abbe::film::exr::read_exr;
-use abbe::spectrum::{ColourSpace, Spectrum, observer, upsample};
+use abbe::spectrum::{ColourSpace, Spectrum, colour, observer, upsample};
 use common::place::Place;
 use serde_json::Value;
 
@@ -17,6 +17,11 @@ shapes:
 - rectangle: {corner: [-3, -1, -2], edge_u: [0, 0, 5], edge_v: [6, 0, 0]}
 - sphere: {center: [-1.5, 3.5, 2], radius: 0.5, emission: 30}
 ";
+
+/// The colour of light in linear Rec. 709.
+fn rgb(s: &Spectrum) -> [f64; 3] {
+    colour::times(ColourSpace::Rec709.matrix_from_xyz(), observer::tristimulus(s))
+}
 
 /// The exit code, and what was said on both outputs.
 fn abbe(place: &Place, arguments: &str) -> (i32, String) {
@@ -146,9 +151,9 @@ fn against_a_closed_form_the_sheet_finds_the_bias_that_is_there() {
     assert_eq!(abbe(&place, "accuracy scene.yaml --truth 0").0, 2);
 }
 
-/// A coloured wall that fills the view, in coloured light that is the same from everywhere: its radiance is that of the
-/// light times its reflectance, wavelength by wavelength; three numbers are multiplied instead. Both colours are those of
-/// smooth spectra, so both products are known. Errors are four of the sheet's, and 2e-4 of what upsampling is off by.
+/// A coloured wall fills the view, in coloured light that is the same from everywhere. Its radiance is that of the light times
+/// its reflectance, wavelength by wavelength; three numbers are multiplied instead. Both colours are those of smooth
+/// spectra, so both products are known. Bounds are four errors of the sheet and the 2e-4 that upsampling may be off by.
 #[test]
 fn transport_of_three_numbers_errs_as_products_of_colours_do() {
     let (wall, light) = ([0.8, 0.3, 0.05], [0.1, 0.5, 1.0]);
@@ -164,10 +169,6 @@ fn transport_of_three_numbers_errs_as_products_of_colours_do() {
     let sheet = &place.json("sheet/accuracy.json")[0];
     let rows = sheet["rows"].as_array().unwrap();
     let row = rows.iter().find(|row| row["knob"] == "transport").unwrap();
-    let rgb = |s: &Spectrum| {
-        let xyz = observer::tristimulus(s);
-        ColourSpace::Rec709.matrix_from_xyz().map(|r| r[0] * xyz[0] + r[1] * xyz[1] + r[2] * xyz[2])
-    };
     let spectral = rgb(&upsample::emission(light).unwrap().times(&upsample::reflectance(wall).unwrap()));
     let of_light = rgb(&upsample::emission(light).unwrap());
     let expected: [f64; 3] = std::array::from_fn(|c| of_light[c] * wall[c] / spectral[c]);
@@ -175,13 +176,13 @@ fn transport_of_three_numbers_errs_as_products_of_colours_do() {
         let [found, error] = ["value", "error"].map(|key| row["light"][c][key].as_f64().unwrap());
         assert!((found - expected).abs() < 4.0 * error + 2e-4 * expected, "{c}: {found} ± {error}, {expected}");
     }
-    // Far from one in two of them, or little would be told.
+    // In two channels or more the products are 2 % apart, so that one is told from the other.
     assert!(expected.iter().filter(|x| (*x - 1.0).abs() > 0.02).count() >= 2, "{expected:?}");
     assert!(said.contains("RGB finds"), "{said}");
 }
 
-/// The scenes of `configs/closed_form` have the light that stands in them, whatever a knob is moved to: no bias of any
-/// setting stands out by four of its errors, and the error that a picture states of itself is the one that it has.
+/// The scenes of `configs/closed_form` have the light that stands in them, whatever a knob is moved to: no bias exceeds four
+/// of its errors. The interval that a picture states of its error holds the one that it has.
 #[test]
 fn shipped_scenes_of_known_light_have_it() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/closed_form");
@@ -197,8 +198,7 @@ fn shipped_scenes_of_known_light_have_it() {
             assert!(bias.abs() < 4.0 * error + 1e-10, "{name}: {row}");
         }
         assert_eq!(abbe(&place, &format!("render {scene} -q -o p.exr")).0, 0);
-        let white = observer::tristimulus(&Spectrum::constant(truth));
-        let white = ColourSpace::Rec709.matrix_from_xyz().map(|r| r[0] * white[0] + r[1] * white[1] + r[2] * white[2]);
+        let white = rgb(&Spectrum::constant(truth));
         let floor = 0.01 * (white.iter().sum::<f64>() / 3.0).powi(2);
         let image = read_exr(&place.path("p.exr")).unwrap();
         let square = |c: usize| {
@@ -213,8 +213,7 @@ fn shipped_scenes_of_known_light_have_it() {
     }
 }
 
-/// This very program beside itself finds the same picture: as much light, and no bias; and what is no build or no knob is
-/// told.
+/// This very program beside itself finds the same picture. What is no build or no knob is told.
 #[test]
 fn another_build_has_a_row_of_its_own() {
     let place = Place::of(SCENE);
@@ -227,7 +226,7 @@ fn another_build_has_a_row_of_its_own() {
     let knobs: Vec<&str> = rows.iter().map(|row| row["knob"].as_str().unwrap()).collect();
     assert_eq!(knobs, ["chosen", "depth", "depth", "depth", "depth", "build", "file"]);
     for key in ["samples", "light", "noise", "bias_squared"] {
-        // The same samples in one sum or after several passes.
+        // The film adds integers: the same samples give the same digits, in one pass or several.
         assert_eq!(rows[5][key], rows[0][key], "{key}");
     }
     assert_eq!(rows[5]["value"], program);
