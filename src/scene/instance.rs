@@ -20,7 +20,7 @@ use super::shape::Detail;
 use super::{Geometry, Hit, Object, SurfacePoint};
 use crate::math::dd::{Dd, Dd3};
 use crate::math::{Departure, Ray};
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::sync::Arc;
 
 /// Objects that are placed together: a run of `Scene::objects`.
@@ -81,6 +81,13 @@ impl AffineMap {
         let direction = self.object_from_world.transform_vector3(ray.direction);
         let length = direction.length();
         (Ray::new(self.object_from_world.transform_point3(ray.origin), direction / length), length)
+    }
+
+    /// What textbooks make of [`AffineMap::enter`] in single precision: see [`crate::scene::watch`].
+    pub(super) fn enter_plain(&self, origin: Vec3, direction: Vec3) -> (Vec3, Vec3) {
+        let DAffine3 { matrix3, translation } = self.object_from_world;
+        let matrix = matrix3.as_mat3();
+        (matrix * origin + translation.as_vec3(), (matrix * direction).normalize())
     }
 
     /// A surface of the group as it lies in the world. Normals go by the inverse transpose, which keeps

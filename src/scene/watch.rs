@@ -1,14 +1,19 @@
 //! What robust arithmetic was needed for, counted where `abbe render --check-numerics` asks for it.
 //!
-//! The textbook intersector in single precision ([`plain`]) is asked about the same rays. Where it
-//! finds nothing of a surface that a path met, light would have leaked; where it finds the face that a ray leaves, ahead
-//! of anything that is there, the ray would have hit its own origin: what other renderers keep an epsilon for. Triangles
-//! and analytic shapes are judged, in place; children of instances, curves and distance grids are counted as met only.
+//! Textbook intersectors in single precision are asked about the same rays: [`plain`] of shapes and triangles,
+//! `sdf/plain.rs` of cells of distance grids, `curves/plain.rs` of segments of curves; of children of instances in the
+//! group's space, where the ray comes by the inverse map in single precision. Where they find nothing of a surface that
+//! a path met, light would have leaked. Where they find what a ray leaves, ahead of anything that is there, the ray would
+//! have hit its own origin: what other renderers keep an epsilon for. A curve is met only from outside, so that only a
+//! ray that goes through it does so: one that rounding puts before the surface that it was to be behind.
+//!
+//! A triangle, cell or segment is judged by itself: a ray that slips over its edge counts as one that misses, though its
+//! neighbour may catch it.
 
 use super::shape::plain;
 use super::{Geometry, Hit, Scene};
 use crate::math::{Departure, Ray};
-use glam::DVec3;
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -82,44 +87,63 @@ impl Watch {
     }
 }
 
-/// The corners of a triangle in the world.
-fn corners(mesh: &super::TriangleMesh, triangle: u32) -> [DVec3; 3] {
-    mesh.mesh.vertices(triangle).map(|v| mesh.mesh.origin + v)
+/// A ray in the space of an object, as robust arithmetic has it and in single precision.
+struct Local {
+    robust: Ray,
+    origin: Vec3,
+    direction: Vec3,
 }
 
-/// Whether single precision finds nothing of the object at all on `ray`.
+/// `ray` of the world in the space of the objects of `instance`, if it is one.
+fn enter(scene: &Scene, ray: &Ray, instance: Option<u32>) -> Local {
+    let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
+    match instance.map(|i| &scene.objects[i as usize].geometry) {
+        Some(Geometry::Instance(instance)) => {
+            let (origin, direction) = instance.map.enter_plain(origin, direction);
+            Local { robust: instance.map.enter(ray).0, origin, direction }
+        }
+        _ => Local { robust: *ray, origin, direction },
+    }
+}
+
+impl Local {
+    /// Where single precision meets a shape, or the one triangle, cell or segment `part`.
+    fn meet(&self, geometry: &Geometry, part: u32) -> Option<f32> {
+        let (origin, direction) = (self.origin, self.direction);
+        match geometry {
+            Geometry::Shape(shape) => shape.plain().intersect(origin, direction, 0.0, f32::INFINITY).map(|(t, _)| t),
+            Geometry::Mesh(mesh) => {
+                let corners = mesh.mesh.vertices(part).map(|v| (mesh.mesh.origin + v).as_vec3());
+                plain::triangle(corners, origin, direction, 0.0, f32::INFINITY)
+            }
+            Geometry::Sdf(sdf) => sdf.meet_plain(part, origin, direction),
+            Geometry::Curves(curves) => curves.meet_plain(part, origin, direction),
+            // Its children are asked.
+            Geometry::Instance(_) => None,
+        }
+    }
+}
+
+/// Whether single precision finds nothing of what was met, on the same ray.
 fn is_missed(scene: &Scene, ray: &Ray, hit: &Hit) -> bool {
-    if hit.instance.is_some() {
-        return false;
-    }
-    let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
-    match &scene.objects[hit.object as usize].geometry {
-        Geometry::Shape(shape) => shape.plain().intersect(origin, direction, 0.0, f32::INFINITY).is_none(),
-        Geometry::Mesh(mesh) => {
-            let corners = corners(mesh, hit.part).map(|v| v.as_vec3());
-            plain::triangle(corners, origin, direction, 0.0, f32::INFINITY).is_none()
-        }
-        Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
-    }
+    let local = enter(scene, ray, hit.instance);
+    local.meet(&scene.objects[hit.object as usize].geometry, hit.part).is_none()
 }
 
-/// Whether single precision meets the face that `ray` leaves where the ray does not come back to it.
+/// Whether single precision meets the part that `ray` leaves where the ray does not come back to it.
 fn is_met_again(scene: &Scene, ray: &Ray, departure: Departure) -> bool {
-    if departure.instance.is_some() {
-        return false;
-    }
-    let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
-    match &scene.objects[departure.object as usize].geometry {
-        Geometry::Shape(shape) => {
-            let met = shape.plain().intersect(origin, direction, 0.0, f32::INFINITY);
-            let far = shape.intersect(ray, f64::INFINITY, Some(departure.part as u8));
-            // The root at the origin is nothing but rounding; the far one is the same in both.
-            met.is_some_and(|(t, _)| far.is_none_or(|far| f64::from(t) < 0.5 * far.t))
-        }
-        Geometry::Mesh(mesh) => {
-            let corners = corners(mesh, departure.part).map(|v| v.as_vec3());
-            plain::triangle(corners, origin, direction, 0.0, f32::INFINITY).is_some()
-        }
-        Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
-    }
+    let Departure { object, part, instance } = departure;
+    let local = enter(scene, ray, instance);
+    let geometry = &scene.objects[object as usize].geometry;
+    let Some(t) = local.meet(geometry, part) else { return false };
+    let far = match geometry {
+        // A ray that leaves a triangle never comes back to it.
+        Geometry::Mesh(_) => None,
+        _ => geometry.meet(&local.robust, f64::INFINITY, Some(part)),
+    };
+    // The root at the origin is nothing but rounding; the far one is the same in both.
+    far.is_none_or(|far| f64::from(t) < 0.5 * far.t)
 }
+
+#[cfg(test)]
+mod tests;

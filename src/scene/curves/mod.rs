@@ -14,6 +14,7 @@
 
 mod cone;
 mod file;
+mod plain;
 #[cfg(test)]
 mod tests;
 mod tube;

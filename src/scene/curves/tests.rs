@@ -179,6 +179,54 @@ fn a_tube_is_entered_where_the_circles_begin() {
     assert!(hits > 400 && misses > 20, "{hits} {misses}");
 }
 
+/// Of random curves whose radius changes, seen from four sizes away: single precision finds the entry that the robust
+/// intersectors find, within a hundredth of the radius, and where they find none no segment has one; of nine rays of ten
+/// at least, and that is 99 of a hundred here. Tubes may be thin, as the iteration subtracts the origin first. The
+/// quadratic of a cone takes r² from squares of the distance, which are known to 4²·2⁻²⁴: a tenth of the square of 0.003.
+#[test]
+fn textbook_formulas_are_the_same_curves() {
+    let mut random = Random::new(28);
+    for (basis, thickness) in [(Basis::Linear, 0.1), (Basis::BSpline, 0.1), (Basis::BSpline, 0.003)] {
+        let (mut same, mut none, mut differ) = (0, 0, 0);
+        for _ in 0..200 {
+            let control: Vec<ControlPoint> = (0..8)
+                .map(|k| {
+                    let p = DVec3::new(f64::from(k) * 0.3 - 1.0, 0.0, 0.0) + random.direction() * 0.3;
+                    [p.x, p.y, p.z, thickness * random.range(0.5, 1.0)]
+                })
+                .collect();
+            let all = curves(&control, basis);
+            for _ in 0..50 {
+                let k = 2 + (random.uniform() * 4.0) as usize;
+                let on_axis = match basis {
+                    Basis::Linear => cone_between(control[k], control[k + 1]).center(random.uniform()),
+                    Basis::BSpline => {
+                        let tube = tube_of([control[k - 2], control[k - 1], control[k], control[k + 1]], 0);
+                        let [x, y, z, _] = tube.at(random.uniform())[0];
+                        DVec3::new(x, y, z)
+                    }
+                };
+                let aim = on_axis + random.direction() * thickness * 1.2 * random.uniform();
+                let ray = ray_at(aim, 4.0, &mut random);
+                let meet = |segment| all.meet_plain(segment, ray.origin.as_vec3(), ray.direction.as_vec3());
+                match all.closest(&ray, FAR) {
+                    Some(hit) => {
+                        let limit = 0.01 * all.thickness(hit.segment, hit.v);
+                        let is_same = meet(hit.segment).is_some_and(|t| (f64::from(t) - hit.t).abs() < limit);
+                        if is_same { same += 1 } else { differ += 1 }
+                    }
+                    None if (0..all.segments()).all(|segment| meet(segment).is_none()) => none += 1,
+                    None => differ += 1,
+                }
+            }
+        }
+        assert!(
+            same > 2000 && none > 100 && differ * 100 < same + none,
+            "{basis:?} {thickness} {same} {none} {differ}"
+        );
+    }
+}
+
 /// Every ray aimed at the middle of a bent curve meets it, at the joints of its segments too: 20 000 rays at a helix of
 /// which every eighth aims exactly at a knot.
 #[test]

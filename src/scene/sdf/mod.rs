@@ -20,6 +20,7 @@
 //! nearness (section 4 of the same paper).
 
 mod cubic;
+mod plain;
 #[cfg(test)]
 mod tests;
 

@@ -132,7 +132,7 @@ impl Plain {
 
 /// The roots of a t² + b t + c, the smaller first; none where they are not real.
 #[inline]
-fn roots(a: f32, b: f32, c: f32) -> Option<[f32; 2]> {
+pub(in crate::scene) fn roots(a: f32, b: f32, c: f32) -> Option<[f32; 2]> {
     let discriminant = b * b - 4.0 * a * c;
     if discriminant < 0.0 {
         return None;
