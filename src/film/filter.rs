@@ -135,6 +135,8 @@ pub struct FilterSample {
 pub struct FilterSampler {
     filter: Filter,
     axis: Axis,
+    /// ∫f along an axis, of a filter so narrow that some places are in no pixel's.
+    narrow: Option<f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -158,7 +160,18 @@ impl FilterSampler {
                 Axis::Table(Table::new(&filter)?)
             }
         };
-        Ok(FilterSampler { filter, axis })
+        let narrow = (filter.radius() < 0.5).then(|| {
+            // By midpoints: exact for the tent, whose kink lies between two cells.
+            let cell = filter.radius() / CELLS as f64;
+            (0..CELLS).map(|i| 2.0 * cell * filter.eval((i as f64 + 0.5) * cell)).sum()
+        });
+        Ok(FilterSampler { filter, axis, narrow })
+    }
+
+    /// Whether some places are in no pixel's filter. Light that is dealt then reaches few pixels, and much of it each.
+    #[must_use]
+    pub fn leaves_gaps(&self) -> bool {
+        self.narrow.is_some()
     }
 
     /// The filter that is sampled.
@@ -173,12 +186,20 @@ impl FilterSampler {
         self.filter.radius()
     }
 
-    /// Deals light that falls on `place` (continuous, in pixels) to the pixels whose filters hold it; the shares
-    /// add up to one.
+    /// Deals light that falls on `place` (continuous, in pixels) to the pixels whose filters hold it. The shares add up to
+    /// one; those of a filter with gaps do so in the mean over places.
     pub fn deal(&self, place: DVec2, mut give: impl FnMut([i32; 2], f32)) {
         if let Axis::Box = self.axis {
             let pixel = place.floor();
             give([pixel.x as i32, pixel.y as i32], 1.0);
+            return;
+        }
+        if let Some(area) = self.narrow {
+            let pixel = place.floor();
+            let [x, y] = (place - pixel - 0.5).to_array().map(|x| self.filter.eval(x) / area);
+            if x * y != 0.0 {
+                give([pixel.x as i32, pixel.y as i32], (x * y) as f32);
+            }
             return;
         }
         // Centres of pixels lie at halves.
@@ -407,6 +428,26 @@ mod tests {
                 previous = x;
             }
             assert_eq!(axis(&sampler, 0.5).0, 0.0);
+        }
+    }
+
+    /// The mean over places of what all pixels are dealt is one, with gaps and without; the sum of midpoints is off by the
+    /// curvature, h²/24 ∫|f''| / ∫f < 1e-4 with a thousand places on a pixel for the narrowest Gaussian here.
+    #[test]
+    fn as_much_is_dealt_as_there_is() {
+        let narrow =
+            [Filter::Tent { radius: 0.25 }, Filter::Gaussian { stddev: 0.04 }, Filter::Lanczos { radius: 0.4 }];
+        for filter in FILTERS.into_iter().chain(narrow) {
+            let sampler = FilterSampler::new(filter).unwrap();
+            assert_eq!(sampler.leaves_gaps(), narrow.contains(&filter), "{filter:?}");
+            let mut sum = 0.0;
+            for i in 0..1000 {
+                for j in 0..1000 {
+                    let place = DVec2::new(f64::from(i), f64::from(j)) / 1000.0 + 7.0005;
+                    sampler.deal(place, |_, share| sum += f64::from(share));
+                }
+            }
+            assert!((sum / 1e6 - 1.0).abs() < 1e-4, "{filter:?}: {}", sum / 1e6);
         }
     }
 

@@ -101,6 +101,9 @@ pub fn decide(
     if wishes.light_tracing == Use::Off {
         return left_off("the scene says so");
     }
+    if filter.leaves_gaps() && wishes.light_tracing == Use::Auto {
+        return left_off("the filter leaves gaps between pixels: little of what comes to the picture would be in any");
+    }
     let casters = Casters::of(scene);
     if casters.balls.is_empty() && casters.endless.is_empty() {
         return left_off("nothing mirrors or refracts sharply");

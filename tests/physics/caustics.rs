@@ -302,6 +302,17 @@ fn a_caustic_is_seen_through_a_window() {
     assert!(dark < 0.8 * b, "without the light of the ball there would be {dark} of {b}");
 }
 
+/// Half of a pixel is the least radius of a filter without gaps; below it light from the lights would be little but noise.
+#[test]
+fn light_is_traced_for_filters_without_gaps() {
+    for (radius, traced) in [(0.5, true), (0.49, false)] {
+        let filter = format!("height: 24, filter: {{tent: {{radius: {radius}}}}}");
+        let scene = AREA.scene("path", "auto", "auto", 64).replace("height: 24", &filter);
+        let (on, _, why) = techniques(&bench_with(&scene, &[]));
+        assert!(on == traced && why.contains("gaps") != traced, "{radius}: {why}");
+    }
+}
+
 /// Light without extent, which no path from the camera finds behind glass, against the tracer of all paths from the
 /// lights, where the ball is out of the picture: a path through a mirror next to the camera is not its part.
 #[test]
