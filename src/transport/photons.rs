@@ -127,8 +127,9 @@ impl PhotonMap {
     /// Shows `visit` the photons around `point` on a surface of `normal`.
     #[inline]
     pub fn each_near(&self, point: DVec3, normal: DVec3, mut visit: impl FnMut(&Photon<Together>)) {
-        self.together.each_near(point, normal, self.radius, |photon| visit(photon));
-        self.alone.each_near(point, normal, self.radius, |photon| visit(&photon.together()));
+        let near = Near::new(point, normal, self.radius);
+        self.together.each_near(&near, |photon| visit(photon));
+        self.alone.each_near(&near, |photon| visit(&photon.together()));
     }
 }
 
@@ -149,7 +150,7 @@ impl<L: Light> Buckets<L> {
         }
         let buckets = count.next_power_of_two();
         let of = |piece: &&[Photon<L>]| -> Vec<u32> {
-            piece.iter().map(|p| bucket(cell(p.point, radius), buckets) as u32).collect()
+            piece.iter().map(|p| bucket(key(cell(p.point, radius)), buckets) as u32).collect()
         };
         let homes: Vec<Vec<u32>> = pieces.par_iter().map(of).collect();
         let mut starts = vec![0u32; buckets + 1];
@@ -173,39 +174,67 @@ impl<L: Light> Buckets<L> {
     }
 
     #[inline]
-    fn each_near(&self, point: DVec3, normal: DVec3, radius: f64, mut visit: impl FnMut(&Photon<L>)) {
+    fn each_near(&self, near: &Near, mut visit: impl FnMut(&Photon<L>)) {
         if self.photons.is_empty() {
             return;
         }
         let buckets = self.starts.len() - 1;
-        let r2 = radius * radius;
-        let normal = normal.as_vec3();
-        // Cells are two radii wide: the ball meets two along each axis.
-        let low = cell(point - radius, radius);
-        let high = cell(point + radius, radius);
-        // A third where rounding puts one on an edge.
-        let mut seen = [usize::MAX; 27];
-        let mut count = 0;
-        for x in low[0]..=high[0] {
-            for y in low[1]..=high[1] {
-                for z in low[2]..=high[2] {
-                    let b = bucket([x, y, z], buckets);
-                    // Two cells may share a bucket, which counts once.
-                    if seen[..count].contains(&b) {
-                        continue;
-                    }
-                    seen[count] = b;
-                    count += 1;
-                    for photon in &self.photons[self.starts[b] as usize..self.starts[b + 1] as usize] {
-                        let offset = photon.point - point;
-                        // What lies around a corner or on the other side of a sheet is another surface.
-                        if offset.length_squared() <= r2 && photon.normal.dot(normal).abs() > FACING {
-                            visit(photon);
-                        }
-                    }
+        let mut seen = [usize::MAX; MOST_CELLS];
+        for (i, &key) in near.keys().iter().enumerate() {
+            let b = bucket(key, buckets);
+            seen[i] = b;
+            // Two cells may share a bucket, which counts once.
+            if seen[..i].contains(&b) {
+                continue;
+            }
+            for photon in &self.photons[self.starts[b] as usize..self.starts[b + 1] as usize] {
+                if near.holds(photon) {
+                    visit(photon);
                 }
             }
         }
+    }
+}
+
+/// Cells are two radii wide, so that a ball meets two along each axis: a third where rounding puts one on an edge.
+const MOST_CELLS: usize = 27;
+
+/// Around a point on a surface.
+struct Near {
+    point: DVec3,
+    normal: Vec3,
+    radius_squared: f64,
+    /// Of the cells that the ball meets; the first `count` are filled.
+    keys: [u64; MOST_CELLS],
+    count: usize,
+}
+
+impl Near {
+    fn new(point: DVec3, normal: DVec3, radius: f64) -> Near {
+        let normal = normal.as_vec3();
+        let mut near = Near { point, normal, radius_squared: radius * radius, keys: [0; MOST_CELLS], count: 0 };
+        let low = cell(point - radius, radius);
+        let high = cell(point + radius, radius);
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    near.keys[near.count] = key([x, y, z]);
+                    near.count += 1;
+                }
+            }
+        }
+        near
+    }
+
+    fn keys(&self) -> &[u64] {
+        &self.keys[..self.count]
+    }
+
+    /// What lies around a corner or on the other side of a sheet is another surface.
+    #[inline]
+    fn holds<L>(&self, photon: &Photon<L>) -> bool {
+        (photon.point - self.point).length_squared() <= self.radius_squared
+            && photon.normal.dot(self.normal).abs() > FACING
     }
 }
 
@@ -217,9 +246,13 @@ fn cell(point: DVec3, radius: f64) -> [i32; 3] {
     (point / (2.0 * radius)).floor().to_array().map(|x| x as i32)
 }
 
-fn bucket([x, y, z]: [i32; 3], buckets: usize) -> usize {
-    let key = mix64(u64::from(x as u32) << 32 | u64::from(y as u32));
-    (mix64(key ^ u64::from(z as u32)) as usize) & (buckets - 1)
+fn key([x, y, z]: [i32; 3]) -> u64 {
+    mix64(mix64(u64::from(x as u32) << 32 | u64::from(y as u32)) ^ u64::from(z as u32))
+}
+
+/// The bucket of a cell's key, of as many as a power of two.
+fn bucket(key: u64, buckets: usize) -> usize {
+    key as usize & (buckets - 1)
 }
 
 #[cfg(test)]
