@@ -135,8 +135,6 @@ pub struct FilterSample {
 pub struct FilterSampler {
     filter: Filter,
     axis: Axis,
-    /// ∫f along an axis, of a filter so narrow that some places are in no pixel's.
-    narrow: Option<f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -144,6 +142,17 @@ enum Axis {
     Box,
     Tent(f64),
     Table(Table),
+}
+
+impl Axis {
+    /// ∫f along the axis.
+    fn integral(&self) -> f64 {
+        match self {
+            Axis::Box => 1.0,
+            Axis::Tent(radius) => *radius,
+            Axis::Table(table) => table.integral,
+        }
+    }
 }
 
 impl FilterSampler {
@@ -160,18 +169,13 @@ impl FilterSampler {
                 Axis::Table(Table::new(&filter)?)
             }
         };
-        let narrow = (filter.radius() < 0.5).then(|| {
-            // By midpoints: exact for the tent, whose kink lies between two cells.
-            let cell = filter.radius() / CELLS as f64;
-            (0..CELLS).map(|i| 2.0 * cell * filter.eval((i as f64 + 0.5) * cell)).sum()
-        });
-        Ok(FilterSampler { filter, axis, narrow })
+        Ok(FilterSampler { filter, axis })
     }
 
     /// Whether some places are in no pixel's filter. Light that is dealt then reaches few pixels, and much of it each.
     #[must_use]
     pub fn leaves_gaps(&self) -> bool {
-        self.narrow.is_some()
+        self.radius() < 0.5
     }
 
     /// The filter that is sampled.
@@ -194,9 +198,9 @@ impl FilterSampler {
             give([pixel.x as i32, pixel.y as i32], 1.0);
             return;
         }
-        if let Some(area) = self.narrow {
+        if self.leaves_gaps() {
             let pixel = place.floor();
-            let [x, y] = (place - pixel - 0.5).to_array().map(|x| self.filter.eval(x) / area);
+            let [x, y] = (place - pixel - 0.5).to_array().map(|x| self.filter.eval(x) / self.axis.integral());
             if x * y != 0.0 {
                 give([pixel.x as i32, pixel.y as i32], (x * y) as f32);
             }
@@ -255,6 +259,8 @@ struct Table {
     negative: Vec<bool>,
     /// For u in [i, i + 1) / CELLS: the first cell that can hold it.
     guide: Vec<u32>,
+    /// ∫f over both halves.
+    integral: f64,
     /// (∫|f| / ∫f)², the magnitude of the weight in two dimensions.
     weight: f32,
 }
@@ -310,7 +316,7 @@ impl Table {
             .collect();
         let axis = total / signed;
         // Non-negative filters: signed and total are the same sums of the same areas, so axis is 1 exactly.
-        Ok(Table { x, density, cumulative, negative, guide, weight: (axis * axis) as f32 })
+        Ok(Table { x, density, cumulative, negative, guide, integral: 2.0 * signed, weight: (axis * axis) as f32 })
     }
 
     /// The position at `u` in [0, 1), and whether f is negative there.
