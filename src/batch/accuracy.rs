@@ -19,6 +19,7 @@ mod knobs;
 pub mod page;
 
 use super::finish::Finish;
+use super::stop::Fit;
 use super::{BatchEntry, Overrides, develop};
 use crate::description;
 use crate::error::{Error, Result};
@@ -276,8 +277,9 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
         png,
     };
     let left = target * target - row.bias().unwrap_or(0.0).powi(2);
-    row.to_target =
-        (left > 0.0).then(|| end.seconds * libm::pow(end.noise[0] * end.noise[0] / left, 1.0 / row.exponent()));
+    let samples = f64::from(end.samples);
+    let fit = Fit::with_slope(samples, end.noise[0], row.exponent());
+    row.to_target = (left > 0.0).then(|| end.seconds * fit.samples_for(left.sqrt()) / samples);
     row
 }
 

@@ -163,15 +163,22 @@ impl Fit {
         let (x, y) = logs.clone().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
         let (xy, xx) = logs.fold((0.0, 0.0), |(a, b), (u, v)| (a + (u - x) * (v - y), b + (u - x) * (u - x)));
         let slope = if xx > 0.0 { (-xy / xx).clamp(1.0, 2.0) } else { 1.0 };
-        Some(Fit { samples, error, even: slope - 1.0 })
+        Some(Fit::with_slope(samples, error, slope))
+    }
+
+    /// Through `error` at `samples`, where variance falls as samples^−slope, from 1 to 2.
+    #[must_use]
+    pub fn with_slope(samples: f64, error: f64, slope: f64) -> Fit {
+        Fit { samples, error, even: slope - 1.0 }
     }
 
     /// Samples at which the error is `error`.
     #[must_use]
     pub fn samples_for(&self, error: f64) -> f64 {
-        let (rest, left) = (1.0 - self.even, (error / self.error).powi(2));
-        // (1 − s) r + s r² = left for r = N₁/N, without cancellation.
-        self.samples * (rest + (rest * rest + 4.0 * self.even * left).sqrt()) / (2.0 * left)
+        // (1 − s) r + s r² = 1/p for r = N₁/N, without cancellation; an error of zero is there at once.
+        let p = (self.error / error).powi(2);
+        let rest = (1.0 - self.even) * p;
+        self.samples * 0.5 * (rest + (rest * rest + 4.0 * self.even * p).sqrt())
     }
 
     /// The error at `samples`.
