@@ -14,11 +14,12 @@ fn scene(text: &str) -> Scene {
     scene
 }
 
-/// A ray from a few sizes away at something near the middle of the scene.
-fn ray(scene: &Scene, random: &mut Random) -> Ray {
+/// A ray from a few sizes away at something near the middle of the scene, and what it meets.
+fn meet(scene: &Scene, random: &mut Random) -> Option<(Ray, Hit)> {
     let origin = scene.center + random.direction() * 4.0 * scene.radius;
     let target = scene.center + random.direction() * 0.5 * scene.radius;
-    Ray::new(origin, (target - origin).normalize())
+    let ray = Ray::new(origin, (target - origin).normalize());
+    Some((ray, scene.closest(&ray, f64::INFINITY)?))
 }
 
 /// The path of a file of the example scenes.
@@ -55,8 +56,7 @@ fn textbook_formulas_are_the_same_surfaces() {
     for (name, scene) in kinds(0.0) {
         let (mut met, mut same) = (0, 0);
         for _ in 0..5000 {
-            let ray = ray(&scene, &mut random);
-            let Some(hit) = scene.closest(&ray, f64::INFINITY) else { continue };
+            let Some((ray, hit)) = meet(&scene, &mut random) else { continue };
             let local = enter(&scene, &ray, hit.instance);
             let stretch = match scene.instance_map(&hit) {
                 Some(map) => map.enter(&ray).1,
@@ -73,8 +73,7 @@ fn textbook_formulas_are_the_same_surfaces() {
 /// What is counted of rays that meet a scene and go on from there in any direction.
 fn counted(scene: &Scene, random: &mut Random) -> Counts {
     for _ in 0..5000 {
-        let ray = ray(scene, random);
-        let Some(hit) = scene.closest(&ray, f64::INFINITY) else { continue };
+        let Some((ray, hit)) = meet(scene, random) else { continue };
         let surface = scene.surface(&ray, &hit);
         let _ = scene.leave(&surface, &hit, random.direction());
     }
@@ -106,8 +105,7 @@ fn what_is_met_again_is_the_start() {
     for (name, scene) in kinds(0.0) {
         let (mut again, mut at_start) = (0, 0);
         for _ in 0..10_000 {
-            let ray = ray(&scene, &mut random);
-            let Some(hit) = scene.closest(&ray, f64::INFINITY) else { continue };
+            let Some((ray, hit)) = meet(&scene, &mut random) else { continue };
             let surface = scene.surface(&ray, &hit);
             let left = scene.leave(&surface, &hit, random.direction());
             if !is_met_again(&scene, &left, hit.departure()) {
