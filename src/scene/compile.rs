@@ -35,7 +35,7 @@ use super::shape::{Detail, Shape};
 use super::shelf::Shelf;
 use super::texture::{Scalar, Texture};
 use super::volume::Volume;
-use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene};
+use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene, TriangleMesh};
 use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
 use crate::math::Ray;
@@ -278,11 +278,21 @@ impl<'a> Compiler<'a> {
         }
 
         let boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
-        let together = Together::take(&mut objects, &boxes);
-        let alone: Vec<u32> =
-            (0..objects.len() as u32).filter(|&i| !together.as_ref().is_some_and(|t| t.holds(i))).collect();
+        let all: Vec<u32> = (0..objects.len() as u32).collect();
+        // The box of one small mesh among few things is met side by side with theirs.
+        let mut meshes = objects.iter().filter_map(|object| match &object.geometry {
+            Geometry::Mesh(mesh) => Some((mesh, &self.materials[object.material as usize])),
+            _ => None,
+        });
+        let one = meshes.next().filter(|_| meshes.next().is_none());
+        // Boundaries are better found together.
+        let is_small = |mesh: &TriangleMesh| mesh.tree.as_ref().is_some_and(MeshTree::is_small);
+        let one = one.filter(|(mesh, material)| is_small(mesh) && !material.lets_through());
+        let few = one.and_then(|_| Few::of(&objects, &all, &boxes));
+        let together = if few.is_none() { Together::take(&mut objects, &boxes) } else { None };
+        let alone: Vec<u32> = all.into_iter().filter(|&i| !together.as_ref().is_some_and(|t| t.holds(i))).collect();
         let bvh = Bvh::build(&alone.iter().map(|&i| boxes[i as usize]).collect::<Vec<Aabb>>()).named(&alone);
-        let few = Few::of(&objects, &alone, &boxes);
+        let few = few.or_else(|| Few::of(&objects, &alone, &boxes));
         objects.extend(children);
         material_names.extend(names_of_children);
         let nested = Nested::of(&mut objects, boxes.len(), |object| {

@@ -13,6 +13,8 @@ use wide::f64x4;
 
 /// How many things are few: of rectangles, spheres and planes as many are met as fast as a tree is searched.
 const MOST: usize = 16;
+/// How many that are met one by one are few: their boxes are met side by side.
+const FEW_ALONE: usize = 4;
 
 /// Names no object: less than all.
 pub(super) const NONE: f64 = -1.0;
@@ -53,7 +55,7 @@ fn add<T>(blocks: &mut Vec<Block<T>>, object: u32, empty: T, put: impl FnOnce(&m
 
 impl Few {
     /// `indices` are of the `objects` that are searched; `boxes` are all objects'. None where they are not few, and where
-    /// most are met one by one, whose boxes a tree finds as fast.
+    /// most of more than four are met one by one, whose boxes a tree finds as fast.
     #[must_use]
     pub fn of(objects: &[Object], indices: &[u32], boxes: &[Aabb]) -> Option<Few> {
         if cfg!(feature = "single_precision") {
@@ -64,7 +66,8 @@ impl Few {
             Geometry::Shape(shape) => matches!(shape, Shape::Cube(_) | Shape::Cylinder(_) | Shape::Cone(_)),
             _ => true,
         };
-        let few = (1..=MOST).contains(&indices.len()) && 2 * indices.iter().filter(alone).count() <= indices.len();
+        let most_alone = (indices.len() / 2).max(FEW_ALONE);
+        let few = (1..=MOST).contains(&indices.len()) && indices.iter().filter(alone).count() <= most_alone;
         few.then(|| Few::new(objects, indices, boxes))
     }
 
@@ -311,8 +314,8 @@ pub(super) mod tests {
         assert!(met > 8_000 && shared > 2_000 && enough, "{met} {shared} {hidden:?} {open:?}");
     }
 
-    /// Spheres up to the limit are few, one more are not; nor are cubes, of which a tree finds the boxes as fast, unless
-    /// there are as many spheres.
+    /// Spheres up to the limit are few, one more are not; nor are more than four cubes, of which a tree finds the boxes as
+    /// fast, unless there are as many spheres.
     #[test]
     fn more_than_few_are_searched_by_the_tree() {
         let compiled = |spheres: usize, cubes: usize| {
@@ -321,8 +324,8 @@ pub(super) mod tests {
             text += &"- cube: {size: [1, 1, 1]}\n".repeat(cubes);
             compile(&SceneDescription::parse(&text, Path::new("s.yaml")).unwrap(), "s").unwrap()
         };
-        let few = [(1, 0), (MOST, 0), (MOST + 1, 0), (0, 1), (2, 2), (2, 3)];
+        let few = [(1, 0), (MOST, 0), (MOST + 1, 0), (0, 4), (0, 5), (5, 5), (4, 5)];
         let found = few.map(|(spheres, cubes)| compiled(spheres, cubes).few.is_some());
-        assert_eq!(found, [true, true, false, false, true, false]);
+        assert_eq!(found, [true, true, false, true, false, true, false]);
     }
 }

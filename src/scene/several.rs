@@ -148,8 +148,7 @@ fn departures([a, b, c, d]: [&Ray; 4]) -> f64x4 {
 impl Scene {
     /// [`Scene::closest`] of the first `count` of four rays.
     pub fn closest_of_four(&self, rays: [&Ray; 4], t_max: [f64; 4], count: usize, hits: &mut [Option<Hit>]) {
-        let few = self.few.as_ref().filter(|_| count > 1 && self.together.is_none());
-        let Some(few) = few else {
+        let Some(few) = self.few.as_ref().filter(|_| count > 1) else {
             for (lane, hit) in hits.iter_mut().enumerate().take(count) {
                 *hit = self.closest(rays[lane], t_max[lane]);
             }
@@ -184,6 +183,12 @@ impl Scene {
             self.meet_nearer(rays[lane], object, &mut best);
             hits[lane] = best.hit;
         });
+        if let Some(together) = &self.together {
+            for (lane, hit) in hits.iter_mut().enumerate().take(count) {
+                let reach = hit.map_or(t_max[lane], |hit| hit.t);
+                *hit = together.closest(rays[lane], reach).or(*hit);
+            }
+        }
     }
 
     /// [`Scene::occluded`] of the first `count` of four rays: one bit each.
@@ -202,7 +207,7 @@ impl Scene {
             let object = &self.objects[object as usize];
             object.flipped || !matches!(object.geometry, Geometry::Shape(_))
         };
-        let few = self.few.as_ref().filter(|_| count > 1 && self.together.is_none());
+        let few = self.few.as_ref().filter(|_| count > 1);
         let Some(few) = few.filter(|_| !aimed.into_iter().flatten().any(hides)) else {
             return (0..count).map(alone).sum();
         };
@@ -223,6 +228,12 @@ impl Scene {
                     hidden |= 1 << lane;
                 }
             });
+        }
+        if let Some(together) = &self.together {
+            for lane in lanes_of(wanted & !hidden) {
+                let stopped = together.any(rays[lane], distances[lane], targets[lane], |_| true);
+                hidden |= u32::from(stopped) << lane;
+            }
         }
         hidden & wanted
     }

@@ -381,7 +381,9 @@ fn follow_together(begun: &mut [Begun], shot: &Shot, settings: &PathSettings, oc
         let Begun { at, ray, sample: PixelSample { wavelengths, .. }, .. } = &begun[i];
         Wanted { sampler: octet.sampler(at.index), nm: wavelengths.nm, ray }
     };
-    path::together::radiance(shot.scene, shot.plan, settings, begun.len(), wanted, |i, found| light[i] = found);
+    let Shot { scene, plan, photons, .. } = *shot;
+    let map = photons.map(|p| p.map);
+    path::together::radiance(scene, plan, settings, map, begun.len(), wanted, |i, found| light[i] = found);
     for (begun, light) in begun.iter_mut().zip(light) {
         begun.see(shot, light);
     }

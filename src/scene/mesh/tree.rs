@@ -261,7 +261,7 @@ impl MeshTree {
 
     /// Whether its blocks are so few that a way down to them costs more than it saves.
     #[inline(always)]
-    fn is_small(&self) -> bool {
+    pub(in crate::scene) fn is_small(&self) -> bool {
         self.blocks.len() <= FEW
     }
 

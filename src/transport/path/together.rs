@@ -9,6 +9,7 @@ use crate::math::Ray;
 use crate::math::sampler::Sampler;
 use crate::scene::Scene;
 use crate::spectrum::Lanes;
+use crate::transport::photons::PhotonMap;
 use crate::transport::plan::{EffectPlan, PathSettings};
 use crate::transport::{Incoming, Shot};
 
@@ -19,10 +20,10 @@ pub const MOST: usize = 8;
 /// part.
 #[must_use]
 pub fn possible(shot: &Shot, settings: &PathSettings) -> bool {
-    let Shot { scene, plan, photons, .. } = shot;
+    let Shot { scene, plan, .. } = shot;
     let one_way = !(plan.media || plan.nested || plan.packets);
     let parted = plan.layers.parts_light();
-    let plain = photons.is_none() && scene.watch.is_none() && settings.light_samples.max(settings.scatter_samples) == 1;
+    let plain = scene.watch.is_none() && settings.light_samples.max(settings.scatter_samples) == 1;
     scene.few.is_some() && one_way && plain && !parted
 }
 
@@ -41,13 +42,14 @@ pub fn radiance<'a>(
     scene: &'a Scene,
     plan: &'a EffectPlan,
     settings: &'a PathSettings,
+    photons: Option<&'a PhotonMap>,
     count: usize,
     wanted: impl Fn(usize) -> Wanted<'a>,
     give: impl FnMut(usize, Incoming),
 ) {
     match plan.chromatic {
-        true => trace::<true>(scene, plan, settings, count, wanted, give),
-        false => trace::<false>(scene, plan, settings, count, wanted, give),
+        true => trace::<true>(scene, plan, settings, photons, count, wanted, give),
+        false => trace::<false>(scene, plan, settings, photons, count, wanted, give),
     }
 }
 
@@ -55,6 +57,7 @@ fn trace<'a, const CHROMATIC: bool>(
     scene: &'a Scene,
     plan: &'a EffectPlan,
     settings: &'a PathSettings,
+    photons: Option<&'a PhotonMap>,
     count: usize,
     wanted: impl Fn(usize) -> Wanted<'a>,
     mut give: impl FnMut(usize, Incoming),
@@ -87,7 +90,7 @@ fn trace<'a, const CHROMATIC: bool>(
         for k in 0..going {
             let i = on[k];
             let Wanted { sampler, nm, .. } = wanted(i);
-            let tracer = Tracer { scene, plan, settings, sampler, nm, photons: None, ledger: None };
+            let tracer = Tracer { scene, plan, settings, sampler, nm, photons, ledger: None };
             let step = tracer.meet::<CHROMATIC, false>(&mut paths[i], &mut walks[i], hits[k], Some(&mut asked[i]));
             if asked[i].is_some() {
                 asking[questions] = i;
