@@ -59,3 +59,79 @@ impl Scene {
         hidden
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile;
+    use crate::scene::few::tests::bits;
+    use crate::scene::shape::testing::Random;
+    use glam::DVec3;
+
+    /// A scene of few things: `meshes` tetrahedra, two spheres, a cube and a plane.
+    fn scene(meshes: usize) -> Scene {
+        let directory = tempfile::tempdir().unwrap();
+        let solid = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+        std::fs::write(directory.path().join("solid.obj"), solid).unwrap();
+        let mut text = String::from(
+            "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes:\n\
+             - sphere: {center: [-1, 0, 0], radius: 0.7}\n- sphere: {center: [0, 1, 1], radius: 0.4}\n\
+             - cube: {center: [1, -1, 0], size: [0.8, 0.5, 0.6]}\n- plane: {point: [0, -1.5, 0], normal: [0, 1, 0]}\n",
+        );
+        for i in 0..meshes {
+            text +=
+                &format!("- mesh: {{file: solid.obj, transform: [{{translate: [{}, -0.3, 0.2]}}]}}\n", i as f64 - 0.5);
+        }
+        let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
+        compile(&description, "s").unwrap()
+    }
+
+    /// Any of eight rays, from anywhere and on from what they met, with what they meet of the same bits as alone, and the
+    /// same ones hidden: with no mesh, one small mesh among the few, and several in a tree of theirs.
+    #[test]
+    fn bundles_meet_what_each_ray_meets_alone() {
+        let mut random = Random::new(5);
+        for meshes in [0, 1, 3] {
+            let scene = scene(meshes);
+            assert!(scene.few.is_some() && scene.together.is_some() == (meshes > 1));
+            let (mut met, mut stopped, mut by_triangles) = (0, 0, 0);
+            let mut rays = [Ray::new(DVec3::ZERO, DVec3::X); LANES];
+            for _ in 0..3_000 {
+                for ray in &mut rays {
+                    if random.uniform() < 0.5 {
+                        let origin = random.direction() * 4.0 * random.uniform();
+                        *ray = Ray::new(origin, (random.direction() * 1.5 * random.uniform() - origin).normalize());
+                    }
+                }
+                let lanes = (random.uniform() * 256.0) as u8;
+                let distances = rays.map(|_| 4.0 * random.uniform());
+                let target = Departure::new((random.uniform() * scene.objects.len() as f64) as u32, 0);
+                let target = (random.uniform() < 0.5).then_some(target);
+                let hits = scene.closest_of(&rays, lanes);
+                let hidden = scene.occluded_of(&rays, &distances, lanes, target);
+                for lane in 0..LANES {
+                    if lanes >> lane & 1 == 0 {
+                        assert!(hits[lane].is_none() && hidden >> lane & 1 == 0);
+                        continue;
+                    }
+                    let alone = scene.closest(&rays[lane], f64::INFINITY);
+                    assert_eq!(bits(hits[lane]), bits(alone), "{:?}", rays[lane]);
+                    let occluded = scene.occluded(&rays[lane], distances[lane], target);
+                    assert_eq!(hidden >> lane & 1 == 1, occluded, "{:?} {target:?}", rays[lane]);
+                    stopped += u32::from(occluded);
+                    if let Some(hit) = alone {
+                        met += 1;
+                        by_triangles += u32::from(hit.object >= 4);
+                        let surface = scene.surface(&rays[lane], &hit);
+                        rays[lane] = scene.leave(&surface, &hit, random.direction());
+                    }
+                }
+            }
+            assert!(
+                met > 5_000 && stopped > 2_000 && (by_triangles > 1_000) == (meshes > 0),
+                "{met} {stopped} {by_triangles}"
+            );
+        }
+    }
+}
