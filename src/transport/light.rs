@@ -13,13 +13,13 @@ mod packet;
 
 use super::caustics::{Caustics, Target};
 use super::merge::WavelengthCell;
-use super::path::{FOR_SURE, SURVIVAL, seen_normal};
+use super::path::{FOR_SURE, longest_survival, seen_normal};
 use super::photons::{Alone, Photon, Photons, Together};
 use super::plan::{EffectPlan, LightSettings};
 use super::shadow::{MAX_BOUNDARIES, Shadow};
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::math::{Frame, Ray};
-use crate::optics::bsdf::{Bsdf, BsdfSample};
+use crate::optics::bsdf::{Bsdf, BsdfSample, Chosen};
 use crate::scene::camera::Entry;
 use crate::scene::compound::Leaf;
 use crate::scene::material::Kind;
@@ -300,7 +300,7 @@ impl<'a> Walk<'a, '_> {
                     let went = medium.phase.sample(point, came, u_scatter);
                     beam.ray = Ray::new(point, went);
                     beam.vertex += 1;
-                    if !self.survives(&mut beam, u_roulette) {
+                    if !self.survives(&mut beam, false, u_roulette) {
                         return;
                     }
                     continue;
@@ -397,27 +397,27 @@ impl<'a> Walk<'a, '_> {
         }
         beam.ray = scene.leave(at.surface, at.hit, went);
         beam.vertex += 1;
-        self.survives(beam, at.roulette)
+        self.survives(beam, sample.chosen == Chosen::Discrete, at.roulette)
     }
 
     /// Russian roulette on the largest lane; false where the beam ends.
-    fn survives(&self, beam: &mut Beam, u: f64) -> bool {
+    fn survives(&self, beam: &mut Beam, discrete: bool, u: f64) -> bool {
         let carried = largest(beam.power) * f64::from(LANES as f32 / beam.rho.reduce_add());
-        let Some(worth) = self.survival(carried, beam.vertex, u) else { return false };
+        let Some(worth) = self.survival(carried, beam.vertex, discrete, u) else { return false };
         beam.power *= worth;
         true
     }
 
     /// Russian roulette at `vertex` of what has `carried` so much power there: how many times more it is worth if it goes
     /// on; `None` where it ends.
-    fn survival(&self, carried: f64, vertex: u32, u: f64) -> Option<f32> {
+    fn survival(&self, carried: f64, vertex: u32, discrete: bool, u: f64) -> Option<f32> {
         if carried.is_nan() || carried <= 0.0 {
             return None;
         }
         if vertex + 1 < self.paths.settings.roulette_depth {
             return Some(1.0);
         }
-        let q = (carried / self.start).min(if vertex <= FOR_SURE { 1.0 } else { SURVIVAL });
+        let q = (carried / self.start).min(if vertex <= FOR_SURE { 1.0 } else { longest_survival(discrete) });
         (u < q).then_some((1.0 / q) as f32)
     }
 

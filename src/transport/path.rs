@@ -39,9 +39,12 @@ use std::cell::Cell;
 /// is behind it without the noise of roulette, in every sample.
 pub(super) const FOR_SURE: u32 = 256;
 
-/// Longest survival of a path beyond that: one in a thousand is ended at each vertex, so that light
-/// trapped between perfect mirrors costs some thousand vertices, not for ever.
-pub(super) const SURVIVAL: f64 = 0.999;
+/// Longest survival of a path beyond that: one in a thousand is ended at each vertex that scatters over a density, as light
+/// in a thick cloud goes through thousands, and one in a hundred at each that mirrors or refracts: light that is trapped
+/// between perfect mirrors or in a ball of glass costs some hundred vertices more, not for ever.
+pub(super) fn longest_survival(discrete: bool) -> f64 {
+    if discrete { 0.99 } else { 0.999 }
+}
 
 /// Light that arrives along a camera ray, entered in a `ledger` if there is one.
 #[must_use]
@@ -444,7 +447,7 @@ impl Tracer<'_> {
         }
         path.ray = self.scene.leave(surface, hit, wi);
         path.vertices += 1;
-        self.survives::<CHROMATIC>(path, || at.choice.draw(2))
+        self.survives::<CHROMATIC>(path, sample.chosen == Chosen::Discrete, || at.choice.draw(2))
     }
 
     /// Light of the photons around a vertex behind mirrors and glass, of lamps of one group or all. A lane could lead both parts of the joined path
@@ -563,11 +566,12 @@ impl Tracer<'_> {
         path.seen |= path.vertices == 0;
         path.specular = false;
         path.vertices += 1;
-        self.survives::<CHROMATIC>(path, || choice[2])
+        self.survives::<CHROMATIC>(path, false, || choice[2])
     }
 
-    /// Russian roulette on the largest lane; false where the path ends.
-    fn survives<const CHROMATIC: bool>(&self, path: &mut Path, u: impl FnOnce() -> f64) -> bool {
+    /// Russian roulette on the largest lane, after a vertex that mirrors or refracts or one that does not; false where the
+    /// path ends.
+    fn survives<const CHROMATIC: bool>(&self, path: &mut Path, discrete: bool, u: impl FnOnce() -> f64) -> bool {
         if path.beta.simd_gt(Lanes::ZERO).none() {
             return false;
         }
@@ -576,7 +580,7 @@ impl Tracer<'_> {
         }
         let beta = path.beta.to_array().into_iter().fold(0.0f32, f32::max);
         let carried = f64::from(beta) * LANES as f64 / path.rho_sum::<CHROMATIC>() * path.eta2;
-        let q = carried.min(if path.vertices < FOR_SURE { 1.0 } else { SURVIVAL });
+        let q = carried.min(if path.vertices < FOR_SURE { 1.0 } else { longest_survival(discrete) });
         if u() >= q {
             return false;
         }

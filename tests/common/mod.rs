@@ -217,11 +217,20 @@ impl Bench {
 
     /// One sample of a pixel, as the batch takes it.
     pub fn sample(&self, pixel: [u32; 2], index: u32) -> transport::PixelSample {
+        self.traced(pixel, index).0
+    }
+
+    /// How many events the path of that sample had.
+    pub fn events(&self, pixel: [u32; 2], index: u32) -> u32 {
+        self.traced(pixel, index).1
+    }
+
+    fn traced(&self, pixel: [u32; 2], index: u32) -> (transport::PixelSample, u32) {
         let Prepared { scene, plan, .. } = &self.prepared;
         let filter = FilterSampler::new(Filter::Box).unwrap();
         let replicates = REPLICATES as u32;
         let shot = transport::Shot { scene, plan, filter: &filter, seed: 0, photons: None };
-        transport::sample(&shot, pixel, index % replicates, index / replicates).0
+        transport::sample(&shot, pixel, index % replicates, index / replicates)
     }
 
     /// The ray through a place of the picture in pixels.

@@ -180,7 +180,7 @@ impl Walk<'_, '_> {
             let adjoint = adjoint(cos, went.dot(normal), true_came, true_went);
             let power = &mut packet.beam.power.as_mut_array()[lane];
             *power *= tint * adjoint as f32;
-            let Some(worth) = self.survival(f64::from(*power), vertex, roulette) else { continue };
+            let Some(worth) = self.survival(f64::from(*power), vertex, true, roulette) else { continue };
             *power *= worth;
             packet.rays[lane] = scene.leave(surface, hit, went);
             if reflects {
@@ -391,7 +391,7 @@ impl Walk<'_, '_> {
             beam.nm = Lanes::splat(nm.to_array()[chosen]);
             beam.alone = Some(chosen);
         }
-        if self.survives(&mut beam, numbers.roulette) {
+        if self.survives(&mut beam, false, numbers.roulette) {
             self.ahead = Some(hit);
             self.follow(beam);
         }
