@@ -13,7 +13,7 @@ mod packet;
 
 use super::caustics::{Caustics, Target};
 use super::merge::WavelengthCell;
-use super::path::{FOR_SURE, longest_survival, seen_normal};
+use super::path::{self, seen_normal};
 use super::photons::{Alone, Photon, Photons, Together};
 use super::plan::{EffectPlan, LightSettings};
 use super::shadow::{MAX_BOUNDARIES, Shadow};
@@ -417,7 +417,7 @@ impl<'a> Walk<'a, '_> {
         if vertex + 1 < self.paths.settings.roulette_depth {
             return Some(1.0);
         }
-        let q = (carried / self.start).min(if vertex <= FOR_SURE { 1.0 } else { longest_survival(discrete) });
+        let q = path::survival(carried / self.start, vertex, discrete);
         (u < q).then_some((1.0 / q) as f32)
     }
 
