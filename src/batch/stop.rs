@@ -35,7 +35,7 @@ pub fn rounding(bits: u32) -> f64 {
 }
 
 /// Passes do not get shorter than this part of what is there: an error that is just missed is not paid for many times.
-const SHORTEST: f64 = 0.125;
+const SHORTEST: f64 = 1.0 / 32.0;
 
 impl Stop {
     /// Whether anything but samples may end the render.
@@ -146,7 +146,8 @@ pub struct Fit {
 
 impl Fit {
     /// Through the last milestone, with the slope of the last three that lie a doubling or so apart, by least squares over
-    /// logarithms, kept to what sampling does. One milestone alone has the slope of independent samples.
+    /// logarithms, kept to what sampling does: it is that in their middle. One milestone alone has the slope of independent
+    /// samples.
     #[must_use]
     pub fn of(milestones: &[Milestone]) -> Option<Fit> {
         let mut points: Vec<(f64, f64)> = Vec::new();
@@ -163,7 +164,10 @@ impl Fit {
         let (x, y) = logs.clone().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
         let (xy, xx) = logs.fold((0.0, 0.0), |(a, b), (u, v)| (a + (u - x) * (v - y), b + (u - x) * (u - x)));
         let slope = if xx > 0.0 { (-xy / xx).clamp(1.0, 2.0) } else { 1.0 };
-        Some(Fit::with_slope(samples, error, slope))
+        // β / αN there, and from it at the last.
+        let share = (slope - 1.0) / (2.0 - slope) * libm::exp(x) / samples;
+        let even = if share < f64::INFINITY { share / (1.0 + share) } else { 1.0 };
+        Some(Fit { samples, error, even })
     }
 
     /// Through `error` at `samples`, where variance falls as samples^−slope, from 1 to 2.
@@ -280,8 +284,9 @@ mod tests {
         assert_eq!(stop.pass_end(&milestones(&[16, 32, 64], 1.0), 1 << 16), Some(100));
         assert_eq!(stop.pass_end(&milestones(&[4, 8, 16], 1.5), 1 << 16), Some(24));
         assert!(stop.reached(&milestones(&[32, 64, 100], 1.0)) && !stop.reached(&milestones(&[32, 64, 99], 1.0)));
-        // Just missed: an eighth more, not four samples.
-        assert_eq!(stop.pass_end(&milestones(&[32, 64, 96], 1.0), 1 << 16), Some(108));
+        // Just missed: a thirty-second more, not four samples.
+        let stop = Stop { error: Some(0.03), ..FREE };
+        assert_eq!(stop.pass_end(&milestones(&[272, 544, 1088], 1.0), 1 << 16), Some(1124));
     }
 
     /// A sample takes a millisecond: after 64 there is time for 30 more, of which 28 make whole rounds of the replicates.
@@ -303,8 +308,9 @@ mod tests {
         let all = milestones(&[4, 8, 16, 32, 64], 1.2);
         let quarter = Forecast::at_a_quarter(&all, &FREE, 64).unwrap();
         assert_eq!(quarter.made_at, 16);
-        // A fifth of the variance at 16 falls as N⁻².
-        assert!((quarter.error / 16f64.powf(-0.6) - (0.8 / 4.0 + 0.2 / 16.0f64).sqrt()).abs() < 1e-12);
+        // A fifth of the variance at 8 falls as N⁻²: a ninth of that at 16.
+        let expected = 16f64.powf(-1.2) * (8.0 / 9.0 / 4.0 + 1.0 / 9.0 / 16.0);
+        assert!((quarter.error - expected.sqrt()).abs() < 1e-12);
         assert!(Forecast::at_a_quarter(&all[..1], &FREE, 4).is_none());
     }
 
