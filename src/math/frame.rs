@@ -33,7 +33,15 @@ impl Frame {
     /// Falls back to [`Frame::from_normal`] where `tangent` is parallel to `n` or zero.
     #[must_use]
     pub fn from_normal_and_tangent(n: DVec3, tangent: DVec3) -> Frame {
-        match (tangent - n * n.dot(tangent)).try_normalize() {
+        let across = |v: DVec3| v - n * n.dot(v);
+        let mut s = across(tangent);
+        // What is left of a tangent nearly parallel to n is rounding, along n as well as across: it is taken across n once
+        // more, and if hardly anything stays it says nothing (Daniel et al. 1976: twice is enough).
+        if s.length_squared() < NEARLY_PARALLEL * tangent.length_squared() {
+            let again = across(s);
+            s = if again.length_squared() < 0.25 * s.length_squared() { DVec3::ZERO } else { again };
+        }
+        match s.try_normalize() {
             Some(s) => Frame { s, t: n.cross(s), n },
             None => Frame::from_normal(n),
         }
@@ -52,9 +60,33 @@ impl Frame {
     }
 }
 
+/// Square of the sine below which a tangent is projected twice: 2⁻²⁰, where the first leaves 2⁻³² of itself along n.
+const NEARLY_PARALLEL: f64 = 1.0 / (1u64 << 40) as f64;
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Tangents that are parallel to n but for rounding, of any size: frames stay orthonormal to 1e-9, which is 2⁻³² and
+    /// room. Projected once, frames came out that lengthened directions by a tenth.
+    #[test]
+    fn a_tangent_along_the_normal_leaves_a_frame() {
+        let mut worst = 0f64;
+        for i in 0..20_000u32 {
+            let turn = |k: u32| f64::from(i.wrapping_mul(k) % 9973) / 9973.0 * 2.0 - 1.0;
+            let Some(n) = DVec3::new(turn(7919), turn(104_729), turn(1_299_709)).try_normalize() else { continue };
+            let size = libm::exp2(f64::from(i % 81) - 40.0);
+            let off = libm::exp2(-f64::from(i % 61)) * DVec3::new(turn(31), turn(37), turn(41));
+            let off = if i % 3 == 0 { DVec3::ZERO } else { off };
+            let Frame { s, t, n } = Frame::from_normal_and_tangent(n, (n * (1.0 + 1e-16) + off) * size);
+            for (found, expected) in
+                [(s.dot(n), 0.0), (t.dot(n), 0.0), (s.dot(t), 0.0), (s.length(), 1.0), (t.length(), 1.0)]
+            {
+                worst = worst.max((found - expected).abs());
+            }
+        }
+        assert!(worst < 1e-9, "{worst}");
+    }
 
     #[test]
     fn frames_are_orthonormal_and_right_handed_for_every_normal() {
