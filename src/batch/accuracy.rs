@@ -278,7 +278,8 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
     };
     let left = target * target - row.bias().unwrap_or(0.0).powi(2);
     let samples = f64::from(end.samples);
-    let fit = Fit::with_slope(samples, end.noise[0], row.exponent());
+    // The slope is that from a quarter of the samples on: in the middle half of them.
+    let fit = Fit::with_slope(samples, end.noise[0], row.exponent(), 0.5 * samples);
     row.to_target = (left > 0.0).then(|| end.seconds * fit.samples_for(left.sqrt()) / samples);
     row
 }

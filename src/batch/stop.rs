@@ -164,16 +164,16 @@ impl Fit {
         let (x, y) = logs.clone().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
         let (xy, xx) = logs.fold((0.0, 0.0), |(a, b), (u, v)| (a + (u - x) * (v - y), b + (u - x) * (u - x)));
         let slope = if xx > 0.0 { (-xy / xx).clamp(1.0, 2.0) } else { 1.0 };
-        // β / αN there, and from it at the last.
-        let share = (slope - 1.0) / (2.0 - slope) * libm::exp(x) / samples;
-        let even = if share < f64::INFINITY { share / (1.0 + share) } else { 1.0 };
-        Some(Fit { samples, error, even })
+        Some(Fit::with_slope(samples, error, slope, libm::exp(x)))
     }
 
-    /// Through `error` at `samples`, where variance falls as samples^−slope, from 1 to 2.
+    /// Through `error` at `samples`, where variance falls at `middle` samples as samples^−slope, from 1 to 2.
     #[must_use]
-    pub fn with_slope(samples: f64, error: f64, slope: f64) -> Fit {
-        Fit { samples, error, even: slope - 1.0 }
+    pub fn with_slope(samples: f64, error: f64, slope: f64, middle: f64) -> Fit {
+        // β / αN in the middle, and from it at the end.
+        let share = (slope - 1.0) / (2.0 - slope) * middle / samples;
+        let even = if share < f64::INFINITY { share / (1.0 + share) } else { 1.0 };
+        Fit { samples, error, even }
     }
 
     /// Samples at which the error is `error`.
