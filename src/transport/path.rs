@@ -37,10 +37,10 @@ use std::cell::Cell;
 
 /// Vertices up to which a path that has lost nothing goes on for sure: clear glass then shows what
 /// is behind it without the noise of roulette, in every sample.
-pub(super) const FOR_SURE: u32 = 256;
+const FOR_SURE: u32 = 256;
 
 /// How much more than it carries a path's chance to go on is: what is left of it is worth more than its end saves. Error² ×
-/// time is 0.90 to 0.99 of that with a chance that is what it carries (`tools/bench/NOTES.md`).
+/// time is 0.87 to 0.99 of that with a chance that is what it carries (`tools/bench/NOTES.md`).
 const SPARED: f64 = 2.0;
 
 /// The chance by Russian roulette that a path of `vertices` goes on which has `carried` of what it began with, after one that
