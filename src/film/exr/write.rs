@@ -10,10 +10,10 @@ use ::exr::meta::BlockDescription;
 use ::exr::meta::attribute::{ChannelDescription, IntegerBounds, LineOrder, SampleType, Text};
 use ::exr::meta::header::Header;
 use ::exr::prelude::SmallVec;
-use flate2::write::ZlibEncoder;
+use flate2::{Compress, FlushCompress, Status};
 use half::f16;
 use rayon::prelude::*;
-use std::io::Write;
+use std::cell::RefCell;
 use std::ops::Range;
 use std::path::Path;
 
@@ -190,17 +190,29 @@ fn deflated_chunk(window: &Window, channels: &[Channel], rows: Range<usize>) -> 
     pack(window.y + rows.start as i32, &differences, plain)
 }
 
+thread_local! {
+    /// A thread's own, for a new one takes as long as a few rows.
+    static DEFLATE: RefCell<Compress> = RefCell::new(Compress::new(flate2::Compression::fast(), true));
+}
+
 /// The chunk of the rows from `y` on: `bytes` deflated. What does not shrink is stored as it is, `plain`, and known by
 /// its length.
 pub(super) fn pack(y: i32, bytes: &[u8], plain: Vec<u8>) -> Vec<u8> {
-    let mut encoder = ZlibEncoder::new(Vec::with_capacity(plain.len()), flate2::Compression::fast());
-    // A vector takes all that it is given.
-    let packed = encoder.write_all(bytes).and_then(|()| encoder.finish());
-    let pixels = packed.ok().filter(|packed| packed.len() < plain.len()).unwrap_or(plain);
+    // There is room for what is shorter alone.
+    let mut packed = vec![0; plain.len().saturating_sub(1)];
+    let length = DEFLATE.with_borrow_mut(|deflate| {
+        deflate.reset();
+        let status = deflate.compress(bytes, &mut packed, FlushCompress::Finish);
+        matches!(status, Ok(Status::StreamEnd)).then(|| deflate.total_out() as usize)
+    });
+    let pixels = match length {
+        Some(length) => &packed[..length],
+        None => &plain,
+    };
     let mut chunk = Vec::with_capacity(8 + pixels.len());
     chunk.extend_from_slice(&y.to_le_bytes());
     chunk.extend_from_slice(&(pixels.len() as i32).to_le_bytes());
-    chunk.extend_from_slice(&pixels);
+    chunk.extend_from_slice(pixels);
     chunk
 }
 
