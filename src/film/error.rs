@@ -61,6 +61,16 @@ pub struct ErrorEstimate {
     pub valid: bool,
 }
 
+impl ErrorEstimate {
+    /// The variance of ln relMSE as an estimate of what is to be expected. A quarter of that which the interval allows for: the
+    /// rest is how far this picture's own error is from there.
+    #[must_use]
+    pub fn log_variance(&self) -> f64 {
+        let half = 2.0 * libm::log(self.high / self.rel_rmse);
+        (0.5 * half / student_t_half_width(0.95, EFFECTIVE_PIXELS)).powi(2)
+    }
+}
+
 /// See [`ErrorEstimate::valid`]: 30 is where the central limit is commonly trusted.
 pub const EFFECTIVE_PIXELS: f64 = 30.0;
 
@@ -76,6 +86,9 @@ pub const FURTHER_SHARE: f64 = 0.1;
 
 /// The next order in units of the square of what the second takes off, which is what the interval allows for.
 const NEXT_ORDER: f64 = 4.0;
+
+/// The most that an end of the interval may be away, as a logarithm, so that both are numbers whatever is taken off.
+const WIDEST: f64 = 100.0;
 
 /// About as many blocks are looked at for what neighbours share.
 const BLOCKS: usize = 64;
@@ -204,7 +217,7 @@ pub fn relative_error(
     let next = NEXT_ORDER * share * share * all.error;
     let half = student_t_half_width(0.95, EFFECTIVE_PIXELS) * (8.0 / 3.0 * trace).sqrt().hypot(next) / n;
     // Of a sum of squares: symmetric in its logarithm, for few squares make it more skewed than a normal number.
-    let stretch = if rel_mse > 0.0 { libm::exp(0.5 * half / rel_mse) } else { 1.0 };
+    let stretch = if rel_mse > 0.0 { libm::exp((0.5 * half / rel_mse).min(WIDEST)) } else { 1.0 };
     let effective = if all.squares > 0.0 { all.error * all.error / all.squares } else { n };
     Ok(ErrorEstimate {
         rel_rmse: rel_mse.sqrt(),
@@ -388,6 +401,27 @@ mod tests {
     fn an_estimate_below_nothing_is_unknown() {
         let rare = film_of(|pixel, replicate| if (pixel + replicate) % 4 < 2 { 3.0 } else { 0.0 });
         assert_eq!(estimate(&rare).unwrap_err(), NoEstimate::Noisy);
+    }
+
+    /// Half of the pixels as above, the others noisy by just as much as leaves something: the interval ends at numbers, which
+    /// JSON can hold.
+    #[test]
+    fn an_estimate_near_nothing_has_a_finite_interval() {
+        let mixed = |noise: f32| {
+            let light = move |pixel: usize, replicate: usize| match pixel < 32 {
+                true if (pixel + replicate) % 4 < 2 => 3.0,
+                true => 0.0,
+                false => 1.0 + noise * replicate as f32,
+            };
+            estimate(&film_of(light)).map(|(_, e)| e)
+        };
+        let (mut none, mut some) = (0.0, 8.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (none + some);
+            *(if mixed(middle).is_ok() { &mut some } else { &mut none }) = middle;
+        }
+        let e = mixed(some).unwrap();
+        assert!(!e.valid && e.rel_rmse < 1e-2 && e.low > 0.0 && e.high > 1e30 && e.high.is_finite(), "{e:?}");
     }
 
     /// Light that is the same in all replicates is without noise; if a part is black, its light may be yet to come. One
