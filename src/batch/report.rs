@@ -77,6 +77,8 @@ pub struct ConvergencePoint {
     pub seconds: f64,
     /// Relative RMSE.
     pub relative_error: f64,
+    /// Whether its interval could be believed.
+    pub valid: bool,
 }
 
 /// How the PNG was developed, where that was not written down.
@@ -298,7 +300,7 @@ impl SceneReport {
         self.error = frame.milestones.last().and_then(|m| m.error);
         if let (Some(error), Some(fit)) = (&self.error, Fit::of(&frame.milestones)) {
             let factor = fit.samples_for(0.5 * error.rel_rmse) / f64::from(frame.samples());
-            self.halving_seconds = Some(seconds * (factor - 1.0));
+            self.halving_seconds = Some(seconds * (factor - 1.0)).filter(|s| s.is_finite());
         }
         self.convergence = frame
             .milestones
@@ -306,7 +308,7 @@ impl SceneReport {
             .filter_map(|m| {
                 let e = m.error.as_ref()?;
                 let seconds = m.elapsed.as_secs_f64();
-                Some(ConvergencePoint { samples: m.samples, seconds, relative_error: e.rel_rmse })
+                Some(ConvergencePoint { samples: m.samples, seconds, relative_error: e.rel_rmse, valid: e.valid })
             })
             .collect();
         if self.error.is_none() && finish.integrator == "path" {
