@@ -156,9 +156,9 @@ const SCATTER: f64 = 0.1;
 const USUAL: (f64, f64) = (1.0, 0.5);
 
 impl Fit {
-    /// Through the last milestone, with the slope of the last three that lie a doubling or so apart, which is that in their
-    /// middle: by least squares over logarithms, each weighed by its interval, and the slope by [`USUAL`]. So what
-    /// few pixels carry, of which the error is a guess, tells no slope, and one milestone alone has that of independent samples.
+    /// Through the last milestone, with the slope in the middle of the last three that lie a doubling or so apart: by least
+    /// squares over logarithms, each weighed by its interval, and with what slopes are before any is seen, 1 ± ½. So what few
+    /// pixels carry, of which the error is a guess, tells no slope, and one milestone alone has that of independent samples.
     #[must_use]
     pub fn of(milestones: &[Milestone]) -> Option<Fit> {
         let mut points: Vec<(f64, &ErrorEstimate)> = Vec::new();
