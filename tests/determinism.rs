@@ -37,6 +37,8 @@ fn scenes() -> Vec<(&'static str, String)> {
                 + "- sphere: {center: [0, 1, 0], radius: 0.5, material: {dielectric: {ior: 1, exterior_ior: 1.5}}}\n"
         }),
         ("glass of many indices", glass("{glass: N-SF11}")),
+        ("a film", glass("1.5, film: {ior: 1.33, thickness_nm: 400}")),
+        ("a film on rough glass", glass("1.5, roughness: 0.2, film: {ior: 1.33, thickness_nm: 400}")),
         (
             "rough glass",
             format!(
@@ -178,6 +180,21 @@ fn all_effects_give_the_bits_of_those_the_scene_calls_for() {
             assert!(differ == 0, "{name}, {integrator}: {differ} of {} sums differ", sums(&all).len());
         }
     }
+}
+
+/// How much light is traced from the lamps is told by the rays that it takes, of which effects that are forced on take none: not
+/// for wavelengths that leave the glass for the sky either.
+#[test]
+fn all_effects_trace_as_many_paths_from_the_lights() {
+    let text = "camera: {origin: [0, 2, 6], target: [0, 0.8, 0], fov_deg: 40}\nimage: {width: 64, height: 64}\n\
+        lights: [{constant: {radiance: 0.3}}]\nshapes:\n- plane: {normal: [0, 1, 0]}\n\
+        - sphere: {center: [-0.8, 0.8, 0], radius: 0.8, material: {dielectric: {ior: {glass: N-SF11}}}}\n\
+        - rectangle: {corner: [-1, 4, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2], emission: 6}\n";
+    let [auto, all] = ["auto", "all"].map(|effects| {
+        let bench = bench_with(&format!("{text}render: {{samples: 16, effects: {effects}}}\n"), &[]);
+        bench.prepared.plan.caustics.as_ref().map(|caustics| caustics.ratio)
+    });
+    assert!(auto.is_some() && auto == all, "{auto:?} {all:?}");
 }
 
 #[test]

@@ -419,7 +419,8 @@ impl Material {
             }
             Kind::Dielectric { interior, exterior, fresnel, facets, tints, film, .. } => {
                 let exterior = around.unwrap_or(exterior);
-                let eta = relative_index(interior, exterior, nm, all_dispersive);
+                // Under a film a leading wavelength would choose by its own reflectance, where otherwise their mean does.
+                let eta = relative_index(interior, exterior, nm, all_dispersive && film.is_none());
                 let film = film.as_ref().map(|film| film.at(at, nm, exterior));
                 let tint = Tints::at(tints.as_deref(), at, nm);
                 match facets {

@@ -125,7 +125,7 @@ impl Walk<'_, '_> {
 
     /// Lanes that meet no surface: only something between could scatter them.
     fn drift_apart(&mut self, packet: &Packet, lanes: u8) {
-        if self.paths.plan.media {
+        if self.paths.plan.media && !self.paths.scene.media.is_empty() {
             each(lanes).for_each(|lane| self.follow(packet.alone(lane)));
         }
     }
