@@ -148,8 +148,8 @@ pub struct Fit {
     power: f64,
 }
 
-/// How far logarithms of variance lie off their line besides what their intervals say: the slopes between one number of
-/// samples and the next differ by 0.15 where such samples are squares of powers of two or not.
+/// How far logarithms of variance lie off their line besides what their intervals say: 0.07 in 118 triples of doublings over the
+/// gallery; 0.2 foretells as well.
 const SCATTER: f64 = 0.1;
 
 /// Slope of independent samples, and how far off it slopes are, before any is seen: from 0 to 2 they are within two of these.
