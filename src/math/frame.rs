@@ -60,7 +60,7 @@ impl Frame {
     }
 }
 
-/// Square of the sine below which a tangent is projected twice: 2⁻²⁰, where the first leaves 2⁻³² of itself along n.
+/// Square of the sine, 2⁻²⁰, below which a tangent is projected twice: the first leaves 2⁻³² of itself along n there.
 const NEARLY_PARALLEL: f64 = 1.0 / (1u64 << 40) as f64;
 
 #[cfg(test)]

@@ -198,21 +198,17 @@ thread_local! {
 /// The chunk of the rows from `y` on: `bytes` deflated. What does not shrink is stored as it is, `plain`, and known by
 /// its length.
 pub(super) fn pack(y: i32, bytes: &[u8], plain: Vec<u8>) -> Vec<u8> {
-    // There is room for what is shorter alone.
-    let mut packed = vec![0; plain.len().saturating_sub(1)];
-    let length = DEFLATE.with_borrow_mut(|deflate| {
+    let mut packed = Vec::with_capacity(plain.len());
+    // It fills the room that there is, and no more.
+    let whole = DEFLATE.with_borrow_mut(|deflate| {
         deflate.reset();
-        let status = deflate.compress(bytes, &mut packed, FlushCompress::Finish);
-        matches!(status, Ok(Status::StreamEnd)).then(|| deflate.total_out() as usize)
+        matches!(deflate.compress_vec(bytes, &mut packed, FlushCompress::Finish), Ok(Status::StreamEnd))
     });
-    let pixels = match length {
-        Some(length) => &packed[..length],
-        None => &plain,
-    };
+    let pixels = if whole && packed.len() < plain.len() { packed } else { plain };
     let mut chunk = Vec::with_capacity(8 + pixels.len());
     chunk.extend_from_slice(&y.to_le_bytes());
     chunk.extend_from_slice(&(pixels.len() as i32).to_le_bytes());
-    chunk.extend_from_slice(pixels);
+    chunk.extend_from_slice(&pixels);
     chunk
 }
 
