@@ -13,7 +13,7 @@ pub struct Camera {
     pub projection: Projection,
     /// The full picture, in pixels.
     pub resolution: [u32; 2],
-    /// A lens of this radius focused at this distance; `None` for a pinhole.
+    /// A lens focused at a distance; `None` for a pinhole, which a lens of radius zero is.
     pub lens: Option<Lens>,
     /// Distances along the axis between which the camera sees, metres: 0 and infinity where nothing is cut away.
     /// Rays begin at the first.
@@ -137,6 +137,7 @@ impl Camera {
             near: world_from_camera.translation + m.z_axis * clip[0],
             camera_from_world: world_from_camera.inverse(),
         };
+        let lens = lens.filter(|lens| lens.radius > 0.0);
         Camera { world_from_camera, projection, resolution, lens, clip, principal_point, view }
     }
 
@@ -319,6 +320,13 @@ mod tests {
         assert!((corner(0.0, 0.0) - top_left).length() < 4.0 * f64::EPSILON);
         assert!((corner(200.0, 100.0) - top_left * DVec3::new(-1.0, -1.0, 1.0)).length() < 4.0 * f64::EPSILON);
         assert!((corner(100.0, 50.0) + DVec3::Z).length() < 4.0 * f64::EPSILON);
+    }
+
+    /// What a lens costs, one without extent does not.
+    #[test]
+    fn a_lens_of_radius_zero_is_a_pinhole() {
+        let lens = |radius| camera(Some(Lens { radius, focus_distance: 4.0 })).lens;
+        assert!(lens(0.0).is_none() && lens(1e-9).is_some());
     }
 
     #[test]

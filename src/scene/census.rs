@@ -80,7 +80,7 @@ impl Census {
     #[must_use]
     pub fn of(scene: &Scene) -> Census {
         let mut census = Census { fog: scene.fog.is_some(), backgrounds: scene.backgrounds.len(), ..Census::default() };
-        census.lens = scene.camera.lens.is_some_and(|l| l.radius > 0.0);
+        census.lens = scene.camera.lens.is_some();
         for object in &scene.objects {
             match &object.geometry {
                 Geometry::Shape(_) => census.shapes += 1,

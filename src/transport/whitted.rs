@@ -361,6 +361,7 @@ impl Tracer<'_> {
             Kind::Dielectric { interior, exterior, fresnel: model, tints, film, .. } => {
                 let tint = Tints::at(tints.as_deref(), at, self.nm);
                 let exterior = standpoint.around.unwrap_or(exterior);
+                // As paths do under a film (`Material::bsdf`).
                 let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive && film.is_none());
                 let m = DVec3::Z * local.z.signum();
                 let toward = |eta: f64| if local.z > 0.0 { eta } else { 1.0 / eta };
