@@ -81,6 +81,8 @@ impl Import<'_> {
             "direct" => {
                 hide_emitters(&bag, &mut fields)?;
                 fields.add("max_depth", whole(bag.object.place, 2));
+                // What shines through a pane has met two things.
+                fields.add("count_crossings", boolean(bag.object.place, true));
                 samples_of_direct(&bag, &mut fields)?;
                 "path"
             }
@@ -268,6 +270,7 @@ mod tests {
             hide_emitters: true,
             light_samples: 4,
             scatter_samples: 4,
+            count_crossings: true,
             ..PathIntegrator::default()
         });
         assert_eq!(scene.integrator, direct);
