@@ -29,6 +29,8 @@ STANDARD_ERRORS = 3.0
 DARK = 0.05
 # More noise than this part of the mean, and agreement would say nothing.
 MOST_NOISE = 0.005
+TOO_NOISY = "too noisy to judge"
+PEER_NOT_FINITE = "a pixel of Mitsuba's is not a finite number"
 # Mitsuba's floor for the variance of one sample.
 SAMPLE_VARIANCE_FLOOR = 1e-4
 
@@ -138,8 +140,10 @@ class Verdict:
 def judge(a: Picture, b: Picture, allowance: float = ALLOWANCE) -> Verdict:
     """Compares Abbe's picture with Mitsuba's."""
     faults = []
-    if not (a.finite and b.finite):
+    if not a.finite:
         faults.append("a pixel is not a finite number")
+    if not b.finite:
+        faults.append(PEER_NOT_FINITE)
 
     # 1. The whole. Errors are relative to a channel's mean.
     scale = np.maximum(np.abs(b.whole.mean), DARK * np.abs(b.whole.mean).max())
@@ -148,7 +152,7 @@ def judge(a: Picture, b: Picture, allowance: float = ALLOWANCE) -> Verdict:
     if (np.abs(difference) > np.maximum(allowance, STANDARD_ERRORS * error)).any():
         faults.append("means differ")
     if (error > MOST_NOISE).any():
-        faults.append("too noisy to judge")
+        faults.append(TOO_NOISY)
 
     # 2. The blocks.
     block_floor = SAMPLE_VARIANCE_FLOOR / BLOCK**2 * (1 / a.samples + 1 / b.samples)

@@ -1,0 +1,400 @@
+"""Scenes drawn at random from Mitsuba's plugins, for what no scene of one feature shows: how they go together.
+
+A scene is a function of its number. It has a ground, one to three bodies, one or two lights, a camera and an integrator,
+each with parameters, textures and transforms that are drawn. What the two renderers are known to mean otherwise (the
+README says why) is left out here, beside the word "known".
+"""
+
+import random
+import re
+from pathlib import Path
+
+from scene_files import FOLDER, SceneFile
+
+SIZE = 32
+ASSETS = FOLDER / "assets"
+# Square: `bumpmap` takes the slopes of turned pictures along the wrong sides where they are not (known).
+RELIEF = "waves.png"
+PICTURES = ("patch.png", "slide.png", "stencil.png", RELIEF)
+MESHES = {"obj": ("tile.obj", "roof.obj"), "ply": ("tile.ply", "tile_text.ply"), "serialized": ("tiles.serialized",)}
+CURVES = {"bsplinecurve": ("coil.txt", "tuft.txt"), "linearcurve": ("zigzag.txt",)}
+SURFACES = (
+    "diffuse", "dielectric", "thindielectric", "roughdielectric", "conductor", "roughconductor", "plastic", "roughplastic",
+    "principled", "principledthin", "null", "mask", "twosided", "blendbsdf", "bumpmap", "normalmap",
+)  # fmt: skip
+METALS = ("Au", "Ag", "Cu", "Al", "Cr", "W", "none")
+# What is met without a change of direction.
+OPEN = {"mask", "null", "thindielectric"}
+# Light that no scattered ray meets.
+DELTA = {"point", "spot", "projector", "directional"}
+SKIES = {"constant", "envmap"}
+# What tangents turn.
+GRAIN = "alpha_u|anisotropic|bumpmap|normalmap"
+
+
+def number(x: float) -> str:
+    return f"{x:.6g}"
+
+
+def leaf(kind: str, name: str, value) -> str:
+    return f'<{kind} name="{name}" value="{value}"/>'
+
+
+def plugin(family: str, kind: str, *inside: str, name: str = "") -> str:
+    named = f' name="{name}"' if name else ""
+    return f'<{family} type="{kind}"{named}>{"".join(inside)}</{family}>'
+
+
+class Draw:
+    """Draws the parts of one scene."""
+
+    def __init__(self, seed: int):
+        self.random = random.Random(seed)
+
+    # -- numbers ---------------------------------------------------------------------------------------
+
+    def chance(self, p: float) -> bool:
+        return self.random.random() < p
+
+    def one(self, *of):
+        return self.random.choice(of)
+
+    def between(self, low: float, high: float) -> str:
+        return number(self.random.uniform(low, high))
+
+    def float(self, name: str, low: float, high: float) -> str:
+        return leaf("float", name, self.between(low, high))
+
+    def maybe(self, part, p: float = 0.3) -> str:
+        return part() if self.chance(p) else ""
+
+    # -- places ----------------------------------------------------------------------------------------
+
+    def turn(self) -> str:
+        axis = [self.random.gauss(0, 1) for _ in range(3)]
+        length = sum(x * x for x in axis) ** 0.5
+        x, y, z = (f"{a / length:.12f}" for a in axis)
+        return f'<rotate x="{x}" y="{y}" z="{z}" angle="{self.between(0, 360)}"/>'
+
+    def place(self, x: float, even: bool) -> str:
+        if even:
+            scale = f'<scale value="{self.between(0.4, 0.8)}"/>'
+        else:
+            scale = "<scale " + " ".join(f'{a}="{self.between(0.4, 0.8)}"' for a in "xyz") + "/>"
+        move = f'<translate x="{number(x)}" y="{self.between(0.6, 1.4)}" z="{self.between(-0.5, 0.5)}"/>'
+        return f'<transform name="to_world">{scale}{self.turn()}{move}</transform>'
+
+    def above(self, scale: str = "") -> str:
+        """Looks down at the scene from somewhere above."""
+        x, z = self.between(-3, 3), self.one(self.between(1.5, 3), self.between(-3, -1.5))
+        up = f"{self.between(-0.3, 0.3)}, 1, {self.between(-0.3, 0.3)}"
+        look = f'<lookat origin="{x}, {self.between(2.5, 4)}, {z}" target="0, 0.7, 0" up="{up}"/>'
+        return f'<transform name="to_world">{scale}{look}</transform>'
+
+    # -- spectra and textures --------------------------------------------------------------------------
+
+    def spectrum(self, name: str, low: float, high: float, rgb: bool = True) -> str:
+        form = self.one("one", "list", "rgb" if rgb else "list")
+        if form == "one":
+            return leaf("spectrum", name, self.between(low, high))
+        if form == "rgb":
+            return leaf("rgb", name, ", ".join(self.between(low, high) for _ in range(3)))
+        # To the ends: `volpathmis` loses light where a medium has no extinction at some wavelengths (known).
+        knots = ", ".join(f"{nm}:{self.between(low, high)}" for nm in (360, 480, 540, 620, 830))
+        return leaf("spectrum", name, knots)
+
+    def on_surface(self) -> str:
+        if self.chance(0.5):
+            return ""
+        steps = [
+            f'<scale x="{self.between(0.5, 5)}" y="{self.between(0.5, 5)}"/>',
+            f'<rotate z="1" angle="{self.between(0, 360)}"/>',
+            f'<translate x="{self.between(-1, 1)}" y="{self.between(-1, 1)}"/>',
+        ]
+        steps = self.random.sample(steps, self.random.randint(1, 3))
+        return f'<transform name="to_uv">{"".join(steps)}</transform>'
+
+    def bitmap(self, name: str, file: str, raw: bool, filters=("nearest", "bilinear")) -> str:
+        return plugin(
+            "texture",
+            "bitmap",
+            leaf("string", "filename", ASSETS / file),
+            leaf("string", "filter_type", self.one(*filters)),
+            leaf("string", "wrap_mode", self.one("repeat", "mirror", "clamp")),
+            leaf("boolean", "raw", str(raw).lower()),
+            self.on_surface(),
+            name=name,
+        )
+
+    def texture(self, name: str) -> str:
+        if self.chance(0.5):
+            return self.bitmap(name, self.one(*PICTURES), False)
+        colours = self.spectrum("color0", 0.05, 0.9) + self.spectrum("color1", 0.05, 0.9)
+        return plugin("texture", "checkerboard", colours, self.on_surface(), name=name)
+
+    def reflectance(self, name: str) -> str:
+        return self.texture(name) if self.chance(0.4) else self.spectrum(name, 0.02, 0.9)
+
+    def scalar(self, name: str, low: float, high: float, textured: float = 0.2, pictures: bool = True) -> str:
+        if not self.chance(textured):
+            return self.float(name, low, high)
+        if pictures and self.chance(0.5):
+            return self.bitmap(name, self.one(*PICTURES), True)
+        values = (leaf("spectrum", f"color{i}", self.between(low, high)) for i in range(2))
+        return plugin("texture", "checkerboard", *values, self.on_surface(), name=name)
+
+    # -- surfaces --------------------------------------------------------------------------------------
+
+    def indices(self) -> str:
+        inside = self.one(self.float("int_ior", 1.05, 2.2), leaf("string", "int_ior", self.one("bk7", "water", "diamond")))
+        return inside + self.maybe(lambda: self.float("ext_ior", 1.0, 1.4), 0.2)
+
+    def tints(self) -> str:
+        return "".join(self.maybe(lambda n=n: self.spectrum(n, 0.3, 1)) for n in ("specular_reflectance", "specular_transmittance"))
+
+    def roughness(self) -> str:
+        shape = leaf("string", "distribution", self.one("ggx", "beckmann"))
+        # Pictures have black, and no roughness is none.
+        names = ("alpha_u", "alpha_v") if self.chance(0.3) else ("alpha",)
+        alphas = "".join(self.scalar(name, 0.05, 0.6, pictures=False) for name in names)
+        return shape + alphas + self.maybe(lambda: leaf("boolean", "sample_visible", "false"), 0.15)
+
+    def bsdf(self, depth: int = 2, open_too: bool = True, brushed: bool = True) -> str:
+        kinds = ["diffuse", "diffuse", "roughconductor", "conductor", "plastic", "roughplastic", "principled"]
+        if open_too:
+            kinds += ["dielectric", "thindielectric", "roughdielectric", "null", "principledthin"]
+        if depth > 0:
+            kinds += ["mask", "twosided", "blendbsdf", "bumpmap", "normalmap"]
+        kind = self.one(*kinds)
+        return plugin("bsdf", kind, getattr(self, kind)(depth, open_too))
+
+    def diffuse(self, *_):
+        return self.maybe(lambda: self.reflectance("reflectance"), 0.9)
+
+    def dielectric(self, *_):
+        return self.indices() + self.tints()
+
+    thindielectric = dielectric
+
+    def roughdielectric(self, *_):
+        return self.indices() + self.roughness() + self.tints()
+
+    def conductor(self, *_):
+        # Colours above one for eta and k are known.
+        measured = leaf("string", "material", self.one(*METALS))
+        given = self.spectrum("eta", 0.2, 2, rgb=False) + self.spectrum("k", 1, 5, rgb=False)
+        return self.one(measured, given) + self.maybe(lambda: self.reflectance("specular_reflectance"))
+
+    def roughconductor(self, *_):
+        return self.conductor() + self.roughness()
+
+    def plastic(self, *_):
+        index = self.one(self.float("int_ior", 1.2, 1.9), leaf("string", "int_ior", "bk7"))
+        further = self.maybe(lambda: leaf("boolean", "nonlinear", "true")) + self.maybe(lambda: self.spectrum("specular_reflectance", 0.3, 1))
+        return index + self.reflectance("diffuse_reflectance") + further
+
+    def roughplastic(self, *_):
+        return self.plastic() + leaf("string", "distribution", self.one("ggx", "beckmann")) + self.float("alpha", 0.05, 0.6)
+
+    def some(self, names, textured: float = 0.2) -> str:
+        return "".join(self.maybe(lambda n=n: self.scalar(n, 0, 1, textured), 0.4) for n in names)
+
+    def principled(self, _, open_too: bool):
+        base = self.reflectance("base_color") + self.scalar("roughness", 0.1, 1, pictures=False)
+        names = ["metallic", "anisotropic", "spec_tint", "sheen", "sheen_tint", "clearcoat", "clearcoat_gloss", "flatness"]
+        names += ["spec_trans"] * (open_too and self.chance(0.5))
+        index = self.one(self.float("specular", 0.1, 0.9), self.float("eta", 1.1, 2), "")
+        return base + self.some(names) + index
+
+    def principledthin(self, *_):
+        base = self.reflectance("base_color") + self.scalar("roughness", 0.1, 1, pictures=False)
+        names = ("anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness")
+        further = self.maybe(lambda: self.scalar("diff_trans", 0, 2)) + self.maybe(lambda: self.float("eta", 1.1, 2))
+        return base + self.some(names) + further
+
+    def null(self, *_):
+        return ""
+
+    def mask(self, depth: int, open_too: bool):
+        return self.scalar("opacity", 0, 1, 0.5) + self.bsdf(depth - 1, open_too)
+
+    def twosided(self, *_):
+        return self.bsdf(0, False) + self.maybe(lambda: self.bsdf(0, False), 0.4)
+
+    def blendbsdf(self, depth: int, open_too: bool):
+        inside = [self.bsdf(depth - 1, open_too) for _ in range(2)]
+        # Perfect lobes and rough glass in a blend are known.
+        while any(re.search('"(conductor|plastic|.*dielectric|null|mask)"', b) for b in inside):
+            inside = [self.bsdf(depth - 1, open_too) for _ in range(2)]
+        return self.scalar("weight", 0, 1, 0.5) + "".join(inside)
+
+    def bumpmap(self, *_):
+        inside = self.bsdf(0, False)
+        # Grain under a relief is known.
+        while re.search(GRAIN, inside):
+            inside = self.bsdf(0, False)
+        return self.bitmap("relief", RELIEF, True, ("bilinear",)) + self.float("scale", 0.01, 0.15) + inside
+
+    def normalmap(self, *_):
+        return self.bitmap("normalmap", "normals.png", True) + self.bsdf(0, False)
+
+    # -- bodies ----------------------------------------------------------------------------------------
+
+    def body(self, x: float, inside: str, closed: bool = False) -> str:
+        kind = self.one("sphere", "cube") if closed else self.one(
+            "sphere", "cube", "cylinder", "disk", "rectangle", "obj", "ply", "serialized", "sdfgrid", "bsplinecurve", "linearcurve"
+        )  # fmt: skip
+        # Linear curves have no tangents, nor have grids of distances (known).
+        while kind in ("linearcurve", "sdfgrid") and re.search(GRAIN, inside):
+            inside = self.bsdf()
+        if kind in CURVES:
+            file = leaf("string", "filename", ASSETS / self.one(*CURVES[kind]))
+            if kind == "bsplinecurve" and self.chance(0.5):
+                melanin = "".join(self.float(n, 0.05, 0.6) for n in ("eumelanin", "pheomelanin"))
+                inside = plugin("bsdf", "hair", melanin, self.float("longitudinal_roughness", 0.2, 0.8))
+            place = f'<transform name="to_world"><rotate y="1" angle="{self.between(0, 360)}"/><translate x="{number(x)}"/></transform>'
+            return plugin("shape", kind, file, place, inside)
+        if kind == "sdfgrid":
+            file = leaf("string", "filename", ASSETS / "ring_and_ball.vol")
+            place = f'<transform name="to_world"><scale value="1.4"/><translate x="{number(x - 0.7)}" z="-0.7"/></transform>'
+            return plugin("shape", kind, file, leaf("string", "normals", self.one("analytic", "smooth")), place, inside)
+        turned = "" if closed or kind == "cube" else self.maybe(lambda: leaf("boolean", "flip_normals", "true"), 0.1)
+        if kind in MESHES:
+            file = leaf("string", "filename", ASSETS / self.one(*MESHES[kind]))
+            # Shading normals turn light through backs, which is known.
+            flat = leaf("boolean", "face_normals", "true") if "roof" in file else self.maybe(lambda: leaf("boolean", "face_normals", "true"))
+            return plugin("shape", kind, file, flat, self.place(x, False), turned, inside)
+        return plugin("shape", kind, self.place(x, kind not in ("cube", "rectangle")), turned, inside)
+
+    def group(self, x: float) -> str:
+        members = [self.body(0, self.bsdf(1, False)) for _ in range(2)]
+        made = plugin("shape", "shapegroup", *members).replace("<shape", f'<shape id="set{number(x)}"', 1)
+        place = f'<transform name="to_world"><scale x="0.8" y="{self.between(0.5, 1)}" z="0.7"/><translate x="{number(x)}"/></transform>'
+        return made + plugin("shape", "instance", f'<ref id="set{number(x)}"/>', place)
+
+    def phase(self) -> str:
+        lobe = lambda: plugin("phase", "hg", self.float("g", -0.8, 0.8))  # noqa: E731
+        kind = self.one("isotropic", "hg", "rayleigh", "blendphase", "tabphase")
+        if kind == "hg":
+            return lobe()
+        if kind == "blendphase":
+            return plugin("phase", kind, self.float("weight", 0, 1), plugin("phase", "isotropic"), lobe())
+        if kind == "tabphase":
+            return plugin("phase", kind, leaf("string", "values", ", ".join(self.between(0.1, 1) for _ in range(4))))
+        return plugin("phase", kind)
+
+    def medium(self) -> str:
+        if self.chance(0.3):
+            around = '<transform name="to_world"><scale value="4"/><translate x="-2" y="-1" z="-2"/></transform>'
+            grid = plugin("volume", "gridvolume", leaf("string", "filename", ASSETS / "puff.vol"), around, name="sigma_t")
+            albedo, scale = self.spectrum("albedo", 0.2, 0.95), self.float("scale", 1, 5)
+            return plugin("medium", "heterogeneous", grid, albedo, scale, self.phase(), name="interior")
+        colour = self.spectrum("sigma_t", 0.3, 1) if self.chance(0.5) else self.float("sigma_t", 0.3, 3)
+        albedo = self.spectrum("albedo", 0.2, 0.95)
+        return plugin("medium", "homogeneous", albedo, colour, self.float("scale", 0.7, 2), self.phase(), name="interior")
+
+    # -- lights ----------------------------------------------------------------------------------------
+
+    def light(self, name: str, most: float) -> str:
+        if self.chance(0.25):
+            return f'<spectrum type="d65" name="{name}">{self.float("scale", 0.2 * most, most)}</spectrum>'
+        return self.spectrum(name, 0.1 * most, most)
+
+    def emitter(self) -> tuple[str, str]:
+        """A light, and its kind."""
+        kind = self.one("area", "area", "point", "constant", "envmap", "spot", "projector", "directional")
+        if kind == "area":
+            shape = self.one("rectangle", "disk", "sphere", "cylinder")
+            # Textures of turned spheres and cylinders that shine are known.
+            plain = shape in ("sphere", "cylinder") or self.chance(0.6)
+            radiance = self.light("radiance", 8) if plain else self.texture("radiance")
+            surface = self.maybe(lambda: self.bsdf(0, False))
+            scale = f'<scale value="{self.between(0.3, 0.8)}"/>'
+            return plugin("shape", shape, self.above(scale), surface, plugin("emitter", "area", radiance)), kind
+        if kind == "point":
+            at = f"{self.between(-2, 2)}, {self.between(2.5, 4)}, {self.between(-2, 2)}"
+            return plugin("emitter", kind, leaf("point", "position", at), self.light("intensity", 30)), kind
+        if kind == "constant":
+            return plugin("emitter", kind, self.light("radiance", 1)), kind
+        if kind == "envmap":
+            turn = self.maybe(lambda: f'<transform name="to_world">{self.turn()}</transform>')
+            return plugin("emitter", kind, leaf("string", "filename", ASSETS / "sky.exr"), self.float("scale", 0.5, 2), turn), kind
+        if kind == "spot":
+            edge = self.float("cutoff_angle", 15, 60) + self.maybe(lambda: leaf("float", "beam_width", "10"))
+            slide = self.maybe(lambda: self.texture("texture"))
+            return plugin("emitter", kind, self.above(), self.light("intensity", 30), edge, slide), kind
+        if kind == "projector":
+            return plugin("emitter", kind, self.above(), self.float("fov", 25, 70), self.texture("irradiance"), self.float("scale", 3, 20)), kind
+        way = f"{self.between(-1, 1)}, -1, {self.between(-1, 1)}"
+        return plugin("emitter", kind, leaf("vector", "direction", way), self.light("irradiance", 3)), kind
+
+    def lights(self) -> tuple[str, set]:
+        first, kind = self.emitter()
+        if self.chance(0.5):
+            return first, {kind}
+        second, other = self.emitter()
+        # One sky a scene.
+        while kind in SKIES and other in SKIES:
+            second, other = self.emitter()
+        return first + second, {kind, other}
+
+    # -- the whole -------------------------------------------------------------------------------------
+
+    def sensor(self) -> str:
+        kind = self.one("perspective", "perspective", "thinlens", "orthographic")
+        look = f'<lookat origin="{self.between(-1.5, 1.5)}, {self.between(1.2, 3)}, {self.between(5, 6)}" target="0, 0.8, 0" up="{self.between(-0.2, 0.2)}, 1, 0"/>'
+        scale = '<scale x="2" y="2"/>' if kind == "orthographic" else ""
+        inside = f'<transform name="to_world">{scale}{look}</transform>'
+        if kind != "orthographic":
+            inside += self.float("fov", 30, 50)
+            inside += self.maybe(lambda: leaf("string", "fov_axis", self.one("x", "y", "diagonal", "smaller", "larger")))
+        if kind == "perspective":
+            inside += self.maybe(lambda: "".join(self.float(f"principal_point_offset_{a}", -0.1, 0.1) for a in "xy"), 0.2)
+        if kind == "thinlens":
+            inside += self.float("aperture_radius", 0.02, 0.2) + self.float("focus_distance", 4, 7)
+        size = leaf("integer", "width", SIZE) + leaf("integer", "height", self.one(SIZE, SIZE * 3 // 4))
+        form = leaf("string", "pixel_format", "rgb") + leaf("string", "component_format", "float32")
+        film = plugin("film", "hdrfilm", size, form, '<rfilter type="box"/>')
+        return plugin("sensor", kind, inside, film, '<sampler type="independent"/>')
+
+    def scene(self) -> str:
+        misty = self.chance(0.3)
+        integrator = self.one("volpath", "volpathmis") if misty else self.one("path", "path", "volpath", "direct")
+        bodies = ""
+        count = self.random.randint(1, 3)
+        for i in range(count):
+            x = 1.7 * (i - (count - 1) / 2)
+            if misty and self.chance(0.7):
+                skin = self.one(plugin("bsdf", "null"), plugin("bsdf", "dielectric", self.indices()))
+                bodies += self.body(x, skin + self.medium(), closed=True)
+            elif self.chance(0.1):
+                bodies += self.group(x)
+            else:
+                bodies += self.body(x, self.bsdf())
+        ground = plugin("shape", "rectangle", '<transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/></transform>', self.bsdf(1, False))
+        lights, kinds = self.lights()
+        settings = ""
+        if integrator != "direct":
+            settings = leaf("integer", "max_depth", self.random.randint(2, 7)) + leaf("integer", "rr_depth", self.random.randint(3, 9))
+        if integrator in ("path", "direct") and any(f'"{kind}"' in ground + bodies for kind in OPEN):
+            # Lamps through what is open, and samples that end behind it: known.
+            if kinds & DELTA or not kinds & SKIES:
+                return self.scene()
+        else:
+            settings += self.maybe(lambda: leaf("boolean", "hide_emitters", "true"))
+        parts = plugin("integrator", integrator, settings) + self.sensor() + ground + bodies + lights
+        return f'<scene version="3.0.0">{parts}</scene>'.replace("><", ">\n<")
+
+
+def cases(count: int, seed: int, folder: Path) -> list[SceneFile]:
+    """`count` scenes, written to `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    made = []
+    for i in range(count):
+        drawn = seed * 1000 + i
+        path = folder / f"drawn_{drawn}.xml"
+        path.write_text(Draw(drawn).scene())
+        # Light of mirrors and glass is found by chance, as Mitsuba finds it: what it misses is known.
+        settings = ["render.techniques.light_tracing=off"]
+        made.append(SceneFile(path, "drawn at random", spp=1024, settings=settings, may_be_noisy=True))
+    return made
