@@ -2,7 +2,7 @@
 
 use super::bvh::Aabb;
 use super::material::{Kind, Material, Roughness};
-use super::{Geometry, Scene};
+use super::{Geometry, Object, Scene};
 use glam::DVec3;
 
 /// A ball around something that focuses light.
@@ -53,6 +53,9 @@ pub struct Casters {
     pub endless: Vec<String>,
     /// For each object of the scene, whether it is one of those.
     pub unending: Vec<bool>,
+    /// Name of a curve that light comes out of. Rays meet curves from outside only, so that what refracts into one leaves
+    /// it unseen: the way back is another.
+    pub one_way: Option<String>,
 }
 
 /// Balls at the most: what is near to each other shares one beyond.
@@ -91,6 +94,12 @@ fn is_dispersive(material: &Material) -> bool {
     })
 }
 
+/// Whether light goes through a material in another direction than straight on.
+fn bends(material: &Material) -> bool {
+    let straight = |m: &Material| matches!(m.kind, Kind::Thin { .. } | Kind::Boundary);
+    material.leaves().iter().any(|m| m.transmits() && !straight(m))
+}
+
 impl Casters {
     /// Finds them.
     #[must_use]
@@ -127,6 +136,10 @@ impl Casters {
             }
         }
         merge_nearest(&mut casters.balls);
+        let one_way = |object: &&Object| {
+            matches!(object.geometry, Geometry::Curves(_)) && bends(&scene.materials[object.material as usize])
+        };
+        casters.one_way = scene.objects.iter().find(one_way).map(|object| object.name.clone());
         casters
     }
 }

@@ -108,6 +108,9 @@ pub fn decide(
     if casters.balls.is_empty() && casters.endless.is_empty() {
         return left_off("nothing mirrors or refracts sharply");
     }
+    if let Some(name) = &casters.one_way {
+        return left_off(&format!("light leaves {name}, a curve, unseen: its way back from the lights is another"));
+    }
     if settings.scatter_samples == 0 || settings.max_depth.is_some_and(|depth| depth < 3) {
         return left_off("paths are too short for light of mirrors and glass");
     }

@@ -274,6 +274,26 @@ fn light_is_traced_where_panes_would_count_and_there_are_none() {
     assert!(!tracing && reason.starts_with("no light that a path from the camera can meet"), "{reason}");
 }
 
+/// Rays meet curves from outside only: what refracts into a fibre of glass leaves it unseen, and a path from the lamp would
+/// enter it on the other side. Such light is left to the camera, of the ball too, whose light may go through the fibre. A fibre
+/// that light only bounces off, or goes straight through, changes nothing.
+#[test]
+fn no_light_is_traced_through_fibres_of_glass() {
+    let fibre = |material: &str| {
+        let curve = format!("- curves: {{name: fibre, file: fibre.txt, basis: linear, material: {material}}}\n{LAMP}");
+        let scene = AREA.scene("path", "on", "auto", 64).replace(LAMP, &curve);
+        techniques(&bench_with(&scene, &[("fibre.txt", b"0.5 0 0.9 0.05\n1.5 0.5 0.9 0.05\n")]))
+    };
+    for material in ["glass", "{mask: {opacity: 0.5, material: glass}}", "{hair: {}}"] {
+        let (tracing, _, reason) = fibre(material);
+        assert!(!tracing && reason.starts_with("light leaves fibre, a curve, unseen"), "{material}: {reason}");
+    }
+    for material in ["{diffuse: {}}", "{mask: {opacity: 0.5, material: {diffuse: {}}}}", "{mirror: {}}"] {
+        let (tracing, _, reason) = fibre(material);
+        assert!(tracing, "{material}: {reason}");
+    }
+}
+
 /// A camera behind a pane of solid glass sees the floor through it only: paths from the lights cannot be joined to it,
 /// and yet the caustic of a point light under the ball is there, as bright as without the pane but for what that reflects.
 #[test]
