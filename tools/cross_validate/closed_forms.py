@@ -59,6 +59,7 @@ class Case:
     why: str
     body: str
     depth: int = -1
+    integrator: str = "path"
 
 
 def cases() -> list[Case]:
@@ -73,6 +74,20 @@ def cases() -> list[Case]:
         floor = f"""<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/></transform>{GREY}</shape>"""
         body = camera("1, 1, 0", "0, 0, 0", 0.01) + light + floor
         found.append(Case(f"lamp of radius {r:g} at distance 1", 0.5, "E = π L r²/d², back comes ρ E / π", body, 2))
+        if r == 1e-2:
+            half = f'<bsdf type="mask"><float name="opacity" value="0.5"/>{GREY}</bsdf>'
+            found.append(Case("the same over ground of opacity 1/2", 0.25, "half of that", body.replace(GREY, half), 2))
+    # The formula holds for all of a ball above the horizon.
+    board = "".join(f'<spectrum name="color{i}" value="{1 / 0.6**2!r}"/>' for i in range(2))
+    light = f"""<shape type="sphere">
+        <transform name="to_world"><scale value="0.6"/><rotate x="1" angle="120"/><translate y="1"/></transform>
+        <emitter type="area"><texture type="checkerboard" name="radiance">{board}</texture></emitter></shape>"""
+    body = camera("1, 1, 0", "0, 0, 0", 0.01) + light + floor
+    found.append(Case("lamp of radius 0.6, turned, its light a board of one colour", 0.5, "as of any ball of even light", body, 2))
+    mist = """<bsdf type="null"/><medium type="homogeneous" name="interior"><spectrum name="albedo" value="1"/>
+        <spectrum name="sigma_t" value="380:1, 760:1"/></medium>"""
+    body = camera("0, 0, 5", "0, 0, 0", 5.0) + sphere("0, 0, 0", 1.0, mist) + SKY
+    found.append(Case("ball of white mist that is none beyond 380 and 760 nm (`volpathmis`)", 1.0, "a furnace", body, integrator="volpathmis"))
     for d in (1e4, 1e5, 1e6):
         body = camera(f"0, 0, {d!r}", "0, 0, 0", np.degrees(0.5 / d).item(), far=1e9) + sphere("0, 0, 0", 1.0) + SKY
         found.append(Case(f"unit sphere seen from {d:g}", 0.5, convex, body))
@@ -107,7 +122,7 @@ def cases() -> list[Case]:
 def write(case: Case, path: Path) -> None:
     path.write_text(f"""<scene version="3.0.0">
     <default name="spp" value="256"/>
-    <integrator type="path"><integer name="max_depth" value="{case.depth}"/></integrator>
+    <integrator type="{case.integrator}"><integer name="max_depth" value="{case.depth}"/></integrator>
     {case.body}
 </scene>
 """)
