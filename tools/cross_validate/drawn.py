@@ -244,8 +244,8 @@ class Draw:
         kind = self.one("sphere", "cube") if closed else self.one(
             "sphere", "cube", "cylinder", "disk", "rectangle", "obj", "ply", "serialized", "sdfgrid", "bsplinecurve", "linearcurve"
         )  # fmt: skip
-        # Linear curves have no tangents, nor have grids of distances (known).
-        while kind in ("linearcurve", "sdfgrid") and re.search(GRAIN, inside):
+        # Linear curves have no tangents, nor have grids of distances; relief on curves takes light through their backs (known).
+        while kind in (*CURVES, "sdfgrid") and re.search(GRAIN, inside):
             inside = self.bsdf()
         if kind in CURVES:
             file = leaf("string", "filename", ASSETS / self.one(*CURVES[kind]))
@@ -393,8 +393,9 @@ def cases(count: int, seed: int, folder: Path) -> list[SceneFile]:
     for i in range(count):
         drawn = seed * 1000 + i
         path = folder / f"drawn_{drawn}.xml"
-        path.write_text(Draw(drawn).scene())
-        # Light of mirrors and glass is found by chance, as Mitsuba finds it: what it misses is known.
-        settings = ["render.techniques.light_tracing=off"]
+        scene = Draw(drawn).scene()
+        path.write_text(scene)
+        # Where panes do not count, light of lamps that no path meets is traced through glass: known.
+        settings = ["render.techniques.light_tracing=off"] if '"volpath' in scene else []
         made.append(SceneFile(path, "drawn at random", spp=1024, settings=settings, may_be_noisy=True))
     return made
