@@ -74,7 +74,26 @@ def test_too_much_noise_is_no_agreement():
     ours, theirs = pictures(truth(), truth())
     ours.whole.variance = ours.whole.variance * 1e4
     verdict = judge.judge(ours, theirs)
-    assert not verdict.passed and "noisy" in verdict.reason
+    assert not verdict.passed and "noisy" in verdict.reason and verdict.undecided
+
+
+def test_noise_excuses_nothing_that_differs():
+    """Red is noisier than can be judged; green differs by a tenth."""
+    ours, theirs = pictures(truth() * [1.0, 1.1, 1.0], truth())
+    ours.whole.variance = ours.whole.variance * [1e4, 1.0, 1.0]
+    verdict = judge.judge(ours, theirs)
+    assert "noisy" in verdict.reason and "means" in verdict.reason and not verdict.undecided
+
+
+def test_only_the_peer_may_have_no_picture():
+    """What is not a number is nobody's verdict where it is Mitsuba's alone, and ours where it is ours as well."""
+    ours, theirs = pictures(truth(), truth())
+    theirs.finite = False
+    verdict = judge.judge(ours, theirs)
+    assert not verdict.passed and verdict.undecided
+    ours.finite = False
+    verdict = judge.judge(ours, theirs)
+    assert not verdict.passed and not verdict.undecided
 
 
 def test_the_index_of_n_sf11_is_that_of_the_data_sheet():

@@ -28,7 +28,7 @@ import drawn
 import page
 import renderers
 import scene_files
-from judge import PEER_NOT_FINITE, TOO_NOISY, Picture, judge
+from judge import Picture, judge
 from renderers import Mitsuba, RenderError, choose_variant
 from scenes import BANDS, Case, all_cases
 
@@ -36,6 +36,13 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # Files of Mitsuba's that a run takes without --all.
 DRAWN = 12
+
+
+def count(text: str) -> int:
+    """A number of scenes."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 up, found {text}")
+    return int(text)
 
 
 def arguments() -> argparse.Namespace:
@@ -50,20 +57,20 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--variant", help="of Mitsuba; default: the fastest that works here")
     parser.add_argument("--all", action="store_true", help="every file of Mitsuba's, not a dozen drawn by the seed")
     parser.add_argument("--files", action="store_true", help="only Mitsuba's files")
-    parser.add_argument("--drawn", type=int, metavar="N", help="only N scenes drawn at random by the seed from all plugins")
+    parser.add_argument("--drawn", type=count, metavar="N", help="only N scenes drawn at random by the seed from most plugins")
     parser.add_argument("--list", action="store_true", help="print the cases and render nothing")
     return parser.parse_args()
 
 
 def chosen_cases(a: argparse.Namespace) -> list:
-    """Those that --only names, from all; else ours and a draw of Mitsuba's files."""
-    if a.drawn is not None:
-        return drawn.cases(a.drawn, a.seed, a.out / "drawn")
+    """Those that --only names, from all; else ours and a draw of Mitsuba's files; or drawn scenes alone."""
     files = scene_files.all_files()
     if not (a.all or a.nightly or a.only or a.list or a.files) and len(files) > DRAWN:
         chosen = np.random.default_rng(a.seed).choice(len(files), DRAWN, replace=False)
         files = [files[i] for i in sorted(chosen)]
     cases = files if a.files else [*all_cases(), *files]
+    if a.drawn:
+        cases = drawn.cases(a.drawn, a.seed, a.out / "drawn")
     return [c for c in cases if not a.only or any(part in c.name for part in a.only)]
 
 
@@ -129,7 +136,7 @@ def main() -> int:
     started = time.monotonic()
     report = {"peer": mitsuba.name, "binary": str(a.binary), "seed": a.seed, "nightly": a.nightly, "cases": {}}
     pictures: dict[str, tuple[Picture, Picture]] = {}
-    passed = failed = noisy = 0
+    passed = failed = undecided = 0
     for case in cases:
         attempts = []
         may_be_noisy = getattr(case, "may_be_noisy", False)
@@ -146,14 +153,14 @@ def main() -> int:
             result["seconds"] = round(time.monotonic() - before, 2)
             attempts.append(result)
             text = row(case.name, result) if "ratio" in result else f"{case.name:28} FAILED {result['reason']}"
-            again = not result["passed"] and attempt < last and "ratio" in result and PEER_NOT_FINITE not in result["reason"]
+            again = not result["passed"] and attempt < last and "ratio" in result
             print(text + ("  once more with 4 times the samples:" if again else ""), flush=True)
             if not again:
                 break
-        undecided = may_be_noisy and any(word in attempts[-1]["reason"] for word in (TOO_NOISY, PEER_NOT_FINITE))
-        noisy += undecided
+        spared = may_be_noisy and attempts[-1].get("undecided", False)
+        undecided += spared
         passed += attempts[-1]["passed"]
-        failed += not (attempts[-1]["passed"] or undecided)
+        failed += not (attempts[-1]["passed"] or spared)
         report["cases"][case.name] = {"about": case.about, "attempts": attempts}
 
     controls = neighbours_differ(pictures)
@@ -172,7 +179,7 @@ def main() -> int:
     (a.out / "report.json").write_text(json.dumps(report, indent=1))
     page.write(a.out / "index.html", report, pictures)
     print(f"report: {a.out / 'index.html'}, {a.out / 'report.json'}")
-    print(f"{passed} passed, {failed} failed" + (f", {noisy} undecided" if noisy else ""))
+    print(f"{passed} passed, {failed} failed" + (f", {undecided} undecided" if undecided else ""))
     return 0 if failed == 0 else 1
 
 

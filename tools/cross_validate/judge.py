@@ -29,8 +29,6 @@ STANDARD_ERRORS = 3.0
 DARK = 0.05
 # More noise than this part of the mean, and agreement would say nothing.
 MOST_NOISE = 0.005
-TOO_NOISY = "too noisy to judge"
-PEER_NOT_FINITE = "a pixel of Mitsuba's is not a finite number"
 # Mitsuba's floor for the variance of one sample.
 SAMPLE_VARIANCE_FLOOR = 1e-4
 
@@ -129,6 +127,8 @@ class Verdict:
     pixels_accepted: float
     samples_abbe: int
     samples_mitsuba: int
+    # Whether nothing speaks against the pictures but noise, or that Mitsuba's is none.
+    undecided: bool
     # What `abbe compare` says of the same pictures; none where pixels are not independent.
     abbe_compare: str | None = None
 
@@ -143,7 +143,7 @@ def judge(a: Picture, b: Picture, allowance: float = ALLOWANCE) -> Verdict:
     if not a.finite:
         faults.append("a pixel is not a finite number")
     if not b.finite:
-        faults.append(PEER_NOT_FINITE)
+        faults.append("a pixel of Mitsuba's is not a finite number")
 
     # 1. The whole. Errors are relative to a channel's mean.
     scale = np.maximum(np.abs(b.whole.mean), DARK * np.abs(b.whole.mean).max())
@@ -151,8 +151,9 @@ def judge(a: Picture, b: Picture, allowance: float = ALLOWANCE) -> Verdict:
     error = np.sqrt(a.whole.variance + b.whole.variance) / scale
     if (np.abs(difference) > np.maximum(allowance, STANDARD_ERRORS * error)).any():
         faults.append("means differ")
-    if (error > MOST_NOISE).any():
-        faults.append(TOO_NOISY)
+    noisy = (error > MOST_NOISE).any()
+    if noisy:
+        faults.append("too noisy to judge")
 
     # 2. The blocks.
     block_floor = SAMPLE_VARIANCE_FLOOR / BLOCK**2 * (1 / a.samples + 1 / b.samples)
@@ -182,4 +183,5 @@ def judge(a: Picture, b: Picture, allowance: float = ALLOWANCE) -> Verdict:
         pixels_accepted=accepted,
         samples_abbe=a.samples,
         samples_mitsuba=b.samples,
+        undecided=bool(noisy and len(faults) == 1 or a.finite and not b.finite),
     )
