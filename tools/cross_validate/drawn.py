@@ -1,4 +1,4 @@
-"""Scenes drawn at random from Mitsuba's plugins, for what no scene of one feature shows: how they go together.
+"""Scenes drawn at random from most of Mitsuba's plugins, for what no scene of one feature shows: how they go together.
 
 A scene is a function of its number. It has a ground, one to three bodies, one or two lights, a camera and an integrator,
 each with parameters, textures and transforms that are drawn. What the two renderers are known to mean otherwise (the
@@ -18,10 +18,11 @@ RELIEF = "waves.png"
 PICTURES = ("patch.png", "slide.png", "stencil.png", RELIEF)
 MESHES = {"obj": ("tile.obj", "roof.obj"), "ply": ("tile.ply", "tile_text.ply"), "serialized": ("tiles.serialized",)}
 CURVES = {"bsplinecurve": ("coil.txt", "tuft.txt"), "linearcurve": ("zigzag.txt",)}
-SURFACES = (
-    "diffuse", "dielectric", "thindielectric", "roughdielectric", "conductor", "roughconductor", "plastic", "roughplastic",
-    "principled", "principledthin", "null", "mask", "twosided", "blendbsdf", "bumpmap", "normalmap",
-)  # fmt: skip
+SHAPES = ("sphere", "cube", "cylinder", "disk", "rectangle", *MESHES, *CURVES, "sdfgrid")
+# Surfaces that let nothing through, that let light through, and that are made of others.
+OPAQUE = ("diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "principled")
+CLEAR = ("dielectric", "thindielectric", "roughdielectric", "null", "principledthin")
+LAYERED = ("mask", "twosided", "blendbsdf", "bumpmap", "normalmap")
 METALS = ("Au", "Ag", "Cu", "Al", "Cr", "W", "none")
 # What is met without a change of direction.
 OPEN = {"mask", "null", "thindielectric"}
@@ -43,6 +44,10 @@ def leaf(kind: str, name: str, value) -> str:
 def plugin(family: str, kind: str, *inside: str, name: str = "") -> str:
     named = f' name="{name}"' if name else ""
     return f'<{family} type="{kind}"{named}>{"".join(inside)}</{family}>'
+
+
+def to_world(steps: str) -> str:
+    return f'<transform name="to_world">{steps}</transform>'
 
 
 class Draw:
@@ -82,14 +87,14 @@ class Draw:
         else:
             scale = "<scale " + " ".join(f'{a}="{self.between(0.4, 0.8)}"' for a in "xyz") + "/>"
         move = f'<translate x="{number(x)}" y="{self.between(0.6, 1.4)}" z="{self.between(-0.5, 0.5)}"/>'
-        return f'<transform name="to_world">{scale}{self.turn()}{move}</transform>'
+        return to_world(scale + self.turn() + move)
 
     def above(self, scale: str = "") -> str:
         """Looks down at the scene from somewhere above."""
         x, z = self.between(-3, 3), self.one(self.between(1.5, 3), self.between(-3, -1.5))
         up = f"{self.between(-0.3, 0.3)}, 1, {self.between(-0.3, 0.3)}"
         look = f'<lookat origin="{x}, {self.between(2.5, 4)}, {z}" target="0, 0.7, 0" up="{up}"/>'
-        return f'<transform name="to_world">{scale}{look}</transform>'
+        return to_world(scale + look)
 
     # -- spectra and textures --------------------------------------------------------------------------
 
@@ -150,7 +155,8 @@ class Draw:
         return inside + self.maybe(lambda: self.float("ext_ior", 1.0, 1.4), 0.2)
 
     def tints(self) -> str:
-        return "".join(self.maybe(lambda n=n: self.spectrum(n, 0.3, 1)) for n in ("specular_reflectance", "specular_transmittance"))
+        names = ("specular_reflectance", "specular_transmittance")
+        return "".join(self.maybe(lambda n=n: self.spectrum(n, 0.3, 1)) for n in names)
 
     def roughness(self) -> str:
         shape = leaf("string", "distribution", self.one("ggx", "beckmann"))
@@ -159,14 +165,10 @@ class Draw:
         alphas = "".join(self.scalar(name, 0.05, 0.6, pictures=False) for name in names)
         return shape + alphas + self.maybe(lambda: leaf("boolean", "sample_visible", "false"), 0.15)
 
-    def bsdf(self, depth: int = 2, open_too: bool = True, brushed: bool = True) -> str:
-        kinds = ["diffuse", "diffuse", "roughconductor", "conductor", "plastic", "roughplastic", "principled"]
-        if open_too:
-            kinds += ["dielectric", "thindielectric", "roughdielectric", "null", "principledthin"]
-        if depth > 0:
-            kinds += ["mask", "twosided", "blendbsdf", "bumpmap", "normalmap"]
-        kind = self.one(*kinds)
-        return plugin("bsdf", kind, getattr(self, kind)(depth, open_too))
+    def bsdf(self, depth: int = 2, clear: bool = True) -> str:
+        """A surface with others in it, at most `depth` deep; whether it may let light through."""
+        kind = self.one("diffuse", *OPAQUE, *(CLEAR if clear else ()), *(LAYERED if depth else ()))
+        return plugin("bsdf", kind, getattr(self, kind)(depth, clear))
 
     def diffuse(self, *_):
         return self.maybe(lambda: self.reflectance("reflectance"), 0.9)
@@ -190,8 +192,9 @@ class Draw:
 
     def plastic(self, *_):
         index = self.one(self.float("int_ior", 1.2, 1.9), leaf("string", "int_ior", "bk7"))
-        further = self.maybe(lambda: leaf("boolean", "nonlinear", "true")) + self.maybe(lambda: self.spectrum("specular_reflectance", 0.3, 1))
-        return index + self.reflectance("diffuse_reflectance") + further
+        shine = self.maybe(lambda: self.spectrum("specular_reflectance", 0.3, 1))
+        nonlinear = self.maybe(lambda: leaf("boolean", "nonlinear", "true"))
+        return index + self.reflectance("diffuse_reflectance") + nonlinear + shine
 
     def roughplastic(self, *_):
         return self.plastic() + leaf("string", "distribution", self.one("ggx", "beckmann")) + self.float("alpha", 0.05, 0.6)
@@ -199,10 +202,10 @@ class Draw:
     def some(self, names, textured: float = 0.2) -> str:
         return "".join(self.maybe(lambda n=n: self.scalar(n, 0, 1, textured), 0.4) for n in names)
 
-    def principled(self, _, open_too: bool):
+    def principled(self, _, clear: bool):
         base = self.reflectance("base_color") + self.scalar("roughness", 0.1, 1, pictures=False)
         names = ["metallic", "anisotropic", "spec_tint", "sheen", "sheen_tint", "clearcoat", "clearcoat_gloss", "flatness"]
-        names += ["spec_trans"] * (open_too and self.chance(0.5))
+        names += ["spec_trans"] * (clear and self.chance(0.5))
         index = self.one(self.float("specular", 0.1, 0.9), self.float("eta", 1.1, 2), "")
         return base + self.some(names) + index
 
@@ -215,17 +218,17 @@ class Draw:
     def null(self, *_):
         return ""
 
-    def mask(self, depth: int, open_too: bool):
-        return self.scalar("opacity", 0, 1, 0.5) + self.bsdf(depth - 1, open_too)
+    def mask(self, depth: int, clear: bool):
+        return self.scalar("opacity", 0, 1, 0.5) + self.bsdf(depth - 1, clear)
 
     def twosided(self, *_):
         return self.bsdf(0, False) + self.maybe(lambda: self.bsdf(0, False), 0.4)
 
-    def blendbsdf(self, depth: int, open_too: bool):
-        inside = [self.bsdf(depth - 1, open_too) for _ in range(2)]
+    def blendbsdf(self, depth: int, clear: bool):
+        inside = [self.bsdf(depth - 1, clear) for _ in range(2)]
         # Perfect lobes and rough glass in a blend are known.
         while any(re.search('"(conductor|plastic|.*dielectric|null|mask)"', b) for b in inside):
-            inside = [self.bsdf(depth - 1, open_too) for _ in range(2)]
+            inside = [self.bsdf(depth - 1, clear) for _ in range(2)]
         return self.scalar("weight", 0, 1, 0.5) + "".join(inside)
 
     def bumpmap(self, *_):
@@ -241,9 +244,7 @@ class Draw:
     # -- bodies ----------------------------------------------------------------------------------------
 
     def body(self, x: float, inside: str, closed: bool = False) -> str:
-        kind = self.one("sphere", "cube") if closed else self.one(
-            "sphere", "cube", "cylinder", "disk", "rectangle", "obj", "ply", "serialized", "sdfgrid", "bsplinecurve", "linearcurve"
-        )  # fmt: skip
+        kind = self.one("sphere", "cube") if closed else self.one(*SHAPES)
         # Linear curves have no tangents, nor have grids of distances; relief on curves takes light through their backs (known).
         while kind in (*CURVES, "sdfgrid") and re.search(GRAIN, inside):
             inside = self.bsdf()
@@ -252,24 +253,24 @@ class Draw:
             if kind == "bsplinecurve" and self.chance(0.5):
                 melanin = "".join(self.float(n, 0.05, 0.6) for n in ("eumelanin", "pheomelanin"))
                 inside = plugin("bsdf", "hair", melanin, self.float("longitudinal_roughness", 0.2, 0.8))
-            place = f'<transform name="to_world"><rotate y="1" angle="{self.between(0, 360)}"/><translate x="{number(x)}"/></transform>'
+            place = to_world(f'<rotate y="1" angle="{self.between(0, 360)}"/><translate x="{number(x)}"/>')
             return plugin("shape", kind, file, place, inside)
         if kind == "sdfgrid":
             file = leaf("string", "filename", ASSETS / "ring_and_ball.vol")
-            place = f'<transform name="to_world"><scale value="1.4"/><translate x="{number(x - 0.7)}" z="-0.7"/></transform>'
+            place = to_world(f'<scale value="1.4"/><translate x="{number(x - 0.7)}" z="-0.7"/>')
             return plugin("shape", kind, file, leaf("string", "normals", self.one("analytic", "smooth")), place, inside)
         turned = "" if closed or kind == "cube" else self.maybe(lambda: leaf("boolean", "flip_normals", "true"), 0.1)
         if kind in MESHES:
             file = leaf("string", "filename", ASSETS / self.one(*MESHES[kind]))
             # Shading normals turn light through backs, which is known.
-            flat = leaf("boolean", "face_normals", "true") if "roof" in file else self.maybe(lambda: leaf("boolean", "face_normals", "true"))
+            flat = self.maybe(lambda: leaf("boolean", "face_normals", "true"), 1.0 if "roof" in file else 0.3)
             return plugin("shape", kind, file, flat, self.place(x, False), turned, inside)
         return plugin("shape", kind, self.place(x, kind not in ("cube", "rectangle")), turned, inside)
 
     def group(self, x: float) -> str:
         members = [self.body(0, self.bsdf(1, False)) for _ in range(2)]
         made = plugin("shape", "shapegroup", *members).replace("<shape", f'<shape id="set{number(x)}"', 1)
-        place = f'<transform name="to_world"><scale x="0.8" y="{self.between(0.5, 1)}" z="0.7"/><translate x="{number(x)}"/></transform>'
+        place = to_world(f'<scale x="0.8" y="{self.between(0.5, 1)}" z="0.7"/><translate x="{number(x)}"/>')
         return made + plugin("shape", "instance", f'<ref id="set{number(x)}"/>', place)
 
     def phase(self) -> str:
@@ -285,7 +286,7 @@ class Draw:
 
     def medium(self) -> str:
         if self.chance(0.3):
-            around = '<transform name="to_world"><scale value="4"/><translate x="-2" y="-1" z="-2"/></transform>'
+            around = to_world('<scale value="4"/><translate x="-2" y="-1" z="-2"/>')
             grid = plugin("volume", "gridvolume", leaf("string", "filename", ASSETS / "puff.vol"), around, name="sigma_t")
             albedo, scale = self.spectrum("albedo", 0.2, 0.95), self.float("scale", 1, 5)
             return plugin("medium", "heterogeneous", grid, albedo, scale, self.phase(), name="interior")
@@ -317,14 +318,15 @@ class Draw:
         if kind == "constant":
             return plugin("emitter", kind, self.light("radiance", 1)), kind
         if kind == "envmap":
-            turn = self.maybe(lambda: f'<transform name="to_world">{self.turn()}</transform>')
-            return plugin("emitter", kind, leaf("string", "filename", ASSETS / "sky.exr"), self.float("scale", 0.5, 2), turn), kind
+            file, turn = leaf("string", "filename", ASSETS / "sky.exr"), self.maybe(lambda: to_world(self.turn()))
+            return plugin("emitter", kind, file, self.float("scale", 0.5, 2), turn), kind
         if kind == "spot":
             edge = self.float("cutoff_angle", 15, 60) + self.maybe(lambda: leaf("float", "beam_width", "10"))
             slide = self.maybe(lambda: self.texture("texture"))
             return plugin("emitter", kind, self.above(), self.light("intensity", 30), edge, slide), kind
         if kind == "projector":
-            return plugin("emitter", kind, self.above(), self.float("fov", 25, 70), self.texture("irradiance"), self.float("scale", 3, 20)), kind
+            slide = self.texture("irradiance")
+            return plugin("emitter", kind, self.above(), self.float("fov", 25, 70), slide, self.float("scale", 3, 20)), kind
         way = f"{self.between(-1, 1)}, -1, {self.between(-1, 1)}"
         return plugin("emitter", kind, leaf("vector", "direction", way), self.light("irradiance", 3)), kind
 
@@ -342,9 +344,9 @@ class Draw:
 
     def sensor(self) -> str:
         kind = self.one("perspective", "perspective", "thinlens", "orthographic")
-        look = f'<lookat origin="{self.between(-1.5, 1.5)}, {self.between(1.2, 3)}, {self.between(5, 6)}" target="0, 0.8, 0" up="{self.between(-0.2, 0.2)}, 1, 0"/>'
-        scale = '<scale x="2" y="2"/>' if kind == "orthographic" else ""
-        inside = f'<transform name="to_world">{scale}{look}</transform>'
+        origin = f"{self.between(-1.5, 1.5)}, {self.between(1.2, 3)}, {self.between(5, 6)}"
+        look = f'<lookat origin="{origin}" target="0, 0.8, 0" up="{self.between(-0.2, 0.2)}, 1, 0"/>'
+        inside = to_world('<scale x="2" y="2"/>' + look if kind == "orthographic" else look)
         if kind != "orthographic":
             inside += self.float("fov", 30, 50)
             inside += self.maybe(lambda: leaf("string", "fov_axis", self.one("x", "y", "diagonal", "smaller", "larger")))
@@ -371,11 +373,13 @@ class Draw:
                 bodies += self.group(x)
             else:
                 bodies += self.body(x, self.bsdf())
-        ground = plugin("shape", "rectangle", '<transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/></transform>', self.bsdf(1, False))
+        flat = to_world('<scale value="4"/><rotate x="1" angle="-90"/>')
+        ground = plugin("shape", "rectangle", flat, self.bsdf(1, False))
         lights, kinds = self.lights()
         settings = ""
         if integrator != "direct":
-            settings = leaf("integer", "max_depth", self.random.randint(2, 7)) + leaf("integer", "rr_depth", self.random.randint(3, 9))
+            settings = leaf("integer", "max_depth", self.random.randint(2, 7))
+            settings += leaf("integer", "rr_depth", self.random.randint(3, 9))
         if integrator in ("path", "direct") and any(f'"{kind}"' in ground + bodies for kind in OPEN):
             # Lamps through what is open, and samples that end behind it: known.
             if kinds & DELTA or not kinds & SKIES:
