@@ -66,28 +66,33 @@ def cases() -> list[Case]:
     # Every point of a convex body gets the whole hemisphere of an even sky of one.
     convex = "a convex body in an even sky, ρ"
     found = []
-    for r in (1e-2, 1e-3, 1e-4):
-        # A lamp of radius r straight above at distance 1 + r, its surface at 1: E = π L (r / d)², and L is chosen such
-        # that E = π; the floor sends back ρ E / π.
-        light = sphere("0, 1, 0", r, f"""<emitter type="area"><spectrum name="radiance" value="{1 / r**2!r}"/></emitter>
+
+    def under(light: str, ground: str = GREY) -> str:
+        turned = '<transform name="to_world"><rotate x="1" angle="-90"/></transform>'
+        return camera("1, 1, 0", "0, 0, 0", 0.01) + light + f'<shape type="rectangle">{turned}{ground}</shape>'
+
+    # A lamp of radius r straight above at distance 1, by its centre: E = π L (r / d)², and L is chosen such that E = π; the
+    # floor sends back ρ E / π.
+    def lamp(r: float) -> str:
+        return sphere("0, 1, 0", r, f"""<emitter type="area"><spectrum name="radiance" value="{1 / r**2!r}"/></emitter>
             <bsdf type="diffuse"><spectrum name="reflectance" value="0"/></bsdf>""")
-        floor = f"""<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/></transform>{GREY}</shape>"""
-        body = camera("1, 1, 0", "0, 0, 0", 0.01) + light + floor
-        found.append(Case(f"lamp of radius {r:g} at distance 1", 0.5, "E = π L r²/d², back comes ρ E / π", body, 2))
-        if r == 1e-2:
-            half = f'<bsdf type="mask"><float name="opacity" value="0.5"/>{GREY}</bsdf>'
-            found.append(Case("the same over ground of opacity 1/2", 0.25, "half of that", body.replace(GREY, half), 2))
+
+    for r in (1e-2, 1e-3, 1e-4):
+        found.append(Case(f"lamp of radius {r:g} at distance 1", 0.5, "E = π L r²/d², back comes ρ E / π", under(lamp(r)), 2))
+    half = f'<bsdf type="mask"><float name="opacity" value="0.5"/>{GREY}</bsdf>'
+    found.append(Case("lamp of radius 0.01 over ground of opacity 1/2", 0.25, "half of that", under(lamp(1e-2), half), 2))
     # The formula holds for all of a ball above the horizon.
     board = "".join(f'<spectrum name="color{i}" value="{1 / 0.6**2!r}"/>' for i in range(2))
     light = f"""<shape type="sphere">
         <transform name="to_world"><scale value="0.6"/><rotate x="1" angle="120"/><translate y="1"/></transform>
         <emitter type="area"><texture type="checkerboard" name="radiance">{board}</texture></emitter></shape>"""
-    body = camera("1, 1, 0", "0, 0, 0", 0.01) + light + floor
-    found.append(Case("lamp of radius 0.6, turned, its light a board of one colour", 0.5, "as of any ball of even light", body, 2))
+    turned = "lamp of radius 0.6, turned, its light a board of one colour"
+    found.append(Case(turned, 0.5, "as of any ball of even light", under(light), 2))
     mist = """<bsdf type="null"/><medium type="homogeneous" name="interior"><spectrum name="albedo" value="1"/>
         <spectrum name="sigma_t" value="380:1, 760:1"/></medium>"""
     body = camera("0, 0, 5", "0, 0, 0", 5.0) + sphere("0, 0, 0", 1.0, mist) + SKY
-    found.append(Case("ball of white mist that is none beyond 380 and 760 nm (`volpathmis`)", 1.0, "a furnace", body, integrator="volpathmis"))
+    thin = "ball of white mist that is none beyond 380 and 760 nm (`volpathmis`)"
+    found.append(Case(thin, 1.0, "a furnace", body, integrator="volpathmis"))
     for d in (1e4, 1e5, 1e6):
         body = camera(f"0, 0, {d!r}", "0, 0, 0", np.degrees(0.5 / d).item(), far=1e9) + sphere("0, 0, 0", 1.0) + SKY
         found.append(Case(f"unit sphere seen from {d:g}", 0.5, convex, body))
