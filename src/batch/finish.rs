@@ -105,7 +105,7 @@ impl Lens {
             return Lens { shutter, ..Lens::default() };
         };
         let focal_length = 18.0 / half_width;
-        let wide = camera.lens.as_ref().filter(|lens| lens.radius > 0.0);
+        let wide = camera.lens.as_ref();
         Lens {
             focal_length_mm: Some(focal_length),
             aperture: wide.map(|lens| focal_length / 1000.0 / (2.0 * lens.radius)),

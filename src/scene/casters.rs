@@ -53,9 +53,6 @@ pub struct Casters {
     pub endless: Vec<String>,
     /// For each object of the scene, whether it is one of those.
     pub unending: Vec<bool>,
-    /// Name of a curve that light comes out of. Rays meet curves from outside only, so that what refracts into one leaves
-    /// it unseen: the way back is another.
-    pub one_way: Option<String>,
 }
 
 /// Balls at the most: what is near to each other shares one beyond.
@@ -100,6 +97,14 @@ fn bends(material: &Material) -> bool {
     material.leaves().iter().any(|m| m.transmits() && !straight(m))
 }
 
+/// A curve that light bends through. Rays meet curves from outside only, so that what refracts into one leaves it unseen: the
+/// way back is another.
+#[must_use]
+pub fn one_way(scene: &Scene) -> Option<&Object> {
+    let is_curve = |object: &Object| matches!(object.geometry, Geometry::Curves(_));
+    scene.objects.iter().find(|object| is_curve(object) && bends(&scene.materials[object.material as usize]))
+}
+
 impl Casters {
     /// Finds them.
     #[must_use]
@@ -136,10 +141,6 @@ impl Casters {
             }
         }
         merge_nearest(&mut casters.balls);
-        let one_way = |object: &&Object| {
-            matches!(object.geometry, Geometry::Curves(_)) && bends(&scene.materials[object.material as usize])
-        };
-        casters.one_way = scene.objects.iter().find(one_way).map(|object| object.name.clone());
         casters
     }
 }

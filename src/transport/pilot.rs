@@ -16,7 +16,7 @@ use super::plan::{Effect, EffectPlan, Integrator, PathSettings};
 use crate::film::accumulate::REPLICATES;
 use crate::film::filter::FilterSampler;
 use crate::scene::Scene;
-use crate::scene::casters::Casters;
+use crate::scene::casters::{self, Casters};
 use crate::scene::light::Light;
 use crate::transport::layers::Source as Channel;
 use aims::is_small;
@@ -108,7 +108,8 @@ pub fn decide(
     if casters.balls.is_empty() && casters.endless.is_empty() {
         return left_off("nothing mirrors or refracts sharply");
     }
-    if let Some(name) = &casters.one_way {
+    if let Some(curve) = casters::one_way(scene) {
+        let name = &curve.name;
         return left_off(&format!("light leaves {name}, a curve, unseen: its way back from the lights is another"));
     }
     if settings.scatter_samples == 0 || settings.max_depth.is_some_and(|depth| depth < 3) {
