@@ -198,62 +198,65 @@ pub(super) fn render_unit(
                     tile.layers.add_once(index, [(channel, value)])
                 });
             }
-            for replicate in 0..REPLICATES as u32 {
-                // Samples take turns among the replicates.
-                let turns = |s: u32| s.saturating_sub(replicate).div_ceil(REPLICATES as u32);
-                let Range { mut start, end } = match shares {
-                    Some(shares) => shares.turns([x, y], replicate, &samples),
-                    None => turns(samples.start)..turns(samples.end),
-                };
-                while start < end {
-                    let next = (start - start % Octet::SAMPLES).saturating_add(LONGEST).min(end);
-                    let run = start..next;
-                    if job.independent {
-                        // A scrambling for each sample: of each sequence the first point alone.
-                        let first = run.map(|i| (replicate + REPLICATES as u32 * i, 0..1));
-                        render_run((&shot, moments), tile, &mut memory, &mut layer_run, [x, y], replicate, first);
-                    } else {
-                        let octets = octets(run).map(|indices| (replicate, indices));
-                        render_run((&shot, moments), tile, &mut memory, &mut layer_run, [x, y], replicate, octets);
-                    }
-                    start = next;
+            // Samples take turns among the replicates.
+            let turns = |replicate: u32| match shares {
+                Some(shares) => shares.turns([x, y], replicate, &samples),
+                None => {
+                    let turns = |s: u32| s.saturating_sub(replicate).div_ceil(REPLICATES as u32);
+                    turns(samples.start)..turns(samples.end)
                 }
+            };
+            let mut wanted = (0..REPLICATES as u32).flat_map(|replicate| turns(replicate).map(move |i| (replicate, i)));
+            while render_run((&shot, moments), job.independent, tile, &mut memory, &mut layer_run, [x, y], &mut wanted)
+            {
             }
         }
     }
 }
 
-/// `indices`, cut where an [`Octet`] ends.
-fn octets(indices: Range<u32>) -> impl Iterator<Item = Range<u32>> {
-    let Range { mut start, end } = indices;
-    std::iter::from_fn(move || {
-        let next = (start - start % Octet::SAMPLES).saturating_add(Octet::SAMPLES).min(end);
-        let octet = start..next;
-        start = next;
-        (!octet.is_empty()).then_some(octet)
-    })
-}
-
-/// Renders samples of one `replicate` of `pixel`, at most [`LONGEST`]: those of `addresses`, a replicate and indices; each at
-/// its own of `moments`, if there are any.
+/// Renders the next of `samples` of `pixel`, each a replicate and an index in it, at most [`LONGEST`]; each at its own of
+/// `moments`, if there are any, and where they are `independent` with a scrambling of its own. False after the last.
 fn render_run(
     (shot, moments): (&Shot, &[Scene]),
+    independent: bool,
     tile: &mut TileBuffer,
     memory: &mut Samples,
     layers: &mut LayerRun,
     pixel: [i32; 2],
-    replicate: u32,
-    addresses: impl Iterator<Item = (u32, Range<u32>)>,
-) {
+    samples: &mut impl Iterator<Item = (u32, u32)>,
+) -> bool {
     let index = tile.window().index(pixel).expect("the pixel lies in the tile");
     let channels = tile.layers.channels();
     let unit = light_unit(shot.scene);
-    let mut run = Run::default();
+    let mut runs = [Run::default(); REPLICATES];
     layers.reset(channels);
     // Overscan makes negative coordinates; as addresses they wrap.
     let address = pixel.map(|x| x as u32);
-    for (stream, indices) in addresses {
-        let mut give = |sample: &PixelSample, values: &[f32], covered: Option<u64>| {
+    // One of them sees one moment.
+    let most = if moments.is_empty() { Octet::SAMPLES } else { 1 };
+    let mut left = LONGEST as usize;
+    let mut ended = false;
+    while left >= Octet::SAMPLES && !ended {
+        let (mut octet, mut replicates, mut count) = ([(0, 0); Octet::SAMPLES], [0; Octet::SAMPLES], 0);
+        while count < most {
+            let Some((replicate, i)) = samples.next() else {
+                ended = true;
+                break;
+            };
+            replicates[count] = replicate as usize;
+            // Of each sequence the first point alone, or those of one for each replicate.
+            octet[count] = if independent { (replicate + REPLICATES as u32 * i, 0) } else { (replicate, i) };
+            count += 1;
+        }
+        if count == 0 {
+            break;
+        }
+        left -= count;
+        let scene = match moments {
+            [] => shot.scene,
+            _ => &moments[moment(shot.seed, address, octet[0].0, octet[0].1, moments.len())],
+        };
+        memory.render(&Shot { scene, ..*shot }, address, &octet[..count], |lane, sample, values, covered| {
             if let Some(number) = covered {
                 let pixels = tile.window().pixels();
                 tile.layers.mattes.add(index, pixels, number, 1);
@@ -261,33 +264,29 @@ fn render_run(
             if channels > 0 && !layers.add(sample.weight, values) {
                 tile.layers.add(index, sample.weight, values);
             }
-            record(tile, &mut run, unit, pixel, replicate, sample);
-        };
-        if moments.is_empty() {
-            memory.render(shot, address, stream, indices, give);
-            continue;
-        }
-        for i in indices {
-            let scene = &moments[moment(shot.seed, address, stream, i, moments.len())];
-            memory.render(&Shot { scene, ..*shot }, address, stream, i..i + 1, &mut give);
-        }
+            let replicate = replicates[lane];
+            record(tile, &mut runs[replicate], unit, pixel, replicate, sample);
+        });
     }
-    tile.add_run(pixel, replicate as usize, &run);
+    for (replicate, run) in runs.iter().enumerate() {
+        tile.add_run(pixel, replicate, run);
+    }
     if channels > 0 {
         tile.layers.add_run(index, layers);
     }
+    !ended
 }
 
 #[inline]
-fn record(tile: &mut TileBuffer, run: &mut Run, unit: f32, pixel: [i32; 2], replicate: u32, sample: &PixelSample) {
+fn record(tile: &mut TileBuffer, run: &mut Run, unit: f32, pixel: [i32; 2], replicate: usize, sample: &PixelSample) {
     if let Some(cause) = Invalid::of(sample.radiance) {
-        tile.drop_sample(pixel, replicate as usize, cause);
+        tile.drop_sample(pixel, replicate, cause);
         return;
     }
     let xyz = sample.xyz.map(|x| x * unit * sample.weight);
     let alpha = sample.alpha * sample.weight;
     if !run.add(xyz, alpha) {
-        tile.add(pixel, replicate as usize, xyz, alpha);
+        tile.add(pixel, replicate, xyz, alpha);
     }
 }
 

@@ -10,7 +10,6 @@
 
 use glam::DVec2;
 use std::cell::Cell;
-use std::ops::Range;
 
 /// What a set of four numbers is for. A path asks for [`Set::Camera`] and [`Set::Lens`] once and
 /// for the others once a vertex.
@@ -48,6 +47,8 @@ pub struct Sampler<'a> {
     stream: u32,
     /// Index of the sample within its replicate.
     index: u32,
+    /// Its place among those of `octet`.
+    lane: u32,
     /// Sets that it shares with its neighbours.
     octet: Option<&'a Octet>,
 }
@@ -65,7 +66,7 @@ impl Sampler<'_> {
     /// The sampler of sample `index` of `replicate` at `pixel`, for a render with `seed`.
     #[must_use]
     pub fn new(seed: u64, pixel: [u32; 2], replicate: u32, index: u32) -> Sampler<'static> {
-        Sampler { stream: stream(seed, pixel, replicate), index, octet: None }
+        Sampler { stream: stream(seed, pixel, replicate), index, lane: 0, octet: None }
     }
 
     /// Four numbers in [0, 1): multiples of 2⁻³², so never one.
@@ -73,8 +74,8 @@ impl Sampler<'_> {
     #[inline(always)]
     pub fn set(&self, set: Set) -> [f64; 4] {
         let bits = match self.octet {
-            Some(octet) if set.index() < SHARED_SETS => octet.set(set, self.index),
-            _ => points(self.stream, [self.index], set)[0],
+            Some(octet) if set.index() < SHARED_SETS => octet.set(set, self.lane),
+            _ => points([key(self.stream, set)], [self.index])[0],
         };
         // Written out: `map` of an array calls a function for each element.
         let unit = |x: u32| f64::from(x) * (1.0 / 4_294_967_296.0);
@@ -85,76 +86,103 @@ impl Sampler<'_> {
 /// Sets that an [`Octet`] keeps: those of the camera and of five vertices.
 const SHARED_SETS: u32 = 17;
 
-/// The numbers of eight samples with consecutive indices, of one replicate of one pixel. The first that asks for a
-/// set has it made for all: eight side by side take little longer than one.
+/// The numbers of up to eight samples of one pixel. The first that asks for a set has it made for all: eight side by
+/// side take little longer than one.
 #[derive(Debug)]
 pub struct Octet {
     /// See [`stream`].
-    stream: u32,
-    /// Index of the first sample, a multiple of eight.
-    first: u32,
-    /// Whether so few samples are wanted that each makes its own numbers.
-    few: bool,
+    streams: [u32; Octet::SAMPLES],
+    /// Index of each sample within its replicate.
+    indices: [u32; Octet::SAMPLES],
+    count: usize,
+    /// Whether all are of one replicate.
+    alike: bool,
     /// One bit a set: whether it is made.
     made: Cell<u32>,
     /// The four numbers of each sample in units of 2⁻³², set by set.
-    sets: [Cell<[[u32; 4]; Octet::SAMPLES as usize]>; SHARED_SETS as usize],
+    sets: [Cell<[[u32; 4]; Octet::SAMPLES]>; SHARED_SETS as usize],
 }
 
 impl Default for Octet {
     fn default() -> Octet {
-        Octet { stream: 0, first: 0, few: true, made: Cell::new(0), sets: [const { Cell::new([[0; 4]; 8]) }; 17] }
+        let sets = [const { Cell::new([[0; 4]; Octet::SAMPLES]) }; SHARED_SETS as usize];
+        Octet { streams: [0; 8], indices: [0; 8], count: 0, alike: true, made: Cell::new(0), sets }
     }
 }
 
 impl Octet {
-    /// How many samples share their sets.
-    pub const SAMPLES: u32 = 8;
+    /// How many samples share their sets at the most.
+    pub const SAMPLES: usize = 8;
 
-    /// Moves to the samples around the first of `indices` of `replicate` at `pixel`, for a render with `seed`.
-    pub fn reset(&mut self, seed: u64, pixel: [u32; 2], replicate: u32, indices: &Range<u32>) {
-        self.stream = stream(seed, pixel, replicate);
-        self.first = indices.start - indices.start % Octet::SAMPLES;
-        // Eight side by side take as long as two or three.
-        self.few = indices.len() <= 2;
-        self.made.set(0);
-    }
-
-    /// The sampler of sample `index`: the numbers of [`Sampler::new`].
+    /// Moves to `samples` of `pixel`, each a replicate and an index in it, for a render with `seed`.
     ///
     /// # Panics
-    /// If it is not one of the eight.
+    /// If they are more than eight.
+    pub fn reset(&mut self, seed: u64, pixel: [u32; 2], samples: &[(u32, u32)]) {
+        assert!(samples.len() <= Octet::SAMPLES, "at most eight samples");
+        self.count = samples.len();
+        self.made.set(0);
+        self.alike = samples.windows(2).all(|two| two[0].0 == two[1].0);
+        let mut last = None;
+        for (lane, &(replicate, index)) in samples.iter().enumerate() {
+            let of = match last {
+                Some((known, stream)) if known == replicate => stream,
+                _ => stream(seed, pixel, replicate),
+            };
+            last = Some((replicate, of));
+            (self.streams[lane], self.indices[lane]) = (of, index);
+        }
+    }
+
+    /// The sampler of the sample at `lane` of those that were told: the numbers of [`Sampler::new`].
+    ///
+    /// # Panics
+    /// If there is none.
     #[must_use]
-    pub fn sampler(&self, index: u32) -> Sampler<'_> {
-        assert_eq!(index - index % Octet::SAMPLES, self.first, "one of the eight samples");
-        Sampler { stream: self.stream, index, octet: (!self.few).then_some(self) }
+    #[inline]
+    pub fn sampler(&self, lane: usize) -> Sampler<'_> {
+        assert!(lane < self.count, "one of the samples");
+        // Eight side by side take as long as two or three.
+        let octet = (self.count > 2).then_some(self);
+        Sampler { stream: self.streams[lane], index: self.indices[lane], lane: lane as u32, octet }
     }
 
     #[inline(always)]
-    fn set(&self, set: Set, index: u32) -> [u32; 4] {
+    fn set(&self, set: Set, lane: u32) -> [u32; 4] {
         let place = set.index();
         if self.made.get() >> place & 1 == 0 {
             self.make(set);
         }
         let numbers = self.sets[place as usize].as_array_of_cells();
-        numbers[(index % Octet::SAMPLES) as usize].get()
+        numbers[lane as usize % Octet::SAMPLES].get()
     }
 
     #[inline(never)]
     fn make(&self, set: Set) {
         let place = set.index();
-        self.sets[place as usize].set(points(self.stream, std::array::from_fn(|i| self.first + i as u32), set));
+        let mut keys = [key(self.streams[0], set); Octet::SAMPLES];
+        if !self.alike {
+            for (key_of, stream) in keys.iter_mut().zip(self.streams) {
+                *key_of = key(stream, set);
+            }
+        }
+        self.sets[place as usize].set(points(keys, self.indices));
         self.made.set(self.made.get() | 1 << place);
     }
 }
 
-/// The points of `set` for samples of one stream, in units of 2⁻³².
+/// What `set` of a stream is scrambled by.
 #[inline(always)]
-fn points<const N: usize>(stream: u32, indices: [u32; N], set: Set) -> [[u32; 4]; N] {
-    let key = mix64(u64::from(stream) << 32 | u64::from(set.index()));
+fn key(stream: u32, set: Set) -> u64 {
+    mix64(u64::from(stream) << 32 | u64::from(set.index()))
+}
+
+/// The points of samples in units of 2⁻³², each scrambled by its own of `keys`.
+#[inline(always)]
+fn points<const N: usize>(keys: [u64; N], indices: [u32; N]) -> [[u32; 4]; N] {
     // Plain loops over arrays become vectors; `map` calls a function for each element.
     let mut shuffled = indices;
-    for i in &mut shuffled {
+    for (i, key) in shuffled.iter_mut().zip(keys) {
         *i = owen_scramble(i.reverse_bits(), key as u32).reverse_bits();
     }
     let mut points = [[0; 4]; N];
@@ -162,10 +190,9 @@ fn points<const N: usize>(stream: u32, indices: [u32; N], set: Set) -> [[u32; 4]
         *point = sobol_reversed(i);
     }
     // A key of its own for each dimension; all numbers run side by side.
-    let keys = DIMENSION_KEYS.map(|k| k ^ (key >> 32) as u32);
-    for point in &mut points {
-        for (x, key) in point.iter_mut().zip(keys) {
-            *x = owen_scramble(*x, key).reverse_bits();
+    for (point, key) in points.iter_mut().zip(keys) {
+        for (x, own) in point.iter_mut().zip(DIMENSION_KEYS) {
+            *x = owen_scramble(*x, own ^ (key >> 32) as u32).reverse_bits();
         }
     }
     points
@@ -406,16 +433,22 @@ mod tests {
         assert!((mean - 1.0).abs() < 4.5 / f64::from(n).sqrt(), "{mean}");
     }
 
-    /// A sample has the same numbers by itself and among its neighbours, in sets that they share and beyond.
+    /// A sample has the same numbers by itself and among its neighbours, in sets that they share and beyond, whether the
+    /// neighbours are of its replicate or not.
     #[test]
     fn numbers_do_not_depend_on_the_neighbours() {
         let mut octet = Octet::default();
-        for (pixel, replicate, first) in [([3, u32::MAX], 1, 8), ([3, 4], 0, 0), ([3, 4], 3, 0xffff_fff8)] {
-            octet.reset(9, pixel, replicate, &(first..first.saturating_add(7)));
+        let row = |replicate, first: u32| (0..7).map(|i| (replicate, first + i)).collect::<Vec<_>>();
+        let mixed = vec![(0, 6), (0, 7), (3, 0), (1, 0), (2, 0), (0, 8)];
+        let neighbours =
+            [([3, u32::MAX], row(1, 8)), ([3, 4], row(0, 3)), ([3, 4], row(3, 0xffff_fff8)), ([5, 4], mixed)];
+        for (pixel, samples) in neighbours {
+            octet.reset(9, pixel, &samples);
             for set in (0..8).flat_map(|v| [Set::Camera, Set::Lens, Set::Scatter(v), Set::Choice(v), Set::Extra(v)]) {
-                for index in [2, 0, 7].map(|i| first + i) {
+                for lane in [2, 0, 5] {
+                    let (replicate, index) = samples[lane];
                     let alone = Sampler::new(9, pixel, replicate, index);
-                    assert_eq!(octet.sampler(index).set(set), alone.set(set), "{set:?} of {index}");
+                    assert_eq!(octet.sampler(lane).set(set), alone.set(set), "{set:?} of {index} of {replicate}");
                 }
             }
         }

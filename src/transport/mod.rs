@@ -30,7 +30,6 @@ use glam::{DVec2, DVec3};
 use merge::Collection;
 use path::together::Wanted;
 use plan::{EffectPlan, Integrator, PathSettings};
-use std::ops::Range;
 use ways::Ledger;
 
 /// Light that a camera ray brings, before fog.
@@ -301,7 +300,7 @@ fn probe(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Incoming,
 /// The memory of samples that are rendered one after the other.
 pub struct Samples {
     octet: Octet,
-    begun: [Begun; Octet::SAMPLES as usize],
+    begun: [Begun; Octet::SAMPLES],
     layers: layers::Values,
     /// One for each, where light is parted.
     ledgers: Vec<Ledger>,
@@ -319,25 +318,24 @@ impl Default for Samples {
 }
 
 impl Samples {
-    /// Renders the samples `indices` of `replicate` at `pixel`, and gives each with the numbers of its layers and what
-    /// covers it, where there are mattes.
+    /// Renders `samples` of `pixel`, each a replicate and an index in it, and gives each by its place among them, with the
+    /// numbers of its layers and what covers it, where there are mattes.
     ///
     /// # Panics
-    /// If the indices are not of one [`Octet`].
+    /// If they are more than [`Octet::SAMPLES`].
     pub fn render(
         &mut self,
         shot: &Shot,
         pixel: [u32; 2],
-        replicate: u32,
-        indices: Range<u32>,
-        mut give: impl FnMut(&PixelSample, &[f32], Option<u64>),
+        samples: &[(u32, u32)],
+        mut give: impl FnMut(usize, &PixelSample, &[f32], Option<u64>),
     ) {
         let Samples { octet, begun, layers, ledgers } = self;
-        let begun = &mut begun[..indices.len()];
-        octet.reset(shot.seed, pixel, replicate, &indices);
+        let begun = &mut begun[..samples.len()];
+        octet.reset(shot.seed, pixel, samples);
         // Step by step: in all but the second no sample waits for the one before, so that they overlap.
-        for (begun, index) in begun.iter_mut().zip(indices) {
-            begun.begin(shot, Address { pixel, replicate, index }, &octet.sampler(index));
+        for (i, (begun, &(replicate, index))) in begun.iter_mut().zip(samples).enumerate() {
+            begun.begin(shot, Address { pixel, replicate, index }, &octet.sampler(i));
         }
         match &shot.plan.integrator {
             Integrator::Path(settings) if path::together::possible(shot, settings) && begun.len() > 1 => {
@@ -350,7 +348,7 @@ impl Samples {
                 }
                 ledgers.iter().for_each(Ledger::clear);
                 for (i, begun) in begun.iter_mut().enumerate() {
-                    begun.follow(shot, &octet.sampler(begun.at.index), ledgers.get(i));
+                    begun.follow(shot, &octet.sampler(i), ledgers.get(i));
                 }
             }
         }
@@ -358,28 +356,28 @@ impl Samples {
         layers.numbers.clear();
         if !shot.plan.layers.layers.is_empty() {
             for (i, begun) in begun.iter().enumerate() {
-                begun.layers(shot, &octet.sampler(begun.at.index), ledgers.get(i), layers);
+                begun.layers(shot, &octet.sampler(i), ledgers.get(i), layers);
             }
         }
         let channels = layers.numbers.len() / begun.len().max(1);
         for (i, begun) in begun.iter().enumerate() {
             let covered = shot.plan.layers.mattes.then(|| {
-                let sampler = octet.sampler(begun.at.index);
+                let sampler = octet.sampler(i);
                 middle::covered(shot.scene, shot.plan, &begun.ray, |crossing| {
                     sampler.set(Set::Extra(crossing << 16))[2]
                 })
             });
-            give(&begun.sample, &layers.numbers[i * channels..(i + 1) * channels], covered.flatten());
+            give(i, &begun.sample, &layers.numbers[i * channels..(i + 1) * channels], covered.flatten());
         }
     }
 }
 
 /// [`Begun::follow`] of several samples whose paths go together.
 fn follow_together(begun: &mut [Begun], shot: &Shot, settings: &PathSettings, octet: &Octet) {
-    let mut light = [Incoming::NONE; Octet::SAMPLES as usize];
+    let mut light = [Incoming::NONE; Octet::SAMPLES];
     let wanted = |i: usize| {
-        let Begun { at, ray, sample: PixelSample { wavelengths, .. }, .. } = &begun[i];
-        Wanted { sampler: octet.sampler(at.index), nm: wavelengths.nm, ray }
+        let Begun { ray, sample: PixelSample { wavelengths, .. }, .. } = &begun[i];
+        Wanted { sampler: octet.sampler(i), nm: wavelengths.nm, ray }
     };
     let Shot { scene, plan, photons, .. } = *shot;
     let map = photons.map(|p| p.map);
