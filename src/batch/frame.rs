@@ -189,6 +189,7 @@ pub(super) fn render_unit(
     let window = tile.window();
     let mut memory = Samples::default();
     let mut layer_run = LayerRun::default();
+    let mut wanted = Vec::new();
     let middles = plan.layers.layers.iter().any(|layer| matches!(layer.source, Source::Middle(_)));
     for y in window.y..window.y + window.height as i32 {
         for x in window.x..window.x + window.width as i32 {
@@ -198,33 +199,35 @@ pub(super) fn render_unit(
                     tile.layers.add_once(index, [(channel, value)])
                 });
             }
-            // Samples take turns among the replicates.
-            let turns = |replicate: u32| match shares {
-                Some(shares) => shares.turns([x, y], replicate, &samples),
-                None => {
-                    let turns = |s: u32| s.saturating_sub(replicate).div_ceil(REPLICATES as u32);
-                    turns(samples.start)..turns(samples.end)
-                }
-            };
-            let mut wanted = (0..REPLICATES as u32).flat_map(|replicate| turns(replicate).map(move |i| (replicate, i)));
-            while render_run((&shot, moments), job.independent, tile, &mut memory, &mut layer_run, [x, y], &mut wanted)
-            {
+            wanted.clear();
+            for replicate in 0..REPLICATES as u32 {
+                // Samples take turns among the replicates.
+                let turns = |s: u32| s.saturating_sub(replicate).div_ceil(REPLICATES as u32);
+                let indices = match shares {
+                    Some(shares) => shares.turns([x, y], replicate, &samples),
+                    None => turns(samples.start)..turns(samples.end),
+                };
+                // A scrambling for each replicate; or for each sample, of which it is the first point.
+                let address = |i| if job.independent { (replicate + REPLICATES as u32 * i, 0) } else { (replicate, i) };
+                wanted.extend(indices.map(address));
+            }
+            for run in wanted.chunks(LONGEST as usize) {
+                render_run((&shot, moments), tile, &mut memory, &mut layer_run, [x, y], run);
             }
         }
     }
 }
 
-/// Renders the next of `samples` of `pixel`, each a replicate and an index in it, at most [`LONGEST`]; each at its own of
-/// `moments`, if there are any, and where they are `independent` with a scrambling of its own. False after the last.
+/// Renders `samples` of `pixel`, at most [`LONGEST`]: each the number of a scrambling, which take turns among the replicates, and
+/// an index in it. Each sees its own of `moments`, if there are any.
 fn render_run(
     (shot, moments): (&Shot, &[Scene]),
-    independent: bool,
     tile: &mut TileBuffer,
     memory: &mut Samples,
     layers: &mut LayerRun,
     pixel: [i32; 2],
-    samples: &mut impl Iterator<Item = (u32, u32)>,
-) -> bool {
+    samples: &[(u32, u32)],
+) {
     let index = tile.window().index(pixel).expect("the pixel lies in the tile");
     let channels = tile.layers.channels();
     let unit = light_unit(shot.scene);
@@ -232,31 +235,14 @@ fn render_run(
     layers.reset(channels);
     // Overscan makes negative coordinates; as addresses they wrap.
     let address = pixel.map(|x| x as u32);
-    // One of them sees one moment.
-    let most = if moments.is_empty() { Octet::SAMPLES } else { 1 };
-    let mut left = LONGEST as usize;
-    let mut ended = false;
-    while left >= Octet::SAMPLES && !ended {
-        let (mut octet, mut replicates, mut count) = ([(0, 0); Octet::SAMPLES], [0; Octet::SAMPLES], 0);
-        while count < most {
-            let Some((replicate, i)) = samples.next() else {
-                ended = true;
-                break;
-            };
-            replicates[count] = replicate as usize;
-            // Of each sequence the first point alone, or those of one for each replicate.
-            octet[count] = if independent { (replicate + REPLICATES as u32 * i, 0) } else { (replicate, i) };
-            count += 1;
-        }
-        if count == 0 {
-            break;
-        }
-        left -= count;
-        let scene = match moments {
-            [] => shot.scene,
-            _ => &moments[moment(shot.seed, address, octet[0].0, octet[0].1, moments.len())],
+    // Those that are rendered together see one moment.
+    let together = if moments.is_empty() { Octet::SAMPLES } else { 1 };
+    for octet in samples.chunks(together) {
+        let scene = match (moments, octet) {
+            ([_, ..], &[(stream, i)]) => &moments[moment(shot.seed, address, stream, i, moments.len())],
+            _ => shot.scene,
         };
-        memory.render(&Shot { scene, ..*shot }, address, &octet[..count], |lane, sample, values, covered| {
+        memory.render(&Shot { scene, ..*shot }, address, octet, |lane, sample, values, covered| {
             if let Some(number) = covered {
                 let pixels = tile.window().pixels();
                 tile.layers.mattes.add(index, pixels, number, 1);
@@ -264,7 +250,7 @@ fn render_run(
             if channels > 0 && !layers.add(sample.weight, values) {
                 tile.layers.add(index, sample.weight, values);
             }
-            let replicate = replicates[lane];
+            let replicate = octet[lane].0 as usize % REPLICATES;
             record(tile, &mut runs[replicate], unit, pixel, replicate, sample);
         });
     }
@@ -274,7 +260,6 @@ fn render_run(
     if channels > 0 {
         tile.layers.add_run(index, layers);
     }
-    !ended
 }
 
 #[inline]
