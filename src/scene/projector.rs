@@ -82,7 +82,7 @@ impl Projector {
         let place = (2.0 * u - 1.0) * self.half;
         let direction = (self.axes * place.extend(1.0)).normalize();
         let at = TexturePoint { uv: u, point: self.position + direction, ..TexturePoint::default() };
-        let factor = PI * 4.0 * self.half.x * self.half.y;
+        let factor = PI * 4.0 * (self.half.x * self.half.y).abs();
         (Ray::new(self.position, direction), self.irradiance.eval(&at, nm) * (self.scale * factor as f32))
     }
 
@@ -167,5 +167,20 @@ mod tests {
     #[test]
     fn power_is_what_falls_on_the_screen() {
         assert!((projector(slide()).power() - 3.0 * PI * 0.5 * 8.0).abs() < 1e-6);
+    }
+
+    /// The same of its rays, in the mean over the slide, upright or upside down: f32 roundings.
+    #[test]
+    fn its_rays_carry_its_power_whichever_way_up() {
+        let place = Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 0.0), DVec3::Y).unwrap();
+        for half in [DVec2::new(2.0, 1.0), DVec2::new(2.0, -1.0)] {
+            let projector = Projector::new(place, half, slide(), 3.0);
+            let power = |i: u32| {
+                let u = DVec2::new((f64::from(i) + 0.5) / 64.0, 0.3);
+                f64::from(projector.emit(u, Lanes::splat(550.0)).1.to_array()[0])
+            };
+            let mean = (0..64).map(power).sum::<f64>() / 64.0;
+            assert!((mean / (3.0 * PI * 0.5 * 8.0) - 1.0).abs() < 1e-6, "{half} {mean}");
+        }
     }
 }
