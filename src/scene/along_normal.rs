@@ -16,9 +16,9 @@ use glam::{DVec2, DVec3};
 /// The most faces of a shape.
 const FACES: u8 = 6;
 
-/// How far the normal may miss the point, relative to the lengths that it was computed from: points of a
-/// surface and their normals are good to some eight roundings each.
-const MISS: f64 = 32.0 * f64::EPSILON;
+/// How near to a surface a point may be and still be in its light, relative to the lengths that the distance is computed from:
+/// points of a surface are good to some eight roundings each, and light that leaves a point does not come back to it.
+const NEAREST: f64 = 32.0 * f64::EPSILON;
 
 /// Light at `from`; `facing` is −1 where the surface shines against its own normal, else 1. A mesh is asked
 /// at one triangle, which `u` chooses by area.
@@ -53,7 +53,8 @@ pub fn arriving(
             let twice = normal.length_squared();
             let (b1, b2) = (p.cross(e2).dot(normal) * facing / twice, e1.cross(p).dot(normal) * facing / twice);
             let height = p.dot(normal) / twice.sqrt();
-            if !(b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && height > 0.0) {
+            let nearest = NEAREST * (a + mesh.mesh.origin).abs().max(from.abs()).max_element();
+            if !(b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && height > nearest) {
                 return None;
             }
             let surface = mesh.mesh.surface(triangle, b1, b2);
@@ -89,10 +90,10 @@ fn foot(shape: &Shape, facing: f64, from: DVec3) -> Option<Foot> {
         let hit = shape.intersect(&Ray::new(from, -normal), f64::INFINITY, None).filter(|hit| hit.face == face)?;
         let surface = shape.surface_with(from - normal * hit.t, face, super::shape::Detail::Geometry);
         let outward = surface.normal * facing;
-        // The foot of another face's normal, or light that comes from the inside.
-        let miss = from - surface.point - outward * hit.t;
-        let largest = surface.scale.max(from.abs().max_element());
-        if outward.dot(normal) <= 0.0 || miss.length() > MISS * largest {
+        let nearest = NEAREST * surface.scale.max(from.abs().max_element());
+        // Light that comes from the inside, or is the point's own. Beyond the apex of a cone the normal of the near side
+        // leads to the far one, which shines elsewhere.
+        if outward.dot(normal) <= 0.0 || hit.t <= nearest || !shape.share_azimuth(from, surface.point, face) {
             return None;
         }
         let [k1, k2] = shape.curvatures(surface.point, face);
@@ -104,6 +105,7 @@ fn foot(shape: &Shape, facing: f64, from: DVec3) -> Option<Foot> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::shape::testing::Random;
     use crate::scene::shape::{Cone, Cube, Cylinder, Disk, Sphere};
     use crate::scene::{TriangleMesh, mesh};
     use glam::{DAffine3, DMat3};
@@ -147,6 +149,45 @@ mod tests {
         assert!(of_shape(pipe(), DVec3::new(0.1, 1.0, 0.1)).is_none());
         assert!(of_shape(pipe(), DVec3::new(2.0, 5.0, 0.1)).is_none());
         assert!(of_shape(cube(), DVec3::new(2.0, 2.0, 0.1)).is_none());
+    }
+
+    /// From each point of the side of a tilted cone along its normal, next to the apex as well, the way back leads there; far from
+    /// the origin, too. Above a blunt apex no side shines: the normal of the near side leads to the far one.
+    #[test]
+    fn every_point_on_a_normal_is_lit() {
+        let mut random = Random::new(4);
+        for centre in [DVec3::ZERO, DVec3::new(1e5, -1e5, 1e5)] {
+            let cone = Shape::Cone(
+                Cone::new(centre + DVec3::new(1.2, 2.2, 0.5), centre + DVec3::new(0.6, 1.4, 0.2), 0.5, false).unwrap(),
+            );
+            for _ in 0..20_000 {
+                let sample = cone.sample_area(random.pair());
+                let height = random.log_uniform(-3.0, 1.0);
+                let (_, distance, _) = of_shape(cone.clone(), sample.point + sample.normal * height).expect("light");
+                // A few roundings of the largest coordinate.
+                let largest = centre.x.max(1.0) + height;
+                assert!((distance - height).abs() < 1e-14 * largest, "{height} {distance}");
+            }
+        }
+        let blunt = Cone::new(DVec3::ZERO, DVec3::Y * 0.1, 1.0, true).unwrap();
+        assert!(of_shape(Shape::Cone(blunt), DVec3::new(0.01, 0.3, 0.0)).is_none());
+    }
+
+    /// What shines outward leaves its own inside and back dark, which lie where its light begins.
+    #[test]
+    fn a_surface_does_not_light_itself() {
+        let mut random = Random::new(5);
+        let (base, top) = (DVec3::new(0.1, 0.0, -1.0), DVec3::new(0.0, 0.13, 1.0));
+        let tube = Shape::Cylinder(Cylinder::new(base, top, 0.37, false, false).unwrap());
+        let cone = Shape::Cone(Cone::new(base, top, 0.37, false).unwrap());
+        let ball = Shape::Sphere(Sphere::new(base, 0.37, DMat3::IDENTITY).unwrap());
+        for shape in [tube, cone, ball] {
+            for _ in 0..20_000 {
+                let sample = shape.sample_area(random.pair());
+                let found = of_shape(shape.clone(), shape.surface(sample.point, sample.face).point);
+                assert!(found.is_none(), "{shape:?} {} {found:?}", sample.point);
+            }
+        }
     }
 
     /// Two triangles of areas 1 and 3: the mean over u of what one of them gives is the exitance.

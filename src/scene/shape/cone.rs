@@ -167,6 +167,11 @@ impl Cone {
         }
     }
 
+    pub(super) fn share_azimuth(&self, a: DVec3, b: DVec3, face: u8) -> bool {
+        let radial = |p: DVec3| self.frame.to_local(p - self.apex).truncate();
+        face != WALL || radial(a).dot(radial(b)) > 0.0
+    }
+
     /// Along a generator none; across it cos α / ρ, with the half angle α at the apex and the distance
     /// ρ from the axis (Meusnier), which is h / r over the distance from the apex.
     pub(super) fn curvatures(&self, point: DVec3, face: u8) -> [f64; 2] {

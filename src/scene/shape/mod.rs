@@ -312,6 +312,15 @@ impl Shape {
         }
     }
 
+    /// Whether two points lie on the same side of the axis of a cone, if `face` is its side; true of anything else.
+    #[must_use]
+    pub fn share_azimuth(&self, a: DVec3, b: DVec3, face: u8) -> bool {
+        match self {
+            Shape::Cone(s) => s.share_azimuth(a, b, face),
+            _ => true,
+        }
+    }
+
     /// The density in sr⁻¹ with which [`Shape::sample_toward`] makes the unit `direction` by the
     /// point that a ray from `from` meets at distance `hit_t`, where the normal is `hit_normal`
     /// (on either side). 0 edge-on, where `sample_toward` gives nothing.
