@@ -182,6 +182,35 @@ fn all_effects_give_the_bits_of_those_the_scene_calls_for() {
     }
 }
 
+/// The wall through which a shadow ray enters a lamp that shines inward stands in its way, half open or not, whether or not
+/// there is smoke somewhere.
+#[test]
+fn lamps_that_shine_inward_stand_in_their_own_way_with_and_without_media() {
+    let base = "shapes:\n- plane: {normal: [0, 1, 0]}\n";
+    let lamps = [
+        "sphere: {center: [0, 2, 0], radius: 0.8, ",
+        "cylinder: {base: [-1, 2, 0], top: [1, 2.2, 0], radius: 0.5, ",
+        "cone: {base: [-1, 2, 0], apex: [1, 2.2, 0], radius: 0.5, ",
+    ];
+    let paint = "{diffuse: {reflectance: 0}}";
+    let smoke = "- sphere: {center: [100, 50, 100], radius: 1, material: {boundary: {}}, inside: smoke}\n";
+    let media = "media: {smoke: {homogeneous: {absorption: 0.3}}}\n";
+    for lamp in lamps {
+        let half = format!(
+            "{base}- {lamp}flip_normals: true, emission: 1, material: {{mask: {{opacity: 0.5, material: {paint}}}}}}}\n"
+        );
+        let [auto, all] =
+            ["auto", "all"].map(|effects| sums(&scene(&half, "path", &format!("effects: {effects}")).film()));
+        assert!(auto == all, "{lamp}");
+        let with_smoke = sums(&scene(&format!("{media}{half}{smoke}"), "path", "effects: auto").film());
+        assert!(auto == with_smoke, "{lamp}");
+        let opaque = format!("{media}{base}- {lamp}flip_normals: true, emission: 1, material: {paint}}}\n{smoke}");
+        let film = scene(&opaque, "{path: {max_depth: 2}}", "effects: auto").film();
+        // The open ends of a tube would let light out; these have none.
+        assert!(sums(&film).iter().all(|sum| sum.0 == [0; 3]), "{lamp}");
+    }
+}
+
 /// How much light is traced from the lamps is told by the rays that it takes, of which effects that are forced on take none: not
 /// for wavelengths that leave the glass for the sky either.
 #[test]

@@ -77,7 +77,7 @@ impl Scene {
             let aimed = target.filter(|t| t.object == object).map(|t| t.part);
             match geometry {
                 Geometry::Instance(_) => {}
-                _ if !lets_through(object) => return geometry.blocks(ray, distance, departing, aimed),
+                _ if !lets_through(object) => return self.blocks(ray, object, distance, target),
                 Geometry::Mesh(mesh) => {
                     let Some(tree) = &mesh.tree else { return false };
                     return tree.any_of(ray, distance, [departing, aimed], |met| {
@@ -92,7 +92,7 @@ impl Scene {
             // From one surface of it to the next.
             let (mut ray, mut gone) = (*ray, 0.0);
             while let Some(hit) = self.meet(&ray, object, distance - gone) {
-                if hit.is_on(target) {
+                if self.reaches(&ray, &hit, target) {
                     break;
                 }
                 if !lets_through(hit.object) {
