@@ -190,8 +190,12 @@ impl Import<'_> {
     }
 }
 
-/// A cylinder where it lies in the world: its transform may stretch it along its axis.
+/// A cylinder where it lies in the world: its transform may stretch it along its axis. What is mirrored is put down as its
+/// image in the plane x = 0, which a transform of its own mirrors back, textures and all.
 fn cylinder(bag: &Bag<'_>, to_world: DMat4, fields: &mut Fields) -> Result<(), Fault> {
+    let mirror = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+    let mirrored = DMat3::from_mat4(to_world).determinant() < 0.0;
+    let to_world = if mirrored { mirror * to_world } else { to_world };
     let base = DVec3::from(bag.vector("p0")?.unwrap_or_default());
     let top = DVec3::from(bag.vector("p1")?.unwrap_or([0.0, 0.0, 1.0]));
     let radius = bag.float("radius")?.unwrap_or(1.0);
@@ -212,6 +216,10 @@ fn cylinder(bag: &Bag<'_>, to_world: DMat4, fields: &mut Fields) -> Result<(), F
     fields.add("radius", number(bag.place("radius"), radius * s.length()));
     fields.add("caps", text(bag.object.place, "none"));
     fields.add("seam", numbers(bag.place("to_world"), &s.to_array()));
+    if mirrored {
+        let at = bag.place("to_world");
+        fields.add("transform", list(at, [entry(at, "matrix", matrix(at, mirror))]));
+    }
     Ok(())
 }
 

@@ -53,14 +53,20 @@ impl Compiler<'_> {
                     written::Caps::Top => (false, true),
                 };
                 let made = Cylinder::new(point(c.base), point(c.top), c.radius * scale, base, top);
-                let made = match c.seam {
-                    Some(seam) => made.and_then(|cylinder| cylinder.with_seam(vector(seam))),
+                let along = vec3(c.top) - vec3(c.base);
+                let made = match c.seam.map(vec3).or_else(|| carried_seam(m, along)) {
+                    Some(seam) => made.and_then(|cylinder| cylinder.with_seam(m.transform_vector3(seam), is_mirror(m))),
                     None => made,
                 };
                 made.map(Shape::Cylinder)
             }
             written::Geometry::Cone(c) => {
-                Cone::new(point(c.base), point(c.apex), c.radius * scale, c.cap).map(Shape::Cone)
+                let made = Cone::new(point(c.base), point(c.apex), c.radius * scale, c.cap);
+                let made = match carried_seam(m, vec3(c.apex) - vec3(c.base)) {
+                    Some(seam) => made.and_then(|cone| cone.with_seam(m.transform_vector3(seam), is_mirror(m))),
+                    None => made,
+                };
+                made.map(Shape::Cone)
             }
             written::Geometry::SdfGrid(grid) => return self.sdf_grid(at, grid, &DAffine3::from_mat4(m)),
             written::Geometry::Curves(curves) => return self.curves(at, curves, &DAffine3::from_mat4(m)),
@@ -103,6 +109,77 @@ fn layout(layout: written::Layout) -> Layout {
     }
 }
 
+/// Where u = 0 about an axis before it is transformed, if it is: textures move with what they are on.
+fn carried_seam(m: DMat4, along: DVec3) -> Option<DVec3> {
+    along.try_normalize().filter(|_| m != DMat4::IDENTITY).map(|axis| Frame::from_normal(axis).s)
+}
+
+fn is_mirror(m: DMat4) -> bool {
+    DMat3::from_mat4(m).determinant() < 0.0
+}
+
 fn normal_transform(m: DMat4, n: DVec3) -> DVec3 {
     DMat3::from_mat4(m).inverse().transpose() * n
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::description::SceneDescription;
+    use crate::scene::Geometry;
+    use crate::scene::compile::compile;
+    use crate::scene::shape::testing::Random;
+    use glam::{DMat3, DVec3};
+    use std::path::Path;
+
+    /// Texture coordinates belong to the thing, however it is turned, resized and mirrored; to a rounding of the largest
+    /// coordinate over the least radius.
+    #[test]
+    fn textures_move_with_what_they_are_on() {
+        let things = [
+            "cylinder: {base: [0.1, 0.2, 0], top: [0.3, 1.2, 0.4], radius: 0.7",
+            "cylinder: {base: [0.1, 0.2, 0], top: [0.3, 1.2, 0.4], radius: 0.7, seam: [1, 0, 0.3]",
+            "cone: {base: [0.1, 0.2, 0], apex: [0.3, 1.2, 0.4], radius: 0.7",
+            "sphere: {center: [0.1, 0.2, 0], radius: 0.7",
+        ];
+        let moves = [
+            ("{rotate: {axis: [0.2, 1, 0.3], deg: 75}}", rotation(75.0)),
+            ("{scale: [-2, 2, 2]}", DMat3::from_diagonal(DVec3::new(-2.0, 2.0, 2.0))),
+            (
+                "{rotate: {axis: [0.2, 1, 0.3], deg: 200}}, {scale: [1, 1, -1]}",
+                DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0)) * rotation(200.0),
+            ),
+        ];
+        for thing in things {
+            for (written, moved) in moves {
+                let text = format!(
+                    "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n- {thing}}}\n\
+                     - {thing}, transform: [{written}]}}\n"
+                );
+                let description = SceneDescription::parse(&text, Path::new("s.yaml")).unwrap();
+                let scene = compile(&description, "s").unwrap();
+                let [Geometry::Shape(plain), Geometry::Shape(turned)] = [0, 1].map(|i| &scene.objects[i].geometry)
+                else {
+                    panic!("two shapes");
+                };
+                let mut random = Random::new(3);
+                for _ in 0..1000 {
+                    let sample = plain.sample_area(random.pair());
+                    let (a, b) =
+                        (plain.surface(sample.point, sample.face), turned.surface(moved * sample.point, sample.face));
+                    let apart = (a.uv - b.uv).abs();
+                    // At the seam 0 is 1.
+                    let apart = apart.min((1.0 - apart).abs());
+                    assert!(apart.max_element() < 1e-12, "{thing} {written}: {} {}", a.uv, b.uv);
+                    assert!(
+                        (moved * a.tangent).normalize().dot(b.tangent.normalize()) > 1.0 - 1e-12,
+                        "{thing} {written}"
+                    );
+                }
+            }
+        }
+    }
+
+    fn rotation(degrees: f64) -> DMat3 {
+        DMat3::from_axis_angle(DVec3::new(0.2, 1.0, 0.3).normalize(), degrees.to_radians())
+    }
 }

@@ -1,6 +1,6 @@
 //! Cones, closed or open.
 
-use super::cylinder::{BASE, Part, WALL, cap_surface, disk_extent};
+use super::cylinder::{BASE, Part, WALL, cap_surface, disk_extent, frame_at_seam};
 use super::exact::{along, cone_form, cross, dot, rows_times};
 use super::plain::Plain;
 use super::span::{Exit, Faces, Span};
@@ -27,6 +27,8 @@ pub struct Cone {
     slant: f64,
     /// n is the axis, from base to apex.
     frame: Frame,
+    /// −1 where u runs the other way about the axis, else 1.
+    turn: f64,
     /// Rows that map p − apex to the unit cone.
     rows: [DVec3; 3],
     present: Faces,
@@ -63,11 +65,22 @@ impl Cone {
             slant: (radius * radius + height * height).sqrt(),
             rows: [frame.s / radius, frame.t / radius, -frame.n / height],
             frame,
+            turn: 1.0,
             present: 1 << WALL | Faces::from(cap) << BASE,
             scale,
             end: 1.0 + pad(16.0),
             last: 1.0 - pad(4096.0).min(0.25),
         })
+    }
+
+    /// The cone with u = 0 in the half plane of the axis and `direction`, and u running the other way where it is `mirrored`.
+    ///
+    /// # Errors
+    /// In words: a direction along the axis.
+    pub fn with_seam(self, direction: DVec3, mirrored: bool) -> Result<Cone, String> {
+        let frame = frame_at_seam(&self.frame, direction)?;
+        let rows = [frame.s / self.radius, frame.t / self.radius, self.rows[2]];
+        Ok(Cone { frame, rows, turn: if mirrored { -1.0 } else { 1.0 }, ..self })
     }
 
     pub(super) fn plain(&self) -> Plain {
@@ -148,7 +161,7 @@ impl Cone {
     pub(super) fn surface(&self, point: DVec3, face: u8, detail: Detail) -> SurfacePoint {
         if face != WALL {
             let local = self.frame.to_local(point - self.base);
-            return cap_surface(&self.frame, self.base, 0.0, -1.0, self.radius, local, self.scale);
+            return cap_surface(&self.frame, self.turn, self.base, 0.0, -1.0, self.radius, local, self.scale);
         }
         let local = self.frame.to_local(point - self.apex);
         let rho = (local.x * local.x + local.y * local.y).sqrt();
@@ -162,8 +175,8 @@ impl Cone {
             scale: self.scale,
             normal,
             shading_normal: normal,
-            uv: detail.uv(|| DVec2::new(turns(local.x, local.y), (1.0 - f).min(BELOW_ONE))),
-            tangent: self.frame.n.cross(outward),
+            uv: detail.uv(|| DVec2::new(turns(local.x, self.turn * local.y), (1.0 - f).min(BELOW_ONE))),
+            tangent: self.frame.n.cross(outward) * self.turn,
         }
     }
 

@@ -28,6 +28,8 @@ pub struct Cylinder {
     radius: f64,
     /// n is the axis, from base to top.
     frame: Frame,
+    /// −1 where u runs the other way about the axis, else 1.
+    turn: f64,
     /// Rows that map p − base to the unit cylinder.
     rows: [DVec3; 3],
     present: Faces,
@@ -65,6 +67,7 @@ impl Cylinder {
             radius,
             rows: [frame.s / radius, frame.t / radius, frame.n / length],
             frame,
+            turn: 1.0,
             present: 1 << WALL | Faces::from(cap_base) << BASE | Faces::from(cap_top) << TOP,
             scale,
             ends: (-pad(cap_base), 1.0 + pad(cap_top)),
@@ -72,20 +75,15 @@ impl Cylinder {
         })
     }
 
-    /// The cylinder with u = 0 in the half plane of the axis and `direction`.
+    /// The cylinder with u = 0 in the half plane of the axis and `direction`, and u running the other way where it is
+    /// `mirrored`.
     ///
     /// # Errors
     /// In words: a direction along the axis.
-    pub fn with_seam(self, direction: DVec3) -> Result<Cylinder, String> {
-        let unit = direction / check_direction("seam", direction)?;
-        let across = unit - self.frame.n * self.frame.n.dot(unit);
-        // Both are rounded: an angle below 4 ε between them is none.
-        if across.length() <= 4.0 * f64::EPSILON {
-            return Err(format!("seam: expected a direction that is not along the axis, found {direction}"));
-        }
-        let frame = Frame::from_normal_and_tangent(self.frame.n, unit);
+    pub fn with_seam(self, direction: DVec3, mirrored: bool) -> Result<Cylinder, String> {
+        let frame = frame_at_seam(&self.frame, direction)?;
         let rows = [frame.s / self.radius, frame.t / self.radius, self.rows[2]];
-        Ok(Cylinder { frame, rows, ..self })
+        Ok(Cylinder { frame, rows, turn: if mirrored { -1.0 } else { 1.0 }, ..self })
     }
 
     pub(super) fn plain(&self) -> Plain {
@@ -163,7 +161,7 @@ impl Cylinder {
         let local = self.frame.to_local(point - self.base);
         if face != WALL {
             let (height, side) = if face == BASE { (0.0, -1.0) } else { (self.length, 1.0) };
-            return cap_surface(&self.frame, self.base, height, side, self.radius, local, self.scale);
+            return cap_surface(&self.frame, self.turn, self.base, height, side, self.radius, local, self.scale);
         }
         let normal = (self.frame.s * local.x + self.frame.t * local.y).normalize_or(self.frame.s);
         let height = local.z.clamp(self.heights.0, self.heights.1);
@@ -172,8 +170,8 @@ impl Cylinder {
             scale: self.scale,
             normal,
             shading_normal: normal,
-            uv: detail.uv(|| DVec2::new(turns(local.x, local.y), (height / self.length).min(BELOW_ONE))),
-            tangent: self.frame.n.cross(normal),
+            uv: detail.uv(|| DVec2::new(turns(local.x, self.turn * local.y), (height / self.length).min(BELOW_ONE))),
+            tangent: self.frame.n.cross(normal) * self.turn,
         }
     }
 
@@ -307,6 +305,20 @@ impl Part {
     }
 }
 
+/// A frame of the same axis that begins in the half plane of `direction`.
+///
+/// # Errors
+/// In words: a direction along the axis.
+pub(super) fn frame_at_seam(frame: &Frame, direction: DVec3) -> Result<Frame, String> {
+    let unit = direction / check_direction("seam", direction)?;
+    let across = unit - frame.n * frame.n.dot(unit);
+    // Both are rounded: an angle below 4 ε between them is none.
+    if across.length() <= 4.0 * f64::EPSILON {
+        return Err(format!("seam: expected a direction that is not along the axis, found {direction}"));
+    }
+    Ok(Frame::from_normal_and_tangent(frame.n, unit))
+}
+
 /// Half extents of the box about a disk across the frame's n: r √(1 − nᵢ²), without cancellation.
 pub(super) fn disk_extent(frame: &Frame, radius: f64) -> DVec3 {
     (frame.s * frame.s + frame.t * frame.t).map(f64::sqrt) * radius
@@ -314,8 +326,10 @@ pub(super) fn disk_extent(frame: &Frame, radius: f64) -> DVec3 {
 
 /// The point of a cap at `height` along the frame's n nearest to `local`; `side` is +1 where the cap's
 /// normal is n and −1 where it is −n.
+#[expect(clippy::too_many_arguments, reason = "a cap of either shape, where it lies and how it is seen")]
 pub(super) fn cap_surface(
     frame: &Frame,
+    turn: f64,
     base: DVec3,
     height: f64,
     side: f64,
@@ -332,7 +346,7 @@ pub(super) fn cap_surface(
         normal,
         shading_normal: normal,
         // Seen from outside: u to the right, v upward.
-        uv: (DVec2::splat(0.5) + DVec2::new(at.x, at.y * side) * (0.5 / radius))
+        uv: (DVec2::splat(0.5) + DVec2::new(at.x, at.y * side * turn) * (0.5 / radius))
             .clamp(DVec2::ZERO, DVec2::splat(BELOW_ONE)),
         tangent: frame.s,
     }
