@@ -32,6 +32,17 @@ pub enum Error {
         message: String,
     },
 
+    /// The system has no threads to give: exit code 1.
+    #[error(
+        "cannot start {threads} threads: {message}; the process may have too few (ulimit -u), or too little memory"
+    )]
+    Threads {
+        /// How many were wanted.
+        threads: usize,
+        /// Why, as the system says it.
+        message: String,
+    },
+
     /// The render ran but its samples cannot be trusted: exit code 4.
     #[error("{0}")]
     Render(String),
@@ -49,7 +60,7 @@ impl Error {
     #[must_use]
     pub fn exit_code(&self) -> i32 {
         match self {
-            Error::Output { .. } => 1,
+            Error::Output { .. } | Error::Threads { .. } => 1,
             Error::Config(_) => 2,
             Error::Input { .. } => 3,
             Error::Render(_) => 4,

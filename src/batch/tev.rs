@@ -52,14 +52,16 @@ impl Viewer {
     pub fn new(place: &str) -> Viewer {
         let (queue, pictures) = sync_channel(1);
         let state = Arc::new(State::default());
-        let (place, shared) = (place.to_owned(), Arc::clone(&state));
-        let thread = std::thread::spawn(move || {
-            if let Err(e) = serve(&place, &pictures, &shared) {
-                *lock(&shared.gone) = Some(format!("tev at {place}: {e}; rendered without it"));
+        let without = |place: &str, e: std::io::Error| Some(format!("tev at {place}: {e}; rendered without it"));
+        let (to, away) = (place.to_owned(), Arc::clone(&state));
+        let thread = std::thread::Builder::new().spawn(move || {
+            if let Err(e) = serve(&to, &pictures, &away) {
+                *lock(&away.gone) = without(&to, e);
             }
-            shared.busy.store(false, Ordering::Relaxed);
+            away.busy.store(false, Ordering::Relaxed);
         });
-        Viewer { queue: Mutex::new(Some(queue)), thread: Mutex::new(Some(thread)), state }
+        let thread = thread.map_err(|e| *lock(&state.gone) = without(place, e)).ok();
+        Viewer { queue: Mutex::new(Some(queue)), thread: Mutex::new(thread), state }
     }
 
     /// Whether it would take a picture now: none is on its way, and it has not gone.

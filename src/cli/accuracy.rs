@@ -1,8 +1,8 @@
 //! `abbe accuracy`.
 
+use super::AccuracyArguments;
 use super::interrupts::Interrupts;
 use super::text::columns;
-use super::{AccuracyArguments, use_threads};
 use crate::batch;
 use crate::batch::accuracy::beside::Beside;
 use crate::batch::accuracy::page::{HEADINGS, cells, held_against, page};
@@ -16,7 +16,6 @@ const MOST_SAMPLES: u32 = 256;
 
 /// Makes the sheets, prints them and writes the page.
 pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
-    use_threads(arguments.threads);
     let interrupts = Interrupts::listen()?;
     let overrides = arguments.scene.overrides(None)?;
     let beside = arguments.beside.as_deref().map(|binary| Beside { binary, file: &arguments.scene.file });

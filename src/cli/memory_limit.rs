@@ -27,7 +27,7 @@ pub fn bytes(text: &str) -> std::result::Result<u64, String> {
 /// their names whole.
 ///
 /// # Errors
-/// [`Error::Config`] where the system does not tell how much memory a process has.
+/// [`Error::Config`] where the system does not tell how much memory a process has; [`Error::Threads`].
 pub fn watch(limit: u64) -> Result<()> {
     if resident().is_none() {
         return Err(Error::Config("--memory-limit: this system does not tell how much memory a process has".into()));
@@ -45,7 +45,7 @@ pub fn watch(limit: u64) -> Result<()> {
         }
     };
     let started = std::thread::Builder::new().name("memory".into()).spawn(look);
-    started.map(drop).map_err(|e| Error::Render(format!("cannot watch the memory: {e}")))
+    started.map(drop).map_err(|e| Error::Threads { threads: 1, message: e.to_string() })
 }
 
 /// Bytes of the process that are in memory.

@@ -1,14 +1,13 @@
 //! `abbe merge`.
 
+use super::MergeArguments;
 use super::render::table;
-use super::{MergeArguments, use_threads};
 use crate::batch::merge;
 use crate::error::Result;
 use crate::film::output::{prepare_place, write_json};
 
 /// Merges, and prints the table of the picture.
 pub fn run(arguments: &MergeArguments) -> Result<i32> {
-    use_threads(arguments.threads);
     if let Some(file) = &arguments.report {
         prepare_place(file)?;
     }

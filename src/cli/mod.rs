@@ -1,6 +1,6 @@
 //! The edge of the process: arguments in, exit code and messages out.
 //!
-//! Exit codes: 0 done, 1 internal or output error, 2 usage or description, 3 missing or broken input,
+//! Exit codes: 0 done, 1 internal or output error, or no threads to be had, 2 usage or description, 3 missing or broken input,
 //! 4 invalid samples, 75 stopped and can be resumed, 130 and 143 stopped by a second signal.
 
 mod accuracy;
@@ -112,7 +112,7 @@ struct RenderArguments {
     #[arg(long, value_name = "TIME", value_parser = duration)]
     time: Option<std::time::Duration>,
     /// Threads; 0 takes every core that the process may use
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads())]
     threads: usize,
     /// End with exit code 33 before the process has more memory than this, as 8G or 500M
     #[arg(long, value_name = "SIZE", value_parser = memory_limit::bytes)]
@@ -162,7 +162,7 @@ struct MergeArguments {
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
     /// Threads; 0 takes every core that the process may use
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads())]
     threads: usize,
     /// Print nothing but errors
     #[arg(short, long)]
@@ -192,7 +192,7 @@ struct FarmArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     frames_per_task: u32,
     /// Threads of a task; 0 for what the engine grants
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads())]
     threads: usize,
     /// The program, as the machines of the farm call it
     #[arg(long, value_name = "PATH", default_value = "abbe")]
@@ -248,7 +248,7 @@ struct AccuracyArguments {
     #[arg(long, value_name = "E", value_parser = relative_error)]
     error: Option<f64>,
     /// Threads; 0 takes every core that the process may use
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads())]
     threads: usize,
     /// Print nothing but errors
     #[arg(short, long)]
@@ -317,6 +317,13 @@ fn host_and_port(text: &str) -> std::result::Result<String, String> {
         Some(_) => Ok(text.to_owned()),
         None => Err("expected HOST:PORT, as localhost:14158".into()),
     }
+}
+
+/// More threads than this help nobody: so many processors a process is bound to at the most (Linux, `cpu_set_t`).
+const MOST_THREADS: usize = 1024;
+
+fn threads() -> clap::builder::RangedU64ValueParser<usize> {
+    clap::builder::RangedU64ValueParser::new().range(..=MOST_THREADS as u64)
 }
 
 fn duration(text: &str) -> std::result::Result<std::time::Duration, String> {
@@ -461,7 +468,8 @@ pub fn run() -> i32 {
             return code;
         }
     };
-    let result = check_cpu().and_then(|()| match &arguments.verb {
+    let threads = || use_threads(arguments.verb.threads());
+    let result = check_cpu().and_then(|()| threads()).and_then(|()| match &arguments.verb {
         Verb::Render(a) => render::run(a),
         Verb::Merge(a) => merge::run(a),
         Verb::Farm(a) => farm::run(a),
@@ -481,14 +489,42 @@ pub fn run() -> i32 {
     }
 }
 
+impl Verb {
+    /// Threads that were asked for; 0 for none.
+    fn threads(&self) -> usize {
+        match self {
+            Verb::Render(a) => a.threads,
+            Verb::Merge(a) => a.threads,
+            Verb::Accuracy(a) => a.threads,
+            // Those of `farm` are its tasks'.
+            Verb::Farm(_) | Verb::Plan(_) | Verb::Import(_) | Verb::Export(_) | Verb::Compare(_) | Verb::Info(_) => 0,
+        }
+    }
+}
+
 /// Makes the pool of as many threads as were asked for, else as the farm grants, else as the cpuset has cores. Renders do
 /// not block, so the pool may be the global one; a second call in one process keeps it.
-fn use_threads(asked: usize) {
+///
+/// # Errors
+/// [`Error::Config`] where the farm grants more than can be meant; [`Error::Threads`] where the system has none to give.
+fn use_threads(asked: usize) -> Result<()> {
     let granted = ["SLURM_CPUS_PER_TASK", "CUE_THREADS", "OMP_NUM_THREADS"];
-    let granted = || granted.iter().find_map(|v| std::env::var(v).ok()?.parse::<usize>().ok().filter(|&n| n > 0));
-    let asked = Some(asked).filter(|&n| n > 0).or_else(granted);
-    let threads = asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    let granted = || {
+        let number = |v: &str| std::env::var(v).ok()?.parse::<usize>().ok().filter(|&n| n > 0);
+        granted.iter().find_map(|v| Some((*v, number(v)?)))
+    };
+    let threads = match Some(("--threads", asked)).filter(|_| asked > 0).or_else(granted) {
+        Some((by, n)) if n > MOST_THREADS => {
+            return Err(Error::Config(format!("{by}: expected at most {MOST_THREADS} threads, found {n}")));
+        }
+        Some((_, n)) => n,
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    match rayon::ThreadPoolBuilder::new().num_threads(threads).build_global() {
+        // Without a cause it is that there is a pool already.
+        Err(e) if std::error::Error::source(&e).is_some() => Err(Error::Threads { threads, message: e.to_string() }),
+        _ => Ok(()),
+    }
 }
 
 /// Writes to the standard output. A reader that went away, as in `abbe plan … | head`, is no fault.

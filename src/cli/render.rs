@@ -3,7 +3,7 @@
 use super::interrupts::Interrupts;
 use super::progress::Teller;
 use super::text::columns;
-use super::{ProgressStyle, RenderArguments, use_threads};
+use super::{ProgressStyle, RenderArguments};
 use crate::batch;
 use crate::batch::report::{Report, SceneReport, Status};
 use crate::batch::tev::Viewer;
@@ -14,7 +14,6 @@ use std::sync::Arc;
 
 /// Renders, and prints a table at the end.
 pub fn run(arguments: &RenderArguments) -> Result<i32> {
-    use_threads(arguments.threads);
     let style = if arguments.quiet { ProgressStyle::None } else { arguments.progress };
     let teller = Teller::new(style);
     if let Some(limit) = arguments.memory_limit {

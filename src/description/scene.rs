@@ -514,7 +514,7 @@ mod tests {
         match error {
             Error::Config(text) => text.lines().all(placed),
             Error::Input { .. } => true,
-            Error::Output { .. } | Error::Render(_) | Error::Stopped(_) => false,
+            Error::Output { .. } | Error::Threads { .. } | Error::Render(_) | Error::Stopped(_) => false,
         }
     }
 

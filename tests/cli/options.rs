@@ -1,7 +1,7 @@
 //! Options of `render`, and from where it runs.
 
 use super::{BALL, SMALL, batch};
-use crate::common::place::Place;
+use crate::common::place::{Place, Ran};
 use serde_json::Value;
 use std::process::Command;
 
@@ -97,4 +97,51 @@ fn a_scene_is_the_same_from_any_directory() {
     assert_eq!(here, hash("elsewhere", "../deep/s.yaml"));
     let absolute = place.path("deep/s.yaml");
     assert_eq!(here, hash("elsewhere", absolute.to_str().unwrap()));
+}
+
+/// No verb needs more threads than a process may be bound to processors.
+#[test]
+fn more_threads_than_processors_can_be_are_refused() {
+    let place = batch();
+    let ran = place.run(&["render", "scenes/good.yaml", "--threads", "1025"]);
+    assert!(ran.err.contains("'1025' for '--threads <N>': 1025 is not in 0..=1024"), "{}", ran.err);
+    assert_eq!(ran.code, 2);
+    let granted = place.command(&["plan", "scenes/good.yaml"]).env("SLURM_CPUS_PER_TASK", "999999").output();
+    let ran = Ran::of(granted.unwrap());
+    assert_eq!(ran.err, "error: SLURM_CPUS_PER_TASK: expected at most 1024 threads, found 999999\n");
+    assert_eq!(ran.code, 2);
+}
+
+/// The user may have one thread. That does not bind root, who becomes another user for this.
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_that_cannot_be_had_are_told_by_every_verb() {
+    use std::os::unix::fs::MetadataExt;
+    let place = batch();
+    let is_root = std::fs::metadata(place.directory.path()).unwrap().uid() == 0;
+    let nobody = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", "bash"];
+    let bash = if is_root { &nobody[..] } else { &nobody[4..] };
+    for verb in [
+        "render scenes/good.yaml",
+        "merge none.exr -o all.exr",
+        "plan scenes/good.yaml",
+        "farm scenes/good.yaml --format slurm",
+        "accuracy scenes/good.yaml",
+        "import scenes/good.yaml",
+        "export scenes/good.yaml",
+        "compare a.exr b.exr",
+        "info a.exr",
+    ] {
+        let script = format!("ulimit -u 1; exec \"$0\" {verb}");
+        let mut command = Command::new(bash[0]);
+        command.args(&bash[1..]).args(["-c", &script, env!("CARGO_BIN_EXE_abbe")]).current_dir("/");
+        let output = command.env("SLURM_CPUS_PER_TASK", "3").output();
+        let Some(output) = output.ok().filter(|output| ![Some(126), Some(127)].contains(&output.status.code())) else {
+            eprintln!("skipped: there is no other user who may run the command");
+            return;
+        };
+        let ran = Ran::of(output);
+        assert!(ran.err.starts_with("error: cannot start 3 threads: ") && ran.err.lines().count() == 1, "{}", ran.err);
+        assert_eq!(ran.code, 1, "{verb}");
+    }
 }
