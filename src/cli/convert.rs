@@ -4,13 +4,15 @@ use super::ConvertArguments;
 use crate::batch;
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
-use crate::film::output::{directory_of, write_atomically};
+use crate::film::output::{directory_of, is_stream, write_atomically};
 use std::path::Path;
 
 /// Prints the scene as YAML, or writes it.
 pub fn import(arguments: &ConvertArguments) -> Result<i32> {
     let scene = read(arguments)?;
-    let directory = arguments.output.as_deref().map_or(Path::new(""), directory_of);
+    // Beside a stream lies nothing.
+    let file = arguments.output.as_deref().filter(|path| !is_stream(path));
+    let directory = file.map_or(Path::new(""), directory_of);
     write(arguments.output.as_deref(), &description::yaml(&scene, directory))?;
     Ok(0)
 }
@@ -19,8 +21,9 @@ pub fn import(arguments: &ConvertArguments) -> Result<i32> {
 pub fn export(arguments: &ConvertArguments) -> Result<i32> {
     let scene = read(arguments)?;
     let output = arguments.output.as_deref();
-    let exported = description::export(&scene, output.unwrap_or(Path::new("")));
-    match output {
+    let file = output.filter(|path| !is_stream(path));
+    let exported = description::export(&scene, file.unwrap_or(Path::new("")));
+    match file {
         Some(path) => {
             for (name, bytes) in &exported.files {
                 write_atomically(&directory_of(path).join(name), bytes)?;

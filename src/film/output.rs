@@ -2,12 +2,17 @@
 //!
 //! Bytes go to a temporary name in the same directory, reach the disk (fsync), and take the final
 //! name by a rename, so a reader never meets half a file and a full disk leaves the old one alone.
+//! A symbolic link stays, and the file at its end is replaced. Devices and FIFOs are written to as they stand.
 
 use crate::error::{Error, Result};
 use atomic_write_file::AtomicWriteFile;
 use serde::Serialize;
+use std::fs::{File, Metadata, OpenOptions};
 use std::io::{BufWriter, ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// So many symbolic links may lead from one to the next, as on Linux.
+const MOST_LINKS: usize = 40;
 
 /// Writes `bytes` to `path`, replacing what stands there.
 ///
@@ -22,13 +27,72 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
 /// # Errors
 /// As [`write_atomically`].
 pub fn write_pieces(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
-    let fail = |e: std::io::Error| Error::output(path, words(path, &e));
-    if path.is_dir() {
-        return Err(Error::output(path, "it is a directory"));
+    let file = match target(path)? {
+        Target::Stream(data) => {
+            let fail = |e| Error::output(path, words(path, &e));
+            let mut stream = BufWriter::new(open_stream(path, &data).map_err(fail)?);
+            return write(&mut stream).and_then(|()| stream.flush()).map_err(fail);
+        }
+        Target::File(file) => file,
+    };
+    let fail = |e| Error::output(path, words(&file, &e));
+    let mut writer = BufWriter::new(AtomicWriteFile::open(&file).map_err(fail)?);
+    write(&mut writer).map_err(fail)?;
+    writer.into_inner().map_err(|e| fail(e.into_error()))?.commit().map_err(fail)
+}
+
+/// What stands at a path that is to be written.
+enum Target {
+    /// A regular file, or none yet: the end of all symbolic links.
+    File(PathBuf),
+    /// What cannot be replaced: a device, a FIFO, what the standard output is.
+    Stream(Metadata),
+}
+
+fn target(path: &Path) -> Result<Target> {
+    match std::fs::metadata(path) {
+        Ok(data) if data.is_dir() => return Err(Error::output(path, "it is a directory")),
+        Ok(data) if !data.is_file() || standard(&data).is_some() => return Ok(Target::Stream(data)),
+        _ => {}
     }
-    let mut file = BufWriter::new(AtomicWriteFile::open(path).map_err(fail)?);
-    write(&mut file).map_err(fail)?;
-    file.into_inner().map_err(|e| fail(e.into_error()))?.commit().map_err(fail)
+    let mut file = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        match std::fs::read_link(&file) {
+            Ok(to) => file = directory_of(&file).join(to),
+            Err(_) => return Ok(Target::File(file)),
+        }
+    }
+    Err(Error::output(path, "it is a symbolic link that leads nowhere"))
+}
+
+/// Whether what is written to `path` is no file beside which others could lie.
+#[must_use]
+pub fn is_stream(path: &Path) -> bool {
+    matches!(target(path), Ok(Target::Stream(_)))
+}
+
+fn open_stream(path: &Path, data: &Metadata) -> std::io::Result<File> {
+    #[cfg(unix)]
+    if std::os::unix::fs::FileTypeExt::is_socket(&data.file_type()) {
+        return Err(std::io::Error::other("it is a socket"));
+    }
+    standard(data).map_or_else(|| OpenOptions::new().write(true).open(path), Ok)
+}
+
+/// The standard output or error, if that is what `data` is of. Opened anew, a file to which it was redirected would be
+/// written from its start, over what was said before.
+#[cfg(unix)]
+fn standard(data: &Metadata) -> Option<File> {
+    use std::os::fd::AsFd;
+    use std::os::unix::fs::MetadataExt;
+    let ends = [std::io::stdout().as_fd().try_clone_to_owned(), std::io::stderr().as_fd().try_clone_to_owned()];
+    let is_it = |own: Metadata| (own.dev(), own.ino()) == (data.dev(), data.ino());
+    ends.into_iter().flatten().map(File::from).find(|end| end.metadata().is_ok_and(is_it))
+}
+
+#[cfg(not(unix))]
+fn standard(_: &Metadata) -> Option<File> {
+    None
 }
 
 /// Writes `value` to `path` as JSON for people, replacing what stands there.
@@ -54,17 +118,15 @@ pub fn directory_of(file: &Path) -> &Path {
 /// # Errors
 /// As [`write_atomically`].
 pub fn prepare_place(file: &Path) -> Result<()> {
-    let directory = directory_of(file);
-    let fail = |e: std::io::Error| Error::output(file, words(file, &e));
+    let Target::File(end) = target(file)? else { return Ok(()) };
+    let directory = directory_of(&end);
+    let fail = |e: std::io::Error| Error::output(file, words(&end, &e));
     if directory.exists() && !directory.is_dir() {
         return Err(Error::output(file, format!("{} is not a directory", directory.display())));
     }
     std::fs::create_dir_all(directory).map_err(fail)?;
-    if file.is_dir() {
-        return Err(Error::output(file, "it is a directory"));
-    }
     let probe = directory.join(format!(".abbe-{}", std::process::id()));
-    std::fs::File::create(&probe).map_err(fail)?;
+    File::create(&probe).map_err(fail)?;
     match std::fs::remove_file(&probe) {
         // Another machine, whose process has the same number, was faster.
         Err(e) if e.kind() != ErrorKind::NotFound => Err(fail(e)),
@@ -113,7 +175,42 @@ mod tests {
         assert!(e.ends_with("it is a directory"), "{e}");
     }
 
-    /// `/dev/full` is no regular file, so the device is not replaced; what a full disk says is tested by words.
+    /// Root may replace anything: `--report /dev/null` took the device away.
+    #[cfg(unix)]
+    #[test]
+    fn links_and_fifos_stay_what_they_are() {
+        use std::os::unix::fs::{FileTypeExt, symlink};
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        std::fs::create_dir(at("deep")).unwrap();
+        std::fs::write(at("old.txt"), "old").unwrap();
+        for (to, link, end) in
+            [("../old.txt", "deep/a", "old.txt"), ("a", "deep/b", "old.txt"), ("deep/new.txt", "c", "deep/new.txt")]
+        {
+            symlink(to, at(link)).unwrap();
+            prepare_place(&at(link)).unwrap();
+            write_atomically(&at(link), link.as_bytes()).unwrap();
+            assert!(at(link).is_symlink() && !at(end).is_symlink(), "{link}");
+            assert_eq!(std::fs::read(at(end)).unwrap(), link.as_bytes());
+        }
+        symlink("loop", at("loop")).unwrap();
+        assert!(write_atomically(&at("loop"), b"").unwrap_err().to_string().ends_with("leads nowhere"));
+
+        let fifo = at("fifo");
+        assert!(std::process::Command::new("mkfifo").arg(&fifo).status().unwrap().success());
+        let reader = std::thread::spawn({
+            let fifo = fifo.clone();
+            move || std::fs::read(fifo).unwrap()
+        });
+        prepare_place(&fifo).unwrap();
+        write_json(&fifo, &[1]).unwrap();
+        assert_eq!(reader.join().unwrap(), b"[\n  1\n]");
+        assert!(std::fs::symlink_metadata(&fifo).unwrap().file_type().is_fifo());
+        drop(std::os::unix::net::UnixListener::bind(at("socket")).unwrap());
+        assert!(write_atomically(&at("socket"), b"").unwrap_err().to_string().ends_with("it is a socket"));
+    }
+
+    /// What a full disk says is tested by words.
     #[test]
     fn a_full_disk_is_named() {
         let e = std::io::Error::from(ErrorKind::StorageFull);

@@ -115,3 +115,20 @@ fn a_killed_render_leaves_nothing_behind() {
     child.wait().unwrap();
     assert!(place.names("out").iter().all(|n| n.starts_with('.')), "{:?}", place.names("out"));
 }
+
+/// A link to the standard output, as `/dev/stdout` is one: what is written goes there, and after what was said before.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_standard_output_may_be_written_to_by_name() {
+    let place = batch();
+    std::os::unix::fs::symlink("/proc/self/fd/1", place.path("stdout")).unwrap();
+    let printed = place.run(&["import", "scenes/good.yaml"]);
+    let written = place.run(&["import", "scenes/good.yaml", "-o", "stdout"]);
+    assert_eq!((written.out, written.err, written.code), (printed.out, String::new(), 0));
+    assert!(place.path("stdout").is_symlink());
+    let log = std::fs::File::create(place.path("log")).unwrap();
+    let mut render = place.command(&["render", "scenes/good.yaml", "-o", "out", "--report", "stdout"]);
+    assert!(render.stdout(log).status().unwrap().success());
+    let log = std::fs::read_to_string(place.path("log")).unwrap();
+    assert!(log.starts_with("{\n") && log.contains("effects in force:"), "{log}");
+}
