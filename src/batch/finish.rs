@@ -384,6 +384,12 @@ pub fn spectral_path(path: &Path) -> PathBuf {
     })
 }
 
+/// All files that the picture at `path` may have.
+#[must_use]
+pub fn places(path: &Path) -> [PathBuf; 3] {
+    [path.to_path_buf(), path.with_extension("png"), spectral_path(path)]
+}
+
 /// Writes bands of the spectrum as Fichet, Pacanowski and Wilkie have them ("An OpenEXR Layout for Spectral Images", JCGT
 /// 10(3), 2021, layout 1.0): `S0.<nm>nm` is the mean spectral radiance of a band around that wavelength, W·m⁻²·sr⁻¹·nm⁻¹;
 /// R, G and B show them.

@@ -45,8 +45,10 @@ pub fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 ///
 /// # Errors
 /// [`Error::Input`] if a part is missing, damaged or of another picture, or if they do not make up the picture exactly
-/// once; [`Error::Output`]; [`Error::Render`] as the render itself.
+/// once; [`Error::Config`] for a place that is that of a part or not one for pictures; [`Error::Output`]; [`Error::Render`] as
+/// the render itself.
 pub fn merge(paths: &[PathBuf], out: &Path) -> Result<(Report, Result<()>)> {
+    super::check_output(Some(out), 1)?;
     let start = Instant::now();
     let parts: Vec<Written> = files(paths)?.par_iter().map(|path| part_file::open(path)).collect::<Result<_>>()?;
     let Some(first) = parts.first() else {
@@ -59,6 +61,7 @@ pub fn merge(paths: &[PathBuf], out: &Path) -> Result<(Report, Result<()>)> {
     let filled = names::fill(out, &finish.name, finish.frame_number);
     let in_directory = || filled.join(format!("{}.exr", names::label(&finish.name, finish.frame_number)));
     let out = if super::ends_in(out, &["exr"]) { filled } else { in_directory() };
+    output::Inputs::of(parts.iter().map(|part| &part.path)).spare(finish::places(&out))?;
     check_cover(&parts, &out)?;
     output::prepare_place(&out)?;
     output::prepare_place(&out.with_extension("png"))?;

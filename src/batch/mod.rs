@@ -25,7 +25,7 @@ use crate::description::{self, BatchEntry, LayerContent, PathMap, SceneDescripti
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::filter::{Filter, FilterSampler};
-use crate::film::output;
+use crate::film::output::{self, Inputs};
 use crate::scene::Scene;
 use crate::scene::compile;
 use crate::scene::shelf::Shelf;
@@ -61,6 +61,8 @@ pub struct Overrides {
     pub paths: PathMap,
     /// Where pictures go: a directory, or for a single scene a file name that ends in `.exr`.
     pub output: Option<PathBuf>,
+    /// Where the report goes as well.
+    pub report: Option<PathBuf>,
     /// Only the scenes with these names; all where empty.
     pub scenes: Vec<String>,
     /// Count what robust arithmetic was needed for, and write it as a layer.
@@ -498,7 +500,7 @@ fn render_and_write(
 ///
 /// # Errors
 /// [`Error::Config`] for the name of another kind of file, and for one file for all scenes.
-fn check_output(output: Option<&PathBuf>, scenes: usize) -> Result<()> {
+fn check_output(output: Option<&Path>, scenes: usize) -> Result<()> {
     const OTHERS: [&str; 7] = ["png", "jpg", "jpeg", "tif", "tiff", "hdr", "pfm"];
     if let Some(file) = output.filter(|path| ends_in(path, &OTHERS) && !path.is_dir()) {
         return Err(Error::Config(format!(
@@ -514,6 +516,17 @@ fn check_output(output: Option<&PathBuf>, scenes: usize) -> Result<()> {
         ))),
         None => Ok(()),
     }
+}
+
+/// Refuses a picture that would take the place of a file that its scene reads, one before it, or the batch: `read`, to which
+/// this one's are added. What an earlier scene has written a later one may read.
+fn check_places(prepared: &Prepared, overrides: &Overrides, read: &mut Inputs) -> Result<()> {
+    for scene in prepared.moments.iter().chain(prepared.next.as_deref()).chain([&prepared.scene]) {
+        read.add(&scene.files);
+    }
+    let places = finish::places(&output_path(prepared, overrides));
+    // A part has no PNG and nothing else beside it.
+    read.spare(if overrides.portion.is_all() { &places[..] } else { &places[..1] })
 }
 
 /// [`check_output`] for the frames of a scene.
@@ -535,15 +548,18 @@ fn check_frames(output: Option<&PathBuf>, frames: usize) -> Result<()> {
 /// What keeps the batch from beginning. What goes wrong in a scene is in the report.
 pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, stop: &AtomicBool) -> Result<Report> {
     let entries = entries(path, overrides)?;
-    check_output(overrides.output.as_ref(), entries.len())?;
+    check_output(overrides.output.as_deref(), entries.len())?;
     let start = Instant::now();
     let mut scenes = Vec::new();
     let mut report_dir: Option<PathBuf> = None;
     let mut shelf = Shelf::default();
     let mut contact = Contact::default();
+    let mut read = Inputs::of(entries.iter().map(|entry| &*entry.path).chain([path]));
+    read.spare(&overrides.report)?;
     'batch: for (i, entry) in entries.iter().enumerate() {
         let mut loading = Instant::now();
         let animation = entry.animation(&overrides.set);
+        read.add(animation.iter().flat_map(|animation| animation.files()));
         let frames = animation.as_ref().map_or(1, |animation| animation.frames().len().max(1));
         let animation = animation.and_then(|a| check_frames(overrides.output.as_ref(), frames).map(|()| a));
         // One that cannot be read is a picture that fails.
@@ -565,6 +581,9 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                 // Nobody comes after the last one.
                 shelf = Shelf::default();
             }
+            let prepared = prepared.and_then(|p| check_places(&p, overrides, &mut read).map(|()| p));
+            // Unlike a picture it would be written all the same.
+            read.spare(&overrides.report)?;
             let mut report = match prepared {
                 Ok(prepared) => {
                     let dir = output_path(&prepared, overrides);

@@ -4,7 +4,7 @@ use super::ConvertArguments;
 use crate::batch;
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
-use crate::film::output::{directory_of, is_stream, write_atomically};
+use crate::film::output::{Inputs, directory_of, is_stream, write_atomically};
 use std::path::Path;
 
 /// Prints the scene as YAML, or writes it.
@@ -44,12 +44,18 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
     Ok(0)
 }
 
-/// The one scene that is asked for.
+/// The one scene that is asked for, of other files than the one that is to be written.
 fn read(arguments: &ConvertArguments) -> Result<SceneDescription> {
     let file = &arguments.scene.file;
     let overrides = arguments.scene.overrides(None)?;
     match &batch::entries(file, &overrides)?[..] {
-        [entry] => entry.scene(&overrides.set),
+        [entry] => {
+            let animation = entry.animation(&overrides.set)?;
+            if let Some(output) = &arguments.output {
+                Inputs::of(animation.files().iter().chain([file])).spare([output])?;
+            }
+            animation.into_first()
+        }
         entries => Err(Error::Config(format!(
             "{}: expected one scene, found {}; --scene NAME picks one",
             file.display(),

@@ -3,7 +3,7 @@
 use super::{FarmArguments, FarmFormat};
 use crate::batch::farm::{Cut, Job, openjd, slurm};
 use crate::error::{Error, Result};
-use crate::film::output::{prepare_place, write_atomically};
+use crate::film::output::{Inputs, prepare_place, write_atomically};
 
 /// Writes the bundle, and says how to start it.
 pub fn run(arguments: &FarmArguments) -> Result<i32> {
@@ -23,6 +23,7 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
         FarmFormat::Openjd => openjd::files(&job),
         FarmFormat::Slurm => slurm::files(&job),
     };
+    Inputs::of(&job.files).spare(files.iter().map(|file| bundle.join(file.name)))?;
     for file in &files {
         let path = bundle.join(file.name);
         prepare_place(&path)?;

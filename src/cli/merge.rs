@@ -4,11 +4,12 @@ use super::MergeArguments;
 use super::render::table;
 use crate::batch::merge;
 use crate::error::Result;
-use crate::film::output::{prepare_place, write_json};
+use crate::film::output::{Inputs, prepare_place, write_json};
 
 /// Merges, and prints the table of the picture.
 pub fn run(arguments: &MergeArguments) -> Result<i32> {
     if let Some(file) = &arguments.report {
+        Inputs::of(merge::files(&arguments.parts)?).spare([file])?;
         prepare_place(file)?;
     }
     let (report, written) = merge::merge(&arguments.parts, &arguments.output)?;

@@ -424,6 +424,7 @@ impl SceneArguments {
             define: self.define.clone(),
             paths,
             output,
+            report: None,
             scenes: self.scenes.clone(),
             check_numerics: false,
             portion: crate::batch::Portion::default(),

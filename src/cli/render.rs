@@ -31,6 +31,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
         scene.set.push(("render.stop.samples".into(), spp.to_string()));
     }
     let overrides = batch::Overrides {
+        report: arguments.report.clone(),
         check_numerics: arguments.check_numerics,
         portion: batch::Portion { tile: arguments.tile, samples: arguments.samples },
         keep: batch::checkpoint::Keep {

@@ -7,6 +7,7 @@
 use crate::error::{Error, Result};
 use atomic_write_file::AtomicWriteFile;
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -132,6 +133,48 @@ pub fn prepare_place(file: &Path) -> Result<()> {
         Err(e) if e.kind() != ErrorKind::NotFound => Err(fail(e)),
         _ => Ok(()),
     }
+}
+
+/// Files that are read, of which no output may take the place.
+#[derive(Clone, Debug, Default)]
+pub struct Inputs {
+    /// As the file system calls them.
+    files: BTreeSet<PathBuf>,
+}
+
+impl Inputs {
+    /// These alone.
+    #[must_use]
+    pub fn of<P: AsRef<Path>>(paths: impl IntoIterator<Item = P>) -> Inputs {
+        let mut inputs = Inputs::default();
+        inputs.add(paths);
+        inputs
+    }
+
+    /// These, too.
+    pub fn add<P: AsRef<Path>>(&mut self, paths: impl IntoIterator<Item = P>) {
+        self.files.extend(paths.into_iter().filter_map(|path| replaceable(path.as_ref())));
+    }
+
+    /// Refuses to write to one of them.
+    ///
+    /// # Errors
+    /// [`Error::Config`] with the first.
+    pub fn spare<P: AsRef<Path>>(&self, outputs: impl IntoIterator<Item = P>) -> Result<()> {
+        let is_read = |path: &P| replaceable(path.as_ref()).is_some_and(|path| self.files.contains(&path));
+        match outputs.into_iter().find(is_read) {
+            Some(path) => Err(Error::Config(format!(
+                "{}: expected a place to write to, found a file that is read",
+                path.as_ref().display()
+            ))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The regular file at `path`, by the one name that tells it from others.
+fn replaceable(path: &Path) -> Option<PathBuf> {
+    path.canonicalize().ok().filter(|path| path.is_file())
 }
 
 /// What an I/O error means for a file that was to be written.

@@ -1,6 +1,6 @@
 //! What is left on the disk: whole files or none, also where none can be written.
 
-use super::batch;
+use super::{SMALL, batch};
 use std::process::Command;
 
 /// A place that cannot be written to is told at once: the scene would take minutes.
@@ -131,4 +131,55 @@ fn the_standard_output_may_be_written_to_by_name() {
     assert!(render.stdout(log).status().unwrap().success());
     let log = std::fs::read_to_string(place.path("log")).unwrap();
     assert!(log.starts_with("{\n") && log.contains("effects in force:"), "{log}");
+}
+
+/// What is read is worth more than what would be written over it.
+#[test]
+fn no_output_takes_the_place_of_what_is_read() {
+    let place = batch();
+    let words = "expected a place to write to, found a file that is read";
+    let lit = format!("{SMALL}render: {{samples: 4}}\nlights: [{{environment: {{file: out/sky.exr}}}}]\n");
+    std::fs::write(place.path("sky.yaml"), lit).unwrap();
+    assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "out/sky.exr"]).code, 0);
+    assert_eq!(place.run(&["export", "scenes/good.yaml", "-o", "me.xml"]).code, 0);
+    assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "parts", "--tile", "0/2"]).code, 0);
+    assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "parts", "--tile", "1/2"]).code, 0);
+    let part = &format!("parts/{}", place.names("parts").into_iter().find(|name| name.ends_with(".exr")).unwrap());
+    let deep = "scenes/../scenes/good.yaml";
+    let exr = "./out/sky.exr";
+    for (arguments, file, before) in [
+        (vec!["export", "scenes/good.yaml", "-o", deep], deep, ""),
+        (vec!["import", "me.xml", "-o", "me.xml"], "me.xml", ""),
+        (vec!["render", "sky.yaml", "-q", "-o", "out"], "out/sky.exr", "sky: "),
+        (vec!["render", "sky.yaml", "-q", "-o", "pictures", "--report", exr], exr, ""),
+        (vec!["render", "sky.yaml", "-q", "--report", "sky.yaml"], "sky.yaml", ""),
+        (vec!["render", "batch.yaml", "-q", "--report", "scenes/bad.yaml"], "scenes/bad.yaml", ""),
+        (vec!["merge", "parts", "-o", part], part, ""),
+        (vec!["merge", "parts", "-o", "all.exr", "--report", part], part, ""),
+        (vec!["compare", exr, exr, "--json", "out/sky.exr"], "out/sky.exr", ""),
+    ] {
+        let bytes = std::fs::read(place.path(file)).unwrap();
+        let ran = place.run(&arguments);
+        assert_eq!((ran.err, ran.code), (format!("error: {before}{file}: {words}\n"), 2), "{arguments:?}");
+        assert!(std::fs::read(place.path(file)).unwrap() == bytes, "{arguments:?}");
+    }
+    assert_eq!(place.names("pictures"), Vec::<String>::new());
+    // A later scene may read what an earlier one has made.
+    let two = "output: {dir: out}\nscenes: [{file: scenes/good.yaml, name: sky}, {file: sky.yaml, name: room}]\n";
+    std::fs::write(place.path("two.yaml"), two).unwrap();
+    assert_eq!(place.run(&["render", "two.yaml", "-q"]).code, 0);
+}
+
+/// It made a directory of that name.
+#[test]
+fn merge_refuses_names_of_other_pictures_as_render_does() {
+    let place = batch();
+    assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "parts", "--tile", "0/1"]).code, 0);
+    let message =
+        "error: -o pic.png: expected a directory or a file name that ends in .exr, beside which the PNG is written\n";
+    for verb in [["render", "scenes/good.yaml"], ["merge", "parts"]] {
+        let ran = place.run(&[verb[0], verb[1], "-q", "-o", "pic.png"]);
+        assert_eq!((ran.err.as_str(), ran.code), (message, 2));
+        assert!(!place.path("pic.png").exists());
+    }
 }
