@@ -80,7 +80,10 @@ fn a_checkpoint_for_which_there_is_no_room_costs_nothing() {
 
 #[test]
 fn rules_for_paths_that_cannot_be_read_are_an_input_error() {
-    let place = Place::with(&[("scene.yaml", SCENE), ("rules.json", "{\"path_mapping_rules\": 3}")]);
+    let place = Place::with(&[
+        ("scene.yaml", SCENE),
+        ("rules.json", "{\"version\": \"pathmapping-1.0\", \"path_mapping_rules\": 3}"),
+    ]);
     let says = |arguments: &[&str], code: i32| {
         let ran = place.run(&[&["render", "scene.yaml", "-q"], arguments].concat());
         assert_eq!(ran.code, code, "{}", ran.err);

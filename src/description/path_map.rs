@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use serde_json::{Map, Value};
 
 use super::node::quote;
 
@@ -20,10 +21,12 @@ struct Rule {
     to: PathBuf,
 }
 
-/// The rules of a session of Open Job Description, `pathmapping-1.0`.
+/// The version of rules that is read.
+const VERSION: &str = "pathmapping-1.0";
+
+/// The rules of a session of Open Job Description.
 #[derive(Deserialize)]
 struct Rules {
-    #[serde(default)]
     path_mapping_rules: Vec<WrittenRule>,
 }
 
@@ -55,8 +58,18 @@ impl PathMap {
     /// # Errors
     /// What was expected and found, in words.
     pub fn add_rules(&mut self, json: &[u8]) -> Result<(), String> {
-        let rules: Rules =
-            serde_json::from_slice(json).map_err(|e| format!("expected rules as of pathmapping-1.0, found {e}"))?;
+        let refused = |e: serde_json::Error| format!("expected rules as of {VERSION}, found {e}");
+        let written: Map<String, Value> = serde_json::from_slice(json).map_err(refused)?;
+        // So a session writes that it has none (openjd-sessions).
+        if written.is_empty() {
+            return Ok(());
+        }
+        match written.get("version") {
+            Some(version) if version == VERSION => {}
+            Some(other) => return Err(format!("expected the version \"{VERSION}\", found {other}")),
+            None => return Err(format!("expected the version \"{VERSION}\", found none")),
+        }
+        let rules: Rules = serde_json::from_value(Value::Object(written)).map_err(refused)?;
         for rule in rules.path_mapping_rules {
             let windows = match rule.source_path_format.to_ascii_uppercase().as_str() {
                 "WINDOWS" => true,
@@ -152,9 +165,20 @@ mod tests {
         map.add_rules(b"{}").unwrap();
         assert_eq!(map.find("C:/a/b"), Some("/a/b".into()));
         let says = |json: &str| PathMap::default().add_rules(json.as_bytes()).unwrap_err();
-        assert!(says("[").starts_with("expected rules as of pathmapping-1.0, found EOF"));
-        let rule =
-            r#"{"path_mapping_rules": [{"source_path_format": "x", "source_path": "", "destination_path": ""}]}"#;
+        assert!(says("{").starts_with("expected rules as of pathmapping-1.0, found EOF"));
+        for (json, found) in [
+            ("[]", "expected rules as of pathmapping-1.0, found invalid type: sequence, expected a map"),
+            (r#"{"version": "x"}"#, "expected the version \"pathmapping-1.0\", found \"x\""),
+            (r#"{"version": 1, "path_mapping_rules": []}"#, "expected the version \"pathmapping-1.0\", found 1"),
+            (r#"{"path_mapping_rules": []}"#, "expected the version \"pathmapping-1.0\", found none"),
+            (
+                r#"{"version": "pathmapping-1.0"}"#,
+                "expected rules as of pathmapping-1.0, found missing field `path_mapping_rules`",
+            ),
+        ] {
+            assert!(says(json).starts_with(found), "{json}: {}", says(json));
+        }
+        let rule = r#"{"version": "pathmapping-1.0", "path_mapping_rules": [{"source_path_format": "x", "source_path": "", "destination_path": ""}]}"#;
         assert_eq!(says(rule), "expected the source_path_format POSIX or WINDOWS, found \"X\"");
         assert_eq!(map.add("a").unwrap_err(), "expected FROM=TO, two directories, found \"a\"");
     }
