@@ -35,21 +35,29 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
             std::fs::set_permissions(&path, all).map_err(|e| Error::output(&path, e))?;
         }
     }
-    let bundle = bundle.display();
+    let shown = |before: &str, name: &str| shell(&format!("{before}{}{name}", bundle.display()));
     let start = match arguments.format {
         FarmFormat::Openjd => {
             let step = if cut.parts() { "Merge --run-dependencies" } else { "Render" };
             format!(
-                "openjd run {bundle}/template.yaml --step {step} -p file://{bundle}/parameters.json\n\
-                 deadline bundle submit {bundle}\n"
+                "openjd run {} --step {step} -p {}\ndeadline bundle submit {}\n",
+                shown("", "/template.yaml"),
+                shown("file://", "/parameters.json"),
+                shown("", "")
             )
         }
-        FarmFormat::Slurm => format!("{bundle}/submit.sh\n"),
+        FarmFormat::Slurm => shown("", "/submit.sh") + "\n",
     };
     if !arguments.quiet {
         super::say(&format!("{} pictures; start with\n{start}", job.count()));
     }
     Ok(0)
+}
+
+/// A word as a person may paste it into a shell, in quotes where it needs them.
+fn shell(text: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "/._-+:,@%=".contains(c);
+    if text.chars().all(plain) { text.to_owned() } else { slurm::word(text) }
 }
 
 /// What every task is told besides its part of the work.
@@ -62,4 +70,16 @@ fn further(arguments: &FarmArguments) -> Vec<String> {
     all.extend(numbers.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value?.to_string()])).flatten());
     all.extend(scene.path_map.iter().flat_map(|rule| ["--path-map".to_owned(), rule.clone()]));
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_shell_would_take_apart_is_quoted() {
+        assert_eq!(shell("file:///a_b/1.json"), "file:///a_b/1.json");
+        assert_eq!(shell("/my jobs/it's"), "'/my jobs/it'\\''s'");
+        assert_eq!(shell("/$(x)"), "'/$(x)'");
+    }
 }

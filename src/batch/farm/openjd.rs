@@ -126,7 +126,7 @@ fn render(job: &Job, group: &Group, mark: &str, out: &mut String) {
             let _ = writeln!(out, "    - {{name: {name}, type: STRING, range: {range}}}");
         }
     }
-    let mut arguments = vec!["render", "{{Param.Batch}}", "--scene", "{{Task.Param.Scene}}"];
+    let mut arguments = vec!["render", "{{Param.Batch}}", "--scene={{Task.Param.Scene}}"];
     let place = match (cut.parts(), frames) {
         (false, _) => "{{Param.OutputDir}}",
         (true, false) => "{{Param.OutputDir}}/parts/{{Task.Param.Scene}}",
@@ -180,6 +180,8 @@ mod tests {
         let whole = text(Cut { tiles: 1, ranges: 1, frames: 2 });
         assert_eq!(steps(&whole), ["Render", "Render2"]);
         assert!(whole.contains("    combination: Scene * Frame\n"));
+        // A name may begin like an option.
+        assert!(whole.contains("\"--scene={{Task.Param.Scene}}\""));
         assert!(whole.contains("- {name: Frames, type: STRING, default: \"1-11:5\"}\n"));
         let parts = text(Cut { tiles: 2, ranges: 1, frames: 2 });
         assert_eq!(steps(&parts), ["Render", "Merge", "Render2", "Merge2"]);

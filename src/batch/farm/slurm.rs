@@ -55,7 +55,8 @@ fn tables(job: &Job) -> (String, String) {
 }
 
 /// A word of the shell.
-fn word(text: &str) -> String {
+#[must_use]
+pub fn word(text: &str) -> String {
     format!("'{}'", text.replace('\'', "'\\''"))
 }
 
@@ -98,7 +99,7 @@ fn render(job: &Job) -> String {
     // Time to write a checkpoint before the limit of the partition.
     let directives = threads + "#SBATCH --signal=TERM@90\n";
     let mut command = format!(
-        "srun --ntasks=1 --kill-on-bad-exit=1 \"$abbe\" render {} --scene \"$scene\" \"${{what[@]}}\" \\\n    \
+        "srun --ntasks=1 --kill-on-bad-exit=1 \"$abbe\" render {} --scene=\"$scene\" \"${{what[@]}}\" \\\n    \
          --resume --progress plain",
         word(&job.source.display().to_string())
     );
@@ -197,6 +198,8 @@ mod tests {
             let done = std::process::Command::new("bash").args(["-n", "-c", &file.text]).output().unwrap();
             assert!(done.status.success(), "{}: {}", file.name, String::from_utf8_lossy(&done.stderr));
         }
+        // A name may begin like an option.
+        assert!(render(&job(Cut { tiles: 1, ranges: 1, frames: 1 })).contains(" --scene=\"$scene\" "));
         assert_eq!(word("it's"), "'it'\\''s'");
         assert_eq!(inner("a\"$b"), "a\\\"\\$b");
     }
