@@ -10,13 +10,14 @@
 //!  scene/                        compiled, immutable, Send + Sync; what rays meet
 //!  optics/  film/  description/  light at one point | samples to files | what a person wrote
 //!  spectrum/                     wavelengths, spectra, observer, refractive indices
-//!  math/  error.rs               frames, rays, warps, statistics | the one error enum
+//!  math/  error.rs  input.rs     frames, rays, warps, statistics | the one error enum | files that are read
 //! ```
 pub mod batch;
 pub mod cli;
 pub mod description;
 pub mod error;
 pub mod film;
+pub mod input;
 pub mod math;
 pub mod optics;
 pub mod scene;

@@ -124,7 +124,7 @@ pub fn load_mapped(path: &Path, map: PathMap) -> Result<Document> {
         return Ok(Document::Scene(BatchEntry::alone(path, sources)?));
     }
     let nothing_read = sources.clone();
-    let root = edit::read_file(path, &mut sources)?;
+    let root = edit::read_named(path, &mut sources)?;
     if root.get("scenes").is_some() {
         return Ok(Document::Batch(Batch::of_tree(&root, &sources)?));
     }

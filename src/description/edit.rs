@@ -13,6 +13,7 @@ use super::path::{self, Segment};
 use super::spectrum::FilePath;
 use super::yaml::{self, MAX_BYTES, MAX_DEPTH};
 use crate::error::{Error, Result};
+use crate::input;
 
 /// The maps that an included file may hold.
 const SHARED: [&str; 4] = ["materials", "textures", "volumes", "media"];
@@ -27,6 +28,20 @@ pub(crate) fn read_file(path: &Path, sources: &mut Sources) -> Result<Node> {
     read_bytes_as(&bytes, path, sources)
 }
 
+/// [`read_file`] of the file that the command line names, which may be what another process writes: `/dev/stdin`, or the
+/// `/dev/fd/63` of a shell's `<(…)`.
+///
+/// # Errors
+/// As there.
+pub(crate) fn read_named(path: &Path, sources: &mut Sources) -> Result<Node> {
+    if !["/dev", "/proc"].iter().any(|system| path.starts_with(system)) {
+        return read_file(path, sources);
+    }
+    let bytes = File::open(path).and_then(read_most);
+    let bytes = bytes.map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
+    read_bytes_as(&bytes, path, sources)
+}
+
 /// Reads the bytes of a file to a tree.
 ///
 /// # Errors
@@ -36,10 +51,14 @@ pub(crate) fn read_bytes_as(bytes: &[u8], path: &Path, sources: &mut Sources) ->
     yaml::read(bytes, source).map_err(|fault| fault.into_error(sources))
 }
 
-/// At most one byte more than may be read.
+/// The bytes of a regular file, at most one more than may be read.
 pub(crate) fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+    read_most(input::open(path)?)
+}
+
+fn read_most(file: File) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes)?;
+    file.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 

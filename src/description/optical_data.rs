@@ -46,7 +46,7 @@ impl OpticalData {
 /// [`Error::Input`] if it cannot be read, [`Error::Config`] with file, line, column and field where it is not what it
 /// should be or cannot be used over the whole band.
 pub fn optical_data(path: &Path) -> Result<OpticalData> {
-    let mut bytes = std::fs::read(path).map_err(|e| {
+    let mut bytes = crate::input::read(path).map_err(|e| {
         let message = match e.kind() {
             std::io::ErrorKind::NotFound => "expected a file, found none".to_owned(),
             _ => e.to_string(),

@@ -34,7 +34,7 @@ impl Grid {
     /// [`Error::Input`] with what is wrong: no file, another format, truncated, a value that is not
     /// finite.
     pub fn load(path: &Path) -> Result<Grid> {
-        let bytes = std::fs::read(path).map_err(|e| Error::input(path, format!("cannot read: {e}")))?;
+        let bytes = crate::input::read(path).map_err(|e| Error::input(path, format!("cannot read: {e}")))?;
         Grid::parse(&bytes).map_err(|message| Error::input(path, message))
     }
 

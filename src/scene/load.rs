@@ -25,7 +25,8 @@ pub struct Picture {
 const LARGEST: u64 = 1 << 31;
 
 fn decode(path: &Path) -> Result<image::DynamicImage> {
-    let open = image::ImageReader::open(path).map_err(|e| Error::input(path, words(&e)))?;
+    let open = crate::input::check(path).and_then(|()| image::ImageReader::open(path));
+    let open = open.map_err(|e| Error::input(path, words(&e)))?;
     let mut reader = open.with_guessed_format().map_err(|e| Error::input(path, words(&e)))?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(LARGEST);
@@ -299,7 +300,8 @@ pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<DataImage>
 /// # Errors
 /// In words, with the line.
 pub fn samples(path: &Path) -> std::result::Result<Vec<(f64, f64)>, String> {
-    let text = std::fs::read_to_string(path).map_err(|e| words(&e))?;
+    let bytes = crate::input::read(path).map_err(|e| words(&e))?;
+    let text = String::from_utf8(bytes).map_err(|_| "expected text, found other bytes")?;
     let mut samples = Vec::new();
     for (i, line) in text.lines().enumerate() {
         let line = line.trim();

@@ -141,6 +141,62 @@ fn faults_with_words_of_others_begin_with_ours() {
     }
 }
 
+/// Nobody writes to the FIFOs: whoever opened one would wait for ever.
+#[cfg(unix)]
+#[test]
+fn what_is_no_regular_file_is_refused() {
+    let place = Place::with(&[]);
+    let names = ["f.png", "f.exr", "f.obj", "f.vol", "f.txt", "f.csv", "f.yaml", "f.yml", "f.xml"];
+    let fifos = names.iter().map(|name| place.path(name));
+    assert!(std::process::Command::new("mkfifo").args(fifos).status().unwrap().success());
+    std::fs::create_dir(place.path("d.obj")).unwrap();
+    let lit = "lights: [{constant: {radiance: 1}}]\n";
+    for (text, file, found) in [
+        ("textures: {t: {image: {file: f.png}}}", "f.png", "a FIFO"),
+        ("lights: [{environment: {file: f.exr}}]", "f.exr", "a FIFO"),
+        ("shapes: [{mesh: {file: f.obj}}]", "f.obj", "a FIFO"),
+        ("shapes: [{mesh: {file: d.obj}}]", "d.obj", "a directory"),
+        ("volumes: {v: {grid: {file: f.vol}}}", "f.vol", "a FIFO"),
+        ("shapes: [{curves: {file: f.txt}}]", "f.txt", "a FIFO"),
+        ("lights: [{constant: {radiance: {file: f.csv}}}]", "f.csv", "a FIFO"),
+        ("include: [f.yaml]", "f.yaml", "a FIFO"),
+        ("materials: {m: {dielectric: {ior: {file: f.yml}}}}", "f.yml", "a FIFO"),
+    ] {
+        let lit = if text.starts_with("lights") { "" } else { lit };
+        std::fs::write(place.path("s.yaml"), format!("{SMALL}{lit}{text}\n")).unwrap();
+        let ran = place.run(&["render", "s.yaml", "-q", "-o", "out"]);
+        let message = format!("expected a regular file, found {found}");
+        assert!(ran.err.contains(file) && ran.err.contains(&message), "{text}: {}", ran.err);
+        assert_eq!((ran.err.lines().count(), ran.code == 0), (1, false), "{text}: {}", ran.err);
+    }
+    std::fs::write(place.path("b.yaml"), "scenes: [{file: f.yaml}]").unwrap();
+    for arguments in [
+        &["render", "f.yaml"][..],
+        &["render", "f.xml"],
+        &["render", "b.yaml", "-q"],
+        &["compare", "f.exr", "f.exr"],
+        &["merge", "f.exr", "-o", "x.exr"],
+        &["info", "f.png"],
+    ] {
+        let ran = place.run(arguments);
+        assert!(ran.err.contains("expected a regular file, found a FIFO"), "{arguments:?}: {}", ran.err);
+        assert_eq!((ran.err.lines().count(), ran.code), (1, 3), "{arguments:?}: {}", ran.err);
+    }
+}
+
+/// A batch is read once, and may come from another process.
+#[cfg(unix)]
+#[test]
+fn a_batch_may_come_by_the_standard_input() {
+    let scene = format!("{SMALL}lights: [{{constant: {{radiance: 1}}}}]\n");
+    let place = Place::with(&[("s.yaml", &scene)]);
+    let script = "echo \"scenes: [{file: $PWD/s.yaml}]\" | \"$0\" render /dev/stdin -q -o out";
+    let mut command = std::process::Command::new("sh");
+    command.args(["-c", script, env!("CARGO_BIN_EXE_abbe")]).current_dir(place.directory.path());
+    assert!(command.status().unwrap().success());
+    assert_eq!(place.names("out"), ["report.json", "s.exr", "s.png"]);
+}
+
 #[test]
 fn all_faults_of_a_scene_come_at_once() {
     let (errors, code) = faults(

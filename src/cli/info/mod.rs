@@ -64,6 +64,9 @@ fn look(file: &Path) -> Result<Found> {
     if file.is_dir() {
         return Err(Error::input(file, "expected an OpenEXR or PNG file, found a directory"));
     }
+    if file.exists() {
+        crate::input::check(file).map_err(|e| Error::input(file, e.to_string()))?;
+    }
     let mut start = [0; 8];
     let read = std::fs::File::open(file).and_then(|mut f| std::io::Read::read(&mut f, &mut start));
     match read {

@@ -166,7 +166,7 @@ impl Header {
 /// # Errors
 /// [`Error::Input`] for a file that is missing, is no OpenEXR file, or whose header is cut off or broken.
 pub fn read_headers(path: &Path) -> Result<Headers> {
-    let file = std::fs::File::open(path).map_err(|e| {
+    let file = crate::input::open(path).map_err(|e| {
         let missing = e.kind() == std::io::ErrorKind::NotFound;
         Error::input(path, if missing { "there is no such file".to_string() } else { e.to_string() })
     })?;

@@ -210,7 +210,7 @@ impl PartFile {
     /// [`Error::Input`] if it is missing or no part.
     pub fn open(path: &Path) -> Result<PartFile> {
         let fail = |message: &str| Error::input(path, message);
-        let file = File::open(path).map_err(|e| {
+        let file = crate::input::open(path).map_err(|e| {
             let missing = e.kind() == std::io::ErrorKind::NotFound;
             Error::input(path, if missing { "there is no such file".to_string() } else { e.to_string() })
         })?;

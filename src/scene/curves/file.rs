@@ -13,7 +13,7 @@ pub type ControlPoint = [f64; 4];
 /// [`Error::Input`] with the line: no file, a line without four finite numbers, a negative radius, no
 /// curve at all.
 pub fn load(path: &Path) -> Result<Vec<Vec<ControlPoint>>> {
-    let bytes = std::fs::read(path).map_err(|e| Error::input(path, format!("cannot read: {e}")))?;
+    let bytes = crate::input::read(path).map_err(|e| Error::input(path, format!("cannot read: {e}")))?;
     let text = String::from_utf8(bytes).map_err(|_| Error::input(path, "expected text, found other bytes"))?;
     parse(&text).map_err(|message| Error::input(path, message))
 }

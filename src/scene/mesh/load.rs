@@ -27,7 +27,7 @@ pub fn load(path: &Path, index: u32) -> Result<MeshSource> {
     let bytes = match extension.as_str() {
         // Unknown kinds are not even opened.
         "obj" | "ply" | "serialized" => {
-            std::fs::read(path).map_err(|e| Error::input(path, format!("cannot read: {e}")))?
+            crate::input::read(path).map_err(|e| Error::input(path, format!("cannot read: {e}")))?
         }
         _ => Vec::new(),
     };

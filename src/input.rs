@@ -1,0 +1,44 @@
+//! Files that are read: regular ones. A FIFO or a device may keep its reader waiting, or never end.
+
+use std::fs::File;
+use std::io::{Error, Result};
+use std::path::Path;
+
+/// Refuses what is no regular file.
+///
+/// # Errors
+/// What stands at `path`, in words, or why that cannot be told.
+pub fn check(path: &Path) -> Result<()> {
+    let kind = std::fs::metadata(path)?.file_type();
+    if kind.is_file() {
+        return Ok(());
+    }
+    #[cfg(unix)]
+    let is_fifo = std::os::unix::fs::FileTypeExt::is_fifo(&kind);
+    #[cfg(not(unix))]
+    let is_fifo = false;
+    let found = match () {
+        () if kind.is_dir() => "a directory",
+        () if is_fifo => "a FIFO",
+        () => "a device or socket",
+    };
+    Err(Error::other(format!("expected a regular file, found {found}")))
+}
+
+/// Opens a regular file.
+///
+/// # Errors
+/// As [`check`] and [`File::open`].
+pub fn open(path: &Path) -> Result<File> {
+    check(path)?;
+    File::open(path)
+}
+
+/// All bytes of a regular file.
+///
+/// # Errors
+/// As [`check`] and [`std::fs::read`].
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    check(path)?;
+    std::fs::read(path)
+}
