@@ -2,15 +2,17 @@
 //!
 //! Bytes go to a temporary name in the same directory, reach the disk (fsync), and take the final
 //! name by a rename, so a reader never meets half a file and a full disk leaves the old one alone.
+//! A process that is killed leaves its temporary file; the next one that writes to the directory removes it.
 //! A symbolic link stays, and the file at its end is replaced. Devices and FIFOs are written to as they stand.
 
 use crate::error::{Error, Result};
-use atomic_write_file::AtomicWriteFile;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{LazyLock, Mutex, PoisonError};
+use std::time::Duration;
 
 /// So many symbolic links may lead from one to the next, as on Linux.
 const MOST_LINKS: usize = 40;
@@ -36,10 +38,132 @@ pub fn write_pieces(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::
         }
         Target::File(file) => file,
     };
-    let fail = |e| Error::output(path, words(&file, &e));
-    let mut writer = BufWriter::new(AtomicWriteFile::open(&file).map_err(fail)?);
-    write(&mut writer).map_err(fail)?;
-    writer.into_inner().map_err(|e| fail(e.into_error()))?.commit().map_err(fail)
+    replace(&file, write).map_err(|e| Error::output(path, words(&file, &e)))
+}
+
+/// Writes to a temporary file, which then takes the place of the one at `path`.
+fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> std::io::Result<()> {
+    let (file, temporary) = open_temporary(path)?;
+    let fill = || -> std::io::Result<()> {
+        take_after(&file, path)?;
+        let mut writer = BufWriter::new(file);
+        write(&mut writer)?;
+        writer.into_inner()?.sync_all()?;
+        std::fs::rename(&temporary, path)
+    };
+    if let Err(e) = fill() {
+        // What went wrong first is told.
+        let _ = std::fs::remove_file(&temporary);
+        return Err(e);
+    }
+    // The name has to reach the disk, too.
+    #[cfg(unix)]
+    File::open(directory_of(path))?.sync_all()?;
+    Ok(())
+}
+
+/// Gives `file` the owner and the permissions of what it is to replace, as far as that may be.
+fn take_after(file: &File, path: &Path) -> std::io::Result<()> {
+    let Ok(old) = std::fs::metadata(path) else { return Ok(()) };
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::{MetadataExt, fchown};
+        let new = file.metadata()?;
+        if (new.uid(), new.gid()) != (old.uid(), old.gid()) {
+            match fchown(file, Some(old.uid()), Some(old.gid())) {
+                // Only root may give files away, and not to users that a container lacks.
+                Err(e) if !matches!(e.kind(), ErrorKind::PermissionDenied | ErrorKind::InvalidInput) => return Err(e),
+                _ => {}
+            }
+        }
+    }
+    file.set_permissions(old.permissions())
+}
+
+/// So many bytes of a name go into that of its temporary file: file systems take 255.
+const LONGEST: usize = 200;
+
+/// A temporary file of a process elsewhere is left over when it has not been written to for so long; writing takes minutes.
+const LEFT_AFTER: Duration = Duration::from_secs(7 * 24 * 3600);
+
+/// A new file beside `path`, `.x.exr.abbe-HOME-PROCESS-NUMBER`. Those that dead processes left in its directory are removed.
+fn open_temporary(path: &Path) -> std::io::Result<(File, PathBuf)> {
+    let name = path.file_name().ok_or(ErrorKind::IsADirectory)?.to_string_lossy();
+    let name = &name[..name.floor_char_boundary(LONGEST)];
+    let home = HOME.as_deref().unwrap_or("0");
+    let mut number = 0_u32;
+    loop {
+        let own = directory_of(path).join(format!(".{name}.abbe-{home}-{}-{number}", std::process::id()));
+        match OpenOptions::new().write(true).create_new(true).open(&own) {
+            // Another thread, or machine.
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => number += 1,
+            Err(e) => return Err(e),
+            Ok(file) => {
+                remove_left_over(directory_of(path), &file.metadata()?);
+                return Ok((file, own));
+            }
+        }
+    }
+}
+
+/// Where the numbers of processes mean what they mean here: this start of this machine, and this container on it. None where
+/// the system does not tell, or shows the processes of another container.
+static HOME: LazyLock<Option<String>> = LazyLock::new(|| {
+    let own = std::fs::read_link("/proc/self").ok()?;
+    let boot = std::fs::read("/proc/sys/kernel/random/boot_id").ok().filter(|boot| !boot.is_empty())?;
+    let space = std::fs::read_link("/proc/self/ns/pid").ok()?;
+    let is_shown = own.to_str() == Some(&std::process::id().to_string());
+    let all = [boot.as_slice(), space.as_os_str().as_encoded_bytes()].concat();
+    is_shown.then(|| blake3::hash(&all).to_hex()[..8].to_owned())
+});
+
+/// Home and process in the name of a temporary file.
+fn owner(name: &str) -> Option<(&str, u32)> {
+    let (_, owner) = name.strip_prefix('.')?.rsplit_once(".abbe-")?;
+    let mut pieces = owner.split('-');
+    let (home, process, number) = (pieces.next()?, pieces.next()?.parse().ok()?, pieces.next()?);
+    (number.parse::<u32>().is_ok() && pieces.next().is_none()).then_some((home, process))
+}
+
+/// Removes the temporary files that dead processes of this user left in `directory`, once in a process: some directories
+/// have a file for each of many thousand frames. `own` is of a file that has just been made there, by the clock of its disk.
+fn remove_left_over(directory: &Path, own: &Metadata) {
+    static DONE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    if !DONE.lock().unwrap_or_else(PoisonError::into_inner).insert(directory.to_path_buf()) {
+        return;
+    }
+    for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let Some((home, process)) = name.to_str().and_then(owner) else { continue };
+        let Ok(data) = entry.metadata() else { continue };
+        let is_dead = match HOME.as_deref() {
+            Some(here) if home == here => {
+                matches!(Path::new("/proc").join(process.to_string()).try_exists(), Ok(false))
+            }
+            _ => age(&data, own).is_some_and(|age| age >= LEFT_AFTER),
+        };
+        if data.is_file() && same_user(&data, own) && is_dead {
+            // What cannot be removed is in nobody's way.
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// How long before `own` a file was last written to.
+fn age(data: &Metadata, own: &Metadata) -> Option<Duration> {
+    own.modified().ok()?.duration_since(data.modified().ok()?).ok()
+}
+
+/// The processes of others may be hidden.
+#[cfg(unix)]
+fn same_user(a: &Metadata, b: &Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    a.uid() == b.uid()
+}
+
+#[cfg(not(unix))]
+fn same_user(_: &Metadata, _: &Metadata) -> bool {
+    true
 }
 
 /// What stands at a path that is to be written.
@@ -126,13 +250,8 @@ pub fn prepare_place(file: &Path) -> Result<()> {
         return Err(Error::output(file, format!("{} is not a directory", directory.display())));
     }
     std::fs::create_dir_all(directory).map_err(fail)?;
-    let probe = directory.join(format!(".abbe-{}", std::process::id()));
-    File::create(&probe).map_err(fail)?;
-    match std::fs::remove_file(&probe) {
-        // Another machine, whose process has the same number, was faster.
-        Err(e) if e.kind() != ErrorKind::NotFound => Err(fail(e)),
-        _ => Ok(()),
-    }
+    let (_, probe) = open_temporary(&end).map_err(fail)?;
+    std::fs::remove_file(&probe).map_err(fail)
 }
 
 /// Files that are read, of which no output may take the place.
@@ -216,6 +335,45 @@ mod tests {
         assert!(e.contains(&format!("the directory {} does not exist", missing.display())), "{e}");
         let e = write_atomically(dir.path(), b"").unwrap_err().to_string();
         assert!(e.ends_with("it is a directory"), "{e}");
+    }
+
+    /// What a dead process left goes, but nothing of a live one, of one elsewhere that may live, or of people.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_dead_processes_left_is_removed() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut dead = std::process::Command::new("true").spawn().unwrap();
+        dead.wait().unwrap();
+        let (home, dead, own) = (HOME.as_deref().unwrap(), dead.id(), std::process::id());
+        let old = std::time::SystemTime::now() - LEFT_AFTER - Duration::from_secs(60);
+        let file = |name: String| (File::create(dir.path().join(&name)).unwrap(), name);
+        let left = [format!(".x.exr.abbe-{home}-{dead}-0"), format!(".y.exr.checkpoint.abbe-{home}-{dead}-7")];
+        let stays =
+            [format!(".x.exr.abbe-{home}-{own}-9"), format!(".x.exr.abbe-01234567-{dead}-0"), ".x.exr.DU08XR".into()];
+        left.iter().chain(&stays).for_each(|name| drop(file(name.clone())));
+        file(format!(".x.exr.abbe-76543210-{own}-0")).0.set_modified(old).unwrap();
+        let (_, kept) = file(format!(".x.exr.abbe-{home}-{dead}-notes"));
+        write_atomically(&dir.path().join("x.exr"), b"new").unwrap();
+        let mut found: Vec<String> =
+            std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        let mut expected: Vec<String> = stays.into_iter().chain([kept, "x.exr".into()]).collect();
+        found.sort();
+        expected.sort();
+        assert_eq!(found, expected);
+    }
+
+    /// Also names as long as file systems take them, and what was there keeps its permissions.
+    #[cfg(unix)]
+    #[test]
+    fn a_long_name_is_written_and_permissions_stay() {
+        use std::os::unix::fs::PermissionsExt;
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("é".repeat(125) + ".exr");
+        write_atomically(&path, b"old").unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o640)).unwrap();
+        write_atomically(&path, b"new").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"new");
+        assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o640);
     }
 
     /// Root may replace anything: `--report /dev/null` took the device away.

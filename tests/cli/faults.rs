@@ -172,7 +172,7 @@ fn what_is_no_regular_file_is_refused() {
     std::fs::write(place.path("b.yaml"), "scenes: [{file: f.yaml}]").unwrap();
     for arguments in [
         &["render", "f.yaml"][..],
-        &["render", "f.xml"],
+        &["render", "f.xml", "-q"],
         &["render", "b.yaml", "-q"],
         &["compare", "f.exr", "f.exr"],
         &["merge", "f.exr", "-o", "x.exr"],
