@@ -28,10 +28,41 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     let open = crate::input::check(path).and_then(|()| image::ImageReader::open(path));
     let open = open.map_err(|e| Error::input(path, words(&e)))?;
     let mut reader = open.with_guessed_format().map_err(|e| Error::input(path, words(&e)))?;
+    // The decoder makes grey of what is missing.
+    if reader.format() == Some(image::ImageFormat::Jpeg) {
+        let bytes = std::fs::read(path).map_err(|e| Error::input(path, words(&e)))?;
+        if !jpeg_ends(&bytes) {
+            return Err(Error::input(path, "expected a JPEG picture to its end, found one cut off: it is damaged"));
+        }
+    }
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(LARGEST);
     reader.limits(limits);
     reader.decode().map_err(|e| Error::input(path, format!("expected a PNG, JPEG, HDR or EXR picture: {e}")))
+}
+
+/// Whether a JPEG file has the marker of its end behind a scan, ITU-T T.81 annex B.
+fn jpeg_ends(bytes: &[u8]) -> bool {
+    const END: u8 = 0xd9;
+    const SCAN: u8 = 0xda;
+    let mut at = 2;
+    let mut scanned = false;
+    while let Some(found) = bytes.get(at..).and_then(|rest| rest.windows(2).position(|m| m[0] == 0xff && m[1] != 0xff))
+    {
+        let marker = bytes[at + found + 1];
+        at += found + 2;
+        scanned |= marker == SCAN;
+        match marker {
+            END => return scanned,
+            // A byte 0xff of the scan itself, the beginnings of its intervals, and markers that stand alone.
+            0x00 | 0x01 | 0xd0..=0xd8 => {}
+            _ => match bytes.get(at..at + 2) {
+                Some(&[high, low]) => at += usize::from(u16::from_be_bytes([high, low])),
+                _ => return false,
+            },
+        }
+    }
+    false
 }
 
 /// A file of pixels, as it was decoded.
@@ -335,6 +366,24 @@ mod tests {
         std::fs::write(&path, "400 0.1\n500 zwei\n").unwrap();
         assert_eq!(samples(&path).unwrap_err(), "line 2: expected a wavelength and a value, found \"500 zwei\"");
         assert_eq!(samples(&dir.path().join("none")).unwrap_err(), "expected a file, found none");
+    }
+
+    /// Cut off anywhere, also within its header or just before the marker of its end; what follows that does no harm.
+    #[test]
+    fn a_jpeg_that_is_cut_off_is_damaged() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.jpg");
+        let image = image::RgbImage::from_fn(64, 48, |x, y| image::Rgb([x as u8, 5 * y as u8, (x * y) as u8]));
+        image.save(&path).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        for length in [300, whole.len() / 2, whole.len() - 2] {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            let error = open(&path).unwrap_err();
+            assert_eq!(error.exit_code(), 3);
+            assert!(error.to_string().contains("cut off: it is damaged"), "{length}: {error}");
+        }
+        std::fs::write(&path, [whole.as_slice(), &[0xff, 1, 2]].concat()).unwrap();
+        open(&path).unwrap();
     }
 
     /// The same colour gives the same texel by both ways, and each pixel finds its own.
