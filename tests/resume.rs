@@ -253,3 +253,28 @@ fn usr1_writes_a_picture_of_what_is_done_and_the_render_goes_on() {
     signal(&child, "TERM");
     assert_eq!(child.wait().unwrap().code(), Some(75));
 }
+
+/// Missing, cut off, or a copy of the picture: then the render is made again.
+#[test]
+fn a_file_of_bands_that_does_not_hold_is_made_again() {
+    let scene = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nimage: {width: 8, height: 8}\n\
+                 render: {samples: 4}\noutput: {spectral: {bands: 4}}\nshapes: [{sphere: {radius: 1}}]\n\
+                 lights: [{constant: {radiance: 1}}]\n";
+    let place = Place::of(scene);
+    let render = || {
+        let ran = place.run(&["render", "scene.yaml", "-o", "out", "--skip-existing", "--progress", "plain"]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        ran.out.contains("1 of 1 were there already")
+    };
+    let (main, bands) = (place.path("out/scene.exr"), place.path("out/scene.spectral.exr"));
+    assert!(!render() && render());
+    std::fs::remove_file(&bands).unwrap();
+    assert!(!render() && render());
+    let whole = std::fs::read(&bands).unwrap();
+    std::fs::write(&bands, &whole[..whole.len() - 40]).unwrap();
+    assert!(!render() && render());
+    for (from, to) in [(&main, &bands), (&bands, &main)] {
+        std::fs::copy(from, to).unwrap();
+        assert!(!render() && render());
+    }
+}

@@ -5,7 +5,7 @@
 //! not asked. Work pauses between two units, so that it is exact: what is resumed gives the same bits. The same pauses show
 //! the picture to a viewer ([`super::tev`]).
 
-use super::finish::Finish;
+use super::finish::{Finish, spectral_path};
 use super::frame::{Begun, FrameJob, Milestone, lock};
 use super::merge::sum;
 use super::names;
@@ -229,16 +229,34 @@ pub fn part_holds(path: &Path, identity: &Identity, share: &Share) -> bool {
     })
 }
 
-/// Whether the picture at `path` and its PNG are there, undamaged, of the same scene and settings and by this version.
+/// Whether the picture at `path`, its PNG and its file of bands are there, undamaged, of the same scene and settings and by
+/// this version.
 #[must_use]
 pub fn picture_holds(path: &Path, finish: &Finish) -> bool {
     // A file that is not there need not be read.
     let png = path.with_extension("png");
-    if !(path.is_file() && png.is_file()) {
+    let spectral = finish.output.spectral.map(|_| spectral_path(path));
+    if !(path.is_file() && png.is_file() && spectral.as_ref().is_none_or(|spectral| spectral.is_file())) {
         return false;
     }
+    let size = [finish.window.width, finish.window.height];
+    exr_holds(path, finish, Holds::Colours)
+        && spectral.is_none_or(|spectral| exr_holds(&spectral, finish, Holds::Bands))
+        && png::holds(&png, size)
+}
+
+/// What a file of a picture is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Holds {
+    Colours,
+    Bands,
+}
+
+/// [`picture_holds`] of one of its EXR files.
+fn exr_holds(path: &Path, finish: &Finish, holds: Holds) -> bool {
     exr::read_exr(path).is_ok_and(|file| {
         let [part] = file.parts.as_slice() else { return false };
+        let found = part.text("spectralLayoutVersion").map_or(Holds::Colours, |_| Holds::Bands);
         let channels = part.channels.iter().map(|(name, plane)| (name.as_str(), plane.as_slice()));
         let expected = [
             ("abbe/version", env!("CARGO_PKG_VERSION").to_owned()),
@@ -246,8 +264,9 @@ pub fn picture_holds(path: &Path, finish: &Finish) -> bool {
             ("abbe/settingsHash", finish.settings_hash()),
             ("abbe/contentHash", exr::content_hash(channels)),
         ];
-        part.window == finish.window && expected.iter().all(|(name, value)| part.text(name) == Some(value.as_str()))
-    }) && png::holds(&png, [finish.window.width, finish.window.height])
+        let is = |(name, value): &(&str, String)| part.text(name) == Some(value.as_str());
+        found == holds && part.window == finish.window && expected.iter().all(is)
+    })
 }
 
 /// Removes the checkpoint of what is at `path` already: a process that was killed after it had written the one and before it
