@@ -5,6 +5,7 @@
 pub mod accuracy;
 pub mod adaptive;
 pub mod checkpoint;
+mod clashes;
 pub mod contact;
 pub mod develop;
 pub mod farm;
@@ -36,7 +37,7 @@ use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, 
 use crate::transport::trial;
 use checkpoint::{Keep, Keeper};
 use contact::Contact;
-use finish::Finish;
+use finish::{Finish, spectral_path};
 use frame::{FrameJob, Progress, go_on};
 use part_file::Identity;
 pub use portion::{Portion, Samples};
@@ -397,11 +398,15 @@ fn ends_in(path: &Path, extensions: &[&str]) -> bool {
 #[must_use]
 pub fn output_path(prepared: &Prepared, overrides: &Overrides) -> PathBuf {
     let Prepared { description, scene, .. } = prepared;
-    let output = overrides.output.as_ref().unwrap_or(&description.output.dir);
-    let filled = names::fill(output, &scene.name, description.frame);
+    place(&description.output.dir, &scene.name, description.frame, overrides)
+}
+
+/// [`output_path`] of the scene `name` whose description has `directory`.
+fn place(directory: &Path, name: &str, frame: Option<i32>, overrides: &Overrides) -> PathBuf {
+    let filled = names::fill(overrides.output.as_deref().unwrap_or(directory), name, frame);
     match &overrides.output {
         Some(path) if ends_in(path, &["exr"]) => filled,
-        _ => filled.join(format!("{}{}.exr", names::label(&scene.name, description.frame), overrides.portion.suffix())),
+        _ => filled.join(format!("{}{}.exr", names::label(name, frame), overrides.portion.suffix())),
     }
 }
 
@@ -549,6 +554,7 @@ fn check_frames(output: Option<&PathBuf>, frames: usize) -> Result<()> {
 pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, stop: &AtomicBool) -> Result<Report> {
     let entries = entries(path, overrides)?;
     check_output(overrides.output.as_deref(), entries.len())?;
+    clashes::check(&entries, overrides)?;
     let start = Instant::now();
     let mut scenes = Vec::new();
     let mut report_dir: Option<PathBuf> = None;

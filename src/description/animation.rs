@@ -7,6 +7,7 @@ use super::fault::Fault;
 use super::frames::Frames;
 use super::keyed;
 use super::node::{Entry, Node, Sources, Value};
+use super::output::Output;
 use super::path::Segment;
 use super::scene::SceneDescription;
 use crate::error::Result;
@@ -73,6 +74,16 @@ impl Animation {
     #[must_use]
     pub fn frames(&self) -> &[i32] {
         &self.frames
+    }
+
+    /// Which files are written for the first of its frames.
+    ///
+    /// # Errors
+    /// [`Error::Config`](crate::error::Error::Config) for what is no output.
+    pub fn output(&self) -> Result<Output> {
+        let Some(mut node) = self.root.get("output").cloned() else { return Ok(Output::default()) };
+        let evaluated = self.frames.first().map_or(Ok(()), |frame| keyed::evaluate(&mut node, f64::from(*frame)));
+        evaluated.and_then(|()| decode(&node, &self.sources)).map_err(|fault| fault.into_error(&self.sources))
     }
 
     /// The scene at one of its frames, or the scene that has none.

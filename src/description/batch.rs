@@ -260,6 +260,12 @@ impl BatchEntry {
         })
     }
 
+    /// Where the batch names the file; none of a scene on its own.
+    #[must_use]
+    pub fn place(&self) -> Option<String> {
+        self.place.map(|place| self.sources.describe(place))
+    }
+
     /// Gives values to parameters of the scene, the `-D NAME=VALUE` of the command line; they win over those of a
     /// batch.
     ///

@@ -1,6 +1,6 @@
 //! Batches: what goes on after a failure, what the report tells, what scenes share.
 
-use super::batch;
+use super::{BALL, SMALL, batch};
 use crate::common::place::Place;
 use serde_json::Value;
 
@@ -104,4 +104,45 @@ fn what_scenes_of_a_batch_share_is_the_same_for_each() {
     let (a, b) = (hashes("a.yaml").remove(0), hashes("b.yaml").remove(0));
     assert_ne!(a, b);
     assert_eq!(hashes("batch.yaml"), [a.clone(), b, a]);
+}
+
+/// Each batch, what is asked of it, and the file that two would write.
+#[test]
+fn two_pictures_of_one_file_are_refused_before_the_work() {
+    let entry = |name: &str, set: &str| format!("- {{file: s.yaml, name: {name}, set: {{{set}}}}}\n");
+    let bands = "output.spectral: {bands: 3}";
+    let cases: [([String; 2], &[&str], &str); 4] = [
+        (
+            [entry("x.0001", ""), entry("x", "render.frames: 1-2")],
+            &["-o", "out"],
+            "out/x.0001.exr would be that of scene \"x.0001\" and of frame 1 of scene \"x\"",
+        ),
+        (
+            [entry("x.spectral", ""), entry("x", bands)],
+            &["-o", "out"],
+            "out/x.spectral.exr would be that of scene \"x.spectral\" and of scene \"x\"",
+        ),
+        (
+            [entry("y", ""), entry("contact-sheet", "")],
+            &["-o", "out"],
+            "out/contact-sheet.png is the contact sheet of the batch",
+        ),
+        (
+            [entry("a", ""), entry("a1", "")],
+            &["-o", "out/{scene}{frame}.exr", "--frames", "1,11"],
+            "out/a11.exr would be that of frame 11 of scene \"a\" and of frame 1 of scene \"a1\"",
+        ),
+    ];
+    for ([one, two], output, expected) in cases {
+        let place = Place::with(&[("b.yaml", &format!("scenes:\n{one}{two}")), ("s.yaml", &format!("{SMALL}{BALL}"))]);
+        let ran = place.run(&[["render", "b.yaml", "-q"].as_slice(), output].concat());
+        assert_eq!(ran.code, 2, "{expected}");
+        assert!(ran.err.starts_with("error: b.yaml:3:10: scene ") && ran.err.contains(expected), "{}", ran.err);
+        assert!(place.names("out").is_empty());
+    }
+    // Scenes whose names end in numbers, and one that is not on the sheet, are none of these.
+    let (one, two) = (entry("s1", bands), entry("s11", bands));
+    let place = Place::with(&[("b.yaml", &format!("scenes:\n{one}{two}")), ("s.yaml", &format!("{SMALL}{BALL}"))]);
+    assert_eq!(place.run(&["render", "b.yaml", "-q", "-o", "out", "--frames", "1,11"]).code, 0);
+    assert_eq!(place.names("out").iter().filter(|name| name.ends_with("exr")).count(), 8);
 }

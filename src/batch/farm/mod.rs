@@ -9,7 +9,7 @@ pub mod openjd;
 pub mod slurm;
 
 use super::part::bands;
-use super::{Overrides, entries, window};
+use super::{Overrides, clashes, entries, window};
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::scene::compile;
@@ -98,7 +98,10 @@ impl Job {
         let mut files = BTreeSet::from([source.to_path_buf()]);
         let mut shelf = Shelf::default();
         let mut faults: Vec<Error> = Vec::new();
-        for entry in entries(source, overrides)? {
+        let entries = entries(source, overrides)?;
+        // A task knows only its own scenes, and all go to one directory.
+        clashes::check(&entries, &Overrides { output: Some("pictures".into()), ..overrides.clone() })?;
+        for entry in entries {
             let mut look = || -> Result<Vec<i32>> {
                 let animation = entry.animation(&overrides.set)?;
                 let frames = animation.frames().to_vec();

@@ -1,0 +1,157 @@
+//! No two pictures of a job go to one file: what would be written twice is told before anything is rendered.
+
+use super::{Overrides, names, place, spectral_path};
+use crate::description::BatchEntry;
+use crate::error::{Error, Result};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::ffi::OsStr;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+
+/// The pictures of a scene, as far as they decide about names.
+struct Pictures {
+    /// Of the description.
+    directory: PathBuf,
+    frames: Vec<i32>,
+    /// Whether each has a file of bands.
+    spectral: bool,
+    /// Whether they are on the contact sheet.
+    sheet: bool,
+}
+
+impl Pictures {
+    /// None of a scene that cannot be read, which is told in its turn.
+    fn of(entry: &BatchEntry, overrides: &Overrides) -> Option<Pictures> {
+        let animation = entry.animation(&overrides.set).ok()?;
+        let output = animation.output().ok()?;
+        Some(Pictures {
+            directory: output.dir,
+            frames: animation.frames().to_vec(),
+            spectral: output.spectral.is_some() && overrides.portion.is_all(),
+            sheet: output.contact_sheet && overrides.portion.is_all(),
+        })
+    }
+
+    /// The EXR files of a frame. What lies beside them has their names, with other endings.
+    fn files(&self, name: &str, frame: Option<i32>, overrides: &Overrides) -> impl Iterator<Item = PathBuf> + use<> {
+        let file = place(&self.directory, name, frame, overrides);
+        let spectral = self.spectral.then(|| spectral_path(&file));
+        std::iter::once(file).chain(spectral)
+    }
+
+    fn frames(&self) -> impl Iterator<Item = Option<i32>> {
+        let none = self.frames.is_empty().then_some(None);
+        none.into_iter().chain(self.frames.iter().map(|frame| Some(*frame)))
+    }
+}
+
+/// What is the same of the names of all frames of a scene.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Key {
+    /// All but the last piece between dots, where that is a number.
+    BeforeNumber,
+    /// All but digits and signs.
+    Letters,
+}
+
+impl Key {
+    /// A hash: equal paths have equal ones.
+    fn of(self, path: &Path) -> u64 {
+        let digits = |c: char| c.is_ascii_digit() || c == '-';
+        let mut hasher = DefaultHasher::new();
+        match self {
+            Key::BeforeNumber => {
+                let stem = path.file_stem().map(OsStr::to_string_lossy).unwrap_or_default();
+                let numbered = stem.rsplit_once('.').filter(|(_, number)| number.chars().all(digits));
+                path.parent().hash(&mut hasher);
+                (numbered.map_or(&*stem, |(before, _)| before), numbered.is_some()).hash(&mut hasher);
+            }
+            Key::Letters => path.to_string_lossy().replace(digits, "").hash(&mut hasher),
+        }
+        hasher.finish()
+    }
+}
+
+/// Refuses a job in which two pictures, or a picture and the contact sheet, go to one file.
+///
+/// Scenes are read for this and forgotten. Only of those whose names are alike but for numbers all frames are compared.
+///
+/// # Errors
+/// [`Error::Config`] with each two scenes, and the first file that both would write.
+pub(super) fn check(entries: &[BatchEntry], overrides: &Overrides) -> Result<()> {
+    if entries.len() < 2 {
+        // Frames of one scene differ by their numbers.
+        return Ok(());
+    }
+    // Two frames that are far apart show what changes.
+    const PROBES: [i32; 2] = [1, 98_765];
+    let look = |entry: &BatchEntry| {
+        let pictures = Pictures::of(entry, overrides)?;
+        let keys_of = |key: Key, frame| -> Vec<u64> {
+            pictures.files(&entry.name, frame, overrides).map(|file| key.of(&file)).collect()
+        };
+        let probe = PROBES.map(|frame| keys_of(Key::BeforeNumber, Some(frame)));
+        let told = pictures.frames.is_empty() || probe[0] == probe[1];
+        let first = pictures.frames.first().copied();
+        let keys = [Key::BeforeNumber, Key::Letters].map(|key| keys_of(key, first));
+        let sheet = pictures.sheet.then(|| sheet(&pictures, &entry.name, overrides));
+        Some((told, keys, sheet))
+    };
+    let looks: Vec<Option<(bool, [Vec<u64>; 2], Option<PathBuf>)>> = entries.par_iter().map(look).collect();
+    let which = usize::from(!looks.iter().flatten().all(|(told, ..)| *told));
+    let key = [Key::BeforeNumber, Key::Letters][which];
+    // The sheet lies beside the first picture.
+    let sheet = looks.iter().flatten().find_map(|(_, _, sheet)| sheet.clone());
+
+    let mut met: HashMap<u64, u32> = HashMap::new();
+    sheet.iter().for_each(|sheet| *met.entry(key.of(sheet)).or_default() += 1);
+    for (_, keys, _) in looks.iter().flatten() {
+        keys[which].iter().collect::<HashSet<_>>().into_iter().for_each(|key| *met.entry(*key).or_default() += 1);
+    }
+    let alike = |(_, keys, _): &(bool, [Vec<u64>; 2], Option<PathBuf>)| keys[which].iter().any(|key| met[key] > 1);
+
+    let mut first: HashMap<PathBuf, (usize, Option<i32>)> = HashMap::new();
+    let mut clashes: BTreeMap<(usize, usize), String> = BTreeMap::new();
+    for (i, entry) in entries.iter().enumerate().filter(|(i, _)| looks[*i].as_ref().is_some_and(alike)) {
+        let Some(pictures) = Pictures::of(entry, overrides) else { continue };
+        for frame in pictures.frames() {
+            for file in pictures.files(&entry.name, frame, overrides) {
+                let who = |i: usize, frame: Option<i32>| {
+                    let frame = frame.map_or(String::new(), |frame| format!("frame {frame} of "));
+                    format!("{frame}scene {}", quoted(&entries[i].name))
+                };
+                if sheet.as_ref() == Some(&file) {
+                    let file = file.with_extension("png");
+                    let clash = format!("{} is the contact sheet of the batch", file.display());
+                    clashes.entry((i, i)).or_insert(clash);
+                }
+                if let Some((other, at)) = first.insert(file.clone(), (i, frame)).filter(|(other, _)| *other != i) {
+                    let (file, one, two) = (file.display(), who(other, at), who(i, frame));
+                    clashes.entry((other, i)).or_insert_with(|| format!("{file} would be that of {one} and of {two}"));
+                }
+            }
+        }
+    }
+    if clashes.is_empty() {
+        return Ok(());
+    }
+    let line = |((_, i), clash): (&(usize, usize), &String)| {
+        let place = entries[*i].place().map_or(String::new(), |place| format!("{place}: "));
+        format!(
+            "{place}scene {}: expected each file once, {clash}; give one of them another name",
+            quoted(&entries[*i].name)
+        )
+    };
+    Err(Error::Config(clashes.iter().map(line).collect::<Vec<_>>().join("\n")))
+}
+
+/// The contact sheet beside `pictures`, as if it were an EXR.
+fn sheet(pictures: &Pictures, name: &str, overrides: &Overrides) -> PathBuf {
+    let picture = place(&pictures.directory, name, pictures.frames.first().copied(), overrides);
+    picture.with_file_name(names::about(overrides, "contact-sheet", "exr"))
+}
+
+fn quoted(name: &str) -> String {
+    format!("\"{name}\"")
+}
