@@ -47,6 +47,10 @@ pub enum Error {
     #[error("{0}")]
     Render(String),
 
+    /// More memory would be needed than the process may have: exit code 33.
+    #[error("{0}")]
+    Memory(String),
+
     /// The render was stopped before its end and can go on later: exit code 75.
     #[error("{0}")]
     Stopped(String),
@@ -64,6 +68,7 @@ impl Error {
             Error::Config(_) => 2,
             Error::Input { .. } => 3,
             Error::Render(_) => 4,
+            Error::Memory(_) => 33,
             Error::Stopped(_) => 75,
         }
     }

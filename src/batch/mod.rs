@@ -25,6 +25,7 @@ pub mod tev;
 use crate::description::{self, BatchEntry, LayerContent, PathMap, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
+use crate::film::accumulate::Film;
 use crate::film::filter::{Filter, FilterSampler};
 use crate::film::output::{self, Inputs};
 use crate::scene::Scene;
@@ -72,6 +73,8 @@ pub struct Overrides {
     pub portion: Portion,
     /// What is kept of a render that ends early.
     pub keep: Keep,
+    /// The most bytes that the process may hold.
+    pub memory_limit: Option<u64>,
 }
 
 /// Whose turn it is in a batch.
@@ -265,6 +268,40 @@ fn prepare_scene(
     };
     let source = entry.path.clone();
     Ok(Prepared { description, scene, moments, plan, samples, planned, stop, hash, source, next })
+}
+
+/// Refuses a picture whose sums are more than the machine's memory or `limit`, before it is begun.
+fn check_memory(description: &SceneDescription, rows: Window, limit: Option<u64>) -> Result<()> {
+    let needed = Film::bytes(rows);
+    let megabytes = |bytes: u64| bytes.div_ceil(1_000_000);
+    if let Some(limit) = limit.filter(|limit| needed > *limit) {
+        let [needed, limit] = [needed, limit].map(megabytes);
+        return Err(Error::Memory(format!(
+            "the sums of {rows} take {needed} MB, more than --memory-limit, {limit} MB"
+        )));
+    }
+    let room = Vec::<u8>::new().try_reserve_exact(usize::try_from(needed).unwrap_or(usize::MAX));
+    if room.is_ok() && machine_memory().is_none_or(|there| needed <= there) {
+        return Ok(());
+    }
+    let description::Image { overscan, crop, .. } = &description.image;
+    let field = match crop {
+        Some(_) => "image.crop",
+        None if *overscan > 0 => "image.overscan",
+        None => "image.width",
+    };
+    let message =
+        format!("expected a picture that fits into memory, found {rows}, which takes {} MB", megabytes(needed));
+    Err(Error::Config(description.fault(field, &message)))
+}
+
+/// Bytes of memory and swap of the machine, where it tells.
+fn machine_memory() -> Option<u64> {
+    let all = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let kilobytes = |name: &str| -> Option<u64> {
+        all.lines().find_map(|line| line.strip_prefix(name))?.trim().trim_end_matches("kB").trim().parse().ok()
+    };
+    Some(1024 * (kilobytes("MemTotal:")? + kilobytes("SwapTotal:").unwrap_or(0)))
 }
 
 /// What ends the render besides samples.
@@ -468,6 +505,7 @@ fn render_and_write(
     let identity = Identity::new(Finish::of(prepared), &prepared.source, &prepared.plan);
     let finish = &identity.finish;
     let share = portion.share(job.window, job.samples, finish.rows())?;
+    check_memory(description, share.rows(job.window), overrides.memory_limit)?;
     if checkpoint::is_there(&overrides.keep, &exr_path, &identity, (!portion.is_all()).then_some(&share)) {
         checkpoint::remove_left_over(&exr_path, &identity)?;
         report.status = Status::Skipped;

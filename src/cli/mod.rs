@@ -429,6 +429,7 @@ impl SceneArguments {
             check_numerics: false,
             portion: crate::batch::Portion::default(),
             keep: crate::batch::checkpoint::Keep::default(),
+            memory_limit: None,
         })
     }
 }

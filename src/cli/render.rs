@@ -33,6 +33,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     let overrides = batch::Overrides {
         report: arguments.report.clone(),
         check_numerics: arguments.check_numerics,
+        memory_limit: arguments.memory_limit,
         portion: batch::Portion { tile: arguments.tile, samples: arguments.samples },
         keep: batch::checkpoint::Keep {
             on_stop: true,

@@ -265,3 +265,16 @@ fn a_missing_scene_file_and_a_missing_argument_are_told_apart() {
     assert_eq!(place.run(&["render", "s.yaml", "--spp", "0"]).code, 2);
     assert_eq!(place.run(&["render", "s.yaml", "--set", "fog"]).code, 2);
 }
+
+#[test]
+fn a_picture_larger_than_memory_is_refused_at_its_field() {
+    let place = Place::of(&SMALL.replace("width: 4, height: 4", "width: 65536, height: 65536"));
+    let ran = place.run(&["render", "scene.yaml", "-q"]);
+    assert!(ran.err.contains("scene.yaml:2:16: image.width: expected a picture that fits into memory"), "{}", ran.err);
+    assert_eq!(ran.code, 2);
+    let ran = place.run(&["render", "scene.yaml", "-q", "--memory-limit", "1G"]);
+    assert!(ran.err.contains("more than --memory-limit, 1074 MB"), "{}", ran.err);
+    assert_eq!(ran.code, 33);
+    let ran = place.run(&["render", "scene.yaml", "-q", "--set", "image={width: 9, height: 9, overscan: 16384}"]);
+    assert!(ran.err.contains("image.overscan: expected a picture that fits into memory"), "{}", ran.err);
+}
