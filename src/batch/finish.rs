@@ -307,7 +307,46 @@ pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut Scene
     frame::check_invalid(&frame.invalid(), samples)
 }
 
+/// Makes the files of a picture of one pixel, which has no sample, to see whether the channels and attributes of the whole one
+/// can stand in them.
+///
+/// # Errors
+/// Why they cannot.
+pub fn check_files(finish: &Finish, frame: &Frame) -> std::result::Result<(), String> {
+    let one = Finish { window: frame.film.window(), ..finish.clone() };
+    let image = frame.resolve(&one.rgb_from_xyz());
+    let mut report = SceneReport::new(&one.name, one.frame_number);
+    let file = exr_image(&one, frame, &image, &mut report);
+    // More of them are written where a pixel shows more things.
+    let numbered = |name: &str, layer: &str| {
+        name.strip_prefix(layer).is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    };
+    for matte in &finish.mattes {
+        let layer = |channel: &Channel| channel.name.rsplit_once('.').map_or("", |(layer, _)| layer).to_owned();
+        if let Some(layer) = finish.layers.iter().map(layer).find(|layer| numbered(layer, &matte.layer)) {
+            return Err(format!("the layer `{layer}` has a name of the mattes {}", matte.layer));
+        }
+    }
+    exr::encode_exr(&file)?;
+    spectral_image(&one, frame, &image, &report).map_or(Ok(()), |file| exr::encode_exr(&file).map(drop))
+}
+
 fn write_exr(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneReport) -> Result<()> {
+    let mut file = exr_image(finish, frame, image, report);
+    write_sealed(path, &mut file)?;
+    let exr = &finish.output.exr;
+    if exr.compression.loses() {
+        let loss = exr::loss(path, &file)?;
+        report.notes.push(format!(
+            "DWA compression of level {} changes values by {:.2e} in the root mean square, at most {:.2e}; their mean is {:.2e}",
+            exr.dwa_level, loss.root_mean_square, loss.most, loss.mean
+        ));
+    }
+    Ok(())
+}
+
+/// The file of a picture, and notes on it.
+fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneReport) -> ExrImage {
     let exr = &finish.output.exr;
     let precision = match exr.precision {
         description::Precision::Half => exr::Precision::Half,
@@ -362,15 +401,7 @@ fn write_exr(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report:
         channels.into_iter().for_each(|(name, samples)| file.push_data(name, samples));
         file.attributes.extend(attributes);
     }
-    write_sealed(path, &mut file)?;
-    if exr.compression.loses() {
-        let loss = exr::loss(path, &file)?;
-        report.notes.push(format!(
-            "DWA compression of level {} changes values by {:.2e} in the root mean square, at most {:.2e}; their mean is {:.2e}",
-            exr.dwa_level, loss.root_mean_square, loss.most, loss.mean
-        ));
-    }
-    Ok(())
+    file
 }
 
 /// The path of the spectral file beside the EXR at `path`: `name.spectral.exr`, and before the number of a frame.
@@ -394,9 +425,17 @@ pub fn places(path: &Path) -> [PathBuf; 3] {
 /// 10(3), 2021, layout 1.0): `S0.<nm>nm` is the mean spectral radiance of a band around that wavelength, W·m⁻²·sr⁻¹·nm⁻¹;
 /// R, G and B show them.
 fn write_spectral(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report: &SceneReport) -> Result<()> {
+    match spectral_image(finish, frame, image, report) {
+        Some(mut file) => write_sealed(path, &mut file),
+        None => Ok(()),
+    }
+}
+
+/// What [`write_spectral`] writes, where it writes.
+fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneReport) -> Option<ExrImage> {
     let channels = finish.spectral_channels();
     if channels.is_empty() {
-        return Ok(());
+        return None;
     }
     let plane = |i: usize| (finish.layers[i].name.clone(), ChannelData::F32(frame.layer(i)));
     let preview = ["R", "G", "B"].iter().zip(&image.rgb);
@@ -404,7 +443,7 @@ fn write_spectral(path: &Path, finish: &Finish, frame: &Frame, image: &Image, re
     let mut attributes = attributes(finish, frame, report);
     let text = |name: &str, value: &str| (name.to_owned(), Attribute::Text(value.to_owned()));
     attributes.extend([text("spectralLayoutVersion", "1.0"), text("emissiveUnits", "W.m^-2.sr^-1")]);
-    let mut file = ExrImage {
+    Some(ExrImage {
         frame: image.frame,
         window: image.window,
         channels: channels.map(plane).chain(preview).collect(),
@@ -413,8 +452,7 @@ fn write_spectral(path: &Path, finish: &Finish, frame: &Frame, image: &Image, re
         data: BTreeSet::new(),
         compression: exr::Compression::Zip,
         layout: exr::Layout::Single,
-    };
-    write_sealed(path, &mut file)
+    })
 }
 
 /// Writes a file that says what its channels add up to, so that damage shows.

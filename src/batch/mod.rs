@@ -39,14 +39,14 @@ use crate::transport::trial;
 use checkpoint::{Keep, Keeper};
 use contact::Contact;
 use finish::{Finish, spectral_path};
-use frame::{FrameJob, Progress, go_on};
+use frame::{Frame, FrameJob, Progress, go_on};
 use part_file::Identity;
 pub use portion::{Portion, Samples};
 use report::{Report, SceneReport, Status};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use stop::{Forecast, Stop};
 
 /// Scenes whose reports are put in one place at a time.
@@ -267,7 +267,20 @@ fn prepare_scene(
         }
     };
     let source = entry.path.clone();
-    Ok(Prepared { description, scene, moments, plan, samples, planned, stop, hash, source, next })
+    let prepared = Prepared { description, scene, moments, plan, samples, planned, stop, hash, source, next };
+    check_files(&prepared)?;
+    Ok(prepared)
+}
+
+/// Whether the files of a picture can be written, whatever its pixels are.
+fn check_files(prepared: &Prepared) -> Result<()> {
+    let Prepared { description, scene, plan, .. } = prepared;
+    let one = Film::new(scene.camera.resolution, Window::full(1, 1))?.with_layers(plan.layers.channels().len());
+    let frame = Frame::of(one, None, 0, Duration::ZERO, false);
+    let field = if description.layers.is_empty() { "output.exr" } else { "layers" };
+    finish::check_files(&Finish::of(prepared), &frame).map_err(|message| {
+        Error::Config(description.fault(field, &format!("expected a file that can be written: {message}")))
+    })
 }
 
 /// Refuses a picture whose sums are more than the machine's memory or `limit`, before it is begun.
@@ -492,8 +505,12 @@ fn render_and_write(
     let exr_path = output_path(prepared, overrides);
     // A place that cannot be written to is told before the work, not after.
     output::prepare_place(&exr_path)?;
+    output::prepare_place(&checkpoint::place(&exr_path))?;
     if overrides.portion.is_all() {
         output::prepare_place(&exr_path.with_extension("png"))?;
+        if description.output.spectral.is_some() {
+            output::prepare_place(&spectral_path(&exr_path))?;
+        }
     }
     let filter = FilterSampler::new(filter(&description.image.filter))?;
     let job = prepared.job(&filter);

@@ -143,6 +143,7 @@ pub(crate) fn check(output: &Output, at: At<'_>, checker: &mut Checker<'_>) {
         let own = OWN.contains(&name.as_str()) || name.starts_with("abbe/") || name.starts_with("cryptomatte/");
         checker.require(!own, at, "a name that the renderer does not give itself", format_args!("{name:?}"));
         checker.require((1..256).contains(&name.len()), at, "a name of 1 to 255 bytes", name.len());
+        checker.require(!name.contains('\0'), at, "a name without a zero byte", format_args!("{name:?}"));
         let number = matches!(value, HeaderValue::Number(_));
         match name.as_str() {
             "timeCode" => {

@@ -305,6 +305,7 @@ fn words(path: &Path, e: &std::io::Error) -> String {
         ErrorKind::NotFound if !there => format!("the directory {directory} does not exist"),
         ErrorKind::PermissionDenied => format!("no permission to write in {directory}"),
         ErrorKind::NotADirectory => format!("{directory} is not a directory"),
+        ErrorKind::InvalidFilename => "the name is too long, with the endings of what is written beside it".into(),
         ErrorKind::StorageFull => format!("the disk that holds {directory} is full"),
         ErrorKind::QuotaExceeded => format!("the quota of the disk that holds {directory} is used up"),
         ErrorKind::FileTooLarge => format!("the file is larger than this process may write in {directory}"),

@@ -266,6 +266,38 @@ fn a_missing_scene_file_and_a_missing_argument_are_told_apart() {
     assert_eq!(place.run(&["render", "s.yaml", "--set", "fog"]).code, 2);
 }
 
+/// What the file of a picture cannot hold is told before the render, as a fault of the description.
+#[test]
+fn channels_that_clash_are_refused_before_the_work() {
+    let lamp = "shapes: [{sphere: {radius: 1, name: lamp, emission: 1}}]\n";
+    let groups =
+        |name: &str| format!("{lamp}light_groups: {{{name}: [lamp]}}\nlights: [{{constant: {{radiance: 1}}}}]\n");
+    let cases = [
+        (groups("default") + "layers: [light_groups]\n", "`light_default.B` is there twice"),
+        (groups("key") + "layers: [{name: light_key, surface: albedo}, light_groups]\n", "`light_key.B` is there"),
+        (
+            "output: {exr: {stderr: true}}\nlayers: [{name: stderr, surface: albedo}]\n".into(),
+            "`stderr.B` is there twice",
+        ),
+        (
+            "layers: [{name: CryptoObject07, light: path, form: rgba}, crypto_object]\n".into(),
+            "`CryptoObject07` has a name of the mattes",
+        ),
+        ("layers: [{name: x, light: path, squares: true, squares_name: x}]\n".into(), "`x.A` is there twice"),
+        ("layers: [{name: x, light: path, squares: true}, {name: m2_x, light: path}]\n".into(), "`m2_x.A` is there"),
+    ];
+    for (text, expected) in cases {
+        let place = Place::of(&format!("{SMALL}{text}"));
+        let ran = place.run(&["render", "scene.yaml", "-q"]);
+        assert_eq!(ran.code, 2, "{expected}");
+        assert!(ran.err.contains("layers: expected a file that can be written: "), "{}", ran.err);
+        assert!(ran.err.contains(expected) && ran.err.contains("scene.yaml:"), "{}", ran.err);
+        assert!(place.names("out").iter().all(|name| name == "report.json"));
+    }
+    let (found, code) = faults("output: {exr: {attributes: {\"a\\0b\": 1}}}\n");
+    assert!(code == 2 && found[0].contains("expected a name without a zero byte"), "{found:?}");
+}
+
 #[test]
 fn a_picture_larger_than_memory_is_refused_at_its_field() {
     let place = Place::of(&SMALL.replace("width: 4, height: 4", "width: 65536, height: 65536"));
@@ -277,4 +309,17 @@ fn a_picture_larger_than_memory_is_refused_at_its_field() {
     assert_eq!(ran.code, 33);
     let ran = place.run(&["render", "scene.yaml", "-q", "--set", "image={width: 9, height: 9, overscan: 16384}"]);
     assert!(ran.err.contains("image.overscan: expected a picture that fits into memory"), "{}", ran.err);
+}
+
+/// A name that is too long for a file, or for what stands beside it on the way, is told before the work.
+#[cfg(unix)]
+#[test]
+fn a_name_too_long_for_a_file_is_refused_before_the_work() {
+    let place = Place::of(SMALL);
+    for (letters, code) in [(228, 0), (248, 1), (300, 1)] {
+        let name = format!("out/{}.exr", "n".repeat(letters));
+        let ran = place.run(&["render", "scene.yaml", "-q", "-o", &name, "--spp", "4"]);
+        assert_eq!(ran.code, code, "{}", ran.err);
+        assert!(code == 0 || ran.err.contains("the name is too long"), "{}", ran.err);
+    }
 }
