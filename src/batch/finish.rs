@@ -401,6 +401,10 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         channels.into_iter().for_each(|(name, samples)| file.push_data(name, samples));
         file.attributes.extend(attributes);
     }
+    let infinite = image.rgb.iter().flatten().filter(|x| x.is_infinite()).count();
+    if infinite > 0 {
+        report.notes.push(format!("{infinite} values are more than 32-bit floats hold: they are written as infinite"));
+    }
     file
 }
 

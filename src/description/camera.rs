@@ -416,7 +416,11 @@ impl Image {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         checker.whole_between(at.key("width"), self.width, 1, MAX_SIDE);
         checker.whole_between(at.key("height"), self.height, 1, MAX_SIDE);
-        checker.positive(at.key("sensitivity"), self.sensitivity);
+        // What a 32-bit float of a file holds in full.
+        let (least, most) = (f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX));
+        let expected = format!("a number from {least:.3e} to {most:.3e}");
+        let found = format_args!("{:e}", self.sensitivity);
+        checker.require((least..=most).contains(&self.sensitivity), at.key("sensitivity"), &expected, found);
         let filter = at.key("filter");
         match self.filter {
             Filter::Box | Filter::Mitchell { .. } | Filter::CatmullRom => {}
@@ -556,6 +560,15 @@ mod tests {
             scene("image: {width: 20, height: 10, crop: {x: 10, width: 10, height: 10}}").image.crop,
             Some(Crop { x: 10, y: 0, width: 10, height: 10 })
         );
+    }
+
+    #[test]
+    fn a_sensitivity_is_what_a_file_can_hold() {
+        for (sensitivity, found) in [("1e40", "1e40"), ("1e-300", "1e-300"), ("0", "0e0")] {
+            let expected = "image.sensitivity: expected a number from 1.175e-38 to 3.403e38, found";
+            let told = faults(&format!("image: {{sensitivity: {sensitivity}}}"));
+            assert!(told.ends_with(&format!("{expected} {found}")), "{told}");
+        }
     }
 
     #[test]
