@@ -365,6 +365,18 @@ mod tests {
         );
     }
 
+    /// Mattes would show both as one.
+    #[test]
+    fn a_shape_is_not_called_what_an_unnamed_one_is() {
+        let shapes = "shapes:\n- sphere: {radius: 1}\n- sphere: {radius: 1, name: sphere0}\n";
+        assert_eq!(
+            faults(&format!("{shapes}layers: [crypto_object]\n")),
+            "dir/s.yaml:4:30: shapes[1].sphere.name: expected a name of its own, found \"sphere0\", which shapes[0] has, \
+             since it has no other"
+        );
+        scene(shapes);
+    }
+
     #[test]
     fn layers_have_names_of_their_own_and_camera_rays() {
         assert_eq!(

@@ -1,6 +1,6 @@
 //! A scene as it is written, and the way back from a field to its line.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -172,6 +172,19 @@ impl SceneDescription {
 
     /// Light groups and assets name what is there, each thing once.
     fn check_names(&self, checker: &mut Checker<'_>) {
+        // Mattes, assets and groups of lamps go by name.
+        let mattes = self.layers.iter().any(|layer| matches!(layer.content, LayerContent::Matte(_)));
+        let named = mattes || !self.light_groups.is_empty() || !self.assets.is_empty();
+        let made = |i: usize| self.shapes[i].name.is_none().then(|| self.shapes[i].name_or_kind(i));
+        let made: HashMap<String, usize> = (0..self.shapes.len()).filter_map(|i| Some((made(i)?, i))).collect();
+        for (i, shape) in self.shapes.iter().enumerate().filter(|_| named) {
+            if let Some((name, other)) = shape.name.as_ref().and_then(|name| Some((name, made.get(name)?))) {
+                let shapes = At::ROOT.key("shapes");
+                let (shape, form) = (shapes.index(i), shape.geometry.kind());
+                let found = format!("{}, which shapes[{other}] has, since it has no other", quote(name));
+                checker.require(false, shape.key(form).key("name"), "a name of its own", found);
+            }
+        }
         let shapes = |shining: bool| {
             let all = self.shapes.iter().enumerate().filter(move |(_, shape)| !shining || shape.emission.is_some());
             all.map(|(i, shape)| shape.name_or_kind(i))
