@@ -19,6 +19,8 @@ pub struct Picture {
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// What was changed in it, where something was.
+    pub note: Option<String>,
 }
 
 /// The most bytes a decoded picture may take: 2 GiB.
@@ -179,19 +181,19 @@ pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
             };
             let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
             let pixels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
-            Picture { pixels, width: part.window.width as usize, height: part.window.height as usize }
+            Picture { pixels, width: part.window.width as usize, height: part.window.height as usize, note: None }
         }
         Decoded::Bytes { rgb, width, height, .. } => {
             let level = colour::srgb8_table();
             let pixel = |p: &[u8]| [0, 1, 2].map(|k| level[usize::from(p[k])]);
-            Picture { pixels: rgb.chunks_exact(3).map(pixel).collect(), width, height }
+            Picture { pixels: rgb.chunks_exact(3).map(pixel).collect(), width, height, note: None }
         }
         Decoded::Other(decoded) => {
             let linear = is_linear(&decoded);
             let rgb = decoded.into_rgb32f();
             let (width, height) = (rgb.width() as usize, rgb.height() as usize);
             let decode = |x: f32| if linear { x } else { colour::srgb_decode(x) };
-            Picture { pixels: rgb.pixels().map(|p| p.0.map(decode)).collect(), width, height }
+            Picture { pixels: rgb.pixels().map(|p| p.0.map(decode)).collect(), width, height, note: None }
         }
     };
     if let Some(i) = picture.pixels.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
@@ -199,8 +201,12 @@ pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
         return Err(Error::input(path, format!("expected finite pixels, found {:?} at ({x}, {y})", picture.pixels[i])));
     }
     // Light cannot be negative; a colour outside Rec. 709 can. It is moved to the nearest one inside.
+    let numbers = picture.pixels.iter().flatten().filter(|x| **x < 0.0);
+    let (count, least) = numbers.fold((0u64, 0.0f32), |(count, least), x| (count + 1, least.min(*x)));
+    let note = (count > 0)
+        .then(|| format!("{count} numbers of {} are below 0, the least {least}: taken for 0", path.display()));
     let pixels = picture.pixels.into_iter().map(|p| p.map(|x| x.max(0.0))).collect();
-    Ok(Picture { pixels, ..picture })
+    Ok(Picture { pixels, note, ..picture })
 }
 
 fn is_linear(decoded: &image::DynamicImage) -> bool {
@@ -208,11 +214,16 @@ fn is_linear(decoded: &image::DynamicImage) -> bool {
 }
 
 /// A picture of reflectances from the file `path`, upsampled texel by texel, or of the spectra of a spectral EXR; `raw`
-/// takes 8- and 16-bit values as linear.
+/// takes 8- and 16-bit values as linear. And what was changed in it, where something was.
 ///
 /// # Errors
 /// As [`picture`]; values above one are refused.
-pub fn image_texture(path: &Path, decoded: Decoded, raw: bool, carried: Carried) -> Result<ImageTexture> {
+pub fn image_texture(
+    path: &Path,
+    decoded: Decoded,
+    raw: bool,
+    carried: Carried,
+) -> Result<(ImageTexture, Option<String>)> {
     let make = |texels: Texels, width: usize, height: usize| ImageTexture {
         texels,
         grid: Grid::new(width, height),
@@ -224,12 +235,13 @@ pub fn image_texture(path: &Path, decoded: Decoded, raw: bool, carried: Carried)
     {
         let Window { width, height, .. } = file.parts[0].window;
         let none = make(Texels::each(Vec::new()), width as usize, height as usize);
-        return Ok(ImageTexture { bands: Some(bands), ..none });
+        return Ok((ImageTexture { bands: Some(bands), ..none }, None));
     }
     match decoded {
         Decoded::Bytes { rgb, width, height, counted } => {
             let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };
-            Ok(make(upsampled_bytes(counted.unwrap_or_else(|| count(&rgb)), &level, carried), width, height))
+            let texels = upsampled_bytes(counted.unwrap_or_else(|| count(&rgb)), &level, carried);
+            Ok((make(texels, width, height), None))
         }
         Decoded::Other(decoded) if !is_linear(&decoded) => {
             let (width, height) = (decoded.width() as usize, decoded.height() as usize);
@@ -239,7 +251,8 @@ pub fn image_texture(path: &Path, decoded: Decoded, raw: bool, carried: Carried)
             };
             let rgb = decoded.into_rgb16();
             let texel = |p: &[u16]| reflectance_texel([level(p[0]), level(p[1]), level(p[2])], carried);
-            Ok(make(Texels::each(rgb.as_raw().par_chunks_exact(3).map(texel).collect()), width, height))
+            let texels = rgb.as_raw().par_chunks_exact(3).map(texel).collect();
+            Ok((make(Texels::each(texels), width, height), None))
         }
         decoded => {
             let picture = picture(path, decoded)?;
@@ -252,7 +265,7 @@ pub fn image_texture(path: &Path, decoded: Decoded, raw: bool, carried: Carried)
                 ));
             }
             let texels = picture.pixels.par_iter().map(|&rgb| reflectance_texel(rgb, carried)).collect();
-            Ok(make(Texels::each(texels), picture.width, picture.height))
+            Ok((make(Texels::each(texels), picture.width, picture.height), picture.note))
         }
     }
 }
@@ -384,6 +397,18 @@ mod tests {
         }
         std::fs::write(&path, [whole.as_slice(), &[0xff, 1, 2]].concat()).unwrap();
         open(&path).unwrap();
+    }
+
+    #[test]
+    fn negative_numbers_of_a_picture_are_told() {
+        let pixels = [[0.5, -0.25, 0.0], [-2.0, 1.0, -0.0]];
+        let channel = |k: usize| (["R", "G", "B"][k].to_owned(), pixels.iter().map(|p| p[k]).collect());
+        let window = Window::full(2, 1);
+        let part = exr::ExrPart { name: None, window, channels: (0..3).map(channel).collect(), texts: Vec::new() };
+        let file = exr::ExrFile { display: window, chromaticities: None, parts: vec![part] };
+        let picture = picture(Path::new("sky.exr"), Decoded::Exr(file)).unwrap();
+        assert_eq!(picture.pixels, [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        assert_eq!(picture.note.unwrap(), "2 numbers of sky.exr are below 0, the least -2: taken for 0");
     }
 
     /// The same colour gives the same texel by both ways, and each pixel finds its own.

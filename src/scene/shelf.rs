@@ -88,12 +88,12 @@ impl<K: Eq + Hash, V: Clone> Kept<K, V> {
 pub struct Shelf {
     /// What they are made for: others have a shelf of their own.
     pub carried: Carried,
-    /// Pictures as colours, raw or not.
-    pub colours: Kept<bool, ImageTexture>,
+    /// Pictures as colours, raw or not, and what was changed in them.
+    pub colours: Kept<bool, (ImageTexture, Option<String>)>,
     /// Pictures as numbers, raw or not.
     pub numbers: Kept<bool, DataImage>,
     /// Maps of light, by what makes one differ from another of the same file: turns, scale and mapping, as bits.
-    pub skies: Kept<Vec<u64>, Arc<Environment>>,
+    pub skies: Kept<Vec<u64>, (Arc<Environment>, Option<String>)>,
     /// Meshes, by their index in the file.
     pub meshes: Kept<u32, Arc<MeshSource>>,
 }

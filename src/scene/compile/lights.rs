@@ -124,13 +124,15 @@ impl<'a> Compiler<'a> {
                     {
                         let size = [file.parts[0].window.width, file.parts[0].window.height].map(|n| n as usize);
                         let map = Environment::of_bands(bands, size, l.scale, mapping, l.world_from_map());
-                        return map.map(Arc::new).map_err(|message| Error::input(&l.file, message));
+                        return map.map(|map| (Arc::new(map), None)).map_err(|message| Error::input(&l.file, message));
                     }
-                    let load::Picture { pixels, width, height } = load::picture(&l.file, decoded)?;
+                    let load::Picture { pixels, width, height, note } = load::picture(&l.file, decoded)?;
                     let map = Environment::new(&pixels, [width, height], l.scale, mapping, l.world_from_map(), carried);
-                    Ok(Arc::new(map))
+                    Ok((Arc::new(map), note))
                 });
-                Light::Environment(map.map_err(|e| self.asked(&format!("{at}.file"), e))?)
+                let (map, note) = map.map_err(|e| self.asked(&format!("{at}.file"), e))?;
+                note.iter().for_each(|note| self.note(&format!("{at}.file"), note));
+                Light::Environment(map)
             }
             written::Light::Projector(l) => return Ok(self.projector(at, l)),
         }))

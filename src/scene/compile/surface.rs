@@ -137,7 +137,9 @@ impl<'a> Compiler<'a> {
                 let loaded = shelf.colours.get(&image.file, image.raw, || {
                     pictures.take(&image.file).and_then(|p| load::image_texture(&image.file, p, image.raw, carried))
                 });
-                let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
+                let file = format!("{at}.image.file");
+                let (mut loaded, note) = loaded.map_err(|e| self.asked(&file, e))?;
+                note.iter().for_each(|note| self.note(&file, note));
                 loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
                 Texture::Image(loaded)
             }
