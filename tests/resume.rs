@@ -278,3 +278,22 @@ fn a_file_of_bands_that_does_not_hold_is_made_again() {
         assert!(!render() && render());
     }
 }
+
+/// A picture of several parts is there once it is, with all its layers.
+#[test]
+fn a_picture_of_several_parts_is_not_rendered_again() {
+    let scene = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nimage: {width: 8, height: 8}\n\
+                 render: {samples: 4}\noutput: {exr: {layout: multipart}}\nlayers: [normal, crypto_object]\n\
+                 shapes: [{sphere: {radius: 1}}]\nlights: [{constant: {radiance: 1}}]\n";
+    let place = Place::of(scene);
+    let render = || {
+        let ran = place.run(&["render", "scene.yaml", "-o", "out", "--skip-existing", "--progress", "plain"]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        ran.out.contains("1 of 1 were there already")
+    };
+    assert!(!render() && render());
+    let file = place.path("out/scene.exr");
+    let whole = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &whole[..whole.len() - 40]).unwrap();
+    assert!(!render() && render());
+}

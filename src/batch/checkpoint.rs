@@ -255,9 +255,11 @@ enum Holds {
 /// [`picture_holds`] of one of its EXR files.
 fn exr_holds(path: &Path, finish: &Finish, holds: Holds) -> bool {
     exr::read_exr(path).is_ok_and(|file| {
-        let [part] = file.parts.as_slice() else { return false };
+        // What is said of the whole file stands in its first part.
+        let part = &file.parts[0];
         let found = part.text("spectralLayoutVersion").map_or(Holds::Colours, |_| Holds::Bands);
-        let channels = part.channels.iter().map(|(name, plane)| (name.as_str(), plane.as_slice()));
+        let channels = file.parts.iter().flat_map(|part| &part.channels);
+        let channels = channels.map(|(name, plane)| (name.as_str(), plane.as_slice()));
         let expected = [
             ("abbe/version", env!("CARGO_PKG_VERSION").to_owned()),
             ("abbe/sceneHash", finish.scene_hash.clone()),

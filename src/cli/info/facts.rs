@@ -122,9 +122,9 @@ pub fn of(path: &Path) -> Result<ExrFacts> {
     };
     let file = if unread.is_none() { Some(read_exr(path)?) } else { None };
     let as_written = file.as_ref().and_then(|file| {
-        let [part] = file.parts.as_slice() else { return None };
-        let channels = part.channels.iter().map(|(name, plane)| (name.as_str(), plane.as_slice()));
-        part.text("abbe/contentHash").map(|hash| hash == content_hash(channels))
+        let channels = file.parts.iter().flat_map(|part| &part.channels);
+        let channels = channels.map(|(name, plane)| (name.as_str(), plane.as_slice()));
+        file.parts[0].text("abbe/contentHash").map(|hash| hash == content_hash(channels))
     });
     let Headers { parts, .. } = headers;
     let frame = parts[0].window("displayWindow").unwrap_or(Window::full(0, 0));
