@@ -527,11 +527,9 @@ mod tests {
         match error {
             Error::Config(text) => text.lines().all(placed),
             Error::Input { .. } => true,
-            Error::Output { .. }
-            | Error::Threads { .. }
-            | Error::Render(_)
-            | Error::Memory(_)
-            | Error::Stopped(_) => false,
+            Error::Output { .. } | Error::Threads { .. } | Error::Render(_) | Error::Memory(_) | Error::Stopped(_) => {
+                false
+            }
         }
     }
 

@@ -4,7 +4,8 @@ use super::bands::Bands;
 use super::texture::{DataImage, Grid, ImageTexture, Numbers, Texel, Texels};
 use crate::error::{Error, Result};
 use crate::film::{Window, exr};
-use crate::spectrum::{Carried, colour};
+use crate::spectrum::Carried;
+use crate::spectrum::colour::{self, ColourSpace};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -167,7 +168,7 @@ fn words(e: &std::io::Error) -> String {
     }
 }
 
-/// A picture of light from the file `path`: EXR and HDR as they are, 8- and 16-bit files decoded from sRGB.
+/// A picture of light from the file `path`: EXR by its chromaticities, HDR as it is, 8- and 16-bit files decoded from sRGB.
 ///
 /// # Errors
 /// [`Error::Input`] where a pixel is not finite.
@@ -180,7 +181,10 @@ pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
                 found.ok_or_else(|| Error::input(path, format!("expected channels R, G, B; found no {name}")))
             };
             let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
-            let pixels = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+            let mut pixels: Vec<[f32; 3]> = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+            if let Some(m) = other_primaries(path, &file)? {
+                pixels.iter_mut().for_each(|p| *p = colour::times(m, p.map(f64::from)).map(|x| x as f32));
+            }
             Picture { pixels, width: part.window.width as usize, height: part.window.height as usize, note: None }
         }
         Decoded::Bytes { rgb, width, height, .. } => {
@@ -207,6 +211,28 @@ pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
         .then(|| format!("{count} numbers of {} are below 0, the least {least}: taken for 0", path.display()));
     let pixels = picture.pixels.into_iter().map(|p| p.map(|x| x.max(0.0))).collect();
     Ok(Picture { pixels, note, ..picture })
+}
+
+/// The matrix to Rec. 709 from what a file says its colours are, where they are others.
+///
+/// # Errors
+/// [`Error::Input`] where they are none.
+fn other_primaries(path: &Path, file: &exr::ExrFile) -> Result<Option<[[f64; 3]; 3]>> {
+    // To the digits that standards print.
+    const SAME: f64 = 1e-3;
+    let Some(primaries) = file.chromaticities.map(|all| all.map(|xy| xy.map(f64::from))) else { return Ok(None) };
+    let is = |space: &ColourSpace| {
+        let own = space.chromaticities();
+        primaries.iter().flatten().zip(own.iter().flatten()).all(|(a, b)| (a - b).abs() <= SAME)
+    };
+    match ColourSpace::ALL.into_iter().find(is) {
+        Some(ColourSpace::Rec709) => return Ok(None),
+        Some(space) => return Ok(Some(space.to_rec709())),
+        None => {}
+    }
+    let expected = "expected chromaticities of red, green, blue and white that span colours";
+    let matrix = colour::rec709_from(primaries);
+    matrix.map(Some).ok_or_else(|| Error::input(path, format!("{expected}, found {primaries:?}")))
 }
 
 fn is_linear(decoded: &image::DynamicImage) -> bool {
@@ -409,6 +435,28 @@ mod tests {
         let picture = picture(Path::new("sky.exr"), Decoded::Exr(file)).unwrap();
         assert_eq!(picture.pixels, [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         assert_eq!(picture.note.unwrap(), "2 numbers of sky.exr are below 0, the least -2: taken for 0");
+    }
+
+    /// The primaries of ACEScg and white, as Abbe itself writes them, come back as the Rec. 709 that was written; to f32.
+    #[test]
+    fn colours_are_read_by_the_chromaticities_of_the_file() {
+        let seen = [[0.9f32, 0.1, 0.2], [0.5, 0.5, 0.5], [0.02, 0.7, 0.3]];
+        let xyz = seen.map(|rgb| ColourSpace::Rec709.to_xyz(rgb));
+        for space in ColourSpace::ALL {
+            let written = xyz.map(|xyz| space.from_xyz(xyz));
+            let channel = |k: usize| (["R", "G", "B"][k].to_owned(), written.iter().map(|p| p[k]).collect());
+            let window = Window::full(3, 1);
+            let part = exr::ExrPart { name: None, window, channels: (0..3).map(channel).collect(), texts: Vec::new() };
+            let chromaticities = Some(space.chromaticities().map(|xy| xy.map(|x| x as f32)));
+            let file = exr::ExrFile { display: window, chromaticities, parts: vec![part] };
+            let read = picture(Path::new("sky.exr"), Decoded::Exr(file)).unwrap();
+            for (found, expected) in read.pixels.iter().flatten().zip(seen.iter().flatten()) {
+                assert!((found - expected).abs() < 3e-6, "{space:?} {found} {expected}");
+            }
+        }
+        let nothing =
+            exr::ExrFile { display: Window::full(1, 1), chromaticities: Some([[0.3, 0.3]; 4]), parts: Vec::new() };
+        assert!(other_primaries(Path::new("sky.exr"), &nothing).unwrap_err().to_string().contains("span colours"));
     }
 
     /// The same colour gives the same texel by both ways, and each pixel finds its own.

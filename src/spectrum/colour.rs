@@ -183,6 +183,15 @@ pub fn adapted_to_d65(white: [f64; 2]) -> Option<Matrix> {
     (real && times(BRADFORD, xyz_of(white)).iter().all(|response| *response > 0.0)).then(|| adaptation(white, D65))
 }
 
+/// The matrix to linear Rec. 709 from RGB with these chromaticities of red, green, blue and white, which becomes D65 as Bradford
+/// has it. `None` where they span no colours, or the white is none.
+#[must_use]
+pub fn rec709_from(primaries: [[f64; 2]; 4]) -> Option<Matrix> {
+    let to_xyz = primaries_matrix(primaries);
+    let m = multiply(ColourSpace::Rec709.matrix_from_xyz(), multiply(adapted_to_d65(primaries[3])?, to_xyz));
+    m.iter().flatten().all(|x| x.is_finite()).then_some(m)
+}
+
 /// The matrix from XYZ under D65 to XYZ under D50, the white of ICC profiles.
 #[must_use]
 pub fn d50_from_d65() -> Matrix {
