@@ -1,7 +1,8 @@
 //! Parts to a picture: the pixels of the one-process render, bit for bit, or a word on what is wrong.
 //!
-//! All headers are read first: parts of other pictures, gaps and overlaps are told before any sum is read. Then one part
-//! after the other is added, row by row, so that memory does not grow with their number.
+//! All headers are read first: parts of other pictures, gaps and overlaps are told before any sum is read. Then all
+//! are read in parallel and added row by row: tiles into films of their own first, whole pictures one at a time. Memory grows with
+//! the threads, not with the parts.
 
 use super::finish;
 use super::frame::{Frame, lock};

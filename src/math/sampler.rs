@@ -5,8 +5,8 @@
 //!
 //! Owen-scrambled Sobol points in sets of four dimensions, padded by hashed shuffles: Burley
 //! 2020, "Practical Hash-based Owen Scrambling". The first four dimensions are those of Joe and
-//! Kuo 2008. A set is a (0, 4)-sequence in each of its dimensions and keeps that structure in
-//! every block of 2ᵐ consecutive samples.
+//! Kuo 2008. A set is a (0, 1)-sequence in base 2 in each of its dimensions and a (0, 2)-sequence in
+//! the first two, and keeps that structure in every aligned block of 2ᵐ consecutive samples.
 
 use glam::DVec2;
 use std::cell::Cell;

@@ -79,7 +79,7 @@ impl Angles {
 /// What the viewer's direction decides.
 struct Seen {
     wo: Angles,
-    /// sin γ, the offset from the axis; −1 to 1.
+    /// γ, radians: sin γ is the offset from the axis in radii.
     gamma: f64,
     /// The angle within.
     gamma_t: f64,

@@ -39,7 +39,7 @@ pub enum Light {
         /// W·sr⁻¹·nm⁻¹.
         intensity: Spectrum,
     },
-    /// A point that shines in a cone, full within `cos_beam` and falling linearly in the angle to
+    /// A point that shines in a cone, full within `beam` and falling linearly in the angle to
     /// nothing at `cutoff`.
     Spot {
         /// Where.

@@ -230,7 +230,7 @@ impl Near {
         &self.keys[..self.count]
     }
 
-    /// What lies around a corner or on the other side of a sheet is another surface.
+    /// What lies around a corner is another surface. Both sides of a sheet count: f says what comes through.
     #[inline]
     fn holds<L>(&self, photon: &Photon<L>) -> bool {
         (photon.point - self.point).length_squared() <= self.radius_squared

@@ -136,7 +136,7 @@ fn the_camera_may_be_anywhere() {
     hold(&cases);
 }
 
-/// A thousand lamps of all strengths on a ring at distance 1 from the middle of a floor, raised by half a turn: together
+/// Three hundred lamps of all strengths on a ring at distance 1 from the middle of a floor, raised by half a turn: together
 /// E = π Σ L r² cos 60°, and back comes ρ E/π.
 #[test]
 fn many_lamps_of_all_strengths_add_up() {

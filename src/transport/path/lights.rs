@@ -8,7 +8,7 @@ use crate::transport::shadow::Shadow;
 use crate::transport::ways::{First, Found};
 use glam::{DVec2, DVec3};
 
-/// The power heuristic for densities `a` and `b`, safe for any finite and infinite values.
+/// The power heuristic for densities `a` and `b`, safe for any values that are not both infinite.
 pub(super) fn power_heuristic(a: f64, b: f64) -> f64 {
     if a <= 0.0 {
         return 0.0;
