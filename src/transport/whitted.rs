@@ -9,6 +9,7 @@
 use super::Incoming;
 use super::path::seen_normal;
 use super::plan::{EffectPlan, WhittedSettings};
+use super::shadow::MAX_BOUNDARIES;
 use crate::math::{Departure, Frame, Ray};
 use crate::optics::bsdf::Pane;
 use crate::optics::dielectric::{RelativeIndex, refract};
@@ -41,11 +42,11 @@ pub fn radiance(
     ray: &Ray,
 ) -> Incoming {
     let tracer = Tracer { scene, plan, settings, nm: wavelengths.nm };
-    let (radiance, first) = tracer.trace(ray, scene.camera_inside, Lanes::ONE, 0);
+    let seen = tracer.trace(ray, scene.camera_inside, Lanes::ONE, 0);
     Incoming {
-        radiance,
-        alpha: if first.is_some() { 1.0 } else { 0.0 },
-        depth: first.map_or(f64::INFINITY, |point| scene.camera.depth(point)),
+        radiance: seen.light,
+        alpha: 1.0 - seen.open,
+        depth: seen.first.map_or(f64::INFINITY, |point| scene.camera.depth(point)),
         ..Incoming::NONE
     }
 }
@@ -55,6 +56,27 @@ struct Tracer<'a> {
     plan: &'a EffectPlan,
     settings: &'a WhittedSettings,
     nm: Lanes,
+}
+
+/// What a ray brings.
+struct Arrived {
+    light: Lanes,
+    /// Share that nothing covers.
+    open: f32,
+    /// The first point that covers some of it.
+    first: Option<DVec3>,
+}
+
+/// What a surface does with the light of one direction.
+struct Sent {
+    /// Sent to the viewer.
+    light: Lanes,
+    /// Share of what is behind that comes straight through.
+    straight: f64,
+}
+
+impl Sent {
+    const NOTHING: Sent = Sent { light: Lanes::ZERO, straight: 0.0 };
 }
 
 /// What is on the two sides of a surface.
@@ -87,59 +109,77 @@ struct Seen<'a> {
 }
 
 impl Tracer<'_> {
-    /// Light along `ray` for the lanes in which `weight`, the share that reaches the eye, is not zero;
-    /// and the first point met.
-    fn trace(&self, ray: &Ray, inside: Inside, weight: Lanes, depth: u32) -> (Lanes, Option<DVec3>) {
+    /// What arrives along `ray`, for the lanes in which `weight`, the share that reaches the eye, is not zero.
+    fn trace(&self, ray: &Ray, mut inside: Inside, weight: Lanes, depth: u32) -> Arrived {
         let scene = self.scene;
-        let Some(hit) = scene.closest(ray, f64::INFINITY) else {
-            let all = &scene.backgrounds;
-            let sky = all.iter().map(|&i| scene.lights[i as usize].background(ray.direction, self.nm));
-            return (sky.fold(Lanes::ZERO, |a, b| a + b), None);
-        };
-        let surface = scene.surface(ray, &hit);
-        let object = &scene.objects[hit.object as usize];
-        let material = &scene.materials[object.material as usize];
-        let wo = -ray.direction;
-        let crossing = scene.crossing(object, &surface, ray.direction, &inside.bodies);
-        if matches!(material.kind, Kind::Boundary) || crossing.is_some_and(|crossing| !crossing.shows) {
+        let mut ray = *ray;
+        let mut arrived = Arrived { light: Lanes::ZERO, open: 1.0, first: None };
+        // What goes straight on does so here, and only mirrors and glass by recursion.
+        for _ in 0..=MAX_BOUNDARIES {
+            let Some(hit) = scene.closest(&ray, f64::INFINITY) else {
+                let all = &scene.backgrounds;
+                let sky = all.iter().map(|&i| scene.lights[i as usize].background(ray.direction, self.nm));
+                arrived.light += sky.fold(Lanes::ZERO, |a, b| a + b) * arrived.open;
+                return arrived;
+            };
+            let surface = scene.surface(&ray, &hit);
+            let object = &scene.objects[hit.object as usize];
+            let material = &scene.materials[object.material as usize];
+            let wo = -ray.direction;
+            let crossing = scene.crossing(object, &surface, ray.direction, &inside.bodies);
+            let hidden = crossing.is_some_and(|crossing| !crossing.shows);
             let beyond = scene.beyond(object, &surface, ray.direction, inside);
-            return self.trace(&scene.leave(&surface, &hit, ray.direction), beyond, weight, depth);
+            if !hidden && !matches!(material.kind, Kind::Boundary) {
+                let standpoint = Standpoint {
+                    here: crossing.map_or(inside, |crossing| Inside { bodies: crossing.here, ..inside }),
+                    beyond,
+                    around: crossing.and_then(|crossing| crossing.around),
+                };
+                let emitted =
+                    object.light.map_or(Lanes::ZERO, |l| scene.lights[l as usize].emitted(&surface, &hit, wo, self.nm));
+                let vertex = Vertex { scene, hit: &hit, surface: &surface, at: &hit.texture_point(&surface), wo };
+                let standing = Standing::new(seen_normal(&surface, wo), surface.tangent);
+                let at = Meeting { x: &vertex, standpoint };
+                let sent = self.scattered(&at, material, standing, weight * arrived.open, depth);
+                arrived.light += (emitted + sent.light) * arrived.open;
+                let straight = sent.straight as f32;
+                if straight < 1.0 {
+                    arrived.first.get_or_insert(surface.point);
+                }
+                arrived.open *= straight;
+                if !visible(weight * arrived.open) {
+                    return arrived;
+                }
+            }
+            inside = beyond;
+            ray = scene.leave(&surface, &hit, ray.direction);
         }
-        let standpoint = Standpoint {
-            here: crossing.map_or(inside, |crossing| Inside { bodies: crossing.here, ..inside }),
-            beyond: scene.beyond(object, &surface, ray.direction, inside),
-            around: crossing.and_then(|crossing| crossing.around),
-        };
-
-        let emitted =
-            object.light.map_or(Lanes::ZERO, |l| scene.lights[l as usize].emitted(&surface, &hit, wo, self.nm));
-        let vertex = Vertex { scene, hit: &hit, surface: &surface, at: &hit.texture_point(&surface), wo };
-        let standing = Standing::new(seen_normal(&surface, wo), surface.tangent);
-        let at = Meeting { x: &vertex, standpoint };
-        (emitted + self.scattered(&at, material, standing, weight, depth), Some(surface.point))
+        arrived
     }
 
-    /// Light that a material sends to the viewer: a material made of others sends the sum of theirs.
-    fn scattered(&self, at: &Meeting, material: &Material, mut standing: Standing, weight: Lanes, depth: u32) -> Lanes {
-        let Meeting { x, standpoint } = at;
-        let part = |share: f64, light: &dyn Fn(Lanes) -> Lanes| {
+    /// What a material does: one made of others does the sum of what they do.
+    fn scattered(&self, at: &Meeting, material: &Material, mut standing: Standing, weight: Lanes, depth: u32) -> Sent {
+        let Meeting { x, .. } = at;
+        let part = |share: f64, inner: &Material| {
             let onward = weight * share as f32;
-            let visible = onward.simd_gt(Lanes::splat(FAINTEST)).any();
-            if visible { light(onward) * share as f32 } else { Lanes::ZERO }
+            if !visible(onward) {
+                return Sent::NOTHING;
+            }
+            let Sent { light, straight } = self.scattered(at, inner, standing, onward, depth);
+            Sent { light: light * share as f32, straight: straight * share }
         };
-        let straight =
-            |weight: Lanes| self.trace(&self.scene.leave(x.surface, x.hit, -x.wo), standpoint.beyond, weight, depth).0;
         let outside = x.wo.dot(x.surface.normal) > 0.0;
         if let Some(compound) = material.compound() {
             return match &compound.composition {
                 Composition::Mask { opacity, inner } => {
                     let opacity = share(opacity, x.at);
-                    part(opacity, &|w| self.scattered(at, inner, standing, w, depth)) + part(1.0 - opacity, &straight)
+                    let Sent { light, straight } = part(opacity, inner);
+                    Sent { light, straight: straight + (1.0 - opacity) }
                 }
                 Composition::Blend { weight: second_share, first, second } => {
                     let share = share(second_share, x.at);
-                    part(1.0 - share, &|w| self.scattered(at, first, standing, w, depth))
-                        + part(share, &|w| self.scattered(at, second, standing, w, depth))
+                    let (first, second) = (part(1.0 - share, first), part(share, second));
+                    Sent { light: first.light + second.light, straight: first.straight + second.straight }
                 }
                 Composition::TwoSided { front, .. } if outside => self.scattered(at, front, standing, weight, depth),
                 Composition::TwoSided { back, .. } => {
@@ -153,20 +193,21 @@ impl Tracer<'_> {
             };
         }
         if matches!(material.kind, Kind::Boundary) {
-            return straight(weight);
+            return Sent { light: Lanes::ZERO, straight: 1.0 };
         }
         if !outside && material.two_sided {
             standing.mirror();
         }
         if !outside && !standing.is_mirrored() && !material.transmits() {
-            return Lanes::ZERO;
+            return Sent::NOTHING;
         }
-        let seen = Seen { x, standpoint, material, normal: standing.frame().n, slopes: standing.slopes() };
+        let seen =
+            Seen { x, standpoint: &at.standpoint, material, normal: standing.frame().n, slopes: standing.slopes() };
         let mut light = self.shade(&seen);
         if depth < self.settings.max_depth {
             light += self.specular(&seen, weight, depth);
         }
-        light
+        Sent { light, straight: 0.0 }
     }
 
     /// Ambient light, and from each light the diffuse part and the highlight.
@@ -307,8 +348,8 @@ impl Tracer<'_> {
         let follow = |share: Lanes, wi: DVec3, inside: Inside| -> Lanes {
             let share = share * slopes.shadowing(wi) as f32;
             let onward = weight * share;
-            if onward.simd_gt(Lanes::splat(FAINTEST)).any() {
-                self.trace(&leave(wi), inside, onward, depth + 1).0 * share
+            if visible(onward) {
+                self.trace(&leave(wi), inside, onward, depth + 1).light * share
             } else {
                 Lanes::ZERO
             }
@@ -410,6 +451,11 @@ impl Tracer<'_> {
             }
         }
     }
+}
+
+/// Whether a ray of which `weight` reaches the eye is followed.
+fn visible(weight: Lanes) -> bool {
+    weight.simd_gt(Lanes::splat(FAINTEST)).any()
 }
 
 /// strength · cosⁿ, zero on the far side.
