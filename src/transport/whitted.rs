@@ -29,9 +29,6 @@ use std::f64::consts::PI;
 /// brightest radiance in the scene for each branch that is cut.
 const FAINTEST: f32 = 1.0 / 65_536.0;
 
-/// Transparent surfaces that a shadow ray crosses at the most.
-const MAX_PANES: u32 = 64;
-
 /// Light that arrives along a camera ray.
 #[must_use]
 pub fn radiance(
@@ -288,7 +285,7 @@ impl Tracer<'_> {
             return if scene.occluded(ray, distance, target) { Lanes::ZERO } else { Lanes::ONE };
         }
         let (mut ray, mut left, mut through) = (*ray, distance, Lanes::ONE);
-        for _ in 0..MAX_PANES {
+        for _ in 0..=MAX_BOUNDARIES {
             let Some(hit) = scene.closest(&ray, left).filter(|h| !scene.reaches(&ray, h, target)) else {
                 return through;
             };

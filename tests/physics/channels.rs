@@ -158,6 +158,27 @@ fn light_goes_straight_through_256_surfaces_at_the_most() {
     }
 }
 
+/// A lamp over a hundred open masks lights the floor below as if there were none.
+#[test]
+fn shadow_rays_of_whitted_go_straight_through_as_camera_rays_do() {
+    let floor = |count: u32| {
+        let mut scene = "camera: {origin: [3, 3, 0], target: [0, 0, 0], fov_deg: 10}\nimage: {width: 1, height: 1}\n\
+             integrator: {whitted: {}}\nlights: [{point: {position: [0, 9, 0], intensity: 30}}]\n\
+             materials: {open: {mask: {opacity: 0, material: {diffuse: {}}}}}\n\
+             shapes:\n- plane: {normal: [0, 1, 0]}\n"
+            .to_owned();
+        for i in 0..count {
+            let y = 5.0 + 1e-3 * f64::from(i);
+            scene += &format!(
+                "- rectangle: {{corner: [-1, {y}, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2], material: open}}\n"
+            );
+        }
+        bench_with(&scene, &[]).sample([0, 0], 0).radiance.to_array()[0]
+    };
+    let (bare, behind) = (floor(0), floor(100));
+    assert!(bare > 0.0 && (behind / bare - 1.0).abs() < 1e-6, "{bare} {behind}");
+}
+
 /// A mask covers as much as its opacity, and fog is that of the depth of what covers anything. The ambient light of 1 shows
 /// the white mask, and the sky behind it has 3.
 #[test]
