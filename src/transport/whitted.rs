@@ -39,7 +39,7 @@ pub fn radiance(
     ray: &Ray,
 ) -> Incoming {
     let tracer = Tracer { scene, plan, settings, nm: wavelengths.nm };
-    let seen = tracer.trace(ray, scene.camera_inside, Lanes::ONE, 0);
+    let seen = tracer.trace(ray, scene.camera_inside, Lanes::ONE, 0, scene.camera.reach(ray));
     Incoming {
         radiance: seen.light,
         alpha: 1.0 - seen.open,
@@ -106,19 +106,21 @@ struct Seen<'a> {
 }
 
 impl Tracer<'_> {
-    /// What arrives along `ray`, for the lanes in which `weight`, the share that reaches the eye, is not zero.
-    fn trace(&self, ray: &Ray, mut inside: Inside, weight: Lanes, depth: u32) -> Arrived {
+    /// What arrives along `ray` from no farther than `reach`, for the lanes in which `weight`, the share that reaches the eye,
+    /// is not zero. As in `path`, the bound is on what is met first.
+    fn trace(&self, ray: &Ray, mut inside: Inside, weight: Lanes, depth: u32, mut reach: f64) -> Arrived {
         let scene = self.scene;
         let mut ray = *ray;
         let mut arrived = Arrived { light: Lanes::ZERO, open: 1.0, first: None };
         // What goes straight on does so here, and only mirrors and glass by recursion.
         for _ in 0..=MAX_BOUNDARIES {
-            let Some(hit) = scene.closest(&ray, f64::INFINITY) else {
+            let Some(hit) = scene.closest(&ray, reach) else {
                 let all = &scene.backgrounds;
                 let sky = all.iter().map(|&i| scene.lights[i as usize].background(ray.direction, self.nm));
                 arrived.light += sky.fold(Lanes::ZERO, |a, b| a + b) * arrived.open;
                 return arrived;
             };
+            reach = f64::INFINITY;
             let surface = scene.surface(&ray, &hit);
             let object = &scene.objects[hit.object as usize];
             let material = &scene.materials[object.material as usize];
@@ -346,7 +348,7 @@ impl Tracer<'_> {
             let share = share * slopes.shadowing(wi) as f32;
             let onward = weight * share;
             if visible(onward) {
-                self.trace(&leave(wi), inside, onward, depth + 1).light * share
+                self.trace(&leave(wi), inside, onward, depth + 1, f64::INFINITY).light * share
             } else {
                 Lanes::ZERO
             }

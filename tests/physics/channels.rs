@@ -324,16 +324,28 @@ fn hidden_lights_shine_and_are_not_seen() {
 /// open, and what the camera sees is the inside.
 #[test]
 fn the_camera_sees_between_its_clipping_planes_only() {
-    let depth = |clip: &str| {
+    let see = |integrator: &str, clip: &str| {
         let camera = PARALLEL.replace("height: 2", &format!("height: 0.01, clip: {{{clip}}}"));
         let frame = render(&format!(
-            "{camera}image: {{width: 1, height: 1}}\nrender: {{samples: 4}}\nlayers: [{{name: d, surface: depth}}]\n\
-             shapes: [{{sphere: {{radius: 1}}}}]\n"
+            "{camera}image: {{width: 1, height: 1}}\nrender: {{samples: 4}}\nintegrator: {integrator}\n\
+             lights: [{{constant: {{radiance: 1}}}}]\nlayers: [{{name: d, surface: depth}}]\n\
+             shapes: [{{sphere: {{radius: 1, material: {{diffuse: {{reflectance: 0}}}}}}}}]\n"
         ));
-        f64::from(frame.layer(0)[0])
+        let Image { rgb, alpha, .. } = frame.resolve(&ColourSpace::Xyz.matrix_from_xyz());
+        (f64::from(frame.layer(0)[0]), rgb[1][0], alpha[0])
     };
-    // Half the picture is 5 mm wide: the sphere is at most 2.5e-5 m off there.
-    for (clip, expected) in [("near: 0", 4.0), ("near: 3.5", 0.5), ("near: 4.5", 1.5), ("near: 4.5, far: 5.5", 0.0)] {
-        assert!((depth(clip) - expected).abs() < 3e-5, "{clip}: {}", depth(clip));
+    for integrator in ["path", "{whitted: {}}"] {
+        // Half the picture is 5 mm wide: the sphere is at most 2.5e-5 m off there.
+        for (clip, expected) in [("near: 0", 4.0), ("near: 3.5", 0.5), ("near: 4.5", 1.5), ("near: 4.5, far: 5.5", 0.0)]
+        {
+            let (depth, light, alpha) = see(integrator, clip);
+            assert!((depth - expected).abs() < 3e-5, "{integrator} {clip}: {depth}");
+            // The sphere is black, and the sky behind it is not.
+            assert_eq!(
+                (light > 0.0, alpha),
+                if expected > 0.0 { (false, 1.0) } else { (true, 0.0) },
+                "{integrator} {clip}"
+            );
+        }
     }
 }
