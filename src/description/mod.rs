@@ -54,7 +54,8 @@
 //!                                   #   depth: the distance to the first surface, m; none: black
 //!                                   # max_depth of a path counts segments: 1 emission, 2 direct light;
 //!                                   # hide_emitters: lights that the camera sees itself are left out;
-//!                                   # light_samples, scatter_samples: rays at the first surface, 0 for none at all
+//!                                   # light_samples, scatter_samples: each sample follows as many whole paths as the
+//!                                   # greater says; 0: without shadow rays, or without light met by scattering
 //! layers:                           # further channels of the OpenEXR file, each name.COMPONENT; default none
 //! - {name: nn, surface: shading_normal}         # of the first surface: depth (T), position (X, Y, Z), uv (U, V),
 //!                                   # geometric_normal, shading_normal, dp_du, dp_dv (X, Y, Z), duv_dx, duv_dy (U, V),

@@ -48,12 +48,12 @@ pub struct PathIntegrator {
     /// Whether light from infinity counts as coverage; default false.
     #[serde(default)]
     pub opaque_sky: bool,
-    /// Shadow rays at the first surface; with 0 lights are only met by chance, and those without extent never;
-    /// default 1.
+    /// Paths that one sample follows from its camera ray, if more than `scatter_samples`; with 0 lights are only met by chance,
+    /// and those without extent never; default 1.
     #[serde(default = "one")]
     pub light_samples: u32,
-    /// Scattered rays at the first surface; with 0 light arrives by shadow rays only, and mirrors are black;
-    /// default 1.
+    /// Paths that one sample follows from its camera ray, if more than `light_samples`; with 0 light arrives by shadow rays
+    /// only, and mirrors are black; default 1.
     #[serde(default = "one")]
     pub scatter_samples: u32,
     /// Whether going straight through a thin pane or the boundary of a medium ends a segment for `max_depth`;
@@ -317,7 +317,7 @@ pub enum Wavelengths {
 /// The most rays per pixel and side of the `whitted` integrator: 2²⁰ a pixel.
 const MAX_GRID: u32 = 1024;
 
-/// The most shadow rays and scattered rays at the first surface.
+/// The most paths from one camera ray.
 const MAX_SPLIT: u32 = 65_536;
 
 impl Integrator {

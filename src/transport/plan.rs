@@ -50,9 +50,9 @@ pub struct PathSettings {
     pub hide_emitters: bool,
     /// Whether light from infinity covers what is behind the picture.
     pub opaque_sky: bool,
-    /// Shadow rays at the first surface; 0 leaves next-event estimation out everywhere.
+    /// Paths from each camera ray, if more than `scatter_samples`; 0 leaves next-event estimation out everywhere.
     pub light_samples: u32,
-    /// Scattered rays at the first surface; 0 leaves light met by scattering out everywhere.
+    /// Paths from each camera ray, if more than `light_samples`; 0 leaves light met by scattering out everywhere.
     pub scatter_samples: u32,
     /// Whether going straight through a pane or a boundary ends a segment for `max_depth`.
     pub count_crossings: bool,

@@ -132,6 +132,17 @@ fn each_technique_alone_has_the_same_mean() {
     assert_agree("three of each", &one("light_samples: 3, scatter_samples: 3"), &both);
 }
 
+/// The greater of the two counts is that of the paths: which of them it is makes no difference.
+#[test]
+fn counts_of_shadow_and_scattered_rays_are_counts_of_paths() {
+    let light = "lights: [{constant: {radiance: 0.5}}]\n";
+    let scene = corner("path", "", "{diffuse: {}}", light).replace("samples: 128", "samples: 4");
+    let with = |samples: &str| render(&scene.replace("max_depth: 4", &format!("max_depth: 4, {samples}"))).film;
+    let both = with("light_samples: 3, scatter_samples: 3");
+    assert!(with("light_samples: 3") == both && with("scatter_samples: 3") == both);
+    assert!(with("light_samples: 1") != both);
+}
+
 /// The sky is seen behind 256 surfaces in a row that hide nothing, and behind more there is none, whatever their number.
 #[test]
 fn light_goes_straight_through_256_surfaces_at_the_most() {
