@@ -25,7 +25,7 @@ pub mod tev;
 use crate::description::{self, BatchEntry, LayerContent, PathMap, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
-use crate::film::accumulate::Film;
+use crate::film::accumulate::{Film, REPLICATES, SAMPLES_LIMIT};
 use crate::film::filter::{Filter, FilterSampler};
 use crate::film::output::{self, Inputs};
 use crate::scene::Scene;
@@ -51,6 +51,9 @@ use stop::{Forecast, Stop};
 
 /// Scenes whose reports are put in one place at a time.
 const GATHERED: usize = 64;
+
+/// What may be written is what a film holds.
+const _: () = assert!(description::SAMPLES_LIMIT == SAMPLES_LIMIT * REPLICATES as u32);
 
 /// What the command line says over the files.
 #[derive(Clone, Debug, Default)]

@@ -16,6 +16,7 @@ mod progress;
 mod render;
 mod text;
 
+use crate::description::SAMPLES_LIMIT;
 use crate::error::{Error, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::io::Write;
@@ -81,7 +82,7 @@ struct SceneArguments {
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = name_value)]
     define: Vec<(String, String)>,
     /// Samples a pixel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(SAMPLES_LIMIT)))]
     spp: Option<u32>,
     /// Seed of all random numbers
     #[arg(long, value_name = "N")]

@@ -450,7 +450,7 @@ mod tests {
                 "DIR/batch.yaml:4:5: render.smaples: expected one of samples, stop, seed, effects, tile, wavelengths, techniques, \
                 frames, seed_per_frame, frames_per_second, \
                  found \"smaples\"; did you mean \"samples\"?\n\
-                 DIR/batch.yaml:8:21: render.samples: expected a whole number of 1 or more, found 0"
+                 DIR/batch.yaml:8:21: render.samples: expected a whole number from 1 to 134217728, found 0"
             );
         });
     }
@@ -473,7 +473,7 @@ mod tests {
         assert_eq!(
             refusal("scenes: []\nrender: {samples: 0}"),
             "DIR/batch.yaml:1:9: scenes: expected at least one scene, found none\n\
-             DIR/batch.yaml:2:19: render.samples: expected a whole number of 1 or more, found 0"
+             DIR/batch.yaml:2:19: render.samples: expected a whole number from 1 to 134217728, found 0"
         );
         assert_eq!(
             refusal("scenes: [{fil: a.yaml}]"),

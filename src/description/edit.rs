@@ -475,7 +475,7 @@ mod tests {
         );
         assert_eq!(
             says("render.samples", "0"),
-            "--set render.samples=0: render.samples: expected a whole number of 1 or more, found 0"
+            "--set render.samples=0: render.samples: expected a whole number from 1 to 134217728, found 0"
         );
         assert_eq!(
             says("render", "[1"),

@@ -451,7 +451,7 @@ pub use print::yaml;
 pub use scene::{Locator, SceneDescription};
 pub use settings::{
     DepthIntegrator, Effects, Integrator, LightTracerIntegrator, MOST_SAMPLES, NoIntegrator, PathIntegrator, Render,
-    Stop, Technique, Techniques, Time, Wavelengths, WhittedIntegrator, duration,
+    SAMPLES_LIMIT, Stop, Technique, Techniques, Time, Wavelengths, WhittedIntegrator, duration,
 };
 pub use shape::{
     Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Geometry, Instance, Layout, Mesh, Normals, Plane, Rectangle,

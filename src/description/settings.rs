@@ -214,6 +214,9 @@ pub struct Stop {
 /// Paths per pixel after which a target counts as out of reach, where nothing else is said.
 pub const MOST_SAMPLES: u32 = 1 << 16;
 
+/// The most paths per pixel that a film holds: 2²⁷.
+pub const SAMPLES_LIMIT: u32 = 1 << 27;
+
 impl Render {
     /// The most paths per pixel.
     #[must_use]
@@ -351,7 +354,7 @@ impl Integrator {
 
 impl Render {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
-        checker.at_least_one(at.key("samples"), self.samples);
+        checker.whole_between(at.key("samples"), self.samples, 1, SAMPLES_LIMIT);
         checker.whole_between(at.key("tile"), self.tile, 1, super::camera::MAX_SIDE);
         let stop = at.key("stop");
         if let Some(error) = self.stop.error {
@@ -365,7 +368,7 @@ impl Render {
             let holds = time.duration().is_some_and(|time| !time.is_zero());
             checker.require(holds, stop.key("time"), "a time greater than 0, as 60, 90s, 10m or 2h", found);
         }
-        checker.at_least_one(stop.key("samples"), self.stop.samples.unwrap_or(1));
+        checker.whole_between(stop.key("samples"), self.stop.samples.unwrap_or(1), 1, SAMPLES_LIMIT);
         if let Some(Err(message)) = self.frames.as_ref().map(Frames::list) {
             checker.fault(at.key("frames"), message);
         }
@@ -385,7 +388,7 @@ mod tests {
     fn counts_are_one_or_more() {
         assert_eq!(
             faults("render: {samples: 0, tile: 0}"),
-            "dir/s.yaml:2:19: render.samples: expected a whole number of 1 or more, found 0\n\
+            "dir/s.yaml:2:19: render.samples: expected a whole number from 1 to 134217728, found 0\n\
              dir/s.yaml:2:28: render.tile: expected a whole number from 1 to 65536, found 0"
         );
         assert_eq!(
@@ -402,12 +405,22 @@ mod tests {
     }
 
     #[test]
+    fn samples_are_no_more_than_a_film_holds() {
+        assert_eq!(
+            faults("render: {samples: 134217729, stop: {samples: 4000000000}}"),
+            "dir/s.yaml:2:19: render.samples: expected a whole number from 1 to 134217728, found 134217729\n\
+             dir/s.yaml:2:46: render.stop.samples: expected a whole number from 1 to 134217728, found 4000000000"
+        );
+        assert_eq!(scene("render: {samples: 134217728}").render.samples, SAMPLES_LIMIT);
+    }
+
+    #[test]
     fn targets_are_above_zero_and_times_have_units() {
         assert_eq!(
             faults("render: {stop: {error: 0, time: 5 days, samples: 0}}"),
             "dir/s.yaml:2:24: render.stop.error: expected a number greater than 0, found 0\n\
              dir/s.yaml:2:33: render.stop.time: expected a time greater than 0, as 60, 90s, 10m or 2h, found \"5 days\"\n\
-             dir/s.yaml:2:50: render.stop.samples: expected a whole number of 1 or more, found 0"
+             dir/s.yaml:2:50: render.stop.samples: expected a whole number from 1 to 134217728, found 0"
         );
         let render = |text: &str| scene(&format!("render: {text}")).render;
         let stop = render("{stop: {time: 2m}}");

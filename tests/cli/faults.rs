@@ -263,6 +263,9 @@ fn a_missing_scene_file_and_a_missing_argument_are_told_apart() {
     let ran = place.run(&["rendr", "none.yaml"]);
     assert!(ran.err.contains("a similar subcommand exists: 'render'") && ran.code == 2, "{}", ran.err);
     assert_eq!(place.run(&["render", "s.yaml", "--spp", "0"]).code, 2);
+    let ran = place.run(&["render", "s.yaml", "--spp", "4000000000"]);
+    let expected = "invalid value '4000000000' for '--spp <N>': 4000000000 is not in 1..=134217728";
+    assert!(ran.err.contains(expected) && ran.code == 2, "{}", ran.err);
     assert_eq!(place.run(&["render", "s.yaml", "--set", "fog"]).code, 2);
 }
 
