@@ -113,7 +113,7 @@ pub struct LightTracerIntegrator {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WhittedIntegrator {
-    /// Most reflections and refractions in a row; default 10.
+    /// Most reflections and refractions in a row, 1 to 256; default 10.
     #[serde(default = "whitted_depth")]
     pub max_depth: u32,
     /// Rays per pixel and side, on a regular grid; default 2.
@@ -320,6 +320,10 @@ pub enum Wavelengths {
 /// The most rays per pixel and side of the `whitted` integrator: 2²⁰ a pixel.
 const MAX_GRID: u32 = 1024;
 
+/// The most reflections and refractions in a row of the `whitted` integrator, each of which takes some 2 kB of a thread's 2 MB
+/// of stack.
+const MAX_RECURSION: u32 = 256;
+
 /// The most paths from one camera ray.
 const MAX_SPLIT: u32 = 65_536;
 
@@ -344,7 +348,7 @@ impl Integrator {
             }
             Integrator::Whitted(whitted) => {
                 let at = at.key("whitted");
-                checker.at_least_one(at.key("max_depth"), whitted.max_depth);
+                checker.whole_between(at.key("max_depth"), whitted.max_depth, 1, MAX_RECURSION);
                 checker.whole_between(at.key("grid"), whitted.grid, 1, MAX_GRID);
                 whitted.ambient.check(Role::Emission, at.key("ambient"), checker);
             }
@@ -398,9 +402,18 @@ mod tests {
         );
         assert_eq!(
             faults("integrator: {whitted: {max_depth: 0, grid: 2000, ambient: -1}}"),
-            "dir/s.yaml:2:35: integrator.whitted.max_depth: expected a whole number of 1 or more, found 0\n\
+            "dir/s.yaml:2:35: integrator.whitted.max_depth: expected a whole number from 1 to 256, found 0\n\
              dir/s.yaml:2:44: integrator.whitted.grid: expected a whole number from 1 to 1024, found 2000\n\
              dir/s.yaml:2:59: integrator.whitted.ambient: expected a number of 0 or more, found -1"
+        );
+    }
+
+    /// Between perfect mirrors each takes more of the stack.
+    #[test]
+    fn whitted_does_not_go_deeper_than_the_stack() {
+        assert_eq!(
+            faults("integrator: {whitted: {max_depth: 257}}"),
+            "dir/s.yaml:2:35: integrator.whitted.max_depth: expected a whole number from 1 to 256, found 257"
         );
     }
 

@@ -169,6 +169,22 @@ fn light_goes_straight_through_256_surfaces_at_the_most() {
     }
 }
 
+/// Between perfect mirrors nothing ends the recursion but its bound, whatever the mirrors are made of.
+#[test]
+fn light_goes_from_mirror_to_mirror_to_the_bound() {
+    let mirror = "{mask: {opacity: 1, material: {two_sided: {front: {mirror: {reflectance: 1}}}}}}";
+    let wall = |z: f64| {
+        format!("- rectangle: {{corner: [-9, -9, {z}], edge_u: [18, 0, 0], edge_v: [0, 18, 0], material: {mirror}}}\n")
+    };
+    let scene = format!(
+        "{PARALLEL}image: {{width: 1, height: 1}}\nintegrator: {{whitted: {{max_depth: 256}}}}\nshapes:\n{}{}",
+        wall(0.0),
+        wall(9.0)
+    );
+    let sample = bench_with(&scene, &[]).sample([0, 0], 0);
+    assert_eq!((sample.radiance.to_array()[0], sample.alpha), (0.0, 1.0));
+}
+
 /// A lamp over a hundred open masks lights the floor below as if there were none.
 #[test]
 fn shadow_rays_of_whitted_go_straight_through_as_camera_rays_do() {
