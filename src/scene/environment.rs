@@ -9,6 +9,7 @@ use super::bands::{self, Bands};
 use super::texture::Texel;
 use crate::math::elementary::atan2;
 use crate::math::trig::sin_cos_turn;
+use crate::spectrum::luminance::REC709;
 use crate::spectrum::{Carried, Lanes, Spectrum, illuminant, upsample};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
@@ -320,10 +321,9 @@ fn upsampled(pixels: &[[f32; 3]], scale: f32, mapping: Mapping, carried: Carried
 /// The density that follows the luminance of each texel's neighbourhood (the largest of its 3 × 3,
 /// because bilinear look-ups spread a texel over its neighbours) times sin θ.
 fn neighbourhood(pixels: &[[f32; 3]], width: usize, height: usize) -> PiecewiseConstant2d {
-    let luminance: Vec<f64> = pixels
-        .iter()
-        .map(|p| (0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])).max(0.0))
-        .collect();
+    let [r, g, b] = REC709;
+    let luminance: Vec<f64> =
+        pixels.iter().map(|p| (r * f64::from(p[0]) + g * f64::from(p[1]) + b * f64::from(p[2])).max(0.0)).collect();
     let mut weights = vec![0.0; width * height];
     for y in 0..height {
         let sin = libm::sin(PI * (y as f64 + 0.5) / height as f64);

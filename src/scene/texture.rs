@@ -4,6 +4,7 @@ use super::SurfacePoint;
 use super::bands::Bands;
 use super::mesh::attribute::AttributeTexture;
 use super::volume::Volume;
+use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use crate::spectrum::{Lanes, Spectrum, upsample};
 use glam::{DAffine2, DVec2, DVec3, Vec3};
 use std::ops::{Add, Mul};
@@ -368,7 +369,8 @@ fn luminance(rgb: [f32; 3]) -> f32 {
     if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
         return rgb[0];
     }
-    0.212_671 * rgb[0] + 0.715_160 * rgb[1] + 0.072_169 * rgb[2]
+    let [r, g, b] = REC709_OF_MITSUBA.map(|weight| weight as f32);
+    r * rgb[0] + g * rgb[1] + b * rgb[2]
 }
 
 impl Texture {

@@ -10,6 +10,7 @@
 
 use super::texture::Wrap;
 use crate::math::Ray;
+use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
@@ -137,7 +138,8 @@ impl GridVolume {
             Voxels::Grey(values) => values[i],
             Voxels::Raw(values) => {
                 let [r, g, b] = values[i];
-                0.212_671 * r + 0.715_160 * g + 0.072_169 * b
+                let weight = REC709_OF_MITSUBA.map(|weight| weight as f32);
+                weight[0] * r + weight[1] * g + weight[2] * b
             }
             // Never asked for: compiling refuses a coloured grid where a number is wanted.
             Voxels::Coloured(values) => values[i][3],

@@ -4,6 +4,12 @@ use crate::spectrum::observer::{matching, quadrature};
 use crate::spectrum::{LANES, Lanes, illuminant};
 use std::sync::LazyLock;
 
+/// What linear red, green and blue of Rec. 709 add to the luminance, as it prints them.
+pub const REC709: [f64; 3] = [0.2126, 0.7152, 0.0722];
+
+/// The same with the digits of Mitsuba 3.
+pub const REC709_OF_MITSUBA: [f64; 3] = [0.212_671, 0.715_160, 0.072_169];
+
 /// Eight wavelengths (nm) and weights that add up to one.
 struct Rule {
     nm: Lanes,

@@ -2,11 +2,12 @@
 
 use super::{ChannelFigures, NoiseSource, PIXEL_ALPHA, PixelTest, VARIANCE_FLOOR, kept};
 use crate::math::statistics::{Moments, normal_two_sided_p, sidak, student_t_two_sided_p};
+use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use half::f16;
 
 /// Linear Rec.709 to XYZ with the digits that Mitsuba 3 and its references use.
 pub(super) const XYZ_FROM_RGB: [[f64; 3]; 3] =
-    [[0.412_453, 0.357_580, 0.180_423], [0.212_671, 0.715_160, 0.072_169], [0.019_334, 0.119_193, 0.950_227]];
+    [[0.412_453, 0.357_580, 0.180_423], REC709_OF_MITSUBA, [0.019_334, 0.119_193, 0.950_227]];
 
 /// Degrees of freedom of a standard error that stems from four replicates.
 const REPLICATE_DOF: f64 = 3.0;

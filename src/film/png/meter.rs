@@ -62,8 +62,7 @@ pub fn stops(image: &Image, luminance: [f64; 3], tonemap: Tonemap) -> f64 {
 mod tests {
     use super::*;
     use crate::film::png::tests::grey;
-
-    const REC709: [f64; 3] = [0.2126, 0.7152, 0.0722];
+    use crate::spectrum::luminance::REC709;
 
     /// A grey of 0.18 needs none, one of 0.045 two stops: half a bin, 1/64 stop, is lost to the bins and 1/200 to rounding.
     #[test]

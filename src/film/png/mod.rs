@@ -15,8 +15,8 @@ use crate::error::{Error, Result};
 use crate::film::output::write_atomically;
 use crate::film::resolve::Image;
 use crate::math::sampler::mix64;
-use crate::spectrum::ColourSpace;
 use crate::spectrum::colour::{Matrix, srgb_curve, times};
+use crate::spectrum::{ColourSpace, luminance};
 use gamut::Gamut;
 use image::ImageEncoder;
 use rayon::prelude::*;
@@ -79,8 +79,7 @@ impl Space {
     #[must_use]
     pub fn luminance(self) -> [f64; 3] {
         match self {
-            // As Rec.709 prints them.
-            Space::Srgb => [0.2126, 0.7152, 0.0722],
+            Space::Srgb => luminance::REC709,
             Space::DisplayP3 => self.primaries().matrix_to_xyz()[1],
         }
     }
