@@ -291,14 +291,6 @@ impl WavelengthDistribution {
     pub fn describe(&self) -> &str {
         &self.description
     }
-
-    /// The colour noise that one path has by its choice of wavelengths alone: the standard
-    /// deviation over u of the linear Rec.709 vector of `emitter` · `reflectance`, relative to its mean.
-    #[must_use]
-    pub fn colour_noise(&self, emitter: &Spectrum, reflectance: &Spectrum) -> f64 {
-        let lattice = Lattice::of(self);
-        lattice.noise(&lattice.values(emitter), Some(&lattice.values(reflectance)))
-    }
 }
 
 /// A density over the band: constant in each cell between sorted edges.
@@ -654,23 +646,30 @@ mod tests {
         }
     }
 
+    /// The colour noise that one path has by its choice of wavelengths alone: the standard
+    /// deviation over u of the linear Rec.709 vector of `emitter` · `reflectance`, relative to its mean.
+    fn colour_noise(of: &WavelengthDistribution, emitter: &Spectrum, reflectance: &Spectrum) -> f64 {
+        let lattice = Lattice::of(of);
+        lattice.noise(&lattice.values(emitter), Some(&lattice.values(reflectance)))
+    }
+
     /// Sampling by the eye leaves 4 to 5 % for D65 on grey, and far more for lines; sampling by the emitter
     /// tames the lines.
     #[test]
     fn the_density_with_the_least_noise_is_taken() {
         let grey = Spectrum::constant(1.0);
         let visible = WavelengthDistribution::visible();
-        let noise = visible.colour_noise(&d65(), &grey);
+        let noise = colour_noise(&visible, &d65(), &grey);
         assert!((0.03..0.06).contains(&noise), "{noise}");
         let day = WavelengthDistribution::for_scene(&[(1.0, d65())], &[]);
         let night = WavelengthDistribution::for_scene(&[(1.0, lines())], &[]);
         assert!(night.describe().starts_with("em:"), "{}", night.describe());
         assert!(
-            night.colour_noise(&lines(), &grey) < 0.2 * visible.colour_noise(&lines(), &grey),
+            colour_noise(&night, &lines(), &grey) < 0.2 * colour_noise(&visible, &lines(), &grey),
             "{}",
             night.describe()
         );
-        assert!(day.colour_noise(&d65(), &grey) <= noise * 1.000_001, "{}", day.describe());
+        assert!(colour_noise(&day, &d65(), &grey) <= noise * 1.000_001, "{}", day.describe());
         println!("{} | {}", day.describe(), night.describe());
         // The scale of a spectrum does not count, and nothing depends on chance.
         let again = WavelengthDistribution::for_scene(&[(1.0, lines().scaled(1e6))], &[]);

@@ -19,7 +19,7 @@
 mod noise;
 
 use crate::film::Window;
-use crate::film::exr::{ChannelData, Compression, ExrFile, ExrImage, ExrPart, Layout};
+use crate::film::exr::{ExrFile, ExrPart};
 use noise::Pair;
 use std::fmt::Write as _;
 
@@ -395,36 +395,6 @@ impl Comparison {
     }
 }
 
-/// The map of the comparison: `difference.*` = a − b, and `score.*` = (a − b) in standard errors where those are known.
-///
-/// # Errors
-/// Why the files cannot be compared.
-pub fn difference_map(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Result<ExrImage, String> {
-    let pairs = pairs(a, b, options)?;
-    let mut channels = Vec::new();
-    for pair in &pairs {
-        let indices = 0..pair.a.len();
-        let difference = indices.clone().map(|i| (f64::from(pair.a[i]) - f64::from(pair.b[i])) as f32).collect();
-        channels.push((format!("difference.{}", pair.name), ChannelData::F32(difference)));
-        if pair.noise.source() != NoiseSource::Differences {
-            let score = indices.map(|i| pair.score(i).map_or(f32::NAN, |(score, _)| score as f32)).collect();
-            channels.push((format!("score.{}", pair.name), ChannelData::F32(score)));
-        }
-    }
-    // The reader's windows may start anywhere; a frame here starts at the origin and holds at least the window's end.
-    let end = |start: i32, size: u32| u32::try_from(i64::from(start) + i64::from(size)).unwrap_or(size).max(1);
-    Ok(ExrImage {
-        data: std::collections::BTreeSet::new(),
-        layout: Layout::Single,
-        frame: [end(a.display.x, a.display.width), end(a.display.y, a.display.height)],
-        window: a.parts[0].window,
-        channels,
-        colour: None,
-        attributes: Vec::new(),
-        compression: Compression::Zip,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -638,17 +608,6 @@ mod tests {
         close(f.smape, 0.5 / (5.0 + 0.015));
         // Σd/√Σd² with 2048 differences of 1.
         close(f.global_z, 2048f64.sqrt());
-    }
-
-    #[test]
-    fn the_map_holds_differences_and_scores() {
-        let (a, b) = (render(1, 1.0, 0.3, 1.0), render(2, 1.0, 0.3, 1.0));
-        let map = difference_map(&a, &b, &CompareOptions::default()).unwrap();
-        let names: Vec<&str> = map.channels.iter().map(|(name, _)| name.as_str()).collect();
-        assert_eq!(names[..2], ["difference.R", "score.R"]);
-        let ChannelData::F32(difference) = &map.channels[0].1 else { panic!("float channels") };
-        assert_eq!(difference[5], a.parts[0].channels[0].1[5] - b.parts[0].channels[0].1[5]);
-        assert!(crate::film::exr::encode_exr(&map).is_ok());
     }
 
     #[test]
