@@ -302,24 +302,25 @@ mod tests {
         assert!((f64::from(image.rgb[1][0]) - 59.0 / 11.0).abs() < 1e-6);
     }
 
-    /// Camera light 2 ± s₁ and splats of total 12 over 4·3 photons: 1 ± s₂. Means add, variances add.
+    /// Camera light 2 ± s₁ and splats of total 12 over 4·3 photons: 1 ± s₂. Means add, variances add; all in units of 2³.
     #[test]
     fn splats_are_divided_by_photons_and_their_variance_adds() {
         let window = Window::full(1, 1);
-        let mut camera = Film::new([1, 1], window).unwrap();
-        let mut photons = Film::new([1, 1], window).unwrap();
+        let mut camera = Film::new([1, 1], window).unwrap().with_exponent(3);
+        let mut photons = Film::new([1, 1], window).unwrap().with_exponent(3);
         for r in 0..4 {
-            let wobble = if r % 2 == 0 { 0.5 } else { -0.5 };
+            let (wobble, other) = (if r % 2 == 0 { 0.5 } else { -0.5 }, if r < 2 { 0.75 } else { -0.75 });
             camera.add([0, 0], r, [2.0 + wobble; 3], 1.0);
             photons.add([0, 0], r, [1.5 + wobble; 3], 0.0);
-            photons.add([0, 0], r, [1.5 - wobble; 3], 0.0);
+            photons.add([0, 0], r, [1.5 - wobble + other; 3], 0.0);
         }
         photons.add([4, 4], 0, [9.0; 3], 0.0); // misses the window
         let image = resolve(&camera, Some(Splats { film: &photons, photons: [3; 4] }), &IDENTITY);
-        assert_eq!(image.rgb[1][0], 3.0);
+        assert_eq!(image.rgb[1][0], 24.0);
         assert_eq!(image.alpha[0], 1.0);
-        // Replicate means 2 ± ½: Σ(m_r − m)²/(3·4) = 1/12; the photons' replicates are all alike.
-        assert_eq!(image.standard_error[2][0], (1.0f64 / 12.0).sqrt() as f32);
+        // Replicate means 2 ± ½ and 1 ± ¼: Σ(m_r − m)²/(3·4) = 1/12 and 1/48. Some roundings in f64, then one to f32.
+        let expected = 8.0 * (5.0f64 / 48.0).sqrt();
+        assert!((f64::from(image.standard_error[2][0]) / expected - 1.0).abs() < f64::from(f32::EPSILON));
     }
 
     /// The matrix acts on each replicate before the spread is taken: X and Y that differ only by sign cancel in X + Y.
