@@ -242,6 +242,20 @@ mod tests {
         }
     }
 
+    /// Schlick 1994, eq. 15, with the R₀ of the complex index: the same gold. n, k and R are rounded to f32, 6e-8 each,
+    /// and of n and k R takes less than a quarter.
+    #[test]
+    fn schlick_of_a_conductor_is_schlick_at_45_60_and_80_degrees() {
+        let (n, k) = (0.2798f64, 2.9278f64);
+        let r0 = ((n - 1.0).powi(2) + k * k) / ((n + 1.0).powi(2) + k * k);
+        for deg in [45.0f64, 60.0, 80.0] {
+            let cos = deg.to_radians().cos();
+            let expected = r0 + (1.0 - r0) * (1.0 - cos).powi(5);
+            let found = conductor(Model::Schlick, cos, Lanes::splat(n as f32), Lanes::splat(k as f32)).to_array()[7];
+            assert!(relative(f64::from(found), expected) < 1e-7, "{deg}°: {found} {expected}");
+        }
+    }
+
     /// The published internal diffuse reflectance at η = 1.5 is 0.5963 and the external one 0.0918
     /// (Egan and Hilgeman 1973, fits quoted to 1e-3). The two are tied by
     /// 1 − F_int = (1 − F_ext)/η².
