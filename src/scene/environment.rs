@@ -374,6 +374,10 @@ fn linear(a: f64, b: f64, u: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Window;
+    use crate::film::exr::ExrPart;
+    use crate::spectrum::LANES;
+    use std::path::Path;
 
     fn bright_spot(mapping: Mapping) -> Environment {
         let (w, h) = (16, 8);
@@ -484,6 +488,41 @@ mod tests {
         let unit = illuminant::d65().at(550.0);
         assert!((at(Mapping::Poles) / unit - 0.25).abs() < 1e-5);
         assert!((at(Mapping::Texels) / unit - 0.5).abs() < 1e-5);
+    }
+
+    /// Four texels of 1 at 400 nm and 3 at 500 nm: 2 at 450 nm, times the scale, with no illuminant. All are whole numbers.
+    #[test]
+    fn a_spectral_sky_shines_as_much_as_its_scale_says() {
+        let plane = |name: &str, value| (name.to_owned(), vec![value; 4]);
+        let part = ExrPart {
+            name: None,
+            window: Window::full(2, 2),
+            channels: vec![plane("S0.400nm", 1.0), plane("S0.500nm", 3.0)],
+            texts: Vec::new(),
+        };
+        for (scale, expected) in [(1.0, 2.0), (2.0, 4.0)] {
+            for mapping in [Mapping::Texels, Mapping::Poles] {
+                let bands = Bands::of(Path::new("sky.exr"), &part).unwrap().unwrap();
+                let map = Environment::of_bands(bands, [2, 2], scale, mapping, DMat3::IDENTITY).unwrap();
+                assert_eq!(map.radiance(DVec3::X, Lanes::splat(450.0)).to_array(), [expected; LANES], "{mapping:?}");
+            }
+        }
+    }
+
+    /// Light between the centres of texels spreads half a texel beyond a bright one, over its eight neighbours, around the
+    /// seam and at the poles: directions are drawn there, too. The 128² directions lie 16 to a texel's side or closer.
+    #[test]
+    fn every_direction_that_shines_may_be_drawn() {
+        let (w, h) = (16, 8);
+        for mapping in [Mapping::Texels, Mapping::Poles] {
+            for bright in [3 * w + 11, 4 * w, 5 * w + w - 1, 2, 7 * w + 9] {
+                let pixels: Vec<[f32; 3]> = (0..w * h).map(|i| [if i == bright { 50.0 } else { 0.0 }; 3]).collect();
+                let map = Environment::new(&pixels, [w, h], 1.0, mapping, DMat3::IDENTITY, Carried::Spectra);
+                let shining = grid(128).map(crate::math::warp::uniform_sphere).filter(|d| green(&map, *d) > 0.0);
+                let densities: Vec<f64> = shining.map(|d| map.pdf(d)).collect();
+                assert!(densities.len() > 16 && densities.iter().all(|pdf| *pdf > 0.0), "{mapping:?} {bright}");
+            }
+        }
     }
 
     #[test]
