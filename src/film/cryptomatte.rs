@@ -137,6 +137,39 @@ mod tests {
         assert_eq!(id_of("").to_bits(), 1 << 23);
     }
 
+    /// Hashes by another implementation: 000c9239 would be a subnormal number and 7ff8e6f3 none. Bit 23 of both is turned, and
+    /// of their neighbours 009a225b and ff07ccea, which are numbers, none.
+    #[test]
+    fn no_id_is_subnormal_infinite_or_no_number() {
+        let ids =
+            [("ball 34", 0x008c_9239), ("ball 293", 0x7f78_e6f3), ("ball 262", 0x009a_225b), ("ball 18", 0xff07_ccea)];
+        for (name, bits) in ids {
+            assert_eq!(id_of(name).to_bits(), bits, "{name}");
+            assert!(id_of(name).is_normal(), "{name}");
+        }
+    }
+
+    /// Of eight samples two met `a`, two `b` and one `d`; one was dropped, which counts: it met what nobody knows. The ids are
+    /// 3c2569b2, 95de7e03 and 27191473, so that of the equal ones `a` comes first, whatever their numbers.
+    #[test]
+    fn dropped_samples_cover_nothing_and_equals_come_by_rising_id() {
+        for names in [["a", "b", "d"], ["b", "d", "a"]] {
+            let mut film = Film::new([1, 1], Window::full(1, 1)).unwrap();
+            (film.cells_mut()[0][1].count, film.cells_mut()[0][2].dropped) = (7, 1);
+            for (name, number) in names.into_iter().zip(0u64..) {
+                film.layers.mattes.add(0, 1, number << 32, if name == "d" { 1 } else { 2 });
+            }
+            let matte = Matte { layer: "M".into(), of_parts: false, names: names.map(str::to_owned).to_vec() };
+            let (channels, _) = matte.write(&film);
+            let value = |data: &ChannelData| match data {
+                ChannelData::F32(plane) => plane[0],
+                _ => f32::NAN,
+            };
+            let found: Vec<f32> = channels.iter().map(|(_, data)| value(data)).collect();
+            assert_eq!(found[..7], [id_of("a"), 0.25, id_of("b"), 0.25, id_of("d"), 0.125, 0.0]);
+        }
+    }
+
     /// Of eight samples of a pixel three met the child 2 of the object 0, one the child 3, two the object 1, two nothing.
     #[test]
     fn ids_come_by_falling_coverage_and_parts_of_one_name_together() {
