@@ -456,6 +456,7 @@ fn attribute_bytes(value: &Attribute) -> (&'static str, Vec<u8>) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::header::{Value, read_headers};
     use super::super::tests::{image, rec709};
     use super::super::{Base, Precision, StandardError, beauty, read_exr};
     use super::*;
@@ -502,6 +503,68 @@ mod tests {
             assert_eq!(part.text("colorInteropID"), Some("lin_rec709_scene"));
             assert_eq!(part.text("abbe:seed"), Some("18446744073709551615"));
         }
+    }
+
+    /// Light and data by themselves are packed as asked for in a file of parts, where each has one; in a single part data
+    /// leave nothing to lose.
+    #[test]
+    fn data_are_never_packed_with_loss() {
+        let code = Value::Code;
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.exr");
+        for (compression, lossy) in [(Compression::Dwaa(45.0), 8), (Compression::Dwab(45.0), 9)] {
+            for layout in [Layout::Single, Layout::Multipart] {
+                let mut written = mixed(compression);
+                written.layout = layout;
+                // Counts and depths are data; a layer of light is none.
+                written.data.extend(["Z".to_owned(), "sampleCount".to_owned()]);
+                written.channels.push(("key.R".to_owned(), ChannelData::F32(vec![0.5; 6])));
+                write_exr(&path, &written).unwrap();
+                for (part, header) in read_exr(&path).unwrap().parts.iter().zip(read_headers(&path).unwrap().parts) {
+                    let light = matches!(part.name.as_deref(), Some("rgba" | "key"));
+                    let expected = if light { lossy } else { compression_code(Compression::Zips) };
+                    assert_eq!(header.get("compression"), Some(&code(expected)), "{layout:?} {:?}", part.name);
+                    for (name, data) in written.channels.iter().filter(|(name, _)| written.data.contains(name)) {
+                        let expected: Vec<u32> = match data {
+                            ChannelData::F16(v) => v.iter().map(|x| x.to_f32().to_bits()).collect(),
+                            ChannelData::F32(v) => v.iter().map(|x| x.to_bits()).collect(),
+                            ChannelData::U32(v) => v.iter().map(|x| (*x as f32).to_bits()).collect(),
+                        };
+                        let found = part.channel(name).map(|v| v.iter().map(|x| x.to_bits()).collect::<Vec<u32>>());
+                        assert!(found.is_none_or(|found| found == expected), "{layout:?} {name}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// In a file of parts the manifest of each Cryptomatte stands in the part of its channels, and nowhere else; what is said
+    /// of the picture stands in the first.
+    #[test]
+    fn manifests_stand_beside_their_channels() {
+        let mut written = mixed(Compression::Zips);
+        written.layout = Layout::Multipart;
+        let name = |layer: &str| format!("{}{}/manifest", cryptomatte::PREFIX, cryptomatte::key(layer));
+        for layer in ["CryptoObject", "CryptoMaterial"] {
+            for pair in ["00.R", "00.G", "01.R"] {
+                written.push_data(format!("{layer}{pair}"), ChannelData::F32(vec![0.0; 6]));
+            }
+            written.attributes.push((name(layer), Attribute::Text(layer.to_owned())));
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.exr");
+        write_exr(&path, &written).unwrap();
+        let headers = read_headers(&path).unwrap();
+        assert!(headers.multipart);
+        for (i, header) in headers.parts.iter().enumerate() {
+            let part = header.text("name").unwrap();
+            for layer in ["CryptoObject", "CryptoMaterial"] {
+                assert_eq!(header.text(&name(layer)), (part == layer).then_some(layer), "{layer} in {part}");
+            }
+            assert_eq!(header.text("owner").is_some(), i == 0, "{part}");
+        }
+        let parts: Vec<&str> = headers.parts.iter().filter_map(|header| header.text("name")).collect();
+        assert_eq!(parts, ["rgba", "CryptoMaterial", "CryptoObject", "stderr"]);
     }
 
     #[test]
