@@ -126,6 +126,21 @@ mod tests {
         }
     }
 
+    /// Of all flights 1 − e^(−σd) scatter before d: that is the u up to which they do. Behind it are three functions and a
+    /// division, each exact to an ulp.
+    #[test]
+    fn the_thinnest_fog_scatters_its_share() {
+        for depth in [1e-12, 1e-8, 1e-4, 1.0] {
+            let medium = MediumLanes { extinction: Lanes::splat(0.25), scattering: Lanes::splat(0.25) };
+            let share = -libm::expm1(-depth);
+            for (u, scatters) in
+                [(share * (1.0 - 4.0 * f64::EPSILON), true), (share * (1.0 + 4.0 * f64::EPSILON), false)]
+            {
+                assert_eq!(medium.fly(4.0 * depth, u).scattered_at.is_some(), scatters, "{depth} {u}");
+            }
+        }
+    }
+
     #[test]
     fn vacuum_and_infinite_distances_are_no_nan() {
         let medium = |s: f32| MediumLanes { extinction: Lanes::splat(s), scattering: Lanes::splat(s) };

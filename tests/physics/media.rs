@@ -228,15 +228,15 @@ fn no_path_through_coloured_fog_is_brighter_than_the_lamp_behind_it() {
     found.assert_is(expected / observer::Y_INTEGRAL, 3e-2);
 }
 
-/// Thin media keep their digits: 1 − e^(−σd) for σd = 10⁻⁸ is told by what they scatter.
+/// Fog of σd = 2·10⁻⁶, which one path in 500 000 meets, and of 2·10⁹, which none leaves: no light that is no number or
+/// negative, and of the thin one no more than there is.
 #[test]
-fn the_thinnest_fog_scatters_its_share() {
+fn the_thinnest_and_the_densest_fog_stay_within_bounds() {
     let scene = filled(
         "{scattering: 1.0e-6}",
         "{boundary: {}}",
         "lights: [{directional: {direction: [0, 0, -1], irradiance: 1}}]\nintegrator: {path: {max_depth: 2}}",
     );
-    // Chance meets it twice in a million paths: most estimates are 0, none is NaN or negative.
     let found = scene.estimate(&ray(v(0.1, 0.2, 5.0), v(0.1, 0.2, 0.0)), 2048);
     assert!((0.0..=1.0).contains(&found.mean), "{found:?}");
     let dense = filled("{scattering: 1.0e+9}", "{boundary: {}}", "lights: [{constant: {radiance: 1}}]");
