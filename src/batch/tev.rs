@@ -292,10 +292,11 @@ mod tests {
     fn a_viewer_that_sleeps_stops_nothing() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let viewer = Viewer::new(&listener.local_addr().unwrap().to_string());
-        let start = Instant::now();
         // 64 MB: more than a connection holds.
-        for _ in 0..3 {
-            viewer.show("large", picture(2000, 2000));
+        let pictures = [(); 3].map(|()| picture(2000, 2000));
+        let start = Instant::now();
+        for picture in pictures {
+            viewer.show("large", picture);
         }
         assert!(start.elapsed() < PATIENCE, "{:?}", start.elapsed());
         assert!(viewer.close().is_some());
