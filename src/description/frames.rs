@@ -142,7 +142,9 @@ mod tests {
         assert_eq!(says("1-3,10-1"), format!("{range}, found \"10-1\""));
         assert_eq!(says("1-10x0"), format!("{range}, found \"1-10x0\""));
         assert_eq!(says("1-10,5"), "expected each frame once, found 5 twice in \"1-10,5\"");
-        assert_eq!(says("0-1000000"), "expected at most 1000000 frames, found \"0-1000000\"");
+        for text in ["0-1000000", "1-600000,700001-1100001", "0,1-1000000", "1-1000000,0"] {
+            assert_eq!(says(text), format!("expected at most 1000000 frames, found {text:?}"));
+        }
         assert_eq!(Frames::Number(1.5).list().unwrap_err(), format!("{expected}, found \"1.5\""));
     }
 }

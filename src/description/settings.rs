@@ -401,6 +401,11 @@ mod tests {
              dir/s.yaml:2:51: integrator.path.roulette_depth: expected a whole number of 1 or more, found 0"
         );
         assert_eq!(
+            faults("integrator: {path: {light_samples: 65537, scatter_samples: 65537}}"),
+            "dir/s.yaml:2:36: integrator.path.light_samples: expected a whole number from 0 to 65536, found 65537\n\
+             dir/s.yaml:2:60: integrator.path.scatter_samples: expected a whole number from 0 to 65536, found 65537"
+        );
+        assert_eq!(
             faults("integrator: {whitted: {max_depth: 0, grid: 2000, ambient: -1}}"),
             "dir/s.yaml:2:35: integrator.whitted.max_depth: expected a whole number from 1 to 256, found 0\n\
              dir/s.yaml:2:44: integrator.whitted.grid: expected a whole number from 1 to 1024, found 2000\n\
