@@ -300,3 +300,53 @@ pub fn is_there(keep: &Keep, path: &Path, identity: &Identity, share: Option<&Sh
         None => picture_holds(path, &identity.finish),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::batch::frame::go_on;
+    use crate::batch::{Overrides, entries, prepare};
+    use crate::film::filter::{Filter, FilterSampler};
+
+    const SCENE: &str = "camera: {origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}\n\
+        image: {width: 4, height: 4}\nrender: {samples: 4, techniques: {light_tracing: on}}\nshapes:\n\
+        - plane: {normal: [0, 1, 0]}\n- sphere: {center: [0, 1, 0], radius: 1, material: {dielectric: {ior: 1.5}}}\n\
+        - sphere: {center: [1, 3, 1], radius: 0.2, emission: 20}\n";
+
+    /// A run of 90 seconds that dropped samples of four kinds, and did no others, is gone on with: the seconds and what was
+    /// counted are there at the end, as scenes like this drop none.
+    #[test]
+    fn a_resumed_run_keeps_the_time_and_the_counts_of_the_one_before() {
+        let dir = tempfile::tempdir().unwrap();
+        let yaml = dir.path().join("scene.yaml");
+        std::fs::write(&yaml, SCENE).unwrap();
+        let none = Overrides::default();
+        let prepared = prepare(&entries(&yaml, &none).unwrap()[0], &none).unwrap();
+        let filter = FilterSampler::new(Filter::Box).unwrap();
+        let job = prepared.job(&filter);
+        let share = Share::all(job.samples);
+        let identity = Identity::new(Finish::of(&prepared), &prepared.source, &prepared.plan);
+
+        let empty = Part::new(&job, share.clone()).unwrap();
+        let claims = empty.claims();
+        let (mut film, splats) = empty.finish();
+        let mut splats = splats.unwrap();
+        (film.invalid.nan, film.layers.invalid.negative) = (1, 2);
+        (splats.film.invalid.infinite, splats.film.layers.invalid.overflow) = (3, 4);
+        let dropped = [film.invalid, film.layers.invalid, splats.film.invalid, splats.film.layers.invalid];
+        let before = Part::resume(&job, share.clone(), &claims, None, film, Some(splats)).unwrap();
+        let (path, time) = (dir.path().join("a.exr"), Duration::from_secs(90));
+        let counts = Counts { surfaces: 5, robust: 1, rays: 4, self_hits: 1 };
+        part_file::write(&place(&path), &identity, &before, &[], time, Some(counts)).unwrap();
+
+        let (keep, stop) = (Keep { resume: true, ..Keep::default() }, AtomicBool::new(false));
+        let mut keeper = Keeper::new(&keep, &stop, &path, &identity, None);
+        let begun = keeper.begin(&job, share).unwrap();
+        assert_eq!((begun.elapsed, keeper.numerics()), (time, Some(counts)));
+        let frame = go_on(begun, &|_| {}, &keeper).unwrap().finish();
+        assert!(frame.elapsed > time);
+        let splats = frame.splats.unwrap().film;
+        let found = [frame.film.invalid, frame.film.layers.invalid, splats.invalid, splats.layers.invalid];
+        assert_eq!(found, dropped);
+    }
+}
