@@ -336,7 +336,7 @@ impl Integrator {
                 checker.at_least_one(at.key("roulette_depth"), path.roulette_depth);
                 checker.whole_between(at.key("light_samples"), path.light_samples, 0, MAX_SPLIT);
                 checker.whole_between(at.key("scatter_samples"), path.scatter_samples, 0, MAX_SPLIT);
-                if path.light_samples + path.scatter_samples == 0 {
+                if path.light_samples == 0 && path.scatter_samples == 0 {
                     checker.at_least_one(at.key("scatter_samples"), 0);
                 }
             }
@@ -401,9 +401,9 @@ mod tests {
              dir/s.yaml:2:51: integrator.path.roulette_depth: expected a whole number of 1 or more, found 0"
         );
         assert_eq!(
-            faults("integrator: {path: {light_samples: 65537, scatter_samples: 65537}}"),
-            "dir/s.yaml:2:36: integrator.path.light_samples: expected a whole number from 0 to 65536, found 65537\n\
-             dir/s.yaml:2:60: integrator.path.scatter_samples: expected a whole number from 0 to 65536, found 65537"
+            faults("integrator: {path: {light_samples: 4294967295, scatter_samples: 65537}}"),
+            "dir/s.yaml:2:36: integrator.path.light_samples: expected a whole number from 0 to 65536, found 4294967295\n\
+             dir/s.yaml:2:65: integrator.path.scatter_samples: expected a whole number from 0 to 65536, found 65537"
         );
         assert_eq!(
             faults("integrator: {whitted: {max_depth: 0, grid: 2000, ambient: -1}}"),
