@@ -289,11 +289,11 @@ fn check_files(prepared: &Prepared) -> Result<()> {
 /// Refuses a picture whose sums are more than the machine's memory or `limit`, before it is begun.
 fn check_memory(description: &SceneDescription, rows: Window, limit: Option<u64>) -> Result<()> {
     let needed = Film::bytes(rows);
-    let megabytes = |bytes: u64| bytes.div_ceil(1_000_000);
+    let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
     if let Some(limit) = limit.filter(|limit| needed > *limit) {
-        let [needed, limit] = [needed, limit].map(megabytes);
+        let [needed, limit] = [needed, limit].map(mebibytes);
         return Err(Error::Memory(format!(
-            "the sums of {rows} take {needed} MB, more than --memory-limit, {limit} MB"
+            "the sums of {rows} take {needed} MiB, more than --memory-limit, {limit} MiB"
         )));
     }
     let room = Vec::<u8>::new().try_reserve_exact(usize::try_from(needed).unwrap_or(usize::MAX));
@@ -307,7 +307,7 @@ fn check_memory(description: &SceneDescription, rows: Window, limit: Option<u64>
         None => "image.width",
     };
     let message =
-        format!("expected a picture that fits into memory, found {rows}, which takes {} MB", megabytes(needed));
+        format!("expected a picture that fits into memory, found {rows}, which takes {} MiB", mebibytes(needed));
     Err(Error::Config(description.fault(field, &message)))
 }
 

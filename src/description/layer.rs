@@ -371,7 +371,7 @@ mod tests {
         let shapes = "shapes:\n- sphere: {radius: 1}\n- sphere: {radius: 1, name: sphere0}\n";
         assert_eq!(
             faults(&format!("{shapes}layers: [crypto_object]\n")),
-            "dir/s.yaml:4:30: shapes[1].sphere.name: expected a name of its own, found \"sphere0\", which shapes[0] has, \
+            "dir/s.yaml:4:29: shapes[1].sphere.name: expected a name of its own, found \"sphere0\", which shapes[0] has, \
              since it has no other"
         );
         scene(shapes);

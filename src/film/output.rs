@@ -250,6 +250,12 @@ pub fn prepare_place(file: &Path) -> Result<()> {
         return Err(Error::output(file, format!("{} is not a directory", directory.display())));
     }
     std::fs::create_dir_all(directory).map_err(fail)?;
+    // A temporary name is shorter than one that is too long.
+    if let Err(e) = std::fs::symlink_metadata(&end)
+        && e.kind() == ErrorKind::InvalidFilename
+    {
+        return Err(fail(e));
+    }
     let (_, probe) = open_temporary(&end).map_err(fail)?;
     std::fs::remove_file(&probe).map_err(fail)
 }

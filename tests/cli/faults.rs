@@ -308,7 +308,7 @@ fn a_picture_larger_than_memory_is_refused_at_its_field() {
     assert!(ran.err.contains("scene.yaml:2:16: image.width: expected a picture that fits into memory"), "{}", ran.err);
     assert_eq!(ran.code, 2);
     let ran = place.run(&["render", "scene.yaml", "-q", "--memory-limit", "1G"]);
-    assert!(ran.err.contains("more than --memory-limit, 1074 MB"), "{}", ran.err);
+    assert!(ran.err.contains("more than --memory-limit, 1024 MiB"), "{}", ran.err);
     assert_eq!(ran.code, 33);
     let ran = place.run(&["render", "scene.yaml", "-q", "--set", "image={width: 9, height: 9, overscan: 16384}"]);
     assert!(ran.err.contains("image.overscan: expected a picture that fits into memory"), "{}", ran.err);
