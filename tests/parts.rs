@@ -2,7 +2,7 @@
 
 mod common;
 
-use abbe::batch::{self, Overrides, Portion, Samples, merge};
+use abbe::batch::{self, Overrides, Portion, Samples, merge, part_file};
 use abbe::error::Error;
 use abbe::film::exr::{ExrFile, read_exr};
 use abbe::math::sampler::mix64;
@@ -242,6 +242,51 @@ fn parts_that_do_not_make_up_one_picture_are_refused() {
     std::fs::write(&bad, &bytes).unwrap();
     let e = refusal(&place, &[a, bad]);
     assert!(e.contains(&format!("expected a part by {version}")) && e.contains("found one by Abbe 9"), "{e}");
+}
+
+/// Headers are compared before any sum is read: here they say other things than the files were rendered with. Nothing else
+/// of the pictures differs.
+#[test]
+fn parts_of_other_plans_and_paths_from_the_lights_are_refused() {
+    let (_, text) = scenes().swap_remove(1);
+    let place = Place::of(&format!("{FRAME}{text}"));
+    let [a, b] = [0, 1].map(|i| render(&place, &format!("{i}.exr"), part([i, 2], [0, 11]), &[]));
+    let header = part_file::open(&b).unwrap().header;
+    let paths = header.paths.unwrap();
+    let half = header.claims.lights[0].0.start;
+    assert_eq!(header.claims.lights, [(half..paths, 0..12)]);
+    // Blanks fill what a shorter text leaves.
+    let edited = |file: &Path, from: &str, to: &str| {
+        let mut bytes = std::fs::read(file).unwrap();
+        let places: Vec<usize> = (0..bytes.len()).filter(|at| bytes[*at..].starts_with(from.as_bytes())).collect();
+        assert_eq!(places.len(), 1, "{from}");
+        bytes[places[0]..places[0] + from.len()].copy_from_slice(format!("{to:<0$}", from.len()).as_bytes());
+        let path = place.path("edited.exr");
+        std::fs::write(&path, bytes).unwrap();
+        path
+    };
+
+    let other = header.plan_hash.replace(|c: char| c != '0', "0");
+    let plan = edited(&b, &format!("\"plan_hash\":\"{}\"", header.plan_hash), &format!("\"plan_hash\":\"{other}\""));
+    let e = refusal(&place, &[a.clone(), plan]);
+    assert!(e.contains(&format!("plan with the hash: expected {}, found {other}", header.plan_hash)), "{e}");
+    let exponent = edited(&b, "\"exponent\":0", "\"exponent\":1");
+    let e = refusal(&place, &[a.clone(), exponent]);
+    assert!(e.contains("it is of another picture: plan"), "{e}");
+    let fewer = edited(&a, &format!("\"paths\":{paths},"), &format!("\"paths\":{},", paths - 1));
+    let e = refusal(&place, &[fewer, b.clone()]);
+    assert!(e.contains("it is of another picture: plan"), "{e}");
+
+    let lights = |from: u64, to: u64, sample: u32| format!("\"lights\":[[{from},{to},{sample},12]]");
+    let own = lights(half, paths, 0);
+    let e = refusal(&place, &[a.clone(), edited(&b, &own, &lights(half, paths, 1))]);
+    assert!(e.contains(&format!("sample 0 of the paths {half}-{} from the lights are missing", paths - 1)), "{e}");
+    let e = refusal(&place, &[a.clone(), edited(&b, &own, &lights(half, paths - 1, 0))]);
+    assert!(e.contains(&format!("samples 0-11 of the paths {0}-{0} from the lights are missing", paths - 1)), "{e}");
+    let e = refusal(&place, &[a.clone(), edited(&b, &own, &lights(half - 1, paths, 0))]);
+    assert!(e.contains("overlap") && e.contains("samples 0-11"), "{e}");
+    // As they were, they make up the picture.
+    merge::merge(&[a, b], &place.path("both/scene.exr")).unwrap().1.unwrap();
 }
 
 #[test]
