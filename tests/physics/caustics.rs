@@ -322,6 +322,29 @@ fn a_caustic_is_seen_through_a_window() {
     assert!(dark < 0.8 * b, "without the light of the ball there would be {dark} of {b}");
 }
 
+/// A spot shines up at a mirror that throws its light down on a floor, which the camera sees in another: lamp, mirror, floor,
+/// mirror and camera are four segments. Nothing else lights the floor: with a path of three it is black.
+#[test]
+fn merged_photons_count_for_the_length_of_a_path() {
+    let light = |depth: u32| {
+        let text = format!(
+            "camera: {{origin: [2, 1.5, 0], target: [4, 1, 0], fov_deg: 10}}\nimage: {{width: 24, height: 24}}\n\
+             render: {{samples: 16, techniques: {{light_tracing: on, merging: on}}}}\n\
+             integrator: {{path: {{max_depth: {depth}}}}}\nshapes:\n\
+             - rectangle: {{corner: [-3, 0, 3], edge_u: [6, 0, 0], edge_v: [0, 0, -6], material: {{diffuse: {{}}}}}}\n\
+             - rectangle: {{corner: [-1, 4, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2], material: {{mirror: {{}}}}}}\n\
+             - rectangle: {{corner: [4, 0.5, -1], edge_u: [0, 0, 2], edge_v: [0, 1, 0], material: {{mirror: {{}}}}}}\n\
+             lights: [{{spot: {{position: [0, 1, 0], target: [0, 4, 0], cutoff_deg: 8, intensity: 9}}}}]\n"
+        );
+        let bench = bench_with(&text, &[]);
+        assert!(bench.prepared.plan.caustics.as_ref().is_some_and(|c| c.merging.is_some()), "{depth}");
+        part(&render(&bench), 1, |_, _| true)
+    };
+    let (bright, error) = light(4);
+    assert!(bright > 10.0 * error && bright > 0.0, "{bright} ± {error}");
+    assert_eq!(light(3).0, 0.0);
+}
+
 /// Half of a pixel is the least radius of a filter without gaps; below it light from the lights would be little but noise.
 #[test]
 fn light_is_traced_for_filters_without_gaps() {
