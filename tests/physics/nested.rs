@@ -290,6 +290,39 @@ fn copies_that_overlap_are_one_body() {
     scene.picture().assert_all(1.0, 2e-5);
 }
 
+/// A path keeps eight bodies: in eight hollows, one in another, it forgets the glass that they are in. Where it then meets the
+/// far side of the glass from within and is reflected, it knows again: a ball of the same glass on the way back is not there,
+/// and changes no sample but by rounding. By Snell's law it comes back to a lamp that it would miss if the ball bent it.
+#[test]
+fn a_path_that_is_reflected_within_a_body_knows_that_it_is_inside() {
+    let light = |ball: &str| -> Vec<f64> {
+        let hollow = |k: i32| {
+            let (side, priority) = (0.4 + 0.02 * f64::from(k), k + 1);
+            format!(
+                "- cube: {{center: [0.5, 0, 1.2], size: {side}, material: {{dielectric: {{ior: 1, priority: {priority}}}}}}}\n"
+            )
+        };
+        let hollows: String = (0..8).map(hollow).collect();
+        let scene = bench(&format!(
+            "integrator: {{path: {{max_depth: 6}}}}\nshapes:\n\
+             - rectangle: {{corner: [-1.3, 0.3, 6], edge_u: [0.5, 0, 0], edge_v: [0, -0.6, 0], {LAMP}}}\n\
+             - sphere: {{radius: 2, material: {{dielectric: {{ior: 1.5, priority: 0}}}}}}\n{hollows}{ball}"
+        ));
+        let sample = |index| {
+            let sampler = Sampler::new(1, [0, 0], 0, index);
+            let way = ray(v(0.6, 0.0, 5.0), v(0.6, 0.0, 0.0));
+            f64::from(scene.incoming(&way, &wavelengths(SPREAD_NM), &sampler).radiance.reduce_add())
+        };
+        (0..1024).map(sample).collect()
+    };
+    let without = light("");
+    assert!(without.iter().filter(|l| **l > 0.0).count() > 10, "the lamp is not met");
+    let ball = "- sphere: {center: [-0.27, 0, -0.8], radius: 0.15, material: {dielectric: {ior: 1.5, priority: 9}}}\n";
+    for (with, without) in light(ball).into_iter().zip(without) {
+        assert_close(with, without, 1e-5);
+    }
+}
+
 #[test]
 fn what_cannot_be_a_body_is_told() {
     let fault = |shapes: &str| {
