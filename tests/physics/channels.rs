@@ -1,12 +1,12 @@
 //! Integrators besides `path`, and the further channels of a picture.
 
-use super::common::{Bench, bench_with};
+use super::common::{Bench, SPREAD_NM, assert_close, bench_with, wavelengths};
 use abbe::batch::frame::{self, Frame, FrameJob};
 use abbe::film::accumulate::{Film, REPLICATES};
 use abbe::film::filter::{Filter, FilterSampler};
 use abbe::film::resolve::Image;
 use abbe::math::statistics::Moments;
-use abbe::spectrum::ColourSpace;
+use abbe::spectrum::{ColourSpace, Lanes, observer};
 use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
@@ -285,9 +285,11 @@ fn layers_of_surfaces_are_their_closed_forms() {
     // A pixel is one metre and samples stand a quarter of it apart: Δu = ¼ / 2.
     assert!((of(15, 0) - 0.125).abs() < 1e-6 && of(16, 0).abs() < 1e-6);
     assert_eq!(of(17, 0), 1.0);
-    // Light on a reflectance of ¼ is as much as a radiance of ¼ in the quadrature of eight wavelengths.
-    let unit = 4.0 * of(19, 0);
-    assert!((unit - 1.0).abs() < 0.1, "{unit}");
+    // Light on a reflectance of ¼ is as much as a radiance of ¼ in the quadrature of eight wavelengths; some thirty f32
+    // operations.
+    let [x, y, z] = observer::xyz(Lanes::ONE, &wavelengths(SPREAD_NM)).map(f64::from);
+    let green = ColourSpace::Rec709.matrix_from_xyz()[1];
+    assert_close(of(19, 0), 0.25 * (green[0] * x + green[1] * y + green[2] * z), 30.0 * f64::from(f32::EPSILON));
 
     let of = scene("sphere: {radius: 1.5}", 1);
     let length = |from: usize| (0..3).map(|c| of(from + c, 0).powi(2)).sum::<f64>().sqrt();
@@ -326,9 +328,9 @@ fn squares_are_second_moments() {
 fn hidden_lights_shine_and_are_not_seen() {
     let scene = |walls: &str| {
         render(&format!(
-            "{PARALLEL}image: {{width: 4, height: 4}}\nrender: {{samples: 64}}\n\
+            "{PARALLEL}image: {{width: 4, height: 4}}\nrender: {{samples: 256}}\n\
              integrator: {{path: {{hide_emitters: true}}}}\nlights: [{{constant: {{radiance: 1}}}}]\n\
-             shapes:\n- sphere: {{radius: 0.5, emission: 4}}\n{walls}"
+             shapes:\n- sphere: {{radius: 0.5, emission: 4, material: {{diffuse: {{reflectance: 0}}}}}}\n{walls}"
         ))
         .resolve(&ColourSpace::Xyz.matrix_from_xyz())
     };
@@ -338,13 +340,16 @@ fn hidden_lights_shine_and_are_not_seen() {
     let wall = "- rectangle: {corner: [-9, -9, -0.6], edge_u: [18, 0, 0], edge_v: [0, 18, 0], material: {diffuse: {reflectance: RHO}}}\n";
     let black = scene(&wall.replace("RHO", "0"));
     assert!(black.rgb.iter().flatten().all(|x| *x == 0.0) && black.alpha.iter().all(|a| *a == 1.0));
-    // A sphere's face of radiance L fills (r/d)² of the cosine-weighted sky at the foot of its axis, d = 0.6:
-    // E/π = (r/d)² L + (1 − (r/d)²). The four middle pixels lie within 0.5 of it, where it is less.
+    // A sphere that stands wholly above a wall fills r²d/D³ of its cosine-weighted sky, where D² = d² + x² + y², d = 0.6 and
+    // r = 0.5, so that the wall's radiance is 1 + (4 − 1) r²d/D³. Over a pixel next to the axis, a = 0.5 wide, ∫∫ d/D³ is the
+    // solid angle of the pixel, atan(a² / (d √(d² + 2a²))): the mean of the share is that times r²/a² = 1.
     let white = scene(&wall.replace("RHO", "1"));
-    let share = (0.5f64 / 0.6).powi(2);
-    let most = share * 4.0 + (1.0 - share);
-    let middle = f64::from(white.rgb[1][5]);
-    assert!(middle > 1.5 && middle < most * 1.02, "{middle} {most}");
+    let solid_angle = (0.25f64 / (0.6 * (0.36f64 + 0.5).sqrt())).atan();
+    let middle = [5, 6, 9, 10];
+    let mean = middle.iter().map(|i| f64::from(white.rgb[1][*i])).sum::<f64>() / 4.0;
+    let error = middle.iter().map(|i| f64::from(white.standard_error[1][*i]).powi(2)).sum::<f64>().sqrt() / 4.0;
+    // Of four pixels with three degrees of freedom each, one in 600 is beyond four of these errors.
+    assert!((mean - 1.0 - 3.0 * solid_angle).abs() < 4.0 * error && error < 0.01 * mean, "{mean} ± {error}");
 }
 
 /// Between clipping planes at 4 and 6 m from a camera at 5 m there is the unit sphere's middle part: the near cap is
