@@ -76,7 +76,9 @@ fn white_media_are_invisible_and_black_ones_follow_beer() {
 }
 
 /// Every surface at the ends of its parameters, as a ball in an even sky: nothing that is no number, nothing negative,
-/// and no more than comes in: at most `most` in every pixel, at least `least` in the mean.
+/// and no more than comes in: at most `most`, at least `least` in the mean. With the masking of GGX facets, which is exact, all
+/// facets that are seen cover what is seen once, so that 1 is the most, and 2e-5 what f32 rounds in the longest path; the
+/// rational fit for Beckmann's errs by 0.35 % (Walter et al. 2007, below eq. 27).
 #[test]
 fn surfaces_at_the_ends_of_their_parameters_stay_within_bounds() {
     let mut cases = Vec::new();
@@ -89,13 +91,13 @@ fn surfaces_at_the_ends_of_their_parameters_stay_within_bounds() {
     let string = |name: &str, x: &str| format!("<string name=\"{name}\" value=\"{x}\"/>");
     let bsdf = |kind: &str, inside: String| format!("<bsdf type=\"{kind}\">{inside}</bsdf>");
     let even = |name: &str, x: f64| format!("<spectrum name=\"{name}\" value=\"{x:?}\"/>");
-    for d in ["ggx", "beckmann"] {
+    for (d, fit) in [("ggx", 1.0 + 2e-5), ("beckmann", 1.0035 + 2e-5)] {
         for (u, v) in [(0.0, 0.0), (1e-6, 1e-6), (1e-6, 1.0), (1.0, 1e-4), (1.0, 1.0), (5.0, 5.0)] {
             let rough = string("distribution", d) + &float("alpha_u", u) + &float("alpha_v", v);
-            ball(format!("metal {d} {u} {v}"), bsdf("roughconductor", rough.clone()), 0.002, 1.1);
+            ball(format!("metal {d} {u} {v}"), bsdf("roughconductor", rough.clone()), 0.002, fit);
             for (int, ext) in [(1.5, 1.0), (1.0, 1.5), (1.0, 1.0), (1.0000001, 1.0), (5.0, 1.0), (1.0, 10.0)] {
                 let glass = bsdf("roughdielectric", rough.clone() + &ior(int, ext));
-                ball(format!("glass {d} {u} {v} {int} {ext}"), glass, 0.002, 1.3);
+                ball(format!("glass {d} {u} {v} {int} {ext}"), glass, 0.002, fit);
             }
         }
         for alpha in [1e-6, 0.1, 1.0] {
@@ -104,7 +106,7 @@ fn surfaces_at_the_ends_of_their_parameters_stay_within_bounds() {
                     + &float("alpha", alpha)
                     + &ior(int, ext)
                     + &even("diffuse_reflectance", 1.0);
-                ball(format!("rough plastic {d} {alpha} {int} {ext}"), bsdf("roughplastic", inside), 0.1, 1.1);
+                ball(format!("rough plastic {d} {alpha} {int} {ext}"), bsdf("roughplastic", inside), 0.1, fit);
             }
         }
     }
@@ -113,7 +115,7 @@ fn surfaces_at_the_ends_of_their_parameters_stay_within_bounds() {
             let inside = format!("<boolean name=\"nonlinear\" value=\"{nonlinear}\"/>")
                 + &ior(int, ext)
                 + &even("diffuse_reflectance", 1.0);
-            ball(format!("plastic {int} {ext} {nonlinear}"), bsdf("plastic", inside), 0.1, 1.05);
+            ball(format!("plastic {int} {ext} {nonlinear}"), bsdf("plastic", inside), 0.1, 1.0 + 2e-5);
         }
         ball(format!("pane {int} {ext}"), bsdf("thindielectric", ior(int, ext)), 1.0 - 2e-5, 1.0 + 2e-5);
         ball(format!("clear {int} {ext}"), bsdf("dielectric", ior(int, ext)), 1.0 - 2e-3, 1.0 + 2e-5);
@@ -130,7 +132,7 @@ fn surfaces_at_the_ends_of_their_parameters_stay_within_bounds() {
             format!("rough metal of {n} and {k}"),
             bsdf("roughconductor", even("eta", n) + &even("k", k) + &float("alpha", 0.2)),
             0.8 * least,
-            1.1 * most,
+            1.0035 * most,
         );
     }
     for roughness in [0.0, 1e-6, 0.5, 1.0] {
