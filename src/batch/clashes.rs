@@ -73,6 +73,16 @@ impl Key {
     }
 }
 
+/// What is kept of a scene.
+struct Look {
+    /// Whether [`Key::BeforeNumber`] is the same for all its frames.
+    told: bool,
+    /// By [`Key::BeforeNumber`] and by [`Key::Letters`], of the files of a frame.
+    keys: [Vec<u64>; 2],
+    /// Where the contact sheet would lie.
+    sheet: Option<PathBuf>,
+}
+
 /// Refuses a job in which two pictures, or a picture and the contact sheet, go to one file.
 ///
 /// Scenes are read for this and forgotten. Only of those whose names are alike but for numbers all frames are compared.
@@ -96,20 +106,20 @@ pub(super) fn check(entries: &[BatchEntry], overrides: &Overrides) -> Result<()>
         let first = pictures.frames.first().copied();
         let keys = [Key::BeforeNumber, Key::Letters].map(|key| keys_of(key, first));
         let sheet = pictures.sheet.then(|| sheet(&pictures, &entry.name, overrides));
-        Some((told, keys, sheet))
+        Some(Look { told, keys, sheet })
     };
-    let looks: Vec<Option<(bool, [Vec<u64>; 2], Option<PathBuf>)>> = entries.par_iter().map(look).collect();
-    let which = usize::from(!looks.iter().flatten().all(|(told, ..)| *told));
+    let looks: Vec<Option<Look>> = entries.par_iter().map(look).collect();
+    let which = usize::from(!looks.iter().flatten().all(|look| look.told));
     let key = [Key::BeforeNumber, Key::Letters][which];
     // The sheet lies beside the first picture.
-    let sheet = looks.iter().flatten().find_map(|(_, _, sheet)| sheet.clone());
+    let sheet = looks.iter().flatten().find_map(|look| look.sheet.clone());
 
     let mut met: HashMap<u64, u32> = HashMap::new();
     sheet.iter().for_each(|sheet| *met.entry(key.of(sheet)).or_default() += 1);
-    for (_, keys, _) in looks.iter().flatten() {
-        keys[which].iter().collect::<HashSet<_>>().into_iter().for_each(|key| *met.entry(*key).or_default() += 1);
+    for look in looks.iter().flatten() {
+        look.keys[which].iter().collect::<HashSet<_>>().into_iter().for_each(|key| *met.entry(*key).or_default() += 1);
     }
-    let alike = |(_, keys, _): &(bool, [Vec<u64>; 2], Option<PathBuf>)| keys[which].iter().any(|key| met[key] > 1);
+    let alike = |look: &Look| look.keys[which].iter().any(|key| met[key] > 1);
 
     let mut first: HashMap<PathBuf, (usize, Option<i32>)> = HashMap::new();
     let mut clashes: BTreeMap<(usize, usize), String> = BTreeMap::new();
