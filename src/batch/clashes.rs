@@ -83,6 +83,24 @@ struct Look {
     sheet: Option<PathBuf>,
 }
 
+impl Look {
+    /// None of a scene that cannot be read.
+    fn at(entry: &BatchEntry, overrides: &Overrides) -> Option<Look> {
+        // Two frames that are far apart show what changes.
+        const PROBES: [i32; 2] = [1, 98_765];
+        let pictures = Pictures::of(entry, overrides)?;
+        let keys_of = |key: Key, frame| -> Vec<u64> {
+            pictures.files(&entry.name, frame, overrides).map(|file| key.of(&file)).collect()
+        };
+        let probe = PROBES.map(|frame| keys_of(Key::BeforeNumber, Some(frame)));
+        let told = pictures.frames.is_empty() || probe[0] == probe[1];
+        let first = pictures.frames.first().copied();
+        let keys = [Key::BeforeNumber, Key::Letters].map(|key| keys_of(key, first));
+        let sheet = pictures.sheet.then(|| sheet(&pictures, &entry.name, overrides));
+        Some(Look { told, keys, sheet })
+    }
+}
+
 /// Refuses a job in which two pictures, or a picture and the contact sheet, go to one file.
 ///
 /// Scenes are read for this and forgotten. Only of those whose names are alike but for numbers all frames are compared.
@@ -94,25 +112,11 @@ pub(super) fn check(entries: &[BatchEntry], overrides: &Overrides) -> Result<()>
         // Frames of one scene differ by their numbers.
         return Ok(());
     }
-    // Two frames that are far apart show what changes.
-    const PROBES: [i32; 2] = [1, 98_765];
-    let look = |entry: &BatchEntry| {
-        let pictures = Pictures::of(entry, overrides)?;
-        let keys_of = |key: Key, frame| -> Vec<u64> {
-            pictures.files(&entry.name, frame, overrides).map(|file| key.of(&file)).collect()
-        };
-        let probe = PROBES.map(|frame| keys_of(Key::BeforeNumber, Some(frame)));
-        let told = pictures.frames.is_empty() || probe[0] == probe[1];
-        let first = pictures.frames.first().copied();
-        let keys = [Key::BeforeNumber, Key::Letters].map(|key| keys_of(key, first));
-        let sheet = pictures.sheet.then(|| sheet(&pictures, &entry.name, overrides));
-        Some(Look { told, keys, sheet })
-    };
-    let looks: Vec<Option<Look>> = entries.par_iter().map(look).collect();
+    let looks: Vec<Option<Look>> = entries.par_iter().map(|entry| Look::at(entry, overrides)).collect();
     let which = usize::from(!looks.iter().flatten().all(|look| look.told));
     let key = [Key::BeforeNumber, Key::Letters][which];
     // The sheet lies beside the first picture.
-    let sheet = looks.iter().flatten().find_map(|look| look.sheet.clone());
+    let sheet = looks.iter().flatten().find_map(|look| look.sheet.as_deref());
 
     let mut met: HashMap<u64, u32> = HashMap::new();
     sheet.iter().for_each(|sheet| *met.entry(key.of(sheet)).or_default() += 1);
@@ -120,18 +124,37 @@ pub(super) fn check(entries: &[BatchEntry], overrides: &Overrides) -> Result<()>
         look.keys[which].iter().collect::<HashSet<_>>().into_iter().for_each(|key| *met.entry(*key).or_default() += 1);
     }
     let alike = |look: &Look| look.keys[which].iter().any(|key| met[key] > 1);
+    let suspects = (0..entries.len()).filter(|i| looks[*i].as_ref().is_some_and(alike));
 
+    let line = |((_, i), clash): (&(usize, usize), &String)| {
+        let place = entries[*i].place().map_or(String::new(), |place| format!("{place}: "));
+        let name = &entries[*i].name;
+        format!("{place}scene \"{name}\": expected each file once, {clash}; give one of them another name")
+    };
+    let lines: Vec<String> = clashes(entries, suspects, sheet, overrides).iter().map(line).collect();
+    if lines.is_empty() { Ok(()) } else { Err(Error::Config(lines.join("\n"))) }
+}
+
+/// For each two of `suspects`, by number, the first file that both would write; twice the same number for one that would
+/// write `sheet`.
+fn clashes(
+    entries: &[BatchEntry],
+    suspects: impl Iterator<Item = usize>,
+    sheet: Option<&Path>,
+    overrides: &Overrides,
+) -> BTreeMap<(usize, usize), String> {
+    let who = |i: usize, frame: Option<i32>| {
+        let frame = frame.map_or(String::new(), |frame| format!("frame {frame} of "));
+        format!("{frame}scene \"{}\"", entries[i].name)
+    };
     let mut first: HashMap<PathBuf, (usize, Option<i32>)> = HashMap::new();
-    let mut clashes: BTreeMap<(usize, usize), String> = BTreeMap::new();
-    for (i, entry) in entries.iter().enumerate().filter(|(i, _)| looks[*i].as_ref().is_some_and(alike)) {
+    let mut clashes = BTreeMap::new();
+    for i in suspects {
+        let entry = &entries[i];
         let Some(pictures) = Pictures::of(entry, overrides) else { continue };
         for frame in pictures.frames() {
             for file in pictures.files(&entry.name, frame, overrides) {
-                let who = |i: usize, frame: Option<i32>| {
-                    let frame = frame.map_or(String::new(), |frame| format!("frame {frame} of "));
-                    format!("{frame}scene {}", quoted(&entries[i].name))
-                };
-                if sheet.as_ref() == Some(&file) {
+                if sheet == Some(&*file) {
                     let file = file.with_extension("png");
                     let clash = format!("{} is the contact sheet of the batch", file.display());
                     clashes.entry((i, i)).or_insert(clash);
@@ -143,25 +166,11 @@ pub(super) fn check(entries: &[BatchEntry], overrides: &Overrides) -> Result<()>
             }
         }
     }
-    if clashes.is_empty() {
-        return Ok(());
-    }
-    let line = |((_, i), clash): (&(usize, usize), &String)| {
-        let place = entries[*i].place().map_or(String::new(), |place| format!("{place}: "));
-        format!(
-            "{place}scene {}: expected each file once, {clash}; give one of them another name",
-            quoted(&entries[*i].name)
-        )
-    };
-    Err(Error::Config(clashes.iter().map(line).collect::<Vec<_>>().join("\n")))
+    clashes
 }
 
 /// The contact sheet beside `pictures`, as if it were an EXR.
 fn sheet(pictures: &Pictures, name: &str, overrides: &Overrides) -> PathBuf {
     let picture = place(&pictures.directory, name, pictures.frames.first().copied(), overrides);
     picture.with_file_name(names::about(overrides, "contact-sheet", "exr"))
-}
-
-fn quoted(name: &str) -> String {
-    format!("\"{name}\"")
 }
