@@ -83,7 +83,7 @@ impl Import<'_> {
                 "sphere"
             }
             "cylinder" => {
-                cylinder(bag, to_world, fields)?;
+                cylinder(bag, to_world, mirrored, fields)?;
                 "cylinder"
             }
             "disk" => {
@@ -192,9 +192,8 @@ impl Import<'_> {
 
 /// A cylinder where it lies in the world: its transform may stretch it along its axis. What is mirrored is put down as its
 /// image in the plane x = 0, which a transform of its own mirrors back, textures and all.
-fn cylinder(bag: &Bag<'_>, to_world: DMat4, fields: &mut Fields) -> Result<(), Fault> {
+fn cylinder(bag: &Bag<'_>, to_world: DMat4, mirrored: bool, fields: &mut Fields) -> Result<(), Fault> {
     let mirror = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
-    let mirrored = DMat3::from_mat4(to_world).determinant() < 0.0;
     let to_world = if mirrored { mirror * to_world } else { to_world };
     let base = DVec3::from(bag.vector("p0")?.unwrap_or_default());
     let top = DVec3::from(bag.vector("p1")?.unwrap_or([0.0, 0.0, 1.0]));

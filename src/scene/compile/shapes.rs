@@ -54,16 +54,16 @@ impl Compiler<'_> {
                 };
                 let made = Cylinder::new(point(c.base), point(c.top), c.radius * scale, base, top);
                 let along = vec3(c.top) - vec3(c.base);
-                let made = match c.seam.map(vec3).or_else(|| carried_seam(m, along)) {
-                    Some(seam) => made.and_then(|cylinder| cylinder.with_seam(m.transform_vector3(seam), is_mirror(m))),
+                let made = match seam(m, along, c.seam.map(vec3)) {
+                    Some((at, mirrored)) => made.and_then(|cylinder| cylinder.with_seam(at, mirrored)),
                     None => made,
                 };
                 made.map(Shape::Cylinder)
             }
             written::Geometry::Cone(c) => {
                 let made = Cone::new(point(c.base), point(c.apex), c.radius * scale, c.cap);
-                let made = match carried_seam(m, vec3(c.apex) - vec3(c.base)) {
-                    Some(seam) => made.and_then(|cone| cone.with_seam(m.transform_vector3(seam), is_mirror(m))),
+                let made = match seam(m, vec3(c.apex) - vec3(c.base), None) {
+                    Some((at, mirrored)) => made.and_then(|cone| cone.with_seam(at, mirrored)),
                     None => made,
                 };
                 made.map(Shape::Cone)
@@ -109,13 +109,12 @@ fn layout(layout: written::Layout) -> Layout {
     }
 }
 
-/// Where u = 0 about an axis before it is transformed, if it is: textures move with what they are on.
-fn carried_seam(m: DMat4, along: DVec3) -> Option<DVec3> {
-    along.try_normalize().filter(|_| m != DMat4::IDENTITY).map(|axis| Frame::from_normal(axis).s)
-}
-
-fn is_mirror(m: DMat4) -> bool {
-    DMat3::from_mat4(m).determinant() < 0.0
+/// Where u = 0 about the axis `along` once it is transformed, and whether u then runs the other way: textures move with what
+/// they are on. `None` where neither a transform nor `written` moves it.
+fn seam(m: DMat4, along: DVec3, written: Option<DVec3>) -> Option<(DVec3, bool)> {
+    let carried = || along.try_normalize().filter(|_| m != DMat4::IDENTITY).map(|axis| Frame::from_normal(axis).s);
+    let direction = written.or_else(carried)?;
+    Some((m.transform_vector3(direction), DMat3::from_mat4(m).determinant() < 0.0))
 }
 
 fn normal_transform(m: DMat4, n: DVec3) -> DVec3 {
