@@ -8,6 +8,7 @@ use crate::spectrum::Carried;
 use crate::spectrum::colour::{self, ColourSpace};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -28,17 +29,16 @@ pub struct Picture {
 const LARGEST: u64 = 1 << 31;
 
 fn decode(path: &Path) -> Result<image::DynamicImage> {
-    let open = crate::input::check(path).and_then(|()| image::ImageReader::open(path));
-    let open = open.map_err(|e| Error::input(path, words(&e)))?;
-    let mut reader = open.with_guessed_format().map_err(|e| Error::input(path, words(&e)))?;
+    let bytes = crate::input::read(path).map_err(|e| Error::input(path, words(&e)))?;
     // The decoder makes grey of what is missing.
-    if reader.format() == Some(image::ImageFormat::Jpeg) {
-        let bytes = std::fs::read(path).map_err(|e| Error::input(path, words(&e)))?;
-        // What does not begin as one is told by the decoder.
-        if bytes.starts_with(&[0xff, 0xd8]) && !jpeg_ends(&bytes) {
-            return Err(Error::input(path, "expected a JPEG picture to its end, found one cut off: it is damaged"));
-        }
+    if image::guess_format(&bytes).is_ok_and(|format| format == image::ImageFormat::Jpeg) && !jpeg_ends(&bytes) {
+        return Err(Error::input(path, "expected a JPEG picture to its end, found one cut off: it is damaged"));
     }
+    let mut reader = image::ImageReader::new(Cursor::new(bytes));
+    if let Ok(format) = image::ImageFormat::from_path(path) {
+        reader.set_format(format);
+    }
+    let mut reader = reader.with_guessed_format().map_err(|e| Error::input(path, words(&e)))?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(LARGEST);
     reader.limits(limits);
@@ -219,13 +219,8 @@ pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
 /// # Errors
 /// [`Error::Input`] where they are none.
 fn other_primaries(path: &Path, file: &exr::ExrFile) -> Result<Option<[[f64; 3]; 3]>> {
-    // To the digits that standards print.
-    const SAME: f64 = 1e-3;
-    let Some(primaries) = file.chromaticities.map(|all| all.map(|xy| xy.map(f64::from))) else { return Ok(None) };
-    let is = |space: &ColourSpace| {
-        let own = space.chromaticities();
-        primaries.iter().flatten().zip(own.iter().flatten()).all(|(a, b)| (a - b).abs() <= SAME)
-    };
+    let primaries = file.primaries();
+    let is = |space: &ColourSpace| colour::are_same_primaries(primaries, space.chromaticities());
     match ColourSpace::ALL.into_iter().find(is) {
         Some(ColourSpace::Rec709) => return Ok(None),
         Some(space) => return Ok(Some(space.to_rec709())),

@@ -183,6 +183,13 @@ pub fn adapted_to_d65(white: [f64; 2]) -> Option<Matrix> {
     (real && times(BRADFORD, xyz_of(white)).iter().all(|response| *response > 0.0)).then(|| adaptation(white, D65))
 }
 
+/// Whether two sets of primaries and whites are the same to the digits that standards print.
+#[must_use]
+pub fn are_same_primaries(a: [Xy; 4], b: [Xy; 4]) -> bool {
+    const PRINTED: f64 = 1e-3;
+    a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| (a - b).abs() <= PRINTED)
+}
+
 /// The matrix to linear Rec. 709 from RGB with these chromaticities of red, green, blue and white, which becomes D65 as Bradford
 /// has it. `None` where they span no colours, or the white is none.
 #[must_use]

@@ -4,8 +4,9 @@ use crate::batch::part_file::Header as PartHeader;
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::exr::header::{Header, Headers, Value, read_headers};
-use crate::film::exr::{content_hash, read_exr};
+use crate::film::exr::read_exr;
 use crate::film::facts::Facts;
+use crate::spectrum::ColourSpace;
 use glam::{DMat4, DVec3};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -122,9 +123,8 @@ pub fn of(path: &Path) -> Result<ExrFacts> {
     };
     let file = if unread.is_none() { Some(read_exr(path)?) } else { None };
     let as_written = file.as_ref().and_then(|file| {
-        let channels = file.parts.iter().flat_map(|part| &part.channels);
-        let channels = channels.map(|(name, plane)| (name.as_str(), plane.as_slice()));
-        file.parts[0].text("abbe/contentHash").map(|hash| hash == content_hash(channels))
+        let written = file.parts[0].text("abbe/contentHash")?;
+        Some(written == file.content_hash())
     });
     let Headers { parts, .. } = headers;
     let frame = parts[0].window("displayWindow").unwrap_or(Window::full(0, 0));
@@ -192,20 +192,23 @@ fn colours(header: &Header) -> Option<String> {
         ("lin_ciexyzd65_scene", "CIE XYZ relative to D65"),
         ("data", "data, no colours"),
     ];
-    const PRIMARIES: [(&str, [f64; 6]); 5] = [
-        ("Rec. 709 primaries", [0.64, 0.33, 0.30, 0.60, 0.15, 0.06]),
-        ("ACEScg (AP1) primaries", [0.713, 0.293, 0.165, 0.830, 0.128, 0.044]),
-        ("ACES2065-1 (AP0) primaries", [0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.0770]),
-        ("Rec. 2020 primaries", [0.708, 0.292, 0.170, 0.797, 0.131, 0.046]),
-        ("P3 primaries", [0.680, 0.320, 0.265, 0.690, 0.150, 0.060]),
+    const PRIMARIES: [(&str, ColourSpace); 5] = [
+        ("Rec. 709 primaries", ColourSpace::Rec709),
+        ("ACEScg (AP1) primaries", ColourSpace::AcesCg),
+        ("ACES2065-1 (AP0) primaries", ColourSpace::Aces2065_1),
+        ("Rec. 2020 primaries", ColourSpace::Rec2020),
+        ("P3 primaries", ColourSpace::P3D65),
     ];
     let named = header.text("colorInteropID").map(|id| {
         let words = KNOWN.iter().find(|(known, _)| *known == id).map(|(_, words)| *words);
         words.map_or_else(|| id.to_owned(), |words| format!("{words} ({id})"))
     });
     let primaries = header.numbers::<8>("chromaticities").map(|c| {
-        let like = |known: &[f64; 6]| known.iter().zip(&c).all(|(a, b)| (a - b).abs() < 5e-4);
-        let name = PRIMARIES.iter().find(|(_, known)| like(known)).map(|(name, _)| (*name).to_owned());
+        // Whatever their white.
+        let like = |space: ColourSpace| {
+            space.chromaticities()[..3].iter().flatten().zip(&c).all(|(a, b)| (a - b).abs() < 5e-4)
+        };
+        let name = PRIMARIES.iter().find(|(_, space)| like(*space)).map(|(name, _)| (*name).to_owned());
         let name =
             name.unwrap_or_else(|| format!("primaries ({}, {}) ({}, {}) ({}, {})", c[0], c[1], c[2], c[3], c[4], c[5]));
         format!("{name}, white ({:.4}, {:.4})", c[6], c[7])

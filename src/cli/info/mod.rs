@@ -61,19 +61,14 @@ pub fn run(arguments: &InfoArguments) -> Result<i32> {
 
 /// By what the file begins with, whatever its name.
 fn look(file: &Path) -> Result<Found> {
-    if file.is_dir() {
-        return Err(Error::input(file, "expected an OpenEXR or PNG file, found a directory"));
-    }
-    if file.exists() {
-        crate::input::check(file).map_err(|e| Error::input(file, e.to_string()))?;
-    }
     let mut start = [0; 8];
-    let read = std::fs::File::open(file).and_then(|mut f| std::io::Read::read(&mut f, &mut start));
+    let read = crate::input::open(file).and_then(|mut f| std::io::Read::read(&mut f, &mut start));
     match read {
         Ok(_) if start == *b"\x89PNG\r\n\x1a\n" => inspect::inspect(file).map(Found::Png),
         Ok(_) if start[..4] != [0x76, 0x2f, 0x31, 0x01] => {
             Err(Error::input(file, "expected an OpenEXR or PNG file, found something else"))
         }
+        // What cannot be opened is told there.
         _ => facts::of(file).map(Found::Exr),
     }
 }

@@ -20,6 +20,7 @@ mod noise;
 
 use crate::film::Window;
 use crate::film::exr::{ExrFile, ExrPart};
+use crate::spectrum::colour;
 use noise::Pair;
 use std::fmt::Write as _;
 
@@ -294,13 +295,13 @@ fn same_window(what: &str, a: Window, b: Window, origin: Origin) -> Result<(), S
     Err(format!("the {what} differ: {a} against {b}"))
 }
 
-/// Files without chromaticities are Rec.709 (OpenEXR's default). Primaries that differ by less than 0.001 are the same to
-/// the digits that standards print.
 fn same_colours(a: &ExrFile, b: &ExrFile) -> Result<(), String> {
-    const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
-    let (of_a, of_b) = (a.chromaticities.unwrap_or(REC709), b.chromaticities.unwrap_or(REC709));
-    let differ = of_a.iter().flatten().zip(of_b.iter().flatten()).any(|(x, y)| (x - y).abs() > 1e-3);
-    if differ { Err(format!("the colour primaries differ: {of_a:?} against {of_b:?}")) } else { Ok(()) }
+    let (a, b) = (a.primaries(), b.primaries());
+    if colour::are_same_primaries(a, b) {
+        return Ok(());
+    }
+    let words = |all: [[f64; 2]; 4]| all.map(|[x, y]| format!("({x:.4}, {y:.4})")).join(" ");
+    Err(format!("the colour primaries differ: {} against {}", words(a), words(b)))
 }
 
 fn compared_names(a: &ExrPart, b: &ExrPart) -> Result<Vec<String>, String> {

@@ -156,7 +156,7 @@ impl ExrImage {
 
 /// 128 bits of BLAKE3 over the channels as [`read_exr`] gives them, in the order of their names: what was damaged is known by
 /// it.
-pub fn content_hash<'a>(channels: impl Iterator<Item = (&'a str, &'a [f32])>) -> String {
+fn content_hash<'a>(channels: impl Iterator<Item = (&'a str, &'a [f32])>) -> String {
     let mut channels: Vec<(&str, &[f32])> = channels.collect();
     channels.sort_by_key(|channel| channel.0);
     let mut hasher = blake3::Hasher::new();

@@ -1,8 +1,10 @@
 //! Reads any flat OpenEXR file that the `exr` crate can decode.
 
+use super::content_hash;
 use super::header::{Header, read_headers};
 use crate::error::{Error, Result};
 use crate::film::Window;
+use crate::spectrum::ColourSpace;
 use ::exr::image::FlatSamples;
 use ::exr::meta::MetaData;
 use ::exr::meta::attribute::{AttributeValue, IntegerBounds, Text};
@@ -34,6 +36,21 @@ pub struct ExrPart {
     pub channels: Vec<(String, Vec<f32>)>,
     /// Text attributes, sorted by name.
     pub texts: Vec<(String, String)>,
+}
+
+impl ExrFile {
+    /// CIE x, y of red, green, blue and white: Rec. 709's where the file does not say, as OpenEXR has it.
+    #[must_use]
+    pub fn primaries(&self) -> [[f64; 2]; 4] {
+        self.chromaticities.map_or(ColourSpace::Rec709.chromaticities(), |all| all.map(|xy| xy.map(f64::from)))
+    }
+
+    /// [`content_hash`] of the channels of all parts.
+    #[must_use]
+    pub fn content_hash(&self) -> String {
+        let channels = self.parts.iter().flat_map(|part| &part.channels);
+        content_hash(channels.map(|(name, plane)| (name.as_str(), plane.as_slice())))
+    }
 }
 
 impl ExrPart {
