@@ -128,7 +128,7 @@ impl Tracer<'_> {
             let crossing = scene.crossing(object, &surface, ray.direction, &inside.bodies);
             let hidden = crossing.is_some_and(|crossing| !crossing.shows);
             let beyond = scene.beyond(object, &surface, ray.direction, inside);
-            if !hidden && !matches!(material.kind, Kind::Boundary) {
+            if !hidden {
                 let standpoint = Standpoint {
                     here: crossing.map_or(inside, |crossing| Inside { bodies: crossing.here, ..inside }),
                     beyond,

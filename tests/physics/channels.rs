@@ -169,6 +169,20 @@ fn light_goes_straight_through_256_surfaces_at_the_most() {
     }
 }
 
+/// Light of a bare boundary is added to what lies behind it, and covers nothing: 2 over a sky of 3.
+#[test]
+fn a_boundary_that_shines_adds_to_what_is_behind_it() {
+    for integrator in ["path", "{whitted: {}}"] {
+        let scene = format!(
+            "{PARALLEL}image: {{width: 1, height: 1}}\nintegrator: {integrator}\nlights: [{{constant: {{radiance: 3}}}}]\n\
+             shapes:\n- rectangle: {{corner: [-9, -9, 0], edge_u: [18, 0, 0], edge_v: [0, 18, 0], material: {{boundary: {{}}}}, \
+             emission: 2}}\n"
+        );
+        let sample = bench_with(&scene, &[]).sample([0, 0], 0);
+        assert_eq!((sample.radiance.to_array()[0], sample.alpha), (5.0, 0.0), "{integrator}");
+    }
+}
+
 /// Between perfect mirrors nothing ends the recursion but its bound, whatever the mirrors are made of.
 #[test]
 fn light_goes_from_mirror_to_mirror_to_the_bound() {
