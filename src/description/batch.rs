@@ -10,11 +10,11 @@ use serde::de::IgnoredAny;
 use super::animation::Animation;
 use super::decode::decode;
 use super::edit::{self, Setting};
-use super::fault::Checker;
+use super::fault::{Checker, Fault};
 use super::mitsuba;
 use super::node::{Entry, Node, Place, Sources, Value, quote};
 use super::output::Output;
-use super::path::At;
+use super::path::{At, Segment};
 use super::path_map::PathMap;
 use super::scene::SceneDescription;
 use super::settings::Render;
@@ -311,6 +311,11 @@ impl BatchEntry {
             }
             (error, _) => error,
         })?;
+        if let (Some(place), Some(list)) = (self.place, root.entry("scenes")) {
+            let message = format!("expected a scene, found a batch; it is named at {}", sources.describe(place));
+            let fault = Fault::at_place(list.key_place, message).under(Segment::Key("scenes".into()));
+            return Err(fault.into_error(&sources));
+        }
         edit::include(&mut root, &self.path, &mut sources)?;
 
         // Over what is no map nothing can be laid; the decoder says so.
@@ -429,6 +434,17 @@ mod tests {
                 "DIR/bad.yaml:1:9: camera: expected a map with fields among origin, target, up, to_world, fov_deg, fov_axis, \
                  orthographic_height, lens, clip, principal_point, shutter, found 3\n\
                  DIR/none.yaml: cannot be read: No such file or directory (os error 2); it is named at DIR/batch.yaml:1:54"
+            );
+        });
+    }
+
+    #[test]
+    fn a_batch_in_a_batch_is_told_as_what_it_is() {
+        let files = [("all.yaml", "scenes:\n- file: batch.yaml\n"), ("batch.yaml", "output: {}\nscenes: [{file: a.yaml}]")];
+        with(&files, |directory| {
+            assert_eq!(
+                in_words(&load(&directory.join("all.yaml")).unwrap().check(&[]).unwrap_err(), directory),
+                "DIR/batch.yaml:2:1: scenes: expected a scene, found a batch; it is named at DIR/all.yaml:2:9"
             );
         });
     }

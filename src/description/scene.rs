@@ -138,7 +138,8 @@ impl SceneDescription {
         let decoded: std::result::Result<SceneDescription, Fault> = decode(&root, &sources);
         let mut scene = decoded.map_err(|fault| {
             // Without a camera it may have been meant for a batch.
-            let fault = if root.get("camera").is_none() { fault.or_one_of(["scenes"]) } else { fault };
+            let batch = root.get("camera").is_none() && root.get("scenes").is_none();
+            let fault = if batch { fault.or_one_of(["scenes"]) } else { fault };
             fault.into_error(&sources)
         })?;
         scene.check(&root, &sources)?;
