@@ -148,9 +148,9 @@ pub(crate) fn check(output: &Output, at: At<'_>, checker: &mut Checker<'_>) {
         match name.as_str() {
             "timeCode" => {
                 let fits = matches!(value, HeaderValue::Name(text) if time_code(text).is_some());
-                checker.require(fits, at, "a time code, as \"01:02:03:04\"", "another value");
+                checker.require(fits, at, "a time code, as \"01:02:03:04\"", checker.written(at));
             }
-            name if NUMBERS.contains(&name) => checker.require(number, at, "a number", "text"),
+            name if NUMBERS.contains(&name) => checker.require(number, at, "a number", checker.written(at)),
             _ => {}
         }
     }
@@ -216,8 +216,13 @@ mod tests {
             faults("output: {exr: {attributes: {compression: 3, timeCode: 7, expTime: long, shot: '010'}}}"),
             "dir/s.yaml:2:42: output.exr.attributes.compression: expected a name that the renderer does not give itself, \
              found \"compression\"\n\
-             dir/s.yaml:2:55: output.exr.attributes.timeCode: expected a time code, as \"01:02:03:04\", found another value\n\
-             dir/s.yaml:2:67: output.exr.attributes.expTime: expected a number, found text"
+             dir/s.yaml:2:55: output.exr.attributes.timeCode: expected a time code, as \"01:02:03:04\", found 7\n\
+             dir/s.yaml:2:67: output.exr.attributes.expTime: expected a number, found the text \"long\""
+        );
+        assert_eq!(
+            faults("output: {exr: {attributes: {timeCode: '01:02:60:00'}}}"),
+            "dir/s.yaml:2:39: output.exr.attributes.timeCode: expected a time code, as \"01:02:03:04\", found the text \
+             \"01:02:60:00\""
         );
     }
 

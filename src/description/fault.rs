@@ -222,6 +222,11 @@ impl<'a> Checker<'a> {
         self.faults.push(Fault::at_place(place, message).under_path(&steps));
     }
 
+    /// What is written in the field `at`, in words.
+    pub(crate) fn written(&self, at: At<'_>) -> String {
+        self.root.find(&at.segments()).map_or_else(|| "nothing".to_owned(), Node::found)
+    }
+
     /// Faults so far.
     pub(crate) fn count(&self) -> usize {
         self.faults.len() + self.untold
