@@ -7,7 +7,7 @@ use super::fault::Checker;
 use super::material::given_fields;
 use super::path::At;
 use super::spectrum::{Role, Spectrum, Vec3, one};
-use super::transform::{TransformStep, is_similarity, parallel};
+use super::transform::{TransformStep, check_view, is_similarity, parallel};
 
 /// `camera: {origin: [0, 3.2, 12], target: [0, 1.1, 0], fov_deg: 38}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -357,11 +357,7 @@ impl Pose {
         match self {
             Pose::LookAt { origin, target, up } => {
                 let along = [0, 1, 2].map(|i| target[i] - origin[i]);
-                checker.direction(at.key("up"), up);
-                if target == origin {
-                    let found = format_args!("{target:?}");
-                    checker.require(false, at.key("target"), "a point other than the origin", found);
-                } else if up != [0.0; 3] && parallel(along, up) {
+                if check_view(origin, target, up, at, checker) && parallel(along, up) {
                     checker.require(
                         false,
                         at.key("up"),
@@ -536,6 +532,39 @@ mod tests {
         assert_eq!(
             faults("image: {overscan: 4, crop: {width: 10, height: 10}}"),
             "dir/s.yaml:2:19: image.overscan: expected no overscan beside a crop, found 4"
+        );
+    }
+
+    #[test]
+    fn what_is_too_far_away_for_a_view_is_told_by_its_own_field() {
+        let told = |fields: &str| parse(&format!("camera: {{{fields}, fov_deg: 40}}")).unwrap_err().to_string();
+        for (fields, message) in [
+            (
+                "origin: [0, 0, 1e300], target: [0, 0, 0]",
+                "1:18: camera.origin: expected three numbers up to 1e60, found [0.0, 0.0, 1e300]",
+            ),
+            (
+                "target: [-1e61, 0, 0], origin: [0, 0, 0]",
+                "1:18: camera.target: expected three numbers up to 1e60, found [-1e61, 0.0, 0.0]",
+            ),
+            (
+                "up: [0, 1e300, 0], origin: [0, 0, 1], target: [0, 0, 0]",
+                "1:14: camera.up: expected a vector of length from 1e-60 to 1e60, found [0.0, 1e300, 0.0]",
+            ),
+            (
+                "up: [0, 1e-300, 0], origin: [0, 0, 1], target: [0, 0, 0]",
+                "1:14: camera.up: expected a vector of length from 1e-60 to 1e60, found [0.0, 1e-300, 0.0]",
+            ),
+            (
+                "origin: [0, 0, 0], target: [0, 0, 1e-300]",
+                "1:37: camera.target: expected a point other than the origin, found [0.0, 0.0, 1e-300]",
+            ),
+        ] {
+            assert_eq!(told(fields), format!("dir/s.yaml:{message}"));
+        }
+        assert_eq!(
+            faults("lights: [{projector: {origin: [1e300, 0, 0], target: [0, 0, 0], fov_deg: 40}}]"),
+            "dir/s.yaml:2:31: lights[0].projector.origin: expected three numbers up to 1e60, found [1e300, 0.0, 0.0]"
         );
     }
 

@@ -7,7 +7,7 @@ use super::camera::FovAxis;
 use super::fault::Checker;
 use super::path::At;
 use super::spectrum::{FilePath, Role, SpectrumOrTexture, Vec3, one};
-use super::transform::{TransformStep, is_similarity, parallel};
+use super::transform::{TransformStep, check_view, is_similarity, parallel};
 
 /// `environment: {file: sky.exr}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -143,10 +143,8 @@ impl EnvironmentLight {
 impl ProjectorLight {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         let (origin, target) = (glam::DVec3::from(self.origin), glam::DVec3::from(self.target));
-        let found = format_args!("{:?}", self.target);
-        checker.require(origin != target, at.key("target"), "a point other than the origin", found);
-        checker.direction(at.key("up"), self.up);
-        if origin != target && self.up != [0.0; 3] && parallel((target - origin).into(), self.up) {
+        let holds = check_view(self.origin, self.target, self.up, at, checker);
+        if holds && parallel((target - origin).into(), self.up) {
             checker.fault(at.key("up"), "expected a direction that is not along the beam, found one along it");
         }
         let within = self.fov_deg > 0.0 && self.fov_deg < 180.0;

@@ -175,6 +175,29 @@ pub(crate) fn check_steps(steps: &[TransformStep], at: At<'_>, checker: &mut Che
     Some(linear)
 }
 
+/// Least and greatest length of a vector, as those of shapes: squares neither overflow nor vanish.
+const LENGTHS: std::ops::RangeInclusive<f64> = 1e-60..=1e60;
+
+/// Whether there are a view from `origin` to `target` and a direction `up`, of the fields of `at`.
+pub(crate) fn check_view(origin: Vec3, target: Vec3, up: Vec3, at: At<'_>, checker: &mut Checker<'_>) -> bool {
+    let before = checker.count();
+    let greatest = |v: Vec3| DVec3::from(v).abs().max_element();
+    for (key, point) in [("origin", origin), ("target", target)] {
+        let found = format_args!("{point:?}");
+        checker.require(greatest(point) <= *LENGTHS.end(), at.key(key), "three numbers up to 1e60", found);
+    }
+    checker.direction(at.key("up"), up);
+    let holds = up == [0.0; 3] || LENGTHS.contains(&greatest(up));
+    let expected = "a vector of length from 1e-60 to 1e60";
+    checker.require(holds, at.key("up"), expected, format_args!("{up:?}"));
+    if checker.count() == before {
+        let along = [0, 1, 2].map(|i| target[i] - origin[i]);
+        let apart = greatest(along) >= *LENGTHS.start();
+        checker.require(apart, at.key("target"), "a point other than the origin", format_args!("{target:?}"));
+    }
+    checker.count() == before
+}
+
 /// Whether two vectors other than zero span no plane.
 ///
 /// Both are divided by their greatest component, which rounds each by ε/2 relative; a component of
