@@ -3,6 +3,7 @@
 use glam::DMat3;
 use serde::Deserialize;
 
+use super::decode::{whole, whole_or_none};
 use super::fault::Checker;
 use super::material::given_fields;
 use super::path::At;
@@ -47,6 +48,7 @@ pub struct ShutterTimes {
     /// When it closes.
     pub close: f64,
     /// At how many moments in between the scene is looked at; default by what moves.
+    #[serde(default, deserialize_with = "whole_or_none::<_, 2, MOST_MOMENTS>")]
     pub moments: Option<u32>,
 }
 
@@ -230,10 +232,10 @@ impl TryFrom<WrittenCamera> for Camera {
 #[serde(deny_unknown_fields)]
 pub struct Image {
     /// Pixels, 1 to 65536; default 600.
-    #[serde(default = "side")]
+    #[serde(default = "side", deserialize_with = "whole::<_, 1, MAX_SIDE>")]
     pub width: u32,
     /// Pixels, 1 to 65536; default 600.
-    #[serde(default = "side")]
+    #[serde(default = "side", deserialize_with = "whole::<_, 1, MAX_SIDE>")]
     pub height: u32,
     /// Reconstruction filter; default `box`.
     #[serde(default)]
@@ -241,7 +243,7 @@ pub struct Image {
     /// The part that is rendered; default all.
     pub crop: Option<Crop>,
     /// Pixels that are rendered beyond each edge of the frame, for what moves the picture later; 0 to 16384, default 0.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "whole::<_, 0, MOST_OVERSCAN>")]
     pub overscan: u32,
     /// Factor on the picture; default 1.
     #[serde(default = "one")]
@@ -338,19 +340,27 @@ fn lanczos_radius() -> f64 {
 #[serde(deny_unknown_fields)]
 pub struct Crop {
     /// First column; default 0.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "whole::<_, 0, LAST_PIXEL>")]
     pub x: u32,
     /// First row; default 0.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "whole::<_, 0, LAST_PIXEL>")]
     pub y: u32,
     /// Columns.
+    #[serde(deserialize_with = "whole::<_, 1, MAX_SIDE>")]
     pub width: u32,
     /// Rows.
+    #[serde(deserialize_with = "whole::<_, 1, MAX_SIDE>")]
     pub height: u32,
 }
 
 /// The longest side of a picture, pixels.
 pub const MAX_SIDE: u32 = 65536;
+
+/// The last column or row that a picture can have.
+const LAST_PIXEL: u32 = MAX_SIDE - 1;
+
+/// The most pixels beyond an edge.
+const MOST_OVERSCAN: u32 = MAX_SIDE / 4;
 
 impl Pose {
     fn check(self, projection: Projection, at: At<'_>, checker: &mut Checker<'_>) {
@@ -430,7 +440,7 @@ impl Image {
             check_channel(&band.name, self.bands[..i].iter().any(|b| b.name == band.name), at.key("name"), checker);
             band.response.check(Role::Emission, at.key("response"), checker);
         }
-        checker.whole_between(at.key("overscan"), self.overscan, 0, MAX_SIDE / 4);
+        checker.whole_between(at.key("overscan"), self.overscan, 0, MOST_OVERSCAN);
         if let Some(crop) = self.crop {
             checker.require(self.overscan == 0, at.key("overscan"), "no overscan beside a crop", self.overscan);
             let at = at.key("crop");

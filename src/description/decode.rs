@@ -9,6 +9,8 @@
 //!   variants do not;
 //! - a [`FilePath`](super::FilePath) starts from the directory of the text in which it stands.
 
+use std::fmt;
+
 use serde::de::value::{BytesDeserializer, StrDeserializer};
 use serde::de::{self, DeserializeOwned, DeserializeSeed, Deserializer, IntoDeserializer, Visitor};
 use serde::forward_to_deserialize_any;
@@ -29,6 +31,37 @@ pub(crate) const FILE_PATH: &str = "FilePath";
 /// The first fault, with its place.
 pub(crate) fn decode<T: DeserializeOwned>(node: &Node, sources: &Sources) -> Result<T, Fault> {
     T::deserialize(De { node, sources }).map_err(|fault| fault.or_at(node.place))
+}
+
+/// For `deserialize_with`: a whole number that is to lie from `LEAST` to `MOST`, as is told of what is no `u32`. Of the others
+/// [`Checker::whole_between`](super::fault::Checker::whole_between) tells it, together with all other faults.
+pub(crate) fn whole<'de, D: Deserializer<'de>, const LEAST: u32, const MOST: u32>(de: D) -> Result<u32, D::Error> {
+    de.deserialize_u32(Whole(match MOST {
+        u32::MAX => format!("a whole number of {LEAST} or more"),
+        _ => format!("a whole number from {LEAST} to {MOST}"),
+    }))
+}
+
+/// [`whole`] of a field that need not be there, with `serde(default)`.
+pub(crate) fn whole_or_none<'de, D: Deserializer<'de>, const LEAST: u32, const MOST: u32>(
+    de: D,
+) -> Result<Option<u32>, D::Error> {
+    whole::<D, LEAST, MOST>(de).map(Some)
+}
+
+/// Takes a `u32`, and says what it is to be.
+pub(crate) struct Whole(pub(crate) String);
+
+impl Visitor<'_> for Whole {
+    type Value = u32;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+
+    fn visit_u64<E: de::Error>(self, value: u64) -> Result<u32, E> {
+        u32::try_from(value).map_err(|_| E::invalid_value(de::Unexpected::Unsigned(value), &self))
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -99,8 +132,11 @@ macro_rules! whole_numbers {
             match self.whole().and_then(|whole| <$type>::try_from(whole).ok()) {
                 Some(value) => visitor.$visit(value),
                 None => {
+                    // Serde's own visitors say no more than the name of the type.
+                    let said = (&visitor as &dyn de::Expected).to_string();
                     let (least, most) = (<$type>::MIN, <$type>::MAX);
-                    Err(Fault::expected(self.node, format_args!("a whole number from {least} to {most}")))
+                    let range = || format!("a whole number from {least} to {most}");
+                    Err(Fault::expected(self.node, if said == stringify!($type) { range() } else { said }))
                 }
             }
         }
@@ -435,16 +471,32 @@ mod tests {
             ),
             (
                 "image: {width: abc}",
-                "2:16: image.width: expected a whole number from 0 to 4294967295, found the text \"abc\"",
+                "2:16: image.width: expected a whole number from 1 to 65536, found the text \"abc\"",
             ),
-            ("image: {width: 1.5}", "2:16: image.width: expected a whole number from 0 to 4294967295, found 1.5"),
+            ("image: {width: 1.5}", "2:16: image.width: expected a whole number from 1 to 65536, found 1.5"),
+            ("image: {width: -16}", "2:16: image.width: expected a whole number from 1 to 65536, found -16"),
+            ("render: {tile: 4294967296}", "2:16: render.tile: expected a whole number from 1 to 65536, found 4294967296"),
+            (
+                "integrator: {path: {max_depth: -1}}",
+                "2:32: integrator.path.max_depth: expected a whole number of 1 or more, found -1",
+            ),
+            ("image: {crop: {x: -1}}", "2:19: image.crop.x: expected a whole number from 0 to 65535, found -1"),
             (
                 "render: {samples: '3'}",
-                "2:19: render.samples: expected a whole number from 0 to 4294967295, found the text \"3\"",
+                "2:19: render.samples: expected a whole number from 1 to 134217728, found the text \"3\"",
             ),
             (
                 "render: {seed: -1}",
                 "2:16: render.seed: expected a whole number from 0 to 18446744073709551615, found -1",
+            ),
+            (
+                "materials: {a: {dielectric: {ior: {formula: {number: -2, coefficients: []}}}}}",
+                "2:54: materials.a.dielectric.ior.formula.number: expected a whole number from 1 to 9, found -2",
+            ),
+            ("output: {png: {bits: -8}}", "2:22: output.png.bits: expected 8 or 16, found -8"),
+            (
+                "shapes: [{mesh: {file: a.serialized, index: -1}}]",
+                "2:45: shapes[0].mesh.index: expected a whole number from 0 to 4294967295, found -1",
             ),
             ("medium: 3", "2:9: medium: expected text, found 3"),
             ("shapes: {sphere: 1}", "2:9: shapes: expected a list, found a map with sphere"),

@@ -471,7 +471,7 @@ mod tests {
         let says = |key: &str, value: &str| set(&[(key, value)]).unwrap_err();
         assert_eq!(
             says("render.samples", "-3"),
-            "--set render.samples=-3: render.samples: expected a whole number from 0 to 4294967295, found -3"
+            "--set render.samples=-3: render.samples: expected a whole number from 1 to 134217728, found -3"
         );
         assert_eq!(
             says("render.samples", "0"),

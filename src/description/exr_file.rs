@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::decode::whole;
 use super::fault::Checker;
 use super::layer::Layer;
 use super::output::{Channels, Colour, Compression, Output, Precision};
@@ -38,6 +39,7 @@ pub type HeaderValues = BTreeMap<String, HeaderValue>;
 #[serde(deny_unknown_fields)]
 pub struct SpectralFile {
     /// How many, 1 to 512.
+    #[serde(deserialize_with = "whole::<_, 1, 512>")]
     pub bands: u32,
     /// Lower end of the first, nm; default 400.
     #[serde(default = "from_nm")]

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
+use super::decode::Whole;
 use super::exr_file::{self, DWA_LEVEL, FileLayout, HeaderValues, SpectralFile};
 use super::fault::Checker;
 use super::path::At;
@@ -174,7 +175,7 @@ pub struct Png {
     #[serde(default)]
     pub space: PngSpace,
     /// Of a channel, 8 or 16; default 8.
-    #[serde(default = "eight")]
+    #[serde(default = "eight", deserialize_with = "bits")]
     pub bits: u32,
     /// Default `hash`.
     #[serde(default)]
@@ -183,6 +184,10 @@ pub struct Png {
 
 fn eight() -> u32 {
     8
+}
+
+fn bits<'de, D: Deserializer<'de>>(de: D) -> std::result::Result<u32, D::Error> {
+    de.deserialize_u32(Whole("8 or 16".to_owned()))
 }
 
 impl Default for Png {

@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use serde::Deserialize;
 
+use super::camera::MAX_SIDE;
+use super::decode::{whole, whole_or_none};
 use super::fault::Checker;
 use super::frames::Frames;
 use super::light::nothing;
@@ -37,9 +39,10 @@ impl Default for Integrator {
 #[serde(deny_unknown_fields)]
 pub struct PathIntegrator {
     /// Most segments of a path: 1 shows emission, 2 direct light; default no limit.
+    #[serde(default, deserialize_with = "whole_or_none::<_, 1, { u32::MAX }>")]
     pub max_depth: Option<u32>,
     /// Segments after which a path may end by chance; default 5.
-    #[serde(default = "roulette_depth")]
+    #[serde(default = "roulette_depth", deserialize_with = "whole::<_, 1, { u32::MAX }>")]
     pub roulette_depth: u32,
     /// Whether lights that the camera sees itself are left out: shining shapes as if they were not there, light
     /// from infinity as nothing; default false.
@@ -50,11 +53,11 @@ pub struct PathIntegrator {
     pub opaque_sky: bool,
     /// Paths that one sample follows from its camera ray, if more than `scatter_samples`; with 0 lights are only met by chance,
     /// and those without extent never; default 1.
-    #[serde(default = "one")]
+    #[serde(default = "one", deserialize_with = "whole::<_, 0, MAX_SPLIT>")]
     pub light_samples: u32,
     /// Paths that one sample follows from its camera ray, if more than `light_samples`; with 0 light arrives by shadow rays
     /// only, and mirrors are black; default 1.
-    #[serde(default = "one")]
+    #[serde(default = "one", deserialize_with = "whole::<_, 0, MAX_SPLIT>")]
     pub scatter_samples: u32,
     /// Whether going straight through a thin pane or the boundary of a medium ends a segment for `max_depth`;
     /// default false.
@@ -100,9 +103,10 @@ pub struct NoIntegrator {}
 #[serde(deny_unknown_fields)]
 pub struct LightTracerIntegrator {
     /// Most segments of a path, counted as for `path`; default no limit.
+    #[serde(default, deserialize_with = "whole_or_none::<_, 1, { u32::MAX }>")]
     pub max_depth: Option<u32>,
     /// Segments after which a path may end by chance; default 5.
-    #[serde(default = "roulette_depth")]
+    #[serde(default = "roulette_depth", deserialize_with = "whole::<_, 1, { u32::MAX }>")]
     pub roulette_depth: u32,
     /// Whether lights that the camera sees itself are left out; default false.
     #[serde(default)]
@@ -114,10 +118,10 @@ pub struct LightTracerIntegrator {
 #[serde(deny_unknown_fields)]
 pub struct WhittedIntegrator {
     /// Most reflections and refractions in a row, 1 to 256; default 10.
-    #[serde(default = "whitted_depth")]
+    #[serde(default = "whitted_depth", deserialize_with = "whole::<_, 1, MAX_RECURSION>")]
     pub max_depth: u32,
     /// Rays per pixel and side, on a regular grid; default 2.
-    #[serde(default = "whitted_grid")]
+    #[serde(default = "whitted_grid", deserialize_with = "whole::<_, 1, MAX_GRID>")]
     pub grid: u32,
     /// Radiance that reaches every surface, times its reflectance; default 0.
     #[serde(default = "nothing")]
@@ -140,7 +144,7 @@ fn whitted_grid() -> u32 {
 #[serde(deny_unknown_fields)]
 pub struct Render {
     /// Paths per pixel, where [`Render::stop`] says nothing else; default 64.
-    #[serde(default = "samples")]
+    #[serde(default = "samples", deserialize_with = "whole::<_, 1, SAMPLES_LIMIT>")]
     pub samples: u32,
     /// When to end; default after `samples`.
     #[serde(default)]
@@ -152,7 +156,7 @@ pub struct Render {
     #[serde(default)]
     pub effects: Effects,
     /// Side of a tile of work, pixels, 1 to 65536; default 32.
-    #[serde(default = "tile")]
+    #[serde(default = "tile", deserialize_with = "whole::<_, 1, MAX_SIDE>")]
     pub tile: u32,
     /// How wavelengths are drawn; default `auto`.
     #[serde(default)]
@@ -208,6 +212,7 @@ pub struct Stop {
     /// Wall time of rendering.
     pub time: Option<Time>,
     /// Paths per pixel; default [`MOST_SAMPLES`] where there is another target, which it is then to reach.
+    #[serde(default, deserialize_with = "whole_or_none::<_, 1, SAMPLES_LIMIT>")]
     pub samples: Option<u32>,
 }
 
@@ -359,7 +364,7 @@ impl Integrator {
 impl Render {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         checker.whole_between(at.key("samples"), self.samples, 1, SAMPLES_LIMIT);
-        checker.whole_between(at.key("tile"), self.tile, 1, super::camera::MAX_SIDE);
+        checker.whole_between(at.key("tile"), self.tile, 1, MAX_SIDE);
         let stop = at.key("stop");
         if let Some(error) = self.stop.error {
             checker.positive(stop.key("error"), error);

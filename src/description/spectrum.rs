@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, Visitor};
 
-use super::decode::FILE_PATH;
+use super::decode::{FILE_PATH, whole};
 use super::fault::Checker;
 use super::path::At;
 
@@ -203,7 +203,8 @@ pub enum Index {
 #[serde(deny_unknown_fields)]
 pub struct NumberedFormula {
     /// Which one, from 1 to 9.
-    pub number: u8,
+    #[serde(deserialize_with = "whole::<_, 1, 9>")]
+    pub number: u32,
     /// As the database lists them, λ in µm.
     pub coefficients: Vec<f64>,
 }

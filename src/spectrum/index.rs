@@ -39,7 +39,7 @@ pub enum RefractiveIndex {
     /// A numbered formula of refractiveindex.info, 1 to 9 (see [`RefractiveIndex::formula`]).
     Formula {
         /// Which of the nine.
-        number: u8,
+        number: u32,
         /// As the database lists them.
         coefficients: Vec<f64>,
     },
@@ -88,7 +88,7 @@ impl RefractiveIndex {
     ///
     /// # Errors
     /// In words, if there is no such formula here or the coefficients do not pair up.
-    pub fn formula(number: u8, coefficients: &[f64]) -> Result<RefractiveIndex, String> {
+    pub fn formula(number: u32, coefficients: &[f64]) -> Result<RefractiveIndex, String> {
         let count = coefficients.len();
         let (fits, shape) = match number {
             1..=3 | 5 | 6 => (count % 2 == 1, "1, 3, 5, …"),
@@ -255,7 +255,7 @@ fn power(x: f64, e: f64) -> f64 {
 }
 
 /// The formulas of [`RefractiveIndex::formula`]; `w` in µm.
-fn numbered(number: u8, c: &[f64], w: f64) -> f64 {
+fn numbered(number: u32, c: &[f64], w: f64) -> f64 {
     let w2 = w * w;
     let pairs = |from: usize| c[from..].chunks_exact(2);
     match number {
