@@ -84,6 +84,14 @@ impl Error {
     }
 }
 
+/// A number as a person would write it: `1e308`, and not its three hundred digits.
+#[must_use]
+pub fn in_short(x: f64) -> String {
+    // Between these the shortest digits that tell the number are few enough.
+    let plain = x == 0.0 || (1e-5..1e16).contains(&x.abs());
+    if plain { x.to_string() } else { format!("{x:e}") }
+}
+
 /// `text` with its control characters written out: what is quoted from a file stays on its line, and commands nothing of a
 /// terminal.
 #[must_use]
@@ -92,4 +100,17 @@ pub fn one_line(text: String) -> String {
         return text;
     }
     text.chars().map(|c| if c.is_control() { c.escape_default().to_string() } else { c.to_string() }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_told_as_they_are_written() {
+        let pairs = [(0.0, "0"), (-1.0, "-1"), (0.25, "0.25"), (1e6, "1000000"), (1e308, "1e308"), (-2.5e-7, "-2.5e-7")];
+        for (x, told) in pairs.into_iter().chain([(f64::INFINITY, "inf"), (f64::NAN, "NaN")]) {
+            assert_eq!(in_short(x), told);
+        }
+    }
 }

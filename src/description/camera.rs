@@ -9,6 +9,7 @@ use super::material::given_fields;
 use super::path::At;
 use super::spectrum::{Role, Spectrum, Vec3, one};
 use super::transform::{TransformStep, check_view, is_similarity, parallel};
+use crate::error::in_short;
 
 /// `camera: {origin: [0, 3.2, 12], target: [0, 1.1, 0], fov_deg: 38}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -69,7 +70,7 @@ impl Shutter {
         match self {
             Shutter::Number(share) => checker.positive(at, *share),
             Shutter::Inline(times) => {
-                let found = format!("{} and {}", times.open, times.close);
+                let found = format!("{} and {}", in_short(times.open), in_short(times.close));
                 checker.require(times.open < times.close, at, "open before close", found);
                 checker.whole_between(at.key("moments"), times.moments.unwrap_or(2), 2, MOST_MOMENTS);
             }

@@ -23,7 +23,7 @@ impl NumberOrTexture {
         match self {
             NumberOrTexture::Number(x) if most == f64::INFINITY => checker.not_negative(at, *x),
             NumberOrTexture::Number(x) => {
-                checker.require((0.0..=most).contains(x), at, &format!("a number from 0 to {most}"), x);
+                checker.require((0.0..=most).contains(x), at, &format!("a number from 0 to {most}"), *x);
             }
             NumberOrTexture::Texture(name) => checker.texture(at.key("texture"), name),
         }

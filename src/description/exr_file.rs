@@ -9,6 +9,7 @@ use super::fault::Checker;
 use super::layer::Layer;
 use super::output::{Channels, Colour, Compression, Output, Precision};
 use super::path::At;
+use crate::error::in_short;
 
 /// How channels lie in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -181,7 +182,7 @@ pub(crate) fn check(output: &Output, at: At<'_>, checker: &mut Checker<'_>) {
         let at = at.key("spectral");
         checker.whole_between(at.key("bands"), spectral.bands, 1, 512);
         let inside = spectral.from_nm >= 360.0 && spectral.to_nm <= 830.0 && spectral.from_nm < spectral.to_nm;
-        let found = format_args!("{} to {}", spectral.from_nm, spectral.to_nm);
+        let found = format_args!("{} to {}", in_short(spectral.from_nm), in_short(spectral.to_nm));
         checker.require(inside, at.key("to_nm"), "a range within 360 to 830 nm", found);
     }
 }

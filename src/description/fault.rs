@@ -10,7 +10,7 @@ use serde::de::{Expected, Unexpected};
 use super::material::Material;
 use super::node::{Node, Place, Sources, did_you_mean, enumerate, quote};
 use super::path::{self, At, Segment};
-use crate::error::{Error, one_line};
+use crate::error::{Error, in_short, one_line};
 
 /// One thing wrong with a document.
 #[derive(Clone, Debug)]
@@ -171,6 +171,30 @@ impl serde::de::Error for Fault {
     }
 }
 
+/// What a fault can have found.
+pub(crate) trait Found {
+    /// For the end of "expected …, found …".
+    fn in_words(&self) -> String;
+}
+
+impl Found for f64 {
+    fn in_words(&self) -> String {
+        in_short(*self)
+    }
+}
+
+macro_rules! found_as_displayed {
+    ($($type:ty),*) => {$(
+        impl Found for $type {
+            fn in_words(&self) -> String {
+                self.to_string()
+            }
+        }
+    )*};
+}
+
+found_as_displayed!(&str, String, u32, usize, fmt::Arguments<'_>, std::path::Display<'_>);
+
 /// The most faults that are told at once; the rest are counted.
 const MAX_FAULTS: usize = 100;
 
@@ -233,9 +257,9 @@ impl<'a> Checker<'a> {
     }
 
     /// Records a fault unless `holds`.
-    pub(crate) fn require(&mut self, holds: bool, at: At<'_>, expected: &str, found: impl fmt::Display) {
+    pub(crate) fn require(&mut self, holds: bool, at: At<'_>, expected: &str, found: impl Found) {
         if !holds {
-            self.fault(at, format!("expected {expected}, found {found}"));
+            self.fault(at, format!("expected {expected}, found {}", found.in_words()));
         }
     }
 

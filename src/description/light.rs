@@ -9,6 +9,7 @@ use super::material::given_fields;
 use super::path::At;
 use super::spectrum::{Role, Spectrum, Vec3, one};
 use super::transform::parallel;
+use crate::error::in_short;
 
 /// A light that is not a surface. Surfaces emit by their field `emission`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -316,7 +317,7 @@ impl Light {
                     checker.require(
                         (0.0..=cutoff).contains(&spot.beam_deg),
                         at.key("beam_deg"),
-                        &format!("an angle from 0 to cutoff_deg, {cutoff} degrees"),
+                        &format!("an angle from 0 to cutoff_deg, {} degrees", in_short(cutoff)),
                         spot.beam_deg,
                     );
                 }
@@ -345,7 +346,7 @@ impl Fog {
         match self.law {
             FogLaw::Linear { start, end } => {
                 checker.not_negative(at.key("start"), start);
-                checker.require(end > start, at.key("end"), &format!("a distance beyond start, {start} m"), end);
+                checker.require(end > start, at.key("end"), &format!("a distance beyond start, {} m", in_short(start)), end);
             }
             FogLaw::Exponential { density, .. } => checker.not_negative(at.key("density"), density),
         }

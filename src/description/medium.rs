@@ -192,7 +192,7 @@ impl Phase {
     fn check<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
         match self {
             Phase::Isotropic | Phase::Rayleigh => {}
-            Phase::Hg(g) => checker.require(g.abs() < 1.0, at.key("hg"), "a number between -1 and 1", g),
+            Phase::Hg(g) => checker.require(g.abs() < 1.0, at.key("hg"), "a number between -1 and 1", *g),
             Phase::Table(values) => {
                 let at = at.key("table");
                 checker.require(values.len() >= 2, at, "2 or more values", values.len());
@@ -208,7 +208,7 @@ impl Phase {
                 match &blend.weight {
                     NumberOrVolume::Number(weight) => {
                         let within = (0.0..=1.0).contains(weight);
-                        checker.require(within, at.key("weight"), "a number from 0 to 1", weight);
+                        checker.require(within, at.key("weight"), "a number from 0 to 1", *weight);
                     }
                     NumberOrVolume::Volume(name) => checker.volume(at.key("weight").key("volume"), name),
                 }

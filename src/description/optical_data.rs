@@ -11,7 +11,7 @@ use std::path::Path;
 use super::fault::Fault;
 use super::node::{Node, Place, Sources, Value};
 use super::yaml;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_short};
 use crate::spectrum::{BAND_NM, RefractiveIndex};
 
 /// What the stated range of a formula has to cover, nm.
@@ -115,7 +115,7 @@ impl Tables {
         }
         if let Some((place, field, samples)) = self.k {
             if let Some([nm, k]) = samples.iter().find(|s| s[1] < -MOST_NOISE) {
-                return Err(told(place, &field, &format!("expected k of 0 or more, found {k} at {nm} nm")));
+                return Err(told(place, &field, &format!("expected k of 0 or more, found {} at {nm} nm", in_short(*k))));
             }
             // The same rules as for an index, but for its size.
             let lifted = samples.iter().map(|s| [s[0], 1.0]).collect();
@@ -381,7 +381,7 @@ mod tests {
         assert!(
             bad("2.500 8", "0.700 8").contains("DATA[1].data: k: expected a table of 360 to 830 nm, found 300 to 700")
         );
-        assert!(bad("8.1300E-06", "-8e-6").contains("expected k of 0 or more, found -0.000008 at 2500 nm"));
+        assert!(bad("8.1300E-06", "-8e-6").contains("expected k of 0 or more, found -8e-6 at 2500 nm"));
         assert!(bad("DATA:", "DATUM:").contains("found no DATA"));
         assert!(
             bad("    wavelength_range: 0.3 2.5\n", "").contains("DATA[0]: expected the field \"wavelength_range\"")

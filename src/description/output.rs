@@ -9,6 +9,7 @@ use super::exr_file::{self, DWA_LEVEL, FileLayout, HeaderValues, SpectralFile};
 use super::fault::Checker;
 use super::path::At;
 use super::settings::yes;
+use crate::error::in_short;
 use crate::spectrum::illuminant;
 use crate::spectrum::observer::tristimulus;
 
@@ -258,12 +259,12 @@ impl WhiteBalance {
         match self {
             WhiteBalance::Number(kelvin) => {
                 let expected = "a temperature from 1000 to 40000 K";
-                checker.require((1000.0..=40_000.0).contains(kelvin), at, expected, kelvin);
+                checker.require((1000.0..=40_000.0).contains(kelvin), at, expected, *kelvin);
             }
             WhiteBalance::List([x, y]) => {
                 let expected = "the chromaticity x, y of a light that can be made white";
                 let white = crate::spectrum::colour::adapted_to_d65([*x, *y]).is_some();
-                checker.require(white, at, expected, format_args!("[{x}, {y}]"));
+                checker.require(white, at, expected, format_args!("[{}, {}]", in_short(*x), in_short(*y)));
             }
             WhiteBalance::Illuminant(name) => {
                 if let Err(message) = illuminant::illuminant(name) {

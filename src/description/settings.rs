@@ -11,6 +11,7 @@ use super::frames::Frames;
 use super::light::nothing;
 use super::path::At;
 use super::spectrum::{Role, Spectrum};
+use crate::error::in_short;
 
 /// `integrator: path` or `integrator: {path: {max_depth: 8}}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -371,7 +372,7 @@ impl Render {
         }
         if let Some(time) = &self.stop.time {
             let found = match time {
-                Time::Number(seconds) => seconds.to_string(),
+                Time::Number(seconds) => in_short(*seconds),
                 Time::Name(text) => format!("\"{text}\""),
             };
             let holds = time.duration().is_some_and(|time| !time.is_zero());

@@ -10,6 +10,7 @@ use serde::de::{self, Deserializer, Visitor};
 use super::decode::{FILE_PATH, whole};
 use super::fault::Checker;
 use super::path::At;
+use crate::error::in_short;
 
 /// Three numbers: a position or a vector, metres; or a colour.
 pub type Vec3 = [f64; 3];
@@ -272,12 +273,12 @@ impl Spectrum {
     /// Checks the spectrum times `by`.
     fn check_times(&self, by: f64, role: Role, at: At<'_>, checker: &mut Checker<'_>) {
         let value = |value: f64, at: At<'_>, checker: &mut Checker<'_>| {
-            let times = if by == 1.0 { String::new() } else { format!(" times {by}") };
+            let times = if by == 1.0 { String::new() } else { format!(" times {}", in_short(by)) };
             let (holds, expected) = match role {
                 Role::Reflectance => ((0.0..=1.0).contains(&(value * by)), "a number from 0 to 1"),
                 Role::Emission | Role::Coefficient => (value * by >= 0.0, "a number of 0 or more"),
             };
-            checker.require(holds, at, expected, format_args!("{value}{times}"));
+            checker.require(holds, at, expected, format_args!("{}{times}", in_short(value)));
         };
         let emits = |kind: &str, checker: &mut Checker<'_>| {
             if role != Role::Emission {
@@ -395,7 +396,7 @@ fn check_wavelengths(table: &[[f64; 2]], at: At<'_>, checker: &mut Checker<'_>) 
     checker.require(table.len() >= 2, at, "at least 2 pairs of wavelength and value", table.len());
     let mut last = 0.0;
     for (i, &[nm, _]) in table.iter().enumerate() {
-        let expected = format!("a wavelength above {last} nm, for wavelengths increase");
+        let expected = format!("a wavelength above {} nm, for wavelengths increase", in_short(last));
         checker.require(nm > last, at.index(i).index(0), &expected, nm);
         last = nm;
     }

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use super::fault::Checker;
 use super::path::At;
 use super::spectrum::Vec3;
+use crate::error::in_short;
 
 /// Three lengths, or one for all.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -89,7 +90,7 @@ impl TransformStep {
                 let expected = "the last row [0, 0, 0, 1]";
                 checker.require(last == [0.0, 0.0, 0.0, 1.0], at.index(3), expected, format_args!("{last:?}"));
                 let linear = DMat3::from_mat4(self.matrix());
-                let found = format_args!("one with determinant {}", linear.determinant());
+                let found = format_args!("one with determinant {}", in_short(linear.determinant()));
                 checker.require(is_invertible(linear), at, "a matrix that can be inverted", found);
             }
         }
@@ -168,7 +169,7 @@ pub(crate) fn check_steps(steps: &[TransformStep], at: At<'_>, checker: &mut Che
     let matrix = matrix_of(steps);
     let linear = DMat3::from_mat4(matrix);
     if !matrix.is_finite() || !is_invertible(linear) {
-        let determinant = linear.determinant();
+        let determinant = in_short(linear.determinant());
         checker.fault(at, format!("expected a transform that can be inverted, found determinant {determinant}"));
         return None;
     }

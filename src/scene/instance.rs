@@ -18,6 +18,7 @@
 use super::bvh::{Aabb, Bvh};
 use super::shape::Detail;
 use super::{Geometry, Hit, Object, SurfacePoint};
+use crate::error::in_short;
 use crate::math::dd::{Dd, Dd3};
 use crate::math::{Departure, Ray};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
@@ -69,7 +70,7 @@ impl AffineMap {
         if world_from_object.is_finite() && object_from_world.is_finite() {
             Ok(AffineMap { world_from_object, object_from_world })
         } else {
-            let found = m.determinant();
+            let found = in_short(m.determinant());
             Err(format!("expected a transform that can be inverted, found one with determinant {found}"))
         }
     }

@@ -1,5 +1,6 @@
 //! Lights by name and by temperature.
 
+use crate::error::in_short;
 use crate::spectrum::Spectrum;
 use crate::spectrum::table::{Outside, Table};
 use std::sync::{Arc, LazyLock};
@@ -23,7 +24,7 @@ fn check_kelvin(kelvin: f64) -> Result<(), String> {
     if (50.0..=1e12).contains(&kelvin) {
         return Ok(());
     }
-    Err(format!("expected a temperature of 50 to 1e12 K, found {kelvin}"))
+    Err(format!("expected a temperature of 50 to 1e12 K, found {}", in_short(kelvin)))
 }
 
 /// A black body of `kelvin`: absolute spectral radiance, W·m⁻²·sr⁻¹·nm⁻¹, at each nanometre of

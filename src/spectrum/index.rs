@@ -4,6 +4,7 @@
 //! converts. Names are looked up in [`crate::spectrum::catalogue`].
 
 pub use crate::spectrum::catalogue::{glass, metal};
+use crate::error::in_short;
 use crate::spectrum::{BAND_NM, LANES, Lanes};
 
 /// Fraunhofer's lines, nm: helium d, hydrogen F and C. An Abbe number is
@@ -59,10 +60,10 @@ impl RefractiveIndex {
     /// In words, if `nd` is not above 1, `vd` is not positive, or the formula fails in the band.
     pub fn from_abbe(nd: f64, vd: f64) -> Result<RefractiveIndex, String> {
         if !(nd > 1.0 && nd.is_finite()) {
-            return Err(format!("expected an index nd above 1 at 587.56 nm, found {nd}"));
+            return Err(format!("expected an index nd above 1 at 587.56 nm, found {}", in_short(nd)));
         }
         if !(vd > 0.0 && vd.is_finite()) {
-            return Err(format!("expected an Abbe number above 0, found {vd}"));
+            return Err(format!("expected an Abbe number above 0, found {}", in_short(vd)));
         }
         let inverse_square = |nm: f64| 1e6 / (nm * nm);
         let b = (nd - 1.0) / vd / (inverse_square(LINE_F) - inverse_square(LINE_C));
@@ -195,15 +196,15 @@ impl RefractiveIndex {
             if let Some(i) = (1..samples.len()).find(|i| samples[*i][0] <= samples[i - 1][0]) {
                 return Err(format!(
                     "sample {i}: expected ascending wavelengths, found {} nm after {} nm",
-                    samples[i][0],
-                    samples[i - 1][0]
+                    in_short(samples[i][0]),
+                    in_short(samples[i - 1][0])
                 ));
             }
             let covers = samples.first().is_some_and(|s| s[0] <= BAND_NM[0])
                 && samples.last().is_some_and(|s| s[0] >= BAND_NM[1]);
             if !covers {
                 let range = match (samples.first(), samples.last()) {
-                    (Some(a), Some(b)) => format!("{} to {} nm", a[0], b[0]),
+                    (Some(a), Some(b)) => format!("{} to {} nm", in_short(a[0]), in_short(b[0])),
                     _ => "no samples".to_string(),
                 };
                 return Err(format!("expected a table of 360 to 830 nm, found {range}"));
@@ -218,7 +219,7 @@ impl RefractiveIndex {
             let nm = BAND_NM[0] + 0.1 * f64::from(i);
             let n = self.at(nm);
             if !(0.1..=10.0).contains(&n) {
-                let found = if n.is_nan() { "a negative square".to_string() } else { format!("{n}") };
+                let found = if n.is_nan() { "a negative square".to_string() } else { in_short(n) };
                 return Err(format!("expected an index of 0.1 to 10 over 360 to 830 nm, found {found} at {nm:.1} nm"));
             }
         }

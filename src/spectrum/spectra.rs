@@ -1,5 +1,6 @@
 //! A function of wavelength: emission, reflectance, absorption.
 
+use crate::error::in_short;
 use crate::spectrum::observer;
 use crate::spectrum::table::{Outside, Table};
 use crate::spectrum::upsample::{eval_sigmoid, sigmoid_at};
@@ -66,13 +67,22 @@ impl Spectrum {
         let mut boxes = Vec::with_capacity(lines.len());
         for (i, &(nm, power, width)) in lines.iter().enumerate() {
             if !(power.is_finite() && power >= 0.0) {
-                return Err(format!("line {i} at {nm} nm: expected a power of zero or more, found {power}"));
+                return Err(format!(
+                    "line {i} at {} nm: expected a power of zero or more, found {}",
+                    in_short(nm),
+                    in_short(power)
+                ));
             }
             if !(width.is_finite() && width >= 0.01) {
-                return Err(format!("line {i} at {nm} nm: expected a width of 0.01 nm or more, found {width}"));
+                return Err(format!(
+                    "line {i} at {} nm: expected a width of 0.01 nm or more, found {}",
+                    in_short(nm),
+                    in_short(width)
+                ));
             }
             let edges = [nm - 0.5 * width, nm + 0.5 * width];
             if !(edges[0] >= BAND_NM[0] && edges[1] <= BAND_NM[1]) {
+                let [nm, width] = [nm, width].map(in_short);
                 return Err(format!("line {i}: expected a line within 360 to 830 nm, found {nm} nm of width {width}"));
             }
             // The height from the edges as they will be stored keeps the power exact.

@@ -1,5 +1,6 @@
 //! Tabulated functions of wavelength, linear between their knots.
 
+use crate::error::in_short;
 use crate::spectrum::{BAND_NM, LANES, Lanes, whole};
 
 /// What a table is worth beyond its first and last knot.
@@ -57,10 +58,11 @@ impl Table {
         }
         for (i, &(nm, value)) in samples.iter().enumerate() {
             if !(nm.is_finite() && nm > 0.0) {
-                return Err(format!("sample {i}: expected a wavelength in nm, found {nm}"));
+                return Err(format!("sample {i}: expected a wavelength in nm, found {}", in_short(nm)));
             }
             if !(value.is_finite() && value >= 0.0 && value <= f64::from(f32::MAX)) {
-                return Err(format!("sample {i} at {nm} nm: expected a finite value of zero or more, found {value}"));
+                let [nm, value] = [nm, value].map(in_short);
+                return Err(format!("sample {i} at {nm} nm: expected a value from 0 to 3.4e38, found {value}"));
             }
         }
         for (i, w) in samples.windows(2).enumerate() {
@@ -68,8 +70,8 @@ impl Table {
                 return Err(format!(
                     "sample {}: expected ascending wavelengths, found {} after {} nm",
                     i + 1,
-                    w[1].0,
-                    w[0].0
+                    in_short(w[1].0),
+                    in_short(w[0].0)
                 ));
             }
         }

@@ -20,6 +20,7 @@
 mod fast;
 mod fit;
 
+use crate::error::in_short;
 use crate::spectrum::{Lanes, Spectrum, illuminant};
 
 /// Middle of the band and half its width in nm: t = (nm − CENTRE) / HALF.
@@ -81,7 +82,7 @@ fn flat(grey: f32) -> [f32; 3] {
 fn check(rgb: [f64; 3], max: f64, what: &str) -> Result<(), String> {
     match rgb.iter().position(|v| !(0.0..=max).contains(v)) {
         None => Ok(()),
-        Some(i) => Err(format!("{} channel: expected {what}, found {}", ["red", "green", "blue"][i], rgb[i])),
+        Some(i) => Err(format!("{} channel: expected {what}, found {}", ["red", "green", "blue"][i], in_short(rgb[i]))),
     }
 }
 
@@ -121,7 +122,7 @@ pub fn emission(rgb: [f64; 3]) -> Result<Spectrum, String> {
 /// In words, if a channel is negative or not finite.
 pub fn unbounded(rgb: [f64; 3]) -> Result<Spectrum, String> {
     if let Some(v) = rgb.iter().find(|v| !v.is_finite() || **v < 0.0) {
-        return Err(format!("expected channels of 0 or more, found {v}"));
+        return Err(format!("expected channels of 0 or more, found {}", in_short(*v)));
     }
     let scale = 2.0 * rgb.into_iter().fold(0.0, f64::max);
     if scale == 0.0 {

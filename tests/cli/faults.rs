@@ -46,6 +46,16 @@ fn each_fault_is_told_with_its_place_its_field_and_what_was_expected() {
             2,
         ),
         (
+            "shapes: [{sphere: {radius: -1e308}}]",
+            "s.yaml:3:28: shapes[0].sphere.radius: expected a number greater than 0, found -1e308",
+            2,
+        ),
+        (
+            "shapes: [{plane: {normal: [1e308, 0, 2.5]}}]",
+            "s.yaml:3:18: shapes[0].plane: normal: expected three numbers up to 1e60, found [1e308, 0, 2.5]",
+            2,
+        ),
+        (
             "materials: {flint: {mirror: {}}}\nshapes: [{sphere: {radius: 1, material: flnt}}]",
             "s.yaml:4:41: shapes[0].sphere.material: unknown material \"flnt\"; did you mean \"flint\"?",
             2,

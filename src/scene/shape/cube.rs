@@ -2,7 +2,7 @@
 
 use super::exact::along;
 use super::plain::Plain;
-use super::{AreaSample, Layout, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest};
+use super::{AreaSample, Layout, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, in_words, largest};
 use crate::math::Ray;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use wide::f64x4;
@@ -79,7 +79,8 @@ impl Cube {
         let volume = e0.dot(crosses[0]);
         // The edges are rounded themselves: a volume below 8 ε of a box's is none. Also NaN.
         if volume.abs().partial_cmp(&(8.0 * f64::EPSILON * lengths)) != Some(std::cmp::Ordering::Greater) {
-            return Err(format!("edges: expected three vectors that are not in one plane, found {e0}, {e1}, {e2}"));
+            let found = [e0, e1, e2].map(in_words).join(", ");
+            return Err(format!("edges: expected three vectors that are not in one plane, found {found}"));
         }
         check_length("edges' volume's root", libm::cbrt(volume.abs()))?;
         let duals = crosses.map(|c| c / volume);

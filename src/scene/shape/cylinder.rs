@@ -4,7 +4,7 @@ use super::exact::{along, difference_of_products, dot, rows_times};
 use super::plain::Plain;
 use super::span::{Exit, Faces, Span};
 use super::{
-    AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest,
+    AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, in_words, largest,
     turns,
 };
 use crate::math::trig::sin_cos_turn;
@@ -314,7 +314,7 @@ pub(super) fn frame_at_seam(frame: &Frame, direction: DVec3) -> Result<Frame, St
     let across = unit - frame.n * frame.n.dot(unit);
     // Both are rounded: an angle below 4 ε between them is none.
     if across.length() <= 4.0 * f64::EPSILON {
-        return Err(format!("seam: expected a direction that is not along the axis, found {direction}"));
+        return Err(format!("seam: expected a direction that is not along the axis, found {}", in_words(direction)));
     }
     Ok(Frame::from_normal_and_tangent(frame.n, unit))
 }

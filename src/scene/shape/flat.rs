@@ -3,7 +3,7 @@
 use super::exact::{along, dot};
 use super::plain::Plain;
 use super::{
-    AreaSample, Detail, ShapeHit, SurfacePoint, TowardSample, check_direction, check_length, check_point, largest,
+    AreaSample, Detail, ShapeHit, SurfacePoint, TowardSample, check_direction, check_length, check_point, in_words, largest,
     toward_by_area, turns,
 };
 use crate::math::warp::concentric_disk;
@@ -44,7 +44,7 @@ impl Plane {
         let tangent = tangent / check_direction("tangent", tangent)?;
         // The cross product of parallel unit vectors is rounding error: below 4 ε it has no direction.
         if normal.cross(tangent).length() <= 4.0 * f64::EPSILON {
-            return Err(format!("tangent: expected a vector that is not along the normal, found {tangent}"));
+            return Err(format!("tangent: expected a vector that is not along the normal, found {}", in_words(tangent)));
         }
         Ok(Plane { point, frame: Frame::from_normal_and_tangent(normal, tangent) })
     }
@@ -124,6 +124,7 @@ impl Patch {
         let jacobian = cross.length();
         // The edges themselves are rounded: an angle below 4 ε between them is none.
         if jacobian <= 4.0 * f64::EPSILON * length_u * length_v {
+            let [u, v] = [u, v].map(in_words);
             return Err(format!("edges: expected two vectors that are not parallel, found {u} and {v}"));
         }
         check_length("edges' area's root", jacobian.sqrt())?;

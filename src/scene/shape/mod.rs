@@ -51,6 +51,7 @@ mod sweeps;
 #[cfg(test)]
 pub(super) mod testing;
 
+use crate::error::in_short;
 use crate::math::Ray;
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -403,12 +404,17 @@ fn choose(mut u: f64, areas: &[f64]) -> (usize, f64) {
 /// products stay within 1e±240 and neither overflow nor underflow.
 const LENGTHS: std::ops::RangeInclusive<f64> = 1e-60..=1e60;
 
+/// A vector for the end of "expected …, found …".
+fn in_words(v: DVec3) -> String {
+    format!("[{}]", v.to_array().map(in_short).join(", "))
+}
+
 /// Errors unless `value` is a length that a shape can have.
 fn check_length(name: &str, value: f64) -> Result<(), String> {
     if LENGTHS.contains(&value) {
         Ok(())
     } else {
-        Err(format!("{name}: expected a positive length from 1e-60 to 1e60, found {value}"))
+        Err(format!("{name}: expected a positive length from 1e-60 to 1e60, found {}", in_short(value)))
     }
 }
 
@@ -417,7 +423,7 @@ fn check_point(name: &str, value: DVec3) -> Result<(), String> {
     if value.abs().cmple(DVec3::splat(*LENGTHS.end())).all() {
         Ok(())
     } else {
-        Err(format!("{name}: expected three numbers up to 1e60, found {value}"))
+        Err(format!("{name}: expected three numbers up to 1e60, found {}", in_words(value)))
     }
 }
 
@@ -428,7 +434,7 @@ fn check_direction(name: &str, value: DVec3) -> Result<f64, String> {
     if LENGTHS.contains(&length) {
         Ok(length)
     } else {
-        Err(format!("{name}: expected a vector of length from 1e-60 to 1e60, found {value}"))
+        Err(format!("{name}: expected a vector of length from 1e-60 to 1e60, found {}", in_words(value)))
     }
 }
 

@@ -4,6 +4,7 @@ use super::super::super::fault::Fault;
 use super::super::super::node::{Place, quote};
 use super::super::object::SpectrumValue;
 use super::super::xml::Attribute;
+use crate::error::in_short;
 
 /// What stands between blanks and commas.
 pub(crate) fn tokens(text: &str) -> impl Iterator<Item = &str> {
@@ -35,6 +36,7 @@ pub(super) fn spectrum_value(text: &str, place: Place) -> std::result::Result<Sp
         if let Some(&[last, _]) = table.last()
             && nm <= last
         {
+            let [nm, last] = [nm, last].map(in_short);
             let message = format!("expected wavelengths that increase, found {nm} nm after {last} nm");
             return Err(Fault::at_place(place, message));
         }
