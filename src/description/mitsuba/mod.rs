@@ -355,6 +355,12 @@ mod tests {
             "s.xml:3:1: expected an element of a scene, found <shap>; did you mean \"shape\"?"
         );
         assert_eq!(
+            fault("<group/>", &[]),
+            "s.xml:3:1: expected an element of a scene, found <group>; known: scene, integrator, sensor, film, rfilter, \
+             sampler, shape, bsdf, emitter, medium, phase, texture, volume, float, integer, boolean, string, point, vector, \
+             rgb, spectrum, transform, ref, alias, default, include, path"
+        );
+        assert_eq!(
             fault("<shape typ=\"sphere\"/>", &[]),
             "s.xml:3:13: expected attributes among type, id, name in <shape>, found \"typ\"; did you mean \"type\"?"
         );

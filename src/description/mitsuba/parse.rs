@@ -398,7 +398,10 @@ impl Parser<'_> {
             }
             _ => {
                 let known = Family::TAGS.iter().map(|(tag, _)| *tag).chain(PROPERTY_TAGS);
-                let hint = did_you_mean(tag, known);
+                let mut hint = did_you_mean(tag, known.clone());
+                if hint.is_empty() {
+                    hint = format!("; known: {}", known.collect::<Vec<_>>().join(", "));
+                }
                 let message = format!("expected an element of a scene, found <{tag}>{hint}");
                 return Err(Fault::at_place(element.place, message));
             }
