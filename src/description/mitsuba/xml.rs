@@ -53,6 +53,11 @@ pub(crate) const SET: &str = "?set";
 /// The attribute of an element made of an instruction that holds its YAML.
 pub(crate) const YAML: &str = "?yaml";
 
+/// Of an entity that is not defined.
+const NO_ENTITIES: &str = "expected no entities but those of XML";
+/// Of text that is in no element.
+const NO_TEXT: &str = "expected an element, found text outside of one";
+
 /// Reads one document. Each element and attribute takes one from `budget`.
 ///
 /// # Errors
@@ -137,8 +142,9 @@ impl<'a> Builder<'a, '_> {
                 Ok(Event::Eof) => break,
                 Ok(Event::Text(text)) if self.open.is_empty() && !blank(&text) => {
                     let at = self.offset_of(&text);
-                    return Err(self.fault(at, "expected an element, found text outside of one"));
+                    return Err(self.fault(at, NO_TEXT));
                 }
+                Ok(Event::GeneralRef(name)) => self.reference(&name)?,
                 // What stands between elements means nothing to a scene.
                 Ok(_) => {}
                 Err(error) => {
@@ -203,7 +209,7 @@ impl<'a> Builder<'a, '_> {
             self.charge(at)?;
             let place = self.cursor.place(at);
             let value = unescape(raw).map_err(|_| {
-                Fault::at_place(place, format!("expected no entities but those of XML, found {}", quote(raw)))
+                Fault::at_place(place, format!("{NO_ENTITIES}, found {}", quote(raw)))
             })?;
             let name = attribute.key.into_inner().to_owned();
             // A line end within an attribute is a blank.
@@ -214,6 +220,19 @@ impl<'a> Builder<'a, '_> {
             self.end();
         }
         Ok(())
+    }
+
+    /// `&name;` between elements.
+    fn reference(&mut self, name: &str) -> Result<(), Fault> {
+        let at = self.offset_of(name).saturating_sub(1);
+        let written = format!("&{name};");
+        if unescape(&written).is_err() {
+            return Err(self.fault(at, format!("{NO_ENTITIES}, found {}", quote(&written))));
+        }
+        match self.open.is_empty() {
+            true => Err(self.fault(at, NO_TEXT)),
+            false => Ok(()),
+        }
     }
 
     /// `<?abbe …?>`; those of other programs say nothing here.
@@ -337,6 +356,14 @@ mod tests {
         assert!(
             fault("<a b='1' b='2'/>").starts_with("s.xml:1:1: expected attributes of the form name=\"value\" in <a>")
         );
+    }
+
+    #[test]
+    fn entities_between_elements_are_those_of_xml_too() {
+        assert_eq!(fault("<a>\n b &d; <c/></a>"), "s.xml:2:4: expected no entities but those of XML, found \"&d;\"");
+        assert_eq!(fault("<a/>&#x110000;"), "s.xml:1:5: expected no entities but those of XML, found \"&#x110000;\"");
+        assert_eq!(fault("<a/>\n&amp;"), "s.xml:2:1: expected an element, found text outside of one");
+        assert_eq!(fault("<a>&amp; &#50;</a>"), "none");
     }
 
     #[test]
