@@ -108,7 +108,8 @@ mod tests {
 
     #[test]
     fn numbers_are_told_as_they_are_written() {
-        let pairs = [(0.0, "0"), (-1.0, "-1"), (0.25, "0.25"), (1e6, "1000000"), (1e308, "1e308"), (-2.5e-7, "-2.5e-7")];
+        let pairs =
+            [(0.0, "0"), (-1.0, "-1"), (0.25, "0.25"), (1e6, "1000000"), (1e308, "1e308"), (-2.5e-7, "-2.5e-7")];
         for (x, told) in pairs.into_iter().chain([(f64::INFINITY, "inf"), (f64::NAN, "NaN")]) {
             assert_eq!(in_short(x), told);
         }

@@ -44,7 +44,7 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
     Ok(0)
 }
 
-/// The one scene that is asked for, of other files than the one that is to be written.
+/// The one scene that is asked for, of other files than the one that is to be written. Its notes are told.
 fn read(arguments: &ConvertArguments) -> Result<SceneDescription> {
     let file = &arguments.scene.file;
     let overrides = arguments.scene.overrides(None)?;
@@ -54,7 +54,11 @@ fn read(arguments: &ConvertArguments) -> Result<SceneDescription> {
             if let Some(output) = &arguments.output {
                 Inputs::of(animation.files().iter().chain([file])).spare([output])?;
             }
-            animation.into_first()
+            let scene = animation.into_first()?;
+            for note in scene.locator.notes() {
+                super::complain(&format!("note: {note}"));
+            }
+            Ok(scene)
         }
         entries => Err(Error::Config(format!(
             "{}: expected one scene, found {}; --scene NAME picks one",

@@ -440,7 +440,8 @@ mod tests {
 
     #[test]
     fn a_batch_in_a_batch_is_told_as_what_it_is() {
-        let files = [("all.yaml", "scenes:\n- file: batch.yaml\n"), ("batch.yaml", "output: {}\nscenes: [{file: a.yaml}]")];
+        let files =
+            [("all.yaml", "scenes:\n- file: batch.yaml\n"), ("batch.yaml", "output: {}\nscenes: [{file: a.yaml}]")];
         with(&files, |directory| {
             assert_eq!(
                 in_words(&load(&directory.join("all.yaml")).unwrap().check(&[]).unwrap_err(), directory),

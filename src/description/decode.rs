@@ -475,7 +475,10 @@ mod tests {
             ),
             ("image: {width: 1.5}", "2:16: image.width: expected a whole number from 1 to 65536, found 1.5"),
             ("image: {width: -16}", "2:16: image.width: expected a whole number from 1 to 65536, found -16"),
-            ("render: {tile: 4294967296}", "2:16: render.tile: expected a whole number from 1 to 65536, found 4294967296"),
+            (
+                "render: {tile: 4294967296}",
+                "2:16: render.tile: expected a whole number from 1 to 65536, found 4294967296",
+            ),
             (
                 "integrator: {path: {max_depth: -1}}",
                 "2:32: integrator.path.max_depth: expected a whole number of 1 or more, found -1",

@@ -346,7 +346,12 @@ impl Fog {
         match self.law {
             FogLaw::Linear { start, end } => {
                 checker.not_negative(at.key("start"), start);
-                checker.require(end > start, at.key("end"), &format!("a distance beyond start, {} m", in_short(start)), end);
+                checker.require(
+                    end > start,
+                    at.key("end"),
+                    &format!("a distance beyond start, {} m", in_short(start)),
+                    end,
+                );
             }
             FogLaw::Exponential { density, .. } => checker.not_negative(at.key("density"), density),
         }

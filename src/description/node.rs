@@ -25,6 +25,8 @@ pub(crate) struct Place {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sources {
     sources: Vec<Source>,
+    /// What is no fault in them, and should be known.
+    notes: Vec<(Place, String)>,
     /// Where files lie that are named in them.
     map: Arc<PathMap>,
 }
@@ -39,7 +41,17 @@ struct Source {
 impl Sources {
     /// None yet, whose files lie where `map` says.
     pub(crate) fn mapped(map: PathMap) -> Sources {
-        Sources { sources: Vec::new(), map: Arc::new(map) }
+        Sources { map: Arc::new(map), ..Sources::default() }
+    }
+
+    /// Something at `place` that is no fault.
+    pub(crate) fn note(&mut self, place: Place, message: String) {
+        self.notes.push((place, message));
+    }
+
+    /// All of these, with their places.
+    pub(crate) fn notes(&self) -> impl Iterator<Item = String> {
+        self.notes.iter().map(|(place, message)| format!("{}: {message}", self.describe(*place)))
     }
 
     /// The file that `written`, at `place`, means.

@@ -115,7 +115,11 @@ impl Tables {
         }
         if let Some((place, field, samples)) = self.k {
             if let Some([nm, k]) = samples.iter().find(|s| s[1] < -MOST_NOISE) {
-                return Err(told(place, &field, &format!("expected k of 0 or more, found {} at {nm} nm", in_short(*k))));
+                return Err(told(
+                    place,
+                    &field,
+                    &format!("expected k of 0 or more, found {} at {nm} nm", in_short(*k)),
+                ));
             }
             // The same rules as for an index, but for its size.
             let lifted = samples.iter().map(|s| [s[0], 1.0]).collect();

@@ -119,6 +119,12 @@ impl Locator {
         let place = path::parse(field).map_or(root.place, |path| root.locate(&path));
         format!("{}: {field}: {message}", sources.describe(place))
     }
+
+    /// What was seen when the text was read that is no fault, each with its place.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        self.text.as_deref().map_or(Vec::new(), |(_, sources)| sources.notes().collect())
+    }
 }
 
 impl SceneDescription {

@@ -3,8 +3,8 @@
 //! Catalogues write dispersion formulas with the wavelength in µm; everything here takes nm and
 //! converts. Names are looked up in [`crate::spectrum::catalogue`].
 
-pub use crate::spectrum::catalogue::{glass, metal};
 use crate::error::in_short;
+pub use crate::spectrum::catalogue::{glass, metal};
 use crate::spectrum::{BAND_NM, LANES, Lanes};
 
 /// Fraunhofer's lines, nm: helium d, hydrogen F and C. An Abbe number is

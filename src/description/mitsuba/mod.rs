@@ -63,7 +63,14 @@ pub(crate) fn is_xml(path: &Path) -> bool {
 /// [`Error::Input`](crate::error::Error::Input) for a file that cannot be read.
 pub(crate) fn read(path: &Path, defines: &[(String, String)], sources: &mut Sources) -> Result<Node> {
     let document = parse::read(path, defines, sources)?;
-    Import::new(&document).scene().map_err(|fault| fault.into_error(sources))
+    let root = Import::new(&document).scene().map_err(|fault| fault.into_error(sources))?;
+    let mut sensors = Bag::new(&document, 0).objects(Family::Sensor).into_iter().map(|i| document.objects[i].place);
+    if let Some(first) = sensors.next().map(|place| sources.describe(place)) {
+        for other in sensors {
+            sources.note(other, format!("sensor: it is passed over, for the first one takes the picture, at {first}"));
+        }
+    }
+    Ok(root)
 }
 
 /// A translation under way.
@@ -364,6 +371,18 @@ mod tests {
             fault("<shape typ=\"sphere\"/>", &[]),
             "s.xml:3:13: expected attributes among type, id, name in <shape>, found \"typ\"; did you mean \"type\"?"
         );
+    }
+
+    #[test]
+    fn sensors_after_the_first_are_noted() {
+        assert_eq!(good("<shape type=\"sphere\"/>").locator.notes(), [""; 0]);
+        let notes = good("<sensor type=\"perspective\"/>\n<sensor type=\"perspective\"/>").locator.notes();
+        let told: Vec<&str> = notes.iter().map(|note| &note[note.find("s.xml").unwrap()..]).collect();
+        assert!(
+            told[0].starts_with("s.xml:3:1: sensor: it is passed over, for the first one takes the picture, at "),
+            "{told:?}"
+        );
+        assert!(told[1].starts_with("s.xml:4:1: ") && told[1].ends_with("s.xml:2:1") && told.len() == 2, "{told:?}");
     }
 
     #[test]

@@ -208,9 +208,8 @@ impl<'a> Builder<'a, '_> {
             let at = self.offset_of(raw);
             self.charge(at)?;
             let place = self.cursor.place(at);
-            let value = unescape(raw).map_err(|_| {
-                Fault::at_place(place, format!("{NO_ENTITIES}, found {}", quote(raw)))
-            })?;
+            let value =
+                unescape(raw).map_err(|_| Fault::at_place(place, format!("{NO_ENTITIES}, found {}", quote(raw))))?;
             let name = attribute.key.into_inner().to_owned();
             // A line end within an attribute is a blank.
             attributes.push(Attribute { name, value: value.replace(['\n', '\r', '\t'], " "), place });

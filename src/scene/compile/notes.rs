@@ -25,7 +25,8 @@ impl<'a> Compiler<'a> {
             None => true,
         };
         let notes = self.notes.iter().filter(|(at, _)| shown(at));
-        notes.map(|(at, message)| self.description.fault(at, message)).collect()
+        let read = self.description.locator.notes();
+        read.into_iter().chain(notes.map(|(at, message)| self.description.fault(at, message))).collect()
     }
 
     /// Adds the names of a material and of all that are in it.

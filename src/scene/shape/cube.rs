@@ -2,7 +2,9 @@
 
 use super::exact::along;
 use super::plain::Plain;
-use super::{AreaSample, Layout, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, in_words, largest};
+use super::{
+    AreaSample, Layout, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, in_words, largest,
+};
 use crate::math::Ray;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use wide::f64x4;

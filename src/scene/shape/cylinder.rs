@@ -4,8 +4,8 @@ use super::exact::{along, difference_of_products, dot, rows_times};
 use super::plain::Plain;
 use super::span::{Exit, Faces, Span};
 use super::{
-    AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, in_words, largest,
-    turns,
+    AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose,
+    in_words, largest, turns,
 };
 use crate::math::trig::sin_cos_turn;
 use crate::math::warp::concentric_disk;

@@ -3,8 +3,8 @@
 use super::exact::{along, dot};
 use super::plain::Plain;
 use super::{
-    AreaSample, Detail, ShapeHit, SurfacePoint, TowardSample, check_direction, check_length, check_point, in_words, largest,
-    toward_by_area, turns,
+    AreaSample, Detail, ShapeHit, SurfacePoint, TowardSample, check_direction, check_length, check_point, in_words,
+    largest, toward_by_area, turns,
 };
 use crate::math::warp::concentric_disk;
 use crate::math::{Frame, Ray};
@@ -44,7 +44,10 @@ impl Plane {
         let tangent = tangent / check_direction("tangent", tangent)?;
         // The cross product of parallel unit vectors is rounding error: below 4 ε it has no direction.
         if normal.cross(tangent).length() <= 4.0 * f64::EPSILON {
-            return Err(format!("tangent: expected a vector that is not along the normal, found {}", in_words(tangent)));
+            return Err(format!(
+                "tangent: expected a vector that is not along the normal, found {}",
+                in_words(tangent)
+            ));
         }
         Ok(Plane { point, frame: Frame::from_normal_and_tangent(normal, tangent) })
     }
