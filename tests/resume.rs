@@ -158,6 +158,23 @@ fn stopped_it_ends_with_75_and_goes_on_where_it_was() {
     assert!(!checkpoint.exists());
 }
 
+/// The second of three scenes is stopped, or about to begin; the third is not begun. None of them has failed.
+#[test]
+fn a_batch_that_is_stopped_says_what_is_written_and_calls_nothing_failed() {
+    let place = Place::of(&scene("off"));
+    let batch = "scenes:\n- file: scene.yaml\n- {file: scene.yaml, name: b, set: {render.samples: 65536}}\n\
+                 - {file: scene.yaml, name: c}\n";
+    std::fs::write(place.path("batch.yaml"), batch).unwrap();
+    let mut child = place.command(&["render", "batch.yaml", "-q", "-o", "out"]).spawn().unwrap();
+    assert!(appears(&mut child, &place.path("out/scene.exr")));
+    signal(&child, "TERM");
+    let done = Ran::of(child.wait_with_output().unwrap());
+    assert_eq!(done.code, 75, "{}", done.err);
+    let last = "error: stopped: scenes written so far: 1; --resume goes on with the others";
+    assert_eq!(done.err.lines().last(), Some(last), "{}", done.err);
+    assert!(!done.err.contains("failed"), "{}", done.err);
+}
+
 #[test]
 fn a_part_is_stopped_and_resumed_like_a_picture() {
     let place = Place::of(&scene("on"));

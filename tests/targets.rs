@@ -72,6 +72,21 @@ fn a_target_out_of_reach_is_told_and_the_picture_is_there() {
 }
 
 #[test]
+fn a_batch_tells_a_target_out_of_reach_from_a_failure() {
+    let place = Place::of(SCENE);
+    let batch = "scenes: [{file: scene.yaml, name: a, set: {render.stop.time: 1e-6}}, {file: scene.yaml}]";
+    std::fs::write(place.path("batch.yaml"), batch).unwrap();
+    let (code, said) = abbe(&place, "render batch.yaml -q -o .");
+    assert_eq!(code, 4, "{said}");
+    assert_eq!(
+        said.lines().last(),
+        Some("error: 1 of 2 scenes written short of a target or with invalid samples"),
+        "{said}"
+    );
+    assert!(!said.contains("failed") && place.path("a.exr").exists() && place.path("scene.exr").exists());
+}
+
+#[test]
 fn what_knows_no_error_refuses_one() {
     let place = Place::of(SCENE);
     let part = abbe(&place, "render scene.yaml -q -o part.exr --error 1% --tile 0/2");

@@ -332,6 +332,18 @@ impl SceneReport {
         self.status = Status::Failed { exit_code: e.exit_code(), message: e.to_string() };
     }
 
+    /// Whether it was asked to stop, and `--resume` goes on with it.
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        matches!(self.status, Status::Failed { exit_code: 75, .. })
+    }
+
+    /// Whether its picture is written although samples were invalid or a target was out of reach.
+    #[must_use]
+    pub fn is_written_with_a_fault(&self) -> bool {
+        matches!(self.status, Status::Failed { exit_code: 4, .. }) && !self.files.is_empty()
+    }
+
     /// Names of the effects that are on.
     #[must_use]
     pub fn effects_in_force(&self) -> Vec<&str> {

@@ -169,6 +169,8 @@ impl Watcher for Teller {
                     complain(&format!("  done in {}{error}", seconds(report.seconds.rendering)));
                 }
                 Status::Skipped => complain("  there already"),
+                Status::Failed { .. } if report.is_stopped() => complain("  stopped"),
+                Status::Failed { .. } if report.is_written_with_a_fault() => complain("  written, with a fault"),
                 Status::Failed { .. } => complain("  failed"),
             },
             Style::Json => line(&json!({"event": "done", "report": report})),

@@ -82,17 +82,41 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     if there > 0 && !arguments.quiet && style != ProgressStyle::Json {
         super::say(&format!("{there} of {} were there already\n", report.scenes.len()));
     }
-    let failed = report.scenes.iter().filter(|s| matches!(s.status, Status::Failed { .. })).count();
-    let all = report.scenes.len();
-    if failed > 0 && all > 1 {
-        let rest = if failed < all { "; the others are written" } else { "" };
-        let what = if report.scenes.iter().any(|s| s.frame.is_some()) { "pictures" } else { "scenes" };
-        super::complain(&format!("error: {failed} of {all} {what} failed{rest}"));
+    for line in endings(&report.scenes) {
+        super::complain(&format!("error: {line}"));
     }
     if let Some(e) = &report.unwritten {
         super::complain(&super::prefixed(e));
     }
     Ok(report.exit_code())
+}
+
+/// How many pictures of several did not end as they should: those that failed, those that are written all the same, and those
+/// that were stopped.
+fn endings(scenes: &[SceneReport]) -> Vec<String> {
+    let all = scenes.len();
+    if all < 2 {
+        return Vec::new();
+    }
+    let what = if scenes.iter().any(|s| s.frame.is_some()) { "pictures" } else { "scenes" };
+    let count = |holds: &dyn Fn(&SceneReport) -> bool| scenes.iter().filter(|s| holds(s)).count();
+    let stopped = count(&|s| s.is_stopped());
+    let faulty = count(&|s| s.is_written_with_a_fault());
+    let failed = count(&|s| matches!(s.status, Status::Failed { .. })) - stopped - faulty;
+    let mut lines = Vec::new();
+    if failed > 0 {
+        let rest = if stopped == 0 && failed < all { "; the others are written" } else { "" };
+        lines.push(format!("{failed} of {all} {what} failed{rest}"));
+    }
+    if faulty > 0 {
+        lines.push(format!("{faulty} of {all} {what} written short of a target or with invalid samples"));
+    }
+    if stopped > 0 {
+        // Of those that were not begun nobody knows how many pictures they are.
+        let written = all - stopped - failed;
+        lines.push(format!("stopped: {what} written so far: {written}; --resume goes on with the others"));
+    }
+    lines
 }
 
 /// A duration as a person says it.
@@ -221,4 +245,44 @@ pub fn table(report: &Report) -> String {
         let _ = writeln!(out, "all of them side by side: {}", page.display());
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+
+    /// A picture that ended with `error`.
+    fn ended(error: Option<Error>, written: bool) -> SceneReport {
+        let mut report = SceneReport::new("a", None);
+        if let Some(error) = error {
+            report.fail(&error);
+        }
+        report.files.extend(written.then(|| "a.exr".into()));
+        report
+    }
+
+    #[test]
+    fn what_failed_what_was_stopped_and_what_is_written_all_the_same_are_told_apart() {
+        let done = || ended(None, true);
+        let bad = || ended(Some(Error::Config("x".into())), false);
+        let stopped = || ended(Some(Error::Stopped("x".into())), false);
+        let missed = || ended(Some(Error::Render("x".into())), true);
+        assert_eq!(endings(&[bad()]), [""; 0]);
+        assert_eq!(endings(&[done(), done()]), [""; 0]);
+        assert_eq!(endings(&[done(), bad()]), ["1 of 2 scenes failed; the others are written"]);
+        assert_eq!(
+            endings(&[done(), stopped(), stopped()]),
+            ["stopped: scenes written so far: 1; --resume goes on with the others"]
+        );
+        let short = "1 of 3 scenes written short of a target or with invalid samples";
+        assert_eq!(endings(&[done(), missed(), done()]), [short]);
+        assert_eq!(endings(&[missed(), bad(), done()]), ["1 of 3 scenes failed; the others are written", short]);
+        assert_eq!(
+            endings(&[bad(), missed(), stopped()]),
+            ["1 of 3 scenes failed", short, "stopped: scenes written so far: 1; --resume goes on with the others"]
+        );
+        // Without its picture it failed.
+        assert_eq!(endings(&[ended(Some(Error::Render("x".into())), false), bad()]), ["2 of 2 scenes failed"]);
+    }
 }
