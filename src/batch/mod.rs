@@ -696,17 +696,22 @@ impl Report {
             Status::Done | Status::Skipped => None,
             Status::Failed { exit_code, .. } => Some(*exit_code),
         });
-        let codes = codes.chain(self.unwritten.as_ref().map(Error::exit_code));
-        // Where something can go on, it should. A fault of the description outranks a missing file, which outranks what
-        // went wrong later.
-        codes
-            .min_by_key(|code| match code {
-                75 => 0,
-                2 => 1,
-                3 => 2,
-                4 => 3,
-                _ => 4,
-            })
-            .unwrap_or(0)
+        worst(codes.chain(self.unwritten.as_ref().map(Error::exit_code)))
     }
+}
+
+/// The exit code of a batch whose scenes call for `codes`; 0 where none does.
+#[must_use]
+pub fn worst(codes: impl Iterator<Item = i32>) -> i32 {
+    // Where something can go on, it should. A fault of the description outranks a missing file, which outranks what
+    // went wrong later.
+    codes
+        .min_by_key(|code| match code {
+            75 => 0,
+            2 => 1,
+            3 => 2,
+            4 => 3,
+            _ => 4,
+        })
+        .unwrap_or(0)
 }

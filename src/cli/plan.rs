@@ -10,13 +10,13 @@ use std::fmt::Write;
 pub fn run(arguments: &PlanArguments) -> Result<i32> {
     let overrides = arguments.scene.overrides(None)?;
     let mut all = Vec::new();
-    let mut code = 0;
+    let mut codes = Vec::new();
     for entry in batch::entries(&arguments.scene.file, &overrides)? {
         let prepared = match batch::prepare(&entry, &overrides) {
             Ok(prepared) => prepared,
             Err(e) => {
                 super::complain(&super::prefixed(&e));
-                code = e.exit_code();
+                codes.push(e.exit_code());
                 continue;
             }
         };
@@ -54,5 +54,5 @@ pub fn run(arguments: &PlanArguments) -> Result<i32> {
     if arguments.format == PlanFormat::Json {
         super::say(&format!("{:#}\n", json!(all)));
     }
-    Ok(code)
+    Ok(batch::worst(codes.into_iter()))
 }

@@ -26,6 +26,16 @@ fn a_batch_goes_on_after_a_scene_that_fails_and_says_so_at_the_end() {
 }
 
 #[test]
+fn plan_and_render_end_alike_where_several_things_are_wrong() {
+    let place = batch();
+    for files in [["scenes/bad.yaml", "none.yaml"], ["none.yaml", "scenes/bad.yaml"]] {
+        let [a, b] = files;
+        std::fs::write(place.path("two.yaml"), format!("scenes: [{{file: {a}}}, {{file: {b}}}]")).unwrap();
+        assert_eq!(["plan", "render"].map(|verb| place.run(&[verb, "two.yaml"]).code), [2, 2], "{files:?}");
+    }
+}
+
+#[test]
 fn the_report_tells_what_was_made_and_what_it_cost() {
     let place = batch();
     place.run(&["render", "batch.yaml", "--threads", "2", "--report", "figures/r.json"]);
