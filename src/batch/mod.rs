@@ -278,6 +278,8 @@ fn prepare_scene(
 /// Whether the files of a picture can be written, whatever its pixels are.
 fn check_files(prepared: &Prepared) -> Result<()> {
     let Prepared { description, scene, plan, .. } = prepared;
+    names::check(&description.output.dir)
+        .map_err(|message| Error::Config(description.fault("output.dir", &message)))?;
     let one = Film::new(scene.camera.resolution, Window::full(1, 1))?.with_layers(plan.layers.channels().len());
     let frame = Frame::of(one, None, 0, Duration::ZERO, false);
     let field = if description.layers.is_empty() { "output.exr" } else { "layers" };
@@ -562,7 +564,8 @@ fn render_and_write(
 /// The place of `-o` for `scenes` scenes.
 ///
 /// # Errors
-/// [`Error::Config`] for the name of another kind of file, and for one file for all scenes.
+/// [`Error::Config`] for the name of another kind of file, for a word in braces that stands for nothing, and for one file for
+/// all scenes.
 fn check_output(output: Option<&Path>, scenes: usize) -> Result<()> {
     const OTHERS: [&str; 7] = ["png", "jpg", "jpeg", "tif", "tiff", "hdr", "pfm"];
     if let Some(file) = output.filter(|path| ends_in(path, &OTHERS) && !path.is_dir()) {
@@ -570,6 +573,9 @@ fn check_output(output: Option<&Path>, scenes: usize) -> Result<()> {
             "-o {}: expected a directory or a file name that ends in .exr, beside which the PNG is written",
             file.display()
         )));
+    }
+    if let Some((output, Err(message))) = output.map(|output| (output, names::check(output))) {
+        return Err(Error::Config(format!("-o {}: {message}", output.display())));
     }
     let file = output.filter(|path| ends_in(path, &["exr"]));
     match file.filter(|file| scenes > 1 && !names::tells(file).scenes) {

@@ -103,6 +103,35 @@ pub fn tells(pattern: &Path) -> Tells {
     tells
 }
 
+/// A word in braces that stands for nothing, where `pattern` has one. Braces around anything else are part of a name.
+#[must_use]
+pub fn unknown(pattern: &Path) -> Option<&str> {
+    let mut rest = pattern.to_str().unwrap_or_default();
+    while !rest.is_empty() {
+        let (piece, after) = piece(rest);
+        let word = rest.strip_prefix('{').and_then(|text| text.split_once('}')).map(|(word, _)| word);
+        let word = word.filter(|word| word.chars().all(|c| c.is_alphanumeric() || "_:".contains(c)));
+        if let (Piece::Text, Some(word)) = (piece, word) {
+            return Some(&rest[..word.len() + 2]);
+        }
+        rest = after;
+    }
+    None
+}
+
+/// Refuses a pattern with a word in braces that stands for nothing.
+///
+/// # Errors
+/// In words, with those there are.
+pub fn check(pattern: &Path) -> Result<(), String> {
+    match unknown(pattern) {
+        Some(word) => {
+            Err(format!("expected {{scene}}, {{frame}}, {{frame:04}}, %04d or #### in a pattern, found {word}"))
+        }
+        None => Ok(()),
+    }
+}
+
 /// What a pattern tells apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tells {
@@ -124,7 +153,7 @@ mod tests {
         assert_eq!(filled("x_%04d.exr", Some(12345)), "x_12345.exr");
         assert_eq!(filled("x_%d-#-{frame}.exr", Some(7)), "x_7-7-7.exr");
         assert_eq!(filled("é{frame:3}%.exr", Some(-7)), "é-07%.exr");
-        // What is no pattern stays.
+        // What is no pattern stays; of such words `unknown` tells.
         assert_eq!(filled("{aov}{frame:x}%s.exr", Some(7)), "{aov}{frame:x}%s.exr");
         assert_eq!(filled("C#/x.####.exr", None), "C#/x.####.exr");
         assert_eq!(filled("{scene}.exr", None), "a#b.exr");
@@ -136,6 +165,17 @@ mod tests {
         assert_eq!(tells("x/{scene}.exr"), Tells { scenes: true, frames: false });
         assert_eq!(tells("x/%03d.exr"), Tells { scenes: false, frames: true });
         assert_eq!(tells("x/{scen}.{frme}.exr"), Tells::default());
+    }
+
+    #[test]
+    fn words_in_braces_that_stand_for_nothing_are_found() {
+        let found = |pattern: &str| unknown(Path::new(pattern)).map(str::to_owned);
+        for pattern in ["{foo}", "{}", "{Scene}", "{frame:x}", "{frame:004}", "{scene:3}"] {
+            assert_eq!(found(&format!("é/%04d{{scene}}{pattern}.exr")).as_deref(), Some(pattern));
+        }
+        for name in ["{scene}.{frame}.exr", "{frame:04}", "####/%d%s", "{B1F0-22}/a", "a{/b}", "{x", "}{"] {
+            assert_eq!(found(name), None, "{name}");
+        }
     }
 
     #[test]

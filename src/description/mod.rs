@@ -91,7 +91,8 @@
 //!   seed_per_frame: true            # the frame is added to the seed, so that noise does not stand still
 //!   frames_per_second: ~            # for those who show the pictures
 //! output:                           # these are the defaults
-//!   dir: out                        # from the working directory
+//!   dir: out                        # from the working directory; {scene}, and {frame:04}, %04d or #### stand for scene and
+//!                                   # frame
 //!   exr: {precision: half, compression: zips, stderr: false, channels: rgba, layout: single, dwa_level: 45,
 //!         attributes: {}, aces_container: false}     # half, float; none, zips, zip, piz, and with loss dwaa, dwab;
 //!                                   # rgba, rgb, xyza, xyz, luminance_alpha, luminance; single, multipart: each layer in
@@ -364,7 +365,7 @@
 //! output: {dir: out}                # laid over the scenes' own, field by field
 //! render: {samples: 256}
 //! scenes:
-//! - file: scenes/a.yaml             # the output's name is the file's, `a`, if there is no name
+//! - file: scenes/a.yaml             # the output's name is the file's, `a`, if there is no name; it is no pattern
 //! - file: scenes/a.yaml
 //!   name: a-nofog
 //!   set: {fog: null, render.samples: 16, "shapes[2].sphere.radius": 2, materials.flint.dielectric.ior: 1.7}

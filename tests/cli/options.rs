@@ -72,6 +72,21 @@ fn scenes_are_chosen_by_name() {
     assert_eq!(place.names("sub"), ["one.exr", "one.png", "report.other.json"]);
 }
 
+#[test]
+fn a_word_in_braces_that_stands_for_nothing_is_refused() {
+    let place = batch();
+    let expected = "expected {scene}, {frame}, {frame:04}, %04d or #### in a pattern, found {name}";
+    let ran = place.run(&["render", "batch.yaml", "-o", "sub/{name}.{scene}.exr"]);
+    assert_eq!((ran.code, ran.err), (2, format!("error: -o sub/{{name}}.{{scene}}.exr: {expected}\n")));
+    let ran = place.run(&["render", "batch.yaml", "--scene", "other", "-q", "--set", "output.dir=sub/{name}"]);
+    let at = "error: other: --set output.dir=sub/{name}: output.dir: ";
+    assert_eq!((ran.code, ran.err), (2, format!("{at}{expected}\n")));
+    assert!(!place.path("sub").exists());
+    // Those for frames stay where there are none.
+    assert_eq!(place.run(&["render", "batch.yaml", "--scene", "other", "-q", "-o", "sub/{scene}.####.exr"]).code, 0);
+    assert!(place.path("sub/other.####.exr").exists());
+}
+
 /// Paths in a scene start from its file, outputs from where the command runs.
 #[test]
 fn a_scene_is_the_same_from_any_directory() {
