@@ -4,8 +4,9 @@
 
 use super::adaptive;
 use super::frame::{self, Frame};
+use super::prepare::{Prepared, colour_space, window};
 use super::report::{Developed, SceneReport};
-use super::{Prepared, colour_space, contact, develop, window};
+use super::{contact, develop};
 use crate::description::{self, HeaderValue, LayerContent, Output, SceneDescription, Shutter};
 use crate::error::Result;
 use crate::film::Window;

@@ -1,6 +1,6 @@
 //! From the layers that are written to those that samples fill.
 
-use super::{colour_space, integrator};
+use super::prepare::{colour_space, integrator};
 use crate::description::{self, LayerContent, SceneDescription};
 use crate::error::Result;
 use crate::scene::Scene;

@@ -4,6 +4,7 @@
 //! are read in parallel and added row by row: tiles into films of their own first, whole pictures one at a time. Memory grows with
 //! the threads, not with the parts.
 
+use super::checks;
 use super::finish;
 use super::frame::{Frame, lock};
 use super::names;
@@ -49,7 +50,7 @@ pub fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 /// once; [`Error::Config`] for a place that is that of a part or not one for pictures; [`Error::Output`]; [`Error::Render`] as
 /// the render itself.
 pub fn merge(paths: &[PathBuf], out: &Path) -> Result<(Report, Result<()>)> {
-    super::check_output(Some(out), 1)?;
+    checks::output_place(Some(out), 1)?;
     let start = Instant::now();
     let parts: Vec<Written> = files(paths)?.par_iter().map(|path| part_file::open(path)).collect::<Result<_>>()?;
     let Some(first) = parts.first() else {

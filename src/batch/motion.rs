@@ -5,7 +5,7 @@
 //! equal times. What the eye would see of their distance is bounded by their number: as many as the pixels that the
 //! fastest thing travels, 16 to 64.
 
-use super::hash_text;
+use super::prepare::hash_text;
 use crate::description::{SceneDescription, ShutterTimes};
 use crate::error::Result;
 use crate::scene::Scene;

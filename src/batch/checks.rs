@@ -1,0 +1,94 @@
+//! What is looked at before a picture is begun: whether it fits into memory, and whether its files may go where they are to.
+
+use super::prepare::Prepared;
+use super::{Overrides, ends_in, finish, names, output_path};
+use crate::description::{self, SceneDescription};
+use crate::error::{Error, Result};
+use crate::film::Window;
+use crate::film::accumulate::Film;
+use crate::film::output::Inputs;
+use std::path::{Path, PathBuf};
+
+/// Refuses a picture whose sums are more than the machine's memory or `limit`, before it is begun.
+pub(super) fn memory(description: &SceneDescription, rows: Window, limit: Option<u64>) -> Result<()> {
+    let needed = Film::bytes(rows);
+    let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
+    if let Some(limit) = limit.filter(|limit| needed > *limit) {
+        let [needed, limit] = [needed, limit].map(mebibytes);
+        return Err(Error::Memory(format!(
+            "the sums of {rows} take {needed} MiB, more than --memory-limit, {limit} MiB"
+        )));
+    }
+    let room = Vec::<u8>::new().try_reserve_exact(usize::try_from(needed).unwrap_or(usize::MAX));
+    if room.is_ok() && machine_memory().is_none_or(|there| needed <= there) {
+        return Ok(());
+    }
+    let description::Image { overscan, crop, .. } = &description.image;
+    let field = match crop {
+        Some(_) => "image.crop",
+        None if *overscan > 0 => "image.overscan",
+        None => "image.width",
+    };
+    let message =
+        format!("expected a picture that fits into memory, found {rows}, which takes {} MiB", mebibytes(needed));
+    Err(Error::Config(description.fault(field, &message)))
+}
+
+/// Bytes of memory and swap of the machine, where it tells.
+fn machine_memory() -> Option<u64> {
+    let all = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let kilobytes = |name: &str| -> Option<u64> {
+        all.lines().find_map(|line| line.strip_prefix(name))?.trim().trim_end_matches("kB").trim().parse().ok()
+    };
+    Some(1024 * (kilobytes("MemTotal:")? + kilobytes("SwapTotal:").unwrap_or(0)))
+}
+
+/// The place of `-o` for `scenes` scenes.
+///
+/// # Errors
+/// [`Error::Config`] for the name of another kind of file, for a word in braces that stands for nothing, and for one file for
+/// all scenes.
+pub(super) fn output_place(output: Option<&Path>, scenes: usize) -> Result<()> {
+    const OTHERS: [&str; 7] = ["png", "jpg", "jpeg", "tif", "tiff", "hdr", "pfm"];
+    if let Some(file) = output.filter(|path| ends_in(path, &OTHERS) && !path.is_dir()) {
+        return Err(Error::Config(format!(
+            "-o {}: expected a directory or a file name that ends in .exr, beside which the PNG is written",
+            file.display()
+        )));
+    }
+    if let Some((output, Err(message))) = output.map(|output| (output, names::check(output))) {
+        return Err(Error::Config(format!("-o {}: {message}", output.display())));
+    }
+    let file = output.filter(|path| ends_in(path, &["exr"]));
+    match file.filter(|file| scenes > 1 && !names::tells(file).scenes) {
+        Some(file) => Err(Error::Config(format!(
+            "-o {}: expected a directory for {scenes} scenes, or a pattern with {{scene}}, found the name of one file",
+            file.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a picture that would take the place of a file that its scene reads, one before it, or the batch: `read`, to which
+/// this one's are added. What an earlier scene has written a later one may read.
+pub(super) fn places(prepared: &Prepared, overrides: &Overrides, read: &mut Inputs) -> Result<()> {
+    for scene in prepared.moments.iter().chain(prepared.next.as_deref()).chain([&prepared.scene]) {
+        read.add(&scene.files);
+    }
+    let places = finish::places(&output_path(prepared, overrides));
+    // A part has no PNG and nothing else beside it.
+    read.spare(if overrides.portion.is_all() { &places[..] } else { &places[..1] })
+}
+
+/// [`output_place`] for the frames of a scene.
+pub(super) fn frames(output: Option<&PathBuf>, frames: usize) -> Result<()> {
+    let file = output.filter(|path| ends_in(path, &["exr"]));
+    match file.filter(|file| frames > 1 && !names::tells(file).frames) {
+        Some(file) => Err(Error::Config(format!(
+            "-o {}: expected a directory for {frames} frames, or a pattern as a.####.exr, a.%04d.exr or \
+             {{scene}}.{{frame:04}}.exr, found the name of one file",
+            file.display()
+        ))),
+        None => Ok(()),
+    }
+}

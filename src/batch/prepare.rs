@@ -1,0 +1,315 @@
+//! From what was written to what is rendered: a scene compiled and planned, with the hash of all that decides about it.
+
+use super::adaptive;
+use super::finish::{self, Finish};
+use super::frame::{Frame, FrameJob};
+use super::stop::{self, Stop};
+use super::{Overrides, layers, motion, names};
+use crate::description::{self, BatchEntry, LayerContent, PathMap, SceneDescription};
+use crate::error::{Error, Result};
+use crate::film::Window;
+use crate::film::accumulate::{Film, REPLICATES, SAMPLES_LIMIT};
+use crate::film::filter::{Filter, FilterSampler};
+use crate::scene::Scene;
+use crate::scene::compile;
+use crate::scene::shelf::Shelf;
+use crate::spectrum::ColourSpace;
+use crate::transport::layers::{Channel, Layer, Source};
+use crate::transport::pilot::{self, Use, Wishes};
+use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
+use crate::transport::trial;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// What may be written is what a film holds.
+const _: () = assert!(description::SAMPLES_LIMIT == SAMPLES_LIMIT * REPLICATES as u32);
+
+/// A scene made ready: compiled and planned.
+#[derive(Debug)]
+pub struct Prepared {
+    /// What was written.
+    pub description: SceneDescription,
+    /// What rays meet.
+    pub scene: Scene,
+    /// The same while the shutter is open, where that is not always the same.
+    pub moments: Vec<Scene>,
+    /// What is simulated.
+    pub plan: EffectPlan,
+    /// Samples of a pixel; the most of them, where `stop` has other targets.
+    pub samples: u32,
+    /// Samples of a pixel for which techniques are planned.
+    pub planned: u32,
+    /// What else ends the render.
+    pub stop: Stop,
+    /// Hash of the description and of the files it names.
+    pub hash: String,
+    /// The file of the scene.
+    pub source: PathBuf,
+    /// The scene one frame later, where the picture says how things move.
+    pub next: Option<Box<Scene>>,
+}
+
+impl Prepared {
+    /// The whole picture, sampled by `filter`.
+    #[must_use]
+    pub fn job<'a>(&'a self, filter: &'a FilterSampler) -> FrameJob<'a> {
+        let Prepared { description, scene, moments, plan, samples, planned, stop, next, .. } = self;
+        FrameJob {
+            scene,
+            moments,
+            next: next.as_deref(),
+            plan,
+            filter,
+            window: window(description),
+            samples: *samples,
+            planned: *planned,
+            stop: *stop,
+            seed: description.render.seed,
+            tile: description.render.tile,
+            independent: false,
+        }
+    }
+}
+
+/// Reads, compiles and plans a scene.
+///
+/// # Errors
+/// [`Error::Config`] and [`Error::Input`], as [`compile::compile`].
+pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
+    prepare_scene(entry, entry.scene(&overrides.set)?, overrides, &mut Shelf::default(), |_| {})
+}
+
+/// Compiles a scene that has been read, with what the scene before has read (see [`compile::compile_with`]), has `alter`
+/// change it, and plans it.
+pub(super) fn prepare_scene(
+    entry: &BatchEntry,
+    description: SceneDescription,
+    overrides: &Overrides,
+    shelf: &mut Shelf,
+    alter: impl FnOnce(&mut Scene),
+) -> Result<Prepared> {
+    let mut scene = compile::compile_with(&description, &entry.name, shelf)?;
+    alter(&mut scene);
+    let integrator = integrator(&description, &description.integrator)?;
+    let stop = stop(&description);
+    let samples = match &integrator {
+        Integrator::Whitted(_) if stop.is_open() => {
+            let hint = "whitted has no noise: its time and its error are given";
+            return Err(Error::Config(format!("render.stop: {hint}")));
+        }
+        Integrator::Whitted(w) => w.samples(),
+        Integrator::Path(_) | Integrator::Depth | Integrator::Light(_) | Integrator::Nothing => {
+            description.render.most_samples()
+        }
+    };
+    let planned = if stop.is_open() { description.render.samples.min(samples) } else { samples };
+    let mode = match description.render.effects {
+        description::Effects::Auto => EffectMode::Auto,
+        description::Effects::All => EffectMode::All,
+    };
+    let blur = motion::moments(&entry.name, &description, &scene, &integrator, shelf)?;
+    let mut moments = blur.scenes;
+    // One film counts the light of all.
+    let exponents = moments.iter().map(|moment| moment.light_exponent);
+    scene.light_exponent = exponents.fold(scene.light_exponent, i32::max);
+    moments.iter_mut().for_each(|moment| moment.light_exponent = scene.light_exponent);
+    let mut plan = EffectPlan::of(&motion::census(&scene, &moments), integrator, mode);
+    plan.effects.extend(blur.said);
+    plan.layers = layers::plan(&description, &scene, planned)?;
+    let filter = FilterSampler::new(filter(&description.image.filter))?;
+    let (seed, wishes) = (description.render.seed, wishes(&description));
+    if let Some((packets, said)) = trial::packets(&scene, &plan, &filter, seed, planned, wishes.packets) {
+        plan.packets = packets;
+        plan.techniques.push(said);
+    }
+    let (caustics, said) = match moments.is_empty() {
+        true => pilot::decide(&scene, &plan, &filter, seed, planned, wishes),
+        false => pilot::left_off("lamps and what bends their light move while the shutter is open"),
+    };
+    plan.caustics = caustics;
+    plan.techniques.extend(said);
+    if overrides.check_numerics && !moments.is_empty() {
+        let expected = "--check-numerics: expected a scene in which nothing moves, or --set camera.shutter=null";
+        return Err(Error::Config(format!("{expected}, found motion blur")));
+    }
+    if overrides.check_numerics {
+        let name = "numerics";
+        let taken = |channel: &Channel| channel.name.split('.').next() == Some(name);
+        if plan.layers.channels().iter().any(taken) {
+            let hint = "--check-numerics writes a layer of that name: give yours another";
+            return Err(Error::Config(format!("{}: layer \"{name}\": {hint}", entry.name)));
+        }
+        // From here on: the pilot's paths are no part of the picture.
+        scene.watch = Some(Box::default());
+        plan.layers.layers.push(Layer { name: name.into(), source: Source::Numerics, squares: None });
+    }
+    let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
+    plan.adaptive = first;
+    plan.techniques.extend(said);
+    let moving =
+        description.layers.iter().any(|layer| layer.content == LayerContent::Middle(description::Data::Motion));
+    let mut hash = hash(&description, &blur.texts, &scene.files, &overrides.paths);
+    let next = match description.frame.filter(|_| moving) {
+        None => None,
+        Some(frame) => {
+            let later = entry.animation(&overrides.set)?.into_scene(Some(frame.saturating_add(1)))?;
+            let scene = compile::compile_with(&later, &entry.name, shelf)?;
+            // It is part of the picture.
+            let both = hash + &self::hash(&later, &[], &scene.files, &overrides.paths);
+            hash = blake3::hash(both.as_bytes()).to_hex()[..32].to_owned();
+            Some(Box::new(scene))
+        }
+    };
+    let source = entry.path.clone();
+    let prepared = Prepared { description, scene, moments, plan, samples, planned, stop, hash, source, next };
+    check_files(&prepared)?;
+    Ok(prepared)
+}
+
+/// Whether the files of a picture can be written, whatever its pixels are.
+fn check_files(prepared: &Prepared) -> Result<()> {
+    let Prepared { description, scene, plan, .. } = prepared;
+    names::check(&description.output.dir)
+        .map_err(|message| Error::Config(description.fault("output.dir", &message)))?;
+    let one = Film::new(scene.camera.resolution, Window::full(1, 1))?.with_layers(plan.layers.channels().len());
+    let frame = Frame::of(one, None, 0, Duration::ZERO, false);
+    let field = if description.layers.is_empty() { "output.exr" } else { "layers" };
+    finish::check_files(&Finish::of(prepared), &frame).map_err(|message| {
+        Error::Config(description.fault(field, &format!("expected a file that can be written: {message}")))
+    })
+}
+
+/// What ends the render besides samples.
+fn stop(description: &SceneDescription) -> Stop {
+    let written = &description.render.stop;
+    let floor = match description.output.exr.precision {
+        description::Precision::Half => stop::rounding(11),
+        description::Precision::Float => stop::rounding(24),
+    };
+    Stop {
+        error: written.error,
+        time: written.time.as_ref().and_then(description::Time::duration),
+        samples_wanted: written.samples.is_some(),
+        floor,
+    }
+}
+
+/// Whether a technique is used.
+fn wish(technique: description::Technique) -> Use {
+    match technique {
+        description::Technique::Auto => Use::Auto,
+        description::Technique::On => Use::On,
+        description::Technique::Off => Use::Off,
+    }
+}
+
+/// Techniques that the description asks for or forbids.
+fn wishes(description: &SceneDescription) -> Wishes {
+    let written = &description.render.techniques;
+    Wishes {
+        light_tracing: wish(written.light_tracing),
+        packets: wish(written.packets),
+        merging: wish(written.merging),
+    }
+}
+
+/// What computes the light.
+pub(super) fn integrator(description: &SceneDescription, written: &description::Integrator) -> Result<Integrator> {
+    Ok(match written {
+        description::Integrator::Path(p) => Integrator::Path(PathSettings {
+            max_depth: p.max_depth,
+            roulette_depth: p.roulette_depth,
+            hide_emitters: p.hide_emitters,
+            opaque_sky: p.opaque_sky,
+            light_samples: p.light_samples,
+            scatter_samples: p.scatter_samples,
+            count_crossings: p.count_crossings,
+        }),
+        description::Integrator::Whitted(w) => Integrator::Whitted(WhittedSettings {
+            max_depth: w.max_depth,
+            grid: w.grid,
+            ambient: compile::ambient(description, &w.ambient)?,
+            transparent_shadows: w.transparent_shadows,
+        }),
+        description::Integrator::Depth(_) => Integrator::Depth,
+        description::Integrator::LightTracer(l) => Integrator::Light(LightSettings {
+            max_depth: l.max_depth,
+            roulette_depth: l.roulette_depth,
+            hide_emitters: l.hide_emitters,
+        }),
+        description::Integrator::None(_) => Integrator::Nothing,
+    })
+}
+
+/// 128 bits of BLAKE3 over what was written, with every default, and over the files that it names.
+fn hash(description: &SceneDescription, moments: &[String], files: &[PathBuf], paths: &PathMap) -> String {
+    let mut hasher = blake3::Hasher::new();
+    // Two machines have one scene in two places.
+    for text in [hash_text(description)].iter().chain(moments) {
+        hasher.update(paths.undo(text.clone()).as_bytes());
+    }
+    // A file that is named several times counts once: where else it is named stands in the text.
+    let mut read: HashSet<&Path> = HashSet::new();
+    for file in files {
+        if read.insert(file)
+            && let Ok(bytes) = std::fs::read(file)
+        {
+            hasher.update(&bytes);
+        }
+    }
+    hasher.finalize().to_hex()[..32].to_owned()
+}
+
+/// What was written, as far as it decides about the picture.
+pub(super) fn hash_text(description: &SceneDescription) -> String {
+    // Where the scene lies, and where its pictures go, does not change them.
+    let mut content = description.clone();
+    content.locator = description::Locator::default();
+    content.directory = PathBuf::new();
+    content.output = description::Output::default();
+    // What is written for a frame says more than its number.
+    content.frame = None;
+    content.motion = None;
+    content.render.frames_per_second = None;
+    let mut text = format!("{content:?}");
+    if description.directory != Path::new("") {
+        text = text.replace(&format!("{}/", description.directory.display()), "");
+    }
+    text
+}
+
+pub(super) fn filter(filter: &description::Filter) -> Filter {
+    match *filter {
+        description::Filter::Box => Filter::Box,
+        description::Filter::Tent { radius } => Filter::Tent { radius },
+        description::Filter::Gaussian { stddev } => Filter::Gaussian { stddev },
+        description::Filter::Mitchell { b, c } => Filter::Mitchell { b, c },
+        description::Filter::CatmullRom => Filter::CatmullRom,
+        description::Filter::Lanczos { radius } => Filter::Lanczos { radius },
+    }
+}
+
+pub(super) fn colour_space(colour: description::Colour) -> ColourSpace {
+    match colour {
+        description::Colour::Rec709 => ColourSpace::Rec709,
+        description::Colour::AcesCg => ColourSpace::AcesCg,
+        description::Colour::Aces2065 => ColourSpace::Aces2065_1,
+        description::Colour::Rec2020 => ColourSpace::Rec2020,
+        description::Colour::P3 => ColourSpace::P3D65,
+        description::Colour::Xyz => ColourSpace::Xyz,
+    }
+}
+
+/// The data window: the crop, or the whole frame and what is rendered beyond it.
+#[must_use]
+pub fn window(description: &SceneDescription) -> Window {
+    match &description.image.crop {
+        Some(c) => Window { x: c.x as i32, y: c.y as i32, width: c.width, height: c.height },
+        None => {
+            let description::Image { width, height, overscan, .. } = description.image;
+            let (x, y) = (-(overscan as i32), -(overscan as i32));
+            Window { x, y, width: width + 2 * overscan, height: height + 2 * overscan }
+        }
+    }
+}
