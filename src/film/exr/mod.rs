@@ -139,7 +139,8 @@ impl ExrImage {
         self.channels.push((name, samples));
     }
 
-    /// [`content_hash`] of the channels.
+    /// 128 bits of BLAKE3 over the channels as [`read_exr`] gives them, in the order of their names: what was damaged is known
+    /// by it.
     #[must_use]
     pub fn content_hash(&self) -> String {
         let plane = |data: &ChannelData| -> Vec<f32> {
@@ -154,8 +155,7 @@ impl ExrImage {
     }
 }
 
-/// 128 bits of BLAKE3 over the channels as [`read_exr`] gives them, in the order of their names: what was damaged is known by
-/// it.
+/// [`ExrImage::content_hash`] of samples as they are read.
 fn content_hash<'a>(channels: impl Iterator<Item = (&'a str, &'a [f32])>) -> String {
     let mut channels: Vec<(&str, &[f32])> = channels.collect();
     channels.sort_by_key(|channel| channel.0);

@@ -45,7 +45,7 @@ impl ExrFile {
         self.chromaticities.map_or(ColourSpace::Rec709.chromaticities(), |all| all.map(|xy| xy.map(f64::from)))
     }
 
-    /// [`content_hash`] of the channels of all parts.
+    /// The hash of the channels of all parts, as [`super::ExrImage::content_hash`].
     #[must_use]
     pub fn content_hash(&self) -> String {
         let channels = self.parts.iter().flat_map(|part| &part.channels);
