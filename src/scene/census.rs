@@ -27,6 +27,8 @@ pub struct Census {
     pub reflective: Vec<String>,
     /// Objects that shine.
     pub area_lights: Vec<String>,
+    /// Lights without power, which are left out.
+    pub dark: Vec<String>,
     /// Lights without extent.
     pub delta_lights: usize,
     /// Lights from infinity.
@@ -65,6 +67,7 @@ impl Census {
             textured: all(self.textured, other.textured),
             reflective: all(self.reflective, other.reflective),
             area_lights: all(self.area_lights, other.area_lights),
+            dark: all(self.dark, other.dark),
             delta_lights: self.delta_lights.max(other.delta_lights),
             backgrounds: self.backgrounds.max(other.backgrounds),
             media: self.media.max(other.media),
@@ -79,8 +82,13 @@ impl Census {
     /// Takes the census of `scene`.
     #[must_use]
     pub fn of(scene: &Scene) -> Census {
-        let mut census = Census { fog: scene.fog.is_some(), backgrounds: scene.backgrounds.len(), ..Census::default() };
-        census.lens = scene.camera.lens.is_some();
+        let mut census = Census {
+            fog: scene.fog.is_some(),
+            backgrounds: scene.backgrounds.len(),
+            dark: scene.dark.clone(),
+            lens: scene.camera.lens.is_some(),
+            ..Census::default()
+        };
         for object in &scene.objects {
             match &object.geometry {
                 Geometry::Shape(_) => census.shapes += 1,

@@ -243,6 +243,7 @@ impl<'a> Compiler<'a> {
         let mut lights: Vec<Light> = Vec::new();
         let mut weights: Vec<f64> = Vec::new();
         let mut light_names: Vec<String> = Vec::new();
+        let mut dark: Vec<String> = Vec::new();
         // Children of groups come after everything that stands in the scene itself.
         let (children, names_of_children) = self.groups(camera_medium)?;
         let mut material_names: Vec<String> = Vec::new();
@@ -254,6 +255,8 @@ impl<'a> Compiler<'a> {
                 if object.light.is_some() {
                     light_names.push(object.name.clone());
                     weights.push(shape.sampling_weight.unwrap_or(1.0));
+                } else if object.is_lamp {
+                    dark.push(object.name.clone());
                 }
                 material_names.push(shape.material_name(&object.name));
                 objects.push(object);
@@ -264,10 +267,15 @@ impl<'a> Compiler<'a> {
             let at = format!("lights[{i}].{}", light.kind());
             let weight = light.sampling_weight();
             let made = self.skies.remove(&i).unwrap_or_else(|| self.light(&at, light));
-            if let Some(light) = made? {
-                lights.push(light);
-                light_names.push(d.lights[i].name_or_kind(i));
-                weights.push(weight);
+            let name = light.name_or_kind(i);
+            match made? {
+                Some(light) if light.is_dark() => dark.push(name),
+                Some(light) => {
+                    lights.push(light);
+                    light_names.push(name);
+                    weights.push(weight);
+                }
+                None => {}
             }
         }
         self.unused_textures();
@@ -345,6 +353,8 @@ impl<'a> Compiler<'a> {
             choice,
             light_exponent,
             backgrounds,
+            has_sky: d.lights.iter().any(|l| matches!(l, written::Light::Constant(_) | written::Light::Environment(_))),
+            dark,
             light_groups: lights::groups(d, &light_names),
             fog,
             wavelengths,
@@ -431,6 +441,7 @@ impl<'a> Compiler<'a> {
                 outside: None,
                 keeps_medium: false,
                 flipped: false,
+                is_lamp: false,
                 body: 0,
             }));
         }
@@ -446,11 +457,13 @@ impl<'a> Compiler<'a> {
                 self.materials.len() as u32 - 1
             }
         };
-        let light = shape.emission.as_ref().map(|emission| {
-            lights.push(self.shining(at, shape, emission, index, &geometry));
+        let is_lamp = shape.emission.is_some();
+        let light = shape.emission.as_ref().map(|emission| self.shining(at, shape, emission, index, &geometry));
+        let light = light.filter(|light| !light.is_dark()).map(|light| {
+            lights.push(light);
             lights.len() as u32 - 1
         });
-        if light.is_some() && matches!(geometry, Geometry::Shape(Shape::Plane(_))) {
+        if is_lamp && matches!(geometry, Geometry::Shape(Shape::Plane(_))) {
             self.fault(&format!("{at}.emission"), "expected a shape with an end, found a plane: its light is infinite");
         }
         let textured = self.materials[material as usize].varies()
@@ -493,6 +506,7 @@ impl<'a> Compiler<'a> {
             outside: medium(&shape.outside, before),
             keeps_medium: unchanged(&shape.inside) && unchanged(&shape.outside),
             flipped: shape.flip_normals,
+            is_lamp,
             body: 0,
         }))
     }

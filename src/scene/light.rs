@@ -161,6 +161,20 @@ pub fn chromaticity(lights: &[Light], objects: &[Object], radius: f64) -> Option
 }
 
 impl Light {
+    /// Whether it sends out nothing: it costs nothing then. Of pictures that is not asked.
+    #[must_use]
+    pub fn is_dark(&self) -> bool {
+        match self {
+            Light::Area { radiance: Texture::Uniform(light), .. }
+            | Light::AlongNormal { exitance: Texture::Uniform(light), .. }
+            | Light::Point { intensity: light, .. }
+            | Light::Spot { intensity: light, .. }
+            | Light::Directional { irradiance: light, .. }
+            | Light::Constant { radiance: light } => light.is_black(),
+            Light::Area { .. } | Light::AlongNormal { .. } | Light::Environment(_) | Light::Projector(_) => false,
+        }
+    }
+
     /// True for light from infinity that a ray which meets nothing sees.
     #[must_use]
     pub fn is_environment(&self) -> bool {

@@ -104,6 +104,10 @@ pub struct Scene {
     pub light_exponent: i32,
     /// Indices of lights from infinity.
     pub backgrounds: Vec<u32>,
+    /// Whether a light from infinity was written, be it with no power: what `opaque_sky` covers all with.
+    pub has_sky: bool,
+    /// Names of those that were written without power, and are none.
+    pub dark: Vec<String>,
     /// The groups that lights are in.
     pub light_groups: LightGroups,
     /// Depth fog of the picture.
@@ -176,6 +180,8 @@ pub struct Object {
     pub keeps_medium: bool,
     /// Whether its normals point to the other side than the form's own.
     pub flipped: bool,
+    /// Whether it was written to shine, be it with no power: what `hide_emitters` hides.
+    pub is_lamp: bool,
     /// Its rank among the bodies with a priority, from 1; 0 for none.
     pub body: u32,
 }

@@ -230,7 +230,8 @@ impl Spectrum {
     /// Whether the value is zero over the whole band.
     #[must_use]
     pub fn is_black(&self) -> bool {
-        self.max() == 0.0
+        // Most that are not show it at once.
+        self.at(555.0) == 0.0 && self.max() == 0.0
     }
 
     /// CIE Y, as the film would show this spectrum: 1 for a constant of 1.

@@ -141,7 +141,7 @@ fn first_covering(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -
         let surface = scene.surface_with_texture(&ray, &hit);
         let object = &scene.objects[hit.object as usize];
         let open = match &scene.materials[object.material as usize].kind {
-            _ if hides && object.light.is_some() => true,
+            _ if hides && object.is_lamp => true,
             Kind::Boundary => true,
             Kind::Compound(compound) => {
                 let (wo, at) = (-ray.direction, &hit.texture_point(&surface));

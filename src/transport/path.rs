@@ -172,14 +172,14 @@ impl Tracer<'_> {
         let scene = self.scene;
         let Some(hit) = hit else {
             self.add_background::<CHROMATIC>(path);
-            if self.settings.opaque_sky && !self.settings.hide_emitters && !scene.backgrounds.is_empty() {
+            if self.settings.opaque_sky && !self.settings.hide_emitters && scene.has_sky {
                 walk.alpha = 1.0;
             }
             return Step::Ended;
         };
         let surface = scene.surface(&path.ray, &hit);
         let object = &scene.objects[hit.object as usize];
-        if self.settings.hide_emitters && path.vertices == 0 && object.light.is_some() {
+        if self.settings.hide_emitters && path.vertices == 0 && object.is_lamp {
             // A lamp that the camera would see itself is not there.
             walk.crossings += 1;
             if walk.crossings > MAX_BOUNDARIES {

@@ -178,12 +178,16 @@ fn path_techniques(census: &Census, chromatic: bool) -> Vec<Effect> {
         on,
         reason: if on { here } else { absent.to_owned() },
     };
+    let dark = match census.dark.as_slice() {
+        [] => String::new(),
+        dark => format!("; without power and left out: {}", some_of(dark)),
+    };
     vec![
         technique(
             "next-event estimation",
             lights > 0,
-            format!("of {lights} lights, chosen by what each may give"),
-            "there is no light",
+            format!("of {lights} lights, chosen by what each may give{dark}"),
+            &format!("there is no light{dark}"),
         ),
         technique(
             "multiple importance sampling",

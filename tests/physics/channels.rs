@@ -169,6 +169,44 @@ fn light_goes_straight_through_256_surfaces_at_the_most() {
     }
 }
 
+/// Lamps without power change no pixel, but what is said of lamps holds of them: `hide_emitters` hides one, and a sky covers.
+#[test]
+fn lights_without_power_are_left_out() {
+    let bench = |integrator: &str, emission: &str, dark: &str| {
+        let scene = format!(
+            "{PARALLEL}image: {{width: 1, height: 1}}\nintegrator: {integrator}\nshapes:\n\
+             - rectangle: {{corner: [-9, -9, 0], edge_u: [18, 0, 0], edge_v: [0, 18, 0], material: {{diffuse: {{}}}}}}\n\
+             - sphere: {{name: lamp, center: [3, 0, 3], radius: 1, material: {{diffuse: {{}}}}{emission}}}\n\
+             lights:\n- point: {{name: bulb, position: [0, 3, 3], intensity: 3}}\n{dark}"
+        );
+        bench_with(&scene, &[])
+    };
+    let dark = "- constant: {radiance: {table: [[360, 0], [830, 0]]}}\n- directional: {direction: [0, 0, -1], irradiance: 0}\n\
+                - point: {name: out, position: [1, 2, 3], intensity: 0}\n\
+                - spot: {position: [1, 2, 3], target: [0, 0, 0], cutoff_deg: 30, intensity: 0}\n\
+                light_groups: {a: [out], b: [bulb]}\n";
+    for integrator in ["path", "{whitted: {}}", "light_tracer"] {
+        let [with, without] =
+            [(", emission: 0", dark), ("", "")].map(|(emission, dark)| bench(integrator, emission, dark));
+        for i in 0..64 {
+            let [a, b] = [&with, &without].map(|bench| bench.sample([0, 0], i));
+            assert_eq!((a.radiance, a.alpha), (b.radiance, b.alpha), "{integrator}");
+        }
+        assert_eq!((with.prepared.scene.lights.len(), &with.prepared.scene.light_groups.of[..]), (1, &[2][..]));
+        assert_eq!(with.prepared.scene.dark, ["lamp", "constant1", "directional2", "out", "spot4"].map(str::to_owned));
+    }
+    let front =
+        ", emission: 0}\n- rectangle: {corner: [-9, -9, 2], edge_u: [18, 0, 0], edge_v: [0, 18, 0], emission: 0";
+    for (setting, alpha) in [("hide_emitters", 0.0), ("opaque_sky", 1.0)] {
+        let lamp = if setting == "hide_emitters" { front } else { "" };
+        let scene = format!(
+            "{PARALLEL}image: {{width: 1, height: 1}}\nintegrator: {{path: {{{setting}: true}}}}\nshapes:\n\
+             - sphere: {{center: [99, 0, 0], radius: 1{lamp}}}\nlights: [{{constant: {{radiance: 0}}}}]\n"
+        );
+        assert_eq!(bench_with(&scene, &[]).sample([0, 0], 0).alpha, alpha, "{setting}");
+    }
+}
+
 /// Light of a bare boundary is added to what lies behind it, and covers nothing: 2 over a sky of 3.
 #[test]
 fn a_boundary_that_shines_adds_to_what_is_behind_it() {

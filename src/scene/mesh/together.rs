@@ -129,6 +129,7 @@ mod tests {
             outside: None,
             keeps_medium: false,
             flipped: false,
+            is_lamp: false,
             body: 0,
         }
     }
