@@ -135,6 +135,9 @@ fn the_sheet_finds_what_a_bound_to_depth_costs() {
     assert!(csv.lines().all(|line| line.split(',').count() == columns), "{csv}");
     let without = abbe(&place, "accuracy scene.yaml -o sheet --set integrator=whitted");
     assert!(without.0 == 0 && without.1.contains("only `path` has knobs to weigh"), "{}", without.1);
+    let dark = abbe(&place, "accuracy scene.yaml -o sheet --set shapes[2].sphere.emission=0");
+    assert!(dark.0 == 0 && dark.1.contains("its picture is black"), "{}", dark.1);
+    assert_eq!(place.json("sheet/accuracy.json"), Value::Array(Vec::new()));
 }
 
 /// In a room whose walls glow with 1 and give half back the light is 1 + 1/2 + 1/4 + … = 2, and 3/2 with one bounce: of

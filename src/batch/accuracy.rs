@@ -133,7 +133,7 @@ pub struct Sheet {
     pub advice: Vec<(&'static str, String)>,
 }
 
-/// The sheet of a scene, or why there is none: what has no noise has nothing to weigh.
+/// The sheet of a scene, or why there is none: what has no noise has nothing to weigh, nor has what is black.
 ///
 /// # Errors
 /// As [`super::prepare`], and where it was stopped.
@@ -194,6 +194,9 @@ pub fn sheet(
         Some(radiance) => Reference::known(&full.image, radiance),
         None => Reference::new(&full.image, full.replicates),
     };
+    if reference.is_black() {
+        return Ok(Err("its picture is black: no error is relative to that".into()));
+    }
     let mut tallies: Vec<Tally> = trials.iter().map(|_| Tally::default()).collect();
     let mut images: Vec<Image> = Vec::new();
     for round in 0..rounds {

@@ -84,6 +84,12 @@ impl Reference {
         Reference::new(&truth, vec![Some([rgb; REPLICATES]); pixels])
     }
 
+    /// Whether there is no light in it.
+    #[must_use]
+    pub fn is_black(&self) -> bool {
+        self.weights.iter().flatten().all(|weight| *weight == 0.0)
+    }
+
     /// The block of each pixel, and how many there are.
     fn blocks(&self) -> (impl Fn(usize) -> usize, usize) {
         let Window { width, height, .. } = self.window;
