@@ -86,6 +86,26 @@ fn a_batch_tells_a_target_out_of_reach_from_a_failure() {
     assert!(!said.contains("failed") && place.path("a.exr").exists() && place.path("scene.exr").exists());
 }
 
+/// A frame before its fade-in: where no light has power the picture is black for sure, whole or in parts.
+#[test]
+fn without_light_any_error_is_reached_at_once() {
+    let place = Place::of(SCENE);
+    let dark = "--set shapes[2].sphere.emission=0";
+    let (code, said) = abbe(&place, &format!("render scene.yaml -o whole.exr --error 1e-3 {dark}"));
+    assert_eq!(code, 0, "{said}");
+    let scene = &place.json("report.json")["scenes"][0];
+    assert!(scene["error"]["rel_rmse"] == 0.0 && scene["error"]["valid"] == true, "{scene}");
+    assert!(scene["samples"].as_u64().unwrap() <= 16, "{scene}");
+    for part in ["0/2", "1/2"] {
+        assert_eq!(
+            abbe(&place, &format!("render scene.yaml -o {{scene}}.{}.exr --tile {part} {dark}", &part[..1])).0,
+            0
+        );
+    }
+    assert_eq!(abbe(&place, "merge scene.0.exr scene.1.exr -o merged.exr").0, 0);
+    assert!(abbe(&place, "info merged.exr").1.contains("error       0"));
+}
+
 #[test]
 fn what_knows_no_error_refuses_one() {
     let place = Place::of(SCENE);

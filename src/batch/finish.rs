@@ -57,6 +57,8 @@ pub struct Finish {
     pub effects: Vec<Effect>,
     /// How.
     pub techniques: Vec<Effect>,
+    /// Whether anything shines.
+    pub lit: bool,
     /// From which wavelengths samples are drawn.
     pub wavelengths: String,
     /// What a person should know of the scene.
@@ -145,6 +147,7 @@ impl Finish {
             integrator: integrator(&plan.integrator).to_owned(),
             effects: plan.effects.clone(),
             techniques: plan.techniques.clone(),
+            lit: plan.lit,
             wavelengths: scene.wavelengths.describe().to_owned(),
             notes: scene.notes.iter().cloned().chain(note).collect(),
             world_to_camera: scene.camera.camera_from_world(),

@@ -10,7 +10,7 @@ use super::stop::{Forecast, Stop};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, TileBuffer};
-use crate::film::error::{self, ErrorEstimate};
+use crate::film::error::{self, ErrorEstimate, NoEstimate};
 use crate::film::filter::FilterSampler;
 use crate::film::resolve::{self, Image, Splats};
 use crate::film::run::{LONGEST, LayerRun, Run};
@@ -101,11 +101,19 @@ pub struct Progress {
 }
 
 impl Frame {
-    /// The frame of `samples` of each pixel that were added up elsewhere in `elapsed`; `random` if replicates differ.
+    /// The frame of `samples` of each pixel that were added up elsewhere in `elapsed`; `random` if replicates differ, `lit` if
+    /// anything shines.
     #[must_use]
-    pub fn of(film: Film, splats: Option<SplatFilm>, samples: u32, elapsed: Duration, random: bool) -> Frame {
+    pub fn of(
+        film: Film,
+        splats: Option<SplatFilm>,
+        samples: u32,
+        elapsed: Duration,
+        random: bool,
+        lit: bool,
+    ) -> Frame {
         let (error, resolved) = if random {
-            let (error, image) = estimate(&film, splats.as_ref());
+            let (error, image) = estimate(&film, splats.as_ref(), lit);
             (error, Some(image))
         } else {
             (None, None)
@@ -372,7 +380,7 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
             breaks.take(part, &begun.milestones, before + start.elapsed())?;
         }
         let error = if random && whole {
-            let (error, image) = part.look(estimate);
+            let (error, image) = part.look(|film, splats| estimate(film, splats, job.plan.lit));
             begun.resolved = Some(image);
             error
         } else {
@@ -387,12 +395,16 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
 /// A picture and the matrix from XYZ to its colours.
 type Resolved = ([[f64; 3]; 3], Image);
 
-/// The error of a picture, and the picture that it was estimated from.
-fn estimate(film: &Film, splats: Option<&SplatFilm>) -> (Option<ErrorEstimate>, Resolved) {
+/// The error of a picture, and the picture that it was estimated from. It is known where nothing shines.
+fn estimate(film: &Film, splats: Option<&SplatFilm>, lit: bool) -> (Option<ErrorEstimate>, Resolved) {
     let photons = splats.map(|s| Splats { film: &s.film, photons: s.paths });
     let space = ColourSpace::Rec709.matrix_from_xyz();
     let image = resolve::resolve(film, photons, &space);
-    (error::relative_error(film, photons, &space, &image).ok(), (space, image))
+    let error = match error::relative_error(film, photons, &space, &image) {
+        Err(NoEstimate::Black) if !lit => Some(ErrorEstimate::none(image.window.pixels() as u64)),
+        estimate => estimate.ok(),
+    };
+    (error, (space, image))
 }
 
 /// An error where too many samples were invalid to trust the picture.

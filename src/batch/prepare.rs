@@ -173,7 +173,7 @@ fn check_files(prepared: &Prepared) -> Result<()> {
     names::check(&description.output.dir)
         .map_err(|message| Error::Config(description.fault("output.dir", &message)))?;
     let one = Film::new(scene.camera.resolution, Window::full(1, 1))?.with_layers(plan.layers.channels().len());
-    let frame = Frame::of(one, None, 0, Duration::ZERO, false);
+    let frame = Frame::of(one, None, 0, Duration::ZERO, false, true);
     let field = if description.layers.is_empty() { "output.exr" } else { "layers" };
     finish::check_files(&Finish::of(prepared), &frame).map_err(|message| {
         Error::Config(description.fault(field, &format!("expected a file that can be written: {message}")))

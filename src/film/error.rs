@@ -62,6 +62,12 @@ pub struct ErrorEstimate {
 }
 
 impl ErrorEstimate {
+    /// Of a picture of so many pixels that is right for sure.
+    #[must_use]
+    pub fn none(pixels: u64) -> ErrorEstimate {
+        ErrorEstimate { rel_rmse: 0.0, low: 0.0, high: 0.0, pixels, valid: true }
+    }
+
     /// The variance of ln relMSE as an estimate of what is to be expected. A quarter of that which the interval allows for: the
     /// rest is how far this picture's own error is from there.
     #[must_use]

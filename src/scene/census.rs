@@ -79,6 +79,18 @@ impl Census {
         }
     }
 
+    /// How many lights can be met by chance.
+    #[must_use]
+    pub fn extended_lights(&self) -> usize {
+        self.area_lights.len() + self.backgrounds
+    }
+
+    /// How many lights there are.
+    #[must_use]
+    pub fn lights(&self) -> usize {
+        self.extended_lights() + self.delta_lights
+    }
+
     /// Takes the census of `scene`.
     #[must_use]
     pub fn of(scene: &Scene) -> Census {

@@ -144,6 +144,8 @@ pub struct EffectPlan {
     pub nested: bool,
     /// Depth fog.
     pub depth_fog: bool,
+    /// Whether anything shines: a picture of light without it is black for sure.
+    pub lit: bool,
     /// Wavelengths that part at glass that the camera looks at are followed together.
     pub packets: bool,
     /// Every glass is computed as if it were dispersive.
@@ -171,8 +173,7 @@ pub(super) fn some_of(names: &[String]) -> String {
 
 /// The techniques of the path tracer for this scene.
 fn path_techniques(census: &Census, chromatic: bool) -> Vec<Effect> {
-    let extended = census.area_lights.len() + census.backgrounds;
-    let lights = extended + census.delta_lights;
+    let (extended, lights) = (census.extended_lights(), census.lights());
     let technique = |name: &'static str, on, here: String, absent: &str| Effect {
         name: name.into(),
         on,
@@ -304,7 +305,9 @@ impl EffectPlan {
         let bends = !(census.dispersive.is_empty() && census.rough_dispersive.is_empty());
         let chromatic = bends || census.chromatic_media > 0 || mode == EffectMode::All;
         let techniques = if path && from_camera { path_techniques(census, chromatic) } else { Vec::new() };
+        let shows_light = matches!(integrator, Integrator::Path(_) | Integrator::Light(_));
         EffectPlan {
+            lit: census.lights() > 0 || census.fog || !shows_light,
             integrator,
             dispersion,
             chromatic,

@@ -527,6 +527,13 @@ mod tests {
         let a = render(5, 1.0, 0.3, 1.0);
         let same = compare(&a, &a, &CompareOptions::default());
         assert!(same.identical && same.verdict == Verdict::Same && same.global_p == 1.0);
+        let mut black = a.clone();
+        black.parts[0].channels.iter_mut().for_each(|(_, values)| values.fill(0.0));
+        let c = compare(&black, &black, &CompareOptions::default());
+        assert!(
+            c.verdict == Verdict::Same && c.channels.iter().all(|c| (c.mean_ratio, c.mean_ratio_error) == (1.0, 0.0))
+        );
+        assert_eq!(compare(&a, &black, &CompareOptions::default()).verdict, Verdict::Different);
         // Without noise, rounding to half is all that differs: known, so still the same.
         let mut exact = a.clone();
         for (name, values) in &mut exact.parts[0].channels {

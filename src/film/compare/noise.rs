@@ -128,7 +128,8 @@ impl<'a> Pair<'a> {
         let n = finite.iter().filter(|&&f| f).count().max(1) as f64;
         let sum_a: f64 = kept(self.a, finite).sum();
         let sum_b: f64 = kept(self.b, finite).sum();
-        let ratio = sum_a / sum_b;
+        let black = sum_a == 0.0 && sum_b == 0.0;
+        let ratio = if black { 1.0 } else { sum_a / sum_b };
         let floor = 0.01 * reference_mean * reference_mean;
         let (mut squares, mut relative, mut symmetric, mut largest) = (0.0, 0.0, 0.0, 0.0f64);
         // Of the difference: sum, variance, and Σv²/ν; of A − ratio·B: variance.
@@ -166,7 +167,7 @@ impl<'a> Pair<'a> {
             mean_a: sum_a / n,
             mean_b: sum_b / n,
             mean_ratio: ratio,
-            mean_ratio_error: ratio_variance.sqrt() / sum_b.abs(),
+            mean_ratio_error: if black { 0.0 } else { ratio_variance.sqrt() / sum_b.abs() },
             global_z: z,
             global_dof: dof,
             global_p: student_t_two_sided_p(z, dof),
