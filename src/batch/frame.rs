@@ -66,6 +66,9 @@ pub struct Milestone {
     pub elapsed: Duration,
     /// The estimate, where replicates give one.
     pub error: Option<ErrorEstimate>,
+    /// Whether no light was met at all.
+    #[serde(default)]
+    pub black: bool,
 }
 
 /// A rendered picture.
@@ -118,7 +121,7 @@ impl Frame {
         } else {
             (None, None)
         };
-        let milestones = vec![Milestone { samples, elapsed, error }];
+        let milestones = vec![Milestone { samples, elapsed, error, black: false }];
         Frame { film, splats, elapsed, milestones, resolved }
     }
 
@@ -386,7 +389,8 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
         } else {
             None
         };
-        begun.milestones.push(Milestone { samples: pass.end, elapsed: before + start.elapsed(), error });
+        let black = begun.resolved.as_ref().is_some_and(|(_, image)| image.rgb.iter().flatten().all(|x| *x == 0.0));
+        begun.milestones.push(Milestone { samples: pass.end, elapsed: before + start.elapsed(), error, black });
     }
     begun.elapsed = before + start.elapsed();
     Ok(begun)

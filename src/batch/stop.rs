@@ -36,6 +36,9 @@ pub fn rounding(bits: u32) -> f64 {
     step * (3.0 / (8.0 * std::f64::consts::LN_2) / 12.0).sqrt()
 }
 
+/// A picture that has met no light with so many samples a pixel is left black: more would hardly find what those did not.
+const BLACK_UNTIL: u32 = 256;
+
 /// Passes do not get shorter than this part of what is there: an error that is just missed is not paid for many times.
 const SHORTEST: f64 = 1.0 / 32.0;
 
@@ -60,7 +63,10 @@ impl Stop {
         let believed = last.error.is_some_and(|e| e.valid);
         let twice = |target| milestones.iter().nth_back(1).is_some_and(|m| below(m, target));
         let error = self.target().is_some_and(|target| below(last, target) && (believed || twice(target)));
-        error || self.time.is_some_and(|time| last.elapsed >= time)
+        // Where nothing but the error would end it.
+        let alone = self.error.is_some() && self.time.is_none() && !self.samples_wanted;
+        let hopeless = alone && last.black && last.samples >= BLACK_UNTIL;
+        error || hopeless || self.time.is_some_and(|time| last.elapsed >= time)
     }
 
     /// The samples at which the pass ends that begins after `milestones`, with at most `most` samples in all; none where
@@ -93,9 +99,11 @@ impl Stop {
     pub fn check(&self, milestones: &[Milestone]) -> Result<()> {
         let Some(last) = milestones.last() else { return Ok(()) };
         if let Some(asked) = self.error {
-            let found = last.error.map_or("the picture is written, its error is unknown".to_owned(), |e| {
-                format!("the picture is written with an error of {:.3e}", e.rel_rmse)
-            });
+            let found = match last.error {
+                Some(e) => format!("the picture is written with an error of {:.3e}", e.rel_rmse),
+                None if last.black => "the picture is written, and black".to_owned(),
+                None => "the picture is written, its error is unknown".to_owned(),
+            };
             if asked < self.floor && last.error.is_some_and(|e| e.rel_rmse <= self.floor) {
                 return Err(Error::Render(format!(
                     "stop.error: {asked:e} is below {:.1e}, what rounding to the precision of the file makes; {found}; \
@@ -263,7 +271,7 @@ mod tests {
         let of = |&n: &u32| {
             let rel_rmse = f64::from(n).powf(-0.5 * b);
             let error = ErrorEstimate { rel_rmse, low: rel_rmse, high: rel_rmse, pixels: 100, valid: true };
-            Milestone { samples: n, elapsed: Duration::from_millis(n.into()), error: Some(error) }
+            Milestone { samples: n, elapsed: Duration::from_millis(n.into()), error: Some(error), black: false }
         };
         samples.iter().map(of).collect()
     }
@@ -280,6 +288,23 @@ mod tests {
         assert_eq!(stop(0.3).pass_end(&known, 1000), Some(20));
         known[2].error = None;
         assert!(!stop(0.4).reached(&known));
+    }
+
+    /// Where nothing else ends it, a picture that stays black does not take all samples there are.
+    #[test]
+    fn a_picture_that_stays_black_is_given_up() {
+        let stop = Stop { error: Some(0.1), samples_wanted: false, ..FREE };
+        let mut known = milestones(&[64, 128, 256], 1.0);
+        known.iter_mut().for_each(|m| (m.error, m.black) = (None, true));
+        assert!(stop.reached(&known) && !stop.reached(&known[..2]));
+        assert!(
+            stop.check(&known)
+                .unwrap_err()
+                .to_string()
+                .ends_with("256 samples a pixel; the picture is written, and black")
+        );
+        let others = [Stop { samples_wanted: true, ..stop }, Stop { time: Some(Duration::from_secs(9)), ..stop }];
+        assert!(others.iter().all(|stop| !stop.reached(&known)));
     }
 
     const FREE: Stop = Stop { error: None, time: None, samples_wanted: true, floor: 0.0 };

@@ -78,7 +78,8 @@
 //!   samples: 64                     # paths per pixel
 //!   stop: {error: ~, time: ~, samples: ~}       # the first that is reached ends the render: relative RMSE of the picture,
 //!                                   # wall time of rendering (60, 90s, 10m, 2h), paths per pixel (65536 where another
-//!                                   # is given); without any: after `samples`, for which techniques are planned anyway
+//!                                   # is given, 256 of a picture that stays black where error alone is);
+//!                                   # without any: after `samples`, for which techniques are planned anyway
 //!   seed: 0
 //!   effects: auto                   # auto, all: the same picture
 //!   tile: 32                        # pixels
