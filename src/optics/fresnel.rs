@@ -217,6 +217,23 @@ mod tests {
         }
     }
 
+    /// Just above the critical angle c² + η² − 1 loses nearly all of its digits. Here squares are kept in two numbers, of which the
+    /// greater ones, near ½ to 1, cancel without rounding.
+    #[test]
+    fn the_refracted_cosine_keeps_its_digits_at_the_critical_angle() {
+        let square = |x: f64| (x * x, x.mul_add(x, -(x * x)));
+        for eta in [0.75f64, 1.0 / 1.33, 0.9, 0.99, 1.0 / 1.0003] {
+            let critical = ((1.0 - eta) * (1.0 + eta)).sqrt();
+            for i in 10..200 {
+                let cos = critical * (1.0 + f64::from(i) * f64::EPSILON);
+                let ((c, c_rest), (e, e_rest)) = (square(cos), square(eta));
+                let expected = ((c - (1.0 - e)) + (c_rest + e_rest)).sqrt() / eta;
+                let found = dielectric(Model::Exact, cos, eta).cos_transmitted;
+                assert!(relative(found, expected) < 8.0 * f64::EPSILON, "{i} {eta}: {found} {expected}");
+            }
+        }
+    }
+
     /// With k = 0 a conductor is a dielectric; with n = 1, k = 0 there is no interface at all.
     #[test]
     fn a_conductor_without_absorption_is_a_dielectric() {

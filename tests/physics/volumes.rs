@@ -93,6 +93,28 @@ fn a_linear_density_dims_by_its_mean() {
     }
 }
 
+/// Two layers of one density, the one before the camera and the other before the lamp, dim by both: e^(−τ₁ − τ₂). Random numbers
+/// that the two walks shared would let the same paths through both. The wall, 1 m below the lamp of 1 W/sr and half white,
+/// sends 1/(2π) back.
+#[test]
+fn camera_and_shadow_rays_walk_through_clouds_by_numbers_of_their_own() {
+    let slab = |at: [f64; 3], size: [f64; 3]| {
+        format!("- cube: {{center: {at:?}, size: {size:?}, material: {{boundary: {{}}}}, inside: m}}\n")
+    };
+    let scene = format!(
+        "{CAMERA}volumes: {{v: {{grid: {{file: v.vol, transform: [{{scale: 9}}, {{translate: [-4.5, -4.5, -4.5]}}]}}}}}}\n\
+         media: {{m: {{heterogeneous: {{extinction: {{volume: v}}, albedo: 0}}}}}}\n\
+         shapes:\n- rectangle: {{corner: [-1, -1, 0], edge_u: [2, 0, 0], edge_v: [0, 2, 0], material: {{diffuse: {{reflectance: 0.5}}}}}}\n\
+         {}{}lights: [{{point: {{position: [0, 0, 1], intensity: 1}}}}]\nintegrator: {{path: {{max_depth: 2}}}}\n",
+        slab([2.0, 0.0, 2.0], [1.0, 2.0, 6.0]),
+        slab([0.0, 0.0, 0.5], [0.5, 0.5, 0.5]),
+    );
+    let scene = bench_with(&scene, &[("v.vol", &vol([8, 8, 8], 1, &[0.75; 512]))]);
+    // Slanted by 45° the first layer is √2 thick.
+    let found = scene.estimate(&ray(v(4.0, 0.0, 4.0), v(0.0, 0.0, 0.0)), 16_384);
+    found.assert_is((-0.75 * (2f64.sqrt() + 0.5)).exp() / (2.0 * PI), 2e-2);
+}
+
 /// A lamp is found by shadow rays and by scattering together as by scattering alone.
 #[test]
 fn shadow_rays_through_clouds_change_no_mean() {
