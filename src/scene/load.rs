@@ -169,13 +169,26 @@ fn words(e: &std::io::Error) -> String {
     }
 }
 
+/// A part of a frame is stretched over the whole, as Mitsuba 3 has it: what a person should know of such a file.
+#[must_use]
+pub fn cut_out(path: &Path, file: &exr::ExrFile) -> Option<String> {
+    let (window, frame) = (file.parts[0].window, file.display);
+    let Window { width, height, .. } = frame;
+    (window != frame).then(|| {
+        let path = path.display();
+        format!("{path} holds {window} of a frame of {width}x{height}; that part is taken for the whole picture")
+    })
+}
+
 /// A picture of light from the file `path`: EXR by its chromaticities, HDR as it is, 8- and 16-bit files decoded from sRGB.
 ///
 /// # Errors
 /// [`Error::Input`] where a pixel is not finite.
 pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
+    let mut notes = Vec::new();
     let picture = match decoded {
         Decoded::Exr(file) => {
+            notes.extend(cut_out(path, &file));
             let part = &file.parts[0];
             let channel = |name: &str| {
                 let found = part.channel(name);
@@ -208,8 +221,10 @@ pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
     // Light cannot be negative; a colour outside Rec. 709 can. It is moved to the nearest one inside.
     let numbers = picture.pixels.iter().flatten().filter(|x| **x < 0.0);
     let (count, least) = numbers.fold((0u64, 0.0f32), |(count, least), x| (count + 1, least.min(*x)));
-    let note = (count > 0)
-        .then(|| format!("{count} numbers of {} are below 0, the least {least}: taken for 0", path.display()));
+    if count > 0 {
+        notes.push(format!("{count} numbers of {} are below 0, the least {least}: taken for 0", path.display()));
+    }
+    let note = (!notes.is_empty()).then(|| notes.join("; "));
     let pixels = picture.pixels.into_iter().map(|p| p.map(|x| x.max(0.0))).collect();
     Ok(Picture { pixels, note, ..picture })
 }
@@ -257,7 +272,7 @@ pub fn image_texture(
     {
         let Window { width, height, .. } = file.parts[0].window;
         let none = make(Texels::each(Vec::new()), width as usize, height as usize);
-        return Ok((ImageTexture { bands: Some(bands), ..none }, None));
+        return Ok((ImageTexture { bands: Some(bands), ..none }, cut_out(path, file)));
     }
     match decoded {
         Decoded::Bytes { rgb, width, height, counted } => {
@@ -324,18 +339,20 @@ fn upsampled_bytes(counted: Counted, level: &[f32; 256], carried: Carried) -> Te
 }
 
 /// A picture of numbers from the file `path`: EXR and HDR as they are, 8- and 16-bit files from 0 to 1, decoded from
-/// sRGB unless `raw`. A picture of one channel gives the same number three times.
+/// sRGB unless `raw`. A picture of one channel gives the same number three times. And [`cut_out`].
 ///
 /// # Errors
 /// As [`picture`]; numbers may be negative.
-pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<DataImage> {
+pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<(DataImage, Option<String>)> {
+    let mut note = None;
     let (texels, width, height): (Vec<[f32; 3]>, usize, usize) = match decoded {
         Decoded::Bytes { rgb, width, height, .. } => {
             let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };
             let texels = Numbers::Bytes { bytes: Arc::new(rgb), level: Box::new(level) };
-            return Ok(DataImage { texels, grid: Grid::new(width, height) });
+            return Ok((DataImage { texels, grid: Grid::new(width, height) }, None));
         }
         Decoded::Exr(file) => {
+            note = cut_out(path, &file);
             let part = &file.parts[0];
             let grey = part.channel("Y");
             let channel = |name: &str| {
@@ -357,7 +374,7 @@ pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<DataImage>
         let (x, y) = (i % width, i / width);
         return Err(Error::input(path, format!("expected finite numbers, found {:?} at ({x}, {y})", texels[i])));
     }
-    Ok(DataImage { texels: Numbers::Floats(Arc::new(texels)), grid: Grid::new(width, height) })
+    Ok((DataImage { texels: Numbers::Floats(Arc::new(texels)), grid: Grid::new(width, height) }, note))
 }
 
 /// Reads a curve: two columns, wavelength in nm and value, separated by commas, semicolons or
@@ -431,6 +448,21 @@ mod tests {
         let picture = picture(Path::new("sky.exr"), Decoded::Exr(file)).unwrap();
         assert_eq!(picture.pixels, [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         assert_eq!(picture.note.unwrap(), "2 numbers of sky.exr are below 0, the least -2: taken for 0");
+    }
+
+    #[test]
+    fn a_picture_that_is_a_part_of_a_frame_is_told() {
+        let plane = |name: &str| (name.to_owned(), vec![0.5, -0.5]);
+        let window = Window { x: 3, y: 1, width: 2, height: 1 };
+        let channels = ["R", "G", "B"].map(plane).into();
+        let part = exr::ExrPart { name: None, window, channels, texts: Vec::new() };
+        let file = |frame| exr::ExrFile { display: frame, chromaticities: None, parts: vec![part.clone()] };
+        let numbers = |frame| data_image(Path::new("bump.exr"), Decoded::Exr(file(frame)), true).unwrap().1;
+        assert_eq!(numbers(window), None);
+        let told = "bump.exr holds 2x1 at (3, 1) of a frame of 8x4; that part is taken for the whole picture";
+        assert_eq!(numbers(Window::full(8, 4)).as_deref(), Some(told));
+        let both = picture(Path::new("bump.exr"), Decoded::Exr(file(Window::full(8, 4)))).unwrap().note.unwrap();
+        assert_eq!(both, format!("{told}; 3 numbers of bump.exr are below 0, the least -0.5: taken for 0"));
     }
 
     /// The primaries of ACEScg and white, as Abbe itself writes them, come back as the Rec. 709 that was written; to f32.

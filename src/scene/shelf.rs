@@ -90,8 +90,8 @@ pub struct Shelf {
     pub carried: Carried,
     /// Pictures as colours, raw or not, and what was changed in them.
     pub colours: Kept<bool, (ImageTexture, Option<String>)>,
-    /// Pictures as numbers, raw or not.
-    pub numbers: Kept<bool, DataImage>,
+    /// Pictures as numbers, raw or not, and what a person should know of them.
+    pub numbers: Kept<bool, (DataImage, Option<String>)>,
     /// Maps of light, by what makes one differ from another of the same file: turns, scale and mapping, as bits.
     pub skies: Kept<Vec<u64>, (Arc<Environment>, Option<String>)>,
     /// Meshes, by their index in the file.

@@ -124,7 +124,8 @@ impl<'a> Compiler<'a> {
                     {
                         let size = [file.parts[0].window.width, file.parts[0].window.height].map(|n| n as usize);
                         let map = Environment::of_bands(bands, size, l.scale, mapping, l.world_from_map());
-                        return map.map(|map| (Arc::new(map), None)).map_err(|message| Error::input(&l.file, message));
+                        let note = load::cut_out(&l.file, file);
+                        return map.map(|map| (Arc::new(map), note)).map_err(|message| Error::input(&l.file, message));
                     }
                     let load::Picture { pixels, width, height, note } = load::picture(&l.file, decoded)?;
                     let map = Environment::new(&pixels, [width, height], l.scale, mapping, l.world_from_map(), carried);

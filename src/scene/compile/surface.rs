@@ -163,7 +163,9 @@ impl<'a> Compiler<'a> {
                 let loaded = shelf.numbers.get(&image.file, image.raw, || {
                     pictures.take(&image.file).and_then(|p| load::data_image(&image.file, p, image.raw))
                 });
-                let mut loaded = loaded.map_err(|e| self.asked(&format!("{at}.image.file"), e))?;
+                let file = format!("{at}.image.file");
+                let (mut loaded, note) = loaded.map_err(|e| self.asked(&file, e))?;
+                note.iter().for_each(|note| self.note(&file, note));
                 loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
                 Scalar::Image(loaded)
             }
