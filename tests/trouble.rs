@@ -117,6 +117,10 @@ fn a_job_for_a_farm_is_refused_where_its_tasks_would_be() {
         says(&["scene.yaml", "--sample-ranges", "5"]),
         "error: scene: --sample-ranges 5: expected at most 4, the samples of a pixel\n"
     );
+    assert_eq!(
+        says(&["scene.yaml", "--pictures", "shots/{scen}"]),
+        "error: --pictures shots/{scen}: expected {scene}, {frame}, {frame:04}, %04d or #### in a pattern, found {scen}\n"
+    );
     assert!(says(&["stop.yaml", "--tiles", "2"]).contains("render.stop: a part cannot know the error or the time"));
     // All that is wrong is told at once.
     let message = says(&["batch.yaml"]);

@@ -2,6 +2,7 @@
 
 use super::{FarmArguments, FarmFormat};
 use crate::batch::farm::{Cut, Job, openjd, slurm};
+use crate::batch::names;
 use crate::error::{Error, Result};
 use crate::film::output::{Inputs, prepare_place, write_atomically};
 
@@ -12,6 +13,8 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
     let overrides = arguments.scene.overrides(None)?;
     let bundle = std::path::absolute(&arguments.output).map_err(|e| Error::output(&arguments.output, e))?;
     let pictures = arguments.pictures.clone().unwrap_or_else(|| bundle.join("pictures"));
+    names::check(&pictures)
+        .map_err(|message| Error::Config(format!("--pictures {}: {message}", pictures.display())))?;
     let job = Job {
         pictures: std::path::absolute(&pictures).map_err(|e| Error::output(&pictures, e))?,
         program: arguments.program.clone(),
