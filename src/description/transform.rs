@@ -7,6 +7,7 @@ use super::fault::Checker;
 use super::path::At;
 use super::spectrum::Vec3;
 use crate::error::in_short;
+use crate::math::LENGTHS;
 
 /// Three lengths, or one for all.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -175,9 +176,6 @@ pub(crate) fn check_steps(steps: &[TransformStep], at: At<'_>, checker: &mut Che
     }
     Some(linear)
 }
-
-/// Least and greatest length of a vector, as those of shapes: squares neither overflow nor vanish.
-const LENGTHS: std::ops::RangeInclusive<f64> = 1e-60..=1e60;
 
 /// Whether there are a view from `origin` to `target` and a direction `up`, of the fields of `at`.
 pub(crate) fn check_view(origin: Vec3, target: Vec3, up: Vec3, at: At<'_>, checker: &mut Checker<'_>) -> bool {

@@ -22,3 +22,7 @@ pub fn inverse_power_of_two(x: f64) -> f64 {
 
 pub use frame::Frame;
 pub use ray::{Departure, Ray};
+
+/// Least and greatest length of a shape, and of what says where one looks. The intersectors multiply at most four lengths, so
+/// their products stay within 1e±240 and neither overflow nor underflow.
+pub const LENGTHS: std::ops::RangeInclusive<f64> = 1e-60..=1e60;

@@ -52,7 +52,7 @@ mod sweeps;
 pub(super) mod testing;
 
 use crate::error::in_short;
-use crate::math::Ray;
+use crate::math::{LENGTHS, Ray};
 use glam::{DAffine3, DVec2, DVec3};
 
 pub use cone::Cone;
@@ -399,10 +399,6 @@ fn choose(mut u: f64, areas: &[f64]) -> (usize, f64) {
     // The sum rounded up past the parts.
     (last, BELOW_ONE)
 }
-
-/// Least and greatest length of a shape. The intersectors multiply at most four lengths, so their
-/// products stay within 1e±240 and neither overflow nor underflow.
-const LENGTHS: std::ops::RangeInclusive<f64> = 1e-60..=1e60;
 
 /// A vector for the end of "expected …, found …".
 fn in_words(v: DVec3) -> String {
