@@ -121,7 +121,7 @@ impl Frame {
         } else {
             (None, None)
         };
-        let milestones = vec![Milestone { samples, elapsed, error, black: false }];
+        let milestones = vec![Milestone { samples, elapsed, error, black: is_black(resolved.as_ref()) }];
         Frame { film, splats, elapsed, milestones, resolved }
     }
 
@@ -389,7 +389,7 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
         } else {
             None
         };
-        let black = begun.resolved.as_ref().is_some_and(|(_, image)| image.rgb.iter().flatten().all(|x| *x == 0.0));
+        let black = is_black(begun.resolved.as_ref());
         begun.milestones.push(Milestone { samples: pass.end, elapsed: before + start.elapsed(), error, black });
     }
     begun.elapsed = before + start.elapsed();
@@ -398,6 +398,11 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
 
 /// A picture and the matrix from XYZ to its colours.
 type Resolved = ([[f64; 3]; 3], Image);
+
+/// Whether no light is in a picture, where there is one.
+fn is_black(resolved: Option<&Resolved>) -> bool {
+    resolved.is_some_and(|(_, image)| image.rgb.iter().flatten().all(|x| *x == 0.0))
+}
 
 /// The error of a picture, and the picture that it was estimated from. It is known where nothing shines.
 fn estimate(film: &Film, splats: Option<&SplatFilm>, lit: bool) -> (Option<ErrorEstimate>, Resolved) {
