@@ -104,8 +104,7 @@ pub fn tells(pattern: &Path) -> Tells {
 }
 
 /// A word in braces that stands for nothing, where `pattern` has one. Braces around anything else are part of a name.
-#[must_use]
-pub fn unknown(pattern: &Path) -> Option<&str> {
+fn unknown(pattern: &Path) -> Option<&str> {
     let mut rest = pattern.to_str().unwrap_or_default();
     while !rest.is_empty() {
         let (piece, after) = piece(rest);
