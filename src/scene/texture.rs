@@ -294,7 +294,8 @@ pub struct DataImage {
 /// True where the cells of a checkerboard that `uv` maps to have the same parity in u and v.
 fn same_cell(uv: &DAffine2, at: &TexturePoint) -> bool {
     let p = uv.transform_point2(at.uv);
-    let cell = |x: f64| x - x.floor() >= 0.5;
+    // Halfway a cell has not ended, as in Mitsuba: joints of curves have a v that can be just that.
+    let cell = |x: f64| x - x.floor() > 0.5;
     cell(p.x) == cell(p.y)
 }
 

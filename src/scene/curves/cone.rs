@@ -26,6 +26,8 @@ pub struct RoundCone {
     pub radius: f64,
     /// Radius at v = 0 less that at v = 1.
     pub taper: f64,
+    /// Whether the ball at v = 0 is that at v = 1 of the piece before.
+    pub joined: bool,
 }
 
 impl RoundCone {
@@ -47,7 +49,7 @@ impl RoundCone {
         self.axis.length_squared() - self.taper * self.taper
     }
 
-    /// The v of the ball on whose surface `p` lies, if it is on the wall or a cap.
+    /// The v of the ball that `p` is deepest in, or on whose surface it lies if it is on the wall or a cap.
     pub fn v_at(&self, p: DVec3) -> f64 {
         let d = self.spread();
         if d > 0.0 {
@@ -55,6 +57,12 @@ impl RoundCone {
         } else {
             self.larger_end()
         }
+    }
+
+    /// Whether `p` lies inside, by more than `slack`.
+    pub fn holds(&self, p: DVec3, slack: f64) -> bool {
+        let v = self.v_at(p);
+        (p - self.center(v)).length() + slack < self.radius(v)
     }
 
     fn larger_end(&self) -> f64 {

@@ -5,7 +5,8 @@
 //! sweeps the surface; the ends are open; see `tube.rs`.
 //!
 //! **Only from outside.** As in Mitsuba, a ray meets a curve only where it comes from outside; what starts
-//! inside leaves unseen, and a piece that lies within another one does not show. It follows that a ray which
+//! inside leaves unseen, and a piece that lies within another one does not show. From within, as light that was let in sees
+//! them, pieces show where they are entered by their walls, and not by the balls of joints. It follows that a ray which
 //! leaves a curve meets no surface that it left: outward it goes away from a front face, and the step of
 //! [`Ray::leaving`], 16 times the rounding of the point, has put it before or behind the surface for certain.
 //!
@@ -98,7 +99,12 @@ impl Curves {
         }
 
         let pieces = match basis {
-            Basis::Linear => Pieces::Cones(segments.iter().map(|s| cone_between(s[0], s[1])).collect()),
+            Basis::Linear => {
+                let joined = |i: usize| i > 0 && segments[i - 1][1] == segments[i][0];
+                let piece =
+                    |(i, s): (usize, &Vec<ControlPoint>)| RoundCone { joined: joined(i), ..cone_between(s[0], s[1]) };
+                Pieces::Cones(segments.iter().enumerate().map(piece).collect())
+            }
             Basis::BSpline => {
                 let (mut tubes, mut first) = (Vec::new(), Vec::new());
                 for (i, s) in segments.iter().enumerate() {
@@ -189,7 +195,11 @@ impl Curves {
         let (t, v, segment) = match &self.pieces {
             Pieces::Cones(cones) => {
                 let (t, v) = cones[piece as usize].entry(origin, direction)?;
-                (t, v, piece)
+                if t <= 0.0 || t >= t_max * length || is_within_joint(cones, piece, v, origin, direction, t) {
+                    return None;
+                }
+                // A joint has the direction of the piece that ends there, as in Mitsuba.
+                if v == 0.0 && cones[piece as usize].joined { (t, 1.0, piece - 1) } else { (t, v, piece) }
             }
             Pieces::Tubes(tubes, _) => {
                 let tube = &tubes[piece as usize];
@@ -257,6 +267,23 @@ impl Curves {
     }
 }
 
+/// Whether a ray that enters a piece at `t` does so by a joint's ball, at a point within the other piece of that joint: there
+/// it is in the curve already. What is the surface of both is off by its rounding, a few units of the last place of what
+/// makes the point.
+fn is_within_joint(cones: &[RoundCone], piece: u32, v: f64, origin: DVec3, direction: DVec3, t: f64) -> bool {
+    let i = piece as usize;
+    let other = match v {
+        0.0 if cones[i].joined => &cones[i - 1],
+        1.0 => match cones.get(i + 1) {
+            Some(next) if next.joined => next,
+            _ => return false,
+        },
+        _ => return false,
+    };
+    let slack = 16.0 * f64::EPSILON * (origin.abs().max_element() + t);
+    other.holds(origin + direction * t, slack)
+}
+
 /// The piece of a segment that holds `v`.
 fn piece_at<'a>(tubes: &'a [Tube], first: &[u32], segment: u32, v: f64) -> &'a Tube {
     let pieces = &tubes[first[segment as usize] as usize..first[segment as usize + 1] as usize];
@@ -270,7 +297,7 @@ fn unit(v: DVec3) -> Option<DVec3> {
 
 fn cone_between(a: ControlPoint, b: ControlPoint) -> RoundCone {
     let start = DVec3::new(a[0], a[1], a[2]);
-    RoundCone { start, axis: DVec3::new(b[0], b[1], b[2]) - start, radius: a[3], taper: a[3] - b[3] }
+    RoundCone { start, axis: DVec3::new(b[0], b[1], b[2]) - start, radius: a[3], taper: a[3] - b[3], joined: false }
 }
 
 /// A segment of a uniform cubic B-spline as a Bézier curve. What it shares with its neighbours, place and slope at the
