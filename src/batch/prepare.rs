@@ -225,6 +225,7 @@ pub(super) fn integrator(description: &SceneDescription, written: &description::
             light_samples: p.light_samples,
             scatter_samples: p.scatter_samples,
             count_crossings: p.count_crossings,
+            delta_caustics: p.delta_caustics,
         }),
         description::Integrator::Whitted(w) => Integrator::Whitted(WhittedSettings {
             max_depth: w.max_depth,

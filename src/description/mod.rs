@@ -46,7 +46,7 @@
 //! integrator: path                  # default; or, with their defaults,
 //!                                   #   {path: {max_depth: null, roulette_depth: 5, hide_emitters: false,
 //!                                   #           light_samples: 1, scatter_samples: 1, count_crossings: false,
-//!                                   #           opaque_sky: false}},
+//!                                   #           opaque_sky: false, delta_caustics: true}},
 //!                                   #   {light_tracer: {max_depth: null, roulette_depth: 5,
 //!                                   #                   hide_emitters: false}}: from the lights to the camera
 //!                                   #   {whitted: {max_depth: 10, grid: 2, ambient: 0,

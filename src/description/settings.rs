@@ -64,6 +64,10 @@ pub struct PathIntegrator {
     /// default false.
     #[serde(default)]
     pub count_crossings: bool,
+    /// Whether mirrors and glass throw the light of point, spot, projector and directional lights, too, which no path from the
+    /// camera can find by chance; default true.
+    #[serde(default = "yes")]
+    pub delta_caustics: bool,
 }
 
 impl Default for PathIntegrator {
@@ -76,6 +80,7 @@ impl Default for PathIntegrator {
             light_samples: one(),
             scatter_samples: one(),
             count_crossings: false,
+            delta_caustics: true,
         }
     }
 }

@@ -121,16 +121,15 @@ pub fn decide(
     if plan.layers.layers.iter().any(|layer| matches!(layer.source, Channel::Light(..))) {
         return left_off("layers of light are measured path by path from the camera");
     }
-    // Who counts panes, as scenes read from Mitsuba's XML do, knows only light that a path from the camera can meet.
-    let met =
-        |light: &Light| !settings.count_crossings || light.is_environment() || matches!(light, Light::Area { .. });
+    let wanted =
+        |light: &Light| settings.delta_caustics || light.is_environment() || matches!(light, Light::Area { .. });
     let traced: Vec<bool> =
-        scene.lights.iter().enumerate().map(|(i, l)| met(l) && is_small(scene, i, &casters)).collect();
+        scene.lights.iter().enumerate().map(|(i, l)| wanted(l) && is_small(scene, i, &casters)).collect();
     if !traced.contains(&true) {
-        return left_off(if settings.count_crossings {
-            "no light that a path from the camera can meet is small or has a sun"
-        } else {
+        return left_off(if settings.delta_caustics {
             "no light is small or has a sun"
+        } else {
+            "no light that a path from the camera can meet is small or has a sun"
         });
     }
     let caustics = Caustics::untrained(scene, &casters, traced, wishes.packets != Use::Off && casters.parts);

@@ -56,6 +56,8 @@ pub struct PathSettings {
     pub scatter_samples: u32,
     /// Whether going straight through a pane or a boundary ends a segment for `max_depth`.
     pub count_crossings: bool,
+    /// Whether light of mirrors and glass is traced from lights without extent.
+    pub delta_caustics: bool,
 }
 
 impl PathSettings {
@@ -80,6 +82,7 @@ impl Default for PathSettings {
             light_samples: 1,
             scatter_samples: 1,
             count_crossings: false,
+            delta_caustics: true,
         }
     }
 }

@@ -253,8 +253,7 @@ fn a_sun_in_an_environment_is_traced_and_an_even_sky_is_not() {
 }
 
 /// Where panes count for the length of a path, as in scenes read from Mitsuba's XML, paths from the lights cannot tell what
-/// they may still meet. Without a pane there is nothing to count: the picture is the same, traced or not. A point light is left
-/// to the camera, which never meets it behind glass.
+/// they may still meet. Without a pane there is nothing to count: the picture is the same, traced or not.
 #[test]
 fn light_is_traced_where_panes_would_count_and_there_are_none() {
     let counted = Case { what: "counted", depth: "5, count_crossings: true", ..AREA };
@@ -267,11 +266,25 @@ fn light_is_traced_where_panes_would_count_and_there_are_none() {
     assert!(!tracing && reason == "panes count for the length of paths", "{reason}");
     let endless = Case { light: PANE, depth: "null, count_crossings: true", ..counted }.bench("on", "auto", 64);
     assert!(techniques(&endless).0, "{}", techniques(&endless).2);
+}
 
-    let point = Case { light: "lights: [{point: {position: [-1.5, 2, 1], intensity: 9}}]\n", ..counted }
-        .bench("on", "auto", 64);
-    let (tracing, _, reason) = techniques(&point);
+/// With `delta_caustics: false`, as in scenes read from Mitsuba's XML, a point light is left to the camera, which never meets it
+/// behind glass; a lamp beside it is traced alone.
+#[test]
+fn light_of_points_behind_glass_is_left_out_where_it_is_not_wanted() {
+    const POINT: &str = "lights: [{point: {position: [-1.5, 2, 1], intensity: 9}}]\n";
+    let unwanted = Case { what: "unwanted", depth: "5, delta_caustics: false", light: POINT, ..AREA };
+    let (tracing, _, reason) = techniques(&unwanted.bench("on", "auto", 64));
     assert!(!tracing && reason.starts_with("no light that a path from the camera can meet"), "{reason}");
+
+    const BOTH: &str = "\
+- sphere: {center: [-1.5, 2, 1], radius: 0.5, emission: {illuminant: {name: D65, scale: 10}}}
+lights: [{point: {position: [-1.5, 2, 1], intensity: 9}}]
+";
+    let (tracing, _, reason) = techniques(&Case { light: BOTH, ..unwanted }.bench("on", "auto", 64));
+    assert!(tracing && reason.starts_with("of 1 of 2 lights"), "{reason}");
+    let (tracing, _, reason) = techniques(&Case { light: BOTH, depth: "5", ..unwanted }.bench("on", "auto", 64));
+    assert!(tracing && reason.starts_with("of 2 lights"), "{reason}");
 }
 
 /// Rays meet curves from outside only: what refracts into a fibre of glass leaves it unseen, and a path from the lamp would

@@ -72,6 +72,7 @@ impl Import<'_> {
                 hide_emitters(&bag, &mut fields)?;
                 depth(&bag, &mut fields)?;
                 fields.add("opaque_sky", boolean(bag.object.place, true));
+                fields.add("delta_caustics", boolean(bag.object.place, false));
                 if bag.object.plugin == "path" {
                     // Panes and null surfaces are vertices for it, unlike for the two that know media.
                     fields.add("count_crossings", boolean(bag.object.place, true));
@@ -83,6 +84,7 @@ impl Import<'_> {
                 fields.add("max_depth", whole(bag.object.place, 2));
                 // What shines through a pane has met two things.
                 fields.add("count_crossings", boolean(bag.object.place, true));
+                fields.add("delta_caustics", boolean(bag.object.place, false));
                 samples_of_direct(&bag, &mut fields)?;
                 "path"
             }
@@ -271,6 +273,7 @@ mod tests {
             light_samples: 4,
             scatter_samples: 4,
             count_crossings: true,
+            delta_caustics: false,
             ..PathIntegrator::default()
         });
         assert_eq!(scene.integrator, direct);

@@ -1,6 +1,6 @@
 //! Materials that are made of others, principled ones, and hair.
 
-use super::super::super::compound::{Blend, Bump, Mask, NormalMap, NumberOrTexture, TwoSided};
+use super::super::super::compound::{Blend, Bump, Mask, NormalMap, NumberOrTexture, Roughness, TwoSided};
 use super::super::super::hair::{Hair, HairColour};
 use super::super::super::material::{Material, MaterialRef};
 use super::super::super::principled::{Contrast, Luminance, Principled, PrincipledThin};
@@ -159,6 +159,20 @@ impl Export<'_> {
         match material {
             MaterialRef::Name(name) => self.scene.materials.get(name),
             MaterialRef::Inline(material) => Some(material),
+        }
+    }
+
+    /// Whether a material throws light as a smooth mirror or glass does.
+    pub(super) fn is_sharp(&self, material: &MaterialRef) -> bool {
+        match self.meant(material) {
+            Some(Material::Mirror(_) | Material::ThinDielectric(_)) => true,
+            Some(Material::Conductor(m)) => m.roughness == Roughness::Number(0.0),
+            Some(Material::Dielectric(m)) => m.roughness == Roughness::Number(0.0),
+            Some(Material::Mask(m)) => self.is_sharp(&m.material),
+            Some(Material::TwoSided(m)) => {
+                self.is_sharp(&m.front) || m.back.as_deref().is_some_and(|back| self.is_sharp(back))
+            }
+            _ => false,
         }
     }
 

@@ -30,11 +30,12 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::super::camera::{Camera, Clip, Filter, FovAxis, Image, Pose, Projection};
+use super::super::light::Light;
 use super::super::node::{Node, Sources, Value};
 use super::super::path::{self, Segment};
 use super::super::print::{Printer, relative};
 use super::super::scene::SceneDescription;
-use super::super::settings::Integrator;
+use super::super::settings::{Integrator, Technique};
 use super::DAYLIGHT;
 use xml::Xml;
 
@@ -69,8 +70,9 @@ pub fn export(scene: &SceneDescription, path: &Path) -> Exported {
     let (losses, files) = (Vec::new(), Vec::new());
     let (ids, mentioned) = (BTreeSet::new(), BTreeSet::new());
     let xml = Xml::default();
-    let mut export = Export { scene, root, sources, directory, stem, ids, mentioned, xml, losses, files };
+    let mut export = Export { scene, root, sources, directory, stem, ids, mentioned, xml, losses, files, sharp: false };
     export.scene();
+    export.caustics();
     let Export { xml, mut losses, files, .. } = export;
     losses.dedup();
     Exported { xml: xml.finish(), losses, files }
@@ -90,6 +92,8 @@ struct Export<'a> {
     xml: Xml,
     losses: Vec<Loss>,
     files: Vec<(String, Vec<u8>)>,
+    /// Whether a shape is a smooth mirror or of glass.
+    sharp: bool,
 }
 
 /// Settings that are about the work and the files, not about the light: Mitsuba has other words for
@@ -146,6 +150,19 @@ impl<'a> Export<'a> {
             }
         }
         self.xml.close();
+    }
+
+    /// Says which light Mitsuba's path tracers do not know.
+    fn caustics(&mut self) {
+        let Integrator::Path(path) = &self.scene.integrator else { return };
+        let delta = |light: &Light| !matches!(light, Light::Constant(_) | Light::Environment(_));
+        let traced = path.delta_caustics && self.scene.render.techniques.light_tracing != Technique::Off;
+        if traced && self.sharp && self.scene.lights.iter().any(delta) {
+            self.lose(
+                "integrator.path.delta_caustics",
+                "no light that mirrors and glass throw of lights without extent",
+            );
+        }
     }
 
     /// Names of the materials that shapes have, or that such materials are made of.
@@ -266,6 +283,11 @@ impl<'a> Export<'a> {
             self.xml.value("boolean", "hide_emitters", true);
         }
         self.xml.close();
+        if let Integrator::Path(path) = &self.scene.integrator
+            && path.delta_caustics
+        {
+            self.xml.instruction("set integrator.path.delta_caustics: true");
+        }
     }
 
     fn sensor(&mut self) {
