@@ -60,8 +60,8 @@ pub struct PathIntegrator {
     /// only, and mirrors are black; default 1.
     #[serde(default = "one", deserialize_with = "whole::<_, 0, MAX_SPLIT>")]
     pub scatter_samples: u32,
-    /// Whether going straight through a thin pane or the boundary of a medium ends a segment for `max_depth`;
-    /// default false.
+    /// Whether going straight through a thin pane or the boundary of a medium ends a segment for `max_depth`, so that lamps behind
+    /// it are seen in spite of `hide_emitters`; default false.
     #[serde(default)]
     pub count_crossings: bool,
     /// Whether mirrors and glass throw the light of point, spot, projector and directional lights, too, which no path from the

@@ -179,7 +179,8 @@ impl Tracer<'_> {
         };
         let surface = scene.surface(&path.ray, &hit);
         let object = &scene.objects[hit.object as usize];
-        if self.settings.hide_emitters && path.vertices == 0 && object.is_lamp {
+        let is_seen = path.vertices == 0 && !(self.settings.count_crossings && path.crossings > 0);
+        if self.settings.hide_emitters && is_seen && object.is_lamp {
             // A lamp that the camera would see itself is not there.
             walk.crossings += 1;
             if walk.crossings > MAX_BOUNDARIES {

@@ -17,6 +17,8 @@ ASSETS = FOLDER / "assets"
 RELIEF = "waves.png"
 PICTURES = ("patch.png", "slide.png", "stencil.png", RELIEF)
 MESHES = {"obj": ("tile.obj", "roof.obj"), "ply": ("tile.ply", "tile_text.ply"), "serialized": ("tiles.serialized",)}
+# Colours of its vertices and faces.
+PAINT = ("vertex_color", "face_paint_color")
 CURVES = {"bsplinecurve": ("coil.txt", "tuft.txt"), "linearcurve": ("zigzag.txt",)}
 SHAPES = ("sphere", "cube", "cylinder", "disk", "rectangle", *MESHES, *CURVES, "sdfgrid")
 # Surfaces that let nothing through, that let light through, and that are made of others.
@@ -82,10 +84,11 @@ class Draw:
         return f'<rotate x="{x}" y="{y}" z="{z}" angle="{self.between(0, 360)}"/>'
 
     def place(self, x: float, even: bool) -> str:
+        mirrored = "-" if not even and self.chance(0.15) else ""
         if even:
             scale = f'<scale value="{self.between(0.4, 0.8)}"/>'
         else:
-            scale = "<scale " + " ".join(f'{a}="{self.between(0.4, 0.8)}"' for a in "xyz") + "/>"
+            scale = "<scale " + " ".join(f'{a}="{mirrored * (a == "x")}{self.between(0.4, 0.8)}"' for a in "xyz") + "/>"
         move = f'<translate x="{number(x)}" y="{self.between(0.6, 1.4)}" z="{self.between(-0.5, 0.5)}"/>'
         return to_world(scale + self.turn() + move)
 
@@ -262,6 +265,9 @@ class Draw:
         turned = "" if closed or kind == "cube" else self.maybe(lambda: leaf("boolean", "flip_normals", "true"), 0.1)
         if kind in MESHES:
             file = leaf("string", "filename", ASSETS / self.one(*MESHES[kind]))
+            if "tile_text" in file and self.chance(0.6):
+                colours = plugin("texture", "mesh_attribute", leaf("string", "name", self.one(*PAINT)), name="base_color")
+                inside = plugin("bsdf", "principled", colours, self.scalar("roughness", 0.1, 1, pictures=False))
             # Shading normals turn light through backs, which is known.
             flat = self.maybe(lambda: leaf("boolean", "face_normals", "true"), 1.0 if "roof" in file else 0.3)
             return plugin("shape", kind, file, flat, self.place(x, False), turned, inside)
@@ -294,24 +300,41 @@ class Draw:
         albedo = self.spectrum("albedo", 0.2, 0.95)
         return plugin("medium", "homogeneous", albedo, colour, self.float("scale", 0.7, 2), self.phase(), name="interior")
 
+    def fog(self) -> tuple[str, list[str]]:
+        """Thin mist around all, and what the camera in it says."""
+        mist = self.float("sigma_t", 0.02, 0.15) + self.spectrum("albedo", 0.2, 0.95) + self.phase()
+        made = plugin("medium", "homogeneous", mist).replace("<medium", '<medium id="fog"', 1)
+        shell = leaf("float", "radius", 12) + plugin("bsdf", "null") + '<ref name="interior" id="fog"/>'
+        return made + plugin("shape", "sphere", shell), ['<ref id="fog"/>']
+
     # -- lights ----------------------------------------------------------------------------------------
 
     def light(self, name: str, most: float) -> str:
-        if self.chance(0.25):
-            return f'<spectrum type="d65" name="{name}">{self.float("scale", 0.2 * most, most)}</spectrum>'
+        form = self.one("d65", "d65", "blackbody", "regular", *("plain",) * 6)
+        if form == "d65":
+            return plugin("spectrum", form, self.float("scale", 0.2 * most, most), name=name)
+        if form == "blackbody":
+            # As bright as it is: some 100 W·m⁻²·sr⁻¹·nm⁻¹ at 2700 K. Redder ones have next to no blue to compare.
+            return plugin("spectrum", form, self.float("temperature", 2400, 3200), name=name)
+        if form == "regular":
+            ends = leaf("float", "wavelength_min", 360) + leaf("float", "wavelength_max", 830)
+            values = leaf("string", "values", ", ".join(self.between(0.1 * most, most) for _ in range(6)))
+            return plugin("spectrum", form, ends, values, name=name)
         return self.spectrum(name, 0.1 * most, most)
 
     def emitter(self) -> tuple[str, str]:
         """A light, and its kind."""
         kind = self.one("area", "area", "point", "constant", "envmap", "spot", "projector", "directional")
         if kind == "area":
-            shape = self.one("rectangle", "disk", "sphere", "cylinder")
+            shape = self.one("rectangle", "disk", "sphere", "cylinder", "cube", "obj", "ply")
             # Textures of turned spheres and cylinders that shine are known.
             plain = shape in ("sphere", "cylinder") or self.chance(0.6)
             radiance = self.light("radiance", 8) if plain else self.texture("radiance")
             surface = self.maybe(lambda: self.bsdf(0, False))
             scale = f'<scale value="{self.between(0.3, 0.8)}"/>'
-            return plugin("shape", shape, self.above(scale), surface, plugin("emitter", "area", radiance)), kind
+            file = leaf("string", "filename", ASSETS / self.one(*MESHES[shape])) if shape in MESHES else ""
+            flat = leaf("boolean", "face_normals", "true") if shape in MESHES else ""
+            return plugin("shape", shape, file, flat, self.above(scale), surface, plugin("emitter", "area", radiance)), kind
         if kind == "point":
             at = f"{self.between(-2, 2)}, {self.between(2.5, 4)}, {self.between(-2, 2)}"
             return plugin("emitter", kind, leaf("point", "position", at), self.light("intensity", 30)), kind
@@ -342,10 +365,15 @@ class Draw:
 
     # -- the whole -------------------------------------------------------------------------------------
 
-    def sensor(self) -> str:
+    def crop(self) -> str:
+        ends = {"offset_x": (0, 8), "offset_y": (0, 8), "width": (16, 24), "height": (8, 16)}
+        return "".join(leaf("integer", f"crop_{name}", self.random.randint(*of)) for name, of in ends.items())
+
+    def sensor(self, *inside_of: str) -> str:
         kind = self.one("perspective", "perspective", "thinlens", "orthographic")
         origin = f"{self.between(-1.5, 1.5)}, {self.between(1.2, 3)}, {self.between(5, 6)}"
         look = f'<lookat origin="{origin}" target="0, 0.8, 0" up="{self.between(-0.2, 0.2)}, 1, 0"/>'
+        look = self.maybe(lambda: '<scale x="-1"/>', 0.15) + look
         inside = to_world('<scale x="2" y="2"/>' + look if kind == "orthographic" else look)
         if kind != "orthographic":
             inside += self.float("fov", 30, 50)
@@ -356,12 +384,14 @@ class Draw:
             inside += self.float("aperture_radius", 0.02, 0.2) + self.float("focus_distance", 4, 7)
         size = leaf("integer", "width", SIZE) + leaf("integer", "height", self.one(SIZE, SIZE * 3 // 4))
         form = leaf("string", "pixel_format", "rgb") + leaf("string", "component_format", "float32")
+        size += self.maybe(self.crop, 0.15)
         film = plugin("film", "hdrfilm", size, form, '<rfilter type="box"/>')
-        return plugin("sensor", kind, inside, film, '<sampler type="independent"/>')
+        return plugin("sensor", kind, inside, film, '<sampler type="independent"/>', *inside_of)
 
     def scene(self) -> str:
         misty = self.chance(0.3)
-        integrator = self.one("volpath", "volpathmis") if misty else self.one("path", "path", "volpath", "direct")
+        foggy = not misty and self.chance(0.1)
+        integrator = self.one("volpath", "volpathmis") if misty or foggy else self.one("path", "path", "volpath", "direct")
         bodies = ""
         count = self.random.randint(1, 3)
         for i in range(count):
@@ -372,7 +402,7 @@ class Draw:
             elif self.chance(0.1):
                 bodies += self.group(x)
             else:
-                bodies += self.body(x, self.bsdf())
+                bodies += self.body(x, self.bsdf(clear=not foggy))
         flat = to_world('<scale value="4"/><rotate x="1" angle="-90"/>')
         ground = plugin("shape", "rectangle", flat, self.bsdf(1, False))
         lights, kinds = self.lights()
@@ -386,7 +416,8 @@ class Draw:
                 return self.scene()
         else:
             settings += self.maybe(lambda: leaf("boolean", "hide_emitters", "true"))
-        parts = plugin("integrator", integrator, settings) + self.sensor() + ground + bodies + lights
+        air, around = self.fog() if foggy else ("", [])
+        parts = plugin("integrator", integrator, settings) + air + self.sensor(*around) + ground + bodies + lights
         return f'<scene version="3.0.0">{parts}</scene>'.replace("><", ">\n<")
 
 
@@ -399,7 +430,5 @@ def cases(count: int, seed: int, folder: Path) -> list[SceneFile]:
         path = folder / f"drawn_{drawn}.xml"
         scene = Draw(drawn).scene()
         path.write_text(scene)
-        # Where panes do not count, light of lamps that no path meets is traced through glass: known.
-        settings = ["render.techniques.light_tracing=off"] if '"volpath' in scene else []
-        made.append(SceneFile(path, "drawn at random", spp=1024, settings=settings, may_be_noisy=True))
+        made.append(SceneFile(path, "drawn at random", spp=1024, may_be_noisy=True))
     return made
