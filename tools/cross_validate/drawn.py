@@ -83,12 +83,12 @@ class Draw:
         x, y, z = (f"{a / length:.12f}" for a in axis)
         return f'<rotate x="{x}" y="{y}" z="{z}" angle="{self.between(0, 360)}"/>'
 
-    def place(self, x: float, even: bool) -> str:
-        mirrored = "-" if not even and self.chance(0.15) else ""
+    def place(self, x: float, even: bool, mirrored: bool = True) -> str:
+        sign = "-" if mirrored and not even and self.chance(0.15) else ""
         if even:
             scale = f'<scale value="{self.between(0.4, 0.8)}"/>'
         else:
-            scale = "<scale " + " ".join(f'{a}="{mirrored * (a == "x")}{self.between(0.4, 0.8)}"' for a in "xyz") + "/>"
+            scale = "<scale " + " ".join(f'{a}="{sign * (a == "x")}{self.between(0.4, 0.8)}"' for a in "xyz") + "/>"
         move = f'<translate x="{number(x)}" y="{self.between(0.6, 1.4)}" z="{self.between(-0.5, 0.5)}"/>'
         return to_world(scale + self.turn() + move)
 
@@ -271,7 +271,9 @@ class Draw:
             # Shading normals turn light through backs, which is known.
             flat = self.maybe(lambda: leaf("boolean", "face_normals", "true"), 1.0 if "roof" in file else 0.3)
             return plugin("shape", kind, file, flat, self.place(x, False), turned, inside)
-        return plugin("shape", kind, self.place(x, kind not in ("cube", "rectangle")), turned, inside)
+        # Media of mirrored cubes are outside of them (known).
+        place = self.place(x, kind not in ("cube", "rectangle"), mirrored=not closed)
+        return plugin("shape", kind, place, turned, inside)
 
     def group(self, x: float) -> str:
         members = [self.body(0, self.bsdf(1, False)) for _ in range(2)]
@@ -327,8 +329,8 @@ class Draw:
         kind = self.one("area", "area", "point", "constant", "envmap", "spot", "projector", "directional")
         if kind == "area":
             shape = self.one("rectangle", "disk", "sphere", "cylinder", "cube", "obj", "ply")
-            # Textures of turned spheres and cylinders that shine are known.
-            plain = shape in ("sphere", "cylinder") or self.chance(0.6)
+            # Textures of things that shine, other than flat ones, are known.
+            plain = shape not in ("rectangle", "disk") or self.chance(0.6)
             radiance = self.light("radiance", 8) if plain else self.texture("radiance")
             surface = self.maybe(lambda: self.bsdf(0, False))
             scale = f'<scale value="{self.between(0.3, 0.8)}"/>'
