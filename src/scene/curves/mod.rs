@@ -195,7 +195,7 @@ impl Curves {
         let (t, v, segment) = match &self.pieces {
             Pieces::Cones(cones) => {
                 let (t, v) = cones[piece as usize].entry(origin, direction)?;
-                if t <= 0.0 || t >= t_max * length || is_within_joint(cones, piece, v, origin, direction, t) {
+                if is_within_joint(cones, piece, v, origin, direction, t) {
                     return None;
                 }
                 // A joint has the direction of the piece that ends there, as in Mitsuba.
