@@ -271,8 +271,8 @@ class Draw:
             # Shading normals turn light through backs, which is known.
             flat = self.maybe(lambda: leaf("boolean", "face_normals", "true"), 1.0 if "roof" in file else 0.3)
             return plugin("shape", kind, file, flat, self.place(x, False), turned, inside)
-        # Media of mirrored cubes are outside of them (known).
-        place = self.place(x, kind not in ("cube", "rectangle"), mirrored=not closed)
+        # Media of mirrored cubes are outside of them, and relief on what is mirrored is black (known).
+        place = self.place(x, kind not in ("cube", "rectangle"), mirrored=not closed and "bumpmap" not in inside)
         return plugin("shape", kind, place, turned, inside)
 
     def group(self, x: float) -> str:
@@ -393,7 +393,9 @@ class Draw:
     def scene(self) -> str:
         misty = self.chance(0.3)
         foggy = not misty and self.chance(0.1)
-        integrator = self.one("volpath", "volpathmis") if misty or foggy else self.one("path", "path", "volpath", "direct")
+        integrator = self.one("volpath", "volpathmis") if misty else self.one("path", "path", "volpath", "direct")
+        # Far from its ends the roulette of `volpathmis` shows (known).
+        integrator = "volpath" if foggy else integrator
         bodies = ""
         count = self.random.randint(1, 3)
         for i in range(count):
