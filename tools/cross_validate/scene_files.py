@@ -41,6 +41,8 @@ class SceneFile:
     inner: int = 0
     allow: float = ALLOWANCE
     skip: set = field(default_factory=set)
+    # Further settings of ours.
+    settings: list = field(default_factory=list)
     # Noise that hides what is asked for is no fault of such a scene.
     may_be_noisy: bool = False
 
@@ -79,7 +81,7 @@ def all_files() -> list[SceneFile]:
 def abbe_channels(binary: Path, case: SceneFile, exr: Path, spp: int, seed: int) -> dict:
     """The channels of one render by name, (h, w) each."""
     command = [binary, "render", case.path, "-o", exr, "--spp", spp, "--seed", seed, "-q"]
-    for setting in ["output.exr.precision=float"]:
+    for setting in ["output.exr.precision=float", *case.settings]:
         command += ["--set", setting]
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
     if done.returncode != 0:
