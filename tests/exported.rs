@@ -104,6 +104,30 @@ lights:
     same_picture(&yaml);
 }
 
+/// Paths from the lights are cut short by panes there, which matters where paths end and panes are.
+#[test]
+fn paths_of_the_light_tracer_are_shorter_there() {
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    let losses = |depth: &str, material: &str| {
+        let scene = format!(
+            "camera: {{origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}}\nintegrator: {{light_tracer: {{{depth}}}}}\nshapes:\n\
+             - sphere: {{radius: 0.5, material: {material}}}\n\
+             - rectangle: {{corner: [-2, -1, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4], material: {{diffuse: {{}}}}}}\n\
+             - disk: {{center: [0, 3, 0], normal: [0, -1, 0], radius: 0.5, emission: 1}}\n"
+        );
+        common::write(&yaml, scene.as_bytes());
+        let (_, exported) = prepared(&yaml, directory.path(), false);
+        same_picture(&yaml);
+        exported.losses.into_iter().map(|loss| loss.field).collect::<Vec<String>>()
+    };
+    let pane = "{thin_dielectric: {ior: 1.5}}";
+    assert_eq!(losses("max_depth: 4", pane), ["integrator.light_tracer.count_crossings"]);
+    assert_eq!(losses("max_depth: 4, count_crossings: true", pane), [""; 0]);
+    assert_eq!(losses("max_depth: 4", "{diffuse: {}}"), [""; 0]);
+    assert_eq!(losses("", pane), [""; 0]);
+}
+
 /// Materials made of others, principled ones, media of volumes, groups, curves, distances on a grid and textures of all
 /// kinds have plugins of Mitsuba's, and nothing of ours is left in the file.
 #[test]

@@ -238,6 +238,7 @@ pub(super) fn integrator(description: &SceneDescription, written: &description::
             max_depth: l.max_depth,
             roulette_depth: l.roulette_depth,
             hide_emitters: l.hide_emitters,
+            count_crossings: l.count_crossings,
         }),
         description::Integrator::None(_) => Integrator::Nothing,
     })

@@ -48,7 +48,8 @@
 //!                                   #           light_samples: 1, scatter_samples: 1, count_crossings: false,
 //!                                   #           opaque_sky: false, delta_caustics: true}},
 //!                                   #   {light_tracer: {max_depth: null, roulette_depth: 5,
-//!                                   #                   hide_emitters: false}}: from the lights to the camera
+//!                                   #                   hide_emitters: false, count_crossings: false}}: from the
+//!                                   #           lights to the camera
 //!                                   #   {whitted: {max_depth: 10, grid: 2, ambient: 0,
 //!                                   #              transparent_shadows: false}},
 //!                                   #   depth: the distance to the first surface, m; none: black

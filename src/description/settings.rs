@@ -104,7 +104,7 @@ pub struct DepthIntegrator {}
 #[serde(deny_unknown_fields)]
 pub struct NoIntegrator {}
 
-/// `light_tracer: {max_depth: null, roulette_depth: 5}`
+/// `light_tracer: {max_depth: null, roulette_depth: 5, hide_emitters: false, count_crossings: false}`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightTracerIntegrator {
@@ -117,6 +117,9 @@ pub struct LightTracerIntegrator {
     /// Whether lights that the camera sees itself are left out; default false.
     #[serde(default)]
     pub hide_emitters: bool,
+    /// As for `path`; default false.
+    #[serde(default)]
+    pub count_crossings: bool,
 }
 
 /// `whitted: {max_depth: 10, grid: 2, ambient: 0.2}`

@@ -155,6 +155,7 @@ pub fn trace(
         medium: None,
         bodies: if paths.plan.nested { scene.bodies_around(&emission.ray) } else { Bodies::NONE },
         vertex: 0,
+        crossings: 0,
     });
     traced.rays = walk.rays;
     traced
@@ -182,6 +183,7 @@ pub(super) fn seen_in_sharp(
         medium: Some(paths.scene.camera_inside.medium),
         bodies: paths.scene.camera_inside.bodies,
         vertex: 0,
+        crossings: 0,
     });
     seen.iter().next()
 }
@@ -206,11 +208,18 @@ struct Beam {
     bodies: Bodies,
     /// Vertices so far.
     vertex: u32,
+    /// What it went straight through so far, if that counts.
+    crossings: u32,
 }
 
 impl Beam {
     fn inside(&self) -> Inside {
         Inside { medium: self.medium.flatten(), bodies: self.bodies }
+    }
+
+    /// Segments so far, less one: events that count for the greatest depth.
+    fn events(&self) -> u32 {
+        self.vertex + self.crossings
     }
 
     /// Of light at the wavelengths of the beam, that at those of the path.
@@ -270,16 +279,16 @@ impl<'a> Walk<'a, '_> {
         Set::Extra((vertex + 1).wrapping_add(crossings << 16))
     }
 
-    /// Whether nothing may be met beyond `vertex` vertices: the camera is one segment further than the next surface.
-    fn is_last(&self, vertex: u32) -> bool {
-        self.paths.settings.max_depth.is_some_and(|depth| vertex + 2 > depth)
+    /// Whether nothing may be met any more after `events`: the camera is one segment further than the next surface.
+    fn is_last(&self, events: u32) -> bool {
+        self.paths.settings.max_depth.is_some_and(|depth| events + 2 > depth)
     }
 
     fn follow(&mut self, mut beam: Beam) {
         let LightPaths { scene, plan, caustics, .. } = *self.paths;
         loop {
             let vertex = beam.vertex;
-            if self.is_last(vertex) {
+            if self.is_last(beam.events()) {
                 return;
             }
             let Numbers { flight: u_flight, lobe: u_lobe, roulette: u_roulette, lens: u_lens, scatter: u_scatter } =
@@ -493,6 +502,10 @@ impl<'a> Walk<'a, '_> {
                     pane => return Some(Met::Surface { hit, surface, leaf, pane: pane.is_some(), meeting }),
                 }
             }
+            beam.crossings += u32::from(self.paths.settings.count_crossings);
+            if self.is_last(beam.events()) {
+                return None;
+            }
             let beyond = scene.beyond(object, &surface, direction, beam.inside());
             beam.medium = beam.medium.map(|_| beyond.medium);
             beam.bodies = beyond.bodies;
@@ -573,10 +586,14 @@ impl<'a> Walk<'a, '_> {
     /// The share of light that comes straight on to the camera at `distance`; `None` where something opaque stands
     /// between.
     fn open(&mut self, ray: &Ray, distance: f64, inside: Inside, beam: &Beam) -> Option<Lanes> {
-        let LightPaths { scene, plan, .. } = *self.paths;
+        let LightPaths { scene, plan, settings, .. } = *self.paths;
         self.rays += 1;
         let (sampler, nm, vertex) = (self.sampler, beam.nm, beam.vertex + 1);
-        let shadow = Shadow { scene, sampler, nm, vertex, inside, panes: MAX_BOUNDARIES, target: None };
+        let panes = match settings.max_depth {
+            Some(depth) if settings.count_crossings => depth.saturating_sub(beam.events() + 2).min(MAX_BOUNDARIES),
+            _ => MAX_BOUNDARIES,
+        };
+        let shadow = Shadow { scene, sampler, nm, vertex, inside, panes, target: None };
         let tracked = plan.media || plan.nested;
         let came = if tracked { shadow.cast::<true>(ray, distance) } else { shadow.cast::<false>(ray, distance) };
         came.map(|(through, _)| through)

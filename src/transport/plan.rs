@@ -37,6 +37,8 @@ pub struct LightSettings {
     pub roulette_depth: u32,
     /// Whether lights that the camera sees itself are left out.
     pub hide_emitters: bool,
+    /// Whether going straight through a pane or a boundary ends a segment for `max_depth`.
+    pub count_crossings: bool,
 }
 
 /// Settings of the path tracer.
@@ -68,6 +70,7 @@ impl PathSettings {
             max_depth: self.max_depth,
             roulette_depth: self.roulette_depth,
             hide_emitters: self.hide_emitters,
+            count_crossings: self.count_crossings,
         }
     }
 }

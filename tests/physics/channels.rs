@@ -96,6 +96,24 @@ fn paths_from_the_lights_and_from_the_camera_agree() {
     }
 }
 
+/// Segments that end at the boundary of nothing count for neither or for both.
+#[test]
+fn crossings_count_from_both_ends() {
+    let light = "- disk: {center: [0.5, 2, 0.5], normal: [0, -1, 0], radius: 0.3, emission: 10}\n";
+    for depth in ["2", "3", "4", "5"] {
+        let by = |integrator, counts| {
+            let scene = corner(integrator, "", "{boundary: {}}", light);
+            render(&scene.replace("max_depth: 4", &format!("max_depth: {depth}, count_crossings: {counts}")))
+        };
+        let [all, counted] = [false, true].map(|counts| {
+            let light_tracer = by("light_tracer", counts);
+            assert_agree(&format!("{depth}, {counts}"), &by("path", counts), &light_tracer);
+            luminance(&light_tracer).0
+        });
+        assert!(counted < 0.99 * all, "{depth}: {counted} of {all}");
+    }
+}
+
 /// The same light lies in other pixels' filters, but none is lost: shares add up to one, for the last in the mean.
 #[test]
 fn splats_keep_their_light_under_every_filter() {

@@ -31,6 +31,12 @@ OPEN = {"mask", "null", "thindielectric"}
 # Light that no scattered ray meets.
 DELTA = {"point", "spot", "projector", "directional"}
 SKIES = {"constant", "envmap"}
+# What `ptracer` does otherwise than `path` (known): lamps that are turned balls, bands, clipping planes, moved middles; things behind
+# what is open; geometric normals of mirrored cubes, slopes, tints by the luminance of a few wavelengths. Hair is not reciprocal.
+UNTRACED = (
+    r'type="sphere">(?:(?!</shape>)[\s\S])*<emitter|specfilm|_clip|principal_point|"(mask|null|thindielectric)"|'
+    r'scale x="-|bumpmap|normalmap|_tint|hair|texture type="checkerboard" name="(radiance|irradiance|texture)|blackbody'
+)
 # What tangents turn.
 GRAIN = "alpha_u|anisotropic|bumpmap|normalmap"
 
@@ -102,14 +108,17 @@ class Draw:
     # -- spectra and textures --------------------------------------------------------------------------
 
     def spectrum(self, name: str, low: float, high: float, rgb: bool = True) -> str:
-        form = self.one("one", "list", "rgb" if rgb else "list")
+        form = self.one("one", "list", "rgb" if rgb else "list", "irregular")
         if form == "one":
             return leaf("spectrum", name, self.between(low, high))
         if form == "rgb":
             return leaf("rgb", name, ", ".join(self.between(low, high) for _ in range(3)))
         # To the ends: `volpathmis` loses light where a medium has no extinction at some wavelengths (known).
-        knots = ", ".join(f"{nm}:{self.between(low, high)}" for nm in (360, 480, 540, 620, 830))
-        return leaf("spectrum", name, knots)
+        knots = {nm: self.between(low, high) for nm in (360, 480, 540, 620, 830)}
+        if form == "irregular":
+            columns = leaf("string", "wavelengths", ", ".join(map(str, knots))), leaf("string", "values", ", ".join(knots.values()))
+            return plugin("spectrum", form, *columns, name=name)
+        return leaf("spectrum", name, ", ".join(f"{nm}:{value}" for nm, value in knots.items()))
 
     def on_surface(self) -> str:
         if self.chance(0.5):
@@ -134,14 +143,23 @@ class Draw:
             name=name,
         )
 
-    def texture(self, name: str) -> str:
+    def grid(self, family: str, name: str, file: str) -> str:
+        """Values all over the scene."""
+        around = to_world('<translate x="-0.5" y="-0.5" z="-0.5"/>' + self.turn() + f'<scale value="{self.between(1, 5)}"/>')
+        form = [leaf("string", "filter_type", self.one("trilinear", "nearest"))]
+        form += [leaf("string", "wrap_mode", self.one("repeat", "mirror", "clamp"))]
+        return plugin(family, "gridvolume", leaf("string", "filename", ASSETS / file), *form, around, name=name)
+
+    def texture(self, name: str, of_volume: bool = True) -> str:
+        if of_volume and self.chance(0.1):
+            return plugin("texture", "volume", self.grid("volume", "volume", "colours.vol"), name=name)
         if self.chance(0.5):
             return self.bitmap(name, self.one(*PICTURES), False)
         colours = self.spectrum("color0", 0.05, 0.9) + self.spectrum("color1", 0.05, 0.9)
         return plugin("texture", "checkerboard", colours, self.on_surface(), name=name)
 
-    def reflectance(self, name: str) -> str:
-        return self.texture(name) if self.chance(0.4) else self.spectrum(name, 0.02, 0.9)
+    def reflectance(self, name: str, of_volume: bool = True) -> str:
+        return self.texture(name, of_volume) if self.chance(0.4) else self.spectrum(name, 0.02, 0.9)
 
     def scalar(self, name: str, low: float, high: float, textured: float = 0.2, pictures: bool = True) -> str:
         if not self.chance(textured):
@@ -197,7 +215,8 @@ class Draw:
         index = self.one(self.float("int_ior", 1.2, 1.9), leaf("string", "int_ior", "bk7"))
         shine = self.maybe(lambda: self.spectrum("specular_reflectance", 0.3, 1))
         nonlinear = self.maybe(lambda: leaf("boolean", "nonlinear", "true"))
-        return index + self.reflectance("diffuse_reflectance") + nonlinear + shine
+        # There is no mean of a volume.
+        return index + self.reflectance("diffuse_reflectance", False) + nonlinear + shine
 
     def roughplastic(self, *_):
         return self.plastic() + leaf("string", "distribution", self.one("ggx", "beckmann")) + self.float("alpha", 0.05, 0.6)
@@ -229,8 +248,8 @@ class Draw:
 
     def blendbsdf(self, depth: int, clear: bool):
         inside = [self.bsdf(depth - 1, clear) for _ in range(2)]
-        # Perfect lobes and rough glass in a blend are known.
-        while any(re.search('"(conductor|plastic|.*dielectric|null|mask)"', b) for b in inside):
+        # Perfect lobes, rough glass and thin sheets in a blend are known.
+        while any(re.search('"(conductor|plastic|.*dielectric|principledthin|null|mask)"', b) for b in inside):
             inside = [self.bsdf(depth - 1, clear) for _ in range(2)]
         return self.scalar("weight", 0, 1, 0.5) + "".join(inside)
 
@@ -246,16 +265,15 @@ class Draw:
 
     # -- bodies ----------------------------------------------------------------------------------------
 
-    def body(self, x: float, inside: str, closed: bool = False) -> str:
-        kind = self.one("sphere", "cube") if closed else self.one(*SHAPES)
+    def body(self, x: float, inside: str, closed: bool = False, mesh: bool = False) -> str:
+        kind = self.one("sphere", "cube") if closed else self.one(*(MESHES if mesh else SHAPES))
         # Linear curves have no tangents, nor have grids of distances; relief on curves takes light through their backs (known).
         while kind in (*CURVES, "sdfgrid") and re.search(GRAIN, inside):
             inside = self.bsdf()
         if kind in CURVES:
             file = leaf("string", "filename", ASSETS / self.one(*CURVES[kind]))
             if kind == "bsplinecurve" and self.chance(0.5):
-                melanin = "".join(self.float(n, 0.05, 0.6) for n in ("eumelanin", "pheomelanin"))
-                inside = plugin("bsdf", "hair", melanin, self.float("longitudinal_roughness", 0.2, 0.8))
+                inside = plugin("bsdf", "hair", self.hair())
             place = to_world(f'<rotate y="1" angle="{self.between(0, 360)}"/><translate x="{number(x)}"/>')
             return plugin("shape", kind, file, place, inside)
         if kind == "sdfgrid":
@@ -265,7 +283,7 @@ class Draw:
         turned = "" if closed or kind == "cube" else self.maybe(lambda: leaf("boolean", "flip_normals", "true"), 0.1)
         if kind in MESHES:
             file = leaf("string", "filename", ASSETS / self.one(*MESHES[kind]))
-            if "tile_text" in file and self.chance(0.6):
+            if "tile_text" in file and not mesh and self.chance(0.6):
                 colours = plugin("texture", "mesh_attribute", leaf("string", "name", self.one(*PAINT)), name="base_color")
                 inside = plugin("bsdf", "principled", colours, self.scalar("roughness", 0.1, 1, pictures=False))
             # Shading normals turn light through backs, which is known.
@@ -273,13 +291,42 @@ class Draw:
             return plugin("shape", kind, file, flat, self.place(x, False), turned, inside)
         # Media of mirrored cubes are outside of them, and relief on what is mirrored is black (known).
         place = self.place(x, kind not in ("cube", "rectangle"), mirrored=not closed and "bumpmap" not in inside)
-        return plugin("shape", kind, place, turned, inside)
+        return plugin("shape", kind, self.measures(kind), place, turned, inside)
+
+    def measures(self, kind: str) -> str:
+        """Where a round shape is before it is placed, if not in the middle."""
+        if kind not in ("sphere", "cylinder") or self.chance(0.7):
+            return ""
+        point = lambda name: leaf("point", name, ", ".join(self.between(-0.5, 0.5) for _ in range(3)))  # noqa: E731
+        radius = self.float("radius", 0.3, 1)
+        return radius + (point("center") if kind == "sphere" else point("p0") + point("p1"))
+
+    def merged(self, x: float) -> str:
+        """Meshes that are one; they have a surface in common."""
+        made = plugin("bsdf", "twosided", plugin("bsdf", "diffuse", self.reflectance("reflectance")))
+        surface = made.replace("<bsdf", f'<bsdf id="skin{number(x)}"', 1)
+        parts = [self.body(x, f'<ref id="skin{number(x)}"/>', mesh=True) for _ in range(2)]
+        # They have to have the same things at their corners.
+        kinds = [re.findall(r"assets/\S+|face_normals", part) for part in parts]
+        if kinds[0] != kinds[1]:
+            return self.merged(x)
+        return surface + plugin("shape", "merge", *parts)
 
     def group(self, x: float) -> str:
         members = [self.body(0, self.bsdf(1, False)) for _ in range(2)]
         made = plugin("shape", "shapegroup", *members).replace("<shape", f'<shape id="set{number(x)}"', 1)
-        place = to_world(f'<scale x="0.8" y="{self.between(0.5, 1)}" z="0.7"/><translate x="{number(x)}"/>')
-        return made + plugin("shape", "instance", f'<ref id="set{number(x)}"/>', place)
+        turn = self.maybe(lambda: f'<rotate y="1" angle="{self.between(0, 360)}"/>')
+        scale = f'<scale x="0.8" y="{self.between(0.5, 1)}" z="0.7"/>'
+        places = [to_world(turn + scale + f'<translate x="{number(x)}"/>')]
+        if self.chance(0.3):
+            places.append(to_world(self.turn() + f'<scale value="0.5"/><translate x="{number(x)}" y="1.5" z="-1"/>'))
+        return made + "".join(plugin("shape", "instance", f'<ref id="set{number(x)}"/>', place) for place in places)
+
+    def hair(self) -> str:
+        names = ("eumelanin", "pheomelanin")
+        dye = self.spectrum("sigma_a", 0.1, 2) if self.chance(0.3) else "".join(self.float(n, 0.05, 0.6) for n in names)
+        rough = self.float("longitudinal_roughness", 0.2, 0.8) + self.maybe(lambda: self.float("azimuthal_roughness", 0.2, 0.8))
+        return dye + rough + self.maybe(lambda: self.float("scale_tilt", 0, 4)) + self.maybe(lambda: self.float("int_ior", 1.3, 1.7))
 
     def phase(self) -> str:
         lobe = lambda: plugin("phase", "hg", self.float("g", -0.8, 0.8))  # noqa: E731
@@ -287,7 +334,8 @@ class Draw:
         if kind == "hg":
             return lobe()
         if kind == "blendphase":
-            return plugin("phase", kind, self.float("weight", 0, 1), plugin("phase", "isotropic"), lobe())
+            weight = self.grid("volume", "weight", "mix.vol") if self.chance(0.3) else self.float("weight", 0, 1)
+            return plugin("phase", kind, weight, self.one(plugin("phase", "isotropic"), lobe()), lobe())
         if kind == "tabphase":
             return plugin("phase", kind, leaf("string", "values", ", ".join(self.between(0.1, 1) for _ in range(4))))
         return plugin("phase", kind)
@@ -296,11 +344,17 @@ class Draw:
         if self.chance(0.3):
             around = to_world('<scale value="4"/><translate x="-2" y="-1" z="-2"/>')
             grid = plugin("volume", "gridvolume", leaf("string", "filename", ASSETS / "puff.vol"), around, name="sigma_t")
-            albedo, scale = self.spectrum("albedo", 0.2, 0.95), self.float("scale", 1, 5)
-            return plugin("medium", "heterogeneous", grid, albedo, scale, self.phase(), name="interior")
+            grid = self.one(grid, grid, self.grid("volume", "sigma_t", "mix.vol"), self.grid("volume", "sigma_t", "colours.vol"))
+            scale = self.float("scale", 1, 5)
+            return plugin("medium", "heterogeneous", grid, self.albedo(), scale, self.phase(), name="interior")
         colour = self.spectrum("sigma_t", 0.3, 1) if self.chance(0.5) else self.float("sigma_t", 0.3, 3)
-        albedo = self.spectrum("albedo", 0.2, 0.95)
-        return plugin("medium", "homogeneous", albedo, colour, self.float("scale", 0.7, 2), self.phase(), name="interior")
+        return plugin("medium", "homogeneous", self.albedo(), colour, self.float("scale", 0.7, 2), self.phase(), name="interior")
+
+    def albedo(self) -> str:
+        form = self.one("plain", "plain", "even", "grid")
+        if form == "even":
+            return plugin("volume", "constvolume", self.spectrum("value", 0.2, 0.95), name="albedo")
+        return self.grid("volume", "albedo", "colours.vol") if form == "grid" else self.spectrum("albedo", 0.2, 0.95)
 
     def fog(self) -> tuple[str, list[str]]:
         """Thin mist around all, and what the camera in it says."""
@@ -324,14 +378,20 @@ class Draw:
             return plugin("spectrum", form, ends, values, name=name)
         return self.spectrum(name, 0.1 * most, most)
 
-    def emitter(self) -> tuple[str, str]:
-        """A light, and its kind."""
-        kind = self.one("area", "area", "point", "constant", "envmap", "spot", "projector", "directional")
+    def emitter(self, traced: bool) -> tuple[str, str]:
+        """A light, and its kind; whether paths start from it alone."""
+        near = ("area", "area", "point", "spot", "projector")
+        # Skies in `ptracer` are known, and nothing else finds light along normals.
+        kind = self.one(*near, *(["directionalarea"] if traced else ["constant", "envmap", "directional"]))
+        slide = lambda name: self.texture(name, False)  # noqa: E731
+        if kind == "directionalarea":
+            shines = plugin("emitter", kind, self.light("radiance", 3))
+            return plugin("shape", self.one("rectangle", "disk"), self.above('<scale value="0.8"/>'), shines), kind
         if kind == "area":
             shape = self.one("rectangle", "disk", "sphere", "cylinder", "cube", "obj", "ply")
             # Textures of things that shine, other than flat ones, are known.
             plain = shape not in ("rectangle", "disk") or self.chance(0.6)
-            radiance = self.light("radiance", 8) if plain else self.texture("radiance")
+            radiance = self.light("radiance", 8) if plain else slide("radiance")
             surface = self.maybe(lambda: self.bsdf(0, False))
             scale = f'<scale value="{self.between(0.3, 0.8)}"/>'
             file = leaf("string", "filename", ASSETS / self.one(*MESHES[shape])) if shape in MESHES else ""
@@ -343,26 +403,27 @@ class Draw:
         if kind == "constant":
             return plugin("emitter", kind, self.light("radiance", 1)), kind
         if kind == "envmap":
-            file, turn = leaf("string", "filename", ASSETS / "sky.exr"), self.maybe(lambda: to_world(self.turn()))
+            picture = self.one("sky.exr", "sky.exr", "patch.png")
+            file, turn = leaf("string", "filename", ASSETS / picture), self.maybe(lambda: to_world(self.turn()))
             return plugin("emitter", kind, file, self.float("scale", 0.5, 2), turn), kind
         if kind == "spot":
             edge = self.float("cutoff_angle", 15, 60) + self.maybe(lambda: leaf("float", "beam_width", "10"))
-            slide = self.maybe(lambda: self.texture("texture"))
-            return plugin("emitter", kind, self.above(), self.light("intensity", 30), edge, slide), kind
+            shade = self.maybe(lambda: slide("texture"))
+            return plugin("emitter", kind, self.above(), self.light("intensity", 30), edge, shade), kind
         if kind == "projector":
-            slide = self.texture("irradiance")
-            return plugin("emitter", kind, self.above(), self.float("fov", 25, 70), slide, self.float("scale", 3, 20)), kind
+            field, scale = self.float("fov", 25, 70), self.float("scale", 3, 20)
+            return plugin("emitter", kind, self.above(), field, slide("irradiance"), scale), kind
         way = f"{self.between(-1, 1)}, -1, {self.between(-1, 1)}"
         return plugin("emitter", kind, leaf("vector", "direction", way), self.light("irradiance", 3)), kind
 
-    def lights(self) -> tuple[str, set]:
-        first, kind = self.emitter()
+    def lights(self, traced: bool) -> tuple[str, set]:
+        first, kind = self.emitter(traced)
         if self.chance(0.5):
             return first, {kind}
-        second, other = self.emitter()
+        second, other = self.emitter(traced)
         # One sky a scene.
         while kind in SKIES and other in SKIES:
-            second, other = self.emitter()
+            second, other = self.emitter(traced)
         return first + second, {kind, other}
 
     # -- the whole -------------------------------------------------------------------------------------
@@ -371,8 +432,9 @@ class Draw:
         ends = {"offset_x": (0, 8), "offset_y": (0, 8), "width": (16, 24), "height": (8, 16)}
         return "".join(leaf("integer", f"crop_{name}", self.random.randint(*of)) for name, of in ends.items())
 
-    def sensor(self, *inside_of: str) -> str:
-        kind = self.one("perspective", "perspective", "thinlens", "orthographic")
+    def sensor(self, *inside_of: str, traced: bool) -> str:
+        # Paths that start from lights do not meet a camera without extent or place.
+        kind = self.one("perspective", "perspective", "thinlens", "thinlens" if traced else "orthographic")
         origin = f"{self.between(-1.5, 1.5)}, {self.between(1.2, 3)}, {self.between(5, 6)}"
         look = f'<lookat origin="{origin}" target="0, 0.8, 0" up="{self.between(-0.2, 0.2)}, 1, 0"/>'
         look = self.maybe(lambda: '<scale x="-1"/>', 0.15) + look
@@ -385,15 +447,27 @@ class Draw:
         if kind == "thinlens":
             inside += self.float("aperture_radius", 0.02, 0.2) + self.float("focus_distance", 4, 7)
         size = leaf("integer", "width", SIZE) + leaf("integer", "height", self.one(SIZE, SIZE * 3 // 4))
-        form = leaf("string", "pixel_format", "rgb") + leaf("string", "component_format", "float32")
         size += self.maybe(self.crop, 0.15)
-        film = plugin("film", "hdrfilm", size, form, '<rfilter type="box"/>')
-        return plugin("sensor", kind, inside, film, '<sampler type="independent"/>', *inside_of)
+        if self.chance(0.1):
+            film = plugin("film", "specfilm", size, *self.bands(), '<rfilter type="box"/>')
+        else:
+            form = leaf("string", "pixel_format", self.one("rgb", "rgb", "rgb", "xyz", "luminance"))
+            film = plugin("film", "hdrfilm", size, form, leaf("string", "component_format", "float32"), '<rfilter type="box"/>')
+        inside += self.maybe(lambda: self.float("near_clip", 3, 5.5), 0.05) + self.maybe(lambda: self.float("far_clip", 5, 7), 0.05)
+        sampler = self.one("independent", "independent", "stratified", "multijitter", "orthogonal", "ldsampler")
+        return plugin("sensor", kind, inside, film, plugin("sampler", sampler), *inside_of)
+
+    def bands(self) -> list[str]:
+        """What the channels of a film take of the light."""
+        starts = sorted(self.random.sample(range(380, 700, 20), 3))
+        return [leaf("spectrum", f"b{i}", f"{nm}:0, {nm + 20}:1, {nm + 60}:{self.between(0.2, 1)}, {nm + 80}:0") for i, nm in enumerate(starts)]
 
     def scene(self) -> str:
         misty = self.chance(0.3)
         foggy = not misty and self.chance(0.1)
-        integrator = self.one("volpath", "volpathmis") if misty else self.one("path", "path", "volpath", "direct")
+        surfaces = self.one("path", "path", "volpath", "direct") if self.chance(0.9) else "ptracer"
+        integrator = self.one("volpath", "volpathmis") if misty else surfaces
+        traced = integrator == "ptracer" and not foggy
         # Far from its ends the roulette of `volpathmis` shows (known).
         integrator = "volpath" if foggy else integrator
         bodies = ""
@@ -405,11 +479,13 @@ class Draw:
                 bodies += self.body(x, skin + self.medium(), closed=True)
             elif self.chance(0.1):
                 bodies += self.group(x)
+            elif self.chance(0.05):
+                bodies += self.merged(x)
             else:
                 bodies += self.body(x, self.bsdf(clear=not foggy))
         flat = to_world('<scale value="4"/><rotate x="1" angle="-90"/>')
         ground = plugin("shape", "rectangle", flat, self.bsdf(1, False))
-        lights, kinds = self.lights()
+        lights, kinds = self.lights(traced)
         settings = ""
         if integrator != "direct":
             settings = leaf("integer", "max_depth", self.random.randint(2, 7))
@@ -421,7 +497,10 @@ class Draw:
         else:
             settings += self.maybe(lambda: leaf("boolean", "hide_emitters", "true"))
         air, around = self.fog() if foggy else ("", [])
-        parts = plugin("integrator", integrator, settings) + air + self.sensor(*around) + ground + bodies + lights
+        sensor = self.sensor(*around, traced=traced)
+        if traced and re.search(UNTRACED, sensor + ground + bodies + lights):
+            return self.scene()
+        parts = plugin("integrator", integrator, settings) + air + sensor + ground + bodies + lights
         return f'<scene version="3.0.0">{parts}</scene>'.replace("><", ">\n<")
 
 

@@ -91,6 +91,7 @@ impl Import<'_> {
             "ptracer" => {
                 hide_emitters(&bag, &mut fields)?;
                 depth(&bag, &mut fields)?;
+                fields.add("count_crossings", boolean(bag.object.place, true));
                 "light_tracer"
             }
             "depth" => {

@@ -60,7 +60,7 @@ impl Walk<'_, '_> {
                 return;
             }
             let vertex = packet.beam.vertex;
-            if self.is_last(vertex) {
+            if self.is_last(packet.beam.events()) {
                 return;
             }
             let numbers = self.numbers(vertex);
@@ -293,7 +293,7 @@ impl Walk<'_, '_> {
             }
         }
         let lane = self.chosen_lane();
-        if packet.lanes >> lane & 1 == 0 || self.is_last(packet.beam.vertex + 1) {
+        if packet.lanes >> lane & 1 == 0 || self.is_last(packet.beam.events() + 1) {
             return;
         }
         if empty {

@@ -70,9 +70,10 @@ pub fn export(scene: &SceneDescription, path: &Path) -> Exported {
     let (losses, files) = (Vec::new(), Vec::new());
     let (ids, mentioned) = (BTreeSet::new(), BTreeSet::new());
     let xml = Xml::default();
-    let mut export = Export { scene, root, sources, directory, stem, ids, mentioned, xml, losses, files, sharp: false };
+    let mut export =
+        Export { scene, root, sources, directory, stem, ids, mentioned, xml, losses, files, sharp: false, open: false };
     export.scene();
-    export.caustics();
+    export.missing_light();
     let Export { xml, mut losses, files, .. } = export;
     losses.dedup();
     Exported { xml: xml.finish(), losses, files }
@@ -94,6 +95,8 @@ struct Export<'a> {
     files: Vec<(String, Vec<u8>)>,
     /// Whether a shape is a smooth mirror or of glass.
     sharp: bool,
+    /// Whether a material lets light straight through.
+    open: bool,
 }
 
 /// Settings that are about the work and the files, not about the light: Mitsuba has other words for
@@ -152,9 +155,19 @@ impl<'a> Export<'a> {
         self.xml.close();
     }
 
-    /// Says which light Mitsuba's path tracers do not know.
-    fn caustics(&mut self) {
-        let Integrator::Path(path) = &self.scene.integrator else { return };
+    /// Says which light Mitsuba's integrators do not know.
+    fn missing_light(&mut self) {
+        let path = match &self.scene.integrator {
+            Integrator::Path(path) => path,
+            Integrator::LightTracer(tracer) => {
+                if self.open && tracer.max_depth.is_some() && !tracer.count_crossings {
+                    let what = "shorter paths where panes, masks and boundaries end a segment";
+                    self.lose("integrator.light_tracer.count_crossings", what);
+                }
+                return;
+            }
+            _ => return,
+        };
         let delta = |light: &Light| !matches!(light, Light::Constant(_) | Light::Environment(_));
         let traced = path.delta_caustics && self.scene.render.techniques.light_tracing != Technique::Off;
         if traced && self.sharp && self.scene.lights.iter().any(delta) {
@@ -283,10 +296,14 @@ impl<'a> Export<'a> {
             self.xml.value("boolean", "hide_emitters", true);
         }
         self.xml.close();
-        if let Integrator::Path(path) = &self.scene.integrator
-            && path.delta_caustics
-        {
-            self.xml.instruction("set integrator.path.delta_caustics: true");
+        match &self.scene.integrator {
+            Integrator::Path(path) if path.delta_caustics => {
+                self.xml.instruction("set integrator.path.delta_caustics: true");
+            }
+            Integrator::LightTracer(tracer) if !tracer.count_crossings => {
+                self.xml.instruction("set integrator.light_tracer.count_crossings: false");
+            }
+            _ => {}
         }
     }
 
