@@ -169,12 +169,17 @@ pub(super) fn seen_in_sharp(
     wavelengths: &SampledWavelengths,
     sampler: &Sampler,
 ) -> Option<Photon<Together>> {
-    let mut seen = Photons::default();
+    let (mut seen, mut ray) = (Photons::default(), *ray);
+    for _ in 0..MAX_BOUNDARIES {
+        let hit = paths.scene.closest(&ray, f64::INFINITY).filter(|_| paths.settings.hide_emitters);
+        let Some(hit) = hit.filter(|hit| paths.scene.objects[hit.object as usize].is_lamp) else { break };
+        ray = paths.scene.leave(&paths.scene.surface(&ray, &hit), &hit, ray.direction);
+    }
     let splat = &mut |_: &SampledWavelengths, _| {};
     let (start, target, photons) = (1.0, Target::Own, Some(&mut seen));
     let mut walk = Walk { paths, sampler, wavelengths, start, splat, photons, target, group: 0, rays: 0, ahead: None };
     walk.follow(Beam {
-        ray: *ray,
+        ray,
         power: Lanes::ONE,
         rho: Lanes::ONE,
         nm: wavelengths.nm,
@@ -282,6 +287,11 @@ impl<'a> Walk<'a, '_> {
     /// Whether nothing may be met any more after `events`: the camera is one segment further than the next surface.
     fn is_last(&self, events: u32) -> bool {
         self.paths.settings.max_depth.is_some_and(|depth| events + 2 > depth)
+    }
+
+    /// Whether lamps that the camera would see itself are not there, as paths from the camera have it.
+    fn hides_lamps(&self) -> bool {
+        self.paths.settings.hide_emitters && self.paths.caustics.is_some()
     }
 
     fn follow(&mut self, mut beam: Beam) {
@@ -535,6 +545,9 @@ impl<'a> Walk<'a, '_> {
     /// Light that a surface sends into the camera.
     fn connect(&mut self, beam: &Beam, bsdf: &Bsdf, at: &Vertex, u_lens: DVec2) {
         let scene = self.paths.scene;
+        if at.object.is_lamp && self.hides_lamps() {
+            return;
+        }
         let Some(entry) = scene.camera.entry(at.surface.point, || u_lens) else { return };
         if !self.paths.bounds.holds(entry.pixel) {
             return;
@@ -593,7 +606,8 @@ impl<'a> Walk<'a, '_> {
             Some(depth) if settings.count_crossings => depth.saturating_sub(beam.events() + 2).min(MAX_BOUNDARIES),
             _ => MAX_BOUNDARIES,
         };
-        let shadow = Shadow { scene, sampler, nm, vertex, inside, panes, target: None };
+        let past_lamps = self.hides_lamps();
+        let shadow = Shadow { scene, sampler, nm, vertex, inside, panes, target: None, past_lamps };
         let tracked = plan.media || plan.nested;
         let came = if tracked { shadow.cast::<true>(ray, distance) } else { shadow.cast::<false>(ray, distance) };
         came.map(|(through, _)| through)

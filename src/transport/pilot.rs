@@ -115,8 +115,13 @@ pub fn decide(
     if settings.scatter_samples == 0 || settings.max_depth.is_some_and(|depth| depth < 3) {
         return left_off("paths are too short for light of mirrors and glass");
     }
-    if settings.count_crossings && settings.max_depth.is_some() && scene.has_boundaries {
-        return left_off("panes count for the length of paths");
+    if settings.count_crossings && scene.has_boundaries {
+        if settings.max_depth.is_some() {
+            return left_off("panes count for the length of paths");
+        }
+        if settings.hide_emitters {
+            return left_off("lamps are hidden up to the first pane only");
+        }
     }
     if plan.layers.layers.iter().any(|layer| matches!(layer.source, Channel::Light(..))) {
         return left_off("layers of light are measured path by path from the camera");

@@ -31,13 +31,15 @@ pub(super) struct Shadow<'a> {
     pub panes: u32,
     /// The face or triangle that it aims at, where there is one.
     pub target: Option<Departure>,
+    /// Whether lamps are not there.
+    pub past_lamps: bool,
 }
 
 impl Shadow<'_> {
     /// Transmittance along `ray` to `distance`, and for each lane the probability that a path would have come through
     /// without scattering; `None` where something opaque stands between.
     pub fn cast<const MEDIA: bool>(self, ray: &Ray, distance: f64) -> Option<(Lanes, Lanes)> {
-        let Shadow { scene, sampler, nm, vertex, mut inside, panes, target } = self;
+        let Shadow { scene, sampler, nm, vertex, mut inside, panes, target, past_lamps } = self;
         let dim = |medium: Option<u32>, ray: &Ray, distance: f64, crossings: u32| match medium {
             Some(m) if MEDIA => {
                 // Shadow rays walk by numbers of their own.
@@ -46,14 +48,14 @@ impl Shadow<'_> {
             }
             _ => Dimmed { through: Lanes::ONE, passing: Lanes::ONE },
         };
-        if !scene.has_boundaries {
+        if !scene.has_boundaries && !past_lamps {
             if scene.occluded(ray, distance, target) {
                 return None;
             }
             let Dimmed { through, passing } = dim(inside.medium, ray, distance, 0);
             return Some((through, passing));
         }
-        let way = if MEDIA { scene.way(ray, distance, target) } else { Way::Long };
+        let way = if MEDIA && !past_lamps { scene.way(ray, distance, target) } else { Way::Long };
         if let Way::Blocked = way {
             return None;
         }
@@ -85,6 +87,11 @@ impl Shadow<'_> {
             through *= dimmed.through;
             passing *= dimmed.passing;
             let Some(hit) = hit else { return Some((through, passing)) };
+            if past_lamps && scene.objects[hit.object as usize].is_lamp {
+                ray = scene.leave(&scene.surface(&ray, &hit), &hit, ray.direction);
+                left -= hit.t;
+                continue;
+            }
             if !scene.lets_through(hit.object) {
                 return None;
             }

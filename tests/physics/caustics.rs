@@ -268,6 +268,38 @@ fn light_is_traced_where_panes_would_count_and_there_are_none() {
     assert!(techniques(&endless).0, "{}", techniques(&endless).2);
 }
 
+/// A lamp that the camera would see itself is not there: what a mirror throws back at it is not seen, nor does it stand before
+/// what is.
+#[test]
+fn hidden_lamps_show_no_traced_light() {
+    let scene = |tracing: &str, samples: u32| {
+        bench_with(
+            &format!(
+                "camera: {{origin: [0, 0.2, 5], target: [0, 0.1, 0], fov_deg: 40}}\nimage: {{width: 24, height: 24}}\n\
+                 render: {{samples: {samples}, techniques: {{light_tracing: {tracing}, merging: off}}}}\n\
+                 integrator: {{path: {{hide_emitters: true}}}}\nshapes:\n\
+                 - rectangle: {{corner: [-3, -1, -2], edge_u: [0, 0, 5], edge_v: [6, 0, 0], material: {{mirror: {{}}}}}}\n\
+                 - rectangle: {{corner: [-3, -1, -2], edge_u: [6, 0, 0], edge_v: [0, 4, 0], \
+                   material: {{diffuse: {{reflectance: 0.7}}}}}}\n\
+                 - disk: {{center: [0.3, 0.8, 0], normal: [0, -1, 0.5], radius: 0.4, emission: 10, \
+                   material: {{diffuse: {{reflectance: 0.8}}}}}}\n"
+            ),
+            &[],
+        )
+    };
+    let [on, off] = [("on", 256), ("off", 4096)].map(|(tracing, samples)| {
+        let image = render(&scene(tracing, samples));
+        // Above the mirror: the lamp would cover a fifteenth of it.
+        part(&image, 1, |_, y| y < 12)
+    });
+    let z = (on.0 - off.0) / on.1.hypot(off.1);
+    assert!(z.abs() < 3.0 && on.1 < 0.01 * on.0 && off.1 < 0.02 * off.0, "{on:?} against {off:?}");
+
+    let paned = Case { light: PANE, depth: "null, count_crossings: true, hide_emitters: true", ..AREA };
+    let (tracing, _, reason) = techniques(&paned.bench("on", "auto", 64));
+    assert!(!tracing && reason == "lamps are hidden up to the first pane only", "{reason}");
+}
+
 /// With `delta_caustics: false`, as in scenes read from Mitsuba's XML, a point light is left to the camera, which never meets it
 /// behind glass; a lamp beside it is traced alone.
 #[test]

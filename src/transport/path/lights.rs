@@ -135,6 +135,7 @@ impl Tracer<'_> {
             inside: inside(light.wi),
             panes: self.panes(path),
             target: light.target,
+            past_lamps: false,
         };
         let Some((through, passing)) = shadow.cast::<MEDIA>(&ray, light.distance) else { return };
         let weight = weight(Some(passing));
