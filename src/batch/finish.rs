@@ -365,6 +365,9 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         description::Compression::Dwab => exr::Compression::Dwab(exr.dwa_level as f32),
     };
     let error = if exr.stderr { exr::StandardError::Write } else { exr::StandardError::Leave };
+    if exr.stderr && finish.bands {
+        report.notes.push("standard errors are those of colours: for bands none are written".to_owned());
+    }
     let layer = |(i, channel): (usize, &Channel)| LayerPlane {
         name: channel.name.clone(),
         plane: if channel.once { frame.layer_once(i) } else { frame.layer(i) },

@@ -63,7 +63,8 @@ pub struct Exr {
     /// Default `zips`.
     #[serde(default)]
     pub compression: Compression,
-    /// Also write the standard error of each pixel, `stderr.R`, `stderr.G`, `stderr.B`; default false.
+    /// Also write the standard error of each pixel, `stderr.R`, `stderr.G`, `stderr.B`; default false. There is none of `bands`,
+    /// and a note says so.
     #[serde(default)]
     pub stderr: bool,
     /// What a pixel holds; default `rgba`.

@@ -26,5 +26,8 @@ def test_every_plugin_is_drawn():
     surfaces = [*drawn.OPAQUE, *drawn.CLEAR, *drawn.LAYERED, "hair"]
     lights = ["area", *drawn.DELTA, *drawn.SKIES]
     media = ["homogeneous", "heterogeneous", "hg", "rayleigh", "tabphase", "blendphase"]
-    for kind in [*surfaces, *drawn.SHAPES, "instance", *lights, *media, "path", "volpath", "volpathmis", "direct"]:
+    shapes = [*drawn.SHAPES, "instance", "merge"]
+    volumes = ["gridvolume", "constvolume", "volume"]
+    integrators = ["path", "volpath", "volpathmis", "direct", "ptracer"]
+    for kind in [*surfaces, *shapes, *lights, "directionalarea", *media, *volumes, "specfilm", *integrators]:
         assert sum(f'type="{kind}"' in scene for scene in scenes) >= 10, kind

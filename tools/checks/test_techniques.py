@@ -26,9 +26,9 @@ NIGHTLY = "ABBE_NIGHTLY" in os.environ
 SEED = int(os.environ.get("ABBE_SEED") or datetime.date.today().strftime("%Y%m%d"))
 SCENES = 40 if NIGHTLY else 4
 SPP = 512
-# A judgement of a drawn scene that fails is made again with four times the samples, twice: rare bright samples make
-# pictures look as if they differed.
-ATTEMPTS = 3
+# A judgement of a drawn scene that fails is made again with four times the samples, three times: rare bright samples make
+# pictures look as if they differed, and of a hundred means one lies three standard errors away.
+ATTEMPTS = 4
 
 # Merging blurs.
 TRACED = ["render.techniques.light_tracing=on", "render.techniques.merging=off"]
@@ -37,10 +37,10 @@ GLASS = re.compile(r'(type="(?:thin|rough)?dielectric">\s*)<(?:float|string) nam
 
 
 def scenes(tmp_path: Path, salt: int, change=lambda scene, _: scene):
-    """Scenes whose lights have an extent, others for each `salt` below ten."""
+    """Scenes whose lights have an extent and whose pictures have errors, others for each `salt` below ten."""
     for i in range(salt, 100_000, 10):
         scene = drawn.Draw(SEED * 100_000 + i).scene()
-        if not any(f'type="{kind}"' in scene for kind in drawn.DELTA) and (scene := change(scene, i)):
+        if not any(f'type="{kind}"' in scene for kind in {*drawn.DELTA, "specfilm"}) and (scene := change(scene, i)):
             path = tmp_path / f"drawn_{i}.xml"
             path.write_text(scene)
             yield SceneFile(path, "drawn at random")
@@ -65,7 +65,8 @@ def in_force(binary: Path, case: SceneFile, technique: str, settings: list) -> b
 def picture(binary: Path, case: SceneFile, settings: list, spp: int, seed: int) -> judge.Picture:
     case.settings = [*settings, "output.exr.stderr=true"]
     channels = abbe_channels(binary, case, case.path.with_suffix(".exr"), spp, seed)
-    mean, error = (np.stack([channels[layer + c] for c in "RGB"], -1) for layer in ("", "stderr."))
+    names = sorted(name for name in channels if f"stderr.{name}" in channels)
+    mean, error = (np.stack([channels[layer + name] for name in names], -1) for layer in ("", "stderr."))
     return judge.picture_of_errors(mean, error, REPLICATES - 1, spp)
 
 

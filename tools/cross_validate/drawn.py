@@ -279,7 +279,9 @@ class Draw:
         if kind == "sdfgrid":
             file = leaf("string", "filename", ASSETS / "ring_and_ball.vol")
             place = to_world(f'<scale value="1.4"/><translate x="{number(x - 0.7)}" z="-0.7"/>')
-            return plugin("shape", kind, file, leaf("string", "normals", self.one("analytic", "smooth")), place, inside)
+            # Mirrors by coarse normals throw light through the surface (known).
+            normals = self.one("analytic", "smooth" if re.search('"(diffuse|principled)"', inside) else "analytic")
+            return plugin("shape", kind, file, leaf("string", "normals", normals), place, inside)
         turned = "" if closed or kind == "cube" else self.maybe(lambda: leaf("boolean", "flip_normals", "true"), 0.1)
         if kind in MESHES:
             file = leaf("string", "filename", ASSETS / self.one(*MESHES[kind]))
@@ -291,7 +293,21 @@ class Draw:
             return plugin("shape", kind, file, flat, self.place(x, False), turned, inside)
         # Media of mirrored cubes are outside of them, and relief on what is mirrored is black (known).
         place = self.place(x, kind not in ("cube", "rectangle"), mirrored=not closed and "bumpmap" not in inside)
-        return plugin("shape", kind, self.measures(kind), place, turned, inside)
+        return plugin("shape", kind, "" if closed else self.measures(kind), place, turned, inside)
+
+    def filled(self, x: float) -> str:
+        """A body with a medium in it, and often something in that."""
+        skin = self.one(plugin("bsdf", "null"), plugin("bsdf", "dielectric", self.indices()))
+        name = f"mist{number(x)}"
+        made = self.medium().replace('<medium type', f'<medium id="{name}" type', 1).replace(' name="interior"', "", 1)
+        outer = self.body(x, skin + f'<ref name="interior" id="{name}"/>', closed=True)
+        if self.chance(0.5):
+            return made + outer
+        middle = re.findall(r"<translate[^>]*>", outer)[-1]
+        place = to_world(f'<scale value="{self.between(0.1, 0.22)}"/>' + self.turn() + middle)
+        glass = self.one("dielectric", "roughdielectric")
+        clear = plugin("bsdf", glass, getattr(self, glass)()) + f'<ref name="exterior" id="{name}"/>'
+        return made + outer + plugin("shape", self.one("sphere", "cube"), place, self.one(self.bsdf(0, False), clear))
 
     def measures(self, kind: str) -> str:
         """Where a round shape is before it is placed, if not in the middle."""
@@ -307,13 +323,16 @@ class Draw:
         surface = made.replace("<bsdf", f'<bsdf id="skin{number(x)}"', 1)
         parts = [self.body(x, f'<ref id="skin{number(x)}"/>', mesh=True) for _ in range(2)]
         # They have to have the same things at their corners.
-        kinds = [re.findall(r"assets/\S+|face_normals", part) for part in parts]
+        kinds = [re.findall(r'assets/\S+|face_normals|flip_normals|<scale x="-?', part) for part in parts]
         if kinds[0] != kinds[1]:
             return self.merged(x)
         return surface + plugin("shape", "merge", *parts)
 
     def group(self, x: float) -> str:
         members = [self.body(0, self.bsdf(1, False)) for _ in range(2)]
+        # Two grids would be in one place.
+        if all("sdfgrid" in member for member in members):
+            return self.group(x)
         made = plugin("shape", "shapegroup", *members).replace("<shape", f'<shape id="set{number(x)}"', 1)
         turn = self.maybe(lambda: f'<rotate y="1" angle="{self.between(0, 360)}"/>')
         scale = f'<scale x="0.8" y="{self.between(0.5, 1)}" z="0.7"/>'
@@ -454,7 +473,8 @@ class Draw:
             form = leaf("string", "pixel_format", self.one("rgb", "rgb", "rgb", "xyz", "luminance"))
             film = plugin("film", "hdrfilm", size, form, leaf("string", "component_format", "float32"), '<rfilter type="box"/>')
         inside += self.maybe(lambda: self.float("near_clip", 3, 5.5), 0.05) + self.maybe(lambda: self.float("far_clip", 5, 7), 0.05)
-        sampler = self.one("independent", "independent", "stratified", "multijitter", "orthogonal", "ldsampler")
+        # Numbers of `ldsampler` that go together shift means by a hundredth (known), and those of `orthogonal` may.
+        sampler = self.one("independent", "independent", "stratified", "multijitter")
         return plugin("sensor", kind, inside, film, plugin("sampler", sampler), *inside_of)
 
     def bands(self) -> list[str]:
@@ -463,20 +483,26 @@ class Draw:
         return [leaf("spectrum", f"b{i}", f"{nm}:0, {nm + 20}:1, {nm + 60}:{self.between(0.2, 1)}, {nm + 80}:0") for i, nm in enumerate(starts)]
 
     def scene(self) -> str:
-        misty = self.chance(0.3)
-        foggy = not misty and self.chance(0.1)
-        surfaces = self.one("path", "path", "volpath", "direct") if self.chance(0.9) else "ptracer"
-        integrator = self.one("volpath", "volpathmis") if misty else surfaces
-        traced = integrator == "ptracer" and not foggy
-        # Far from its ends the roulette of `volpathmis` shows (known).
-        integrator = "volpath" if foggy else integrator
+        air = self.one(*["clear"] * 13, *["misty"] * 6, "foggy")
+        # Far from its ends the roulette of `volpathmis` shows in fog (known).
+        integrators = {"clear": ("path", "path", "volpath", "direct"), "misty": ("volpath", "volpathmis"), "foggy": ("volpath",)}
+        integrator = self.one(*integrators[air])
+        if air == "clear" and self.chance(0.1):
+            integrator = "ptracer"
+        # Others than those that the two are known to mean otherwise.
+        while (scene := self.scene_in(air, integrator)) is None:
+            pass
+        return scene
+
+    def scene_in(self, air: str, integrator: str) -> str | None:
+        """A scene, or none where the two are known to differ."""
+        misty, foggy, traced = air == "misty", air == "foggy", integrator == "ptracer"
         bodies = ""
         count = self.random.randint(1, 3)
         for i in range(count):
             x = 1.7 * (i - (count - 1) / 2)
             if misty and self.chance(0.7):
-                skin = self.one(plugin("bsdf", "null"), plugin("bsdf", "dielectric", self.indices()))
-                bodies += self.body(x, skin + self.medium(), closed=True)
+                bodies += self.filled(x)
             elif self.chance(0.1):
                 bodies += self.group(x)
             elif self.chance(0.05):
@@ -493,14 +519,21 @@ class Draw:
         if integrator in ("path", "direct") and any(f'"{kind}"' in ground + bodies for kind in OPEN):
             # Lamps through what is open, and samples that end behind it: known.
             if kinds & DELTA or not kinds & SKIES:
-                return self.scene()
-        else:
+                return None
+        elif not foggy:
+            # What is behind a hidden lamp in fog is known.
             settings += self.maybe(lambda: leaf("boolean", "hide_emitters", "true"))
-        air, around = self.fog() if foggy else ("", [])
+        fog, around = self.fog() if foggy else ("", [])
         sensor = self.sensor(*around, traced=traced)
         if traced and re.search(UNTRACED, sensor + ground + bodies + lights):
-            return self.scene()
-        parts = plugin("integrator", integrator, settings) + air + sensor + ground + bodies + lights
+            return None
+        if misty and "_clip" in sensor:
+            # A body that is cut open has its medium here alone (known).
+            return None
+        if "specfilm" in sensor and "_tint" in ground + bodies:
+            # The luminance of a tint is that of the wavelengths that a film wants (known).
+            return None
+        parts = plugin("integrator", integrator, settings) + fog + sensor + ground + bodies + lights
         return f'<scene version="3.0.0">{parts}</scene>'.replace("><", ">\n<")
 
 
@@ -513,5 +546,7 @@ def cases(count: int, seed: int, folder: Path) -> list[SceneFile]:
         path = folder / f"drawn_{drawn}.xml"
         scene = Draw(drawn).scene()
         path.write_text(scene)
-        made.append(SceneFile(path, "drawn at random", spp=1024, may_be_noisy=True))
+        # Merged photons blur over pixels, which are large here.
+        settings = ["render.techniques.merging=off"]
+        made.append(SceneFile(path, "drawn at random", spp=1024, settings=settings, may_be_noisy=True))
     return made

@@ -146,7 +146,7 @@ def judge(a: Picture, b: Picture, allowance: float = ALLOWANCE) -> Verdict:
         faults.append("a pixel of Mitsuba's is not a finite number")
 
     # 1. The whole. Errors are relative to a channel's mean.
-    scale = np.maximum(np.abs(b.whole.mean), DARK * np.abs(b.whole.mean).max())
+    scale = np.maximum(np.abs(b.whole.mean), max(DARK * np.abs(b.whole.mean).max(), np.finfo(float).tiny))
     difference = (a.whole.mean - b.whole.mean) / scale
     error = np.sqrt(a.whole.variance + b.whole.variance) / scale
     if (np.abs(difference) > np.maximum(allowance, STANDARD_ERRORS * error)).any():
