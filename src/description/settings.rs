@@ -117,7 +117,8 @@ pub struct LightTracerIntegrator {
     /// Whether lights that the camera sees itself are left out; default false.
     #[serde(default)]
     pub hide_emitters: bool,
-    /// As for `path`; default false.
+    /// Whether going straight through a thin pane or the boundary of a medium ends a segment for `max_depth`, except for lamps that
+    /// the camera sees itself; default false.
     #[serde(default)]
     pub count_crossings: bool,
 }

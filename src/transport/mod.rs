@@ -209,7 +209,6 @@ impl Begun {
                 let direct = PathSettings {
                     max_depth: Some(1),
                     hide_emitters: settings.hide_emitters,
-                    count_crossings: settings.count_crossings,
                     ..PathSettings::default()
                 };
                 path::radiance(scene, plan, &direct, sampler, wavelengths, ray, None, None)

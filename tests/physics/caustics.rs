@@ -272,13 +272,13 @@ fn light_is_traced_where_panes_would_count_and_there_are_none() {
 /// what is.
 #[test]
 fn hidden_lamps_show_no_traced_light() {
-    let scene = |tracing: &str, samples: u32| {
+    let scene = |floor: &str, tracing: &str, samples: u32| {
         bench_with(
             &format!(
                 "camera: {{origin: [0, 0.2, 5], target: [0, 0.1, 0], fov_deg: 40}}\nimage: {{width: 24, height: 24}}\n\
-                 render: {{samples: {samples}, techniques: {{light_tracing: {tracing}, merging: off}}}}\n\
+                 render: {{samples: {samples}, techniques: {{light_tracing: {tracing}, packets: {tracing}, merging: off}}}}\n\
                  integrator: {{path: {{hide_emitters: true}}}}\nshapes:\n\
-                 - rectangle: {{corner: [-3, -1, -2], edge_u: [0, 0, 5], edge_v: [6, 0, 0], material: {{mirror: {{}}}}}}\n\
+                 {floor}\
                  - rectangle: {{corner: [-3, -1, -2], edge_u: [6, 0, 0], edge_v: [0, 4, 0], \
                    material: {{diffuse: {{reflectance: 0.7}}}}}}\n\
                  - disk: {{center: [0.3, 0.8, 0], normal: [0, -1, 0.5], radius: 0.4, emission: 10, \
@@ -287,13 +287,23 @@ fn hidden_lamps_show_no_traced_light() {
             &[],
         )
     };
-    let [on, off] = [("on", 256), ("off", 4096)].map(|(tracing, samples)| {
-        let image = render(&scene(tracing, samples));
-        // Above the mirror: the lamp would cover a fifteenth of it.
-        part(&image, 1, |_, y| y < 12)
-    });
-    let z = (on.0 - off.0) / on.1.hypot(off.1);
-    assert!(z.abs() < 3.0 && on.1 < 0.01 * on.0 && off.1 < 0.02 * off.0, "{on:?} against {off:?}");
+    let mirror = "- rectangle: {corner: [-3, -1, -2], edge_u: [0, 0, 5], edge_v: [6, 0, 0], material: {mirror: {}}}\n";
+    // A prism over a mirror: wavelengths part on the way back.
+    let prism = format!(
+        "{mirror}- cube: {{center: [0.3, -0.6, 0.4], size: [2, 0.4, 2], material: {{dielectric: {{ior: {{glass: SF11}}}}}}, \
+         transform: [{{rotate: {{axis: [1, 0, 0.2], deg: 12}}}}]}}\n"
+    );
+    for floor in [mirror, &prism] {
+        let [on, off] = [("on", 256), ("off", 8192)].map(|(tracing, samples)| {
+            let bench = scene(floor, tracing, samples);
+            let packets = bench.prepared.plan.techniques.iter().any(|t| t.name == "wavelength packets" && t.on);
+            assert_eq!(packets, floor == prism && tracing == "on");
+            // Above the mirror: the lamp would cover a fifteenth of it.
+            part(&render(&bench), 1, |_, y| y < 12)
+        });
+        let z = (on.0 - off.0) / on.1.hypot(off.1);
+        assert!(z.abs() < 3.0 && on.1 < 0.01 * on.0 && off.1 < 0.03 * off.0, "{floor}: {on:?} against {off:?}");
+    }
 
     let paned = Case { light: PANE, depth: "null, count_crossings: true, hide_emitters: true", ..AREA };
     let (tracing, _, reason) = techniques(&paned.bench("on", "auto", 64));

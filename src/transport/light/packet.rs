@@ -238,6 +238,9 @@ impl Walk<'_, '_> {
         let mut wanted = 0;
         for lane in each(packet.lanes) {
             let ((surface, hit), normal, came) = (at[lane], normals[lane], -packet.rays[lane].direction);
+            if scene.objects[hit.object as usize].is_lamp && self.hides_lamps() {
+                continue;
+            }
             let Some(entry) = scene.camera.entry(surface.point, || numbers.lens) else { continue };
             let (from, to) = (came.dot(normal), entry.direction.dot(normal));
             let (true_from, true_to) = (came.dot(surface.normal), entry.direction.dot(surface.normal));
@@ -261,7 +264,7 @@ impl Walk<'_, '_> {
             }
         }
         let empty = scene.media.is_empty() && scene.nested.bodies().is_empty() && !scene.has_boundaries;
-        if !empty {
+        if !empty || self.hides_lamps() {
             for lane in each(wanted) {
                 let (surface, came) = (at[lane].0, -packet.rays[lane].direction);
                 let object = &scene.objects[at[lane].1.object as usize];
