@@ -527,8 +527,8 @@ class Draw:
         sensor = self.sensor(*around, traced=traced)
         if traced and re.search(UNTRACED, sensor + ground + bodies + lights):
             return None
-        if misty and "_clip" in sensor:
-            # A body that is cut open has its medium here alone (known).
+        if (misty or foggy) and "_clip" in sensor:
+            # A body that is cut open has its medium here alone, and fog beyond the far plane is seen here alone (known).
             return None
         if "specfilm" in sensor and "_tint" in ground + bodies:
             # The luminance of a tint is that of the wavelengths that a film wants (known).
