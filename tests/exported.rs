@@ -244,3 +244,25 @@ fn optical_materials_come_back() {
     assert!(told.contains("no absorption") && told.contains("no priority"), "{told}");
     same_picture(&yaml);
 }
+
+/// What the lights' paths are aimed at here, and is told as missing there: materials that are sharp as a whole.
+#[test]
+fn what_is_made_of_mirrors_is_told_as_a_mirror_is() {
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    let loses = |material: &str| {
+        let scene = format!(
+            "camera: {{origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}}\ntextures: {{board: {{checkerboard: {{a: 0, b: 1}}}}}}\nshapes:\n\
+             - sphere: {{radius: 0.5, material: {material}}}\nlights: [point: {{position: [2, 3, 1], intensity: 1}}]\n"
+        );
+        common::write(&yaml, scene.as_bytes());
+        let (_, exported) = prepared(&yaml, directory.path(), false);
+        exported.losses.iter().any(|loss| loss.field == "integrator.path.delta_caustics")
+    };
+    let blend = |second: &str| format!("{{blend: {{first: {{mirror: {{}}}}, second: {{{second}: {{}}}}}}}}");
+    assert!(loses("{mirror: {}}"));
+    assert!(loses("{bump: {height: {texture: board}, scale: 0.01, material: {mirror: {}}}}"));
+    assert!(loses(&blend("boundary")));
+    assert!(!loses(&blend("diffuse")));
+    assert!(!loses("{boundary: {}}"));
+}

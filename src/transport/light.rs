@@ -169,15 +169,11 @@ pub(super) fn seen_in_sharp(
     wavelengths: &SampledWavelengths,
     sampler: &Sampler,
 ) -> Option<Photon<Together>> {
-    let (mut seen, mut ray) = (Photons::default(), *ray);
-    for _ in 0..MAX_BOUNDARIES {
-        let hit = paths.scene.closest(&ray, f64::INFINITY).filter(|_| paths.settings.hide_emitters);
-        let Some(hit) = hit.filter(|hit| paths.scene.objects[hit.object as usize].is_lamp) else { break };
-        ray = paths.scene.leave(&paths.scene.surface(&ray, &hit), &hit, ray.direction);
-    }
+    let mut seen = Photons::default();
     let splat = &mut |_: &SampledWavelengths, _| {};
     let (start, target, photons) = (1.0, Target::Own, Some(&mut seen));
     let mut walk = Walk { paths, sampler, wavelengths, start, splat, photons, target, group: 0, rays: 0, ahead: None };
+    let ray = if walk.hides_lamps() { past_lamps(paths.scene, ray) } else { *ray };
     walk.follow(Beam {
         ray,
         power: Lanes::ONE,
@@ -191,6 +187,17 @@ pub(super) fn seen_in_sharp(
         crossings: 0,
     });
     seen.iter().next()
+}
+
+/// A ray of the camera, from behind the lamps in its way.
+fn past_lamps(scene: &Scene, ray: &Ray) -> Ray {
+    let mut ray = *ray;
+    for _ in 0..MAX_BOUNDARIES {
+        let lamp = |hit: &Hit| scene.objects[hit.object as usize].is_lamp;
+        let Some(hit) = scene.closest(&ray, f64::INFINITY).filter(lamp) else { break };
+        ray = scene.leave(&scene.surface(&ray, &hit), &hit, ray.direction);
+    }
+    ray
 }
 
 /// Light on its way.

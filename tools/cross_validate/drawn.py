@@ -27,14 +27,15 @@ CLEAR = ("dielectric", "thindielectric", "roughdielectric", "null", "principledt
 LAYERED = ("mask", "twosided", "blendbsdf", "bumpmap", "normalmap")
 METALS = ("Au", "Ag", "Cu", "Al", "Cr", "W", "none")
 # What is met without a change of direction.
-OPEN = {"mask", "null", "thindielectric"}
+OPEN = ("mask", "null", "thindielectric")
 # Light that no scattered ray meets.
 DELTA = {"point", "spot", "projector", "directional"}
 SKIES = {"constant", "envmap"}
 # What `ptracer` does otherwise than `path` (known): lamps that are turned balls, bands, clipping planes, moved middles; things behind
 # what is open; geometric normals of mirrored cubes, slopes, tints by the luminance of a few wavelengths. Hair is not reciprocal.
 UNTRACED = (
-    r'type="sphere">(?:(?!</shape>)[\s\S])*<emitter|specfilm|_clip|principal_point|"(mask|null|thindielectric)"|'
+    r'type="sphere">(?:(?!</shape>)[\s\S])*<emitter|specfilm|_clip|principal_point|'
+    f'"({"|".join(OPEN)})"|'
     r'scale x="-|bumpmap|normalmap|_tint|hair|texture type="checkerboard" name="(radiance|irradiance|texture)|blackbody'
 )
 # What tangents turn.
@@ -150,7 +151,7 @@ class Draw:
         form += [leaf("string", "wrap_mode", self.one("repeat", "mirror", "clamp"))]
         return plugin(family, "gridvolume", leaf("string", "filename", ASSETS / file), *form, around, name=name)
 
-    def texture(self, name: str, of_volume: bool = True) -> str:
+    def texture(self, name: str, of_volume: bool = False) -> str:
         if of_volume and self.chance(0.1):
             return plugin("texture", "volume", self.grid("volume", "volume", "colours.vol"), name=name)
         if self.chance(0.5):
@@ -402,7 +403,6 @@ class Draw:
         near = ("area", "area", "point", "spot", "projector")
         # Skies in `ptracer` are known, and nothing else finds light along normals.
         kind = self.one(*near, *(["directionalarea"] if traced else ["constant", "envmap", "directional"]))
-        slide = lambda name: self.texture(name, False)  # noqa: E731
         if kind == "directionalarea":
             shines = plugin("emitter", kind, self.light("radiance", 3))
             return plugin("shape", self.one("rectangle", "disk"), self.above('<scale value="0.8"/>'), shines), kind
@@ -410,7 +410,7 @@ class Draw:
             shape = self.one("rectangle", "disk", "sphere", "cylinder", "cube", "obj", "ply")
             # Textures of things that shine, other than flat ones, are known.
             plain = shape not in ("rectangle", "disk") or self.chance(0.6)
-            radiance = self.light("radiance", 8) if plain else slide("radiance")
+            radiance = self.light("radiance", 8) if plain else self.texture("radiance")
             surface = self.maybe(lambda: self.bsdf(0, False))
             scale = f'<scale value="{self.between(0.3, 0.8)}"/>'
             file = leaf("string", "filename", ASSETS / self.one(*MESHES[shape])) if shape in MESHES else ""
@@ -427,11 +427,11 @@ class Draw:
             return plugin("emitter", kind, file, self.float("scale", 0.5, 2), turn), kind
         if kind == "spot":
             edge = self.float("cutoff_angle", 15, 60) + self.maybe(lambda: leaf("float", "beam_width", "10"))
-            shade = self.maybe(lambda: slide("texture"))
+            shade = self.maybe(lambda: self.texture("texture"))
             return plugin("emitter", kind, self.above(), self.light("intensity", 30), edge, shade), kind
         if kind == "projector":
             field, scale = self.float("fov", 25, 70), self.float("scale", 3, 20)
-            return plugin("emitter", kind, self.above(), field, slide("irradiance"), scale), kind
+            return plugin("emitter", kind, self.above(), field, self.texture("irradiance"), scale), kind
         way = f"{self.between(-1, 1)}, -1, {self.between(-1, 1)}"
         return plugin("emitter", kind, leaf("vector", "direction", way), self.light("irradiance", 3)), kind
 

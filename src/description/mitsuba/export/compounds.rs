@@ -162,35 +162,51 @@ impl Export<'_> {
         }
     }
 
-    /// Whether a material throws light as a smooth mirror or glass does.
+    /// A material and all that it is made of.
+    fn made_of<'m>(&'m self, material: &'m MaterialRef) -> Vec<&'m Material> {
+        let Some(material) = self.meant(material) else { return Vec::new() };
+        let inner: &[Option<&MaterialRef>] = match material {
+            Material::Mask(m) => &[Some(&m.material)],
+            Material::Blend(m) => &[Some(&m.first), Some(&m.second)],
+            Material::TwoSided(m) => &[Some(&m.front), m.back.as_deref()],
+            Material::Bump(m) => &[Some(&m.material)],
+            Material::NormalMap(m) => &[Some(&m.material)],
+            _ => &[],
+        };
+        let inner = inner.iter().flatten().flat_map(|part| self.made_of(part));
+        [material].into_iter().chain(inner).collect()
+    }
+
+    /// Whether a material throws all light as a smooth mirror or glass does.
     pub(super) fn is_sharp(&self, material: &MaterialRef) -> bool {
-        match self.meant(material) {
-            Some(Material::Mirror(_) | Material::ThinDielectric(_)) => true,
-            Some(Material::Conductor(m)) => m.roughness == Roughness::Number(0.0),
-            Some(Material::Dielectric(m)) => m.roughness == Roughness::Number(0.0),
-            Some(Material::Mask(m)) => self.is_sharp(&m.material),
-            Some(Material::TwoSided(m)) => {
-                self.is_sharp(&m.front) || m.back.as_deref().is_some_and(|back| self.is_sharp(back))
-            }
-            _ => false,
-        }
+        let throws = |m: &Material| match m {
+            Material::Mirror(_) | Material::ThinDielectric(_) => Some(true),
+            Material::Conductor(m) => Some(m.roughness == Roughness::Number(0.0)),
+            Material::Dielectric(m) => Some(m.roughness == Roughness::Number(0.0)),
+            Material::Diffuse(_) | Material::Plastic(_) | Material::Hair(_) => Some(false),
+            Material::Principled(_) | Material::PrincipledThin(_) => Some(false),
+            Material::Mask(_) | Material::Blend(_) | Material::TwoSided(_) | Material::Boundary(_) => None,
+            Material::Bump(_) | Material::NormalMap(_) => None,
+        };
+        let leaves: Vec<bool> = self.made_of(material).into_iter().filter_map(throws).collect();
+        !leaves.is_empty() && leaves.iter().all(|sharp| *sharp)
+    }
+
+    /// Whether a material lets light straight through.
+    pub(super) fn is_open(&self, material: &MaterialRef) -> bool {
+        let open = |m| matches!(m, &Material::ThinDielectric(_) | &Material::Boundary(_) | &Material::Mask(_));
+        self.made_of(material).into_iter().any(open)
     }
 
     /// Whether light may cross a surface.
     pub(super) fn transmits(&self, material: &MaterialRef) -> bool {
-        match self.meant(material) {
-            None => false,
-            Some(Material::Dielectric(_) | Material::ThinDielectric(_) | Material::PrincipledThin(_)) => true,
-            Some(Material::Hair(_) | Material::Boundary(_) | Material::Mask(_)) => true,
-            Some(Material::Principled(m)) => m.spec_trans.is_some(),
-            Some(Material::Diffuse(_) | Material::Conductor(_) | Material::Mirror(_) | Material::Plastic(_)) => false,
-            Some(Material::Blend(m)) => self.transmits(&m.first) || self.transmits(&m.second),
-            Some(Material::TwoSided(m)) => {
-                self.transmits(&m.front) || m.back.as_ref().is_some_and(|back| self.transmits(back))
-            }
-            Some(Material::Bump(m)) => self.transmits(&m.material),
-            Some(Material::NormalMap(m)) => self.transmits(&m.material),
-        }
+        self.made_of(material).into_iter().any(|m| match m {
+            Material::Dielectric(_) | Material::ThinDielectric(_) | Material::PrincipledThin(_) => true,
+            Material::Hair(_) | Material::Boundary(_) | Material::Mask(_) => true,
+            Material::Principled(m) => m.spec_trans.is_some(),
+            Material::Diffuse(_) | Material::Conductor(_) | Material::Mirror(_) | Material::Plastic(_) => false,
+            Material::Blend(_) | Material::TwoSided(_) | Material::Bump(_) | Material::NormalMap(_) => false,
+        })
     }
 
     /// What Mitsuba gets in place of such a material, where it cannot express it.

@@ -95,7 +95,7 @@ struct Export<'a> {
     files: Vec<(String, Vec<u8>)>,
     /// Whether a shape is a smooth mirror or of glass.
     sharp: bool,
-    /// Whether a material lets light straight through.
+    /// Whether a shape lets light straight through.
     open: bool,
 }
 

@@ -171,6 +171,7 @@ impl Export<'_> {
             self.xml.value("boolean", "flip_normals", true);
         }
         self.sharp |= self.is_sharp(&shape.material);
+        self.open |= self.is_open(&shape.material);
         self.material_ref(&format!("{field}.material"), &shape.material);
         if let Some(emission) = &shape.emission {
             self.area(shape, emission);

@@ -82,25 +82,16 @@ impl Export<'_> {
             Material::Dielectric(m) => {
                 self.dielectric(m, &named(plugin("dielectric", "roughdielectric", &m.roughness), inner_id));
             }
-            Material::ThinDielectric(m) => {
-                self.open = true;
-                self.thin(m, &named("thindielectric", inner_id));
-            }
+            Material::ThinDielectric(m) => self.thin(m, &named("thindielectric", inner_id)),
             Material::Plastic(m) => {
                 let kind = if m.roughness > 0.0 { "roughplastic" } else { "plastic" };
                 self.plastic(m, &named(kind, inner_id));
             }
-            Material::Boundary(_) => {
-                self.open = true;
-                self.open_owned("bsdf", &named("null", inner_id));
-            }
+            Material::Boundary(_) => self.open_owned("bsdf", &named("null", inner_id)),
             Material::Principled(m) => self.principled(m, &named("principled", inner_id)),
             Material::PrincipledThin(m) => self.principled_thin(m, &named("principledthin", inner_id)),
             Material::Hair(m) => self.hair(m, &named("hair", inner_id)),
-            Material::Mask(m) => {
-                self.open = true;
-                self.mask(field, m, &named("mask", inner_id));
-            }
+            Material::Mask(m) => self.mask(field, m, &named("mask", inner_id)),
             Material::Blend(m) => self.blend(field, m, &named("blendbsdf", inner_id)),
             // What lets light through cannot have two sides.
             Material::TwoSided(_) if self.shortfall(material).is_some() => {
