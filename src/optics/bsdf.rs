@@ -291,6 +291,25 @@ impl Bsdf<'_> {
         }
     }
 
+    /// False where light that comes at the cosine `cos` to the normal cannot leave at an angle to the surface of sine `most` or
+    /// less.
+    #[must_use]
+    pub fn may_graze(&self, cos: f64, most: f64) -> bool {
+        match self {
+            Bsdf::Mirror { .. } | Bsdf::Conductor(_) | Bsdf::Thin { .. } => cos.abs() <= most,
+            Bsdf::Dielectric(glass) => glass.may_graze(cos, most),
+            Bsdf::Null
+            | Bsdf::Diffuse { .. }
+            | Bsdf::RoughConductor(..)
+            | Bsdf::RoughDielectric(_)
+            | Bsdf::Plastic(_)
+            | Bsdf::RoughPlastic(_)
+            | Bsdf::Principled(_)
+            | Bsdf::PrincipledThin(_)
+            | Bsdf::Hair(_) => true,
+        }
+    }
+
     /// f and pdf for a pair of directions; discrete parts excluded.
     #[must_use]
     pub fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {

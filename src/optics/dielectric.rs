@@ -141,6 +141,19 @@ impl Dielectric {
         ways
     }
 
+    /// Whether light that comes at the cosine `cos` to the normal can leave at an angle to the surface of sine `most` or less.
+    #[must_use]
+    pub fn may_graze(&self, cos: f64, most: f64) -> bool {
+        let (sin2, least) = (1.0 - cos * cos, 1.0 - most * most);
+        let refracted = |eta: f64| if cos > 0.0 { sin2 / (eta * eta) } else { sin2 * (eta * eta) };
+        let bent = |eta: &f64| (least..=1.0).contains(&refracted(*eta));
+        sin2 >= least
+            || match &self.eta {
+                RelativeIndex::Constant(eta) => bent(eta),
+                RelativeIndex::Dispersive(each) => each.iter().any(bent),
+            }
+    }
+
     /// The reflection, where `u_lobe` has every wavelength reflected that decides for itself.
     #[must_use]
     pub fn reflects_all(&self, wo: DVec3, u_lobe: f64) -> Option<BsdfSample> {

@@ -123,6 +123,15 @@ fn shadowing(alpha2: f64, cos: f64) -> f64 {
     2.0 / (1.0 + alpha2.mul_add(tan2, 1.0).sqrt())
 }
 
+/// Which of the reliefs that turn toward their viewer are turned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turns {
+    /// Those that the vertex's `wo` would see from behind.
+    Seen,
+    /// The k-th of them if bit k is set: as somebody else sees them.
+    Given(u8),
+}
+
 /// What a compound material is to one path at one vertex.
 #[derive(Clone, Copy, Debug)]
 pub struct Leaf<'a> {
@@ -134,6 +143,10 @@ pub struct Leaf<'a> {
     pub flipped: bool,
     /// How the relief's slopes shadow each other.
     pub slopes: Slopes,
+    /// How many reliefs turn toward their viewer.
+    pub turning: u8,
+    /// Which of them are turned, a bit each.
+    pub turned: u8,
 }
 
 /// A vertex on a compound material.
@@ -159,6 +172,9 @@ pub struct Standing {
     /// Where the back is seen, the normal of the plane about which it mirrors the front.
     mirrored: Option<DVec3>,
     slopes: Slopes,
+    turns: Turns,
+    turning: u8,
+    turned: u8,
 }
 
 impl Standing {
@@ -166,7 +182,8 @@ impl Standing {
     #[must_use]
     pub fn new(normal: DVec3, tangent: DVec3) -> Standing {
         let frame = Frame::from_normal_and_tangent(normal, tangent);
-        Standing { frame, mirrored: None, slopes: Slopes::default() }
+        let (slopes, turns) = (Slopes::default(), Turns::Seen);
+        Standing { frame, mirrored: None, slopes, turns, turning: 0, turned: 0 }
     }
 
     /// Seen from behind, by a material with two sides.
@@ -199,8 +216,14 @@ impl Standing {
             }
         };
         let wo = self.frame.to_local(self.reflected(x.wo));
-        let local =
-            if relief.turn && wo.z * wo.dot(local) <= 0.0 { DVec3::new(-local.x, -local.y, local.z) } else { local };
+        let turned = relief.turn
+            && match self.turns {
+                Turns::Seen => wo.z * wo.dot(local) <= 0.0,
+                Turns::Given(turned) => turned >> self.turning & 1 == 1,
+            };
+        self.turned |= u8::from(turned) << self.turning;
+        self.turning += u8::from(relief.turn);
+        let local = if turned { DVec3::new(-local.x, -local.y, local.z) } else { local };
         // A texel without direction leaves the surface as it is.
         let Some(local) = local.try_normalize() else { return };
         if relief.shadowing && self.slopes.count < MOST_RELIEFS {
@@ -230,7 +253,7 @@ impl Standing {
 }
 
 /// Splits a random number at `share`: true below it. What is left of `u` is uniform again.
-fn below(u: &mut f64, share: f64) -> bool {
+pub fn below(u: &mut f64, share: f64) -> bool {
     if *u < share {
         *u /= share;
         true
@@ -254,8 +277,14 @@ impl Compound {
     /// The material that one path meets, chosen by `u` in [0, 1); `None` where it goes straight on. `normal` is the
     /// shading normal on the side of the true one.
     #[must_use]
-    pub fn resolve<'a>(&'a self, x: &Vertex, normal: DVec3, mut u: f64) -> Option<Leaf<'a>> {
-        let mut standing = Standing::new(normal, x.surface.tangent);
+    pub fn resolve<'a>(&'a self, x: &Vertex, normal: DVec3, u: f64) -> Option<Leaf<'a>> {
+        self.resolve_as(x, normal, Turns::Seen, u)
+    }
+
+    /// The same with the reliefs turned as they are said to be.
+    #[must_use]
+    pub fn resolve_as<'a>(&'a self, x: &Vertex, normal: DVec3, turns: Turns, mut u: f64) -> Option<Leaf<'a>> {
+        let mut standing = Standing { turns, ..Standing::new(normal, x.surface.tangent) };
         let from_behind = x.wo.dot(x.surface.normal) < 0.0;
         let mut compound = self;
         loop {
@@ -292,8 +321,9 @@ impl Compound {
                     if inner.two_sided && from_behind && !standing.is_mirrored() {
                         standing.mirror();
                     }
-                    let (frame, flipped, slopes) = (standing.frame(), standing.is_mirrored(), standing.slopes);
-                    return Some(Leaf { material: inner, frame, flipped, slopes });
+                    let (frame, flipped) = (standing.frame(), standing.is_mirrored());
+                    let Standing { slopes, turning, turned, .. } = standing;
+                    return Some(Leaf { material: inner, frame, flipped, slopes, turning, turned });
                 }
             }
         }

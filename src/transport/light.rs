@@ -10,21 +10,23 @@
 //! itself, L E, is the camera's part (`path` of one segment). Wavelengths are carried as in [`path`].
 
 mod packet;
+mod views;
 
+use self::views::{Place, View};
 use super::caustics::{Caustics, Target};
 use super::merge::WavelengthCell;
 use super::path::{self, seen_normal};
 use super::photons::{Alone, Photon, Photons, Together};
 use super::plan::{EffectPlan, LightSettings};
 use super::shadow::{MAX_BOUNDARIES, Shadow};
+use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
-use crate::math::{Frame, Ray};
 use crate::optics::bsdf::{Bsdf, BsdfSample, Chosen};
 use crate::scene::camera::Entry;
-use crate::scene::compound::Leaf;
+use crate::scene::compound::{Compound, Leaf, below};
 use crate::scene::material::Kind;
 use crate::scene::nested::{Bodies, Crossing as Meeting};
-use crate::scene::{Hit, Inside, Medium, Object, Scene, SurfacePoint};
+use crate::scene::{Hit, Inside, Medium, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
 
@@ -242,10 +244,13 @@ impl Beam {
     }
 }
 
+/// What a path meets of a material that is made of others: that, all of it, and the number that chose.
+type Part<'a> = (Leaf<'a>, &'a Compound, f64);
+
 /// What ends a flight.
 #[expect(clippy::large_enum_variant, reason = "surfaces are what is met, and a box would cost an allocation each")]
 enum Met<'a> {
-    Surface { hit: Hit, surface: SurfacePoint, leaf: Option<Leaf<'a>>, pane: bool, meeting: Option<Meeting<'a>> },
+    Surface { hit: Hit, surface: SurfacePoint, part: Option<Part<'a>>, pane: bool, meeting: Option<Meeting<'a>> },
     Medium { point: DVec3, medium: &'a Medium },
 }
 
@@ -312,8 +317,8 @@ impl<'a> Walk<'a, '_> {
                 self.numbers(vertex);
             let Some(met) = self.fly(&mut beam, u_flight) else { return };
             let came = -beam.ray.direction;
-            let (hit, surface, leaf, pane, meeting) = match met {
-                Met::Surface { hit, surface, leaf, pane, meeting } => (hit, surface, leaf, pane, meeting),
+            let (hit, surface, part, pane, meeting) = match met {
+                Met::Surface { hit, surface, part, pane, meeting } => (hit, surface, part, pane, meeting),
                 Met::Medium { point, medium } => {
                     // Next to the light something sharp is wanted.
                     if caustics.is_some() && vertex == 0 {
@@ -337,19 +342,15 @@ impl<'a> Walk<'a, '_> {
             if vertex == 0 && caustics.is_some_and(|c| !c.begins_at(self.target, hit.object)) {
                 return;
             }
-            let material = leaf.as_ref().map_or(&scene.materials[object.material as usize], |leaf| leaf.material);
-            let frame = match &leaf {
-                Some(leaf) => leaf.frame,
-                None => {
-                    let flip = material.two_sided && came.dot(surface.normal) < 0.0;
-                    let normal = seen_normal(&surface, came);
-                    Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent)
-                }
+            let (material, part_of) = match &part {
+                Some((leaf, compound, u)) => (leaf.material, Some((*compound, *u, leaf.turning))),
+                None => (&scene.materials[object.material as usize], None),
             };
-            // Slopes shadow by the direction to the light alone, which is where the path comes from.
-            if let Some(leaf) = &leaf {
-                beam.power *= leaf.slopes.shadowing(came) as f32;
-            }
+            let at = Place { scene, hit: &hit, surface: &surface, came, two_sided: material.two_sided, part_of };
+            let view = match &part {
+                Some((leaf, ..)) => at.of_leaf(leaf),
+                None => at.seen_from(came),
+            };
             let around = meeting.and_then(|meeting| meeting.around);
             if let Some(meeting) = meeting {
                 beam.bodies = meeting.here;
@@ -358,7 +359,7 @@ impl<'a> Walk<'a, '_> {
             if let (Bsdf::Dielectric(glass), Some(_)) = (&bsdf, beam.alone) {
                 bsdf = Bsdf::Dielectric(glass.lane(0));
             }
-            let wo = frame.to_local(came);
+            let wo = view.frame.to_local(came);
 
             // What is black, or lit from behind, sends nothing on and leaves nothing to collect.
             if let Bsdf::Diffuse { reflectance } = &bsdf
@@ -367,9 +368,8 @@ impl<'a> Walk<'a, '_> {
                 return;
             }
             if !bsdf.is_discrete() && !sharp {
-                let at = Vertex { hit: &hit, surface: &surface, frame: &frame, came, local: wo, object };
-                self.connect(&beam, &bsdf, &at, u_lens);
-                self.leave_photon(&beam, &surface);
+                self.connect(&beam, &bsdf, &at, &view, u_lens);
+                self.leave_photon(&Beam { power: beam.power * view.shadowing, ..beam }, &surface);
                 if !self.goes_on(&mut beam) {
                     return;
                 }
@@ -377,7 +377,6 @@ impl<'a> Walk<'a, '_> {
 
             // A pane that did not let the path straight through reflects it.
             let u_lobe = if pane { 0.0 } else { u_lobe };
-            let crossing = Crossing { hit: &hit, surface: &surface, frame: &frame, came, roulette: u_roulette };
             if let Bsdf::Dielectric(glass) = &bsdf
                 && caustics.is_some_and(|c| c.packets)
                 && beam.alone.is_none()
@@ -387,25 +386,60 @@ impl<'a> Walk<'a, '_> {
                 // Each wavelength decides for itself with the same random numbers: none leads.
                 beam.power *= LANES as f32 / beam.rho.reduce_add();
                 beam.rho = Lanes::ONE;
-                if let Some(sample) = glass.reflects_all(wo, u_lobe) {
-                    if !self.cross(&mut beam, &sample, &crossing, wo) {
-                        return;
+                if at.is_plain() {
+                    if let Some(sample) = glass.reflects_all(wo, u_lobe) {
+                        if !self.cross(&mut beam, &sample, &at, &view, u_roulette) {
+                            return;
+                        }
+                        continue;
                     }
-                    continue;
+                    self.part(&beam, glass, &at, &view, [u_lobe, u_roulette]);
+                    return;
                 }
-                self.part(&beam, glass, &crossing, u_lobe);
+                for view in at.views(&view, &bsdf) {
+                    self.part(&beam, glass, &at, &view, [u_lobe, u_roulette]);
+                }
                 return;
             }
-            let Some(sample) = bsdf.sample(wo, u_lobe, u_scatter) else { return };
-            if !self.cross(&mut beam, &sample, &crossing, wo) {
+            let Some((sample, view)) = self.sample(&bsdf, &at, &view, vertex, u_lobe, u_scatter) else { return };
+            if !self.cross(&mut beam, &sample, &at, &view, u_roulette) {
                 return;
             }
         }
     }
 
-    /// Sends the beam on from a surface; false where it ends.
-    fn cross(&self, beam: &mut Beam, sample: &BsdfSample, at: &Crossing, wo: DVec3) -> bool {
-        let went = at.frame.to_world(sample.wi);
+    /// Where light goes on from a surface, and as what it is seen from there; `view` is what it is to those whence it came.
+    fn sample(
+        &self,
+        bsdf: &Bsdf,
+        at: &Place,
+        view: &View,
+        vertex: u32,
+        u_lobe: f64,
+        u_scatter: DVec2,
+    ) -> Option<(BsdfSample, View)> {
+        if at.is_plain() {
+            let sample = bsdf.sample(view.frame.to_local(at.came), u_lobe, u_scatter)?;
+            return Some((sample, *view));
+        }
+        let mut found = None;
+        let (mut count, mut u) = (0u8, self.sampler.set(Walk::set_of_flight(vertex, 0))[3]);
+        for view in at.views(view, bsdf) {
+            let Some(sample) = bsdf.sample(view.frame.to_local(at.came), u_lobe, u_scatter) else { continue };
+            if at.is_seen_so(&view, view.frame.to_world(sample.wi)) {
+                // Of n each is kept with probability 1/n.
+                count += 1;
+                if below(&mut u, 1.0 / f64::from(count)) {
+                    found = Some((sample, view));
+                }
+            }
+        }
+        found.map(|(sample, view)| (BsdfSample { weight: sample.weight * f32::from(count), ..sample }, view))
+    }
+
+    /// Sends the beam on from a surface that is seen as `view` from where it goes; false where it ends.
+    fn cross(&self, beam: &mut Beam, sample: &BsdfSample, at: &Place, view: &View, roulette: f64) -> bool {
+        let (wo, went) = (view.frame.to_local(at.came), view.frame.to_world(sample.wi));
         let side = went.dot(at.surface.normal) * at.came.dot(at.surface.normal);
         if (side > 0.0) == sample.transmitted || side == 0.0 {
             return false;
@@ -413,7 +447,7 @@ impl<'a> Walk<'a, '_> {
         // Power, not radiance: no 1/η² on crossing, and the cosines of the true normal for those of the other.
         let normal = at.surface.normal;
         let adjoint = sample.eta2 * adjoint(wo.z, sample.wi.z, at.came.dot(normal), went.dot(normal));
-        beam.power *= sample.weight * adjoint as f32;
+        beam.power *= sample.weight * (view.shadowing * adjoint as f32);
         beam.rho *= sample.ratio;
         let scene = self.paths.scene;
         if sample.transmitted {
@@ -423,7 +457,7 @@ impl<'a> Walk<'a, '_> {
         }
         beam.ray = scene.leave(at.surface, at.hit, went);
         beam.vertex += 1;
-        self.survives(beam, sample.chosen == Chosen::Discrete, at.roulette)
+        self.survives(beam, sample.chosen == Chosen::Discrete, roulette)
     }
 
     /// Russian roulette on the largest lane; false where the beam ends.
@@ -503,20 +537,21 @@ impl<'a> Walk<'a, '_> {
             let meeting = scene.crossing(object, &surface, direction, &beam.bodies);
             let hidden = meeting.is_some_and(|meeting| !meeting.shows);
             // Of a material made of others, what this path meets, if anything.
-            let (shown, leaf) = match &material.kind {
+            let (shown, part) = match &material.kind {
                 _ if hidden => (None, None),
                 Kind::Compound(compound) => {
                     let (at, wo) = (&hit.texture_point(&surface), -direction);
                     let x = crate::scene::compound::Vertex { scene, hit: &hit, surface: &surface, at, wo };
-                    let leaf = compound.resolve(&x, seen_normal(&surface, wo), self.sampler.set(set)[2]);
-                    (leaf.as_ref().map(|leaf| leaf.material), leaf)
+                    let u = self.sampler.set(set)[2];
+                    let leaf = compound.resolve(&x, seen_normal(&surface, wo), u);
+                    (leaf.as_ref().map(|leaf| leaf.material), leaf.map(|leaf| (leaf, &**compound, u)))
                 }
                 _ => (Some(material), None),
             };
             if let Some(shown) = shown.filter(|m| !matches!(m.kind, Kind::Boundary)) {
                 match shown.straight(&surface, direction, || hit.texture_point(&surface), beam.nm) {
                     Some(straight) if self.sampler.set(set)[1] < straight.share => beam.power *= straight.weight,
-                    pane => return Some(Met::Surface { hit, surface, leaf, pane: pane.is_some(), meeting }),
+                    pane => return Some(Met::Surface { hit, surface, part, pane: pane.is_some(), meeting }),
                 }
             }
             beam.crossings += u32::from(self.paths.settings.count_crossings);
@@ -550,31 +585,32 @@ impl<'a> Walk<'a, '_> {
     }
 
     /// Light that a surface sends into the camera.
-    fn connect(&mut self, beam: &Beam, bsdf: &Bsdf, at: &Vertex, u_lens: DVec2) {
+    fn connect(&mut self, beam: &Beam, bsdf: &Bsdf, at: &Place, view: &View, u_lens: DVec2) {
         let scene = self.paths.scene;
-        if at.object.is_lamp && self.hides_lamps() {
+        let object = &scene.objects[at.hit.object as usize];
+        if object.is_lamp && self.hides_lamps() {
             return;
         }
         let Some(entry) = scene.camera.entry(at.surface.point, || u_lens) else { return };
         if !self.paths.bounds.holds(entry.pixel) {
             return;
         }
-        let to_camera = at.frame.to_local(entry.direction);
+        let view = if at.is_plain() { *view } else { at.seen_from(entry.direction) };
+        let [local, to_camera] = [at.came, entry.direction].map(|direction| view.frame.to_local(direction));
         let (came, went) = (at.came.dot(at.surface.normal), entry.direction.dot(at.surface.normal));
-        if came * at.local.z * went * to_camera.z <= 0.0 {
+        if came * local.z * went * to_camera.z <= 0.0 {
             return;
         }
         // The viewer is at the camera: f as radiance has it.
-        let f = bsdf.eval(to_camera, at.local).f;
+        let f = bsdf.eval(to_camera, local).f;
         if f.simd_eq(Lanes::ZERO).all() {
             return;
         }
-        let cosines = to_camera.z.abs() * adjoint(at.local.z, to_camera.z, came, went);
+        let cosines = to_camera.z.abs() * adjoint(local.z, to_camera.z, came, went);
         let before = beam.inside();
-        let inside =
-            if came * went < 0.0 { scene.beyond(at.object, at.surface, entry.direction, before) } else { before };
+        let inside = if came * went < 0.0 { scene.beyond(object, at.surface, entry.direction, before) } else { before };
         let ray = scene.leave(at.surface, at.hit, entry.direction);
-        let light = f * (cosines * entry.density) as f32;
+        let light = f * (view.shadowing * (cosines * entry.density) as f32);
         self.send(beam, at.surface.point, &ray, inside, &entry, light);
     }
 
@@ -621,16 +657,6 @@ impl<'a> Walk<'a, '_> {
     }
 }
 
-/// Where a beam crosses or leaves a surface.
-struct Crossing<'a> {
-    hit: &'a Hit,
-    surface: &'a SurfacePoint,
-    frame: &'a Frame,
-    /// Toward where the light came from.
-    came: DVec3,
-    roulette: f64,
-}
-
 /// |cos(came, n_s) cos(went, n_g) / (cos(came, n_g) cos(went, n_s))|, Veach 1997, eq. 5.19.
 fn adjoint(came_shading: f64, went_shading: f64, came_true: f64, went_true: f64) -> f64 {
     if came_shading.abs() == came_true.abs() && went_shading.abs() == went_true.abs() {
@@ -642,16 +668,4 @@ fn adjoint(came_shading: f64, went_shading: f64, came_true: f64, went_true: f64)
 
 fn largest(x: Lanes) -> f64 {
     f64::from(x.to_array().into_iter().fold(0.0f32, |a, b| if b > a || b.is_nan() { b } else { a }))
-}
-
-/// A point where light scatters.
-struct Vertex<'a> {
-    hit: &'a Hit,
-    surface: &'a SurfacePoint,
-    frame: &'a Frame,
-    /// Toward where the light came from.
-    came: DVec3,
-    /// The same in the frame.
-    local: DVec3,
-    object: &'a Object,
 }

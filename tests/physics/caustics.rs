@@ -87,8 +87,8 @@ impl Case {
     fn bench(&self, tracing: &str, packets: &str, samples: u32) -> Bench {
         let hill = |x: u32| 64.0 * (1.0 + (f64::from(x) * std::f64::consts::TAU / 16.0).sin());
         let waves = grey_png(16, 16, |x, y| (hill(x) + hill(y)) as u8);
-        let files: [(&str, &[u8]); 2] = [("round.obj", ROUND_OBJ.as_bytes()), ("waves.png", &waves)];
-        bench_with(&self.scene("path", tracing, packets, samples), &files)
+        let meshes = [("round.obj", ROUND_OBJ.as_bytes()), ("slab.obj", SLAB_OBJ.as_bytes())];
+        bench_with(&self.scene("path", tracing, packets, samples), &[meshes[0], meshes[1], ("waves.png", &waves)])
     }
 }
 
@@ -103,6 +103,12 @@ const ROUND_OBJ: &str = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1
     f 1 11 8\nf 4 8 17\nf 5 17 11\nf 8 11 17\nf 1 8 12\nf 4 18 8\nf 6 12 18\nf 8 18 12\n\
     f 2 13 9\nf 3 9 15\nf 5 15 13\nf 9 13 15\nf 2 9 14\nf 3 16 9\nf 6 14 16\nf 9 16 14\n\
     f 2 10 13\nf 4 17 10\nf 5 13 17\nf 10 17 13\nf 2 14 10\nf 4 10 18\nf 6 18 14\nf 10 14 18\n";
+
+/// A slab without sides. The normals of its lower face lean toward −x.
+const SLAB: &str = "mesh: {name: ball, file: slab.obj, material: glass}";
+const SLAB_OBJ: &str = "v -0.6 0 -0.6\nv -0.6 0 0.6\nv 0.9 0 0.6\nv 0.9 0 -0.6\n\
+    v -0.6 -0.3 -0.6\nv -0.6 -0.3 0.6\nv 0.9 -0.3 0.6\nv 0.9 -0.3 -0.6\nvn 0 1 0\nvn -0.894 -0.447 0\n\
+    f 1//1 2//1 3//1\nf 1//1 3//1 4//1\nf 5//2 7//2 6//2\nf 5//2 8//2 7//2\n";
 
 fn render(bench: &Bench) -> Image {
     let frame = render_with(bench, Filter::Box, 32);
@@ -165,6 +171,18 @@ fn no_light_is_lost_and_none_counted_twice() {
             light: WAVES,
             ..AREA
         },
+        Case {
+            what: "bumped mirror",
+            material: "{bump: {height: {texture: waves}, scale: 0.1, material: {mirror: {reflectance: 0.9}}}}",
+            light: WAVES,
+            ..AREA
+        },
+        Case {
+            what: "bumped glass",
+            material: "{bump: {height: {texture: waves}, scale: 0.1, material: {dielectric: {ior: 1.5}}}}",
+            light: WAVES,
+            ..AREA
+        },
         Case { what: "ground metal", material: "{conductor: {metal: silver, roughness: 0.04}}", ..AREA },
         Case { what: "ground glass", material: "{dielectric: {ior: 1.5, roughness: 0.04}}", ..AREA },
         Case {
@@ -200,6 +218,14 @@ fn wavelengths_that_part_are_all_there_with_and_without_packets() {
     // Lanes part at the edges of a mesh, and with normals of its own each has another factor.
     let mesh = Case { what: "flint mesh", caster: ROUND, ..flint };
     assert_agree(mesh.what, &render(&mesh.bench("on", "on", 96)), &render(&mesh.bench("off", "auto", 1536)));
+    // Normals of the lower face lean so far that from the floor all of it is seen by the true one.
+    let low = "- sphere: {center: [-2.5, 1.2, 0.3], radius: 0.5, emission: {illuminant: {name: D65, scale: 10}}}\n";
+    let leaning = Case { what: "leaning flint", caster: SLAB, light: low, ..flint };
+    assert_agree(leaning.what, &render(&leaning.bench("on", "on", 192)), &render(&leaning.bench("off", "off", 3072)));
+    // A relief turns the normal at which they part.
+    let material = "{bump: {height: {texture: waves}, scale: 0.1, material: {dielectric: {ior: {glass: SF11}}}}}";
+    let bumped = Case { what: "bumped flint", material, light: WAVES, ..flint };
+    assert_agree(bumped.what, &render(&bumped.bench("on", "on", 192)), &render(&bumped.bench("on", "off", 192)));
 }
 
 /// A spot lamp shines on nothing but a ball that parts its colours over a floor, close to a block. The camera sees that side

@@ -1,6 +1,6 @@
 //! Integrators besides `path`, and the further channels of a picture.
 
-use super::common::{Bench, SPREAD_NM, assert_close, bench_with, wavelengths};
+use super::common::{Bench, SPREAD_NM, assert_close, bench_with, grey_png, wavelengths};
 use abbe::batch::frame::{self, Frame, FrameJob};
 use abbe::film::accumulate::{Film, REPLICATES};
 use abbe::film::filter::{Filter, FilterSampler};
@@ -93,6 +93,53 @@ fn paths_from_the_lights_and_from_the_camera_agree() {
     for (what, camera, material, light) in cases {
         let by = |integrator| render(&corner(integrator, camera, material, light));
         assert_agree(what, &by("path"), &by("light_tracer"));
+    }
+}
+
+/// Which normal a surface has depends on who sees it: the true one stands in where the interpolated one would be seen from
+/// behind, and a relief turns toward its viewer. The normals of a floor lean away from the camera, or from a wall that it
+/// lights, and toward the lamp. Paths from the lights, which come from there, have the normals of those they go to.
+#[test]
+fn normals_that_lean_away_from_the_viewer_are_the_same_from_both_ends() {
+    const SCENE: &str = "\
+camera: {origin: CAMERA, fov_deg: 20}
+image: {width: 16, height: 16}
+render: {samples: SAMPLES, techniques: {light_tracing: TRACING}}
+integrator: {INTEGRATOR: {max_depth: 4}}
+textures: {lean: {image: {file: lean.png, raw: true}}}
+shapes:
+- FLOOR
+- rectangle: {corner: [-2, 0, -1], edge_u: [0, 0, 2], edge_v: [0, 2, 0], flip_normals: true, material: {diffuse: {}}}
+- rectangle: {corner: [2, 0, -1], edge_u: [0, 0, 2], edge_v: [0, 2, 0], material: {diffuse: {}}}
+- sphere: {center: LAMP, radius: 0.5, emission: 10}
+";
+    const MESH: &str = "mesh: {file: lean.obj, material: MATERIAL}";
+    const RELIEF: &str = "rectangle: {corner: [-2, 0, 1], edge_u: [2, 0, 2], edge_v: [2, 0, -2], \
+        material: {normal_map: {normals: {texture: lean}, material: MATERIAL}}}";
+    let obj = "v -2 0 1\nv 2 0 1\nv 2 0 -1\nv -2 0 -1\nvn 0.8 0.6 0\nf 1//1 2//1 3//1\nf 1//1 3//1 4//1\n";
+    // (1, 1, 1) / √3, which leans along u + v = x.
+    let white = grey_png(1, 1, |_, _| 255);
+    // The floor itself, the wall that it leans away from, and the other.
+    let [floor_seen, wall_seen] = ["[-1.9, 0.6, 0], target: [-0.9, 0, 0]", "[1, 1.5, 2], target: [-2, 1, 0]"];
+    let other_seen = "[-1, 1.5, 2], target: [2, 1, 0]";
+    // Where mirrors throw the light of each onto the wall.
+    for (what, floor, lamp) in [("mesh", MESH, "[1, 1, 0]"), ("relief", RELIEF, "[-0.5, 1.6, 0]")] {
+        let by = |camera: &str, material: &str, integrator: &str, tracing: &str, samples: u32| {
+            let scene = SCENE.replace("CAMERA", camera).replace("FLOOR", floor).replace("MATERIAL", material);
+            let scene =
+                scene.replace("SAMPLES", &samples.to_string()).replace("INTEGRATOR", integrator).replace("LAMP", lamp);
+            let files = [("lean.obj", obj.as_bytes()), ("lean.png", &white)];
+            render_with(&bench_with(&scene.replace("TRACING", tracing), &files), Filter::Box, 32)
+        };
+        for (seen, camera) in [("floor", floor_seen), ("wall", wall_seen), ("other wall", other_seen)] {
+            let [path, light] = ["path", "light_tracer"]
+                .map(|integrator| by(camera, "{conductor: {metal: gold, roughness: 0.4}}", integrator, "off", 1024));
+            assert_agree(&format!("{seen}, {what}"), &path, &light);
+        }
+        let [chance, traced] = [("off", 1024), ("on", 256)]
+            .map(|(tracing, samples)| by(wall_seen, "{mirror: {}}", "path", tracing, samples));
+        assert!(traced.splats.is_some());
+        assert_agree(&format!("mirror, {what}"), &chance, &traced);
     }
 }
 

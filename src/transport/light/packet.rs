@@ -4,7 +4,8 @@
 //! and go the same way from there, what depends on neither place nor direction is found once: the numbers, the material,
 //! its indices. A lane that takes another way goes on with those that take it, too, or as a [`Beam`] alone.
 
-use super::{Beam, Crossing, LightPaths, Splat, Walk, adjoint};
+use super::views::{Place, View};
+use super::{Beam, LightPaths, Splat, Walk, adjoint};
 use crate::math::{Frame, Ray, warp};
 use crate::optics::bsdf::Bsdf;
 use crate::optics::dielectric::{Dielectric, refract};
@@ -30,6 +31,12 @@ pub(super) struct Packet {
 /// Where each lane has come to; anything for lanes that are not there.
 type Places<'a> = [(&'a SurfacePoint, &'a Hit); LANES];
 
+/// The same with the normals that stand for those of the surfaces.
+struct Faces<'a> {
+    at: &'a Places<'a>,
+    normals: &'a [DVec3; LANES],
+}
+
 impl Packet {
     /// One of the wavelengths alone.
     fn alone(&self, lane: usize) -> Beam {
@@ -40,10 +47,20 @@ impl Packet {
 }
 
 impl Walk<'_, '_> {
-    /// Sends each wavelength of a beam on from glass in which they part. None has led so far.
-    pub(super) fn part(&mut self, beam: &Beam, glass: &Dielectric, at: &Crossing, u_lobe: f64) {
-        let mut packet = Packet { beam: *beam, lanes: u8::MAX, rays: [beam.ray; LANES] };
-        self.cross_glass(&mut packet, glass, &[(at.surface, at.hit); LANES], u_lobe, at.roulette);
+    /// Sends each wavelength of a beam on from glass in which they part, if from where it goes the glass is seen as `view`.
+    /// None has led so far.
+    pub(super) fn part(
+        &mut self,
+        beam: &Beam,
+        glass: &Dielectric,
+        at: &Place,
+        view: &View,
+        [u_lobe, roulette]: [f64; 2],
+    ) {
+        let beam = Beam { power: beam.power * view.shadowing, ..*beam };
+        let mut packet = Packet { beam, lanes: u8::MAX, rays: [beam.ray; LANES] };
+        let faces = Faces { at: &[(at.surface, at.hit); LANES], normals: &[view.frame.n; LANES] };
+        self.cross_glass(&mut packet, glass, &faces, |_, went| at.is_seen_so(view, went), [u_lobe, roulette]);
         self.together(packet);
     }
 
@@ -119,7 +136,30 @@ impl Walk<'_, '_> {
             }
             let at = leader.texture_point(&leading);
             let Bsdf::Dielectric(glass) = material.bsdf(&at, packet.beam.nm, plan.all_dispersive) else { return };
-            self.cross_glass(&mut packet, &glass, &places, numbers.lobe, numbers.roulette);
+            let normals = surfaces.each_ref().map(|surface| surface.shading_normal);
+            let faces = Faces { at: &places, normals: &normals };
+            let chances = [numbers.lobe, numbers.roulette];
+            if each(packet.lanes).all(|lane| surfaces[lane].normal == normals[lane]) {
+                self.cross_glass(&mut packet, &glass, &faces, |_, _| true, chances);
+                continue;
+            }
+            // Where the normals are interpolated there are two ways to see the glass.
+            let seen_by =
+                |normals: [DVec3; LANES]| move |lane: usize, went| seen_normal(places[lane].0, went) == normals[lane];
+            let two_ways = |lane: &usize| {
+                let (normal, came) = (surfaces[*lane].normal, -packet.rays[*lane].direction);
+                let apart = normal.cross(normals[*lane]).length();
+                apart > 0.0 && glass.may_graze(came.dot(normal), apart)
+            };
+            let behind = each(packet.lanes).filter(two_ways).fold(0, |set, lane| set | 1 << lane);
+            if behind != 0 {
+                let true_normals = surfaces.each_ref().map(|surface| surface.normal);
+                let faces = Faces { at: &places, normals: &true_normals };
+                let mut behind = Packet { lanes: behind, ..packet };
+                self.cross_glass(&mut behind, &glass, &faces, seen_by(true_normals), chances);
+                self.together(behind);
+            }
+            self.cross_glass(&mut packet, &glass, &faces, seen_by(normals), chances);
         }
     }
 
@@ -148,15 +188,20 @@ impl Walk<'_, '_> {
     }
 
     /// Sends each lane on from smooth glass. Those that it reflects where it lets the others through are followed to
-    /// their end, or these where they are fewer; the packet has the rest.
-    fn cross_glass(&mut self, packet: &mut Packet, glass: &Dielectric, at: &Places, u_lobe: f64, roulette: f64) {
+    /// their end, or these where they are fewer; the packet has the rest. Those go on for which `seen_so` tells that from
+    /// where they go the glass has these normals.
+    fn cross_glass(
+        &mut self,
+        packet: &mut Packet,
+        glass: &Dielectric,
+        &Faces { at, normals }: &Faces,
+        seen_so: impl Fn(usize, DVec3) -> bool,
+        [u_lobe, roulette]: [f64; 2],
+    ) {
         let scene = self.paths.scene;
-        let mut normals = [DVec3::ZERO; LANES];
         let mut cosines = [1.0; LANES];
         for lane in each(packet.lanes) {
-            let came = -packet.rays[lane].direction;
-            normals[lane] = seen_normal(at[lane].0, came);
-            cosines[lane] = came.dot(normals[lane]);
+            cosines[lane] = -packet.rays[lane].direction.dot(normals[lane]);
         }
         let ways = glass.lanes(&cosines);
         let (mut reflected, mut transmitted) = (0, 0);
@@ -173,7 +218,7 @@ impl Walk<'_, '_> {
                 refract(came, normal * 1.0f64.copysign(cos), ways.eta[lane], ways.cos_transmitted[lane])
             };
             let (true_came, true_went) = (came.dot(surface.normal), went.dot(surface.normal));
-            if true_came * true_went == 0.0 || (true_came * true_went > 0.0) != reflects {
+            if true_came * true_went == 0.0 || (true_came * true_went > 0.0) != reflects || !seen_so(lane, went) {
                 continue;
             }
             let tint = if reflects { mirrored[lane] } else { through[lane] };
@@ -224,11 +269,11 @@ impl Walk<'_, '_> {
         if alike.is_some_and(|all| all == [0.0; LANES]) {
             return;
         }
-        let normals: [DVec3; LANES] = std::array::from_fn(|lane| {
-            let (surface, came) = (at[lane].0, -packet.rays[lane].direction);
-            let normal = seen_normal(surface, came);
-            if material.two_sided && came.dot(surface.normal) < 0.0 { -normal } else { normal }
-        });
+        let place = |lane: usize| {
+            let ((surface, hit), came) = (at[lane], -packet.rays[lane].direction);
+            Place { scene, hit, surface, came, two_sided: material.two_sided, part_of: None }
+        };
+        let from_light = |lane: usize| place(lane).seen_from(-packet.rays[lane].direction);
 
         // What each would send into the camera.
         let mut rays = packet.rays;
@@ -237,11 +282,12 @@ impl Walk<'_, '_> {
         let mut light = [0.0f32; LANES];
         let mut wanted = 0;
         for lane in each(packet.lanes) {
-            let ((surface, hit), normal, came) = (at[lane], normals[lane], -packet.rays[lane].direction);
+            let ((surface, hit), came) = (at[lane], -packet.rays[lane].direction);
             if scene.objects[hit.object as usize].is_lamp && self.hides_lamps() {
                 continue;
             }
             let Some(entry) = scene.camera.entry(surface.point, || numbers.lens) else { continue };
+            let normal = place(lane).seen_from(entry.direction).frame.n;
             let (from, to) = (came.dot(normal), entry.direction.dot(normal));
             let (true_from, true_to) = (came.dot(surface.normal), entry.direction.dot(surface.normal));
             let seen = from > 0.0 && to > 0.0 && true_from * from * true_to * to > 0.0;
@@ -290,7 +336,7 @@ impl Walk<'_, '_> {
         }
 
         if self.photons.is_some() {
-            let lit = |lane: &usize| packet.rays[*lane].direction.dot(normals[*lane]) < 0.0;
+            let lit = |lane: &usize| from_light(*lane).frame.n.dot(packet.rays[*lane].direction) < 0.0;
             for lane in each(packet.lanes).filter(lit) {
                 self.leave_photon(&packet.alone(lane), at[lane].0);
             }
@@ -299,7 +345,7 @@ impl Walk<'_, '_> {
         if packet.lanes >> lane & 1 == 0 || self.is_last(packet.beam.events() + 1) {
             return;
         }
-        if empty {
+        if empty && each(packet.lanes).all(|lane| place(lane).is_plain()) {
             let reflected: [f32; LANES] = match &alike {
                 Some(all) => *all,
                 None => std::array::from_fn(|k| match packet.lanes >> k & 1 {
@@ -307,19 +353,17 @@ impl Walk<'_, '_> {
                     _ => 0.0,
                 }),
             };
+            let normals = std::array::from_fn(|lane| from_light(lane).frame.n);
             self.scatter_together(packet, lane, &reflected, &normals, at, numbers);
             return;
         }
-        let ((surface, hit), came) = (at[lane], -packet.rays[lane].direction);
-        let mut beam = packet.alone(lane);
+        let (at, view, mut beam) = (place(lane), from_light(lane), packet.alone(lane));
         beam.power *= LANES as f32;
         beam.chosen = true;
         let bsdf = material.bsdf(&texture_point(lane), beam.nm, false);
-        let frame = Frame::from_normal_and_tangent(normals[lane], surface.tangent);
-        let wo = frame.to_local(came);
-        let crossing = Crossing { hit, surface, frame: &frame, came, roulette: numbers.roulette };
-        let sample = bsdf.sample(wo, numbers.lobe, numbers.scatter);
-        if sample.is_some_and(|sample| self.cross(&mut beam, &sample, &crossing, wo)) {
+        if let Some((sample, view)) = self.sample(&bsdf, &at, &view, beam.vertex, numbers.lobe, numbers.scatter)
+            && self.cross(&mut beam, &sample, &at, &view, numbers.roulette)
+        {
             self.follow(beam);
         }
     }
