@@ -274,6 +274,30 @@ impl Scene {
         Inside { medium, bodies }
     }
 
+    /// What fills the space where `origin` of a ray is that leaves a light, but for bodies with a priority.
+    ///
+    /// A light that is an object shines from its front. Elsewhere the first surface between two media on the way to the
+    /// camera tells, and if there is none it is what the camera is in.
+    #[must_use]
+    pub fn medium_around(&self, origin: &Ray) -> Option<u32> {
+        let lamp = origin.departure.map(|departure| &self.objects[departure.object as usize]);
+        if let Some(lamp) = lamp.filter(|lamp| !lamp.keeps_medium) {
+            return lamp.outside;
+        }
+        let way = self.camera.eye() - origin.origin;
+        let (mut distance, mut ray) = (way.length(), Ray { direction: way.normalize_or(DVec3::Z), ..*origin });
+        for _ in 0..MOST_SURFACES {
+            let Some(hit) = self.closest(&ray, distance) else { break };
+            let (object, surface) = (&self.objects[hit.object as usize], self.surface(&ray, &hit));
+            if !object.keeps_medium {
+                return object.beyond(&surface, -ray.direction, None);
+            }
+            distance -= hit.t;
+            ray = self.leave(&surface, &hit, ray.direction);
+        }
+        self.camera_medium
+    }
+
     /// True where light may go straight through an object.
     #[must_use]
     pub fn lets_through(&self, object: u32) -> bool {

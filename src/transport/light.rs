@@ -510,12 +510,12 @@ impl<'a> Walk<'a, '_> {
             let surface = hit.map(|hit| scene.surface(&beam.ray, &hit));
             if self.paths.plan.media {
                 let known = beam.medium.unwrap_or_else(|| {
-                    // The side on which the beam meets the first surface tells what it is in.
-                    let before = hit.zip(surface).and_then(|(hit, surface)| {
+                    // The side on which the beam meets the first surface between media tells what it is in.
+                    let told = hit.zip(surface).and_then(|(hit, surface)| {
                         let object = &scene.objects[hit.object as usize];
-                        object.beyond(&surface, -beam.ray.direction, scene.camera_medium)
+                        (!object.keeps_medium).then(|| object.beyond(&surface, -beam.ray.direction, None))
                     });
-                    let before = if hit.is_some() { before } else { scene.camera_medium };
+                    let before = told.unwrap_or_else(|| scene.medium_around(&beam.ray));
                     scene.inside(beam.bodies, before).medium
                 });
                 beam.medium = Some(known);

@@ -96,6 +96,27 @@ fn paths_from_the_lights_and_from_the_camera_agree() {
     }
 }
 
+/// A camera is in a ball of mist with nothing around it. Lamps outside shine away from it: nothing scatters their light.
+#[test]
+fn light_that_meets_nothing_is_not_in_what_the_camera_is_in() {
+    let unchanged = "inside: unchanged, outside: unchanged";
+    let lamps = [
+        "lights: [{spot: {position: [0, 4, 0], target: [0, 5, 0], cutoff_deg: 30, intensity: 20}}]".to_owned(),
+        "- disk: {center: [0, 4, 0], normal: [0, 1, 0], radius: 0.5, emission: 10, outside: vacuum}".to_owned(),
+        format!("- disk: {{center: [0, 4, 0], normal: [0, 1, 0], radius: 0.5, emission: 10, {unchanged}}}"),
+    ];
+    for lamp in lamps {
+        let frame = render(&format!(
+            "camera: {{origin: [0, 0, 1.8], target: [0, 0, 0], fov_deg: 90}}\nimage: {{width: 16, height: 12}}\n\
+             render: {{samples: 64}}\nintegrator: {{light_tracer: {{}}}}\n\
+             media: {{mist: {{homogeneous: {{scattering: 0.2}}}}}}\nmedium: mist\nshapes:\n\
+             - sphere: {{radius: 2, material: {{boundary: {{}}}}, inside: mist, outside: vacuum}}\n\
+             - disk: {{center: [0, 2.5, 0], normal: [0, 1, 0], radius: 9, {unchanged}}}\n{lamp}\n"
+        ));
+        assert_eq!(luminance(&frame).0, 0.0, "{lamp}");
+    }
+}
+
 /// Which normal a surface has depends on who sees it: the true one stands in where the interpolated one would be seen from
 /// behind, and a relief turns toward its viewer. The normals of a floor lean away from the camera, or from a wall that it
 /// lights, and toward the lamp. Paths from the lights, which come from there, have the normals of those they go to.
