@@ -398,6 +398,22 @@ impl Material {
         "normal_map",
     ];
 
+    /// What the material is made of, if of others.
+    #[must_use]
+    pub fn inner(&self) -> Vec<&MaterialRef> {
+        match self {
+            Material::Mask(m) => vec![&m.material],
+            Material::Blend(m) => vec![&m.first, &m.second],
+            Material::TwoSided(m) => std::iter::once(&m.front).chain(&m.back).map(|m| &**m).collect(),
+            Material::Bump(m) => vec![&m.material],
+            Material::NormalMap(m) => vec![&m.material],
+            Material::Diffuse(_) | Material::Conductor(_) | Material::Mirror(_) => Vec::new(),
+            Material::Dielectric(_) | Material::ThinDielectric(_) | Material::Plastic(_) => Vec::new(),
+            Material::Principled(_) | Material::PrincipledThin(_) => Vec::new(),
+            Material::Hair(_) | Material::Boundary(_) => Vec::new(),
+        }
+    }
+
     /// The key under which the material is written.
     #[must_use]
     pub fn kind(&self) -> &'static str {

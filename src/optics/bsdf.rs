@@ -296,17 +296,9 @@ impl Bsdf<'_> {
     #[must_use]
     pub fn may_graze(&self, cos: f64, most: f64) -> bool {
         match self {
-            Bsdf::Mirror { .. } | Bsdf::Conductor(_) | Bsdf::Thin { .. } => cos.abs() <= most,
             Bsdf::Dielectric(glass) => glass.may_graze(cos, most),
-            Bsdf::Null
-            | Bsdf::Diffuse { .. }
-            | Bsdf::RoughConductor(..)
-            | Bsdf::RoughDielectric(_)
-            | Bsdf::Plastic(_)
-            | Bsdf::RoughPlastic(_)
-            | Bsdf::Principled(_)
-            | Bsdf::PrincipledThin(_)
-            | Bsdf::Hair(_) => true,
+            // A single direction has the angle that it came at.
+            _ => !self.is_discrete() || cos.abs() <= most,
         }
     }
 

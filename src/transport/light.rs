@@ -386,15 +386,13 @@ impl<'a> Walk<'a, '_> {
                 // Each wavelength decides for itself with the same random numbers: none leads.
                 beam.power *= LANES as f32 / beam.rho.reduce_add();
                 beam.rho = Lanes::ONE;
-                if at.is_plain() {
-                    if let Some(sample) = glass.reflects_all(wo, u_lobe) {
-                        if !self.cross(&mut beam, &sample, &at, &view, u_roulette) {
-                            return;
-                        }
-                        continue;
+                if at.is_plain()
+                    && let Some(sample) = glass.reflects_all(wo, u_lobe)
+                {
+                    if !self.cross(&mut beam, &sample, &at, &view, u_roulette) {
+                        return;
                     }
-                    self.part(&beam, glass, &at, &view, [u_lobe, u_roulette]);
-                    return;
+                    continue;
                 }
                 for view in at.views(&view, &bsdf) {
                     self.part(&beam, glass, &at, &view, [u_lobe, u_roulette]);
@@ -439,14 +437,15 @@ impl<'a> Walk<'a, '_> {
 
     /// Sends the beam on from a surface that is seen as `view` from where it goes; false where it ends.
     fn cross(&self, beam: &mut Beam, sample: &BsdfSample, at: &Place, view: &View, roulette: f64) -> bool {
-        let (wo, went) = (view.frame.to_local(at.came), view.frame.to_world(sample.wi));
+        let went = view.frame.to_world(sample.wi);
         let side = went.dot(at.surface.normal) * at.came.dot(at.surface.normal);
         if (side > 0.0) == sample.transmitted || side == 0.0 {
             return false;
         }
         // Power, not radiance: no 1/η² on crossing, and the cosines of the true normal for those of the other.
         let normal = at.surface.normal;
-        let adjoint = sample.eta2 * adjoint(wo.z, sample.wi.z, at.came.dot(normal), went.dot(normal));
+        let cosines = [view.frame.n, normal].map(|normal| at.came.dot(normal));
+        let adjoint = sample.eta2 * adjoint(cosines[0], sample.wi.z, cosines[1], went.dot(normal));
         beam.power *= sample.weight * (view.shadowing * adjoint as f32);
         beam.rho *= sample.ratio;
         let scene = self.paths.scene;

@@ -40,15 +40,7 @@ impl<'a> Compiler<'a> {
             }
             written::MaterialRef::Inline(material) => material,
         };
-        let inner: Vec<&written::MaterialRef> = match material {
-            written::Material::Mask(m) => vec![&m.material],
-            written::Material::Blend(m) => vec![&m.first, &m.second],
-            written::Material::TwoSided(m) => std::iter::once(&m.front).chain(&m.back).map(|m| &**m).collect(),
-            written::Material::Bump(m) => vec![&m.material],
-            written::Material::NormalMap(m) => vec![&m.material],
-            _ => Vec::new(),
-        };
-        for material in inner {
+        for material in material.inner() {
             self.use_material(material, used);
         }
     }

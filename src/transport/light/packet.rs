@@ -273,7 +273,7 @@ impl Walk<'_, '_> {
             let ((surface, hit), came) = (at[lane], -packet.rays[lane].direction);
             Place { scene, hit, surface, came, two_sided: material.two_sided, part_of: None }
         };
-        let from_light = |lane: usize| place(lane).seen_from(-packet.rays[lane].direction);
+        let lit_normal = |lane: usize| place(lane).normal_from(-packet.rays[lane].direction);
 
         // What each would send into the camera.
         let mut rays = packet.rays;
@@ -287,7 +287,7 @@ impl Walk<'_, '_> {
                 continue;
             }
             let Some(entry) = scene.camera.entry(surface.point, || numbers.lens) else { continue };
-            let normal = place(lane).seen_from(entry.direction).frame.n;
+            let normal = place(lane).normal_from(entry.direction);
             let (from, to) = (came.dot(normal), entry.direction.dot(normal));
             let (true_from, true_to) = (came.dot(surface.normal), entry.direction.dot(surface.normal));
             let seen = from > 0.0 && to > 0.0 && true_from * from * true_to * to > 0.0;
@@ -336,7 +336,7 @@ impl Walk<'_, '_> {
         }
 
         if self.photons.is_some() {
-            let lit = |lane: &usize| from_light(*lane).frame.n.dot(packet.rays[*lane].direction) < 0.0;
+            let lit = |lane: &usize| lit_normal(*lane).dot(packet.rays[*lane].direction) < 0.0;
             for lane in each(packet.lanes).filter(lit) {
                 self.leave_photon(&packet.alone(lane), at[lane].0);
             }
@@ -353,11 +353,12 @@ impl Walk<'_, '_> {
                     _ => 0.0,
                 }),
             };
-            let normals = std::array::from_fn(|lane| from_light(lane).frame.n);
+            let normals = std::array::from_fn(lit_normal);
             self.scatter_together(packet, lane, &reflected, &normals, at, numbers);
             return;
         }
-        let (at, view, mut beam) = (place(lane), from_light(lane), packet.alone(lane));
+        let (at, mut beam) = (place(lane), packet.alone(lane));
+        let view = at.seen_from(at.came);
         beam.power *= LANES as f32;
         beam.chosen = true;
         let bsdf = material.bsdf(&texture_point(lane), beam.nm, false);

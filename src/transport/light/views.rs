@@ -47,8 +47,12 @@ impl Place<'_> {
 
     /// The surface to those whence the light came, to whom it has been found to be `leaf`.
     pub fn of_leaf(&self, leaf: &Leaf) -> View {
-        let shadowing = leaf.slopes.shadowing(self.came) as f32;
-        View { frame: leaf.frame, shadowing, way: (seen_normal(self.surface, self.came), leaf.turned) }
+        self.resolved(leaf, seen_normal(self.surface, self.came))
+    }
+
+    /// The normal to those in the direction `viewer`, of a material that is not made of others.
+    pub fn normal_from(&self, viewer: DVec3) -> DVec3 {
+        self.on_lit_side(seen_normal(self.surface, viewer))
     }
 
     /// Whether it is the same to all.
@@ -74,30 +78,30 @@ impl Place<'_> {
         let normals = [Some(shading_normal), second.then_some(normal)];
         let turns = move |normal| (0..1u8 << turning).map(move |turned| (normal, turned));
         let ways = normals.into_iter().flatten().flat_map(turns);
-        let view = |way: Way| match way == own.way {
-            true => *own,
-            false => self.view(way.0, self.came, Turns::Given(way.1)),
-        };
-        ways.map(view)
+        ways.map(|way| if way == own.way { *own } else { self.view(way.0, self.came, Turns::Given(way.1)) })
     }
 
     #[inline]
     fn view(&self, normal: DVec3, viewer: DVec3, turns: Turns) -> View {
-        let Place { scene, hit, surface, came, .. } = *self;
+        let Place { scene, hit, surface, .. } = *self;
         let leaf = self.part_of.and_then(|(compound, u, _)| {
             let at = &hit.texture_point(surface);
             compound.resolve_as(&Vertex { scene, hit, surface, at, wo: viewer }, normal, turns, u)
         });
-        match leaf {
-            Some(leaf) => {
-                let shadowing = leaf.slopes.shadowing(came) as f32;
-                View { frame: leaf.frame, shadowing, way: (normal, leaf.turned) }
-            }
-            None => {
-                let flip = self.two_sided && came.dot(surface.normal) < 0.0;
-                let frame = Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent);
-                View { frame, shadowing: 1.0, way: (normal, 0) }
-            }
+        if let Some(leaf) = leaf {
+            return self.resolved(&leaf, normal);
         }
+        let frame = Frame::from_normal_and_tangent(self.on_lit_side(normal), surface.tangent);
+        View { frame, shadowing: 1.0, way: (normal, 0) }
+    }
+
+    fn resolved(&self, leaf: &Leaf, normal: DVec3) -> View {
+        let shadowing = leaf.slopes.shadowing(self.came) as f32;
+        View { frame: leaf.frame, shadowing, way: (normal, leaf.turned) }
+    }
+
+    /// A normal, turned to the light where the material is the same from both sides.
+    fn on_lit_side(&self, normal: DVec3) -> DVec3 {
+        if self.two_sided && self.came.dot(self.surface.normal) < 0.0 { -normal } else { normal }
     }
 }

@@ -165,16 +165,8 @@ impl Export<'_> {
     /// A material and all that it is made of.
     fn made_of<'m>(&'m self, material: &'m MaterialRef) -> Vec<&'m Material> {
         let Some(material) = self.meant(material) else { return Vec::new() };
-        let inner: &[Option<&MaterialRef>] = match material {
-            Material::Mask(m) => &[Some(&m.material)],
-            Material::Blend(m) => &[Some(&m.first), Some(&m.second)],
-            Material::TwoSided(m) => &[Some(&m.front), m.back.as_deref()],
-            Material::Bump(m) => &[Some(&m.material)],
-            Material::NormalMap(m) => &[Some(&m.material)],
-            _ => &[],
-        };
-        let inner = inner.iter().flatten().flat_map(|part| self.made_of(part));
-        [material].into_iter().chain(inner).collect()
+        let inner = material.inner().into_iter().flat_map(|part| self.made_of(part));
+        std::iter::once(material).chain(inner).collect()
     }
 
     /// Whether a material throws all light as a smooth mirror or glass does.

@@ -70,8 +70,7 @@ pub fn export(scene: &SceneDescription, path: &Path) -> Exported {
     let (losses, files) = (Vec::new(), Vec::new());
     let (ids, mentioned) = (BTreeSet::new(), BTreeSet::new());
     let xml = Xml::default();
-    let mut export =
-        Export { scene, root, sources, directory, stem, ids, mentioned, xml, losses, files, sharp: false, open: false };
+    let mut export = Export { scene, root, sources, directory, stem, ids, mentioned, xml, losses, files };
     export.scene();
     export.missing_light();
     let Export { xml, mut losses, files, .. } = export;
@@ -93,10 +92,6 @@ struct Export<'a> {
     xml: Xml,
     losses: Vec<Loss>,
     files: Vec<(String, Vec<u8>)>,
-    /// Whether a shape is a smooth mirror or of glass.
-    sharp: bool,
-    /// Whether a shape lets light straight through.
-    open: bool,
 }
 
 /// Settings that are about the work and the files, not about the light: Mitsuba has other words for
@@ -157,10 +152,12 @@ impl<'a> Export<'a> {
 
     /// Says which light Mitsuba's integrators do not know.
     fn missing_light(&mut self) {
+        let mut shapes = self.scene.shapes.iter().chain(self.scene.groups.values().flatten());
         let path = match &self.scene.integrator {
             Integrator::Path(path) => path,
             Integrator::LightTracer(tracer) => {
-                if self.open && tracer.max_depth.is_some() && !tracer.count_crossings {
+                let open = shapes.any(|shape| self.is_open(&shape.material));
+                if open && tracer.max_depth.is_some() && !tracer.count_crossings {
                     let what = "shorter paths where panes, masks and boundaries end a segment";
                     self.lose("integrator.light_tracer.count_crossings", what);
                 }
@@ -170,7 +167,8 @@ impl<'a> Export<'a> {
         };
         let delta = |light: &Light| !matches!(light, Light::Constant(_) | Light::Environment(_));
         let traced = path.delta_caustics && self.scene.render.techniques.light_tracing != Technique::Off;
-        if traced && self.sharp && self.scene.lights.iter().any(delta) {
+        let sharp = shapes.any(|shape| self.is_sharp(&shape.material));
+        if traced && sharp && self.scene.lights.iter().any(delta) {
             self.lose(
                 "integrator.path.delta_caustics",
                 "no light that mirrors and glass throw of lights without extent",

@@ -170,8 +170,6 @@ impl Export<'_> {
         if shape.flip_normals != (mirrored && flat) {
             self.xml.value("boolean", "flip_normals", true);
         }
-        self.sharp |= self.is_sharp(&shape.material);
-        self.open |= self.is_open(&shape.material);
         self.material_ref(&format!("{field}.material"), &shape.material);
         if let Some(emission) = &shape.emission {
             self.area(shape, emission);
