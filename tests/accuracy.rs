@@ -2,9 +2,10 @@
 
 mod common;
 
-use abbe::batch::frame::{self, FrameJob};
+use abbe::batch::frame::{self, Frame, FrameJob};
 use abbe::film::error::ErrorEstimate;
 use abbe::film::filter::{Filter, FilterSampler};
+use abbe::math::statistics::Moments;
 use abbe::spectrum::ColourSpace;
 use common::{Bench, bench_with};
 use std::sync::atomic::AtomicBool;
@@ -76,10 +77,14 @@ struct Picture {
     error: ErrorEstimate,
 }
 
-fn picture(bench: &Bench, seed: u64) -> Picture {
+fn frame_of(bench: &Bench, seed: u64) -> Frame {
     let filter = FilterSampler::new(Filter::Box).unwrap();
     let job = FrameJob { seed, ..bench.prepared.job(&filter) };
-    let frame = frame::render(&job, &|_| {}, &AtomicBool::new(false)).unwrap();
+    frame::render(&job, &|_| {}, &AtomicBool::new(false)).unwrap()
+}
+
+fn picture(bench: &Bench, seed: u64) -> Picture {
+    let frame = frame_of(bench, seed);
     let image = frame.resolve(&ColourSpace::Rec709.matrix_from_xyz());
     let rgb = (0..image.window.pixels()).flat_map(|i| image.rgb.each_ref().map(|c| f64::from(c[i]))).collect();
     Picture { rgb, error: frame.milestones.last().unwrap().error.unwrap() }
@@ -149,4 +154,42 @@ fn a_picture_that_has_not_converged_says_so() {
     let fog = kinds.iter().find(|kind| kind.name == "fog").unwrap();
     let bench = bench_with(&format!("{STAGE}{}", fog.rest).replace("SAMPLES", "8"), &[]);
     assert!((0..10).all(|seed| !picture(&bench, seed).error.valid));
+}
+
+/// In three bands of direct light, and of light that comes through a ball which parts wavelengths: what pixels say of
+/// their error is how far they lie apart over the seeds. The picture of a seed says a variance v of each pixel, and has
+/// (x − m)² n/(n − 1) of it, with m the mean over the n seeds; summed over the pixels, which light from the lights makes depend on
+/// each other, the two have the same mean. Their difference is independent from seed to seed, so that its scatter tells the standard error
+/// of its mean: asked for are 4 of them, and that they are less than a tenth of the variance itself, so that errors told wrong by
+/// a quarter of themselves would show. A band is the same whether its error is asked for or not.
+#[test]
+fn bands_know_their_errors() {
+    const SEEDS: u64 = 48;
+    const BANDS: &str = "height: 24, bands: [{name: blue, response: {table: [[420, 1], [500, 1]]}}, \
+                         {name: green, response: {table: [[500, 1], [600, 1]]}}, {name: all, response: 1}]";
+    let kinds = kinds();
+    for name in ["direct", "dispersive"] {
+        let kind = kinds.iter().find(|kind| kind.name == name).unwrap();
+        let yaml = format!("{STAGE}{}", kind.rest).replace("SAMPLES", "32").replace("height: 24", BANDS);
+        let bench = bench_with(&format!("{yaml}output: {{exr: {{stderr: true}}}}\n"), &[]);
+        let plain = frame_of(&bench_with(&yaml, &[]), 0);
+        let frames: Vec<Frame> = (0..SEEDS).map(|seed| frame_of(&bench, seed)).collect();
+        for band in 0..3 {
+            let values: Vec<Vec<f32>> = frames.iter().map(|frame| frame.layer(band)).collect();
+            assert_eq!(values[0], plain.layer(band), "{name}: the band itself");
+            assert!(plain.layer_error(band).iter().all(|e| e.is_nan()), "{name}: nobody asked");
+            let n = SEEDS as f64;
+            let mean = |i: usize| values.iter().map(|x| f64::from(x[i])).sum::<f64>() / n;
+            let means: Vec<f64> = (0..values[0].len()).map(mean).collect();
+            let found = |x: &Vec<f32>| -> f64 {
+                x.iter().zip(&means).map(|(x, m)| (f64::from(*x) - m).powi(2) * n / (n - 1.0)).sum()
+            };
+            let stated = |frame: &Frame| -> f64 { frame.layer_error(band).iter().map(|e| f64::from(*e).powi(2)).sum() };
+            let variance = values.iter().map(found).sum::<f64>() / n;
+            let difference: Moments = frames.iter().zip(&values).map(|(f, x)| stated(f) - found(x)).collect();
+            let (ratio, sharp) = (difference.mean / variance, difference.standard_error() / variance);
+            println!("{name}, band {band}: stated beyond found {ratio:.3} ± {sharp:.3}");
+            assert!(ratio.abs() < 4.0 * sharp && sharp < 0.1, "{name}, band {band}: {ratio} ± {sharp}");
+        }
+    }
 }

@@ -229,6 +229,41 @@ fn a_spectral_file_is_light_again() {
     }
 }
 
+/// Bands of the picture and of the spectral file have their standard errors beside them, as data; a picture without a wish for
+/// them has none.
+#[test]
+fn bands_stand_beside_their_standard_errors() {
+    let place = TempDir::new().unwrap();
+    let path = |name: &str| place.path().join(name);
+    let parts = |exr: &str| {
+        let text = format!(
+            "camera: {{origin: [0, 1, 5], target: [0, 1, 0], fov_deg: 40}}\n\
+             image: {{width: 6, height: 4, bands: [{{name: red, response: 1}}, {{name: uv.a, response: 2}}]}}\n\
+             render: {{samples: 8}}\noutput: {{exr: {{{exr}}}, spectral: {{bands: 1}}}}\n\
+             shapes: [{{plane: {{normal: [0, 1, 0]}}}}, {{sphere: {{center: [0, 4, 0], radius: 1, emission: 5}}}}]\n"
+        );
+        common::write(&path("s.yaml"), text.as_bytes());
+        let overrides = Overrides { output: Some(path("out.exr")), ..Overrides::default() };
+        let report = batch::render_batch(&path("s.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+        ["out.exr", "out.spectral.exr"].map(|name| read_exr(&path(name)).unwrap().parts.remove(0))
+    };
+    let names = |part: &ExrPart| part.channels.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    let [picture, spectral] = parts("precision: float, stderr: true");
+    assert_eq!(names(&picture), ["red", "stderr.red", "stderr.uv.a", "uv.a"]);
+    let bands = ["S0.550,000000nm", "stderr.S0.550,000000nm"];
+    assert_eq!(names(&spectral), ["B", "G", "R", bands[0], bands[1]]);
+    // The second band is twice the first, and so is its error.
+    let twice = |name: &str| plane(&picture, name).iter().map(|x| 2.0 * x).collect::<Vec<_>>();
+    assert_eq!(
+        (twice("red"), twice("stderr.red")),
+        (plane(&picture, "uv.a").into(), plane(&picture, "stderr.uv.a").into())
+    );
+    assert!(plane(&spectral, bands[1]).iter().any(|e| *e > 0.0));
+    let [picture, spectral] = parts("precision: float");
+    assert_eq!((names(&picture).len(), names(&spectral).len()), (2, 4));
+}
+
 /// A wall of measured reflectance under a white sky, in the bands of the measurement.
 #[test]
 fn a_spectral_file_is_paint() {

@@ -6,23 +6,23 @@ use super::adaptive;
 use super::frame::{self, Frame};
 use super::prepare::{Prepared, colour_space, window};
 use super::report::{Developed, SceneReport};
-use super::{contact, develop};
+use super::{contact, develop, layers};
 use crate::description::{self, HeaderValue, LayerContent, Output, SceneDescription, Shutter};
 use crate::error::Result;
 use crate::film::Window;
 use crate::film::accumulate::PixelCells;
 use crate::film::cryptomatte::Matte;
-use crate::film::exr::{self, Attribute, ChannelData, ColourEncoding, ExrImage, LayerPlane};
+use crate::film::exr::{self, Attribute, ChannelData, ColourEncoding, ExrImage, LayerPlane, stderr_name};
 use crate::film::heat;
+use crate::film::layers::{Kept, Layout};
 use crate::film::png::{self, PngSettings};
 use crate::film::resolve::Image;
 use crate::scene::Scene;
 use crate::scene::camera::{Camera, Projection};
 use crate::spectrum::{ColourSpace, observer};
-use crate::transport::layers::Channel;
+use crate::transport::layers::{Channel, Holds};
 use crate::transport::plan::{Effect, Integrator};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -133,7 +133,7 @@ impl Finish {
         let asked = |content: &LayerContent| description.layers.iter().any(|layer| layer.content == *content);
         // Where the files go is no matter of what is in them.
         let mut output = Output { dir: PathBuf::new(), contact_sheet: true, ..description.output.clone() };
-        output.exr.stderr |= asked(&LayerContent::StandardError);
+        output.exr.stderr = layers::wants_errors(description);
         Finish {
             name: scene.name.clone(),
             frame_number: description.frame,
@@ -162,6 +162,14 @@ impl Finish {
             mattes: mattes(description, scene),
             lens: Lens::of(&scene.camera, description.camera.shutter.as_ref()),
         }
+    }
+
+    /// How the sums of the layers are kept: those of bands by replicate where their standard errors are wanted.
+    #[must_use]
+    pub fn layout(&self) -> Layout {
+        let bands = self.bands || self.output.spectral.is_some();
+        let kept = if self.output.exr.stderr && bands { Kept::ByReplicate } else { Kept::Together };
+        Layout { channels: self.layers.len(), kept }
     }
 
     /// Of the layers, the bands of the spectral file.
@@ -365,17 +373,20 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         description::Compression::Dwab => exr::Compression::Dwab(exr.dwa_level as f32),
     };
     let error = if exr.stderr { exr::StandardError::Write } else { exr::StandardError::Leave };
-    if exr.stderr && finish.bands {
-        report.notes.push("standard errors are those of colours: for bands none are written".to_owned());
-    }
-    let layer = |(i, channel): (usize, &Channel)| LayerPlane {
-        name: channel.name.clone(),
-        plane: if channel.once { frame.layer_once(i) } else { frame.layer(i) },
-        light: channel.light,
+    let layer = |(i, channel): (usize, &Channel)| {
+        let own = LayerPlane {
+            name: channel.name.clone(),
+            plane: if channel.holds == Holds::Once { frame.layer_once(i) } else { frame.layer(i) },
+            light: matches!(channel.holds, Holds::Band | Holds::Light),
+        };
+        let of_band = exr.stderr && channel.holds == Holds::Band;
+        let error =
+            of_band.then(|| LayerPlane { name: stderr_name(&channel.name), plane: frame.layer_error(i), light: false });
+        [Some(own), error].into_iter().flatten()
     };
     let own = finish.layers.iter().enumerate().filter(|(i, _)| !finish.spectral_channels().contains(i));
-    let mut beauty =
-        exr::beauty(image, finish.base(), own.map(layer).collect(), finish.colour(), precision, error, compression);
+    let own = own.flat_map(layer).collect();
+    let mut beauty = exr::beauty(image, finish.base(), own, finish.colour(), precision, error, compression);
     if frame.film.layers.invalid.total() > 0 {
         report.notes.push(format!("{} samples of layers could not be added", frame.film.layers.invalid.total()));
     }
@@ -434,7 +445,7 @@ pub fn places(path: &Path) -> [PathBuf; 3] {
 
 /// Writes bands of the spectrum as Fichet, Pacanowski and Wilkie have them ("An OpenEXR Layout for Spectral Images", JCGT
 /// 10(3), 2021, layout 1.0): `S0.<nm>nm` is the mean spectral radiance of a band around that wavelength, W·m⁻²·sr⁻¹·nm⁻¹;
-/// R, G and B show them.
+/// R, G and B show them, and `stderr.S0.<nm>nm` is the standard error of each value where those are wanted.
 fn write_spectral(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report: &SceneReport) -> Result<()> {
     match spectral_image(finish, frame, image, report) {
         Some(mut file) => write_sealed(path, &mut file),
@@ -449,6 +460,9 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
         return None;
     }
     let plane = |i: usize| (finish.layers[i].name.clone(), ChannelData::F32(frame.layer(i)));
+    let error = |i: usize| (stderr_name(&finish.layers[i].name), ChannelData::F32(frame.layer_error(i)));
+    let errors: Vec<(String, ChannelData)> =
+        if finish.output.exr.stderr { channels.clone().map(error).collect() } else { Vec::new() };
     let preview = ["R", "G", "B"].iter().zip(&image.rgb);
     let preview = preview.map(|(name, plane)| ((*name).to_owned(), ChannelData::F32(plane.clone())));
     let mut attributes = attributes(finish, frame, report);
@@ -457,10 +471,10 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
     Some(ExrImage {
         frame: image.frame,
         window: image.window,
-        channels: channels.map(plane).chain(preview).collect(),
+        data: errors.iter().map(|(name, _)| name.clone()).collect(),
+        channels: channels.map(plane).chain(preview).chain(errors).collect(),
         colour: Some(finish.colour()),
         attributes,
-        data: BTreeSet::new(),
         compression: exr::Compression::Zip,
         layout: exr::Layout::Single,
     })

@@ -12,6 +12,7 @@ use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, TileBuffer};
 use crate::film::error::{self, ErrorEstimate, NoEstimate};
 use crate::film::filter::FilterSampler;
+use crate::film::layers::Layout;
 use crate::film::resolve::{self, Image, Splats};
 use crate::film::run::{LONGEST, LayerRun, Run};
 use crate::math::sampler::Octet;
@@ -160,6 +161,18 @@ impl Frame {
         plane
     }
 
+    /// The standard errors of [`Frame::layer`], where sums are kept by replicate; else NaN.
+    #[must_use]
+    pub fn layer_error(&self, channel: usize) -> Vec<f32> {
+        let mut variances: Vec<f64> = self.film.layers.variances_of(channel, None).collect();
+        if let Some(splats) = self.splats.as_ref().filter(|s| channel < s.film.layers.channels()) {
+            // Two independent estimates of two parts of the light: variances add.
+            let light = splats.film.layers.variances_of(channel, Some(splats.paths));
+            variances.iter_mut().zip(light).for_each(|(all, own)| *all += own);
+        }
+        variances.into_iter().map(|v| v.sqrt() as f32).collect()
+    }
+
     /// Samples that were dropped.
     #[must_use]
     pub fn invalid(&self) -> InvalidCounts {
@@ -199,7 +212,7 @@ pub(super) fn render_unit(
     let shot = Shot { scene, plan, filter, seed, photons };
     let window = tile.window();
     let mut memory = Samples::default();
-    let mut layer_run = LayerRun::default();
+    let mut layer_runs: [LayerRun; REPLICATES] = std::array::from_fn(|_| LayerRun::default());
     let mut wanted = Vec::new();
     let middles = plan.layers.layers.iter().any(|layer| matches!(layer.source, Source::Middle(_)));
     for y in window.y..window.y + window.height as i32 {
@@ -223,7 +236,7 @@ pub(super) fn render_unit(
                 wanted.extend(indices.map(address));
             }
             for run in wanted.chunks(LONGEST as usize) {
-                render_run((&shot, moments), tile, &mut memory, &mut layer_run, [x, y], run);
+                render_run((&shot, moments), tile, &mut memory, &mut layer_runs, [x, y], run);
             }
         }
     }
@@ -235,15 +248,16 @@ fn render_run(
     (shot, moments): (&Shot, &[Scene]),
     tile: &mut TileBuffer,
     memory: &mut Samples,
-    layers: &mut LayerRun,
+    layers: &mut [LayerRun; REPLICATES],
     pixel: [i32; 2],
     samples: &[(u32, u32)],
 ) {
     let index = tile.window().index(pixel).expect("the pixel lies in the tile");
-    let channels = tile.layers.channels();
+    let Layout { channels, kept } = tile.layers.layout();
+    let layers = &mut layers[..kept.sets()];
     let unit = light_unit(shot.scene);
     let mut runs = [Run::default(); REPLICATES];
-    layers.reset(channels);
+    layers.iter_mut().for_each(|run| run.reset(channels));
     // Overscan makes negative coordinates; as addresses they wrap.
     let address = pixel.map(|x| x as u32);
     // Those that are rendered together see one moment.
@@ -258,10 +272,10 @@ fn render_run(
                 let pixels = tile.window().pixels();
                 tile.layers.mattes.add(index, pixels, number, 1);
             }
-            if channels > 0 && !layers.add(sample.weight, values) {
-                tile.layers.add(index, sample.weight, values);
-            }
             let replicate = octet[lane].0 as usize % REPLICATES;
+            if channels > 0 && !layers[kept.set(replicate)].add(sample.weight, values) {
+                tile.layers.add(index, replicate, sample.weight, values);
+            }
             record(tile, &mut runs[replicate], unit, pixel, replicate, sample);
         });
     }
@@ -269,7 +283,9 @@ fn render_run(
         tile.add_run(pixel, replicate, run);
     }
     if channels > 0 {
-        tile.layers.add_run(index, layers);
+        for (replicate, run) in layers.iter().enumerate() {
+            tile.layers.add_run(index, replicate, run);
+        }
     }
 }
 

@@ -3,10 +3,17 @@
 use super::prepare::{colour_space, integrator};
 use crate::description::{self, LayerContent, SceneDescription};
 use crate::error::Result;
+use crate::film::layers::Kept;
 use crate::scene::Scene;
 use crate::transport::layers::{Form, Layer, LayerPlan, Quantity, Source};
 use crate::transport::middle::Middle;
 use crate::transport::ways::{Way, Ways};
+
+/// Whether standard errors are to be written, as a setting of the file or as a layer.
+pub(super) fn wants_errors(description: &SceneDescription) -> bool {
+    let asked = |layer: &description::Layer| layer.content == LayerContent::StandardError;
+    description.output.exr.stderr || description.layers.iter().any(asked)
+}
 
 /// The further channels of the picture.
 pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) -> Result<LayerPlan> {
@@ -16,6 +23,9 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
         sample_distance: 1.0 / f64::from(samples).sqrt(),
         ..LayerPlan::default()
     };
+    if wants_errors(description) && !scene.bands.is_empty() {
+        plan.kept = Kept::ByReplicate;
+    }
     for (i, band) in scene.bands.iter().enumerate() {
         plan.layers.push(Layer { name: band.name.clone(), source: Source::Band(i), squares: None });
     }

@@ -17,6 +17,7 @@ use super::frame::{FrameJob, Milestone, lock, render_unit};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::{Film, REPLICATES, TileBuffer};
+use crate::film::layers::Layout;
 use crate::transport::light::LightPaths;
 use crate::transport::merge::Collection;
 pub use lights::SplatFilm;
@@ -217,7 +218,7 @@ pub struct Part<'a> {
     splats: Option<(LightPaths<'a>, Mutex<SplatFilm>)>,
     tiles: Vec<Tile>,
     lights: Mutex<LightsDone>,
-    layers: usize,
+    layers: Layout,
     /// Once the samples that all pixels have are there.
     allocation: OnceLock<Allocation>,
 }
@@ -228,7 +229,7 @@ impl<'a> Part<'a> {
     /// # Errors
     /// [`Error::Render`] if the memory cannot be had.
     pub fn new(job: &'a FrameJob<'a>, share: Share) -> Result<Part<'a>> {
-        let layers = job.plan.layers.channels().len();
+        let layers = job.plan.layers.layout();
         let exponent = job.scene.light_exponent;
         let window = share.rows(job.window);
         let film = |window, layers| {
@@ -237,7 +238,7 @@ impl<'a> Part<'a> {
         };
         let splats = match light_paths(job) {
             Some(paths) => {
-                let film = film(job.window, job.plan.layers.light_channels())?;
+                let film = film(job.window, Layout { channels: job.plan.layers.light_channels(), ..layers })?;
                 Some((paths, Mutex::new(SplatFilm { film, paths: [0; REPLICATES] })))
             }
             None => None,

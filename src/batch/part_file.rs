@@ -3,7 +3,8 @@
 //! [`crate::film::exr::part`] says how sums become channels. Their names: `camera0.X` is the sum of X in replicate 0, in
 //! units of 2⁻⁶⁴ of light over 2^`exponent`; `camera0.A` that of coverage, in 2⁻³⁴; `camera0.n` counts its samples,
 //! `camera0.dropped` those that were dropped; `lights0.X` … are the same of paths from the lights. `cameraLayers.3` is
-//! the sum of the fourth further channel, `cameraLayers.n` its samples; `cameraMattes.0` is the number of what covers the
+//! the sum of the fourth further channel, `cameraLayers.n` its samples, or `cameraLayers0.3` and `cameraLayers0.n` those of
+//! replicate 0 where standard errors of layers are wanted; `cameraMattes.0` is the number of what covers the
 //! pixel, times 2³², and how many samples met it, `cameraMattes.1` of the next. A value is the sum over replicates over the count
 //! over replicates; of paths from the lights over `splat_paths` instead.
 //!
@@ -18,6 +19,7 @@ use crate::film::Window;
 use crate::film::accumulate::{Cell, Film, InvalidCounts, REPLICATES, SAMPLES_LIMIT};
 use crate::film::exr::Attribute;
 use crate::film::exr::part::{Numbers, PartFile, Plane, write_part};
+use crate::film::layers::{Kept, Layout};
 use crate::scene::watch::Counts;
 use crate::transport::plan::EffectPlan;
 use serde::{Deserialize, Serialize};
@@ -131,13 +133,14 @@ enum Kind {
     Alpha(usize),
     Count(usize),
     Dropped(usize),
-    Layer(usize),
-    LayerCount,
+    /// Of a set of sums, see [`LayerSums::place`](crate::film::layers::LayerSums::place), and a channel.
+    Layer(usize, usize),
+    LayerCount(usize),
     Matte(usize),
 }
 
 /// The planes of one film, with their names.
-fn kinds(prefix: &str, layers: usize) -> Vec<(Kind, String)> {
+fn kinds(prefix: &str, layers: Layout) -> Vec<(Kind, String)> {
     let mut all = Vec::new();
     for r in 0..REPLICATES {
         for (c, letter) in ["X", "Y", "Z"].iter().enumerate() {
@@ -147,15 +150,21 @@ fn kinds(prefix: &str, layers: usize) -> Vec<(Kind, String)> {
         all.push((Kind::Count(r), format!("{prefix}{r}.n")));
         all.push((Kind::Dropped(r), format!("{prefix}{r}.dropped")));
     }
-    all.extend((0..layers).map(|i| (Kind::Layer(i), format!("{prefix}Layers.{i}"))));
-    if layers > 0 {
-        all.push((Kind::LayerCount, format!("{prefix}Layers.n")));
+    if layers.channels > 0 {
+        for set in 0..layers.kept.sets() {
+            let of = match layers.kept {
+                Kept::Together => format!("{prefix}Layers"),
+                Kept::ByReplicate => format!("{prefix}Layers{set}"),
+            };
+            all.extend((0..layers.channels).map(|i| (Kind::Layer(set, i), format!("{of}.{i}"))));
+            all.push((Kind::LayerCount(set), format!("{of}.n")));
+        }
     }
     all
 }
 
 /// The planes of a part: those of the lights follow those of the camera.
-fn all_kinds(camera_layers: usize, mattes: usize, light_layers: Option<usize>) -> (usize, Vec<(Kind, String)>) {
+fn all_kinds(camera_layers: Layout, mattes: usize, light_layers: Option<Layout>) -> (usize, Vec<(Kind, String)>) {
     let mut all = kinds("camera", camera_layers);
     all.extend((0..mattes).map(|i| (Kind::Matte(i), format!("{MATTES}{i}"))));
     let own = all.len();
@@ -195,8 +204,8 @@ impl Numbers for Sums<'_> {
                 Kind::Alpha(r) => cells[i][r].alpha.into(),
                 Kind::Count(r) => cells[i][r].count.into(),
                 Kind::Dropped(r) => cells[i][r].dropped.into(),
-                Kind::Layer(c) => sums[(start + i) * channels + c].0,
-                Kind::LayerCount => counts[start + i].into(),
+                Kind::Layer(set, c) => sums[film.layers.place(start + i, set) * channels + c].0,
+                Kind::LayerCount(set) => counts[film.layers.place(start + i, set)].into(),
                 Kind::Matte(rank) => {
                     let of = film.layers.mattes.of(start + i).get(rank);
                     of.map_or(0, |&(number, count)| i128::from(number) << 32 | i128::from(count))
@@ -220,8 +229,8 @@ pub fn write(
 ) -> Result<()> {
     let share = part.share();
     part.look(|film, splats| {
-        let layers = splats.map(|s| s.film.layers.channels());
-        let (own, kinds) = all_kinds(film.layers.channels(), film.layers.mattes.most(), layers);
+        let layers = splats.map(|s| s.film.layers.layout());
+        let (own, kinds) = all_kinds(film.layers.layout(), film.layers.mattes.most(), layers);
         let window = splats.map_or(film.window(), |s| s.film.window());
         let sums = Sums { window, film, splats: splats.map(|s| &s.film), own, kinds };
         let none = InvalidCounts::default();
@@ -472,12 +481,14 @@ impl Written {
             Some(_) => Some(SplatFilm { film: film(finish.window, self.light_layers())?, paths: [0; REPLICATES] }),
             None => None,
         };
-        Ok((film(window, finish.layers.len())?, splats))
+        Ok((film(window, finish.layout())?, splats))
     }
 
     /// Channels of bands and of light by its ways come first among the layers, and paths from the lights have those alone.
-    fn light_layers(&self) -> usize {
-        self.header.planes.iter().filter(|p| p.name.starts_with("lightsLayers.") && !p.name.ends_with(".n")).count()
+    fn light_layers(&self) -> Layout {
+        let kept = self.header.finish.layout().kept;
+        let sums = |p: &&Plane| p.name.starts_with("lightsLayers") && !p.name.ends_with(".n");
+        Layout { channels: self.header.planes.iter().filter(sums).count() / kept.sets(), kept }
     }
 
     /// Reads all, and keeps nothing.
@@ -497,7 +508,7 @@ impl Written {
         let damaged = |what: &str| Error::input(&self.path, format!("the part is damaged: {what}"));
         let light_layers = header.splat_paths.map(|_| self.light_layers());
         let mattes = header.planes.iter().filter(|p| p.name.starts_with(MATTES)).count();
-        let (own, kinds) = all_kinds(header.finish.layers.len(), mattes, light_layers);
+        let (own, kinds) = all_kinds(header.finish.layout(), mattes, light_layers);
         if !kinds.iter().map(|(_, name)| name).eq(header.planes.iter().map(|plane| &plane.name)) {
             return Err(damaged("its planes are not those of the sums"));
         }
@@ -532,10 +543,10 @@ impl Written {
 fn add_row(film: &mut Film, kind: Kind, start: usize, row: &[i128]) -> Option<()> {
     let channels = film.layers.channels();
     match kind {
-        Kind::Layer(c) => {
-            let (sums, _) = film.layers.parts_mut();
+        Kind::Layer(set, c) => {
             for (i, x) in row.iter().enumerate() {
-                let sum = &mut sums[(start + i) * channels + c].0;
+                let place = film.layers.place(start + i, set);
+                let sum = &mut film.layers.parts_mut().0[place * channels + c].0;
                 *sum = sum.checked_add(*x)?;
             }
         }
@@ -546,9 +557,10 @@ fn add_row(film: &mut Film, kind: Kind, start: usize, row: &[i128]) -> Option<()
                 film.layers.mattes.add(start + i, pixels, number, count);
             }
         }
-        Kind::LayerCount => {
-            let (_, counts) = film.layers.parts_mut();
-            for (count, x) in counts[start..].iter_mut().zip(row) {
+        Kind::LayerCount(set) => {
+            for (i, x) in row.iter().enumerate() {
+                let place = film.layers.place(start + i, set);
+                let count = &mut film.layers.parts_mut().1[place];
                 *count = count_of(*count, *x)?;
             }
         }
@@ -559,7 +571,7 @@ fn add_row(film: &mut Film, kind: Kind, start: usize, row: &[i128]) -> Option<()
                     Kind::Alpha(_) => cell.alpha = cell.alpha.checked_add(i64::try_from(x).ok()?)?,
                     Kind::Count(_) => cell.count = count_of(cell.count, x)?,
                     Kind::Dropped(_) => cell.dropped = cell.dropped.saturating_add(u32::try_from(x).ok()?),
-                    Kind::Layer(_) | Kind::LayerCount | Kind::Matte(_) => {}
+                    Kind::Layer(..) | Kind::LayerCount(_) | Kind::Matte(_) => {}
                 }
                 Some(())
             };

@@ -172,7 +172,7 @@ fn check_files(prepared: &Prepared) -> Result<()> {
     let Prepared { description, scene, plan, .. } = prepared;
     names::check(&description.output.dir)
         .map_err(|message| Error::Config(description.fault("output.dir", &message)))?;
-    let one = Film::new(scene.camera.resolution, Window::full(1, 1))?.with_layers(plan.layers.channels().len());
+    let one = Film::new(scene.camera.resolution, Window::full(1, 1))?.with_layers(plan.layers.layout());
     let frame = Frame::of(one, None, 0, Duration::ZERO, false, true);
     let field = if description.layers.is_empty() { "output.exr" } else { "layers" };
     finish::check_files(&Finish::of(prepared), &frame).map_err(|message| {

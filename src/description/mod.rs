@@ -99,6 +99,7 @@
 //!                                   # frame
 //!   exr: {precision: half, compression: zips, stderr: false, channels: rgba, layout: single, dwa_level: 45,
 //!         attributes: {}, aces_container: false}     # half, float; none, zips, zip, piz, and with loss dwaa, dwab;
+//!                                   # stderr: standard errors of colours and of bands, stderr.R, stderr.NAME;
 //!                                   # rgba, rgb, xyza, xyz, luminance_alpha, luminance; single, multipart: each layer in
 //!                                   # a part of its own; attributes of the header by name, text or numbers, such as
 //!                                   # {owner: us, timeCode: "01:00:00:00"} (of frame 0)

@@ -63,8 +63,8 @@ pub struct Exr {
     /// Default `zips`.
     #[serde(default)]
     pub compression: Compression,
-    /// Also write the standard error of each pixel, `stderr.R`, `stderr.G`, `stderr.B`; default false. There is none of `bands`,
-    /// and a note says so.
+    /// Also write the standard error of each pixel, `stderr.R`, `stderr.G`, `stderr.B`; default false. Of bands, too:
+    /// `stderr.NAME`, and `stderr.S0.…nm` in the spectral file.
     #[serde(default)]
     pub stderr: bool,
     /// What a pixel holds; default `rgba`.

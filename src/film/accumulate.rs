@@ -18,7 +18,7 @@
 
 use crate::error::{Error, Result};
 use crate::film::Window;
-use crate::film::layers::LayerSums;
+use crate::film::layers::{LayerSums, Layout};
 use crate::film::run::Run;
 use crate::spectrum::Lanes;
 use rayon::prelude::*;
@@ -295,8 +295,8 @@ impl TileBuffer {
         &self.cells
     }
 
-    /// Empties the buffer and moves it to `window`, keeping its memory; `layers` further channels.
-    pub fn reset(&mut self, window: Window, layers: usize) {
+    /// Empties the buffer and moves it to `window`, keeping its memory; further channels are as `layers` says.
+    pub fn reset(&mut self, window: Window, layers: Layout) {
         self.window = window;
         self.cells.clear();
         self.cells.resize(window.pixels(), PixelCells::default());
@@ -381,10 +381,10 @@ impl Film {
         self.exponent
     }
 
-    /// The film with `channels` empty layers.
+    /// The film with empty layers.
     #[must_use]
-    pub fn with_layers(mut self, channels: usize) -> Film {
-        self.layers = LayerSums::new(channels, self.window.pixels());
+    pub fn with_layers(mut self, layout: Layout) -> Film {
+        self.layers = LayerSums::new(layout, self.window.pixels());
         self
     }
 

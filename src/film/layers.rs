@@ -2,18 +2,58 @@
 //! surfaces, light of other integrators, squares.
 //!
 //! A layer is a number a sample. Numbers are added exactly, as in [`accumulate`](super::accumulate), in one sum a
-//! pixel and channel and one count a pixel; a picture without layers has neither. What cannot be added is left out
-//! of all layers of its pixel and counted by cause; colour does not hear of it.
+//! pixel and channel and one count a pixel, or where their standard errors are wanted in one a replicate; a picture without
+//! layers has neither. What cannot be added is left out of all layers of its pixel and counted by cause; colour does not
+//! hear of it.
 
 use super::Window;
-use super::accumulate::{Invalid, InvalidCounts, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum};
+use super::accumulate::{Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum};
 use super::mattes::Mattes;
 use super::run::LayerRun;
 
-/// Sums of all layers of a window, pixel by pixel in raster order.
+/// How many sums a pixel has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Layout {
+    /// Numbers of a sample.
+    pub channels: usize,
+    /// Whose they are.
+    pub kept: Kept,
+}
+
+/// Which samples of a pixel share their sums.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kept {
+    /// All of them.
+    #[default]
+    Together,
+    /// Those of a replicate, so that the spread of the replicates tells the error.
+    ByReplicate,
+}
+
+impl Kept {
+    /// How many sums a channel has.
+    #[must_use]
+    pub fn sets(self) -> usize {
+        match self {
+            Kept::Together => 1,
+            Kept::ByReplicate => REPLICATES,
+        }
+    }
+
+    /// Which of them a sample of `replicate` is in.
+    #[must_use]
+    pub fn set(self, replicate: usize) -> usize {
+        match self {
+            Kept::Together => 0,
+            Kept::ByReplicate => replicate,
+        }
+    }
+}
+
+/// Sums of all layers of a window, pixel by pixel in raster order, and in a pixel set by set.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LayerSums {
-    channels: usize,
+    layout: Layout,
     sums: Vec<Sum>,
     counts: Vec<u32>,
     /// Who covers the pixels.
@@ -23,41 +63,55 @@ pub struct LayerSums {
 }
 
 impl LayerSums {
-    /// Empty sums of `channels` numbers for each of `pixels`.
+    /// Empty sums for each of `pixels`.
     #[must_use]
-    pub fn new(channels: usize, pixels: usize) -> LayerSums {
+    pub fn new(layout: Layout, pixels: usize) -> LayerSums {
         let mut sums = LayerSums::default();
-        sums.reset(channels, pixels);
+        sums.reset(layout, pixels);
         sums
     }
 
     /// Empties the sums, keeping their memory.
-    pub fn reset(&mut self, channels: usize, pixels: usize) {
-        self.channels = channels;
+    pub fn reset(&mut self, layout: Layout, pixels: usize) {
+        self.layout = layout;
         self.sums.clear();
         self.counts.clear();
         self.mattes.clear();
         self.invalid = InvalidCounts::default();
-        if channels > 0 {
-            self.sums.resize(channels * pixels, Sum::default());
-            self.counts.resize(pixels, 0);
+        if layout.channels > 0 {
+            let sets = layout.kept.sets() * pixels;
+            self.sums.resize(layout.channels * sets, Sum::default());
+            self.counts.resize(sets, 0);
         }
     }
 
     /// The memory that they take.
     #[must_use]
-    pub fn bytes(channels: usize, pixels: usize) -> u64 {
-        let pixel = if channels == 0 { 0 } else { size_of::<Sum>() * channels + size_of::<u32>() };
-        pixels as u64 * pixel as u64
+    pub fn bytes(Layout { channels, kept }: Layout, pixels: usize) -> u64 {
+        let set = if channels == 0 { 0 } else { size_of::<Sum>() * channels + size_of::<u32>() };
+        pixels as u64 * kept.sets() as u64 * set as u64
+    }
+
+    /// How many numbers a sample has, and whose sums they are in.
+    #[must_use]
+    pub fn layout(&self) -> Layout {
+        self.layout
     }
 
     /// How many numbers a sample has.
     #[must_use]
     pub fn channels(&self) -> usize {
-        self.channels
+        self.layout.channels
     }
 
-    /// Sums pixel by pixel, the channels of one together, and the count of each pixel.
+    /// The place of the set in which samples of `replicate` of the pixel at `index` are: of its count, and over the channels
+    /// of its first sum.
+    #[must_use]
+    pub fn place(&self, index: usize, replicate: usize) -> usize {
+        index * self.layout.kept.sets() + self.layout.kept.set(replicate)
+    }
+
+    /// Sums set by set, the channels of one together, and the count of each set; [`LayerSums::place`] tells where.
     #[must_use]
     pub fn parts(&self) -> (&[Sum], &[u32]) {
         (&self.sums, &self.counts)
@@ -68,57 +122,59 @@ impl LayerSums {
         (&mut self.sums, &mut self.counts)
     }
 
-    /// Adds a sample of the pixel at `index`: its numbers times the filter's `weight`.
+    /// Adds a sample of `replicate` of the pixel at `index`: its numbers times the filter's `weight`.
     ///
     /// # Panics
     /// If there are not as many numbers as channels.
-    pub fn add(&mut self, index: usize, weight: f32, values: &[f32]) {
-        assert_eq!(values.len(), self.channels, "a number for each channel");
-        if self.channels == 0 {
+    pub fn add(&mut self, index: usize, replicate: usize, weight: f32, values: &[f32]) {
+        let channels = self.layout.channels;
+        assert_eq!(values.len(), channels, "a number for each channel");
+        if channels == 0 {
             return;
         }
         if let Some(cause) = values.iter().find_map(|x| fault(x * weight)) {
             self.invalid.record(cause);
             return;
         }
-        if self.counts[index] >= SAMPLES_LIMIT {
+        let place = self.place(index, replicate);
+        if self.counts[place] >= SAMPLES_LIMIT {
             self.invalid.record(Invalid::Overflow);
             return;
         }
-        let start = index * self.channels;
-        for (sum, x) in self.sums[start..start + self.channels].iter_mut().zip(values) {
+        for (sum, x) in self.sums[place * channels..][..channels].iter_mut().zip(values) {
             // The check above leaves nothing to refuse.
             let _ = sum.add(x * weight);
         }
-        self.counts[index] += 1;
+        self.counts[place] += 1;
     }
 
     /// Adds what stands in a pixel once, however many samples it has: the number of each of `channels`.
     pub fn add_once(&mut self, index: usize, values: impl IntoIterator<Item = (usize, f32)>) {
+        let start = self.place(index, 0) * self.layout.channels;
         for (channel, x) in values {
             match fault(x) {
                 Some(cause) => self.invalid.record(cause),
                 None => {
-                    let _ = self.sums[index * self.channels + channel].add(x);
+                    let _ = self.sums[start + channel].add(x);
                 }
             }
         }
     }
 
-    /// Adds the samples of a run to the pixel at `index`.
+    /// Adds the samples of a run to `replicate` of the pixel at `index`.
     ///
     /// # Panics
     /// If the run has other channels.
-    pub fn add_run(&mut self, index: usize, run: &LayerRun) {
-        if self.counts[index] + run.count() > SAMPLES_LIMIT {
+    pub fn add_run(&mut self, index: usize, replicate: usize, run: &LayerRun) {
+        let (place, channels) = (self.place(index, replicate), self.layout.channels);
+        if self.counts[place] + run.count() > SAMPLES_LIMIT {
             self.invalid.overflow += u64::from(run.count());
             return;
         }
-        let start = index * self.channels;
-        for (sum, part) in self.sums[start..start + self.channels].iter_mut().zip(run.sums()) {
+        for (sum, part) in self.sums[place * channels..][..channels].iter_mut().zip(run.sums()) {
             *sum += part;
         }
-        self.counts[index] += run.count();
+        self.counts[place] += run.count();
     }
 
     /// Adds the sums of `part`, which cover `inner`, to these, which cover `window` around it.
@@ -126,38 +182,83 @@ impl LayerSums {
     /// # Panics
     /// If the channels differ or `inner` reaches beyond `window`.
     pub fn merge(&mut self, window: Window, part: &LayerSums, inner: Window) {
-        assert_eq!(self.channels, part.channels, "sums of the same layers");
+        assert_eq!(self.layout, part.layout, "sums of the same layers");
         self.invalid += part.invalid;
         self.mattes.merge(window, &part.mattes, inner);
-        if self.channels == 0 {
+        let Layout { channels, kept } = self.layout;
+        if channels == 0 {
             return;
         }
-        for from in 0..inner.pixels() {
-            let (column, row) = (from % inner.width as usize, from / inner.width as usize);
+        for pixel in 0..inner.pixels() {
+            let (column, row) = (pixel % inner.width as usize, pixel / inner.width as usize);
             let place = [inner.x + column as i32, inner.y + row as i32];
             let to = window.index(place).expect("the part lies in the window");
-            if self.counts[to] + part.counts[from] > SAMPLES_LIMIT {
-                self.invalid.overflow += u64::from(part.counts[from]);
-                continue;
-            }
-            self.counts[to] += part.counts[from];
-            for c in 0..self.channels {
-                self.sums[to * self.channels + c] += part.sums[from * self.channels + c];
+            for set in 0..kept.sets() {
+                let (from, to) = (part.place(pixel, set), self.place(to, set));
+                if self.counts[to] + part.counts[from] > SAMPLES_LIMIT {
+                    self.invalid.overflow += u64::from(part.counts[from]);
+                    continue;
+                }
+                self.counts[to] += part.counts[from];
+                for c in 0..channels {
+                    self.sums[to * channels + c] += part.sums[from * channels + c];
+                }
             }
         }
     }
 
+    /// The sums of one channel, pixel by pixel: of each set, and how many samples are in it.
+    fn sets_of(&self, channel: usize) -> impl Iterator<Item = impl Iterator<Item = (Sum, u32)> + Clone> {
+        let Layout { channels, kept } = self.layout;
+        let pixels = self.sums.chunks_exact((channels * kept.sets()).max(1)).zip(self.counts.chunks_exact(kept.sets()));
+        pixels.map(move |(sums, counts)| {
+            let own = sums.iter().skip(channel).step_by(channels.max(1)).copied();
+            own.zip(counts.iter().copied())
+        })
+    }
+
+    /// The sum of one channel and how many samples are in it, pixel by pixel.
+    fn all_of(&self, channel: usize) -> impl Iterator<Item = (f64, u64)> {
+        self.sets_of(channel).map(|sets| {
+            let (sum, count) = sets.fold((Sum::default(), 0), |(mut all, n), (own, count)| {
+                all += own;
+                (all, n + u64::from(count))
+            });
+            (sum.value(), count)
+        })
+    }
+
     /// The sums of one channel, pixel by pixel.
     pub fn sums_of(&self, channel: usize) -> impl Iterator<Item = f64> {
-        self.sums.iter().skip(channel).step_by(self.channels.max(1)).map(|sum| sum.value())
+        self.all_of(channel).map(|(sum, _)| sum)
     }
 
     /// The means of one channel, pixel by pixel; 0 where there is no sample.
     #[must_use]
     pub fn plane(&self, channel: usize) -> Vec<f32> {
-        let sums = self.sums.iter().skip(channel).step_by(self.channels.max(1));
-        sums.zip(&self.counts).map(|(sum, &n)| if n == 0 { 0.0 } else { (sum.value() / f64::from(n)) as f32 }).collect()
+        self.all_of(channel).map(|(sum, n)| if n == 0 { 0.0 } else { (sum / n as f64) as f32 }).collect()
     }
+
+    /// The variances of the means of one channel, pixel by pixel, from the spread of the replicates as
+    /// [`resolve`](super::resolve) has it. `divisors` are what the sums of a pixel's replicates are divided by, where that
+    /// is not how many samples they have.
+    ///
+    /// NaN where fewer than two replicates have samples, and where sums are not kept by replicate.
+    pub fn variances_of(&self, channel: usize, divisors: Option<[u64; REPLICATES]>) -> impl Iterator<Item = f64> {
+        self.sets_of(channel).map(move |sets| {
+            let own = sets.enumerate().map(|(r, (sum, n))| (sum.value(), divisors.map_or(u64::from(n), |all| all[r])));
+            variance_of_mean(own.filter(|(_, n)| *n > 0).map(|(sum, n)| (sum, n as f64)))
+        })
+    }
+}
+
+/// Σᵣ nᵣ (mᵣ − m)² / ((R − 1) Σ nᵣ), given sums and nᵣ.
+fn variance_of_mean(replicates: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
+    let (sum, total) = replicates.clone().fold((0.0, 0.0), |(sum, total), (s, n)| (sum + s, total + n));
+    let mean = sum / total;
+    let (squares, count) =
+        replicates.fold((0.0, 0), |(squares, count), (s, n)| (squares + n * (s / n - mean).powi(2), count + 1));
+    if count < 2 { f64::NAN } else { squares / (f64::from(count - 1) * total) }
 }
 
 /// Why `x` cannot be added, if it cannot.
@@ -182,38 +283,59 @@ mod tests {
     fn layers_do_not_depend_on_order_or_split() {
         let window = Window { x: 4, y: -1, width: 2, height: 2 };
         let sample = |i: usize| (i % 4, [0.1 * i as f32 - 3.0, 1e9 / (i + 1) as f32], 1.0 - 0.3 * (i % 5) as f32);
-        let mut whole = LayerSums::new(2, 4);
-        let mut halves = [LayerSums::new(2, 2), LayerSums::new(2, 2)];
-        for i in 0..1000 {
-            let (pixel, values, weight) = sample(i);
-            whole.add(pixel, weight, &values);
-        }
-        for i in (0..1000).rev() {
-            let (pixel, values, weight) = sample(i);
-            halves[pixel % 2].add(pixel / 2, weight, &values);
-        }
-        for order in [[0, 1], [1, 0]] {
-            let mut merged = LayerSums::new(2, 4);
-            for half in order {
-                merged.merge(window, &halves[half], Window { x: 4 + half as i32, y: -1, width: 1, height: 2 });
+        for kept in [Kept::Together, Kept::ByReplicate] {
+            let empty = |pixels| LayerSums::new(Layout { channels: 2, kept }, pixels);
+            let (mut whole, mut halves) = (empty(4), [empty(2), empty(2)]);
+            for i in 0..1000 {
+                let (pixel, values, weight) = sample(i);
+                whole.add(pixel, i / 7 % 4, weight, &values);
             }
-            assert_eq!(merged, whole);
+            for i in (0..1000).rev() {
+                let (pixel, values, weight) = sample(i);
+                halves[pixel % 2].add(pixel / 2, i / 7 % 4, weight, &values);
+            }
+            for order in [[0, 1], [1, 0]] {
+                let mut merged = empty(4);
+                for half in order {
+                    merged.merge(window, &halves[half], Window { x: 4 + half as i32, y: -1, width: 1, height: 2 });
+                }
+                assert_eq!(merged, whole);
+            }
         }
+    }
+
+    /// Replicates of 2, 1, 0 and 3 samples with means 1, 4, – and 2: m = 12/6 = 2, and
+    /// (2·1² + 1·2² + 3·0²)/((3 − 1)·6) = 1/2. Sums over divisors of their own, here 4, 4, 4 and 4, with means
+    /// 1/2, 1, 0, 3/2: m = 3/4, and 4 (1/16 + 1/16 + 9/16 + 9/16)/(3·16) = 5/48.
+    #[test]
+    fn the_spread_of_replicates_is_the_variance_of_the_mean() {
+        let mut sums = LayerSums::new(Layout { channels: 2, kept: Kept::ByReplicate }, 2);
+        for (replicate, x) in [(0, 0.5), (0, 1.5), (1, 4.0), (3, 1.0), (3, 2.0), (3, 3.0)] {
+            sums.add(1, replicate, 1.0, &[7.0, x]);
+        }
+        assert_eq!((sums.plane(0), sums.plane(1)), (vec![0.0, 7.0], vec![0.0, 2.0]));
+        let variances: Vec<f64> = sums.variances_of(1, None).collect();
+        assert!(variances[0].is_nan() && variances[1] == 0.5, "{variances:?}");
+        let variances: Vec<f64> = sums.variances_of(1, Some([4; 4])).collect();
+        assert!(variances[0] == 0.0 && (variances[1] - 5.0 / 48.0).abs() < 1e-15, "{variances:?}");
+        let together = LayerSums::new(Layout { channels: 1, kept: Kept::Together }, 1);
+        assert!(together.variances_of(0, None).all(f64::is_nan));
     }
 
     #[test]
     fn what_is_not_a_number_is_counted_and_left_out() {
-        let mut sums = LayerSums::new(2, 1);
-        sums.add(0, 1.0, &[1.0, f32::NAN]);
-        sums.add(0, 1.0, &[f32::INFINITY, 1.0]);
-        sums.add(0, 2.0, &[1.5, -1.0]);
+        let mut sums = LayerSums::new(Layout { channels: 2, kept: Kept::Together }, 1);
+        sums.add(0, 0, 1.0, &[1.0, f32::NAN]);
+        sums.add(0, 1, 1.0, &[f32::INFINITY, 1.0]);
+        sums.add(0, 2, 2.0, &[1.5, -1.0]);
         assert_eq!((sums.plane(0), sums.plane(1)), (vec![3.0], vec![-2.0]));
         assert_eq!(sums.invalid, InvalidCounts { nan: 1, infinite: 1, negative: 0, overflow: 0 });
     }
 
     #[test]
     fn a_picture_without_layers_takes_no_memory_for_them() {
-        assert_eq!(LayerSums::bytes(0, 1 << 20), 0);
-        assert_eq!(LayerSums::new(0, 1 << 20), LayerSums::default());
+        let none = Layout::default();
+        assert_eq!(LayerSums::bytes(none, 1 << 20), 0);
+        assert_eq!(LayerSums::new(none, 1 << 20), LayerSums::default());
     }
 }

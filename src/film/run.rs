@@ -144,7 +144,7 @@ mod tests {
     use super::*;
     use crate::film::Window;
     use crate::film::accumulate::TileBuffer;
-    use crate::film::layers::LayerSums;
+    use crate::film::layers::{LayerSums, Layout};
     use crate::math::sampler::mix64;
 
     /// Numbers of both signs and any exponent up to 2¹⁵, some of them halfway between two units of either part.
@@ -202,15 +202,17 @@ mod tests {
     /// Six channels: a whole quad and a half.
     #[test]
     fn a_run_of_layers_has_the_bits_of_its_samples() {
-        let (mut run, mut found, mut expected) = (LayerRun::default(), LayerSums::new(6, 2), LayerSums::new(6, 2));
+        let layout = Layout { channels: 6, ..Layout::default() };
+        let (mut run, mut found, mut expected) =
+            (LayerRun::default(), LayerSums::new(layout, 2), LayerSums::new(layout, 2));
         run.reset(6);
         for i in 0..u64::from(LONGEST) {
             let values: [f32; 6] = std::array::from_fn(|c| number(6 * i + c as u64));
             let weight = if i % 3 == 0 { -0.75 } else { 1.5 };
             assert!(run.add(weight, &values));
-            expected.add(1, weight, &values);
+            expected.add(1, 0, weight, &values);
         }
-        found.add_run(1, &run);
+        found.add_run(1, 0, &run);
         assert_eq!(found, expected);
     }
 }

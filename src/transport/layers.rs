@@ -7,6 +7,7 @@ use super::middle::Middle;
 use super::plan::{EffectPlan, Integrator};
 use super::ways::{Ledger, Way, Ways};
 use crate::film::accumulate::{Invalid, SAMPLE_LIMIT};
+use crate::film::layers::{Kept, Layout};
 use crate::math::Ray;
 use crate::optics::bsdf::Bsdf;
 use crate::scene::compound::{Composition, Vertex, share};
@@ -135,6 +136,8 @@ pub struct LayerPlan {
     pub sample_distance: f64,
     /// Whether it is noted who covers the pixels.
     pub mattes: bool,
+    /// Whose samples share a sum.
+    pub kept: Kept,
 }
 
 impl Default for LayerPlan {
@@ -146,6 +149,7 @@ impl Default for LayerPlan {
             sensitivity: 1.0,
             sample_distance: 1.0,
             mattes: false,
+            kept: Kept::Together,
         }
     }
 }
@@ -155,10 +159,22 @@ impl Default for LayerPlan {
 pub struct Channel {
     /// With the component, `nn.X`.
     pub name: String,
-    /// True for light, false for data.
-    pub light: bool,
-    /// True for what stands in a pixel once, false for the mean of its samples.
-    pub once: bool,
+    /// What it holds.
+    pub holds: Holds,
+}
+
+/// What kind of number a channel holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Holds {
+    /// Light of a band, the mean of the samples.
+    Band,
+    /// Other light, the mean of the samples.
+    Light,
+    /// Data, the mean of the samples.
+    Data,
+    /// Data that stand in the pixel once.
+    Once,
 }
 
 impl LayerPlan {
@@ -183,6 +199,13 @@ impl LayerPlan {
             Source::Surface(_) | Source::Light(..) | Source::Numerics | Source::Middle(_) => 0,
         };
         self.layers.iter().map(count).sum()
+    }
+
+    /// How the sums are kept.
+    #[must_use]
+    pub fn layout(&self) -> Layout {
+        let channels = self.layers.iter().map(Layer::channels).sum();
+        Layout { channels, kept: self.kept }
     }
 
     /// What `light` that paths from the lights bring from a lamp of `group` adds to these channels.
@@ -213,26 +236,28 @@ impl LayerPlan {
     pub fn channels(&self) -> Vec<Channel> {
         let mut all = Vec::new();
         for layer in &self.layers {
-            for (name, light) in
-                [Some((&layer.name, true)), layer.squares.as_ref().map(|name| (name, false))].into_iter().flatten()
+            for (name, squared) in
+                [Some((&layer.name, false)), layer.squares.as_ref().map(|name| (name, true))].into_iter().flatten()
             {
+                let unless_squared = |holds| if squared { Holds::Data } else { holds };
                 match layer.source {
                     Source::Surface(quantity) => {
                         let names = quantity.components().iter().map(|c| format!("{name}.{c}"));
-                        let light = light && quantity == Quantity::Albedo;
-                        all.extend(names.map(|name| Channel { name, light, once: false }));
+                        let colour = quantity == Quantity::Albedo;
+                        let holds = unless_squared(if colour { Holds::Light } else { Holds::Data });
+                        all.extend(names.map(|name| Channel { name, holds }));
                     }
                     Source::Light(_, form) => {
                         let components: &[&str] = match form {
                             Form::Rgba => &["R", "G", "B", "A"],
                             Form::Xyz => &["X", "Y", "Z"],
                         };
-                        all.extend(channels(name, components, light, false));
+                        all.extend(channels(name, components, unless_squared(Holds::Light)));
                     }
-                    Source::Band(_) => all.push(Channel { name: name.clone(), light, once: false }),
-                    Source::Numerics => all.extend(channels(name, &NUMERICS, false, false)),
-                    Source::Ways(..) => all.extend(channels(name, &["R", "G", "B"], true, false)),
-                    Source::Middle(middle) => all.extend(channels(name, middle.components(), false, true)),
+                    Source::Band(_) => all.push(Channel { name: name.clone(), holds: Holds::Band }),
+                    Source::Numerics => all.extend(channels(name, &NUMERICS, Holds::Data)),
+                    Source::Ways(..) => all.extend(channels(name, &["R", "G", "B"], Holds::Light)),
+                    Source::Middle(middle) => all.extend(channels(name, middle.components(), Holds::Once)),
                 }
             }
         }
@@ -241,10 +266,10 @@ impl LayerPlan {
 }
 
 /// Channels of the layer `name`; a component without a name is the layer itself.
-fn channels(name: &str, components: &[&str], light: bool, once: bool) -> impl Iterator<Item = Channel> {
+fn channels(name: &str, components: &[&str], holds: Holds) -> impl Iterator<Item = Channel> {
     components.iter().map(move |c| {
         let name = if c.is_empty() { name.to_owned() } else { format!("{name}.{c}") };
-        Channel { name, light, once }
+        Channel { name, holds }
     })
 }
 

@@ -212,7 +212,7 @@ impl Landed {
         for (i, &(pixel, xyz)) in self.pixels.iter().enumerate() {
             splats.film.add(pixel, replicate as usize, xyz, 0.0);
             if let (Some(index), true) = (window.index(pixel), channels > 0) {
-                splats.film.layers.add(index, 1.0, &self.numbers[i * channels..(i + 1) * channels]);
+                splats.film.layers.add(index, replicate as usize, 1.0, &self.numbers[i * channels..(i + 1) * channels]);
             }
         }
     }

@@ -19,7 +19,7 @@
 mod noise;
 
 use crate::film::Window;
-use crate::film::exr::{ExrFile, ExrPart};
+use crate::film::exr::{ExrFile, ExrPart, stderr_name};
 use crate::spectrum::colour;
 use noise::Pair;
 use std::fmt::Write as _;
@@ -280,7 +280,7 @@ fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions<'a>) -> Re
                 Some((plane, samples))
             }
         };
-        let error = format!("stderr.{name}");
+        let error = stderr_name(&name);
         let errors = [find(part_a, &error), find(part_b, &error)];
         pairs.push(Pair::new(name, values_a, values_b, errors, variance));
     }

@@ -280,6 +280,12 @@ pub enum StandardError {
     Write,
 }
 
+/// The name of the channel with the standard errors of the channel `name`.
+#[must_use]
+pub fn stderr_name(name: &str) -> String {
+    format!("stderr.{name}")
+}
+
 /// A beauty file, and why it is wider than was asked for, if it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Beauty {
@@ -326,7 +332,7 @@ pub fn beauty(
     let mut data_channels = BTreeSet::new();
     if error == StandardError::Write {
         for &(name, i) in base.colours() {
-            let name = format!("stderr.{name}");
+            let name = stderr_name(name);
             data_channels.insert(name.clone());
             channels.push((name, ChannelData::F32(image.standard_error[i].clone())));
         }
