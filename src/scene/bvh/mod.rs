@@ -166,10 +166,7 @@ impl Bvh {
     /// Over more than 2²⁸ boxes.
     #[must_use]
     pub fn build_blocks(boxes: &[Aabb]) -> Bvh {
-        // Blocks of a few primitives are tried without a way down to them: full ones are fewer.
-        const FEW: usize = 16;
-        let block = if boxes.len() <= FEW { 8 } else { 4 };
-        Bvh::build_leaves(boxes, LeafSize { block, align: 8, max: 8 })
+        Bvh::build_leaves(boxes, LeafSize { block: 8, align: 8, max: 8 })
     }
 
     /// A tree of blocks of the same shape over other primitives: cheaper than a new tree, and about as good where they
