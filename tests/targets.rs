@@ -289,6 +289,14 @@ fn a_memory_limit_ends_the_process_with_a_code_of_its_own() {
     assert!(said.contains("more than --memory-limit, 300 MiB"), "{said}");
     assert!(!place.path("large.exr").exists());
     assert_eq!(abbe(&place, "render scene.yaml -q -o small.exr --memory-limit 4G").0, 0);
+
+    // Of 512 × 512 pixels colours and coverage take 64 MiB, 64 bands 256 + 1, and 1024 + 4 with the sums of each replicate.
+    let bands = "render scene.yaml -q -o bands.exr --spp 1 --set image.width=512 --set image.height=512 --set output.spectral.bands=64";
+    for (more, needed) in [("", 321), (" --set output.exr.stderr=true", 1092)] {
+        let (code, said) = abbe(&place, &format!("{bands}{more} --memory-limit 300M"));
+        assert!(code == 33 && said.contains(&format!("take {needed} MiB, more than --memory-limit")), "{code} {said}");
+    }
+    assert!(!place.path("bands.exr").exists());
 }
 
 /// Samples that are shared out by noise leave a picture that knows its error, and may end at one.

@@ -5,13 +5,11 @@ use super::{Overrides, ends_in, finish, names, output_path};
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
-use crate::film::accumulate::Film;
 use crate::film::output::Inputs;
 use std::path::{Path, PathBuf};
 
-/// Refuses a picture whose sums are more than the machine's memory or `limit`, before it is begun.
-pub(super) fn memory(description: &SceneDescription, rows: Window, limit: Option<u64>) -> Result<()> {
-    let needed = Film::bytes(rows);
+/// Refuses a picture whose sums, of `rows` and `needed` bytes, are more than the machine's memory or `limit`, before it is begun.
+pub(super) fn memory(description: &SceneDescription, rows: Window, needed: u64, limit: Option<u64>) -> Result<()> {
     let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
     if let Some(limit) = limit.filter(|limit| needed > *limit) {
         let [needed, limit] = [needed, limit].map(mebibytes);

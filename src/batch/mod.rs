@@ -195,7 +195,7 @@ fn render_and_write(
     let identity = Identity::new(Finish::of(prepared), &prepared.source, &prepared.plan);
     let finish = &identity.finish;
     let share = portion.share(job.window, job.samples, finish.rows())?;
-    checks::memory(description, share.rows(job.window), overrides.memory_limit)?;
+    checks::memory(description, share.rows(job.window), part::Part::bytes(&job, &share), overrides.memory_limit)?;
     if checkpoint::is_there(&overrides.keep, &exr_path, &identity, (!portion.is_all()).then_some(&share)) {
         checkpoint::remove_left_over(&exr_path, &identity)?;
         report.status = Status::Skipped;

@@ -223,7 +223,20 @@ pub struct Part<'a> {
     allocation: OnceLock<Allocation>,
 }
 
+/// The layers to which paths from the lights add.
+fn light_layers(job: &FrameJob) -> Layout {
+    Layout { channels: job.plan.layers.light_channels(), ..job.plan.layers.layout() }
+}
+
 impl<'a> Part<'a> {
+    /// The memory that the sums of `share` take: the camera's of its rows, and those of paths from the lights, which land anywhere.
+    #[must_use]
+    pub fn bytes(job: &FrameJob, share: &Share) -> u64 {
+        let layers = job.plan.layers.layout();
+        let lights = light_paths(job).map_or(0, |_| Film::bytes(job.window, light_layers(job)));
+        Film::bytes(share.rows(job.window), layers) + lights
+    }
+
     /// Nothing yet of `share`.
     ///
     /// # Errors
@@ -238,7 +251,7 @@ impl<'a> Part<'a> {
         };
         let splats = match light_paths(job) {
             Some(paths) => {
-                let film = film(job.window, Layout { channels: job.plan.layers.light_channels(), ..layers })?;
+                let film = film(job.window, light_layers(job))?;
                 Some((paths, Mutex::new(SplatFilm { film, paths: [0; REPLICATES] })))
             }
             None => None,

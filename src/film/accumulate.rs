@@ -361,7 +361,7 @@ impl Film {
         }
         let mut cells = Vec::new();
         if cells.try_reserve_exact(window.pixels()).is_err() {
-            let megabytes = Film::bytes(window) / 1_000_000;
+            let megabytes = Film::bytes(window, Layout::default()) / 1_000_000;
             return Err(Error::Render(format!("film: {window} needs {megabytes} MB, more than there is")));
         }
         cells.resize(window.pixels(), PixelCells::default());
@@ -388,10 +388,10 @@ impl Film {
         self
     }
 
-    /// The memory that a film of `window` takes.
+    /// The memory that a film of `window` with such layers takes, but for mattes.
     #[must_use]
-    pub fn bytes(window: Window) -> u64 {
-        window.pixels() as u64 * size_of::<PixelCells>() as u64
+    pub fn bytes(window: Window, layers: Layout) -> u64 {
+        window.pixels() as u64 * size_of::<PixelCells>() as u64 + LayerSums::bytes(layers, window.pixels())
     }
 
     /// Width and height of the full frame.
@@ -544,7 +544,7 @@ mod tests {
 
     #[test]
     fn a_film_of_full_hd_takes_less_than_600_megabytes() {
-        assert_eq!(Film::bytes(Window::full(1920, 1080)), 530_841_600);
+        assert_eq!(Film::bytes(Window::full(1920, 1080), Layout::default()), 530_841_600);
     }
 
     #[test]
