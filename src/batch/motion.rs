@@ -20,7 +20,7 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 const LEAST: u32 = 16;
 /// Moments where much does.
 const MOST: u32 = 64;
-/// Triangles of all moments, each of which has its own: 180 bytes each.
+/// Triangles of all moments, each of which has its own: 130 bytes each.
 const TRIANGLES: usize = 16_000_000;
 
 /// The scene while the shutter is open.
