@@ -21,7 +21,7 @@ fn scene(render: &str) -> String {
         "camera: {{origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}}\n\
          image: {{width: 44, height: 30}}\n\
          output: {{exr: {{precision: float, stderr: true}}}}\n\
-         layers:\n- {{name: n, surface: shading_normal}}\n\
+         layers:\n- {{name: n, surface: shading_normal}}\n- caustic\n- indirect\n- Z\n\
          render: {{samples: 64, techniques: {{adaptive: on, merging: off, light_tracing: on}}, {render}}}\n\
          shapes:\n\
          - plane: {{normal: [0, 1, 0]}}\n\
@@ -159,9 +159,10 @@ fn adaptive_sampling_is_off_where_it_would_not_be_exact() {
     assert!(said(&[("seed: 1", "stop: {error: 0.1}")]).contains("told by 64"));
     assert!(said(&[("merging: off", "merging: on")]).contains("photons are collected"));
     assert!(said(&[("samples: 64", "samples: 15")]).contains("fewer than 16 samples"));
-    assert!(said(&[("surface: shading_normal", "light: depth")]).contains("layers of light"));
-    assert_eq!(said(&[("shapes:", "integrator: whitted\nshapes:")]), "");
-    let no_layers = ("layers:\n- {name: n, surface: shading_normal}\n", "");
+    // Layers of light go with it.
+    assert_eq!(said(&[("surface: shading_normal", "light: depth")]), "cells of 8 x 8 pixels, told by 16 samples");
+    let no_layers = ("layers:\n- {name: n, surface: shading_normal}\n- caustic\n- indirect\n- Z\n", "");
+    assert_eq!(said(&[no_layers, ("shapes:", "integrator: whitted\nshapes:")]), "");
     assert_eq!(said(&[no_layers, ("shapes:", "integrator: light_tracer\nshapes:")]), "");
 }
 

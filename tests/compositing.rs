@@ -55,12 +55,16 @@ fn light_by_its_ways_and_by_its_lamps_adds_up_to_the_picture() {
         let techniques = format!("samples: 16, techniques: {{light_tracing: {light}, merging: {merging}}}");
         FRAME.replace("samples: 16", &techniques)
     };
+    let adaptive = FRAME.replace("samples: 16", "samples: 64, techniques: {adaptive: on, merging: off}");
+    let adaptive = adaptive.replace("width: 24, height: 16", "width: 64, height: 48");
     let scenes = [
         ("paths alone", frame("off", "off") + STAGE),
         ("paths from the lights", frame("on", "off") + STAGE),
         ("photons", frame("on", "on") + STAGE),
         ("haze", FRAME.to_owned() + medium + STAGE + cloud),
         ("depth fog", FRAME.to_owned() + "fog: {colour: 0.3, density: 0.1}\n" + STAGE),
+        // Some cells of 8 × 8 pixels have more samples in one half of the replicates than in the other.
+        ("samples shared out", adaptive.clone() + STAGE),
         ("rays", FRAME.to_owned() + "integrator: {path: {light_samples: 2, scatter_samples: 2}}\n" + STAGE),
     ];
     let families: [&[&str]; 3] = [

@@ -25,7 +25,6 @@ use crate::film::accumulate::{Film, Invalid, REPLICATES, SAMPLES_LIMIT};
 use crate::film::resolve::{counts, replicate_means};
 use crate::math::sampler::mix64;
 use crate::spectrum::ColourSpace;
-use crate::transport::layers::Source;
 use crate::transport::pilot::Use;
 use crate::transport::plan::{Effect, EffectPlan, Integrator};
 use crate::transport::{self, Shot};
@@ -73,7 +72,6 @@ pub fn choose(wish: Use, open: bool, plan: &EffectPlan, samples: u32) -> (Option
         (first, Some(Effect { name: "adaptive sampling".into(), on: first.is_some(), reason }))
     };
     let off = |reason: &str| say(None, reason.to_owned());
-    let surface = |source: &Source| matches!(source, Source::Surface(_));
     match wish {
         Use::Off => return off("the scene says so"),
         // It saves a tenth of the time in most scenes and costs some in others; forecasts do not know of it yet.
@@ -82,9 +80,6 @@ pub fn choose(wish: Use, open: bool, plan: &EffectPlan, samples: u32) -> (Option
     }
     if plan.caustics.as_ref().is_some_and(|c| c.merging.is_some()) {
         return off("photons are collected, and every sample needs its own");
-    }
-    if plan.layers.layers.iter().any(|layer| !surface(&layer.source)) {
-        return off("bands and layers of light are summed over all samples of a pixel");
     }
     if samples < FEWEST {
         return off("there are fewer than 16 samples");

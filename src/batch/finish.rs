@@ -77,6 +77,8 @@ pub struct Finish {
     pub bands: bool,
     /// Further channels.
     pub layers: Vec<Channel>,
+    /// Whose samples share a sum of them.
+    pub kept: Kept,
     /// Whether the variance of each pixel's mean is one.
     pub variance: bool,
     /// Whether the number of samples of each pixel is one.
@@ -157,6 +159,7 @@ impl Finish {
             sensitivity: description.image.sensitivity,
             bands: !description.image.bands.is_empty(),
             layers: plan.layers.channels(),
+            kept: plan.layers.kept,
             variance: asked(&LayerContent::Variance),
             sample_count: asked(&LayerContent::SampleCount),
             mattes: mattes(description, scene),
@@ -164,12 +167,10 @@ impl Finish {
         }
     }
 
-    /// How the sums of the layers are kept: those of bands by replicate where their standard errors are wanted.
+    /// How the sums of the layers are kept.
     #[must_use]
     pub fn layout(&self) -> Layout {
-        let bands = self.bands || self.output.spectral.is_some();
-        let kept = if self.output.exr.stderr && bands { Kept::ByReplicate } else { Kept::Together };
-        Layout { channels: self.layers.len(), kept }
+        Layout { channels: self.layers.len(), kept: self.kept }
     }
 
     /// Of the layers, the bands of the spectral file.

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::{Film, REPLICATES, SAMPLES_LIMIT};
 use crate::film::filter::{Filter, FilterSampler};
+use crate::film::layers::Kept;
 use crate::scene::Scene;
 use crate::scene::compile;
 use crate::scene::shelf::Shelf;
@@ -146,6 +147,10 @@ pub(super) fn prepare_scene(
     }
     let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
     plan.adaptive = first;
+    if first.is_some() {
+        // The halves of the replicates weigh alike, whatever their counts.
+        plan.layers.kept = Kept::ByReplicate;
+    }
     plan.techniques.extend(said);
     let moving =
         description.layers.iter().any(|layer| layer.content == LayerContent::Middle(description::Data::Motion));

@@ -3,12 +3,13 @@
 //!
 //! A layer is a number a sample. Numbers are added exactly, as in [`accumulate`](super::accumulate), in one sum a
 //! pixel and channel and one count a pixel, or where their standard errors are wanted in one a replicate; a picture without
-//! layers has neither. What cannot be added is left out of all layers of its pixel and counted by cause; colour does not
+//! layers has neither. So they are kept where samples are shared out by noise, too. What cannot be added is left out of all layers of its pixel and counted by cause; colour does not
 //! hear of it.
 
 use super::Window;
 use super::accumulate::{Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum};
 use super::mattes::Mattes;
+use super::resolve::HALF;
 use super::run::LayerRun;
 
 /// How many sums a pixel has.
@@ -21,7 +22,8 @@ pub struct Layout {
 }
 
 /// Which samples of a pixel share their sums.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Kept {
     /// All of them.
     #[default]
@@ -217,26 +219,20 @@ impl LayerSums {
         })
     }
 
-    /// The sum of one channel and how many samples are in it, pixel by pixel.
-    fn all_of(&self, channel: usize) -> impl Iterator<Item = (f64, u64)> {
-        self.sets_of(channel).map(|sets| {
-            let (sum, count) = sets.fold((Sum::default(), 0), |(mut all, n), (own, count)| {
-                all += own;
-                (all, n + u64::from(count))
-            });
-            (sum.value(), count)
-        })
-    }
-
     /// The sums of one channel, pixel by pixel.
     pub fn sums_of(&self, channel: usize) -> impl Iterator<Item = f64> {
-        self.all_of(channel).map(|(sum, _)| sum)
+        self.sets_of(channel).map(|sets| total(sets).0)
     }
 
-    /// The means of one channel, pixel by pixel; 0 where there is no sample.
+    /// The means of one channel, pixel by pixel, as [`resolve`](super::resolve) has them; 0 where there is no sample.
     #[must_use]
     pub fn plane(&self, channel: usize) -> Vec<f32> {
-        self.all_of(channel).map(|(sum, n)| if n == 0 { 0.0 } else { (sum / n as f64) as f32 }).collect()
+        let mean = |(sum, n): (f64, u64)| if n == 0 { 0.0 } else { sum / n as f64 };
+        let value = |sets| match halves(&sets) {
+            Some([a, b]) => 0.5 * (mean(a) + mean(b)),
+            None => mean(total(sets)),
+        };
+        self.sets_of(channel).map(|sets| value(sets) as f32).collect()
     }
 
     /// The variances of the means of one channel, pixel by pixel, from the spread of the replicates as
@@ -246,18 +242,37 @@ impl LayerSums {
     /// NaN where fewer than two replicates have samples, and where sums are not kept by replicate.
     pub fn variances_of(&self, channel: usize, divisors: Option<[u64; REPLICATES]>) -> impl Iterator<Item = f64> {
         self.sets_of(channel).map(move |sets| {
+            let alike = divisors.is_none() && halves(&sets).is_some();
             let own = sets.enumerate().map(|(r, (sum, n))| (sum.value(), divisors.map_or(u64::from(n), |all| all[r])));
-            variance_of_mean(own.filter(|(_, n)| *n > 0).map(|(sum, n)| (sum, n as f64)))
+            // Where the halves weigh alike, so do their replicates, which take turns.
+            let weight = |n: u64| if alike { 1.0 } else { n as f64 };
+            variance_of_mean(own.filter(|(_, n)| *n > 0).map(|(sum, n)| (sum / n as f64, weight(n))))
         })
     }
 }
 
-/// Σᵣ nᵣ (mᵣ − m)² / ((R − 1) Σ nᵣ), given sums and nᵣ.
+/// The sum of all sets, rounded once, and its samples.
+fn total(sets: impl Iterator<Item = (Sum, u32)>) -> (f64, u64) {
+    let (sum, count) = sets.fold((Sum::default(), 0), |(mut all, n), (own, count)| {
+        all += own;
+        (all, n + u64::from(count))
+    });
+    (sum.value(), count)
+}
+
+/// The sums of the halves of the replicates and their samples, where one half went on for longer than the other.
+fn halves(sets: &(impl Iterator<Item = (Sum, u32)> + Clone)) -> Option<[(f64, u64); 2]> {
+    let (first, second) = (total(sets.clone().take(HALF)), total(sets.clone().skip(HALF)));
+    let both = first.1 > 0 && second.1 > 0;
+    (both && first.1.abs_diff(second.1) > HALF as u64).then_some([first, second])
+}
+
+/// Σᵣ nᵣ (mᵣ − m)² / ((R − 1) Σ nᵣ), given mᵣ and nᵣ.
 fn variance_of_mean(replicates: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
-    let (sum, total) = replicates.clone().fold((0.0, 0.0), |(sum, total), (s, n)| (sum + s, total + n));
+    let (sum, total) = replicates.clone().fold((0.0, 0.0), |(sum, total), (m, n)| (sum + n * m, total + n));
     let mean = sum / total;
     let (squares, count) =
-        replicates.fold((0.0, 0), |(squares, count), (s, n)| (squares + n * (s / n - mean).powi(2), count + 1));
+        replicates.fold((0.0, 0), |(squares, count), (m, n)| (squares + n * (m - mean).powi(2), count + 1));
     if count < 2 { f64::NAN } else { squares / (f64::from(count - 1) * total) }
 }
 
@@ -318,6 +333,14 @@ mod tests {
         assert!(variances[0].is_nan() && variances[1] == 0.5, "{variances:?}");
         let variances: Vec<f64> = sums.variances_of(1, Some([4; 4])).collect();
         assert!(variances[0] == 0.0 && (variances[1] - 5.0 / 48.0).abs() < 1e-15, "{variances:?}");
+        // Halves that had 2 and 8 samples weigh alike: (1 + 2)/2, and with means 0, 2, 1 and 3 of the replicates
+        // (9/4 + 1/4 + 1/4 + 9/4)/(4·3) = 5/12.
+        let mut sums = LayerSums::new(Layout { channels: 1, kept: Kept::ByReplicate }, 1);
+        for (replicate, count, x) in [(0, 1, 0.0), (1, 1, 2.0), (2, 4, 1.0), (3, 4, 3.0)] {
+            (0..count).for_each(|_| sums.add(0, replicate, 1.0, &[x]));
+        }
+        let variance = sums.variances_of(0, None).next().unwrap();
+        assert!(sums.plane(0) == [1.5] && (variance - 5.0 / 12.0).abs() < 1e-15, "{variance}");
         let together = LayerSums::new(Layout { channels: 1, kept: Kept::Together }, 1);
         assert!(together.variances_of(0, None).all(f64::is_nan));
     }

@@ -117,7 +117,7 @@ struct PixelMean {
 }
 
 /// Replicates of a half.
-const HALF: usize = REPLICATES / 2;
+pub(super) const HALF: usize = REPLICATES / 2;
 
 /// Whether one half of the replicates had other samples than the other: replicates in turn differ by one.
 fn in_halves(cells: &PixelCells) -> bool {
