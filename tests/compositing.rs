@@ -188,6 +188,26 @@ fn mattes_know_objects_materials_and_assets() {
     }
 }
 
+/// Where samples are shared out by noise, halves of a pixel's samples weigh alike, whatever their numbers: mattes add up to
+/// alpha there, too, to the rounding of the counts' shares, their factor and their sum.
+#[test]
+fn mattes_add_up_to_alpha_where_samples_are_shared_out() {
+    let frame =
+        FRAME.replace("samples: 16", "samples: 64, techniques: {adaptive: on, merging: off, light_tracing: off}");
+    let frame = frame.replace("width: 24, height: 16", "width: 64, height: 48");
+    let part = render(&format!(
+        "{frame}layers: [crypto_object]\nlights: [{{point: {{position: [-2, 3, 2], intensity: 3}}}}]\nshapes:\n\
+         - sphere: {{center: [1.2, 1.7, 0.5], radius: 0.5}}\n- sphere: {{center: [0, 3, 0], radius: 0.3, emission: 20}}\n\
+         - sphere: {{center: [-0.8, 0.6, 1], radius: 0.6, material: {{conductor: {{metal: gold, roughness: 0.3}}}}}}\n"
+    ));
+    let coverage = (0..3).flat_map(|i| ["G", "A"].map(|c| plane(&part, &format!("CryptoObject0{i}.{c}"))));
+    let mut sums = vec![0.0; 64 * 48];
+    coverage.for_each(|plane| sums.iter_mut().zip(plane).for_each(|(sum, x)| *sum += x));
+    for (sum, alpha) in sums.iter().zip(plane(&part, "A")) {
+        assert!((sum - alpha).abs() <= 8.0 * f32::EPSILON, "{sum} {alpha}");
+    }
+}
+
 /// A mask lets a third through: the matte of what is before covers two thirds, as alpha of a picture without a background.
 #[test]
 fn holes_of_a_mask_are_holes_of_its_matte() {

@@ -7,6 +7,7 @@
 
 use super::accumulate::{Film, PixelCells};
 use super::exr::{Attribute, ChannelData};
+use super::resolve::coverage_of_halves;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -46,7 +47,9 @@ impl Matte {
             let mut pairs: Vec<(u64, u32)> = counts.into_iter().map(|(id, count)| (count, id)).collect();
             // Of equal coverage by rising id.
             pairs.sort_by_key(|&(count, id)| (std::cmp::Reverse(count), id));
-            let pair = |(count, id): (u64, u32)| (f32::from_bits(id), count as f32 / samples.max(1) as f32);
+            // What covers the pixel shares its coverage by counts.
+            let share = coverage_of_halves(cells) as f32;
+            let pair = |(count, id): (u64, u32)| (f32::from_bits(id), share * (count as f32 / samples.max(1) as f32));
             pairs.into_iter().map(pair).collect::<Vec<(f32, f32)>>()
         };
         let pixels: Vec<Vec<(f32, f32)>> = film.cells().par_iter().enumerate().map(pixel).collect();

@@ -75,19 +75,10 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
                 }
             }
             let unit = 2f64.powi(film.exponent());
-            let alpha = |cells: &[Cell]| {
-                let samples: u64 = cells.iter().map(|cell| u64::from(cell.count)).sum();
-                let alpha: f64 = cells.iter().map(Cell::alpha_sum).sum();
-                if samples == 0 { 0.0 } else { alpha / samples as f64 }
-            };
-            let alpha = match halves {
-                true => 0.5 * (alpha(&cells[..HALF]) + alpha(&cells[HALF..])),
-                false => alpha(cells),
-            };
             Resolved {
                 rgb: pixel.rgb.map(|x| (x * unit) as f32),
                 standard_error: pixel.variance.map(|v| (v.sqrt() * unit) as f32),
-                alpha: alpha as f32,
+                alpha: alpha(cells) as f32,
             }
         })
         .collect();
@@ -123,6 +114,26 @@ pub(super) const HALF: usize = REPLICATES / 2;
 fn in_halves(cells: &PixelCells) -> bool {
     let of = |cells: &[Cell]| cells.iter().map(|cell| u64::from(cell.count) + u64::from(cell.dropped)).sum::<u64>();
     of(&cells[..HALF]).abs_diff(of(&cells[HALF..])) > HALF as u64
+}
+
+/// Coverage of a pixel.
+fn alpha(cells: &PixelCells) -> f64 {
+    match in_halves(cells) {
+        true => 0.5 * (mean_alpha(&cells[..HALF]) + mean_alpha(&cells[HALF..])),
+        false => mean_alpha(cells),
+    }
+}
+
+fn mean_alpha(cells: &[Cell]) -> f64 {
+    let samples: u64 = cells.iter().map(|cell| u64::from(cell.count)).sum();
+    let alpha: f64 = cells.iter().map(Cell::alpha_sum).sum();
+    if samples == 0 { 0.0 } else { alpha / samples as f64 }
+}
+
+/// How much coverage a pixel has over what its samples have in the mean: one but where the halves weigh alike.
+pub(super) fn coverage_of_halves(cells: &PixelCells) -> f64 {
+    let mean = mean_alpha(cells);
+    if in_halves(cells) && mean > 0.0 { alpha(cells) / mean } else { 1.0 }
 }
 
 /// As [`mean_of`], where the halves weigh alike: how far one went on was for the other to say, so that it is no measure
