@@ -124,16 +124,27 @@ fn alpha(cells: &PixelCells) -> f64 {
     }
 }
 
+fn samples(cells: &[Cell]) -> u64 {
+    cells.iter().map(|cell| u64::from(cell.count)).sum()
+}
+
 fn mean_alpha(cells: &[Cell]) -> f64 {
-    let samples: u64 = cells.iter().map(|cell| u64::from(cell.count)).sum();
+    let samples = samples(cells);
     let alpha: f64 = cells.iter().map(Cell::alpha_sum).sum();
     if samples == 0 { 0.0 } else { alpha / samples as f64 }
 }
 
-/// How much coverage a pixel has over what its samples have in the mean: one but where the halves weigh alike.
+/// How much coverage a pixel has over what its samples have in the mean: one but where the halves weigh alike. Of N samples with n
+/// and N − n in the halves a sample weighs N/(2n) or N/(2(N − n)), and coverage no more and no less; what a filter with negative
+/// lobes makes of alpha may lie beyond.
 pub(super) fn coverage_of_halves(cells: &PixelCells) -> f64 {
     let mean = mean_alpha(cells);
-    if in_halves(cells) && mean > 0.0 { alpha(cells) / mean } else { 1.0 }
+    if !in_halves(cells) || mean <= 0.0 {
+        return 1.0;
+    }
+    let weight = |half: &[Cell]| 0.5 * samples(cells) as f64 / samples(half) as f64;
+    let (a, b) = (weight(&cells[..HALF]), weight(&cells[HALF..]));
+    (alpha(cells) / mean).clamp(a.min(b), a.max(b))
 }
 
 /// As [`mean_of`], where the halves weigh alike: how far one went on was for the other to say, so that it is no measure
