@@ -2,9 +2,9 @@
 //! surfaces, light of other integrators, squares.
 //!
 //! A layer is a number a sample. Numbers are added exactly, as in [`accumulate`](super::accumulate), in one sum a
-//! pixel and channel and one count a pixel, or where their standard errors are wanted in one a replicate; a picture without
-//! layers has neither. So they are kept where samples are shared out by noise, too. What cannot be added is left out of all layers of its pixel and counted by cause; colour does not
-//! hear of it.
+//! pixel and channel and one count a pixel; a picture without layers has neither. Where standard errors are wanted or
+//! samples are shared out by noise, a pixel has a sum and a count for each replicate. What cannot be added is left out of
+//! all layers of its pixel and counted by cause; colour does not hear of it.
 
 use super::Window;
 use super::accumulate::{Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum};
@@ -17,11 +17,11 @@ use super::run::LayerRun;
 pub struct Layout {
     /// Numbers of a sample.
     pub channels: usize,
-    /// Whose they are.
+    /// Which samples share their sums.
     pub kept: Kept,
 }
 
-/// Which samples of a pixel share their sums.
+/// Which samples of a pixel are added up together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kept {
