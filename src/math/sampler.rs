@@ -78,8 +78,20 @@ impl Sampler<'_> {
             _ => points([key(self.stream, set)], [self.index])[0],
         };
         // Written out: `map` of an array calls a function for each element.
-        let unit = |x: u32| f64::from(x) * (1.0 / 4_294_967_296.0);
         [unit(bits[0]), unit(bits[1]), unit(bits[2]), unit(bits[3])]
+    }
+
+    /// Tells `all` the numbers of the samples that share theirs with this one, if none of them has asked for `set` yet:
+    /// time to prepare what they will need.
+    #[inline]
+    pub fn announce(&self, set: Set, all: impl FnOnce(&[[u32; 4]])) {
+        if let Some(octet) = self.octet
+            && set.index() < SHARED_SETS
+            && !octet.is_made(set)
+        {
+            octet.make(set);
+            all(&octet.sets[set.index() as usize].get()[..octet.count]);
+        }
     }
 }
 
@@ -149,12 +161,16 @@ impl Octet {
 
     #[inline(always)]
     fn set(&self, set: Set, lane: u32) -> [u32; 4] {
-        let place = set.index();
-        if self.made.get() >> place & 1 == 0 {
+        if !self.is_made(set) {
             self.make(set);
         }
-        let numbers = self.sets[place as usize].as_array_of_cells();
+        let numbers = self.sets[set.index() as usize].as_array_of_cells();
         numbers[lane as usize % Octet::SAMPLES].get()
+    }
+
+    #[inline(always)]
+    fn is_made(&self, set: Set) -> bool {
+        self.made.get() >> set.index() & 1 == 1
     }
 
     #[inline(never)]
@@ -169,6 +185,13 @@ impl Octet {
         self.sets[place as usize].set(points(keys, self.indices));
         self.made.set(self.made.get() | 1 << place);
     }
+}
+
+/// In [0, 1), of units of 2⁻³².
+#[must_use]
+#[inline(always)]
+pub fn unit(x: u32) -> f64 {
+    f64::from(x) * (1.0 / 4_294_967_296.0)
 }
 
 /// What `set` of a stream is scrambled by.
@@ -466,6 +489,23 @@ mod tests {
         assert!((mean - 1.0).abs() < 4.5 / f64::from(n).sqrt(), "{mean}");
     }
 
+    /// Who asks first is told the numbers of all that share theirs; nobody is who comes later or is alone, or where
+    /// numbers are not shared.
+    #[test]
+    fn numbers_of_neighbours_are_announced_once() {
+        let mut octet = Octet::default();
+        let samples: Vec<(u32, u32)> = (0..5).map(|i| (i % 2, i)).collect();
+        octet.reset(7, [3, 4], &samples);
+        let set = Set::Scatter(2);
+        let mut told = Vec::new();
+        octet.sampler(1).announce(set, |all| told = all.iter().map(|numbers| numbers.map(unit)).collect());
+        assert_eq!(told, (0..5).map(|i| octet.sampler(i).set(set)).collect::<Vec<_>>());
+        let alone = Sampler::new(7, [3, 4], 0, 0);
+        for (sampler, set) in [(octet.sampler(3), set), (octet.sampler(0), Set::Scatter(50)), (alone, Set::Camera)] {
+            sampler.announce(set, |_| unreachable!("{set:?}"));
+        }
+    }
+
     /// A sample has the same numbers by itself and among its neighbours, in sets that they share and beyond, whether the
     /// neighbours are of its replicate or not.
     #[test]
@@ -489,6 +529,6 @@ mod tests {
 
     #[test]
     fn the_largest_number_is_below_one() {
-        assert!(f64::from(u32::MAX) * (1.0 / 4_294_967_296.0) < 1.0);
+        assert!(unit(u32::MAX) < 1.0);
     }
 }

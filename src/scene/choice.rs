@@ -497,7 +497,8 @@ impl Node {
 
 impl Scene {
     /// A light chosen by `u` in [0, 1) for `point`, and the probability of that. With `normal` light is wanted on that
-    /// side of a surface only.
+    /// side of a surface only. `judged` becomes what all lights together may give, as they are judged for it; it stays zero
+    /// where one need not choose.
     #[must_use]
     #[inline(always)]
     pub fn choose_light_at(
@@ -505,6 +506,7 @@ impl Scene {
         point: DVec3,
         normal: Option<DVec3>,
         u: impl FnOnce() -> f64,
+        judged: &mut f32,
     ) -> Option<(usize, f64)> {
         // One alone needs no number.
         if let [all] = self.light_cdf[..]
@@ -512,14 +514,16 @@ impl Scene {
         {
             return Some((0, all));
         }
-        self.choose_among(point, normal, u())
+        self.choose_among(point, normal, u(), judged)
     }
 
     #[inline(never)]
-    fn choose_among(&self, point: DVec3, normal: Option<DVec3>, u: f64) -> Option<(usize, f64)> {
+    fn choose_among(&self, point: DVec3, normal: Option<DVec3>, u: f64, judged: &mut f32) -> Option<(usize, f64)> {
         let Some(choice) = &self.choice else { return self.choose_light(u) };
         let asking = choice.asking(point, normal);
-        let Some(root) = choice.root(&asking) else { return self.choose_light(u) };
+        let root = choice.root(&asking);
+        *judged = root.as_ref().map_or(0.0, |root| root.sum);
+        let Some(root) = root else { return self.choose_light(u) };
         let mixed = |i: usize, there: f64| BY_POWER * self.light_probability(i) + (1.0 - BY_POWER) * there;
         if u < BY_POWER {
             let (i, _) = self.choose_light(u / BY_POWER)?;
@@ -529,12 +533,18 @@ impl Scene {
         Some((i as usize, mixed(i as usize, there)))
     }
 
-    /// The probability of [`Scene::choose_light_at`] for light `i`.
+    /// The probability of [`Scene::choose_light_at`] for light `i`, and what that `judged`: zero where it is not known.
     #[must_use]
-    pub fn light_probability_at(&self, i: usize, point: DVec3, normal: Option<DVec3>) -> f64 {
+    pub fn light_probability_at(&self, i: usize, point: DVec3, normal: Option<DVec3>, judged: f32) -> f64 {
         let alone = self.light_probability(i);
         let Some(choice) = &self.choice else { return alone };
         let asking = choice.asking(point, normal);
+        if let Place::Distant(k) = choice.places[i]
+            && judged > 0.0
+        {
+            let there = f64::from(choice.distant[k as usize].weigh(&asking)) / f64::from(judged);
+            return BY_POWER * alone + (1.0 - BY_POWER) * there;
+        }
         match choice.root(&asking) {
             Some(root) => BY_POWER * alone + (1.0 - BY_POWER) * choice.probability(&asking, &root, i as u32),
             None => alone,
@@ -605,13 +615,16 @@ mod tests {
                 let mut counts = vec![0u32; scene.lights.len()];
                 for j in 0..N {
                     let u = (f64::from(j) + 0.5) / f64::from(N);
-                    let Some((i, p)) = scene.choose_light_at(at, normal, || u) else { continue };
-                    let said = scene.light_probability_at(i, at, normal);
-                    assert!((p / said - 1.0).abs() < 1e-12, "{p} {said}");
+                    let mut judged = 0.0;
+                    let Some((i, p)) = scene.choose_light_at(at, normal, || u, &mut judged) else { continue };
+                    for known in [judged, 0.0] {
+                        let said = scene.light_probability_at(i, at, normal, known);
+                        assert!((p / said - 1.0).abs() < 1e-12, "{p} {said}");
+                    }
                     counts[i] += 1;
                 }
                 let probabilities: Vec<f64> =
-                    (0..scene.lights.len()).map(|i| scene.light_probability_at(i, at, normal)).collect();
+                    (0..scene.lights.len()).map(|i| scene.light_probability_at(i, at, normal, 0.0)).collect();
                 let none = 1.0 - f64::from(counts.iter().sum::<u32>()) / f64::from(N);
                 let ends = 16.0 / f64::from(N);
                 assert!((probabilities.iter().sum::<f64>() + none - 1.0).abs() < ends, "{probabilities:?} {none}");
@@ -654,7 +667,7 @@ mod tests {
     #[test]
     fn the_nearer_of_two_equal_lamps_is_chosen_by_the_square_of_the_distance() {
         let scene = scene(&(point(1.0, 3.0, 0.0, 1.0) + &point(-3.0, 3.0, 0.0, 1.0)), "");
-        let p = scene.light_probability_at(0, DVec3::new(0.0, 3.0, 0.0), None);
+        let p = scene.light_probability_at(0, DVec3::new(0.0, 3.0, 0.0), None, 0.0);
         assert!((p - (BY_POWER * 0.5 + (1.0 - BY_POWER) * 0.9)).abs() < 1e-6, "{p}");
     }
 
@@ -675,7 +688,7 @@ mod tests {
             let total: f64 = light.iter().sum();
             for (i, x) in light.iter().enumerate() {
                 let share = x / total;
-                here += share * share / scene.light_probability_at(i, at, None) / 50.0;
+                here += share * share / scene.light_probability_at(i, at, None, 0.0) / 50.0;
                 by_power += share * share / scene.light_probability(i) / 50.0;
             }
         }

@@ -332,6 +332,8 @@ impl<'a> Compiler<'a> {
             },
         });
         let shines_on_rays = lights.iter().any(|light| light.is_environment() || matches!(light, Light::Area { .. }));
+        let is_large = |light: &Light| matches!(light, Light::Environment(map) if map.is_large());
+        let large_sky = lights.iter().position(is_large).map(|i| i as u32);
         let lets_through = |o: &Object| o.body != 0 || self.materials[o.material as usize].lets_through();
         let has_boundaries = objects.iter().any(lets_through);
         let mut scene = Scene {
@@ -363,6 +365,7 @@ impl<'a> Compiler<'a> {
             radius,
             has_boundaries,
             shines_on_rays,
+            large_sky,
             files: std::mem::take(&mut self.files),
             notes: self.told_notes(),
             watch: None,

@@ -40,6 +40,7 @@ pub mod through;
 pub mod volume;
 pub mod watch;
 
+use crate::math::sampler::{Octet, Sampler, Set, unit};
 use crate::math::{Departure, Ray};
 use crate::spectrum::{Spectrum, WavelengthDistribution};
 use bvh::Bvh;
@@ -47,7 +48,7 @@ use camera::Camera;
 use choice::Choice;
 use curves::Curves;
 use few::Few;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use instance::{AffineMap, Instance, PartHit};
 use light::Light;
 use material::Material;
@@ -124,6 +125,8 @@ pub struct Scene {
     pub has_boundaries: bool,
     /// True where a ray can meet light by chance: some light has an extent.
     pub shines_on_rays: bool,
+    /// The light that is an environment too large for the caches, if any: see [`Scene::foresee`].
+    pub large_sky: Option<u32>,
     /// Files that were read.
     pub files: Vec<PathBuf>,
     /// What a person should know of the scene, with its place in the file.
@@ -492,6 +495,21 @@ impl Scene {
     pub fn choose_light(&self, u: f64) -> Option<(usize, f64)> {
         let i = self.light_cdf.partition_point(|&c| c <= u);
         (i < self.lights.len()).then(|| (i, self.light_probability(i)))
+    }
+
+    /// Prepares for the samples that go with this one, when the first of them asks for the numbers by which they choose
+    /// points of lights.
+    #[inline]
+    pub fn foresee(&self, sampler: &Sampler, set: Set) {
+        if let Some(sky) = self.large_sky
+            && let Light::Environment(map) = &self.lights[sky as usize]
+        {
+            sampler.announce(set, |all| {
+                let mut us = [DVec2::ZERO; Octet::SAMPLES];
+                us.iter_mut().zip(all).for_each(|(u, x)| *u = DVec2::new(unit(x[0]), unit(x[1])));
+                map.foresee(&us[..all.len()]);
+            });
+        }
     }
 
     /// The probability of [`Scene::choose_light`] for light `i`.

@@ -225,7 +225,7 @@ impl Tracer<'_> {
                 None => 1.0,
                 Some(p) => {
                     let total = crate::scene::Hit { t: p.distance + hit.t, ..hit };
-                    let q = scene.light_probability_at(light as usize, p.point, p.normal)
+                    let q = scene.light_probability_at(light as usize, p.point, p.normal, path.judged)
                         * scene.lights[light as usize].area_pdf(
                             &scene.objects,
                             p.point,
@@ -335,6 +335,7 @@ impl Tracer<'_> {
         let Leaving { hit, surface, object, frame, .. } = *at;
         let scene = self.scene;
         let wo = frame.to_local(at.wo);
+        scene.foresee(&self.sampler, Set::Scatter(path.vertices));
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
         if !bsdf.is_discrete() && self.settings.light_samples > 0 {
             let toward = path.ray.direction.dot(surface.normal);
@@ -541,6 +542,7 @@ impl Tracer<'_> {
         path.sharp = false;
         let choice = self.sampler.set(Set::Choice(path.vertices));
         let wo = -path.ray.direction;
+        self.scene.foresee(&self.sampler, Set::Scatter(path.vertices));
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
         let next_event = self.settings.light_samples > 0 && medium.shadow_rays;
         if next_event {

@@ -1,5 +1,6 @@
 //! A density over a grid that is constant in each cell.
 
+use crate::scene::bvh::prefetch;
 use glam::DVec2;
 
 /// Cells for which a row has one entry in its guide.
@@ -67,13 +68,19 @@ impl Rows {
         let at = u * ONE;
         // The last 2⁻³² counts as what lies before it: what is stored as 1 − 2⁻³² is one.
         let whole = (at as u32).min(u32::MAX - 1);
-        let k = row * (self.guides + 1) + ((u * self.guides as f64) as u32 as usize).min(self.guides - 1);
+        let k = self.guided(row, u);
         let (from, to) = (self.guide[k] as usize, self.guide[k + 1] as usize);
         let sums = self.row(row);
         let above = from + sums[from..to].partition_point(|&sum| sum <= whole);
         let cell = above.saturating_sub(1).min(self.width - 1);
         let (below, mass) = (sums[cell], sums[cell + 1].saturating_sub(sums[cell]));
         (mass > 0).then(|| (cell, ((at - f64::from(below)) / f64::from(mass)).clamp(0.0, 1.0)))
+    }
+
+    /// Where in the guide a search for `u` starts.
+    #[inline]
+    fn guided(&self, row: usize, u: f64) -> usize {
+        row * (self.guides + 1) + ((u * self.guides as f64) as u32 as usize).min(self.guides - 1)
     }
 
     /// Share of a cell in its row.
@@ -124,6 +131,31 @@ impl PiecewiseConstant2d {
         Some(Cell { row, column, within: DVec2::new(x, y) })
     }
 
+    /// [`PiecewiseConstant2d::sample_cell`] of up to `N` points side by side: none waits for memory alone.
+    pub(super) fn sample_cells<const N: usize>(&self, us: &[DVec2]) -> [Option<Cell>; N] {
+        let mut rows = [None; N];
+        for (row, u) in rows.iter_mut().zip(us) {
+            *row = self.marginal.find(0, u.y);
+            if let Some((row, _)) = *row {
+                prefetch(&self.rows.guide, self.rows.guided(row, u.x));
+            }
+        }
+        for (row, u) in rows.iter().zip(us) {
+            if let Some((row, _)) = *row {
+                let from = self.rows.guide[self.rows.guided(row, u.x)] as usize;
+                prefetch(&self.rows.sums, row * (self.width + 1) + from);
+            }
+        }
+        let mut cells = [const { None }; N];
+        for ((cell, row), u) in cells.iter_mut().zip(rows).zip(us) {
+            *cell = row.and_then(|(row, y)| {
+                let (column, x) = self.rows.find(row, u.x)?;
+                Some(Cell { row, column, within: DVec2::new(x, y) })
+            });
+        }
+        cells
+    }
+
     fn density(&self, row: usize, column: usize) -> f64 {
         self.marginal.share(0, row) * self.rows.share(row, column) * (self.width * self.height) as f64
     }
@@ -161,6 +193,22 @@ mod tests {
                 assert_eq!(table.find(row, u).map(|(cell, _)| cell), cell, "{row} {u}");
             }
         }
+    }
+
+    /// Points side by side fall into the cells that they fall into alone.
+    #[test]
+    fn cells_of_several_points_are_those_of_each() {
+        let (width, height) = (64, 16);
+        let weights: Vec<f64> =
+            (0..width * height).map(|i| if i / width == 5 { 0.0 } else { ((i * 37) % 11) as f64 }).collect();
+        let table = PiecewiseConstant2d::new(&weights, width, height);
+        let us: Vec<DVec2> = (0..64).map(|i| DVec2::new(f64::from(i * 29 % 64), f64::from(i)) / 64.0).collect();
+        let named = |cell: Option<Cell>| cell.map(|cell| (cell.row, cell.column, cell.within));
+        for us in us.chunks(8) {
+            let found = table.sample_cells::<8>(us).map(named);
+            assert_eq!(found[..], us.iter().map(|&u| named(table.sample_cell(u))).collect::<Vec<_>>());
+        }
+        assert!(table.sample_cells::<8>(&us[..3])[3..].iter().all(Option::is_none));
     }
 
     /// Half a unit of rounding at either end of a cell, and one that is stored a unit low; the last number of 32 bits finds the last cell with weight.

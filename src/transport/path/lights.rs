@@ -75,7 +75,7 @@ impl Tracer<'_> {
                 None => (light.background(path.ray.direction, self.nm), 1.0),
                 Some(p) => {
                     let (l, pdf) = light.background_and_pdf(path.ray.direction, p.normal, self.nm);
-                    let q = self.scene.light_probability_at(i as usize, p.point, p.normal) * pdf;
+                    let q = self.scene.light_probability_at(i as usize, p.point, p.normal, path.judged) * pdf;
                     (l, power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho))
                 }
             };
@@ -100,7 +100,7 @@ impl Tracer<'_> {
         later: Option<&mut Option<Asked>>,
     ) {
         let scene = self.scene;
-        let Some((i, probability)) = scene.choose_light_at(point, normal, u_light) else { return };
+        let Some((i, probability)) = scene.choose_light_at(point, normal, u_light, &mut path.judged) else { return };
         let Some(light) = scene.lights[i].arriving(&scene.objects, point, normal, u, self.nm) else { return };
         let (f, pdf) = eval(light.wi);
         if f.simd_eq(Lanes::ZERO).all() {

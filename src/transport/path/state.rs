@@ -36,6 +36,8 @@ pub(super) struct Path {
     pub(super) inside: Inside,
     /// `None` where only scattering could find light: at the camera and after mirrors.
     pub(super) previous: Option<Previous>,
+    /// What lights may give to the last vertex that asked for one, which is `previous`; zero where that is not known.
+    pub(super) judged: f32,
     pub(super) radiance: Lanes,
     /// Scattering events so far.
     pub(super) vertices: u32,
@@ -149,6 +151,7 @@ impl Path {
         eta2: 1.0,
         inside: Inside::NOTHING,
         previous: None,
+        judged: 0.0,
         radiance: Lanes::ZERO,
         vertices: 0,
         crossings: 0,
