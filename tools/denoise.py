@@ -3,7 +3,7 @@
 
     pip install pyoidn OpenEXR numpy
     abbe render SCENE -o noisy.exr --set output.exr.precision=float \\
-        --set 'layers=[{name: albedo, surface: albedo}, {name: normal, surface: shading_normal}]'
+        --set 'layers=[albedo, normal]'
     tools/denoise.py noisy.exr denoised.exr
 """
 import sys

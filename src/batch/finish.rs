@@ -180,27 +180,27 @@ impl Finish {
         start..start + bands
     }
 
-    /// What the colours of the file mean.
-    fn colour(&self) -> ColourEncoding {
-        let space = self.space();
-        ColourEncoding { primaries: space.chromaticities(), interop_id: Some(space.interop_id().to_owned()) }
-    }
-
     /// Luminance of what is one in red, green and blue, cd·m⁻²: Y is ∫ L ȳ dλ over that of ȳ, times the sensitivity.
     fn white_luminance(&self) -> Option<f64> {
         let unit = LUMENS_PER_WATT * observer::Y_INTEGRAL;
         (self.sensitivity > 0.0 && !self.bands).then(|| unit / self.sensitivity)
     }
 
-    /// The time code of the frame, where that of frame 0 is `start`.
-    fn time_code(&self, start: [u32; 4]) -> [u32; 4] {
-        let (Some(number), Some(rate)) = (self.frame_number, self.frames_per_second) else { return start };
-        let rate = i64::from((rate.round() as u32).clamp(1, 60));
+    /// The time code of the frame, where that of frame 0 is `start`. More than 30 frames a second share numbers: two of 48 to 60
+    /// one, of which the code tells them; more of a faster rate.
+    fn time_code(&self, start: [u32; 4]) -> exr::TimeCode {
+        // Of a still nobody says the rate.
+        let rate = self.frames_per_second.unwrap_or(if start[3] < 30 { 30.0 } else { 60.0 });
+        let rate = (rate.round() as i64).max(1);
         let [hours, minutes, seconds, frames] = start.map(i64::from);
+        let number = self.frame_number.filter(|_| self.frames_per_second.is_some()).unwrap_or(0);
         let all = ((hours * 60 + minutes) * 60 + seconds) * rate + frames + i64::from(number);
         let all = all.rem_euclid(24 * 3600 * rate);
-        let (seconds, frames) = (all / rate, all % rate);
-        [seconds / 3600, seconds / 60 % 60, seconds % 60, frames].map(|n| n as u32)
+        let (seconds, frame) = (all / rate, all % rate);
+        let share = (rate + 29) / 30;
+        let [hours, minutes, seconds, frames] =
+            [seconds / 3600, seconds / 60 % 60, seconds % 60, frame / share].map(|n| n as u32);
+        exr::TimeCode { hours, minutes, seconds, frames, second: share == 2 && frame % 2 == 1 }
     }
 
     /// Rows of the frame that no part cuts.
@@ -209,19 +209,9 @@ impl Finish {
         if self.adaptive.is_some() { adaptive::SIDE } else { 1 }
     }
 
-    /// What a pixel of the file holds: bands replace colour.
+    /// What a pixel of the file holds.
     fn base(&self) -> exr::Base {
-        if self.bands {
-            return exr::Base::Nothing;
-        }
-        match self.output.exr.channels {
-            description::Channels::Rgba => exr::Base::Rgba,
-            description::Channels::Rgb => exr::Base::Rgb,
-            description::Channels::Xyza => exr::Base::Xyza,
-            description::Channels::Xyz => exr::Base::Xyz,
-            description::Channels::LuminanceAlpha => exr::Base::LuminanceAlpha,
-            description::Channels::Luminance => exr::Base::Luminance,
-        }
+        base(&self.output, self.bands)
     }
 
     /// The colour space of the file.
@@ -245,6 +235,20 @@ impl Finish {
     #[must_use]
     pub fn png_settings(&self, image: &Image) -> PngSettings {
         develop::settings(&self.output.png, self.white, image, self.space())
+    }
+}
+
+/// What a pixel of a file holds: bands replace colour.
+#[must_use]
+pub fn base(output: &description::Output, bands: bool) -> exr::Base {
+    match output.exr.channels {
+        _ if bands => exr::Base::Nothing,
+        description::Channels::Rgba => exr::Base::Rgba,
+        description::Channels::Rgb => exr::Base::Rgb,
+        description::Channels::Xyza => exr::Base::Xyza,
+        description::Channels::Xyz => exr::Base::Xyz,
+        description::Channels::LuminanceAlpha => exr::Base::LuminanceAlpha,
+        description::Channels::Luminance => exr::Base::Luminance,
     }
 }
 
@@ -290,7 +294,11 @@ pub fn integrator(integrator: &Integrator) -> &'static str {
 /// [`Error::Output`](crate::error::Error::Output) where a file cannot be written, [`Error::Render`](crate::error::Error::Render)
 /// for invalid samples; the files are then written all the same.
 pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut SceneReport) -> Result<()> {
-    let image = frame.resolve(&finish.rgb_from_xyz());
+    let mut image = frame.resolve(&finish.rgb_from_xyz());
+    if finish.integrator == "whitted" {
+        // Its samples differ by where they are, and would be the same again: there is no noise.
+        image.standard_error.iter_mut().for_each(|plane| plane.fill(0.0));
+    }
     report.pixel_hash = pixel_hash(&image);
     let written = Instant::now();
     let png_path = exr_path.with_extension("png");
@@ -378,16 +386,24 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         let own = LayerPlane {
             name: channel.name.clone(),
             plane: if channel.holds == Holds::Once { frame.layer_once(i) } else { frame.layer(i) },
-            light: matches!(channel.holds, Holds::Band | Holds::Light),
+            kind: match channel.holds {
+                Holds::Light => exr::PlaneKind::Colour,
+                Holds::Band => exr::PlaneKind::Band,
+                Holds::Data | Holds::Once => exr::PlaneKind::Data,
+            },
         };
         let of_band = exr.stderr && channel.holds == Holds::Band;
-        let error =
-            of_band.then(|| LayerPlane { name: stderr_name(&channel.name), plane: frame.layer_error(i), light: false });
+        let error = of_band.then(|| LayerPlane {
+            name: stderr_name(&channel.name),
+            plane: frame.layer_error(i),
+            kind: exr::PlaneKind::Data,
+        });
         [Some(own), error].into_iter().flatten()
     };
     let own = finish.layers.iter().enumerate().filter(|(i, _)| !finish.spectral_channels().contains(i));
     let own = own.flat_map(layer).collect();
-    let mut beauty = exr::beauty(image, finish.base(), own, finish.colour(), precision, error, compression);
+    let colour = ColourEncoding::of(colour_space(finish.output.colour));
+    let mut beauty = exr::beauty(image, finish.base(), own, colour, precision, error, compression);
     if frame.film.layers.invalid.total() > 0 {
         report.notes.push(format!("{} samples of layers could not be added", frame.film.layers.invalid.total()));
     }
@@ -405,8 +421,10 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         report.notes.push("an ACES container holds half floats only: the file is none".to_owned());
     }
     if finish.variance {
-        for (name, plane) in ["R", "G", "B"].iter().zip(&image.standard_error) {
-            let variance = plane.iter().map(|x| x * x).collect();
+        // Beside bands of the colours that the PNG is made of.
+        let base = if finish.bands { exr::Base::Rgb } else { finish.base() };
+        for &(name, i) in base.colours() {
+            let variance = image.standard_error[i].iter().map(|x| x * x).collect();
             file.push_data(format!("variance.{name}"), ChannelData::F32(variance));
         }
     }
@@ -474,7 +492,7 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
         window: image.window,
         data: errors.iter().map(|(name, _)| name.clone()).collect(),
         channels: channels.map(plane).chain(preview).chain(errors).collect(),
-        colour: Some(finish.colour()),
+        colour: Some(ColourEncoding::of(finish.space())),
         attributes,
         compression: exr::Compression::Zip,
         layout: exr::Layout::Single,

@@ -1,10 +1,12 @@
 //! From the layers that are written to those that samples fill.
 
+use super::finish;
 use super::prepare::{colour_space, integrator};
 use crate::description::{self, LayerContent, SceneDescription};
 use crate::error::Result;
 use crate::film::layers::Kept;
 use crate::scene::Scene;
+use crate::scene::casters::Casters;
 use crate::transport::layers::{Form, Layer, LayerPlan, Quantity, Source};
 use crate::transport::middle::Middle;
 use crate::transport::ways::{Way, Ways};
@@ -19,6 +21,7 @@ pub(super) fn wants_errors(description: &SceneDescription) -> bool {
 pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) -> Result<LayerPlan> {
     let mut plan = LayerPlan {
         rgb_from_xyz: colour_space(description.output.colour).matrix_from_xyz(),
+        in_xyz: finish::base(&description.output, !description.image.bands.is_empty()).is_xyz(),
         sensitivity: description.image.sensitivity,
         sample_distance: 1.0 / f64::from(samples).sqrt(),
         ..LayerPlan::default()
@@ -39,7 +42,8 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
             }
             LayerContent::LightGroups => {
                 let groups = &scene.light_groups;
-                let rest = groups.of.contains(&0).then(|| "default".to_owned());
+                // Depth fog is of no lamp.
+                let rest = (groups.of.contains(&0) || scene.fog.is_some()).then(|| "default".to_owned());
                 let numbers = if rest.is_some() { 0 } else { 1 }..groups.count();
                 for (name, i) in rest.iter().chain(&groups.names).zip(numbers) {
                     let source = Source::Ways(Ways::ALL, Some(i));
@@ -48,6 +52,9 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
             }
             _ => {}
         }
+    }
+    if plan.parts_light() {
+        plan.sharp = Casters::of(scene).casts;
     }
     plan.mattes = description.layers.iter().any(|layer| matches!(layer.content, LayerContent::Matte(_)));
     for layer in &description.layers {
@@ -66,6 +73,7 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
             | LayerContent::StandardError
             | LayerContent::SampleCount => continue,
             LayerContent::Surface(quantity) => Source::Surface(self::quantity(*quantity)),
+            LayerContent::Seen(quantity) => Source::Seen(self::quantity(*quantity)),
             LayerContent::Light { of, form } => {
                 let form = match form {
                     description::LightForm::Rgba => Form::Rgba,

@@ -25,8 +25,12 @@ pub struct Layer {
 /// What a layer holds.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LayerContent {
-    /// Something of the first surface that the camera sees, mean over the pixel.
+    /// Something of the first surface that rays of the camera meet, mean over the pixel, as Mitsuba has it. Colours are those in
+    /// light of equal energy.
     Surface(Quantity),
+    /// Something of the first surface that covers what is behind it, mean over the pixel: no hole of a mask, no boundary of a
+    /// medium, no hidden lamp. Colours are those in daylight, D65.
+    Seen(Quantity),
     /// Light.
     Light {
         /// By another integrator than the picture's; default that of the picture.
@@ -61,7 +65,7 @@ pub enum LayerContent {
 pub enum LightWay {
     /// By nothing: the camera sees the lamp.
     Emission,
-    /// Thrown by a mirror or smooth glass onto something else; in no other way.
+    /// Thrown by a mirror, or by glass or metal that is smooth or nearly so, onto something else; in no other way.
     Caustic,
     /// Scattered once.
     Direct,
@@ -199,8 +203,8 @@ const NAMED: [(&str, &str, LayerContent); 13] = [
     ("P", "P", LayerContent::Middle(Data::Position)),
     ("uv", "uv", LayerContent::Middle(Data::Uv)),
     ("motion", "motion", LayerContent::Middle(Data::Motion)),
-    ("normal", "normal", LayerContent::Surface(Quantity::ShadingNormal)),
-    ("albedo", "albedo", LayerContent::Surface(Quantity::Albedo)),
+    ("normal", "normal", LayerContent::Seen(Quantity::ShadingNormal)),
+    ("albedo", "albedo", LayerContent::Seen(Quantity::Albedo)),
     ("light_groups", "light_groups", LayerContent::LightGroups),
     ("variance", "variance", LayerContent::Variance),
     ("stderr", "stderr", LayerContent::StandardError),
@@ -274,7 +278,9 @@ impl Layer {
     #[must_use]
     pub fn is_data(&self) -> bool {
         match &self.content {
-            LayerContent::Surface(quantity) => *quantity != Quantity::Albedo || self.squares.is_some(),
+            LayerContent::Surface(quantity) | LayerContent::Seen(quantity) => {
+                *quantity != Quantity::Albedo || self.squares.is_some()
+            }
             LayerContent::Light { .. } => self.squares.is_some(),
             LayerContent::Ways { .. } | LayerContent::LightGroups => false,
             LayerContent::Middle(_)

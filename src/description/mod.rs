@@ -68,14 +68,15 @@
 //!                                   # of squares as m2_direct.R, …, or under squares_name
 //! - {name: key_diffuse, ways: [diffuse], light_group: key}      # of the light of `path` what came these ways (~ all)
 //!                                   # from lamps of this group (~ all). Emission: the camera sees the lamp; caustic: a
-//!                                   # mirror or smooth glass threw it onto something else; other light direct (scattered
+//!                                   # mirror, or glass or metal of alpha 0.05 or less, threw it onto something else; other light direct (scattered
 //!                                   # once) or indirect, by what the camera sees: diffuse, glossy, transmission, media;
 //!                                   # both: diffuse_direct, … . emission, caustic, direct, indirect add up to the picture,
 //!                                   # and so do emission, caustic, diffuse, glossy, transmission, media
 //! - diffuse                         # or a name that says all: a way; light_groups: light_key, …, and light_default of
-//!                                   # lamps in no group; Z (depth along the line of sight, 1e10 where there is nothing),
+//!                                   # lamps in no group and of depth fog; Z (depth along the line of sight, 1e10 where there is nothing),
 //!                                   # P, uv, motion (X to the right, Y up, in pixels, until the next frame): of the ray
-//!                                   # through the middle of the pixel, not filtered; normal, albedo: means over it; variance, stderr: of the pixel's mean; sampleCount;
+//!                                   # through the middle of the pixel, not filtered; normal, albedo (in daylight): means over it,
+//!                                   # of what is seen, not of holes; variance, stderr: of the pixel's mean; sampleCount;
 //!                                   # crypto_object, crypto_material, crypto_asset: Cryptomatte
 //! render:                           # these are the defaults
 //!   samples: 64                     # paths per pixel

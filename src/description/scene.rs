@@ -19,7 +19,7 @@ use super::medium::{Medium, UNCHANGED, VACUUM};
 use super::node::{Node, Sources, quote};
 use super::output::Output;
 use super::path::{self, At};
-use super::settings::{Integrator, Render};
+use super::settings::{Integrator, Render, Technique};
 use super::shape::Shape;
 use super::spectrum::{FilePath, Role};
 use super::texture::Texture;
@@ -247,6 +247,12 @@ impl SceneDescription {
             }
         }
         self.render.check(at.key("render"), &mut checker);
+        let measured = self.layers.iter().any(|layer| matches!(layer.content, LayerContent::Light { .. }));
+        let asked = self.render.techniques.light_tracing == Technique::On;
+        let place = at.key("render");
+        let place = place.key("techniques");
+        let expected = "auto or off beside layers of light, which are measured path by path from the camera";
+        checker.require(!(measured && asked), place.key("light_tracing"), expected, "on");
         self.output.check(at.key("output"), &mut checker);
         exr_file::check_layers(&self.output, &self.layers, &mut checker);
         for (name, material) in &self.materials {

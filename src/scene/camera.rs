@@ -212,7 +212,7 @@ impl Camera {
     /// there (Veach 1997, 8.2). Parallel rays through an area dA across them pass dx = dA / s².
     #[must_use]
     pub fn entry(&self, point: DVec3, lens: impl FnOnce() -> DVec2) -> Option<Entry> {
-        let (w, h) = (f64::from(self.resolution[0]), f64::from(self.resolution[1]));
+        let w = f64::from(self.resolution[0]);
         let local = self.view.camera_from_world.transform_point3(point);
         if !(local.z > 0.0 && local.z >= self.clip[0] && local.z <= self.clip[1]) {
             return None;
@@ -242,8 +242,7 @@ impl Camera {
                 (half_width, place, place + aperture, 1.0 / (side * side * stretch))
             }
         };
-        let pixel = (DVec2::new(plane.x, -plane.y) * w / half_width + DVec2::new(w, h)) * 0.5
-            + self.principal_point * DVec2::new(w, h);
+        let pixel = self.on_picture(plane / half_width);
         // Rays begin at the near clipping plane.
         let start = origin.extend(0.0);
         let begin = start + (local - start) * (self.clip[0] / local.z);
@@ -251,6 +250,21 @@ impl Camera {
         let whole = self.world_from_camera.transform_point3(start) - point;
         let wi = whole.try_normalize()?;
         Some(Entry { pixel, direction: wi, distance: offset.length(), density })
+    }
+
+    /// Where the middle of the lens sees what is infinitely far in `direction`; `None` behind the camera, and where parallel
+    /// rays all look into one direction.
+    #[must_use]
+    pub fn vanishing_point(&self, direction: DVec3) -> Option<DVec2> {
+        let Projection::Perspective { half_width } = self.projection else { return None };
+        let local = self.view.camera_from_world.transform_vector3(direction);
+        (local.z > 0.0).then(|| self.on_picture(local.truncate() / (local.z * half_width)))
+    }
+
+    /// In pixels what is at `place`: from the middle to the right and up, in halves of the picture's width.
+    fn on_picture(&self, place: DVec2) -> DVec2 {
+        let size = DVec2::new(f64::from(self.resolution[0]), f64::from(self.resolution[1]));
+        (DVec2::new(place.x, -place.y) * size.x + size) * 0.5 + self.principal_point * size
     }
 
     /// World to camera for row vectors, row by row, as EXR files and RenderMan have it: +x right, +y up,
@@ -289,10 +303,10 @@ impl Camera {
         (ndc_from_camera * DMat4::from(self.view.camera_from_world)).to_cols_array().map(|x| x as f32)
     }
 
-    /// Distance of `point` along the axis.
+    /// Distance of `point` along the axis, metres, whatever the scale of the camera's own coordinates.
     #[must_use]
     pub fn depth(&self, point: DVec3) -> f64 {
-        (point - self.world_from_camera.translation).dot(self.world_from_camera.matrix3.z_axis)
+        (point - self.world_from_camera.translation).dot(self.view.unit_axis)
     }
 }
 

@@ -3,18 +3,18 @@
 //! Names of channels are those of OpenEXR layers: `name.R`, `name.X`, …; components of colour are linear in the
 //! primaries of the file.
 
-use super::middle::Middle;
+use super::middle::{Covering, Middle, first_covering};
 use super::plan::{EffectPlan, Integrator};
 use super::ways::{Ledger, Way, Ways};
 use crate::film::accumulate::{Invalid, SAMPLE_LIMIT};
 use crate::film::layers::{Kept, Layout};
-use crate::math::Ray;
+use crate::math::{Frame, Ray};
 use crate::optics::bsdf::Bsdf;
 use crate::scene::compound::{Composition, Vertex, share};
 use crate::scene::material::Material;
 use crate::scene::watch::Counts;
 use crate::scene::{Hit, Scene, SurfacePoint};
-use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
+use crate::spectrum::{LANES, Lanes, SampledWavelengths, Spectrum, illuminant, observer};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
@@ -78,15 +78,17 @@ pub enum Form {
 /// Where the numbers of a group of channels come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The first surface.
+    /// The first surface that the ray meets.
     Surface(Quantity),
+    /// The first surface that covers what is behind it: what the camera sees.
+    Seen(Quantity),
     /// The light of an integrator: that of the picture for `None`, else one of [`LayerPlan::integrators`].
     Light(Option<usize>, Form),
     /// A band of the scene.
     Band(usize),
     /// What was counted on the way of the sample: [`NUMERICS`].
     Numerics,
-    /// The part of the picture's light that came certain ways, of one group of lamps or all: red, green, blue.
+    /// The part of the picture's light that came certain ways, of one group of lamps or all: in the terms of the picture.
     Ways(Ways, Option<u8>),
     /// What the ray through the middle of the pixel meets, once a pixel.
     Middle(Middle),
@@ -110,7 +112,7 @@ impl Layer {
     /// How many channels it has.
     pub(super) fn channels(&self) -> usize {
         let count = match self.source {
-            Source::Surface(quantity) => quantity.components().len(),
+            Source::Surface(quantity) | Source::Seen(quantity) => quantity.components().len(),
             Source::Light(_, Form::Rgba) => 4,
             Source::Light(_, Form::Xyz) | Source::Ways(..) => 3,
             Source::Band(_) => 1,
@@ -130,12 +132,19 @@ pub struct LayerPlan {
     pub integrators: Vec<Integrator>,
     /// From XYZ to the primaries of the file.
     pub rgb_from_xyz: [[f64; 3]; 3],
-    /// Factor on colours, as on the picture's own.
+    /// In whose light colours of surfaces are seen, of luminance 1.
+    pub white: Spectrum,
+    /// Whether the picture is in XYZ, or its luminance; light by its ways, which adds up to it, then is, too.
+    pub in_xyz: bool,
+    /// Factor on light, as on the picture's own.
     pub sensitivity: f64,
     /// How far apart samples of a pixel stand, in pixels: 1/√n.
     pub sample_distance: f64,
     /// Whether it is noted who covers the pixels.
     pub mattes: bool,
+    /// Of each object whether what it throws onto others is a caustic, where light is parted: mirrors, and glass and metal that are
+    /// smooth or nearly so, as paths from the lights take them. Whether those are used changes nothing about it.
+    pub sharp: Vec<bool>,
     /// Whose samples share a sum.
     pub kept: Kept,
 }
@@ -146,9 +155,12 @@ impl Default for LayerPlan {
             layers: Vec::new(),
             integrators: Vec::new(),
             rgb_from_xyz: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            white: illuminant::d65(),
+            in_xyz: false,
             sensitivity: 1.0,
             sample_distance: 1.0,
             mattes: false,
+            sharp: Vec::new(),
             kept: Kept::Together,
         }
     }
@@ -180,7 +192,7 @@ pub enum Holds {
 impl LayerPlan {
     /// Whether the layers hold nothing but what the picture's own light gives.
     fn own_light_only(&self) -> bool {
-        let own = |layer: &Layer| !matches!(layer.source, Source::Surface(_));
+        let own = |layer: &Layer| !matches!(layer.source, Source::Surface(_) | Source::Seen(_));
         self.integrators.is_empty() && self.layers.iter().all(own)
     }
 
@@ -196,7 +208,7 @@ impl LayerPlan {
         let count = |layer: &Layer| match layer.source {
             Source::Band(_) => 1,
             Source::Ways(..) => 3,
-            Source::Surface(_) | Source::Light(..) | Source::Numerics | Source::Middle(_) => 0,
+            Source::Surface(_) | Source::Seen(_) | Source::Light(..) | Source::Numerics | Source::Middle(_) => 0,
         };
         self.layers.iter().map(count).sum()
     }
@@ -206,6 +218,11 @@ impl LayerPlan {
     pub fn layout(&self) -> Layout {
         let channels = self.layers.iter().map(Layer::channels).sum();
         Layout { channels, kept: self.kept }
+    }
+
+    /// Light in the terms of the picture.
+    fn as_the_picture(&self, xyz: [f32; 3]) -> [f32; 3] {
+        if self.in_xyz { xyz } else { rgb(&self.rgb_from_xyz, xyz) }
     }
 
     /// What `light` that paths from the lights bring from a lamp of `group` adds to these channels.
@@ -224,9 +241,9 @@ impl LayerPlan {
                 Source::Ways(ways, of) => {
                     let counts = ways.holds(Way::Caustic) && of.is_none_or(|of| of == group);
                     let light = xyz.map(|x| x * self.sensitivity as f32);
-                    numbers.extend(if counts { rgb(&self.rgb_from_xyz, light) } else { [0.0; 3] });
+                    numbers.extend(if counts { self.as_the_picture(light) } else { [0.0; 3] });
                 }
-                Source::Surface(_) | Source::Light(..) | Source::Numerics | Source::Middle(_) => {}
+                Source::Surface(_) | Source::Seen(_) | Source::Light(..) | Source::Numerics | Source::Middle(_) => {}
             }
         }
     }
@@ -241,7 +258,7 @@ impl LayerPlan {
             {
                 let unless_squared = |holds| if squared { Holds::Data } else { holds };
                 match layer.source {
-                    Source::Surface(quantity) => {
+                    Source::Surface(quantity) | Source::Seen(quantity) => {
                         let names = quantity.components().iter().map(|c| format!("{name}.{c}"));
                         let colour = quantity == Quantity::Albedo;
                         let holds = unless_squared(if colour { Holds::Light } else { Holds::Data });
@@ -256,7 +273,10 @@ impl LayerPlan {
                     }
                     Source::Band(_) => all.push(Channel { name: name.clone(), holds: Holds::Band }),
                     Source::Numerics => all.extend(channels(name, &NUMERICS, Holds::Data)),
-                    Source::Ways(..) => all.extend(channels(name, &["R", "G", "B"], Holds::Light)),
+                    Source::Ways(..) => {
+                        let components = if self.in_xyz { ["X", "Y", "Z"] } else { ["R", "G", "B"] };
+                        all.extend(channels(name, &components, Holds::Light));
+                    }
                     Source::Middle(middle) => all.extend(channels(name, middle.components(), Holds::Once)),
                 }
             }
@@ -309,9 +329,10 @@ pub struct Values {
 }
 
 impl Values {
-    /// Looks at what is more than the picture's own light: the first surface that `ray` meets, and the `light` of
-    /// further integrators.
+    /// Looks at what is more than the picture's own light: the first surface that `ray` meets, that which it shows by the
+    /// numbers `u` of its crossings, and the `light` of further integrators.
     #[inline(never)]
+    #[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
     fn look(
         &mut self,
         scene: &Scene,
@@ -319,18 +340,20 @@ impl Values {
         wavelengths: &SampledWavelengths,
         ray: &Ray,
         neighbours: impl Fn(DVec2) -> Ray,
+        u: impl Fn(u32) -> f64,
         light: impl Fn(&Integrator) -> Seen,
     ) {
         self.others.clear();
         self.others.extend(plan.layers.integrators.iter().map(light));
         self.surface.clear();
-        let quantities = plan.layers.layers.iter().filter_map(|layer| match layer.source {
-            Source::Surface(quantity) => Some(quantity),
-            _ => None,
-        });
-        let mut first = None;
-        for quantity in quantities {
-            match first.get_or_insert_with(|| First::met(scene, ray)) {
+        let (mut met, mut seen) = (None, None);
+        for layer in &plan.layers.layers {
+            let (quantity, first) = match layer.source {
+                Source::Surface(quantity) => (quantity, met.get_or_insert_with(|| First::met(scene, ray))),
+                Source::Seen(quantity) => (quantity, seen.get_or_insert_with(|| First::seen(scene, plan, ray, &u))),
+                _ => continue,
+            };
+            match first {
                 Some(first) => {
                     first.append(scene, plan, wavelengths, ray, &neighbours, quantity, &mut self.surface);
                 }
@@ -340,7 +363,8 @@ impl Values {
     }
 
     /// Appends the numbers of one sample. `light` gives the light of an integrator, `neighbours` the ray of a sample
-    /// some pixels away; `counted` is what was counted on its way, and the weight of the filter.
+    /// some pixels away, `u` the number that decides at a crossing of its ray; `counted` is what was counted on its way, and
+    /// the weight of the filter.
     #[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
     #[inline]
     pub fn append(
@@ -350,6 +374,7 @@ impl Values {
         wavelengths: &SampledWavelengths,
         ray: &Ray,
         neighbours: impl Fn(DVec2) -> Ray,
+        u: impl Fn(u32) -> f64,
         own: Seen,
         counted: (Counts, f32),
         ledger: Option<&Ledger>,
@@ -357,7 +382,7 @@ impl Values {
     ) {
         let layers = &plan.layers;
         if !layers.own_light_only() {
-            self.look(scene, plan, wavelengths, ray, neighbours, light);
+            self.look(scene, plan, wavelengths, ray, neighbours, u, light);
         }
         let Values { numbers, surface, others } = self;
         let mut surface = surface.iter();
@@ -365,7 +390,7 @@ impl Values {
         for layer in &layers.layers {
             let squares = layer.squares.is_some();
             match layer.source {
-                Source::Surface(quantity) => {
+                Source::Surface(quantity) | Source::Seen(quantity) => {
                     let count = quantity.components().len();
                     let start = numbers.len();
                     numbers.extend(surface.by_ref().take(count));
@@ -391,7 +416,7 @@ impl Values {
                 Source::Ways(ways, group) => {
                     let light = ledger.map_or(Lanes::ZERO, |ledger| ledger.light(ways, group));
                     let xyz = observer::xyz(light, wavelengths).map(|x| x * sensitivity);
-                    numbers.extend(rgb(&layers.rgb_from_xyz, xyz));
+                    numbers.extend(layers.as_the_picture(xyz));
                 }
                 // These stand in the pixel once.
                 Source::Middle(middle) => numbers.extend(middle.components().iter().map(|_| 0.0)),
@@ -421,16 +446,23 @@ fn rgb(matrix: &[[f64; 3]; 3], xyz: [f32; 3]) -> [f32; 3] {
     matrix.map(|row| (row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2]) as f32)
 }
 
-/// The first surface that a camera ray meets.
+/// The first surface that a camera ray meets, or shows.
 struct First {
     hit: Hit,
     surface: SurfacePoint,
+    /// Its normal in light, where it is what the ray shows.
+    normal: Option<DVec3>,
 }
 
 impl First {
     fn met(scene: &Scene, ray: &Ray) -> Option<First> {
         let hit = scene.closest(ray, scene.camera.reach(ray))?;
-        Some(First { hit, surface: scene.surface_with_texture(ray, &hit) })
+        Some(First { hit, surface: scene.surface_with_texture(ray, &hit), normal: None })
+    }
+
+    fn seen(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<First> {
+        let Covering { hit, surface, normal } = first_covering(scene, plan, ray, u)?;
+        Some(First { hit, surface, normal: Some(normal) })
     }
 
     #[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
@@ -451,7 +483,9 @@ impl First {
             Quantity::Position => values.extend(three(surface.point)),
             Quantity::Uv => values.extend(surface.uv.to_array().map(|x| x as f32)),
             Quantity::GeometricNormal => values.extend(three(surface.normal)),
-            Quantity::ShadingNormal => values.extend(three(self.shading_normal(scene, ray))),
+            Quantity::ShadingNormal => {
+                values.extend(three(self.normal.unwrap_or_else(|| self.shading_normal(scene, ray))));
+            }
             Quantity::DpDu | Quantity::DpDv => {
                 let [du, dv] = scene.uv_gradient(&self.hit, surface).partials();
                 values.extend(three(if quantity == Quantity::DpDu { du } else { dv }));
@@ -463,8 +497,12 @@ impl First {
                 values.extend(change.to_array().map(|x| x as f32));
             }
             Quantity::Albedo => {
-                let albedo = self.albedo(scene, plan, wavelengths.nm, ray);
-                let xyz = observer::xyz(albedo * plan.layers.sensitivity as f32, wavelengths);
+                let mut albedo = self.albedo(scene, plan, wavelengths.nm, ray);
+                // Of what is seen in the light of day, so that grey is grey.
+                if self.normal.is_some() {
+                    albedo *= plan.layers.white.eval(wavelengths.nm);
+                }
+                let xyz = observer::xyz(albedo, wavelengths);
                 values.extend(rgb(&plan.layers.rgb_from_xyz, xyz));
             }
             Quantity::Primitive => values.push(self.hit.part as f32),
@@ -523,7 +561,7 @@ impl First {
             Bsdf::PrincipledThin(principled) => principled.base,
             other => {
                 // As if the light came along the normal.
-                let frame = crate::math::Frame::from_normal(surface.shading_normal);
+                let frame = Frame::from_normal_and_tangent(surface.shading_normal, surface.tangent);
                 let mut wo = frame.to_local(-ray.direction);
                 if material.two_sided {
                     wo.z = wo.z.abs();

@@ -61,10 +61,10 @@ pub fn middle(
                 (ray, first_covering(scene, plan, &ray, |_| 0.5))
             });
             let values = match (middle, met) {
-                (Middle::Depth, Some((_, surface))) => [scene.camera.depth(surface.point) as f32, 0.0, 0.0],
+                (Middle::Depth, Some(seen)) => [scene.camera.depth(seen.surface.point) as f32, 0.0, 0.0],
                 (Middle::Depth, None) => [FAR, 0.0, 0.0],
-                (Middle::Position, Some((_, surface))) => surface.point.to_array().map(|x| x as f32),
-                (Middle::Uv, Some((_, surface))) => [surface.uv.x as f32, surface.uv.y as f32, 0.0],
+                (Middle::Position, Some(seen)) => seen.surface.point.to_array().map(|x| x as f32),
+                (Middle::Uv, Some(seen)) => [seen.surface.uv.x as f32, seen.surface.uv.y as f32, 0.0],
                 (Middle::Position | Middle::Uv, None) => [0.0; 3],
                 (Middle::Motion, met) => {
                     let [x, y] = next.map_or([0.0; 2], |next| motion(scene, next, place, ray, met.as_ref()));
@@ -78,14 +78,17 @@ pub fn middle(
 }
 
 /// How far what is seen at `place` moves until the scene is `next`, pixels, to the right and up.
-fn motion(scene: &Scene, next: &Scene, place: DVec2, ray: &Ray, met: Option<&(Hit, SurfacePoint)>) -> [f32; 2] {
-    let point = match met {
-        Some((hit, surface)) => moved(scene, next, hit, surface.point),
+fn motion(scene: &Scene, next: &Scene, place: DVec2, ray: &Ray, met: Option<&Covering>) -> [f32; 2] {
+    let there = match met {
+        Some(Covering { hit, surface, .. }) => {
+            let point = moved(scene, next, hit, surface.point);
+            next.camera.entry(point, || DVec2::splat(0.5)).map(|entry| entry.pixel)
+        }
         // What is infinitely far keeps its direction.
-        None => next.camera.eye() + ray.direction,
+        None => next.camera.vanishing_point(ray.direction),
     };
-    let Some(entry) = next.camera.entry(point, || DVec2::splat(0.5)) else { return [0.0; 2] };
-    let shift = entry.pixel - place;
+    let Some(there) = there else { return [0.0; 2] };
+    let shift = there - place;
     [shift.x as f32, -shift.y as f32]
 }
 
@@ -117,6 +120,13 @@ fn moved(scene: &Scene, next: &Scene, hit: &Hit, point: DVec3) -> DVec3 {
         (Geometry::Mesh(_), Geometry::Mesh(after)) if (hit.part as usize) < after.mesh.triangles.len() => {
             after.mesh.surface(hit.part, hit.barycentric[0], hit.barycentric[1]).point
         }
+        (Geometry::Sdf(before), Geometry::Sdf(after)) => {
+            let own = before.placement().inverse().transform_point3(local);
+            after.placement().transform_point3(own)
+        }
+        (Geometry::Curves(before), Geometry::Curves(after)) => {
+            before.carried(after, hit.part, hit.barycentric[0], local).unwrap_or(local)
+        }
         _ => local,
     };
     let moved = out.map_or(local, |out| out.transform_point3(local));
@@ -127,31 +137,44 @@ fn moved(scene: &Scene, next: &Scene, hit: &Hit, point: DVec3) -> DVec3 {
 /// shows, or the object itself.
 #[must_use]
 pub fn covered(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<u64> {
-    let (hit, _) = first_covering(scene, plan, ray, u)?;
+    let hit = match &plan.integrator {
+        // It knows no materials.
+        Integrator::Depth => scene.closest(ray, scene.camera.reach(ray))?,
+        _ => first_covering(scene, plan, ray, u)?.hit,
+    };
     Some(u64::from(hit.instance.unwrap_or(hit.object)) << 32 | u64::from(hit.object))
+}
+
+/// A surface that the camera sees.
+pub(super) struct Covering {
+    pub hit: Hit,
+    pub surface: SurfacePoint,
+    /// Its normal in light, with all relief, on the side of the surface's own.
+    pub normal: DVec3,
 }
 
 /// The first surface that a camera ray meets and that is really there: no hole of a mask, which `u` decides at the
 /// crossing of that number, no boundary of a medium alone, no hidden lamp.
-fn first_covering(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<(Hit, SurfacePoint)> {
+pub(super) fn first_covering(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<Covering> {
     let hides = matches!(&plan.integrator, Integrator::Path(settings) if settings.hide_emitters);
     let (mut ray, mut reach) = (*ray, scene.camera.reach(ray));
     for crossing in 0..=MAX_BOUNDARIES {
         let hit = scene.closest(&ray, reach)?;
         let surface = scene.surface_with_texture(&ray, &hit);
         let object = &scene.objects[hit.object as usize];
-        let open = match &scene.materials[object.material as usize].kind {
-            _ if hides && object.is_lamp => true,
-            Kind::Boundary => true,
+        let normal = match &scene.materials[object.material as usize].kind {
+            _ if hides && object.is_lamp => None,
+            Kind::Boundary => None,
             Kind::Compound(compound) => {
                 let (wo, at) = (-ray.direction, &hit.texture_point(&surface));
                 let vertex = Vertex { scene, hit: &hit, surface: &surface, at, wo };
-                compound.resolve(&vertex, seen_normal(&surface, wo), u(crossing)).is_none()
+                let leaf = compound.resolve(&vertex, seen_normal(&surface, wo), u(crossing));
+                leaf.map(|leaf| if leaf.flipped { -leaf.frame.n } else { leaf.frame.n })
             }
-            _ => false,
+            _ => Some(surface.shading_normal),
         };
-        if !open {
-            return Some((hit, surface));
+        if let Some(normal) = normal {
+            return Some(Covering { hit, surface, normal });
         }
         ray = scene.leave(&surface, &hit, ray.direction);
         reach = f64::INFINITY;

@@ -259,6 +259,7 @@ impl Begun {
             &wavelengths,
             &ray,
             |step| shot.scene.camera.ray(place + step, || pairs(sampler.set(Set::Lens)).0),
+            |crossing| deciding(shot, sampler, self.at, crossing),
             layers::Seen { radiance, xyz, alpha },
             (counted, weight),
             ledger,
@@ -362,13 +363,27 @@ impl Samples {
         let channels = layers.numbers.len() / begun.len().max(1);
         for (i, begun) in begun.iter().enumerate() {
             let covered = shot.plan.layers.mattes.then(|| {
-                let sampler = octet.sampler(i);
-                middle::covered(shot.scene, shot.plan, &begun.ray, |crossing| {
-                    sampler.set(Set::Extra(crossing << 16))[2]
-                })
+                let u = |crossing| deciding(shot, &octet.sampler(i), begun.at, crossing);
+                middle::covered(shot.scene, shot.plan, &begun.ray, u)
             });
             give(i, &begun.sample, &layers.numbers[i * channels..(i + 1) * channels], covered.flatten());
         }
+    }
+}
+
+/// What decides whether the ray of a sample goes through a hole at a crossing: the number by which its path does.
+///
+/// A ray of [`Integrator::Whitted`] is parted there and draws none: its samples, each in turn, stand for the parts.
+fn deciding(shot: &Shot, sampler: &Sampler, at: Address, crossing: u32) -> f64 {
+    /// The fraction of the golden ratio, of which multiples are spread evenly.
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    match &shot.plan.integrator {
+        Integrator::Whitted(settings) => {
+            let s = at.index * REPLICATES as u32 + at.replicate;
+            let place = (f64::from(s) + 0.5) / f64::from(settings.samples());
+            (place + GOLDEN * f64::from(crossing)).fract()
+        }
+        _ => sampler.set(Set::Extra(crossing << 16))[2],
     }
 }
 

@@ -287,6 +287,9 @@ impl Tracer<'_> {
         if let Some(caustics) = &self.plan.caustics {
             path.sharp = caustics.is_sharp(hit.object);
         }
+        if let Some(ledger) = self.ledger {
+            ledger.meet(self.plan.layers.sharp[hit.object as usize]);
+        }
         let choice = Choice { sampler: self.sampler, vertex: path.vertices, drawn: Cell::new(None) };
         let leaving = Leaving {
             hit: &hit,
@@ -540,6 +543,9 @@ impl Tracer<'_> {
             return false;
         }
         path.sharp = false;
+        if let Some(ledger) = self.ledger {
+            ledger.meet(false);
+        }
         let choice = self.sampler.set(Set::Choice(path.vertices));
         let wo = -path.ray.direction;
         self.scene.foresee(&self.sampler, Set::Scatter(path.vertices));

@@ -89,8 +89,12 @@ pub struct Ledger {
     /// Ways of the first group, of the second, …
     sums: RefCell<Vec<Lanes>>,
     first: Cell<First>,
-    /// Whether the last vertex was in a single direction.
+    /// Whether the vertex that the path is at is on something sharp.
+    here: Cell<bool>,
+    /// Whether the last vertex that it left was sharp.
     sharp: Cell<bool>,
+    /// Whether some vertex that it left was not.
+    spread: Cell<bool>,
 }
 
 /// One contribution of light.
@@ -111,7 +115,9 @@ impl Ledger {
         Ledger {
             sums: RefCell::new(vec![Lanes::ZERO; WAYS * groups]),
             first: Cell::new(First::Media),
+            here: Cell::new(false),
             sharp: Cell::new(false),
+            spread: Cell::new(false),
         }
     }
 
@@ -120,19 +126,38 @@ impl Ledger {
         self.sums.borrow_mut().fill(Lanes::ZERO);
     }
 
-    /// A path leaves its `vertex`th vertex, from 0: what the first scattered, and whether any went in a single direction.
+    /// The next of the wavelengths that part leaves, from a path that has met nothing but what is sharp.
+    pub fn part(&self) {
+        self.spread.set(false);
+    }
+
+    /// A path has come to a vertex on something `sharp` or not.
     #[inline]
-    pub fn leave(&self, vertex: u32, first: impl FnOnce() -> First, sharp: bool) {
+    pub fn meet(&self, sharp: bool) {
+        self.here.set(sharp);
+    }
+
+    /// A path leaves its `vertex`th vertex, from 0: what the first scattered, and whether this one went in a single direction.
+    #[inline]
+    pub fn leave(&self, vertex: u32, first: impl FnOnce() -> First, single: bool) {
+        let sharp = single || self.here.get();
+        self.spread.set(!sharp || vertex > 0 && self.spread.get());
         if vertex == 0 {
             self.first.set(first());
         }
         self.sharp.set(sharp);
     }
 
-    /// Whether the last vertex went in a single direction.
+    /// Whether light that the path meets was thrown by something sharp onto something else.
     #[must_use]
-    pub fn is_sharp(&self) -> bool {
-        self.sharp.get()
+    pub fn is_caustic(&self) -> bool {
+        self.spread.get() && self.sharp.get()
+    }
+
+    /// Whether light that is found from the vertex that the path is at was.
+    #[must_use]
+    pub fn is_caustic_from_here(&self, vertex: u32) -> bool {
+        vertex > 0 && self.spread.get() && self.here.get()
     }
 
     /// Light that the camera sees itself.
@@ -140,7 +165,7 @@ impl Ledger {
         self.put(Way::Emission, found, found.light);
     }
 
-    /// Light that was thrown by a mirror or smooth glass.
+    /// Light that was thrown by something sharp.
     pub fn caustic(&self, found: Found) {
         self.put(Way::Caustic, found, found.light);
     }

@@ -126,6 +126,11 @@ def test_attributes_have_their_types(render):
     assert (header["owner"], header["shot"]) == ("us", "0010")
     code = header["timeCode"]
     assert (code.hours, code.minutes, code.seconds, code.frame) == (1, 2, 3, 4)
+    # Of 60 frames a second two share a number; the bit of dropped frames stays off.
+    _, header = official(render("fast", render={"samples": 4, "frames": 45, "frames_per_second": 60}, output={"exr": {"attributes": attributes}}))
+    code = header["timeCode"]
+    assert (code.seconds, code.frame, code.fieldPhase, code.dropFrame) == (3, 24, True, False)
+    _, header = official(path)
     assert header["expTime"] == pytest.approx(0.02)
     # 36 mm of film seen under 36 degrees.
     focal = 18 / np.tan(np.radians(18))

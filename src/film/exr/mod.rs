@@ -20,6 +20,7 @@ pub use write::{encode_exr, write_exr};
 use crate::error::Result;
 use crate::film::Window;
 use crate::film::resolve::Image;
+use crate::spectrum::ColourSpace;
 use half::f16;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -90,6 +91,29 @@ pub struct ColourEncoding {
     pub interop_id: Option<String>,
 }
 
+impl ColourEncoding {
+    /// Of numbers in `space`.
+    #[must_use]
+    pub fn of(space: ColourSpace) -> ColourEncoding {
+        ColourEncoding { primaries: space.chromaticities(), interop_id: Some(space.interop_id().to_owned()) }
+    }
+}
+
+/// When a frame is shown, as SMPTE ST 12-1 counts it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimeCode {
+    /// Below 24.
+    pub hours: u32,
+    /// Below 60.
+    pub minutes: u32,
+    /// Below 60.
+    pub seconds: u32,
+    /// Below 30: there is room for 39.
+    pub frames: u32,
+    /// Whether it is the second of two frames of this number, as above 30 a second.
+    pub second: bool,
+}
+
 /// The value of a header attribute.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Attribute {
@@ -105,8 +129,8 @@ pub enum Attribute {
     Rational(i32, u32),
     /// `v2f`.
     Vec2([f32; 2]),
-    /// `timecode`: hours, minutes, seconds, frames; no frames are dropped.
-    TimeCode([u32; 4]),
+    /// `timecode`; no frames are dropped.
+    TimeCode(TimeCode),
     /// `m44f`, row by row for row vectors (v·M), as Imath holds it: `(matrix for column vectors).to_cols_array()`.
     Matrix4([f32; 16]),
 }
@@ -210,7 +234,8 @@ impl Base {
     }
 
     /// Names of the colour channels and which planes they are.
-    fn colours(self) -> &'static [(&'static str, usize)] {
+    #[must_use]
+    pub fn colours(self) -> &'static [(&'static str, usize)] {
         match self {
             Base::Rgba | Base::Rgb => &[("R", 0), ("G", 1), ("B", 2)],
             Base::Xyza | Base::Xyz => &[("X", 0), ("Y", 1), ("Z", 2)],
@@ -231,8 +256,19 @@ pub struct LayerPlane {
     pub name: String,
     /// The samples.
     pub plane: Vec<f32>,
-    /// True for light, which follows the precision of the file; data are 32-bit floats.
-    pub light: bool,
+    /// What they are.
+    pub kind: PlaneKind,
+}
+
+/// What a further channel is, for the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlaneKind {
+    /// Light in colours: its primaries are told.
+    Colour,
+    /// Light of a band: of no colour.
+    Band,
+    /// Data: 32-bit floats, whatever the precision of the file.
+    Data,
 }
 
 /// What packing with loss changed.
@@ -295,7 +331,7 @@ pub struct Beauty {
     pub note: Option<String>,
 }
 
-/// The file of a resolved picture, with `layers`.
+/// The file of a resolved picture, with `layers`; `colour` is what R, G and B mean in it.
 ///
 /// Half holds 11 significant bits between 2⁻¹⁴ and 65504. A picture with a finite value that would round to infinity,
 /// or so dim that the step of subnormal halves (2⁻²⁴) exceeds half's own relative precision at the mean
@@ -311,7 +347,8 @@ pub fn beauty(
     compression: Compression,
 ) -> Beauty {
     let colours: Vec<(&str, &Vec<f32>)> = base.colours().iter().map(|&(name, i)| (name, &image.rgb[i])).collect();
-    let light = layers.iter().filter(|layer| layer.light).map(|layer| &layer.plane);
+    let light = layers.iter().filter(|layer| layer.kind != PlaneKind::Data).map(|layer| &layer.plane);
+    let in_colours = base != Base::Nothing || layers.iter().any(|layer| layer.kind == PlaneKind::Colour);
     let note = match precision {
         Precision::Float => None,
         Precision::Half => half_loses(colours.iter().map(|(_, plane)| *plane).chain(light)),
@@ -338,19 +375,20 @@ pub fn beauty(
         }
     }
     for layer in layers {
-        let samples = if layer.light {
-            data(&layer.plane)
-        } else {
-            data_channels.insert(layer.name.clone());
-            ChannelData::F32(layer.plane)
+        let samples = match layer.kind {
+            PlaneKind::Colour | PlaneKind::Band => data(&layer.plane),
+            PlaneKind::Data => ChannelData::F32(layer.plane),
         };
+        if layer.kind != PlaneKind::Colour {
+            data_channels.insert(layer.name.clone());
+        }
         channels.push((layer.name, samples));
     }
     let exr = ExrImage {
         frame: image.frame,
         window: image.window,
         channels,
-        colour: (base != Base::Nothing).then_some(colour),
+        colour: in_colours.then_some(colour),
         attributes: Vec::new(),
         data: data_channels,
         compression,

@@ -1,9 +1,10 @@
 //! Writes the header; the `exr` crate packs the rows.
 
-use super::{Attribute, ChannelData, ColourEncoding, Compression, ExrImage, Layout};
+use super::{Attribute, ChannelData, ColourEncoding, Compression, ExrImage, Layout, TimeCode};
 use crate::error::{Error, Result};
 use crate::film::output::write_atomically;
 use crate::film::{Window, cryptomatte};
+use crate::spectrum::ColourSpace;
 use ::exr::block::{BlockIndex, UncompressedBlock, enumerate_ordered_header_block_indices};
 use ::exr::math::Vec2;
 use ::exr::meta::BlockDescription;
@@ -282,6 +283,18 @@ fn compressor_header(image: &ExrImage, channels: &[Channel], compression: Compre
         .with_encoding(compression, BlockDescription::ScanLines, LineOrder::Increasing)
 }
 
+/// What the colours of a part mean, those of the picture itself where they are in it: X, Y and Z say it by their names.
+fn encoding(image: &ExrImage, part: &Part) -> Option<ColourEncoding> {
+    let rgb = image.colour.as_ref().filter(|_| part.light)?;
+    let light = || part.channels.iter().map(|(name, _)| *name).filter(|name| !image.data.contains(*name));
+    let component = |name: &str| name.rsplit('.').next().filter(|c| *c != "A").map(str::to_owned);
+    let own = light().filter(|name| !name.contains('.')).find_map(component);
+    match own.or_else(|| light().find_map(component)).as_deref() {
+        Some("X" | "Y" | "Z") => Some(ColourEncoding::of(ColourSpace::Xyz)),
+        _ => Some(rgb.clone()),
+    }
+}
+
 /// The attributes of a part, sorted by name, and whether a name is long; `chunks` of one among several.
 fn header_bytes(image: &ExrImage, part: &Part, chunks: Option<usize>) -> std::result::Result<(Vec<u8>, bool), String> {
     let channels: Vec<(&str, i32)> = part
@@ -294,7 +307,7 @@ fn header_bytes(image: &ExrImage, part: &Part, chunks: Option<usize>) -> std::re
         })
         .collect();
     let compression = part_compression(image, part);
-    let colour = image.colour.as_ref().filter(|_| part.light);
+    let colour = encoding(image, part);
     let mut structure = Vec::new();
     if let (Some(name), Some(chunks)) = (&part.name, chunks) {
         check_name("part", name)?;
@@ -311,7 +324,7 @@ fn header_bytes(image: &ExrImage, part: &Part, chunks: Option<usize>) -> std::re
         (Some(rest), Some(layer)) => rest.starts_with(&cryptomatte::key(layer)),
     };
     let further: Vec<&(String, Attribute)> = image.attributes.iter().filter(|(name, _)| here(name)).collect();
-    header(image.frame, image.window, &channels, compression_code(compression), colour, structure, &further)
+    header(image.frame, image.window, &channels, compression_code(compression), colour.as_ref(), structure, &further)
 }
 
 /// The beginning of a file of whole numbers in `channels`, whose names are sorted: magic number, version and header.
@@ -435,9 +448,12 @@ fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
     values.into_iter().flat_map(f32::to_le_bytes).collect()
 }
 
-/// A time code as SMPTE ST 12 packs it: decimal digits of frames, seconds, minutes and hours, a byte each.
-fn time_bits([hours, minutes, seconds, frames]: [u32; 4]) -> u32 {
-    [frames, seconds, minutes, hours].iter().rev().fold(0, |bits, n| bits << 8 | (n / 10) << 4 | (n % 10))
+/// A time code as SMPTE ST 12-1 packs it for 60 fields: decimal digits of frames, seconds, minutes and hours, a byte each; bit
+/// 15 tells the second of two frames.
+fn time_bits(code: TimeCode) -> u32 {
+    let TimeCode { hours, minutes, seconds, frames, second } = code;
+    let digits = [hours, minutes, seconds, frames].iter().fold(0, |bits, n| bits << 8 | (n / 10) << 4 | (n % 10));
+    digits | u32::from(second) << 15
 }
 
 /// Type name and bytes of a value.
@@ -460,6 +476,14 @@ mod tests {
     use super::super::tests::{image, rec709};
     use super::super::{Base, Precision, StandardError, beauty, read_exr};
     use super::*;
+
+    /// 01:02:03:24, the second of its pair: no digit of the frames reaches the bit of dropped frames.
+    #[test]
+    fn time_codes_are_packed_digit_by_digit() {
+        let code = TimeCode { hours: 1, minutes: 2, seconds: 3, frames: 24, second: true };
+        assert_eq!(time_bits(code), 0x0102_8324);
+        assert_eq!(time_bits(TimeCode { second: false, frames: 29, ..code }), 0x0102_0329);
+    }
 
     fn mixed(compression: Compression) -> ExrImage {
         let f = [1.5, -0.0, f32::NAN, f32::INFINITY, 1e-40, -3e38];

@@ -64,6 +64,8 @@ pub struct Curves {
     bvh: Bvh,
     segments: u32,
     bounds: Aabb,
+    /// From the control points as written to the world.
+    placement: DAffine3,
 }
 
 impl Curves {
@@ -133,7 +135,7 @@ impl Curves {
         };
         let bvh = Bvh::build(&boxes);
         let bounds = bvh.bounds();
-        Ok(Curves { pieces, bvh, segments: segments.len() as u32, bounds })
+        Ok(Curves { pieces, bvh, segments: segments.len() as u32, bounds, placement: *world_from_object })
     }
 
     /// How many segments there are.
@@ -214,10 +216,30 @@ impl Curves {
     /// The radius at `v` of a segment.
     #[must_use]
     pub fn thickness(&self, segment: u32, v: f64) -> f64 {
+        self.line(segment, v).1
+    }
+
+    /// The middle of a segment at `v`, and its radius.
+    fn line(&self, segment: u32, v: f64) -> (DVec3, f64) {
         match &self.pieces {
-            Pieces::Cones(cones) => cones[segment as usize].radius(v),
-            Pieces::Tubes(tubes, first) => piece_at(tubes, first, segment, v).at(v)[0][3],
+            Pieces::Cones(cones) => (cones[segment as usize].center(v), cones[segment as usize].radius(v)),
+            Pieces::Tubes(tubes, first) => {
+                let [x, y, z, r] = piece_at(tubes, first, segment, v).at(v)[0];
+                (DVec3::new(x, y, z), r)
+            }
         }
+    }
+
+    /// Where `point` at `v` of a segment is on `other`, the same curves placed elsewhere: its side of the curve turns with
+    /// them, and stays as far from the middle as they are thick. `None` where there is no such place.
+    #[must_use]
+    pub fn carried(&self, other: &Curves, segment: u32, v: f64, point: DVec3) -> Option<DVec3> {
+        if segment >= other.segments {
+            return None;
+        }
+        let ((here, _), (there, radius)) = (self.line(segment, v), other.line(segment, v));
+        let turn = other.placement.matrix3 * self.placement.matrix3.inverse();
+        Some(there + unit(turn * (point - here))? * radius)
     }
 
     /// The surface of a segment nearest to `point_on_ray`, which `closest` has found at `v`.

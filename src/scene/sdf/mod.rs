@@ -201,6 +201,13 @@ impl SdfGrid {
         })
     }
 
+    /// From the unit cube that the grid fills to the world.
+    #[must_use]
+    pub fn placement(&self) -> DAffine3 {
+        let extent = DVec3::from(self.size.map(|n| (n - 1) as f64));
+        DAffine3 { matrix3: self.world_from_grid * DMat3::from_diagonal(extent), translation: self.origin }
+    }
+
     /// The box of all cells that hold a piece of the surface.
     #[must_use]
     pub fn bounds(&self) -> Aabb {

@@ -49,7 +49,7 @@ impl Tracer<'_> {
             let found = self.found(path, share, light);
             match path.vertices {
                 0 => ledger.emitted(found),
-                _ if !path.specular && (path.sharp || ledger.is_sharp()) => ledger.caustic(found),
+                _ if ledger.is_caustic() => ledger.caustic(found),
                 times => ledger.scattered(found, times),
             }
         }
@@ -149,7 +149,7 @@ impl Tracer<'_> {
             let found = self.found(path, share, i as u32);
             match path.vertices {
                 0 => ledger.scattered_by(first(light.wi), found, 1),
-                _ if !path.specular && path.sharp => ledger.caustic(found),
+                vertex if ledger.is_caustic_from_here(vertex) => ledger.caustic(found),
                 vertices => ledger.scattered(found, vertices + 1),
             }
         }

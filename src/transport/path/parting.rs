@@ -31,6 +31,9 @@ impl Tracer<'_> {
         let (mut vertices, mut crossings) = (path.vertices, path.crossings);
         for lane in 0..LANES {
             let Some(sample) = glass.lane(lane).sample(wo, u_lobe) else { continue };
+            if let Some(ledger) = self.ledger {
+                ledger.part();
+            }
             let mut alone = Path {
                 beta: Lanes::splat(beta[lane]),
                 radiance: Lanes::ZERO,

@@ -1,7 +1,9 @@
 //! Layers and mattes for compositing: parts of the light that add up to the picture, data of the middle of a pixel, and
 //! who covers it.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod seen;
 
 use abbe::batch::{self, Overrides};
 use abbe::film::cryptomatte::id_of;

@@ -1,0 +1,227 @@
+//! What layers say of what is seen, in closed form: where it moves, which surface it is, in which colours.
+
+use super::{FRAME, common, plane, render};
+use abbe::batch::{self, Overrides};
+use abbe::film::exr::{ExrPart, read_exr};
+use std::sync::atomic::AtomicBool;
+use tempfile::TempDir;
+
+/// Pixels a metre at 1 m from a camera of 40° across 64 pixels.
+const SCALE: f64 = 32.0 / 0.363_970_234_266_202_4;
+
+/// Frame 1 of two, 64 × 48 pixels, with `files` beside it.
+fn first_of_two(yaml: &str, files: &[(&str, Vec<u8>)]) -> ExrPart {
+    let place = TempDir::new().unwrap();
+    let path = |name: &str| place.path().join(name);
+    for (name, bytes) in files {
+        common::write(&path(name), bytes);
+    }
+    let text = format!(
+        "image: {{width: 64, height: 48}}\nrender: {{samples: 1, frames: '1-2'}}\noutput: {{exr: {{precision: float}}}}\n\
+         layers: [motion, Z, P]\n{yaml}"
+    );
+    common::write(&path("scene.yaml"), text.as_bytes());
+    let overrides = Overrides { output: Some(path("out")), ..Overrides::default() };
+    let report = batch::render_batch(&path("scene.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+    assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+    read_exr(&path("out/scene.0001.exr")).unwrap().parts.remove(0)
+}
+
+/// Under a camera that stands still nothing moves on the picture, whatever its projection and where it begins to see; where it
+/// pans by an angle a, the sky above its middle moves by tan a.
+#[test]
+fn the_sky_moves_with_the_camera_alone() {
+    let scene = |camera: &str| {
+        let sky = "lights: [{constant: {radiance: {1: 1, 2: 0.9}}}]\nshapes: [{sphere: {radius: 1}}]\n";
+        first_of_two(&format!("camera: {{origin: [0, 0, 6], {camera}}}\n{sky}"), &[])
+    };
+    for view in
+        ["fov_deg: 40", "fov_deg: 40, clip: {near: 2}", "fov_deg: 40, clip: {far: 5.5}", "orthographic_height: 4"]
+    {
+        let part = scene(&format!("target: [0, 0, 0], {view}"));
+        for (i, z) in plane(&part, "Z").iter().enumerate() {
+            let [x, y] = ["motion.X", "motion.Y"].map(|name| plane(&part, name)[i]);
+            // f32 of what is exact to some roundings of f64 times 64 pixels.
+            assert!(x.abs().max(y.abs()) < 1e-9, "{view}: {x} {y} at {i}, depth {z}");
+        }
+    }
+    for clip in ["", ", clip: {near: 2}"] {
+        let part = scene(&format!("target: {{1: [0, 0, 0], 2: [0.36, 0, 0]}}, fov_deg: 40{clip}"));
+        let sky = f64::from(plane(&part, "motion.X")[2 * 64 + 32]);
+        // Half a pixel beside the middle, b = 1/2 SCALE, it is tan(a + b) - b: 4e-4 more than tan a.
+        let expected = -SCALE * 0.06;
+        assert!((sky / expected - 1.0).abs() < 1e-3, "{sky} {expected}");
+    }
+}
+
+/// The ball of distances of Mitsuba's VOL, radius 0.4 about the middle of the unit cube.
+fn ball_of_distances() -> Vec<u8> {
+    let mut bytes = b"VOL\x03".to_vec();
+    bytes.extend(1i32.to_le_bytes());
+    [9i32, 9, 9, 1].iter().for_each(|n| bytes.extend(n.to_le_bytes()));
+    [0f32, 0.0, 0.0, 1.0, 1.0, 1.0].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+    for i in 0..729 {
+        let p = [i % 9, i / 9 % 9, i / 81].map(|k| f64::from(k) / 8.0 - 0.5);
+        let distance = p.iter().map(|x| x * x).sum::<f64>().sqrt() - 0.4;
+        bytes.extend((distance as f32).to_le_bytes());
+    }
+    bytes
+}
+
+/// Curves and grids of distances that turn by 10° about the line of sight and are moved: each point they show is carried
+/// along. P is written in 32 bits, 2⁻²⁴ of some metres, which are seen at 30 pixels a metre.
+#[test]
+fn curves_and_grids_carry_their_points_along() {
+    let hair = b"-1 0 0 0.3\n1 0 0 0.3\n".to_vec();
+    let bend = b"-2 -0.5 0 0.2\n-0.7 0.2 0 0.3\n0.7 0.2 0.3 0.3\n2 -0.5 0 0.2\n2.5 -1 0 0.2\n".to_vec();
+    let files = [("hair.txt", hair), ("bend.txt", bend), ("ball.vol", ball_of_distances())];
+    let turn =
+        "transform: [{rotate: {axis: [0, 0, 1], deg: {1: 0, 2: 10}}}, {translate: {1: [0, 0, 0], 2: [0.3, 0.1, 0.2]}}]";
+    for shape in [
+        format!("curves: {{file: hair.txt, {turn}}}"),
+        format!("curves: {{file: bend.txt, basis: bspline, {turn}}}"),
+        format!("sdf_grid: {{file: ball.vol, {turn}}}"),
+    ] {
+        let part = first_of_two(
+            &format!(
+                "camera: {{origin: [0, 0, 6], target: [0, 0, 0], fov_deg: 40}}\nlights: [{{constant: {{radiance: 1}}}}]\n\
+                 shapes: [{{{shape}}}]\n"
+            ),
+            &files,
+        );
+        let mut seen = 0;
+        for (i, z) in plane(&part, "Z").iter().enumerate().filter(|(_, z)| **z < 1e9) {
+            let [x, y, height] = ["P.X", "P.Y", "P.Z"].map(|name| f64::from(plane(&part, name)[i]));
+            let (sin, cos) = 10f64.to_radians().sin_cos();
+            let to = [x * cos - y * sin + 0.3, x * sin + y * cos + 0.1, height + 0.2];
+            let on = |p: [f64; 3]| [p[0], p[1]].map(|c| SCALE * c / (6.0 - p[2]));
+            let (before, after) = (on([x, y, height]), on(to));
+            let motion = ["motion.X", "motion.Y"].map(|name| f64::from(plane(&part, name)[i]));
+            let off = (0..2).map(|k| (motion[k] - (after[k] - before[k])).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-4, "{shape}: off by {off} at {i}, depth {z}");
+            seen += 1;
+        }
+        assert!(seen > 40, "{shape}: {seen}");
+    }
+}
+
+/// A camera whose own coordinates are scaled still measures depth in metres.
+#[test]
+fn depth_is_in_metres_whatever_the_scale_of_the_camera() {
+    let part = render(
+        "camera: {to_world: [[-2, 0, 0, 0], [0, 2, 0, 0], [0, 0, -2, 6], [0, 0, 0, 1]], orthographic_height: 4}\n\
+         image: {width: 8, height: 8}\nrender: {samples: 1}\noutput: {exr: {precision: float}}\n\
+         layers: [Z, {name: d, surface: depth}]\nlights: [{constant: {radiance: 1}}]\n\
+         shapes: [{plane: {normal: [0, 0, 1]}}]\n",
+    );
+    assert!(plane(&part, "Z").iter().chain(plane(&part, "d.T")).all(|z| (z - 6.0).abs() < 1e-5));
+}
+
+/// Normal and albedo are those of what the camera sees: through the box of a medium, through a lamp that is hidden, through the
+/// holes of a card, in which a pixel is a mean; with the relief of a material that is within another. In daylight grey is
+/// grey, whatever the sensitivity of the film.
+#[test]
+fn normal_and_albedo_are_of_what_is_seen() {
+    let scene = |front: &str| {
+        render(&format!(
+            "camera: {{origin: [0, 0, 6], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 8, height: 8, sensitivity: 50}}\n\
+             integrator: {{path: {{hide_emitters: true}}}}\nrender: {{samples: 1024}}\noutput: {{exr: {{precision: float}}}}\n\
+             media: {{haze: {{homogeneous: {{extinction: 0.01, albedo: 0.8}}}}}}\nlights: [{{constant: {{radiance: 1}}}}]\n\
+             layers: [normal, albedo]\nshapes:\n\
+             - plane: {{normal: [0.6, 0, 0.8], material: {{diffuse: {{reflectance: 0.5}}}}}}\n{front}"
+        ))
+    };
+    let lamp = "- rectangle: {corner: [-5, -5, 3], edge_u: [10, 0, 0], edge_v: [0, 10, 0], emission: 1}\n";
+    let card = "- rectangle: {corner: [-5, -5, 3], edge_u: [10, 0, 0], edge_v: [0, 10, 0], material: {mask: {opacity: 0.25, \
+                material: {diffuse: {reflectance: 0.9}}}}}\n";
+    let haze = "- cube: {center: [0, 0, 3], size: 2, inside: haze, material: {boundary: {}}}\n";
+    for (front, share) in [("", 0.0), (haze, 0.0), (lamp, 0.0), (card, 0.25)] {
+        let part = scene(front);
+        let mean = |name: &str| f64::from(plane(&part, name).iter().sum::<f32>()) / 64.0;
+        // 1024 evenly spread samples decide on the card: a pixel is off by few of them, the mean of 64 pixels by less than one.
+        for (name, wall, front) in [("normal.X", 0.6, 0.0), ("normal.Z", 0.8, 1.0)] {
+            let expected = wall + (front - wall) * share;
+            assert!((mean(name) - expected).abs() < 1e-3, "{front}: {name} {}", mean(name));
+        }
+        // Wavelengths are evenly spread, too: 64 · 1024 sets of eight.
+        for name in ["albedo.R", "albedo.G", "albedo.B"] {
+            let expected = 0.5 + (0.9 - 0.5) * share;
+            assert!((mean(name) - expected).abs() < 2e-3, "{front}: {name} {}", mean(name));
+        }
+    }
+}
+
+/// In a file of X, Y, Z, or of Y, the parts of the light are X, Y and Z, and add up to it.
+#[test]
+fn light_by_its_ways_is_in_the_terms_of_the_picture() {
+    for channels in ["xyza", "luminance"] {
+        let part = render(&format!(
+            "{}layers: [emission, direct, indirect, caustic, variance]\nlights: [{{constant: {{radiance: 0.2}}}}]\n\
+             shapes: [{{plane: {{normal: [0, 1, 0], material: {{diffuse: {{reflectance: {{rgb: [0.8, 0.1, 0.1]}}}}}}}}}}]\n",
+            FRAME.replace("float", &format!("float, stderr: true, channels: {channels}"))
+        ));
+        let names: &[&str] = if channels == "xyza" { &["X", "Y", "Z"] } else { &["Y"] };
+        for c in names {
+            for (i, whole) in plane(&part, c).iter().enumerate() {
+                let of = |layer: &str| plane(&part, &format!("{layer}.{c}"))[i];
+                let sum: f32 = ["emission", "direct", "indirect", "caustic"].map(of).iter().sum();
+                assert!((sum - whole).abs() <= 16.0 * whole.abs() * f32::EPSILON, "{c} of {channels}: {sum} {whole}");
+                let error = plane(&part, &format!("stderr.{c}"))[i];
+                assert_eq!(plane(&part, &format!("variance.{c}"))[i], error * error);
+            }
+        }
+    }
+}
+
+/// Depth fog is of no lamp: it is in a group of its own where each lamp has one.
+#[test]
+fn depth_fog_is_light_of_no_lamp() {
+    let part = render(&format!(
+        "{FRAME}fog: {{colour: 0.3, density: 0.1}}\nlight_groups: {{key: [sky]}}\nlayers: [light_groups]\n\
+         lights: [{{constant: {{name: sky, radiance: 0.2}}}}]\nshapes: [{{plane: {{normal: [0, 1, 0]}}}}]\n"
+    ));
+    for (i, whole) in plane(&part, "G").iter().enumerate() {
+        let sum = plane(&part, "light_key.G")[i] + plane(&part, "light_default.G")[i];
+        assert!((sum - whole).abs() <= 16.0 * whole * f32::EPSILON, "{sum} {whole}");
+    }
+}
+
+/// Nearly smooth glass throws a caustic, whether paths from the lights or from the camera find it: what is not caustic has the
+/// same mean, 0.0084, with both. It has little noise: 1 % at 256 samples of 384 pixels is ten standard errors.
+#[test]
+fn techniques_do_not_decide_what_is_a_caustic() {
+    let indirect = |light_tracing: &str| {
+        let part = render(&format!(
+            "camera: {{origin: [0, 3, 6], target: [0, 0.3, 0], fov_deg: 30}}\nimage: {{width: 24, height: 16}}\n\
+             render: {{samples: 256, techniques: {{light_tracing: {light_tracing}, merging: off}}}}\n\
+             output: {{exr: {{precision: float}}}}\nlayers: [caustic, direct, indirect]\nshapes:\n\
+             - plane: {{normal: [0, 1, 0], material: {{diffuse: {{reflectance: 0.5}}}}}}\n\
+             - sphere: {{center: [-2, 3, 0], radius: 0.1, emission: 320}}\n\
+             - sphere: {{center: [0, 0.6, 0], radius: 0.6, material: {{dielectric: {{ior: 1.5, roughness: 0.03}}}}}}\n"
+        ));
+        let mean = |name: &str| f64::from(plane(&part, name).iter().sum::<f32>()) / 384.0;
+        (mean("indirect.G"), mean("caustic.G"))
+    };
+    let ((on, thrown), (off, found)) = (indirect("on"), indirect("off"));
+    assert!((on / off - 1.0).abs() < 0.01, "{on} {off}");
+    assert!(thrown > 0.005 && found > 0.0, "{thrown} {found}");
+}
+
+/// What `whitted` and `depth` see adds up to alpha: the one parts its rays at a half-open card, and n samples tell a share to
+/// 1/2n; the other knows no materials.
+#[test]
+fn mattes_of_other_integrators_add_up_to_alpha() {
+    for (integrator, opacity, bound) in
+        [("{whitted: {grid: 4}}", 0.3, 1.0 / 32.0), ("{whitted: {grid: 2}}", 0.5, 0.0), ("depth", 0.5, 0.0)]
+    {
+        let part = render(&format!(
+            "{FRAME}integrator: {integrator}\nlayers: [crypto_object]\nlights: [{{constant: {{radiance: 0.2}}}}]\nshapes:\n\
+             - rectangle: {{corner: [-9, -9, 0], edge_u: [18, 0, 0], edge_v: [0, 18, 0], material: {{mask: {{opacity: {opacity}, \
+             material: {{diffuse: {{reflectance: 0.9}}}}}}}}}}\n"
+        ));
+        for (i, alpha) in plane(&part, "A").iter().enumerate() {
+            let covered: f32 = ["CryptoObject00.G", "CryptoObject00.A"].map(|name| plane(&part, name)[i]).iter().sum();
+            assert!((covered - alpha).abs() <= bound + 1e-6, "{integrator}: {covered} of {alpha}");
+        }
+    }
+}
