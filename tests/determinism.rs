@@ -10,7 +10,7 @@ use abbe::film::Window;
 use abbe::film::accumulate::Film;
 use abbe::film::exr::{ExrFile, read_exr};
 use abbe::film::filter::{Filter, FilterSampler};
-use common::{Bench, bench_with, grey_png, try_bench};
+use common::{Bench, bench_with, grey_png, try_bench, write};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -179,6 +179,34 @@ fn all_effects_give_the_bits_of_those_the_scene_calls_for() {
             let differ = sums(&auto).iter().zip(sums(&all)).filter(|(a, b)| **a != *b).count();
             assert!(differ == 0, "{name}, {integrator}: {differ} of {} sums differ", sums(&all).len());
         }
+    }
+}
+
+/// A medium that is declared and fills nothing is none to light that comes from the lamps through dispersive glass, whose
+/// wavelengths go together as long as it is known what they are in.
+#[test]
+fn a_medium_that_nothing_holds_changes_nothing() {
+    let picture = |media: &str, effects: &str| {
+        let place = tempfile::TempDir::new().unwrap();
+        let path = |name: &str| place.path().join(name);
+        let yaml = format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 42}}\nimage: {{width: 16, height: 16}}\n{media}\
+             render: {{samples: 64, seed: 1, effects: {effects}}}\n\
+             output: {{exr: {{precision: float}}}}\nshapes:\n\
+             - plane: {{point: [0, -1, 0], normal: [0, 1, 0]}}\n\
+             - cube: {{center: [-1.4, 0.3, 0.8], size: 0.8, material: {{dielectric: {{ior: {{glass: N-SF11}}}}}}}}\n\
+             - sphere: {{center: [-2.5, -0.5, -2], radius: 0.3, emission: 5}}\n"
+        );
+        write(&path("s.yaml"), yaml.as_bytes());
+        let overrides = Overrides { output: Some(path("s.exr")), ..Overrides::default() };
+        let report = batch::render_batch(&path("s.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+        report.scenes[0].pixel_hash.clone()
+    };
+    let unused = "media: {unused: {homogeneous: {absorption: 0.3}}}\n";
+    let plain = picture("", "auto");
+    assert!(!plain.is_empty());
+    for (media, effects) in [("", "all"), (unused, "auto"), (unused, "all")] {
+        assert_eq!(picture(media, effects), plain, "{media} {effects}");
     }
 }
 

@@ -311,7 +311,6 @@ impl<'a> Compiler<'a> {
         let powers: Vec<f64> = lights.iter().map(|light| light.power(&objects, radius)).collect();
         let light_cdf = lights::light_cdf(&powers, &weights);
         let choice = Choice::of(&lights, &powers, &weights, &objects, center, radius);
-        let light_exponent = crate::scene::light::exponent(&lights, &powers, &objects, radius);
         let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
         let bands = self.bands();
         let wavelengths = self.shelf.carried.wavelengths().unwrap_or_else(|| match d.render.wavelengths {
@@ -336,6 +335,7 @@ impl<'a> Compiler<'a> {
         let large_sky = lights.iter().position(is_large).map(|i| i as u32);
         let lets_through = |o: &Object| o.body != 0 || self.materials[o.material as usize].lets_through();
         let has_boundaries = objects.iter().any(lets_through);
+        let has_media = camera_medium.is_some() || objects.iter().any(|o| o.inside.is_some() || o.outside.is_some());
         let mut scene = Scene {
             name: name.to_owned(),
             camera,
@@ -353,7 +353,8 @@ impl<'a> Compiler<'a> {
             lights,
             light_cdf,
             choice,
-            light_exponent,
+            light_exponent: 0,
+            has_media,
             backgrounds,
             has_sky: d.lights.iter().any(|l| matches!(l, written::Light::Constant(_) | written::Light::Environment(_))),
             dark,
@@ -370,6 +371,7 @@ impl<'a> Compiler<'a> {
             notes: self.told_notes(),
             watch: None,
         };
+        scene.light_exponent = scene.film_exponent(&powers);
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         self.note_overlaps(&mut scene);
         scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);

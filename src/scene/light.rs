@@ -122,25 +122,6 @@ pub fn spot_falloff(cos: f64, beam: f64, cutoff: f64) -> f64 {
     }
 }
 
-/// The power of two by which a film divides the light of a scene, [`crate::film::accumulate::Film::exponent`]: 0 where the
-/// brightest of its `lights`, of [`Light::power`] `powers`, lies between 2⁻²⁴ and 2³⁶. A darker scene is raised to one,
-/// with 2³⁸ left above; of brighter lamps the film just holds what they show, and what they light beside as finely as may be.
-#[must_use]
-pub fn exponent(lights: &[Light], powers: &[f64], objects: &[Object], radius: f64) -> i32 {
-    let brightness = lights.iter().zip(powers).map(|(light, power)| light.brightness(*power, objects, radius));
-    let brightest = brightness.filter(|b| b.is_finite()).fold(0.0, f64::max);
-    if brightest < f64::MIN_POSITIVE {
-        return 0;
-    }
-    // The exponent of the number.
-    let log2 = (brightest.to_bits() >> 52) as i32 - 1023;
-    match log2 {
-        ..-24 => log2.max(-100),
-        36.. => (log2 - 36).min(100),
-        _ => 0,
-    }
-}
-
 /// CIE x, y of all `lights` together, each by its luminous power; `None` where none shines.
 #[must_use]
 pub fn chromaticity(lights: &[Light], objects: &[Object], radius: f64) -> Option<[f64; 2]> {
@@ -372,14 +353,6 @@ impl Light {
             Light::Constant { radiance } => 4.0 * PI * PI * radius * radius * radiance.luminance(),
             Light::Environment(map) => 4.0 * PI * PI * radius * radius * map.mean_luminance(),
             Light::Projector(projector) => projector.power(),
-        }
-    }
-
-    /// About how bright a white wall is that it lights with `power`, or the lamp itself where that is seen, in film units.
-    fn brightness(&self, power: f64, objects: &[Object], radius: f64) -> f64 {
-        match self {
-            Light::Area { object, .. } => power / (PI * objects[*object as usize].geometry.area()),
-            _ => power / (4.0 * PI * PI * radius * radius),
         }
     }
 

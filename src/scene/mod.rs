@@ -7,6 +7,7 @@
 pub mod ahead;
 pub mod along_normal;
 pub mod bands;
+mod brightness;
 pub mod bundle;
 pub mod bvh;
 pub mod camera;
@@ -89,6 +90,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Media, by index.
     pub media: Vec<Medium>,
+    /// Whether any of them fills a part of space.
+    pub has_media: bool,
     /// What is where no body is.
     pub camera_medium: Option<u32>,
     /// Bodies with a priority.
@@ -101,7 +104,7 @@ pub struct Scene {
     pub light_cdf: Vec<f64>,
     /// How a point of the scene chooses among them; `None` where all choose alike.
     pub choice: Option<Choice>,
-    /// The film counts light over two to this power: see [`light::exponent`].
+    /// The film counts light over two to this power: see [`Scene::film_exponent`].
     pub light_exponent: i32,
     /// Indices of lights from infinity.
     pub backgrounds: Vec<u32>,

@@ -2,7 +2,7 @@
 
 use crate::common::grey_png;
 use crate::meshes::icosphere;
-use crate::xml::{Answer, Case, DIRECT, GREY, SKY, camera, hold, shape, shining, sphere};
+use crate::xml::{Answer, Case, DIRECT, GREY, SKY, camera, glowing, hold, shape, shining, sphere};
 use std::f64::consts::PI;
 
 fn floor(s: f64) -> String {
@@ -129,6 +129,44 @@ fn masks_blends_and_reliefs_of_nothing_are_what_they_hold() {
         let body = camera([0.0, 0.0, 5.0], [0.0; 3], 10.0).replace("\"perspective\">", &format!("\"thinlens\"><float name=\"aperture_radius\" value=\"{lens:?}\"/><float name=\"focus_distance\" value=\"5\"/>"));
         let wall = shape("rectangle", "<scale value=\"1e7\"/>", GREY);
         cases.push(Case::new(format!("lens {lens:e}"), body + &wall + SKY, Answer::Every(0.5, 2e-6)));
+    }
+    hold(&cases);
+}
+
+/// A ball that shines outward does not light its own inside: rounding puts points of its wall a little out of it, from where it
+/// must not look like a lamp that is touched.
+#[test]
+fn a_ball_of_light_is_dark_within() {
+    let eye = |r: f64| camera([0.2 * r, 0.3 * r, 0.0], [0.0, 0.0, -r], 60.0);
+    let cases: Vec<Case> = [1e-9, 1e-3, 0.123, 0.5, 0.6, 0.7, 1.0, 2.0, 3.0, 1e6]
+        .into_iter()
+        .flat_map(|r| {
+            let grey = glowing(0.5);
+            let at = |x: f64| [x, 0.0, 0.0];
+            let moved = camera([1e3 * r + 0.2 * r, 0.3 * r, 0.0], [1e3 * r, 0.0, -r], 60.0);
+            [
+                Case::new(format!("ball of {r}"), eye(r) + &sphere([0.0; 3], r, &grey), Answer::Every(0.0, 0.0)),
+                Case::new(format!("far ball of {r}"), moved + &sphere(at(1e3 * r), r, &grey), Answer::Every(0.0, 0.0)),
+            ]
+        })
+        .collect();
+    hold(&cases);
+}
+
+/// A lamp of intensity 2π at h above grey ground of radius R: the ground below it has L = ρ/π I/h² = 1 with I = 2π h², however
+/// large the ground is beside it. Seen within 0.01°, of 1e-4 h: cosines differ from 1 by less than 1e-6.
+#[test]
+fn a_lamp_just_above_a_large_ground_lights_it() {
+    let mut cases = Vec::new();
+    for (h, r) in [(1.0, 1e2), (1.0, 6.371e6), (1e-3, 1e5), (1e3, 1e10), (1e-9, 1.0)] {
+        let lamp = format!(
+            "<emitter type=\"point\"><point name=\"position\" x=\"0\" y=\"{h:?}\" z=\"0\"/><spectrum name=\"intensity\" \
+             value=\"{:?}\"/></emitter>",
+            2.0 * PI * h * h
+        );
+        let eye = camera([0.5 * h, 0.5 * h, 0.0], [0.0; 3], 0.01);
+        let body = eye + &sphere([0.0, -r, 0.0], r, GREY) + &lamp;
+        cases.push(Case::new(format!("{h:e} above {r:e}"), body, Answer::Every(1.0, 1e-5)).integrator(DIRECT));
     }
     hold(&cases);
 }

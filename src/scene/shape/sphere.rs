@@ -150,10 +150,16 @@ impl Sphere {
     }
 
     /// The cone of directions from `from` to the sphere; `None` from inside or on it.
+    ///
+    /// With u = 2⁻⁵³ and S the largest of its numbers, a point of the surface is off it by less than 8uS: 2u from the length
+    /// of its normal, and three coordinates of at most 2S with 2u each. The distance adds as much again at the most. What is
+    /// nearer than four times that counts as on it, so that no wall sees its own lamp from the wrong side.
     fn cone(&self, from: DVec3) -> Option<Cap> {
+        /// 2⁻⁴⁸.
+        const ON: f64 = 16.0 * f64::EPSILON;
         let to_center = self.center - from;
         let distance = to_center.length();
-        if distance <= self.radius {
+        if distance - self.radius <= ON * self.scale() {
             return None;
         }
         let s = self.radius / distance;

@@ -70,8 +70,7 @@ impl Walk<'_, '_> {
         loop {
             // One needs no company. What they are in is known but for light that has only been reflected so far, and where
             // bodies overlap each meets others.
-            let media = !scene.media.is_empty();
-            let unknown = !scene.nested.bodies().is_empty() || media && packet.beam.medium.is_none();
+            let unknown = !scene.nested.bodies().is_empty() || scene.has_media && packet.beam.medium.is_none();
             if packet.lanes.count_ones() < 2 || unknown {
                 each(packet.lanes).for_each(|lane| self.follow(packet.alone(lane)));
                 return;
@@ -165,7 +164,7 @@ impl Walk<'_, '_> {
 
     /// Lanes that meet no surface: only something between could scatter them.
     fn drift_apart(&mut self, packet: &Packet, lanes: u8) {
-        if self.paths.plan.media && !self.paths.scene.media.is_empty() {
+        if self.paths.plan.media && self.paths.scene.has_media {
             each(lanes).for_each(|lane| self.follow(packet.alone(lane)));
         }
     }
@@ -309,7 +308,7 @@ impl Walk<'_, '_> {
                 wanted |= 1 << lane;
             }
         }
-        let empty = scene.media.is_empty() && scene.nested.bodies().is_empty() && !scene.has_boundaries;
+        let empty = !scene.has_media && scene.nested.bodies().is_empty() && !scene.has_boundaries;
         if !empty || self.hides_lamps() {
             for lane in each(wanted) {
                 let (surface, came) = (at[lane].0, -packet.rays[lane].direction);

@@ -1,0 +1,113 @@
+//! How bright the brightest of a scene is: by which power of two its film counts.
+
+use super::Scene;
+use super::light::Light;
+use crate::math::warp::uniform_cone;
+use crate::math::{Frame, Ray};
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+
+/// Rays that look for what a lamp without extent lights.
+const LOOKS: u32 = 64;
+
+/// Lamps without extent, the strongest, that are asked.
+const ASKED: usize = 64;
+
+impl Scene {
+    /// The power of two by which a film divides the light of the scene, [`crate::film::accumulate::Film::exponent`]: 0 where
+    /// the brightest of what its lights, of [`Light::power`] `powers`, show lies between 2⁻²⁴ and 2³⁶. A darker scene is raised
+    /// to one, with 2³⁸ left above; of brighter lamps the film just holds what they show, and what they light beside as
+    /// finely as may be.
+    pub(super) fn film_exponent(&self, powers: &[f64]) -> i32 {
+        let mut lamps: Vec<(&Light, f64)> = self.lights.iter().zip(powers.iter().copied()).collect();
+        lamps.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut asked = 0;
+        let brightness = lamps.into_iter().map(|(light, power)| match light {
+            Light::Area { object, .. } | Light::AlongNormal { object, .. } => {
+                power / (PI * self.objects[*object as usize].geometry.area())
+            }
+            Light::Directional { .. } | Light::Constant { .. } | Light::Environment(_) => {
+                power / (4.0 * PI * PI * self.radius * self.radius)
+            }
+            Light::Point { .. } | Light::Spot { .. } | Light::Projector(_) if asked == ASKED => 0.0,
+            Light::Point { position, .. } => {
+                asked += 1;
+                self.lit_around(power, *position, DVec3::Z, 2.0)
+            }
+            Light::Spot { position, axis, cutoff, .. } => {
+                asked += 1;
+                self.lit_around(power, *position, *axis, 1.0 - libm::cos(*cutoff))
+            }
+            Light::Projector(projector) => {
+                asked += 1;
+                let cone = projector.cone();
+                self.lit_around(power, cone.apex, cone.axis, 1.0 - libm::cos(cone.half_angle))
+            }
+        });
+        let brightest = brightness.filter(|b| b.is_finite()).fold(0.0, f64::max);
+        if brightest < f64::MIN_POSITIVE {
+            return 0;
+        }
+        // The exponent of the number.
+        let log2 = (brightest.to_bits() >> 52) as i32 - 1023;
+        match log2 {
+            ..-24 => log2.max(-100),
+            36.. => (log2 - 36).min(100),
+            _ => 0,
+        }
+    }
+
+    /// About how bright a white wall is where a lamp of `power` at `position` lights the nearest thing, film units; its light
+    /// goes into a cone about `axis`, up to a 1 − cos of `spread`.
+    fn lit_around(&self, power: f64, position: DVec3, axis: DVec3, spread: f64) -> f64 {
+        let frame = Frame::from_normal(axis);
+        let looks = (0..LOOKS).map(|i| {
+            // Evenly spread over the cone: Fibonacci's lattice.
+            let u = DVec2::new((f64::from(i) + 0.5) / f64::from(LOOKS), (f64::from(i) * 0.618_033_988_749_895).fract());
+            let ray = Ray::new(position, frame.to_world(uniform_cone(u, spread)));
+            self.closest(&ray, f64::INFINITY).map_or(f64::INFINITY, |hit| hit.t)
+        });
+        let nearest = looks.fold(f64::INFINITY, f64::min);
+        let distance = if nearest.is_finite() { nearest } else { (self.center - position).length().max(self.radius) };
+        power / (2.0 * PI * spread * distance * distance) / PI
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile;
+
+    fn exponent(text: &str) -> i32 {
+        let text = format!("camera: {{origin: [0, 5, 9], target: [0, 0, 0], fov_deg: 40}}\n{text}");
+        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
+        compile(&description, "s").unwrap().light_exponent
+    }
+
+    /// A lamp of intensity d² at d over a plane lights it by 1 below, whatever d: the film counts as ever. So it does where the
+    /// ground is larger than the lamp is far by many orders, and where the lamp is a spot.
+    #[test]
+    fn what_a_lamp_lights_is_judged_by_how_far_it_is() {
+        for d in [1e-18, 1e-12, 1e-6, 1.0, 1e6, 1e12, 1e18] {
+            let lamp = format!("point: {{position: [0, {d:e}, 0], intensity: {:e}}}", d * d);
+            assert_eq!(exponent(&format!("shapes: [plane: {{normal: [0, 1, 0]}}]\nlights: [{lamp}]\n")), 0, "{d:e}");
+        }
+        let ground = "shapes: [sphere: {center: [0, -6371000, 0], radius: 6371000}]\n";
+        assert_eq!(exponent(&format!("{ground}lights: [point: {{position: [0, 1, 0], intensity: 100}}]\n")), 0);
+        let spot = "spot: {position: [0, 1, 0], target: [0, 0, 0], cutoff_deg: 20, intensity: 100}";
+        assert_eq!(exponent(&format!("{ground}lights: [{spot}]\n")), 0);
+    }
+
+    /// Light of 2⁻⁵⁰ and of 2⁵⁰ is counted in powers of two that bring it into reach.
+    #[test]
+    fn dark_and_bright_scenes_are_brought_into_reach() {
+        let lamp = |intensity: f64| {
+            exponent(&format!(
+                "shapes: [plane: {{normal: [0, 1, 0]}}]\nlights: [point: {{position: [0, 1, 0], intensity: {intensity:e}}}]\n"
+            ))
+        };
+        // ρ/π is left out: 2⁻⁵⁰/π, and the nearest of the looks is a little aslant.
+        assert!((-53..=-51).contains(&lamp(2f64.powi(-50))), "{}", lamp(2f64.powi(-50)));
+        assert!((11..=13).contains(&lamp(2f64.powi(50))), "{}", lamp(2f64.powi(50)));
+    }
+}
