@@ -4,7 +4,7 @@
 
 use super::adaptive;
 use super::frame::{self, Frame};
-use super::prepare::{Prepared, colour_space, window};
+use super::prepare::{Prepared, colour_space, filter, window};
 use super::report::{Developed, SceneReport};
 use super::{contact, develop, layers};
 use crate::description::{self, HeaderValue, LayerContent, Output, SceneDescription, Shutter};
@@ -73,6 +73,8 @@ pub struct Finish {
     pub white: Option<[f64; 2]>,
     /// Factor on colours.
     pub sensitivity: f64,
+    /// [`crate::film::filter::Filter::span`] of the filter.
+    pub filter_span: f64,
     /// Whether bands of the spectrum stand in place of colour.
     pub bands: bool,
     /// Further channels.
@@ -157,6 +159,7 @@ impl Finish {
             white,
             output,
             sensitivity: description.image.sensitivity,
+            filter_span: filter(&description.image.filter).span(),
             bands: !description.image.bands.is_empty(),
             layers: plan.layers.channels(),
             kept: plan.layers.kept,
@@ -415,6 +418,10 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         description::FileLayout::Multipart => exr::Layout::Multipart,
     };
     file.attributes = attributes(finish, frame, report);
+    let shared = frame.shared_errors(image, &finish.rgb_from_xyz(), finish.filter_span);
+    if shared > 1.0 {
+        file.attributes.push((exr::SHARED_ERRORS.to_owned(), Attribute::Text(format!("{shared:.3}"))));
+    }
     if exr.aces_container && !wide {
         file.attributes.push(("acesImageContainerFlag".to_owned(), Attribute::Int(1)));
     } else if exr.aces_container {

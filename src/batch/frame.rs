@@ -142,6 +142,14 @@ impl Frame {
         resolve::resolve(&self.film, splats, rgb_from_xyz)
     }
 
+    /// How many times the variance of the sum of all pixels of `image` is that of independent ones; see
+    /// [`resolve::shared_errors`].
+    #[must_use]
+    pub fn shared_errors(&self, image: &Image, rgb_from_xyz: &[[f64; 3]; 3], span: f64) -> f64 {
+        let splats = self.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
+        splats.map_or(1.0, |splats| resolve::shared_errors(image, &splats, rgb_from_xyz, span))
+    }
+
     /// The further channel `channel` where its values stand once, not samples.
     #[must_use]
     pub fn layer_once(&self, channel: usize) -> Vec<f32> {

@@ -62,6 +62,17 @@ impl Filter {
         }
     }
 
+    /// In how many pixels light falls together that is dealt to all that the filter covers: (∫h)² / ∫h² over the plane. Errors
+    /// of their sum are those of independent pixels, times its root.
+    #[must_use]
+    pub fn span(&self) -> f64 {
+        const STEPS: u32 = 4096;
+        let step = 2.0 * self.radius() / f64::from(STEPS);
+        let values = (0..STEPS).map(|i| self.eval((f64::from(i) + 0.5) * step - self.radius()));
+        let (sum, squares) = values.fold((0.0, 0.0), |(sum, squares), f| (sum + f, squares + f * f));
+        (sum * sum * step / squares).powi(2)
+    }
+
     /// The filter along an axis at distance `x` from the centre, up to a factor.
     #[must_use]
     pub fn eval(&self, x: f64) -> f64 {
@@ -357,6 +368,19 @@ mod tests {
     fn axis(sampler: &FilterSampler, u: f64) -> (f64, f64) {
         let s = sampler.sample(DVec2::new(u, 0.5));
         (s.offset.x, f64::from(s.weight))
+    }
+
+    /// Closed forms of (∫f)²/∫f², squared for the plane: 1; a tent of radius r 3r/2; a Gaussian 2√π σ, cut at 4σ.
+    #[test]
+    fn spans_are_those_of_the_squares() {
+        let near = |filter: Filter, expected: f64, off: f64| {
+            let span = filter.span();
+            assert!((span / expected - 1.0).abs() < off, "{filter:?}: {span} for {expected}");
+        };
+        near(Filter::Box, 1.0, 1e-12);
+        near(Filter::Tent { radius: 2.0 }, 9.0, 1e-5);
+        // What is cut off is 3e-4 at the middle and 8 / √(2π) of that in all.
+        near(Filter::Gaussian { stddev: 0.7 }, 4.0 * std::f64::consts::PI * 0.49, 3e-3);
     }
 
     /// E[weight · g(offset)] = ∫f·g / ∫f for g = cos(kx): the Fourier transform of the filter, against Simpson's rule

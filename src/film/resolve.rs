@@ -94,6 +94,26 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
     }
 }
 
+/// How many times the variance of the sum of all pixels of an `image` in the colours of `rgb_from_xyz` is that of independent ones, in the colour where it is most: of what
+/// is splatted, each falls into `span` pixels together ([`crate::film::filter::Filter::span`]). 1 without any.
+#[must_use]
+pub fn shared_errors(image: &Image, splats: &Splats, rgb_from_xyz: &[[f64; 3]; 3], span: f64) -> f64 {
+    let unit = 2f64.powi(splats.film.exponent());
+    let (mut all, mut own) = ([0.0; 3], [0.0; 3]);
+    for (i, cells) in splats.film.cells().iter().enumerate() {
+        let splatted = mean_of(cells, splats.photons, rgb_from_xyz).variance;
+        for c in 0..3 {
+            let error = f64::from(image.standard_error[c][i]);
+            if error.is_finite() && splatted[c].is_finite() {
+                all[c] += error * error;
+                own[c] += splatted[c] * unit * unit;
+            }
+        }
+    }
+    let shared = |c: usize| if all[c] > 0.0 { 1.0 + (span - 1.0) * (own[c] / all[c]).min(1.0) } else { 1.0 };
+    (0..3).map(shared).fold(1.0, f64::max)
+}
+
 /// A pixel of an [`Image`].
 struct Resolved {
     rgb: [f32; 3],

@@ -14,12 +14,13 @@
 //! differences themselves: where both pictures are right, E(Σd²) = Σvar(d), so Σd/√Σd² is a standard score. That
 //! form tests the mean only. A picture in half floats carries the variance of its rounding besides.
 //!
-//! Both tests want pixels that are independent: a box filter, or filters by importance sampling.
+//! Both tests want pixels that are independent: a box filter, or filters by importance sampling. Light that is dealt to all
+//! pixels which a filter covers is not; a file says by how much more the sum of its pixels varies ([`SHARED_ERRORS`]).
 
 mod noise;
 
 use crate::film::Window;
-use crate::film::exr::{ExrFile, ExrPart, stderr_name};
+use crate::film::exr::{ExrFile, ExrPart, SHARED_ERRORS, stderr_name};
 use crate::spectrum::colour;
 use noise::Pair;
 use std::fmt::Write as _;
@@ -282,9 +283,15 @@ fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions<'a>) -> Re
         };
         let error = stderr_name(&name);
         let errors = [find(part_a, &error), find(part_b, &error)];
-        pairs.push(Pair::new(name, values_a, values_b, errors, variance));
+        pairs.push(Pair::new(name, values_a, values_b, errors, [shared(part_a), shared(part_b)], variance));
     }
     Ok(pairs)
+}
+
+/// How many times the variance of the sum of all pixels is that of independent ones, by what the file says.
+fn shared(part: &ExrPart) -> f64 {
+    let said = part.texts.iter().find(|(name, _)| name == SHARED_ERRORS);
+    said.and_then(|(_, text)| text.parse::<f64>().ok()).filter(|x| x.is_finite()).map_or(1.0, |x| x.max(1.0))
 }
 
 fn same_window(what: &str, a: Window, b: Window, origin: Origin) -> Result<(), String> {

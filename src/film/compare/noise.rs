@@ -18,6 +18,8 @@ pub(super) struct Pair<'a> {
     pub a: &'a [f32],
     pub b: &'a [f32],
     pub noise: Noise<'a>,
+    /// How many times the variance of the sum of all pixels of A and of B is that of independent ones.
+    shared: [f64; 2],
     /// Whether the values of A and of B are half floats.
     half: [bool; 2],
 }
@@ -70,6 +72,7 @@ impl<'a> Pair<'a> {
         a: &'a [f32],
         b: &'a [f32],
         errors: [Option<&'a [f32]>; 2],
+        shared: [f64; 2],
         variance: Option<(&'a [f32], u32)>,
     ) -> Pair<'a> {
         // Standard errors of which none is finite (one replicate) say nothing.
@@ -82,7 +85,7 @@ impl<'a> Pair<'a> {
         };
         let is_half = |values: &[f32]| values.iter().all(|&v| v.is_nan() || f16::from_f32(v).to_f32() == v);
         let half = [is_half(a), is_half(b)];
-        Pair { name, a, b, noise, half }
+        Pair { name, a, b, noise, shared, half }
     }
 
     pub fn is_finite(&self, i: usize) -> bool {
@@ -144,11 +147,13 @@ impl<'a> Pair<'a> {
             }
             match (&self.noise, self.variance(i)) {
                 (Noise::Unknown, _) => {
+                    let shared = self.shared[0].max(self.shared[1]);
                     difference += d;
-                    variance += d * d;
-                    ratio_variance += (a - ratio * b) * (a - ratio * b);
+                    variance += d * d * shared;
+                    ratio_variance += (a - ratio * b) * (a - ratio * b) * shared;
                 }
                 (_, Some(v)) => {
+                    let v = Variance { estimated: [0, 1].map(|k| v.estimated[k] * self.shared[k]), ..v };
                     difference += d;
                     variance += v.total();
                     spread += v.estimated.iter().map(|v| v * v).sum::<f64>() / REPLICATE_DOF;
