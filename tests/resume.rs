@@ -260,6 +260,30 @@ fn what_is_there_is_skipped_only_if_it_holds() {
     }
 }
 
+/// The EXR is written first: where the process dies before the PNG, that of an earlier render lies beside it. It is of the
+/// same size and undamaged, but of another scene, seed or exposure.
+#[test]
+fn a_png_of_another_picture_is_made_again() {
+    let place = Place::of(&scene("off"));
+    let render = |out: &str, further: &[&str]| {
+        let done = run(&place, out, &[&["--spp", "8"], further].concat());
+        assert_eq!(done.code, 0, "{}", done.err);
+    };
+    let png = |name: &str| std::fs::read(place.path(name)).unwrap();
+    for other in ["shapes[2].sphere.emission=3", "render.seed=9", "output.png.exposure=1"] {
+        for keep in ["--resume", "--skip-existing"] {
+            render("a.exr", &["--set", other]);
+            render("b.exr", &[]);
+            std::fs::copy(place.path("b.exr"), place.path("a.exr")).unwrap();
+            assert!(png("a.png") != png("b.png"), "{other}");
+            render("a.exr", &[keep]);
+            assert!(png("a.png") == png("b.png"), "{other} {keep}");
+        }
+    }
+    let says = place.run(&["info", "a.png"]);
+    assert!(says.code == 0 && says.out.contains("\n  pixelHash   "), "{}", says.out);
+}
+
 #[test]
 fn usr1_writes_a_picture_of_what_is_done_and_the_render_goes_on() {
     let place = Place::of(&scene("off"));

@@ -5,6 +5,7 @@
 //! not asked. Work pauses between two units, so that it is exact: what is resumed gives the same bits. The same pauses show
 //! the picture to a viewer ([`super::tev`]).
 
+use super::develop;
 use super::finish::{Finish, spectral_path};
 use super::frame::{Begun, FrameJob, Milestone, lock};
 use super::merge::sum;
@@ -230,7 +231,7 @@ pub fn part_holds(path: &Path, identity: &Identity, share: &Share) -> bool {
 }
 
 /// Whether the picture at `path`, its PNG and its file of bands are there, undamaged, of the same scene and settings and by
-/// this version.
+/// this version, and of one render.
 #[must_use]
 pub fn picture_holds(path: &Path, finish: &Finish) -> bool {
     // A file that is not there need not be read.
@@ -239,10 +240,12 @@ pub fn picture_holds(path: &Path, finish: &Finish) -> bool {
     if !(path.is_file() && png.is_file() && spectral.as_ref().is_none_or(|spectral| spectral.is_file())) {
         return false;
     }
+    let Some(pixels) = exr_holds(path, finish, Holds::Colours) else { return false };
     let size = [finish.window.width, finish.window.height];
-    exr_holds(path, finish, Holds::Colours)
-        && spectral.is_none_or(|spectral| exr_holds(&spectral, finish, Holds::Bands))
-        && png::holds(&png, size)
+    let mut texts = finish.png_marks(&pixels);
+    texts.push(develop::software());
+    spectral.is_none_or(|spectral| exr_holds(&spectral, finish, Holds::Bands).as_ref() == Some(&pixels))
+        && png::holds(&png, size, &texts)
 }
 
 /// What a file of a picture is for.
@@ -252,21 +255,21 @@ enum Holds {
     Bands,
 }
 
-/// [`picture_holds`] of one of its EXR files.
-fn exr_holds(path: &Path, finish: &Finish, holds: Holds) -> bool {
-    exr::read_exr(path).is_ok_and(|file| {
-        // What is said of the whole file stands in its first part.
-        let part = &file.parts[0];
-        let found = part.text("spectralLayoutVersion").map_or(Holds::Colours, |_| Holds::Bands);
-        let expected = [
-            ("abbe/version", env!("CARGO_PKG_VERSION").to_owned()),
-            ("abbe/sceneHash", finish.scene_hash.clone()),
-            ("abbe/settingsHash", finish.settings_hash()),
-            ("abbe/contentHash", file.content_hash()),
-        ];
-        let is = |(name, value): &(&str, String)| part.text(name) == Some(value.as_str());
-        found == holds && part.window == finish.window && expected.iter().all(is)
-    })
+/// [`picture_holds`] of one of its EXR files: the hash of the picture's pixels, if it does.
+fn exr_holds(path: &Path, finish: &Finish, holds: Holds) -> Option<String> {
+    let file = exr::read_exr(path).ok()?;
+    // What is said of the whole file stands in its first part.
+    let part = &file.parts[0];
+    let found = part.text("spectralLayoutVersion").map_or(Holds::Colours, |_| Holds::Bands);
+    let expected = [
+        ("abbe/version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("abbe/sceneHash", finish.scene_hash.clone()),
+        ("abbe/settingsHash", finish.settings_hash()),
+        ("abbe/contentHash", file.content_hash()),
+    ];
+    let is = |(name, value): &(&str, String)| part.text(name) == Some(value.as_str());
+    let same = found == holds && part.window == finish.window && expected.iter().all(is);
+    part.text("abbe/pixelHash").filter(|_| same).map(str::to_owned)
 }
 
 /// Removes the checkpoint of what is at `path` already: a process that was killed after it had written the one and before it

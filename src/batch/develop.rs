@@ -8,6 +8,12 @@ use crate::scene::light;
 use crate::spectrum::ColourSpace;
 use crate::spectrum::colour::{adapted_to_d65, multiply};
 
+/// What a PNG says of the program that developed it.
+#[must_use]
+pub fn software() -> (String, String) {
+    ("Software".to_owned(), concat!("Abbe ", env!("CARGO_PKG_VERSION")).to_owned())
+}
+
 /// The chromaticity that is shown white, and what a person should know where there is none.
 #[must_use]
 pub fn white(png: &Png, scene: &Scene) -> (Option<[f64; 2]>, Option<String>) {
@@ -60,7 +66,7 @@ pub fn settings(png: &Png, white: Option<[f64; 2]>, image: &Image, space: Colour
     };
     let metered = if png.exposure == Exposure::Auto { ", metered" } else { "" };
     let mut texts = vec![
-        ("Software".to_owned(), concat!("Abbe ", env!("CARGO_PKG_VERSION")).to_owned()),
+        software(),
         ("abbe/exposure".to_owned(), format!("{exposure_stops} stops{metered}")),
         ("abbe/tonemap".to_owned(), name.to_owned()),
     ];

@@ -239,6 +239,13 @@ impl Finish {
     pub fn png_settings(&self, image: &Image) -> PngSettings {
         develop::settings(&self.output.png, self.white, image, self.space())
     }
+
+    /// What the PNG says of the picture from which it was developed: that of the EXR whose pixels have the hash `pixels`.
+    #[must_use]
+    pub fn png_marks(&self, pixels: &str) -> Vec<(String, String)> {
+        let text = |name: &str, value: &str| (name.to_owned(), value.to_owned());
+        vec![text("abbe/settingsHash", &self.settings_hash()), text("abbe/pixelHash", pixels)]
+    }
 }
 
 /// What a pixel of a file holds: bands replace colour.
@@ -305,7 +312,8 @@ pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut Scene
     report.pixel_hash = pixel_hash(&image);
     let written = Instant::now();
     let png_path = exr_path.with_extension("png");
-    let settings = finish.png_settings(&image);
+    let mut settings = finish.png_settings(&image);
+    settings.texts.extend(finish.png_marks(&report.pixel_hash));
     report.png = Some(Developed {
         exposure_stops: settings.exposure_stops,
         metered: finish.output.png.exposure == description::Exposure::Auto,

@@ -24,7 +24,7 @@ fn size(bytes: u64) -> String {
 
 /// A line of the answer.
 fn line(out: &mut String, what: &str, text: &str) {
-    let _ = writeln!(out, "  {what:<12}{text}");
+    let _ = writeln!(out, "  {what:<11} {text}");
 }
 
 /// A PNG file.

@@ -128,10 +128,10 @@ impl Default for PngSettings {
     }
 }
 
-/// Whether `path` is a whole picture of that width and height.
+/// Whether `path` is a whole picture of that width and height that says `texts`.
 #[must_use]
-pub fn holds(path: &Path, size: [u32; 2]) -> bool {
-    image::open(path).is_ok_and(|image| [image.width(), image.height()] == size)
+pub fn holds(path: &Path, size: [u32; 2], texts: &[(String, String)]) -> bool {
+    inspect::inspect(path).is_ok_and(|facts| facts.size == size && texts.iter().all(|text| facts.texts.contains(text)))
 }
 
 /// Writes the preview of `image` to `path`.
