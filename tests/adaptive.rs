@@ -93,7 +93,7 @@ fn parts_by_rows_of_cells_are_the_picture_bit_for_bit() {
             })
             .collect();
         let merged = place.path(&format!("merged{n}.exr"));
-        merge::merge(&parts, &merged).unwrap().1.unwrap();
+        merge::merge(&parts, &merged, None).unwrap().1.unwrap();
         assert!(pixels(&merged) == pixels(&whole), "{n} parts");
     }
     let refused = |portion| match render(&place, "x.exr", portion, Keep::default(), &(), &go).status {

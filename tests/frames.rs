@@ -131,7 +131,7 @@ fn parts_of_a_frame_make_it_up_and_those_of_two_are_refused() {
         assert!(pixels(&place.path("merged").join(&name)) == pixels(&place.path("out").join(&name)));
     }
     let mixed = [place.path("parts/3/a.0003.tile0of2.exr"), place.path("parts/4/a.0004.tile1of2.exr")];
-    let error = merge::merge(&mixed, &place.path("x.exr")).unwrap_err();
+    let error = merge::merge(&mixed, &place.path("x.exr"), None).unwrap_err();
     assert_eq!(error.exit_code(), 3);
     let message = error.to_string();
     assert!(message.ends_with("it is of another picture: frame_number: expected 3, found 4"), "{message}");
@@ -144,7 +144,7 @@ fn parts_of_a_frame_make_it_up_and_those_of_two_are_refused() {
     let parts = [still("one.exr", &["--frames", "1"]), still("none.exr", &[])];
     for (a, b) in [(0, 1), (1, 0)] {
         let message =
-            merge::merge(&[parts[a].clone(), parts[b].clone()], &place.path("x.exr")).unwrap_err().to_string();
+            merge::merge(&[parts[a].clone(), parts[b].clone()], &place.path("x.exr"), None).unwrap_err().to_string();
         let [expected, found] = [["1", "none"][a], ["1", "none"][b]];
         assert!(message.ends_with(&format!("frame_number: expected {expected}, found {found}")), "{message}");
     }

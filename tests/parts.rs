@@ -151,7 +151,7 @@ fn any_parts_add_up_to_the_picture_bit_for_bit() {
                 .map(|(i, portion)| render(&place, &format!("{draw}/{i}.exr"), portion, &[("render.tile", "32")]))
                 .collect();
             let merged = place.path(&format!("merged{draw}/scene.exr"));
-            let (_, written) = merge::merge(&paths, &merged).unwrap_or_else(|e| panic!("{what}: {e}"));
+            let (_, written) = merge::merge(&paths, &merged, None).unwrap_or_else(|e| panic!("{what}: {e}"));
             written.unwrap();
             same(&whole, &merged, &what);
             let (a, b) = (place.json("whole/report.json"), place.json(&format!("merged{draw}/report.scene.json")));
@@ -174,7 +174,7 @@ fn light_from_the_lights_is_in_the_scenes_of_this_file() {
 /// The message of a merge that must fail with exit code 3 and write nothing.
 fn refusal(place: &Place, paths: &[PathBuf]) -> String {
     let out = place.path("refused/scene.exr");
-    let error = merge::merge(paths, &out).unwrap_err();
+    let error = merge::merge(paths, &out, None).unwrap_err();
     assert!(matches!(error, Error::Input { .. }) && error.exit_code() == 3, "{error}");
     assert!(!out.exists() && !out.with_extension("png").exists());
     error.to_string()
@@ -286,7 +286,7 @@ fn parts_of_other_plans_and_paths_from_the_lights_are_refused() {
     let e = refusal(&place, &[a.clone(), edited(&b, &own, &lights(half - 1, paths, 0))]);
     assert!(e.contains("overlap") && e.contains("samples 0-11"), "{e}");
     // As they were, they make up the picture.
-    merge::merge(&[a, b], &place.path("both/scene.exr")).unwrap().1.unwrap();
+    merge::merge(&[a, b], &place.path("both/scene.exr"), None).unwrap().1.unwrap();
 }
 
 #[test]

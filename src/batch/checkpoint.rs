@@ -48,6 +48,12 @@ pub fn place(path: &Path) -> PathBuf {
     name.into()
 }
 
+/// The PNG of what is done of the file at `path`.
+#[must_use]
+pub fn snapshot_place(path: &Path) -> PathBuf {
+    path.with_extension("snapshot.png")
+}
+
 /// Keeps one render.
 pub struct Keeper<'a> {
     keep: &'a Keep,
@@ -155,7 +161,7 @@ impl<'a> Keeper<'a> {
     fn snapshot(&self, part: &Part) -> Result<()> {
         let finish = &self.identity.finish;
         let image = self.look(part, &finish.rgb_from_xyz());
-        png::write_png(&self.path.with_extension("snapshot.png"), &image, &finish.png_settings(&image))
+        png::write_png(&snapshot_place(self.path), &image, &finish.png_settings(&image))
     }
 
     fn is_due(&self) -> bool {

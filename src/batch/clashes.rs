@@ -1,8 +1,9 @@
-//! No two pictures of a job go to one file: what would be written twice is told before anything is rendered.
+//! No two pictures of a job go to one file, and no report: what would be written twice is told before anything is rendered.
 
-use super::{Overrides, names, place, spectral_path};
-use crate::description::BatchEntry;
+use super::{Overrides, checkpoint, finish, names, place, spectral_path};
+use crate::description::{Animation, BatchEntry};
 use crate::error::{Error, Result};
+use crate::film::output::{self, Inputs};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ffi::OsStr;
@@ -23,7 +24,11 @@ struct Pictures {
 impl Pictures {
     /// None of a scene that cannot be read, which is told in its turn.
     fn of(entry: &BatchEntry, overrides: &Overrides) -> Option<Pictures> {
-        let animation = entry.animation(&overrides.set).ok()?;
+        Pictures::seen(&entry.animation(&overrides.set).ok()?, overrides)
+    }
+
+    /// [`Pictures::of`] a scene that has been read.
+    fn seen(animation: &Animation, overrides: &Overrides) -> Option<Pictures> {
         let output = animation.output().ok()?;
         Some(Pictures {
             directory: output.dir,
@@ -96,7 +101,7 @@ impl Look {
         let told = pictures.frames.is_empty() || probe[0] == probe[1];
         let first = pictures.frames.first().copied();
         let keys = [Key::BeforeNumber, Key::Letters].map(|key| keys_of(key, first));
-        let sheet = pictures.sheet.then(|| sheet(&pictures, &entry.name, overrides));
+        let sheet = pictures.sheet.then(|| sheet_place(&pictures, &entry.name, overrides));
         Some(Look { told, keys, sheet })
     }
 }
@@ -170,7 +175,60 @@ fn clashes(
 }
 
 /// The contact sheet beside `pictures`, as if it were an EXR.
-fn sheet(pictures: &Pictures, name: &str, overrides: &Overrides) -> PathBuf {
+fn sheet_place(pictures: &Pictures, name: &str, overrides: &Overrides) -> PathBuf {
     let picture = place(&pictures.directory, name, pictures.frames.first().copied(), overrides);
     picture.with_file_name(names::about(overrides, "contact-sheet", "exr"))
+}
+
+/// Refuses a report in the place of a picture, of what is written beside it, or of a file from which scenes are read.
+///
+/// # Errors
+/// [`Error::Config`] with the place.
+pub(super) fn check_report(entries: &[BatchEntry], overrides: &Overrides) -> Result<()> {
+    let Some(report) = &overrides.report else { return Ok(()) };
+    let looked = |entry: &BatchEntry| -> Result<Option<Pictures>> {
+        let Ok(animation) = entry.animation(&overrides.set) else { return Ok(None) };
+        Inputs::of(animation.files()).spare([report])?;
+        Ok(Pictures::seen(&animation, overrides))
+    };
+    let all: Vec<Option<Pictures>> = entries.par_iter().map(looked).collect::<Result<_>>()?;
+    let found = entries.iter().zip(&all).filter_map(|(entry, pictures)| Some((entry, pictures.as_ref()?)));
+    for (entry, pictures) in found.clone() {
+        for frame in pictures.frames() {
+            let file = place(&pictures.directory, &entry.name, frame, overrides);
+            spare(report, &file, overrides.portion.is_all(), &names::label(&entry.name, frame))?;
+        }
+    }
+    // The sheet lies beside the first picture.
+    let sheet = found.clone().find(|(_, pictures)| pictures.sheet);
+    let sheet = sheet.map(|(entry, pictures)| sheet_place(pictures, &entry.name, overrides));
+    let several = found.map(|(_, pictures)| pictures.frames().count()).sum::<usize>() > 1;
+    let mut files = sheet.iter().flat_map(|sheet| ["png", "html"].map(|ending| sheet.with_extension(ending)));
+    match several && files.any(|file| is_place_of(report, &file)) {
+        true => Err(taken(report, "the contact sheet")),
+        false => Ok(()),
+    }
+}
+
+/// Refuses a report in the place of the picture at `exr`, or of what is written beside it, which is `whole` or a part.
+///
+/// # Errors
+/// [`Error::Config`] with the place.
+pub(super) fn spare(report: &Path, exr: &Path, whole: bool, label: &str) -> Result<()> {
+    let files = finish::places(exr);
+    // A part has nothing of a picture beside it.
+    let files = if whole { &files[..] } else { &files[..1] };
+    let kept = [checkpoint::place(exr), checkpoint::snapshot_place(exr)];
+    match files.iter().chain(&kept).any(|file| is_place_of(report, file)) {
+        true => Err(taken(report, &format!("a file of the picture {label}"))),
+        false => Ok(()),
+    }
+}
+
+fn is_place_of(report: &Path, file: &Path) -> bool {
+    output::end(report).is_some_and(|end| Some(end) == output::end(file))
+}
+
+fn taken(report: &Path, by: &str) -> Error {
+    Error::Config(format!("--report {}: expected a place of its own, found that of {by}", report.display()))
 }

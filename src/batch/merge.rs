@@ -5,6 +5,7 @@
 //! the threads, not with the parts.
 
 use super::checks;
+use super::clashes;
 use super::finish;
 use super::frame::{Frame, lock};
 use super::names;
@@ -47,9 +48,9 @@ pub fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 ///
 /// # Errors
 /// [`Error::Input`] if a part is missing, damaged or of another picture, or if they do not make up the picture exactly
-/// once; [`Error::Config`] for a place that is that of a part or not one for pictures; [`Error::Output`]; [`Error::Render`] as
-/// the render itself.
-pub fn merge(paths: &[PathBuf], out: &Path) -> Result<(Report, Result<()>)> {
+/// once; [`Error::Config`] for a place that is that of a part or not one for pictures, and where a further `report` would take
+/// the picture's; [`Error::Output`]; [`Error::Render`] as the render itself.
+pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Report, Result<()>)> {
     checks::output_place(Some(out), 1)?;
     let start = Instant::now();
     let parts: Vec<Written> = files(paths)?.par_iter().map(|path| part_file::open(path)).collect::<Result<_>>()?;
@@ -64,6 +65,9 @@ pub fn merge(paths: &[PathBuf], out: &Path) -> Result<(Report, Result<()>)> {
     let in_directory = || filled.join(format!("{}.exr", names::label(&finish.name, finish.frame_number)));
     let out = if super::ends_in(out, &["exr"]) { filled } else { in_directory() };
     output::Inputs::of(parts.iter().map(|part| &part.path)).spare(finish::places(&out))?;
+    if let Some(report) = report {
+        clashes::spare(report, &out, true, &names::label(&finish.name, finish.frame_number))?;
+    }
     check_cover(&parts, &out)?;
     output::prepare_place(&out)?;
     output::prepare_place(&out.with_extension("png"))?;

@@ -244,6 +244,7 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
     let mut contact = Contact::default();
     let mut read = Inputs::of(entries.iter().map(|entry| &*entry.path).chain([path]));
     read.spare(&overrides.report)?;
+    clashes::check_report(&entries, overrides)?;
     'batch: for (i, entry) in entries.iter().enumerate() {
         let mut loading = Instant::now();
         let animation = entry.animation(&overrides.set);
@@ -270,8 +271,9 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                 shelf = Shelf::default();
             }
             let prepared = prepared.and_then(|p| checks::places(&p, overrides, &mut read).map(|()| p));
-            // Unlike a picture it would be written all the same.
-            read.spare(&overrides.report)?;
+            if scenes.is_empty() {
+                read.spare(&overrides.report)?;
+            }
             let mut report = match prepared {
                 Ok(prepared) => {
                     let dir = output_path(&prepared, overrides);
@@ -301,6 +303,8 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
         }
     }
     let mut report = Report::new(path, scenes, start.elapsed());
+    // What only a later scene reads.
+    report.misplaced = read.spare(&overrides.report).err();
     if let Some(dir) = report_dir {
         let sheet = ["png", "html"].map(|ending| dir.join(names::about(overrides, "contact-sheet", ending)));
         match contact.write(&sheet, &report) {
@@ -320,7 +324,8 @@ impl Report {
             Status::Done | Status::Skipped => None,
             Status::Failed { exit_code, .. } => Some(*exit_code),
         });
-        worst(codes.chain(self.unwritten.as_ref().map(Error::exit_code)))
+        let lost = self.unwritten.iter().chain(&self.misplaced);
+        worst(codes.chain(lost.map(Error::exit_code)))
     }
 }
 

@@ -38,6 +38,9 @@ pub struct Report {
     /// Why it is not written, where it could not be.
     #[serde(skip)]
     pub unwritten: Option<Error>,
+    /// Why it may not be written where `--report` says, where it may not.
+    #[serde(skip)]
+    pub misplaced: Option<Error>,
 }
 
 /// How a scene ended.
@@ -218,6 +221,7 @@ impl Report {
             contact_sheet: None,
             file: None,
             unwritten: None,
+            misplaced: None,
         }
     }
 

@@ -12,7 +12,7 @@ pub fn run(arguments: &MergeArguments) -> Result<i32> {
         Inputs::of(merge::files(&arguments.parts)?).spare([file])?;
         prepare_place(file)?;
     }
-    let (report, written) = merge::merge(&arguments.parts, &arguments.output)?;
+    let (report, written) = merge::merge(&arguments.parts, &arguments.output, arguments.report.as_deref())?;
     if let Some(file) = &arguments.report {
         write_json(file, &report)?;
     }

@@ -53,7 +53,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     if let Some(gone) = overrides.keep.viewer.as_ref().and_then(|viewer| viewer.close()) {
         super::complain(&format!("warning: {gone}"));
     }
-    if let Some(file) = &arguments.report {
+    if let Some(file) = arguments.report.as_ref().filter(|_| report.misplaced.is_none()) {
         write_json(file, &report)?;
     }
     if !arguments.quiet && style != ProgressStyle::Json {
@@ -85,7 +85,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     for line in endings(&report.scenes) {
         super::complain(&format!("error: {line}"));
     }
-    if let Some(e) = &report.unwritten {
+    for e in report.unwritten.iter().chain(&report.misplaced) {
         super::complain(&super::prefixed(e));
     }
     Ok(report.exit_code())

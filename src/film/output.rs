@@ -196,6 +196,13 @@ pub fn is_stream(path: &Path) -> bool {
     matches!(target(path), Ok(Target::Stream(_)))
 }
 
+/// The one name of the file that is written where `path` is; none of a stream, or where there is no directory for it.
+#[must_use]
+pub fn end(path: &Path) -> Option<PathBuf> {
+    let Ok(Target::File(end)) = target(path) else { return None };
+    Some(directory_of(&end).canonicalize().ok()?.join(end.file_name()?))
+}
+
 fn open_stream(path: &Path, data: &Metadata) -> std::io::Result<File> {
     #[cfg(unix)]
     if std::os::unix::fs::FileTypeExt::is_socket(&data.file_type()) {

@@ -170,6 +170,57 @@ fn no_output_takes_the_place_of_what_is_read() {
     assert_eq!(place.run(&["render", "two.yaml", "-q"]).code, 0);
 }
 
+/// JSON in the place of a picture would be found by nobody before the picture is looked at.
+#[test]
+fn no_report_takes_the_place_of_what_is_written_beside_it() {
+    let place = batch();
+    assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "parts", "--tile", "0/1"]).code, 0);
+    std::fs::create_dir(place.path("o")).unwrap();
+    let words =
+        |file: &str, by: &str| format!("error: --report {file}: expected a place of its own, found that of {by}\n");
+    let good = "a file of the picture good";
+    for (arguments, file, by) in [
+        (&["render", "scenes/good.yaml", "-o", "o/a.exr"][..], "o/a.exr", good),
+        (&["render", "scenes/good.yaml", "-o", "o/a.exr"], "o/../o/a.png", good),
+        (&["render", "scenes/good.yaml", "-o", "o/a.exr"], "o/a.spectral.exr", good),
+        (&["render", "scenes/good.yaml", "-o", "o/a.exr"], "o/a.exr.checkpoint", good),
+        (&["render", "scenes/good.yaml", "-o", "o/a.exr"], "o/a.snapshot.png", good),
+        (&["render", "scenes/good.yaml", "-o", "o/a.exr", "--tile", "0/2"], "o/a.exr", good),
+        (&["render", "scenes/good.yaml", "-o", "o/####.exr", "--frames", "1-9"], "o/0007.exr", &format!("{good}.0007")),
+        (&["render", "batch.yaml", "-o", "o"], "o/other.png", "a file of the picture other"),
+        (&["render", "batch.yaml", "-o", "o"], "o/contact-sheet.html", "the contact sheet"),
+        (&["merge", "parts", "-o", "o/m.exr"], "o/m.exr", good),
+        (&["merge", "parts", "-o", "o"], "o/good.png", good),
+    ] {
+        let ran = place.run(&[arguments, &["-q", "--report", file]].concat());
+        assert_eq!((ran.err, ran.code), (words(file, by), 2), "{arguments:?}");
+        assert_eq!(place.names("o"), Vec::<String>::new(), "{arguments:?}");
+    }
+    // The report that is written in any case may be named.
+    assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "o", "--report", "o/report.json"]).code, 0);
+}
+
+/// What a scene is read from is found before the first one is rendered; what it names besides only in its turn. Then all
+/// pictures are made, and the report is the one in their directory.
+#[test]
+fn a_report_in_the_place_of_what_a_later_scene_reads_costs_no_picture() {
+    let place = batch();
+    let words = "expected a place to write to, found a file that is read\n";
+    let lit = format!("{SMALL}render: {{samples: 4}}\nlights: [{{environment: {{file: sky.exr}}}}]\n");
+    std::fs::write(place.path("lit.yaml"), lit).unwrap();
+    std::fs::write(place.path("two.yaml"), "scenes: [{file: scenes/good.yaml}, {file: lit.yaml}]\n").unwrap();
+    assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "sky.exr"]).code, 0);
+    let render = |report: &str| place.run(&["render", "two.yaml", "-q", "-o", "o", "--report", report]);
+    let ran = render("lit.yaml");
+    assert_eq!((ran.err, ran.code), (format!("error: lit.yaml: {words}"), 2));
+    assert_eq!(place.names("o"), Vec::<String>::new());
+    let sky = std::fs::read(place.path("sky.exr")).unwrap();
+    let ran = render("sky.exr");
+    assert_eq!((ran.err, ran.code), (format!("error: sky.exr: {words}"), 2));
+    assert!(std::fs::read(place.path("sky.exr")).unwrap() == sky);
+    assert!(["good.exr", "lit.exr", "report.json"].iter().all(|name| place.path("o").join(name).is_file()));
+}
+
 /// It made a directory of that name.
 #[test]
 fn merge_refuses_names_of_other_pictures_as_render_does() {
