@@ -128,6 +128,41 @@ fn a_job_for_a_farm_is_refused_where_its_tasks_would_be() {
     assert!(message.contains("none.yaml: cannot be read") && message.lines().count() == 2, "{message}");
 }
 
+/// A task runs in the directory of the job, or of a session. Its texture lies where rules on the command line and in a file
+/// say, from the directory in which the job was made.
+#[test]
+fn tasks_of_a_farm_find_files_where_the_job_was_told_they_are() {
+    let words = |texture: &str| SCENE.to_owned() + &format!("textures: {{t: {{image: {{file: {texture}}}}}}}\n");
+    let rules = "{\"version\": \"pathmapping-1.0\", \"path_mapping_rules\": [{\"source_path_format\": \"POSIX\", \
+                 \"source_path\": \"/old\", \"destination_path\": \"tex\"}]}";
+    let place = Place::with(&[("scenes/a.yaml", &words("/old/t.png")), ("rules.json", rules), ("tex/x", "")]);
+    image::GrayImage::new(2, 2).save(place.path("tex/t.png")).unwrap();
+    for (i, further) in [["--path-map", "/old=tex"], ["--path-map-file", "rules.json"]].iter().enumerate() {
+        let job = format!("job{i}");
+        let made =
+            place.run(&[&["farm", "scenes/a.yaml", "-q", "--format", "slurm", "-o", &job], &further[..]].concat());
+        assert_eq!((made.code, made.err.as_str()), (0, ""));
+        let ran = task(&place, &job);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        assert!(place.path(&job).join("pictures/a.exr").is_file());
+        let made =
+            place.run(&[&["farm", "scenes/a.yaml", "-q", "--format", "openjd", "-o", &job], &further[..]].concat());
+        assert_eq!(made.code, 0, "{}", made.err);
+        let rule = format!("\"--path-map\", \"/old={}\"", place.path("tex").display());
+        let template = std::fs::read_to_string(place.path(&job).join("template.yaml")).unwrap();
+        assert!(template.contains(&rule), "{template}");
+    }
+}
+
+/// Runs the first task of a job of Slurm, without Slurm.
+fn task(place: &Place, job: &str) -> Ran {
+    let run = "srun() { while [ \"${1#--}\" != \"$1\" ]; do shift; done; \"$@\"; }; . ./render.sbatch";
+    let mut command = Command::new("bash");
+    command.current_dir(place.path(job)).args(["-c", run]);
+    command.env("ABBE", env!("CARGO_BIN_EXE_abbe")).env("SLURM_ARRAY_TASK_ID", "0");
+    Ran::of(command.output().unwrap())
+}
+
 /// Even ranges cover all samples once, however many there are.
 #[test]
 fn samples_may_be_cut_into_even_ranges() {

@@ -2,7 +2,7 @@
 
 use super::{FarmArguments, FarmFormat};
 use crate::batch::farm::{Cut, Job, openjd, slurm};
-use crate::batch::names;
+use crate::batch::{Overrides, names};
 use crate::error::{Error, Result};
 use crate::film::output::{Inputs, prepare_place, write_atomically};
 
@@ -18,7 +18,7 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
     let job = Job {
         pictures: std::path::absolute(&pictures).map_err(|e| Error::output(&pictures, e))?,
         program: arguments.program.clone(),
-        arguments: further(arguments),
+        arguments: further(arguments, &overrides)?,
         threads: arguments.threads,
         ..Job::of(&arguments.scene.file, &overrides, cut)?
     };
@@ -63,16 +63,17 @@ fn shell(text: &str) -> String {
     if text.chars().all(plain) { text.to_owned() } else { slurm::word(text) }
 }
 
-/// What every task is told besides its part of the work.
-fn further(arguments: &FarmArguments) -> Vec<String> {
+/// What every task is told besides its part of the work, in the words of one that runs in another directory.
+fn further(arguments: &FarmArguments, overrides: &Overrides) -> Result<Vec<String>> {
     let scene = &arguments.scene;
     let set = scene.set.iter().map(|(key, value)| ["--set".to_owned(), format!("{key}={value}")]);
     let define = scene.define.iter().map(|(name, value)| ["-D".to_owned(), format!("{name}={value}")]);
     let mut all: Vec<String> = set.chain(define).flatten().collect();
     let numbers = [("--spp", scene.spp.map(u64::from)), ("--seed", scene.seed)];
     all.extend(numbers.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value?.to_string()])).flatten());
-    all.extend(scene.path_map.iter().flat_map(|rule| ["--path-map".to_owned(), rule.clone()]));
-    all
+    let rules = overrides.paths.written().map_err(Error::Config)?;
+    all.extend(rules.into_iter().flat_map(|rule| ["--path-map".to_owned(), rule]));
+    Ok(all)
 }
 
 #[cfg(test)]

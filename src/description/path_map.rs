@@ -45,8 +45,7 @@ impl PathMap {
     pub fn add(&mut self, text: &str) -> Result<(), String> {
         match text.split_once('=') {
             Some((from, to)) if !from.is_empty() && !to.is_empty() => {
-                let windows = from.contains('\\') || from.as_bytes().get(1) == Some(&b':');
-                self.rules.push(Rule { from: from.to_owned(), windows, to: to.into() });
+                self.rules.push(Rule { from: from.to_owned(), windows: is_of_windows(from), to: to.into() });
                 Ok(())
             }
             _ => Err(format!("expected FROM=TO, two directories, found {}", quote(text))),
@@ -84,6 +83,14 @@ impl PathMap {
         Ok(())
     }
 
+    /// The rules as [`PathMap::add`] takes them, from whatever directory: for other processes.
+    ///
+    /// # Errors
+    /// In words, for one that it cannot take.
+    pub fn written(&self) -> Result<Vec<String>, String> {
+        self.rules.iter().map(Rule::written).collect()
+    }
+
     /// Where `path` is, as far as a rule says so; of several the one with the longest beginning.
     #[must_use]
     pub fn find(&self, path: &str) -> Option<PathBuf> {
@@ -105,7 +112,32 @@ impl PathMap {
     }
 }
 
+/// Whether a path has a drive or a backslash.
+fn is_of_windows(path: &str) -> bool {
+    path.contains('\\') || path.as_bytes().get(1) == Some(&b':')
+}
+
 impl Rule {
+    /// `FROM=TO` with a place that does not depend on the working directory.
+    fn written(&self) -> Result<String, String> {
+        // Either slash parts the steps of a path of Windows, and one at its end says no more.
+        let from = match self.windows && !is_of_windows(&self.from) {
+            true => self.from.replace('/', "\\").trim_end_matches('\\').to_owned() + "\\",
+            false => self.from.clone(),
+        };
+        let to = std::path::absolute(&self.to).ok();
+        match to.as_deref().and_then(Path::to_str) {
+            Some(to) if !self.from.is_empty() && !from.contains('=') && is_of_windows(&from) == self.windows => {
+                Ok(format!("{from}={to}"))
+            }
+            _ => Err(format!(
+                "expected a rule that --path-map FROM=TO can say, found {} to {}",
+                quote(&self.from),
+                quote(&self.to.to_string_lossy())
+            )),
+        }
+    }
+
     /// The steps of `path` below `from`, if it lies there.
     fn rest<'a>(&self, path: &'a str) -> Option<Vec<&'a str>> {
         let slash = |c: char| c == '/' || self.windows && c == '\\';
@@ -152,6 +184,34 @@ mod tests {
         assert_eq!(at("mnt/a/x.ply"), "dir/mnt/a/x.ply");
         assert_eq!(place(&map, Path::new("/mnt/a"), "x.ply"), Path::new("/b/x.ply"));
         assert_eq!(map.undo("file: /b/x.ply, /bc/y".into()), "file: /mnt/a/x.ply, /bc/y");
+    }
+
+    #[test]
+    fn rules_are_written_for_other_processes() {
+        let mut map = map(&["/mnt/a=/b", "Z:\\show=/mnt/show", "tex=sub/tex"]);
+        let rules = |format: &str, from: &str| {
+            format!(
+                "{{\"version\": \"pathmapping-1.0\", \"path_mapping_rules\": [{{\"source_path_format\": \"{format}\", \
+                 \"source_path\": \"{from}\", \"destination_path\": \"/c\"}}]}}"
+            )
+        };
+        map.add_rules(rules("WINDOWS", "//nas/show").as_bytes()).unwrap();
+        let here = std::env::current_dir().unwrap().join("sub/tex");
+        let tex = format!("tex={}", here.display());
+        let written = map.written().unwrap();
+        assert_eq!(written, ["/mnt/a=/b", "Z:\\show=/mnt/show", &tex, "\\\\nas\\show\\=/c"]);
+        let mut again = PathMap::default();
+        written.iter().for_each(|rule| again.add(rule).unwrap());
+        for path in ["/mnt/a/x", "z:/Show/y", "//NAS/show/x/y", "tex/z", "/c/x"] {
+            let absolute = map.find(path).map(|path| std::path::absolute(path).unwrap());
+            assert_eq!(again.find(path), absolute, "{path}");
+        }
+        for (format, from) in [("POSIX", "/a=b"), ("POSIX", "c:x"), ("WINDOWS", "")] {
+            let mut map = PathMap::default();
+            map.add_rules(rules(format, from).as_bytes()).unwrap();
+            let message = format!("expected a rule that --path-map FROM=TO can say, found \"{from}\" to \"/c\"");
+            assert_eq!(map.written(), Err(message));
+        }
     }
 
     #[test]
