@@ -128,7 +128,7 @@ fn a_job_for_a_farm_is_refused_where_its_tasks_would_be() {
     assert!(message.contains("none.yaml: cannot be read") && message.lines().count() == 2, "{message}");
 }
 
-/// A task runs in the directory of the job, or of a session. Its texture lies where rules on the command line and in a file
+/// A task runs in the directory of the job, or of a session. Its texture lies where the command line and a file of rules
 /// say, from the directory in which the job was made.
 #[test]
 fn tasks_of_a_farm_find_files_where_the_job_was_told_they_are() {
@@ -137,20 +137,30 @@ fn tasks_of_a_farm_find_files_where_the_job_was_told_they_are() {
                  \"source_path\": \"/old\", \"destination_path\": \"tex\"}]}";
     let place = Place::with(&[("scenes/a.yaml", &words("/old/t.png")), ("rules.json", rules), ("tex/x", "")]);
     image::GrayImage::new(2, 2).save(place.path("tex/t.png")).unwrap();
-    for (i, further) in [["--path-map", "/old=tex"], ["--path-map-file", "rules.json"]].iter().enumerate() {
+    let here = place.directory.path().canonicalize().unwrap();
+    let rule = format!("/old={}", here.join("tex").display());
+    for (i, (further, told)) in [
+        (&["--path-map", "/old=tex"][..], ["--path-map", &rule]),
+        (&["--path-map-file", "rules.json"], ["--path-map", &rule]),
+        (&["--set", "textures.t.image.file=tex/t.png"], ["--set-from", here.to_str().unwrap()]),
+        (&["--set", "textures.t={image: {file: t.png}}", "--set-from", "tex"], ["--set-from", &rule["/old=".len()..]]),
+    ]
+    .into_iter()
+    .enumerate()
+    {
         let job = format!("job{i}");
-        let made =
-            place.run(&[&["farm", "scenes/a.yaml", "-q", "--format", "slurm", "-o", &job], &further[..]].concat());
-        assert_eq!((made.code, made.err.as_str()), (0, ""));
+        let farm = |format: &str| {
+            let asked = ["farm", "scenes/a.yaml", "-q", "--format", format, "-o", &job];
+            let made = place.run(&[&asked, further].concat());
+            assert_eq!((made.code, made.err.as_str()), (0, ""));
+        };
+        farm("slurm");
         let ran = task(&place, &job);
         assert_eq!(ran.code, 0, "{}", ran.err);
         assert!(place.path(&job).join("pictures/a.exr").is_file());
-        let made =
-            place.run(&[&["farm", "scenes/a.yaml", "-q", "--format", "openjd", "-o", &job], &further[..]].concat());
-        assert_eq!(made.code, 0, "{}", made.err);
-        let rule = format!("\"--path-map\", \"/old={}\"", place.path("tex").display());
+        farm("openjd");
         let template = std::fs::read_to_string(place.path(&job).join("template.yaml")).unwrap();
-        assert!(template.contains(&rule), "{template}");
+        assert!(template.contains(&told.map(|word| format!("{word:?}")).join(", ")), "{template}");
     }
 }
 

@@ -5,6 +5,7 @@ use crate::batch::farm::{Cut, Job, openjd, slurm};
 use crate::batch::{Overrides, names};
 use crate::error::{Error, Result};
 use crate::film::output::{Inputs, prepare_place, write_atomically};
+use std::path::Path;
 
 /// Writes the bundle, and says how to start it.
 pub fn run(arguments: &FarmArguments) -> Result<i32> {
@@ -69,6 +70,11 @@ fn further(arguments: &FarmArguments, overrides: &Overrides) -> Result<Vec<Strin
     let set = scene.set.iter().map(|(key, value)| ["--set".to_owned(), format!("{key}={value}")]);
     let define = scene.define.iter().map(|(name, value)| ["-D".to_owned(), format!("{name}={value}")]);
     let mut all: Vec<String> = set.chain(define).flatten().collect();
+    if !scene.set.is_empty() {
+        let from = scene.set_from.as_deref().unwrap_or(Path::new("."));
+        let from = std::path::absolute(from).map_err(|e| Error::input(from, e.to_string()))?;
+        all.extend(["--set-from".to_owned(), from.display().to_string()]);
+    }
     let numbers = [("--spp", scene.spp.map(u64::from)), ("--seed", scene.seed)];
     all.extend(numbers.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value?.to_string()])).flatten());
     let rules = overrides.paths.written().map_err(Error::Config)?;

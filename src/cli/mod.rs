@@ -78,6 +78,9 @@ struct SceneArguments {
     /// Set a field of each scene, as in `--set render.seed=3` (may be repeated)
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     set: Vec<(String, String)>,
+    /// Directory in which relative paths of `--set` start [default: the working directory]
+    #[arg(long, value_name = "DIR")]
+    set_from: Option<PathBuf>,
     /// Give a parameter of a Mitsuba scene a value, as in `-D res=256` (may be repeated)
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = name_value)]
     define: Vec<(String, String)>,
@@ -402,7 +405,7 @@ impl SceneArguments {
     /// # Errors
     /// [`Error::Input`] for rules that cannot be read.
     fn overrides(&self, output: Option<PathBuf>) -> Result<crate::batch::Overrides> {
-        let mut paths = crate::description::PathMap::default();
+        let mut paths = crate::description::PathMap::starting(self.set_from.clone().unwrap_or_default());
         for rule in &self.path_map {
             paths.add(rule).map_err(Error::Config)?;
         }

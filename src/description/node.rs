@@ -75,9 +75,9 @@ impl Sources {
         self.sources.iter().filter(|source| !source.argument).map(|source| source.label.clone().into()).collect()
     }
 
-    /// Adds an argument of the command line; relative paths in it start from the working directory.
+    /// Adds an argument of the command line; relative paths in it start from the working directory, or where the map says.
     pub(crate) fn add_argument(&mut self, argument: String) -> u32 {
-        self.add(argument, PathBuf::new(), true)
+        self.add(argument, self.map.arguments.clone(), true)
     }
 
     fn add(&mut self, label: String, directory: PathBuf, argument: bool) -> u32 {

@@ -11,6 +11,8 @@ use super::node::quote;
 #[derive(Clone, Debug, Default)]
 pub struct PathMap {
     rules: Vec<Rule>,
+    /// Where relative paths of the command line start; empty for the working directory.
+    pub(super) arguments: PathBuf,
 }
 
 /// What begins with `from` is in `to`.
@@ -38,6 +40,12 @@ struct WrittenRule {
 }
 
 impl PathMap {
+    /// No rules yet; relative paths of the command line start in `arguments`.
+    #[must_use]
+    pub fn starting(arguments: PathBuf) -> PathMap {
+        PathMap { rules: Vec::new(), arguments }
+    }
+
     /// Adds `FROM=TO`. A FROM with a drive or a backslash is a path of Windows.
     ///
     /// # Errors
