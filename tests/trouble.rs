@@ -128,6 +128,44 @@ fn a_job_for_a_farm_is_refused_where_its_tasks_would_be() {
     assert!(message.contains("none.yaml: cannot be read") && message.lines().count() == 2, "{message}");
 }
 
+/// A task takes what it is told with `-o` for a pattern; the merge, that looks for parts, takes it as it stands.
+#[test]
+fn a_job_for_a_farm_whose_names_are_patterns_is_refused() {
+    let batch = "scenes: [{file: scene.yaml, name: \"a#1\"}, {file: scene.yaml, name: \"b%d{x}\"}]\n";
+    let place = Place::with(&[("scene.yaml", SCENE), ("batch.yaml", batch), ("here#/scene.yaml", SCENE)]);
+    let farm = |directory: &str, arguments: &[&str]| {
+        let all = [&["farm", "--format", "slurm", "-q"], arguments].concat();
+        let ran = Ran::of(place.command(&all).current_dir(place.path(directory)).output().unwrap());
+        (ran.code, ran.err)
+    };
+    let name = |name: &str, mark: &str| {
+        format!(
+            "{name}: expected a name of plain text, which is part of the pattern for its parts, found one with {mark}"
+        )
+    };
+    let (a, b) = (name("a#1", "#"), name("b%d{x}", "%d"));
+    let both = ["batch.yaml", "--frames", "1-3", "-o", "job"];
+    assert_eq!(farm(".", &[&both[..], &["--tiles", "2"]].concat()), (2, format!("error: {a}\nerror: {b}\n")));
+    assert_eq!(farm(".", &both), (0, String::new()));
+    // Without frames the marks of frames are text.
+    let b = name("b%d{x}", "{x}");
+    assert_eq!(farm(".", &["batch.yaml", "-o", "job", "--tiles", "2"]), (2, format!("error: {b}\n")));
+
+    let plain = |what: &str, mark: &str| {
+        (2, format!("error: {what}: expected a place of plain text, found {mark}, which is a pattern\n"))
+    };
+    let frames = ["scene.yaml", "--frames", "1-3"];
+    let framed = |directory: &str, further: &[&str]| farm(directory, &[&frames[..], further].concat());
+    assert_eq!(framed(".", &["-o", "job#1"]), plain("-o job#1", "#"));
+    assert_eq!(farm(".", &["scene.yaml", "-o", "job#1"]), (0, String::new()));
+    let shots = ["--pictures", "shots/####", "-o", "job"];
+    assert_eq!(framed(".", &shots), (0, String::new()));
+    assert_eq!(framed(".", &[&shots[..], &["--sample-ranges", "2"]].concat()), plain("--pictures shots/####", "####"));
+    let here = place.directory.path().canonicalize().unwrap().join("here#");
+    let here = format!("the working directory {}", here.display());
+    assert_eq!(framed("here#", &["--pictures", "out", "-o", "/tmp"]), plain(&here, "#"));
+}
+
 /// A task runs in the directory of the job, or of a session. Its texture lies where the command line and a file of rules
 /// say, from the directory in which the job was made.
 #[test]

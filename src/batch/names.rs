@@ -103,6 +103,23 @@ pub fn tells(pattern: &Path) -> Tells {
     tells
 }
 
+/// The first piece of `text` that is more than text in a pattern: what stands for the scene, or for a frame of one that has
+/// `frames`, or a word in braces that stands for nothing.
+#[must_use]
+pub fn mark(text: &str, frames: bool) -> Option<&str> {
+    let mut rest = text;
+    while !rest.is_empty() {
+        let (piece, after) = piece(rest);
+        match piece {
+            Piece::Frame(_) if !frames => {}
+            Piece::Text => {}
+            Piece::Scene | Piece::Frame(_) => return Some(&rest[..rest.len() - after.len()]),
+        }
+        rest = after;
+    }
+    unknown(Path::new(text))
+}
+
 /// A word in braces that stands for nothing, where `pattern` has one. Braces around anything else are part of a name.
 fn unknown(pattern: &Path) -> Option<&str> {
     let mut rest = pattern.to_str().unwrap_or_default();
@@ -174,6 +191,22 @@ mod tests {
         }
         for name in ["{scene}.{frame}.exr", "{frame:04}", "####/%d%s", "{B1F0-22}/a", "a{/b}", "{x", "}{"] {
             assert_eq!(found(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_mere_text_in_a_pattern_is_found() {
+        for (text, with, without) in [
+            ("é#1", Some("#"), None),
+            ("a##", Some("##"), None),
+            ("shot_%d", Some("%d"), None),
+            ("{frame:04}", Some("{frame:04}"), None),
+            ("x{scene}", Some("{scene}"), Some("{scene}")),
+            ("#{x}", Some("#"), Some("{x}")),
+            ("50%", None, None),
+            ("{a b}", None, None),
+        ] {
+            assert_eq!((mark(text, true), mark(text, false)), (with, without), "{text}");
         }
     }
 

@@ -13,16 +13,18 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
         Cut { tiles: arguments.tiles, ranges: arguments.sample_ranges, frames: arguments.frames_per_task as usize };
     let overrides = arguments.scene.overrides(None)?;
     let bundle = std::path::absolute(&arguments.output).map_err(|e| Error::output(&arguments.output, e))?;
-    let pictures = arguments.pictures.clone().unwrap_or_else(|| bundle.join("pictures"));
-    names::check(&pictures)
-        .map_err(|message| Error::Config(format!("--pictures {}: {message}", pictures.display())))?;
+    let pictures = match &arguments.pictures {
+        Some(pictures) => std::path::absolute(pictures).map_err(|e| Error::output(pictures, e))?,
+        None => bundle.join("pictures"),
+    };
     let job = Job {
-        pictures: std::path::absolute(&pictures).map_err(|e| Error::output(&pictures, e))?,
+        pictures,
         program: arguments.program.clone(),
         arguments: further(arguments, &overrides)?,
         threads: arguments.threads,
         ..Job::of(&arguments.scene.file, &overrides, cut)?
     };
+    check_pictures(arguments, &job)?;
     let files = match arguments.format {
         FarmFormat::Openjd => openjd::files(&job),
         FarmFormat::Slurm => slurm::files(&job),
@@ -56,6 +58,30 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
         super::say(&format!("{} pictures; start with\n{start}", job.count()));
     }
     Ok(0)
+}
+
+/// Refuses a place that means another one to a task, which takes it for a pattern. `--pictures` may be one, if no parts are
+/// looked for there.
+fn check_pictures(arguments: &FarmArguments, job: &Job) -> Result<()> {
+    let refuse = |what: &str, path: &Path, mark: &str| {
+        let path = path.display();
+        Err(Error::Config(format!("{what} {path}: expected a place of plain text, found {mark}, which is a pattern")))
+    };
+    let mark = |path: &Path| names::mark(&path.to_string_lossy(), job.has_frames()).map(str::to_owned);
+    let (what, written) = match &arguments.pictures {
+        Some(pictures) => ("--pictures", pictures),
+        // In the directory of the job.
+        None => ("-o", &arguments.output),
+    };
+    if let (true, Some(mark)) = (job.cut.parts() || arguments.pictures.is_none(), mark(written)) {
+        return refuse(what, written, &mark);
+    }
+    names::check(written).map_err(|message| Error::Config(format!("{what} {}: {message}", written.display())))?;
+    let here = std::env::current_dir().ok().filter(|_| written.is_relative());
+    match here.and_then(|here| Some((mark(&here)?, here))) {
+        Some((mark, here)) => refuse("the working directory", &here, &mark),
+        None => Ok(()),
+    }
 }
 
 /// A word as a person may paste it into a shell, in quotes where it needs them.

@@ -9,7 +9,7 @@ pub mod openjd;
 pub mod slurm;
 
 use super::part::bands;
-use super::{Overrides, clashes, entries, window};
+use super::{Overrides, clashes, entries, names, window};
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::scene::compile;
@@ -112,6 +112,12 @@ impl Job {
                 if entry.name.contains("{{") {
                     return Err(Error::Config(format!("{}: expected a name without {{{{, found one", entry.name)));
                 }
+                if let Some(mark) = names::mark(&entry.name, !frames.is_empty()).filter(|_| cut.parts()) {
+                    return Err(Error::Config(format!(
+                        "{}: expected a name of plain text, which is part of the pattern for its parts, found one with {mark}",
+                        entry.name
+                    )));
+                }
                 Ok(frames)
             };
             match look() {
@@ -143,6 +149,12 @@ impl Job {
             threads: 0,
             files: files.into_iter().map(absolute).collect::<Result<_>>()?,
         })
+    }
+
+    /// Whether any of its pictures is a frame.
+    #[must_use]
+    pub fn has_frames(&self) -> bool {
+        self.groups.iter().any(|group| !group.frames.is_empty())
     }
 
     /// Pictures, all frames counted.

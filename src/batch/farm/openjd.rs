@@ -66,7 +66,7 @@ fn template(job: &Job) -> String {
          - {{name: Threads, type: INT, default: {threads}, minValue: 0, description: \"Of a task; 0 for all that it may use\"}}\n",
         job.count()
     );
-    if job.groups.iter().any(|group| !group.frames.is_empty()) {
+    if job.has_frames() {
         let _ = writeln!(
             out,
             "- {{name: FramesPerTask, type: INT, default: {}, minValue: 1, description: \"Frames in a row share what they load\"}}",
