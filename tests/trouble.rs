@@ -122,6 +122,18 @@ fn a_job_for_a_farm_is_refused_where_its_tasks_would_be() {
         "error: --pictures shots/{scen}: expected {scene}, {frame}, {frame:04}, %04d or #### in a pattern, found {scen}\n"
     );
     assert!(says(&["stop.yaml", "--tiles", "2"]).contains("render.stop: a part cannot know the error or the time"));
+    // Of 60 rows cells of 8 make eight, if there are samples to be shared out.
+    let cells = |samples: &str| {
+        let set = format!("render={{samples: {samples}, techniques: {{adaptive: on}}}}");
+        says(&["scene.yaml", "--tiles", "61", "--set", &set])
+    };
+    let rows = |rows: &str| format!("error: scene: --tiles 61: expected at most {rows} of the picture\n");
+    assert_eq!((cells("16"), cells("8")), (rows("8, the rows of cells of adaptive sampling"), rows("60, the rows")));
+    // Each frame has its own rows and samples.
+    assert_eq!(
+        says(&["scene.yaml", "--tiles", "9", "--frames", "1-4", "--set", "image.height={1: 60, 4: 6}"]),
+        "error: scene.0004: --tiles 9: expected at most 6, the rows of the picture\n"
+    );
     // All that is wrong is told at once.
     let message = says(&["batch.yaml"]);
     assert!(message.contains("keyed.yaml:7:15: fog.colour: expected render.frames or --frames"), "{message}");

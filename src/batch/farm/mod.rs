@@ -8,8 +8,9 @@
 pub mod openjd;
 pub mod slurm;
 
+use super::adaptive::SIDE;
 use super::part::bands;
-use super::{Overrides, clashes, entries, names, window};
+use super::{Overrides, clashes, entries, names, prepare, window};
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::scene::compile;
@@ -89,7 +90,7 @@ pub struct BundleFile {
 }
 
 impl Job {
-    /// Reads each scene at its first frame, and finds what there is to do.
+    /// Reads each scene at its first frame, at all where pictures are cut, and finds what there is to do.
     ///
     /// # Errors
     /// [`Error::Config`] and [`Error::Input`] with the faults of all scenes, or for a cut that one of them does not have.
@@ -106,9 +107,17 @@ impl Job {
                 let animation = entry.animation(&overrides.set)?;
                 let frames = animation.frames().to_vec();
                 files.extend(animation.files());
-                let description = animation.into_first()?;
+                let description = animation.scene(frames.first().copied())?;
                 files.extend(compile::compile_with(&description, &entry.name, &mut shelf)?.files);
-                check_cut(&description, cut).map_err(|message| Error::Config(format!("{}: {message}", entry.name)))?;
+                if cut.parts() {
+                    let adaptive = description.render.techniques.adaptive == description::Technique::On
+                        && prepare(&entry, overrides)?.plan.adaptive.is_some();
+                    for (frame, description) in animation.into_scenes() {
+                        check_cut(&description?, cut, adaptive).map_err(|message| {
+                            Error::Config(format!("{}: {message}", names::label(&entry.name, frame)))
+                        })?;
+                    }
+                }
                 if entry.name.contains("{{") {
                     return Err(Error::Config(format!("{}: expected a name without {{{{, found one", entry.name)));
                 }
@@ -164,11 +173,12 @@ impl Job {
     }
 }
 
-/// Whether pictures of `scene` can be cut so.
-fn check_cut(scene: &SceneDescription, cut: Cut) -> std::result::Result<(), String> {
-    let rows = bands(window(scene), 1);
+/// Whether pictures of `scene` can be cut so, which are sampled adaptively or not.
+fn check_cut(scene: &SceneDescription, cut: Cut, adaptive: bool) -> std::result::Result<(), String> {
+    let (rows, cells) = if adaptive { (SIDE, " of cells of adaptive sampling") } else { (1, "") };
+    let rows = bands(window(scene), rows);
     if u64::from(cut.tiles) > rows {
-        return Err(format!("--tiles {}: expected at most {rows}, the rows of the picture", cut.tiles));
+        return Err(format!("--tiles {}: expected at most {rows}, the rows{cells} of the picture", cut.tiles));
     }
     let samples = match &scene.integrator {
         description::Integrator::Whitted(whitted) => whitted.grid.saturating_mul(whitted.grid),
@@ -178,13 +188,13 @@ fn check_cut(scene: &SceneDescription, cut: Cut) -> std::result::Result<(), Stri
         return Err(format!("--sample-ranges {}: expected at most {samples}, the samples of a pixel", cut.ranges));
     }
     let stop = &scene.render.stop;
-    if cut.parts() && (stop.error.is_some() || stop.time.is_some()) {
+    if stop.error.is_some() || stop.time.is_some() {
         return Err(
             "render.stop: a part cannot know the error or the time of the whole picture; give it a number of samples"
                 .into(),
         );
     }
-    if cut.parts() && scene.render.techniques.adaptive == description::Technique::On && cut.ranges > 1 {
+    if adaptive && cut.ranges > 1 {
         return Err(
             "--sample-ranges: expected --tiles alone, found adaptive sampling, which is decided by all first samples"
                 .into(),
