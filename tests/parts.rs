@@ -160,6 +160,37 @@ fn any_parts_add_up_to_the_picture_bit_for_bit() {
     }
 }
 
+/// Places and views beyond f32, 3.4e38, which matrices in a header are made of.
+#[test]
+fn parts_of_a_camera_beyond_what_a_header_can_hold_are_read() {
+    let place = Place::of(
+        "camera: {origin: [0, 1, 6], target: [0, 1, 0], fov_deg: 40}\nimage: {width: 8, height: 8}\n\
+         render: {samples: 4}\nlights: [constant: {radiance: 1}]\nshapes: [sphere: {radius: 1}]\n",
+    );
+    for (i, set) in [
+        "camera.origin=[0, 1, 1e39]",
+        "camera.principal_point=[1e60, 0]",
+        "camera.fov_deg=1e-60",
+        "camera={origin: [0, 1, 6], target: [0, 1, 0], orthographic_height: 1e-60}",
+    ]
+    .iter()
+    .enumerate()
+    {
+        let run = |arguments: &[&str]| {
+            let ran = place.run(arguments);
+            assert_eq!(ran.code, 0, "{set}: {}", ran.err);
+        };
+        let [parts, merged, whole] = ["parts", "merged", "whole"].map(|name| format!("{i}/{name}"));
+        let common = ["render", "scene.yaml", "-q", "--set", set, "-o"];
+        for tile in ["0/2", "1/2"] {
+            run(&[&common[..], &[&parts, "--tile", tile]].concat());
+        }
+        run(&["merge", &parts, "-q", "-o", &merged]);
+        run(&[&common[..], &[&whole]].concat());
+        same(&place.path(&whole).join("scene.exr"), &place.path(&merged).join("scene.exr"), set);
+    }
+}
+
 #[test]
 fn light_from_the_lights_is_in_the_scenes_of_this_file() {
     let light = |name: &str| {

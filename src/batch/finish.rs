@@ -63,10 +63,10 @@ pub struct Finish {
     pub wavelengths: String,
     /// What a person should know of the scene.
     pub notes: Vec<String>,
-    /// The camera's place and view, as the header of an EXR file has them.
-    pub world_to_camera: [f32; 16],
+    /// The camera's place and view, as the header of an EXR file has them; none where they are more than it can hold.
+    pub world_to_camera: Option<[f32; 16]>,
     /// And to the frame.
-    pub world_to_ndc: [f32; 16],
+    pub world_to_ndc: Option<[f32; 16]>,
     /// Files, colours and tone curve.
     pub output: Output,
     /// The chromaticity that is shown white.
@@ -154,8 +154,8 @@ impl Finish {
             lit: plan.lit,
             wavelengths: scene.wavelengths.describe().to_owned(),
             notes: scene.notes.iter().cloned().chain(note).collect(),
-            world_to_camera: scene.camera.camera_from_world(),
-            world_to_ndc: scene.camera.ndc_from_world(),
+            world_to_camera: finite(scene.camera.camera_from_world()),
+            world_to_ndc: finite(scene.camera.ndc_from_world()),
             white,
             output,
             sensitivity: description.image.sensitivity,
@@ -260,6 +260,11 @@ pub fn base(output: &description::Output, bands: bool) -> exr::Base {
         description::Channels::LuminanceAlpha => exr::Base::LuminanceAlpha,
         description::Channels::Luminance => exr::Base::Luminance,
     }
+}
+
+/// A matrix all whose numbers f32 can hold: JSON has no others.
+fn finite(matrix: [f32; 16]) -> Option<[f32; 16]> {
+    Some(matrix).filter(|matrix| matrix.iter().all(|x| x.is_finite()))
 }
 
 /// The mattes that are asked for, with the names of what the scene's objects are part of.
@@ -526,8 +531,6 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
     let text = |s: &str| Attribute::Text(s.to_owned());
     let mut all = vec![
         ("software".to_owned(), text(concat!("Abbe ", env!("CARGO_PKG_VERSION")))),
-        ("worldToCamera".to_owned(), Attribute::Matrix4(finish.world_to_camera)),
-        ("worldToNDC".to_owned(), Attribute::Matrix4(finish.world_to_ndc)),
         ("abbe/version".to_owned(), text(env!("CARGO_PKG_VERSION"))),
         ("abbe/sceneHash".to_owned(), text(&finish.scene_hash)),
         ("abbe/settingsHash".to_owned(), text(&finish.settings_hash())),
@@ -540,6 +543,9 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
         ("abbe/renderSeconds".to_owned(), Attribute::Double(frame.elapsed.as_secs_f64())),
         ("abbe/invalidSamples".to_owned(), text(&frame.invalid().total().to_string())),
     ];
+    for (name, matrix) in [("worldToCamera", finish.world_to_camera), ("worldToNDC", finish.world_to_ndc)] {
+        all.extend(matrix.map(|matrix| (name.to_owned(), Attribute::Matrix4(matrix))));
+    }
     if let Some(number) = finish.frame_number {
         all.push(("abbe/frame".to_owned(), Attribute::Int(number)));
         all.push(("imageCounter".to_owned(), Attribute::Int(number)));
