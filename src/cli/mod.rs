@@ -20,7 +20,8 @@ use crate::description::SAMPLES_LIMIT;
 use crate::error::{Error, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// A spectral batch renderer: wavelengths, dispersion, an error bar on every image.
 #[derive(Debug, Parser)]
@@ -470,8 +471,8 @@ pub fn run() -> i32 {
         Err(e) => {
             // Help and version go to the standard output and are no error.
             let code = if e.use_stderr() { 2 } else { 0 };
-            let _ = e.print();
-            return code;
+            note_loss(e.print());
+            return after_loss(code);
         }
     };
     let threads = || use_threads(arguments.verb.threads());
@@ -486,13 +487,10 @@ pub fn run() -> i32 {
         Verb::Compare(a) => compare::run(a),
         Verb::Info(a) => info::run(a),
     });
-    match result {
-        Ok(code) => code,
-        Err(e) => {
-            complain(&prefixed(&e));
-            e.exit_code()
-        }
-    }
+    after_loss(result.unwrap_or_else(|e| {
+        complain(&prefixed(&e));
+        e.exit_code()
+    }))
 }
 
 impl Verb {
@@ -533,10 +531,30 @@ fn use_threads(asked: usize) -> Result<()> {
     }
 }
 
-/// Writes to the standard output. A reader that went away, as in `abbe plan … | head`, is no fault.
+/// Why something could not be said, the first time.
+static LOST: OnceLock<String> = OnceLock::new();
+
+/// Writes to the standard output. What cannot be written ends the process with an error, but not before its work is done.
 fn say(text: &str) {
     let mut out = std::io::stdout().lock();
-    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    note_loss(out.write_all(text.as_bytes()).and_then(|()| out.flush()));
+}
+
+/// Keeps why the standard output was not written to. A reader that went away, as in `abbe plan … | head`, is no fault.
+fn note_loss(written: std::io::Result<()>) {
+    if let Err(e) = written
+        && e.kind() != std::io::ErrorKind::BrokenPipe
+    {
+        LOST.get_or_init(|| e.to_string());
+    }
+}
+
+/// The exit code of a process that would end with `code` if all that it had to say was read.
+fn after_loss(code: i32) -> i32 {
+    let Some(why) = LOST.get() else { return code };
+    let lost = Error::output(Path::new("the standard output"), why);
+    complain(&prefixed(&lost));
+    if code == 0 { lost.exit_code() } else { code }
 }
 
 /// Writes a line to the standard error, if anyone listens.

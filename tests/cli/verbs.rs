@@ -1,7 +1,7 @@
 //! What the verbs say: help, `plan`, `compare`; and to whom.
 
 use super::{BALL, SMALL, batch};
-use crate::common::place::Place;
+use crate::common::place::{Place, Ran};
 use serde_json::Value;
 
 #[test]
@@ -112,4 +112,32 @@ fn a_reader_that_goes_away_is_no_fault() {
         let mut child = place.command(arguments).stdout(writer).stderr(writer_too).spawn().unwrap();
         assert_eq!(child.wait().unwrap().code(), Some(0), "{arguments:?}");
     }
+}
+
+/// What goes to the standard output is all that some verbs are for; a script must not take nothing for it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_behind_the_standard_output_is_a_fault() {
+    let place = batch();
+    let full = || std::fs::File::create("/dev/full").unwrap();
+    assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "out"]).code, 0);
+    assert_eq!(place.run(&["export", "scenes/good.yaml", "-o", "good.xml"]).code, 0);
+    for arguments in [
+        &["plan", "scenes/good.yaml", "--format", "json"][..],
+        &["export", "scenes/good.yaml"],
+        &["import", "good.xml"],
+        &["info", "out/good.exr", "--json"],
+        &["compare", "out/good.exr", "out/good.exr"],
+        &["render", "scenes/good.yaml", "-o", "other"],
+        &["--help"],
+    ] {
+        let ran = Ran::of(place.command(arguments).stdout(full()).output().unwrap());
+        let words = "error: the standard output: cannot write: No space left on device";
+        assert!(ran.code == 1 && ran.err.lines().last().unwrap().starts_with(words), "{arguments:?}: {}", ran.err);
+    }
+    // The picture is written all the same.
+    assert!(place.path("other/good.exr").is_file());
+    // Another fault counts more.
+    let ran = Ran::of(place.command(&["info", "out/good.exr", "none.exr"]).stdout(full()).output().unwrap());
+    assert_eq!(ran.code, 3, "{}", ran.err);
 }
