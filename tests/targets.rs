@@ -69,6 +69,8 @@ fn a_target_out_of_reach_is_told_and_the_picture_is_there() {
     assert_eq!(code, 4, "{said}");
     assert!(said.contains("is too short for 4 samples of each pixel"), "{said}");
     assert!(place.path("short.exr").exists() && place.path("short.png").exists());
+    let (code, again) = abbe(&place, "render scene.yaml -q -o short.exr --time 0.000001s --resume");
+    assert_eq!((code, again.lines().last()), (4, said.lines().last()));
 }
 
 #[test]

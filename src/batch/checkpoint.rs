@@ -6,7 +6,7 @@
 //! the picture to a viewer ([`super::tev`]).
 
 use super::develop;
-use super::finish::{Finish, spectral_path};
+use super::finish::{FAULT, Finish, spectral_path};
 use super::frame::{Begun, FrameJob, Milestone, lock};
 use super::merge::sum;
 use super::names;
@@ -237,21 +237,21 @@ pub fn part_holds(path: &Path, identity: &Identity, share: &Share) -> bool {
 }
 
 /// Whether the picture at `path`, its PNG and its file of bands are there, undamaged, of the same scene and settings and by
-/// this version, and of one render.
-#[must_use]
-pub fn picture_holds(path: &Path, finish: &Finish) -> bool {
+/// this version, and of one render: how that ended.
+fn picture_ended(path: &Path, finish: &Finish) -> Option<Result<()>> {
     // A file that is not there need not be read.
     let png = path.with_extension("png");
     let spectral = finish.output.spectral.map(|_| spectral_path(path));
     if !(path.is_file() && png.is_file() && spectral.as_ref().is_none_or(|spectral| spectral.is_file())) {
-        return false;
+        return None;
     }
-    let Some(pixels) = exr_holds(path, finish, Holds::Colours) else { return false };
+    let Found { pixels, fault } = exr_holds(path, finish, Holds::Colours)?;
     let size = [finish.window.width, finish.window.height];
     let mut texts = finish.png_marks(&pixels);
     texts.push(develop::software());
-    spectral.is_none_or(|spectral| exr_holds(&spectral, finish, Holds::Bands).as_ref() == Some(&pixels))
-        && png::holds(&png, size, &texts)
+    let bands = |spectral: PathBuf| exr_holds(&spectral, finish, Holds::Bands).is_some_and(|f| f.pixels == pixels);
+    let holds = spectral.is_none_or(bands) && png::holds(&png, size, &texts);
+    holds.then(|| fault.map_or(Ok(()), |fault| Err(Error::Render(fault))))
 }
 
 /// What a file of a picture is for.
@@ -261,8 +261,16 @@ enum Holds {
     Bands,
 }
 
-/// [`picture_holds`] of one of its EXR files: the hash of the picture's pixels, if it does.
-fn exr_holds(path: &Path, finish: &Finish, holds: Holds) -> Option<String> {
+/// What such a file says.
+struct Found {
+    /// The hash of the picture's pixels.
+    pixels: String,
+    /// What is wrong with the picture although it is written.
+    fault: Option<String>,
+}
+
+/// [`picture_ended`] of one of its EXR files.
+fn exr_holds(path: &Path, finish: &Finish, holds: Holds) -> Option<Found> {
     let file = exr::read_exr(path).ok()?;
     // What is said of the whole file stands in its first part.
     let part = &file.parts[0];
@@ -275,7 +283,8 @@ fn exr_holds(path: &Path, finish: &Finish, holds: Holds) -> Option<String> {
     ];
     let is = |(name, value): &(&str, String)| part.text(name) == Some(value.as_str());
     let same = found == holds && part.window == finish.window && expected.iter().all(is);
-    part.text("abbe/pixelHash").filter(|_| same).map(str::to_owned)
+    let text = |name: &str| part.text(name).map(str::to_owned);
+    Some(Found { pixels: text("abbe/pixelHash").filter(|_| same)?, fault: text(FAULT) })
 }
 
 /// Removes the checkpoint of what is at `path` already: a process that was killed after it had written the one and before it
@@ -296,15 +305,15 @@ fn remove(file: &Path) -> Result<()> {
     }
 }
 
-/// Whether what is to be at `path` is there already.
+/// How the render of what is to be at `path` ended, if that is there already.
 #[must_use]
-pub fn is_there(keep: &Keep, path: &Path, identity: &Identity, share: Option<&Share>) -> bool {
+pub fn ended(keep: &Keep, path: &Path, identity: &Identity, share: Option<&Share>) -> Option<Result<()>> {
     if !(keep.skip_existing || keep.resume) || !output::directory_of(path).is_dir() {
-        return false;
+        return None;
     }
     match share {
-        Some(share) => part_holds(path, identity, share),
-        None => picture_holds(path, &identity.finish),
+        Some(share) => part_holds(path, identity, share).then_some(Ok(())),
+        None => picture_ended(path, &identity.finish),
     }
 }
 

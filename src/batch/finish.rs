@@ -125,6 +125,9 @@ impl Lens {
 /// How the names of the bands of a spectral file begin.
 pub(super) const SPECTRAL: &str = "S0.";
 
+/// The attribute of a header that says what is wrong with a picture that is written all the same.
+pub(super) const FAULT: &str = "abbe/fault";
+
 /// Of light at 555 nm, lm/W.
 const LUMENS_PER_WATT: f64 = 683.002;
 
@@ -303,12 +306,22 @@ pub fn integrator(integrator: &Integrator) -> &'static str {
     }
 }
 
-/// Writes the EXR at `exr_path` and the PNG beside it, and notes them in the report, which has measured the frame.
+/// Writes the EXR at `exr_path` and the PNG beside it, and notes them in the report, which has measured the frame. `target` is
+/// whether that is as good as was asked for.
 ///
 /// # Errors
 /// [`Error::Output`](crate::error::Error::Output) where a file cannot be written, [`Error::Render`](crate::error::Error::Render)
-/// for invalid samples; the files are then written all the same.
-pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut SceneReport) -> Result<()> {
+/// for invalid samples, or `target`; the files are then written all the same.
+pub fn write(
+    finish: &Finish,
+    frame: &Frame,
+    target: Result<()>,
+    exr_path: &Path,
+    report: &mut SceneReport,
+) -> Result<()> {
+    let (counted, dropped) = frame.film.samples();
+    let sound = frame::check_invalid(&frame.invalid(), counted + dropped).and(target);
+    report.fault = sound.as_ref().err().map(ToString::to_string);
     let mut image = frame.resolve(&finish.rgb_from_xyz());
     if finish.integrator == "whitted" {
         // Its samples differ by where they are, and would be the same again: there is no noise.
@@ -338,10 +351,7 @@ pub fn write(finish: &Finish, frame: &Frame, exr_path: &Path, report: &mut Scene
     report.files = vec![exr_path.to_path_buf(), png_path];
     report.files.extend((!finish.spectral_channels().is_empty()).then_some(spectral));
     report.seconds.writing = written.elapsed().as_secs_f64();
-
-    let (counted, dropped) = frame.film.samples();
-    let samples = counted + dropped;
-    frame::check_invalid(&frame.invalid(), samples)
+    sound
 }
 
 /// Makes the files of a picture of one pixel, which has no sample, to see whether the channels and attributes of the whole one
@@ -590,6 +600,9 @@ fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(Stri
         let state = if e.valid { "valid" } else { "not converged, interval not valid" };
         all.push(("abbe/relativeErrorState".to_owned(), text(state)));
         all.push(("abbe/relativeErrorInterval95".to_owned(), text(&format!("{:.3e} {:.3e}", e.low, e.high))));
+    }
+    if let Some(fault) = &report.fault {
+        all.push((FAULT.to_owned(), text(fault)));
     }
     if let Some(seconds) = report.halving_seconds {
         all.push(("abbe/secondsToHalveError".to_owned(), Attribute::Double(seconds)));

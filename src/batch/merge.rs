@@ -92,7 +92,7 @@ pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Re
     let mut scene = SceneReport::new(&finish.name, finish.frame_number);
     scene.describe(finish, start.elapsed());
     scene.measure(finish, &frame, sum(parts.iter().filter_map(|part| part.header.numerics)));
-    let written = finish::write(finish, &frame, &out, &mut scene);
+    let written = finish::write(finish, &frame, Ok(()), &out, &mut scene);
     if let Err(e) = &written {
         scene.fail(e);
     }

@@ -196,11 +196,12 @@ fn render_and_write(
     let finish = &identity.finish;
     let share = portion.share(job.window, job.samples, finish.rows())?;
     checks::memory(description, share.rows(job.window), part::Part::bytes(&job, &share), overrides.memory_limit)?;
-    if checkpoint::is_there(&overrides.keep, &exr_path, &identity, (!portion.is_all()).then_some(&share)) {
+    let part = (!portion.is_all()).then_some(&share);
+    if let Some(ended) = checkpoint::ended(&overrides.keep, &exr_path, &identity, part) {
         checkpoint::remove_left_over(&exr_path, &identity)?;
         report.status = Status::Skipped;
         report.files = vec![exr_path];
-        return Ok(());
+        return ended;
     }
     let mut keeper = Keeper::new(&overrides.keep, stop, &exr_path, &identity, prepared.scene.watch.as_deref());
     let begun = keeper.begin(&job, share)?;
@@ -220,13 +221,14 @@ fn render_and_write(
     }
     report.measure(finish, &frame, keeper.numerics());
     report.forecast = Forecast::at_a_quarter(&frame.milestones, &prepared.stop, prepared.samples);
-    let written = finish::write(finish, &frame, &exr_path, report);
+    let target = prepared.stop.check(&frame.milestones);
+    let written = finish::write(finish, &frame, target, &exr_path, report);
     // What cannot be written can still be resumed.
     if report.files.is_empty() {
         return written;
     }
     report.notes.extend(keeper.done()?);
-    written.and_then(|()| prepared.stop.check(&frame.milestones))
+    written
 }
 
 /// Renders all frames of all scenes of `path` that are asked for; one that fails does not stop the others.

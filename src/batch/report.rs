@@ -178,6 +178,9 @@ pub struct SceneReport {
     pub notes: Vec<String>,
     /// Files written.
     pub files: Vec<PathBuf>,
+    /// What is wrong with the picture although it is written, which its header tells.
+    #[serde(skip)]
+    pub fault: Option<String>,
 }
 
 /// What `serde` does for an [`Arc`] only with its feature `rc`.
@@ -268,6 +271,7 @@ impl SceneReport {
             wavelengths: String::new(),
             notes: Vec::new(),
             files: Vec::new(),
+            fault: None,
         }
     }
 
