@@ -245,6 +245,14 @@ fn what_is_there_is_skipped_only_if_it_holds() {
     assert!(runs(&skip), "samples of before");
     assert!(runs(&[&skip[..], &["--set", "output.colour=acescg"]].concat()), "other colours");
     assert!(runs(&skip), "colours of before");
+    // Chunks of the PNG that decoders pass over.
+    for chunk in ["sRGB", "tEXt"] {
+        let mut bytes = std::fs::read(place.path("a.png")).unwrap();
+        let at = bytes.windows(4).position(|w| w == chunk.as_bytes()).unwrap();
+        bytes[at] ^= 16;
+        std::fs::write(place.path("a.png"), bytes).unwrap();
+        assert!(runs(&skip) && !runs(&skip), "{chunk}");
+    }
     // Damage in the middle of either file, half a file, none.
     for name in ["a.exr", "a.png"] {
         let whole = std::fs::read(place.path(name)).unwrap();

@@ -1,5 +1,6 @@
 //! What a PNG file says of itself.
 
+use super::tags;
 use crate::error::{Error, Result};
 use serde::Serialize;
 use std::path::Path;
@@ -28,14 +29,21 @@ pub fn inspect(path: &Path) -> Result<PngFacts> {
         let missing = e.kind() == std::io::ErrorKind::NotFound;
         Error::input(path, if missing { "there is no such file".to_string() } else { e.to_string() })
     })?;
-    let facts = chunks(&bytes).ok_or_else(|| Error::input(path, "not a whole PNG file: its chunks break off"))?;
+    let mut damaged = None;
+    let facts = chunks(&bytes, &mut damaged);
+    if let Some(chunk) = damaged {
+        return Err(Error::input(path, format!("the PNG file is damaged: the checksum of the chunk {chunk} is wrong")));
+    }
+    let facts = facts.ok_or_else(|| Error::input(path, "not a whole PNG file: its chunks break off"))?;
     // All pixels are there and their checksums hold.
     image::load_from_memory_with_format(&bytes, image::ImageFormat::Png)
         .map_err(|e| Error::input(path, format!("the PNG file is damaged: {e}")))?;
     Ok(facts)
 }
 
-fn chunks(bytes: &[u8]) -> Option<PngFacts> {
+/// What chunks say, up to the first that is `damaged`, whose name is left there; readers of pixels pass over those of text and
+/// colours. None where they break off or make no sense.
+fn chunks(bytes: &[u8], damaged: &mut Option<String>) -> Option<PngFacts> {
     let mut rest = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n")?;
     let mut facts = PngFacts::default();
     // By rank: a better one replaces what was found before.
@@ -45,7 +53,12 @@ fn chunks(bytes: &[u8]) -> Option<PngFacts> {
         let length = u32::from_be_bytes(length.try_into().ok()?) as usize;
         let (name, after) = after.split_at_checked(4)?;
         let (content, after) = after.split_at_checked(length)?;
-        rest = after.get(4..)?;
+        let (crc, after) = after.split_at_checked(4)?;
+        rest = after;
+        if crc != tags::crc(name, content).to_be_bytes() {
+            *damaged = Some(latin1(name));
+            return None;
+        }
         let mut says = |own: i32, text: String| {
             if own > rank {
                 (rank, facts.colours) = (own, text);
@@ -120,16 +133,21 @@ mod tests {
             texts: texts.clone(),
             ..PngSettings::default()
         };
-        let mut bytes = encode_png(&grey(0.3, 5), &settings).unwrap();
+        let bytes = encode_png(&grey(0.3, 5), &settings).unwrap();
         std::fs::write(&path, &bytes).unwrap();
         let facts = inspect(&path).unwrap();
         let colours = "Display P3 (cICP)".to_owned();
         assert_eq!(facts, PngFacts { size: [5, 5], bits: 16, channels: "RGB", colours, texts });
         std::fs::write(&path, &bytes[..bytes.len() - 20]).unwrap();
         assert!(inspect(&path).unwrap_err().to_string().contains("its chunks break off"));
-        let at = bytes.windows(4).position(|w| w == b"IDAT").unwrap() + 8;
-        bytes[at] ^= 0x55;
-        std::fs::write(&path, &bytes).unwrap();
-        assert!(inspect(&path).unwrap_err().to_string().contains("damaged"));
+        // A chunk's name, what it says, and the pixels.
+        for (name, place, told) in [(b"cICP", 0, "dICP"), (b"tEXt", 9, "tEXt"), (b"IDAT", 8, "IDAT")] {
+            let mut bytes = bytes.clone();
+            let at = bytes.windows(4).position(|w| w == name).unwrap() + place;
+            bytes[at] = bytes[at].wrapping_add(1);
+            std::fs::write(&path, &bytes).unwrap();
+            let message = format!("the PNG file is damaged: the checksum of the chunk {told} is wrong");
+            assert!(inspect(&path).unwrap_err().to_string().ends_with(&message), "{told}");
+        }
     }
 }

@@ -5,15 +5,20 @@ use crate::spectrum::ColourSpace;
 use crate::spectrum::colour::{d50_from_d65, multiply};
 use std::io::Write;
 
-/// A chunk: length, name, content, and the CRC-32 of name and content.
-pub(super) fn chunk(name: &[u8; 4], content: &[u8]) -> Vec<u8> {
+/// The CRC-32 of a chunk's name and content.
+pub(super) fn crc(name: &[u8], content: &[u8]) -> u32 {
     let mut crc = flate2::Crc::new();
     crc.update(name);
     crc.update(content);
+    crc.sum()
+}
+
+/// A chunk: length, name, content, and its CRC.
+pub(super) fn chunk(name: &[u8; 4], content: &[u8]) -> Vec<u8> {
     let mut bytes = (content.len() as u32).to_be_bytes().to_vec();
     bytes.extend(name);
     bytes.extend(content);
-    bytes.extend(crc.sum().to_be_bytes());
+    bytes.extend(crc(name, content).to_be_bytes());
     bytes
 }
 
