@@ -134,8 +134,11 @@ fn table(path: &Path, sources: &mut Sources) -> Result<Vec<Node>, String> {
             None if rows.is_empty() && fields.iter().all(|field| field.parse::<f64>().is_err()) => {}
             _ => {
                 let found = quote(text.trim());
+                let at = fields.iter().find(|field| !field.parse().is_ok_and(f64::is_finite)).unwrap_or(&fields[0]);
+                let before = &text[..at.as_ptr() as usize - text.as_ptr() as usize];
+                let column = before.chars().count() + 1;
                 return Err(format!(
-                    "line {line}: expected a frame and one number or more, with commas, found {found}"
+                    "line {line}, column {column}: expected a frame and one number or more, with commas, found {found}"
                 ));
             }
         }
@@ -519,8 +522,8 @@ mod tests {
         let says = |table: &str| scene(&[("s.yaml", &text), ("p.csv", table)]).unwrap_err();
         let line = "expected a frame and one number or more, with commas, found";
         let named = "it is named at DIR/s.yaml:4:45";
-        assert_eq!(says("1, 2, 3, 4\n2, a\n"), format!("DIR/p.csv: line 2: {line} \"2, a\"; {named}"));
-        assert_eq!(says("1\n"), format!("DIR/p.csv: line 1: {line} \"1\"; {named}"));
+        assert_eq!(says("1, 2, 3, 4\n2, a\n"), format!("DIR/p.csv: line 2, column 4: {line} \"2, a\"; {named}"));
+        assert_eq!(says("1\n"), format!("DIR/p.csv: line 1, column 1: {line} \"1\"; {named}"));
         assert_eq!(
             says("1, 2, 3, 4\n2, 5\n"),
             "DIR/p.csv:2:1: shapes[0].sphere.center.keys[1]: expected a list of 3 as at frame 1, found a number"

@@ -345,6 +345,8 @@ impl Output {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         let named = !self.dir.as_os_str().is_empty();
         checker.require(named, at.key("dir"), "the path of a directory", "empty text");
+        let ends = self.dir.as_os_str().as_encoded_bytes().contains(&0);
+        checker.require(!ends, at.key("dir"), "the path of a directory", "one with a NUL character");
         exr_file::check(self, at, checker);
         let png = at.key("png");
         if let Exposure::Number(stops) = self.png.exposure {
@@ -389,6 +391,10 @@ mod tests {
         assert_eq!(
             faults("output: {dir: ''}"),
             "dir/s.yaml:2:15: output.dir: expected the path of a directory, found empty text"
+        );
+        assert_eq!(
+            faults("output: {dir: \"a\\0b\"}"),
+            "dir/s.yaml:2:15: output.dir: expected the path of a directory, found one with a NUL character"
         );
     }
 
