@@ -277,6 +277,19 @@ fn parts_that_do_not_make_up_one_picture_are_refused() {
 
 /// Headers are compared before any sum is read: here they say other things than the files were rendered with. Nothing else
 /// of the pictures differs.
+/// Settings of files are one field of a header, longer than a message.
+#[test]
+fn where_parts_of_other_settings_differ_is_told() {
+    let place = Place::of(&yaml("whitted", &scenes()[0].1));
+    let a = render(&place, "a.exr", part([0, 2], [0, 8]), &[]);
+    let b = render(&place, "b.exr", part([1, 2], [0, 8]), &[("output.png.tonemap", "agx")]);
+    let message = refusal(&place, &[a, b]);
+    assert!(
+        message.ends_with("it is of another picture: output.png.tonemap: expected \"aces\", found \"agx\""),
+        "{message}"
+    );
+}
+
 #[test]
 fn parts_of_other_plans_and_paths_from_the_lights_are_refused() {
     let (_, text) = scenes().swap_remove(1);

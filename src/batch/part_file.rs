@@ -23,6 +23,7 @@ use crate::film::layers::{Kept, Layout};
 use crate::scene::watch::Counts;
 use crate::transport::plan::EffectPlan;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::ops::Range;
@@ -357,7 +358,7 @@ impl Header {
         }
         // What was set says more than a hash.
         let fields = |finish: &Finish| match serde_json::to_value(finish) {
-            Ok(serde_json::Value::Object(fields)) => fields,
+            Ok(Value::Object(fields)) => fields,
             _ => serde_json::Map::new(),
         };
         let (own, others) = (fields(&self.finish), fields(finish));
@@ -365,10 +366,8 @@ impl Header {
         const CONSEQUENCES: [&str; 5] = ["notes", "scene_hash", "effects", "techniques", "wavelengths"];
         let names: BTreeSet<&String> = own.keys().chain(others.keys()).collect();
         for name in names.into_iter().filter(|name| !CONSEQUENCES.contains(&name.as_str())) {
-            let word = |value: Option<&serde_json::Value>| value.map_or("none".to_owned(), ToString::to_string);
-            let (found, expected) = (own.get(name), others.get(name));
-            if found != expected {
-                return Err(differs(path, name, &word(expected), &word(found)));
+            if let Some((field, expected, found)) = difference(name, others.get(name), own.get(name)) {
+                return Err(differs(path, &field, &expected, &found));
             }
         }
         if self.finish.scene_hash != finish.scene_hash {
@@ -378,6 +377,25 @@ impl Header {
             return Err(differs(path, "plan with the hash", plan_hash, &self.plan_hash));
         }
         Ok(())
+    }
+}
+
+/// Where two values differ, if they do: the field below `name`, and its two values in words.
+fn difference(name: &str, expected: Option<&Value>, found: Option<&Value>) -> Option<(String, String, String)> {
+    match (expected, found) {
+        (Some(Value::Object(a)), Some(Value::Object(b))) => {
+            let keys: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+            keys.into_iter().find_map(|key| difference(&format!("{name}.{key}"), a.get(key), b.get(key)))
+        }
+        (Some(Value::Array(a)), Some(Value::Array(b))) if a.len() == b.len() && a.len() > 4 => {
+            let mut pairs = a.iter().zip(b).enumerate();
+            pairs.find_map(|(i, (a, b))| difference(&format!("{name}[{i}]"), Some(a), Some(b)))
+        }
+        _ if expected == found => None,
+        _ => {
+            let word = |value: Option<&Value>| value.map_or("none".to_owned(), ToString::to_string);
+            Some((name.to_owned(), word(expected), word(found)))
+        }
     }
 }
 
