@@ -60,7 +60,8 @@ enum Verb {
     /// Print a scene as Mitsuba 3 XML, and say what Mitsuba cannot express
     #[command(after_help = "Example:\n  abbe export configs/scenes/flint.yaml -o flint.xml")]
     Export(ConvertArguments),
-    /// Say whether two EXR files show the same picture, within their noise (exit 0 same, 1 different, 2 cannot compare)
+    /// Say whether two EXR files show the same picture, within their noise (exit 0 same, 1 different, 2 of different
+    /// size or channels, 3 missing or damaged)
     #[command(after_help = "Example:\n  abbe compare ours.exr theirs.exr --json figures.json")]
     Compare(CompareArguments),
     /// Say what is in a picture: size, colours, layers and their numbers, error, camera, scene
@@ -86,10 +87,13 @@ struct SceneArguments {
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = name_value)]
     define: Vec<(String, String)>,
     /// Samples a pixel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(SAMPLES_LIMIT)))]
+    #[arg(
+        long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(SAMPLES_LIMIT)),
+        allow_negative_numbers = true
+    )]
     spp: Option<u32>,
     /// Seed of all random numbers
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Frames, as 12, 1-100, 1-100x5 (or 1-100:5) or 1-10,20,30-40; all verbs but `render` and `farm` take the first
     #[arg(long, value_name = "FRAMES", value_parser = frames, allow_hyphen_values = true)]
@@ -111,16 +115,16 @@ struct RenderArguments {
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
     /// End at this relative error of the picture, as 0.01 or 1%; with --spp or --time at what is reached first
-    #[arg(long, value_name = "E", value_parser = relative_error)]
+    #[arg(long, value_name = "E", value_parser = relative_error, allow_hyphen_values = true)]
     error: Option<f64>,
     /// End after this time of rendering each scene, as 60s, 10m or 2h
-    #[arg(long, value_name = "TIME", value_parser = duration)]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     time: Option<std::time::Duration>,
     /// Threads; 0 takes every core that the process may use
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads())]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
     threads: usize,
     /// End with exit code 33 before the process has more memory than this, as 8G or 500M
-    #[arg(long, value_name = "SIZE", value_parser = memory_limit::bytes)]
+    #[arg(long, value_name = "SIZE", value_parser = memory_limit::bytes, allow_hyphen_values = true)]
     memory_limit: Option<u64>,
     /// Write the report here as well
     #[arg(long, value_name = "FILE.json")]
@@ -129,17 +133,17 @@ struct RenderArguments {
     #[arg(long)]
     check_numerics: bool,
     /// Render a part: the i-th, from 0, of n bands of rows; `abbe merge` makes the picture
-    #[arg(long, value_name = "i/n", value_parser = tile)]
+    #[arg(long, value_name = "i/n", value_parser = tile, allow_hyphen_values = true)]
     tile: Option<[u32; 2]>,
     /// Render a part: samples a to b of each pixel, counted from 0, both included; or the i-th, from 0, of n even ranges
-    #[arg(long, value_name = "a-b|i/n", value_parser = samples)]
+    #[arg(long, value_name = "a-b|i/n", value_parser = samples, allow_hyphen_values = true)]
     samples: Option<crate::batch::Samples>,
     /// Go on from the checkpoint beside the output, if there is one; what is finished is left alone
     #[arg(long)]
     resume: bool,
     /// How often to write a checkpoint, as 90s, 10m or 2h; 0 for never. SIGTERM and Ctrl-C write one, too, and end
     /// with exit code 75; SIGUSR1 writes a PNG of what is done
-    #[arg(long, value_name = "TIME", default_value = "10m", value_parser = duration)]
+    #[arg(long, value_name = "TIME", default_value = "10m", value_parser = duration, allow_hyphen_values = true)]
     checkpoint_interval: std::time::Duration,
     /// Leave alone pictures that are there, undamaged and of the same scene and settings
     #[arg(long)]
@@ -150,7 +154,7 @@ struct RenderArguments {
     /// How to tell of progress
     #[arg(long, value_enum, default_value_t = ProgressStyle::Auto)]
     progress: ProgressStyle,
-    /// Print nothing but errors
+    /// Print nothing but errors and notes
     #[arg(short, long)]
     quiet: bool,
 }
@@ -167,7 +171,7 @@ struct MergeArguments {
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
     /// Threads; 0 takes every core that the process may use
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads())]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
     threads: usize,
     /// Print nothing but errors
     #[arg(short, long)]
@@ -188,16 +192,25 @@ struct FarmArguments {
     #[arg(long, value_name = "DIR")]
     pictures: Option<PathBuf>,
     /// Cut each picture into this many bands of rows
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    #[arg(
+        long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024),
+        allow_negative_numbers = true
+    )]
     tiles: u32,
     /// Cut the samples of each picture into this many ranges
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    #[arg(
+        long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024),
+        allow_negative_numbers = true
+    )]
     sample_ranges: u32,
     /// Frames that one task renders; they share what they load
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(
+        long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..),
+        allow_negative_numbers = true
+    )]
     frames_per_task: u32,
     /// Threads of a task; 0 for what the engine grants
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads())]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
     threads: usize,
     /// The program, as the machines of the farm call it
     #[arg(long, value_name = "PATH", default_value = "abbe")]
@@ -232,13 +245,16 @@ struct AccuracyArguments {
     #[arg(short, long, value_name = "DIR", default_value = "out/accuracy")]
     output: PathBuf,
     /// Pixels of the small copy of each scene, about
-    #[arg(long, value_name = "N", default_value_t = 9216, value_parser = clap::value_parser!(u32).range(64..=1 << 26))]
+    #[arg(
+        long, value_name = "N", default_value_t = 9216, value_parser = clap::value_parser!(u32).range(64..=1 << 26),
+        allow_negative_numbers = true
+    )]
     pixels: u32,
     /// About how long each scene may take, as 30s or 5m: its samples are cut to that, to 16 at the least
-    #[arg(long, value_name = "TIME", value_parser = duration)]
+    #[arg(long, value_name = "TIME", value_parser = some_time, allow_hyphen_values = true)]
     time: Option<std::time::Duration>,
     /// The radiance that every pixel is known to have at all wavelengths, in place of a reference
-    #[arg(long, value_name = "L", value_parser = radiance)]
+    #[arg(long, value_name = "L", value_parser = radiance, allow_hyphen_values = true)]
     truth: Option<f64>,
     /// Move this knob alone, as in the first column of the table (may be repeated)
     #[arg(long = "knob", value_name = "KNOB")]
@@ -247,15 +263,18 @@ struct AccuracyArguments {
     #[arg(long, value_name = "PROGRAM")]
     beside: Option<PathBuf>,
     /// How often each setting is rendered, each time with another seed
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(
+        long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000),
+        allow_negative_numbers = true
+    )]
     rounds: u32,
     /// The error that is wanted, as 0.01 or 1% [default: that of the scene as it is written]
-    #[arg(long, value_name = "E", value_parser = relative_error)]
+    #[arg(long, value_name = "E", value_parser = relative_error, allow_hyphen_values = true)]
     error: Option<f64>,
     /// Threads; 0 takes every core that the process may use
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads())]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
     threads: usize,
-    /// Print nothing but errors
+    /// Print nothing but errors and notes
     #[arg(short, long)]
     quiet: bool,
 }
@@ -276,7 +295,7 @@ struct CompareArguments {
     /// The other, which counts as the reference where one is needed
     b: PathBuf,
     /// A relative difference of the means that is no fault, as 0.003 for 0.3 %
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share, allow_hyphen_values = true)]
     mean_tolerance: f64,
     /// Write the figures here as well
     #[arg(long, value_name = "FILE.json")]
@@ -327,12 +346,25 @@ fn host_and_port(text: &str) -> std::result::Result<String, String> {
 /// More threads than this help nobody: so many processors a process is bound to at the most (Linux, `cpu_set_t`).
 const MOST_THREADS: usize = 1024;
 
-fn threads() -> clap::builder::RangedU64ValueParser<usize> {
-    clap::builder::RangedU64ValueParser::new().range(..=MOST_THREADS as u64)
+fn threads(text: &str) -> std::result::Result<usize, String> {
+    match text.parse() {
+        Ok(n) if n <= MOST_THREADS => Ok(n),
+        Ok(n) => Err(format!("{n} is not in 0..={MOST_THREADS}")),
+        Err(_) => Err(format!("expected a whole number from 0 to {MOST_THREADS}")),
+    }
+}
+
+fn seed(text: &str) -> std::result::Result<u64, String> {
+    text.parse().map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
 }
 
 fn duration(text: &str) -> std::result::Result<std::time::Duration, String> {
     crate::description::duration(text).ok_or_else(|| "expected a time, as 90s, 10m or 2h".into())
+}
+
+fn some_time(text: &str) -> std::result::Result<std::time::Duration, String> {
+    let time = duration(text)?;
+    if time.is_zero() { Err("expected a time above 0, as 90s, 10m or 2h".into()) } else { Ok(time) }
 }
 
 /// Frames, which are read again where they belong.

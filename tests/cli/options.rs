@@ -127,6 +127,26 @@ fn more_threads_than_processors_can_be_are_refused() {
     assert_eq!(ran.code, 2);
 }
 
+/// They are values of their options, with words on what was expected, and no other options.
+#[test]
+fn numbers_below_zero_are_told_as_values() {
+    let place = batch();
+    for (verb, option, value, words) in [
+        ("render", "--seed", "-1", "'-1' for '--seed <N>': expected a whole number from 0 to 18446744073709551615"),
+        ("render", "--spp", "-1", "'-1' for '--spp <N>': -1 is not in 1..="),
+        ("render", "--threads", "-1", "'-1' for '--threads <N>': expected a whole number from 0 to 1024"),
+        ("render", "--tile", "-1/4", "'-1/4' for '--tile <i/n>': expected i/n"),
+        ("render", "--samples", "-1-4", "'-1-4' for '--samples <a-b|i/n>': expected a-b"),
+        ("render", "--time", "-1s", "'-1s' for '--time <TIME>': expected a time"),
+        ("farm", "--tiles", "-2", "'-2' for '--tiles <N>': -2 is not in 1..=1024"),
+        ("accuracy", "--time", "0", "'0' for '--time <TIME>': expected a time above 0"),
+    ] {
+        let ran = place.run(&[verb, "scenes/good.yaml", option, value]);
+        assert!(ran.code == 2 && ran.err.contains(words), "{option} {value}: {}", ran.err);
+        assert!(!ran.err.contains("-- -"), "{option} {value}: {}", ran.err);
+    }
+}
+
 /// The user may have one thread. That does not bind root, who becomes another user for this.
 #[cfg(target_os = "linux")]
 #[test]
