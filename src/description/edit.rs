@@ -200,6 +200,14 @@ impl Setting {
         Ok(Setting { path, place, value })
     }
 
+    /// What it names within a field of the scene.
+    pub(crate) fn entry(&self) -> Option<&str> {
+        match self.path.get(1) {
+            Some(Segment::Key(key)) => Some(key),
+            _ => None,
+        }
+    }
+
     /// A setting of the command line, `KEY=VALUE`.
     ///
     /// # Errors

@@ -34,15 +34,16 @@ mod textures;
 mod volumes;
 mod xml;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use glam::DMat4;
 
+use super::edit::Setting;
 use super::fault::Fault;
 use super::node::{Entry, Node, Place, Sources, Value};
 use crate::error::Result;
-use object::{Bag, Document, Family};
+use object::{Bag, Document, Family, Object};
 
 /// Ratio of the integral of ȳ, by which our film divides, to the constant of Mitsuba's film.
 const FILM: f64 = 106.856_914_916_767 / 106.750_259_399_414_06;
@@ -85,10 +86,17 @@ struct Import<'a> {
     lights: Vec<Node>,
     /// Under which name an object stands in one of the maps.
     names: HashMap<usize, String>,
+    /// Under which name a texture stands there a second time, for numbers.
+    for_numbers: HashMap<usize, String>,
+    /// Names that no other object may be given.
+    taken: HashSet<String>,
 }
 
 impl<'a> Import<'a> {
     fn new(document: &'a Document) -> Import<'a> {
+        let with_ids = document.objects.iter().filter(|object| object.id.is_some());
+        let mut taken: HashSet<String> = with_ids.filter_map(|object| named(document, object)).collect();
+        taken.extend(document.settings.iter().filter_map(Setting::entry).map(str::to_owned));
         Import {
             document,
             textures: Vec::new(),
@@ -99,6 +107,8 @@ impl<'a> Import<'a> {
             shapes: Vec::new(),
             lights: Vec::new(),
             names: HashMap::new(),
+            for_numbers: HashMap::new(),
+            taken,
         }
     }
 
@@ -162,17 +172,33 @@ impl<'a> Import<'a> {
     /// A name for an object in one of the maps: its id, or one made from its place.
     fn name_for(&mut self, index: usize) -> String {
         let object = &self.document.objects[index];
-        // One list of ids, but a list of names for each kind: see `export`.
-        let kind = format!(" ({})", object.family.tag());
-        let id = object.id.as_ref().map(|id| id.strip_suffix(&kind).unwrap_or(id).to_owned());
-        let name = id.unwrap_or_else(|| format!("{} {index}", object.plugin));
+        let name = named(self.document, object).unwrap_or_else(|| self.made(format!("{} {index}", object.plugin)));
         self.names.insert(index, name.clone());
+        name
+    }
+
+    /// `wanted`, or where something has this name, one like it that nothing has.
+    fn made(&mut self, wanted: String) -> String {
+        let mut name = wanted.clone();
+        let mut count = 1;
+        while !self.taken.insert(name.clone()) {
+            count += 1;
+            name = format!("{wanted} ({count})");
+        }
         name
     }
 
     fn entry(&self, index: usize, key: &str, node: Node) -> Entry {
         Entry { key: key.to_owned(), key_place: self.document.objects[index].place, node }
     }
+}
+
+/// The name that an object has by its id. There is one list of ids, but a list of names for each kind, so the exporter
+/// ends an id in its kind where another kind has the name: see [`export`].
+fn named(document: &Document, object: &Object) -> Option<String> {
+    let id = object.id.as_ref()?;
+    let name = id.strip_suffix(&format!(" ({})", object.family.tag()));
+    Some(name.filter(|name| !document.has(object.family, name)).unwrap_or(id).to_owned())
 }
 
 /// A map under construction whose fields stand at one place, unless they know a better one.
@@ -408,6 +434,42 @@ mod tests {
         );
         assert_eq!(scene.materials.len(), 1);
         assert_eq!(scene.shapes[0].material, scene.shapes[1].material);
+    }
+
+    /// One list of ids makes several lists of names, of which none has a name twice.
+    #[test]
+    fn names_that_are_made_are_nobodys_id() {
+        let grey = |id: &str, value: &str| {
+            format!("<bsdf type=\"diffuse\" id=\"{id}\"><float name=\"reflectance\" value=\"{value}\"/></bsdf>")
+        };
+        let scene =
+            good(&(grey("m", "0.1") + &grey("m (bsdf)", "0.9") + "<shape type=\"sphere\"><ref id=\"m\"/></shape>"));
+        let super::super::MaterialRef::Name(name) = &scene.shapes[0].material else { panic!("a name") };
+        let Material::Diffuse(diffuse) = &scene.materials[name] else { panic!("diffuse") };
+        assert_eq!(diffuse.reflectance, super::super::SpectrumOrTexture::Spectrum(super::super::Spectrum::Number(0.1)));
+        // Where another kind has the name, or nothing, the kind is taken away as ever.
+        let scene = good(&("<texture type=\"checkerboard\" id=\"n\"/>".to_owned() + &grey("n (bsdf)", "0.1")));
+        assert!(scene.materials.contains_key("n") && scene.textures.contains_key("n"));
+
+        // The unnamed ones are objects 8 and 10 of the file: the scene is 0, the sensor 1.
+        let board = |id: &str, value: &str| {
+            format!("<texture type=\"checkerboard\" {id}><float name=\"color0\" value=\"{value}\"/></texture>")
+        };
+        let rough =
+            |board: &str| format!("<shape type=\"sphere\"><bsdf type=\"roughconductor\">{board}</bsdf></shape>");
+        let named = board("id=\"checkerboard 8\"", "0.1") + &board("id=\"checkerboard 8 as numbers\"", "0.3");
+        let unnamed = board("name=\"specular_reflectance\"", "0.5") + &board("name=\"alpha\"", "0.7");
+        let more = "<texture type=\"checkerboard\" id=\"checkerboard 7 as numbers\"/>\
+                    <texture type=\"checkerboard\" id=\"checkerboard 7\"/>";
+        let scene = good(&(named + more + &rough(&unnamed)));
+        // Four with ids and two without.
+        assert_eq!(scene.textures.len(), 6, "{:?}", scene.textures.keys());
+
+        let group = |id: &str| format!("<shape type=\"shapegroup\" {id}><shape type=\"sphere\"/></shape>");
+        let instance = |group: &str| format!("<shape type=\"instance\">{group}</shape>");
+        let scene =
+            good(&(group("id=\"shapegroup 5\"") + &instance(&group("")) + &instance("<ref id=\"shapegroup 5\"/>")));
+        assert_eq!(scene.groups.len(), 2, "{:?}", scene.groups.keys());
     }
 
     /// A chain of references is as deep as nested elements, and has its limit.

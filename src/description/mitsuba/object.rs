@@ -138,6 +138,8 @@ impl Value {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Document {
     pub(crate) objects: Vec<Object>,
+    /// Which object has this id, or this alias.
+    pub(crate) ids: std::collections::HashMap<String, usize>,
     /// Fields of the grammar that are set past everything else, in the order of the text.
     pub(crate) settings: Vec<Setting>,
     /// Directories in which files are looked for, in order.
@@ -377,6 +379,11 @@ impl<'a> Bag<'a> {
 }
 
 impl Document {
+    /// Whether an object of this family has this id.
+    pub(crate) fn has(&self, family: Family, id: &str) -> bool {
+        self.ids.get(id).is_some_and(|index| self.objects[*index].family == family)
+    }
+
     /// Where the file `name` is: absolute, else in the first directory of the search that has it,
     /// else in that of the file that mentions it.
     pub(crate) fn find(&self, name: &str, source: u32) -> String {

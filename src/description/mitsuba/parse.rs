@@ -33,7 +33,6 @@ pub(crate) fn read(path: &Path, defines: &[(String, String)], sources: &mut Sour
         budget: MAX_NODES,
         parameters: Vec::new(),
         document: Document::default(),
-        ids: HashMap::new(),
         names: HashMap::new(),
         references: Vec::new(),
         reading: Vec::new(),
@@ -88,7 +87,6 @@ struct Parser<'a> {
     budget: usize,
     parameters: Vec<Parameter>,
     document: Document,
-    ids: HashMap<String, usize>,
     /// Where each named property of each object is written.
     names: HashMap<(usize, String), Place>,
     references: Vec<Reference>,
@@ -243,7 +241,7 @@ impl Parser<'_> {
     }
 
     fn name(&mut self, id: &str, index: usize, place: Place) -> std::result::Result<(), Fault> {
-        if let Some(first) = self.ids.insert(id.to_owned(), index) {
+        if let Some(first) = self.document.ids.insert(id.to_owned(), index) {
             let first = self.sources.describe(self.document.objects[first].place);
             let message = format!("expected each id once, found {} again; it is first at {first}", quote(id));
             return Err(Fault::at_place(place, message));
@@ -347,8 +345,8 @@ impl Parser<'_> {
             "alias" => {
                 check_attributes(element, &["id", "as"], &[])?;
                 let id = self.text(attribute(element, "id")?)?;
-                let Some(&index) = self.ids.get(&id) else {
-                    let hint = did_you_mean(&id, self.ids.keys().map(String::as_str));
+                let Some(&index) = self.document.ids.get(&id) else {
+                    let hint = did_you_mean(&id, self.document.ids.keys().map(String::as_str));
                     let message = format!("expected the id of an object above, found {}{hint}", quote(&id));
                     return Err(Fault::at_place(element.place, message));
                 };

@@ -52,12 +52,14 @@ impl Import<'_> {
         if bag.object.plugin != "checkerboard" {
             return self.declare_texture(index);
         }
-        let name = format!("{} as numbers", bag.object.id.clone().unwrap_or_else(|| format!("checkerboard {index}")));
-        if self.textures.iter().any(|entry| entry.key == name) {
-            return Ok(name);
+        if let Some(name) = self.for_numbers.get(&index) {
+            return Ok(name.clone());
         }
         let node = self.checkerboard(&bag, Use::Numbers)?;
         bag.finish()?;
+        let plain = bag.object.id.clone().unwrap_or_else(|| format!("checkerboard {index}"));
+        let name = self.made(format!("{plain} as numbers"));
+        self.for_numbers.insert(index, name.clone());
         self.textures.push(self.entry(index, &name, node));
         Ok(name)
     }

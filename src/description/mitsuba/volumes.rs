@@ -74,7 +74,7 @@ impl Import<'_> {
         if node.get("volume").is_some() {
             return Ok(node);
         }
-        let key = format!("{name} {}", self.volumes.len());
+        let key = self.made(format!("{name} {}", self.volumes.len()));
         let mut fields = Fields::new(place);
         fields.add("value", node);
         self.volumes.push(super::Entry { key: key.clone(), key_place: place, node: fields.kind("constant") });

@@ -10,8 +10,8 @@ impl Parser<'_> {
     /// Fills in what references name, and checks that nothing holds itself.
     pub(super) fn resolve(&mut self) -> std::result::Result<(), Fault> {
         for reference in &self.references {
-            let Some(&index) = self.ids.get(&reference.id) else {
-                let hint = did_you_mean(&reference.id, self.ids.keys().map(String::as_str));
+            let Some(&index) = self.document.ids.get(&reference.id) else {
+                let hint = did_you_mean(&reference.id, self.document.ids.keys().map(String::as_str));
                 let message = format!("expected the id of an object, found {}{hint}", quote(&reference.id));
                 return Err(Fault::at_place(reference.place, message));
             };
