@@ -5,6 +5,7 @@ use super::super::node::{Node, Place, did_you_mean, quote};
 use super::object::{Bag, Family, SpectrumValue, Value};
 use super::parse;
 use super::{DAYLIGHT, Fields, Import, entry, list, number, numbers, text};
+use crate::spectrum::{BAND_NM, Lanes, Spectrum as Curve, upsample};
 
 /// What a spectrum stands for, which decides what a colour or a bare number means.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +78,7 @@ impl Import<'_> {
                 Ok(Some(entry(place, "zero_outside", file)))
             }
             Value::Object(index) if bag.document.objects[*index].family == Family::Texture => {
-                match self.spectrum_plugin(*index)? {
+                match self.spectrum_plugin(*index, role)? {
                     Some(node) => Ok(Some(node)),
                     None => {
                         let found = value.kind(bag.document);
@@ -146,7 +147,7 @@ impl Import<'_> {
     }
 
     /// A `<spectrum type="…">`; `None` where the plugin varies over the surface.
-    fn spectrum_plugin(&mut self, index: usize) -> Result<Option<Node>, Fault> {
+    fn spectrum_plugin(&mut self, index: usize, role: Role) -> Result<Option<Node>, Fault> {
         let bag = self.bag(index);
         let place = bag.object.place;
         let node = match bag.object.plugin.as_str() {
@@ -183,7 +184,14 @@ impl Import<'_> {
                     None => return Err(bag.fault("expected the parameter \"color\", found none")),
                 };
                 bag.boolean("unbounded")?;
-                entry(place, "rgb", numbers(place, &rgb))
+                match role {
+                    Role::Reflectance => entry(place, "rgb", numbers(place, &rgb)),
+                    // What a surface of this colour reflects, also as light: there is no D65 in it.
+                    Role::Emission | Role::Coefficient => match upsample::reflectance(rgb) {
+                        Ok(curve) => sampled(place, BAND_NM, &curve),
+                        Err(message) => return Err(bag.fault_of("color", message)),
+                    },
+                }
             }
             "regular" => {
                 let least = bag.required("wavelength_min", bag.float("wavelength_min"))?;
@@ -272,6 +280,27 @@ pub(crate) struct Index {
 /// Plugins that are a spectrum, the same everywhere.
 const SPECTRA: [&str; 7] = ["uniform", "rawconstant", "d65", "srgb", "regular", "irregular", "blackbody"];
 
+/// A curve at one wavelength, nm.
+pub(crate) fn at(curve: &Curve, nm: f64) -> f64 {
+    f64::from(curve.eval(Lanes::splat(nm as f32)).to_array()[0])
+}
+
+/// A curve between two wavelengths, nm, at each whole one, and zero outside.
+fn sampled(place: Place, ends: [f64; 2], curve: &Curve) -> Node {
+    if let Curve::Constant(value) = curve
+        && ends == BAND_NM
+    {
+        return number(place, f64::from(*value));
+    }
+    let [from, to] = [ends[0].max(BAND_NM[0]), ends[1].min(BAND_NM[1])];
+    if from >= to {
+        return number(place, 0.0);
+    }
+    let between = (from.floor() as i32 + 1..to.ceil() as i32).map(f64::from);
+    let pairs: Vec<[f64; 2]> = [from].into_iter().chain(between).chain([to]).map(|nm| [nm, at(curve, nm)]).collect();
+    table(place, &pairs)
+}
+
 /// The numbers of a string such as `"1, 2, 3"`.
 fn floats(bag: &Bag<'_>, name: &'static str) -> Result<Vec<f64>, Fault> {
     let text = bag.required(name, bag.text(name))?;
@@ -316,4 +345,33 @@ fn table(place: Place, pairs: &[[f64; 2]]) -> Node {
     let table = entry(place, "table", pairs_node(place, pairs));
     let covers = pairs.first().is_some_and(|p| p[0] <= 360.0) && pairs.last().is_some_and(|p| p[0] >= 830.0);
     if covers { table } else { entry(place, "zero_outside", table) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{Light, Spectrum};
+    use super::super::tests::{fault, good};
+    use crate::spectrum::upsample;
+
+    /// The radiance of a constant emitter.
+    fn radiance(spectrum: &str) -> Spectrum {
+        let scene = good(&format!("<emitter type=\"constant\">{spectrum}</emitter>"));
+        let Light::Constant(light) = &scene.lights[0] else { panic!("a constant light") };
+        light.radiance.clone()
+    }
+
+    /// Mitsuba 3.9.1 shows this sky as 1.0371 0.2862 0.0860, and one of `<rgb>`, under D65, as 0.9005 0.2998 0.0998.
+    #[test]
+    fn an_srgb_spectrum_shines_as_it_reflects() {
+        let srgb = |rgb: &str| {
+            format!("<spectrum type=\"srgb\" name=\"radiance\"><rgb name=\"color\" value=\"{rgb}\"/></spectrum>")
+        };
+        let Spectrum::Table(table) = radiance(&srgb("0.9, 0.3, 0.1")) else { panic!("a table") };
+        assert_eq!((table[0][0], table[470][0], table.len()), (360.0, 830.0, 471));
+        let curve = upsample::reflectance([0.9, 0.3, 0.1]).unwrap();
+        assert!(table.iter().all(|[nm, value]| super::at(&curve, *nm) == *value));
+        assert_eq!(radiance(&srgb("0.5")), Spectrum::Number(0.5));
+        let above = fault(&format!("<emitter type=\"constant\">{}</emitter>", srgb("2, 1, 1")), &[]);
+        assert!(above.contains("texture \"srgb\": color: red channel: expected"), "{above}");
+    }
 }

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use super::super::super::spectrum::{Spectrum, SpectrumOrTexture};
+pub(super) use super::super::spectra::at;
 use super::xml::numbers;
 use super::{DAYLIGHT, Export};
-use crate::spectrum::{BAND_NM, Lanes, Spectrum as Curve, illuminant, upsample};
+use crate::spectrum::{BAND_NM, Spectrum as Curve, illuminant, upsample};
 
 /// What a spectrum is of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,11 +151,6 @@ impl Export<'_> {
 /// Whether Mitsuba reads such a file of two columns: one between which are blanks.
 fn reads(file: &Path) -> bool {
     file.extension().is_some_and(|e| e.eq_ignore_ascii_case("spd"))
-}
-
-/// A curve at one wavelength, nm.
-pub(super) fn at(curve: &Curve, nm: f64) -> f64 {
-    f64::from(curve.eval(Lanes::splat(nm as f32)).to_array()[0])
 }
 
 /// A coefficient as a function of the wavelength, where it is numbers.
