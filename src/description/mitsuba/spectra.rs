@@ -5,7 +5,7 @@ use super::super::node::{Node, Place, did_you_mean, quote};
 use super::object::{Bag, Family, SpectrumValue, Value};
 use super::parse;
 use super::{DAYLIGHT, Fields, Import, entry, list, number, numbers, text};
-use crate::spectrum::{BAND_NM, Lanes, Spectrum as Curve, upsample};
+use crate::spectrum::{BAND_NM, Lanes, Spectrum as Curve, illuminant, upsample};
 
 /// What a spectrum stands for, which decides what a colour or a bare number means.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -213,12 +213,21 @@ impl Import<'_> {
             }
             "blackbody" => {
                 let kelvin = bag.required("temperature", bag.float("temperature"))?;
-                bag.float("wavelength_min")?;
-                bag.float("wavelength_max")?;
-                let mut fields = Fields::new(place);
-                fields.add("kelvin", number(place, kelvin));
-                fields.add("normalised", super::boolean(place, false));
-                fields.kind("blackbody")
+                let least = bag.float("wavelength_min")?.unwrap_or(BAND_NM[0]);
+                let most = bag.float("wavelength_max")?.unwrap_or(BAND_NM[1]);
+                if least >= most {
+                    let message = format!("expected more than wavelength_min, {least}, found {most}");
+                    return Err(bag.fault_of("wavelength_max", message));
+                }
+                if least <= BAND_NM[0] && most >= BAND_NM[1] {
+                    let mut fields = Fields::new(place);
+                    fields.add("kelvin", number(place, kelvin));
+                    fields.add("normalised", super::boolean(place, false));
+                    fields.kind("blackbody")
+                } else {
+                    let curve = illuminant::blackbody(kelvin).map_err(|m| bag.fault_of("temperature", m))?;
+                    sampled(place, [least, most], &curve)
+                }
             }
             _ => return Ok(None),
         };
@@ -351,7 +360,7 @@ fn table(place: Place, pairs: &[[f64; 2]]) -> Node {
 mod tests {
     use super::super::super::{Light, Spectrum};
     use super::super::tests::{fault, good};
-    use crate::spectrum::upsample;
+    use crate::spectrum::{illuminant, upsample};
 
     /// The radiance of a constant emitter.
     fn radiance(spectrum: &str) -> Spectrum {
@@ -373,5 +382,28 @@ mod tests {
         assert_eq!(radiance(&srgb("0.5")), Spectrum::Number(0.5));
         let above = fault(&format!("<emitter type=\"constant\">{}</emitter>", srgb("2, 1, 1")), &[]);
         assert!(above.contains("texture \"srgb\": color: red channel: expected"), "{above}");
+    }
+
+    /// Of 500 to 600 nm at 4000 K, Mitsuba 3.9.1 shows 1193 3314 -306; of the whole body 4903 3204 1850.
+    #[test]
+    fn a_black_body_may_be_cut() {
+        let body = |ends: &str| {
+            let ends = ends.split_once(' ').map_or(String::new(), |(least, most)| {
+                format!("<float name=\"wavelength_min\" value=\"{least}\"/><float name=\"wavelength_max\" value=\"{most}\"/>")
+            });
+            format!(
+                "<spectrum type=\"blackbody\" name=\"radiance\"><float name=\"temperature\" value=\"4000\"/>{ends}</spectrum>"
+            )
+        };
+        assert!(matches!(radiance(&body("")), Spectrum::Blackbody(_)));
+        assert_eq!(radiance(&body("300 1000")), radiance(&body("")));
+        let Spectrum::ZeroOutside(cut) = radiance(&body("500 599.5")) else { panic!("zero outside") };
+        let Spectrum::Table(table) = *cut else { panic!("a table") };
+        let curve = illuminant::blackbody(4000.0).unwrap();
+        assert_eq!((table[0][0], table[1][0], table[99][0], table[100][0]), (500.0, 501.0, 599.0, 599.5));
+        assert!(table.iter().all(|[nm, value]| super::at(&curve, *nm) == *value) && table.len() == 101);
+        assert_eq!(radiance(&body("900 1000")), Spectrum::Number(0.0));
+        let none = fault(&format!("<emitter type=\"constant\">{}</emitter>", body("600 500")), &[]);
+        assert!(none.ends_with("wavelength_max: expected more than wavelength_min, 600, found 500"), "{none}");
     }
 }
