@@ -11,6 +11,9 @@ use super::{DAYLIGHT, Fields, Import, entry, list, matrix, number, numbers, text
 
 const EMITTERS: [&str; 6] = ["point", "constant", "envmap", "spot", "directional", "projector"];
 
+/// How far from equal and perpendicular axes may come out: numbers of six digits, as in shapes.
+const SIMILAR: f64 = 3e-6;
+
 /// Emitters that are a part of a shape.
 const SHINING: [&str; 2] = ["area", "directionalarea"];
 
@@ -78,6 +81,7 @@ impl Import<'_> {
 
     fn spot(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<&'static str, Fault> {
         let to_world = bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
+        round(bag, to_world)?;
         let place = bag.place("to_world");
         fields.add("position", numbers(place, &to_world.transform_point3(DVec3::ZERO).to_array()));
         fields.add("direction", numbers(place, &to_world.transform_vector3(DVec3::Z).to_array()));
@@ -159,13 +163,25 @@ fn weight(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
     Ok(())
 }
 
+/// Whether the axes of a transform are perpendicular and as long as `length`.
+fn are_even(linear: DMat3, length: f64) -> bool {
+    let gram = linear.transpose() * linear * length.powi(-2);
+    (gram - DMat3::IDENTITY).to_cols_array().iter().all(|x| x.abs() <= SIMILAR)
+}
+
+/// That a transform leaves a cone round, and its angle what it is.
+fn round(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
+    let linear = DMat3::from_mat4(to_world);
+    if are_even(linear, linear.z_axis.length()) {
+        return Ok(());
+    }
+    Err(bag.fault_of("to_world", "expected turns, moves, mirrors and even scaling, found another transform"))
+}
+
 /// That a transform moves and turns what throws a picture.
 fn rigid(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
     let linear = DMat3::from_mat4(to_world);
-    let gram = linear.transpose() * linear;
-    // Numbers of six digits, as in shapes.
-    let off = (gram - DMat3::IDENTITY).to_cols_array().into_iter().fold(0.0f64, |most, x| most.max(x.abs()));
-    if off <= 3e-6 && linear.determinant() > 0.0 {
+    if are_even(linear, 1.0) && linear.determinant() > 0.0 {
         return Ok(());
     }
     Err(bag.fault_of("to_world", "expected turns and moves, found a transform that scales, shears or mirrors"))
@@ -198,6 +214,25 @@ mod tests {
         let Light::Projector(projector) = &scene.lights[1] else { panic!("a projector") };
         assert_eq!((projector.up, projector.v, projector.fov_deg), ([0.0, 1.0, 0.0], Growth::Down, 30.0));
         assert_eq!((projector.origin, projector.target), ([1.0, 2.0, 3.0], [1.0, 2.0, 4.0]));
+    }
+
+    /// Mitsuba throws an ellipse where a cone is scaled unevenly, and the same circle where evenly.
+    #[test]
+    fn the_cone_of_a_spot_stays_round() {
+        let spot = |transform: &str| {
+            format!("<emitter type=\"spot\"><transform name=\"to_world\">{transform}</transform></emitter>")
+        };
+        let even = "<scale value=\"2\"/><scale x=\"-1\"/><rotate x=\"1\" angle=\"30\"/><translate x=\"7\"/>";
+        let scene = good(&spot(even));
+        let Light::Spot(light) = &scene.lights[0] else { panic!("a spot") };
+        assert_eq!(light.position, [7.0, 0.0, 0.0]);
+        for uneven in
+            ["<scale x=\"3\"/>", "<scale z=\"2\"/>", "<matrix value=\"1 0.1 0 0 1 0 0 0 1\"/>", "<scale value=\"0\"/>"]
+        {
+            let told = fault(&spot(uneven), &[]);
+            let expected = "to_world: expected turns, moves, mirrors and even scaling, found another transform";
+            assert!(told.ends_with(expected), "{told}");
+        }
     }
 
     #[test]
