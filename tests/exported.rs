@@ -221,6 +221,28 @@ fn what_mitsuba_lacks_is_told_by_name() {
     assert_eq!(exported.files.len(), 1);
 }
 
+/// Mitsuba's colours of optical constants end at 1.
+#[test]
+fn colours_of_metals_above_one_are_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    let losses = |eta: &str| {
+        let scene = format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n\
+             - sphere: {{radius: 0.5, material: {{conductor: {{eta: {eta}, k: 1, distribution: beckmann}}}}}}\n\
+             lights: [{{constant: {{radiance: 1}}}}]\n"
+        );
+        common::write(&yaml, scene.as_bytes());
+        let (_, exported) = prepared(&yaml, directory.path(), false);
+        same_picture(&yaml);
+        exported.losses.into_iter().map(|loss| format!("{}: {}", loss.field, loss.instead)).collect::<Vec<String>>()
+    };
+    assert_eq!(losses("{rgb: [0.2, 0.9, 1]}"), [""; 0]);
+    let told = "its colour at every fifth nanometre: Mitsuba has none above 1 there, and no multiples";
+    assert_eq!(losses("{rgb: [0.2, 0.9, 1.1]}"), [format!("shapes[0].sphere.material: {told}")]);
+    assert_eq!(losses("{scaled: {by: 2, of: {rgb: [0.2, 0.5, 0.4]}}}"), [format!("shapes[0].sphere.material: {told}")]);
+}
+
 /// Films, absorption, priorities and indices from files come back by the lines that Mitsuba passes over.
 #[test]
 fn optical_materials_come_back() {

@@ -55,6 +55,34 @@ fn a_scene_is_rendered_with_parameters_from_the_command_line() {
     }
 }
 
+/// The mean colour of 16 x 16 pixels of 30 degrees from (0, 0, 5) toward the origin.
+fn colour(body: &str) -> [f64; 3] {
+    let directory = tempfile::tempdir().unwrap();
+    let head = "<scene version=\"3.0.0\"><integrator type=\"path\"/><sensor type=\"perspective\"><float name=\"fov\" value=\"30\"/>\
+                <transform name=\"to_world\"><lookat origin=\"0, 0, 5\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform>\
+                <film type=\"hdrfilm\"><integer name=\"width\" value=\"16\"/><integer name=\"height\" value=\"16\"/>\
+                <string name=\"component_format\" value=\"float32\"/><rfilter type=\"box\"/></film></sensor>";
+    std::fs::write(directory.path().join("s.xml"), format!("{head}{body}</scene>")).unwrap();
+    let output = abbe(directory.path(), &["render", "s.xml", "-o", "out.exr", "--spp", "64", "-q", "--threads", "1"]);
+    assert_eq!(outcome(&output), (0, String::new()));
+    let file = abbe::film::exr::read_exr(&directory.path().join("out.exr")).unwrap();
+    ["R", "G", "B"].map(|name| {
+        let values = file.parts[0].channel(name).unwrap();
+        values.iter().map(|v| f64::from(*v)).sum::<f64>() / values.len() as f64
+    })
+}
+
+/// Mitsuba 3.9.1, `scalar_spectral`, 4096 samples a pixel. 16384 paths of stratified wavelengths are within 1e-3 here.
+#[test]
+fn colours_of_metals_are_as_in_mitsuba() {
+    let metal = "<emitter type=\"constant\"/><shape type=\"rectangle\"><transform name=\"to_world\"><scale value=\"5\"/></transform>\
+                 <bsdf type=\"conductor\"><rgb name=\"eta\" value=\"0.2, 0.3, 0.9\"/><rgb name=\"k\" value=\"0.9, 0.2, 0.1\"/></bsdf></shape>";
+    let found = colour(metal);
+    for (found, expected) in found.iter().zip([0.6415, 0.3086, -0.0259]) {
+        assert!((found - expected).abs() < 3e-3, "{found} for {expected}");
+    }
+}
+
 #[test]
 fn a_parameter_that_the_scene_does_not_use_is_an_error() {
     let directory = tempfile::tempdir().unwrap();

@@ -131,6 +131,15 @@ pub fn unbounded(rgb: [f64; 3]) -> Result<Spectrum, String> {
     Ok(reflectance(rgb.map(|v| v / scale))?.scaled(scale))
 }
 
+/// A smooth nonnegative spectrum with the colour `rgb` for an optical constant of a surface: the reflectance of this colour
+/// where there is one, as Mitsuba has it, else [`unbounded`].
+///
+/// # Errors
+/// In words, if a channel is negative or not finite.
+pub fn optical_constant(rgb: [f64; 3]) -> Result<Spectrum, String> {
+    if rgb.iter().all(|v| (0.0..=1.0).contains(v)) { reflectance(rgb) } else { unbounded(rgb) }
+}
+
 /// Coefficients of the reflectance that has the linear Rec.709 colour `rgb` under D65: within
 /// 2e-4 of each channel, fast enough for each texel of a texture. Channels are clamped to [0, 1].
 #[must_use]
@@ -193,6 +202,15 @@ mod tests {
     fn error(reflectance: &Spectrum, rgb: [f64; 3]) -> f64 {
         let found = colour(reflectance);
         (0..3).map(|k| (found[k] - rgb[k]).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn an_optical_constant_is_a_reflectance_where_it_may_be_one() {
+        let nm = Lanes::from([380.0, 430.0, 480.0, 530.0, 580.0, 630.0, 680.0, 780.0]);
+        let values = |spectrum: Result<Spectrum, String>| spectrum.unwrap().eval(nm).to_array();
+        assert_eq!(values(optical_constant([0.2, 0.3, 1.0])), values(reflectance([0.2, 0.3, 1.0])));
+        assert_eq!(values(optical_constant([0.2, 0.3, 1.5])), values(unbounded([0.2, 0.3, 1.5])));
+        assert!(optical_constant([-0.1, 0.3, 0.5]).is_err());
     }
 
     /// A deterministic spread of colours: inside, on faces, on edges, dark and near white.

@@ -17,7 +17,7 @@ impl Compiler<'_> {
     pub(super) fn hair(&mut self, place: &str, m: &written::Hair) -> Kind {
         let absorption = match &m.colour {
             written::HairColour::Absorption(s) => {
-                vec![self.spectrum(&format!("{place}.absorption"), s, Outside::Hold, Role::Coefficient)]
+                vec![self.spectrum(&format!("{place}.absorption"), s, Outside::Hold, Role::OpticalConstant)]
             }
             written::HairColour::Pigments { eumelanin, pheomelanin } => {
                 let mut pigment = |concentration: f64, rgb: [f64; 3]| {

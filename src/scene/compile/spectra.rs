@@ -12,6 +12,8 @@ pub(super) enum Role {
     Reflectance,
     Light,
     Coefficient,
+    /// η and k of a metal, σₐ of hair.
+    OpticalConstant,
 }
 
 impl Compiler<'_> {
@@ -22,7 +24,7 @@ impl Compiler<'_> {
         match role {
             Role::Reflectance => carried.reflectance(spectrum),
             Role::Light => carried.light(spectrum),
-            Role::Coefficient => carried.coefficient(spectrum),
+            Role::Coefficient | Role::OpticalConstant => carried.coefficient(spectrum),
         }
     }
 
@@ -41,6 +43,7 @@ impl Compiler<'_> {
                 Role::Reflectance => self.or(at, upsample::reflectance(*rgb), black),
                 Role::Light => self.or(at, upsample::emission(*rgb), black),
                 Role::Coefficient => self.or(at, upsample::unbounded(*rgb), black),
+                Role::OpticalConstant => self.or(at, upsample::optical_constant(*rgb), black),
             },
             written::Spectrum::Table(samples) => {
                 let samples: Vec<(f64, f64)> = samples.iter().map(|s| (s[0], s[1])).collect();

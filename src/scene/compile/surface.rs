@@ -242,8 +242,8 @@ impl<'a> Compiler<'a> {
                     }
                     written::ConductorIndex::File(file) => self.metal_file(&at("file"), file).into(),
                     written::ConductorIndex::Written { eta, k } => [
-                        self.written_spectrum(&at("eta"), eta, Outside::Hold, Role::Coefficient),
-                        self.written_spectrum(&at("k"), k, Outside::Hold, Role::Coefficient),
+                        self.written_spectrum(&at("eta"), eta, Outside::Hold, Role::OpticalConstant),
+                        self.written_spectrum(&at("k"), k, Outside::Hold, Role::OpticalConstant),
                     ],
                 };
                 let [eta, k] = self.shelf.carried.metal(metal);

@@ -95,7 +95,7 @@ impl Export<'_> {
         self.xml.value("float", "int_ior", m.ior);
         self.xml.value("float", "ext_ior", m.exterior_ior);
         match &m.colour {
-            HairColour::Absorption(absorption) => self.spectrum("sigma_a", absorption, Role::Coefficient),
+            HairColour::Absorption(absorption) => self.spectrum("sigma_a", absorption, Role::OpticalConstant),
             HairColour::Pigments { eumelanin, pheomelanin } => {
                 let curves = PIGMENTS.map(|rgb| upsample::unbounded(rgb).ok());
                 let value = |nm: f64| {
@@ -216,9 +216,7 @@ impl Export<'_> {
                 HairColour::Pigments { .. } => {
                     Some("the absorption of its pigments at every fifth nanometre".to_owned())
                 }
-                HairColour::Absorption(s) => {
-                    (!Export::can_say_all(&[(s, Role::Coefficient)])).then(|| "a grey absorption".to_owned())
-                }
+                HairColour::Absorption(s) => Export::constant_shortfall(&[s], "a grey absorption"),
             },
             Material::TwoSided(m) => {
                 let sides = [Some(&m.front), m.back.as_ref()];

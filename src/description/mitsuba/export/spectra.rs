@@ -13,8 +13,10 @@ use crate::spectrum::{BAND_NM, Spectrum as Curve, illuminant, upsample};
 pub(super) enum Role {
     /// Held beyond the ends of a table.
     Reflectance,
-    /// η, k, σ: held beyond the ends.
+    /// σ of media: held beyond the ends.
     Coefficient,
+    /// η, k, σₐ of hair: held beyond the ends.
+    OpticalConstant,
     /// Zero beyond the ends.
     Emission,
 }
@@ -41,9 +43,15 @@ impl Export<'_> {
         }
     }
 
-    /// Whether Mitsuba has words for it in this role: colours of coefficients are upsampled otherwise.
-    pub(super) fn can_say_all(spectra: &[(&Spectrum, Role)]) -> bool {
-        spectra.iter().all(|(spectrum, _)| Export::can_say(spectrum))
+    /// What Mitsuba gets in place of optical constants that it has no words for: `grey`, or where a colour is above 1, which
+    /// Mitsuba takes for 1, its curve.
+    pub(super) fn constant_shortfall(constants: &[&Spectrum], grey: &str) -> Option<String> {
+        if !constants.iter().all(|constant| Export::can_say(constant)) {
+            return Some(grey.to_owned());
+        }
+        let sampled = constants.iter().any(|constant| colour_beyond(constant, 1.0).is_some());
+        sampled
+            .then(|| "its colour at every fifth nanometre: Mitsuba has none above 1 there, and no multiples".to_owned())
     }
 
     /// A `<spectrum>` or `<rgb>`; what Mitsuba cannot say is grey of one half.
@@ -52,6 +60,11 @@ impl Export<'_> {
     }
 
     fn scaled_spectrum(&mut self, name: &str, spectrum: &Spectrum, role: Role, by: f64) {
+        if role == Role::OpticalConstant
+            && let Some(curve) = colour_beyond(spectrum, by)
+        {
+            return self.curve(name, &curve, 1.0);
+        }
         match spectrum {
             Spectrum::Number(value) => self.xml.value("spectrum", name, value * by),
             Spectrum::Rgb(rgb) => {
@@ -145,6 +158,17 @@ impl Export<'_> {
             SpectrumOrTexture::Spectrum(spectrum) => Export::can_say(spectrum),
             SpectrumOrTexture::Texture(_) => true,
         }
+    }
+}
+
+/// The curve of a colour times `by`, unless it is a reflectance as it stands.
+fn colour_beyond(spectrum: &Spectrum, by: f64) -> Option<Curve> {
+    match spectrum {
+        Spectrum::Rgb(rgb) if by != 1.0 || rgb.iter().any(|channel| *channel > 1.0) => {
+            upsample::optical_constant(*rgb).ok().map(|curve| curve.scaled(by))
+        }
+        Spectrum::Scaled(scaled) => colour_beyond(&scaled.of, by * scaled.by),
+        _ => None,
     }
 }
 

@@ -138,8 +138,8 @@ impl Export<'_> {
                 }
             }
             ConductorIndex::Written { eta, k } => {
-                self.spectrum("eta", eta, Role::Coefficient);
-                self.spectrum("k", k, Role::Coefficient);
+                self.spectrum("eta", eta, Role::OpticalConstant);
+                self.spectrum("k", k, Role::OpticalConstant);
             }
         }
         self.tint("specular_reflectance", &m.tint);
@@ -227,8 +227,7 @@ fn plain_shortfall(material: &Material) -> Option<String> {
                     Some("its index at every fifth nanometre".to_owned())
                 }
                 ConductorIndex::Written { eta, k } => {
-                    let good = Export::can_say_all(&[(eta, Role::Coefficient), (k, Role::Coefficient)]);
-                    (!good).then(|| "grey indices in place of spectra".to_owned())
+                    Export::constant_shortfall(&[eta, k], "grey indices in place of spectra")
                 }
             };
             let film = film(m.film.is_some());
