@@ -221,6 +221,45 @@ fn what_mitsuba_lacks_is_told_by_name() {
     assert_eq!(exported.files.len(), 1);
 }
 
+/// Bands are a film of Mitsuba's, too, unless one is of a colour.
+#[test]
+fn bands_are_exported() {
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    let back = |response: &str| {
+        let scene = format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nlights: [{{constant: {{radiance: 1}}}}]\nimage:\n  bands:\n  \
+             - {{name: first, response: {{table: [[400, 1], [450.5, 0.25]]}}}}\n  - {{name: 'S0.500,0nm', response: {response}}}\n"
+        );
+        common::write(&yaml, scene.as_bytes());
+        let scene_of = |file: &Path| {
+            let none = Overrides::default();
+            let entry = batch::entries(file, &none).unwrap_or_else(|error| panic!("{error}")).remove(0);
+            entry.scene(&none.set).unwrap_or_else(|error| panic!("{error}"))
+        };
+        let ours = scene_of(&yaml);
+        let exported = description::export(&ours, &directory.path().join("s.xml"));
+        let xml = directory.path().join("s.xml");
+        std::fs::write(&xml, &exported.xml).unwrap();
+        let theirs = scene_of(&xml);
+        (ours.image.bands, theirs.image.bands, exported)
+    };
+    for response in ["2", "{scaled: {by: 3, of: {table: [[500, 1], [600, 1]]}}}", "{illuminant: D65}"] {
+        let (ours, theirs, exported) = back(response);
+        assert_eq!(exported.losses, []);
+        assert!(exported.xml.contains("<film type=\"specfilm\">"), "{}", exported.xml);
+        let names = |bands: &[description::Band]| bands.iter().map(|band| band.name.clone()).collect::<Vec<_>>();
+        assert_eq!(names(&ours), names(&theirs));
+    }
+    assert!(back("2").2.xml.contains("<spectrum name=\"S0.500,0nm\" value=\"360:2, 830:2\"/>"));
+    for response in ["{rgb: [1, 0.5, 0.2]}", "{blackbody: {kelvin: 4000, normalised: false}}"] {
+        let (ours, theirs, exported) = back(response);
+        assert_eq!(ours, theirs);
+        assert_eq!(exported.losses[0].field, "image.bands");
+        assert!(exported.xml.contains("<film type=\"hdrfilm\">"), "{}", exported.xml);
+    }
+}
+
 /// Mitsuba's colours of optical constants end at 1.
 #[test]
 fn colours_of_metals_above_one_are_told() {

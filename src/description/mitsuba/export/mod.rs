@@ -29,7 +29,7 @@ mod xml;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::super::camera::{Camera, Clip, Filter, FovAxis, Image, Pose, Projection};
+use super::super::camera::{Band, Camera, Clip, Filter, FovAxis, Image, Pose, Projection};
 use super::super::light::Light;
 use super::super::node::{Node, Sources, Value};
 use super::super::path::{self, Segment};
@@ -37,6 +37,7 @@ use super::super::print::{Printer, relative};
 use super::super::scene::SceneDescription;
 use super::super::settings::{Integrator, Technique};
 use super::DAYLIGHT;
+use spectra::can_be_band;
 use xml::Xml;
 
 /// Something that Mitsuba cannot express.
@@ -382,7 +383,8 @@ impl<'a> Export<'a> {
         self.xml.open("sampler", &[("type", "independent")]);
         self.xml.value("integer", "sample_count", "$spp");
         self.xml.close();
-        self.xml.open("film", &[("type", "hdrfilm")]);
+        let bands = self.bands();
+        self.xml.open("film", &[("type", if bands.is_empty() { "hdrfilm" } else { "specfilm" })]);
         self.xml.value("integer", "width", width);
         self.xml.value("integer", "height", height);
         if let Some(crop) = crop {
@@ -391,7 +393,12 @@ impl<'a> Export<'a> {
             self.xml.value("integer", "crop_width", crop.width);
             self.xml.value("integer", "crop_height", crop.height);
         }
-        self.xml.value("string", "pixel_format", "rgba");
+        for band in bands {
+            self.band(&band.name, &band.response);
+        }
+        if bands.is_empty() {
+            self.xml.value("string", "pixel_format", "rgba");
+        }
         self.xml.value("string", "component_format", "float32");
         self.filter(*filter);
         self.xml.close();
@@ -400,6 +407,20 @@ impl<'a> Export<'a> {
         if self.root.get("output").is_none() {
             self.xml.instruction("set output: {}");
         }
+    }
+
+    /// The bands of the film, where Mitsuba has words for all of them.
+    fn bands(&mut self) -> &'a [Band] {
+        let bands = &self.scene.image.bands;
+        if bands.iter().all(|band| can_be_band(&band.response)) {
+            return bands;
+        }
+        self.lose("image.bands", "colour: Mitsuba has no words for the response of a band");
+        if let Some(node) = self.root.get("image").and_then(|image| image.get("bands")) {
+            let yaml = self.yaml(node);
+            self.xml.instruction(&format!("set image.bands: {yaml}"));
+        }
+        &[]
     }
 
     fn filter(&mut self, filter: Filter) {

@@ -101,6 +101,18 @@ impl Export<'_> {
         }
     }
 
+    /// The response of a band, zero beyond the ends of a table; a number is a table of the whole band.
+    pub(super) fn band(&mut self, name: &str, response: &Spectrum) {
+        let (by, inner) = match response {
+            Spectrum::Scaled(scaled) => (scaled.by, &*scaled.of),
+            other => (1.0, other),
+        };
+        match inner {
+            Spectrum::Number(value) => self.table(name, &BAND_NM.map(|nm| [nm, *value]), by, Ends::Zero),
+            _ => self.scaled_spectrum(name, inner, Role::Emission, by),
+        }
+    }
+
     /// A curve at every fifth nanometre.
     pub(super) fn curve(&mut self, name: &str, curve: &Curve, by: f64) {
         self.samples(name, |nm| at(curve, nm) * by);
@@ -169,6 +181,15 @@ fn colour_beyond(spectrum: &Spectrum, by: f64) -> Option<Curve> {
         }
         Spectrum::Scaled(scaled) => colour_beyond(&scaled.of, by * scaled.by),
         _ => None,
+    }
+}
+
+/// Whether Mitsuba has words for it as the response of a band, whose wavelengths have to end.
+pub(super) fn can_be_band(spectrum: &Spectrum) -> bool {
+    match spectrum {
+        Spectrum::Rgb(_) | Spectrum::Blackbody(_) => false,
+        Spectrum::Scaled(scaled) => Export::can_say(spectrum) && can_be_band(&scaled.of),
+        other => Export::can_say(other),
     }
 }
 
