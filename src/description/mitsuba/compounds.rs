@@ -50,7 +50,7 @@ impl Import<'_> {
             }
             _ => return Err(bag.fault("expected either alpha, or both alpha_u and alpha_v")),
         }
-        let distribution = bag.choice("distribution", &["beckmann", "ggx"])?.unwrap_or("beckmann");
+        let distribution = bag.choice_in_any_case("distribution", &["beckmann", "ggx"])?.unwrap_or("beckmann");
         fields.add("distribution", text(bag.place("distribution"), distribution));
         // How directions are drawn, not which there are.
         bag.boolean("sample_visible")?;

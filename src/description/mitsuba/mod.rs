@@ -399,6 +399,25 @@ mod tests {
         );
     }
 
+    /// Mitsuba 3.9.1 lowers the letters of some words and not of others.
+    #[test]
+    fn words_may_be_in_capitals_where_they_may_for_mitsuba() {
+        let metal = |word: &str| {
+            let metal =
+                format!("<bsdf type=\"roughconductor\"><string name=\"distribution\" value=\"{word}\"/></bsdf>");
+            format!("<shape type=\"sphere\">{metal}</shape>")
+        };
+        assert_eq!(good(&metal("GGX")).shapes, good(&metal("ggx")).shapes);
+        let film = "<sensor type=\"perspective\"><float name=\"fov\" value=\"30\"/><string name=\"fov_axis\" value=\"Larger\"/>\
+                    <film type=\"hdrfilm\"><string name=\"pixel_format\" value=\"RGBA\"/><string name=\"file_format\" value=\"OpenEXR\"/>\
+                    <string name=\"component_format\" value=\"Float32\"/></film></sensor>";
+        good(film);
+        let texture = "<texture type=\"bitmap\" id=\"t\"><string name=\"filename\" value=\"a.png\"/>\
+                       <string name=\"wrap_mode\" value=\"Clamp\"/></texture>";
+        assert!(fault(texture, &[]).contains("wrap_mode: expected one of repeat, mirror, clamp, found \"Clamp\""));
+        assert!(fault(&metal("phong"), &[]).contains("distribution: expected one of beckmann, ggx, found \"phong\""));
+    }
+
     #[test]
     fn sensors_after_the_first_are_noted() {
         assert_eq!(good("<shape type=\"sphere\"/>").locator.notes(), [""; 0]);

@@ -268,10 +268,24 @@ impl<'a> Bag<'a> {
         })
     }
 
-    /// One of several words.
+    /// One of several words, as they are spelt.
     pub(crate) fn choice(&self, name: &'static str, choices: &[&'static str]) -> Asked<&'static str> {
+        self.one_of(name, choices, |choice, text| choice == text)
+    }
+
+    /// One of several words, in capitals or not: some are so for Mitsuba.
+    pub(crate) fn choice_in_any_case(&self, name: &'static str, choices: &[&'static str]) -> Asked<&'static str> {
+        self.one_of(name, choices, str::eq_ignore_ascii_case)
+    }
+
+    fn one_of(
+        &self,
+        name: &'static str,
+        choices: &[&'static str],
+        same: impl Fn(&str, &str) -> bool,
+    ) -> Asked<&'static str> {
         let Some(text) = self.text(name)? else { return Ok(None) };
-        match choices.iter().find(|choice| **choice == text) {
+        match choices.iter().find(|choice| same(choice, text)) {
             Some(choice) => Ok(Some(choice)),
             None => {
                 let hint = did_you_mean(text, choices.iter().copied());

@@ -115,13 +115,13 @@ impl Import<'_> {
             } else {
                 // The words are the same.
                 let pixels = ["rgb", "rgba", "xyz", "xyza", "luminance", "luminance_alpha"];
-                if let Some(pixel) = bag.choice("pixel_format", &pixels)? {
+                if let Some(pixel) = bag.choice_in_any_case("pixel_format", &pixels)? {
                     channels = pixel;
                 }
-                bag.choice("file_format", &["openexr", "exr"])?;
+                bag.choice_in_any_case("file_format", &["openexr", "exr"])?;
                 bag.boolean("banner")?;
             }
-            if let Some("float32") = bag.choice("component_format", &["float16", "float32"])? {
+            if let Some("float32") = bag.choice_in_any_case("component_format", &["float16", "float32"])? {
                 precision = "float";
             }
             bag.boolean("sample_border")?;
@@ -226,7 +226,7 @@ fn size(bag: &Bag<'_>) -> Result<[i64; 2], Fault> {
 /// Degrees and the axis along which they are measured.
 pub(super) fn field_of_view(bag: &Bag<'_>) -> Result<(f64, &'static str), Fault> {
     let fov = bag.float("fov")?;
-    let axis = bag.choice("fov_axis", &["x", "y", "diagonal", "smaller", "larger"])?;
+    let axis = bag.choice_in_any_case("fov_axis", &["x", "y", "diagonal", "smaller", "larger"])?;
     let focal_length = bag.text("focal_length")?;
     match (fov, focal_length) {
         (Some(fov), None) => Ok((fov, axis.unwrap_or("x"))),
