@@ -131,7 +131,7 @@ impl<'a> Import<'a> {
         }
         let camera = camera.ok_or_else(|| root.fault("expected a <sensor>, found none"))?;
         for texture in root.objects(Family::Texture) {
-            self.declare_texture(texture)?;
+            self.texture_or_spectrum(texture)?;
         }
         for bsdf in root.objects(Family::Bsdf) {
             self.material(bsdf)?;
@@ -147,6 +147,19 @@ impl<'a> Import<'a> {
         }
         for emitter in root.objects(Family::Emitter) {
             self.emitter(emitter)?;
+        }
+        // Parts of others that stand here for a <ref>: they have to hold, used or not.
+        for film in root.objects(Family::Film) {
+            self.film(Some(film), place)?;
+        }
+        for filter in root.objects(Family::ReconstructionFilter) {
+            self.filter(filter)?;
+        }
+        for sampler in root.objects(Family::Sampler) {
+            self.sampler(Some(sampler), place)?;
+        }
+        for phase in root.objects(Family::Phase) {
+            self.phase(phase)?;
         }
         root.finish()?;
 
@@ -489,6 +502,19 @@ mod tests {
         let scene =
             good(&(group("id=\"shapegroup 5\"") + &instance(&group("")) + &instance("<ref id=\"shapegroup 5\"/>")));
         assert_eq!(scene.groups.len(), 2, "{:?}", scene.groups.keys());
+    }
+
+    /// As Mitsuba has it: what is a part of another object may stand in the scene, to be named from there.
+    #[test]
+    fn parts_of_others_may_stand_in_the_scene() {
+        let parts = "<phase type=\"hg\" id=\"p\"/><spectrum type=\"d65\" id=\"v\"/><film type=\"hdrfilm\" id=\"f\"/>\
+                     <sampler type=\"independent\" id=\"s\"/><rfilter type=\"box\" id=\"r\"/>\
+                     <medium type=\"homogeneous\"><ref id=\"p\"/></medium><emitter type=\"constant\"><ref name=\"radiance\" id=\"v\"/></emitter>\
+                     <sensor type=\"perspective\"><ref id=\"f\"/><ref id=\"s\"/></sensor>";
+        let scene = good(parts);
+        assert_eq!((scene.media.len(), scene.lights.len(), scene.textures.len()), (1, 1, 0));
+        let wrong = "<phase type=\"hg\" id=\"p\"><float name=\"gg\" value=\"1\"/></phase>";
+        assert!(fault(wrong, &[]).contains("phase \"hg\": expected parameters among g, found \"gg\""));
     }
 
     /// A chain of references is as deep as nested elements, and has its limit.

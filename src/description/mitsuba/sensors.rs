@@ -85,7 +85,7 @@ impl Import<'_> {
         Ok(number(bag.object.place, 2.0 * height as f64 / width.max(1) as f64))
     }
 
-    fn film(&mut self, index: Option<usize>, place: Place) -> Result<Fields, Fault> {
+    pub(crate) fn film(&mut self, index: Option<usize>, place: Place) -> Result<Fields, Fault> {
         let mut image = Fields::new(place);
         let mut output = Fields::new(place);
         let mut exr = Fields::new(place);
@@ -159,7 +159,7 @@ impl Import<'_> {
         Ok(list(bag.object.place, bands))
     }
 
-    fn filter(&mut self, index: usize) -> Result<Node, Fault> {
+    pub(crate) fn filter(&mut self, index: usize) -> Result<Node, Fault> {
         let bag = self.bag(index);
         let place = bag.object.place;
         let mut fields = Fields::new(place);
@@ -196,7 +196,7 @@ impl Import<'_> {
     }
 
     /// How many samples; which kind of sampler it was makes no difference to ours.
-    fn sampler(&mut self, index: Option<usize>, place: Place) -> Result<Node, Fault> {
+    pub(crate) fn sampler(&mut self, index: Option<usize>, place: Place) -> Result<Node, Fault> {
         let mut render = Fields::new(place);
         let mut samples = 4;
         let mut at = place;

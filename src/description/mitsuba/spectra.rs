@@ -146,6 +146,15 @@ impl Import<'_> {
         Ok(Some(name))
     }
 
+    /// Declares a texture of the scene; a spectrum stands where it is used, but has to hold.
+    pub(crate) fn texture_or_spectrum(&mut self, index: usize) -> Result<(), Fault> {
+        let lit = self.bag(index).object.plugin == "d65" && self.lit_texture(index)?.is_some();
+        if !lit && self.spectrum_plugin(index, Role::Reflectance)?.is_none() {
+            self.declare_texture(index)?;
+        }
+        Ok(())
+    }
+
     /// A `<spectrum type="…">`; `None` where the plugin varies over the surface.
     fn spectrum_plugin(&mut self, index: usize, role: Role) -> Result<Option<Node>, Fault> {
         let bag = self.bag(index);
