@@ -1,6 +1,7 @@
 //! Media and phase functions.
 
 use super::super::fault::Fault;
+use super::super::medium::{UNCHANGED, VACUUM};
 use super::super::node::Node;
 use super::object::{Bag, Family, Value};
 use super::parse;
@@ -67,7 +68,7 @@ impl Import<'_> {
         for (ours, theirs) in sides {
             let name = match bag.object(theirs, &[Family::Medium])? {
                 Some(medium) => self.medium(medium)?,
-                None => if written { "vacuum" } else { "unchanged" }.to_owned(),
+                None => if written { VACUUM } else { UNCHANGED }.to_owned(),
             };
             fields.add(ours, text(bag.place(theirs), name));
         }
@@ -127,6 +128,30 @@ impl Import<'_> {
 mod tests {
     use super::super::super::{Coefficients, Medium, Spectrum};
     use super::super::tests::{fault, good};
+
+    /// Two names are words of the grammar, and a medium has another.
+    #[test]
+    fn media_may_have_any_id() {
+        let medium = |id: &str, t: &str| {
+            let t = format!("<float name=\"sigma_t\" value=\"{t}\"/>");
+            let sphere =
+                format!("<shape type=\"sphere\"><bsdf type=\"null\"/><ref name=\"interior\" id=\"{id}\"/></shape>");
+            format!("<medium type=\"homogeneous\" id=\"{id}\">{t}</medium>{sphere}")
+        };
+        let scene = good(&(medium("vacuum", "1") + &medium("unchanged", "2") + &medium("vacuum (medium)", "3")));
+        let inside: Vec<f64> = scene
+            .shapes
+            .iter()
+            .map(|shape| match &scene.media[shape.inside.as_ref().unwrap()] {
+                Medium::Homogeneous(m) => match &m.coefficients {
+                    Coefficients::Sum { extinction: Spectrum::Number(t), .. } => *t,
+                    other => panic!("{other:?}"),
+                },
+                other => panic!("{other:?}"),
+            })
+            .collect();
+        assert_eq!(inside, [1.0, 2.0, 3.0]);
+    }
 
     /// A volume that is the same everywhere is a spectrum, wherever it is; one that varies is no even extinction.
     #[test]

@@ -41,6 +41,7 @@ use glam::DMat4;
 
 use super::edit::Setting;
 use super::fault::Fault;
+use super::medium::{UNCHANGED, VACUUM};
 use super::node::{Entry, Node, Place, Sources, Value};
 use crate::error::Result;
 use object::{Bag, Document, Family, Object};
@@ -185,7 +186,14 @@ impl<'a> Import<'a> {
     /// A name for an object in one of the maps: its id, or one made from its place.
     fn name_for(&mut self, index: usize) -> String {
         let object = &self.document.objects[index];
-        let name = named(self.document, object).unwrap_or_else(|| self.made(format!("{} {index}", object.plugin)));
+        let name = match named(self.document, object) {
+            // Words of the grammar, where the name of a medium is wanted.
+            Some(name) if object.family == Family::Medium && [VACUUM, UNCHANGED].contains(&name.as_str()) => {
+                self.made(format!("{name} (medium)"))
+            }
+            Some(name) => name,
+            None => self.made(format!("{} {index}", object.plugin)),
+        };
         self.names.insert(index, name.clone());
         name
     }
