@@ -189,17 +189,9 @@ pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
     let picture = match decoded {
         Decoded::Exr(file) => {
             notes.extend(cut_out(path, &file));
-            let part = &file.parts[0];
-            let channel = |name: &str| {
-                let found = part.channel(name);
-                found.ok_or_else(|| Error::input(path, format!("expected channels R, G, B; found no {name}")))
-            };
-            let (r, g, b) = (channel("R")?, channel("G")?, channel("B")?);
-            let mut pixels: Vec<[f32; 3]> = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
-            if let Some(m) = other_primaries(path, &file)? {
-                pixels.iter_mut().for_each(|p| *p = colour::times(m, p.map(f64::from)).map(|x| x as f32));
-            }
-            Picture { pixels, width: part.window.width as usize, height: part.window.height as usize, note: None }
+            let Window { width, height, .. } = file.parts[0].window;
+            let pixels = exr_colours(path, &file)?;
+            Picture { pixels, width: width as usize, height: height as usize, note: None }
         }
         Decoded::Bytes { rgb, width, height, .. } => {
             let level = colour::srgb8_table();
@@ -227,6 +219,31 @@ pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
     let note = (!notes.is_empty()).then(|| notes.join("; "));
     let pixels = picture.pixels.into_iter().map(|p| p.map(|x| x.max(0.0))).collect();
     Ok(Picture { pixels, note, ..picture })
+}
+
+/// The colours of an EXR file in linear Rec. 709: R, G, B by its chromaticities; X, Y, Z; Y alone is grey.
+fn exr_colours(path: &Path, file: &exr::ExrFile) -> Result<Vec<[f32; 3]>> {
+    let part = &file.parts[0];
+    let all = |names: [&str; 3]| match names.map(|name| part.channel(name)) {
+        [Some(a), Some(b), Some(c)] => Some(a.iter().zip(b).zip(c).map(|((&a, &b), &c)| [a, b, c])),
+        _ => None,
+    };
+    if let Some(rgb) = all(["R", "G", "B"]) {
+        let into = |m| move |p: [f32; 3]| colour::times(m, p.map(f64::from)).map(|x| x as f32);
+        return Ok(match other_primaries(path, file)? {
+            Some(matrix) => rgb.map(into(matrix)).collect(),
+            None => rgb.collect(),
+        });
+    }
+    if let Some(xyz) = all(["X", "Y", "Z"]) {
+        return Ok(xyz.map(|p| ColourSpace::Rec709.from_xyz(p)).collect());
+    }
+    let is_grey = ["R", "G", "B", "RY", "BY"].iter().all(|name| part.channel(name).is_none());
+    if let (Some(grey), true) = (part.channel("Y"), is_grey) {
+        return Ok(grey.iter().map(|&y| [y; 3]).collect());
+    }
+    let missing = ["R", "G", "B"].into_iter().find(|name| part.channel(name).is_none()).unwrap_or("R");
+    Err(Error::input(path, format!("expected channels R, G, B, or X, Y, Z, or Y alone; found no {missing}")))
 }
 
 /// The matrix to Rec. 709 from what a file says its colours are, where they are others.
@@ -466,6 +483,26 @@ mod tests {
     }
 
     /// The primaries of ACEScg and white, as Abbe itself writes them, come back as the Rec. 709 that was written; to f32.
+    /// Mitsuba 3.9.1 makes the same of these: 0.3, 0.3, 0.2 in XYZ is 0.41129, 0.28033, 0.16694.
+    #[test]
+    fn grey_and_xyz_are_colours() {
+        let colours = |names: &[&str], values: &[f32]| {
+            let channels = names.iter().zip(values).map(|(name, value)| ((*name).to_owned(), vec![*value])).collect();
+            let part = exr::ExrPart { name: None, window: Window::full(1, 1), channels, texts: Vec::new() };
+            let file = exr::ExrFile { display: Window::full(1, 1), chromaticities: None, parts: vec![part] };
+            picture(Path::new("t.exr"), Decoded::Exr(file)).map(|picture| picture.pixels[0])
+        };
+        assert_eq!(colours(&["Y"], &[0.3]).unwrap(), [0.3; 3]);
+        assert_eq!(colours(&["A", "Y"], &[1.0, 0.3]).unwrap(), [0.3; 3]);
+        let found = colours(&["X", "Y", "Z"], &[0.3, 0.3, 0.2]).unwrap();
+        // The entries of the matrices, up to 3.24, differ in the fifth digit.
+        assert!(found.iter().zip([0.41129, 0.28033, 0.16694]).all(|(a, b)| (a - b).abs() < 1e-4), "{found:?}");
+        for wrong in [&["B", "G", "Y"][..], &["BY", "RY", "Y"], &["X", "Z"]] {
+            let told = colours(wrong, &[0.3; 3]).unwrap_err().to_string();
+            assert!(told.contains("expected channels R, G, B, or X, Y, Z, or Y alone; found no R"), "{told}");
+        }
+    }
+
     #[test]
     fn colours_are_read_by_the_chromaticities_of_the_file() {
         let seen = [[0.9f32, 0.1, 0.2], [0.5, 0.5, 0.5], [0.02, 0.7, 0.3]];
