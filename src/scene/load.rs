@@ -395,24 +395,26 @@ pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<(DataImage
 }
 
 /// Reads a curve: two columns, wavelength in nm and value, separated by commas, semicolons or
-/// blanks; lines that start with `#` and a heading are passed over.
+/// blanks; what follows a `#` and a heading are passed over. In a `.spd` anything may follow the two columns, as in
+/// Mitsuba.
 ///
 /// # Errors
 /// In words, with the line.
 pub fn samples(path: &Path) -> std::result::Result<Vec<(f64, f64)>, String> {
     let bytes = crate::input::read(path).map_err(|e| words(&e))?;
     let text = String::from_utf8(bytes).map_err(|_| "expected text, found other bytes")?;
+    let has_comments = extension(path) == "spd";
     let mut samples = Vec::new();
     for (i, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.is_empty() {
             continue;
         }
         let fields: Vec<&str> =
             line.split(|c: char| c == ',' || c == ';' || c.is_whitespace()).filter(|f| !f.is_empty()).collect();
         let numbers: Vec<Option<f64>> = fields.iter().map(|f| f.parse().ok().filter(|x: &f64| x.is_finite())).collect();
         match numbers.as_slice() {
-            [Some(nm), Some(value)] => samples.push((*nm, *value)),
+            [Some(nm), Some(value), rest @ ..] if rest.is_empty() || has_comments => samples.push((*nm, *value)),
             // A heading may stand before the first numbers.
             _ if samples.is_empty() && numbers.first().is_none_or(Option::is_none) => {}
             _ => return Err(format!("line {}: expected a wavelength and a value, found \"{line}\"", i + 1)),
@@ -432,6 +434,14 @@ mod tests {
         let path = dir.path().join("curve.csv");
         std::fs::write(&path, "# source\nnm,value\n400, 0.1\n500;0.2\n\n600\t3e-1\n").unwrap();
         assert_eq!(samples(&path).unwrap(), [(400.0, 0.1), (500.0, 0.2), (600.0, 0.3)]);
+        std::fs::write(&path, "400 0.1 # dark\n500 0.2#\n").unwrap();
+        assert_eq!(samples(&path).unwrap(), [(400.0, 0.1), (500.0, 0.2)]);
+        let wide = "400 0.1 7\n500 0.2 lit by day\n";
+        std::fs::write(&path, wide).unwrap();
+        let told = "line 1: expected a wavelength and a value, found \"400 0.1 7\"";
+        assert_eq!(samples(&path).unwrap_err(), told);
+        std::fs::write(dir.path().join("curve.spd"), wide).unwrap();
+        assert_eq!(samples(&dir.path().join("curve.spd")).unwrap(), [(400.0, 0.1), (500.0, 0.2)]);
         std::fs::write(&path, "400 0.1\n500 zwei\n").unwrap();
         assert_eq!(samples(&path).unwrap_err(), "line 2: expected a wavelength and a value, found \"500 zwei\"");
         assert_eq!(samples(&dir.path().join("none")).unwrap_err(), "expected a file, found none");
