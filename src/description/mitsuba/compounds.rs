@@ -9,6 +9,11 @@ use super::{Fields, Import, boolean, entry, number, text};
 /// The least roughness: Mitsuba takes what is less for this.
 const LEAST_ALPHA: f64 = 1e-4;
 
+/// Whether two nodes are the same number.
+fn same(a: &Node, b: &Node) -> bool {
+    matches!((&a.value, &b.value), (super::Value::Float(a), super::Value::Float(b)) if a == b)
+}
+
 impl Import<'_> {
     /// A number, or `{texture: name}`; `None` where it is not written.
     pub(crate) fn number_or_texture(&mut self, bag: &Bag<'_>, name: &'static str) -> Result<Option<Node>, Fault> {
@@ -29,6 +34,15 @@ impl Import<'_> {
         }
     }
 
+    /// A share from 0 to 1, to which Mitsuba clamps numbers.
+    fn share(&mut self, bag: &Bag<'_>, name: &'static str) -> Result<Option<Node>, Fault> {
+        let node = self.number_or_texture(bag, name)?;
+        Ok(node.map(|node| match node.value {
+            super::Value::Float(share) => number(node.place, share.clamp(0.0, 1.0)),
+            _ => node,
+        }))
+    }
+
     /// `alpha`, or `alpha_u` and `alpha_v`, and `distribution`.
     pub(crate) fn roughness(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
         let clamped = |node: Node| match node.value {
@@ -41,6 +55,10 @@ impl Import<'_> {
             [None, None] => {
                 let alpha = self.number_or_texture(bag, "alpha")?.unwrap_or_else(|| number(place, 0.1));
                 fields.add("roughness", clamped(alpha));
+            }
+            // Plastic is the same along u and v: this is one number for it.
+            [Some(u), Some(v)] if !bag.has("alpha") && bag.object.plugin == "roughplastic" && same(&u, &v) => {
+                fields.add("roughness", clamped(u));
             }
             [Some(u), Some(v)] if !bag.has("alpha") => {
                 let mut both = Fields::new(place);
@@ -93,7 +111,7 @@ impl Import<'_> {
 
     pub(crate) fn mask(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
         let mut fields = Fields::new(bag.object.place);
-        fields.maybe("opacity", self.number_or_texture(bag, "opacity")?);
+        fields.maybe("opacity", self.share(bag, "opacity")?);
         fields.add("material", self.covered(bag)?);
         bag.finish()?;
         Ok(fields.kind("mask"))
@@ -101,7 +119,7 @@ impl Import<'_> {
 
     pub(crate) fn blended(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
         let mut fields = Fields::new(bag.object.place);
-        let weight = self.number_or_texture(bag, "weight")?;
+        let weight = self.share(bag, "weight")?;
         fields.add("weight", weight.ok_or_else(|| bag.fault("expected the parameter \"weight\", found none"))?);
         let inner = bag.objects(Family::Bsdf);
         let [first, second] = inner[..] else {
@@ -143,5 +161,45 @@ impl Import<'_> {
         fields.add("material", self.covered(bag)?);
         bag.finish()?;
         Ok(fields.kind(kind))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{Material, MaterialRef, NumberOrTexture};
+    use super::super::tests::{fault, good};
+
+    /// The material of a sphere.
+    fn material(bsdf: &str) -> Material {
+        let scene = good(&format!("<shape type=\"sphere\">{bsdf}</shape>"));
+        let MaterialRef::Inline(material) = &scene.shapes[0].material else { panic!("in place") };
+        (*material).clone()
+    }
+
+    /// Mitsuba 3.9.1 gives the pictures of 1 for 2, and those of 0 for -1.
+    #[test]
+    fn shares_are_clamped() {
+        for (written, share) in [("2", 1.0), ("-1", 0.0), ("0.5", 0.5)] {
+            let number = |name: &str| format!("<float name=\"{name}\" value=\"{written}\"/><bsdf type=\"diffuse\"/>");
+            let Material::Mask(mask) = material(&format!("<bsdf type=\"mask\">{}</bsdf>", number("opacity"))) else {
+                panic!("a mask")
+            };
+            assert_eq!(mask.opacity, NumberOrTexture::Number(share));
+            let blend = format!("<bsdf type=\"blendbsdf\">{}<bsdf type=\"diffuse\"/></bsdf>", number("weight"));
+            let Material::Blend(blend) = material(&blend) else { panic!("a blend") };
+            assert_eq!(blend.weight, NumberOrTexture::Number(share));
+        }
+    }
+
+    #[test]
+    fn rough_plastic_may_say_twice_how_rough_it_is() {
+        let plastic = |v: &str| {
+            format!(
+                "<bsdf type=\"roughplastic\"><float name=\"alpha_u\" value=\"0.2\"/><float name=\"alpha_v\" value=\"{v}\"/></bsdf>"
+            )
+        };
+        let once = "<bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"0.2\"/></bsdf>";
+        assert_eq!(material(&plastic("0.2")), material(once));
+        assert_ne!(fault(&format!("<shape type=\"sphere\">{}</shape>", plastic("0.3")), &[]), "none");
     }
 }

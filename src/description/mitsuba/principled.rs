@@ -32,8 +32,14 @@ impl Import<'_> {
         if bag.has("eta") && bag.has("specular") {
             return Err(bag.fault("expected either eta or specular, found both"));
         }
-        for name in ["eta", "specular"] {
-            fields.maybe(name, bag.float(name)?.map(|value| number(bag.place(name), value)));
+        fields.maybe("eta", bag.float("eta")?.map(|value| number(bag.place("eta"), value)));
+        if let Some(specular) = bag.float("specular")? {
+            let place = bag.place("specular");
+            // Above 1, up to 12.5, it stands for an index just the same.
+            let index = 2.0 / (1.0 - (0.08 * specular).sqrt()) - 1.0;
+            let beyond = specular > 1.0 && index > 1.0 && index.is_finite();
+            let (name, value) = if beyond { ("eta", index) } else { ("specular", specular) };
+            fields.add(name, number(place, value));
         }
         rates(
             bag,
@@ -136,6 +142,26 @@ mod tests {
         assert_eq!(c.diff_trans, NumberOrTexture::Number(2.0));
         let Material::Hair(d) = &scene.materials["d"] else { panic!("hair") };
         assert!(matches!(d.colour, HairColour::Absorption(_)) && d.ior == 1.55);
+    }
+
+    /// F0 = 0.08 · specular of ((n - 1) / (n + 1))²; at 2, n = 1.4 / 0.6.
+    #[test]
+    fn specular_above_one_is_an_index() {
+        let contrast = |specular: &str| {
+            let text =
+                format!("<bsdf type=\"principled\" id=\"a\"><float name=\"specular\" value=\"{specular}\"/></bsdf>");
+            let Material::Principled(a) = &good(&text).materials["a"] else { panic!("principled") };
+            a.contrast
+        };
+        assert_eq!(contrast("1"), Contrast::Specular(1.0));
+        let Contrast::Eta(eta) = contrast("2") else { panic!("an index") };
+        assert!((eta - 1.4 / 0.6).abs() < 1e-15);
+        let none = "<bsdf type=\"principled\" id=\"a\"><float name=\"specular\" value=\"12.5\"/></bsdf>";
+        assert!(
+            fault(none, &[]).contains("specular: expected a number from 0 to 1, found 12.5"),
+            "{}",
+            fault(none, &[])
+        );
     }
 
     #[test]
