@@ -4,6 +4,7 @@ use super::super::fault::Fault;
 use super::super::node::Node;
 use super::bsdfs::Sides;
 use super::object::{Bag, Family, SpectrumValue, Value};
+use super::spectra::Role;
 use super::{Fields, Import, boolean, entry, number, text};
 
 /// The least roughness: Mitsuba takes what is less for this.
@@ -23,9 +24,20 @@ impl Import<'_> {
             Value::Float(value) => Ok(Some(number(place, *value))),
             Value::Integer(value) => Ok(Some(number(place, *value as f64))),
             Value::Spectrum(SpectrumValue::Uniform(value)) => Ok(Some(number(place, *value))),
+            Value::Rgb([r, g, b]) if r == g && g == b => Ok(Some(number(place, *r))),
             Value::Object(index) if bag.document.objects[*index].family == Family::Texture => {
-                let texture = self.declare_numbers(*index)?;
-                Ok(Some(entry(place, "texture", text(place, texture))))
+                match self.spectrum_plugin(*index, Role::Coefficient)? {
+                    Some(node) if matches!(node.value, super::Value::Float(_)) => Ok(Some(node)),
+                    Some(_) => {
+                        let found = value.kind(bag.document);
+                        let message = format!("expected a float or a texture of numbers, found {found}");
+                        Err(bag.fault_of(name, message))
+                    }
+                    None => {
+                        let texture = self.declare_numbers(*index)?;
+                        Ok(Some(entry(place, "texture", text(place, texture))))
+                    }
+                }
             }
             other => {
                 let found = other.kind(bag.document);
@@ -35,7 +47,7 @@ impl Import<'_> {
     }
 
     /// A share from 0 to 1, to which Mitsuba clamps numbers.
-    fn share(&mut self, bag: &Bag<'_>, name: &'static str) -> Result<Option<Node>, Fault> {
+    pub(crate) fn share(&mut self, bag: &Bag<'_>, name: &'static str) -> Result<Option<Node>, Fault> {
         let node = self.number_or_texture(bag, name)?;
         Ok(node.map(|node| match node.value {
             super::Value::Float(share) => number(node.place, share.clamp(0.0, 1.0)),
@@ -189,6 +201,36 @@ mod tests {
             let Material::Blend(blend) = material(&blend) else { panic!("a blend") };
             assert_eq!(blend.weight, NumberOrTexture::Number(share));
         }
+    }
+
+    /// What is the same everywhere and at all wavelengths is a number, in whatever words.
+    #[test]
+    fn grey_is_a_number() {
+        let words = [
+            "<rgb name=\"NAME\" value=\"0.25\"/>",
+            "<spectrum name=\"NAME\" value=\"0.25\"/>",
+            "<spectrum type=\"uniform\" name=\"NAME\"><float name=\"value\" value=\"0.25\"/></spectrum>",
+            "<texture type=\"rawconstant\" name=\"NAME\"><float name=\"value\" value=\"0.25\"/></texture>",
+            "<spectrum type=\"srgb\" name=\"NAME\"><rgb name=\"color\" value=\"0.25\"/></spectrum>",
+        ];
+        for word in words {
+            let mask =
+                format!("<bsdf type=\"mask\">{}<bsdf type=\"diffuse\"/></bsdf>", word.replace("NAME", "opacity"));
+            let Material::Mask(mask) = material(&mask) else { panic!("a mask") };
+            assert_eq!(mask.opacity, NumberOrTexture::Number(0.25), "{word}");
+            let phase = format!(
+                "<medium type=\"homogeneous\"><phase type=\"blendphase\">{}<phase type=\"isotropic\"/><phase type=\"rayleigh\"/>\
+                 </phase></medium>",
+                word.replace("NAME", "weight")
+            );
+            assert_eq!(fault(&phase, &[]), "none", "{word}");
+        }
+        let told =
+            |word: &str| fault(&format!("<bsdf type=\"mask\" id=\"m\">{word}<bsdf type=\"diffuse\"/></bsdf>"), &[]);
+        let green = told("<rgb name=\"opacity\" value=\"0, 1, 0\"/>");
+        assert!(green.ends_with("opacity: expected a float or a texture of numbers, found an rgb colour"), "{green}");
+        let day = told("<spectrum type=\"d65\" name=\"opacity\"/>");
+        assert!(day.ends_with("expected a float or a texture of numbers, found the texture \"d65\""), "{day}");
     }
 
     #[test]

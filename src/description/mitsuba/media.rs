@@ -104,13 +104,15 @@ impl Import<'_> {
         let mut fields = Fields::new(bag.object.place);
         let place = bag.place("weight");
         let weight = match bag.value("weight") {
-            None => return Err(bag.fault("expected the parameter \"weight\", found none")),
             Some(Value::Object(index)) if bag.document.objects[*index].family == Family::Volume => {
                 let volume = self.declare_volume(*index)?;
                 entry(place, "volume", text(place, volume))
             }
-            // Mitsuba clamps it.
-            Some(_) => number(place, bag.float("weight")?.unwrap_or_default().clamp(0.0, 1.0)),
+            _ => match self.share(bag, "weight")? {
+                None => return Err(bag.fault("expected the parameter \"weight\", found none")),
+                Some(weight) if matches!(weight.value, super::Value::Float(_)) => weight,
+                Some(_) => return Err(bag.fault_of("weight", "expected a float or a volume, found a texture")),
+            },
         };
         fields.add("weight", weight);
         // In the order of the text. (The names of the two play no part.)

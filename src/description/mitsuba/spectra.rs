@@ -156,7 +156,7 @@ impl Import<'_> {
     }
 
     /// A `<spectrum type="…">`; `None` where the plugin varies over the surface.
-    fn spectrum_plugin(&mut self, index: usize, role: Role) -> Result<Option<Node>, Fault> {
+    pub(crate) fn spectrum_plugin(&mut self, index: usize, role: Role) -> Result<Option<Node>, Fault> {
         let bag = self.bag(index);
         let place = bag.object.place;
         let node = match bag.object.plugin.as_str() {
