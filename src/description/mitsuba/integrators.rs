@@ -103,7 +103,12 @@ impl Import<'_> {
             _ => return Err(bag.unknown(INTEGRATORS)),
         };
         bag.finish()?;
-        Ok(Translated { integrator: fields.kind(kind), layers: Vec::new() })
+        // Paths that may not even meet a lamp show nothing.
+        let integrator = match bag.integer("max_depth")? {
+            Some(0) => Fields::new(bag.place("max_depth")).kind("none"),
+            _ => fields.kind(kind),
+        };
+        Ok(Translated { integrator, layers: Vec::new() })
     }
 
     /// What lies inside an integrator, with its name.
@@ -281,6 +286,19 @@ mod tests {
         let [layer] = &scene.layers[..] else { panic!("one layer") };
         assert_eq!((layer.name.as_str(), layer.squares.as_deref()), ("_arg_0", Some("m2__arg_0")));
         assert_eq!(layer.content, LayerContent::Light { of: Some(direct), form: LightForm::Xyz });
+    }
+
+    /// Black and transparent for Mitsuba 3.9.1, too.
+    #[test]
+    fn paths_of_no_depth_show_nothing() {
+        for plugin in ["path", "volpath", "volpathmis", "ptracer"] {
+            let depth = |n: i32| {
+                format!("<integrator type=\"{plugin}\"><integer name=\"max_depth\" value=\"{n}\"/></integrator>")
+            };
+            assert!(matches!(good(&depth(0)).integrator, Integrator::None(_)));
+            assert!(!matches!(good(&depth(1)).integrator, Integrator::None(_)));
+            assert!(fault(&depth(-2), &[]).contains("max_depth: expected"), "{}", fault(&depth(-2), &[]));
+        }
     }
 
     #[test]
