@@ -260,6 +260,20 @@ fn bands_are_exported() {
     }
 }
 
+/// Mitsuba has one environment.
+#[test]
+fn a_second_environment_is_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    let scene = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes: [{sphere: {radius: 1}}]\n\
+                 lights: [{constant: {radiance: 0.5}}, {constant: {radiance: {rgb: [0.1, 0.5, 0.3]}}}]\n";
+    common::write(&yaml, scene.as_bytes());
+    let (_, exported) = prepared(&yaml, directory.path(), false);
+    let losses: Vec<String> = exported.losses.iter().map(|l| format!("{}: {}", l.field, l.instead)).collect();
+    assert_eq!(losses, ["lights[1]: nothing: Mitsuba has one environment"]);
+    same_picture(&yaml);
+}
+
 /// Mitsuba's colours of optical constants end at 1.
 #[test]
 fn colours_of_metals_above_one_are_told() {

@@ -46,6 +46,10 @@ impl Import<'_> {
     /// The fields of a shape that shines.
     pub(crate) fn emission(&mut self, index: usize, fields: &mut Fields) -> Result<(), Fault> {
         let bag = self.bag(index);
+        if !self.shining.insert(index) {
+            let message = "expected an emitter of its own, found one that another shape has";
+            return Err(Fault::at_place(fields.place, message));
+        }
         match bag.object.plugin.as_str() {
             "area" => {}
             "directionalarea" => fields.add("emission_direction", text(bag.object.place, "normal")),

@@ -89,6 +89,8 @@ struct Import<'a> {
     names: HashMap<usize, String>,
     /// Under which name a texture stands there a second time, for numbers.
     for_numbers: HashMap<usize, String>,
+    /// The emitters that shapes have.
+    shining: HashSet<usize>,
     /// Names that no other object may be given.
     taken: HashSet<String>,
 }
@@ -109,6 +111,7 @@ impl<'a> Import<'a> {
             lights: Vec::new(),
             names: HashMap::new(),
             for_numbers: HashMap::new(),
+            shining: HashSet::new(),
             taken,
         }
     }
@@ -146,7 +149,12 @@ impl<'a> Import<'a> {
         for shape in root.objects(Family::Shape) {
             self.shape(shape)?;
         }
-        for emitter in root.objects(Family::Emitter) {
+        let emitters = root.objects(Family::Emitter);
+        let around = |index: &&usize| ["constant", "envmap"].contains(&self.bag(**index).object.plugin.as_str());
+        if let Some(second) = emitters.iter().filter(around).nth(1) {
+            return Err(self.bag(*second).fault("expected one environment, found another"));
+        }
+        for emitter in emitters {
             self.emitter(emitter)?;
         }
         // Parts of others that stand here for a <ref>: they have to hold, used or not.
@@ -523,6 +531,37 @@ mod tests {
         assert_eq!((scene.media.len(), scene.lights.len(), scene.textures.len()), (1, 1, 0));
         let wrong = "<phase type=\"hg\" id=\"p\"><float name=\"gg\" value=\"1\"/></phase>";
         assert!(fault(wrong, &[]).contains("phase \"hg\": expected parameters among g, found \"gg\""));
+    }
+
+    /// Each is an error for Mitsuba 3.9.1, too.
+    #[test]
+    fn what_mitsuba_refuses_is_refused() {
+        let sensor = |text: &str| fault(&format!("<sensor type=\"perspective\">{text}</sensor>"), &[]);
+        let float = |name: &str, value: &str| format!("<float name=\"{name}\" value=\"{value}\"/>");
+        let told = sensor(&float("near_clip", "0"));
+        assert_eq!(told, "s.xml:3:28: sensor \"perspective\": near_clip: expected a number above 0, found 0");
+        let told = sensor(&float("shutter_open", "1"));
+        assert!(told.ends_with("shutter_close: expected at least shutter_open, 1, found 0"), "{told}");
+        let told = sensor("<string name=\"focal_length\" value=\"50mm\"/><string name=\"fov_axis\" value=\"y\"/>");
+        assert!(told.ends_with("fov_axis: expected it beside fov, found it without"), "{told}");
+        let told = sensor(&format!(
+            "<film type=\"hdrfilm\"><rfilter type=\"lanczos\">{}</rfilter></film>",
+            float("lobes", "3")
+        ));
+        assert!(told.ends_with("lobes: expected an integer, found a float"), "{told}");
+        let told = sensor("<film type=\"hdrfilm\"><integer name=\"width\" value=\"+32\"/></film>");
+        assert!(told.ends_with("expected a whole number, found \"+32\""), "{told}");
+
+        let sky = |radiance: &str| format!("<emitter type=\"constant\">{radiance}</emitter>");
+        let told = fault(&sky("<spectrum type=\"uniform\" name=\"radiance\"/>"), &[]);
+        assert!(told.ends_with("expected the parameter \"value\", found none"), "{told}");
+        let told = fault(&sky("<spectrum name=\"radiance\" value=\"500:0.3\"/>"), &[]);
+        assert!(told.ends_with("expected two pairs or more, found \"500:0.3\""), "{told}");
+        let told = fault(&format!("{}\n{}", sky(""), sky("")), &[]);
+        assert_eq!(told, "s.xml:4:1: emitter \"constant\": expected one environment, found another");
+        let lit = "<shape type=\"sphere\"><ref id=\"a\"/></shape>";
+        let told = fault(&format!("<shape type=\"sphere\"><emitter type=\"area\" id=\"a\"/></shape>\n{lit}"), &[]);
+        assert_eq!(told, "s.xml:4:1: expected an emitter of its own, found one that another shape has");
     }
 
     /// A chain of references is as deep as nested elements, and has its limit.

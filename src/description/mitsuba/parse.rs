@@ -286,10 +286,11 @@ impl Parser<'_> {
                 check_attributes(element, &["name", "value"], &[])?;
                 let written = attribute(element, "value")?;
                 let text = self.text(written)?;
-                let whole = text.trim().parse().map_err(|_| {
+                // Mitsuba's have no plus.
+                let whole = text.trim().parse().ok().filter(|_| !text.trim().starts_with('+'));
+                Value::Integer(whole.ok_or_else(|| {
                     Fault::at_place(written.place, format!("expected a whole number, found {}", quote(&text)))
-                })?;
-                Value::Integer(whole)
+                })?)
             }
             "boolean" => {
                 check_attributes(element, &["name", "value"], &[])?;

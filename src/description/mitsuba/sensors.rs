@@ -31,6 +31,9 @@ impl Import<'_> {
         camera.add("to_world", matrix(bag.place("to_world"), ours));
         let near = bag.float("near_clip")?.unwrap_or(0.01);
         let far = bag.float("far_clip")?.unwrap_or(1e4);
+        if near <= 0.0 {
+            return Err(bag.fault_of("near_clip", format!("expected a number above 0, found {near}")));
+        }
         let mut clip = Fields::new(place);
         clip.add("near", number(bag.place("near_clip"), near));
         clip.add("far", number(bag.place("far_clip"), far));
@@ -57,9 +60,11 @@ impl Import<'_> {
             lens.add("focus_distance", number(bag.place("focus_distance"), focus_distance.unwrap_or(far)));
             camera.add("lens", lens.map());
         }
-        for key in ["shutter_open", "shutter_close"] {
-            // Nothing moves.
-            bag.float(key)?;
+        // Nothing moves.
+        let [open, close] = [bag.float("shutter_open")?, bag.float("shutter_close")?].map(Option::unwrap_or_default);
+        if open > close {
+            let message = format!("expected at least shutter_open, {open}, found {close}");
+            return Err(bag.fault_of("shutter_close", message));
         }
 
         let mut all = Fields::new(place);
@@ -186,7 +191,9 @@ impl Import<'_> {
             }
             "catmullrom" => "catmull_rom",
             "lanczos" => {
-                add("radius", "lobes")?;
+                if let Some(lobes) = bag.integer("lobes")? {
+                    fields.add("radius", number(bag.place("lobes"), lobes as f64));
+                }
                 "lanczos"
             }
             _ => return Err(bag.unknown(FILTERS)),
@@ -231,6 +238,7 @@ pub(super) fn field_of_view(bag: &Bag<'_>) -> Result<(f64, &'static str), Fault>
     match (fov, focal_length) {
         (Some(fov), None) => Ok((fov, axis.unwrap_or("x"))),
         (Some(_), Some(_)) => Err(bag.fault_of("focal_length", "expected either fov or focal_length, found both")),
+        (None, _) if axis.is_some() => Err(bag.fault_of("fov_axis", "expected it beside fov, found it without")),
         (None, focal_length) => {
             let written = focal_length.unwrap_or("50mm");
             let millimetres = written.trim().trim_end_matches("mm").trim().parse::<f64>().ok();

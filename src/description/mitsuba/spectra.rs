@@ -69,10 +69,7 @@ impl Import<'_> {
             Value::Integer(value) => Ok(Some(grey(place, *value as f64, role))),
             Value::Rgb(rgb) => Ok(Some(colour(place, *rgb, role))),
             Value::Spectrum(SpectrumValue::Uniform(value)) => Ok(Some(number(place, *value))),
-            Value::Spectrum(SpectrumValue::Table(pairs)) => {
-                let node = if let [[_, value]] = pairs[..] { number(place, value) } else { table(place, pairs) };
-                Ok(Some(node))
-            }
+            Value::Spectrum(SpectrumValue::Table(pairs)) => Ok(Some(table(place, pairs))),
             Value::Spectrum(SpectrumValue::File(path)) => {
                 let file = entry(place, "file", text(place, path.as_str()));
                 Ok(Some(entry(place, "zero_outside", file)))
@@ -162,7 +159,7 @@ impl Import<'_> {
         let node = match bag.object.plugin.as_str() {
             "rawconstant" => number(place, bag.required("value", bag.float("value"))?),
             "uniform" => {
-                let value = bag.float("value")?.unwrap_or(1.0);
+                let value = bag.required("value", bag.float("value"))?;
                 // The range is read and, as in Mitsuba, does not cut the spectrum.
                 bag.float("wavelength_min")?;
                 bag.float("wavelength_max")?;

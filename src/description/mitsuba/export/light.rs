@@ -17,6 +17,12 @@ use super::{DAYLIGHT, Export};
 impl Export<'_> {
     /// A light of the scene's list.
     pub(super) fn light(&mut self, i: usize, light: &Light) {
+        let around = |light: &Light| matches!(light, Light::Constant(_) | Light::Environment(_));
+        if around(light) && self.scene.lights[..i].iter().any(around) {
+            self.instead("emitter", &format!("lights[{i}]"), "nothing: Mitsuba has one environment");
+            self.end();
+            return;
+        }
         let why = match light {
             Light::Point(l) => Export::light_shortfall(&l.intensity),
             Light::Spot(l) => Export::light_shortfall(&l.intensity),

@@ -44,6 +44,7 @@ pub(super) fn spectrum_value(text: &str, place: Place) -> std::result::Result<Sp
     }
     match table.len() {
         0 => Err(Fault::at_place(place, "expected a number or pairs such as 400:0.5, found none")),
+        1 => Err(Fault::at_place(place, format!("expected two pairs or more, found {}", quote(text)))),
         _ => Ok(SpectrumValue::Table(table)),
     }
 }
