@@ -235,7 +235,7 @@ fn parts_that_do_not_make_up_one_picture_are_refused() {
     for (key, value, field) in [
         ("render.seed", "5", "seed: expected 0, found 5"),
         ("render.samples", "16", "samples: expected 12, found 16"),
-        ("output.colour", "acescg", "output: expected {"),
+        ("output.colour", "acescg", "output.colour: expected \"rec709\", found \"acescg\""),
         ("image.sensitivity", "2", "sensitivity: expected 1.0, found 2.0"),
         ("shapes[1].sphere.radius", "0.9", "scene with the hash: expected "),
     ] {
