@@ -6,8 +6,9 @@
 //! the picture to a viewer ([`super::tev`]).
 
 use super::develop;
-use super::finish::{FAULT, Finish, spectral_path};
+use super::finish::{Finish, spectral_path};
 use super::frame::{Begun, FrameJob, Milestone, lock};
+use super::header::FAULT;
 use super::merge::sum;
 use super::names;
 use super::part::{Breaks, Part, Share};

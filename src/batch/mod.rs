@@ -12,6 +12,7 @@ pub mod develop;
 pub mod farm;
 pub mod finish;
 pub mod frame;
+mod header;
 mod layers;
 pub mod merge;
 pub mod motion;
