@@ -159,8 +159,10 @@ fn adaptive_sampling_is_off_where_it_would_not_be_exact() {
     assert!(said(&[("seed: 1", "stop: {error: 0.1}")]).contains("told by 64"));
     assert!(said(&[("merging: off", "merging: on")]).contains("photons are collected"));
     assert!(said(&[("samples: 64", "samples: 15")]).contains("fewer than 16 samples"));
-    // Layers of light go with it.
-    assert_eq!(said(&[("surface: shading_normal", "light: depth")]), "cells of 8 x 8 pixels, told by 16 samples");
+    // Layers of light go with it, beside which nothing is traced from the lights.
+    let untraced = ("light_tracing: on", "light_tracing: off");
+    let with_light = said(&[("surface: shading_normal", "light: depth"), untraced]);
+    assert_eq!(with_light, "cells of 8 x 8 pixels, told by 16 samples");
     let no_layers = ("layers:\n- {name: n, surface: shading_normal}\n- caustic\n- indirect\n- Z\n", "");
     assert_eq!(said(&[no_layers, ("shapes:", "integrator: whitted\nshapes:")]), "");
     assert_eq!(said(&[no_layers, ("shapes:", "integrator: light_tracer\nshapes:")]), "");
