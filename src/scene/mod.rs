@@ -104,7 +104,7 @@ pub struct Scene {
     pub light_cdf: Vec<f64>,
     /// How a point of the scene chooses among them; `None` where all choose alike.
     pub choice: Option<Choice>,
-    /// The film counts light over two to this power: see [`Scene::film_exponent`].
+    /// The film counts light over two to this power: `scene/brightness.rs` tells which.
     pub light_exponent: i32,
     /// Indices of lights from infinity.
     pub backgrounds: Vec<u32>,
