@@ -11,12 +11,12 @@ use super::frame::{Begun, FrameJob, Milestone, lock};
 use super::header::FAULT;
 use super::merge::sum;
 use super::names;
-use super::part::{Breaks, Part, Share};
+use super::part::{Breaks, Part, Share, SplatFilm};
 use super::part_file::{self, Identity};
 use super::tev::{self, Viewer};
 use crate::error::{Error, Result};
 use crate::film::output;
-use crate::film::resolve::{self, Image, Splats};
+use crate::film::resolve::{self, Image};
 use crate::film::{exr, png};
 use crate::scene::watch::{Counts, Watch};
 use std::path::{Path, PathBuf};
@@ -147,7 +147,7 @@ impl<'a> Keeper<'a> {
         part.look(|film, splats| {
             // A tile's rows are less than what its light from the lights covers.
             let splats = splats.filter(|s| s.film.window() == film.window());
-            let splats = splats.map(|s| Splats { film: &s.film, photons: s.paths });
+            let splats = splats.map(SplatFilm::splats);
             resolve::resolve(film, splats, rgb_from_xyz)
         })
     }

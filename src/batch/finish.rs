@@ -74,7 +74,7 @@ pub struct Finish {
     pub white: Option<[f64; 2]>,
     /// Factor on colours.
     pub sensitivity: f64,
-    /// [`crate::film::filter::Filter::span`] of the filter.
+    /// [`crate::film::filter::Filter::span`] of the filter; 1 where nothing is splatted.
     pub filter_span: f64,
     /// Whether bands of the spectrum stand in place of colour.
     pub bands: bool,
@@ -133,6 +133,7 @@ impl Finish {
         let Prepared { description, scene, plan, samples, hash, .. } = prepared;
         let (white, note) = develop::white(&description.output.png, scene);
         let asked = |content: &LayerContent| description.layers.iter().any(|layer| layer.content == *content);
+        let splats = plan.caustics.is_some() || matches!(plan.integrator, Integrator::Light(_));
         // Where the files go is no matter of what is in them.
         let mut output = Output { dir: PathBuf::new(), contact_sheet: true, ..description.output.clone() };
         output.exr.stderr = layers::wants_errors(description);
@@ -157,7 +158,7 @@ impl Finish {
             white,
             output,
             sensitivity: description.image.sensitivity,
-            filter_span: filter(&description.image.filter).span(),
+            filter_span: if splats { filter(&description.image.filter).span() } else { 1.0 },
             bands: !description.image.bands.is_empty(),
             layers: plan.layers.channels(),
             kept: plan.layers.kept,
@@ -179,6 +180,12 @@ impl Finish {
         let bands = self.output.spectral.map_or(0, |spectral| spectral.bands as usize);
         let start = self.layers.iter().position(|channel| channel.name.starts_with(SPECTRAL)).unwrap_or(0);
         start..start + bands
+    }
+
+    /// Whether samples differ by chance, so that there is noise.
+    #[must_use]
+    pub fn is_random(&self) -> bool {
+        self.integrator != "whitted"
     }
 
     /// Rows of the frame that no part cuts.
@@ -295,7 +302,7 @@ pub fn write(
     let sound = frame::check_invalid(&frame.invalid(), counted + dropped).and(target);
     report.fault = sound.as_ref().err().map(ToString::to_string);
     let mut image = frame.resolve(&finish.rgb_from_xyz());
-    if finish.integrator == "whitted" {
+    if !finish.is_random() {
         // Its samples differ by where they are, and would be the same again: there is no noise.
         image.standard_error.iter_mut().for_each(|plane| plane.fill(0.0));
     }

@@ -13,7 +13,7 @@ use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, TileBuff
 use crate::film::error::{self, ErrorEstimate, NoEstimate};
 use crate::film::filter::FilterSampler;
 use crate::film::layers::Layout;
-use crate::film::resolve::{self, Image, Splats};
+use crate::film::resolve::{self, Image};
 use crate::film::run::{LONGEST, LayerRun, Run};
 use crate::math::sampler::Octet;
 use crate::scene::Scene;
@@ -138,7 +138,7 @@ impl Frame {
         if let Some((_, image)) = self.resolved.as_ref().filter(|(space, _)| space == rgb_from_xyz) {
             return image.clone();
         }
-        let splats = self.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
+        let splats = self.splats.as_ref().map(SplatFilm::splats);
         resolve::resolve(&self.film, splats, rgb_from_xyz)
     }
 
@@ -146,7 +146,7 @@ impl Frame {
     /// [`resolve::shared_errors`].
     #[must_use]
     pub fn shared_errors(&self, image: &Image, rgb_from_xyz: &[[f64; 3]; 3], span: f64) -> f64 {
-        let splats = self.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
+        let splats = self.splats.as_ref().map(SplatFilm::splats);
         splats.map_or(1.0, |splats| resolve::shared_errors(image, &splats, rgb_from_xyz, span))
     }
 
@@ -430,7 +430,7 @@ fn is_black(resolved: Option<&Resolved>) -> bool {
 
 /// The error of a picture, and the picture that it was estimated from. It is known where nothing shines.
 fn estimate(film: &Film, splats: Option<&SplatFilm>, lit: bool) -> (Option<ErrorEstimate>, Resolved) {
-    let photons = splats.map(|s| Splats { film: &s.film, photons: s.paths });
+    let photons = splats.map(SplatFilm::splats);
     let space = ColourSpace::Rec709.matrix_from_xyz();
     let image = resolve::resolve(film, photons, &space);
     let error = match error::relative_error(film, photons, &space, &image) {

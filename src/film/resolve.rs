@@ -94,8 +94,9 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
     }
 }
 
-/// How many times the variance of the sum of all pixels of an `image` in the colours of `rgb_from_xyz` is that of independent ones, in the colour where it is most: of what
-/// is splatted, each falls into `span` pixels together ([`crate::film::filter::Filter::span`]). 1 without any.
+/// How many times the variance of the sum of all pixels of an `image` in the colours of `rgb_from_xyz` is that of independent
+/// ones, in the colour where it is most: what is splatted falls into `span` pixels together
+/// ([`crate::film::filter::Filter::span`]).
 #[must_use]
 pub fn shared_errors(image: &Image, splats: &Splats, rgb_from_xyz: &[[f64; 3]; 3], span: f64) -> f64 {
     let unit = 2f64.powi(splats.film.exponent());

@@ -187,6 +187,9 @@ impl Octet {
     }
 }
 
+/// The fraction of the golden ratio, of which multiples are spread evenly over [0, 1).
+pub const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
 /// In [0, 1), of units of 2⁻³².
 #[must_use]
 #[inline(always)]

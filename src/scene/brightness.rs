@@ -2,6 +2,7 @@
 
 use super::Scene;
 use super::light::Light;
+use crate::math::sampler::GOLDEN;
 use crate::math::warp::uniform_cone;
 use crate::math::{Frame, Ray};
 use glam::{DVec2, DVec3};
@@ -19,31 +20,21 @@ impl Scene {
     /// to one, with 2³⁸ left above; of brighter lamps the film just holds what they show, and what they light beside as
     /// finely as may be.
     pub(super) fn film_exponent(&self, powers: &[f64]) -> i32 {
-        let mut lamps: Vec<(&Light, f64)> = self.lights.iter().zip(powers.iter().copied()).collect();
-        lamps.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let mut asked = 0;
-        let brightness = lamps.into_iter().map(|(light, power)| match light {
+        let lamps = || self.lights.iter().zip(powers.iter().copied());
+        let shown = lamps().filter_map(|(light, power)| match light {
             Light::Area { object, .. } | Light::AlongNormal { object, .. } => {
-                power / (PI * self.objects[*object as usize].geometry.area())
+                Some(power / (PI * self.objects[*object as usize].geometry.area()))
             }
             Light::Directional { .. } | Light::Constant { .. } | Light::Environment(_) => {
-                power / (4.0 * PI * PI * self.radius * self.radius)
+                Some(power / (4.0 * PI * PI * self.radius * self.radius))
             }
-            Light::Point { .. } | Light::Spot { .. } | Light::Projector(_) if asked == ASKED => 0.0,
-            Light::Point { position, .. } => {
-                asked += 1;
-                self.lit_around(power, *position, DVec3::Z, 2.0)
-            }
-            Light::Spot { position, axis, cutoff, .. } => {
-                asked += 1;
-                self.lit_around(power, *position, *axis, 1.0 - libm::cos(*cutoff))
-            }
-            Light::Projector(projector) => {
-                asked += 1;
-                let cone = projector.cone();
-                self.lit_around(power, cone.apex, cone.axis, 1.0 - libm::cos(cone.half_angle))
-            }
+            Light::Point { .. } | Light::Spot { .. } | Light::Projector(_) => None,
         });
+        let mut cones: Vec<(Cone, f64)> =
+            lamps().filter_map(|(light, power)| Some((Cone::of(light)?, power))).collect();
+        cones.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let lit = cones.iter().take(ASKED).map(|(cone, power)| self.lit(cone, *power));
+        let brightness = shown.chain(lit);
         let brightest = brightness.filter(|b| b.is_finite()).fold(0.0, f64::max);
         if brightest < f64::MIN_POSITIVE {
             return 0;
@@ -57,19 +48,41 @@ impl Scene {
         }
     }
 
-    /// About how bright a white wall is where a lamp of `power` at `position` lights the nearest thing, film units; its light
-    /// goes into a cone about `axis`, up to a 1 − cos of `spread`.
-    fn lit_around(&self, power: f64, position: DVec3, axis: DVec3, spread: f64) -> f64 {
+    /// About how bright a white wall is where a lamp of `power` lights the nearest thing, film units.
+    fn lit(&self, &Cone { position, axis, spread }: &Cone, power: f64) -> f64 {
         let frame = Frame::from_normal(axis);
         let looks = (0..LOOKS).map(|i| {
             // Evenly spread over the cone: Fibonacci's lattice.
-            let u = DVec2::new((f64::from(i) + 0.5) / f64::from(LOOKS), (f64::from(i) * 0.618_033_988_749_895).fract());
+            let u = DVec2::new((f64::from(i) + 0.5) / f64::from(LOOKS), (f64::from(i) * GOLDEN).fract());
             let ray = Ray::new(position, frame.to_world(uniform_cone(u, spread)));
             self.closest(&ray, f64::INFINITY).map_or(f64::INFINITY, |hit| hit.t)
         });
         let nearest = looks.fold(f64::INFINITY, f64::min);
         let distance = if nearest.is_finite() { nearest } else { (self.center - position).length().max(self.radius) };
         power / (2.0 * PI * spread * distance * distance) / PI
+    }
+}
+
+/// Where a lamp without extent sends its light.
+struct Cone {
+    position: DVec3,
+    axis: DVec3,
+    /// 1 − cos of the half angle.
+    spread: f64,
+}
+
+impl Cone {
+    fn of(light: &Light) -> Option<Cone> {
+        let (position, axis, spread) = match light {
+            Light::Point { position, .. } => (*position, DVec3::Z, 2.0),
+            Light::Spot { position, axis, cutoff, .. } => (*position, *axis, 1.0 - libm::cos(*cutoff)),
+            Light::Projector(projector) => {
+                let cone = projector.cone();
+                (cone.apex, cone.axis, 1.0 - libm::cos(cone.half_angle))
+            }
+            _ => return None,
+        };
+        Some(Cone { position, axis, spread })
     }
 }
 

@@ -358,10 +358,15 @@ impl Choice {
         }
     }
 
+    /// What the `k`th light from infinity may give, of `all`.
+    fn share_of_distant(&self, k: u32, asking: &Asking, all: f32) -> f64 {
+        f64::from(self.distant[k as usize].weigh(asking)) / f64::from(all)
+    }
+
     /// The probability of [`Choice::choose`] for a light.
     fn probability(&self, asking: &Asking, root: &Root, light: u32) -> f64 {
         let (mut node, mut lane) = match self.places[light as usize] {
-            Place::Distant(k) => return f64::from(self.distant[k as usize].weigh(asking)) / f64::from(root.sum),
+            Place::Distant(k) => return self.share_of_distant(k, asking, root.sum),
             Place::Child { node, lane } => (node, lane),
         };
         let mut probability = 1.0 / f64::from(root.sum);
@@ -409,6 +414,11 @@ fn parting(group: &mut [(u32, Extent)]) -> usize {
     let (_, axis, at) = best;
     group.sort_unstable_by(by(axis));
     at
+}
+
+/// The probability of a light that by power alone has one of `alone`, and at a point one of `there`.
+fn mixed(alone: f64, there: f64) -> f64 {
+    BY_POWER * alone + (1.0 - BY_POWER) * there
 }
 
 impl Distant {
@@ -524,7 +534,7 @@ impl Scene {
         let root = choice.root(&asking);
         *judged = root.as_ref().map_or(0.0, |root| root.sum);
         let Some(root) = root else { return self.choose_light(u) };
-        let mixed = |i: usize, there: f64| BY_POWER * self.light_probability(i) + (1.0 - BY_POWER) * there;
+        let mixed = |i: usize, there: f64| mixed(self.light_probability(i), there);
         if u < BY_POWER {
             let (i, _) = self.choose_light(u / BY_POWER)?;
             return Some((i, mixed(i, choice.probability(&asking, &root, i as u32))));
@@ -539,16 +549,14 @@ impl Scene {
         let alone = self.light_probability(i);
         let Some(choice) = &self.choice else { return alone };
         let asking = choice.asking(point, normal);
-        if let Place::Distant(k) = choice.places[i]
-            && judged > 0.0
-        {
-            let there = f64::from(choice.distant[k as usize].weigh(&asking)) / f64::from(judged);
-            return BY_POWER * alone + (1.0 - BY_POWER) * there;
-        }
-        match choice.root(&asking) {
-            Some(root) => BY_POWER * alone + (1.0 - BY_POWER) * choice.probability(&asking, &root, i as u32),
-            None => alone,
-        }
+        let there = match choice.places[i] {
+            Place::Distant(k) if judged > 0.0 => choice.share_of_distant(k, &asking, judged),
+            _ => match choice.root(&asking) {
+                Some(root) => choice.probability(&asking, &root, i as u32),
+                None => return alone,
+            },
+        };
+        mixed(alone, there)
     }
 }
 

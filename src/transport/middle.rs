@@ -9,7 +9,7 @@ use crate::math::Ray;
 use crate::scene::compound::Vertex;
 use crate::scene::material::Kind;
 use crate::scene::{Geometry, Hit, Scene, SurfacePoint};
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 
 /// A datum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,18 +112,13 @@ fn moved(scene: &Scene, next: &Scene, hit: &Hit, point: DVec3) -> DVec3 {
     else {
         return point;
     };
+    let carried = |from: DAffine3, to: DAffine3| to.transform_point3(from.inverse().transform_point3(local));
     let local = match (&before.geometry, &after.geometry) {
-        (Geometry::Shape(before), Geometry::Shape(after)) => {
-            let own = before.placement().inverse().transform_point3(local);
-            after.placement().transform_point3(own)
-        }
+        (Geometry::Shape(before), Geometry::Shape(after)) => carried(before.placement(), after.placement()),
         (Geometry::Mesh(_), Geometry::Mesh(after)) if (hit.part as usize) < after.mesh.triangles.len() => {
             after.mesh.surface(hit.part, hit.barycentric[0], hit.barycentric[1]).point
         }
-        (Geometry::Sdf(before), Geometry::Sdf(after)) => {
-            let own = before.placement().inverse().transform_point3(local);
-            after.placement().transform_point3(own)
-        }
+        (Geometry::Sdf(before), Geometry::Sdf(after)) => carried(before.placement(), after.placement()),
         (Geometry::Curves(before), Geometry::Curves(after)) => {
             before.carried(after, hit.part, hit.barycentric[0], local).unwrap_or(local)
         }

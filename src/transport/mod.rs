@@ -22,7 +22,7 @@ pub mod whitted;
 use crate::film::accumulate::REPLICATES;
 use crate::film::filter::FilterSampler;
 use crate::math::Ray;
-use crate::math::sampler::{Octet, Sampler, Set, pairs};
+use crate::math::sampler::{GOLDEN, Octet, Sampler, Set, pairs};
 use crate::scene::Scene;
 use crate::scene::watch::{self, Counts};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, Spectrum, observer};
@@ -100,6 +100,13 @@ struct Address {
     index: u32,
 }
 
+impl Address {
+    /// Its number among all samples of the pixel, of whose replicates one comes after the other.
+    fn in_turn(self) -> u32 {
+        self.index * REPLICATES as u32 + self.replicate
+    }
+}
+
 /// Which of `moments` a sample sees, by the number of it that is spread evenly together with its place and wavelengths.
 #[must_use]
 pub fn moment(seed: u64, pixel: [u32; 2], replicate: u32, index: u32, moments: usize) -> usize {
@@ -143,7 +150,7 @@ impl Begun {
             // A regular grid, the same for every pixel. The wavelengths of all samples together make one
             // lattice: a step of the lanes' own distance over their number.
             let n = settings.grid;
-            let s = at.index * REPLICATES as u32 + at.replicate;
+            let s = at.in_turn();
             let cell = s % (n * n);
             let offset = DVec2::new(f64::from(cell % n) + 0.5, f64::from(cell / n) + 0.5) / f64::from(n);
             let nodes = f64::from(settings.samples()) * LANES as f64;
@@ -375,12 +382,9 @@ impl Samples {
 ///
 /// A ray of [`Integrator::Whitted`] is parted there and draws none: its samples, each in turn, stand for the parts.
 fn deciding(shot: &Shot, sampler: &Sampler, at: Address, crossing: u32) -> f64 {
-    /// The fraction of the golden ratio, of which multiples are spread evenly.
-    const GOLDEN: f64 = 0.618_033_988_749_894_9;
     match &shot.plan.integrator {
         Integrator::Whitted(settings) => {
-            let s = at.index * REPLICATES as u32 + at.replicate;
-            let place = (f64::from(s) + 0.5) / f64::from(settings.samples());
+            let place = (f64::from(at.in_turn()) + 0.5) / f64::from(settings.samples());
             (place + GOLDEN * f64::from(crossing)).fract()
         }
         _ => sampler.set(Set::Extra(crossing << 16))[2],

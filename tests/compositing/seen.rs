@@ -1,5 +1,6 @@
 //! What layers say of what is seen, in closed form: where it moves, which surface it is, in which colours.
 
+use super::common::ball_of_distances;
 use super::{FRAME, common, plane, render};
 use abbe::batch::{self, Overrides};
 use abbe::film::exr::{ExrPart, read_exr};
@@ -52,20 +53,6 @@ fn the_sky_moves_with_the_camera_alone() {
         let expected = -SCALE * 0.06;
         assert!((sky / expected - 1.0).abs() < 1e-3, "{sky} {expected}");
     }
-}
-
-/// The ball of distances of Mitsuba's VOL, radius 0.4 about the middle of the unit cube.
-fn ball_of_distances() -> Vec<u8> {
-    let mut bytes = b"VOL\x03".to_vec();
-    bytes.extend(1i32.to_le_bytes());
-    [9i32, 9, 9, 1].iter().for_each(|n| bytes.extend(n.to_le_bytes()));
-    [0f32, 0.0, 0.0, 1.0, 1.0, 1.0].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
-    for i in 0..729 {
-        let p = [i % 9, i / 9 % 9, i / 81].map(|k| f64::from(k) / 8.0 - 0.5);
-        let distance = p.iter().map(|x| x * x).sum::<f64>().sqrt() - 0.4;
-        bytes.extend((distance as f32).to_le_bytes());
-    }
-    bytes
 }
 
 /// Curves and grids of distances that turn by 10° about the line of sight and are moved: each point they show is carried

@@ -3,7 +3,7 @@
 //! In the texts below `P(x, y, z)` is a point, `L(x)` a length, `I(x)` one over a length and `S(x)` a length squared; the
 //! rest has no unit of length.
 
-use crate::common::{Bench, bench_with, grey_png};
+use crate::common::{Bench, ball_of_distances, bench_with, grey_png};
 use crate::meshes::icosphere;
 use abbe::film::accumulate::Film;
 
@@ -161,24 +161,6 @@ fn subjects() -> Vec<Subject> {
             ),
         ),
     ]
-}
-
-/// A sphere as signed distances on 9³ points over the unit cube: Mitsuba's VOL, version 3, f32.
-fn ball_of_distances() -> Vec<u8> {
-    let mut bytes = b"VOL\x03".to_vec();
-    bytes.extend(1i32.to_le_bytes());
-    [9i32, 9, 9, 1].iter().for_each(|n| bytes.extend(n.to_le_bytes()));
-    [0f32, 0.0, 0.0, 1.0, 1.0, 1.0].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
-    for z in 0..9 {
-        for y in 0..9 {
-            for x in 0..9 {
-                let p = [x, y, z].map(|k| f64::from(k) / 8.0 - 0.5);
-                let distance = p.iter().map(|x| x * x).sum::<f64>().sqrt() - 0.4;
-                bytes.extend((distance as f32).to_le_bytes());
-            }
-        }
-    }
-    bytes
 }
 
 fn bench(subject: &Subject, frame: Frame) -> Bench {

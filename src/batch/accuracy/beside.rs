@@ -5,9 +5,10 @@
 
 use super::desk::{Outcome, Pass};
 use super::figures::Reference;
+use crate::batch::part::SplatFilm;
 use crate::batch::{Overrides, part_file};
 use crate::error::{Error, Result};
-use crate::film::resolve::{self, Splats};
+use crate::film::resolve;
 use crate::spectrum::ColourSpace;
 use std::path::Path;
 use std::process::Command;
@@ -75,7 +76,7 @@ fn read(part: &Path, reference: Option<&Reference>) -> Result<Outcome> {
     let (mut film, mut splats) = written.empty(written.header.finish.window)?;
     written.add_to(&mut film, splats.as_mut())?;
     let space = ColourSpace::Rec709.matrix_from_xyz();
-    let lights = || splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
+    let lights = || splats.as_ref().map(SplatFilm::splats);
     let replicates = resolve::replicates(&film, lights(), &space);
     let noise = reference.map_or(Vec::new(), |reference| reference.noise_of(&replicates));
     let passes = vec![Pass { samples: written.header.finish.samples, seconds: written.header.seconds, noise }];

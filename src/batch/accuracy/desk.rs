@@ -4,11 +4,11 @@ use super::figures::{Reference, Replicates};
 use super::knobs::{self, Trial, Way};
 use super::{FEWEST, REFERENCE, Settings};
 use crate::batch::frame::{FrameJob, pass_end};
-use crate::batch::part::{Part, Share};
+use crate::batch::part::{Part, Share, SplatFilm};
 use crate::batch::{self, BatchEntry, Overrides, Prepared, prepare_scene};
 use crate::error::{Error, Result};
 use crate::film::filter::FilterSampler;
-use crate::film::resolve::{self, Image, Splats};
+use crate::film::resolve::{self, Image};
 use crate::scene::Scene;
 use crate::scene::shelf::Shelf;
 use crate::spectrum::Carried;
@@ -129,7 +129,7 @@ impl<'a> Desk<'a> {
         let replicates = || {
             let of = |part: &Part| {
                 part.look(|film, splats| {
-                    let splats = splats.map(|s| Splats { film: &s.film, photons: s.paths });
+                    let splats = splats.map(SplatFilm::splats);
                     resolve::replicates(film, splats, &space)
                 })
             };
@@ -153,7 +153,7 @@ impl<'a> Desk<'a> {
         let replicates = replicates();
         let image = |part: &Part| {
             part.look(|film, splats| {
-                let splats = splats.map(|s| Splats { film: &s.film, photons: s.paths });
+                let splats = splats.map(SplatFilm::splats);
                 resolve::resolve(film, splats, &space)
             })
         };

@@ -3,6 +3,7 @@
 use super::{Breaks, Part};
 use crate::batch::frame::{FrameJob, light_unit, lock};
 use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES};
+use crate::film::resolve::Splats;
 use crate::spectrum::SampledWavelengths;
 use crate::transport;
 use crate::transport::light::{Bounds, LightPaths, Splat};
@@ -21,6 +22,14 @@ pub struct SplatFilm {
     pub film: Film,
     /// Paths that began in each replicate.
     pub paths: [u64; REPLICATES],
+}
+
+impl SplatFilm {
+    /// As a picture is made of them.
+    #[must_use]
+    pub fn splats(&self) -> Splats<'_> {
+        Splats { film: &self.film, photons: self.paths }
+    }
 }
 
 /// Paths of one work unit from the lights: some milliseconds, so that threads end together where a sample has few.

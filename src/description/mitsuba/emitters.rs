@@ -4,15 +4,13 @@ use glam::{DMat3, DMat4, DVec3};
 
 use super::super::fault::Fault;
 use super::super::node::Node;
+use super::super::transform::is_similarity;
 use super::object::{Bag, Family};
 use super::sensors::field_of_view;
 use super::spectra::Role;
 use super::{DAYLIGHT, Fields, Import, entry, list, matrix, number, numbers, text};
 
 const EMITTERS: [&str; 6] = ["point", "constant", "envmap", "spot", "directional", "projector"];
-
-/// How far from equal and perpendicular axes may come out: numbers of six digits, as in shapes.
-const SIMILAR: f64 = 3e-6;
 
 /// Emitters that are a part of a shape.
 const SHINING: [&str; 2] = ["area", "directionalarea"];
@@ -167,16 +165,9 @@ fn weight(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Whether the axes of a transform are perpendicular and as long as `length`.
-fn are_even(linear: DMat3, length: f64) -> bool {
-    let gram = linear.transpose() * linear * length.powi(-2);
-    (gram - DMat3::IDENTITY).to_cols_array().iter().all(|x| x.abs() <= SIMILAR)
-}
-
 /// That a transform leaves a cone round, and its angle what it is.
 fn round(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
-    let linear = DMat3::from_mat4(to_world);
-    if are_even(linear, linear.z_axis.length()) {
+    if is_similarity(DMat3::from_mat4(to_world)) {
         return Ok(());
     }
     Err(bag.fault_of("to_world", "expected turns, moves, mirrors and even scaling, found another transform"))
@@ -185,7 +176,10 @@ fn round(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
 /// That a transform moves and turns what throws a picture.
 fn rigid(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
     let linear = DMat3::from_mat4(to_world);
-    if are_even(linear, 1.0) && linear.determinant() > 0.0 {
+    let gram = linear.transpose() * linear;
+    // Numbers of six digits, as in shapes.
+    let off = (gram - DMat3::IDENTITY).to_cols_array().into_iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    if off <= 3e-6 && linear.determinant() > 0.0 {
         return Ok(());
     }
     Err(bag.fault_of("to_world", "expected turns and moves, found a transform that scales, shears or mirrors"))

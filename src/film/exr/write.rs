@@ -286,11 +286,12 @@ fn compressor_header(image: &ExrImage, channels: &[Channel], compression: Compre
 /// What the colours of a part mean, those of the picture itself where they are in it: X, Y and Z say it by their names.
 fn encoding(image: &ExrImage, part: &Part) -> Option<ColourEncoding> {
     let rgb = image.colour.as_ref().filter(|_| part.light)?;
-    let light = || part.channels.iter().map(|(name, _)| *name).filter(|name| !image.data.contains(*name));
-    let component = |name: &str| name.rsplit('.').next().filter(|c| *c != "A").map(str::to_owned);
-    let own = light().filter(|name| !name.contains('.')).find_map(component);
-    match own.or_else(|| light().find_map(component)).as_deref() {
-        Some("X" | "Y" | "Z") => Some(ColourEncoding::of(ColourSpace::Xyz)),
+    let colours = || {
+        let light = part.channels.iter().map(|(name, _)| *name).filter(|name| !image.data.contains(*name));
+        light.map(|name| name.rsplit_once('.').map_or((true, name), |(_, c)| (false, c))).filter(|(_, c)| *c != "A")
+    };
+    match colours().find(|(own, _)| *own).or_else(|| colours().next()) {
+        Some((_, "X" | "Y" | "Z")) => Some(ColourEncoding::of(ColourSpace::Xyz)),
         _ => Some(rgb.clone()),
     }
 }

@@ -126,8 +126,13 @@ impl PiecewiseConstant2d {
     /// A cell, and numbers uniform in [0, 1] within it.
     #[inline]
     pub(super) fn sample_cell(&self, u: DVec2) -> Option<Cell> {
-        let (row, y) = self.marginal.find(0, u.y)?;
-        let (column, x) = self.rows.find(row, u.x)?;
+        self.cell_of_row(self.marginal.find(0, u.y)?, u.x)
+    }
+
+    /// The cell of a row, and how far down in it a point is, that is found by `u`.
+    #[inline]
+    fn cell_of_row(&self, (row, y): (usize, f64), u: f64) -> Option<Cell> {
+        let (column, x) = self.rows.find(row, u)?;
         Some(Cell { row, column, within: DVec2::new(x, y) })
     }
 
@@ -148,10 +153,7 @@ impl PiecewiseConstant2d {
         }
         let mut cells = [const { None }; N];
         for ((cell, row), u) in cells.iter_mut().zip(rows).zip(us) {
-            *cell = row.and_then(|(row, y)| {
-                let (column, x) = self.rows.find(row, u.x)?;
-                Some(Cell { row, column, within: DVec2::new(x, y) })
-            });
+            *cell = row.and_then(|row| self.cell_of_row(row, u.x));
         }
         cells
     }
