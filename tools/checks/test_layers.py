@@ -32,7 +32,7 @@ def test_layers_are_read_and_add_up(render, precision):
         assert all(part.dtype == light for part in parts)
         total = sum(part.astype(np.float64) for part in parts)
         # A half is off by half a unit in the last of its 11 bits, 2^-11 of it at most; floats by sixteen roundings of
-        # the colours on their way (tests/compositing.rs). The smallest step of a half is 2^-24.
+        # the colours on their way (tests/compositing). The smallest step of a half is 2^-24.
         size = sum(np.abs(part.astype(np.float64)) for part in parts) + np.abs(channels[c].astype(np.float64))
         colours = sum(np.abs(channels[k].astype(np.float64)) for k in "RGB")
         bound = size * 2.0**-11 + 7 * 2.0**-25 if precision == "half" else 0
