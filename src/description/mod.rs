@@ -57,8 +57,9 @@
 //!                                   # hide_emitters: lights that the camera sees itself are left out;
 //!                                   # light_samples, scatter_samples: each sample follows as many whole paths as the
 //!                                   # greater says; 0: without shadow rays, or without light met by scattering
-//!                                   # delta_caustics: mirrors and glass throw the light of points, spots, projectors and
-//!                                   # directional lights, too, which path tracers do not meet (false in Mitsuba's XML)
+//!                                   # delta_caustics: mirrors, glass and the coats of plastics throw the light of points, spots,
+//!                                   # projectors and directional lights, too, which path tracers do not meet (false in
+//!                                   # Mitsuba's XML)
 //! layers:                           # further channels of the OpenEXR file, each name.COMPONENT; default none
 //! - {name: nn, surface: shading_normal}         # of the first surface: depth (T), position (X, Y, Z), uv (U, V),
 //!                                   # geometric_normal, shading_normal, dp_du, dp_dv (X, Y, Z), duv_dx, duv_dy (U, V),

@@ -64,8 +64,8 @@ pub struct PathIntegrator {
     /// it are seen in spite of `hide_emitters`; default false.
     #[serde(default)]
     pub count_crossings: bool,
-    /// Whether mirrors and glass throw the light of point, spot, projector and directional lights, too, which no path from the
-    /// camera can find by chance; default true.
+    /// Whether mirrors, glass and the coats of plastics throw the light of point, spot, projector and directional lights, too, which
+    /// no path from the camera can find by chance; default true.
     #[serde(default = "yes")]
     pub delta_caustics: bool,
 }

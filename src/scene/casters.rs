@@ -53,6 +53,8 @@ pub struct Casters {
     pub endless: Vec<String>,
     /// For each object of the scene, whether it is one of those.
     pub unending: Vec<bool>,
+    /// Whether any of them throws light in single directions.
+    pub single: bool,
 }
 
 /// Balls at the most: what is near to each other shares one beyond.
@@ -83,6 +85,17 @@ fn is_sharp(material: &Material) -> bool {
     leaves.iter().any(sharp) && leaves.iter().all(|m| sharp(m) || matches!(m.kind, Kind::Boundary))
 }
 
+/// Whether a material throws light in single directions, as mirrors, smooth glass and the coats of plastics do, be it a part of
+/// what comes.
+fn is_single(material: &Material) -> bool {
+    material.leaves().iter().any(|m| match &m.kind {
+        Kind::Mirror { .. } | Kind::Thin { .. } => true,
+        Kind::Conductor { facets, .. } | Kind::Dielectric { facets, .. } => facets.is_none(),
+        Kind::Plastic { coat, .. } => coat.facets.is_none(),
+        _ => false,
+    })
+}
+
 /// Whether an index of a material depends on wavelength.
 fn is_dispersive(material: &Material) -> bool {
     material.leaves().iter().any(|m| match &m.kind {
@@ -106,12 +119,35 @@ pub fn one_way(scene: &Scene) -> Option<&Object> {
 }
 
 impl Casters {
-    /// Finds them.
+    /// Those that only mirror and refract.
     #[must_use]
     pub fn of(scene: &Scene) -> Casters {
-        let sharp = |i: usize| is_sharp(&scene.materials[scene.objects[i].material as usize]);
+        Casters::made_of(scene, is_sharp)
+    }
+
+    /// Those that mirror or refract in single directions a part of what comes, and scatter the rest.
+    #[must_use]
+    pub fn in_part(scene: &Scene) -> Casters {
+        Casters::made_of(scene, |material| is_single(material) && !is_sharp(material))
+    }
+
+    /// None.
+    #[must_use]
+    pub fn none(scene: &Scene) -> Casters {
         let none = vec![false; scene.objects.len()];
-        let mut casters = Casters { casts: none.clone(), unending: none, ..Casters::default() };
+        Casters { casts: none.clone(), unending: none, ..Casters::default() }
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.balls.is_empty() && self.endless.is_empty()
+    }
+
+    fn made_of(scene: &Scene, is_wanted: impl Fn(&Material) -> bool) -> Casters {
+        let material = |i: usize| &scene.materials[scene.objects[i].material as usize];
+        let sharp = |i: usize| is_wanted(material(i));
+        let mut casters = Casters::none(scene);
         for (i, object) in scene.objects.iter().enumerate() {
             let (casts, children) = match &object.geometry {
                 Geometry::Instance(instance) => {
@@ -129,8 +165,8 @@ impl Casters {
             for child in children {
                 casters.casts[child] = sharp(child);
                 casters.unending[child] = sharp(child) && ball.is_none();
-                let material = &scene.materials[scene.objects[child].material as usize];
-                casters.parts |= sharp(child) && is_dispersive(material);
+                casters.parts |= sharp(child) && is_dispersive(material(child));
+                casters.single |= sharp(child) && is_single(material(child));
             }
             match ball {
                 Some(ball) => {

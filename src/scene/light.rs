@@ -6,7 +6,7 @@ use super::projector::Projector;
 use super::shape::{Shape, TowardSample};
 use super::texture::{Texture, TexturePoint};
 use super::{Geometry, Hit, Object, SurfacePoint};
-use crate::math::Departure;
+use crate::math::{Departure, Ray};
 use crate::math::frame::Frame;
 use crate::math::warp;
 use crate::spectrum::observer::tristimulus;
@@ -109,6 +109,16 @@ pub struct Arriving {
     pub target: Option<Departure>,
 }
 
+/// How far a `ray` that left a surface at `point` has to be free toward a light at `distance` from the point. The ray begins a
+/// little nearer, and what is behind a lamp without extent does not hide it; one that has a `target` ends there.
+#[must_use]
+pub fn free(distance: f64, target: Option<Departure>, point: DVec3, ray: &Ray) -> f64 {
+    match target {
+        None if distance.is_finite() => distance - (ray.origin - point).length(),
+        _ => distance,
+    }
+}
+
 /// How spot light falls off between beam and cutoff, as a factor in [0, 1].
 #[must_use]
 pub fn spot_falloff(cos: f64, beam: f64, cutoff: f64) -> f64 {
@@ -160,6 +170,12 @@ impl Light {
     #[must_use]
     pub fn is_environment(&self) -> bool {
         matches!(self, Light::Constant { .. } | Light::Environment(_))
+    }
+
+    /// Whether a ray may meet it: lamps without extent are met by none.
+    #[must_use]
+    pub fn may_be_met(&self) -> bool {
+        self.is_environment() || matches!(self, Light::Area { .. })
     }
 
     /// Radiance seen along `direction` by a ray that meets nothing.

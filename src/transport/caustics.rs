@@ -4,6 +4,9 @@
 //! and refracts in single directions or nearly so, and its vertex next to the camera is not and scatters over a density: in
 //! Heckbert's notation L S (D|S)* D E. The path tracer finds such light only by chance, and of a lamp without extent
 //! never; so it leaves the class out, and paths from the lights, which connect to the camera at every vertex, add it.
+//! Of lamps without extent the class is wider, by all that no path from the camera finds: their light may be thrown in single
+//! directions by what scatters, too, as by the coats of plastics and blends with mirrors, and the vertex next to the camera may be
+//! on a narrow gloss if all before it were sharp.
 //! Every path of light belongs to one of the two, so nothing is lost and nothing counted twice, and no weights are
 //! needed.
 //!
@@ -26,7 +29,9 @@ use std::f64::consts::{PI, TAU};
 pub struct Caustics {
     /// For each object, whether it is sharp.
     pub casts: Vec<bool>,
-    /// For each object, whether it is sharp and has no end.
+    /// For each object, whether it throws light of lamps without extent in single directions and scatters the rest.
+    pub in_part: Vec<bool>,
+    /// For each object, whether it is one of those and has no end.
     pub unending: Vec<bool>,
     /// For each light, whether its part of the class is traced from it.
     pub traced: Vec<bool>,
@@ -243,11 +248,12 @@ impl Caustics {
         ((samples as f64 * self.ratio).round() as u64).max(1)
     }
 
-    /// Whether a path that is aimed at `target` counts where `object` is what it meets first.
+    /// Whether a path that is aimed at `target` counts where `object` is what it meets first, from a lamp `without_extent` or
+    /// another.
     #[must_use]
-    pub fn begins_at(&self, target: Target, object: u32) -> bool {
+    pub fn begins_at(&self, target: Target, object: u32, without_extent: bool) -> bool {
         let unending = self.unending[object as usize];
-        self.is_sharp(object)
+        (self.is_sharp(object) || without_extent && self.in_part[object as usize])
             && match target {
                 Target::Ball(_) => !unending,
                 Target::Endless => unending,

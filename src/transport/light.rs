@@ -24,6 +24,7 @@ use crate::math::sampler::{Sampler, Set, pairs};
 use crate::optics::bsdf::{Bsdf, BsdfSample, Chosen};
 use crate::scene::camera::Entry;
 use crate::scene::compound::{Compound, Leaf, below};
+use crate::scene::light::free;
 use crate::scene::material::Kind;
 use crate::scene::nested::{Bodies, Crossing as Meeting};
 use crate::scene::{Hit, Inside, Medium, Scene, SurfacePoint};
@@ -103,6 +104,8 @@ pub struct Traced {
     pub began: Option<(usize, DVec2)>,
     /// Its wavelengths.
     pub wavelengths: Option<SampledWavelengths>,
+    /// Whether no path from the camera could be the same: a lamp without extent, and what throws its light in a single direction.
+    pub unfound: bool,
 }
 
 /// Follows path `index` of `replicate` and hands each of its splats within the bounds to `splat`.
@@ -120,13 +123,14 @@ pub fn trace(
     let (u_point, u_direction) = pairs(sampler.set(Set::Extra(0)));
     let wavelengths = scene.wavelengths.sample(paths.wavelength.map_or(u_time.x, |cell| cell.at(u_time.x)));
     let mut traced = Traced { wavelengths: Some(wavelengths), ..Traced::default() };
-    let (mut target, mut group) = (Target::Own, 0);
+    let (mut target, mut group, mut without_extent) = (Target::Own, 0, false);
     let emission = match paths.caustics {
         None => scene.emit(u_choice.x, u_point, u_direction, wavelengths.nm),
         Some(caustics) => caustics.begin(scene, u_choice.x, u_point, u_direction, wavelengths.nm).map(|aimed| {
             traced.began = Some((aimed.source, aimed.cell));
             target = aimed.target;
-            group = scene.light_groups.of[caustics.sources[aimed.source].light as usize];
+            let light = caustics.sources[aimed.source].light as usize;
+            (group, without_extent) = (scene.light_groups.of[light], !scene.lights[light].may_be_met());
             aimed.emission
         }),
     };
@@ -144,6 +148,8 @@ pub fn trace(
         photons,
         target,
         group,
+        without_extent,
+        unfound: false,
         rays: 0,
         ahead: None,
     };
@@ -158,8 +164,9 @@ pub fn trace(
         bodies: if paths.plan.nested { scene.bodies_around(&emission.ray) } else { Bodies::NONE },
         vertex: 0,
         crossings: 0,
+        unfound: false,
     });
-    traced.rays = walk.rays;
+    (traced.rays, traced.unfound) = (walk.rays, walk.unfound);
     traced
 }
 
@@ -173,8 +180,20 @@ pub(super) fn seen_in_sharp(
 ) -> Option<Photon<Together>> {
     let mut seen = Photons::default();
     let splat = &mut |_: &SampledWavelengths, _| {};
-    let (start, target, photons) = (1.0, Target::Own, Some(&mut seen));
-    let mut walk = Walk { paths, sampler, wavelengths, start, splat, photons, target, group: 0, rays: 0, ahead: None };
+    let mut walk = Walk {
+        paths,
+        sampler,
+        wavelengths,
+        start: 1.0,
+        splat,
+        photons: Some(&mut seen),
+        target: Target::Own,
+        group: 0,
+        without_extent: false,
+        unfound: false,
+        rays: 0,
+        ahead: None,
+    };
     let ray = if walk.hides_lamps() { past_lamps(paths.scene, ray) } else { *ray };
     walk.follow(Beam {
         ray,
@@ -187,6 +206,7 @@ pub(super) fn seen_in_sharp(
         bodies: paths.scene.camera_inside.bodies,
         vertex: 0,
         crossings: 0,
+        unfound: false,
     });
     seen.iter().next()
 }
@@ -224,6 +244,8 @@ struct Beam {
     vertex: u32,
     /// What it went straight through so far, if that counts.
     crossings: u32,
+    /// Whether no path from the camera that collects photons on the way could be the same.
+    unfound: bool,
 }
 
 impl Beam {
@@ -268,6 +290,10 @@ struct Walk<'a, 'b> {
     target: Target,
     /// The group of the lamp.
     group: u8,
+    /// Whether the lamp has no extent.
+    without_extent: bool,
+    /// As [`Traced::unfound`].
+    unfound: bool,
     rays: u32,
     /// What the beam that is to be followed meets next, where that is known.
     ahead: Option<Hit>,
@@ -339,7 +365,9 @@ impl<'a> Walk<'a, '_> {
             };
             let object = &scene.objects[hit.object as usize];
             let sharp = caustics.is_some_and(|c| c.is_sharp(hit.object));
-            if vertex == 0 && caustics.is_some_and(|c| !c.begins_at(self.target, hit.object)) {
+            // What else is next to a lamp without extent counts as far as it throws light in a single direction.
+            let in_part = vertex == 0 && caustics.is_some() && !sharp;
+            if vertex == 0 && caustics.is_some_and(|c| !c.begins_at(self.target, hit.object, self.without_extent)) {
                 return;
             }
             let (material, part_of) = match &part {
@@ -367,9 +395,12 @@ impl<'a> Walk<'a, '_> {
             {
                 return;
             }
-            if !bsdf.is_discrete() && !sharp {
+            if !bsdf.is_discrete() && !in_part && (!sharp || beam.unfound) {
                 self.connect(&beam, &bsdf, &at, &view, u_lens);
-                self.leave_photon(&Beam { power: beam.power * view.shadowing, ..beam }, &surface);
+                if !sharp {
+                    self.leave_photon(&Beam { power: beam.power * view.shadowing, ..beam }, &surface);
+                    beam.unfound = false;
+                }
                 if !self.goes_on(&mut beam) {
                     return;
                 }
@@ -383,6 +414,7 @@ impl<'a> Walk<'a, '_> {
                 && !beam.chosen
                 && glass.parts()
             {
+                self.throw(&mut beam);
                 // Each wavelength decides for itself with the same random numbers: none leads.
                 beam.power *= LANES as f32 / beam.rho.reduce_add();
                 beam.rho = Lanes::ONE;
@@ -400,9 +432,21 @@ impl<'a> Walk<'a, '_> {
                 return;
             }
             let Some((sample, view)) = self.sample(&bsdf, &at, &view, vertex, u_lobe, u_scatter) else { return };
+            match sample.chosen {
+                Chosen::Discrete => self.throw(&mut beam),
+                Chosen::Density(_) if in_part => return,
+                Chosen::Density(_) => {}
+            }
             if !self.cross(&mut beam, &sample, &at, &view, u_roulette) {
                 return;
             }
+        }
+    }
+
+    /// Notes that a beam is thrown in a single direction.
+    fn throw(&mut self, beam: &mut Beam) {
+        if beam.vertex == 0 && self.without_extent {
+            (beam.unfound, self.unfound) = (true, true);
         }
     }
 
@@ -610,7 +654,8 @@ impl<'a> Walk<'a, '_> {
         let inside = if came * went < 0.0 { scene.beyond(object, at.surface, entry.direction, before) } else { before };
         let ray = scene.leave(at.surface, at.hit, entry.direction);
         let light = f * (view.shadowing * (cosines * entry.density) as f32);
-        self.send(beam, at.surface.point, &ray, inside, &entry, light);
+        let distance = free(entry.distance, None, at.surface.point, &ray);
+        self.send(beam, at.surface.point, &ray, inside, &Entry { distance, ..entry }, light);
     }
 
     /// Light that a point of a medium sends into the camera.

@@ -25,7 +25,7 @@ use glam::DVec2;
 use rounds::Round;
 use seen::Seen;
 use std::sync::Arc;
-use words::{say, some, technique};
+use words::{say, technique};
 
 /// Whether a technique is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -101,12 +101,16 @@ pub fn decide(
     if wishes.light_tracing == Use::Off {
         return left_off("the scene says so");
     }
-    if filter.leaves_gaps() && wishes.light_tracing == Use::Auto {
-        return left_off("the filter leaves gaps between pixels: little of what comes to the picture would be in any");
-    }
     let casters = Casters::of(scene);
-    if casters.balls.is_empty() && casters.endless.is_empty() {
+    let without_extent = settings.delta_caustics && scene.lights.iter().any(|light| !light.may_be_met());
+    let in_part = if without_extent { Casters::in_part(scene) } else { Casters::none(scene) };
+    if casters.is_empty() && in_part.is_empty() {
         return left_off("nothing mirrors or refracts sharply");
+    }
+    // What no path from the camera finds is worth its noise.
+    let unfound = without_extent && (casters.single || in_part.single);
+    if filter.leaves_gaps() && wishes.light_tracing == Use::Auto && !unfound {
+        return left_off("the filter leaves gaps between pixels: little of what comes to the picture would be in any");
     }
     if let Some(curve) = casters::one_way(scene) {
         let name = &curve.name;
@@ -126,8 +130,7 @@ pub fn decide(
     if plan.layers.layers.iter().any(|layer| matches!(layer.source, Channel::Light(..))) {
         return left_off("layers of light are measured path by path from the camera");
     }
-    let wanted =
-        |light: &Light| settings.delta_caustics || light.is_environment() || matches!(light, Light::Area { .. });
+    let wanted = |light: &Light| settings.delta_caustics || light.may_be_met();
     let traced: Vec<bool> =
         scene.lights.iter().enumerate().map(|(i, l)| wanted(l) && is_small(scene, i, &casters)).collect();
     if !traced.contains(&true) {
@@ -137,12 +140,14 @@ pub fn decide(
             "no light that a path from the camera can meet is small or has a sun"
         });
     }
-    let caustics = Caustics::untrained(scene, &casters, traced, wishes.packets != Use::Off && casters.parts);
+    let packets = wishes.packets != Use::Off && (casters.parts || in_part.parts);
+    let caustics = Caustics::untrained(scene, &casters, &in_part, traced, packets);
     if caustics.sources.is_empty() {
-        let name = casters.endless.first().map_or("", String::as_str);
+        let name = casters.endless.iter().chain(&in_part.endless).next().map_or("", String::as_str);
         return left_off(&format!("light from infinity cannot be aimed at what has no end: {name}"));
     }
-    run(&Trial { scene, plan, settings, filter, seed, samples, wishes, casters: &casters }, caustics)
+    let (casters, in_part) = (&casters, &in_part);
+    run(&Trial { scene, plan, settings, filter, seed, samples, wishes, casters, in_part }, caustics)
 }
 
 /// What a decision rests on.
@@ -156,6 +161,8 @@ struct Trial<'a> {
     samples: u32,
     wishes: Wishes,
     casters: &'a Casters,
+    /// What throws light of lamps without extent alone.
+    in_part: &'a Casters,
 }
 
 impl Trial<'_> {
@@ -187,11 +194,7 @@ fn average(values: &[(usize, f64)], weights: &[f64]) -> f64 {
 
 /// Whether a light that is traced has no extent, so that no path from the camera can find it by chance.
 fn endless_odds(scene: &Scene, caustics: &Caustics) -> bool {
-    scene
-        .lights
-        .iter()
-        .zip(&caustics.traced)
-        .any(|(light, traced)| *traced && !light.is_environment() && !matches!(light, Light::Area { .. }))
+    scene.lights.iter().zip(&caustics.traced).any(|(light, traced)| *traced && !light.may_be_met())
 }
 
 /// The mean of values with weights, without the largest hundredth: single fireflies do not decide.
@@ -203,7 +206,7 @@ fn trimmed(values: &[(usize, f64)], weights: &[f64]) -> f64 {
 }
 
 fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Effect>) {
-    let Trial { scene, plan, settings, filter, seed, wishes, casters, .. } = *trial;
+    let Trial { scene, plan, settings, filter, seed, wishes, .. } = *trial;
     let seen = match wishes.merging {
         Use::Off => None,
         Use::Auto | Use::On => Seen::of(trial, plan, &caustics),
@@ -221,6 +224,8 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let mut learnt = vec![Vec::new(); caustics.sources.len()];
     let most_rays = SHARE * trial.paths() * camera.rays;
     let (mut found, mut followed) = (Round::default(), 0);
+    // As soon as one path has found light that no path from the camera could, it is traced.
+    let (mut unfound, mut unfound_gathered) = (false, false);
     for number in 0..ROUNDS {
         let paths = LightPaths {
             scene,
@@ -233,6 +238,8 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
         };
         found = trial.round(&paths, seen.as_ref(), number, &weights, most_rays, &mut learnt);
         followed += found.paths;
+        unfound |= found.unfound;
+        unfound_gathered |= found.unfound_gathered;
         caustics.learn(&mut learnt);
         // What the lights send there is part of the picture that errors are relative to.
         let means: Vec<f64> = camera.means.iter().zip(&found.thrown).map(|(a, b)| a + b).collect();
@@ -240,10 +247,10 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
             weights = relative(&means);
         }
     }
-    if found.splatted + found.collected <= 0.0 && wishes.light_tracing == Use::Auto {
+    if found.splatted + found.collected <= 0.0 && !unfound && wishes.light_tracing == Use::Auto {
         return left_off(&format!(
             "of {followed} paths from the lights none came to the picture over {}",
-            some(casters)
+            trial.throwers()
         ));
     }
 
@@ -259,6 +266,7 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     // from how bright it is.
     let (kept, mirrored) = (trimmed(&camera.kept, &weights), average(&camera.mirrored, &weights));
     let unmerged = match camera.met_mirrored {
+        _ if unfound_gathered => f64::INFINITY,
         ENOUGH.. => mirrored,
         met => by_chance(&found.gathered, met),
     };
@@ -282,12 +290,15 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let (left, overhead) = if merges { (0.0, OVERHEAD) } else { (mirrored, 1.0) };
     let with = overhead * (kept + left + thrown / k) * (a + k * b);
     let measured = if camera.met >= ENOUGH { average(&camera.all, &weights) } else { f64::INFINITY };
-    let without = measured.min(kept + mirrored + by_chance(&found.thrown, camera.met)) * a;
+    let without = match unfound {
+        true => f64::INFINITY,
+        false => measured.min(kept + mirrored + by_chance(&found.thrown, camera.met)) * a,
+    };
     if wishes.light_tracing == Use::Auto && without < with {
         let loss = with / without;
         return left_off(&format!(
             "the pilot expects it to cost {loss:.1} times as much: paths from the camera find the light over {}, or it hardly counts",
-            some(casters)
+            trial.throwers()
         ));
     }
     let said = say(trial, &caustics, &camera, k * b / (a + k * b), seen.is_some(), found.collected > 0.0);

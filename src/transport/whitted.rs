@@ -15,7 +15,7 @@ use crate::optics::bsdf::Pane;
 use crate::optics::dielectric::{RelativeIndex, refract};
 use crate::optics::fresnel::{self, Model};
 use crate::scene::compound::{Composition, Slopes, Standing, Vertex, share};
-use crate::scene::light::Light;
+use crate::scene::light::{Light, free};
 use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Thickness, Tints, metal, relative_index};
 use crate::scene::shape::Shape;
 use crate::scene::texture::Texture;
@@ -245,7 +245,9 @@ impl Tracer<'_> {
             if cos <= 0.0 || wi.dot(surface.normal) * wo.dot(surface.normal) <= 0.0 {
                 continue;
             }
-            let through = self.unshadowed(&leave(wi), standpoint.here, distance, target);
+            let ray = leave(wi);
+            let distance = free(distance, target, surface.point, &ray);
+            let through = self.unshadowed(&ray, standpoint.here, distance, target);
             if !through.simd_gt(Lanes::ZERO).any() {
                 continue;
             }

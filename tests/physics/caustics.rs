@@ -43,6 +43,9 @@ const FLOOR: &str = "{diffuse: {reflectance: {rgb: [0.7, 0.5, 0.3]}}}";
 const AREA: Case =
     Case { what: "area", camera: "", material: GLASS, light: LAMP, depth: "null", caster: BALL, floor: FLOOR };
 
+/// A lamp without extent there.
+const POINT: &str = "lights: [{point: {position: [-1.5, 2, 1], intensity: 9}}]\n";
+
 /// The same lamp, and a pane.
 const PANE: &str = "\
 - sphere: {center: [-1.5, 2, 1], radius: 0.5, emission: {illuminant: {name: D65, scale: 10}}}
@@ -340,7 +343,6 @@ fn hidden_lamps_show_no_traced_light() {
 /// behind glass; a lamp beside it is traced alone.
 #[test]
 fn light_of_points_behind_glass_is_left_out_where_it_is_not_wanted() {
-    const POINT: &str = "lights: [{point: {position: [-1.5, 2, 1], intensity: 9}}]\n";
     let unwanted = Case { what: "unwanted", depth: "5, delta_caustics: false", light: POINT, ..AREA };
     let (tracing, _, reason) = techniques(&unwanted.bench("on", "auto", 64));
     assert!(!tracing && reason.starts_with("no light that a path from the camera can meet"), "{reason}");
@@ -429,11 +431,31 @@ fn merged_photons_count_for_the_length_of_a_path() {
 /// Half of a pixel is the least radius of a filter without gaps; below it light from the lights would be little but noise.
 #[test]
 fn light_is_traced_for_filters_without_gaps() {
-    for (radius, traced) in [(0.5, true), (0.49, false)] {
+    let point = Case { light: POINT, ..AREA };
+    for (case, radius, traced) in [(AREA, 0.5, true), (AREA, 0.49, false), (point, 0.49, true)] {
         let filter = format!("height: 24, filter: {{tent: {{radius: {radius}}}}}");
-        let scene = AREA.scene("path", "auto", "auto", 64).replace("height: 24", &filter);
+        let scene = case.scene("path", "auto", "auto", 64).replace("height: 24", &filter);
         let (on, _, why) = techniques(&bench_with(&scene, &[]));
         assert!(on == traced && why.contains("gaps") != traced, "{radius}: {why}");
+    }
+}
+
+/// What no path from the camera can find is traced whatever the seed, be the same thing lit by a panel that they find, or
+/// a ball of ground metal beside it, which throws the same lamp's light so that they find it.
+#[test]
+fn light_that_nothing_else_finds_is_traced_for_every_seed() {
+    let mirror = "{mirror: {reflectance: 0.9}}";
+    let panel = format!("{LAMP}{POINT}");
+    let ground =
+        "- sphere: {center: [-1.2, -0.5, 0.3], radius: 0.5, material: {conductor: {metal: silver, roughness: 0.04}}}\n";
+    let ground = format!("{ground}{POINT}");
+    for (what, light) in [("panel", &panel), ("ground metal", &ground)] {
+        for seed in 0..8 {
+            let seeded = format!("samples: 256, seed: {seed}");
+            let scene = AREA.scene("path", "auto", "auto", 256).replace(GLASS, mirror).replace(LAMP, light);
+            let (on, _, why) = techniques(&bench_with(&scene.replace("samples: 256", &seeded), &[]));
+            assert!(on, "{what}, {seed}: {why}");
+        }
     }
 }
 
@@ -441,9 +463,13 @@ fn light_is_traced_for_filters_without_gaps() {
 /// lights, where the ball is out of the picture: a path through a mirror next to the camera is not its part.
 #[test]
 fn lights_without_extent_agree_with_the_light_tracer() {
-    // Straight down on the floor beside the ball, where its light falls.
+    // Straight down on the floor beside the ball, where its light falls; where a glossy floor shows the lamp in the ball.
     let above = "origin: [1.6, 2, -0.6], target: [1.6, -1, -0.6], fov_deg: 24, up: [0, 0, -1]";
-    let place = |text: String| text.replace("origin: [0, 1.2, 5], target: [0, 0.1, 0], fov_deg: 40", above);
+    let glossy = "origin: [-1.8, 1.12, 2.46], target: [-0.6, -1, 0.9], fov_deg: 16";
+    let place = |text: String, what: &str| {
+        let camera = if what == "gloss" { glossy } else { above };
+        text.replace("origin: [0, 1.2, 5], target: [0, 0.1, 0], fov_deg: 40", camera)
+    };
     let lights = [
         ("point", "lights: [{point: {position: [-1.5, 2, 1], intensity: {illuminant: {name: D65, scale: 9}}}}]\n"),
         ("spot", "lights: [{spot: {position: [-1.5, 2, 1], target: [0, -0.5, 0], cutoff_deg: 30, intensity: 9}}]\n"),
@@ -457,11 +483,49 @@ fn lights_without_extent_agree_with_the_light_tracer() {
             "- disk: {center: [-1.5, 2, 1], normal: [1.7, -2.2, -1], radius: 0.4, emission: 3, emission_direction: normal}\n",
         ),
     ];
-    for (what, light) in lights {
-        let case = Case { what, light, ..AREA };
-        let on = bench_with(&place(case.scene("path", "on", "auto", 192)), &[]);
+    let lamps = lights.map(|(what, light)| Case { what, light, ..AREA });
+    // What mirrors or refracts a part of the light, what is glossy beside a mirror, and a mirror without end beside a sun
+    // that does not reach it.
+    let point = Case { light: POINT, ..AREA };
+    let others = [
+        Case { what: "coat", material: "{plastic: {reflectance: 0.2, ior: 2.5}}", ..point },
+        Case {
+            what: "blend",
+            material: "{blend: {weight: 0.6, first: {diffuse: {reflectance: 0.5}}, second: {dielectric: {ior: 1.5}}}}",
+            ..point
+        },
+        Case {
+            what: "two sides",
+            material: "{two_sided: {front: {mirror: {reflectance: 0.9}}, back: {diffuse: {reflectance: 0}}}}",
+            ..point
+        },
+        Case {
+            what: "gloss",
+            material: "{mirror: {reflectance: 0.9}}",
+            floor: "{conductor: {metal: silver, roughness: 0.045}}",
+            light: "lights: [{spot: {position: [-1.5, 2, 1], target: [0.2, -0.2, 0], cutoff_deg: 14, intensity: 9}}]\n",
+            ..AREA
+        },
+        Case {
+            what: "mirror without end",
+            material: "{mirror: {reflectance: 0.8}}",
+            caster: "plane: {name: ball, point: [2.6, 0, 0], normal: [-1, 0, 0.2], material: glass}",
+            light: "lights: [{point: {position: [-1.5, 2, 1], intensity: 9}}, \
+                {directional: {direction: [-1, -0.2, 0], irradiance: 3}}]\n",
+            ..AREA
+        },
+        Case {
+            what: "coat without end",
+            material: "{plastic: {reflectance: 0.1, ior: 2.5}}",
+            caster: "plane: {name: ball, point: [2.6, 0, 0], normal: [-1, 0, 0.2], material: glass}",
+            ..point
+        },
+    ];
+    for case in lamps.iter().chain(&others) {
+        let what = case.what;
+        let on = bench_with(&place(case.scene("path", "auto", "auto", 192), what), &[]);
         assert!(on.prepared.plan.caustics.is_some(), "{what}");
-        let all = bench_with(&place(case.scene("light_tracer", "auto", "auto", 1024)), &[]);
+        let all = bench_with(&place(case.scene("light_tracer", "auto", "auto", 1024), what), &[]);
         assert_agree(what, &render(&on), &render(&all));
     }
 }

@@ -340,6 +340,8 @@ impl Walk<'_, '_> {
                 self.leave_photon(&packet.alone(lane), at[lane].0);
             }
         }
+        // It has left photons here.
+        let packet = &Packet { beam: Beam { unfound: false, ..packet.beam }, ..*packet };
         let lane = self.chosen_lane();
         if packet.lanes >> lane & 1 == 0 || self.is_last(packet.beam.events() + 1) {
             return;

@@ -3,6 +3,7 @@
 use super::{Path, Tracer};
 use crate::math::{Departure, Ray};
 use crate::scene::Inside;
+use crate::scene::light::free;
 use crate::spectrum::Lanes;
 use crate::transport::shadow::Shadow;
 use crate::transport::ways::{First, Found};
@@ -124,7 +125,8 @@ impl Tracer<'_> {
             && !scene.has_boundaries
         {
             let light_found = path.share_of::<CHROMATIC>(value, weight(None));
-            *later = Some(Asked { ray, distance: light.distance, target: light.target, light: light_found, traced });
+            let distance = free(light.distance, light.target, point, &ray);
+            *later = Some(Asked { ray, distance, target: light.target, light: light_found, traced });
             return;
         }
         let shadow = Shadow {
@@ -137,7 +139,7 @@ impl Tracer<'_> {
             target: light.target,
             past_lamps: false,
         };
-        let Some((through, passing)) = shadow.cast::<MEDIA>(&ray, light.distance) else { return };
+        let Some((through, passing)) = shadow.cast::<MEDIA>(&ray, free(light.distance, light.target, point, &ray)) else { return };
         let weight = weight(Some(passing));
         if traced {
             path.leave_out::<CHROMATIC>(value * through, weight);

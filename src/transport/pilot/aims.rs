@@ -25,6 +25,7 @@ pub(super) fn is_small(scene: &Scene, i: usize, casters: &Casters) -> bool {
         | Light::Directional { .. }
         | Light::Projector(_)
         | Light::AlongNormal { .. } => true,
+        _ if casters.is_empty() => false,
         Light::Constant { .. } => false,
         Light::Environment(map) => has_sun(map),
         Light::Area { object, .. } => {
@@ -66,18 +67,32 @@ fn has_sun(map: &Environment) -> bool {
 
 impl Caustics {
     /// Aimed at everything alike.
-    pub(super) fn untrained(scene: &Scene, casters: &Casters, traced: Vec<bool>, packets: bool) -> Caustics {
+    pub(super) fn untrained(
+        scene: &Scene,
+        casters: &Casters,
+        in_part: &Casters,
+        traced: Vec<bool>,
+        packets: bool,
+    ) -> Caustics {
         let infinite = |light: &Light| light.is_environment() || matches!(light, Light::Directional { .. });
-        // Light from infinity meets what has no end everywhere: neither is aimed at the other.
+        // Light from infinity meets what has no end everywhere: neither is aimed at the other. What throws light of no lamp that a
+        // path could meet is as good as what does so in part.
         let bounded = scene.lights.iter().zip(&traced).any(|(light, traced)| *traced && infinite(light));
-        let (mut casts, mut unending) = (casters.casts.clone(), casters.unending.clone());
-        if bounded {
-            casts.iter_mut().zip(&mut unending).for_each(|(casts, unending)| *casts &= !std::mem::take(unending));
-        }
-        let mut targets: Vec<Target> = casters.balls.iter().map(|ball| Target::Ball(*ball)).collect();
-        if unending.contains(&true) {
-            targets.push(Target::Endless);
-        }
+        let is_bounded = |i: usize| bounded && casters.unending[i];
+        let objects = 0..scene.objects.len();
+        let casts = objects.clone().map(|i| casters.casts[i] && !is_bounded(i)).collect();
+        let partly: Vec<bool> = objects.clone().map(|i| in_part.casts[i] || is_bounded(i)).collect();
+        let unending: Vec<bool> = objects.map(|i| in_part.unending[i] || casters.unending[i]).collect();
+        let aimed_at = |light: &Light| -> Vec<Target> {
+            let partly = if light.may_be_met() { None } else { Some(in_part) };
+            let endless = |casters: &Casters| !casters.endless.is_empty();
+            let balls = casters.balls.iter().chain(partly.iter().flat_map(|casters| &casters.balls));
+            let endless = match partly {
+                Some(in_part) => !infinite(light) && (endless(casters) || endless(in_part)),
+                None => !bounded && endless(casters),
+            };
+            balls.map(|ball| Target::Ball(*ball)).chain(endless.then_some(Target::Endless)).collect()
+        };
         let mut sources = Vec::new();
         for (i, light) in scene.lights.iter().enumerate().filter(|(i, _)| traced[*i]) {
             let probability = scene.light_probability(i);
@@ -85,6 +100,7 @@ impl Caustics {
             if matches!(light, Light::AlongNormal { .. } | Light::Projector(_)) {
                 sources.push(source(Target::Own, probability));
             } else {
+                let targets = aimed_at(light);
                 let each = probability / targets.len() as f64;
                 sources.extend(targets.iter().map(|target| source(*target, each)));
             }
@@ -96,13 +112,14 @@ impl Caustics {
         let sums = Caustics::sums(&sources);
         Caustics {
             casts,
+            in_part: partly,
             unending,
             traced,
             sources,
             sums,
             ratio: 1.0,
             packets,
-            parts: casters.parts,
+            parts: casters.parts || in_part.parts,
             endless,
             merging: None,
         }

@@ -25,6 +25,8 @@ struct Landed {
     /// What it would collect where mirrors and glass are seen.
     collected: Vec<Arrival>,
     rays: u32,
+    /// Whether no path from the camera could be the same.
+    unfound: bool,
 }
 
 /// Paths `indices` of one round, in the order of their numbers.
@@ -58,7 +60,7 @@ fn from_lights(paths: &LightPaths, seen: Option<&Seen>, round: u32, indices: Ran
                 photons.iter().for_each(|photon| seen.collect(&photon, wavelengths, &mut collected));
             }
             let (source, place) = traced.began.unwrap_or((usize::MAX, DVec2::ZERO));
-            Landed { source, place, splats, collected, rays: traced.rays }
+            Landed { source, place, splats, collected, rays: traced.rays, unfound: traced.unfound }
         })
         .collect()
 }
@@ -91,6 +93,9 @@ pub(super) struct Round {
     /// Mean luminance of each block, and the part of it that is collected.
     pub thrown: Vec<f64>,
     pub gathered: Vec<f64>,
+    /// Whether any of it, and any of what is collected, is light that no path from the camera could find.
+    pub unfound: bool,
+    pub unfound_gathered: bool,
 }
 
 impl Trial<'_> {
@@ -120,6 +125,8 @@ impl Trial<'_> {
                 for arrival in &landed.collected {
                     round.gathered[arrival.block] += arrival.pixels * arrival.y;
                 }
+                round.unfound |= landed.unfound && splatted + collected > 0.0;
+                round.unfound_gathered |= landed.unfound && collected > 0.0;
                 if splatted + collected > 0.0 {
                     let source = &caustics.sources[landed.source];
                     let density = source.probability * source.guide.density(landed.place);

@@ -23,15 +23,15 @@ pub(super) fn say(
     seen: bool,
     collected: bool,
 ) -> Vec<Effect> {
-    let Trial { scene, plan, wishes, casters, .. } = *trial;
+    let Trial { scene, plan, wishes, .. } = *trial;
     let tracing = format!(
         "of {} over {}: {:.2} paths from the lights for each from the camera, {:.0} % of the rays",
         lamps(scene, caustics),
-        some(casters),
+        trial.throwers(),
         caustics.ratio,
         100.0 * share
     );
-    let packets = match (caustics.packets, casters.parts) {
+    let packets = match (caustics.packets, caustics.parts) {
         (true, _) => "wavelengths that part in glass are followed together from the lights",
         (false, true) => "the scene says so",
         (false, false) => "no wavelengths part",
@@ -67,9 +67,12 @@ pub(super) fn say(
     ]
 }
 
-pub(super) fn some(casters: &Casters) -> String {
-    let names: Vec<String> = casters.names.iter().chain(&casters.endless).cloned().collect();
-    plan::some_of(&names)
+impl Trial<'_> {
+    /// Names of what throws light.
+    pub(super) fn throwers(&self) -> String {
+        let names = |casters: &Casters| casters.names.iter().chain(&casters.endless).cloned().collect::<Vec<String>>();
+        plan::some_of(&[names(self.casters), names(self.in_part)].concat())
+    }
 }
 
 fn lamps(scene: &Scene, caustics: &Caustics) -> String {

@@ -169,19 +169,17 @@ impl Export<'_> {
         std::iter::once(material).chain(inner).collect()
     }
 
-    /// Whether a material throws all light as a smooth mirror or glass does.
-    pub(super) fn is_sharp(&self, material: &MaterialRef) -> bool {
-        let throws = |m: &Material| match m {
-            Material::Mirror(_) | Material::ThinDielectric(_) => Some(true),
-            Material::Conductor(m) => Some(m.roughness == Roughness::Number(0.0)),
-            Material::Dielectric(m) => Some(m.roughness == Roughness::Number(0.0)),
-            Material::Diffuse(_) | Material::Plastic(_) | Material::Hair(_) => Some(false),
-            Material::Principled(_) | Material::PrincipledThin(_) => Some(false),
-            Material::Mask(_) | Material::Blend(_) | Material::TwoSided(_) | Material::Boundary(_) => None,
-            Material::Bump(_) | Material::NormalMap(_) => None,
-        };
-        let leaves: Vec<bool> = self.made_of(material).into_iter().filter_map(throws).collect();
-        !leaves.is_empty() && leaves.iter().all(|sharp| *sharp)
+    /// Whether a material throws light in single directions, be it a part of what comes.
+    pub(super) fn is_single(&self, material: &MaterialRef) -> bool {
+        self.made_of(material).into_iter().any(|m| match m {
+            Material::Mirror(_) | Material::ThinDielectric(_) => true,
+            Material::Conductor(m) => m.roughness == Roughness::Number(0.0),
+            Material::Dielectric(m) => m.roughness == Roughness::Number(0.0),
+            Material::Plastic(m) => m.roughness <= 0.0,
+            Material::Diffuse(_) | Material::Hair(_) | Material::Principled(_) | Material::PrincipledThin(_) => false,
+            Material::Mask(_) | Material::Blend(_) | Material::TwoSided(_) | Material::Boundary(_) => false,
+            Material::Bump(_) | Material::NormalMap(_) => false,
+        })
     }
 
     /// Whether a material lets light straight through.

@@ -168,11 +168,11 @@ impl<'a> Export<'a> {
         };
         let delta = |light: &Light| !matches!(light, Light::Constant(_) | Light::Environment(_));
         let traced = path.delta_caustics && self.scene.render.techniques.light_tracing != Technique::Off;
-        let sharp = shapes.any(|shape| self.is_sharp(&shape.material));
-        if traced && sharp && self.scene.lights.iter().any(delta) {
+        let throws = shapes.any(|shape| self.is_single(&shape.material));
+        if traced && throws && self.scene.lights.iter().any(delta) {
             self.lose(
                 "integrator.path.delta_caustics",
-                "no light that mirrors and glass throw of lights without extent",
+                "no light that mirrors, glass and smooth coats throw of lights without extent",
             );
         }
     }
