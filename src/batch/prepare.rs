@@ -5,7 +5,7 @@ use super::finish::{self, Finish};
 use super::frame::{Frame, FrameJob};
 use super::stop::{self, Stop};
 use super::{Overrides, layers, motion, names};
-use crate::description::{self, BatchEntry, LayerContent, PathMap, SceneDescription};
+use crate::description::{self, BatchEntry, LayerContent, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::{Film, REPLICATES, SAMPLES_LIMIT};
@@ -19,7 +19,7 @@ use crate::transport::layers::{Channel, Layer, Source};
 use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
 use crate::transport::trial;
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -154,14 +154,15 @@ pub(super) fn prepare_scene(
     plan.techniques.extend(said);
     let moving =
         description.layers.iter().any(|layer| layer.content == LayerContent::Middle(description::Data::Motion));
-    let mut hash = hash(&description, &blur.texts, &scene.files, &overrides.paths);
+    let files = scene.files.iter().chain(moments.iter().flat_map(|moment| &moment.files));
+    let mut hash = hash(&description, &blur.texts, files);
     let next = match description.frame.filter(|_| moving) {
         None => None,
         Some(frame) => {
             let later = entry.animation(&overrides.set)?.into_scene(Some(frame.saturating_add(1)))?;
             let scene = compile::compile_with(&later, &entry.name, shelf)?;
             // It is part of the picture.
-            let both = hash + &self::hash(&later, &[], &scene.files, &overrides.paths);
+            let both = hash + &self::hash(&later, &[], &scene.files);
             hash = blake3::hash(both.as_bytes()).to_hex()[..32].to_owned();
             Some(Box::new(scene))
         }
@@ -249,28 +250,59 @@ pub(super) fn integrator(description: &SceneDescription, written: &description::
     })
 }
 
-/// 128 bits of BLAKE3 over what was written, with every default, and over the files that it names.
-fn hash(description: &SceneDescription, moments: &[String], files: &[PathBuf], paths: &PathMap) -> String {
-    let mut hasher = blake3::Hasher::new();
-    // Two machines have one scene in two places.
-    for text in [hash_text(description)].iter().chain(moments) {
-        hasher.update(paths.undo(text.clone()).as_bytes());
-    }
-    // A file that is named several times counts once: where else it is named stands in the text.
-    let mut read: HashSet<&Path> = HashSet::new();
+/// 128 bits of BLAKE3 over what was written, with every default, where each of the `files` that were read stands by what it
+/// holds: two machines, and two working directories, call one file by two names.
+fn hash<'a>(
+    description: &SceneDescription,
+    moments: &[String],
+    files: impl IntoIterator<Item = &'a PathBuf>,
+) -> String {
+    let mut held: HashMap<String, String> = HashMap::new();
     for file in files {
-        if read.insert(file)
-            && let Ok(bytes) = std::fs::read(file)
-        {
-            hasher.update(&bytes);
+        held.entry(format!("{file:?}")).or_insert_with(|| contents(file).unwrap_or_default());
+    }
+    let mut hasher = blake3::Hasher::new();
+    for text in [hash_text(description)].iter().chain(moments) {
+        let mut rest = text.as_str();
+        while let Some(at) = rest.find('"') {
+            let (before, from) = rest.split_at(at);
+            let (quoted, after) = from.split_at(end_of_quoted(from));
+            hasher.update(before.as_bytes());
+            match before.ends_with("FilePath(") {
+                // What nothing reads does not change the picture.
+                true => hasher.update(held.get(quoted).map_or(&[][..], |held| held.as_bytes())),
+                false => hasher.update(quoted.as_bytes()),
+            };
+            rest = after;
         }
+        hasher.update(rest.as_bytes());
     }
     hasher.finalize().to_hex()[..32].to_owned()
 }
 
-/// What was written, as far as it decides about the picture.
+/// The hash of what a file holds, with the ending of its name, from which some readers know what it is.
+fn contents(file: &Path) -> Option<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(std::fs::File::open(file).ok()?).ok()?;
+    Some(format!("{} {:?}", hasher.finalize().to_hex(), file.extension()))
+}
+
+/// Bytes of the text in quotes, as `{:?}` writes it, with which `text` begins.
+fn end_of_quoted(text: &str) -> usize {
+    let mut at = 1;
+    loop {
+        match text.as_bytes().get(at) {
+            None => return text.len(),
+            Some(b'"') => return at + 1,
+            Some(b'\\') => at += 2,
+            Some(_) => at += 1,
+        }
+    }
+}
+
+/// What was written, as far as it decides about the picture; files by the names that they have here.
 pub(super) fn hash_text(description: &SceneDescription) -> String {
-    // Where the scene lies, and where its pictures go, does not change them.
+    // Where its pictures go does not change them.
     let mut content = description.clone();
     content.locator = description::Locator::default();
     content.directory = PathBuf::new();
@@ -279,11 +311,7 @@ pub(super) fn hash_text(description: &SceneDescription) -> String {
     content.frame = None;
     content.motion = None;
     content.render.frames_per_second = None;
-    let mut text = format!("{content:?}");
-    if description.directory != Path::new("") {
-        text = text.replace(&format!("{}/", description.directory.display()), "");
-    }
-    text
+    format!("{content:?}")
 }
 
 pub(super) fn filter(filter: &description::Filter) -> Filter {

@@ -106,18 +106,6 @@ impl PathMap {
         let (_, rest, to) = fits.max_by_key(|(length, _, _)| *length)?;
         Some(rest.iter().fold(to.clone(), |path, step| path.join(step)))
     }
-
-    /// `text` with the directories of this machine called as they were written.
-    #[must_use]
-    pub fn undo(&self, text: String) -> String {
-        self.rules.iter().fold(text, |text, rule| {
-            let with_end = |path: &str| path.trim_end_matches('/').to_owned() + "/";
-            match rule.to.to_str() {
-                Some(to) if text.contains(to) => text.replace(&with_end(to), &with_end(&rule.from)),
-                _ => text,
-            }
-        })
-    }
 }
 
 /// Whether a path has a drive or a backslash.
@@ -191,7 +179,6 @@ mod tests {
         assert_eq!(at("x.ply"), "dir/x.ply");
         assert_eq!(at("mnt/a/x.ply"), "dir/mnt/a/x.ply");
         assert_eq!(place(&map, Path::new("/mnt/a"), "x.ply"), Path::new("/b/x.ply"));
-        assert_eq!(map.undo("file: /b/x.ply, /bc/y".into()), "file: /mnt/a/x.ply, /bc/y");
     }
 
     #[test]

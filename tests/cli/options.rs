@@ -87,31 +87,46 @@ fn a_word_in_braces_that_stands_for_nothing_is_refused() {
     assert!(place.path("sub/other.####.exr").exists());
 }
 
-/// Paths in a scene start from its file, outputs from where the command runs.
+/// Paths in a scene start from its file, outputs from where the command runs. One letter was taken for the directory wherever
+/// it stood before a slash, and the place of a file that a batch sets for that of the command.
 #[test]
 fn a_scene_is_the_same_from_any_directory() {
+    let textured = |file: &str| format!("{SMALL}{BALL}textures: {{t: {{image: {{file: {file}}}}}}}\n");
+    let set = "set: {textures.t.image.file: s/maps/t.png}";
     let place = Place::with(&[
-        ("deep/s.yaml", &format!("{SMALL}{BALL}textures: {{t: {{image: {{file: maps/t.png}}}}}}\n")),
+        ("s/s.yaml", &textured("maps/t.png")),
+        ("moved/far/s.yaml", &textured("/old/t.png")),
+        ("b.yaml", &format!("scenes: [{{file: s/s.yaml, {set}}}]\n")),
         ("elsewhere/x", ""),
     ]);
-    let mut png = std::io::Cursor::new(Vec::new());
-    image::GrayImage::new(2, 2).write_to(&mut png, image::ImageFormat::Png).unwrap();
-    std::fs::create_dir_all(place.path("deep/maps")).unwrap();
-    std::fs::write(place.path("deep/maps/t.png"), png.into_inner()).unwrap();
-    let hash = |directory: &str, file: &str| {
-        let output = Command::new(env!("CARGO_BIN_EXE_abbe"))
-            .current_dir(place.path(directory))
-            .args(["plan", file, "--format", "json"])
-            .output()
-            .unwrap();
+    std::fs::create_dir_all(place.path("s/maps")).unwrap();
+    image::GrayImage::new(2, 2).save(place.path("s/maps/t.png")).unwrap();
+    image::GrayImage::new(3, 2).save(place.path("s/maps/other.png")).unwrap();
+    let hash = |directory: &str, arguments: &[&str]| {
+        let all = [&["plan", "--format", "json"], arguments].concat();
+        let output = place.command(&all).current_dir(place.path(directory)).output().unwrap();
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
         let plan: Value = serde_json::from_slice(&output.stdout).unwrap();
         plan[0]["scene_hash"].as_str().unwrap().to_owned()
     };
-    let here = hash("deep", "s.yaml");
-    assert_eq!(here, hash(".", "deep/s.yaml"));
-    assert_eq!(here, hash("elsewhere", "../deep/s.yaml"));
-    let absolute = place.path("deep/s.yaml");
-    assert_eq!(here, hash("elsewhere", absolute.to_str().unwrap()));
+    let here = hash("s", &["s.yaml"]);
+    let absolute = place.path("s/s.yaml");
+    for (directory, arguments) in [
+        (".", &["s/s.yaml"][..]),
+        ("elsewhere", &["../s/s.yaml"]),
+        ("elsewhere", &[absolute.to_str().unwrap()]),
+        (".", &["b.yaml"]),
+        ("s", &["../b.yaml"]),
+        ("s", &["s.yaml", "--set", "textures.t.image.file=maps/t.png"]),
+        (".", &["s/s.yaml", "--set", "textures.t.image.file=t.png", "--set-from", "s/maps"]),
+        (".", &["moved/far/s.yaml", "--path-map", "/old=s/maps"]),
+        ("s", &["../moved/far/s.yaml", "--path-map", "/old=maps"]),
+    ] {
+        assert_eq!(hash(directory, arguments), here, "{arguments:?} in {directory}");
+    }
+    assert_ne!(hash("s", &["s.yaml", "--set", "textures.t.image.file=maps/other.png"]), here);
+    image::GrayImage::new(2, 3).save(place.path("s/maps/t.png")).unwrap();
+    assert_ne!(hash("s", &["s.yaml"]), here);
 }
 
 /// No verb needs more threads than a process may be bound to processors.
