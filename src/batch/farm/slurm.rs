@@ -73,22 +73,14 @@ fn head(job: &Job, name: &str, directives: &str) -> String {
          {directives}\
          # abbe farm --format slurm: started by submit.sh, in the directory of the bundle\n\
          set -uo pipefail\n\
-         abbe=\"${{ABBE:-{}}}\"\n\
-         pictures=\"${{ABBE_PICTURES:-{}}}\"\n",
-        inner(&job.program),
-        inner(&job.pictures.display().to_string())
+         # Within ${{...}} of these two, bash would take quotes and braces for its own.\n\
+         own_abbe={}\n\
+         own_pictures={}\n\
+         abbe=\"${{ABBE:-$own_abbe}}\"\n\
+         pictures=\"${{ABBE_PICTURES:-$own_pictures}}\"\n",
+        word(&job.program),
+        word(&job.pictures.display().to_string())
     )
-}
-
-/// Text within double quotes of the shell.
-fn inner(text: &str) -> String {
-    text.chars().fold(String::new(), |mut out, c| {
-        if "\\\"$`".contains(c) {
-            out.push('\\');
-        }
-        out.push(c);
-        out
-    })
 }
 
 fn render(job: &Job) -> String {
@@ -201,6 +193,23 @@ mod tests {
         // A name may begin like an option.
         assert!(render(&job(Cut { tiles: 1, ranges: 1, frames: 1 })).contains(" --scene=\"$scene\" "));
         assert_eq!(word("it's"), "'it'\\''s'");
-        assert_eq!(inner("a\"$b"), "a\\\"\\$b");
+    }
+
+    /// Within `${…:-…}` an apostrophe began a text that did not end, and a brace ended the path.
+    #[cfg(unix)]
+    #[test]
+    fn the_scripts_have_the_paths_that_were_given() {
+        for path in ["/o/it's", "/o/{B1-2}/x", "/o/\"$`\\ }", "/o/two\nlines"] {
+            let own =
+                Job { pictures: path.into(), program: path.into(), ..job(Cut { tiles: 1, ranges: 1, frames: 1 }) };
+            let script = head(&own, "render", "") + "printf '%s|%s' \"$abbe\" \"$pictures\"";
+            let said = |others: &[(&str, &str)]| {
+                let mut bash = std::process::Command::new("bash");
+                bash.args(["-c", &script]).env_remove("ABBE").env_remove("ABBE_PICTURES");
+                String::from_utf8(bash.envs(others.iter().copied()).output().unwrap().stdout).unwrap()
+            };
+            assert_eq!(said(&[]), format!("{path}|{path}"));
+            assert_eq!(said(&[("ABBE", "/a b"), ("ABBE_PICTURES", "/c'}")]), "/a b|/c'}");
+        }
     }
 }
