@@ -336,14 +336,27 @@ impl Report {
 #[must_use]
 pub fn worst(codes: impl Iterator<Item = i32>) -> i32 {
     // Where something can go on, it should. A fault of the description outranks a missing file, which outranks what
-    // went wrong later.
+    // went wrong later; least is 4, which says that the picture is written, so that no other is lost behind it.
     codes
         .min_by_key(|code| match code {
             75 => 0,
             2 => 1,
             3 => 2,
-            4 => 3,
-            _ => 4,
+            4 => 4,
+            _ => 3,
         })
         .unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 4 says that the picture is written: behind it a picture that is not was lost.
+    #[test]
+    fn a_batch_ends_with_the_code_of_what_is_lost() {
+        let codes = |codes: &[i32]| worst(codes.iter().copied());
+        assert_eq!((codes(&[4, 1]), codes(&[33, 4]), codes(&[4, 4])), (1, 33, 4));
+        assert_eq!((codes(&[1, 3, 2, 4]), codes(&[3, 33]), codes(&[2, 75]), codes(&[])), (2, 3, 75, 0));
+    }
 }
