@@ -20,11 +20,9 @@ impl Interrupts {
     /// [`Error::Render`](crate::error::Error::Render) if the system refuses.
     #[cfg(unix)]
     pub fn listen() -> Result<Interrupts> {
-        use crate::error::Error;
         use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
         use signal_hook::flag;
         let all = Interrupts::default();
-        let refused = |e: std::io::Error| Error::Render(format!("cannot listen for signals: {e}"));
         for (signal, code) in [(SIGTERM, 143), (SIGINT, 130)] {
             // In this order: the first signal finds the flag down, the second one up.
             flag::register_conditional_shutdown(signal, code, all.stop.clone()).map_err(refused)?;
@@ -39,4 +37,21 @@ impl Interrupts {
     pub fn listen() -> Result<Interrupts> {
         Ok(Interrupts::default())
     }
+}
+
+/// Lets a write beyond the limit on the size of files (`ulimit -f`) fail with an error that says so, in the place of SIGXFSZ,
+/// which would end the process without a word. Programs that it starts are not touched.
+///
+/// # Errors
+/// [`Error::Render`](crate::error::Error::Render) if the system refuses.
+pub fn take_size_limits_for_errors() -> Result<()> {
+    #[cfg(unix)]
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default()).map_err(refused)?;
+    Ok(())
+}
+
+/// What keeps the process from hearing signals.
+#[cfg(unix)]
+fn refused(e: std::io::Error) -> crate::error::Error {
+    crate::error::Error::Render(format!("cannot listen for signals: {e}"))
 }

@@ -508,7 +508,8 @@ pub fn run() -> i32 {
         }
     };
     let threads = || use_threads(arguments.verb.threads());
-    let result = check_cpu().and_then(|()| threads()).and_then(|()| match &arguments.verb {
+    let ready = check_cpu().and_then(|()| interrupts::take_size_limits_for_errors()).and_then(|()| threads());
+    let result = ready.and_then(|()| match &arguments.verb {
         Verb::Render(a) => render::run(a),
         Verb::Merge(a) => merge::run(a),
         Verb::Farm(a) => farm::run(a),
