@@ -131,6 +131,8 @@ pub struct Sheet {
     pub rows: Vec<Row>,
     /// A sentence for each knob.
     pub advice: Vec<(&'static str, String)>,
+    /// Why there is no row of another build, where there should be.
+    pub failed: Option<String>,
 }
 
 /// The sheet of a scene, or why there is none: what has no noise has nothing to weigh, nor has what is black.
@@ -198,20 +200,32 @@ pub fn sheet(
         return Ok(Err("its picture is black: no error is relative to that".into()));
     }
     let mut tallies: Vec<Tally> = trials.iter().map(|_| Tally::default()).collect();
-    let mut images: Vec<Image> = Vec::new();
+    let mut images: Vec<Option<Image>> = trials.iter().map(|_| None).collect();
+    let mut failed = None;
     for round in 0..rounds {
-        for (trial, tally) in trials.iter().zip(&mut tallies) {
+        for ((trial, tally), image) in trials.iter().zip(&mut tallies).zip(&mut images) {
+            if failed.is_some() && trial.way == Way::Beside {
+                continue;
+            }
             tell(&format!("{} {}", trial.knob, trial.value));
             let seed = seed.wrapping_add(u64::from(round));
             let outcome = match settings.beside.filter(|_| trial.way == Way::Beside) {
                 Some(build) => {
                     let seed = ("render.seed".to_owned(), seed.to_string());
-                    build.render(&entry.name, &desk.overrides, &[seed], Some(&reference))?
+                    match build.render(&entry.name, &desk.overrides, &[seed], Some(&reference)) {
+                        Ok(outcome) => outcome,
+                        // It costs its own row, and not those that are done.
+                        Err(e) => {
+                            failed = Some(e.to_string());
+                            *image = None;
+                            continue;
+                        }
+                    }
                 }
                 None => desk.render(trial, seed, Some(&reference))?,
             };
             if round == 0 {
-                images.push(outcome.image.clone());
+                *image = Some(outcome.image.clone());
             }
             tally.add(outcome);
         }
@@ -222,15 +236,16 @@ pub fn sheet(
     let target = settings.target.unwrap_or(tallies[0].noise()[0]);
     let mut rows: Vec<Row> = Vec::new();
     for ((trial, tally), image) in trials.iter().zip(&tallies).zip(&images) {
+        let Some(image) = image else { continue };
         let png = png::encode_png(image, &settings_of_png).map_err(Error::Render)?;
         rows.push(row(trial, tally, &tallies[0], &reference, target, png));
     }
-    let bias_squared = Figure { value: rounding(&images[0]), error: 0.0 };
+    let bias_squared = Figure { value: images[0].as_ref().map_or(0.0, rounding), error: 0.0 };
     rows.push(Row { knob: "file", value: "half".into(), chosen: false, bias_squared, ..rows[0].clone() });
     let advice = advice::sentences(&rows);
     let reference = settings.truth.is_none().then_some((more, reference.noise));
     let png = png::encode_png(&full.image, &settings_of_png).map_err(Error::Render)?;
-    Ok(Ok(Sheet { scene: chosen.scene.name, size, target, reference, png, rows, advice }))
+    Ok(Ok(Sheet { scene: chosen.scene.name, size, target, reference, png, rows, advice, failed }))
 }
 
 /// relMSE of what has no noise and no bias, at most: sums in f32 and the inverse of a matrix are off by 1e-5.

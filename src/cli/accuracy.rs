@@ -7,7 +7,7 @@ use crate::batch;
 use crate::batch::accuracy::beside::Beside;
 use crate::batch::accuracy::page::{HEADINGS, cells, held_against, page};
 use crate::batch::accuracy::{self, FEWEST, Settings, Sheet};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::output::{prepare_place, write_atomically, write_json};
 use std::fmt::Write;
 
@@ -27,7 +27,7 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
         prepare_place(file)?;
     }
     let (mut sheets, mut without) = (Vec::new(), Vec::new());
-    let mut code = 0;
+    let mut codes = Vec::new();
     for entry in batch::entries(&arguments.scene.file, &overrides)? {
         let told = |what: &str, done: usize, total: usize| {
             if !arguments.quiet {
@@ -46,18 +46,24 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
                 if !arguments.quiet {
                     super::say(&text(&sheet));
                 }
+                if let Some(failed) = &sheet.failed {
+                    let failed = Error::Render(format!("{}: {failed}", entry.name));
+                    super::complain(&super::prefixed(&failed));
+                    codes.push(failed.exit_code());
+                }
                 sheets.push(sheet);
             }
             Ok(Err(why)) => without.push((entry.name.clone(), why)),
             Err(e) => {
                 super::complain(&format!("error: {}: {e}", entry.name));
-                code = e.exit_code();
+                codes.push(e.exit_code());
                 if interrupts.stop.load(std::sync::atomic::Ordering::Relaxed) {
                     break;
                 }
             }
         }
     }
+    let code = batch::worst(codes.into_iter());
     for (scene, why) in &without {
         super::complain(&format!("note: {scene}: {why}"));
     }

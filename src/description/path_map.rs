@@ -46,6 +46,12 @@ impl PathMap {
         PathMap { rules: Vec::new(), arguments }
     }
 
+    /// Where relative paths of the command line start.
+    #[must_use]
+    pub fn starts(&self) -> &Path {
+        if self.arguments.as_os_str().is_empty() { Path::new(".") } else { &self.arguments }
+    }
+
     /// Adds `FROM=TO`. A FROM with a drive or a backslash is a path of Windows.
     ///
     /// # Errors

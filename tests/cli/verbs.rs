@@ -2,7 +2,10 @@
 
 use super::{BALL, SMALL, batch};
 use crate::common::place::{Place, Ran};
+use abbe::batch::accuracy::{self, Settings};
+use abbe::batch::{self, Overrides};
 use serde_json::Value;
+use std::sync::atomic::AtomicBool;
 
 #[test]
 fn help_of_every_verb_shows_an_example() {
@@ -140,4 +143,52 @@ fn a_full_disk_behind_the_standard_output_is_a_fault() {
     // Another fault counts more.
     let ran = Ran::of(place.command(&["info", "out/good.exr", "none.exr"]).stdout(full()).output().unwrap());
     assert_eq!(ran.code, 3, "{}", ran.err);
+}
+
+/// Adaptive sampling has no ranges of samples, and files lie where the command line says: the other build did not hear of
+/// it, and what it could not do cost the whole sheet.
+#[test]
+fn a_build_beside_has_a_row_wherever_files_lie_and_costs_no_more() {
+    let scene = format!("{SMALL}{BALL}")
+        .replace("samples: 4", "samples: 16, techniques: {adaptive: on}")
+        .replace("4, height: 4", "16, height: 16");
+    let texture = "textures: {t: {image: {file: /old/t.png}}, u: {image: {file: none.png}}}\n";
+    let place = Place::with(&[("scenes/a.yaml", &format!("{scene}{texture}")), ("tex/x", "")]);
+    image::GrayImage::new(2, 2).save(place.path("tex/t.png")).unwrap();
+    let own = env!("CARGO_BIN_EXE_abbe");
+    let sheet = |beside: &str, out: &str| {
+        let file = ["accuracy", "scenes/a.yaml", "--path-map", "/old=tex", "-q", "-o", out, "--rounds", "1"];
+        let set =
+            ["--set", "textures.u.image.file=t.png", "--set-from", "tex", "--knob", "effects", "--beside", beside];
+        place.run(&[&file[..], &set].concat())
+    };
+    let ran = sheet(own, "all");
+    assert_eq!((ran.code, ran.err.as_str()), (0, ""));
+    let rows = |out: &str| place.json(&format!("{out}/accuracy.json"))[0]["rows"].as_array().unwrap().clone();
+    assert!(rows("all").iter().any(|row| row["knob"] == "build"), "{:?}", rows("all"));
+    // One that says what it is, and renders nothing.
+    let other = place.path("other");
+    std::fs::write(&other, "#!/bin/sh\n[ $1 = --version ] && echo abbe 0 && exit\necho no light >&2; exit 4\n")
+        .unwrap();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        std::fs::set_permissions(&other, std::fs::Permissions::from_mode(0o755)).unwrap();
+        let ran = sheet(other.to_str().unwrap(), "less");
+        assert_eq!(ran.code, 4, "{}", ran.err);
+        assert!(ran.err.starts_with("error: a: ") && ran.err.ends_with("other: no light\n"), "{}", ran.err);
+        assert!(!rows("less").is_empty() && rows("less").iter().all(|row| row["knob"] != "build"));
+    }
+}
+
+/// It ended with 4, which says that the picture is written.
+#[test]
+fn a_sheet_that_is_stopped_is_none() {
+    let place = batch();
+    let overrides = Overrides::default();
+    let entry = batch::entries(&place.path("scenes/good.yaml"), &overrides).unwrap().remove(0);
+    let [target, truth] = [None; 2];
+    let settings = Settings { pixels: 64, samples: 16, rounds: 1, target, time: None, truth, knobs: &[], beside: None };
+    let stopped = accuracy::sheet(&entry, &overrides, &settings, &|_, _, _| {}, &AtomicBool::new(true));
+    assert_eq!(stopped.unwrap_err().exit_code(), 75);
 }

@@ -51,13 +51,19 @@ impl Beside<'_> {
         std::fs::create_dir_all(&place).map_err(|e| Error::output(&place, e))?;
         let part = place.join("part.exr");
         let mut command = Command::new(self.binary);
-        command.arg("render").arg(self.file).args(["--scene", scene, "--samples", "0/1", "-q", "-o"]).arg(&part);
+        command.arg("render").arg(self.file).arg(format!("--scene={scene}"));
+        // A part of all rows: adaptive sampling has no ranges of samples.
+        command.args(["--tile", "0/1", "-q", "-o"]).arg(&part);
         command.args(["--threads", &rayon::current_num_threads().to_string()]);
         for (key, value) in overrides.set.iter().chain(set) {
             command.arg("--set").arg(format!("{key}={value}"));
         }
         for (name, value) in &overrides.define {
             command.arg("-D").arg(format!("{name}={value}"));
+        }
+        command.arg("--set-from").arg(overrides.paths.starts());
+        for rule in overrides.paths.written().map_err(Error::Config)? {
+            command.arg("--path-map").arg(rule);
         }
         let failed = |why: &str| Error::Render(format!("{}: {}", self.binary.display(), why.trim()));
         let done = command.output().map_err(|e| failed(&e.to_string()))?;

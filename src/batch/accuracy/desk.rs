@@ -144,7 +144,7 @@ impl<'a> Desk<'a> {
             }
             elapsed += start.elapsed();
             if self.stop.load(Ordering::Relaxed) {
-                return Err(Error::Render("stopped; nothing was written".into()));
+                return Err(Error::Stopped("stopped before its sheet was done, which begins anew".into()));
             }
             let noise = reference.map_or(Vec::new(), |reference| reference.noise_of(&replicates()));
             passes.push(Pass { samples: end, seconds: elapsed.as_secs_f64(), noise });
