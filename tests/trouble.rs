@@ -209,6 +209,9 @@ fn tasks_of_a_farm_find_files_where_the_job_was_told_they_are() {
         assert_eq!(ran.code, 0, "{}", ran.err);
         assert!(place.path(&job).join("pictures/a.exr").is_file());
         farm("openjd");
+        // All steps, for which no step is asked.
+        let said = place.run(&[&["farm", "scenes/a.yaml", "--format", "openjd", "-o", &job], further].concat()).out;
+        assert!(said.lines().any(|line| line.starts_with("openjd run ") && !line.contains("--step")), "{said}");
         let template = std::fs::read_to_string(place.path(&job).join("template.yaml")).unwrap();
         assert!(template.contains(&told.map(|word| format!("{word:?}")).join(", ")), "{template}");
     }

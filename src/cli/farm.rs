@@ -43,15 +43,13 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
     }
     let shown = |before: &str, name: &str| shell(&format!("{before}{}{name}", bundle.display()));
     let start = match arguments.format {
-        FarmFormat::Openjd => {
-            let step = if cut.parts() { "Merge --run-dependencies" } else { "Render" };
-            format!(
-                "openjd run {} --step {step} -p {}\ndeadline bundle submit {}\n",
-                shown("", "/template.yaml"),
-                shown("file://", "/parameters.json"),
-                shown("", "")
-            )
-        }
+        // All of its steps, each after those that it depends on.
+        FarmFormat::Openjd => format!(
+            "openjd run {} -p {}\ndeadline bundle submit {}\n",
+            shown("", "/template.yaml"),
+            shown("file://", "/parameters.json"),
+            shown("", "")
+        ),
         FarmFormat::Slurm => shown("", "/submit.sh") + "\n",
     };
     if !arguments.quiet {
