@@ -26,7 +26,7 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
     };
     check_pictures(arguments, &job)?;
     let files = match arguments.format {
-        FarmFormat::Openjd => openjd::files(&job),
+        FarmFormat::Openjd => openjd::files(&job)?,
         FarmFormat::Slurm => slurm::files(&job),
     };
     Inputs::of(&job.files).spare(files.iter().map(|file| bundle.join(file.name)))?;

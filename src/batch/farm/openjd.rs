@@ -6,12 +6,30 @@
 use super::NO_SHEET;
 use super::{BundleFile, Group, Job};
 use crate::description::frames_in_short;
+use crate::error::{Error, Result};
 use serde_json::json;
 use std::fmt::Write;
 
+/// Letters of the value of a parameter, and values of the range of a task's: as many as the specification allows.
+const MOST_VALUES: usize = 1024;
+/// Parameters of a job.
+const MOST_PARAMETERS: usize = 50;
+
 /// The files of the bundle.
-#[must_use]
-pub fn files(job: &Job) -> Vec<BundleFile> {
+///
+/// # Errors
+/// [`Error::Config`] for what a template cannot hold.
+pub fn files(job: &Job) -> Result<Vec<BundleFile>> {
+    // A step for as many scenes as it can have.
+    let each = |group: &Group| -> Vec<Group> {
+        let frames = || group.frames.clone();
+        group.scenes.chunks(MOST_VALUES).map(|scenes| Group { scenes: scenes.to_vec(), frames: frames() }).collect()
+    };
+    let job = &Job { groups: job.groups.iter().flat_map(each).collect(), ..job.clone() };
+    let faults = faults(job);
+    if !faults.is_empty() {
+        return Err(Error::Config(faults.join("\n")));
+    }
     let [source, pictures] = [&job.source, &job.pictures].map(|path| path.display().to_string());
     let values = json!({"parameterValues": [
         {"name": "Batch", "value": source}, {"name": "OutputDir", "value": pictures},
@@ -24,12 +42,55 @@ pub fn files(job: &Job) -> Vec<BundleFile> {
     }});
     let file = |name, text| BundleFile { name, text, executable: false };
     // JSON is YAML.
-    vec![
+    Ok(vec![
         file("template.yaml", template(job)),
         file("parameter_values.yaml", format!("{values:#}\n")),
         file("asset_references.yaml", format!("{assets:#}\n")),
         file("parameters.json", format!("{:#}\n", json!({"Batch": source, "OutputDir": pictures}))),
-    ]
+    ])
+}
+
+/// What a template cannot hold, in words.
+fn faults(job: &Job) -> Vec<String> {
+    let mut faults = Vec::new();
+    let letters = |what: &str, text: &str| {
+        let found = text.chars().count();
+        (found > MOST_VALUES).then(|| {
+            format!(
+                "{what}: expected at most {MOST_VALUES} letters, as many as Open Job Description allows, found {found}"
+            )
+        })
+    };
+    let [source, pictures] = [&job.source, &job.pictures].map(|path| path.display().to_string());
+    let values = [("the path of the batch", &source), ("--pictures", &pictures), ("--program", &job.program)];
+    faults.extend(values.into_iter().filter_map(|(what, text)| letters(what, text)));
+    for group in &job.groups {
+        let what = || format!("{}: render.frames, written in short", group.scenes[0]);
+        faults.extend(letters(&what(), &frames_of(group)));
+    }
+    let fixed = parameters(job).lines().count();
+    let framed = job.groups.iter().filter(|group| !group.frames.is_empty()).count();
+    if fixed + framed > MOST_PARAMETERS {
+        faults.push(format!(
+            "render.frames: expected at most {} different sets of frames in one job, as many as Open Job Description has \
+             parameters for, found {framed}; --scene makes a job of some scenes",
+            MOST_PARAMETERS - fixed
+        ));
+    }
+    let bound = job.arguments.iter().filter(|argument| argument.contains("{{"));
+    faults.extend(bound.map(|argument| {
+        format!(
+            "{argument}: expected an argument without {{{{, which Open Job Description takes for a variable, found one"
+        )
+    }));
+    faults
+}
+
+/// The frames of a group in order, for its ranges may not overlap.
+fn frames_of(group: &Group) -> String {
+    let mut frames = group.frames.clone();
+    frames.sort_unstable();
+    frames_in_short(&frames)
 }
 
 /// A text as YAML writes it in quotes.
@@ -48,36 +109,17 @@ fn mark(i: usize) -> String {
 }
 
 fn template(job: &Job) -> String {
-    let mut out = String::new();
-    let name = quoted(&job.name.chars().take(100).collect::<String>());
-    let threads = job.threads;
-    let program = quoted(&job.program);
-    let _ = write!(
-        out,
+    let mut out = format!(
         "# abbe farm --format openjd: {} pictures\n\
          specificationVersion: jobtemplate-2023-09\n\
          extensions: [TASK_CHUNKING]\n\
          name: \"{{{{Param.JobName}}}}\"\n\
-         parameterDefinitions:\n\
-         - {{name: JobName, type: STRING, default: {name}}}\n\
-         - {{name: Abbe, type: STRING, default: {program}, description: \"The program, on the path of each worker\"}}\n\
-         - {{name: Batch, type: PATH, objectType: FILE, dataFlow: IN, description: \"The batch or scene\"}}\n\
-         - {{name: OutputDir, type: PATH, objectType: DIRECTORY, dataFlow: OUT, description: \"Where the pictures go\"}}\n\
-         - {{name: Threads, type: INT, default: {threads}, minValue: 0, description: \"Of a task; 0 for all that it may use\"}}\n",
+         parameterDefinitions:\n",
         job.count()
     );
-    if job.has_frames() {
-        let _ = writeln!(
-            out,
-            "- {{name: FramesPerTask, type: INT, default: {}, minValue: 1, description: \"Frames in a row share what they load\"}}",
-            job.cut.frames
-        );
-    }
+    out += &parameters(job);
     for (i, group) in job.groups.iter().enumerate().filter(|(_, group)| !group.frames.is_empty()) {
-        // Its ranges may not overlap.
-        let mut frames = group.frames.clone();
-        frames.sort_unstable();
-        let frames = quoted(&frames_in_short(&frames));
+        let frames = quoted(&frames_of(group));
         let _ = writeln!(out, "- {{name: Frames{}, type: STRING, default: {frames}}}", mark(i));
     }
     let _ = writeln!(out, "steps:");
@@ -86,6 +128,28 @@ fn template(job: &Job) -> String {
         if job.cut.parts() {
             merge(group, &mark(i), &mut out);
         }
+    }
+    out
+}
+
+/// The parameters of a job besides its frames, one a line.
+fn parameters(job: &Job) -> String {
+    let name = quoted(&job.name.chars().take(100).collect::<String>());
+    let threads = job.threads;
+    let program = quoted(&job.program);
+    let mut out = format!(
+        "- {{name: JobName, type: STRING, default: {name}}}\n\
+         - {{name: Abbe, type: STRING, default: {program}, description: \"The program, on the path of each worker\"}}\n\
+         - {{name: Batch, type: PATH, objectType: FILE, dataFlow: IN, description: \"The batch or scene\"}}\n\
+         - {{name: OutputDir, type: PATH, objectType: DIRECTORY, dataFlow: OUT, description: \"Where the pictures go\"}}\n\
+         - {{name: Threads, type: INT, default: {threads}, minValue: 0, description: \"Of a task; 0 for all that it may use\"}}\n"
+    );
+    if job.has_frames() {
+        let _ = writeln!(
+            out,
+            "- {{name: FramesPerTask, type: INT, default: {}, minValue: 1, description: \"Frames in a row share what they load\"}}",
+            job.cut.frames
+        );
     }
     out
 }
@@ -188,6 +252,37 @@ mod tests {
         assert!(parts.contains("    combination: Scene * Frame * Tile\n"));
         assert!(parts.contains("- {name: Scene, type: STRING, range: [\"a\", \"b c\"]}\n"));
         assert!(parts.contains("\"--set\", \"render.seed='x y'\"]\n"));
-        assert!(files(&job(Cut { tiles: 1, ranges: 1, frames: 1 }))[1].text.contains("/in/it's.yaml"));
+        let files = files(&job(Cut { tiles: 1, ranges: 1, frames: 1 })).unwrap();
+        assert!(files[1].text.contains("/in/it's.yaml"));
+    }
+
+    /// `openjd check` refused what was written. Of 50 parameters a job with frames has 6 of its own.
+    #[test]
+    fn what_a_template_cannot_hold_is_refused_or_shared_out() {
+        let one = job(Cut { tiles: 1, ranges: 1, frames: 1 });
+        let group =
+            |scenes: usize, frames: Vec<i32>| Group { scenes: (0..scenes).map(|i| format!("s{i}")).collect(), frames };
+        let of = |groups: Vec<Group>| files(&Job { groups, ..one.clone() });
+        let says = |groups: Vec<Group>| of(groups).unwrap_err().to_string();
+        // Squares have no steps in common.
+        let squares = |n: i32| (0..n).map(|i| i * i).collect::<Vec<i32>>();
+        let most = (1..400).filter(|n| frames_in_short(&squares(*n)).len() <= 1024).max().unwrap();
+        let long = frames_in_short(&squares(most + 1)).len();
+        assert!(of(vec![group(1, squares(most))]).is_ok());
+        let expected =
+            "s0: render.frames, written in short: expected at most 1024 letters, as many as Open Job Description";
+        assert_eq!(says(vec![group(1, squares(most + 1))]), format!("{expected} allows, found {long}"));
+
+        let steps = |files: Vec<BundleFile>| files[0].text.matches("- name: Render").count();
+        assert_eq!(steps(of(vec![group(1024, vec![])]).unwrap()), 1);
+        assert_eq!(steps(of(vec![group(1025, vec![])]).unwrap()), 2);
+
+        let sets = |n: i32| (1..=n).map(|last| group(1, (0..last).collect())).collect::<Vec<Group>>();
+        assert!(of(sets(44)).is_ok());
+        assert!(says(sets(45)).starts_with("render.frames: expected at most 44 different sets of frames in one job"));
+
+        let told = Job { arguments: vec!["--set".into(), "a={b: c{{d}}}".into()], ..one.clone() };
+        let says = files(&told).unwrap_err().to_string();
+        assert!(says.starts_with("a={b: c{{d}}}: expected an argument without {{, which"), "{says}");
     }
 }
