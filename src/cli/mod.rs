@@ -120,7 +120,8 @@ struct RenderArguments {
     /// End after this time of rendering each scene, as 60s, 10m or 2h
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     time: Option<std::time::Duration>,
-    /// Threads; 0 takes every core that the process may use
+    /// Threads; 0 takes as many as SLURM_CPUS_PER_TASK, CUE_THREADS or OMP_NUM_THREADS says (the first that is set), else
+    /// every core that the process may use
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
     threads: usize,
     /// End with exit code 33 before the process has more memory than this, as 8G or 500M
@@ -170,7 +171,8 @@ struct MergeArguments {
     /// Write the report here as well
     #[arg(long, value_name = "FILE.json")]
     report: Option<PathBuf>,
-    /// Threads; 0 takes every core that the process may use
+    /// Threads; 0 takes as many as SLURM_CPUS_PER_TASK, CUE_THREADS or OMP_NUM_THREADS says (the first that is set), else
+    /// every core that the process may use
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
     threads: usize,
     /// Print nothing but errors
@@ -271,7 +273,8 @@ struct AccuracyArguments {
     /// The error that is wanted, as 0.01 or 1% [default: that of the scene as it is written]
     #[arg(long, value_name = "E", value_parser = relative_error, allow_hyphen_values = true)]
     error: Option<f64>,
-    /// Threads; 0 takes every core that the process may use
+    /// Threads; 0 takes as many as SLURM_CPUS_PER_TASK, CUE_THREADS or OMP_NUM_THREADS says (the first that is set), else
+    /// every core that the process may use
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
     threads: usize,
     /// Print nothing but errors and notes
@@ -527,30 +530,34 @@ pub fn run() -> i32 {
 }
 
 impl Verb {
-    /// Threads that were asked for; 0 for none.
-    fn threads(&self) -> usize {
+    /// Threads that were asked for, 0 for as many as are granted; none where nothing is rendered.
+    fn threads(&self) -> Option<usize> {
         match self {
-            Verb::Render(a) => a.threads,
-            Verb::Merge(a) => a.threads,
-            Verb::Accuracy(a) => a.threads,
+            Verb::Render(a) => Some(a.threads),
+            Verb::Merge(a) => Some(a.threads),
+            Verb::Accuracy(a) => Some(a.threads),
             // Those of `farm` are its tasks'.
-            Verb::Farm(_) | Verb::Plan(_) | Verb::Import(_) | Verb::Export(_) | Verb::Compare(_) | Verb::Info(_) => 0,
+            Verb::Farm(_) | Verb::Plan(_) | Verb::Import(_) | Verb::Export(_) | Verb::Compare(_) | Verb::Info(_) => {
+                None
+            }
         }
     }
 }
 
-/// Makes the pool of as many threads as were asked for, else as the farm grants, else as the cpuset has cores. Renders do
-/// not block, so the pool may be the global one; a second call in one process keeps it.
+/// Makes the pool of as many threads as were asked for, else as the farm grants, else as the cpuset has cores; the latter
+/// where nothing is rendered, too (`None`). Renders do not block, so the pool may be the global one; a second call in one
+/// process keeps it.
 ///
 /// # Errors
 /// [`Error::Config`] where the farm grants more than can be meant; [`Error::Threads`] where the system has none to give.
-fn use_threads(asked: usize) -> Result<()> {
+fn use_threads(asked: Option<usize>) -> Result<()> {
     let granted = ["SLURM_CPUS_PER_TASK", "CUE_THREADS", "OMP_NUM_THREADS"];
     let granted = || {
         let number = |v: &str| std::env::var(v).ok()?.parse::<usize>().ok().filter(|&n| n > 0);
         granted.iter().find_map(|v| Some((*v, number(v)?)))
     };
-    let threads = match Some(("--threads", asked)).filter(|_| asked > 0).or_else(granted) {
+    let wanted = asked.and_then(|n| Some(("--threads", n)).filter(|_| n > 0).or_else(granted));
+    let threads = match wanted {
         Some((by, n)) if n > MOST_THREADS => {
             return Err(Error::Config(format!("{by}: expected at most {MOST_THREADS} threads, found {n}")));
         }
