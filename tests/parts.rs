@@ -202,6 +202,22 @@ fn light_from_the_lights_is_in_the_scenes_of_this_file() {
     assert_eq!(light("bands"), (true, true));
 }
 
+/// The second merge took the picture of the first for a part.
+#[test]
+fn parts_may_be_merged_where_they_lie_as_often_as_one_likes() {
+    let place = Place::of(&format!("{FRAME}render: {{samples: 4}}\nlights: [{{constant: {{radiance: 1}}}}]\n"));
+    for tile in ["0/2", "1/2"] {
+        assert_eq!(place.run(&["render", "scene.yaml", "-q", "-o", "parts", "--tile", tile]).code, 0);
+    }
+    for _ in 0..2 {
+        let ran = place.run(&["merge", "parts", "-q", "-o", "parts"]);
+        assert_eq!((ran.code, ran.err), (0, String::new()));
+    }
+    // By its own name it is no part.
+    let ran = place.run(&["merge", "parts", "parts/scene.exr", "-q", "-o", "parts"]);
+    assert!(ran.code == 3 && ran.err.contains("parts/scene.exr: expected a part"), "{}", ran.err);
+}
+
 /// The message of a merge that must fail with exit code 3 and write nothing.
 fn refusal(place: &Place, paths: &[PathBuf]) -> String {
     let out = place.path("refused/scene.exr");

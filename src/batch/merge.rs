@@ -6,7 +6,7 @@
 
 use super::checks;
 use super::clashes;
-use super::finish;
+use super::finish::{self, Finish};
 use super::frame::{Frame, lock};
 use super::names;
 use super::part_file::{self, Header, Written};
@@ -53,7 +53,15 @@ pub fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Report, Result<()>)> {
     checks::output_place(Some(out), 1)?;
     let start = Instant::now();
-    let parts: Vec<Written> = files(paths)?.par_iter().map(|path| part_file::open(path)).collect::<Result<_>>()?;
+    let mut opened: Vec<(PathBuf, Result<Written>)> =
+        files(paths)?.into_par_iter().map(|path| (path.clone(), part_file::open(&path))).collect();
+    let out = opened.iter().find_map(|(_, part)| Some(picture(out, &part.as_ref().ok()?.header.finish)));
+    let out = out.unwrap_or_default();
+    // What an earlier merge has written among its parts is none.
+    let earlier = out.canonicalize().ok();
+    let is_earlier = |path: &PathBuf| earlier.is_some() && path.canonicalize().ok() == earlier && !paths.contains(path);
+    opened.retain(|(path, part)| part.is_ok() || !is_earlier(path));
+    let parts: Vec<Written> = opened.into_iter().map(|(_, part)| part).collect::<Result<_>>()?;
     let Some(first) = parts.first() else {
         return Err(Error::Config("expected parts to merge, found none".into()));
     };
@@ -61,9 +69,6 @@ pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Re
         part.header.check_like(&part.path, &first.header)?;
     }
     let finish = &first.header.finish;
-    let filled = names::fill(out, &finish.name, finish.frame_number);
-    let in_directory = || filled.join(format!("{}.exr", names::label(&finish.name, finish.frame_number)));
-    let out = if super::ends_in(out, &["exr"]) { filled } else { in_directory() };
     output::Inputs::of(parts.iter().map(|part| &part.path)).spare(finish::places(&out))?;
     if let Some(report) = report {
         clashes::spare(report, &out, true, &names::label(&finish.name, finish.frame_number))?;
@@ -101,6 +106,15 @@ pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Re
     let picture = out.file_stem().unwrap_or_default().to_string_lossy();
     report.write(&out.with_file_name(format!("report.{picture}.json")));
     Ok((report, written))
+}
+
+/// The file at or in `out` of the picture that `finish` is of.
+fn picture(out: &Path, finish: &Finish) -> PathBuf {
+    let filled = names::fill(out, &finish.name, finish.frame_number);
+    match super::ends_in(out, &["exr"]) {
+        true => filled,
+        false => filled.join(format!("{}.exr", names::label(&finish.name, finish.frame_number))),
+    }
 }
 
 /// What several counted of robust arithmetic, if any did.

@@ -122,10 +122,8 @@ impl Stop {
             && first.elapsed > time.mul_f64(1.0 + f64::from(u8::from(first.samples > 1)) * 0.5)
         {
             return Err(Error::Render(format!(
-                "stop.time: {:.3} s is too short for {} samples of each pixel, which took {:.3} s; they are written",
-                time.as_secs_f64(),
-                first.samples,
-                first.elapsed.as_secs_f64()
+                "stop.time: {time:?} is too short for {} samples of each pixel, which took {:.1?}; they are written",
+                first.samples, first.elapsed
             )));
         }
         Ok(())
@@ -339,7 +337,11 @@ mod tests {
         assert_eq!(stop.pass_end(&milestones(&[32, 64, 92], 1.0), 1 << 16), None);
         assert!(stop.check(&milestones(&[32, 64, 92], 1.0)).is_ok());
         let short = Stop { time: Some(Duration::from_millis(1)), ..FREE };
-        assert!(short.check(&milestones(&[4], 1.0)).unwrap_err().to_string().contains("too short for 4 samples"));
+        let says = |stop: Stop| stop.check(&milestones(&[4], 1.0)).unwrap_err().to_string();
+        assert!(says(short).starts_with("stop.time: 1ms is too short for 4 samples"));
+        // To three decimals it was 0.000 s.
+        let shorter = Stop { time: Some(Duration::from_micros(100)), ..FREE };
+        assert!(says(shorter).starts_with("stop.time: 100µs is too short for 4 samples"));
     }
 
     #[test]
