@@ -74,8 +74,8 @@ pub struct Finish {
     pub white: Option<[f64; 2]>,
     /// Factor on colours.
     pub sensitivity: f64,
-    /// [`crate::film::filter::Filter::span`] of the filter; 1 where nothing is splatted.
-    pub filter_span: f64,
+    /// Which pixels share their errors.
+    pub sharing: Sharing,
     /// Whether bands of the spectrum stand in place of colour.
     pub bands: bool,
     /// Further channels.
@@ -90,6 +90,16 @@ pub struct Finish {
     pub mattes: Vec<Matte>,
     /// What a photographer would say of the camera.
     pub lens: Lens,
+}
+
+/// Which pixels of a picture share their errors.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sharing {
+    /// All: where photons are merged, the samples of one number share their wavelengths in all pixels.
+    All,
+    /// Those under the filter, of what is splatted: [`crate::film::filter::Filter::span`], 1 where nothing is.
+    Span(f64),
 }
 
 /// The lens of a camera whose picture were on film 36 mm wide.
@@ -158,7 +168,11 @@ impl Finish {
             white,
             output,
             sensitivity: description.image.sensitivity,
-            filter_span: if splats { filter(&description.image.filter).span() } else { 1.0 },
+            sharing: match &plan.caustics {
+                Some(caustics) if caustics.merging.is_some() => Sharing::All,
+                _ if splats => Sharing::Span(filter(&description.image.filter).span()),
+                _ => Sharing::Span(1.0),
+            },
             bands: !description.image.bands.is_empty(),
             layers: plan.layers.channels(),
             kept: plan.layers.kept,
@@ -420,7 +434,7 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         description::FileLayout::Multipart => exr::Layout::Multipart,
     };
     file.attributes = attributes(finish, frame, report);
-    let shared = frame.shared_errors(image, &finish.rgb_from_xyz(), finish.filter_span);
+    let shared = frame.shared_errors(image, &finish.rgb_from_xyz(), finish.sharing);
     if shared > 1.0 {
         file.attributes.push((exr::SHARED_ERRORS.to_owned(), Attribute::Text(format!("{shared:.3}"))));
     }

@@ -5,6 +5,7 @@
 //! and after each pass the error so far is known.
 
 use super::adaptive::Allocation;
+use super::finish::Sharing;
 use super::part::{Breaks, Part, Share, SplatFilm};
 use super::stop::{Forecast, Stop};
 use crate::error::{Error, Result};
@@ -142,12 +143,17 @@ impl Frame {
         resolve::resolve(&self.film, splats, rgb_from_xyz)
     }
 
-    /// How many times the variance of the sum of all pixels of `image` is that of independent ones; see
-    /// [`resolve::shared_errors`].
+    /// How many times the variance of the sum of all pixels of `image` is that of independent ones, at the most; see
+    /// [`resolve::shared_errors`] and, for samples that share their wavelengths, [`resolve::errors_shared_by_all`].
     #[must_use]
-    pub fn shared_errors(&self, image: &Image, rgb_from_xyz: &[[f64; 3]; 3], span: f64) -> f64 {
+    pub fn shared_errors(&self, image: &Image, rgb_from_xyz: &[[f64; 3]; 3], sharing: Sharing) -> f64 {
         let splats = self.splats.as_ref().map(SplatFilm::splats);
-        splats.map_or(1.0, |splats| resolve::shared_errors(image, &splats, rgb_from_xyz, span))
+        match sharing {
+            Sharing::All => resolve::errors_shared_by_all(image, &self.film, splats.as_ref(), rgb_from_xyz),
+            Sharing::Span(span) => {
+                splats.map_or(1.0, |splats| resolve::shared_errors(image, &splats, rgb_from_xyz, span))
+            }
+        }
     }
 
     /// The further channel `channel` where its values stand once, not samples.

@@ -16,6 +16,8 @@
 
 use crate::film::Window;
 use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES, Sum};
+use crate::film::compare::GLOBAL_ALPHA;
+use crate::math::statistics::student_t_half_width;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -113,6 +115,41 @@ pub fn shared_errors(image: &Image, splats: &Splats, rgb_from_xyz: &[[f64; 3]; 3
     }
     let shared = |c: usize| if all[c] > 0.0 { 1.0 + (span - 1.0) * (own[c] / all[c]).min(1.0) } else { 1.0 };
     (0..3).map(shared).fold(1.0, f64::max)
+}
+
+/// At the most so many times the variance of the sum of all pixels of an `image` is that of independent ones, in the colour where
+/// that is most, where every pixel may share its errors with every other; 1 where replicates are empty.
+///
+/// What the sum varies by is told by the sums of the replicates, with three degrees of freedom. [`compare`](super::compare) takes
+/// what a file says for known and its scores for normal: so variances are multiplied by (t/z)², t and z the quantiles of Student
+/// and Gauss at its level, and what is beyond z standard errors is beyond t of those that were found.
+#[must_use]
+pub fn errors_shared_by_all(image: &Image, film: &Film, splats: Option<&Splats>, rgb_from_xyz: &[[f64; 3]; 3]) -> f64 {
+    let (mut sums, mut samples, mut own) = ([[0.0; 3]; REPLICATES], [0.0; REPLICATES], [0.0; 3]);
+    for (i, cells) in film.cells().iter().enumerate() {
+        let error = image.standard_error.each_ref().map(|plane| f64::from(plane[i]));
+        let Some(light) =
+            replicate_light(film, splats, i, rgb_from_xyz).filter(|_| error.iter().all(|e| e.is_finite()))
+        else {
+            continue;
+        };
+        for (r, count) in counts(cells).into_iter().enumerate() {
+            samples[r] += count as f64;
+            (0..3).for_each(|c| sums[r][c] += light[r][c]);
+        }
+        (0..3).for_each(|c| own[c] += error[c] * error[c]);
+    }
+    let total: f64 = samples.iter().sum();
+    let bound = |c: usize| {
+        let mean = (0..REPLICATES).map(|r| samples[r] * sums[r][c]).sum::<f64>() / total;
+        let squares: f64 = (0..REPLICATES).map(|r| samples[r] * (sums[r][c] - mean).powi(2)).sum();
+        squares / ((REPLICATES - 1) as f64 * total) / own[c]
+    };
+    let confidence = 1.0 - GLOBAL_ALPHA / 3.0;
+    let quantile = |dof| student_t_half_width(confidence, dof);
+    let widened = (quantile((REPLICATES - 1) as f64) / quantile(f64::INFINITY)).powi(2);
+    // Without errors there is nothing to share: 0/0.
+    (0..3).map(|c| widened * bound(c)).filter(|shared| shared.is_finite()).fold(1.0, f64::max)
 }
 
 /// A pixel of an [`Image`].

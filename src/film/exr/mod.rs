@@ -316,8 +316,8 @@ pub enum StandardError {
     Write,
 }
 
-/// The attribute that says how many times the variance of the mean of all pixels is that of independent ones, where light of
-/// one path falls into several; a number.
+/// The attribute that says how many times, at the most, the variance of the mean of all pixels is that of independent ones,
+/// where light of one path falls into several or samples of all pixels share their wavelengths; a number.
 pub const SHARED_ERRORS: &str = "abbe/sharedErrors";
 
 /// The name of the channel with the standard errors of the channel `name`.
