@@ -12,7 +12,7 @@ import OpenEXR
 import OpenImageIO as oiio
 import pytest
 from check_exr import check
-from test_exr_files import official, specification
+from test_exr_files import flat, official, specification
 
 COMPONENTS = ["emission", "caustic", "diffuse", "glossy", "transmission", "media"]
 LAYERS = ["Z", "P", "uv", "normal", "albedo", "variance", "stderr", "sampleCount", *COMPONENTS]
@@ -89,6 +89,49 @@ def test_parts_have_the_layers_and_the_same_pixels(render):
         file.close()
     # OpenImageIO shortens names that begin with the part's own.
     assert len(names) == len(single)
+
+
+ALBEDO, LIGHT = "albedo", {"name": "light", "light": "path", "form": "xyz"}
+BANDS = {"width": 40, "height": 30, "bands": [{"name": "a", "response": 1}, {"name": "b", "response": 2}]}
+
+
+@pytest.mark.parametrize(
+    "channels, layers, image",
+    [
+        ("xyza", [ALBEDO], None),
+        ("luminance_alpha", [ALBEDO], None),
+        ("rgba", [LIGHT], None),
+        ("rgba", [LIGHT, "Z"], BANDS),
+        ("rgba", [LIGHT, ALBEDO, "Z"], BANDS),
+    ],
+)
+def test_all_parts_have_one_set_of_primaries(render, channels, layers, image):
+    """No reader opens a file whose parts differ in them."""
+    sections = {"layers": layers, **({"image": image} if image else {})}
+    exr = {"channels": channels, "precision": "float"}
+    single, header = official(render("single", output={"colour": "acescg", "exr": exr}, **sections))
+    path = render("parts", output={"colour": "acescg", "exr": {**exr, "layout": "multipart"}}, **sections)
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        headers = [dict(part.header) for part in file.parts]
+        pixels = {n: c.pixels.copy() for part in file.parts for n, c in part.channels.items()}
+    assert set(pixels) == set(single) and all(np.array_equal(single[name], pixels[name]) for name in single)
+    rgb = any(name.split(".")[-1] == "R" for name in single)
+    expected = [0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767] if rgb else [1, 0, 0, 1, 0, 0, 1 / 3, 1 / 3]
+    for part in [header, *headers]:
+        assert OpenEXR.checkColorMetadata(part) == 0
+        if part.get("colorInteropID") != "data":
+            assert np.allclose(flat(part["chromaticities"]), expected, atol=1e-6), part["name"]
+    assert "chromaticities" in headers[0]
+    file = oiio.ImageInput.open(str(path))
+    assert file, oiio.geterror()
+    spaces = {}
+    for i in range(len(headers)):
+        assert file.seek_subimage(i, 0)
+        spaces[headers[i]["name"]] = file.spec().get_string_attribute("colorInteropID")
+    file.close()
+    xyz = ["light"] if channels == "rgba" else ["rgba"]
+    assert all(spaces[name] == "lin_ciexyzd65_scene" for name in xyz), spaces
+    assert spaces.get("albedo", "lin_ap1_scene") == "lin_ap1_scene" and spaces.get("a", "data") == "data", spaces
 
 
 @pytest.mark.parametrize("compression", ["dwaa", "dwab"])

@@ -107,10 +107,11 @@ fn parts_of<'a>(image: &ExrImage, channels: Vec<Channel<'a>>) -> Vec<Part<'a>> {
             None => parts.push(Part { name: Some(name), channels: vec![channel], light, first: false }),
         }
     }
-    parts.sort_by_key(|part| part.name.as_deref() != Some("rgba"));
-    if let Some(part) = parts.first_mut() {
-        part.first = true;
-    }
+    // Readers ask the first part for the primaries of all, so it holds colour where any part does.
+    let picture = parts.iter().position(|part| part.name.as_deref() == Some("rgba"));
+    let first = picture.or_else(|| parts.iter().position(|part| part.light)).unwrap_or(0);
+    parts[..=first].rotate_right(1);
+    parts[0].first = true;
     parts
 }
 
@@ -283,17 +284,31 @@ fn compressor_header(image: &ExrImage, channels: &[Channel], compression: Compre
         .with_encoding(compression, BlockDescription::ScanLines, LineOrder::Increasing)
 }
 
-/// What the colours of a part mean, those of the picture itself where they are in it: X, Y and Z say it by their names.
+/// What the colours of a part mean; none of data.
+///
+/// A file has one set of `chromaticities`, which OpenEXR wants to be the same in all parts: the primaries of R, G and B
+/// wherever there are any, else those of X, Y and Z, which say by their names what they are. `colorInteropID` is that of
+/// the picture's own R, G and B, else told where all colours of the part are in one space.
 fn encoding(image: &ExrImage, part: &Part) -> Option<ColourEncoding> {
     let rgb = image.colour.as_ref().filter(|_| part.light)?;
-    let colours = || {
-        let light = part.channels.iter().map(|(name, _)| *name).filter(|name| !image.data.contains(*name));
-        light.map(|name| name.rsplit_once('.').map_or((true, name), |(_, c)| (false, c))).filter(|(_, c)| *c != "A")
+    let xyz = &ColourEncoding::of(ColourSpace::Xyz);
+    let of = |name: &str| {
+        let component = name.rsplit_once('.').map_or(name, |(_, component)| component);
+        match component {
+            "A" => None,
+            "X" | "Y" | "Z" => Some(xyz),
+            _ => Some(rgb),
+        }
     };
-    match colours().find(|(own, _)| *own).or_else(|| colours().next()) {
-        Some((_, "X" | "Y" | "Z")) => Some(ColourEncoding::of(ColourSpace::Xyz)),
-        _ => Some(rgb.clone()),
-    }
+    let colour = |name: &str| if image.data.contains(name) { None } else { of(name) };
+    let in_rgb = image.channels.iter().any(|(name, _)| colour(name) == Some(rgb));
+    let own = || part.channels.iter().filter_map(|(name, _)| colour(name));
+    let picture = part.channels.iter().any(|(name, _)| !name.contains('.') && colour(name) == Some(rgb));
+    let told = if picture { Some(rgb) } else { own().next().filter(|first| own().all(|other| other == *first)) };
+    Some(ColourEncoding {
+        primaries: if in_rgb { rgb.primaries } else { xyz.primaries },
+        interop_id: told.and_then(|of| of.interop_id.clone()),
+    })
 }
 
 /// The attributes of a part, sorted by name, and whether a name is long; `chunks` of one among several.
@@ -590,6 +605,51 @@ mod tests {
         }
         let parts: Vec<&str> = headers.parts.iter().filter_map(|header| header.text("name")).collect();
         assert_eq!(parts, ["rgba", "CryptoMaterial", "CryptoObject", "stderr"]);
+    }
+
+    /// OpenEXR and OpenImageIO open no file whose parts differ in `chromaticities`, nor one whose first part has none where a
+    /// later one has.
+    #[test]
+    fn all_parts_have_the_primaries_of_red_green_and_blue() {
+        let xyz = ColourEncoding::of(ColourSpace::Xyz);
+        let told = |names: &[&str], data: &[&str], layout| {
+            let mut written = mixed(Compression::Zips);
+            written.channels = names.iter().map(|n| ((*n).to_owned(), ChannelData::F32(vec![0.5; 6]))).collect();
+            written.data = data.iter().map(|n| (*n).to_owned()).collect();
+            written.layout = layout;
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("a.exr");
+            write_exr(&path, &written).unwrap();
+            let of = |header: &super::super::header::Header| {
+                let name = |primaries: [[f64; 2]; 4]| primaries.concat().iter().map(|x| *x as f32).collect::<Vec<_>>();
+                let set = header.numbers::<8>("chromaticities").map(|set| {
+                    let set = set.map(|x| x as f32).to_vec();
+                    ["rgb", "xyz"].into_iter().zip([rec709(), xyz.clone()]).find(|(_, of)| name(of.primaries) == set)
+                });
+                let set = set.map_or("none", |known| known.unwrap().0);
+                let id =
+                    header.text("colorInteropID").map(|id| id.trim_start_matches("lin_").trim_end_matches("_scene"));
+                format!("{} {set} {}", header.text("name").unwrap_or("all"), id.unwrap_or("none"))
+            };
+            read_headers(&path).unwrap().parts.iter().map(of).collect::<Vec<_>>().join(", ")
+        };
+        let (single, multi) = (Layout::Single, Layout::Multipart);
+        let picture = ["X", "Y", "Z", "A"];
+        let albedo = ["albedo.R", "albedo.G", "albedo.B"];
+        let light = ["light.X", "light.Y", "light.Z"];
+        assert_eq!(told(&picture, &[], single), "all xyz ciexyzd65");
+        let both = [&picture[..], &albedo].concat();
+        assert_eq!(told(&both, &[], single), "all rgb none");
+        assert_eq!(told(&both, &[], multi), "rgba rgb ciexyzd65, albedo rgb rec709");
+        assert_eq!(told(&["Y", "A", "albedo.R"], &[], multi), "rgba rgb ciexyzd65, albedo rgb rec709");
+        let other = [&["R", "G", "B", "Z"][..], &light].concat();
+        assert_eq!(told(&other, &["Z"], single), "all rgb rec709");
+        assert_eq!(told(&other, &["Z"], multi), "rgba rgb rec709, Z none data, light rgb ciexyzd65");
+        // Bands are no colour, and stand before all others by their names.
+        let bands = [&["a", "b"][..], &light, &albedo].concat();
+        let expected = "albedo rgb rec709, a none data, b none data, light rgb ciexyzd65";
+        assert_eq!(told(&bands, &["a", "b"], multi), expected);
+        assert_eq!(told(&["a", "b"], &["a", "b"], multi), "a none data, b none data");
     }
 
     #[test]
