@@ -3,7 +3,7 @@
 use super::finish::Finish;
 use super::frame::Frame;
 use super::report::SceneReport;
-use crate::description::{self, HeaderValue};
+use crate::description::{self, HeaderValue, Standard};
 use crate::film::exr::{Attribute, TimeCode};
 use crate::spectrum::observer;
 
@@ -60,7 +60,7 @@ pub(super) fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -
     for (name, value) in written {
         all.retain(|(other, _)| other != name);
         let value = match value {
-            HeaderValue::Number(number) => Attribute::Float(*number as f32),
+            HeaderValue::Number(value) => number(name, *value),
             HeaderValue::Name(written) => match description::time_code(written).filter(|_| name == "timeCode") {
                 Some(code) => Attribute::TimeCode(time_code(code, finish.frame_number, finish.frames_per_second)),
                 None => text(written),
@@ -85,6 +85,18 @@ pub(super) fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -
         all.push(("abbe/secondsToHalveError".to_owned(), Attribute::Double(seconds)));
     }
     all
+}
+
+/// A number as the standard has it: a float in its attributes; in others an int where it is one, else a double, which holds all
+/// digits that were written.
+fn number(name: &str, value: f64) -> Attribute {
+    if description::standard(name) == Some(Standard::Float) {
+        Attribute::Float(value as f32)
+    } else if f64::from(value as i32) == value {
+        Attribute::Int(value as i32)
+    } else {
+        Attribute::Double(value)
+    }
 }
 
 /// Frames and seconds of a rate: whole ones a second, those of television (24000 in 1001 seconds, written 23.976 or 23.98),
@@ -113,8 +125,7 @@ fn white_luminance(finish: &Finish) -> Option<f64> {
 fn time_code(start: [u32; 4], number: Option<i32>, rate: Option<f64>) -> TimeCode {
     // Of a still nobody says the rate.
     let number = i64::from(number.filter(|_| rate.is_some()).unwrap_or(0));
-    let rate = rate.unwrap_or(if start[3] < 30 { 30.0 } else { 60.0 });
-    let rate = (rate.round() as i64).max(1);
+    let rate = i64::from(description::counted_rate(rate));
     let [hours, minutes, seconds, frames] = start.map(i64::from);
     let all = ((hours * 60 + minutes) * 60 + seconds) * rate + frames + number;
     let all = all.rem_euclid(24 * 3600 * rate);
@@ -137,6 +148,19 @@ mod tests {
         {
             assert_eq!(rational_rate(rate), rational, "{rate}");
         }
+    }
+
+    /// 2³¹ − 1 is the largest int; 123456789 has more digits than a float; 1e300 is beyond one.
+    #[test]
+    fn numbers_of_users_are_written_as_they_are() {
+        assert_eq!(number("shot", 123_456_789.0), Attribute::Int(123_456_789));
+        assert_eq!(number("shot", -3.0), Attribute::Int(-3));
+        assert_eq!(number("last", 2_147_483_647.0), Attribute::Int(i32::MAX));
+        assert_eq!(number("more", 2_147_483_648.0), Attribute::Double(2_147_483_648.0));
+        assert_eq!(number("big", 1e300), Attribute::Double(1e300));
+        assert_eq!(number("part", 0.1), Attribute::Double(0.1));
+        assert_eq!(number("focus", 2.0), Attribute::Float(2.0));
+        assert_eq!(number("expTime", 0.02), Attribute::Float(0.02));
     }
 
     /// Frame 45 after 01:00:00:00 is 45/24 s, 45/60 s and 45/120 s later; over midnight codes begin again.

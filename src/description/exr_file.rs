@@ -9,6 +9,7 @@ use super::fault::Checker;
 use super::layer::Layer;
 use super::output::{Channels, Colour, Compression, Output, Precision};
 use super::path::At;
+use super::scene::SceneDescription;
 use crate::error::in_short;
 
 /// How channels lie in a file.
@@ -62,7 +63,8 @@ fn to_nm() -> f64 {
 pub(crate) const DWA_LEVEL: f64 = 45.0;
 
 /// Names that the renderer itself writes, or that say how a file is built.
-const OWN: [&str; 21] = [
+const OWN: [&str; 23] = [
+    "acesImageContainerFlag",
     "channels",
     "chromaticities",
     "chunkCount",
@@ -70,6 +72,7 @@ const OWN: [&str; 21] = [
     "compression",
     "dataWindow",
     "displayWindow",
+    "dwaCompressionLevel",
     "framesPerSecond",
     "imageCounter",
     "lineOrder",
@@ -86,18 +89,90 @@ const OWN: [&str; 21] = [
     "worldToNDC",
 ];
 
-/// Attributes whose value is a number.
-const NUMBERS: [&str; 9] = [
+/// What a standard attribute of OpenEXR holds ("Standard Attributes", openexr.com).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standard {
+    /// Text.
+    Text,
+    /// A 32-bit float.
+    Float,
+    /// A time code.
+    TimeCode,
+    /// What is neither text nor a number, such as a box or a rational.
+    Other,
+}
+
+const TEXTS: [&str; 19] = [
+    "ascFramingDecisionList",
+    "cameraFirmwareVersion",
+    "cameraLabel",
+    "cameraMake",
+    "cameraModel",
+    "cameraSerialNumber",
+    "cameraUuid",
+    "capDate",
+    "comments",
+    "lensFirmwareVersion",
+    "lensMake",
+    "lensModel",
+    "lensSerialNumber",
+    "lookModTransform",
+    "owner",
+    "reelName",
+    "renderingTransform",
+    "view",
+    "wrapmodes",
+];
+
+const FLOATS: [&str; 19] = [
     "altitude",
+    "aperture",
+    "cameraCCTSetting",
+    "cameraTintSetting",
+    "effectiveFocalLength",
+    "entrancePupilOffset",
     "expTime",
+    "focus",
     "isoSpeed",
     "latitude",
     "longitude",
+    "nominalFocalLength",
+    "pinholeFocalLength",
+    "sensorPhotositePitch",
     "shutterAngle",
     "tStop",
     "utcOffset",
     "whiteLuminance",
+    "xDensity",
 ];
+
+const OTHERS: [&str; 13] = [
+    "adoptedNeutral",
+    "cameraColorBalance",
+    "captureRate",
+    "deepImageState",
+    "envmap",
+    "idManifest",
+    "keyCode",
+    "multiView",
+    "originalDataWindow",
+    "preview",
+    "sensorAcquisitionRectangle",
+    "sensorCenterOffset",
+    "sensorOverallDimensions",
+];
+
+/// What the attribute `name` holds, if it is a standard one.
+#[must_use]
+pub fn standard(name: &str) -> Option<Standard> {
+    match name {
+        "timeCode" => Some(Standard::TimeCode),
+        _ if TEXTS.contains(&name) => Some(Standard::Text),
+        _ if FLOATS.contains(&name) => Some(Standard::Float),
+        _ if OTHERS.contains(&name) => Some(Standard::Other),
+        _ => None,
+    }
+}
 
 impl SpectralFile {
     /// The ends of each band, nm.
@@ -116,10 +191,26 @@ pub fn time_code(text: &str) -> Option<[u32; 4]> {
     (hours < 24 && minutes < 60 && seconds < 60 && frames < 60).then_some([hours, minutes, seconds, frames])
 }
 
-/// What a file with these layers may not have, beside what each field says of itself.
-pub(crate) fn check_layers(output: &Output, layers: &[Layer], checker: &mut Checker<'_>) {
+/// Frames a second as time codes count them: whole ones, and 30 where nobody says how many.
+#[must_use]
+pub fn counted_rate(frames_per_second: Option<f64>) -> u32 {
+    frames_per_second.map_or(30, |rate| (rate.round() as u32).max(1))
+}
+
+/// What the file of `scene` may not have, beside what each field says of itself.
+pub(crate) fn check_scene(scene: &SceneDescription, checker: &mut Checker<'_>) {
+    let (output, layers) = (&scene.output, &scene.layers);
     let at = At::ROOT.key("output");
     let exr = at.key("exr");
+    if let Some(HeaderValue::Name(text)) = output.exr.attributes.get("timeCode")
+        && let Some([.., frames]) = time_code(text)
+    {
+        let rate = counted_rate(scene.render.frames_per_second);
+        let told = if scene.render.frames_per_second.is_some() { "" } else { ", for want of render.frames_per_second" };
+        let expected = format!("a time code of frames below {rate}{told}");
+        let attributes = exr.key("attributes");
+        checker.require(frames < rate, attributes.key("timeCode"), &expected, format_args!("{text:?}"));
+    }
     if output.exr.compression.loses() && output.exr.layout == FileLayout::Single && layers.iter().any(Layer::is_data) {
         let expected = "no loss in layers of data, found dwa; layout: multipart keeps them apart";
         checker.fault(exr.key("compression"), format!("expected {expected}"));
@@ -147,15 +238,22 @@ pub(crate) fn check(output: &Output, at: At<'_>, checker: &mut Checker<'_>) {
         checker.require(!own, at, "a name that the renderer does not give itself", format_args!("{name:?}"));
         checker.require((1..256).contains(&name.len()), at, "a name of 1 to 255 bytes", name.len());
         checker.require(!name.contains('\0'), at, "a name without a zero byte", format_args!("{name:?}"));
-        let number = matches!(value, HeaderValue::Number(_));
-        match name.as_str() {
-            "timeCode" => {
-                let fits = matches!(value, HeaderValue::Name(text) if time_code(text).is_some());
-                checker.require(fits, at, "a time code, as \"01:02:03:04\"", checker.written(at));
+        let (expected, fits) = match (standard(name), value) {
+            (None, _) => continue,
+            (Some(Standard::Text), value) => ("text", matches!(value, HeaderValue::Name(_))),
+            (Some(Standard::Float), HeaderValue::Number(number)) => {
+                ("a number that a 32-bit float holds", number.abs() <= f64::from(f32::MAX))
             }
-            name if NUMBERS.contains(&name) => checker.require(number, at, "a number", checker.written(at)),
-            _ => {}
-        }
+            (Some(Standard::Float), HeaderValue::Name(_)) => ("a number", false),
+            (Some(Standard::TimeCode), value) => {
+                let fits = matches!(value, HeaderValue::Name(text) if time_code(text).is_some());
+                ("a time code, as \"01:02:03:04\"", fits)
+            }
+            (Some(Standard::Other), _) => {
+                ("an attribute of text or of a number, which this one of OpenEXR is not", false)
+            }
+        };
+        checker.require(fits, at, expected, checker.written(at));
     }
     if exr.aces_container {
         let holds = output.colour == Colour::Aces2065
@@ -227,6 +325,54 @@ mod tests {
             "dir/s.yaml:2:39: output.exr.attributes.timeCode: expected a time code, as \"01:02:03:04\", found the text \
              \"01:02:60:00\""
         );
+        // The standard says of which type an attribute is, and a 32-bit float must hold what one is to hold.
+        for (value, expected) in [
+            ("owner: 3", "owner: expected text, found 3"),
+            ("capDate: 2026", "capDate: expected text, found 2026"),
+            ("wrapmodes: 1", "wrapmodes: expected text, found 1"),
+            ("aperture: f/2", "aperture: expected a number, found the text \"f/2\""),
+            ("focus: far", "focus: expected a number, found the text \"far\""),
+            ("xDensity: a", "xDensity: expected a number, found the text \"a\""),
+            ("altitude: 1e39", "altitude: expected a number that a 32-bit float holds, found 1e39"),
+            (
+                "keyCode: 7",
+                "keyCode: expected an attribute of text or of a number, which this one of OpenEXR is not, found 7",
+            ),
+            (
+                "acesImageContainerFlag: 1",
+                "acesImageContainerFlag: expected a name that the renderer does not give itself, found \
+                 \"acesImageContainerFlag\"",
+            ),
+        ] {
+            let found = faults(&format!("output: {{exr: {{attributes: {{{value}}}}}}}"));
+            assert_eq!(found.split_once("attributes.").map(|(_, told)| told), Some(expected));
+        }
+        scene("output: {exr: {attributes: {shot: 123456789, big: 1e300, owner: '3', focus: 2, xDensity: 72}}}");
+    }
+
+    /// A second has as many frames as the rate says; without one, 30.
+    #[test]
+    fn frames_of_a_time_code_are_below_the_rate() {
+        let told = |rate: &str, frames: &str| {
+            let attributes = format!("{{timeCode: '01:00:00:{frames}'}}");
+            format!("render: {{{rate}}}\noutput: {{exr: {{attributes: {attributes}}}}}\n")
+        };
+        let refused = |rate: &str, frames: &str| {
+            let found = faults(&told(rate, frames));
+            found.split_once("timeCode: ").map(|(_, told)| told.to_owned()).unwrap()
+        };
+        assert_eq!(
+            refused("frames_per_second: 24", "40"),
+            "expected a time code of frames below 24, found \"01:00:00:40\""
+        );
+        assert_eq!(
+            refused("", "40"),
+            "expected a time code of frames below 30, for want of render.frames_per_second, found \"01:00:00:40\""
+        );
+        refused("frames_per_second: 29.97", "30");
+        for (rate, frames) in [("frames_per_second: 23.976", "23"), ("", "29"), ("frames_per_second: 59.94", "59")] {
+            scene(&told(rate, frames));
+        }
     }
 
     #[test]

@@ -104,7 +104,8 @@
 //!                                   # stderr: standard errors of colours and of bands, stderr.R, stderr.NAME;
 //!                                   # rgba, rgb, xyza, xyz, luminance_alpha, luminance; single, multipart: each layer in
 //!                                   # a part of its own; attributes of the header by name, text or numbers, such as
-//!                                   # {owner: us, timeCode: "01:00:00:00"} (of frame 0)
+//!                                   # {owner: us, timeCode: "01:00:00:00"} (of frame 0): standard ones of OpenEXR by
+//!                                   # their types, other numbers int where they are whole and fit, else double
 //!   spectral: ~                     # or {bands: 31, from_nm: 400, to_nm: 700}: a further file, NAME.spectral.exr, of mean
 //!                                   # radiance in bands (layout 1.0 of Fichet, Pacanowski and Wilkie); ~ from 400 to 700
 //!   png:
@@ -437,7 +438,7 @@ pub use camera::{
 pub use coating::{Film, TexturedThickness, Thickness};
 pub use compound::{Blend, Brushed, Bump, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided};
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, Growth, ProjectorLight};
-pub use exr_file::{FileLayout, HeaderValue, HeaderValues, SpectralFile, time_code};
+pub use exr_file::{FileLayout, HeaderValue, HeaderValues, SpectralFile, Standard, counted_rate, standard, time_code};
 pub use frames::{Frames, frames, frames_in_short};
 pub use hair::{Hair, HairColour};
 pub use layer::{Data, Layer, LayerContent, LightForm, LightWay, Matte, Quantity};

@@ -254,7 +254,7 @@ impl SceneDescription {
         let expected = "auto or off beside layers of light, which are measured path by path from the camera";
         checker.require(!(measured && asked), place.key("light_tracing"), expected, "on");
         self.output.check(at.key("output"), &mut checker);
-        exr_file::check_layers(&self.output, &self.layers, &mut checker);
+        exr_file::check_scene(self, &mut checker);
         for (name, material) in &self.materials {
             material.check(at.key("materials").key(name), &mut checker);
         }

@@ -161,7 +161,7 @@ def test_an_aces_container_is_one(render):
 
 
 def test_attributes_have_their_types(render):
-    attributes = {"owner": "us", "timeCode": "01:02:03:04", "expTime": 0.02, "shot": "0010"}
+    attributes = {"owner": "us", "timeCode": "01:02:03:04", "expTime": 0.02, "shot": "0010", "take": 123456789, "big": 1e300}
     camera = {"origin": [0, 1.5, 5], "target": [0, 0.8, 0], "fov_deg": 36, "lens": {"radius": 0.01, "focus_distance": 5}}
     path = render("attributes", camera=camera, output={"exr": {"attributes": attributes}})
     _, header = official(path)
@@ -181,6 +181,7 @@ def test_attributes_have_their_types(render):
     assert header["aperture"] == pytest.approx(focal / 20, rel=1e-6)
     assert header["focus"] == 5
     assert spec.get_string_attribute("Copyright") == "us" or spec.get_string_attribute("owner") == "us"
+    assert (header["take"], header["big"]) == (123456789, 1e300)
 
 
 def test_overscan_lies_around_the_same_frame(render):
