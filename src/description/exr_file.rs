@@ -216,7 +216,10 @@ pub(crate) fn check_scene(scene: &SceneDescription, checker: &mut Checker<'_>) {
         checker.fault(exr.key("compression"), format!("expected {expected}"));
     }
     if output.exr.aces_container {
-        checker.require(layers.is_empty(), exr.key("aces_container"), "no layers", format_args!("{}", layers.len()));
+        let at = exr.key("aces_container");
+        checker.require(layers.is_empty(), at, "no layers", layers.len());
+        let bands = scene.image.bands.len();
+        checker.require(bands == 0, at, "no bands in the place of R, G and B", bands);
     }
     let xyz = matches!(output.exr.channels, Channels::Xyz | Channels::Xyza);
     if xyz && layers.iter().any(|layer| layer.name == "Z") {
@@ -382,6 +385,11 @@ mod tests {
             found.starts_with("dir/s.yaml:2:32: output.exr.aces_container: expected colour aces2065-1,"),
             "{found}"
         );
-        scene("output: {colour: aces2065-1, exr: {aces_container: true, compression: none}}");
+        let aces = "output: {colour: aces2065-1, exr: {aces_container: true, compression: none}}";
+        scene(aces);
+        assert_eq!(
+            faults(&format!("{aces}\nimage: {{bands: [{{name: R, response: 1}}]}}\n")),
+            "dir/s.yaml:2:52: output.exr.aces_container: expected no bands in the place of R, G and B, found 1"
+        );
     }
 }
