@@ -374,12 +374,16 @@ pub fn check_files(finish: &Finish, frame: &Frame) -> std::result::Result<(), St
 fn write_exr(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneReport) -> Result<()> {
     let mut file = exr_image(finish, frame, image, report);
     write_sealed(path, &mut file)?;
-    let exr = &finish.output.exr;
-    if exr.compression.loses() {
+    if file.compression.loses() {
         let loss = exr::loss(path, &file)?;
         report.notes.push(format!(
+        if loss.no_longer_finite > 0 {
+            report
+                .notes
+                .push(format!("DWA compression changes {} values between finite and not", loss.no_longer_finite));
+        }
             "DWA compression of level {} changes values by {:.2e} in the root mean square, at most {:.2e}; their mean is {:.2e}",
-            exr.dwa_level, loss.root_mean_square, loss.most, loss.mean
+            finish.output.exr.dwa_level, loss.root_mean_square, loss.most, loss.mean
         ));
     }
     Ok(())
@@ -426,7 +430,7 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
     if frame.film.layers.invalid.total() > 0 {
         report.notes.push(format!("{} samples of layers could not be added", frame.film.layers.invalid.total()));
     }
-    let wide = beauty.note.is_some();
+    let as_asked = beauty.note.is_none();
     report.notes.extend(beauty.note.take());
     let mut file = beauty.exr;
     file.layout = match exr.layout {
@@ -438,7 +442,7 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
     if shared > 1.0 {
         file.attributes.push((exr::SHARED_ERRORS.to_owned(), Attribute::Text(format!("{shared:.3}"))));
     }
-    if exr.aces_container && !wide {
+    if exr.aces_container && as_asked {
         file.attributes.push(("acesImageContainerFlag".to_owned(), Attribute::Int(1)));
     } else if exr.aces_container {
         report.notes.push("an ACES container holds half floats only: the file is none".to_owned());

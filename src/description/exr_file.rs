@@ -232,7 +232,8 @@ pub(crate) fn check(output: &Output, at: At<'_>, checker: &mut Checker<'_>) {
     let exr = &output.exr;
     let file = at.key("exr");
     let level = file.key("dwa_level");
-    checker.not_negative(level, exr.dwa_level);
+    let most = f64::from(f32::MAX);
+    checker.require((0.0..=most).contains(&exr.dwa_level), level, "a number from 0 to 3.4e38", exr.dwa_level);
     let lossy = exr.compression.loses();
     for (name, value) in &exr.attributes {
         let attributes = file.key("attributes");
@@ -376,6 +377,14 @@ mod tests {
         for (rate, frames) in [("frames_per_second: 23.976", "23"), ("", "29"), ("frames_per_second: 59.94", "59")] {
             scene(&told(rate, frames));
         }
+    }
+
+    #[test]
+    fn dwa_loses_what_a_header_can_hold() {
+        assert_eq!(
+            faults("output: {exr: {dwa_level: 1e39}}"),
+            "dir/s.yaml:2:27: output.exr.dwa_level: expected a number from 0 to 3.4e38, found 1e39"
+        );
     }
 
     #[test]

@@ -134,6 +134,20 @@ def test_all_parts_have_one_set_of_primaries(render, channels, layers, image):
     assert spaces.get("albedo", "lin_ap1_scene") == "lin_ap1_scene" and spaces.get("a", "data") == "data", spaces
 
 
+@pytest.mark.parametrize("precision", ["half", "float"])
+@pytest.mark.parametrize("sensitivity", [1e6, 1e-8])
+def test_dwa_takes_no_picture_that_halves_cannot_hold(render, sensitivity, precision):
+    image = {"width": 40, "height": 30, "sensitivity": sensitivity}
+    exr = {"precision": precision}
+    plain, _ = official(render("plain", image=image, output={"exr": {**exr, "compression": "zip"}}))
+    path = render("dwa", image=image, output={"exr": {**exr, "compression": "dwaa"}})
+    packed, header = official(path)
+    assert header["compression"] == OpenEXR.ZIPS_COMPRESSION
+    assert all(np.isfinite(packed[c]).all() and np.array_equal(packed[c], plain[c]) for c in "RGBA")
+    notes = json.loads((path.parent / "report.json").read_text())["scenes"][0]["notes"]
+    assert any("packed as ZIPS in place of DWA" in note for note in notes), notes
+
+
 @pytest.mark.parametrize("compression", ["dwaa", "dwab"])
 def test_dwa_loses_light_only_and_says_how_much(render, compression):
     layers = ["Z", "diffuse"]
@@ -167,6 +181,7 @@ def test_attributes_have_their_types(render):
     _, header = official(path)
     spec = specification(path)
     assert (header["owner"], header["shot"]) == ("us", "0010")
+    assert (header["take"], header["big"]) == (123456789, 1e300)
     code = header["timeCode"]
     assert (code.hours, code.minutes, code.seconds, code.frame) == (1, 2, 3, 4)
     # Of 60 frames a second two share a number; the bit of dropped frames stays off.
@@ -181,7 +196,6 @@ def test_attributes_have_their_types(render):
     assert header["aperture"] == pytest.approx(focal / 20, rel=1e-6)
     assert header["focus"] == 5
     assert spec.get_string_attribute("Copyright") == "us" or spec.get_string_attribute("owner") == "us"
-    assert (header["take"], header["big"]) == (123456789, 1e300)
 
 
 def test_overscan_lies_around_the_same_frame(render):

@@ -43,6 +43,14 @@ pub enum Compression {
     Dwab(f32),
 }
 
+impl Compression {
+    /// Whether values are changed.
+    #[must_use]
+    pub fn loses(self) -> bool {
+        matches!(self, Compression::Dwaa(_) | Compression::Dwab(_))
+    }
+}
+
 /// How channels lie in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Layout {
@@ -278,6 +286,8 @@ pub struct Loss {
     pub root_mean_square: f64,
     /// The largest change.
     pub most: f64,
+    /// How many values are finite on one side only; they are in no other number.
+    pub no_longer_finite: u64,
     /// Mean of the values' sizes.
     pub mean: f64,
 }
@@ -289,6 +299,7 @@ pub struct Loss {
 pub fn loss(path: &Path, image: &ExrImage) -> Result<Loss> {
     let file = read_exr(path)?;
     let (mut count, mut squares, mut most, mut sizes) = (0u64, 0.0, 0.0f64, 0.0);
+    let mut no_longer_finite = 0;
     for (name, data) in image.channels.iter().filter(|(name, _)| !image.data.contains(name)) {
         let Some(found) = file.parts.iter().find_map(|part| part.channel(name)) else { continue };
         let written: Vec<f32> = match data {
@@ -296,6 +307,7 @@ pub fn loss(path: &Path, image: &ExrImage) -> Result<Loss> {
             ChannelData::F32(samples) => samples.clone(),
             ChannelData::U32(_) => continue,
         };
+        no_longer_finite += written.iter().zip(found).filter(|(a, b)| a.is_finite() != b.is_finite()).count() as u64;
         for (a, b) in written.iter().zip(found).filter(|(a, b)| a.is_finite() && b.is_finite()) {
             let change = f64::from(a - b).abs();
             (count, squares, most) = (count + 1, squares + change * change, most.max(change));
@@ -303,7 +315,7 @@ pub fn loss(path: &Path, image: &ExrImage) -> Result<Loss> {
         }
     }
     let n = count.max(1) as f64;
-    Ok(Loss { root_mean_square: (squares / n).sqrt(), most, mean: sizes / n })
+    Ok(Loss { root_mean_square: (squares / n).sqrt(), most, no_longer_finite, mean: sizes / n })
 }
 
 /// Whether a beauty file says how noisy it is.
@@ -326,12 +338,12 @@ pub fn stderr_name(name: &str) -> String {
     format!("stderr.{name}")
 }
 
-/// A beauty file, and why it is wider than was asked for, if it is.
+/// A beauty file, and why it is wider or packed otherwise than was asked for, if it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Beauty {
     /// What to write.
     pub exr: ExrImage,
-    /// A sentence for the log and the report, if half was asked for and would have lost something.
+    /// A sentence for the log and the report, if half or DWA was asked for and would have lost something.
     pub note: Option<String>,
 }
 
@@ -340,6 +352,9 @@ pub struct Beauty {
 /// Half holds 11 significant bits between 2⁻¹⁴ and 65504. A picture with a finite value that would round to infinity,
 /// or so dim that the step of subnormal halves (2⁻²⁴) exceeds half's own relative precision at the mean
 /// (mean of |value| below 2⁻¹⁴), is written as float instead, and the note says so. Nothing is clamped.
+///
+/// DWA packs halves, also of floats, and takes infinity for 0: a picture that half cannot hold, or that is not finite, is
+/// packed as ZIPS instead, which loses nothing.
 #[must_use]
 pub fn beauty(
     image: &Image,
@@ -353,11 +368,18 @@ pub fn beauty(
     let colours: Vec<(&str, &Vec<f32>)> = base.colours().iter().map(|&(name, i)| (name, &image.rgb[i])).collect();
     let light = layers.iter().filter(|layer| layer.kind != PlaneKind::Data).map(|layer| &layer.plane);
     let in_colours = base != Base::Nothing || layers.iter().any(|layer| layer.kind == PlaneKind::Colour);
-    let note = match precision {
-        Precision::Float => None,
-        Precision::Half => half_loses(colours.iter().map(|(_, plane)| *plane).chain(light)),
+    let planes: Vec<&Vec<f32>> = colours.iter().map(|(_, plane)| *plane).chain(light).collect();
+    let (narrow, lossy) = (precision == Precision::Half, compression.loses());
+    let beyond_half = if narrow || lossy { half_loses(&planes) } else { None };
+    let wide = !narrow || beyond_half.is_some();
+    let beyond_dwa = if lossy { beyond_half.clone().or_else(|| not_finite(&planes)) } else { None };
+    let compression = if beyond_dwa.is_some() { Compression::Zips } else { compression };
+    let note = match (beyond_half.filter(|_| narrow), beyond_dwa) {
+        (Some(why), None) => Some(format!("{why}: written as 32-bit float")),
+        (Some(why), Some(_)) => Some(format!("{why}: written as 32-bit float, packed as ZIPS in place of DWA")),
+        (None, Some(why)) => Some(format!("{why}: packed as ZIPS in place of DWA")),
+        (None, None) => None,
     };
-    let wide = precision == Precision::Float || note.is_some();
     let data = |plane: &[f32]| {
         if wide {
             ChannelData::F32(plane.to_vec())
@@ -402,23 +424,25 @@ pub fn beauty(
 }
 
 /// Why 16-bit floats cannot hold the planes, if they cannot.
-fn half_loses<'a>(planes: impl IntoIterator<Item = &'a Vec<f32>>) -> Option<String> {
-    let planes: Vec<&Vec<f32>> = planes.into_iter().collect();
-    let values = planes.into_iter().flatten();
+fn half_loses(planes: &[&Vec<f32>]) -> Option<String> {
+    let values = planes.iter().copied().flatten();
     let too_large = values.clone().filter(|v| v.is_finite() && f16::from_f32(**v).is_infinite()).count();
     if too_large > 0 {
         let peak = values.filter(|v| v.is_finite()).fold(0.0f32, |peak, v| peak.max(v.abs()));
-        return Some(format!(
-            "{too_large} values exceed what half floats hold (65504; the peak is {peak:e}): written as 32-bit float"
-        ));
+        return Some(format!("{too_large} values exceed what half floats hold (65504; the peak is {peak:e})"));
     }
     let finite = values.filter(|v| v.is_finite() && **v != 0.0);
     let (count, sum) = finite.fold((0u64, 0.0f64), |(n, sum), v| (n + 1, sum + f64::from(v.abs())));
     let mean = sum / count.max(1) as f64;
     let smallest_normal = f64::from(f16::MIN_POSITIVE);
-    (count > 0 && mean < smallest_normal).then(|| {
-        format!("the mean value {mean:.1e} is below the normal range of half floats (6.1e-5): written as 32-bit float")
-    })
+    (count > 0 && mean < smallest_normal)
+        .then(|| format!("the mean value {mean:.1e} is below the normal range of half floats (6.1e-5)"))
+}
+
+/// How many values are infinite or no number, if any is.
+fn not_finite(planes: &[&Vec<f32>]) -> Option<String> {
+    let count = planes.iter().copied().flatten().filter(|v| !v.is_finite()).count();
+    (count > 0).then(|| format!("{count} values are not finite"))
 }
 
 #[cfg(test)]
@@ -464,10 +488,10 @@ pub(super) mod tests {
         let (half, note) = precision_of(65_504.0);
         assert!(!half && note.unwrap().contains("exceed what half floats hold"));
         // 65519 still rounds to 65504.
-        assert!(half_loses(&[vec![65_519.0], vec![], vec![]]).is_none());
-        assert!(half_loses(&[vec![65_520.0], vec![], vec![]]).is_some());
+        assert!(half_loses(&[&vec![65_519.0]]).is_none());
+        assert!(half_loses(&[&vec![65_520.0]]).is_some());
         // Infinity is infinity in half too.
-        assert!(half_loses(&[vec![f32::INFINITY, f32::NAN, 1.0], vec![], vec![]]).is_none());
+        assert!(half_loses(&[&vec![f32::INFINITY, f32::NAN, 1.0]]).is_none());
     }
 
     #[test]
@@ -475,5 +499,64 @@ pub(super) mod tests {
         let (half, note) = precision_of(1e-6);
         assert!(!half && note.unwrap().contains("below the normal range"));
         assert_eq!(precision_of(0.0), (true, None));
+    }
+
+    /// DWA works in halves: 1e9 comes back infinite, 5e-9 as 0, and infinity as 0. Such pictures come back to the bit, and one
+    /// that half holds is packed as asked for.
+    #[test]
+    fn dwa_packs_only_what_it_can_hold() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.exr");
+        let dwa = Compression::Dwaa(45.0);
+        for precision in [Precision::Half, Precision::Float] {
+            for (value, why) in [
+                (0.5, None),
+                (1e9, Some("values exceed what half floats hold")),
+                (5e-9, Some("below the normal range of half floats")),
+                (f32::INFINITY, Some("values are not finite")),
+            ] {
+                let mut image = image(0.5);
+                image.rgb[0].fill(value);
+                image.rgb[1].fill(value);
+                image.rgb[2].fill(value.max(0.0));
+                let beauty = beauty(&image, Base::Rgb, Vec::new(), rec709(), precision, StandardError::Leave, dwa);
+                let expected = if why.is_some() { Compression::Zips } else { dwa };
+                assert_eq!(beauty.exr.compression, expected, "{value} {precision:?}");
+                let said = beauty.note.as_deref().unwrap_or("");
+                assert!(
+                    why.map_or(said.is_empty(), |why| said.contains(why) && said.ends_with("in place of DWA")),
+                    "{said}"
+                );
+                write_exr(&path, &beauty.exr).unwrap();
+                let loss = loss(&path, &beauty.exr).unwrap();
+                assert_eq!(loss.no_longer_finite, 0);
+                assert!(why.is_none() || loss.most == 0.0, "{value} {precision:?}: {loss:?}");
+            }
+        }
+    }
+
+    /// Three values of six are infinite in the file and were not; of the others the largest is off by 1/2.
+    #[test]
+    fn a_value_that_became_infinite_is_lost() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.exr");
+        let of = |values: [f32; 6]| {
+            let mut exr = beauty(
+                &image(0.5),
+                Base::Rgb,
+                Vec::new(),
+                rec709(),
+                Precision::Float,
+                StandardError::Leave,
+                Compression::Zips,
+            )
+            .exr;
+            exr.channels = vec![("R".to_owned(), ChannelData::F32(values.to_vec()))];
+            exr
+        };
+        let infinite = f32::INFINITY;
+        write_exr(&path, &of([infinite, infinite, infinite, infinite, 1.0, 2.5])).unwrap();
+        let found = loss(&path, &of([1.0, 2.0, f32::MAX, infinite, 1.0, 2.0])).unwrap();
+        assert_eq!((found.no_longer_finite, found.most, found.mean), (3, 0.5, 1.5));
     }
 }
