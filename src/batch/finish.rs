@@ -133,9 +133,6 @@ impl Lens {
     }
 }
 
-/// How the names of the bands of a spectral file begin.
-pub(super) const SPECTRAL: &str = "S0.";
-
 impl Finish {
     /// What the files of `prepared` need.
     #[must_use]
@@ -189,11 +186,11 @@ impl Finish {
         Layout { channels: self.layers.len(), kept: self.kept }
     }
 
-    /// Of the layers, the bands of the spectral file.
+    /// Of the layers, the bands of the spectral file: the last bands, whatever those of the picture before them are called.
     fn spectral_channels(&self) -> Range<usize> {
-        let bands = self.output.spectral.map_or(0, |spectral| spectral.bands as usize);
-        let start = self.layers.iter().position(|channel| channel.name.starts_with(SPECTRAL)).unwrap_or(0);
-        start..start + bands
+        let all = self.layers.iter().filter(|channel| channel.holds == Holds::Band).count();
+        let spectral = self.output.spectral.map_or(0, |spectral| spectral.bands as usize);
+        all.saturating_sub(spectral)..all
     }
 
     /// Whether samples differ by chance, so that there is noise.
@@ -377,14 +374,14 @@ fn write_exr(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report:
     if file.compression.loses() {
         let loss = exr::loss(path, &file)?;
         report.notes.push(format!(
+            "DWA compression of level {} changes values by {:.2e} in the root mean square, at most {:.2e}; their mean is {:.2e}",
+            finish.output.exr.dwa_level, loss.root_mean_square, loss.most, loss.mean
+        ));
         if loss.no_longer_finite > 0 {
             report
                 .notes
                 .push(format!("DWA compression changes {} values between finite and not", loss.no_longer_finite));
         }
-            "DWA compression of level {} changes values by {:.2e} in the root mean square, at most {:.2e}; their mean is {:.2e}",
-            finish.output.exr.dwa_level, loss.root_mean_square, loss.most, loss.mean
-        ));
     }
     Ok(())
 }

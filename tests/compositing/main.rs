@@ -290,6 +290,37 @@ fn bands_stand_beside_their_standard_errors() {
     assert_eq!((names(&picture).len(), names(&spectral).len()), (2, 4));
 }
 
+/// Radiance 1 at 400 nm to 4 at 700 nm is 750 in a band of response 1, whatever the sensitivity, and 1.5, 2.5 and 3.5 in the
+/// means of the spectral file; the name of the band is one that the latter has.
+#[test]
+fn a_band_may_be_called_as_one_of_the_spectral_file() {
+    let place = TempDir::new().unwrap();
+    let path = |name: &str| place.path().join(name);
+    let sky = "lights: [{constant: {radiance: {table: [[400, 1], [700, 4]]}}}]\n";
+    let mut pictures = Vec::new();
+    for sensitivity in ["1", "2"] {
+        let image =
+            format!("height: 16, sensitivity: {sensitivity}, bands: [{{name: 'S0.550,000000nm', response: 1}}]");
+        let frame = FRAME.replace("float}", "float}, spectral: {bands: 3}").replace("height: 16", &image);
+        common::write(&path("s.yaml"), format!("{frame}{sky}").replace("samples: 16", "samples: 256").as_bytes());
+        let overrides = Overrides { output: Some(path("out.exr")), ..Overrides::default() };
+        let report = batch::render_batch(&path("s.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+        let [picture, spectral] =
+            ["out.exr", "out.spectral.exr"].map(|name| read_exr(&path(name)).unwrap().parts.remove(0));
+        let mean = |part: &ExrPart, name: &str| plane(part, name).iter().sum::<f32>() / 384.0;
+        // The bound of `a_spectral_file_is_light_again`.
+        let near = |found: f32, expected: f32| assert!((found / expected - 1.0).abs() < 2e-3, "{found} for {expected}");
+        near(mean(&picture, "S0.550,000000nm"), 750.0);
+        for (name, expected) in [("S0.450,000000nm", 1.5), ("S0.550,000000nm", 2.5), ("S0.650,000000nm", 3.5)] {
+            near(mean(&spectral, name), expected);
+        }
+        assert_eq!((picture.channels.len(), spectral.channels.len()), (1, 6));
+        pictures.push(picture.channels);
+    }
+    assert_eq!(pictures[0], pictures[1]);
+}
+
 /// A wall of measured reflectance under a white sky, in the bands of the measurement.
 #[test]
 fn a_spectral_file_is_paint() {
