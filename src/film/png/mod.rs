@@ -194,7 +194,8 @@ pub fn develop(image: &Image, settings: &PngSettings) -> Vec<u16> {
     out.par_chunks_mut(3 * width).enumerate().for_each(|(row, line)| {
         for (column, levels) in line.chunks_exact_mut(3).enumerate() {
             let i = row * width + column;
-            let rgb = [0, 1, 2].map(|c| f64::from(image.rgb[c][i]) * gain);
+            // Infinite light is as bright as can be, where a matrix would make it none: 0 · ∞ is no number.
+            let rgb = [0, 1, 2].map(|c| f64::from(image.rgb[c][i].clamp(-f32::MAX, f32::MAX)) * gain);
             let light = times(settings.display_from_rgb, rgb);
             let display = tone.apply(gamut.as_ref().map_or(light, |gamut| gamut.compress(light)));
             let pixel = [i64::from(image.window.x) + column as i64, i64::from(image.window.y) + row as i64];
@@ -291,6 +292,24 @@ pub(super) mod tests {
             if map != Tonemap::Reinhard {
                 let settings = PngSettings { tonemap: map, ..PngSettings::default() };
                 assert!(develop(&grey(3e38, 1), &settings).iter().all(|&b| b == 255), "{map:?}");
+            }
+        }
+    }
+
+    /// A pixel beyond 32-bit floats is as white as one at their end, and no number is black.
+    #[test]
+    fn infinite_light_is_white() {
+        for tonemap in MAPS {
+            for space in [Space::Srgb, Space::DisplayP3] {
+                let display_from_rgb = crate::spectrum::colour::multiply(
+                    space.primaries().matrix_from_xyz(),
+                    ColourSpace::Rec709.matrix_to_xyz(),
+                );
+                let settings = PngSettings { tonemap, space, display_from_rgb, ..PngSettings::default() };
+                let shown = |value: f32| develop(&grey(value, 1), &settings);
+                assert_eq!(shown(f32::INFINITY), [255; 3], "{tonemap:?} {space:?}");
+                assert_eq!(shown(f32::NEG_INFINITY), [0; 3], "{tonemap:?} {space:?}");
+                assert_eq!(shown(f32::NAN), [0; 3], "{tonemap:?} {space:?}");
             }
         }
     }
