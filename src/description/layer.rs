@@ -312,6 +312,9 @@ impl Layer {
 impl Layer {
     pub(crate) fn check(&self, taken: bool, at: At<'_>, checker: &mut Checker<'_>) {
         check_channel(&self.name, taken, at.key("name"), checker);
+        if let LayerContent::Ways { ways, .. } = &self.content {
+            checker.require(!ways.is_empty(), at.key("ways"), "one way or more", "none");
+        }
         if let LayerContent::Light { of: Some(integrator), .. } = &self.content {
             let at = at.key("light");
             let by_camera = matches!(integrator, Integrator::Path(_) | Integrator::Depth(_) | Integrator::None(_));
@@ -368,6 +371,15 @@ mod tests {
             ),
             "dir/s.yaml:3:33: light_groups.b[0]: expected each name once, found \"point0\"\n\
              dir/s.yaml:3:41: light_groups.b[1]: unknown lamp \"x\"; known: point0"
+        );
+    }
+
+    /// It would be black.
+    #[test]
+    fn a_layer_of_no_way_is_refused() {
+        assert_eq!(
+            faults("layers: [{name: k, ways: []}]\n"),
+            "dir/s.yaml:2:26: layers[0].ways: expected one way or more, found none"
         );
     }
 
