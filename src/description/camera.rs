@@ -246,7 +246,7 @@ pub struct Image {
     /// Pixels that are rendered beyond each edge of the frame, for what moves the picture later; 0 to 16384, default 0.
     #[serde(default, deserialize_with = "whole::<_, 0, MOST_OVERSCAN>")]
     pub overscan: u32,
-    /// Factor on the picture; default 1.
+    /// Factor on colours, of the picture and of its layers of light, not on bands; default 1.
     #[serde(default = "one")]
     pub sensitivity: f64,
     /// Spectral bands that the OpenEXR file holds instead of colour; default none.
@@ -254,7 +254,8 @@ pub struct Image {
     pub bands: Vec<Band>,
 }
 
-/// `{name: s00_380_405, response: {table: [[380, 1], [405, 1]]}}`: a channel of the picture, ∫ radiance · response dλ.
+/// `{name: s00_380_405, response: {table: [[380, 1], [405, 1]]}}`: a channel of the picture, ∫ radiance · response dλ,
+/// whatever the sensitivity.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Band {

@@ -41,8 +41,9 @@
 //!   crop: {x: 0, y: 0, width: 10, height: 10}   # default all; x and y default 0
 //!   overscan: 0                     # default; pixels that are rendered beyond each edge of the frame, without a crop
 //!   bands: []                       # ~ the OpenEXR file holds bands of the spectrum instead of colour:
-//!                                   #   {name: blue, response: SPECTRUM}: ∫ radiance · response dλ, nm
-//!   sensitivity: 1                  # default; factor on the picture
+//!                                   #   {name: blue, response: SPECTRUM}: ∫ radiance · response dλ, nm,
+//!                                   #   whatever the sensitivity
+//!   sensitivity: 1                  # default; factor on colours: of the picture, of layers of light, of the PNG
 //! integrator: path                  # default; or, with their defaults,
 //!                                   #   {path: {max_depth: null, roulette_depth: 5, hide_emitters: false,
 //!                                   #           light_samples: 1, scatter_samples: 1, count_crossings: false,
