@@ -203,7 +203,7 @@
 //!   leaf: {mask: {opacity: 0.5, material: clay}} # ~ a number or {texture: name}; a material is a name, or a kind
 //!                                                # written in place
 //!   worn: {blend: {weight: 0.5, first: clay, second: ring}}          # ~ of the second
-//!   card: {two_sided: {front: clay, back: lacquer}}                  # ~ back is the front's
+//!   card: {two_sided: {front: clay, back: lacquer}}                  # ~ back is the front's; no glass
 //!   waves: {bump: {height: {texture: floor}, scale: 1, material: clay}}
 //!                                                # ~ scale; metres along the normal
 //!   scales: {normal_map: {normals: {texture: earth}, material: clay}}

@@ -366,6 +366,17 @@ impl Material {
         }
     }
 
+    /// True where light may be bent on its way through: what is behind is then another medium.
+    #[must_use]
+    pub fn refracts(&self) -> bool {
+        match &self.kind {
+            Kind::Dielectric { .. } => true,
+            Kind::Principled(solid) => solid.transmission.is_some(),
+            Kind::Compound(compound) => compound.composition.inner().iter().any(|m| m.refracts()),
+            _ => false,
+        }
+    }
+
     /// What goes straight through at `surface` in `direction`; `None` where nothing can.
     #[must_use]
     #[inline]

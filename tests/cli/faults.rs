@@ -112,6 +112,19 @@ fn each_fault_is_told_with_its_place_its_field_and_what_was_expected() {
              s.yaml:3:24: shapes[0].mesh.file",
             3,
         ),
+        (
+            "shapes: [{sphere: {radius: 1, material: {two_sided: {front: {dielectric: {ior: 1.5}}}}}}]",
+            "s.yaml:3:61: shapes[0].sphere.material.two_sided.front: expected a material that bends no light, found one \
+             that does: neither side would be its inside",
+            2,
+        ),
+        (
+            "shapes: [{sphere: {radius: 1, material: {two_sided: {front: {thin_dielectric: {ior: 1.5}}, \
+             back: {mask: {material: {principled: {spec_trans: 1}}}}}}}}]",
+            "s.yaml:3:98: shapes[0].sphere.material.two_sided.back: expected a material that bends no light, found one \
+             that does: neither side would be its inside",
+            2,
+        ),
     ];
     for (text, message, code) in cases {
         let (errors, found) = faults(text);

@@ -324,11 +324,17 @@ impl<'a> Compiler<'a> {
                 plain(self.compound(&place, Composition::Blend { weight, first, second }))
             }
             written::Material::TwoSided(m) => {
-                let front = self.inner(&at("front"), &m.front);
-                let back = match &m.back {
-                    Some(back) => self.inner(&at("back"), back),
-                    None => front.clone(),
+                let mut side = |name: &str, side: &'a written::MaterialRef| {
+                    let material = self.inner(&at(name), side);
+                    // The back is the front's mirror image: light would enter from either side, and never leave.
+                    if material.refracts() {
+                        let expected = "expected a material that bends no light, found one that does";
+                        self.fault(&at(name), format!("{expected}: neither side would be its inside"));
+                    }
+                    material
                 };
+                let front = side("front", &m.front);
+                let back = m.back.as_ref().map_or_else(|| front.clone(), |back| side("back", back));
                 plain(self.compound(&place, Composition::TwoSided { front, back }))
             }
             written::Material::Bump(m) => {
