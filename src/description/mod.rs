@@ -183,7 +183,7 @@
 //!       clearcoat_gloss: 0                       # ~
 //!       luminance: colour                        # ~ what the base is divided by for a tint: its luminance; or
 //!                                                # mitsuba, as its spectral modes estimate it (0.38 of white)
-//!       sampling: {specular: 1, clearcoat: 1, diffuse: 1}          # ~ how often lobes are sampled
+//!       sampling: {specular: 1, clearcoat: 1, diffuse: 1}          # ~ how often lobes are sampled, specular above 0
 //!       two_sided: true                          # ~ without spec_trans
 //!   petal: {principled_thin: {base_color: 0.5, roughness: 0.5, spec_trans: 0, diff_trans: 1, eta: 1.5}}
 //!                                                # a sheet; diff_trans up to 2: all diffuse light crosses; numbers

@@ -6,6 +6,7 @@ use super::compound::NumberOrTexture;
 use super::fault::Checker;
 use super::path::At;
 use super::spectrum::{Role, Spectrum, SpectrumOrTexture};
+use crate::error::in_short;
 
 /// `principled: {base_color: SPECTRUM_OR_TEXTURE, roughness: 0.5, metallic: 0, …}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -13,7 +14,7 @@ use super::spectrum::{Role, Spectrum, SpectrumOrTexture};
 pub struct Principled {
     /// The colour of the diffuse lobe, the metal and the body; default 0.5.
     pub base_color: SpectrumOrTexture,
-    /// √α of the facets, default 0.5.
+    /// √α of the facets, 0 to 1; default 0.5.
     pub roughness: NumberOrTexture,
     /// 0 to 1; default 0.
     pub anisotropic: NumberOrTexture,
@@ -63,15 +64,18 @@ pub enum Luminance {
     Mitsuba,
 }
 
+/// Factors from the least to the most on how often a lobe is sampled: beyond, the others would in effect not be.
+const RATES: [f64; 2] = [1e-6, 1e6];
+
 /// Factors on how often the lobes of a [`Principled`] are sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sampling {
-    /// Main facets; default 1.
+    /// Main facets; default 1, more than 0.
     pub specular: f64,
-    /// Clear coat; default 1.
+    /// Clear coat; default 1. Where it is 0 the main facets find what the coat scatters.
     pub clearcoat: f64,
-    /// Default 1.
+    /// Default 1. Where it is 0 the main facets find what is diffuse.
     pub diffuse: f64,
 }
 
@@ -155,7 +159,7 @@ pub struct PrincipledThin {
     /// The colour of the diffuse lobes and of what is transmitted; default 0.5.
     #[serde(default = "half_colour")]
     pub base_color: SpectrumOrTexture,
-    /// √α of the facets; default 0.5.
+    /// √α of the facets, 0 to 1; default 0.5.
     #[serde(default = "half")]
     pub roughness: NumberOrTexture,
     /// 0 to 1; default 0.
@@ -190,7 +194,7 @@ pub struct PrincipledThin {
     pub sampling: ThinSampling,
 }
 
-/// Factors on how often the lobes of a [`PrincipledThin`] are sampled.
+/// Factors on how often the lobes of a [`PrincipledThin`] are sampled; 0 only for a lobe that is not there.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ThinSampling {
@@ -230,6 +234,7 @@ impl Principled {
     pub(crate) fn check<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
         self.base_color.check(Role::Reflectance, at.key("base_color"), checker);
         let shares = [
+            ("roughness", Some(&self.roughness)),
             ("anisotropic", Some(&self.anisotropic)),
             ("metallic", Some(&self.metallic)),
             ("spec_trans", self.spec_trans.as_ref()),
@@ -243,8 +248,7 @@ impl Principled {
                 share.check(1.0, at.key(key), checker);
             }
         }
-        for (key, strength) in [("roughness", &self.roughness), ("sheen", &self.sheen), ("clearcoat", &self.clearcoat)]
-        {
+        for (key, strength) in [("sheen", &self.sheen), ("clearcoat", &self.clearcoat)] {
             strength.check(f64::INFINITY, at.key(key), checker);
         }
         match self.contrast {
@@ -255,9 +259,9 @@ impl Principled {
         }
         let at = at.key("sampling");
         let Sampling { specular, clearcoat, diffuse } = self.sampling;
-        for (key, rate) in [("specular", specular), ("clearcoat", clearcoat), ("diffuse", diffuse)] {
-            checker.not_negative(at.key(key), rate);
-        }
+        check_rate(at.key("specular"), specular, Lobe::Needed, checker);
+        check_rate(at.key("clearcoat"), clearcoat, Lobe::Spared, checker);
+        check_rate(at.key("diffuse"), diffuse, Lobe::Spared, checker);
     }
 }
 
@@ -265,7 +269,7 @@ impl PrincipledThin {
     pub(crate) fn check<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
         self.base_color.check(Role::Reflectance, at.key("base_color"), checker);
         let ranges = [
-            ("roughness", &self.roughness, f64::INFINITY),
+            ("roughness", &self.roughness, 1.0),
             ("anisotropic", &self.anisotropic, 1.0),
             ("spec_trans", &self.spec_trans, 1.0),
             ("diff_trans", &self.diff_trans, 2.0),
@@ -283,15 +287,33 @@ impl PrincipledThin {
         }
         let at = at.key("sampling");
         let ThinSampling { reflection, transmission, diffuse_reflection, diffuse_transmission } = self.sampling;
-        for (key, rate) in [
-            ("reflection", reflection),
-            ("transmission", transmission),
-            ("diffuse_reflection", diffuse_reflection),
-            ("diffuse_transmission", diffuse_transmission),
+        let is = |number: &NumberOrTexture, x: f64| *number == NumberOrTexture::Number(x);
+        let clear = is(&self.spec_trans, 1.0);
+        for (key, rate, absent) in [
+            ("reflection", reflection, is(&self.spec_trans, 0.0)),
+            ("transmission", transmission, is(&self.spec_trans, 0.0)),
+            ("diffuse_reflection", diffuse_reflection, clear || is(&self.diff_trans, 2.0)),
+            ("diffuse_transmission", diffuse_transmission, clear || is(&self.diff_trans, 0.0)),
         ] {
-            checker.not_negative(at.key(key), rate);
+            check_rate(at.key(key), rate, if absent { Lobe::Spared } else { Lobe::Needed }, checker);
         }
     }
+}
+
+/// Whether anything else samples what a lobe scatters.
+#[derive(Clone, Copy, PartialEq)]
+enum Lobe {
+    /// Nothing: without it light is lost.
+    Needed,
+    /// Something, or there is no such light.
+    Spared,
+}
+
+fn check_rate(at: At<'_>, rate: f64, lobe: Lobe, checker: &mut Checker<'_>) {
+    let [least, most] = RATES;
+    let holds = (least..=most).contains(&rate) || lobe == Lobe::Spared && rate == 0.0;
+    let or_zero = if lobe == Lobe::Spared { "0, or " } else { "" };
+    checker.require(holds, at, &format!("{or_zero}a number from {} to {}", in_short(least), in_short(most)), rate);
 }
 
 #[cfg(test)]
@@ -334,7 +356,18 @@ mod tests {
             ),
             (
                 "{sampling: {diffuse: -1}}",
-                "dir/s.yaml:3:40: materials.m.principled.sampling.diffuse: expected a number of 0 or more, found -1",
+                "dir/s.yaml:3:40: materials.m.principled.sampling.diffuse: expected 0, or a number from 1e-6 to 1000000, \
+                 found -1",
+            ),
+            (
+                "{sampling: {specular: 0, clearcoat: 0, diffuse: 1e300}}",
+                "dir/s.yaml:3:41: materials.m.principled.sampling.specular: expected a number from 1e-6 to 1000000, found 0\n\
+                 dir/s.yaml:3:67: materials.m.principled.sampling.diffuse: expected 0, or a number from 1e-6 to 1000000, \
+                 found 1e300",
+            ),
+            (
+                "{roughness: 2}",
+                "dir/s.yaml:3:31: materials.m.principled.roughness: expected a number from 0 to 1, found 2",
             ),
         ] {
             assert_eq!(faults(&format!("materials:\n  m: {{principled: {text}}}")), message);
@@ -344,5 +377,22 @@ mod tests {
             "dir/s.yaml:3:37: materials.m.principled_thin.diff_trans: expected a number from 0 to 2, found 3\n\
              dir/s.yaml:3:62: materials.m.principled_thin.spec_trans.texture: unknown texture \"no\"; the scene defines none"
         );
+    }
+
+    /// A sheet's lobes do not reach where the others do; a rate of 0 is right for one that is not there.
+    #[test]
+    fn a_lobe_of_a_sheet_that_nothing_samples_is_refused() {
+        let refused = |fields: &str| {
+            let faults = faults(&format!("materials:\n  m: {{principled_thin: {{{fields}}}}}"));
+            faults.matches(".sampling.").count()
+        };
+        let none = "sampling: {reflection: 0, transmission: 0, diffuse_reflection: 0, diffuse_transmission: 0}";
+        assert_eq!(refused(none), 1);
+        for (lobes, count) in
+            [("spec_trans: 1", 2), ("spec_trans: 0.5", 3), ("diff_trans: 2", 1), ("spec_trans: 0.5, diff_trans: 1", 4)]
+        {
+            assert_eq!(refused(&format!("{lobes}, {none}")), count, "{lobes}");
+        }
+        assert_eq!(refused("sampling: {reflection: 0, transmission: 0, diffuse_transmission: 0}"), 0);
     }
 }
