@@ -284,13 +284,14 @@ pub enum FogFalloff {
 }
 
 impl FogFalloff {
-    /// The share of fog at depth `z` metres, in [0, 1]; one at infinity.
+    /// The share of fog at depth `z` metres, in [0, 1]; one at infinity, unless its density is 0.
     #[must_use]
     pub fn amount(&self, z: f64) -> f64 {
         match *self {
             FogFalloff::Linear { start, end } => ((z - start) / (end - start)).clamp(0.0, 1.0),
-            FogFalloff::Exponential { density } => -libm::expm1(-density * z.max(0.0)),
-            FogFalloff::ExponentialSquared { density } => -libm::expm1(-(density * z.max(0.0)).powi(2)),
+            // max takes no NaN: a density of 0 leaves no fog even at infinity.
+            FogFalloff::Exponential { density } => -libm::expm1(-(density * z).max(0.0)),
+            FogFalloff::ExponentialSquared { density } => -libm::expm1(-(density * z).max(0.0).powi(2)),
         }
     }
 }
@@ -543,6 +544,10 @@ mod tests {
         assert!((squared.amount(20.0) - (1.0 - (-4f64).exp())).abs() < 1e-15);
         for f in [linear, exponential, squared] {
             assert_eq!(f.amount(f64::INFINITY), 1.0);
+            assert_eq!(f.amount(-1.0), 0.0);
+        }
+        for none in [FogFalloff::Exponential { density: 0.0 }, FogFalloff::ExponentialSquared { density: 0.0 }] {
+            assert_eq!([1.0, f64::INFINITY].map(|z| none.amount(z)), [0.0; 2]);
         }
     }
 }

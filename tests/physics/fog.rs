@@ -38,7 +38,12 @@ fn fog_fades_a_wall_by_its_depth() {
 #[test]
 fn fog_hides_the_background() {
     for integrator in ["path", "{whitted: {grid: 1}}"] {
-        for (fog, expected) in [("fog: {colour: 0.3, density: 0.01}\n", 0.3), ("", 0.8)] {
+        for (fog, expected) in [
+            ("fog: {colour: 0.3, density: 0.01}\n", 0.3),
+            ("fog: {colour: 0.3, density: 0}\n", 0.8),
+            ("fog: {colour: 0.3, density: 0, falloff: exp2}\n", 0.8),
+            ("", 0.8),
+        ] {
             let scene = bench(&format!("integrator: {integrator}\nlights: [{{constant: {{radiance: 0.8}}}}]\n{fog}"));
             scene.grey().picture().assert_all(expected, 1e-6);
         }
