@@ -156,7 +156,7 @@ pub enum Quantity {
     DuvDx,
     /// ∂(u, v)/∂y from one sample to the next.
     DuvDy,
-    /// Diffuse reflectance.
+    /// Colour of the material.
     Albedo,
     /// Number of the face or triangle, from 0.
     Primitive,

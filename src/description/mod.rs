@@ -77,8 +77,9 @@
 //! - diffuse                         # or a name that says all: a way; light_groups: light_key, …, and light_default of
 //!                                   # lamps in no group and of depth fog; Z (depth along the line of sight, 1e10 where there is nothing),
 //!                                   # P, uv, motion (X to the right, Y up, in pixels, until the next frame): of the ray
-//!                                   # through the middle of the pixel, not filtered; normal, albedo (in daylight): means over it,
-//!                                   # of what is seen, not of holes; variance, stderr: of the pixel's mean; sampleCount;
+//!                                   # through the middle of the pixel, not filtered; normal, albedo (in daylight; of metal at
+//!                                   # normal incidence, of clear glass 1): means over it, of what is seen, not of holes;
+//!                                   # variance, stderr: of the pixel's mean; sampleCount;
 //!                                   # crypto_object, crypto_material, crypto_asset: Cryptomatte
 //! render:                           # these are the defaults
 //!   samples: 64                     # paths per pixel

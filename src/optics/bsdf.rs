@@ -320,6 +320,37 @@ impl Bsdf<'_> {
         }
     }
 
+    /// The colour of the surface whatever its roughness, each lane from 0 to 1: of what has a diffuse base or a base colour that
+    /// one; of metal, mirrors and what is clear the light along the normal that is not absorbed, reflected and transmitted; of hair
+    /// that toward `wo`.
+    #[must_use]
+    pub fn albedo(&self, wo: DVec3) -> Lanes {
+        let clear =
+            |reflected: Lanes, tint: &Tint| reflected * tint.reflected + (Lanes::ONE - reflected) * tint.transmitted;
+        let interface = |glass: &Dielectric| {
+            let reflected = glass.lanes(&[1.0; LANES]).reflected;
+            clear(Lanes::new(reflected.map(|r| r as f32)), &glass.tint)
+        };
+        match self {
+            Bsdf::Diffuse { reflectance } | Bsdf::Mirror { reflectance } => *reflectance,
+            Bsdf::Plastic(plastic) => plastic.base.reflectance,
+            Bsdf::RoughPlastic(plastic) => plastic.base.reflectance,
+            Bsdf::Principled(surface) => surface.base,
+            Bsdf::PrincipledThin(sheet) => sheet.base,
+            Bsdf::Conductor(metal) | Bsdf::RoughConductor(metal, _) => metal.reflectance(1.0),
+            Bsdf::Dielectric(glass) => interface(glass),
+            Bsdf::RoughDielectric(RoughDielectric { eta, tint, film, .. }) => {
+                interface(&Dielectric { eta: *eta, fresnel: Model::Exact, tint: *tint, film: *film })
+            }
+            Bsdf::Thin { eta, thickness, tint } => {
+                let pane = Pane::new(1.0, eta, *thickness);
+                clear(pane.reflected * (1.0 - pane.share) as f32, tint)
+            }
+            Bsdf::Hair(hair) => hair.reflectance(wo),
+            Bsdf::Null => Lanes::ONE,
+        }
+    }
+
     /// Of f, for a pair of directions on one side, the share of a diffuse base, from 0 to 1.
     #[must_use]
     pub fn diffuse_share(&self, wo: DVec3, wi: DVec3) -> Lanes {

@@ -168,6 +168,11 @@ impl Hair<'_> {
         Some(Seen { wo: a, gamma, gamma_t: libm::asin(sin_gamma_t), shares, probability: means.map(|m| m / total) })
     }
 
+    /// The share of light from all around that leaves toward `wo`: M and N are densities.
+    pub(super) fn reflectance(&self, wo: DVec3) -> Lanes {
+        self.seen(wo).map_or(Lanes::ZERO, |seen| seen.shares.into_iter().fold(Lanes::ZERO, |sum, share| sum + share))
+    }
+
     /// θ_o as the scales turn it on way `p`: its sine and cosine.
     fn turned(&self, wo: &Angles, p: usize) -> (f64, f64) {
         let Some(&(sin, cos)) = self.fibre.turn.get(p) else { return (wo.sin_theta, wo.cos_theta) };
@@ -255,21 +260,26 @@ mod tests {
     /// Without absorption the shares are F + (1 − F)² + (1 − F)² F + … = 1, M and N are densities: all
     /// light leaves. But M is turned by the scales and |cos(θ_o + tilt)| is folded at grazing, which these
     /// viewers are far from; 256² midpoints of lobes of 0.1 rad leave 1e-3. The density integrates to one for any
-    /// absorption.
+    /// absorption, and what is left of the light is the albedo.
     #[test]
     fn clear_hair_keeps_all_light_and_densities_integrate_to_one() {
         for (along, around) in [(0.3, 0.3), (0.6, 0.5), (0.9, 0.9)] {
             for wo in VIEWERS {
                 let (clear, dark) = (hair(along, around, 0.0), hair(along, around, 0.7));
-                let (mut light, mut density) = (0.0, 0.0);
+                let (mut light, mut density, mut left) = (0.0, 0.0, 0.0);
                 for wi in sphere(256) {
                     let e = clear.eval(wo, wi);
                     light += f64::from(e.f.to_array()[0]) * wi.z.abs();
-                    density += f64::from(dark.eval(wo, wi).pdf.to_array()[0]);
+                    let e = dark.eval(wo, wi);
+                    density += f64::from(e.pdf.to_array()[0]);
+                    left += f64::from(e.f.to_array()[0]) * wi.z.abs();
                 }
                 let area = 4.0 * PI / 65_536.0;
                 assert!((light * area - 1.0).abs() < 2e-3, "{along} {around} {wo}: {}", light * area);
                 assert!((density * area - 1.0).abs() < 2e-3, "{along} {around} {wo}: {}", density * area);
+                let albedo = f64::from(dark.albedo(wo).to_array()[0]);
+                assert!((left * area - albedo).abs() < 2e-3, "{along} {around} {wo}: {} {albedo}", left * area);
+                assert!((f64::from(clear.albedo(wo).to_array()[0]) - 1.0).abs() < 1e-6);
             }
         }
     }

@@ -40,7 +40,8 @@ pub enum Quantity {
     DuvDx,
     /// The same downward.
     DuvDy,
-    /// What the material sends back of diffuse light, in the colour space of the file.
+    /// Colour of the material, in the colour space of the file: of what is seen [`Bsdf::albedo`] in daylight; of what is met
+    /// that of a diffuse base in light of equal energy, else π f for light along the normal.
     Albedo,
     /// Number of the triangle or face, from 0.
     Primitive,
@@ -528,7 +529,7 @@ impl First {
         leaf.map_or(surface.shading_normal, |leaf| leaf.frame.n)
     }
 
-    /// The part of light from all around that comes back diffusely.
+    /// The colour of the material: see [`Quantity::Albedo`].
     fn albedo(&self, scene: &Scene, plan: &EffectPlan, nm: Lanes, ray: &Ray) -> Lanes {
         let object = &scene.objects[self.hit.object as usize];
         let material = &scene.materials[object.material as usize];
@@ -553,21 +554,26 @@ impl First {
             };
         }
         let bsdf = material.bsdf(&self.hit.texture_point(surface), nm, plan.all_dispersive);
+        let frame = Frame::from_normal_and_tangent(surface.shading_normal, surface.tangent);
+        let mut wo = frame.to_local(-ray.direction);
         match &bsdf {
-            Bsdf::Diffuse { reflectance } => *reflectance,
-            Bsdf::Plastic(plastic) => plastic.base.reflectance,
-            Bsdf::RoughPlastic(plastic) => plastic.base.reflectance,
-            Bsdf::Principled(principled) => principled.base,
-            Bsdf::PrincipledThin(principled) => principled.base,
-            other => {
-                // As if the light came along the normal.
-                let frame = Frame::from_normal_and_tangent(surface.shading_normal, surface.tangent);
-                let mut wo = frame.to_local(-ray.direction);
+            // Mitsuba's stand-in where nothing is diffuse, as if all light came along the normal: a highlight.
+            Bsdf::Mirror { .. }
+            | Bsdf::Conductor(_)
+            | Bsdf::RoughConductor(..)
+            | Bsdf::Dielectric(_)
+            | Bsdf::RoughDielectric(_)
+            | Bsdf::Thin { .. }
+            | Bsdf::Hair(_)
+            | Bsdf::Null
+                if self.normal.is_none() =>
+            {
                 if material.two_sided {
                     wo.z = wo.z.abs();
                 }
-                other.eval(wo, DVec3::Z).f * PI as f32
+                bsdf.eval(wo, DVec3::Z).f * PI as f32
             }
+            _ => bsdf.albedo(wo),
         }
     }
 }
