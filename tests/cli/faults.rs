@@ -5,8 +5,12 @@ use crate::common::place::Place;
 
 /// Renders the scene of [`SMALL`] and, from line 3, `text`, as `s.yaml`: the error lines and the exit code.
 fn faults(text: &str) -> (Vec<String>, i32) {
-    let place =
-        Place::with(&[("s.yaml", &format!("{SMALL}{text}\n")), ("no_picture.png", "words"), ("odd.ply", "ply\nno")]);
+    let place = Place::with(&[
+        ("s.yaml", &format!("{SMALL}{text}\n")),
+        ("no_picture.png", "words"),
+        ("odd.ply", "ply\nno"),
+        ("um.csv", "0.4,0.1\n0.7,0.9\n"),
+    ]);
     let ran = place.run(&["render", "s.yaml", "-o", "out"]);
     assert_eq!(ran.out, "", "nothing was made");
     assert!(place.names("out").iter().all(|n| n == "report.json"), "{:?}", place.names("out"));
@@ -110,6 +114,24 @@ fn each_fault_is_told_with_its_place_its_field_and_what_was_expected() {
             "shapes: [{mesh: {file: none.obj}}]",
             "none.obj: cannot read: No such file or directory (os error 2); it is named at \
              s.yaml:3:24: shapes[0].mesh.file",
+            3,
+        ),
+        (
+            "lights: [{constant: {radiance: {table: [[0.4, 1], [0.7, 1]]}}}]",
+            "s.yaml:3:32: lights[0].constant.radiance: expected wavelengths within 360 to 830 nm, found 0.4 to 0.7 nm \
+             (are they in µm?)",
+            2,
+        ),
+        (
+            "materials: {m: {mirror: {reflectance: {zero_outside: {table: [[1000, 1], [2000, 1]]}}}}}",
+            "s.yaml:3:54: materials.m.mirror.reflectance.zero_outside: expected wavelengths within 360 to 830 nm, found \
+             1000 to 2000 nm",
+            2,
+        ),
+        (
+            "lights: [{constant: {radiance: {file: um.csv}}}]",
+            "um.csv: expected wavelengths within 360 to 830 nm, found 0.4 to 0.7 nm (are they in µm?); it is named at \
+             s.yaml:3:32: lights[0].constant.radiance",
             3,
         ),
         (
@@ -322,6 +344,20 @@ fn channels_that_clash_are_refused_before_the_work() {
     }
     let (found, code) = faults("output: {exr: {attributes: {\"a\\0b\": 1}}}\n");
     assert!(code == 2 && found[0].contains("expected a name without a zero byte"), "{found:?}");
+}
+
+#[test]
+fn a_band_outside_of_what_is_rendered_is_told_once() {
+    let bands = |table: &str| format!("height: 4, bands: [{{name: b, response: {{table: {table}}}}}]");
+    for (table, told) in [
+        ("[[0.4, 1], [0.7, 1]]", "expected wavelengths within 360 to 830 nm, found 0.4 to 0.7 nm (are they in µm?)"),
+        ("[[400, 0], [700, 0]]", "expected a response within 360 to 830 nm, found none"),
+    ] {
+        let place = Place::of(&SMALL.replace("height: 4", &bands(table)));
+        let ran = place.run(&["render", "scene.yaml", "-q"]);
+        assert!(ran.err.contains(&format!("image.bands[0].response: {told}")), "{}", ran.err);
+        assert_eq!((ran.err.lines().count(), ran.code), (1, 2), "{}", ran.err);
+    }
 }
 
 #[test]

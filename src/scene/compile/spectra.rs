@@ -3,8 +3,8 @@
 use super::super::{Band, load};
 use super::Compiler;
 use crate::description as written;
-use crate::error::Error;
-use crate::spectrum::{Outside, Spectrum, illuminant, upsample};
+use crate::error::{Error, in_short};
+use crate::spectrum::{BAND_NM, Outside, Spectrum, illuminant, upsample};
 
 /// What a spectrum stands for, which decides how a colour becomes one.
 #[derive(Clone, Copy)]
@@ -47,12 +47,11 @@ impl Compiler<'_> {
             },
             written::Spectrum::Table(samples) => {
                 let samples: Vec<(f64, f64)> = samples.iter().map(|s| (s[0], s[1])).collect();
-                self.or(at, Spectrum::from_samples(&samples, outside), black)
+                self.or(at, measured(&samples, outside), black)
             }
             written::Spectrum::File(path) => {
                 self.files.push(path.to_path_buf());
-                let samples = load::samples(path);
-                let spectrum = samples.and_then(|samples| Spectrum::from_samples(&samples, outside));
+                let spectrum = load::samples(path).and_then(|samples| measured(&samples, outside));
                 spectrum.unwrap_or_else(|message| {
                     let error = self.asked(at, Error::input(path, message));
                     self.unread.get_or_insert(error);
@@ -94,8 +93,10 @@ impl Compiler<'_> {
         let mut all = Vec::new();
         for (i, band) in self.description.image.bands.iter().enumerate() {
             let at = format!("image.bands[{i}].response");
+            let (faults, unread) = (self.faults.len(), self.unread.is_some());
             let response = self.written_spectrum(&at, &band.response, Outside::Zero, Role::Coefficient);
-            if response.is_black() {
+            let told = self.faults.len() > faults || self.unread.is_some() && !unread;
+            if response.is_black() && !told {
                 self.fault(&at, "expected a response within 360 to 830 nm, found none");
             }
             all.push(Band { name: band.name.clone(), response });
@@ -111,4 +112,16 @@ impl Compiler<'_> {
         }
         all
     }
+}
+
+/// A spectrum from samples (nm, value), some of which count in a picture.
+fn measured(samples: &[(f64, f64)], outside: Outside) -> Result<Spectrum, String> {
+    let spectrum = Spectrum::from_samples(samples, outside)?;
+    let ([low, high], first, last) = (BAND_NM, samples[0].0, samples[samples.len() - 1].0);
+    if first <= high && last >= low {
+        return Ok(spectrum);
+    }
+    let hint = if first * 1e3 <= high && last * 1e3 >= low { " (are they in µm?)" } else { "" };
+    let [first, last] = [first, last].map(in_short);
+    Err(format!("expected wavelengths within {low} to {high} nm, found {first} to {last} nm{hint}"))
 }
