@@ -98,9 +98,14 @@ impl Fault {
     /// Writes the fault on one line.
     pub(crate) fn write(&self, sources: &Sources) -> String {
         let place = self.place.map_or(String::new(), |place| format!("{}: ", sources.describe(place)));
+        one_line(format!("{place}{}", self.told()))
+    }
+
+    /// The field and what is wrong.
+    pub(crate) fn told(&self) -> String {
         let path = path::display(self.steps.iter().rev());
         let separator = if path.is_empty() { "" } else { ": " };
-        one_line(format!("{place}{path}{separator}{self}"))
+        format!("{path}{separator}{self}")
     }
 
     /// The fault as the error that ends the reading.

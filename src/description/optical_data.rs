@@ -43,8 +43,8 @@ impl OpticalData {
 /// Reads a file; one whose name ends in `.yml` or `.yaml` is YAML, any other CSV.
 ///
 /// # Errors
-/// [`Error::Input`] if it cannot be read, [`Error::Config`] with file, line, column and field where it is not what it
-/// should be or cannot be used over the whole band.
+/// [`Error::Input`] if it cannot be read, or with line, column and field where it is not what it should be or cannot be used
+/// over the whole band.
 pub fn optical_data(path: &Path) -> Result<OpticalData> {
     let mut bytes = crate::input::read(path).map_err(|e| {
         let message = match e.kind() {
@@ -55,15 +55,17 @@ pub fn optical_data(path: &Path) -> Result<OpticalData> {
     })?;
     // Parsers differ about a last line without an end.
     bytes.push(b'\n');
-    let mut sources = Sources::default();
-    let source = sources.add_file(path);
+    let source = Sources::default().add_file(path);
     let ending = path.extension().map(|e| e.to_ascii_lowercase());
     let read = if ending.is_some_and(|e| e == "yml" || e == "yaml") {
         yaml::read(&bytes, source).and_then(|root| of_yaml(&root))
     } else {
         of_csv(&String::from_utf8_lossy(&bytes), source)
     };
-    read.map_err(|fault| fault.into_error(&sources))
+    read.map_err(|fault| {
+        let Place { line, column, .. } = fault.place.unwrap_or_default();
+        Error::input(path, format!("line {line}, column {column}: {}", fault.told()))
+    })
 }
 
 /// Columns of a table.
@@ -312,7 +314,10 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join(name);
         std::fs::write(&path, text).unwrap();
-        optical_data(&path).map_err(|e| e.to_string().replace(&format!("{}/", directory.path().display()), ""))
+        optical_data(&path).map_err(|e| {
+            assert_eq!(e.exit_code(), 3, "{e}");
+            e.to_string().replace(&format!("{}/", directory.path().display()), "")
+        })
     }
 
     /// Schott's N-BK7 as the database has it: n_d is 1.5168, and k at 546 nm as written.
@@ -362,7 +367,7 @@ mod tests {
         );
         assert_eq!(
             with("0.5 2.5").unwrap_err(),
-            "a.yml:8:23: DATA[0].wavelength_range: expected a range that covers 405 to 700 nm, found 500 to 2500 nm"
+            "a.yml: line 8, column 23: DATA[0].wavelength_range: expected a range that covers 405 to 700 nm, found 500 to 2500 nm"
         );
     }
 
@@ -370,15 +375,19 @@ mod tests {
     fn what_is_wrong_with_a_file_is_told_with_its_place() {
         let bad = |from: &str, to: &str| read("a.yml", &BK7.replacen(from, to, 1)).unwrap_err();
         assert!(
-            bad("formula 2", "formula 12").starts_with("a.yml:7:11: DATA[0].type: expected formula 1 to 9, found 12")
+            bad("formula 2", "formula 12")
+                .starts_with("a.yml: line 7, column 11: DATA[0].type: expected formula 1 to 9, found 12")
         );
         assert!(bad("formula 2", "magic").contains("DATA[0].type: expected formula 1 to 9, tabulated n"));
         assert_eq!(
             bad(" 103.560653", ""),
-            "a.yml:9:19: DATA[0].coefficients: formula 2: expected 1, 3, 5, … coefficients, found 6"
+            "a.yml: line 9, column 19: DATA[0].coefficients: formula 2: expected 1, 3, 5, … coefficients, found 6"
         );
         // 0.25 µm² is a resonance at 500 nm.
-        assert!(bad("0.00600069867", "0.25").starts_with("a.yml:9:19: DATA[0].coefficients: a resonance at 500.0 nm"));
+        assert!(
+            bad("0.00600069867", "0.25")
+                .starts_with("a.yml: line 9, column 19: DATA[0].coefficients: a resonance at 500.0 nm")
+        );
         assert!(
             bad("0.546 6", "0.546 x").contains("DATA[1].data: row 2: expected 2 numbers, found \"0.546 x.9658E-09\"")
         );
@@ -392,14 +401,20 @@ mod tests {
         );
         assert_eq!(
             read("a.csv", "0.3,1.5\n").unwrap_err(),
-            "a.csv:1:1: expected a heading wl,n or wl,k or wl,n,k, found \"0.3,1.5\""
+            "a.csv: line 1, column 1: expected a heading wl,n or wl,k or wl,n,k, found \"0.3,1.5\""
         );
-        assert_eq!(read("a.csv", "wl,n\n0.3,1.5\n0.9\n").unwrap_err(), "a.csv:3:1: expected 2 numbers, found \"0.9\"");
+        assert_eq!(
+            read("a.csv", "wl,n\n0.3,1.5\n0.9\n").unwrap_err(),
+            "a.csv: line 3, column 1: expected 2 numbers, found \"0.9\""
+        );
         assert_eq!(
             read("a.csv", "wl,n\n0.4,1.5\n0.7,1.4\n").unwrap_err(),
-            "a.csv:1:1: expected a table of 360 to 830 nm, found 400 to 700 nm"
+            "a.csv: line 1, column 1: expected a table of 360 to 830 nm, found 400 to 700 nm"
         );
-        assert_eq!(read("a.csv", "wl,n\n").unwrap_err(), "a.csv:1:1: expected rows of numbers, found none");
+        assert_eq!(
+            read("a.csv", "wl,n\n").unwrap_err(),
+            "a.csv: line 1, column 1: expected rows of numbers, found none"
+        );
         assert!(
             optical_data(Path::new("/nowhere/a.yml")).unwrap_err().to_string().contains("expected a file, found none")
         );

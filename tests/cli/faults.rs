@@ -9,6 +9,7 @@ fn faults(text: &str) -> (Vec<String>, i32) {
         ("s.yaml", &format!("{SMALL}{text}\n")),
         ("no_picture.png", "words"),
         ("odd.ply", "ply\nno"),
+        ("odd.csv", "wl,n\n0.3,abc\n"),
         ("um.csv", "0.4,0.1\n0.7,0.9\n"),
     ]);
     let ran = place.run(&["render", "s.yaml", "-o", "out"]);
@@ -114,6 +115,12 @@ fn each_fault_is_told_with_its_place_its_field_and_what_was_expected() {
             "shapes: [{mesh: {file: none.obj}}]",
             "none.obj: cannot read: No such file or directory (os error 2); it is named at \
              s.yaml:3:24: shapes[0].mesh.file",
+            3,
+        ),
+        (
+            "shapes: [{sphere: {radius: 1, material: {dielectric: {ior: {file: odd.csv}}}}}]",
+            "odd.csv: line 2, column 1: expected 2 numbers, found \"0.3,abc\"; it is named at s.yaml:3:67: \
+             shapes[0].sphere.material.dielectric.ior.file",
             3,
         ),
         (

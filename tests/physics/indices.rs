@@ -76,7 +76,7 @@ fn files_that_cannot_be_used_are_told_with_both_places() {
     let nk = |n: f64, k: f64| format!("DATA:\n- type: tabulated nk\n  data: |\n    0.3 {n} {k}\n    0.9 {n} {k}\n");
     assert_eq!(
         told(clear, "DATA:\n- type: tabulated n\n  data: |\n    0.4 1.5\n    0.7 1.5\n"),
-        "DIR/f.yml:4:5: DATA[0].data: expected a table of 360 to 830 nm, found 400 to 700 nm; it is named at \
+        "DIR/f.yml: line 4, column 5: DATA[0].data: expected a table of 360 to 830 nm, found 400 to 700 nm; it is named at \
          DIR/scene.yaml:4:32: materials.m.dielectric.ior.file"
     );
     assert!(told(clear, &nk(0.2, 3.0)).starts_with(

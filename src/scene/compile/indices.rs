@@ -3,7 +3,6 @@
 use super::Compiler;
 use super::spectra::Role;
 use crate::description::{self as written, OpticalData};
-use crate::error::Error;
 use crate::optics::phase::Phase;
 use crate::scene::Geometry;
 use crate::scene::medium::{Filling, Medium, PhaseFunction};
@@ -70,15 +69,6 @@ impl<'a> Compiler<'a> {
                     self.note(at, note);
                 }
                 Some(data)
-            }
-            Err(Error::Config(fault)) => {
-                let place = self.description.fault(at, "");
-                let fault = format!("{fault}; it is named at {}", place.trim_end_matches([':', ' ']));
-                // Index and absorption may ask for one file.
-                if !self.faults.contains(&fault) {
-                    self.faults.push(fault);
-                }
-                None
             }
             Err(error) => {
                 let error = self.asked(at, error);
