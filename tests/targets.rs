@@ -264,7 +264,7 @@ fn another_build_has_a_row_of_its_own() {
     let sheet = &place.json("sheet/accuracy.json")[0];
     let rows = sheet["rows"].as_array().unwrap();
     let knobs: Vec<&str> = rows.iter().map(|row| row["knob"].as_str().unwrap()).collect();
-    assert_eq!(knobs, ["chosen", "depth", "depth", "depth", "depth", "build", "file"]);
+    assert_eq!(knobs, ["chosen", "depth", "depth", "depth", "depth", "build"]);
     for key in ["samples", "light", "noise", "bias_squared"] {
         // The film adds integers: the same samples give the same digits, in one pass or several.
         assert_eq!(rows[5][key], rows[0][key], "{key}");
@@ -272,6 +272,10 @@ fn another_build_has_a_row_of_its_own() {
     assert_eq!(rows[5]["value"], program);
     let (code, said) = abbe(&place, "accuracy scene.yaml --knob depht");
     assert!(code == 2 && said.contains("expected one of samples, depth, sampler"), "{code} {said}");
+    let (code, said) = abbe(&place, "accuracy scene.yaml -o file --rounds 2 --knob file");
+    assert_eq!(code, 0, "{said}");
+    let rows = &place.json("file/accuracy.json")[0]["rows"];
+    assert_eq!(rows.as_array().unwrap().iter().map(|row| &row["knob"]).collect::<Vec<_>>(), ["chosen", "file"]);
     // A program that is not Abbe is told before anything is rendered, and the sheet that is there stays.
     for (program, found) in [("./nothing", "./nothing: "), ("/bin/sh", "/bin/sh: another program")] {
         let (code, said) = abbe(&place, &format!("accuracy scene.yaml -o sheet --knob depth --beside {program}"));

@@ -58,6 +58,13 @@ pub struct Settings<'a> {
     pub beside: Option<Beside<'a>>,
 }
 
+impl Settings<'_> {
+    /// Whether a knob is moved.
+    fn moves(&self, knob: &str) -> bool {
+        self.knobs.is_empty() || self.knobs.iter().any(|name| name == knob)
+    }
+}
+
 /// See [`Settings::time`].
 pub const FEWEST: u32 = 16;
 
@@ -240,8 +247,10 @@ pub fn sheet(
         let png = png::encode_png(image, &settings_of_png).map_err(Error::Render)?;
         rows.push(row(trial, tally, &tallies[0], &reference, target, png));
     }
-    let bias_squared = Figure { value: images[0].as_ref().map_or(0.0, rounding), error: 0.0 };
-    rows.push(Row { knob: "file", value: "half".into(), chosen: false, bias_squared, ..rows[0].clone() });
+    if settings.moves(knobs::FILE) {
+        let bias_squared = Figure { value: images[0].as_ref().map_or(0.0, rounding), error: 0.0 };
+        rows.push(Row { knob: knobs::FILE, value: "half".into(), chosen: false, bias_squared, ..rows[0].clone() });
+    }
     let advice = advice::sentences(&rows);
     let reference = settings.truth.is_none().then_some((more, reference.noise));
     let png = png::encode_png(&full.image, &settings_of_png).map_err(Error::Render)?;

@@ -84,12 +84,13 @@ pub fn note(knob: &str) -> Option<&'static str> {
 /// [`Error::Config`] for a knob that the scene does not have.
 pub fn wanted(chosen: &Prepared, settings: &Settings<'_>) -> Result<Vec<Trial>> {
     let mut all = trials(chosen);
-    if let Some(unknown) = settings.knobs.iter().find(|name| all.iter().all(|t| t.knob != name.as_str())) {
-        let mut names: Vec<&str> = all[1..].iter().map(|t| t.knob).collect();
-        names.dedup();
+    let mut names: Vec<&str> = all[1..].iter().map(|t| t.knob).collect();
+    names.dedup();
+    names.push(FILE);
+    if let Some(unknown) = settings.knobs.iter().find(|name| !names.contains(&name.as_str())) {
         return Err(Error::Config(format!("--knob: expected one of {}; found \"{unknown}\"", names.join(", "))));
     }
-    all.retain(|t| t.knob == CHOSEN || settings.knobs.is_empty() || settings.knobs.iter().any(|name| name == t.knob));
+    all.retain(|t| t.knob == CHOSEN || settings.moves(t.knob));
     if let Some(build) = settings.beside {
         let value = build.binary.display().to_string();
         all.push(Trial { knob: "build", value, set: Vec::new(), way: Way::Beside });
@@ -99,6 +100,9 @@ pub fn wanted(chosen: &Prepared, settings: &Settings<'_>) -> Result<Vec<Trial>> 
 
 /// The name of no knob: nothing is moved.
 pub const CHOSEN: &str = "chosen";
+
+/// The knob that takes no render: how precisely the picture is written.
+pub const FILE: &str = "file";
 
 /// The chosen setting, then each knob at other values.
 #[must_use]
