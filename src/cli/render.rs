@@ -232,10 +232,11 @@ pub fn table(report: &Report) -> String {
         done.iter().flat_map(|s| &s.files).filter_map(|f| f.parent()).map(|d| d.display().to_string()).collect();
     dirs.dedup();
     dirs.iter_mut().filter(|d| d.is_empty()).for_each(|d| *d = ".".into());
-    let pictures: usize = done.iter().map(|s| s.files.len()).sum();
+    let files: usize = done.iter().map(|s| s.files.len()).sum();
     let _ = writeln!(
         out,
-        "\n{pictures} pictures in {}/ after {} on {} threads{}",
+        "\n{files} {} in {}/ after {} on {} threads{}",
+        if files == 1 { "file" } else { "files" },
         dirs.join("/, "),
         seconds(report.seconds),
         report.threads,

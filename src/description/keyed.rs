@@ -143,6 +143,9 @@ fn table(path: &Path, sources: &mut Sources) -> Result<Vec<Node>, String> {
             }
         }
     }
+    if rows.is_empty() {
+        return Err("expected lines of a frame and one number or more, with commas, found none".to_owned());
+    }
     Ok(rows)
 }
 
@@ -524,6 +527,8 @@ mod tests {
         let named = "it is named at DIR/s.yaml:4:45";
         assert_eq!(says("1, 2, 3, 4\n2, a\n"), format!("DIR/p.csv: line 2, column 4: {line} \"2, a\"; {named}"));
         assert_eq!(says("1\n"), format!("DIR/p.csv: line 1, column 1: {line} \"1\"; {named}"));
+        let empty = "expected lines of a frame and one number or more, with commas, found none";
+        assert_eq!(says("# frame, x, y, z\n"), format!("DIR/p.csv: {empty}; {named}"));
         assert_eq!(
             says("1, 2, 3, 4\n2, 5\n"),
             "DIR/p.csv:2:1: shapes[0].sphere.center.keys[1]: expected a list of 3 as at frame 1, found a number"

@@ -144,7 +144,8 @@
 //!       two_sided: true                          # ~
 //!   ring:
 //!     conductor:
-//!       metal: gold                              # either this, or file: Au.yml, or eta: SPECTRUM and k: SPECTRUM
+//!       metal: gold                              # either this, or file: Au.yml, or eta: SPECTRUM and k: SPECTRUM;
+//!                                                # 43 names, told where one is unknown
 //!       tint: 1                                  # ~ or a texture
 //!       roughness: 0                             # ~ microfacet α, 0 is smooth; a number, {texture: name}, or
 //!                                                # {u: 0.1, v: 0.3} of these: along ∂p/∂u and across

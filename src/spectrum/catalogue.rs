@@ -198,6 +198,9 @@ pub fn metal_names() -> Vec<&'static str> {
     METALS.iter().map(|m| m.name).collect()
 }
 
+/// The most names that are told where none is near.
+const LISTED: usize = 50;
+
 /// `unknown glass "N-BK8"; did you mean "N-BK7" or "N-BK10"?`
 pub(super) fn unknown(kind: &str, name: &str, known: &[&str]) -> String {
     let wanted = plain(name);
@@ -209,6 +212,7 @@ pub(super) fn unknown(kind: &str, name: &str, known: &[&str]) -> String {
     let near: Vec<String> =
         near.iter().take(3).filter(|(distance, _)| *distance <= most).map(|(_, k)| format!("{k:?}")).collect();
     match near.as_slice() {
+        [] if known.len() <= LISTED => format!("unknown {kind} {name:?}; there are {}", known.join(", ")),
         [] => format!(
             "unknown {kind} {name:?}; there are {} such names, from {:?} to {:?}",
             known.len(),
@@ -277,6 +281,8 @@ mod tests {
         assert!(message.starts_with("unknown glass \"N-BK8\"; did you mean \"N-BK7\""), "{message}");
         assert!(glass("xyzzyplugh").unwrap_err().contains("there are"));
         assert!(metal("gould").unwrap_err().contains("\"gold\""));
+        let all = metal("xyzzyplugh").unwrap_err();
+        assert!(metal_names().iter().all(|name| all.contains(name)), "{all}");
     }
 
     #[test]

@@ -22,7 +22,7 @@ fn a_batch_goes_on_after_a_scene_that_fails_and_says_so_at_the_end() {
         ]
     );
     // The table shows what was made.
-    assert!(ran.out.contains("4 pictures in out/") && ran.out.lines().any(|l| l.starts_with("other ")), "{}", ran.out);
+    assert!(ran.out.contains("4 files in out/") && ran.out.lines().any(|l| l.starts_with("other ")), "{}", ran.out);
 }
 
 #[test]
