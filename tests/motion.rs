@@ -118,6 +118,93 @@ fn moments_are_as_many_as_pixels_that_are_travelled() {
     }
 }
 
+/// A point lamp, a ball of glass and a floor, with whatever else.
+fn caustic(eye: &str, lamp: &str, ball: &str, further: &str) -> String {
+    format!(
+        "image: {{width: 16, height: 16}}\n\
+         output: {{exr: {{precision: float, channels: luminance, stderr: true}}}}\n\
+         render: {{frames: 0, samples: 256}}\n\
+         camera: {{origin: {eye}, target: [0, 0.5, 0], fov_deg: 40, {further}}}\n\
+         lights: [point: {{position: {lamp}, intensity: 10}}]\n\
+         shapes:\n\
+         - rectangle: {{corner: [-2, 0, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4], material: {{diffuse: {{reflectance: 0.5}}}}}}\n\
+         - sphere: {{center: {ball}, radius: 0.5, material: {{dielectric: {{ior: 1.5}}}}}}\n"
+    )
+}
+
+/// The mean luminance of a picture, its standard error from those of the pixels, and the report.
+fn mean(scene: &str, further: &[&str]) -> (f64, f64, Value) {
+    let place = Place::of(scene);
+    let ran = place.run(&[&["render", "scene.yaml", "-q", "-o", "out.exr", "--report", "r.json"], further].concat());
+    assert_eq!(ran.code, 0, "{}\n{scene}", ran.err);
+    let channels = pixels(&place.path("out.exr"));
+    let of = |name: &str| -> Vec<f64> {
+        let (_, bits) = channels.iter().find(|(n, _)| n == name).unwrap();
+        bits.iter().map(|bits| f64::from(f32::from_bits(*bits))).collect()
+    };
+    let (light, errors) = (of("Y"), of("stderr.Y"));
+    let n = light.len() as f64;
+    let error = errors.iter().map(|e| e * e).sum::<f64>().sqrt() / n;
+    (light.iter().sum::<f64>() / n, error, place.json("r.json")["scenes"][0].clone())
+}
+
+fn technique(report: &Value, name: &str) -> String {
+    let all = report["techniques"].as_array().unwrap();
+    let found = all.iter().find(|e| e["name"] == name).unwrap();
+    format!("{} {}", found["on"], found["reason"].as_str().unwrap())
+}
+
+/// A ball that moves behind the camera changes no light. Five standard errors of the difference.
+#[test]
+fn light_that_glass_throws_is_there_while_other_things_move() {
+    let (eye, lamp, ball) = ("[0, 1, 3.5]", "[0.5, 2, 0]", "[0.2, 0.7, 0]");
+    let moving = caustic(eye, lamp, ball, "shutter: {open: 0, close: 1}")
+        + "- sphere: {center: {0: [0, 1, 20], 1: [0, 1, 21]}, radius: 0.1}\n";
+    for merging in ["on", "off"] {
+        let set = ["--set", &format!("render.techniques.merging={merging}")];
+        let (still, error, _) = mean(&caustic(eye, lamp, ball, ""), &set);
+        let (found, error_found, report) = mean(&moving, &set);
+        assert!(effect(&report).starts_with("true") && technique(&report, "light tracing").starts_with("true"));
+        assert!(technique(&report, "photon merging").starts_with(if merging == "on" { "true" } else { "false" }));
+        let allowed = 5.0 * error.hypot(error_found);
+        assert!((found - still).abs() < allowed, "{merging}: expected {still}, found {found} ± {error_found}");
+    }
+}
+
+/// Camera, lamp and ball move: at two moments, a quarter and three quarters of the way, the picture is the mean of those with
+/// the places written in. Five standard errors of the difference.
+#[test]
+fn light_that_moving_glass_throws_is_the_mean_of_its_moments() {
+    let path = |from: [f64; 3], to: [f64; 3]| {
+        let at = |t: f64| format!("{:?}", [0, 1, 2].map(|k| from[k] + t * (to[k] - from[k])));
+        [format!("{{0: {from:?}, 1: {to:?}}}"), at(0.25), at(0.75)]
+    };
+    let eye = path([0.0, 1.0, 3.5], [0.5, 1.5, 3.5]);
+    let lamp = path([0.5, 2.0, 0.0], [-0.5, 2.5, 0.5]);
+    let ball = path([0.7, 0.7, 0.0], [-0.6, 0.9, 0.3]);
+    for merging in ["on", "off"] {
+        let set = ["--set", &format!("render.techniques.merging={merging}")];
+        let stills = [1, 2].map(|k| mean(&caustic(&eye[k], &lamp[k], &ball[k], ""), &set));
+        let shutter = "shutter: {open: 0, close: 1, moments: 2}";
+        let (found, error, report) = mean(&caustic(&eye[0], &lamp[0], &ball[0], shutter), &set);
+        assert!(technique(&report, "light tracing").starts_with("true"));
+        let expected = 0.5 * (stills[0].0 + stills[1].0);
+        let allowed = 5.0 * error.hypot(0.5 * stills[0].1.hypot(stills[1].1));
+        assert!((found - expected).abs() < allowed, "{merging}: expected {expected}, found {found} ± {error}");
+        assert!((stills[0].0 - stills[1].0).abs() > allowed, "the two differ");
+    }
+}
+
+/// A lamp that is out at some moments has no number there by which its paths could be told.
+#[test]
+fn a_lamp_that_goes_on_is_told() {
+    let scene = caustic("[0, 1, 3.5]", "[0.5, 2, 0]", "[0.2, 0.7, 0]", "shutter: {open: 0, close: 1, moments: 4}")
+        .replace("intensity: 10", "intensity: {keys: [[0, 0], [0.5, 10]], interpolation: step}");
+    let (_, _, report) = mean(&scene, &["--spp", "4"]);
+    let said = technique(&report, "light tracing");
+    assert!(said.starts_with("false a lamp goes on or off") && said.ends_with("is missing"), "{said}");
+}
+
 #[test]
 fn parts_of_a_blurred_picture_make_it_up() {
     let scene = ortho("{0: -16, 8: 16}", "0.5")

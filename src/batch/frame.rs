@@ -224,6 +224,10 @@ pub(super) fn render_unit(
 ) {
     let FrameJob { scene, moments, plan, filter, seed, .. } = *job;
     let shot = Shot { scene, plan, filter, seed, photons };
+    let moments = match photons.and_then(|photons| photons.moment) {
+        Some(shared) => &moments[shared..=shared],
+        None => moments,
+    };
     let window = tile.window();
     let mut memory = Samples::default();
     let mut layer_runs: [LayerRun; REPLICATES] = std::array::from_fn(|_| LayerRun::default());

@@ -54,7 +54,7 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
         }
     }
     if plan.parts_light() {
-        plan.sharp = Casters::of(scene).casts;
+        plan.sharp = Casters::of(scene, &[]).casts;
     }
     plan.mattes = description.layers.iter().any(|layer| matches!(layer.content, LayerContent::Matte(_)));
     for layer in &description.layers {

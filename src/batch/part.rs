@@ -19,7 +19,7 @@ use crate::film::Window;
 use crate::film::accumulate::{Film, REPLICATES, TileBuffer};
 use crate::film::layers::Layout;
 use crate::transport::light::LightPaths;
-use crate::transport::merge::Collection;
+use crate::transport::merge::{self, Collection};
 pub use lights::SplatFilm;
 use lights::{LightsDone, PATHS_OF_A_UNIT, light_paths, paths_of_a_sample};
 use rayon::prelude::*;
@@ -394,10 +394,15 @@ impl<'a> Part<'a> {
                     if self.has(sample) {
                         return true;
                     }
-                    let Some((map, wavelength)) = self.photons(paths, sample, first, splats, &ending) else {
+                    let (replicate, index) = (sample % REPLICATES as u32, sample / REPLICATES as u32);
+                    let FrameJob { seed, moments, .. } = *self.job;
+                    let moment =
+                        (!moments.is_empty()).then(|| merge::shared_moment(seed, replicate, index, moments.len()));
+                    let paths = LightPaths { moments: moment.map_or(&[], |k| &moments[k..=k]), ..*paths };
+                    let Some((map, wavelength)) = self.photons(&paths, sample, first, splats, &ending) else {
                         return false;
                     };
-                    let photons = Collection { map: &map, wavelength };
+                    let photons = Collection { map: &map, wavelength, moment };
                     let whole = self.add_tiles(sample..sample + 1, Some(photons), &ending, finished);
                     whole && (sample + 1 == samples.end || !pause.wanted())
                 })

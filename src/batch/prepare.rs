@@ -124,10 +124,7 @@ pub(super) fn prepare_scene(
         plan.packets = packets;
         plan.techniques.push(said);
     }
-    let (caustics, said) = match moments.is_empty() {
-        true => pilot::decide(&scene, &plan, &filter, seed, planned, wishes),
-        false => pilot::left_off("lamps and what bends their light move while the shutter is open"),
-    };
+    let (caustics, said) = pilot::decide(&scene, &moments, &plan, &filter, seed, planned, wishes);
     plan.caustics = caustics;
     plan.techniques.extend(said);
     if overrides.check_numerics && !moments.is_empty() {

@@ -325,7 +325,7 @@
 //!
 //! With a `shutter` of the camera all that changes while it is open is blurred, cameras, shapes, lights and materials alike:
 //! each sample sees the scene at one of a number of evenly spaced moments. `image`, `integrator`, `layers`, `render` and
-//! `output` stay as at the frame. Light of mirrors and glass is then not traced from the lamps.
+//! `output` stay as at the frame. Where photons are merged all pixels of a sample see the same moment.
 //!
 //! Which frames are rendered says `render.frames`, of the scene or of the batch, or `--frames`; a scene that changes and says
 //! nothing of frames is refused. Frame 12 is the very picture of a scene in which the values at 12 are written, with the

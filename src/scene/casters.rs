@@ -118,17 +118,30 @@ pub fn one_way(scene: &Scene) -> Option<&Object> {
     scene.objects.iter().find(|object| is_curve(object) && bends(&scene.materials[object.material as usize]))
 }
 
+/// Whether the same things, by their numbers, focus light in two scenes, and the same of them have no end.
+#[must_use]
+pub fn casts_alike(a: &Scene, b: &Scene) -> bool {
+    let kinds = |scene: &Scene, object: &Object| {
+        let material = &scene.materials[object.material as usize];
+        (is_sharp(material), is_single(material), object.bounds().is_finite())
+    };
+    a.objects.len() == b.objects.len()
+        && a.standing == b.standing
+        && a.objects.iter().zip(&b.objects).all(|(of_a, of_b)| kinds(a, of_a) == kinds(b, of_b))
+}
+
 impl Casters {
-    /// Those that only mirror and refract.
+    /// Those that only mirror and refract. Balls hold each of them at all of `moments`, too, which have the same things
+    /// ([`casts_alike`]).
     #[must_use]
-    pub fn of(scene: &Scene) -> Casters {
-        Casters::made_of(scene, is_sharp)
+    pub fn of(scene: &Scene, moments: &[Scene]) -> Casters {
+        Casters::made_of(scene, moments, is_sharp)
     }
 
-    /// Those that mirror or refract in single directions a part of what comes, and scatter the rest.
+    /// Those that mirror or refract in single directions a part of what comes, and scatter the rest; in balls as above.
     #[must_use]
-    pub fn in_part(scene: &Scene) -> Casters {
-        Casters::made_of(scene, |material| is_single(material) && !is_sharp(material))
+    pub fn in_part(scene: &Scene, moments: &[Scene]) -> Casters {
+        Casters::made_of(scene, moments, |material| is_single(material) && !is_sharp(material))
     }
 
     /// None.
@@ -144,7 +157,7 @@ impl Casters {
         self.balls.is_empty() && self.endless.is_empty()
     }
 
-    fn made_of(scene: &Scene, is_wanted: impl Fn(&Material) -> bool) -> Casters {
+    fn made_of(scene: &Scene, moments: &[Scene], is_wanted: impl Fn(&Material) -> bool) -> Casters {
         let material = |i: usize| &scene.materials[scene.objects[i].material as usize];
         let sharp = |i: usize| is_wanted(material(i));
         let mut casters = Casters::none(scene);
@@ -161,11 +174,13 @@ impl Casters {
             if !casts || i >= scene.standing {
                 continue;
             }
-            let ball = Ball::around(&object.bounds());
+            let bounds = moments.iter().fold(object.bounds(), |all, moment| all.union(&moment.objects[i].bounds()));
+            let ball = Ball::around(&bounds);
             for child in children {
                 casters.casts[child] = sharp(child);
                 casters.unending[child] = sharp(child) && ball.is_none();
-                casters.parts |= sharp(child) && is_dispersive(material(child));
+                let parts = |scene: &Scene| is_dispersive(&scene.materials[scene.objects[child].material as usize]);
+                casters.parts |= sharp(child) && (parts(scene) || moments.iter().any(parts));
                 casters.single |= sharp(child) && is_single(material(child));
             }
             match ball {
@@ -252,7 +267,7 @@ mod tests {
         let description = SceneDescription::parse(text, &directory.path().join("s.yaml")).unwrap();
         let scene = compile(&description, "s").unwrap();
         assert!(scene.together.is_some());
-        let casters = Casters::of(&scene);
+        let casters = Casters::of(&scene, &[]);
         assert_eq!((casters.casts, casters.balls.len()), (vec![false, true], 1));
     }
 }

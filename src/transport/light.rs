@@ -15,6 +15,7 @@ mod views;
 use self::views::{Place, View};
 use super::caustics::{Caustics, Target};
 use super::merge::WavelengthCell;
+use super::moment_at;
 use super::path::{self, seen_normal};
 use super::photons::{Alone, Photon, Photons, Together};
 use super::plan::{EffectPlan, LightSettings};
@@ -81,6 +82,8 @@ impl Bounds {
 pub struct LightPaths<'a> {
     /// What light crosses.
     pub scene: &'a Scene,
+    /// The same while the shutter is open, of which each path sees one; none where nothing is blurred.
+    pub moments: &'a [Scene],
     /// What is simulated.
     pub plan: &'a EffectPlan,
     /// How far.
@@ -116,11 +119,19 @@ pub fn trace(
     photons: Option<&mut Photons>,
     splat: &mut dyn FnMut(&SampledWavelengths, Splat),
 ) -> Traced {
-    let scene = paths.scene;
     // One long sequence a replicate, as the lights are the same for every pixel.
     let sampler = Sampler::new(paths.seed ^ STREAM, [(index >> 32) as u32, 0], replicate, index as u32);
     let (u_choice, u_time) = pairs(sampler.set(Set::Camera));
     let (u_point, u_direction) = pairs(sampler.set(Set::Extra(0)));
+    let at_moment;
+    let paths = match paths.moments {
+        [] => paths,
+        moments => {
+            at_moment = LightPaths { scene: &moments[moment_at(u_time.y, moments.len())], ..*paths };
+            &at_moment
+        }
+    };
+    let scene = paths.scene;
     let wavelengths = scene.wavelengths.sample(paths.wavelength.map_or(u_time.x, |cell| cell.at(u_time.x)));
     let mut traced = Traced { wavelengths: Some(wavelengths), ..Traced::default() };
     let (mut target, mut group, mut without_extent) = (Target::Own, 0, false);

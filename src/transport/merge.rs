@@ -11,7 +11,11 @@
 //! path has wavelengths of its own within a cell around the shared ones. The cells of all samples fill the band, so that
 //! light which is not merged stays as it was, and what is merged is blurred by one of them over wavelength; they are the
 //! narrower the more samples there are.
+//!
+//! While the shutter is open all paths of a sample see one moment, too: light is collected where it came to. With fewer
+//! samples than moments single pictures may show.
 
+use super::moment_at;
 use super::photons::PhotonMap;
 use crate::math::sampler::{Sampler, Set};
 use crate::spectrum::LANES;
@@ -23,6 +27,8 @@ pub struct Collection<'a> {
     pub map: &'a PhotonMap,
     /// Chooses the wavelengths, in [0, 1).
     pub wavelength: f64,
+    /// Which of the moments while the shutter is open all see, where there are any.
+    pub moment: Option<usize>,
 }
 
 /// Chooses the wavelengths of sample `index` of `replicate`. The eight of a sample are an eighth apart: where they
@@ -32,6 +38,12 @@ pub fn shared_wavelength(seed: u64, replicate: u32, index: u32) -> f64 {
     let u = Sampler::new(seed ^ STREAM, [0, 0], replicate, index).set(Set::Camera);
     let lanes = LANES as f64;
     (u[0] + (u[1] * lanes).floor()) / lanes
+}
+
+/// Which of `moments` the paths of sample `index` of `replicate` see, as evenly spread as their wavelengths.
+#[must_use]
+pub fn shared_moment(seed: u64, replicate: u32, index: u32, moments: usize) -> usize {
+    moment_at(Sampler::new(seed ^ STREAM, [0, 0], replicate, index).set(Set::Camera)[2], moments)
 }
 
 /// The numbers in [0, 1) that choose wavelengths near to shared ones.
@@ -104,6 +116,16 @@ mod tests {
                 leads.sort_unstable();
                 assert_eq!(leads, [0, 1, 2, 3, 4, 5, 6, 7]);
             }
+        }
+    }
+
+    /// Of 32 samples of a replicate, each of 32 moments is seen by one.
+    #[test]
+    fn shared_moments_are_evenly_spread() {
+        for replicate in 0..4 {
+            let mut all: Vec<usize> = (0..32).map(|i| shared_moment(3, replicate, i, 32)).collect();
+            all.sort_unstable();
+            assert!(all.iter().enumerate().all(|(i, moment)| i == *moment), "{all:?}");
         }
     }
 

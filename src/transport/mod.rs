@@ -110,7 +110,11 @@ impl Address {
 /// Which of `moments` a sample sees, by the number of it that is spread evenly together with its place and wavelengths.
 #[must_use]
 pub fn moment(seed: u64, pixel: [u32; 2], replicate: u32, index: u32, moments: usize) -> usize {
-    let u = pairs(Sampler::new(seed, pixel, replicate, index).set(Set::Camera)).1.y;
+    moment_at(pairs(Sampler::new(seed, pixel, replicate, index).set(Set::Camera)).1.y, moments)
+}
+
+/// Which of `moments` is at `u` of [0, 1).
+fn moment_at(u: f64, moments: usize) -> usize {
     // A number next to 1 may become it.
     ((u * moments as f64) as usize).min(moments - 1)
 }

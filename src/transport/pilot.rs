@@ -87,10 +87,18 @@ pub fn left_off(reason: &str) -> (Option<Arc<Caustics>>, Vec<Effect>) {
     (None, vec![technique("light tracing", false, reason.to_owned())])
 }
 
-/// Decides for a picture of `samples` a pixel, and returns what to trace and what to say of it.
+/// Whether two scenes have the same lamps, by their numbers, and the same things that focus light.
+fn correspond(a: &Scene, b: &Scene) -> bool {
+    let kinds = |scene: &Scene| -> Vec<_> { scene.lights.iter().map(std::mem::discriminant).collect() };
+    kinds(a) == kinds(b) && a.dark == b.dark && a.light_groups == b.light_groups && casters::casts_alike(a, b)
+}
+
+/// Decides for a picture of `samples` a pixel, and returns what to trace and what to say of it. `moments` are the scene
+/// while the shutter is open, of which each path sees one; none where nothing is blurred.
 #[must_use]
 pub fn decide(
     scene: &Scene,
+    moments: &[Scene],
     plan: &EffectPlan,
     filter: &FilterSampler,
     seed: u64,
@@ -101,9 +109,21 @@ pub fn decide(
     if wishes.light_tracing == Use::Off {
         return left_off("the scene says so");
     }
-    let casters = Casters::of(scene);
+    let scenes = || std::iter::once(scene).chain(moments);
+    // Which paths are left to the lights is told by the numbers of lamps and things.
+    if !moments.iter().all(|moment| correspond(scene, moment)) {
+        let throws = |scene: &Scene| !Casters::of(scene, &[]).is_empty() || !Casters::in_part(scene, &[]).is_empty();
+        if !scenes().any(throws) {
+            return left_off("nothing mirrors or refracts sharply");
+        }
+        return left_off(
+            "a lamp goes on or off, or something begins or ceases to mirror or refract, while the shutter is open: \
+             what mirrors and glass throw of lamps without extent is missing",
+        );
+    }
+    let casters = Casters::of(scene, moments);
     let without_extent = settings.delta_caustics && scene.lights.iter().any(|light| !light.may_be_met());
-    let in_part = if without_extent { Casters::in_part(scene) } else { Casters::none(scene) };
+    let in_part = if without_extent { Casters::in_part(scene, moments) } else { Casters::none(scene) };
     if casters.is_empty() && in_part.is_empty() {
         return left_off("nothing mirrors or refracts sharply");
     }
@@ -112,14 +132,14 @@ pub fn decide(
     if filter.leaves_gaps() && wishes.light_tracing == Use::Auto && !unfound {
         return left_off("the filter leaves gaps between pixels: little of what comes to the picture would be in any");
     }
-    if let Some(curve) = casters::one_way(scene) {
+    if let Some(curve) = scenes().find_map(casters::one_way) {
         let name = &curve.name;
         return left_off(&format!("light leaves {name}, a curve, unseen: its way back from the lights is another"));
     }
     if settings.scatter_samples == 0 || settings.max_depth.is_some_and(|depth| depth < 3) {
         return left_off("paths are too short for light of mirrors and glass");
     }
-    if settings.count_crossings && scene.has_boundaries {
+    if settings.count_crossings && scenes().any(|scene| scene.has_boundaries) {
         if settings.max_depth.is_some() {
             return left_off("panes count for the length of paths");
         }
@@ -147,12 +167,13 @@ pub fn decide(
         return left_off(&format!("light from infinity cannot be aimed at what has no end: {name}"));
     }
     let (casters, in_part) = (&casters, &in_part);
-    run(&Trial { scene, plan, settings, filter, seed, samples, wishes, casters, in_part }, caustics)
+    run(&Trial { scene, moments, plan, settings, filter, seed, samples, wishes, casters, in_part }, caustics)
 }
 
 /// What a decision rests on.
 struct Trial<'a> {
     scene: &'a Scene,
+    moments: &'a [Scene],
     plan: &'a EffectPlan,
     settings: &'a PathSettings,
     filter: &'a FilterSampler,
@@ -206,7 +227,7 @@ fn trimmed(values: &[(usize, f64)], weights: &[f64]) -> f64 {
 }
 
 fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Effect>) {
-    let Trial { scene, plan, settings, filter, seed, wishes, .. } = *trial;
+    let Trial { scene, moments, plan, settings, filter, seed, wishes, .. } = *trial;
     let seen = match wishes.merging {
         Use::Off => None,
         Use::Auto | Use::On => Seen::of(trial, plan, &caustics),
@@ -215,7 +236,7 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let wanted = Caustics { merging: Some(1.0), ..caustics.clone() };
     let with_all = EffectPlan { caustics: Some(Arc::new(wanted)), ..plan.clone() };
     let shot = Shot { scene, plan: &with_all, filter, seed: seed ^ STREAM, photons: None };
-    let camera = from_camera(&shot, trial.tries());
+    let camera = from_camera(&shot, moments, trial.tries());
     let [width, height] = scene.camera.resolution.map(f64::from);
     let pixels = width * height;
 
@@ -229,6 +250,7 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     for number in 0..ROUNDS {
         let paths = LightPaths {
             scene,
+            moments,
             plan: &with_all,
             settings: settings.of_light_paths(),
             caustics: Some(&caustics),

@@ -159,7 +159,7 @@ fn pieces(paths: u64, own: &Range<u64>, there: &[Range<u64>]) -> Vec<(Range<u64>
 
 /// The paths from the lights that the plan calls for.
 pub(super) fn light_paths<'a>(job: &FrameJob<'a>) -> Option<LightPaths<'a>> {
-    let FrameJob { scene, plan, filter, window, seed, .. } = *job;
+    let FrameJob { scene, moments, plan, filter, window, seed, .. } = *job;
     let (settings, caustics) = match &plan.integrator {
         Integrator::Light(settings) => (*settings, None),
         Integrator::Path(settings) => (settings.of_light_paths(), Some(plan.caustics.as_deref()?)),
@@ -171,7 +171,7 @@ pub(super) fn light_paths<'a>(job: &FrameJob<'a>) -> Option<LightPaths<'a>> {
         low: corner - radius,
         high: corner + DVec2::new(f64::from(window.width), f64::from(window.height)) + radius,
     };
-    Some(LightPaths { scene, plan, settings, caustics, seed, bounds, wavelength: None })
+    Some(LightPaths { scene, moments, plan, settings, caustics, seed, bounds, wavelength: None })
 }
 
 /// Paths from the lights for each sample of all pixels.

@@ -139,7 +139,10 @@ impl Tracer<'_> {
             target: light.target,
             past_lamps: false,
         };
-        let Some((through, passing)) = shadow.cast::<MEDIA>(&ray, free(light.distance, light.target, point, &ray)) else { return };
+        let Some((through, passing)) = shadow.cast::<MEDIA>(&ray, free(light.distance, light.target, point, &ray))
+        else {
+            return;
+        };
         let weight = weight(Some(passing));
         if traced {
             path.leave_out::<CHROMATIC>(value * through, weight);

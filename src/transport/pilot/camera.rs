@@ -2,8 +2,9 @@
 
 use super::BLOCKS;
 use crate::math::sampler::{Sampler, Set, pairs};
+use crate::scene::Scene;
 use crate::spectrum::{ColourSpace, Lanes, observer};
-use crate::transport::{Shot, place_in, probe};
+use crate::transport::{Shot, moment, place_in, probe};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -67,12 +68,16 @@ struct Shown {
 
 /// Paths from the camera through all blocks: `pixels` of each, two replicates of each with `each` samples. Evenly spread
 /// samples have less variance than their number says, as those of the picture have.
-pub(super) fn from_camera(shot: &Shot, (pixels, each): (u32, u32)) -> Camera {
+pub(super) fn from_camera(shot: &Shot, moments: &[Scene], (pixels, each): (u32, u32)) -> Camera {
     let show = |pixel: [u32; 2], replicate: u32| {
         let mut shown = Shown::default();
         let share = 1.0 / each as f32;
         for index in 0..each {
-            let (light, wavelengths) = probe(shot, pixel, replicate, index);
+            let scene = match moments {
+                [] => shot.scene,
+                moments => &moments[moment(shot.seed, pixel, replicate, index, moments.len())],
+            };
+            let (light, wavelengths) = probe(&Shot { scene, ..*shot }, pixel, replicate, index);
             let colour = |light: Lanes| Colour::of(observer::xyz(light * share, &wavelengths));
             let left = colour(light.left);
             let met = left.y > 0.0;

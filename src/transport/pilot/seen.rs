@@ -3,8 +3,8 @@
 use super::super::caustics::Caustics;
 use super::super::light::{Bounds, LightPaths, seen_in_sharp};
 use super::super::photons::{Photon, PhotonMap, Photons, Together};
-use super::super::place_in;
 use super::super::plan::EffectPlan;
+use super::super::{moment_at, place_in};
 use super::camera::Colour;
 use super::{BLOCKS, PIXELS, STREAM, Trial};
 use crate::math::sampler::{Sampler, Set, pairs};
@@ -45,18 +45,24 @@ pub(super) struct Arrival {
 impl Seen {
     /// Looks through a few pixels of each block; `None` where nothing is seen so.
     pub fn of(trial: &Trial, plan: &EffectPlan, caustics: &Caustics) -> Option<Seen> {
-        let Trial { scene, settings, seed, .. } = *trial;
+        let Trial { scene, moments, settings, seed, .. } = *trial;
         // One wavelength stands for all.
         let caustics = Caustics { packets: false, ..caustics.clone() };
         let bounds = Bounds { low: DVec2::INFINITY, high: DVec2::NEG_INFINITY };
         let settings = settings.of_light_paths();
-        let paths = LightPaths { scene, plan, settings, caustics: Some(&caustics), seed, bounds, wavelength: None };
+        let caustics = Some(&caustics);
+        let paths = LightPaths { scene, moments: &[], plan, settings, caustics, seed, bounds, wavelength: None };
         let size = DVec2::from(scene.camera.resolution.map(f64::from));
         let (pixels, each) = trial.tries();
         let tries = (2 * pixels * each).min(2 * PIXELS);
         let look = |block: usize, n: u32| {
             let sampler = Sampler::new(seed ^ STREAM, [block as u32, n], 1, 0);
             let (u_place, u) = pairs(sampler.set(Set::Camera));
+            let scene = match moments {
+                [] => scene,
+                moments => &moments[moment_at(u.y, moments.len())],
+            };
+            let paths = LightPaths { scene, ..paths };
             let place = place_in(scene, BLOCKS, block, u_place);
             let ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
             let seen = seen_in_sharp(&paths, &ray, &scene.wavelengths.sample(u.x), &sampler)?;
