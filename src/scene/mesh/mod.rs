@@ -15,6 +15,7 @@ pub mod attribute;
 mod load;
 mod obj;
 mod ply;
+mod polygon;
 mod serialized;
 pub mod together;
 mod tree;

@@ -4,6 +4,7 @@
 //! numbers follow `v`; the weight or the colour that may come after them is not used.
 
 use super::MeshSource;
+use super::polygon::unfold;
 use glam::{DVec2, DVec3};
 
 /// Position, texture coordinate and normal of a corner of a face, counted from 1; 0 where there is none.
@@ -111,7 +112,9 @@ fn weld(positions: &[DVec3], uvs: &[DVec2], normals: &[DVec3], faces: &Faces) ->
             vertices.push(vertex);
         }
         start = end;
+        let fan = out.triangles.len();
         out.triangles.extend((2..vertices.len()).map(|k| [vertices[0], vertices[k - 1], vertices[k]]));
+        unfold(&out.positions, &mut out.triangles[fan..]);
     }
     Ok(out)
 }

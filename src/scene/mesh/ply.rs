@@ -6,6 +6,7 @@
 
 use super::MeshSource;
 use super::attribute::{Attribute, Channel, Column, Element, named_columns};
+use super::polygon::unfold;
 use glam::{DVec2, DVec3};
 
 /// The type of a number.
@@ -235,6 +236,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
         }
     };
     let mut out = MeshSource::default();
+    // Triangles of faces of more than three corners: where these are is known when all is read.
+    let mut fans = Vec::new();
     for (name, count, properties) in &header.elements {
         // Every row takes at least a byte: a count beyond that is a fault, not a long wait.
         if *count > total {
@@ -279,6 +282,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
                     }
                     // An index that is none becomes one that no file has vertices for: casts saturate.
                     let corner = |k: usize| if list[k] < 0.0 { u32::MAX } else { list[k] as u32 };
+                    if list.len() > 3 {
+                        fans.push(out.triangles.len()..out.triangles.len() + list.len() - 2);
+                    }
                     for k in 2..list.len() {
                         out.triangles.push([corner(0), corner(k - 1), corner(k)]);
                         attributes.iter_mut().for_each(|(attribute, from)| push(attribute, from, &scalars));
@@ -293,6 +299,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
             }
         }
     }
+    fans.into_iter().for_each(|fan| unfold(&out.positions, &mut out.triangles[fan]));
     Ok(out)
 }
 
