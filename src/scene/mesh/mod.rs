@@ -158,7 +158,7 @@ impl Mesh {
     /// Places `source` in the world.
     ///
     /// # Errors
-    /// What [`MeshSource::check`] finds, or that the transform takes a vertex out of the range
+    /// What [`MeshSource::check`] finds, or that the transform takes a vertex or the size of the mesh out of the range
     /// of f32.
     pub fn new(
         source: &MeshSource,
@@ -168,7 +168,13 @@ impl Mesh {
     ) -> Result<Mesh, String> {
         source.check()?;
         let world: Vec<DVec3> = source.positions.iter().map(|&p| world_from_object.transform_point3(p)).collect();
-        let origin = choose_origin(&Aabb::from_points(world.iter().copied()));
+        let bounds = Aabb::from_points(world.iter().copied());
+        let size = (bounds.max - bounds.min).max_element();
+        // Below, f32 has fewer digits. What is scaled to nothing is nowhere.
+        if size > 0.0 && size < f64::from(f32::MIN_POSITIVE) {
+            return Err(format!("the mesh is {size:e} m across in the world, outside the range of f32"));
+        }
+        let origin = choose_origin(&bounds);
         let positions: Vec<[f32; 3]> = world.iter().map(|&p| (p - origin).as_vec3().to_array()).collect();
         if let Some(i) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
             return Err(format!("vertex {i} lies at {} in the world, outside the range of f32", world[i]));

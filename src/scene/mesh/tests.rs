@@ -450,3 +450,20 @@ fn triangles_are_chosen_by_area_and_flat_ones_never() {
         assert_eq!(brute_force(&flat, &ray, f64::INFINITY, None), None);
     }
 }
+
+/// 2⁻¹²⁶ is the least that f32 holds with all digits. What is scaled to nothing is no fault.
+#[test]
+fn meshes_beyond_what_f32_holds_are_refused() {
+    let (positions, triangles) = grid(2, |u| DVec3::new(u.x, u.y, 0.0));
+    let source = MeshSource { positions, triangles, ..MeshSource::default() };
+    let scaled = |scale: f64| {
+        let place = DAffine3::from_scale(DVec3::splat(scale));
+        Mesh::new(&source, &place, NormalMode::Face, Winding::Object).map(|_| ())
+    };
+    for fits in [0.0, f64::from(f32::MIN_POSITIVE), 1e38] {
+        assert_eq!(scaled(fits), Ok(()));
+    }
+    assert_eq!(scaled(1e-38).unwrap_err(), "the mesh is 1e-38 m across in the world, outside the range of f32");
+    assert!(scaled(1e-50).is_err());
+    assert!(scaled(1e39).unwrap_err().ends_with("in the world, outside the range of f32"));
+}
