@@ -348,7 +348,7 @@
 //! A reflectance lies in 0 to 1; an emission and a coefficient (η, k, absorption, scattering) is 0 or
 //! more. Beyond its ends a table or file of emission is 0; a reflectance or coefficient keeps its last value, unless
 //! `zero_outside`. `blackbody`, `illuminant` and `lines` are emissions only. Where a texture is allowed it is
-//! written `{texture: name}`.
+//! written `{texture: name}`; a picture with numbers above 1 is light and no reflectance.
 //!
 //! # Refractive indices
 //! ```yaml

@@ -267,11 +267,11 @@ fn is_linear(decoded: &image::DynamicImage) -> bool {
     matches!(decoded, image::DynamicImage::ImageRgb32F(_) | image::DynamicImage::ImageRgba32F(_))
 }
 
-/// A picture of reflectances from the file `path`, upsampled texel by texel, or of the spectra of a spectral EXR; `raw`
+/// A picture of colours from the file `path`, upsampled texel by texel, or of the spectra of a spectral EXR; `raw`
 /// takes 8- and 16-bit values as linear. And what was changed in it, where something was.
 ///
 /// # Errors
-/// As [`picture`]; values above one are refused.
+/// As [`picture`]. Colours above one are light: who takes them for reflectances looks at [`Texels::greatest`].
 pub fn image_texture(
     path: &Path,
     decoded: Decoded,
@@ -304,28 +304,23 @@ pub fn image_texture(
                 if raw { x } else { colour::srgb_decode(x) }
             };
             let rgb = decoded.into_rgb16();
-            let texel = |p: &[u16]| reflectance_texel([level(p[0]), level(p[1]), level(p[2])], carried);
+            let texel = |p: &[u16]| colour_texel([level(p[0]), level(p[1]), level(p[2])], carried);
             let texels = rgb.as_raw().par_chunks_exact(3).map(texel).collect();
             Ok((make(Texels::each(texels), width, height), None))
         }
         decoded => {
             let picture = picture(path, decoded)?;
-            if let Some(i) = picture.pixels.iter().position(|p| p.iter().any(|&x| x > 1.0)) {
-                let (x, y) = (i % picture.width, i / picture.width);
-                let found = picture.pixels[i];
-                return Err(Error::input(
-                    path,
-                    format!("expected reflectances from 0 to 1, found {found:?} at ({x}, {y})"),
-                ));
-            }
-            let texels = picture.pixels.par_iter().map(|&rgb| reflectance_texel(rgb, carried)).collect();
+            let texels = picture.pixels.par_iter().map(|&rgb| colour_texel(rgb, carried)).collect();
             Ok((make(Texels::each(texels), picture.width, picture.height), picture.note))
         }
     }
 }
 
-fn reflectance_texel(rgb: [f32; 3], carried: Carried) -> Texel {
-    Texel { coefficients: carried.coefficients(rgb), scale: 1.0 }
+/// A reflectance; or of a colour above one its largest channel times the reflectance of the same hue, so that there is no
+/// step at one.
+fn colour_texel(rgb: [f32; 3], carried: Carried) -> Texel {
+    let scale = rgb.into_iter().fold(1.0, f32::max);
+    Texel { coefficients: carried.coefficients(rgb.map(|x| x / scale)), scale }
 }
 
 /// The colours of pixels (red, green, blue in turn).
@@ -350,9 +345,9 @@ fn count(pixels: &[u8]) -> Counted {
 
 /// Texels of pixels of the given levels. Many share a colour: each is upsampled once.
 fn upsampled_bytes(counted: Counted, level: &[f32; 256], carried: Carried) -> Texels {
-    let texel = |c: &[u8; 3]| reflectance_texel(c.map(|x| level[usize::from(x)]), carried);
+    let texel = |c: &[u8; 3]| colour_texel(c.map(|x| level[usize::from(x)]), carried);
     let colours = counted.colours.par_iter().with_min_len(256).map(texel).collect();
-    Texels { colours: Arc::new(colours), numbers: Some(Arc::new(counted.numbers)) }
+    Texels { colours: Arc::new(colours), numbers: Some(Arc::new(counted.numbers)), greatest: 1.0 }
 }
 
 /// A picture of numbers from the file `path`: EXR and HDR as they are, 8- and 16-bit files from 0 to 1, decoded from
@@ -426,7 +421,7 @@ pub fn samples(path: &Path) -> std::result::Result<Vec<(f64, f64)>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spectrum::upsample;
+    use crate::spectrum::{Spectrum, illuminant, observer, upsample};
 
     #[test]
     fn curves_are_read_with_headings_comments_and_any_separator() {
@@ -546,6 +541,23 @@ mod tests {
             assert_eq!(texel.coefficients, upsample::coefficients(rgb), "{p:?}");
         }
         assert_eq!(texels.colours.len(), 4);
+    }
+
+    /// Of a colour in daylight: by D65 it comes back, to the 2e-4 of the upsampling times its largest channel. At most one nothing
+    /// is scaled.
+    #[test]
+    fn colours_above_one_are_a_reflectance_times_their_largest_channel() {
+        for rgb in [[5.0, 2.0, 0.5], [1e6, 1e6, 1e6], [0.9, 0.2, 0.5], [1.0, 0.0, 0.0]] {
+            let texel = colour_texel(rgb, Carried::Spectra);
+            let largest = rgb[0].max(rgb[1]).max(rgb[2]);
+            assert_eq!(texel.scale, largest.max(1.0));
+            let light = Spectrum::Sigmoid { c: texel.coefficients, scale: texel.scale }.times(&illuminant::d65());
+            let found = colour::times(ColourSpace::Rec709.matrix_from_xyz(), observer::tristimulus(&light));
+            for (found, expected) in found.into_iter().zip(rgb) {
+                // White itself is off by 3e-4: see `upsample`.
+                assert!((found - f64::from(expected)).abs() < 5e-4 * f64::from(largest), "{rgb:?}: {found} {expected}");
+            }
+        }
     }
 
     #[test]

@@ -80,7 +80,7 @@ pub enum Interpolation {
 pub struct Texel {
     /// Coefficients of the sigmoid (`spectrum::upsample`).
     pub coefficients: [f32; 3],
-    /// Factor: one for reflectances.
+    /// Factor: one, or of a colour above one its largest channel.
     pub scale: f32,
 }
 
@@ -176,13 +176,16 @@ pub struct Texels {
     pub colours: Arc<Vec<Texel>>,
     /// For each texel the number of its colour: a quarter of the memory of a picture of few colours.
     pub numbers: Option<Arc<Vec<u32>>>,
+    /// The greatest factor of any: above one they are light, and no reflectances.
+    pub greatest: f32,
 }
 
 impl Texels {
     /// Texels with a colour each.
     #[must_use]
     pub fn each(texels: Vec<Texel>) -> Texels {
-        Texels { colours: Arc::new(texels), numbers: None }
+        let greatest = texels.iter().fold(1.0, |greatest: f32, texel| greatest.max(texel.scale));
+        Texels { colours: Arc::new(texels), numbers: None, greatest }
     }
 
     /// The texel at `index`.

@@ -392,3 +392,34 @@ fn a_name_too_long_for_a_file_is_refused_before_the_work() {
         assert!(code == 0 || ran.err.contains("the name is too long"), "{}", ran.err);
     }
 }
+
+/// Radiance of 5 in a picture is shown where it is light, by itself or in a board, and refused where it is to reflect. The
+/// luminance of a path is no more uncertain than it is large: four deviations of 16 × 16 samples.
+#[test]
+fn a_picture_above_one_is_light_and_no_reflectance() {
+    let place = Place::with(&[]);
+    exr::prelude::write_rgb_file(place.path("lamp.exr"), 4, 2, |_, _| (5.0f32, 5.0f32, 5.0f32)).unwrap();
+    let scene = |of: &str| {
+        let textures =
+            "{lamp: {image: {file: lamp.exr}}, board: {checkerboard: {a: {texture: lamp}, b: {texture: lamp}}}}";
+        let text = format!(
+            "{SMALL}textures: {textures}\n\
+             output: {{exr: {{precision: float, channels: luminance}}}}\nrender: {{samples: 16}}\n\
+             shapes: [{{rectangle: {{corner: [-9, -9, 0], edge_u: [18, 0, 0], edge_v: [0, 18, 0], {of}}}}}]\n"
+        );
+        std::fs::write(place.path("s.yaml"), text).unwrap();
+        place.run(&["render", "s.yaml", "-q", "-o", "out.exr"])
+    };
+    for name in ["lamp", "board"] {
+        let ran = scene(&format!("emission: {{texture: {name}}}"));
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        let (_, light) = crate::common::place::pixels(&place.path("out.exr")).swap_remove(0);
+        let mean = light.iter().map(|bits| f64::from(f32::from_bits(*bits))).sum::<f64>() / light.len() as f64;
+        assert!((mean - 5.0).abs() < 4.0 * 5.0 / 16.0, "{name}: {mean}");
+        let ran = scene(&format!(
+            "emission: {{texture: {name}}}, material: {{diffuse: {{reflectance: {{texture: {name}}}}}}}"
+        ));
+        let told = "lamp.exr: expected reflectances from 0 to 1, found 5 at (0, 0); it is named at s.yaml:6:";
+        assert!(ran.code == 3 && ran.err.contains(told), "{name}: {}", ran.err);
+    }
+}

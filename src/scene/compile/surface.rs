@@ -3,7 +3,7 @@
 use super::Compiler;
 use super::spectra::Role;
 use crate::description as written;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::optics::fresnel::Model;
 use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::optics::plastic::DiffuseMean;
@@ -26,14 +26,49 @@ impl<'a> Compiler<'a> {
     pub(super) fn reflectance_texture(&mut self, at: &str, s: &'a written::SpectrumOrTexture) -> Texture {
         match s {
             written::SpectrumOrTexture::Texture(name) => {
-                let texture = self.named_texture(&format!("{at}.texture"), name);
-                if let Texture::Image(ImageTexture { bands: Some(bands), .. }) = &texture
-                    && bands.quantity == bands::Quantity::Radiance
-                {
-                    self.fault(&format!("{at}.texture"), "expected reflectances (channels T), found radiance (S0)");
-                }
+                let at = format!("{at}.texture");
+                let texture = self.named_texture(&at, name);
+                self.check_reflects(&at, &texture, name);
                 texture
             }
+            written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.reflectance(at, s)),
+        }
+    }
+
+    /// Refuses light in the texture `name`, which the field `at` takes for reflectances.
+    fn check_reflects(&mut self, at: &str, texture: &Texture, name: &str) {
+        let description = self.description;
+        match (&description.textures[name], texture) {
+            (written::Texture::Image(_), Texture::Image(ImageTexture { bands: Some(bands), .. })) => {
+                if bands.quantity == bands::Quantity::Radiance {
+                    self.fault(at, "expected reflectances (channels T), found radiance (S0)");
+                }
+            }
+            (written::Texture::Image(written), Texture::Image(ImageTexture { texels, grid, .. })) => {
+                if texels.greatest > 1.0
+                    && let Some(i) = texels.colours.iter().position(|texel| texel.scale > 1.0)
+                {
+                    let (x, y, found) = (i % grid.width, i / grid.width, texels.at(i).scale);
+                    let message = format!("expected reflectances from 0 to 1, found {found} at ({x}, {y})");
+                    let error = self.asked(at, Error::input(&written.file, message));
+                    self.unread.get_or_insert(error);
+                }
+            }
+            (written::Texture::Checkerboard(board), Texture::Checkerboard { a, b, .. }) => {
+                for (written, texture) in [(&board.a, a), (&board.b, b)] {
+                    if let Some(name) = written.name() {
+                        self.check_reflects(at, texture, name);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A cell of a checkerboard, which may reflect or shine.
+    fn cell(&mut self, at: &str, s: &'a written::SpectrumOrTexture) -> Texture {
+        match s {
+            written::SpectrumOrTexture::Texture(name) => self.named_texture(&format!("{at}.texture"), name),
             written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.reflectance(at, s)),
         }
     }
@@ -148,8 +183,8 @@ impl<'a> Compiler<'a> {
             }
             written::Texture::Volume(name) => Texture::Volume(self.volume_texture(&format!("{at}.volume"), name)),
             written::Texture::Checkerboard(board) => Texture::Checkerboard {
-                a: Box::new(self.reflectance_texture(&format!("{at}.checkerboard.a"), &board.a)),
-                b: Box::new(self.reflectance_texture(&format!("{at}.checkerboard.b"), &board.b)),
+                a: Box::new(self.cell(&format!("{at}.checkerboard.a"), &board.a)),
+                b: Box::new(self.cell(&format!("{at}.checkerboard.b"), &board.b)),
                 uv: uv_map(board.uv, board.scale, [0.0; 2]),
             },
         })
@@ -185,11 +220,7 @@ impl<'a> Compiler<'a> {
                         written::SpectrumOrTexture::Texture(name) => self.named_numbers(&format!("{at}.texture"), name),
                     })
                 };
-                Scalar::Checkerboard {
-                    a: cell("a", &board.a),
-                    b: cell("b", &board.b),
-                    uv: uv_map(board.uv, board.scale, [0.0; 2]),
-                }
+                Scalar::Checkerboard { a: cell("a", &board.a), b: cell("b", &board.b), uv: uv_map(board.uv, board.scale, [0.0; 2]) }
             }
         })
     }
