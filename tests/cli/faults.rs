@@ -71,6 +71,12 @@ fn each_fault_is_told_with_its_place_its_field_and_what_was_expected() {
             2,
         ),
         (
+            "textures: {t: {checkerboard: {a: 0, b: 1, uv: [[1e200, 0, 0], [0, 1, 0]], scale: [1e200, 1]}}}",
+            "s.yaml:3:30: textures.t.checkerboard: expected a uv, scale and offset that stay within the range of numbers, \
+             found a product beyond it",
+            2,
+        ),
+        (
             "materials: {m: {conductor: {metal: golf}}}",
             "s.yaml:3:36: materials.m.conductor.metal: unknown metal \"golf\"; did you mean \"gold\"?",
             2,

@@ -4,6 +4,7 @@ use super::Compiler;
 use super::spectra::Role;
 use crate::description as written;
 use crate::error::{Error, Result};
+use crate::math::LENGTHS;
 use crate::optics::fresnel::Model;
 use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::optics::plastic::DiffuseMean;
@@ -175,7 +176,7 @@ impl<'a> Compiler<'a> {
                 let file = format!("{at}.image.file");
                 let (mut loaded, note) = loaded.map_err(|e| self.asked(&file, e))?;
                 note.iter().for_each(|note| self.note(&file, note));
-                loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
+                loaded.grid = self.grid(at, image, loaded.grid.width, loaded.grid.height);
                 Texture::Image(loaded)
             }
             written::Texture::MeshAttribute(attribute) => {
@@ -185,7 +186,7 @@ impl<'a> Compiler<'a> {
             written::Texture::Checkerboard(board) => Texture::Checkerboard {
                 a: Box::new(self.cell(&format!("{at}.checkerboard.a"), &board.a)),
                 b: Box::new(self.cell(&format!("{at}.checkerboard.b"), &board.b)),
-                uv: uv_map(board.uv, board.scale, [0.0; 2]),
+                uv: self.board_map(at, board),
             },
         })
     }
@@ -201,7 +202,7 @@ impl<'a> Compiler<'a> {
                 let file = format!("{at}.image.file");
                 let (mut loaded, note) = loaded.map_err(|e| self.asked(&file, e))?;
                 note.iter().for_each(|note| self.note(&file, note));
-                loaded.grid = grid(image, loaded.grid.width, loaded.grid.height);
+                loaded.grid = self.grid(at, image, loaded.grid.width, loaded.grid.height);
                 Scalar::Image(loaded)
             }
             written::Texture::MeshAttribute(attribute) => {
@@ -220,9 +221,44 @@ impl<'a> Compiler<'a> {
                         written::SpectrumOrTexture::Texture(name) => self.named_numbers(&format!("{at}.texture"), name),
                     })
                 };
-                Scalar::Checkerboard { a: cell("a", &board.a), b: cell("b", &board.b), uv: uv_map(board.uv, board.scale, [0.0; 2]) }
+                Scalar::Checkerboard { a: cell("a", &board.a), b: cell("b", &board.b), uv: self.board_map(at, board) }
             }
         })
+    }
+
+    /// The lattice of the picture `image` of the texture `at`.
+    fn grid(&mut self, at: &str, image: &written::ImageTexture, width: usize, height: usize) -> Grid {
+        let uv = uv_map(image.uv, image.scale, image.offset);
+        self.check_map(&format!("{at}.image"), uv, DVec2::new(width as f64, height as f64));
+        Grid {
+            width,
+            height,
+            wrap: [wrap(image.wrap), wrap(image.wrap_v.unwrap_or(image.wrap))],
+            interpolation: match image.filter {
+                written::TextureFilter::Bilinear => Interpolation::Bilinear,
+                written::TextureFilter::Nearest => Interpolation::Nearest,
+            },
+            uv,
+        }
+    }
+
+    /// From u, v to the periods of the board of the texture `at`.
+    fn board_map(&mut self, at: &str, board: &written::Checkerboard) -> DAffine2 {
+        let uv = uv_map(board.uv, board.scale, [0.0; 2]);
+        self.check_map(&format!("{at}.checkerboard"), uv, DVec2::ONE);
+        uv
+    }
+
+    /// Refuses a map that takes some u, v, which are lengths on some shapes, out of the range of numbers; `size` of what it maps
+    /// to, in cells.
+    fn check_map(&mut self, at: &str, uv: DAffine2, size: DVec2) {
+        let [u, v] = [uv.matrix2.x_axis, uv.matrix2.y_axis].map(|axis| axis.abs() * *LENGTHS.end());
+        if !((u + v + uv.translation.abs()) * size).is_finite() {
+            self.fault(
+                at,
+                "expected a uv, scale and offset that stay within the range of numbers, found a product beyond it",
+            );
+        }
     }
 
     /// The material `name`.
@@ -447,6 +483,14 @@ fn is_one(texture: &Texture) -> bool {
     matches!(texture, Texture::Uniform(Spectrum::Constant(x)) if *x == 1.0)
 }
 
+fn wrap(w: written::Wrap) -> Wrap {
+    match w {
+        written::Wrap::Repeat => Wrap::Repeat,
+        written::Wrap::Mirror => Wrap::Mirror,
+        written::Wrap::Clamp => Wrap::Clamp,
+    }
+}
+
 /// First the affine map, then scale and offset.
 fn uv_map(map: Option<[[f64; 3]; 2]>, scale: [f64; 2], offset: [f64; 2]) -> DAffine2 {
     let scaled = DAffine2::from_mat2_translation(DMat2::from_diagonal(DVec2::from(scale)), DVec2::from(offset));
@@ -455,24 +499,6 @@ fn uv_map(map: Option<[[f64; 3]; 2]>, scale: [f64; 2], offset: [f64; 2]) -> DAff
         Some([[a, b, c], [d, e, f]]) => {
             scaled * DAffine2::from_cols(DVec2::new(a, d), DVec2::new(b, e), DVec2::new(c, f))
         }
-    }
-}
-
-fn grid(image: &written::ImageTexture, width: usize, height: usize) -> Grid {
-    let wrap = |w: written::Wrap| match w {
-        written::Wrap::Repeat => Wrap::Repeat,
-        written::Wrap::Mirror => Wrap::Mirror,
-        written::Wrap::Clamp => Wrap::Clamp,
-    };
-    Grid {
-        width,
-        height,
-        wrap: [wrap(image.wrap), wrap(image.wrap_v.unwrap_or(image.wrap))],
-        interpolation: match image.filter {
-            written::TextureFilter::Bilinear => Interpolation::Bilinear,
-            written::TextureFilter::Nearest => Interpolation::Nearest,
-        },
-        uv: uv_map(image.uv, image.scale, image.offset),
     }
 }
 

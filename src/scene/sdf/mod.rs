@@ -172,6 +172,9 @@ impl SdfGrid {
                 }
             }
         }
+        if grid.values.iter().all(|&s| s == 0.0) {
+            return Err("expected values of both signs, found zeros alone".into());
+        }
         if low.x > high.x {
             return Err("expected values of both signs, found none where the distance is zero".into());
         }

@@ -286,6 +286,7 @@ fn a_grid_without_a_surface_is_refused_in_words() {
     let fault = |grid: &Grid| SdfGrid::new(grid, &DAffine3::IDENTITY, SdfNormals::Smooth).unwrap_err();
     assert!(fault(&grid(3, |_| 1.0)).contains("both signs"));
     assert!(fault(&grid(3, |_| -1.0)).contains("both signs"));
+    assert!(fault(&grid(3, |_| 0.0)).contains("both signs, found zeros alone"));
     let flat = Grid { size: [1, 3, 9], ..grid(3, |_| 1.0) };
     assert!(fault(&flat).contains("found 1 × 3 × 9"));
     let channels = Grid { size: [3, 3, 1], channels: 3, ..grid(3, |_| 1.0) };
