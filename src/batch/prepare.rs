@@ -17,7 +17,9 @@ use crate::scene::shelf::Shelf;
 use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Channel, Layer, Source};
 use crate::transport::pilot::{self, Use, Wishes};
-use crate::transport::plan::{EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings};
+use crate::transport::plan::{
+    Coverage, EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings,
+};
 use crate::transport::trial;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -229,6 +231,11 @@ pub(super) fn integrator(description: &SceneDescription, written: &description::
             scatter_samples: p.scatter_samples,
             count_crossings: p.count_crossings,
             delta_caustics: p.delta_caustics,
+            coverage: match p.coverage {
+                description::Coverage::Surfaces => Coverage::Surfaces,
+                description::Coverage::Scattering => Coverage::Scattering,
+                description::Coverage::FirstHit => Coverage::FirstHit,
+            },
         }),
         description::Integrator::Whitted(w) => Integrator::Whitted(WhittedSettings {
             max_depth: w.max_depth,

@@ -47,7 +47,7 @@
 //! integrator: path                  # default; or, with their defaults,
 //!                                   #   {path: {max_depth: null, roulette_depth: 5, hide_emitters: false,
 //!                                   #           light_samples: 1, scatter_samples: 1, count_crossings: false,
-//!                                   #           opaque_sky: false, delta_caustics: true}},
+//!                                   #           opaque_sky: false, coverage: surfaces, delta_caustics: true}},
 //!                                   #   {light_tracer: {max_depth: null, roulette_depth: 5,
 //!                                   #                   hide_emitters: false, count_crossings: false}}: from the
 //!                                   #           lights to the camera
@@ -58,6 +58,9 @@
 //!                                   # hide_emitters: lights that the camera sees itself are left out;
 //!                                   # light_samples, scatter_samples: each sample follows as many whole paths as the
 //!                                   # greater says; 0: without shadow rays, or without light met by scattering
+//!                                   # coverage: what alpha counts: surfaces and media, not holes and boundaries; or what
+//!                                   # light is scattered by, of panes what they mirror (scattering); or the first thing of
+//!                                   # any kind (first_hit)
 //!                                   # delta_caustics: mirrors, glass and the coats of plastics throw the light of points, spots,
 //!                                   # projectors and directional lights, too, which path tracers do not meet (false in
 //!                                   # Mitsuba's XML)
@@ -462,8 +465,8 @@ pub use principled::{Contrast, Luminance, Principled, PrincipledThin, Sampling, 
 pub use print::yaml;
 pub use scene::{Locator, SceneDescription};
 pub use settings::{
-    DepthIntegrator, Effects, Integrator, LightTracerIntegrator, MOST_SAMPLES, NoIntegrator, PathIntegrator, Render,
-    SAMPLES_LIMIT, Stop, Technique, Techniques, Time, Wavelengths, WhittedIntegrator, duration,
+    Coverage, DepthIntegrator, Effects, Integrator, LightTracerIntegrator, MOST_SAMPLES, NoIntegrator, PathIntegrator,
+    Render, SAMPLES_LIMIT, Stop, Technique, Techniques, Time, Wavelengths, WhittedIntegrator, duration,
 };
 pub use shape::{
     Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Geometry, Instance, Layout, Mesh, Normals, Plane, Rectangle,

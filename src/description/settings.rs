@@ -68,6 +68,22 @@ pub struct PathIntegrator {
     /// no path from the camera can find by chance; default true.
     #[serde(default = "yes")]
     pub delta_caustics: bool,
+    /// What counts as coverage, for alpha and for the depth at which fog is taken; default `surfaces`.
+    #[serde(default)]
+    pub coverage: Coverage,
+}
+
+/// What of that which a path meets counts as coverage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Coverage {
+    /// Surfaces and media, but for the holes of masks and the boundaries of media.
+    #[default]
+    Surfaces,
+    /// What scatters the path: of a pane what it mirrors, not what goes straight through.
+    Scattering,
+    /// The first thing, be it a hole or a boundary.
+    FirstHit,
 }
 
 impl Default for PathIntegrator {
@@ -81,6 +97,7 @@ impl Default for PathIntegrator {
             scatter_samples: one(),
             count_crossings: false,
             delta_caustics: true,
+            coverage: Coverage::Surfaces,
         }
     }
 }

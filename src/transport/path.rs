@@ -17,7 +17,7 @@ pub mod together;
 
 use super::Incoming;
 use super::photons::PhotonMap;
-use super::plan::{EffectPlan, PathSettings};
+use super::plan::{Coverage, EffectPlan, PathSettings};
 use super::shadow::MAX_BOUNDARIES;
 use super::ways::{First, Found, Ledger};
 use crate::math::Frame;
@@ -214,7 +214,11 @@ impl Tracer<'_> {
         } else {
             material.straight(&surface, path.ray.direction, || hit.texture_point(&surface), self.nm)
         };
-        if !boundary {
+        if match self.settings.coverage {
+            Coverage::Surfaces => !boundary,
+            Coverage::Scattering => straight.is_none(),
+            Coverage::FirstHit => true,
+        } {
             walk.show(|| scene.camera.depth(surface.point));
         }
 
@@ -271,6 +275,8 @@ impl Tracer<'_> {
             path.ray = scene.leave(&surface, &hit, path.ray.direction);
             return Step::Straight(hit.t);
         }
+        // A pane that mirrors.
+        walk.show(|| scene.camera.depth(surface.point));
         if self.is_last(path) {
             return Step::Ended;
         }

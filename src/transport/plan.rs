@@ -60,6 +60,19 @@ pub struct PathSettings {
     pub count_crossings: bool,
     /// Whether light of mirrors and glass is traced from lights without extent.
     pub delta_caustics: bool,
+    /// What counts as coverage.
+    pub coverage: Coverage,
+}
+
+/// What of that which a path meets counts as coverage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coverage {
+    /// Surfaces and media, but for holes and boundaries.
+    Surfaces,
+    /// What scatters the path.
+    Scattering,
+    /// The first thing of any kind.
+    FirstHit,
 }
 
 impl PathSettings {
@@ -86,6 +99,7 @@ impl Default for PathSettings {
             scatter_samples: 1,
             count_crossings: false,
             delta_caustics: true,
+            coverage: Coverage::Surfaces,
         }
     }
 }

@@ -72,6 +72,7 @@ impl Import<'_> {
                 hide_emitters(&bag, &mut fields)?;
                 depth(&bag, &mut fields)?;
                 fields.add("opaque_sky", boolean(bag.object.place, true));
+                fields.add("coverage", text(bag.object.place, "scattering"));
                 fields.add("delta_caustics", boolean(bag.object.place, false));
                 if bag.object.plugin == "path" {
                     // Panes and null surfaces are vertices for it, unlike for the two that know media.
@@ -82,6 +83,7 @@ impl Import<'_> {
             "direct" => {
                 hide_emitters(&bag, &mut fields)?;
                 fields.add("max_depth", whole(bag.object.place, 2));
+                fields.add("coverage", text(bag.object.place, "first_hit"));
                 // What shines through a pane has met two things.
                 fields.add("count_crossings", boolean(bag.object.place, true));
                 fields.add("delta_caustics", boolean(bag.object.place, false));
@@ -264,7 +266,7 @@ fn depth(bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::{Integrator, LayerContent, LightForm, PathIntegrator, Quantity};
+    use super::super::super::{Coverage, Integrator, LayerContent, LightForm, PathIntegrator, Quantity};
     use super::super::tests::{fault, good};
 
     #[test]
@@ -280,6 +282,7 @@ mod tests {
             scatter_samples: 4,
             count_crossings: true,
             delta_caustics: false,
+            coverage: Coverage::FirstHit,
             ..PathIntegrator::default()
         });
         assert_eq!(scene.integrator, direct);
