@@ -27,7 +27,6 @@ pub mod tev;
 
 use crate::description::{self, BatchEntry, PathMap, SceneDescription};
 use crate::error::{Error, Result};
-use crate::film::filter::FilterSampler;
 use crate::film::output::{self, Inputs};
 use crate::scene::shelf::Shelf;
 use checkpoint::{Keep, Keeper};
@@ -36,8 +35,8 @@ use finish::{Finish, spectral_path};
 use frame::{Progress, go_on};
 use part_file::Identity;
 pub use portion::{Portion, Samples};
+use prepare::prepare_scene;
 pub use prepare::{Prepared, prepare, window};
-use prepare::{filter, prepare_scene};
 use report::{Report, SceneReport, Status};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -186,7 +185,7 @@ fn render_and_write(
             output::prepare_place(&spectral_path(&exr_path))?;
         }
     }
-    let filter = FilterSampler::new(filter(&description.image.filter))?;
+    let filter = prepare::sampler(description)?;
     let job = prepared.job(&filter);
     let portion = &overrides.portion;
     if prepared.stop.is_open() && !portion.is_all() {

@@ -21,6 +21,7 @@ use crate::transport::plan::{
     Coverage, EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings,
 };
 use crate::transport::trial;
+use glam::DVec2;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -120,7 +121,7 @@ pub(super) fn prepare_scene(
     let mut plan = EffectPlan::of(&motion::census(&scene, &moments), integrator, mode);
     plan.effects.extend(blur.said);
     plan.layers = layers::plan(&description, &scene, planned)?;
-    let filter = FilterSampler::new(filter(&description.image.filter))?;
+    let filter = sampler(&description)?;
     let (seed, wishes) = (description.render.seed, wishes(&description));
     if let Some((packets, said)) = trial::packets(&scene, &plan, &filter, seed, planned, wishes.packets) {
         plan.packets = packets;
@@ -327,6 +328,17 @@ pub(super) fn filter(filter: &description::Filter) -> Filter {
         description::Filter::CatmullRom => Filter::CatmullRom,
         description::Filter::Lanczos { radius } => Filter::Lanczos { radius },
     }
+}
+
+/// The filter of a picture, ready for sampling.
+pub(super) fn sampler(description: &SceneDescription) -> Result<FilterSampler> {
+    let sampler = FilterSampler::new(filter(&description.image.filter))?;
+    if description.image.sample_border {
+        return Ok(sampler);
+    }
+    let Window { x, y, width, height } = window(description);
+    let low = DVec2::new(f64::from(x), f64::from(y));
+    sampler.within(low, low + DVec2::new(f64::from(width), f64::from(height)))
 }
 
 pub(super) fn colour_space(colour: description::Colour) -> ColourSpace {

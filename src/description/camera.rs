@@ -7,7 +7,7 @@ use super::decode::{whole, whole_or_none};
 use super::fault::Checker;
 use super::material::given_fields;
 use super::path::At;
-use super::spectrum::{Role, Spectrum, Vec3, one};
+use super::spectrum::{Role, Spectrum, Vec3, one, yes};
 use super::transform::{TransformStep, check_view, is_similarity, parallel};
 use crate::error::in_short;
 
@@ -246,6 +246,10 @@ pub struct Image {
     /// Pixels that are rendered beyond each edge of the frame, for what moves the picture later; 0 to 16384, default 0.
     #[serde(default, deserialize_with = "whole::<_, 0, MOST_OVERSCAN>")]
     pub overscan: u32,
+    /// Whether pixels at the edges take light from beyond them, as far as the filter reaches; if not, it is cut there. Default
+    /// true.
+    #[serde(default = "yes")]
+    pub sample_border: bool,
     /// Factor on colours, of the picture and of its layers of light, not on bands; default 1.
     #[serde(default = "one")]
     pub sensitivity: f64,
@@ -277,6 +281,7 @@ impl Default for Image {
             filter: Filter::default(),
             crop: None,
             overscan: 0,
+            sample_border: true,
             sensitivity: 1.0,
             bands: Vec::new(),
         }

@@ -436,7 +436,7 @@ mod tests {
     fn an_unknown_field_is_told_with_its_near_miss() {
         assert_eq!(
             faults("image: {widht: 3}"),
-            "dir/s.yaml:2:9: image.widht: expected one of width, height, filter, crop, overscan, sensitivity, bands, found \"widht\"; did you mean \"width\"?"
+            "dir/s.yaml:2:9: image.widht: expected one of width, height, filter, crop, overscan, sample_border, sensitivity, bands, found \"widht\"; did you mean \"width\"?"
         );
         assert_eq!(
             faults("materials:\n  a: {boundary: {thick: 1}}"),
@@ -467,7 +467,7 @@ mod tests {
         let cases = [
             (
                 "image: 3",
-                "2:8: image: expected a map with fields among width, height, filter, crop, overscan, sensitivity, bands, found 3",
+                "2:8: image: expected a map with fields among width, height, filter, crop, overscan, sample_border, sensitivity, bands, found 3",
             ),
             (
                 "image: {width: abc}",

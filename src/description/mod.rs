@@ -40,6 +40,7 @@
 //!                                   #   default 1/3), catmull_rom, {lanczos: {radius: 3}}
 //!   crop: {x: 0, y: 0, width: 10, height: 10}   # default all; x and y default 0
 //!   overscan: 0                     # default; pixels that are rendered beyond each edge of the frame, without a crop
+//!   sample_border: true             # default; false: the filter is cut where the picture ends, and takes no light from beyond
 //!   bands: []                       # ~ the OpenEXR file holds bands of the spectrum instead of colour:
 //!                                   #   {name: blue, response: SPECTRUM}: ∫ radiance · response dλ, nm,
 //!                                   #   whatever the sensitivity

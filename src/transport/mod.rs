@@ -165,8 +165,9 @@ impl Begun {
             return;
         }
         let (u_pixel, u_time) = pairs(sampler.set(Set::Camera));
-        let chosen = filter.sample(u_pixel);
-        let place = corner + DVec2::splat(0.5) + chosen.offset;
+        let centre = corner + DVec2::splat(0.5);
+        let chosen = filter.sample_at(centre, u_pixel);
+        let place = centre + chosen.offset;
         self.sample.wavelengths = scene.wavelengths.sample(shot.photons.map_or(u_time.x, |p| p.wavelength));
         self.sample.weight = chosen.weight;
         self.place = place;

@@ -7,7 +7,6 @@ use crate::batch::frame::{FrameJob, pass_end};
 use crate::batch::part::{Part, Share, SplatFilm};
 use crate::batch::{self, BatchEntry, Overrides, Prepared, prepare_scene};
 use crate::error::{Error, Result};
-use crate::film::filter::FilterSampler;
 use crate::film::resolve::{self, Image};
 use crate::scene::Scene;
 use crate::scene::shelf::Shelf;
@@ -121,7 +120,7 @@ impl<'a> Desk<'a> {
     /// spread of replicates is that of independent means, whatever the copies have in common.
     fn follow(&self, prepared: &[Prepared], way: Way, reference: Option<&Reference>) -> Result<Outcome> {
         let independent = way == Way::Independent;
-        let filter = FilterSampler::new(batch::filter(&prepared[0].description.image.filter))?;
+        let filter = batch::prepare::sampler(&prepared[0].description)?;
         let jobs: Vec<FrameJob> = prepared.iter().map(|p| FrameJob { independent, ..p.job(&filter) }).collect();
         let samples = jobs[0].samples;
         let parts = jobs.iter().map(|job| Part::new(job, Share::all(samples))).collect::<Result<Vec<Part>>>()?;

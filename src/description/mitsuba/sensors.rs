@@ -6,7 +6,7 @@ use super::super::fault::Fault;
 use super::super::node::{Node, Place, quote};
 use super::object::{Bag, Family};
 use super::spectra::Role;
-use super::{FILM, Fields, Import, list, matrix, number, numbers, text, whole};
+use super::{FILM, Fields, Import, boolean, list, matrix, number, numbers, text, whole};
 
 const SENSORS: [&str; 3] = ["perspective", "thinlens", "orthographic"];
 const FILMS: [&str; 2] = ["hdrfilm", "specfilm"];
@@ -96,6 +96,7 @@ impl Import<'_> {
         let mut exr = Fields::new(place);
         let (mut filter, mut precision, mut channels) = (None, "half", "rgb");
         let [mut width, mut height] = [768, 576];
+        let mut sample_border = boolean(place, false);
         if let Some(index) = index {
             let bag = self.bag(index);
             if !FILMS.contains(&bag.object.plugin.as_str()) {
@@ -129,7 +130,9 @@ impl Import<'_> {
             if let Some("float32") = bag.choice_in_any_case("component_format", &["float16", "float32"])? {
                 precision = "float";
             }
-            bag.boolean("sample_border")?;
+            if let Some(on) = bag.boolean("sample_border")? {
+                sample_border = boolean(bag.place("sample_border"), on);
+            }
             bag.boolean("compensate")?;
             if let Some(index) = bag.only(Family::ReconstructionFilter)? {
                 filter = Some(self.filter(index)?);
@@ -138,6 +141,7 @@ impl Import<'_> {
         }
         image.add("width", whole(place, width));
         image.add("height", whole(place, height));
+        image.add("sample_border", sample_border);
         image.add("sensitivity", number(place, FILM));
         image.add("filter", filter.unwrap_or_else(|| text(place, "gaussian")));
         exr.add("precision", text(place, precision));

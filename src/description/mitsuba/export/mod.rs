@@ -311,7 +311,7 @@ impl<'a> Export<'a> {
         if self.scene.motion.is_some() {
             self.lose("camera.shutter", "the scene at its frame: what is exported does not move");
         }
-        let Image { width, height, filter, crop, overscan, sensitivity, .. } = &self.scene.image;
+        let Image { width, height, filter, crop, overscan, sample_border, sensitivity, .. } = &self.scene.image;
         if *overscan > 0 {
             self.lose("image.overscan", "the frame: Mitsuba's film ends at its edge");
             self.xml.instruction(&format!("set image.overscan: {overscan}"));
@@ -400,6 +400,9 @@ impl<'a> Export<'a> {
             self.xml.value("string", "pixel_format", "rgba");
         }
         self.xml.value("string", "component_format", "float32");
+        if *sample_border {
+            self.xml.value("boolean", "sample_border", true);
+        }
         self.filter(*filter);
         self.xml.close();
         self.xml.close();
