@@ -1,8 +1,8 @@
 //! Integrators: the fields `integrator` and `layers`.
 
 use super::super::fault::Fault;
-use super::super::node::{Node, Place};
-use super::object::{Bag, Family, Object, Value};
+use super::super::node::{Node, Place, quote};
+use super::object::{Bag, Document, Family, Object, Value};
 use super::{Fields, Import, boolean, list, text, whole};
 
 const INTEGRATORS: [&str; 8] = ["path", "volpath", "volpathmis", "direct", "ptracer", "depth", "aov", "moment"];
@@ -22,6 +22,46 @@ const QUANTITIES: [(&str, &str); 12] = [
     ("prim_index", "primitive"),
     ("shape_index", "shape"),
 ];
+
+/// Whether the scene's integrator sees media. Mitsuba's `path`, `direct` and `ptracer` do not: light goes through as if there
+/// were none. What is written in the grammar does.
+///
+/// # Errors
+/// Where there are media and one of several integrators sees them and another does not.
+pub(super) fn sees_media(document: &Document) -> Result<bool, Fault> {
+    let objects = Bag::new(document, 0).objects(Family::Integrator);
+    let mut known: Option<(usize, bool)> = None;
+    let mut open = objects;
+    while let Some(index) = open.pop() {
+        let bag = Bag::new(document, index);
+        let sees = match bag.object.plugin.as_str() {
+            _ if bag.written().is_some() => true,
+            "volpath" | "volpathmis" => true,
+            "path" | "direct" | "ptracer" => false,
+            _ => {
+                open.extend(bag.objects(Family::Integrator));
+                continue;
+            }
+        };
+        match known {
+            Some((other, seen)) if seen != sees && has_media(document) => {
+                let [with, without] = if sees { [index, other] } else { [other, index] };
+                let [with, without] = [with, without].map(|i| quote(&document.objects[i].plugin));
+                let message = format!(
+                    "expected integrators that all see the scene's media, or none, found {with} beside {without}, which does not"
+                );
+                return Err(Fault::at_place(bag.object.place, message));
+            }
+            _ => known = Some((index, sees)),
+        }
+    }
+    Ok(known.is_none_or(|(_, sees)| sees))
+}
+
+/// Whether a scene has media.
+pub(super) fn has_media(document: &Document) -> bool {
+    document.objects.iter().any(|object| object.family == Family::Medium)
+}
 
 /// What computes the picture, and its further channels.
 struct Translated {
@@ -289,6 +329,36 @@ mod tests {
         let [layer] = &scene.layers[..] else { panic!("one layer") };
         assert_eq!((layer.name.as_str(), layer.squares.as_deref()), ("_arg_0", Some("m2__arg_0")));
         assert_eq!(layer.content, LayerContent::Light { of: Some(direct), form: LightForm::Xyz });
+    }
+
+    /// Mitsuba 3.9.1's `path`, `direct` and `ptracer` give a ball of fog the picture of a ball of nothing.
+    #[test]
+    fn media_are_for_the_integrators_that_see_them() {
+        let fog = "<medium type=\"homogeneous\" id=\"fog\"/><shape type=\"sphere\"><bsdf type=\"null\"/>\
+                   <ref name=\"interior\" id=\"fog\"/></shape>";
+        let inside = |integrator: &str| good(&format!("{integrator}{fog}")).shapes[0].inside.clone();
+        let one = |plugin: &str| format!("<integrator type=\"{plugin}\"/>");
+        for plugin in ["path", "direct", "ptracer"] {
+            assert_eq!(inside(&one(plugin)), None, "{plugin}");
+        }
+        for plugin in ["volpath", "volpathmis", "depth"] {
+            assert_eq!(inside(&one(plugin)).as_deref(), Some("fog"), "{plugin}");
+        }
+        assert_eq!(inside("").as_deref(), Some("fog"));
+        let moment = |inner: &str| format!("<integrator type=\"moment\">{inner}</integrator>");
+        assert_eq!(inside(&moment(&one("direct"))), None);
+        let aov = format!(
+            "<integrator type=\"aov\"><string name=\"aovs\" value=\"d:depth\"/>{}</integrator>",
+            one("volpath")
+        );
+        assert_eq!(inside(&moment(&aov)).as_deref(), Some("fog"));
+        // They have to hold all the same.
+        let bad = format!("{}{}", one("path"), fog.replace("homogeneous", "homogenous"));
+        assert!(fault(&bad, &[]).contains("expected a medium that Abbe has"), "{}", fault(&bad, &[]));
+        let both = moment(&(one("path") + &one("volpath")));
+        assert_eq!(fault(&both, &[]), "none");
+        let told = fault(&format!("{both}{fog}"), &[]);
+        assert!(told.ends_with("found \"volpath\" beside \"path\", which does not"), "{told}");
     }
 
     /// Black and transparent for Mitsuba 3.9.1, too.

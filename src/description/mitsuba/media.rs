@@ -3,6 +3,7 @@
 use super::super::fault::Fault;
 use super::super::medium::{UNCHANGED, VACUUM};
 use super::super::node::Node;
+use super::integrators::has_media;
 use super::object::{Bag, Family, Value};
 use super::parse;
 use super::spectra::Role;
@@ -60,7 +61,7 @@ impl Import<'_> {
     /// The media on the two sides of a shape. A side that a shape does not name is empty if it names the other; a
     /// shape that names none leaves a ray in what it is in.
     pub(crate) fn sides(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
-        if !self.document.objects.iter().any(|object| object.family == Family::Medium) {
+        if !has_media(self.document) {
             return Ok(());
         }
         let sides = [("inside", "interior"), ("outside", "exterior")];
@@ -70,6 +71,9 @@ impl Import<'_> {
                 Some(medium) => self.medium(medium)?,
                 None => if written { VACUUM } else { UNCHANGED }.to_owned(),
             };
+            if !self.sees_media {
+                continue;
+            }
             fields.add(ours, text(bag.place(theirs), name));
         }
         Ok(())

@@ -65,7 +65,13 @@ pub(crate) fn is_xml(path: &Path) -> bool {
 /// [`Error::Input`](crate::error::Error::Input) for a file that cannot be read.
 pub(crate) fn read(path: &Path, defines: &[(String, String)], sources: &mut Sources) -> Result<Node> {
     let document = parse::read(path, defines, sources)?;
-    let root = Import::new(&document).scene().map_err(|fault| fault.into_error(sources))?;
+    let sees_media = integrators::sees_media(&document).map_err(|fault| fault.into_error(sources))?;
+    let import = Import { sees_media, ..Import::new(&document) };
+    let root = import.scene().map_err(|fault| fault.into_error(sources))?;
+    if !sees_media && let Some(medium) = document.objects.iter().find(|object| object.family == Family::Medium) {
+        let message = "medium: it is passed over, with all others: the scene's integrator sees none, volpath does";
+        sources.note(medium.place, message.to_owned());
+    }
     let mut sensors = Bag::new(&document, 0).objects(Family::Sensor).into_iter().map(|i| document.objects[i].place);
     if let Some(first) = sensors.next().map(|place| sources.describe(place)) {
         for other in sensors {
@@ -93,6 +99,8 @@ struct Import<'a> {
     shining: HashSet<usize>,
     /// Names that no other object may be given.
     taken: HashSet<String>,
+    /// Whether the integrator sees media.
+    sees_media: bool,
 }
 
 impl<'a> Import<'a> {
@@ -113,6 +121,7 @@ impl<'a> Import<'a> {
             for_numbers: HashMap::new(),
             shining: HashSet::new(),
             taken,
+            sees_media: true,
         }
     }
 

@@ -75,7 +75,9 @@ impl Import<'_> {
         all.add("render", self.sampler(sampler, place)?);
         if let Some(medium) = bag.only(Family::Medium)? {
             let name = self.medium(medium)?;
-            all.add("medium", text(place, name));
+            if self.sees_media {
+                all.add("medium", text(place, name));
+            }
         }
         bag.finish()?;
         Ok(all)
