@@ -264,18 +264,23 @@ impl Light {
         }
     }
 
+    /// Its name, where it has one.
+    #[must_use]
+    pub fn name(&self) -> Option<&str> {
+        match self {
+            Light::Point(light) => light.name.as_deref(),
+            Light::Spot(light) => light.name.as_deref(),
+            Light::Directional(light) => light.name.as_deref(),
+            Light::Constant(light) => light.name.as_deref(),
+            Light::Environment(light) => light.name.as_deref(),
+            Light::Projector(light) => light.name.as_deref(),
+        }
+    }
+
     /// Its name, given or made from kind and number.
     #[must_use]
     pub fn name_or_kind(&self, number: usize) -> String {
-        let name = match self {
-            Light::Point(light) => &light.name,
-            Light::Spot(light) => &light.name,
-            Light::Directional(light) => &light.name,
-            Light::Constant(light) => &light.name,
-            Light::Environment(light) => &light.name,
-            Light::Projector(light) => &light.name,
-        };
-        name.clone().unwrap_or_else(|| format!("{}{number}", self.kind()))
+        self.name().map_or_else(|| format!("{}{number}", self.kind()), str::to_owned)
     }
 
     /// How often the light is chosen, relative to its power.

@@ -8,7 +8,7 @@ use super::super::transform::is_similarity;
 use super::object::{Bag, Family};
 use super::sensors::field_of_view;
 use super::spectra::Role;
-use super::{DAYLIGHT, Fields, Import, entry, list, matrix, number, numbers, text};
+use super::{DAYLIGHT, Fields, Import, entry, list, matrix, named, number, numbers, text};
 
 const EMITTERS: [&str; 6] = ["point", "constant", "envmap", "spot", "directional", "projector"];
 
@@ -24,6 +24,9 @@ impl Import<'_> {
             return Ok(());
         }
         let mut fields = Fields::new(bag.object.place);
+        if let Some(name) = named(self.document, bag.object) {
+            fields.add("name", text(bag.object.place, name));
+        }
         weight(&bag, &mut fields)?;
         let plugin = bag.object.plugin.as_str();
         let kind = match plugin {

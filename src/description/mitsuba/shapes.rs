@@ -7,7 +7,7 @@ use glam::{DMat3, DMat4, DVec3};
 
 use super::super::fault::Fault;
 use super::object::{Bag, Family};
-use super::{Fields, Import, boolean, entry, list, matrix, number, numbers, text, whole};
+use super::{Fields, Import, boolean, entry, list, matrix, named, number, numbers, text, whole};
 use crate::math::Frame;
 
 const SHAPES: [&str; 14] = [
@@ -57,8 +57,8 @@ impl Import<'_> {
         }
         let kind = self.form(&bag, to_world, &mut fields)?;
         if kind == "instance" {
-            if let Some(id) = &bag.object.id {
-                fields.add("name", text(bag.object.place, id.as_str()));
+            if let Some(name) = named(self.document, bag.object) {
+                fields.add("name", text(bag.object.place, name));
             }
         } else {
             self.surface(&bag, &mut fields)?;
@@ -183,8 +183,8 @@ impl Import<'_> {
             self.emission(emitter, fields)?;
         }
         self.sides(bag, fields)?;
-        if let Some(id) = &bag.object.id {
-            fields.add("name", text(place, id.as_str()));
+        if let Some(name) = named(self.document, bag.object) {
+            fields.add("name", text(place, name));
         }
         Ok(())
     }

@@ -35,14 +35,18 @@ impl Export<'_> {
         if let Some(why) = why {
             self.instead("emitter", &format!("lights[{i}]"), why);
         }
+        let id = light.name().and_then(|name| self.emitter_id(name));
+        let open = |plugin| {
+            [Some(("type", plugin)), id.as_deref().map(|id| ("id", id))].into_iter().flatten().collect::<Vec<_>>()
+        };
         match light {
             Light::Point(l) => {
-                self.xml.open("emitter", &[("type", "point")]);
+                self.xml.open("emitter", &open("point"));
                 self.xml.value("point", "position", numbers(&l.position));
                 self.spectrum("intensity", &l.intensity, Role::Emission);
             }
             Light::Spot(l) => {
-                self.xml.open("emitter", &[("type", "spot")]);
+                self.xml.open("emitter", &open("spot"));
                 let axis = l.axis();
                 let target = DVec3::from(l.position) + axis;
                 // Any direction across will do without a slide. With one, u grows to the left of who looks along the
@@ -65,16 +69,16 @@ impl Export<'_> {
                 }
             }
             Light::Directional(l) => {
-                self.xml.open("emitter", &[("type", "directional")]);
+                self.xml.open("emitter", &open("directional"));
                 self.xml.value("vector", "direction", numbers(&l.direction));
                 self.spectrum("irradiance", &l.irradiance, Role::Emission);
             }
             Light::Constant(l) => {
-                self.xml.open("emitter", &[("type", "constant")]);
+                self.xml.open("emitter", &open("constant"));
                 self.spectrum("radiance", &l.radiance, Role::Emission);
             }
             Light::Environment(l) => {
-                self.xml.open("emitter", &[("type", "envmap")]);
+                self.xml.open("emitter", &open("envmap"));
                 let file = self.file(&l.file);
                 self.xml.value("string", "filename", file);
                 self.xml.value("float", "scale", l.scale / DAYLIGHT);
@@ -83,7 +87,7 @@ impl Export<'_> {
                 self.placing(matrix_of(&l.transform) * rotation(DVec3::Y, l.rotate_deg + turn));
             }
             Light::Projector(l) => {
-                self.xml.open("emitter", &[("type", "projector")]);
+                self.xml.open("emitter", &open("projector"));
                 self.xml.open("transform", &[("name", "to_world")]);
                 let [origin, target, up] = [l.origin, l.target, l.up].map(|v| numbers(&v));
                 self.xml.leaf("lookat", &[("origin", &origin), ("target", &target), ("up", &up)]);
@@ -106,6 +110,13 @@ impl Export<'_> {
         if why.is_some() {
             self.end();
         }
+    }
+
+    /// The id of a light of this name; none where another light has the name.
+    fn emitter_id(&mut self, name: &str) -> Option<String> {
+        let id = self.id(name, "emitter");
+        let id = if self.ids.contains(&id) { format!("{name} (emitter)") } else { id };
+        self.ids.insert(id.clone()).then_some(id)
     }
 
     /// The emission of a shape.

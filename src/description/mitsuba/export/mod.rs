@@ -86,7 +86,7 @@ struct Export<'a> {
     directory: &'a Path,
     /// Before the names of files that are written beside the scene.
     stem: String,
-    /// Ids that shapes have.
+    /// Ids that shapes and lights have.
     ids: BTreeSet<String>,
     /// Texts in what is written as it was: a name of a volume among them needs that volume.
     mentioned: BTreeSet<String>,

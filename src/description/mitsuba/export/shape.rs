@@ -21,6 +21,7 @@ impl Export<'_> {
     /// The shapes of a group.
     pub(super) fn group(&mut self, name: &str, shapes: &[Shape]) {
         let id = self.id(name, "shape");
+        self.ids.insert(id.clone());
         self.xml.open("shape", &[("type", "shapegroup"), ("id", &id)]);
         let list = super::field(&["groups", name]);
         for (i, shape) in shapes.iter().enumerate() {
