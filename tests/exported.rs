@@ -51,12 +51,16 @@ fn every_shipped_scene_comes_back_from_mitsubas_xml() {
     files.iter().for_each(|file| same_picture(file));
 }
 
+/// What covers the picture comes back, too.
 fn same_picture(file: &Path) {
     let pictures = [false, true].map(|again| {
         let directory = tempfile::tempdir().unwrap();
         let (prepared, _) = prepared(file, directory.path(), again);
         Bench { prepared, directory }.picture()
     });
+    let [ours, theirs] = pictures.each_ref().map(|picture| picture.alpha.iter());
+    let uncovered = ours.zip(theirs).filter(|(a, b)| (*a - *b).abs() > 1e-4).count();
+    assert!(uncovered * 100 <= pictures[0].alpha.len(), "{}: alpha of {uncovered} pixels differs", file.display());
     let mean = pictures[0].y.iter().sum::<f64>() / pictures[0].y.len() as f64;
     assert!(mean > 0.0, "{}: the picture is black", file.display());
     let differing = pictures[0].y.iter().zip(&pictures[1].y).filter(|(a, b)| (*a - *b).abs() > 1e-4 * mean).count();
@@ -71,7 +75,7 @@ fn a_scene_of_plain_things_loses_nothing() {
     let scene = "
 camera: {origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40, fov_axis: y, lens: {radius: 0.1, focus_distance: 5}}
 image: {filter: {gaussian: {stddev: 0.4}}}
-integrator: {path: {delta_caustics: false}}
+integrator: {path: {delta_caustics: false, opaque_sky: true}}
 media: {smoke: {homogeneous: {absorption: 0.1, scattering: 0.3, phase: {hg: 0.5}}}}
 textures: {board: {checkerboard: {a: 0.2, b: {rgb: [0.2, 0.5, 0.8]}, scale: [4, 4]}}}
 materials:
@@ -97,7 +101,7 @@ lights:
     same_picture(&yaml);
 
     // What its glass throws of the point and the spot, no path tracer of Mitsuba's finds.
-    common::write(&yaml, scene.replace("integrator: {path: {delta_caustics: false}}\n", "").as_bytes());
+    common::write(&yaml, scene.replace("delta_caustics: false, opaque_sky: true", "opaque_sky: true").as_bytes());
     let (_, exported) = prepared(&yaml, directory.path(), false);
     let losses: Vec<&str> = exported.losses.iter().map(|loss| loss.field.as_str()).collect();
     assert_eq!(losses, ["integrator.path.delta_caustics"]);
@@ -138,6 +142,7 @@ fn a_scene_of_all_that_mitsuba_has_plugins_for_loses_nothing() {
     let scene = format!(
         "
 camera: {{origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 50}}
+integrator: {{path: {{opaque_sky: true}}}}
 medium: haze
 volumes:
   puff: {{grid: {{file: {root}/tools/cross_validate/mitsuba/assets/puff.vol, transform: [{{translate: [-3, 0, 0]}}]}}}}
@@ -228,7 +233,7 @@ fn bands_are_exported() {
     let yaml = directory.path().join("s.yaml");
     let back = |response: &str| {
         let scene = format!(
-            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nlights: [{{constant: {{radiance: 1}}}}]\nimage:\n  bands:\n  \
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nintegrator: {{path: {{opaque_sky: true}}}}\nlights: [{{constant: {{radiance: 1}}}}]\nimage:\n  bands:\n  \
              - {{name: first, response: {{table: [[400, 1], [450.5, 0.25]]}}}}\n  - {{name: 'S0.500,0nm', response: {response}}}\n"
         );
         common::write(&yaml, scene.as_bytes());
@@ -265,7 +270,7 @@ fn bands_are_exported() {
 fn a_second_environment_is_told() {
     let directory = tempfile::tempdir().unwrap();
     let yaml = directory.path().join("s.yaml");
-    let scene = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes: [{sphere: {radius: 1}}]\n\
+    let scene = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nintegrator: {path: {opaque_sky: true}}\nshapes: [{sphere: {radius: 1}}]\n\
                  lights: [{constant: {radiance: 0.5}}, {constant: {radiance: {rgb: [0.1, 0.5, 0.3]}}}]\n";
     common::write(&yaml, scene.as_bytes());
     let (_, exported) = prepared(&yaml, directory.path(), false);
@@ -281,7 +286,7 @@ fn colours_of_metals_above_one_are_told() {
     let yaml = directory.path().join("s.yaml");
     let losses = |eta: &str| {
         let scene = format!(
-            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n\
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nintegrator: {{path: {{opaque_sky: true}}}}\nshapes:\n\
              - sphere: {{radius: 0.5, material: {{conductor: {{eta: {eta}, k: 1, distribution: beckmann}}}}}}\n\
              lights: [{{constant: {{radiance: 1}}}}]\n"
         );
@@ -340,4 +345,46 @@ fn what_is_made_of_mirrors_is_told_as_a_mirror_is() {
     assert!(loses(&blend("boundary")));
     assert!(!loses(&blend("diffuse")));
     assert!(!loses("{boundary: {}}"));
+}
+
+/// Lamps are called what they were, be it what a material or shape is called; the groups of the file name them. The sky has no
+/// alpha of its own, nor has what is behind a pane.
+#[test]
+fn lamps_keep_their_names_and_pictures_their_alpha() {
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    common::write(
+        &yaml,
+        b"camera: {origin: [0, 1, 5], target: [0, 0.5, 0], fov_deg: 40}\nlayers: [light_groups, crypto_object]\n\
+          light_groups: {key: [sun], fill: [sky, panel], red: [clay]}\nassets: {all: [clay thing, gold]}\n\
+          integrator: {path: {max_depth: 4, light_samples: 2, count_crossings: true}}\nmedia: {smoke: {homogeneous: {scattering: 1}}}\n\
+          materials: {clay: {diffuse: {}}, gold: {conductor: {metal: gold}}}\nshapes:\n\
+          - sphere: {name: clay thing, radius: 0.5, material: clay}\n\
+          - sphere: {name: gold, center: [1, 0, 0], radius: 0.5, material: gold}\n\
+          - sphere: {name: panel, center: [-1, 3, 1], radius: 0.5, emission: 2}\n\
+          - sphere: {center: [-1, 0.5, 1], radius: 0.4, material: {thin_dielectric: {ior: 1.5}}}\n\
+          - sphere: {center: [1, 1, 1], radius: 0.3, material: {boundary: {}}, inside: smoke}\n\
+          lights:\n- constant: {name: sky, radiance: 0.3}\n- directional: {name: sun, direction: [1, -2, -1], irradiance: 0.5}\n\
+          - point: {name: clay, position: [0, 3, 3], intensity: {rgb: [3, 0, 0]}}\n",
+    );
+    let (_, exported) = prepared(&yaml, directory.path(), false);
+    let told: Vec<&str> = exported.losses.iter().map(|loss| loss.field.as_str()).collect();
+    for field in ["opaque_sky", "coverage", "count_crossings"] {
+        assert!(told.contains(&format!("integrator.path.{field}").as_str()), "{field}: {told:?}");
+    }
+    for said in
+        ["id=\"clay (emitter)\"", "opaque_sky: false", "coverage: surfaces", "light_samples: 2", "type=\"volpath\""]
+    {
+        assert!(exported.xml.contains(said), "{said}: {}", exported.xml);
+    }
+    same_picture(&yaml);
+
+    // Paths from the lights that meet media are no ptracer's.
+    let text = std::fs::read_to_string(&yaml).unwrap();
+    let traced = text.replace("layers: [light_groups, crypto_object]\n", "");
+    let (from, to) = (traced.find("integrator").unwrap(), traced.find("\nmedia").unwrap());
+    common::write(&yaml, format!("{}integrator: light_tracer{}", &traced[..from], &traced[to..]).as_bytes());
+    let (_, exported) = prepared(&yaml, directory.path(), false);
+    assert!(exported.losses.iter().any(|loss| loss.field == "integrator.light_tracer"), "{:?}", exported.losses);
+    same_picture(&yaml);
 }

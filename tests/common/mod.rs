@@ -41,6 +41,8 @@ pub struct Picture {
     pub error: Vec<f64>,
     /// Linear Rec. 709 of each pixel.
     pub rgb: Vec<[f64; 3]>,
+    /// Coverage of each pixel.
+    pub alpha: Vec<f64>,
     /// Samples that were dropped.
     pub invalid: u64,
 }
@@ -229,6 +231,7 @@ impl Bench {
             invalid: film.invalid.total(),
             y: xyz.rgb[1].iter().map(|y| f64::from(*y) / unit).collect(),
             error: xyz.standard_error[1].iter().map(|y| f64::from(*y) / unit).collect(),
+            alpha: xyz.alpha.iter().map(|a| f64::from(*a)).collect(),
             rgb: (0..film.window().pixels()).map(|i| rgb.rgb.each_ref().map(|c| f64::from(c[i]))).collect(),
         }
     }

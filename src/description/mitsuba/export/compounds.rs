@@ -188,6 +188,11 @@ impl Export<'_> {
         self.made_of(material).into_iter().any(open)
     }
 
+    /// Whether a material has a pane in it.
+    pub(super) fn is_pane(&self, material: &MaterialRef) -> bool {
+        self.made_of(material).into_iter().any(|m| matches!(m, Material::ThinDielectric(_)))
+    }
+
     /// Whether light may cross a surface.
     pub(super) fn transmits(&self, material: &MaterialRef) -> bool {
         self.made_of(material).into_iter().any(|m| match m {

@@ -35,7 +35,7 @@ use super::super::node::{Node, Sources, Value};
 use super::super::path::{self, Segment};
 use super::super::print::{Printer, relative};
 use super::super::scene::SceneDescription;
-use super::super::settings::{Integrator, Technique};
+use super::super::settings::{Coverage, Integrator, Technique};
 use super::DAYLIGHT;
 use spectra::can_be_band;
 use xml::Xml;
@@ -166,8 +166,17 @@ impl<'a> Export<'a> {
             }
             _ => return,
         };
-        let delta = |light: &Light| !matches!(light, Light::Constant(_) | Light::Environment(_));
+        let around = |light: &Light| matches!(light, Light::Constant(_) | Light::Environment(_));
+        let delta = |light: &Light| !around(light);
+        if !path.opaque_sky && !path.hide_emitters && self.scene.lights.iter().any(around) {
+            self.lose("integrator.path.opaque_sky", "an alpha of 1 where light from infinity is seen");
+        }
+        let mut shapes = self.scene.shapes.iter().chain(self.scene.groups.values().flatten());
+        if path.coverage == Coverage::Surfaces && shapes.any(|shape| self.is_pane(&shape.material)) {
+            self.lose("integrator.path.coverage", "the alpha of what is behind them where light goes through panes");
+        }
         let traced = path.delta_caustics && self.scene.render.techniques.light_tracing != Technique::Off;
+        let mut shapes = self.scene.shapes.iter().chain(self.scene.groups.values().flatten());
         let throws = shapes.any(|shape| self.is_single(&shape.material));
         if traced && throws && self.scene.lights.iter().any(delta) {
             self.lose(
@@ -253,27 +262,34 @@ impl<'a> Export<'a> {
     }
 
     fn integrator(&mut self) {
-        // Theirs counts the crossing of a pane as scattering, unless it is the one for media.
+        // Theirs counts the crossing of a pane as scattering, unless it is the one for media, which alone sees them.
+        let media = !self.scene.media.is_empty();
         let counts = matches!(&self.scene.integrator, Integrator::Path(path) if path.count_crossings);
-        let plugin = if counts { "path" } else { "volpath" };
+        let plugin = if counts && !media { "path" } else { "volpath" };
         let (plugin, depth, roulette, hidden) = match &self.scene.integrator {
             Integrator::Depth(_) => {
                 self.xml.open("integrator", &[("type", "depth")]);
                 self.xml.close();
                 return;
             }
-            Integrator::LightTracer(tracer) => {
+            Integrator::LightTracer(tracer) if !media => {
                 ("ptracer", tracer.max_depth, tracer.roulette_depth, tracer.hide_emitters)
             }
             Integrator::Path(path) => {
                 if path.light_samples != 1 || path.scatter_samples != 1 {
                     self.lose("integrator.path", "one shadow ray and one scattered ray at each surface");
                 }
+                if counts && media {
+                    let what =
+                        "longer paths where panes, masks and boundaries end a segment, or lamps behind them hidden";
+                    self.lose("integrator.path.count_crossings", what);
+                }
                 (plugin, path.max_depth, path.roulette_depth, path.hide_emitters)
             }
             other => {
                 let (tag, what) = match other {
                     Integrator::Whitted(_) => ("whitted", "a path tracer: Mitsuba has no Whitted ray tracer"),
+                    Integrator::LightTracer(_) => ("light_tracer", "a path tracer: Mitsuba's ptracer sees no media"),
                     _ => ("", "a path tracer"),
                 };
                 let field = if tag.is_empty() { "integrator".to_owned() } else { format!("integrator.{tag}") };
@@ -296,8 +312,23 @@ impl<'a> Export<'a> {
         }
         self.xml.close();
         match &self.scene.integrator {
-            Integrator::Path(path) if path.delta_caustics => {
-                self.xml.instruction("set integrator.path.delta_caustics: true");
+            Integrator::Path(path) => {
+                let coverage = match path.coverage {
+                    Coverage::Surfaces => "surfaces",
+                    Coverage::Scattering => "scattering",
+                    Coverage::FirstHit => "first_hit",
+                };
+                let fields = [
+                    ("opaque_sky", "false".to_owned(), !path.opaque_sky),
+                    ("coverage", coverage.to_owned(), path.coverage != Coverage::Scattering),
+                    ("delta_caustics", "true".to_owned(), path.delta_caustics),
+                    ("count_crossings", "true".to_owned(), counts && media),
+                    ("light_samples", path.light_samples.to_string(), path.light_samples != 1),
+                    ("scatter_samples", path.scatter_samples.to_string(), path.scatter_samples != 1),
+                ];
+                for (key, value, _) in fields.iter().filter(|(.., differs)| *differs) {
+                    self.xml.instruction(&format!("set integrator.path.{key}: {value}"));
+                }
             }
             Integrator::LightTracer(tracer) if !tracer.count_crossings => {
                 self.xml.instruction("set integrator.light_tracer.count_crossings: false");
