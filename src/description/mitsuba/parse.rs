@@ -12,6 +12,7 @@ use glam::{DMat4, DVec3};
 
 use self::text::{major_version, underscored};
 pub(crate) use self::text::{number, tokens};
+pub(super) use self::transform::ABOUT_ONE;
 use super::super::edit::{Setting, read_bytes};
 use super::super::fault::Fault;
 use super::super::node::{Node, Place, Sources, Value as NodeValue, did_you_mean, quote};

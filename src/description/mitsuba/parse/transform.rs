@@ -9,7 +9,7 @@ use super::super::xml::{Attribute, Element};
 use super::{Parser, attribute, check_attributes};
 
 /// What the length of a unit vector that is written with three digits may be off by.
-const ABOUT_ONE: f64 = 1e-3;
+pub(in crate::description::mitsuba) const ABOUT_ONE: f64 = 1e-3;
 
 /// Mitsuba's turn: Rodrigues' formula with the axis as it is written. Where that is not of length one it stretches too,
 /// and files that were made by looking at the picture mean what they showed. What was rounded is taken for a unit vector.
