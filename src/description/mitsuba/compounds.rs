@@ -94,9 +94,12 @@ impl Import<'_> {
     }
 
     pub(crate) fn twosided(&mut self, bag: &Bag<'_>) -> Result<Node, Fault> {
-        bag.boolean("allow_transmission")?;
+        let allowed = bag.boolean("allow_transmission")?.unwrap_or(false);
         let inner = bag.objects(Family::Bsdf);
         bag.finish()?;
+        if !allowed && let Some(open) = inner.iter().find_map(|index| self.lets_through(*index)) {
+            super::bsdfs::transparent(&self.bag(open), Sides::Both)?;
+        }
         match inner[..] {
             // Named once for all who refer to it, it stands on its own.
             [one] if !self.is_compound(one) => self.bsdf(one, Sides::Both),
@@ -112,6 +115,16 @@ impl Import<'_> {
                 Ok(fields.kind("two_sided"))
             }
             _ => Err(bag.fault(format!("expected one <bsdf> inside, or two, found {}", inner.len()))),
+        }
+    }
+
+    /// A part of a material that lets light through, whatever its numbers.
+    fn lets_through(&self, index: usize) -> Option<usize> {
+        let bag = self.bag(index);
+        match bag.object.plugin.as_str() {
+            "dielectric" | "dispersivedielectric" | "thindielectric" | "roughdielectric" => Some(index),
+            "null" | "mask" | "principledthin" | "hair" => Some(index),
+            _ => bag.objects(Family::Bsdf).into_iter().find_map(|inner| self.lets_through(inner)),
         }
     }
 
@@ -231,6 +244,21 @@ mod tests {
         assert!(green.ends_with("opacity: expected a float or a texture of numbers, found an rgb colour"), "{green}");
         let day = told("<spectrum type=\"d65\" name=\"opacity\"/>");
         assert!(day.ends_with("expected a float or a texture of numbers, found the texture \"d65\""), "{day}");
+    }
+
+    /// So it is for Mitsuba 3.9.1, unless allow_transmission is true.
+    #[test]
+    fn what_has_two_sides_lets_nothing_through() {
+        let told = |inside: &str, allowed: &str| {
+            fault(&format!("<bsdf type=\"twosided\" id=\"m\">{allowed}{inside}</bsdf>"), &[])
+        };
+        let mask = "<bsdf type=\"mask\"><bsdf type=\"diffuse\"/></bsdf>";
+        let blend = "<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\"0.5\"/><bsdf type=\"diffuse\"/><bsdf type=\"null\"/></bsdf>";
+        for open in [mask, blend, "<bsdf type=\"null\"/>", "<bsdf type=\"dielectric\"/>"] {
+            assert!(told(open, "").ends_with("lets no light through inside <twosided>"), "{open}: {}", told(open, ""));
+        }
+        assert_eq!(told(mask, "<boolean name=\"allow_transmission\" value=\"true\"/>"), "none");
+        assert_eq!(told("<bsdf type=\"diffuse\"/>", ""), "none");
     }
 
     #[test]
