@@ -53,6 +53,22 @@ const FILM: f64 = 106.856_914_916_767 / 106.750_259_399_414_06;
 /// the integral of its table, divided by 98.997417518762 there, against ȳ over 106.7502594.
 const DAYLIGHT: f64 = 0.999_894_136 / FILM;
 
+/// Parameters of a scene that are about the structures in which Mitsuba looks for surfaces.
+const SEARCH: [&str; 12] = [
+    "allow_thread_reordering",
+    "compact_acceleration_structures",
+    "embree_use_robust_intersections",
+    "kd_clip",
+    "kd_empty_space_bonus",
+    "kd_exact_primitive_threshold",
+    "kd_intersection_cost",
+    "kd_max_depth",
+    "kd_min_max_bins",
+    "kd_retract_bad_splits",
+    "kd_stop_prims",
+    "kd_traversal_cost",
+];
+
 /// Whether a file holds a Mitsuba scene: by its name.
 pub(crate) fn is_xml(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xml"))
@@ -178,6 +194,10 @@ impl<'a> Import<'a> {
         }
         for phase in root.objects(Family::Phase) {
             self.phase(phase)?;
+        }
+        // How what rays meet is looked for.
+        for name in SEARCH {
+            root.value(name);
         }
         root.finish()?;
 

@@ -70,10 +70,7 @@ impl Import<'_> {
             Value::Rgb(rgb) => Ok(Some(colour(place, *rgb, role))),
             Value::Spectrum(SpectrumValue::Uniform(value)) => Ok(Some(number(place, *value))),
             Value::Spectrum(SpectrumValue::Table(pairs)) => Ok(Some(table(place, pairs))),
-            Value::Spectrum(SpectrumValue::File(path)) => {
-                let file = entry(place, "file", text(place, path.as_str()));
-                Ok(Some(entry(place, "zero_outside", file)))
-            }
+            Value::Spectrum(SpectrumValue::File(path)) => Ok(Some(file(place, path))),
             Value::Object(index) if bag.document.objects[*index].family == Family::Texture => {
                 match self.spectrum_plugin(*index, role)? {
                     Some(node) => Ok(Some(node)),
@@ -199,6 +196,14 @@ impl Import<'_> {
                     },
                 }
             }
+            "regular" | "irregular" if bag.has("value") => match bag.value("value") {
+                Some(Value::Spectrum(SpectrumValue::Table(pairs))) => table(place, pairs),
+                Some(Value::Spectrum(SpectrumValue::File(path))) => file(place, path),
+                other => {
+                    let found = other.map_or(String::new(), |value| value.kind(bag.document));
+                    return Err(bag.fault_of("value", format!("expected wavelengths and values, found {found}")));
+                }
+            },
             "regular" => {
                 let least = bag.required("wavelength_min", bag.float("wavelength_min"))?;
                 let most = bag.required("wavelength_max", bag.float("wavelength_max"))?;
@@ -353,6 +358,11 @@ pub(crate) fn scaled(place: Place, by: f64, of: Node) -> Node {
 
 fn pairs_node(place: Place, pairs: &[[f64; 2]]) -> Node {
     list(place, pairs.iter().map(|pair| numbers(place, pair)))
+}
+
+/// A table in a file, zero outside.
+fn file(place: Place, path: &str) -> Node {
+    entry(place, "zero_outside", entry(place, "file", text(place, path)))
 }
 
 /// Linear between the pairs, zero outside.

@@ -70,7 +70,10 @@ impl Parser<'_> {
                     check_attributes(step, &["origin", "target"], &["up"])?;
                     let origin = self.triple(attribute(step, "origin")?)?;
                     let target = self.triple(attribute(step, "target")?)?;
-                    let up = step.attribute("up").map_or(Ok(DVec3::ZERO), |up| self.triple(up))?;
+                    let up = match step.attribute("up") {
+                        Some(up) if !self.peek(up)?.is_empty() => self.triple(up)?,
+                        _ => DVec3::ZERO,
+                    };
                     look_at(origin, target, up).ok_or_else(|| {
                         at("expected a target other than the origin and an up across the line of sight".to_owned())
                     })?
