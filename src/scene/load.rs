@@ -29,7 +29,11 @@ pub struct Picture {
 const LARGEST: u64 = 1 << 31;
 
 fn decode(path: &Path) -> Result<image::DynamicImage> {
-    let bytes = crate::input::read(path).map_err(|e| Error::input(path, words(&e)))?;
+    let mut bytes = crate::input::read(path).map_err(|e| Error::input(path, words(&e)))?;
+    // Radiance pictures have either signature; the decoder knows one.
+    if bytes.starts_with(b"#?RGBE") {
+        bytes.splice(..6, *b"#?RADIANCE");
+    }
     // The decoder makes grey of what is missing.
     if image::guess_format(&bytes).is_ok_and(|format| format == image::ImageFormat::Jpeg) && !jpeg_ends(&bytes) {
         return Err(Error::input(path, "expected a JPEG picture to its end, found one cut off: it is damaged"));
@@ -440,6 +444,22 @@ mod tests {
         std::fs::write(&path, "400 0.1\n500 zwei\n").unwrap();
         assert_eq!(samples(&path).unwrap_err(), "line 2: expected a wavelength and a value, found \"500 zwei\"");
         assert_eq!(samples(&dir.path().join("none")).unwrap_err(), "expected a file, found none");
+    }
+
+    /// One of 2 x 1 pixels in four bytes each: 0.5 and, half as bright, 0.25, under both signatures.
+    #[test]
+    fn radiance_pictures_have_either_signature() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.hdr");
+        let read = |signature: &str| {
+            let mut bytes = format!("{signature}\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n").into_bytes();
+            bytes.extend([128, 128, 128, 128, 128, 128, 128, 127]);
+            std::fs::write(&path, bytes).unwrap();
+            decode(&path).unwrap().to_rgb32f().into_raw()
+        };
+        for signature in ["#?RADIANCE", "#?RGBE"] {
+            assert_eq!(read(signature), [0.5, 0.5, 0.5, 0.25, 0.25, 0.25], "{signature}");
+        }
     }
 
     /// Cut off anywhere, also within its header or just before the marker of its end; what follows that does no harm.
