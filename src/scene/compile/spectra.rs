@@ -98,6 +98,9 @@ impl Compiler<'_> {
             let told = self.faults.len() > faults || self.unread.is_some() && !unread;
             if response.is_black() && !told {
                 self.fault(&at, "expected a response within 360 to 830 nm, found none");
+            } else if let Some([from, to]) = beyond_the_band(&band.response) {
+                let expected = "expected a response that is 0 beyond 360 and 830 nm, where no light is simulated";
+                self.fault(&at, format!("{expected}, found more between {from} and {to} nm"));
             }
             all.push(Band { name: band.name.clone(), response });
         }
@@ -124,4 +127,20 @@ fn measured(samples: &[(f64, f64)], outside: Outside) -> Result<Spectrum, String
     let hint = if first * 1e3 <= high && last * 1e3 >= low { " (are they in µm?)" } else { "" };
     let [first, last] = [first, last].map(in_short);
     Err(format!("expected wavelengths within {low} to {high} nm, found {first} to {last} nm{hint}"))
+
+/// Between which wavelengths, nm, a response counts light beyond the band, if it does.
+fn beyond_the_band(response: &written::Spectrum) -> Option<[f64; 2]> {
+    let samples = match response {
+        written::Spectrum::Table(samples) => samples.clone(),
+        // What is wrong with the file has been told.
+        written::Spectrum::File(path) => load::samples(path).ok()?.into_iter().map(Into::into).collect(),
+        written::Spectrum::ZeroOutside(of) => return beyond_the_band(of),
+        written::Spectrum::Scaled(scaled) => return beyond_the_band(&scaled.of),
+        _ => return None,
+    };
+    let beyond = |[from, to]: [[f64; 2]; 2]| {
+        let counts = from[1] != 0.0 || to[1] != 0.0;
+        (counts && (from[0] < BAND_NM[0] || to[0] > BAND_NM[1])).then_some([from[0], to[0]])
+    };
+    samples.windows(2).find_map(|pair| beyond([pair[0], pair[1]]))
 }
