@@ -55,21 +55,140 @@ fn a_scene_is_rendered_with_parameters_from_the_command_line() {
     }
 }
 
-/// The mean colour of 16 x 16 pixels of 30 degrees from (0, 0, 5) toward the origin.
-fn colour(body: &str) -> [f64; 3] {
+/// The channels of 16 x 16 pixels of 30 degrees from (0, 0, 5) toward the origin, by an integrator and a further part of the film.
+fn channels<const N: usize>(integrator: &str, film: &str, body: &str, names: [&str; N]) -> [Vec<f32>; N] {
     let directory = tempfile::tempdir().unwrap();
-    let head = "<scene version=\"3.0.0\"><integrator type=\"path\"/><sensor type=\"perspective\"><float name=\"fov\" value=\"30\"/>\
+    let head = "<sensor type=\"perspective\"><float name=\"fov\" value=\"30\"/>\
                 <transform name=\"to_world\"><lookat origin=\"0, 0, 5\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform>\
                 <film type=\"hdrfilm\"><integer name=\"width\" value=\"16\"/><integer name=\"height\" value=\"16\"/>\
-                <string name=\"component_format\" value=\"float32\"/><rfilter type=\"box\"/></film></sensor>";
-    std::fs::write(directory.path().join("s.xml"), format!("{head}{body}</scene>")).unwrap();
+                <string name=\"component_format\" value=\"float32\"/>FILM</film></sensor>"
+        .replace("FILM", film);
+    let scene = format!("<scene version=\"3.0.0\"><integrator type=\"{integrator}\"/>{head}{body}</scene>");
+    std::fs::write(directory.path().join("s.xml"), scene).unwrap();
     let output = abbe(directory.path(), &["render", "s.xml", "-o", "out.exr", "--spp", "64", "-q", "--threads", "1"]);
-    assert_eq!(outcome(&output), (0, String::new()));
+    assert_eq!(output.status.code(), Some(0), "{}", outcome(&output).1);
     let file = abbe::film::exr::read_exr(&directory.path().join("out.exr")).unwrap();
-    ["R", "G", "B"].map(|name| {
-        let values = file.parts[0].channel(name).unwrap();
-        values.iter().map(|v| f64::from(*v)).sum::<f64>() / values.len() as f64
-    })
+    names.map(|name| file.parts[0].channel(name).unwrap().to_vec())
+}
+
+const BOX: &str = "<rfilter type=\"box\"/>";
+
+fn mean(values: &[f32]) -> f64 {
+    values.iter().map(|v| f64::from(*v)).sum::<f64>() / values.len() as f64
+}
+
+/// The mean colour.
+fn colour(body: &str) -> [f64; 3] {
+    channels("path", BOX, body, ["R", "G", "B"]).each_ref().map(|values| mean(values))
+}
+
+/// The lamp ends at the top edge of the picture, where 5 tan(15 deg) lies: the filters of the pixels below it reach
+/// beyond, but what is there counts only where the film says so. Mitsuba 3.9.1: 0, and 0.16 of the lamp with a Gaussian
+/// of 0.5 pixels in the top row.
+#[test]
+fn light_from_beyond_the_picture_counts_where_the_film_says_so() {
+    let edge = 5.0 * 15f64.to_radians().tan();
+    let lamp = format!(
+        "<shape type=\"rectangle\"><transform name=\"to_world\"><scale x=\"9\"/><translate y=\"{}\"/></transform>\
+         <emitter type=\"area\"/></shape>",
+        edge + 1.0
+    );
+    let [bell, crop] = [
+        "",
+        "<integer name=\"crop_width\" value=\"4\"/><integer name=\"crop_height\" value=\"3\"/>\
+         <integer name=\"crop_offset_x\" value=\"6\"/>",
+    ];
+    for film in [bell, crop] {
+        let [dark] = channels("path", film, &lamp, ["G"]);
+        assert!(dark.iter().all(|g| *g == 0.0), "{dark:?}");
+        let with = format!("{film}<boolean name=\"sample_border\" value=\"true\"/>");
+        let [lit] = channels("path", &with, &lamp, ["G"]);
+        // 1 - F(1/2 pixel), one standard deviation, of the Gaussian less its value at four: 0.159 - 0.001; 64 samples.
+        let top = mean(&lit[..4]);
+        assert!((top - 0.158).abs() < 0.02, "{top}");
+    }
+}
+
+/// Of what fills the picture: a pane covers by what it mirrors, 2R / (1 + R) of R for 1.5046 over 1.000277 where light falls
+/// on it squarely, and 1 % more at the corners; `direct` counts the first thing, be it nothing but a boundary or a hole.
+/// Mitsuba 3.9.1 has these alphas.
+#[test]
+fn coverage_is_what_mitsuba_takes_for_it() {
+    let alpha = |integrator: &str, bsdf: &str| {
+        let wall = format!(
+            "<shape type=\"rectangle\"><transform name=\"to_world\"><scale value=\"5\"/></transform>{bsdf}</shape>\
+             <emitter type=\"point\"><point name=\"position\" x=\"0\" y=\"0\" z=\"4\"/></emitter>"
+        );
+        let film = format!("{BOX}<string name=\"pixel_format\" value=\"rgba\"/>");
+        mean(&channels(integrator, &film, &wall, ["A"])[0])
+    };
+    let r = ((1.5046f64 - 1.000_277) / (1.5046 + 1.000_277)).powi(2);
+    let pane = 2.0 * r / (1.0 + r);
+    for integrator in ["path", "volpath"] {
+        // 16384 samples: a standard error of 2.1e-3 at random, less when stratified.
+        let found = alpha(integrator, "<bsdf type=\"thindielectric\"/>");
+        assert!((found - pane).abs() < 6e-3, "{integrator}: {found} for {pane}");
+        assert_eq!(alpha(integrator, "<bsdf type=\"null\"/>"), 0.0);
+    }
+    for open in [
+        "<bsdf type=\"null\"/>",
+        "<bsdf type=\"mask\"><bsdf type=\"diffuse\"/></bsdf>",
+        "<bsdf type=\"thindielectric\"/>",
+    ] {
+        assert_eq!(alpha("direct", open), 1.0, "{open}");
+    }
+}
+
+/// Mitsuba 3.9.1's `path` sees no media: the bits are those of the same file without.
+#[test]
+fn media_are_nothing_to_an_integrator_without_them() {
+    let scene = |media: &str| {
+        let [fog, inside] = if media.is_empty() { ["", ""] } else { [media, "<ref name=\"interior\" id=\"fog\"/>"] };
+        let ball =
+            format!("{fog}<shape type=\"sphere\"><bsdf type=\"null\"/>{inside}</shape><emitter type=\"constant\"/>");
+        channels("path", BOX, &format!("{ball}<shape type=\"disk\"/>"), ["R", "G", "B"])
+    };
+    let fog = "<medium type=\"homogeneous\" id=\"fog\"><float name=\"sigma_t\" value=\"2\"/></medium>";
+    assert!(scene(fog) == scene(""), "the pictures differ");
+}
+
+/// What a response counts beyond the band is not simulated: Mitsuba 3.9.1 gives 600 nm of an even light for this band.
+#[test]
+fn responses_end_with_the_band() {
+    let film = |response: &str| {
+        let spectrum = format!("<film type=\"specfilm\"><spectrum name=\"a\" value=\"{response}\"/>");
+        told(&GOOD.replace("<film type=\"hdrfilm\">", &spectrum))
+    };
+    let (code, message) = film("300:1, 900:1");
+    assert_eq!(code, 2);
+    assert!(message.contains("expected a response that is 0 beyond 360 and 830 nm"), "{message}");
+    assert!(message.contains("s.xml:5:") && message.ends_with("found more between 300 and 900 nm\n"), "{message}");
+    // It falls from 500 to 900 nm.
+    assert_eq!(film("300:0, 360:0, 500:1, 900:0").0, 2);
+    assert_eq!(film("360:1, 830:1"), (0, String::new()));
+    assert_eq!(film("300:0, 360:0, 500:1, 830:0, 900:0"), (0, String::new()));
+}
+
+/// Parameters that say nothing about the picture, an up that is empty, and spectra in their third form.
+#[test]
+fn words_that_mitsuba_reads_are_read() {
+    let with = |text: &str| told(&GOOD.replace("</scene>", &format!("{text}</scene>")));
+    let words = [
+        "<boolean name=\"embree_use_robust_intersections\" value=\"true\"/><integer name=\"kd_max_depth\" value=\"9\"/>",
+        "<shape type=\"sphere\"><transform name=\"to_world\"><lookat origin=\"0,0,1\" target=\"0,0,0\" up=\"\"/></transform></shape>",
+        "<bsdf type=\"diffuse\" id=\"a\"><spectrum type=\"irregular\" name=\"reflectance\">\
+         <spectrum name=\"value\" value=\"400:0.1, 500:0.6, 700:0.3\"/></spectrum></bsdf>",
+        "<bsdf type=\"diffuse\" id=\"a\"><spectrum type=\"regular\" name=\"reflectance\">\
+         <spectrum name=\"value\" value=\"400:0.1, 500:0.6, 600:0.3\"/></spectrum></bsdf>",
+    ];
+    for text in words {
+        assert_eq!(with(text), (0, String::new()), "{text}");
+    }
+    let (code, message) = with(
+        "<bsdf type=\"diffuse\" id=\"a\"><spectrum type=\"irregular\" name=\"reflectance\">\
+                                <float name=\"value\" value=\"1\"/></spectrum></bsdf>",
+    );
+    assert!(code == 2 && message.contains("value: expected wavelengths and values, found a float"), "{message}");
 }
 
 /// Mitsuba 3.9.1, `scalar_spectral`, 4096 samples a pixel. 16384 paths of stratified wavelengths are within 1e-3 here.
