@@ -127,6 +127,7 @@ fn measured(samples: &[(f64, f64)], outside: Outside) -> Result<Spectrum, String
     let hint = if first * 1e3 <= high && last * 1e3 >= low { " (are they in µm?)" } else { "" };
     let [first, last] = [first, last].map(in_short);
     Err(format!("expected wavelengths within {low} to {high} nm, found {first} to {last} nm{hint}"))
+}
 
 /// Between which wavelengths, nm, a response counts light beyond the band, if it does.
 fn beyond_the_band(response: &written::Spectrum) -> Option<[f64; 2]> {
