@@ -5,6 +5,8 @@
     abbe render SCENE -o noisy.exr --set output.exr.precision=float \\
         --set 'layers=[albedo, normal]'
     tools/denoise.py noisy.exr denoised.exr
+
+What is written has the windows, the colours and the alpha of what was read: R, G, B, or X, Y, Z, or Y.
 """
 import sys
 
@@ -12,24 +14,32 @@ import numpy as np
 import OpenEXR
 import pyoidn
 
-
-def layer(channels, name):
-    """Three channels side by side, whether the file groups them or not."""
-    if name + "RGB" in channels or name + "RGBA" in channels:
-        return channels.get(name + "RGB", channels.get(name + "RGBA")).pixels[..., :3]
-    for letters in ("RGB", "XYZ"):
-        if name + letters[0] in channels:
-            return np.stack([channels[name + letter].pixels for letter in letters], axis=-1)
-    for key in channels:
-        if key.rstrip(".") == name.rstrip("."):
-            return channels[key].pixels[..., :3]
-    sys.exit(f"{sys.argv[1]}: no layer {name!r}; there are {', '.join(channels)}")
+# What the denoised file has of its own; `abbe/...` speaks of the pixels that were rendered.
+OWN = {"acesImageContainerFlag", "channels", "chunkCount", "compression", "dwaCompressionLevel", "lineOrder", "name", "type"}
 
 
-with OpenEXR.File(sys.argv[1]) as file:
-    channels = file.channels()
-    images = {name: np.ascontiguousarray(layer(channels, prefix), dtype=np.float32)
-              for name, prefix in [("color", ""), ("albedo", "albedo."), ("normal", "normal.")]}
+def letters(channels, layer, choices):
+    """Names of the channels of a layer."""
+    for choice in choices:
+        if all(layer + letter in channels for letter in choice):
+            return [layer + letter for letter in choice]
+    expected = " or ".join(", ".join(layer + letter for letter in choice) for choice in choices)
+    sys.exit(f"{sys.argv[1]}: expected channels {expected}; found {', '.join(channels)}")
+
+
+with OpenEXR.File(sys.argv[1], separate_channels=True) as file:
+    parts = [(dict(part.header), {name: channel.pixels for name, channel in part.channels.items()}) for part in file.parts]
+channels = {name: pixels for _, part in reversed(parts) for name, pixels in part.items()}
+names = {
+    "color": letters(channels, "", ["RGB", "XYZ", "Y"]),
+    "albedo": letters(channels, "albedo.", ["RGB", "XYZ"]),
+    "normal": letters(channels, "normal.", ["XYZ"]),
+}
+# Of luminance alone all three numbers are one.
+images = {
+    image: np.stack([channels[name] for name in (own if len(own) == 3 else own * 3)], axis=-1).astype(np.float32)
+    for image, own in names.items()
+}
 output = np.zeros_like(images["color"])
 device = pyoidn.Device()
 device.commit()
@@ -39,4 +49,11 @@ for name, image in (images | {"output": output}).items():
 denoise.set_bool("hdr", True)
 denoise.commit()
 denoise.execute()
-OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, {"RGB": output}).write(sys.argv[2])
+
+picture = next(header for header, part in parts if names["color"][0] in part)
+header = {name: value for name, value in picture.items() if name not in OWN and not name.startswith(("abbe/", "cryptomatte/"))}
+header |= {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+written = {name: np.ascontiguousarray(output[..., i]) for i, name in enumerate(names["color"])}
+if "A" in channels:
+    written["A"] = channels["A"]
+OpenEXR.File(header, written).write(sys.argv[2])
