@@ -142,7 +142,7 @@ fn a_scene_of_all_that_mitsuba_has_plugins_for_loses_nothing() {
     let scene = format!(
         "
 camera: {{origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 50}}
-integrator: {{path: {{opaque_sky: true}}}}
+integrator: {{path: {{delta_caustics: false, opaque_sky: true}}}}
 medium: haze
 volumes:
   puff: {{grid: {{file: {root}/tools/cross_validate/mitsuba/assets/puff.vol, transform: [{{translate: [-3, 0, 0]}}]}}}}
@@ -325,7 +325,8 @@ fn optical_materials_come_back() {
     same_picture(&yaml);
 }
 
-/// What the lights' paths are aimed at here, and is told as missing there: materials that are sharp as a whole.
+/// What the paths of lamps without extent are aimed at here, and is told as missing there: materials that throw light in single
+/// directions, be it a part of it.
 #[test]
 fn what_is_made_of_mirrors_is_told_as_a_mirror_is() {
     let directory = tempfile::tempdir().unwrap();
@@ -343,7 +344,9 @@ fn what_is_made_of_mirrors_is_told_as_a_mirror_is() {
     assert!(loses("{mirror: {}}"));
     assert!(loses("{bump: {height: {texture: board}, scale: 0.01, material: {mirror: {}}}}"));
     assert!(loses(&blend("boundary")));
-    assert!(!loses(&blend("diffuse")));
+    assert!(loses(&blend("diffuse")));
+    assert!(loses("{plastic: {}}"));
+    assert!(!loses("{plastic: {roughness: 0.1}}"));
     assert!(!loses("{boundary: {}}"));
 }
 
