@@ -353,7 +353,7 @@ pub struct Beauty {
 /// or so dim that the step of subnormal halves (2⁻²⁴) exceeds half's own relative precision at the mean
 /// (mean of |value| below 2⁻¹⁴), is written as float instead, and the note says so. Nothing is clamped.
 ///
-/// DWA packs halves, also of floats, and takes infinity for 0: a picture that half cannot hold, or that is not finite, is
+/// DWA packs halves, also of floats, and keeps no infinity: a picture that half cannot hold, or that is not finite, is
 /// packed as ZIPS instead, which loses nothing.
 #[must_use]
 pub fn beauty(
@@ -501,7 +501,7 @@ pub(super) mod tests {
         assert_eq!(precision_of(0.0), (true, None));
     }
 
-    /// DWA works in halves: 1e9 comes back infinite, 5e-9 as 0, and infinity as 0. Such pictures come back to the bit, and one
+    /// DWA works in halves: 1e9 and infinity come back as 65504 at most or infinite, and 5e-9 as 0. Such pictures come back to the bit, and one
     /// that half holds is packed as asked for.
     #[test]
     fn dwa_packs_only_what_it_can_hold() {
