@@ -41,14 +41,15 @@ impl<'a> Compiler<'a> {
         let description = self.description;
         match (&description.textures[name], texture) {
             (written::Texture::Image(_), Texture::Image(ImageTexture { bands: Some(bands), .. })) => {
-                if bands.quantity == bands::Quantity::Radiance {
+                let is_light = bands.quantity == bands::Quantity::Radiance;
+                if is_light {
                     self.fault(at, "expected reflectances (channels T), found radiance (S0)");
                 }
             }
             (written::Texture::Image(written), Texture::Image(ImageTexture { texels, grid, .. })) => {
-                if texels.greatest > 1.0
-                    && let Some(i) = texels.colours.iter().position(|texel| texel.scale > 1.0)
-                {
+                let above = || texels.colours.iter().position(|texel| texel.scale > 1.0);
+                let above = if texels.greatest > 1.0 { above() } else { None };
+                if let Some(i) = above {
                     let (x, y, found) = (i % grid.width, i / grid.width, texels.at(i).scale);
                     let message = format!("expected reflectances from 0 to 1, found {found} at ({x}, {y})");
                     let error = self.asked(at, Error::input(&written.file, message));
