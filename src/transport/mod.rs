@@ -23,16 +23,16 @@ use crate::film::accumulate::REPLICATES;
 use crate::film::filter::FilterSampler;
 use crate::math::Ray;
 use crate::math::sampler::{GOLDEN, Octet, Sampler, Set, pairs};
-use crate::scene::Scene;
 use crate::scene::watch::{self, Counts};
-use crate::spectrum::{LANES, Lanes, SampledWavelengths, Spectrum, observer};
+use crate::scene::{DepthFog, Scene};
+use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
 use merge::Collection;
 use path::together::Wanted;
 use plan::{EffectPlan, Integrator, PathSettings};
 use ways::Ledger;
 
-/// Light that a camera ray brings, before fog.
+/// Light that a camera ray brings.
 #[derive(Clone, Copy, Debug)]
 pub struct Incoming {
     /// Spectral radiance of each lane, W·m⁻²·sr⁻¹·nm⁻¹, scaled so that the mean over lanes of
@@ -40,7 +40,7 @@ pub struct Incoming {
     pub radiance: Lanes,
     /// One where the ray met something, zero where it met the background only.
     pub alpha: f32,
-    /// Distance of the first surface along the axis of the camera; infinite for none.
+    /// Distance of the first surface along the axis of the camera; infinite for none, and where several paths are added.
     pub depth: f64,
     /// Light that was left to paths from the lights, like `radiance`.
     pub left: Lanes,
@@ -90,6 +90,13 @@ pub struct Shot<'a> {
     pub seed: u64,
     /// Photons that paths collect, and the wavelengths that all then share.
     pub photons: Option<Collection<'a>>,
+}
+
+impl<'a> Shot<'a> {
+    /// Depth fog, where there is some.
+    fn fog(&self) -> Option<&'a DepthFog> {
+        self.scene.fog.as_ref().filter(|_| self.plan.depth_fog)
+    }
 }
 
 /// Where the random numbers of a sample come from.
@@ -176,35 +183,72 @@ impl Begun {
         (self.ray.origin, self.ray.direction) = (ray.origin, ray.direction);
     }
 
-    /// What `integrator` makes of the ray, entered in a `ledger` if there is one.
+    /// What `integrator` makes of the ray, entered in a `ledger` if there is one, behind `fog`.
     #[inline]
-    fn light(&self, shot: &Shot, sampler: &Sampler, integrator: &Integrator, ledger: Option<&Ledger>) -> Incoming {
-        let Begun { at, ray, sample: PixelSample { wavelengths, .. }, .. } = self;
+    fn light(
+        &self,
+        shot: &Shot,
+        sampler: &Sampler,
+        integrator: &Integrator,
+        fog: Option<&DepthFog>,
+        ledger: Option<&Ledger>,
+    ) -> Incoming {
+        if let Integrator::Path(settings) = integrator {
+            let rays = settings.light_samples.max(settings.scatter_samples);
+            if rays != 1 {
+                return self.light_of_several(shot, rays, integrator, fog, ledger);
+            }
+        }
+        let mut light = self.clear_light(shot, sampler, integrator, ledger);
+        veil(fog, &mut light, self.sample.wavelengths.nm, ledger);
+        light
+    }
+
+    /// The mean of as many paths as `rays` from one camera ray, each with numbers of its own. What one meets first need not
+    /// be what another does, so that each is behind its own fog.
+    #[inline(never)]
+    fn light_of_several(
+        &self,
+        shot: &Shot,
+        rays: u32,
+        integrator: &Integrator,
+        fog: Option<&DepthFog>,
+        ledger: Option<&Ledger>,
+    ) -> Incoming {
+        let Begun { at, sample: PixelSample { wavelengths, .. }, .. } = self;
+        let mut sum = Incoming::NONE;
+        for i in 0..rays {
+            let index = at.index.wrapping_mul(rays).wrapping_add(i);
+            let sampler = Sampler::new(shot.seed, at.pixel, at.replicate, index);
+            let mut one = self.clear_light(shot, &sampler, integrator, ledger);
+            veil(fog, &mut one, wavelengths.nm, ledger);
+            sum.radiance += one.radiance;
+            sum.alpha += one.alpha;
+            sum.left += one.left;
+            sum.events += one.events;
+        }
+        let share = 1.0 / rays as f32;
+        if let Some(ledger) = ledger {
+            ledger.scale(share);
+        }
+        Incoming { radiance: sum.radiance * share, alpha: sum.alpha * share, left: sum.left * share, ..sum }
+    }
+
+    /// What one path of `integrator` makes of the ray, without fog.
+    #[inline]
+    fn clear_light(
+        &self,
+        shot: &Shot,
+        sampler: &Sampler,
+        integrator: &Integrator,
+        ledger: Option<&Ledger>,
+    ) -> Incoming {
+        let Begun { ray, sample: PixelSample { wavelengths, .. }, .. } = self;
         let Shot { scene, plan, .. } = shot;
-        let map = shot.photons.map(|p| p.map);
         match integrator {
             Integrator::Path(settings) => {
-                let rays = settings.light_samples.max(settings.scatter_samples);
-                if rays == 1 {
-                    return path::radiance(scene, plan, settings, sampler, wavelengths, ray, map, ledger);
-                }
-                // Several paths from one camera ray, each with numbers of its own.
-                let mut sum = Incoming::NONE;
-                for i in 0..rays {
-                    let index = at.index.wrapping_mul(rays).wrapping_add(i);
-                    let sampler = Sampler::new(shot.seed, at.pixel, at.replicate, index);
-                    let one = path::radiance(scene, plan, settings, &sampler, wavelengths, ray, map, ledger);
-                    sum.radiance += one.radiance;
-                    sum.alpha += one.alpha;
-                    sum.depth = one.depth;
-                    sum.left += one.left;
-                    sum.events += one.events;
-                }
-                let share = 1.0 / rays as f32;
-                if let Some(ledger) = ledger {
-                    ledger.scale(share);
-                }
-                Incoming { radiance: sum.radiance * share, alpha: sum.alpha * share, left: sum.left * share, ..sum }
+                let map = shot.photons.map(|p| p.map);
+                path::radiance(scene, plan, settings, sampler, wavelengths, ray, map, ledger)
             }
             Integrator::Whitted(settings) => whitted::radiance(scene, plan, settings, wavelengths, ray),
             Integrator::Depth => {
@@ -237,20 +281,17 @@ impl Begun {
             // What came before belongs to no sample.
             let _ = watch::take();
         }
-        let light = self.light(shot, sampler, &shot.plan.integrator, ledger);
+        let light = self.light(shot, sampler, &shot.plan.integrator, shot.fog(), ledger);
         if watched {
             self.counted = watch::take();
         }
-        self.see(shot, light);
-        if let (Some(ledger), Some((amount, veil))) = (ledger, veil(shot.scene, shot.plan, light.depth)) {
-            ledger.veil(1.0 - amount, veil.eval(self.sample.wavelengths.nm) * amount);
-        }
+        self.see(&light);
     }
 
     /// Takes what came of the ray.
     #[inline]
-    fn see(&mut self, shot: &Shot, light: Incoming) {
-        self.sample.radiance = fogged(shot.scene, shot.plan, light, self.sample.wavelengths.nm);
+    fn see(&mut self, light: &Incoming) {
+        self.sample.radiance = light.radiance;
         self.sample.alpha = light.alpha;
     }
 
@@ -276,7 +317,7 @@ impl Begun {
             (counted, weight),
             ledger,
             |integrator| {
-                let light = self.light(shot, sampler, integrator, None);
+                let light = self.light(shot, sampler, integrator, None, None);
                 let xyz = observer::xyz(light.radiance, &wavelengths);
                 layers::Seen { radiance: light.radiance, xyz, alpha: light.alpha }
             },
@@ -290,8 +331,8 @@ pub fn sample(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Pixe
     let sampler = Sampler::new(shot.seed, pixel, replicate, index);
     let mut begun = Begun::blank();
     begun.begin(shot, Address { pixel, replicate, index }, &sampler);
-    let light = begun.light(shot, &sampler, &shot.plan.integrator, None);
-    begun.see(shot, light);
+    let light = begun.light(shot, &sampler, &shot.plan.integrator, shot.fog(), None);
+    begun.see(&light);
     begun.finish();
     (begun.sample, light.events)
 }
@@ -307,7 +348,7 @@ fn probe(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Incoming,
     let sampler = Sampler::new(shot.seed, pixel, replicate, index);
     let mut begun = Begun::blank();
     begun.begin(shot, Address { pixel, replicate, index }, &sampler);
-    (begun.light(shot, &sampler, &shot.plan.integrator, None), begun.sample.wavelengths)
+    (begun.light(shot, &sampler, &shot.plan.integrator, None, None), begun.sample.wavelengths)
 }
 
 /// The memory of samples that are rendered one after the other.
@@ -406,21 +447,20 @@ fn follow_together(begun: &mut [Begun], shot: &Shot, settings: &PathSettings, oc
     let Shot { scene, plan, photons, .. } = *shot;
     let map = photons.map(|p| p.map);
     path::together::radiance(scene, plan, settings, map, begun.len(), wanted, |i, found| light[i] = found);
-    for (begun, light) in begun.iter_mut().zip(light) {
-        begun.see(shot, light);
+    for (begun, mut light) in begun.iter_mut().zip(light) {
+        veil(shot.fog(), &mut light, begun.sample.wavelengths.nm, None);
+        begun.see(&light);
     }
 }
 
-/// Depth fog over what the camera sees.
-fn fogged(scene: &Scene, plan: &EffectPlan, light: Incoming, nm: Lanes) -> Lanes {
-    match veil(scene, plan, light.depth) {
-        Some((amount, colour)) => light.radiance * (1.0 - amount) + colour.eval(nm) * amount,
-        None => light.radiance,
+/// Puts depth fog before the `light` of a path, which may be entered in a `ledger`.
+#[inline]
+fn veil(fog: Option<&DepthFog>, light: &mut Incoming, nm: Lanes, ledger: Option<&Ledger>) {
+    let Some(fog) = fog else { return };
+    let amount = fog.falloff.amount(light.depth) as f32;
+    let veil = fog.colour.eval(nm) * amount;
+    light.radiance = light.radiance * (1.0 - amount) + veil;
+    if let Some(ledger) = ledger {
+        ledger.veil(1.0 - amount, veil);
     }
-}
-
-/// How much depth fog hides at `depth`, and its light.
-fn veil<'a>(scene: &'a Scene, plan: &EffectPlan, depth: f64) -> Option<(f32, &'a Spectrum)> {
-    let fog = scene.fog.as_ref().filter(|_| plan.depth_fog)?;
-    Some((fog.falloff.amount(depth) as f32, &fog.colour))
 }

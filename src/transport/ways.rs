@@ -88,6 +88,8 @@ pub enum First {
 pub struct Ledger {
     /// Ways of the first group, of the second, …
     sums: RefCell<Vec<Lanes>>,
+    /// The same of paths that are behind depth fog already.
+    veiled: RefCell<Vec<Lanes>>,
     first: Cell<First>,
     /// Whether the vertex that the path is at is on something sharp.
     here: Cell<bool>,
@@ -114,6 +116,7 @@ impl Ledger {
     pub fn new(groups: usize) -> Ledger {
         Ledger {
             sums: RefCell::new(vec![Lanes::ZERO; WAYS * groups]),
+            veiled: RefCell::new(vec![Lanes::ZERO; WAYS * groups]),
             first: Cell::new(First::Media),
             here: Cell::new(false),
             sharp: Cell::new(false),
@@ -124,6 +127,7 @@ impl Ledger {
     /// Empties it.
     pub fn clear(&self) {
         self.sums.borrow_mut().fill(Lanes::ZERO);
+        self.veiled.borrow_mut().fill(Lanes::ZERO);
     }
 
     /// The next of the wavelengths that part leaves, from a path that has met nothing but what is sharp.
@@ -203,26 +207,30 @@ impl Ledger {
         }
     }
 
-    /// Dims all by `factor`, and adds the `veil` of depth fog.
+    /// Dims by `factor` all that was entered since the last veil, the light of one path, and adds the `veil` of depth fog.
     pub fn veil(&self, factor: f32, veil: Lanes) {
-        self.scale(factor);
-        self.sums.borrow_mut()[Way::MediaDirect as usize] += veil;
+        let mut veiled = self.veiled.borrow_mut();
+        for (veiled, light) in veiled.iter_mut().zip(self.sums.borrow_mut().iter_mut()) {
+            *veiled += std::mem::replace(light, Lanes::ZERO) * factor;
+        }
+        veiled[Way::MediaDirect as usize] += veil;
     }
 
     /// Multiplies all with `factor`.
     pub fn scale(&self, factor: f32) {
         self.sums.borrow_mut().iter_mut().for_each(|light| *light *= factor);
+        self.veiled.borrow_mut().iter_mut().for_each(|light| *light *= factor);
     }
 
     /// The light of `ways`, of one group or all.
     #[must_use]
     pub fn light(&self, ways: Ways, group: Option<u8>) -> Lanes {
-        let sums = self.sums.borrow();
+        let (sums, veiled) = (self.sums.borrow(), self.veiled.borrow());
         let mut light = Lanes::ZERO;
-        for (i, sum) in sums.iter().enumerate() {
+        for (i, (sum, veiled)) in sums.iter().zip(veiled.iter()).enumerate() {
             let (of, way) = (i / WAYS, i % WAYS);
             if ways.0 & 1 << way != 0 && group.is_none_or(|group| usize::from(group) == of) {
-                light += *sum;
+                light += *sum + *veiled;
             }
         }
         light
@@ -270,6 +278,10 @@ mod tests {
         assert_eq!(light(&[Way::Emission], Some(1)), [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
         ledger.veil(0.5, Lanes::splat(3.0));
         assert_eq!(ledger.light(Ways::ALL, None).to_array()[0], 9.0);
+        // Another path is behind fog of its own.
+        ledger.scattered(found(4.0, 1, None), 1);
+        ledger.veil(0.25, Lanes::splat(2.0));
+        assert_eq!(ledger.light(Ways::ALL, None).to_array()[0], 12.0);
         ledger.clear();
         assert_eq!(ledger.light(Ways::ALL, None), Lanes::ZERO);
     }

@@ -65,6 +65,13 @@ fn light_by_its_ways_and_by_its_lamps_adds_up_to_the_picture() {
         ("photons", frame("on", "on") + STAGE),
         ("haze", FRAME.to_owned() + medium + STAGE + cloud),
         ("depth fog", FRAME.to_owned() + "fog: {colour: 0.3, density: 0.1}\n" + STAGE),
+        (
+            "rays in depth fog",
+            FRAME.to_owned()
+                + "fog: {colour: 0.3, density: 0.1}\nintegrator: {path: {light_samples: 2}}\n"
+                + STAGE
+                + "- sphere: {center: [0, 1, 3], radius: 0.5, material: {mask: {opacity: 0.5, material: {diffuse: {reflectance: 1}}}}}\n",
+        ),
         // Some cells of 8 × 8 pixels have more samples in one half of the replicates than in the other.
         ("samples shared out", adaptive.clone() + STAGE),
         ("rays", FRAME.to_owned() + "integrator: {path: {light_samples: 2, scatter_samples: 2}}\n" + STAGE),
@@ -99,7 +106,7 @@ fn light_by_its_ways_and_by_its_lamps_adds_up_to_the_picture() {
         for layer in families.concat().iter().filter(|layer| **layer != "media") {
             assert!(total(layer) > 0.0, "{name}: {layer} is black");
         }
-        assert_eq!(total("media") > 0.0, ["haze", "depth fog"].contains(&name), "{name}");
+        assert_eq!(total("media") > 0.0, ["haze", "depth fog", "rays in depth fog"].contains(&name), "{name}");
     }
 }
 

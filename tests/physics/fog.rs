@@ -1,7 +1,7 @@
 //! Depth fog: (1 − a) L + a C with a of the depth along the camera's axis, in both integrators.
 
 use super::LAMP;
-use super::common::{bench, v};
+use super::common::{bench, bench_with, v};
 use glam::DVec3;
 
 /// A shining wall across the view, 2, 6, 10 or 40 metres from the eye, for each law. The camera is at
@@ -60,8 +60,8 @@ fn fog_follows_the_depth_of_each_pixel() {
              shapes: [{{plane: {{normal: [0, 1, 0]}}}}]\n"
         )
     };
-    let clear = super::common::bench_with(&text(""), &[]).grey().picture();
-    let fogged = super::common::bench_with(&text("fog: {colour: 0.5, density: 0.2}\n"), &[]).grey();
+    let clear = bench_with(&text(""), &[]).grey().picture();
+    let fogged = bench_with(&text("fog: {colour: 0.5, density: 0.2}\n"), &[]).grey();
     let picture = fogged.picture();
     let axis = v(0.0, -1.0, -4.0).normalize();
     for (x, y) in [(0, 2), (3, 3), (7, 5), (2, 7)] {
@@ -72,5 +72,23 @@ fn fog_follows_the_depth_of_each_pixel() {
         let a = 1.0 - (-0.2 * depth).exp();
         let expected = clear.at(x, y) * (1.0 - a) + 0.5 * a;
         assert!((picture.at(x, y) - expected).abs() < 2e-6, "({x}, {y}): {expected}, {}", picture.at(x, y));
+    }
+}
+
+/// A mask, half open, one metre from the eye, and a black wall far behind: which of them a path meets first is drawn, and its
+/// light is faded by that depth alone, however many paths a sample has: ½ · ρE/π · e^(−0.2), with ρ = 1 and E = π.
+#[test]
+fn each_path_of_a_sample_is_behind_its_own_fog() {
+    for rays in [1, 2, 8] {
+        let scene = format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], orthographic_height: 0.1}}\nimage: {{width: 8, height: 8}}\n\
+             render: {{samples: 64}}\nintegrator: {{path: {{light_samples: {rays}}}}}\nfog: {{colour: 0, density: 0.2}}\n\
+             lights: [{{directional: {{direction: [0, 0, -1], irradiance: 3.14159265}}}}]\nmaterials:\n\
+             \x20 half: {{mask: {{opacity: 0.5, material: {{diffuse: {{reflectance: 1}}}}}}}}\n\
+             \x20 black: {{diffuse: {{reflectance: 0}}}}\nshapes:\n\
+             - rectangle: {{corner: [-1, -1, 4], edge_u: [2, 0, 0], edge_v: [0, 2, 0], material: half}}\n\
+             - rectangle: {{corner: [-1, -1, -5], edge_u: [2, 0, 0], edge_v: [0, 2, 0], material: black}}\n"
+        );
+        bench_with(&scene, &[]).grey().picture().mean().assert_is(0.5 * (-0.2f64).exp(), 0.02);
     }
 }
