@@ -82,7 +82,8 @@ pub struct SceneDescription {
     /// Names of shapes by the asset that they are part of, for mattes.
     #[serde(default)]
     pub assets: BTreeMap<String, Vec<String>>,
-    /// Name of the medium that the camera is in; default none.
+    /// Name of the medium that the camera is in, and all space where no body is; default none. It has no end: light from
+    /// infinity comes through only at wavelengths at which it neither absorbs nor scatters.
     pub medium: Option<String>,
     /// Depth fog; default none.
     pub fog: Option<Fog>,

@@ -374,6 +374,7 @@ impl<'a> Compiler<'a> {
         scene.light_exponent = scene.film_exponent(&powers);
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         self.note_overlaps(&mut scene);
+        self.note_lost_light(&mut scene, &light_names);
         scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);
         Ok(scene)
     }

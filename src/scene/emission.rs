@@ -16,6 +16,8 @@ pub struct Emission {
     /// Spectral power over the density of the ray and of the choice of its light, W·nm⁻¹: its mean is the power of all
     /// lights.
     pub power: Lanes,
+    /// Index of the light.
+    pub light: u32,
 }
 
 /// A point drawn by area on a shape that shines.
@@ -152,7 +154,7 @@ impl Scene {
         let environment = self.lights[i].is_environment();
         let (u_start, u_rest) = if environment { (u_direction, u_point) } else { (u_point, u_direction) };
         let (ray, power) = self.shine(i, u_start, u_rest, nm)?;
-        Some(Emission { ray, power: power * (1.0 / probability) as f32 })
+        Some(Emission { ray, power: power * (1.0 / probability) as f32, light: i as u32 })
     }
 
     /// A ray of light `i` as it shines by itself, and its power over its density, W·nm⁻¹: `u_start` and `u_rest` as for

@@ -178,6 +178,12 @@ impl Light {
         self.is_environment() || matches!(self, Light::Area { .. })
     }
 
+    /// True for light from infinity.
+    #[must_use]
+    pub fn is_distant(&self) -> bool {
+        self.is_environment() || matches!(self, Light::Directional { .. })
+    }
+
     /// Radiance seen along `direction` by a ray that meets nothing.
     #[must_use]
     pub fn background(&self, direction: DVec3, nm: Lanes) -> Lanes {

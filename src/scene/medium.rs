@@ -158,6 +158,17 @@ impl Medium {
         Dimmed { through, passing: if scatters { through } else { Lanes::ONE } }
     }
 
+    /// Whether light at some wavelengths does not come through an endless way in it.
+    #[must_use]
+    pub fn is_opaque_at_infinity(&self) -> bool {
+        match &self.filling {
+            Filling::Even { absorption, scattering } => !(absorption.is_black() && scattering.is_black()),
+            Filling::EvenExtinction { extinction, .. } => !extinction.is_black(),
+            // It has an end.
+            Filling::Varying(_) => false,
+        }
+    }
+
     /// Whether flights depend on wavelength: light is scattered, and extinction is not grey.
     #[must_use]
     pub fn is_chromatic(&self) -> bool {

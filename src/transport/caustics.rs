@@ -171,7 +171,7 @@ impl Caustics {
         let source = self.sources.get(index)?;
         let light = source.light as usize;
         let aimed = |ray, power: Lanes, density: f64, cell| {
-            let emission = Emission { ray, power: power * (1.0 / density) as f32 };
+            let emission = Emission { ray, power: power * (1.0 / density) as f32, light: source.light };
             Aimed { emission, source: index, target: source.target, cell }
         };
         let own_density = |cell| source.probability * source.guide.density(cell);

@@ -140,7 +140,7 @@ pub fn trace(
         Some(caustics) => caustics.begin(scene, u_choice.x, u_point, u_direction, wavelengths.nm).map(|aimed| {
             traced.began = Some((aimed.source, aimed.cell));
             target = aimed.target;
-            let light = caustics.sources[aimed.source].light as usize;
+            let light = aimed.emission.light as usize;
             (group, without_extent) = (scene.light_groups.of[light], !scene.lights[light].may_be_met());
             aimed.emission
         }),
@@ -161,6 +161,7 @@ pub fn trace(
         group,
         without_extent,
         unfound: false,
+        distant: scene.lights[emission.light as usize].is_distant(),
         rays: 0,
         ahead: None,
     };
@@ -202,6 +203,7 @@ pub(super) fn seen_in_sharp(
         group: 0,
         without_extent: false,
         unfound: false,
+        distant: false,
         rays: 0,
         ahead: None,
     };
@@ -305,6 +307,8 @@ struct Walk<'a, 'b> {
     without_extent: bool,
     /// As [`Traced::unfound`].
     unfound: bool,
+    /// Whether the lamp is at infinity.
+    distant: bool,
     rays: u32,
     /// What the beam that is to be followed meets next, where that is known.
     ahead: Option<Hit>,
@@ -572,6 +576,15 @@ impl<'a> Walk<'a, '_> {
                     let before = told.unwrap_or_else(|| scene.medium_around(&beam.ray));
                     scene.inside(beam.bodies, before).medium
                 });
+                if beam.medium.is_none()
+                    && self.distant
+                    && let Some(medium) = known
+                {
+                    beam.power *= self.arrived(beam, &scene.media[medium as usize]);
+                    if beam.power.simd_eq(Lanes::ZERO).all() {
+                        return None;
+                    }
+                }
                 beam.medium = Some(known);
                 if let Some(medium) = known.map(|m| &scene.media[m as usize]) {
                     let u = if crossings == 0 { u_flight } else { self.sampler.set(set)[0] };
@@ -618,6 +631,14 @@ impl<'a> Walk<'a, '_> {
             beam.ray = scene.leave(&surface, &hit, direction);
         }
         None
+    }
+
+    /// What `medium`, in which a beam of light from infinity begins, has left of it: the way from there is endless, as that
+    /// of a shadow ray to such a light is. Where extinction is above zero nothing comes through.
+    fn arrived(&self, beam: &Beam, medium: &Medium) -> Lanes {
+        let back = Ray::new(beam.ray.origin, -beam.ray.direction);
+        let distance = self.paths.scene.closest(&back, f64::INFINITY).map_or(f64::INFINITY, |hit| hit.t);
+        medium.dim(&back, distance, beam.nm, || self.sampler.walk(Set::Extra(0))).through
     }
 
     /// Leaves a photon where the beam has come to, if photons are wanted.

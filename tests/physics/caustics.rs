@@ -530,6 +530,51 @@ fn lights_without_extent_agree_with_the_light_tracer() {
     }
 }
 
+/// Light from infinity has no end of a way through a medium that fills all space: of wavelengths that the medium takes away
+/// nothing is left, of others all, on whatever path it comes. So a medium that takes away all above 620 nm is as none under
+/// a sun that has none of that.
+#[test]
+fn light_from_infinity_is_lost_in_a_medium_without_end() {
+    let sun = |irradiance: &str| {
+        format!("lights: [{{directional: {{direction: [0.5, -1, -0.3], irradiance: {irradiance}}}}}]\n")
+    };
+    let filled = |light: &str, medium: &str| format!("{light}media: {{air: {{homogeneous: {medium}}}}}\nmedium: air\n");
+    let place = |text: String| {
+        text.replace(
+            "origin: [0, 1.2, 5], target: [0, 0.1, 0], fov_deg: 40",
+            "origin: [1.6, 2, -0.6], target: [1.6, -1, -0.6], fov_deg: 24, up: [0, 0, -1]",
+        )
+    };
+    let bench = |light: &str, integrator: &str, tracing: &str, samples: u32| {
+        let depth = if integrator == "whitted" { "8" } else { "null" };
+        let case = Case { what: "endless", light: "", depth, ..AREA };
+        bench_with(&place(case.scene(integrator, tracing, "auto", samples) + light), &[])
+    };
+    let lost = |bench: &Bench| bench.prepared.scene.notes.iter().any(|note| note.contains("medium: has no end"));
+    for light in [sun("3"), "lights: [{constant: {radiance: 1}}]\n".to_owned()] {
+        for medium in ["{absorption: 0.05, scattering: 0.02}", "{extinction: 0.1, albedo: 0}"] {
+            for (integrator, tracing) in [("path", "on"), ("path", "auto"), ("light_tracer", "auto")] {
+                let bench = bench(&filled(&light, medium), integrator, tracing, 16);
+                let black = render(&bench).rgb.iter().flatten().all(|x| *x == 0.0);
+                assert!(black, "{integrator}, {tracing}: {light}");
+                assert!(lost(&bench), "{:?}", bench.prepared.scene.notes);
+            }
+        }
+    }
+    let long = "{absorption: {table: [[360, 0], [620, 0], [621, 1], [830, 1]]}}";
+    let short = "{zero_outside: {table: [[360, 3], [620, 3]]}}";
+    for (medium, left) in [("{}", "3"), (long, short)] {
+        let expected = render(&bench(&sun(left), "path", "on", 192));
+        let air = filled(&sun("3"), medium);
+        assert!(!lost(&bench(&air, "whitted", "auto", 16)), "{medium}");
+        for (integrator, samples) in [("path", 192), ("light_tracer", 1024)] {
+            let found = bench(&air, integrator, "on", samples);
+            assert_eq!(lost(&found), medium != "{}");
+            assert_agree(&format!("{integrator}: {medium}"), &render(&found), &expected);
+        }
+    }
+}
+
 /// Photons are collected in the order of their paths, radii and wavelengths go by the sample's number: no bit depends on
 /// threads or tiles.
 #[test]

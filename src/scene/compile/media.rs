@@ -9,6 +9,7 @@ use crate::scene::grid::Grid;
 use crate::scene::medium::{Filling, Medium, PhaseBlend, PhaseFunction, Varying};
 use crate::scene::texture::Wrap;
 use crate::scene::volume::{Between, GridVolume, Volume, Voxels};
+use crate::scene::{Geometry, Object, Scene};
 use crate::spectrum::{Carried, Outside, Spectrum};
 use glam::{DAffine3, DVec3};
 use std::path::Path;
@@ -111,6 +112,32 @@ impl Compiler<'_> {
                     shadow_rays: m.shadow_rays,
                 }
             }
+        }
+    }
+
+    /// Notes which lights, of these names, are lost in an endless medium. `whitted` knows no media.
+    pub(super) fn note_lost_light(&self, scene: &mut Scene, names: &[String]) {
+        let followed =
+            matches!(self.description.integrator, written::Integrator::Path(_) | written::Integrator::LightTracer(_));
+        let around = scene.camera_medium.filter(|medium| scene.media[*medium as usize].is_opaque_at_infinity());
+        // Out there is what the camera is in, unless some surface has something else on its far side.
+        let holds = |object: &Object| {
+            let (far, near) =
+                if object.flipped { (object.inside, object.outside) } else { (object.outside, object.inside) };
+            let alike = far == around && (near == around || object.bounds().is_finite());
+            alike || object.keeps_medium || matches!(object.geometry, Geometry::Instance(_))
+        };
+        let lost = || {
+            let named = scene.lights.iter().zip(names).filter(|(light, _)| light.is_distant());
+            named.map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(", ")
+        };
+        if followed && around.is_some() && scene.objects.iter().all(holds) && !lost().is_empty() {
+            let note = format!(
+                "has no end: light from infinity comes through it only at wavelengths at which it neither absorbs nor \
+                 scatters: {}",
+                lost()
+            );
+            scene.notes.push(self.description.fault("medium", &note));
         }
     }
 

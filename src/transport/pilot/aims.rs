@@ -74,10 +74,9 @@ impl Caustics {
         traced: Vec<bool>,
         packets: bool,
     ) -> Caustics {
-        let infinite = |light: &Light| light.is_environment() || matches!(light, Light::Directional { .. });
         // Light from infinity meets what has no end everywhere: neither is aimed at the other. What throws light of no lamp that a
         // path could meet is as good as what does so in part.
-        let bounded = scene.lights.iter().zip(&traced).any(|(light, traced)| *traced && infinite(light));
+        let bounded = scene.lights.iter().zip(&traced).any(|(light, traced)| *traced && light.is_distant());
         let is_bounded = |i: usize| bounded && casters.unending[i];
         let objects = 0..scene.objects.len();
         let casts = objects.clone().map(|i| casters.casts[i] && !is_bounded(i)).collect();
@@ -88,7 +87,7 @@ impl Caustics {
             let endless = |casters: &Casters| !casters.endless.is_empty();
             let balls = casters.balls.iter().chain(partly.iter().flat_map(|casters| &casters.balls));
             let endless = match partly {
-                Some(in_part) => !infinite(light) && (endless(casters) || endless(in_part)),
+                Some(in_part) => !light.is_distant() && (endless(casters) || endless(in_part)),
                 None => !bounded && endless(casters),
             };
             balls.map(|ball| Target::Ball(*ball)).chain(endless.then_some(Target::Endless)).collect()
