@@ -415,7 +415,7 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         let of_band = exr.stderr && channel.holds == Holds::Band;
         let error = of_band.then(|| LayerPlane {
             name: stderr_name(&channel.name),
-            plane: frame.layer_error(i),
+            plane: layer_error(finish, frame, i),
             kind: exr::PlaneKind::Data,
         });
         [Some(own), error].into_iter().flatten()
@@ -469,6 +469,12 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
     file
 }
 
+/// The standard errors of the band that is channel `i`.
+fn layer_error(finish: &Finish, frame: &Frame, i: usize) -> Vec<f32> {
+    // As of colours: samples that are not random would be the same again.
+    if finish.is_random() { frame.layer_error(i) } else { vec![0.0; frame.film.window().pixels()] }
+}
+
 /// The path of the spectral file beside the EXR at `path`: `name.spectral.exr`, and before the number of a frame.
 #[must_use]
 pub fn spectral_path(path: &Path) -> PathBuf {
@@ -503,7 +509,7 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
         return None;
     }
     let plane = |i: usize| (finish.layers[i].name.clone(), ChannelData::F32(frame.layer(i)));
-    let error = |i: usize| (stderr_name(&finish.layers[i].name), ChannelData::F32(frame.layer_error(i)));
+    let error = |i: usize| (stderr_name(&finish.layers[i].name), ChannelData::F32(layer_error(finish, frame, i)));
     let errors: Vec<(String, ChannelData)> =
         if finish.output.exr.stderr { channels.clone().map(error).collect() } else { Vec::new() };
     let preview = ["R", "G", "B"].iter().zip(&image.rgb);

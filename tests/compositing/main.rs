@@ -328,6 +328,39 @@ fn a_band_may_be_called_as_one_of_the_spectral_file() {
     assert_eq!(pictures[0], pictures[1]);
 }
 
+/// `whitted` draws nothing, so that another seed is the same picture, and the standard errors of its bands are 0, as those of
+/// its colours are.
+#[test]
+fn bands_without_noise_have_standard_errors_of_zero() {
+    let place = TempDir::new().unwrap();
+    let path = |name: &str| place.path().join(name);
+    let parts = |seed: u32| {
+        let text = format!(
+            "camera: {{origin: [0, 1, 5], target: [0, 1, 0], fov_deg: 40}}\nintegrator: whitted\n\
+             image: {{width: 6, height: 4, bands: [{{name: sodium, response: {{lines: [{{nm: 589}}]}}}}]}}\n\
+             render: {{seed: {seed}}}\noutput: {{exr: {{precision: float, stderr: true}}, spectral: {{bands: 3}}}}\n\
+             lights: [{{point: {{position: [0, 4, 3], intensity: {{rgb: [30, 20, 10]}}}}}}]\nshapes:\n\
+             - plane: {{normal: [0, 1, 0], material: {{mask: {{opacity: 0.5, material: {{diffuse: {{reflectance: 1}}}}}}}}}}\n\
+             - plane: {{point: [0, 0, -2], normal: [0, 0, 1]}}\n\
+             - sphere: {{center: [0, 1, 0], radius: 1, material: {{dielectric: {{ior: {{glass: SF11}}}}}}}}\n"
+        );
+        common::write(&path("s.yaml"), text.as_bytes());
+        let overrides = Overrides { output: Some(path("out.exr")), ..Overrides::default() };
+        let report = batch::render_batch(&path("s.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+        ["out.exr", "out.spectral.exr"].map(|name| read_exr(&path(name)).unwrap().parts.remove(0))
+    };
+    for (one, other) in parts(1).iter().zip(&parts(2)) {
+        let errors = one.channels.iter().filter(|(name, _)| name.starts_with("stderr.")).count();
+        assert!(errors > 0);
+        for (name, _) in &one.channels {
+            assert_eq!(plane(one, name), plane(other, name), "{name}");
+            let is_error = name.starts_with("stderr.");
+            assert_eq!(plane(one, name).iter().all(|x| *x == 0.0), is_error, "{name}: {:?}", plane(one, name));
+        }
+    }
+}
+
 /// A wall of measured reflectance under a white sky, in the bands of the measurement.
 #[test]
 fn a_spectral_file_is_paint() {
