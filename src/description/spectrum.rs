@@ -100,13 +100,13 @@ pub struct Blackbody {
     /// Factor; default 1.
     #[serde(default = "one")]
     pub scale: f64,
-    /// Whether the curve is divided by its greatest value; default true. If not, it is radiance in
-    /// W·m⁻²·sr⁻¹·nm⁻¹.
+    /// Whether the curve is scaled to luminance 1, that of 1 at every wavelength, as illuminants are; default true. If not,
+    /// it is radiance in W·m⁻²·sr⁻¹·nm⁻¹.
     #[serde(default = "yes")]
     pub normalised: bool,
 }
 
-/// A CIE illuminant.
+/// A CIE illuminant, scaled to luminance 1, that of 1 at every wavelength.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(from = "WrittenIlluminant")]
 pub struct Illuminant {
