@@ -284,19 +284,24 @@ impl Compound {
     /// The same with the reliefs turned as they are said to be.
     #[must_use]
     pub fn resolve_as<'a>(&'a self, x: &Vertex, normal: DVec3, turns: Turns, mut u: f64) -> Option<Leaf<'a>> {
+        self.choose(x, normal, turns, &mut u)
+    }
+
+    /// The same; what is left of `u` is uniform again, also where the path goes straight on.
+    pub fn choose<'a>(&'a self, x: &Vertex, normal: DVec3, turns: Turns, u: &mut f64) -> Option<Leaf<'a>> {
         let mut standing = Standing { turns, ..Standing::new(normal, x.surface.tangent) };
         let from_behind = x.wo.dot(x.surface.normal) < 0.0;
         let mut compound = self;
         loop {
             let inner = match &compound.composition {
                 Composition::Mask { opacity, inner } => {
-                    if !below(&mut u, share(opacity, x.at)) {
+                    if !below(u, share(opacity, x.at)) {
                         return None;
                     }
                     inner
                 }
                 Composition::Blend { weight, first, second } => {
-                    if below(&mut u, share(weight, x.at)) {
+                    if below(u, share(weight, x.at)) {
                         second
                     } else {
                         first

@@ -341,7 +341,7 @@ impl Values {
         wavelengths: &SampledWavelengths,
         ray: &Ray,
         neighbours: impl Fn(DVec2) -> Ray,
-        u: impl Fn(u32) -> f64,
+        u: impl Fn(u32, Option<f64>) -> f64,
         light: impl Fn(&Integrator) -> Seen,
     ) {
         self.others.clear();
@@ -375,7 +375,7 @@ impl Values {
         wavelengths: &SampledWavelengths,
         ray: &Ray,
         neighbours: impl Fn(DVec2) -> Ray,
-        u: impl Fn(u32) -> f64,
+        u: impl Fn(u32, Option<f64>) -> f64,
         own: Seen,
         counted: (Counts, f32),
         ledger: Option<&Ledger>,
@@ -461,7 +461,7 @@ impl First {
         Some(First { hit, surface: scene.surface_with_texture(ray, &hit), normal: None })
     }
 
-    fn seen(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<First> {
+    fn seen(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32, Option<f64>) -> f64) -> Option<First> {
         let Covering { hit, surface, normal } = first_covering(scene, plan, ray, u)?;
         Some(First { hit, surface, normal: Some(normal) })
     }

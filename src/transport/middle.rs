@@ -6,7 +6,7 @@ use super::path::seen_normal;
 use super::plan::{EffectPlan, Integrator};
 use super::shadow::MAX_BOUNDARIES;
 use crate::math::Ray;
-use crate::scene::compound::Vertex;
+use crate::scene::compound::{Turns, Vertex};
 use crate::scene::material::Kind;
 use crate::scene::{Geometry, Hit, Scene, SurfacePoint};
 use glam::{DAffine3, DVec2, DVec3};
@@ -58,7 +58,7 @@ pub fn middle(
             let (ray, met) = met.get_or_insert_with(|| {
                 let ray = scene.camera.ray(place, || DVec2::splat(0.5));
                 // What is half there counts.
-                (ray, first_covering(scene, plan, &ray, |_| 0.5))
+                (ray, first_covering(scene, plan, &ray, |_, _| 0.5))
             });
             let values = match (middle, met) {
                 (Middle::Depth, Some(seen)) => [scene.camera.depth(seen.surface.point) as f32, 0.0, 0.0],
@@ -131,7 +131,7 @@ fn moved(scene: &Scene, next: &Scene, hit: &Hit, point: DVec3) -> DVec3 {
 /// The number of what covers a sample: above 2³² the object that stands in the scene, below the child of a group that it
 /// shows, or the object itself.
 #[must_use]
-pub fn covered(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<u64> {
+pub fn covered(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32, Option<f64>) -> f64) -> Option<u64> {
     let hit = match &plan.integrator {
         // It knows no materials.
         Integrator::Depth => scene.closest(ray, scene.camera.reach(ray))?,
@@ -149,10 +149,15 @@ pub(super) struct Covering {
 }
 
 /// The first surface that a camera ray meets and that is really there: no hole of a mask, which `u` decides at the
-/// crossing of that number, no boundary of a medium alone, no hidden lamp.
-pub(super) fn first_covering(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32) -> f64) -> Option<Covering> {
+/// crossing of that number, told what is left of the number before, no boundary of a medium alone, no hidden lamp.
+pub(super) fn first_covering(
+    scene: &Scene,
+    plan: &EffectPlan,
+    ray: &Ray,
+    u: impl Fn(u32, Option<f64>) -> f64,
+) -> Option<Covering> {
     let hides = matches!(&plan.integrator, Integrator::Path(settings) if settings.hide_emitters);
-    let (mut ray, mut reach) = (*ray, scene.camera.reach(ray));
+    let (mut ray, mut reach, mut left) = (*ray, scene.camera.reach(ray), None);
     for crossing in 0..=MAX_BOUNDARIES {
         let hit = scene.closest(&ray, reach)?;
         let surface = scene.surface_with_texture(&ray, &hit);
@@ -163,7 +168,9 @@ pub(super) fn first_covering(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: imp
             Kind::Compound(compound) => {
                 let (wo, at) = (-ray.direction, &hit.texture_point(&surface));
                 let vertex = Vertex { scene, hit: &hit, surface: &surface, at, wo };
-                let leaf = compound.resolve(&vertex, seen_normal(&surface, wo), u(crossing));
+                let mut number = u(crossing, left);
+                let leaf = compound.choose(&vertex, seen_normal(&surface, wo), Turns::Seen, &mut number);
+                left = Some(number);
                 leaf.map(|leaf| if leaf.flipped { -leaf.frame.n } else { leaf.frame.n })
             }
             _ => Some(surface.shading_normal),

@@ -312,7 +312,7 @@ impl Begun {
             &wavelengths,
             &ray,
             |step| shot.scene.camera.ray(place + step, || pairs(sampler.set(Set::Lens)).0),
-            |crossing| deciding(shot, sampler, self.at, crossing),
+            |crossing, left| deciding(shot, sampler, self.at, crossing, left),
             layers::Seen { radiance, xyz, alpha },
             (counted, weight),
             ledger,
@@ -416,7 +416,7 @@ impl Samples {
         let channels = layers.numbers.len() / begun.len().max(1);
         for (i, begun) in begun.iter().enumerate() {
             let covered = shot.plan.layers.mattes.then(|| {
-                let u = |crossing| deciding(shot, &octet.sampler(i), begun.at, crossing);
+                let u = |crossing, left| deciding(shot, &octet.sampler(i), begun.at, crossing, left);
                 middle::covered(shot.scene, shot.plan, &begun.ray, u)
             });
             give(i, &begun.sample, &layers.numbers[i * channels..(i + 1) * channels], covered.flatten());
@@ -426,15 +426,30 @@ impl Samples {
 
 /// What decides whether the ray of a sample goes through a hole at a crossing: the number by which its path does.
 ///
-/// A ray of [`Integrator::Whitted`] is parted there and draws none: its samples, each in turn, stand for the parts.
-fn deciding(shot: &Shot, sampler: &Sampler, at: Address, crossing: u32) -> f64 {
+/// A ray of [`Integrator::Whitted`] is parted there and draws none: its samples stand for the parts, each by what is `left` of
+/// its number behind a hole.
+fn deciding(shot: &Shot, sampler: &Sampler, at: Address, crossing: u32, left: Option<f64>) -> f64 {
     match &shot.plan.integrator {
-        Integrator::Whitted(settings) => {
-            let place = (f64::from(at.in_turn()) + 0.5) / f64::from(settings.samples());
-            (place + GOLDEN * f64::from(crossing)).fract()
-        }
+        Integrator::Whitted(settings) => left.unwrap_or_else(|| spread(at.in_turn(), settings.samples())),
         _ => sampler.set(Set::Extra(crossing << 16))[2],
     }
+}
+
+/// Of the numbers (k + 1/2)/n that of sample `s`, k = s·g mod n. With g next to the golden part of n and coprime, the numbers of
+/// neighbouring rows or columns of a pixel are spread nearly as evenly as all, so that what covers them meets its share.
+fn spread(s: u32, n: u32) -> f64 {
+    let is_coprime = |step: &u32| {
+        let (mut a, mut b) = (*step, n);
+        while b > 0 {
+            (a, b) = (b, a % b);
+        }
+        a == 1
+    };
+    let golden = (GOLDEN * f64::from(n)).round() as u32;
+    // n + 1 is.
+    let step = (golden..=n + 1).find(is_coprime).unwrap_or(1);
+    let k = u64::from(s) * u64::from(step) % u64::from(n);
+    (k as f64 + 0.5) / f64::from(n)
 }
 
 /// [`Begun::follow`] of several samples whose paths go together.

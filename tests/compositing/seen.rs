@@ -3,6 +3,7 @@
 use super::common::ball_of_distances;
 use super::{FRAME, common, plane, render};
 use abbe::batch::{self, Overrides};
+use abbe::film::cryptomatte::id_of;
 use abbe::film::exr::{ExrPart, read_exr};
 use abbe::spectrum::catalogue;
 use std::sync::atomic::AtomicBool;
@@ -273,5 +274,64 @@ fn mattes_of_other_integrators_add_up_to_alpha() {
             let covered: f32 = ["CryptoObject00.G", "CryptoObject00.A"].map(|name| plane(&part, name)[i]).iter().sum();
             assert!((covered - alpha).abs() <= bound + 1e-6, "{integrator}: {covered} of {alpha}");
         }
+    }
+}
+
+/// How much of each pixel is covered by what is called `name`.
+fn coverage(part: &ExrPart, name: &str) -> Vec<f32> {
+    let id = id_of(name);
+    let mut all = vec![0.0; part.window.pixels()];
+    for layer in 0..3 {
+        for [ids, shares] in [["R", "G"], ["B", "A"]] {
+            let [ids, shares] = [ids, shares].map(|c| plane(part, &format!("CryptoObject{layer:02}.{c}")));
+            for (sum, (found, share)) in all.iter_mut().zip(ids.iter().zip(shares)) {
+                *sum += if *found == id { *share } else { 0.0 };
+            }
+        }
+    }
+    all
+}
+
+/// The samples of `whitted` behind the hole of a card decide as evenly at the next. n of them, of numbers k/n + 1/2n in any
+/// order, tell a share o of all to 1/2n, and what is between two such shares to 1/n.
+#[test]
+fn cards_behind_cards_cover_their_share_in_whitted() {
+    let scene = |grid: u32, shapes: &str| {
+        render(&format!(
+            "camera: {{origin: [0, 0, 6], target: [0, 0, 0], orthographic_height: 4}}\nimage: {{width: 4, height: 4}}\n\
+             integrator: {{whitted: {{grid: {grid}}}}}\noutput: {{exr: {{precision: float}}}}\n\
+             layers: [crypto_object, normal]\nlights: [{{constant: {{radiance: 1}}}}]\nshapes:\n{shapes}"
+        ))
+    };
+    let mask = |opacity: f64| format!("material: {{mask: {{opacity: {opacity}, material: {{diffuse: {{}}}}}}}}");
+    let card = |name: &str, z: i32, low: f64, normal: &str, material: &str| {
+        format!("- rectangle: {{name: {name}, corner: [-9, {low}, {z}], edge_u: [18, 0, 0], {normal}, {material}}}\n")
+    };
+    let facing = "edge_v: [0, 18, 0]";
+    for (grid, opacity, bound) in [(4, 0.5, 0.0), (8, 0.5, 0.0), (5, 0.3, 0.04)] {
+        let stack = [("front", 2), ("middle", 1), ("back", 0)].map(|(name, z)| {
+            card(name, z, -9.0, facing, &if z > 0 { mask(opacity) } else { "material: {diffuse: {}}".into() })
+        });
+        let part = scene(grid, &stack.concat());
+        let open = 1.0 - opacity;
+        for (name, expected) in [("front", opacity), ("middle", open * opacity), ("back", open * open)] {
+            for found in coverage(&part, name) {
+                let off = (f64::from(found) - expected).abs();
+                assert!(off <= bound + 1e-6, "{grid}: {name} covers {found}, not {expected}");
+            }
+        }
+    }
+    // A ball of two walls: what it covers is one share, 1 - 0.4². The wall that is seen from within is its own back.
+    let ball = format!("- sphere: {{name: ball, radius: 9, center: [0, 0, -12], {}}}\n", mask(0.6));
+    let part = scene(16, &ball);
+    for (found, alpha) in coverage(&part, "ball").iter().zip(plane(&part, "A")) {
+        assert!((alpha - 0.84).abs() < 1e-6 && (found - alpha).abs() <= 1.0 / 512.0 + 1e-6, "{found} of {alpha}");
+    }
+    // A card to the middle of a pixel covers a half of its half, to a sample of 64: those there decide as evenly as all.
+    let part = scene(8, &card("half", 0, 0.5, facing, &mask(0.5)));
+    let alpha = plane(&part, "A");
+    assert_eq!(alpha[4], 0.25);
+    for (found, alpha) in coverage(&part, "half").iter().zip(alpha) {
+        assert!((found - alpha).abs() <= 1.0 / 64.0 + 1e-6, "{found} of {alpha}");
     }
 }
