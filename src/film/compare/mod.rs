@@ -10,9 +10,9 @@
 //!   correction derives from [`PIXEL_ALPHA`], passed by [`ACCEPT_FRACTION`] of all. Sees local faults.
 //!
 //! The noise is known from `stderr.*` channels (standard errors of the means, from four replicates: three degrees of
-//! freedom a pixel), from a file of variances per sample (as Mitsuba's references come with), or else from the
-//! differences themselves: where both pictures are right, E(Σd²) = Σvar(d), so Σd/√Σd² is a standard score. That
-//! form tests the mean only. A picture in half floats carries the variance of its rounding besides.
+//! freedom a pixel), from a file of variances per sample (as Mitsuba's references come
+//! with), or else from the differences themselves: where both pictures are right, E(Σd²) = Σvar(d), so Σd/√Σd² is a
+//! standard score. That form tests the mean only. A picture in half floats carries the variance of its rounding besides.
 //!
 //! Both tests want pixels that are independent: a box filter, or filters by importance sampling. Light that is dealt to all
 //! pixels which a filter covers is not; a file says by how much more the sum of its pixels varies ([`SHARED_ERRORS`]).
@@ -23,6 +23,7 @@ use crate::film::Window;
 use crate::film::exr::{ExrFile, ExrPart, SHARED_ERRORS, stderr_name};
 use crate::spectrum::colour;
 use noise::Pair;
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 /// The global test calls a picture different below this p: one comparison of equals in a thousand.
@@ -167,12 +168,15 @@ pub struct Comparison {
     pub pixel_test: Option<PixelTest>,
     /// Pixels that were compared: those finite in every channel of both pictures.
     pub pixels: usize,
+    /// Channels of either file that were not looked at.
+    pub not_compared: Vec<String>,
 }
 
-/// Compares the first parts of two files; `b` is the reference.
+/// Compares two files; `b` is the reference.
 ///
-/// Compared are the spectral bands (`S0.…nm`, `T.…nm`) if both files have the same, else R, G, B, else X, Y, Z, else Y,
-/// else all channels that both have, without alpha and `stderr.*`.
+/// Compared are the spectral bands (`S0.…nm`, `T.…nm`) of a file that has any, else R, G, B, else X, Y, Z, else Y, else all
+/// channels without alpha and `stderr.*`; in whichever parts they are that have the window of the first. These must be the
+/// same in both files.
 #[must_use]
 pub fn compare(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Comparison {
     let pairs = match pairs(a, b, options) {
@@ -190,6 +194,7 @@ pub fn compare(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Comparison
     let source = pairs[0].noise.source();
     let pixel_test = noise::pixel_test(&pairs, &finite);
     let identical = pairs.iter().all(|pair| pair.is_identical());
+    let names: Vec<&str> = pairs.iter().map(|pair| pair.name.as_str()).collect();
 
     let mut comparison = Comparison {
         verdict: Verdict::Same,
@@ -200,6 +205,7 @@ pub fn compare(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Comparison
         global_p,
         pixel_test,
         pixels,
+        not_compared: BTreeSet::from_iter(not_compared(a, &names).chain(not_compared(b, &names))).into_iter().collect(),
     };
     (comparison.verdict, comparison.reason) = judge(&comparison, count, options);
     comparison
@@ -246,6 +252,7 @@ fn cannot_compare(reason: String) -> Comparison {
         global_p: f64::NAN,
         pixel_test: None,
         pixels: 0,
+        not_compared: Vec::new(),
     }
 }
 
@@ -256,10 +263,10 @@ fn kept<'a>(values: &'a [f32], finite: &'a [bool]) -> impl Iterator<Item = f64> 
 
 /// What is to be compared, or why nothing can be.
 fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions<'a>) -> Result<Vec<Pair<'a>>, String> {
-    let (part_a, part_b) = (&a.parts[0], &b.parts[0]);
-    same_window("data windows", part_a.window, part_b.window, options.origin)?;
+    let (window_a, window_b) = (a.parts[0].window, b.parts[0].window);
+    same_window("data windows", window_a, window_b, options.origin)?;
     same_window("display windows", a.display, b.display, options.origin)?;
-    let names = compared_names(part_a, part_b)?;
+    let names = compared_names(a, b)?;
     // X, Y, Z and bands are the same in any primaries.
     if names.iter().any(|name| ["R", "G", "B"].contains(&name.as_str())) {
         same_colours(a, b)?;
@@ -268,33 +275,55 @@ fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions<'a>) -> Re
         None => None,
         Some((_, 0)) => return Err("a variance per sample needs the number of samples a pixel".to_string()),
         Some((file, samples)) => {
-            let part = &file.parts[0];
-            same_window("windows of picture and variance", part_a.window, part.window, Origin::Ignore)?;
-            Some((part, samples))
+            same_window("windows of picture and variance", window_a, file.parts[0].window, Origin::Ignore)?;
+            Some((file, samples))
         }
     };
     let mut pairs = Vec::new();
     for name in names {
-        let find = |part: &'a ExrPart, name: &str| part.channel(name);
-        let (Some(values_a), Some(values_b)) = (find(part_a, &name), find(part_b, &name)) else { continue };
+        let floats = |file: &'a ExrFile, name: &str| parts(file).find_map(|part| part.channel(name));
+        let (Some(values_a), Some(values_b)) = (floats(a, &name), floats(b, &name)) else { continue };
         let variance = match variance {
             None => None,
-            Some((part, samples)) => {
-                let plane = find(part, &name).ok_or(format!("the variance file has no channel {name}"))?;
+            Some((file, samples)) => {
+                let plane = floats(file, &name).ok_or(format!("the variance file has no channel {name}"))?;
                 Some((plane, samples))
             }
         };
-        let error = stderr_name(&name);
-        let errors = [find(part_a, &error), find(part_b, &error)];
-        pairs.push(Pair::new(name, values_a, values_b, errors, [shared(part_a), shared(part_b)], variance));
+        let errors = [a, b].map(|file| floats(file, &stderr_name(&name)));
+        pairs.push(Pair::new(name, values_a, values_b, errors, [shared(a), shared(b)], variance));
     }
     Ok(pairs)
 }
 
+/// The parts of a file that hold the same pixels as the first.
+fn parts(file: &ExrFile) -> impl Iterator<Item = &ExrPart> {
+    file.parts.iter().filter(|part| part.window == file.parts[0].window)
+}
+
+/// What a file says under `name`.
+fn said<T: std::str::FromStr>(file: &ExrFile, name: &str) -> Option<T> {
+    file.parts.iter().find_map(|part| part.text(name))?.parse().ok()
+}
+
 /// How many times the variance of the sum of all pixels is that of independent ones, by what the file says.
-fn shared(part: &ExrPart) -> f64 {
-    let said = part.texts.iter().find(|(name, _)| name == SHARED_ERRORS);
-    said.and_then(|(_, text)| text.parse::<f64>().ok()).filter(|x| x.is_finite()).map_or(1.0, |x| x.max(1.0))
+fn shared(file: &ExrFile) -> f64 {
+    said(file, SHARED_ERRORS).filter(|x: &f64| x.is_finite()).map_or(1.0, |x| x.max(1.0))
+}
+
+/// The channels of `file` but for those of `names` and their standard errors.
+fn not_compared<'a>(file: &'a ExrFile, names: &'a [&str]) -> impl Iterator<Item = String> + 'a {
+    let looked_at = move |name: &str| names.contains(&name.strip_prefix("stderr.").unwrap_or(name));
+    file.parts.iter().flat_map(move |part| {
+        // Of channels with one name in several parts the first is taken.
+        let taken =
+            move |name: &str| parts(file).find(|p| p.channel(name).is_some()).is_some_and(|p| std::ptr::eq(p, part));
+        let left = part.channels.iter().filter(move |(name, _)| !(looked_at(name) && taken(name)));
+        left.map(move |(name, _)| match &part.name {
+            Some(part) if looked_at(name) => format!("{part}: {name}"),
+            _ => name.clone(),
+        })
+    })
 }
 
 fn same_window(what: &str, a: Window, b: Window, origin: Origin) -> Result<(), String> {
@@ -314,28 +343,30 @@ fn same_colours(a: &ExrFile, b: &ExrFile) -> Result<(), String> {
     Err(format!("the colour primaries differ: {} against {}", words(a), words(b)))
 }
 
-fn compared_names(a: &ExrPart, b: &ExrPart) -> Result<Vec<String>, String> {
-    let is_band = |name: &&str| (name.starts_with("S0.") || name.starts_with("T.")) && name.ends_with("nm");
-    let names = |part: &'_ ExrPart| part.channels.iter().map(|(name, _)| name.clone()).collect::<Vec<String>>();
-    let (of_a, of_b) = (names(a), names(b));
-    let bands = |all: &[String]| all.iter().filter(|n| is_band(&n.as_str())).cloned().collect::<Vec<String>>();
-    let (bands_a, bands_b) = (bands(&of_a), bands(&of_b));
-    if !bands_a.is_empty() && bands_a == bands_b {
-        return Ok(bands_a);
+fn compared_names(a: &ExrFile, b: &ExrFile) -> Result<Vec<String>, String> {
+    let (of_a, of_b) = (own_names(a), own_names(b));
+    if of_a.is_empty() || BTreeSet::from_iter(&of_a) != BTreeSet::from_iter(&of_b) {
+        return Err(format!("the channels differ: {} against {}", of_a.join(", "), of_b.join(", ")));
     }
-    let both = |name: &str| of_a.iter().any(|n| n == name) && of_b.iter().any(|n| n == name);
-    for group in [&["R", "G", "B"][..], &["X", "Y", "Z"], &["Y"]] {
-        if group.iter().all(|name| both(name)) {
-            return Ok(group.iter().map(ToString::to_string).collect());
+    Ok(of_a)
+}
+
+/// The channels of a picture that are compared with another's.
+fn own_names(file: &ExrFile) -> Vec<String> {
+    let all: Vec<&str> = parts(file).flat_map(|part| &part.channels).map(|(name, _)| name.as_str()).collect();
+    let owned = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<String>>();
+    let is_band = |name: &&str| (name.starts_with("S0.") || name.starts_with("T.")) && name.ends_with("nm");
+    let bands: Vec<&str> = all.iter().copied().filter(is_band).collect();
+    if !bands.is_empty() {
+        return owned(&bands);
+    }
+    let groups = [&["R", "G", "B"][..], &["X", "Y", "Z"], &["Y"]];
+    match groups.into_iter().find(|group| group.iter().all(|name| all.contains(name))) {
+        Some(group) => owned(group),
+        None => {
+            all.into_iter().filter(|name| *name != "A" && !name.starts_with("stderr.")).map(str::to_owned).collect()
         }
     }
-    let common: Vec<String> =
-        of_a.iter().filter(|n| both(n) && n.as_str() != "A" && !n.starts_with("stderr.")).cloned().collect();
-    if common.is_empty() {
-        let (of_a, of_b) = (of_a.join(", "), of_b.join(", "));
-        return Err(format!("the files have no channel in common: {of_a} against {of_b}"));
-    }
-    Ok(common)
 }
 
 impl Comparison {
@@ -386,6 +417,13 @@ impl Comparison {
                 sum(|c| c.nan_b),
                 sum(|c| c.infinite_b)
             ));
+            if !self.not_compared.is_empty() {
+                let layer =
+                    |name: &String| name.rsplit_once('.').map_or(name.clone(), |(layer, _)| format!("{layer}.*"));
+                let mut layers: Vec<String> = self.not_compared.iter().map(layer).collect();
+                layers.dedup();
+                line(format!("not compared             {}", layers.join(", ")));
+            }
             line(format!(
                 "noise known from         {}",
                 match noise {
@@ -604,7 +642,80 @@ mod tests {
         assert_eq!(compare(&xyz(&a), &xyz(&wide), &CompareOptions::default()).verdict, Verdict::Same);
         let mut other = a.clone();
         other.parts[0].channels.iter_mut().for_each(|(name, _)| name.push('x'));
-        assert!(reason(&other).starts_with("the files have no channel in common"));
+        assert_eq!(reason(&other), "the channels differ: R, G, B against Rx, Gx, Bx");
+    }
+
+    /// The channels of `file` in a part for each name before a point, as `layout: multipart` has it.
+    fn in_parts(file: &ExrFile) -> ExrFile {
+        let part = &file.parts[0];
+        let mut parts: Vec<ExrPart> = Vec::new();
+        for channel in &part.channels {
+            let layer = channel.0.rsplit_once('.').map_or("rgba", |(layer, _)| layer);
+            match parts.iter_mut().find(|part| part.name.as_deref() == Some(layer)) {
+                Some(part) => part.channels.push(channel.clone()),
+                None => parts.push(ExrPart {
+                    name: Some(layer.into()),
+                    channels: vec![channel.clone()],
+                    // What is said of the picture stands in the first.
+                    texts: if parts.is_empty() { part.texts.clone() } else { Vec::new() },
+                    ..part.clone()
+                }),
+            }
+        }
+        ExrFile { parts, ..file.clone() }
+    }
+
+    #[test]
+    fn pictures_in_several_parts_are_compared_as_those_in_one() {
+        let (mut a, b) = (render(11, 1.0, 0.3, 1.0), render(12, 1.0, 0.3, 1.0));
+        let c = compare(&in_parts(&a), &in_parts(&b), &CompareOptions::default());
+        assert_eq!(c, compare(&a, &b, &CompareOptions::default()));
+        assert_eq!(c.noise, Some(NoiseSource::StandardErrors));
+        // One pixel far off is seen by its standard error alone.
+        a.parts[0].channels[0].1[5] += 100.0;
+        a.parts[0].channels[0].1[6] -= 100.0;
+        let c = compare(&in_parts(&a), &in_parts(&b), &CompareOptions::default());
+        assert_eq!(c.pixel_test.unwrap().pixels_rejected, 2, "{}", c.reason);
+        // Bands of which each is a part, the second twice as bright.
+        let bands = |gain: f32| {
+            let band = |name: &str, value| (name.to_string(), vec![value; PIXELS]);
+            let parts = in_parts(&file(vec![band("a", 1.0), band("b.T", gain)]));
+            assert_eq!(parts.parts.len(), 2);
+            parts
+        };
+        let c = compare(&bands(1.0), &bands(2.0), &CompareOptions::default());
+        assert_eq!((c.verdict, c.channels.len()), (Verdict::Different, 2), "{}", c.reason);
+    }
+
+    #[test]
+    fn files_with_other_channels_cannot_be_compared() {
+        let channels =
+            |names: &[&str]| file(names.iter().map(|name| ((*name).to_string(), vec![1.0; PIXELS])).collect());
+        let three = ["S0.450,0nm", "S0.550,0nm", "S0.650,0nm", "R", "G", "B"];
+        let pairs: [(&[&str], &[&str]); 6] = [
+            (&three, &["S0.425,0nm", "S0.475,0nm", "S0.525,0nm", "R", "G", "B"]),
+            (&three, &["R", "G", "B", "A"]),
+            (&["R", "G", "B"], &["R"]),
+            (&["X", "Y", "Z"], &["Y"]),
+            (&["X", "Y", "Z", "A"], &["Y", "A"]),
+            (&["a", "b", "A"], &["a", "A"]),
+        ];
+        for (a, b) in pairs {
+            for (a, b) in [(a, b), (b, a)] {
+                let c = compare(&channels(a), &channels(b), &CompareOptions::default());
+                assert_eq!(c.verdict, Verdict::CannotCompare, "{a:?} {b:?}");
+                assert!(c.reason.contains(a[0]) && c.reason.contains(b[0]), "{}", c.reason);
+            }
+        }
+        // Further layers of either file and alpha are none of the picture's colours; the table names them.
+        let c = compare(
+            &channels(&["A", "B", "G", "R", "Z", "stderr.R"]),
+            &channels(&["B", "G", "R", "normal.X", "normal.Y"]),
+            &CompareOptions::default(),
+        );
+        assert!(c.verdict == Verdict::Same && c.identical);
+        let told = "not compared             A, Z, normal.*\n";
+        assert!(c.table().contains(told), "{}", c.table());
     }
 
     #[test]
