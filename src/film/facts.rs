@@ -20,11 +20,10 @@ pub struct Facts {
 impl Facts {
     /// Of `samples`.
     #[must_use]
-    pub fn of(samples: &[f32]) -> Facts {
+    pub fn of(samples: impl IntoIterator<Item = f64>) -> Facts {
         let (mut min, mut max, mut sum, mut finite) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0usize);
         let (mut nan, mut infinite) = (0, 0);
-        for &sample in samples {
-            let x = f64::from(sample);
+        for x in samples {
             if x.is_finite() {
                 (min, max, sum, finite) = (min.min(x), max.max(x), sum + x, finite + 1);
             } else if x.is_nan() {
@@ -44,8 +43,8 @@ mod tests {
 
     #[test]
     fn what_is_not_finite_is_counted_and_left_out() {
-        let facts = Facts::of(&[1.0, f32::NAN, 3.0, f32::INFINITY, f32::NEG_INFINITY, -1.0]);
+        let facts = Facts::of([1.0, f64::NAN, 3.0, f64::INFINITY, f64::NEG_INFINITY, -1.0]);
         assert_eq!(facts, Facts { min: Some(-1.0), max: Some(3.0), mean: Some(1.0), nan: 1, infinite: 2 });
-        assert_eq!(Facts::of(&[f32::NAN]).mean, None);
+        assert_eq!(Facts::of([f64::NAN]).mean, None);
     }
 }

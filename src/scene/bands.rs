@@ -204,6 +204,7 @@ mod tests {
             name: None,
             window: Window::full(2, 1),
             channels: channels.iter().map(|(name, v)| ((*name).to_owned(), v.to_vec())).collect(),
+            integers: Vec::new(),
             texts: Vec::new(),
         }
     }

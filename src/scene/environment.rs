@@ -529,6 +529,7 @@ mod tests {
             name: None,
             window: Window::full(2, 2),
             channels: vec![plane("S0.400nm", 1.0), plane("S0.500nm", 3.0)],
+            integers: Vec::new(),
             texts: Vec::new(),
         };
         for (scale, expected) in [(1.0, 2.0), (2.0, 4.0)] {

@@ -485,7 +485,13 @@ mod tests {
         let pixels = [[0.5, -0.25, 0.0], [-2.0, 1.0, -0.0]];
         let channel = |k: usize| (["R", "G", "B"][k].to_owned(), pixels.iter().map(|p| p[k]).collect());
         let window = Window::full(2, 1);
-        let part = exr::ExrPart { name: None, window, channels: (0..3).map(channel).collect(), texts: Vec::new() };
+        let part = exr::ExrPart {
+            name: None,
+            window,
+            channels: (0..3).map(channel).collect(),
+            integers: Vec::new(),
+            texts: Vec::new(),
+        };
         let file = exr::ExrFile { display: window, chromaticities: None, parts: vec![part] };
         let picture = picture(Path::new("sky.exr"), Decoded::Exr(file)).unwrap();
         assert_eq!(picture.pixels, [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0]]);
@@ -497,7 +503,7 @@ mod tests {
         let plane = |name: &str| (name.to_owned(), vec![0.5, -0.5]);
         let window = Window { x: 3, y: 1, width: 2, height: 1 };
         let channels = ["R", "G", "B"].map(plane).into();
-        let part = exr::ExrPart { name: None, window, channels, texts: Vec::new() };
+        let part = exr::ExrPart { name: None, window, channels, integers: Vec::new(), texts: Vec::new() };
         let file = |frame| exr::ExrFile { display: frame, chromaticities: None, parts: vec![part.clone()] };
         let numbers = |frame| data_image(Path::new("bump.exr"), Decoded::Exr(file(frame)), true).unwrap().1;
         assert_eq!(numbers(window), None);
@@ -513,7 +519,13 @@ mod tests {
     fn grey_and_xyz_are_colours() {
         let colours = |names: &[&str], values: &[f32]| {
             let channels = names.iter().zip(values).map(|(name, value)| ((*name).to_owned(), vec![*value])).collect();
-            let part = exr::ExrPart { name: None, window: Window::full(1, 1), channels, texts: Vec::new() };
+            let part = exr::ExrPart {
+                name: None,
+                window: Window::full(1, 1),
+                channels,
+                integers: Vec::new(),
+                texts: Vec::new(),
+            };
             let file = exr::ExrFile { display: Window::full(1, 1), chromaticities: None, parts: vec![part] };
             picture(Path::new("t.exr"), Decoded::Exr(file)).map(|picture| picture.pixels[0])
         };
@@ -536,7 +548,13 @@ mod tests {
             let written = xyz.map(|xyz| space.from_xyz(xyz));
             let channel = |k: usize| (["R", "G", "B"][k].to_owned(), written.iter().map(|p| p[k]).collect());
             let window = Window::full(3, 1);
-            let part = exr::ExrPart { name: None, window, channels: (0..3).map(channel).collect(), texts: Vec::new() };
+            let part = exr::ExrPart {
+                name: None,
+                window,
+                channels: (0..3).map(channel).collect(),
+                integers: Vec::new(),
+                texts: Vec::new(),
+            };
             let chromaticities = Some(space.chromaticities().map(|xy| xy.map(|x| x as f32)));
             let file = exr::ExrFile { display: window, chromaticities, parts: vec![part] };
             let read = picture(Path::new("sky.exr"), Decoded::Exr(file)).unwrap();

@@ -137,7 +137,7 @@ pub fn of(path: &Path) -> Result<ExrFacts> {
                 name: name.to_owned(),
                 kind: channel.kind,
                 sampling: channel.sampling,
-                facts: pixels.and_then(|part| part.channel(&channel.name)).map(Facts::of),
+                facts: pixels.and_then(|part| part.samples(&channel.name)).map(|samples| Facts::of(samples.iter())),
             };
             match layers.iter_mut().find(|known| known.layer == layer) {
                 Some(known) => known.channels.push(facts),
@@ -240,4 +240,30 @@ fn camera(header: &Header) -> Option<CameraFacts> {
         (perspective && fov.iter().all(|angle| *angle > 0.0)).then_some(fov)
     });
     Some(CameraFacts { position, direction, fov_deg: fov })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::exr::{ChannelData, Compression, ExrImage, Layout, write_exr};
+
+    /// Between 2³¹ and 2³² floats of 32 bits are 256 apart.
+    #[test]
+    fn whole_numbers_are_told_to_the_last_digit() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.exr");
+        let image = ExrImage {
+            frame: [2, 1],
+            window: Window::full(2, 1),
+            channels: vec![("id".into(), ChannelData::U32(vec![4_291_595_995, 3]))],
+            colour: None,
+            attributes: Vec::new(),
+            data: std::collections::BTreeSet::new(),
+            compression: Compression::None,
+            layout: Layout::Single,
+        };
+        write_exr(&path, &image).unwrap();
+        let facts = of(&path).unwrap().parts[0].layers[0].channels[0].facts.unwrap();
+        assert_eq!((facts.min, facts.mean, facts.max), (Some(3.0), Some(2_145_797_999.0), Some(4_291_595_995.0)));
+    }
 }

@@ -20,7 +20,7 @@
 mod noise;
 
 use crate::film::Window;
-use crate::film::exr::{ExrFile, ExrPart, SHARED_ERRORS, stderr_name};
+use crate::film::exr::{ExrFile, ExrPart, SHARED_ERRORS, Samples, stderr_name};
 use crate::spectrum::colour;
 use noise::Pair;
 use std::collections::BTreeSet;
@@ -257,8 +257,8 @@ fn cannot_compare(reason: String) -> Comparison {
 }
 
 /// The values of the pixels that are kept.
-fn kept<'a>(values: &'a [f32], finite: &'a [bool]) -> impl Iterator<Item = f64> + 'a {
-    values.iter().zip(finite).filter(|(_, keep)| **keep).map(|(v, _)| f64::from(*v))
+fn kept<'a>(samples: Samples<'a>, finite: &'a [bool]) -> impl Iterator<Item = f64> + 'a {
+    samples.iter().zip(finite).filter(|(_, keep)| **keep).map(|(v, _)| v)
 }
 
 /// What is to be compared, or why nothing can be.
@@ -281,8 +281,9 @@ fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions<'a>) -> Re
     };
     let mut pairs = Vec::new();
     for name in names {
+        let samples = |file: &'a ExrFile| parts(file).find_map(|part| part.samples(&name));
         let floats = |file: &'a ExrFile, name: &str| parts(file).find_map(|part| part.channel(name));
-        let (Some(values_a), Some(values_b)) = (floats(a, &name), floats(b, &name)) else { continue };
+        let (Some(samples_a), Some(samples_b)) = (samples(a), samples(b)) else { continue };
         let variance = match variance {
             None => None,
             Some((file, samples)) => {
@@ -291,7 +292,7 @@ fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions<'a>) -> Re
             }
         };
         let errors = [a, b].map(|file| floats(file, &stderr_name(&name)));
-        pairs.push(Pair::new(name, values_a, values_b, errors, [shared(a), shared(b)], variance));
+        pairs.push(Pair::new(name, [samples_a, samples_b], errors, [shared(a), shared(b)], variance));
     }
     Ok(pairs)
 }
@@ -447,6 +448,7 @@ impl Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::exr::{Attribute, ChannelData, Compression, ExrImage, Layout, read_exr, write_exr};
     use crate::math::sampler::mix64;
     use crate::math::statistics::Moments;
 
@@ -464,7 +466,7 @@ mod tests {
         ExrFile {
             display: window,
             chromaticities: None,
-            parts: vec![ExrPart { name: None, window, channels, texts: Vec::new() }],
+            parts: vec![ExrPart { name: None, window, channels, integers: Vec::new(), texts: Vec::new() }],
         }
     }
 
@@ -645,6 +647,23 @@ mod tests {
         assert_eq!(reason(&other), "the channels differ: R, G, B against Rx, Gx, Bx");
     }
 
+    fn read_back(channels: Vec<(String, ChannelData)>, attributes: Vec<(String, Attribute)>) -> ExrFile {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.exr");
+        let image = ExrImage {
+            frame: [SIDE; 2],
+            window: Window::full(SIDE, SIDE),
+            channels,
+            colour: None,
+            attributes,
+            data: BTreeSet::new(),
+            compression: Compression::None,
+            layout: Layout::Single,
+        };
+        write_exr(&path, &image).unwrap();
+        read_exr(&path).unwrap()
+    }
+
     /// The channels of `file` in a part for each name before a point, as `layout: multipart` has it.
     fn in_parts(file: &ExrFile) -> ExrFile {
         let part = &file.parts[0];
@@ -716,6 +735,20 @@ mod tests {
         assert!(c.verdict == Verdict::Same && c.identical);
         let told = "not compared             A, Z, normal.*\n";
         assert!(c.table().contains(told), "{}", c.table());
+    }
+
+    /// Near 4291595995 floats of 32 bits are 256 apart.
+    #[test]
+    fn whole_numbers_are_compared_to_the_last_bit() {
+        let ids = |last: u32| {
+            let mut ids = vec![7; PIXELS];
+            ids[9] = last;
+            read_back(vec![("id".into(), ChannelData::U32(ids))], Vec::new())
+        };
+        let (a, b) = (ids(4_291_595_995), ids(4_291_595_996));
+        assert!(compare(&a, &a, &CompareOptions::default()).identical);
+        let c = compare(&a, &b, &CompareOptions::default());
+        assert!(!c.identical && c.channels[0].max_difference == 1.0, "{}", c.table());
     }
 
     #[test]

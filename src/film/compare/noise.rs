@@ -1,6 +1,7 @@
 //! What the noise of two pictures explains.
 
 use super::{ChannelFigures, NoiseSource, PIXEL_ALPHA, PixelTest, VARIANCE_FLOOR, kept};
+use crate::film::exr::Samples;
 use crate::math::statistics::{Moments, normal_two_sided_p, sidak, student_t_two_sided_p};
 use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use half::f16;
@@ -15,8 +16,8 @@ const REPLICATE_DOF: f64 = 3.0;
 /// A channel of both pictures with what is known of its noise.
 pub(super) struct Pair<'a> {
     pub name: String,
-    pub a: &'a [f32],
-    pub b: &'a [f32],
+    pub a: Samples<'a>,
+    pub b: Samples<'a>,
     pub noise: Noise<'a>,
     /// How many times the variance of the sum of all pixels of A and of B is that of independent ones.
     shared: [f64; 2],
@@ -69,8 +70,7 @@ impl Variance {
 impl<'a> Pair<'a> {
     pub fn new(
         name: String,
-        a: &'a [f32],
-        b: &'a [f32],
+        [a, b]: [Samples<'a>; 2],
         errors: [Option<&'a [f32]>; 2],
         shared: [f64; 2],
         variance: Option<(&'a [f32], u32)>,
@@ -83,21 +83,24 @@ impl<'a> Pair<'a> {
             (None, [Some(one), None] | [None, Some(one)]) => Noise::OneError(one),
             (None, [None, None]) => Noise::Unknown,
         };
-        let is_half = |values: &[f32]| values.iter().all(|&v| v.is_nan() || f16::from_f32(v).to_f32() == v);
+        let is_half = |samples| match samples {
+            Samples::Float(values) => values.iter().all(|&v| v.is_nan() || f16::from_f32(v).to_f32() == v),
+            Samples::Integer(_) => false,
+        };
         let half = [is_half(a), is_half(b)];
         Pair { name, a, b, noise, shared, half }
     }
 
     pub fn is_finite(&self, i: usize) -> bool {
-        self.a[i].is_finite() && self.b[i].is_finite()
+        self.a.at(i).is_finite() && self.b.at(i).is_finite()
     }
 
     pub fn is_identical(&self) -> bool {
-        self.a.iter().zip(self.b).all(|(x, y)| x.to_bits() == y.to_bits())
+        self.a.iter().zip(self.b.iter()).all(|(x, y)| x.to_bits() == y.to_bits())
     }
 
     fn difference(&self, i: usize) -> f64 {
-        f64::from(self.a[i]) - f64::from(self.b[i])
+        self.a.at(i) - self.b.at(i)
     }
 
     /// The variance of a pixel's difference, if it is known.
@@ -105,9 +108,9 @@ impl<'a> Pair<'a> {
         let square = |e: f32| f64::from(e) * f64::from(e);
         // A half float of exponent e was rounded to a multiple of 2^(e − 10): a uniform error of variance step²/12.
         // If both pictures were rounded alike and agree, there is no difference to explain.
-        let rounding: f64 = [(self.a[i], self.half[0]), (self.b[i], self.half[1])]
+        let rounding: f64 = [(self.a, self.half[0]), (self.b, self.half[1])]
             .iter()
-            .map(|&(v, half)| if half { half_step(v) * half_step(v) / 12.0 } else { 0.0 })
+            .map(|&(samples, half)| if half { half_step(samples.at(i)) * half_step(samples.at(i)) / 12.0 } else { 0.0 })
             .sum();
         let variance = match self.noise {
             Noise::Errors(a, b) => Variance { estimated: [square(a[i]), square(b[i])], known: rounding },
@@ -138,7 +141,7 @@ impl<'a> Pair<'a> {
         // Of the difference: sum, variance, and Σv²/ν; of A − ratio·B: variance.
         let (mut difference, mut variance, mut spread, mut ratio_variance) = (0.0, 0.0, 0.0, 0.0);
         for i in (0..finite.len()).filter(|&i| finite[i]) {
-            let (a, b, d) = (f64::from(self.a[i]), f64::from(self.b[i]), self.difference(i));
+            let (a, b, d) = (self.a.at(i), self.b.at(i), self.difference(i));
             if d != 0.0 {
                 squares += d * d;
                 relative += d * d / (b * b + floor);
@@ -166,7 +169,7 @@ impl<'a> Pair<'a> {
         }
         let z = score(difference, variance);
         let dof = if spread > 0.0 { variance * variance / spread } else { f64::INFINITY };
-        let count = |values: &[f32], is: fn(f32) -> bool| values.iter().filter(|&&v| is(v)).count();
+        let count = |samples: Samples, is: fn(f64) -> bool| samples.iter().filter(|&v| is(v)).count();
         ChannelFigures {
             name: self.name.clone(),
             mean_a: sum_a / n,
@@ -180,10 +183,10 @@ impl<'a> Pair<'a> {
             rel_mse: relative / n,
             smape: symmetric / n,
             max_difference: largest,
-            nan_a: count(self.a, f32::is_nan),
-            infinite_a: count(self.a, f32::is_infinite),
-            nan_b: count(self.b, f32::is_nan),
-            infinite_b: count(self.b, f32::is_infinite),
+            nan_a: count(self.a, f64::is_nan),
+            infinite_a: count(self.a, f64::is_infinite),
+            nan_b: count(self.b, f64::is_nan),
+            infinite_b: count(self.b, f64::is_infinite),
         }
     }
 }
@@ -194,8 +197,8 @@ fn score(difference: f64, variance: f64) -> f64 {
 }
 
 /// The distance of half floats at `v`: 2^(e − 10), 2⁻²⁴ for subnormals.
-fn half_step(v: f32) -> f64 {
-    let exponent = (v.to_bits() >> 23 & 0xff) as i32 - 127;
+fn half_step(v: f64) -> f64 {
+    let exponent = (v.to_bits() >> 52 & 0x7ff) as i32 - 1023;
     libm::ldexp(1.0, exponent.max(-14) - 10)
 }
 
@@ -261,8 +264,8 @@ mod tests {
     #[test]
     fn the_step_of_half_floats_is_the_distance_to_the_next() {
         for bits in (0..0x7bffu16).step_by(37) {
-            let (v, next) = (f16::from_bits(bits).to_f32(), f16::from_bits(bits + 1).to_f32());
-            assert_eq!(half_step(v), f64::from(next) - f64::from(v), "{v}");
+            let (v, next) = (f16::from_bits(bits).to_f64(), f16::from_bits(bits + 1).to_f64());
+            assert_eq!(half_step(v), next - v, "{v}");
         }
     }
 

@@ -14,7 +14,7 @@ pub mod part;
 mod read;
 mod write;
 
-pub use read::{ExrFile, ExrPart, read_exr};
+pub use read::{ExrFile, ExrPart, Samples, read_exr};
 pub use write::{encode_exr, write_exr};
 
 use crate::error::Result;

@@ -34,8 +34,42 @@ pub struct ExrPart {
     pub window: Window,
     /// Channels by name; samples in raster order. Integers are rounded to 24 bits.
     pub channels: Vec<(String, Vec<f32>)>,
-    /// Text attributes, sorted by name.
+    /// Those of integers, as they are.
+    pub integers: Vec<(String, Vec<u32>)>,
+    /// Attributes that are texts or integers, as text, sorted by name.
     pub texts: Vec<(String, String)>,
+}
+
+/// The samples of a channel, none of them rounded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Samples<'a> {
+    /// Of floats.
+    Float(&'a [f32]),
+    /// Of integers.
+    Integer(&'a [u32]),
+}
+
+impl<'a> Samples<'a> {
+    /// The sample of pixel `i`.
+    ///
+    /// # Panics
+    /// If there is none.
+    #[must_use]
+    pub fn at(self, i: usize) -> f64 {
+        match self {
+            Samples::Float(samples) => samples[i].into(),
+            Samples::Integer(samples) => samples[i].into(),
+        }
+    }
+
+    /// All of them.
+    pub fn iter(self) -> impl Iterator<Item = f64> + 'a {
+        let count = match self {
+            Samples::Float(samples) => samples.len(),
+            Samples::Integer(samples) => samples.len(),
+        };
+        (0..count).map(move |i| self.at(i))
+    }
 }
 
 impl ExrFile {
@@ -60,7 +94,16 @@ impl ExrPart {
         self.channels.iter().find(|(n, _)| n == name).map(|(_, samples)| samples.as_slice())
     }
 
-    /// The text attribute `name`.
+    /// The samples of the channel `name` as they stand in the file.
+    #[must_use]
+    pub fn samples(&self, name: &str) -> Option<Samples<'_>> {
+        match self.integers.iter().find(|(n, _)| n == name) {
+            Some((_, samples)) => Some(Samples::Integer(samples)),
+            None => self.channel(name).map(Samples::Float),
+        }
+    }
+
+    /// The attribute `name` that is a text or an integer.
     #[must_use]
     pub fn text(&self, name: &str) -> Option<&str> {
         self.texts.iter().find(|(n, _)| n == name).map(|(_, text)| text.as_str())
@@ -98,13 +141,17 @@ pub fn read_exr(path: &Path) -> Result<ExrFile> {
         let own = &layer.attributes;
         let size = [layer.size.width() as u32, layer.size.height() as u32];
         let window = Window { x: own.layer_position.x(), y: own.layer_position.y(), width: size[0], height: size[1] };
-        let mut channels = Vec::new();
+        let (mut channels, mut integers) = (Vec::new(), Vec::new());
         for channel in layer.channel_data.list {
             let name = text(&channel.name);
             let samples = match channel.sample_data {
                 FlatSamples::F16(samples) => samples.into_iter().map(half::f16::to_f32).collect(),
                 FlatSamples::F32(samples) => samples,
-                FlatSamples::U32(samples) => samples.into_iter().map(|v| v as f32).collect(),
+                FlatSamples::U32(samples) => {
+                    let rounded = samples.iter().map(|&v| v as f32).collect();
+                    integers.push((name.clone(), samples));
+                    rounded
+                }
             };
             channels.push((name, samples));
         }
@@ -121,11 +168,12 @@ pub fn read_exr(path: &Path) -> Result<ExrFile> {
         let known = known.iter().filter_map(|(name, value)| Some(((*name).to_string(), text(value.as_ref()?))));
         let custom = own.other.iter().chain(&shared.other).filter_map(|(name, value)| match value {
             AttributeValue::Text(value) => Some((text(name), text(value))),
+            AttributeValue::I32(value) => Some((text(name), value.to_string())),
             _ => None,
         });
         let mut texts: Vec<(String, String)> = known.chain(custom).collect();
         texts.sort();
-        parts.push(ExrPart { name: own.layer_name.as_ref().map(text), window, channels, texts });
+        parts.push(ExrPart { name: own.layer_name.as_ref().map(text), window, channels, integers, texts });
     }
     if parts.is_empty() {
         return Err(Error::input(path, "the file has no part with pixels"));
