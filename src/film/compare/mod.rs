@@ -10,7 +10,7 @@
 //!   correction derives from [`PIXEL_ALPHA`], passed by [`ACCEPT_FRACTION`] of all. Sees local faults.
 //!
 //! The noise is known from `stderr.*` channels (standard errors of the means, from four replicates: three degrees of
-//! freedom a pixel), from a file of variances per sample (as Mitsuba's references come
+//! freedom a pixel, or one less than the samples), from a file of variances per sample (as Mitsuba's references come
 //! with), or else from the differences themselves: where both pictures are right, E(Σd²) = Σvar(d), so Σd/√Σd² is a
 //! standard score. That form tests the mean only. A picture in half floats carries the variance of its rounding besides.
 //!
@@ -20,6 +20,7 @@
 mod noise;
 
 use crate::film::Window;
+use crate::film::accumulate::REPLICATES;
 use crate::film::exr::{ExrFile, ExrPart, SHARED_ERRORS, Samples, stderr_name};
 use crate::spectrum::colour;
 use noise::Pair;
@@ -292,7 +293,8 @@ fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions<'a>) -> Re
             }
         };
         let errors = [a, b].map(|file| floats(file, &stderr_name(&name)));
-        pairs.push(Pair::new(name, [samples_a, samples_b], errors, [shared(a), shared(b)], variance));
+        let (shared, dof) = ([shared(a), shared(b)], [degrees(a), degrees(b)]);
+        pairs.push(Pair::new(name, [samples_a, samples_b], errors, shared, dof, variance));
     }
     Ok(pairs)
 }
@@ -310,6 +312,12 @@ fn said<T: std::str::FromStr>(file: &ExrFile, name: &str) -> Option<T> {
 /// How many times the variance of the sum of all pixels is that of independent ones, by what the file says.
 fn shared(file: &ExrFile) -> f64 {
     said(file, SHARED_ERRORS).filter(|x: &f64| x.is_finite()).map_or(1.0, |x| x.max(1.0))
+}
+
+/// Degrees of freedom of a standard error: of samples that are fewer than the replicates each is one.
+fn degrees(file: &ExrFile) -> f64 {
+    let replicates = said(file, "abbe/samples").unwrap_or(REPLICATES).clamp(2, REPLICATES);
+    (replicates - 1) as f64
 }
 
 /// The channels of `file` but for those of `names` and their standard errors.
@@ -472,13 +480,18 @@ mod tests {
 
     /// A picture of R, G, B near `mean`·(1 … 2), as four replicates of deviation `sigma` would make it, times `gain`.
     fn render(seed: u64, mean: f64, sigma: f64, gain: f64) -> ExrFile {
+        render_of(4, seed, mean, sigma, gain)
+    }
+
+    /// The same of up to four replicates.
+    fn render_of(count: usize, seed: u64, mean: f64, sigma: f64, gain: f64) -> ExrFile {
         let mut channels = Vec::new();
         for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
             let (mut values, mut errors) = (Vec::new(), Vec::new());
             for i in 0..PIXELS {
                 let truth = mean * (1.0 + i as f64 / PIXELS as f64);
                 let replicates: Moments =
-                    (0..4).map(|r| gain * (truth + sigma * normal(seed, (i * 3 + c) * 4 + r))).collect();
+                    (0..count).map(|r| gain * (truth + sigma * normal(seed, (i * 3 + c) * 4 + r))).collect();
                 values.push(replicates.mean as f32);
                 errors.push(replicates.standard_error() as f32);
             }
@@ -647,6 +660,13 @@ mod tests {
         assert_eq!(reason(&other), "the channels differ: R, G, B against Rx, Gx, Bx");
     }
 
+    /// What a reader finds in a file of these channels in 32-bit floats that was rendered with `samples` a pixel.
+    fn written(file: &ExrFile, samples: i32) -> ExrFile {
+        let part = &file.parts[0];
+        let channels = part.channels.iter().map(|(name, plane)| (name.clone(), ChannelData::F32(plane.clone())));
+        read_back(channels.collect(), vec![("abbe/samples".into(), Attribute::Int(samples))])
+    }
+
     fn read_back(channels: Vec<(String, ChannelData)>, attributes: Vec<(String, Attribute)>) -> ExrFile {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a.exr");
@@ -735,6 +755,28 @@ mod tests {
         assert!(c.verdict == Verdict::Same && c.identical);
         let told = "not compared             A, Z, normal.*\n";
         assert!(c.table().contains(told), "{}", c.table());
+    }
+
+    /// Two samples make replicates of one each and an error of one degree of freedom, three make one of two. Against what
+    /// is exact a pixel of two is a Student's t of one: beyond 144, the level of a pixel by three, in 2/(144 π) = 0.44 % of all.
+    #[test]
+    fn errors_of_two_and_three_samples_are_as_uncertain_as_they_are() {
+        let exact = without_errors(render(0, 1.0, 0.0, 1.0));
+        for samples in [2, 3] {
+            for pair in 0..3 {
+                let [a, b] = [2 * pair, 2 * pair + 1].map(|seed| render_of(samples, seed, 1.0, 0.3, 1.0));
+                let [a, b] = [a, b].map(|file| written(&file, samples as i32));
+                for b in [&b, &exact] {
+                    let c = compare(&a, b, &CompareOptions::default());
+                    assert_eq!(c.verdict, Verdict::Same, "{samples}: {}", c.table());
+                }
+            }
+        }
+        let untold = compare(&render_of(2, 0, 1.0, 0.3, 1.0), &exact, &CompareOptions::default());
+        assert_eq!(untold.verdict, Verdict::Different, "taken for three degrees of freedom: {}", untold.table());
+        // A picture that is off is still told from its like.
+        let [a, b] = [(1, 1.05), (2, 1.0)].map(|(seed, gain)| written(&render_of(2, seed, 1.0, 0.3, gain), 2));
+        assert_eq!(compare(&a, &b, &CompareOptions::default()).verdict, Verdict::Different);
     }
 
     /// Near 4291595995 floats of 32 bits are 256 apart.

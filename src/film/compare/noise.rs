@@ -10,9 +10,6 @@ use half::f16;
 pub(super) const XYZ_FROM_RGB: [[f64; 3]; 3] =
     [[0.412_453, 0.357_580, 0.180_423], REC709_OF_MITSUBA, [0.019_334, 0.119_193, 0.950_227]];
 
-/// Degrees of freedom of a standard error that stems from four replicates.
-const REPLICATE_DOF: f64 = 3.0;
-
 /// A channel of both pictures with what is known of its noise.
 pub(super) struct Pair<'a> {
     pub name: String,
@@ -21,6 +18,8 @@ pub(super) struct Pair<'a> {
     pub noise: Noise<'a>,
     /// How many times the variance of the sum of all pixels of A and of B is that of independent ones.
     shared: [f64; 2],
+    /// Degrees of freedom of the standard errors of A and of B.
+    dof: [f64; 2],
     /// Whether the values of A and of B are half floats.
     half: [bool; 2],
 }
@@ -49,8 +48,10 @@ impl Noise<'_> {
 /// The variance of the difference of a pixel.
 #[derive(Clone, Copy)]
 struct Variance {
-    /// Of A and B, each with [`REPLICATE_DOF`] degrees of freedom.
+    /// Of A and B.
     estimated: [f64; 2],
+    /// Degrees of freedom of each.
+    dof: [f64; 2],
     /// Known without estimation: the rounding to half floats, or the whole of a variance file.
     known: f64,
 }
@@ -62,8 +63,12 @@ impl Variance {
 
     /// Welch's degrees of freedom (Satterthwaite 1946): (Σv)² / Σ(v²/ν).
     fn dof(&self) -> f64 {
-        let squares: f64 = self.estimated.iter().map(|v| v * v).sum();
-        self.total() * self.total() * REPLICATE_DOF / squares
+        self.total() * self.total() / self.spread()
+    }
+
+    /// Σ(v²/ν).
+    fn spread(&self) -> f64 {
+        self.estimated.iter().zip(self.dof).map(|(v, dof)| v * v / dof).sum()
     }
 }
 
@@ -73,6 +78,7 @@ impl<'a> Pair<'a> {
         [a, b]: [Samples<'a>; 2],
         errors: [Option<&'a [f32]>; 2],
         shared: [f64; 2],
+        dof: [f64; 2],
         variance: Option<(&'a [f32], u32)>,
     ) -> Pair<'a> {
         // Standard errors of which none is finite (one replicate) say nothing.
@@ -88,7 +94,7 @@ impl<'a> Pair<'a> {
             Samples::Integer(_) => false,
         };
         let half = [is_half(a), is_half(b)];
-        Pair { name, a, b, noise, shared, half }
+        Pair { name, a, b, noise, shared, dof, half }
     }
 
     pub fn is_finite(&self, i: usize) -> bool {
@@ -112,12 +118,13 @@ impl<'a> Pair<'a> {
             .iter()
             .map(|&(samples, half)| if half { half_step(samples.at(i)) * half_step(samples.at(i)) / 12.0 } else { 0.0 })
             .sum();
+        let dof = self.dof;
         let variance = match self.noise {
-            Noise::Errors(a, b) => Variance { estimated: [square(a[i]), square(b[i])], known: rounding },
-            Noise::OneError(one) => Variance { estimated: [square(one[i]), 0.0], known: rounding },
+            Noise::Errors(a, b) => Variance { estimated: [square(a[i]), square(b[i])], dof, known: rounding },
+            Noise::OneError(one) => Variance { estimated: [square(one[i]), 0.0], dof, known: rounding },
             Noise::Sample(plane, samples) => {
                 let per_sample = f64::from(plane[i]).max(VARIANCE_FLOOR);
-                Variance { estimated: [0.0; 2], known: per_sample / samples }
+                Variance { estimated: [0.0; 2], dof, known: per_sample / samples }
             }
             Noise::Unknown => return None,
         };
@@ -159,7 +166,7 @@ impl<'a> Pair<'a> {
                     let v = Variance { estimated: [0, 1].map(|k| v.estimated[k] * self.shared[k]), ..v };
                     difference += d;
                     variance += v.total();
-                    spread += v.estimated.iter().map(|v| v * v).sum::<f64>() / REPLICATE_DOF;
+                    spread += v.spread();
                     // What is known without estimation belongs to A: a variance file, or rounding.
                     ratio_variance += v.estimated[0] + v.known + ratio * ratio * v.estimated[1];
                 }
@@ -272,8 +279,9 @@ mod tests {
     /// Welch: equal variances give ν₁ + ν₂ = 6, one vanishing gives 3, known variance adds certainty.
     #[test]
     fn welch_degrees_of_freedom_at_their_limits() {
-        let dof = |a, b, known| Variance { estimated: [a, b], known }.dof();
+        let dof = |a, b, known| Variance { estimated: [a, b], dof: [3.0; 2], known }.dof();
         assert_eq!((dof(2.0, 2.0, 0.0), dof(2.0, 0.0, 0.0), dof(1.0, 0.0, 1.0)), (6.0, 3.0, 12.0));
         assert!(dof(0.0, 0.0, 1.0).is_infinite());
+        assert_eq!(Variance { estimated: [2.0, 2.0], dof: [1.0, 2.0], known: 0.0 }.dof(), 16.0 / (4.0 + 2.0));
     }
 }
