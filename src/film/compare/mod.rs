@@ -12,7 +12,8 @@
 //! The noise is known from `stderr.*` channels (standard errors of the means, from four replicates: three degrees of
 //! freedom a pixel, or one less than the samples), from a file of variances per sample (as Mitsuba's references come
 //! with), or else from the differences themselves: where both pictures are right, E(Σd²) = Σvar(d), so Σd/√Σd² is a
-//! standard score. That form tests the mean only. A picture in half floats carries the variance of its rounding besides.
+//! standard score. That form tests the mean only, and has the say where single pixels lack a standard error. A picture in
+//! half floats carries the variance of its rounding besides.
 //!
 //! Both tests want pixels that are independent: a box filter, or filters by importance sampling. Light that is dealt to all
 //! pixels which a filter covers is not; a file says by how much more the sum of its pixels varies ([`SHARED_ERRORS`]).
@@ -169,6 +170,8 @@ pub struct Comparison {
     pub pixel_test: Option<PixelTest>,
     /// Pixels that were compared: those finite in every channel of both pictures.
     pub pixels: usize,
+    /// Of these, pixels that lack a standard error where others have one.
+    pub pixels_without_error: usize,
     /// Channels of either file that were not looked at.
     pub not_compared: Vec<String>,
 }
@@ -195,6 +198,7 @@ pub fn compare(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Comparison
     let source = pairs[0].noise.source();
     let pixel_test = noise::pixel_test(&pairs, &finite);
     let identical = pairs.iter().all(|pair| pair.is_identical());
+    let lacks_error = |&i: &usize| finite[i] && pairs.iter().any(|pair| pair.lacks_error(i));
     let names: Vec<&str> = pairs.iter().map(|pair| pair.name.as_str()).collect();
 
     let mut comparison = Comparison {
@@ -206,6 +210,7 @@ pub fn compare(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Comparison
         global_p,
         pixel_test,
         pixels,
+        pixels_without_error: (0..count).filter(lacks_error).count(),
         not_compared: BTreeSet::from_iter(not_compared(a, &names).chain(not_compared(b, &names))).into_iter().collect(),
     };
     (comparison.verdict, comparison.reason) = judge(&comparison, count, options);
@@ -238,7 +243,13 @@ fn judge(c: &Comparison, count: usize, options: &CompareOptions) -> (Verdict, St
             let share = 100.0 * test.accepted;
             (Verdict::Different, format!("only {share:.2} % of the pixel values agree within their noise"))
         }
-        Some(_) => (Verdict::Same, "means and pixels agree within their noise".to_string()),
+        Some(_) => {
+            let untested = match c.pixels_without_error {
+                0 => String::new(),
+                n => format!(" ({n} pixels without a standard error: not tested singly)"),
+            };
+            (Verdict::Same, format!("means and pixels agree within their noise{untested}"))
+        }
         None => (Verdict::Same, "means agree within the noise (no variances: single pixels not tested)".to_string()),
     }
 }
@@ -253,6 +264,7 @@ fn cannot_compare(reason: String) -> Comparison {
         global_p: f64::NAN,
         pixel_test: None,
         pixels: 0,
+        pixels_without_error: 0,
         not_compared: Vec::new(),
     }
 }
@@ -426,6 +438,10 @@ impl Comparison {
                 sum(|c| c.nan_b),
                 sum(|c| c.infinite_b)
             ));
+            if self.pixels_without_error > 0 {
+                let n = self.pixels_without_error;
+                line(format!("without a standard error {n} pixels: judged together, by their differences"));
+            }
             if !self.not_compared.is_empty() {
                 let layer =
                     |name: &String| name.rsplit_once('.').map_or(name.clone(), |(layer, _)| format!("{layer}.*"));
@@ -777,6 +793,27 @@ mod tests {
         // A picture that is off is still told from its like.
         let [a, b] = [(1, 1.05), (2, 1.0)].map(|(seed, gain)| written(&render_of(2, seed, 1.0, 0.3, gain), 2));
         assert_eq!(compare(&a, &b, &CompareOptions::default()).verdict, Verdict::Different);
+    }
+
+    /// Of such pixels only the differences are known, as of pictures without any standard error: Σd/√Σd² of the 2048 whose
+    /// difference is their value, some 1.5, is about √2048 = 45.
+    #[test]
+    fn pixels_without_a_standard_error_have_a_say() {
+        let unknown = |mut f: ExrFile, gain: f32| {
+            for (name, plane) in &mut f.parts[0].channels {
+                let is_error = name.starts_with("stderr.");
+                plane.iter_mut().step_by(2).for_each(|x| *x = if is_error { f32::NAN } else { *x * gain });
+            }
+            f
+        };
+        let pair = |gain| (unknown(render(21, 1.0, 0.3, 1.0), gain), unknown(render(22, 1.0, 0.3, 1.0), 1.0));
+        let compared = |(a, b): (ExrFile, ExrFile)| compare(&a, &b, &CompareOptions::default());
+        let c = compared(pair(1.0));
+        assert_eq!(c.verdict, Verdict::Same, "{}", c.table());
+        assert!(c.table().contains("without a standard error 2048 pixels"), "{}", c.table());
+        let c = compared(pair(2.0));
+        assert_eq!(c.verdict, Verdict::Different, "{}", c.table());
+        assert!((30.0..60.0).contains(&c.channels[0].global_z), "{}", c.table());
     }
 
     /// Near 4291595995 floats of 32 bits are 256 apart.

@@ -109,6 +109,11 @@ impl<'a> Pair<'a> {
         self.a.at(i) - self.b.at(i)
     }
 
+    /// Whether a pixel lacks the standard error by which others are judged: too few replicates.
+    pub fn lacks_error(&self, i: usize) -> bool {
+        self.noise.source() != NoiseSource::Differences && self.variance(i).is_none()
+    }
+
     /// The variance of a pixel's difference, if it is known.
     fn variance(&self, i: usize) -> Option<Variance> {
         let square = |e: f32| f64::from(e) * f64::from(e);
@@ -155,23 +160,21 @@ impl<'a> Pair<'a> {
                 symmetric += d.abs() / (a.abs() + b.abs() + 0.01 * reference_mean.abs());
                 largest = largest.max(d.abs());
             }
-            match (&self.noise, self.variance(i)) {
-                (Noise::Unknown, _) => {
+            difference += d;
+            match self.variance(i) {
+                // Also where a pixel has no estimate though others have.
+                None => {
                     let shared = self.shared[0].max(self.shared[1]);
-                    difference += d;
                     variance += d * d * shared;
                     ratio_variance += (a - ratio * b) * (a - ratio * b) * shared;
                 }
-                (_, Some(v)) => {
+                Some(v) => {
                     let v = Variance { estimated: [0, 1].map(|k| v.estimated[k] * self.shared[k]), ..v };
-                    difference += d;
                     variance += v.total();
                     spread += v.spread();
                     // What is known without estimation belongs to A: a variance file, or rounding.
                     ratio_variance += v.estimated[0] + v.known + ratio * ratio * v.estimated[1];
                 }
-                // A pixel without an estimate (too few replicates) has no say.
-                (_, None) => {}
             }
         }
         let z = score(difference, variance);
