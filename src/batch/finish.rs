@@ -8,7 +8,7 @@ use super::header::attributes;
 use super::prepare::{Prepared, colour_space, filter, window};
 use super::report::{Developed, SceneReport};
 use super::{contact, develop, layers};
-use crate::description::{self, LayerContent, Output, SceneDescription, Shutter};
+use crate::description::{self, LayerContent, MaterialRef, Output, SceneDescription, Shutter};
 use crate::error::Result;
 use crate::film::Window;
 use crate::film::accumulate::PixelCells;
@@ -24,6 +24,7 @@ use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Channel, Holds};
 use crate::transport::plan::{Effect, Integrator};
 use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -159,7 +160,7 @@ impl Finish {
             techniques: plan.techniques.clone(),
             lit: plan.lit,
             wavelengths: scene.wavelengths.describe().to_owned(),
-            notes: scene.notes.iter().cloned().chain(note).collect(),
+            notes: scene.notes.iter().cloned().chain(note).chain(shared_names(description)).collect(),
             world_to_camera: finite(scene.camera.camera_from_world()),
             world_to_ndc: finite(scene.camera.ndc_from_world()),
             white,
@@ -282,6 +283,50 @@ fn mattes(description: &SceneDescription, scene: &Scene) -> Vec<Matte> {
         },
     };
     wanted.map(matte).collect()
+}
+
+/// Notes on names that mean two things in one matte, which goes by names alone.
+fn shared_names(description: &SceneDescription) -> Vec<String> {
+    let SceneDescription { shapes, groups, assets, .. } = description;
+    let named = || shapes.iter().enumerate().map(|(i, shape)| (shape, shape.name_or_kind(i)));
+    let children = || groups.iter().flat_map(|(group, shapes)| shapes.iter().map(move |shape| (group, shape)));
+    let mut told = Vec::new();
+    for layer in &description.layers {
+        let LayerContent::Matte(matte) = layer.content else { continue };
+        let mut meanings: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        let mut means = |name: &str, what: &str| {
+            meanings.entry(name.to_owned()).or_default().insert(what.to_owned());
+        };
+        match matte {
+            description::Matte::Object => {}
+            description::Matte::Material => {
+                let own = named().map(|(shape, name)| (shape, name, "a shape".to_owned()));
+                let of_child = children().filter_map(|(group, shape)| {
+                    Some((shape, shape.name.clone()?, format!("a shape of the group `{group}`")))
+                });
+                for (shape, name, what) in own.chain(of_child) {
+                    match &shape.material {
+                        MaterialRef::Name(material) => means(material, "a material"),
+                        MaterialRef::Inline(_) => means(&name, &what),
+                    }
+                }
+            }
+            description::Matte::Asset => {
+                for (shape, name) in named() {
+                    match (assets.iter().find(|(_, shapes)| shapes.contains(&name)), shape.geometry.group()) {
+                        (Some((asset, _)), _) => means(asset, "an asset"),
+                        (None, Some(group)) => means(group, "a group"),
+                        (None, None) => means(&name, "a shape"),
+                    }
+                }
+            }
+        }
+        for (name, what) in meanings.into_iter().filter(|(_, what)| what.len() > 1) {
+            let what = Vec::from_iter(what).join(" and of ");
+            told.push(format!("{}: the name `{name}` is that of {what}: they are one matte", matte.layer()));
+        }
+    }
+    told
 }
 
 /// The name of an integrator.

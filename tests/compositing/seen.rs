@@ -335,3 +335,42 @@ fn cards_behind_cards_cover_their_share_in_whitted() {
         assert!((found - alpha).abs() <= 1.0 / 64.0 + 1e-6, "{found} of {alpha}");
     }
 }
+
+/// A name that a material and a shape have, or an asset and a shape, is that of one matte.
+#[test]
+fn names_of_two_things_in_one_matte_are_told() {
+    let notes = |more: &str| {
+        let place = TempDir::new().unwrap();
+        let text = format!(
+            "camera: {{origin: [0, 0, 8], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 3, height: 1}}\n\
+             render: {{samples: 1}}\nlayers: [crypto_object, crypto_material, crypto_asset]\n\
+             materials: {{gold: {{diffuse: {{reflectance: 0.2}}}}}}\nlights: [{{constant: {{radiance: 0.5}}}}]\n{more}"
+        );
+        common::write(&place.path().join("scene.yaml"), text.as_bytes());
+        let overrides = Overrides { output: Some(place.path().join("out")), ..Overrides::default() };
+        let path = place.path().join("scene.yaml");
+        let report = batch::render_batch(&path, &overrides, &(), &AtomicBool::new(false)).unwrap();
+        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+        report.scenes[0].notes.iter().filter(|note| note.contains("matte")).cloned().collect::<Vec<_>>()
+    };
+    let left = "- sphere: {name: left, center: [-2, 0, 0], radius: 0.5, material: gold}\n";
+    let own = "material: {diffuse: {}}";
+    let told = "CryptoMaterial: the name `gold` is that of a material and of a shape: they are one matte";
+    assert_eq!(notes(&format!("shapes:\n{left}- sphere: {{name: gold, radius: 0.5, {own}}}\n")), [told]);
+    // The shape has that very material; or the one that is called like another has no shape.
+    assert!(notes(&format!("shapes:\n{left}- sphere: {{name: gold, radius: 0.5, material: gold}}\n")).is_empty());
+    assert!(notes(&format!("shapes:\n- sphere: {{name: gold, radius: 0.5, {own}}}\n")).is_empty());
+    let asset =
+        format!("assets: {{toy: [left]}}\nshapes:\n{left}- sphere: {{name: toy, radius: 0.5, material: gold}}\n");
+    let told = "CryptoAsset: the name `toy` is that of a shape and of an asset: they are one matte";
+    assert_eq!(notes(&asset), [told]);
+    let groups = format!(
+        "groups: {{oak: [sphere: {{name: leaf, radius: 0.2, {own}}}], fir: [sphere: {{name: leaf, radius: 0.1, {own}}}]}}\n\
+         shapes:\n- instance: {{name: a, group: oak}}\n- instance: {{name: fir, group: fir}}\n- sphere: {{name: oak, radius: 0.1, {own}}}\n"
+    );
+    let told = [
+        "CryptoMaterial: the name `leaf` is that of a shape of the group `fir` and of a shape of the group `oak`: they are one matte",
+        "CryptoAsset: the name `oak` is that of a group and of a shape: they are one matte",
+    ];
+    assert_eq!(notes(&groups), told);
+}
