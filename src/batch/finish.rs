@@ -7,8 +7,8 @@ use super::frame::{self, Frame};
 use super::header::attributes;
 use super::prepare::{Prepared, colour_space, filter, window};
 use super::report::{Developed, SceneReport};
-use super::{contact, develop, layers};
-use crate::description::{self, LayerContent, MaterialRef, Output, SceneDescription, Shutter};
+use super::{contact, develop, layers, mattes};
+use crate::description::{self, LayerContent, Output, Shutter};
 use crate::error::Result;
 use crate::film::Window;
 use crate::film::accumulate::PixelCells;
@@ -18,13 +18,11 @@ use crate::film::heat;
 use crate::film::layers::{Kept, Layout};
 use crate::film::png::{self, PngSettings};
 use crate::film::resolve::Image;
-use crate::scene::Scene;
 use crate::scene::camera::{Camera, Projection};
 use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Channel, Holds};
 use crate::transport::plan::{Effect, Integrator};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -160,7 +158,7 @@ impl Finish {
             techniques: plan.techniques.clone(),
             lit: plan.lit,
             wavelengths: scene.wavelengths.describe().to_owned(),
-            notes: scene.notes.iter().cloned().chain(note).chain(shared_names(description)).collect(),
+            notes: scene.notes.iter().cloned().chain(note).chain(mattes::shared_names(description)).collect(),
             world_to_camera: finite(scene.camera.camera_from_world()),
             world_to_ndc: finite(scene.camera.ndc_from_world()),
             white,
@@ -176,7 +174,7 @@ impl Finish {
             kept: plan.layers.kept,
             variance: asked(&LayerContent::Variance),
             sample_count: asked(&LayerContent::SampleCount),
-            mattes: mattes(description, scene),
+            mattes: mattes::mattes(description, scene),
             lens: Lens::of(&scene.camera, description.camera.shutter.as_ref()),
         }
     }
@@ -259,74 +257,6 @@ pub fn base(output: &description::Output, bands: bool) -> exr::Base {
 /// A matrix all whose numbers f32 can hold: JSON has no others.
 fn finite(matrix: [f32; 16]) -> Option<[f32; 16]> {
     Some(matrix).filter(|matrix| matrix.iter().all(|x| x.is_finite()))
-}
-
-/// The mattes that are asked for, with the names of what the scene's objects are part of.
-fn mattes(description: &SceneDescription, scene: &Scene) -> Vec<Matte> {
-    let asset = |i: usize| {
-        let own = &scene.objects[i].name;
-        let named = description.assets.iter().find(|(_, shapes)| shapes.contains(own)).map(|(asset, _)| asset.as_str());
-        let group = || description.shapes.get(i).and_then(|shape| shape.geometry.group());
-        named.or_else(group).unwrap_or(own).to_owned()
-    };
-    let wanted = description.layers.iter().filter_map(|layer| match layer.content {
-        LayerContent::Matte(matte) => Some(matte),
-        _ => None,
-    });
-    let matte = |matte: description::Matte| Matte {
-        layer: matte.layer().to_owned(),
-        of_parts: matte == description::Matte::Material,
-        names: match matte {
-            description::Matte::Object => scene.objects.iter().map(|object| object.name.clone()).collect(),
-            description::Matte::Material => scene.material_names.clone(),
-            description::Matte::Asset => (0..scene.objects.len()).map(asset).collect(),
-        },
-    };
-    wanted.map(matte).collect()
-}
-
-/// Notes on names that mean two things in one matte, which goes by names alone.
-fn shared_names(description: &SceneDescription) -> Vec<String> {
-    let SceneDescription { shapes, groups, assets, .. } = description;
-    let named = || shapes.iter().enumerate().map(|(i, shape)| (shape, shape.name_or_kind(i)));
-    let children = || groups.iter().flat_map(|(group, shapes)| shapes.iter().map(move |shape| (group, shape)));
-    let mut told = Vec::new();
-    for layer in &description.layers {
-        let LayerContent::Matte(matte) = layer.content else { continue };
-        let mut meanings: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-        let mut means = |name: &str, what: &str| {
-            meanings.entry(name.to_owned()).or_default().insert(what.to_owned());
-        };
-        match matte {
-            description::Matte::Object => {}
-            description::Matte::Material => {
-                let own = named().map(|(shape, name)| (shape, name, "a shape".to_owned()));
-                let of_child = children().filter_map(|(group, shape)| {
-                    Some((shape, shape.name.clone()?, format!("a shape of the group `{group}`")))
-                });
-                for (shape, name, what) in own.chain(of_child) {
-                    match &shape.material {
-                        MaterialRef::Name(material) => means(material, "a material"),
-                        MaterialRef::Inline(_) => means(&name, &what),
-                    }
-                }
-            }
-            description::Matte::Asset => {
-                for (shape, name) in named() {
-                    match (assets.iter().find(|(_, shapes)| shapes.contains(&name)), shape.geometry.group()) {
-                        (Some((asset, _)), _) => means(asset, "an asset"),
-                        (None, Some(group)) => means(group, "a group"),
-                        (None, None) => means(&name, "a shape"),
-                    }
-                }
-            }
-        }
-        for (name, what) in meanings.into_iter().filter(|(_, what)| what.len() > 1) {
-            let what = Vec::from_iter(what).join(" and of ");
-            told.push(format!("{}: the name `{name}` is that of {what}: they are one matte", matte.layer()));
-        }
-    }
-    told
 }
 
 /// The name of an integrator.

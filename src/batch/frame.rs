@@ -23,7 +23,7 @@ use crate::transport::layers::Source;
 use crate::transport::merge::Collection;
 use crate::transport::middle;
 use crate::transport::plan::{EffectPlan, Integrator};
-use crate::transport::{PixelSample, Samples, Shot, moment};
+use crate::transport::{PixelSample, Samples, Shot, moment, scene_at};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Mutex;
@@ -281,10 +281,8 @@ fn render_run(
     // Those that are rendered together see one moment.
     let together = if moments.is_empty() { Octet::SAMPLES } else { 1 };
     for octet in samples.chunks(together) {
-        let scene = match (moments, octet) {
-            ([_, ..], &[(stream, i)]) => &moments[moment(shot.seed, address, stream, i, moments.len())],
-            _ => shot.scene,
-        };
+        let (stream, i) = octet[0];
+        let scene = scene_at(shot.scene, moments, |count| moment(shot.seed, address, stream, i, count));
         memory.render(&Shot { scene, ..*shot }, address, octet, |lane, sample, values, covered| {
             if let Some(number) = covered {
                 let pixels = tile.window().pixels();

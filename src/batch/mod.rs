@@ -14,6 +14,7 @@ pub mod finish;
 pub mod frame;
 mod header;
 mod layers;
+mod mattes;
 pub mod merge;
 pub mod motion;
 pub mod names;

@@ -345,16 +345,12 @@ impl FilterSampler {
     /// The sample at `u` in [0, 1)². Increases with `u` along each axis, so stratified numbers stay stratified.
     #[must_use]
     pub fn sample(&self, u: DVec2) -> FilterSample {
-        match &self.axis {
-            Axis::Box => FilterSample { offset: u - 0.5, weight: 1.0 },
-            Axis::Tent(radius) => FilterSample { offset: DVec2::new(tent(u.x), tent(u.y)) * *radius, weight: 1.0 },
-            Axis::Table(table) => {
-                let (x, x_negative) = table.sample(u.x);
-                let (y, y_negative) = table.sample(u.y);
-                let weight = if x_negative == y_negative { table.weight } else { -table.weight };
-                FilterSample { offset: DVec2::new(x, y), weight }
-            }
-        }
+        let [(x, x_negative), (y, y_negative)] = [u.x, u.y].map(|u| self.axis.at(u));
+        let weight = match &self.axis {
+            Axis::Box | Axis::Tent(_) => 1.0,
+            Axis::Table(table) => table.weight,
+        };
+        FilterSample { offset: DVec2::new(x, y), weight: if x_negative == y_negative { weight } else { -weight } }
     }
 }
 

@@ -320,6 +320,19 @@ impl Bsdf<'_> {
         }
     }
 
+    /// The colour of a diffuse base, or the base colour; `None` of what has neither.
+    #[must_use]
+    pub fn base(&self) -> Option<Lanes> {
+        match self {
+            Bsdf::Diffuse { reflectance } => Some(*reflectance),
+            Bsdf::Plastic(plastic) => Some(plastic.base.reflectance),
+            Bsdf::RoughPlastic(plastic) => Some(plastic.base.reflectance),
+            Bsdf::Principled(surface) => Some(surface.base),
+            Bsdf::PrincipledThin(sheet) => Some(sheet.base),
+            _ => None,
+        }
+    }
+
     /// The colour of the surface whatever its roughness, each lane from 0 to 1: of what has a diffuse base or a base colour that
     /// one; of metal, mirrors and what is clear the light along the normal that is not absorbed, reflected and transmitted; of hair
     /// that toward `wo`.
@@ -331,12 +344,11 @@ impl Bsdf<'_> {
             let reflected = glass.lanes(&[1.0; LANES]).reflected;
             clear(Lanes::new(reflected.map(|r| r as f32)), &glass.tint)
         };
+        if let Some(base) = self.base() {
+            return base;
+        }
         match self {
-            Bsdf::Diffuse { reflectance } | Bsdf::Mirror { reflectance } => *reflectance,
-            Bsdf::Plastic(plastic) => plastic.base.reflectance,
-            Bsdf::RoughPlastic(plastic) => plastic.base.reflectance,
-            Bsdf::Principled(surface) => surface.base,
-            Bsdf::PrincipledThin(sheet) => sheet.base,
+            Bsdf::Mirror { reflectance } => *reflectance,
             Bsdf::Conductor(metal) | Bsdf::RoughConductor(metal, _) => metal.reflectance(1.0),
             Bsdf::Dielectric(glass) => interface(glass),
             Bsdf::RoughDielectric(RoughDielectric { eta, tint, film, .. }) => {
@@ -347,7 +359,8 @@ impl Bsdf<'_> {
                 clear(pane.reflected * (1.0 - pane.share) as f32, tint)
             }
             Bsdf::Hair(hair) => hair.reflectance(wo),
-            Bsdf::Null => Lanes::ONE,
+            // A boundary; all others have a base.
+            _ => Lanes::ONE,
         }
     }
 

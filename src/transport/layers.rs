@@ -9,7 +9,6 @@ use super::ways::{Ledger, Way, Ways};
 use crate::film::accumulate::{Invalid, SAMPLE_LIMIT};
 use crate::film::layers::{Kept, Layout};
 use crate::math::{Frame, Ray};
-use crate::optics::bsdf::Bsdf;
 use crate::scene::compound::{Composition, Vertex, share};
 use crate::scene::material::Material;
 use crate::scene::watch::Counts;
@@ -40,7 +39,7 @@ pub enum Quantity {
     DuvDx,
     /// The same downward.
     DuvDy,
-    /// Colour of the material, in the colour space of the file: of what is seen [`Bsdf::albedo`] in daylight; of what is met
+    /// Colour of the material, in the colour space of the file: of what is seen [`Bsdf::albedo`](crate::optics::bsdf::Bsdf::albedo) in daylight; of what is met
     /// that of a diffuse base in light of equal energy, else π f for light along the normal.
     Albedo,
     /// Number of the triangle or face, from 0.
@@ -556,18 +555,9 @@ impl First {
         let bsdf = material.bsdf(&self.hit.texture_point(surface), nm, plan.all_dispersive);
         let frame = Frame::from_normal_and_tangent(surface.shading_normal, surface.tangent);
         let mut wo = frame.to_local(-ray.direction);
-        match &bsdf {
+        match bsdf.base() {
             // Mitsuba's stand-in where nothing is diffuse, as if all light came along the normal: a highlight.
-            Bsdf::Mirror { .. }
-            | Bsdf::Conductor(_)
-            | Bsdf::RoughConductor(..)
-            | Bsdf::Dielectric(_)
-            | Bsdf::RoughDielectric(_)
-            | Bsdf::Thin { .. }
-            | Bsdf::Hair(_)
-            | Bsdf::Null
-                if self.normal.is_none() =>
-            {
+            None if self.normal.is_none() => {
                 if material.two_sided {
                     wo.z = wo.z.abs();
                 }

@@ -9,23 +9,23 @@
 //! Found are paths L … D E: what a smooth mirror or glass shows cannot be found, and is black. Light that the camera sees
 //! itself, L E, is the camera's part (`path` of one segment). Wavelengths are carried as in [`path`].
 
+mod connect;
 mod packet;
 mod views;
 
 use self::views::{Place, View};
 use super::caustics::{Caustics, Target};
 use super::merge::WavelengthCell;
-use super::moment_at;
 use super::path::{self, seen_normal};
 use super::photons::{Alone, Photon, Photons, Together};
 use super::plan::{EffectPlan, LightSettings};
-use super::shadow::{MAX_BOUNDARIES, Shadow};
+use super::shadow::MAX_BOUNDARIES;
+use super::{moment_at, scene_at};
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::optics::bsdf::{Bsdf, BsdfSample, Chosen};
-use crate::scene::camera::Entry;
 use crate::scene::compound::{Compound, Leaf, below};
-use crate::scene::light::free;
+use crate::scene::light::Light;
 use crate::scene::material::Kind;
 use crate::scene::nested::{Bodies, Crossing as Meeting};
 use crate::scene::{Hit, Inside, Medium, Scene, SurfacePoint};
@@ -123,25 +123,17 @@ pub fn trace(
     let sampler = Sampler::new(paths.seed ^ STREAM, [(index >> 32) as u32, 0], replicate, index as u32);
     let (u_choice, u_time) = pairs(sampler.set(Set::Camera));
     let (u_point, u_direction) = pairs(sampler.set(Set::Extra(0)));
-    let at_moment;
-    let paths = match paths.moments {
-        [] => paths,
-        moments => {
-            at_moment = LightPaths { scene: &moments[moment_at(u_time.y, moments.len())], ..*paths };
-            &at_moment
-        }
-    };
-    let scene = paths.scene;
+    let scene = scene_at(paths.scene, paths.moments, |count| moment_at(u_time.y, count));
+    let paths = &LightPaths { scene, ..*paths };
     let wavelengths = scene.wavelengths.sample(paths.wavelength.map_or(u_time.x, |cell| cell.at(u_time.x)));
     let mut traced = Traced { wavelengths: Some(wavelengths), ..Traced::default() };
-    let (mut target, mut group, mut without_extent) = (Target::Own, 0, false);
+    let (mut target, mut group) = (Target::Own, 0);
     let emission = match paths.caustics {
         None => scene.emit(u_choice.x, u_point, u_direction, wavelengths.nm),
         Some(caustics) => caustics.begin(scene, u_choice.x, u_point, u_direction, wavelengths.nm).map(|aimed| {
             traced.began = Some((aimed.source, aimed.cell));
             target = aimed.target;
-            let light = aimed.emission.light as usize;
-            (group, without_extent) = (scene.light_groups.of[light], !scene.lights[light].may_be_met());
+            group = scene.light_groups.of[aimed.emission.light as usize];
             aimed.emission
         }),
     };
@@ -159,9 +151,8 @@ pub fn trace(
         photons,
         target,
         group,
-        without_extent,
+        lamp: Some(&scene.lights[emission.light as usize]),
         unfound: false,
-        distant: scene.lights[emission.light as usize].is_distant(),
         rays: 0,
         ahead: None,
     };
@@ -201,9 +192,8 @@ pub(super) fn seen_in_sharp(
         photons: Some(&mut seen),
         target: Target::Own,
         group: 0,
-        without_extent: false,
+        lamp: None,
         unfound: false,
-        distant: false,
         rays: 0,
         ahead: None,
     };
@@ -303,12 +293,10 @@ struct Walk<'a, 'b> {
     target: Target,
     /// The group of the lamp.
     group: u8,
-    /// Whether the lamp has no extent.
-    without_extent: bool,
+    /// The lamp; none of a walk that begins at the camera.
+    lamp: Option<&'a Light>,
     /// As [`Traced::unfound`].
     unfound: bool,
-    /// Whether the lamp is at infinity.
-    distant: bool,
     rays: u32,
     /// What the beam that is to be followed meets next, where that is known.
     ahead: Option<Hit>,
@@ -347,6 +335,11 @@ impl<'a> Walk<'a, '_> {
         self.paths.settings.hide_emitters && self.paths.caustics.is_some()
     }
 
+    /// Whether no ray meets the lamp.
+    fn is_without_extent(&self) -> bool {
+        self.lamp.is_some_and(|lamp| !lamp.may_be_met())
+    }
+
     fn follow(&mut self, mut beam: Beam) {
         let LightPaths { scene, plan, caustics, .. } = *self.paths;
         loop {
@@ -382,7 +375,8 @@ impl<'a> Walk<'a, '_> {
             let sharp = caustics.is_some_and(|c| c.is_sharp(hit.object));
             // What else is next to a lamp without extent counts as far as it throws light in a single direction.
             let in_part = vertex == 0 && caustics.is_some() && !sharp;
-            if vertex == 0 && caustics.is_some_and(|c| !c.begins_at(self.target, hit.object, self.without_extent)) {
+            if vertex == 0 && caustics.is_some_and(|c| !c.begins_at(self.target, hit.object, self.is_without_extent()))
+            {
                 return;
             }
             let (material, part_of) = match &part {
@@ -460,7 +454,7 @@ impl<'a> Walk<'a, '_> {
 
     /// Notes that a beam is thrown in a single direction.
     fn throw(&mut self, beam: &mut Beam) {
-        if beam.vertex == 0 && self.without_extent {
+        if beam.vertex == 0 && self.is_without_extent() {
             (beam.unfound, self.unfound) = (true, true);
         }
     }
@@ -577,7 +571,7 @@ impl<'a> Walk<'a, '_> {
                     scene.inside(beam.bodies, before).medium
                 });
                 if beam.medium.is_none()
-                    && self.distant
+                    && self.lamp.is_some_and(Light::is_distant)
                     && let Some(medium) = known
                 {
                     beam.power *= self.arrived(beam, &scene.media[medium as usize]);
@@ -657,79 +651,6 @@ impl<'a> Walk<'a, '_> {
                 photons.alone.push(Photon { point, came, normal, light, vertices, group });
             }
         }
-    }
-
-    /// Light that a surface sends into the camera.
-    fn connect(&mut self, beam: &Beam, bsdf: &Bsdf, at: &Place, view: &View, u_lens: DVec2) {
-        let scene = self.paths.scene;
-        let object = &scene.objects[at.hit.object as usize];
-        if object.is_lamp && self.hides_lamps() {
-            return;
-        }
-        let Some(entry) = scene.camera.entry(at.surface.point, || u_lens) else { return };
-        if !self.paths.bounds.holds(entry.pixel) {
-            return;
-        }
-        let view = if at.is_plain() { *view } else { at.seen_from(entry.direction) };
-        let [local, to_camera] = [at.came, entry.direction].map(|direction| view.frame.to_local(direction));
-        let (came, went) = (at.came.dot(at.surface.normal), entry.direction.dot(at.surface.normal));
-        if came * local.z * went * to_camera.z <= 0.0 {
-            return;
-        }
-        // The viewer is at the camera: f as radiance has it.
-        let f = bsdf.eval(to_camera, local).f;
-        if f.simd_eq(Lanes::ZERO).all() {
-            return;
-        }
-        let cosines = to_camera.z.abs() * adjoint(local.z, to_camera.z, came, went);
-        let before = beam.inside();
-        let inside = if came * went < 0.0 { scene.beyond(object, at.surface, entry.direction, before) } else { before };
-        let ray = scene.leave(at.surface, at.hit, entry.direction);
-        let light = f * (view.shadowing * (cosines * entry.density) as f32);
-        let distance = free(entry.distance, None, at.surface.point, &ray);
-        self.send(beam, at.surface.point, &ray, inside, &Entry { distance, ..entry }, light);
-    }
-
-    /// Light that a point of a medium sends into the camera.
-    fn connect_medium(&mut self, beam: &Beam, point: DVec3, medium: &Medium, u_lens: DVec2) {
-        let Some(entry) = self.paths.scene.camera.entry(point, || u_lens) else { return };
-        if !self.paths.bounds.holds(entry.pixel) {
-            return;
-        }
-        let f = medium.phase.eval(point, -beam.ray.direction, entry.direction);
-        let light = Lanes::splat((f * entry.density) as f32);
-        self.send(beam, point, &Ray::new(point, entry.direction), beam.inside(), &entry, light);
-    }
-
-    /// Splats the light of a beam that is scattered by `light` into the camera, as far as it gets there.
-    fn send(&mut self, beam: &Beam, point: DVec3, ray: &Ray, inside: Inside, entry: &Entry, light: Lanes) {
-        let Some(through) = self.open(ray, entry.distance, inside, beam) else { return };
-        let share = LANES as f32 / beam.rho.reduce_add();
-        let light = beam.only(beam.power * light * through * share) * self.clear(point);
-        (self.splat)(self.wavelengths, Splat { place: entry.pixel, light, alone: beam.alone, group: self.group });
-    }
-
-    /// What depth fog leaves of light from a point.
-    fn clear(&self, point: DVec3) -> f32 {
-        let fog = self.paths.scene.fog.as_ref().filter(|_| self.paths.plan.depth_fog);
-        fog.map_or(1.0, |fog| 1.0 - fog.falloff.amount(self.paths.scene.camera.depth(point)) as f32)
-    }
-
-    /// The share of light that comes straight on to the camera at `distance`; `None` where something opaque stands
-    /// between.
-    fn open(&mut self, ray: &Ray, distance: f64, inside: Inside, beam: &Beam) -> Option<Lanes> {
-        let LightPaths { scene, plan, settings, .. } = *self.paths;
-        self.rays += 1;
-        let (sampler, nm, vertex) = (self.sampler, beam.nm, beam.vertex + 1);
-        let panes = match settings.max_depth {
-            Some(depth) if settings.count_crossings => depth.saturating_sub(beam.events() + 2).min(MAX_BOUNDARIES),
-            _ => MAX_BOUNDARIES,
-        };
-        let past_lamps = self.hides_lamps();
-        let shadow = Shadow { scene, sampler, nm, vertex, inside, panes, target: None, past_lamps };
-        let tracked = plan.media || plan.nested;
-        let came = if tracked { shadow.cast::<true>(ray, distance) } else { shadow.cast::<false>(ray, distance) };
-        came.map(|(through, _)| through)
     }
 }
 

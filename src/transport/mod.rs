@@ -95,8 +95,13 @@ pub struct Shot<'a> {
 impl<'a> Shot<'a> {
     /// Depth fog, where there is some.
     fn fog(&self) -> Option<&'a DepthFog> {
-        self.scene.fog.as_ref().filter(|_| self.plan.depth_fog)
+        depth_fog(self.scene, self.plan)
     }
+}
+
+/// Depth fog of a scene, where there is some.
+fn depth_fog<'a>(scene: &'a Scene, plan: &EffectPlan) -> Option<&'a DepthFog> {
+    scene.fog.as_ref().filter(|_| plan.depth_fog)
 }
 
 /// Where the random numbers of a sample come from.
@@ -118,6 +123,12 @@ impl Address {
 #[must_use]
 pub fn moment(seed: u64, pixel: [u32; 2], replicate: u32, index: u32, moments: usize) -> usize {
     moment_at(pairs(Sampler::new(seed, pixel, replicate, index).set(Set::Camera)).1.y, moments)
+}
+
+/// What is seen of a scene: one of its `moments` while the shutter is open, `which` of so many; itself where nothing is blurred.
+#[must_use]
+pub fn scene_at<'a>(scene: &'a Scene, moments: &'a [Scene], which: impl FnOnce(usize) -> usize) -> &'a Scene {
+    if moments.is_empty() { scene } else { &moments[which(moments.len())] }
 }
 
 /// Which of `moments` is at `u` of [0, 1).

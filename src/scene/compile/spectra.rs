@@ -96,13 +96,17 @@ impl Compiler<'_> {
             let (faults, unread) = (self.faults.len(), self.unread.is_some());
             let response = self.written_spectrum(&at, &band.response, Outside::Zero, Role::Coefficient);
             let told = self.faults.len() > faults || self.unread.is_some() && !unread;
-            if told {
-                // Once is enough.
-            } else if response.is_black() {
-                self.fault(&at, "expected a response within 360 to 830 nm, found none");
-            } else if let Some([from, to]) = beyond_the_band(&band.response) {
-                let expected = "expected a response that is 0 beyond 360 and 830 nm, where no light is simulated";
-                self.fault(&at, format!("{expected}, found more between {from} and {to} nm"));
+            let fault = match beyond_the_band(&band.response) {
+                _ if told => None,
+                _ if response.is_black() => Some("expected a response within 360 to 830 nm, found none".to_owned()),
+                beyond => beyond.map(|[from, to]| {
+                    format!(
+                        "expected a response that is 0 beyond 360 and 830 nm, where no light is simulated, found more between {from} and {to} nm"
+                    )
+                }),
+            };
+            if let Some(fault) = fault {
+                self.fault(&at, fault);
             }
             all.push(Band { name: band.name.clone(), response });
         }

@@ -108,6 +108,7 @@ impl Tracer<'_> {
             return;
         }
         let ray = leave(light.wi);
+        let distance = free(light.distance, light.target, point, &ray);
         let traced = self.leaves(path, i as u32);
         let value = f * light.radiance;
         let led = if CHROMATIC { path.rho * pdf } else { pdf };
@@ -125,7 +126,6 @@ impl Tracer<'_> {
             && !scene.has_boundaries
         {
             let light_found = path.share_of::<CHROMATIC>(value, weight(None));
-            let distance = free(light.distance, light.target, point, &ray);
             *later = Some(Asked { ray, distance, target: light.target, light: light_found, traced });
             return;
         }
@@ -139,10 +139,7 @@ impl Tracer<'_> {
             target: light.target,
             past_lamps: false,
         };
-        let Some((through, passing)) = shadow.cast::<MEDIA>(&ray, free(light.distance, light.target, point, &ray))
-        else {
-            return;
-        };
+        let Some((through, passing)) = shadow.cast::<MEDIA>(&ray, distance) else { return };
         let weight = weight(Some(passing));
         if traced {
             path.leave_out::<CHROMATIC>(value * through, weight);

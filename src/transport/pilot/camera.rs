@@ -4,7 +4,7 @@ use super::BLOCKS;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::Scene;
 use crate::spectrum::{ColourSpace, Lanes, observer};
-use crate::transport::{Shot, moment, place_in, probe};
+use crate::transport::{Shot, moment, place_in, probe, scene_at};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -73,10 +73,7 @@ pub(super) fn from_camera(shot: &Shot, moments: &[Scene], (pixels, each): (u32, 
         let mut shown = Shown::default();
         let share = 1.0 / each as f32;
         for index in 0..each {
-            let scene = match moments {
-                [] => shot.scene,
-                moments => &moments[moment(shot.seed, pixel, replicate, index, moments.len())],
-            };
+            let scene = scene_at(shot.scene, moments, |count| moment(shot.seed, pixel, replicate, index, count));
             let (light, wavelengths) = probe(&Shot { scene, ..*shot }, pixel, replicate, index);
             let colour = |light: Lanes| Colour::of(observer::xyz(light * share, &wavelengths));
             let left = colour(light.left);

@@ -4,7 +4,7 @@ use super::super::caustics::Caustics;
 use super::super::light::{Bounds, LightPaths, seen_in_sharp};
 use super::super::photons::{Photon, PhotonMap, Photons, Together};
 use super::super::plan::EffectPlan;
-use super::super::{moment_at, place_in};
+use super::super::{moment_at, place_in, scene_at};
 use super::camera::Colour;
 use super::{BLOCKS, PIXELS, STREAM, Trial};
 use crate::math::sampler::{Sampler, Set, pairs};
@@ -58,10 +58,7 @@ impl Seen {
         let look = |block: usize, n: u32| {
             let sampler = Sampler::new(seed ^ STREAM, [block as u32, n], 1, 0);
             let (u_place, u) = pairs(sampler.set(Set::Camera));
-            let scene = match moments {
-                [] => scene,
-                moments => &moments[moment_at(u.y, moments.len())],
-            };
+            let scene = scene_at(scene, moments, |count| moment_at(u.y, count));
             let paths = LightPaths { scene, ..paths };
             let place = place_in(scene, BLOCKS, block, u_place);
             let ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);

@@ -153,11 +153,11 @@ impl<'a> Export<'a> {
 
     /// Says which light Mitsuba's integrators do not know.
     fn missing_light(&mut self) {
-        let mut shapes = self.scene.shapes.iter().chain(self.scene.groups.values().flatten());
+        let shapes = || self.scene.shapes.iter().chain(self.scene.groups.values().flatten());
         let path = match &self.scene.integrator {
             Integrator::Path(path) => path,
             Integrator::LightTracer(tracer) => {
-                let open = shapes.any(|shape| self.is_open(&shape.material));
+                let open = shapes().any(|shape| self.is_open(&shape.material));
                 if open && tracer.max_depth.is_some() && !tracer.count_crossings {
                     let what = "shorter paths where panes, masks and boundaries end a segment";
                     self.lose("integrator.light_tracer.count_crossings", what);
@@ -171,13 +171,11 @@ impl<'a> Export<'a> {
         if !path.opaque_sky && !path.hide_emitters && self.scene.lights.iter().any(around) {
             self.lose("integrator.path.opaque_sky", "an alpha of 1 where light from infinity is seen");
         }
-        let mut shapes = self.scene.shapes.iter().chain(self.scene.groups.values().flatten());
-        if path.coverage == Coverage::Surfaces && shapes.any(|shape| self.is_pane(&shape.material)) {
+        if path.coverage == Coverage::Surfaces && shapes().any(|shape| self.is_pane(&shape.material)) {
             self.lose("integrator.path.coverage", "the alpha of what is behind them where light goes through panes");
         }
         let traced = path.delta_caustics && self.scene.render.techniques.light_tracing != Technique::Off;
-        let mut shapes = self.scene.shapes.iter().chain(self.scene.groups.values().flatten());
-        let throws = shapes.any(|shape| self.is_single(&shape.material));
+        let throws = shapes().any(|shape| self.is_single(&shape.material));
         if traced && throws && self.scene.lights.iter().any(delta) {
             self.lose(
                 "integrator.path.delta_caustics",

@@ -1,0 +1,79 @@
+//! Which names the mattes of a picture go by.
+
+use crate::description::{self, LayerContent, MaterialRef, SceneDescription, Shape};
+use crate::film::cryptomatte::Matte;
+use crate::scene::Scene;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The mattes that are asked for, with the names of what the scene's objects are part of.
+pub(super) fn mattes(description: &SceneDescription, scene: &Scene) -> Vec<Matte> {
+    let wanted = description.layers.iter().filter_map(|layer| match layer.content {
+        LayerContent::Matte(matte) => Some(matte),
+        _ => None,
+    });
+    let matte = |matte: description::Matte| Matte {
+        layer: matte.layer().to_owned(),
+        of_parts: matte == description::Matte::Material,
+        names: match matte {
+            description::Matte::Object => scene.objects.iter().map(|object| object.name.clone()).collect(),
+            description::Matte::Material => scene.material_names.clone(),
+            description::Matte::Asset => {
+                let shapes = description.shapes.iter().map(Some).chain(std::iter::repeat(None));
+                let objects = scene.objects.iter().zip(shapes);
+                objects.map(|(object, shape)| asset(description, &object.name, shape).0.to_owned()).collect()
+            }
+        },
+    };
+    wanted.map(matte).collect()
+}
+
+/// What the object `name` is part of, and what that is: an asset, else the group that its `shape` copies, else itself.
+fn asset<'a>(description: &'a SceneDescription, name: &'a str, shape: Option<&'a Shape>) -> (&'a str, &'static str) {
+    let named = description.assets.iter().find(|(_, shapes)| shapes.iter().any(|shape| shape == name));
+    match (named, shape.and_then(|shape| shape.geometry.group())) {
+        (Some((asset, _)), _) => (asset, "an asset"),
+        (None, Some(group)) => (group, "a group"),
+        (None, None) => (name, "a shape"),
+    }
+}
+
+/// Notes on names that mean two things in one matte, which goes by names alone.
+pub(super) fn shared_names(description: &SceneDescription) -> Vec<String> {
+    let SceneDescription { shapes, groups, .. } = description;
+    let named = || shapes.iter().enumerate().map(|(i, shape)| (shape, shape.name_or_kind(i)));
+    let children = || groups.iter().flat_map(|(group, shapes)| shapes.iter().map(move |shape| (group, shape)));
+    let mut told = Vec::new();
+    for layer in &description.layers {
+        let LayerContent::Matte(matte) = layer.content else { continue };
+        let mut meanings: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        let mut means = |name: &str, what: &str| {
+            meanings.entry(name.to_owned()).or_default().insert(what.to_owned());
+        };
+        match matte {
+            description::Matte::Object => {}
+            description::Matte::Material => {
+                let own = named().map(|(shape, name)| (shape, name, "a shape".to_owned()));
+                let of_child = children().filter_map(|(group, shape)| {
+                    Some((shape, shape.name.clone()?, format!("a shape of the group `{group}`")))
+                });
+                for (shape, name, what) in own.chain(of_child) {
+                    match &shape.material {
+                        MaterialRef::Name(material) => means(material, "a material"),
+                        MaterialRef::Inline(_) => means(&name, &what),
+                    }
+                }
+            }
+            description::Matte::Asset => {
+                for (shape, name) in named() {
+                    let (asset, what) = asset(description, &name, Some(shape));
+                    means(asset, what);
+                }
+            }
+        }
+        for (name, what) in meanings.into_iter().filter(|(_, what)| what.len() > 1) {
+            let what = Vec::from_iter(what).join(" and of ");
+            told.push(format!("{}: the name `{name}` is that of {what}: they are one matte", matte.layer()));
+        }
+    }
+    told
+}
