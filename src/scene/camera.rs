@@ -147,6 +147,20 @@ impl Camera {
         self.view.near
     }
 
+    /// Where it looks: the axis, unit.
+    #[must_use]
+    pub fn forward(&self) -> DVec3 {
+        self.view.unit_axis
+    }
+
+    /// The same camera, moved by `step`, metres.
+    #[must_use]
+    pub fn moved(&self, step: DVec3) -> Camera {
+        let Camera { mut world_from_camera, projection, resolution, lens, clip, principal_point, .. } = *self;
+        world_from_camera.translation += step;
+        Camera::new(world_from_camera, projection, resolution, lens, clip, principal_point)
+    }
+
     /// Where the camera stands and looks; `None` where `target` is `origin` or `up` is along the view.
     #[must_use]
     pub fn look_at(origin: DVec3, target: DVec3, up: DVec3) -> Option<DAffine3> {

@@ -330,7 +330,7 @@ impl<'a> Compiler<'a> {
                 }
             },
         });
-        let shines_on_rays = lights.iter().any(|light| light.is_environment() || matches!(light, Light::Area { .. }));
+        let shines_on_rays = lights.iter().any(Light::may_be_met);
         let is_large = |light: &Light| matches!(light, Light::Environment(map) if map.is_large());
         let large_sky = lights.iter().position(is_large).map(|i| i as u32);
         let lets_through = |o: &Object| o.body != 0 || self.materials[o.material as usize].lets_through();
@@ -371,6 +371,7 @@ impl<'a> Compiler<'a> {
             notes: self.told_notes(),
             watch: None,
         };
+        self.note_beside(&mut scene, &light_names);
         scene.light_exponent = scene.film_exponent(&powers);
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         self.note_overlaps(&mut scene);

@@ -7,6 +7,7 @@
 pub mod ahead;
 pub mod along_normal;
 pub mod bands;
+mod beside;
 mod brightness;
 pub mod bundle;
 pub mod bvh;

@@ -44,6 +44,23 @@ impl Projector {
         Projector { position, axes, half, irradiance, scale: scale as f32 }
     }
 
+    /// Where it stands.
+    #[must_use]
+    pub fn position(&self) -> DVec3 {
+        self.position
+    }
+
+    /// The way it shines, unit.
+    #[must_use]
+    pub fn axis(&self) -> DVec3 {
+        self.axes.z_axis
+    }
+
+    /// Moves it by `step`, metres.
+    pub fn shift(&mut self, step: DVec3) {
+        self.position += step;
+    }
+
     /// Light at `from`.
     ///
     /// An angle θ off the axis the screen one metre away is at a distance of 1 / cos θ and inclined by

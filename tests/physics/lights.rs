@@ -1,7 +1,7 @@
 //! Light on a floor, from every kind of lamp, against the closed form.
 
 use super::LAMP;
-use super::common::{Bench, assert_close, bench, ray, v};
+use super::common::{Bench, assert_close, bench, bench_with, ray, v};
 use std::f64::consts::PI;
 
 /// A floor y = 0 of albedo 0.6 under `lights` and before further `shapes` (lines of a list).
@@ -251,4 +251,108 @@ fn a_shape_that_shines_inward_lights_its_inside_alone() {
         scene.estimate(&ray(v(0.1, 0.2, 0.3), v(0.5, 0.3, -2.0)), 16_384).assert_is(2.0, 5e-3);
         assert_eq!(scene.estimate(&ray(v(3.0, 0.0, 5.0), v(3.0, -5.0, 0.0)), 500).mean, 0.0, "{form}");
     }
+}
+
+/// A lamp hangs exactly on a black ceiling, or the last place before it: the floor is lit as without the ceiling, but for the
+/// step off the surface. A ceiling that rounding lets hide the lamp, for any shape and either integrator, leaves it black or
+/// salted; the corner of a cube has three of them.
+#[test]
+fn lamps_on_surfaces_shine_as_without_them() {
+    const CEILINGS: [&str; 7] = [
+        "rectangle: {corner: [-2, 2, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4], material: black}",
+        "plane: {point: [0, 2, 0], normal: [0, 1, 0], material: black}",
+        "disk: {center: [0, 2, 0], normal: [0.01, 1, 0.02], radius: 1, material: black}",
+        "cube: {center: [1, 3, -1], size: 2, material: black}",
+        "sphere: {center: [0, 3, 0], radius: 1, material: black}",
+        "cylinder: {base: [-1, 2.3, 0], top: [1, 2.3, 0], radius: 0.3, material: black}",
+        "cone: {base: [0, 2, 0.1], apex: [0, 3, 0.1], radius: 0.5, material: black}",
+    ];
+    const LAMPS: [&str; 3] = [
+        "point: {position: [0, Y, 0], intensity: 10}",
+        "spot: {position: [0, Y, 0], target: [0.2, 0, 0.1], cutoff_deg: 50, intensity: 10}",
+        "projector: {origin: [0, Y, 0], target: [0.2, 0, 0.1], up: [1, 0, 0], fov_deg: 60, irradiance: 10}",
+    ];
+    let picture = |integrator: &str, lamp: &str, y: f64, ceiling: &str| {
+        let lamp = lamp.replace('Y', &y.to_string());
+        let scene = format!(
+            "camera: {{origin: [0, 1, 3.5], target: [0, 0.5, 0], fov_deg: 40}}\nimage: {{width: 8, height: 8}}\n\
+             render: {{samples: 16}}\nintegrator: {integrator}\nlights: [{lamp}]\n\
+             materials: {{black: {{diffuse: {{reflectance: 0}}}}}}\nshapes:\n\
+             - plane: {{normal: [0, 1, 0], material: {{diffuse: {{reflectance: 0.6}}}}}}\n{ceiling}\n"
+        );
+        bench_with(&scene, &[]).picture().y
+    };
+    for (integrator, lamps) in [("path", &LAMPS[..]), ("{whitted: {}}", &LAMPS), ("{light_tracer: {}}", &LAMPS[..1])] {
+        for lamp in lamps {
+            for y in [2.0, 2.0 - 2f64.powi(-47)] {
+                let free = picture(integrator, lamp, y, "");
+                for ceiling in CEILINGS {
+                    let found = picture(integrator, lamp, y, &format!("- {ceiling}"));
+                    // What differs is a step of 2⁻³³ of some metres, and the roundings of f32.
+                    let off = |(a, b): (&f64, &f64)| (a - b).abs() / b.max(1e-3);
+                    let worst = found.iter().zip(&free).map(off).fold(0.0, f64::max);
+                    assert!(worst < 1e-5, "{integrator}, {lamp} at {y}, {ceiling}: {worst}");
+                }
+            }
+        }
+    }
+}
+
+/// An eye exactly on the surface of a body: all rays leave at once, and none is in the body that looks away from it; where
+/// it looks inward each sees what the way through the body leaves of a white sky, exp(−d) with d from 4 to 4.5 metres.
+#[test]
+fn an_eye_on_a_surface_stands_beside_it() {
+    let look = |within: &str, eye: &str, body: &str| {
+        let scene = format!(
+            "camera: {{{eye}, fov_deg: 30}}\nimage: {{width: 16, height: 16}}\n\
+             render: {{samples: 4}}\nlights: [{{constant: {{radiance: 1}}}}]\nintegrator: {{path: {{roulette_depth: 1000}}}}\n\
+             media: {{smoke: {{homogeneous: {{absorption: 1}}}}}}\nmaterials: {{glass: {{dielectric: {{ior: 1.5}}}}}}\n\
+             {within}\nshapes:\n{body}\n"
+        );
+        bench_with(&scene, &[]).picture().y
+    };
+    let away = [
+        "sphere: {center: [0, -1, 0], radius: 1, material: glass}",
+        "cube: {center: [0.1, -1, 0.3], size: 2, material: glass}",
+        "cylinder: {base: [-1, -0.3, 0], top: [1, -0.3, 0], radius: 0.3, material: glass}",
+        "cone: {base: [0, 0, 0.1], apex: [0, -1, 0.1], radius: 0.5, material: glass}",
+        "rectangle: {corner: [-2, 0, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4], material: glass}",
+    ];
+    // Out of the way of all that is looked at, so that there is one.
+    const FAR: &str = "- sphere: {center: [0, -9, 0], radius: 1, material: glass}";
+    // Straight up, so that the least of all rays goes up by the sine of 69°.
+    let up = "origin: [0, 0, 0], target: [0, 1, 0.2]";
+    let free = look("", up, FAR);
+    for body in away {
+        assert_eq!(look("", up, &format!("- {body}")), free, "{body}");
+    }
+    let smoke = "- cube: {size: 4, material: {boundary: {}}, inside: smoke, outside: vacuum}";
+    let inward = "origin: [0.1, 0.2, 2], target: [0.1, 0.2, 0]";
+    for (dim, bright) in look("medium: smoke", inward, smoke).iter().zip(look("", inward, FAR)) {
+        // The roundings of f32.
+        let bounds = (-4.5f64).exp()..(-4f64).exp() * (1.0 + 1e-5);
+        assert!(bounds.contains(&(dim / bright)), "{dim} of {bright}");
+    }
+}
+
+/// A black plane through the eye, behind all that it sees, changes nothing about light that is traced into the camera.
+#[test]
+fn a_wall_in_the_plane_of_the_camera_hides_no_caustic() {
+    let scene = |wall: &str| {
+        bench_with(
+            &format!(
+                "camera: {{origin: [0, 1, 3.5], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 16, height: 16}}\n\
+             render: {{samples: 64}}\nlights: [{{point: {{position: [0.5, 2, 0.5], intensity: 10}}}}]\nshapes:\n\
+             - plane: {{normal: [0, 1, 0], material: {{diffuse: {{reflectance: 0.6}}}}}}\n\
+             - sphere: {{center: [0, 0.6, 0], radius: 0.5, material: {{dielectric: {{ior: 1.5}}}}}}\n{wall}\n"
+            ),
+            &[],
+        )
+    };
+    let [free, walled] =
+        ["", "- plane: {point: [0, 0, 3.5], normal: [0, 0, 1], material: {diffuse: {reflectance: 0}}}"].map(scene);
+    for scene in [&free, &walled] {
+        assert!(scene.prepared.plan.caustics.is_some());
+    }
+    walled.picture().mean().assert_agrees(&free.picture().mean(), 0.01);
 }

@@ -26,6 +26,21 @@ impl Compiler<'_> {
         }
     }
 
+    /// Puts the eye and lamps beside the surfaces that they lie on, and says so.
+    pub(super) fn note_beside(&self, scene: &mut Scene, light_names: &[String]) {
+        for (light, object) in scene.put_beside() {
+            let name = &scene.objects[object as usize].name;
+            let note = match light {
+                None => format!("camera: stands on {name}: it sees from the side to which it looks"),
+                Some(i) => format!(
+                    "lamp {} lies on {name}: it shines from the side that it is aimed at, or that is seen",
+                    light_names[i]
+                ),
+            };
+            scene.notes.push(note);
+        }
+    }
+
     /// Why an object of this form cannot be a body with a priority, if its material asks for one.
     pub(super) fn unfit_for_a_body(
         &self,
