@@ -18,13 +18,11 @@
 //! Both tests want pixels that are independent: a box filter, or filters by importance sampling. Light that is dealt to all
 //! pixels which a filter covers is not; a file says by how much more the sum of its pixels varies ([`SHARED_ERRORS`]).
 
+mod channels;
 mod noise;
 
-use crate::film::Window;
-use crate::film::accumulate::REPLICATES;
-use crate::film::exr::{ExrFile, ExrPart, SHARED_ERRORS, Samples, stderr_name};
-use crate::spectrum::colour;
-use noise::Pair;
+use crate::film::exr::{ExrFile, Samples};
+use channels::{not_compared, pairs};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
@@ -274,122 +272,6 @@ fn kept<'a>(samples: Samples<'a>, finite: &'a [bool]) -> impl Iterator<Item = f6
     samples.iter().zip(finite).filter(|(_, keep)| **keep).map(|(v, _)| v)
 }
 
-/// What is to be compared, or why nothing can be.
-fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions<'a>) -> Result<Vec<Pair<'a>>, String> {
-    let (window_a, window_b) = (a.parts[0].window, b.parts[0].window);
-    same_window("data windows", window_a, window_b, options.origin)?;
-    same_window("display windows", a.display, b.display, options.origin)?;
-    let names = compared_names(a, b)?;
-    // X, Y, Z and bands are the same in any primaries.
-    if names.iter().any(|name| ["R", "G", "B"].contains(&name.as_str())) {
-        same_colours(a, b)?;
-    }
-    let variance = match options.sample_variance {
-        None => None,
-        Some((_, 0)) => return Err("a variance per sample needs the number of samples a pixel".to_string()),
-        Some((file, samples)) => {
-            same_window("windows of picture and variance", window_a, file.parts[0].window, Origin::Ignore)?;
-            Some((file, samples))
-        }
-    };
-    let mut pairs = Vec::new();
-    for name in names {
-        let samples = |file: &'a ExrFile| parts(file).find_map(|part| part.samples(&name));
-        let floats = |file: &'a ExrFile, name: &str| parts(file).find_map(|part| part.channel(name));
-        let (Some(samples_a), Some(samples_b)) = (samples(a), samples(b)) else { continue };
-        let variance = match variance {
-            None => None,
-            Some((file, samples)) => {
-                let plane = floats(file, &name).ok_or(format!("the variance file has no channel {name}"))?;
-                Some((plane, samples))
-            }
-        };
-        let errors = [a, b].map(|file| floats(file, &stderr_name(&name)));
-        let (shared, dof) = ([shared(a), shared(b)], [degrees(a), degrees(b)]);
-        pairs.push(Pair::new(name, [samples_a, samples_b], errors, shared, dof, variance));
-    }
-    Ok(pairs)
-}
-
-/// The parts of a file that hold the same pixels as the first.
-fn parts(file: &ExrFile) -> impl Iterator<Item = &ExrPart> {
-    file.parts.iter().filter(|part| part.window == file.parts[0].window)
-}
-
-/// What a file says under `name`.
-fn said<T: std::str::FromStr>(file: &ExrFile, name: &str) -> Option<T> {
-    file.parts.iter().find_map(|part| part.text(name))?.parse().ok()
-}
-
-/// How many times the variance of the sum of all pixels is that of independent ones, by what the file says.
-fn shared(file: &ExrFile) -> f64 {
-    said(file, SHARED_ERRORS).filter(|x: &f64| x.is_finite()).map_or(1.0, |x| x.max(1.0))
-}
-
-/// Degrees of freedom of a standard error: of samples that are fewer than the replicates each is one.
-fn degrees(file: &ExrFile) -> f64 {
-    let replicates = said(file, "abbe/samples").unwrap_or(REPLICATES).clamp(2, REPLICATES);
-    (replicates - 1) as f64
-}
-
-/// The channels of `file` but for those of `names` and their standard errors.
-fn not_compared<'a>(file: &'a ExrFile, names: &'a [&str]) -> impl Iterator<Item = String> + 'a {
-    let looked_at = move |name: &str| names.contains(&name.strip_prefix("stderr.").unwrap_or(name));
-    file.parts.iter().flat_map(move |part| {
-        // Of channels with one name in several parts the first is taken.
-        let taken =
-            move |name: &str| parts(file).find(|p| p.channel(name).is_some()).is_some_and(|p| std::ptr::eq(p, part));
-        let left = part.channels.iter().filter(move |(name, _)| !(looked_at(name) && taken(name)));
-        left.map(move |(name, _)| match &part.name {
-            Some(part) if looked_at(name) => format!("{part}: {name}"),
-            _ => name.clone(),
-        })
-    })
-}
-
-fn same_window(what: &str, a: Window, b: Window, origin: Origin) -> Result<(), String> {
-    let sizes_agree = a.width == b.width && a.height == b.height;
-    if a == b || (sizes_agree && origin == Origin::Ignore) {
-        return Ok(());
-    }
-    Err(format!("the {what} differ: {a} against {b}"))
-}
-
-fn same_colours(a: &ExrFile, b: &ExrFile) -> Result<(), String> {
-    let (a, b) = (a.primaries(), b.primaries());
-    if colour::are_same_primaries(a, b) {
-        return Ok(());
-    }
-    let words = |all: [[f64; 2]; 4]| all.map(|[x, y]| format!("({x:.4}, {y:.4})")).join(" ");
-    Err(format!("the colour primaries differ: {} against {}", words(a), words(b)))
-}
-
-fn compared_names(a: &ExrFile, b: &ExrFile) -> Result<Vec<String>, String> {
-    let (of_a, of_b) = (own_names(a), own_names(b));
-    if of_a.is_empty() || BTreeSet::from_iter(&of_a) != BTreeSet::from_iter(&of_b) {
-        return Err(format!("the channels differ: {} against {}", of_a.join(", "), of_b.join(", ")));
-    }
-    Ok(of_a)
-}
-
-/// The channels of a picture that are compared with another's.
-fn own_names(file: &ExrFile) -> Vec<String> {
-    let all: Vec<&str> = parts(file).flat_map(|part| &part.channels).map(|(name, _)| name.as_str()).collect();
-    let owned = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<String>>();
-    let is_band = |name: &&str| (name.starts_with("S0.") || name.starts_with("T.")) && name.ends_with("nm");
-    let bands: Vec<&str> = all.iter().copied().filter(is_band).collect();
-    if !bands.is_empty() {
-        return owned(&bands);
-    }
-    let groups = [&["R", "G", "B"][..], &["X", "Y", "Z"], &["Y"]];
-    match groups.into_iter().find(|group| group.iter().all(|name| all.contains(name))) {
-        Some(group) => owned(group),
-        None => {
-            all.into_iter().filter(|name| *name != "A" && !name.starts_with("stderr.")).map(str::to_owned).collect()
-        }
-    }
-}
-
 impl Comparison {
     /// The comparison as a table for people.
     #[must_use]
@@ -470,14 +352,16 @@ impl Comparison {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
-    use crate::film::exr::{Attribute, ChannelData, Compression, ExrImage, Layout, read_exr, write_exr};
+    use crate::film::Window;
+    use crate::film::exr::{Attribute, ChannelData, Compression, ExrImage, ExrPart, Layout, read_exr, write_exr};
     use crate::math::sampler::mix64;
     use crate::math::statistics::Moments;
+    use std::collections::BTreeSet;
 
     const SIDE: u32 = 64;
-    const PIXELS: usize = 64 * 64;
+    pub(in crate::film::compare) const PIXELS: usize = 64 * 64;
 
     /// Standard normal numbers by the sum of twelve uniforms less six (kurtosis −0.1: no heavy tails).
     fn normal(seed: u64, i: usize) -> f64 {
@@ -485,7 +369,7 @@ mod tests {
         (0..12).map(uniform).sum::<f64>() - 6.0
     }
 
-    fn file(channels: Vec<(String, Vec<f32>)>) -> ExrFile {
+    pub(in crate::film::compare) fn file(channels: Vec<(String, Vec<f32>)>) -> ExrFile {
         let window = Window::full(SIDE, SIDE);
         ExrFile {
             display: window,
@@ -495,7 +379,7 @@ mod tests {
     }
 
     /// A picture of R, G, B near `mean`·(1 … 2), as four replicates of deviation `sigma` would make it, times `gain`.
-    fn render(seed: u64, mean: f64, sigma: f64, gain: f64) -> ExrFile {
+    pub(in crate::film::compare) fn render(seed: u64, mean: f64, sigma: f64, gain: f64) -> ExrFile {
         render_of(4, seed, mean, sigma, gain)
     }
 
@@ -517,7 +401,7 @@ mod tests {
         file(channels)
     }
 
-    fn without_errors(mut file: ExrFile) -> ExrFile {
+    pub(in crate::film::compare) fn without_errors(mut file: ExrFile) -> ExrFile {
         file.parts[0].channels.retain(|(name, _)| !name.starts_with("stderr."));
         file
     }
@@ -646,36 +530,6 @@ mod tests {
         assert_eq!(compare(&a, &a, &CompareOptions::default()).verdict, Verdict::Different);
     }
 
-    #[test]
-    fn pictures_of_different_things_cannot_be_compared() {
-        let a = render(7, 1.0, 0.3, 1.0);
-        let reason = |b: &ExrFile| {
-            let c = compare(&a, b, &CompareOptions::default());
-            assert_eq!((c.verdict, c.verdict.exit_code(), c.noise), (Verdict::CannotCompare, 2, None));
-            assert!(c.table().starts_with("verdict: cannot compare: "));
-            c.reason
-        };
-        let mut moved = a.clone();
-        moved.parts[0].window.x = 5;
-        assert_eq!(reason(&moved), "the data windows differ: 64x64 at (0, 0) against 64x64 at (5, 0)");
-        let ignore = CompareOptions { origin: Origin::Ignore, ..CompareOptions::default() };
-        assert_eq!(compare(&a, &moved, &ignore).verdict, Verdict::Same);
-        let mut wide = a.clone();
-        wide.chromaticities = Some([[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]]);
-        assert!(reason(&wide).starts_with("the colour primaries differ"));
-        // The primaries of an XYZ picture are those of its layers.
-        let xyz = |file: &ExrFile| {
-            let mut file = file.clone();
-            let names = file.parts[0].channels.iter_mut().map(|(name, _)| name);
-            names.for_each(|name| *name = name.replace('R', "X").replace('G', "Y").replace('B', "Z"));
-            file
-        };
-        assert_eq!(compare(&xyz(&a), &xyz(&wide), &CompareOptions::default()).verdict, Verdict::Same);
-        let mut other = a.clone();
-        other.parts[0].channels.iter_mut().for_each(|(name, _)| name.push('x'));
-        assert_eq!(reason(&other), "the channels differ: R, G, B against Rx, Gx, Bx");
-    }
-
     /// What a reader finds in a file of these channels in 32-bit floats that was rendered with `samples` a pixel.
     fn written(file: &ExrFile, samples: i32) -> ExrFile {
         let part = &file.parts[0];
@@ -698,79 +552,6 @@ mod tests {
         };
         write_exr(&path, &image).unwrap();
         read_exr(&path).unwrap()
-    }
-
-    /// The channels of `file` in a part for each name before a point, as `layout: multipart` has it.
-    fn in_parts(file: &ExrFile) -> ExrFile {
-        let part = &file.parts[0];
-        let mut parts: Vec<ExrPart> = Vec::new();
-        for channel in &part.channels {
-            let layer = channel.0.rsplit_once('.').map_or("rgba", |(layer, _)| layer);
-            match parts.iter_mut().find(|part| part.name.as_deref() == Some(layer)) {
-                Some(part) => part.channels.push(channel.clone()),
-                None => parts.push(ExrPart {
-                    name: Some(layer.into()),
-                    channels: vec![channel.clone()],
-                    // What is said of the picture stands in the first.
-                    texts: if parts.is_empty() { part.texts.clone() } else { Vec::new() },
-                    ..part.clone()
-                }),
-            }
-        }
-        ExrFile { parts, ..file.clone() }
-    }
-
-    #[test]
-    fn pictures_in_several_parts_are_compared_as_those_in_one() {
-        let (mut a, b) = (render(11, 1.0, 0.3, 1.0), render(12, 1.0, 0.3, 1.0));
-        let c = compare(&in_parts(&a), &in_parts(&b), &CompareOptions::default());
-        assert_eq!(c, compare(&a, &b, &CompareOptions::default()));
-        assert_eq!(c.noise, Some(NoiseSource::StandardErrors));
-        // One pixel far off is seen by its standard error alone.
-        a.parts[0].channels[0].1[5] += 100.0;
-        a.parts[0].channels[0].1[6] -= 100.0;
-        let c = compare(&in_parts(&a), &in_parts(&b), &CompareOptions::default());
-        assert_eq!(c.pixel_test.unwrap().pixels_rejected, 2, "{}", c.reason);
-        // Bands of which each is a part, the second twice as bright.
-        let bands = |gain: f32| {
-            let band = |name: &str, value| (name.to_string(), vec![value; PIXELS]);
-            let parts = in_parts(&file(vec![band("a", 1.0), band("b.T", gain)]));
-            assert_eq!(parts.parts.len(), 2);
-            parts
-        };
-        let c = compare(&bands(1.0), &bands(2.0), &CompareOptions::default());
-        assert_eq!((c.verdict, c.channels.len()), (Verdict::Different, 2), "{}", c.reason);
-    }
-
-    #[test]
-    fn files_with_other_channels_cannot_be_compared() {
-        let channels =
-            |names: &[&str]| file(names.iter().map(|name| ((*name).to_string(), vec![1.0; PIXELS])).collect());
-        let three = ["S0.450,0nm", "S0.550,0nm", "S0.650,0nm", "R", "G", "B"];
-        let pairs: [(&[&str], &[&str]); 6] = [
-            (&three, &["S0.425,0nm", "S0.475,0nm", "S0.525,0nm", "R", "G", "B"]),
-            (&three, &["R", "G", "B", "A"]),
-            (&["R", "G", "B"], &["R"]),
-            (&["X", "Y", "Z"], &["Y"]),
-            (&["X", "Y", "Z", "A"], &["Y", "A"]),
-            (&["a", "b", "A"], &["a", "A"]),
-        ];
-        for (a, b) in pairs {
-            for (a, b) in [(a, b), (b, a)] {
-                let c = compare(&channels(a), &channels(b), &CompareOptions::default());
-                assert_eq!(c.verdict, Verdict::CannotCompare, "{a:?} {b:?}");
-                assert!(c.reason.contains(a[0]) && c.reason.contains(b[0]), "{}", c.reason);
-            }
-        }
-        // Further layers of either file and alpha are none of the picture's colours; the table names them.
-        let c = compare(
-            &channels(&["A", "B", "G", "R", "Z", "stderr.R"]),
-            &channels(&["B", "G", "R", "normal.X", "normal.Y"]),
-            &CompareOptions::default(),
-        );
-        assert!(c.verdict == Verdict::Same && c.identical);
-        let told = "not compared             A, Z, normal.*\n";
-        assert!(c.table().contains(told), "{}", c.table());
     }
 
     /// Two samples make replicates of one each and an error of one degree of freedom, three make one of two. Against what
@@ -828,20 +609,6 @@ mod tests {
         assert!(compare(&a, &a, &CompareOptions::default()).identical);
         let c = compare(&a, &b, &CompareOptions::default());
         assert!(!c.identical && c.channels[0].max_difference == 1.0, "{}", c.table());
-    }
-
-    #[test]
-    fn spectral_files_are_compared_band_by_band() {
-        let spectral = |seed| {
-            let mut f = without_errors(render(seed, 1.0, 0.3, 1.0));
-            let red = f.parts[0].channels[0].1.clone();
-            for band in ["S0.450,0nm", "S0.550,0nm"] {
-                f.parts[0].channels.push((band.to_string(), red.clone()));
-            }
-            f
-        };
-        let c = compare(&spectral(1), &spectral(2), &CompareOptions::default());
-        assert_eq!(c.channels.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["S0.450,0nm", "S0.550,0nm"]);
     }
 
     /// Figures by hand: a = (1, 3), b = (1, 2) in one channel, twice; m = 1.5.
