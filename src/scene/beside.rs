@@ -129,3 +129,23 @@ impl Scene {
         true
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile;
+
+    #[test]
+    fn what_is_moved_is_told_where_it_is_written() {
+        let text = "camera: {origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}\n\
+            shapes: [rectangle: {name: wall, corner: [-1, 0, 5], edge_u: [2, 0, 0], edge_v: [0, 2, 0]}]\n\
+            lights:\n- point: {position: [0, 1, 4], intensity: 1}\n- point: {position: [0.5, 1, 5], intensity: 1}\n";
+        let description = SceneDescription::parse(text, std::path::Path::new("s.yaml")).unwrap();
+        let notes = compile(&description, "s").unwrap().notes;
+        let told = [
+            "s.yaml:1:9: camera: stands on wall: it sees from the side to which it looks",
+            "s.yaml:5:10: lights[1].point: lies on wall: it shines from the side that it is aimed at, or that is seen",
+        ];
+        assert_eq!(notes, told);
+    }
+}

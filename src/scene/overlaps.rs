@@ -160,7 +160,7 @@ mod tests {
 
     /// Notes of a scene of these shapes.
     fn notes(shapes: &str) -> Vec<String> {
-        let text = format!("camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n{shapes}");
+        let text = format!("camera: {{origin: [0, 0.3, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n{shapes}");
         let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
         compile(&description, "s").unwrap().notes
     }

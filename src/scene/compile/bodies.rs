@@ -29,15 +29,17 @@ impl Compiler<'_> {
     /// Puts the eye and lamps beside the surfaces that they lie on, and says so.
     pub(super) fn note_beside(&self, scene: &mut Scene, light_names: &[String]) {
         for (light, object) in scene.put_beside() {
-            let name = &scene.objects[object as usize].name;
-            let note = match light {
-                None => format!("camera: stands on {name}: it sees from the side to which it looks"),
-                Some(i) => format!(
-                    "lamp {} lies on {name}: it shines from the side that it is aimed at, or that is seen",
-                    light_names[i]
+            let on = &scene.objects[object as usize].name;
+            let lamps = self.description.lights.iter().enumerate();
+            let lamp = |i: usize| lamps.clone().find(|(k, lamp)| lamp.name_or_kind(*k) == light_names[i]);
+            let (at, note) = match light.and_then(lamp) {
+                None => ("camera".to_owned(), format!("stands on {on}: it sees from the side to which it looks")),
+                Some((k, lamp)) => (
+                    format!("lights[{k}].{}", lamp.kind()),
+                    format!("lies on {on}: it shines from the side that it is aimed at, or that is seen"),
                 ),
             };
-            scene.notes.push(note);
+            scene.notes.push(self.description.fault(&at, &note));
         }
     }
 
