@@ -391,3 +391,61 @@ fn lamps_keep_their_names_and_pictures_their_alpha() {
     assert!(exported.losses.iter().any(|loss| loss.field == "integrator.light_tracer"), "{:?}", exported.losses);
     same_picture(&yaml);
 }
+
+/// A picture on a plane repeats by the metre along the tangent for Mitsuba, too, which reads none of our instructions; a plane that
+/// is mirrored keeps its front. What else has no texture coordinates there, or others, is told.
+#[test]
+fn pictures_on_planes_stay_where_they_are() {
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    let scene = |more: &str| {
+        format!(
+            "camera: {{origin: [0.3, 2, 4], target: [0.2, 0, 0], fov_deg: 40}}\nintegrator: {{path: {{max_depth: 2}}}}\n\
+             image: {{width: 24, height: 16}}\nrender: {{samples: 8}}\n\
+             textures: {{board: {{checkerboard: {{a: 0.1, b: 0.8}}}}}}\n\
+             materials: {{tiles: {{diffuse: {{reflectance: {{texture: board}}}}}}, one: {{two_sided: {{front: tiles, back: {{diffuse: {{reflectance: 0}}}}}}}}}}\n\
+             shapes:\n{more}lights: [point: {{position: [1, 3, 2], intensity: 5}}]\n"
+        )
+    };
+    let planes = [
+        "- plane: {point: [0, -0.2, 0], normal: [0, 2, 0], tangent: [3, 0, 1], material: tiles}\n",
+        "- plane: {point: [0, -0.2, 0], normal: [0, 1, 0], tangent: [3, 0, 1], material: one, transform: [scale: [-0.7, 1, 0.5]]}\n",
+        "- plane: {point: [0, -0.2, 0], normal: [0, 1, 0], material: {two_sided: {front: {diffuse: {}}, back: {diffuse: {reflectance: 0}}}}, transform: [scale: [-1, 1, 1]]}\n",
+    ];
+    for plane in planes {
+        common::write(&yaml, scene(plane).as_bytes());
+        let (ours, exported) = prepared(&yaml, directory.path(), false);
+        let ours = Bench { prepared: ours, directory: tempfile::tempdir().unwrap() }.picture();
+        let plain: String = exported
+            .xml
+            .split("<?abbe")
+            .enumerate()
+            .map(|(i, piece)| if i == 0 { piece } else { piece.split_once("?>").unwrap().1 })
+            .collect();
+        let xml = directory.path().join("plain.xml");
+        common::write(&xml, plain.as_bytes());
+        for (name, bytes) in &exported.files {
+            common::write(&directory.path().join(name), bytes);
+        }
+        let overrides = small();
+        let entry = batch::entries(&xml, &overrides).unwrap().remove(0);
+        let theirs = batch::prepare(&entry, &overrides).unwrap_or_else(|error| panic!("{error}\n{plain}"));
+        let theirs = Bench { prepared: theirs, directory: tempfile::tempdir().unwrap() }.picture();
+        let mean = ours.y.iter().sum::<f64>() / ours.y.len() as f64;
+        let differing = ours.y.iter().zip(&theirs.y).filter(|(a, b)| (*a - *b).abs() > 1e-3 * mean).count();
+        assert!(mean > 0.01, "{plane}: the picture is black");
+        assert!(differing * 100 <= ours.y.len(), "{plane}: {differing} pixels differ\n{plain}");
+    }
+    for (shape, told) in [
+        (
+            "cylinder: {base: [0, 0, 0], top: [0, 1, 0], radius: 0.5, material: tiles}",
+            ", with Mitsuba's texture coordinates: ",
+        ),
+        ("cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 0.5, material: tiles}", " without texture coordinates, "),
+    ] {
+        common::write(&yaml, scene(&format!("- {shape}\n")).as_bytes());
+        let (_, exported) = prepared(&yaml, directory.path(), false);
+        let losses: Vec<String> = exported.losses.iter().map(|loss| format!("{loss:?}")).collect();
+        assert!(losses.iter().any(|loss| loss.contains(told)), "{losses:?}");
+    }
+}

@@ -125,9 +125,10 @@ pub fn entries(path: &Path, overrides: &Overrides) -> Result<Vec<BatchEntry>> {
     Ok(entries)
 }
 
-/// Whether the name of `path` ends in one of `extensions`, whose case does not matter.
+/// Whether the name of `path` ends in one of `extensions`, whose case does not matter. `a.exr/` is a directory.
 fn ends_in(path: &Path, extensions: &[&str]) -> bool {
-    path.extension().is_some_and(|e| extensions.iter().any(|x| e.eq_ignore_ascii_case(x)))
+    let directory = path.to_string_lossy().ends_with(std::path::is_separator);
+    !directory && path.extension().is_some_and(|e| extensions.iter().any(|x| e.eq_ignore_ascii_case(x)))
 }
 
 /// Where a picture goes: `-o FILE.exr`, `-o DIR`, or the directory of the description, each of which may be a pattern

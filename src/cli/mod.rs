@@ -118,7 +118,7 @@ struct RenderArguments {
     #[arg(long, value_name = "E", value_parser = relative_error, allow_hyphen_values = true)]
     error: Option<f64>,
     /// End after this time of rendering each scene, as 60s, 10m or 2h
-    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
+    #[arg(long, value_name = "TIME", value_parser = some_time, allow_hyphen_values = true)]
     time: Option<std::time::Duration>,
     /// Threads; 0 takes as many as SLURM_CPUS_PER_TASK, CUE_THREADS or OMP_NUM_THREADS says (the first that is set), else
     /// every core that the process may use

@@ -51,12 +51,19 @@ impl Film {
 impl Thickness {
     pub(crate) fn check<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
         match self {
-            Thickness::Number(nm) => checker.not_negative(at, *nm),
+            Thickness::Number(nm) => thickness(at, *nm, checker),
             Thickness::Textured(textured) => {
                 checker.texture(at.key("texture"), &textured.texture);
-                checker.not_negative(at.key("from"), textured.from);
-                checker.not_negative(at.key("to"), textured.to);
+                thickness(at.key("from"), textured.from, checker);
+                thickness(at.key("to"), textured.to, checker);
             }
         }
     }
+}
+
+/// The thickest film, nanometres: a metre, of some 10⁷ waves, whose phase f64 knows to 10⁻⁸.
+const THICKEST: f64 = 1e9;
+
+fn thickness(at: At<'_>, found: f64, checker: &mut Checker<'_>) {
+    checker.require((0.0..=THICKEST).contains(&found), at, "a thickness from 0 to 1e9 nm", found);
 }

@@ -70,18 +70,29 @@ impl Default for Roughness {
 impl Roughness {
     pub(crate) fn check<'a>(&'a self, at: At<'_>, checker: &mut Checker<'a>) {
         match self {
-            Roughness::Number(x) => checker.not_negative(at, *x),
+            Roughness::Number(x) => checker.roughness(at, *x),
             Roughness::Texture(name) => checker.texture(at.key("texture"), name),
             Roughness::Brushed(brushed) => {
                 for (key, alpha) in [("u", &brushed.u), ("v", &brushed.v)] {
                     let at = at.key(key);
-                    if let NumberOrTexture::Number(x) = alpha {
-                        checker.positive(at, *x);
+                    match alpha {
+                        NumberOrTexture::Number(x) if *x == 0.0 => checker.positive(at, *x),
+                        NumberOrTexture::Number(x) => checker.roughness(at, *x),
+                        NumberOrTexture::Texture(_) => alpha.check(ROUGHEST, at, checker),
                     }
-                    alpha.check(f64::INFINITY, at, checker);
                 }
             }
         }
+    }
+}
+
+/// The largest roughness. Above 1 the model loses most light between its facets, as Mitsuba's does.
+const ROUGHEST: f64 = 10.0;
+
+impl Checker<'_> {
+    /// `found` is a roughness.
+    pub(crate) fn roughness(&mut self, at: At<'_>, found: f64) {
+        self.require((0.0..=ROUGHEST).contains(&found), at, "a roughness, a number from 0 to 10", found);
     }
 }
 

@@ -108,10 +108,11 @@ impl Hair {
                 checker.not_negative(at.key("pheomelanin"), *pheomelanin);
             }
         }
-        checker.positive(at.key("exterior_ior"), self.exterior_ior);
+        checker.index(at.key("exterior_ior"), self.exterior_ior);
         // A ray that grazes the fibre needs a denser inside to have a way through.
         let expected = "an index above that outside";
         checker.require(self.ior > self.exterior_ior, at.key("ior"), expected, self.ior);
+        checker.index(at.key("ior"), self.ior);
         for (key, roughness) in [("roughness_along", self.roughness_along), ("roughness_around", self.roughness_around)]
         {
             let holds = (LEAST_ROUGHNESS..=1.0).contains(&roughness);

@@ -445,8 +445,8 @@ impl Material {
             }
             Material::Conductor(conductor) => {
                 if let ConductorIndex::Written { eta, k } = &conductor.index {
-                    eta.check(Role::Coefficient, at.key("eta"), checker);
-                    k.check(Role::Coefficient, at.key("k"), checker);
+                    eta.check(Role::OpticalConstant, at.key("eta"), checker);
+                    k.check(Role::OpticalConstant, at.key("k"), checker);
                 }
                 conductor.tint.check(Role::Reflectance, at.key("tint"), checker);
                 conductor.roughness.check(at.key("roughness"), checker);
@@ -486,7 +486,7 @@ impl Material {
                 plastic.ior.check(at.key("ior"), checker);
                 plastic.exterior_ior.check(at.key("exterior_ior"), checker);
                 plastic.tint.check(Role::Reflectance, at.key("tint"), checker);
-                checker.not_negative(at.key("roughness"), plastic.roughness);
+                checker.roughness(at.key("roughness"), plastic.roughness);
                 check_highlight(plastic.highlight, at, checker);
             }
             Material::Principled(surface) => surface.check(at, checker),
@@ -533,7 +533,7 @@ mod tests {
         assert_eq!(conductor("eta: 1, k: 2"), "none");
         assert_eq!(
             conductor("eta: -1, k: -2, tint: 3, roughness: -1"),
-            "dir/s.yaml:3:24: materials.a.conductor.eta: expected a number of 0 or more, found -1\n\
+            "dir/s.yaml:3:24: materials.a.conductor.eta: expected a number from 0 to 1e6, found -1\n\
              dir/s.yaml:3:31: materials.a.conductor.k: expected a number of 0 or more, found -2\n\
              dir/s.yaml:3:41: materials.a.conductor.tint: expected a number from 0 to 1, found 3\n\
              dir/s.yaml:3:55: materials.a.conductor.roughness: expected a number of 0 or more, found -1"
@@ -554,12 +554,12 @@ mod tests {
         );
         assert_eq!(
             a("thin_dielectric: {ior: 1, exterior_ior: 0}"),
-            "dir/s.yaml:3:47: materials.a.thin_dielectric.exterior_ior: expected a number greater than 0, found 0"
+            "dir/s.yaml:3:47: materials.a.thin_dielectric.exterior_ior: expected an index of refraction, a number from 1e-6 to 1e6, found 0"
         );
         assert_eq!(
             a("plastic: {reflectance: 2, ior: 0, roughness: -1}"),
             "dir/s.yaml:3:30: materials.a.plastic.reflectance: expected a number from 0 to 1, found 2\n\
-             dir/s.yaml:3:38: materials.a.plastic.ior: expected a number greater than 0, found 0\n\
+             dir/s.yaml:3:38: materials.a.plastic.ior: expected an index of refraction, a number from 1e-6 to 1e6, found 0\n\
              dir/s.yaml:3:52: materials.a.plastic.roughness: expected a number of 0 or more, found -1"
         );
     }

@@ -252,7 +252,7 @@ impl Principled {
             strength.check(f64::INFINITY, at.key(key), checker);
         }
         match self.contrast {
-            Contrast::Eta(eta) => checker.positive(at.key("eta"), eta),
+            Contrast::Eta(eta) => checker.index(at.key("eta"), eta),
             Contrast::Specular(s) => {
                 checker.require((0.0..=1.0).contains(&s), at.key("specular"), "a number from 0 to 1", s);
             }
@@ -283,7 +283,7 @@ impl PrincipledThin {
             number.check(most, at.key(key), checker);
         }
         if let NumberOrTexture::Number(eta) = self.eta {
-            checker.positive(at.key("eta"), eta);
+            checker.index(at.key("eta"), eta);
         }
         let at = at.key("sampling");
         let ThinSampling { reflection, transmission, diffuse_reflection, diffuse_transmission } = self.sampling;
@@ -349,7 +349,10 @@ mod tests {
                 "{spec_trans: 1, two_sided: true}",
                 "dir/s.yaml:3:19: materials.m.principled: expected two_sided: false with spec_trans, found true",
             ),
-            ("{eta: 0}", "dir/s.yaml:3:25: materials.m.principled.eta: expected a number greater than 0, found 0"),
+            (
+                "{eta: 0}",
+                "dir/s.yaml:3:25: materials.m.principled.eta: expected an index of refraction, a number from 1e-6 to 1e6, found 0",
+            ),
             (
                 "{metallic: 2}",
                 "dir/s.yaml:3:30: materials.m.principled.metallic: expected a number from 0 to 1, found 2",

@@ -261,9 +261,14 @@ pub(crate) enum Role {
     Reflectance,
     /// 0 or more.
     Emission,
-    /// 0 or more, and nothing that emits: η, k, σ.
+    /// 0 or more, and nothing that emits: σ.
     Coefficient,
+    /// η and k: from 0 to [`MOST_INDEX`], and nothing that emits.
+    OpticalConstant,
 }
+
+/// The largest index of refraction; its inverse is the smallest. Fresnel's equations take fourth powers of it.
+const MOST_INDEX: f64 = 1e6;
 
 impl Spectrum {
     pub(crate) fn check(&self, role: Role, at: At<'_>, checker: &mut Checker<'_>) {
@@ -277,6 +282,7 @@ impl Spectrum {
             let (holds, expected) = match role {
                 Role::Reflectance => ((0.0..=1.0).contains(&(value * by)), "a number from 0 to 1"),
                 Role::Emission | Role::Coefficient => (value * by >= 0.0, "a number of 0 or more"),
+                Role::OpticalConstant => ((0.0..=MOST_INDEX).contains(&(value * by)), "a number from 0 to 1e6"),
             };
             checker.require(holds, at, expected, format_args!("{}{times}", in_short(value)));
         };
@@ -365,7 +371,7 @@ impl SpectrumOrTexture {
 impl Index {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         match self {
-            Index::Number(n) => checker.positive(at, *n),
+            Index::Number(n) => checker.index(at, *n),
             Index::Glass(_) | Index::Schott(_) | Index::Formula(_) | Index::File(_) => {}
             Index::Sellmeier(Sellmeier { c, .. }) => {
                 let at = at.key("sellmeier");
@@ -374,20 +380,28 @@ impl Index {
                     checker.not_negative(at.index(i), c);
                 }
             }
-            Index::Cauchy(cauchy) => checker.positive(at.key("cauchy").index(0), cauchy.a),
+            Index::Cauchy(cauchy) => checker.index(at.key("cauchy").index(0), cauchy.a),
             Index::Abbe(abbe) => {
                 let at = at.key("abbe");
-                checker.positive(at.key("nd"), abbe.nd);
+                checker.index(at.key("nd"), abbe.nd);
                 checker.positive(at.key("vd"), abbe.vd);
             }
             Index::Table(table) => {
                 let at = at.key("table");
                 check_wavelengths(table, at, checker);
                 for (i, pair) in table.iter().enumerate() {
-                    checker.positive(at.index(i).index(1), pair[1]);
+                    checker.index(at.index(i).index(1), pair[1]);
                 }
             }
         }
+    }
+}
+
+impl Checker<'_> {
+    /// `found` is an index of refraction.
+    pub(crate) fn index(&mut self, at: At<'_>, found: f64) {
+        let holds = (1.0 / MOST_INDEX..=MOST_INDEX).contains(&found);
+        self.require(holds, at, "an index of refraction, a number from 1e-6 to 1e6", found);
     }
 }
 
@@ -532,7 +546,7 @@ mod tests {
         assert_eq!(
             index("{abbe: {nd: 0, vd: 0}}"),
             format!(
-                "dir/s.yaml:4:35: {GLASS}.abbe.nd: expected a number greater than 0, found 0\n\
+                "dir/s.yaml:4:35: {GLASS}.abbe.nd: expected an index of refraction, a number from 1e-6 to 1e6, found 0\n\
                  dir/s.yaml:4:42: {GLASS}.abbe.vd: expected a number greater than 0, found 0"
             )
         );

@@ -313,9 +313,10 @@ fn replaceable(path: &Path) -> Option<PathBuf> {
 fn words(path: &Path, e: &std::io::Error) -> String {
     let directory = directory_of(path);
     let there = directory.is_dir();
-    let directory = directory.display();
+    let directory =
+        if directory == Path::new(".") { "the working directory".into() } else { directory.to_string_lossy() };
     match e.kind() {
-        ErrorKind::NotFound if !there => format!("the directory {directory} does not exist"),
+        ErrorKind::NotFound if !there => format!("{directory} does not exist"),
         ErrorKind::PermissionDenied => format!("no permission to write in {directory}"),
         ErrorKind::NotADirectory => format!("{directory} is not a directory"),
         ErrorKind::InvalidFilename => "the name is too long, with the endings of what is written beside it".into(),

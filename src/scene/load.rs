@@ -46,7 +46,19 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(LARGEST);
     reader.limits(limits);
-    reader.decode().map_err(|e| Error::input(path, format!("expected a PNG, JPEG, HDR or EXR picture: {e}")))
+    let fault = |e| Error::input(path, format!("expected a PNG, JPEG, HDR or EXR picture: {e}"));
+    let decoder = reader.into_decoder().map_err(fault)?;
+    let (width, height) = image::ImageDecoder::dimensions(&decoder);
+    if width == 0 || height == 0 {
+        return Err(Error::input(path, format!("expected a picture of one pixel or more, found {width} x {height}")));
+    }
+    if image::ImageDecoder::total_bytes(&decoder) > LARGEST {
+        return Err(Error::input(
+            path,
+            format!("expected a picture of at most 2 GiB, found {width} x {height} pixels"),
+        ));
+    }
+    image::DynamicImage::from_decoder(decoder).map_err(fault)
 }
 
 /// Whether a JPEG file has the marker of its end behind a scan, ITU-T T.81 annex B.

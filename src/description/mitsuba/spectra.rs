@@ -298,7 +298,7 @@ pub(crate) struct Index {
 }
 
 /// Plugins that are a spectrum, the same everywhere.
-const SPECTRA: [&str; 7] = ["uniform", "rawconstant", "d65", "srgb", "regular", "irregular", "blackbody"];
+pub(super) const SPECTRA: [&str; 7] = ["uniform", "rawconstant", "d65", "srgb", "regular", "irregular", "blackbody"];
 
 /// A curve at one wavelength, nm.
 pub(crate) fn at(curve: &Curve, nm: f64) -> f64 {

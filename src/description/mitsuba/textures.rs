@@ -5,7 +5,7 @@ use glam::DVec4;
 use super::super::fault::Fault;
 use super::super::node::Node;
 use super::object::{Bag, Family};
-use super::spectra::Role;
+use super::spectra::{Role, SPECTRA};
 use super::{Fields, Import, boolean, entry, list, number, numbers, text};
 
 const TEXTURES: [&str; 4] = ["bitmap", "checkerboard", "volume", "mesh_attribute"];
@@ -37,7 +37,7 @@ impl Import<'_> {
                 let name = self.declare_volume(volume)?;
                 entry(bag.object.place, "volume", text(bag.place("volume"), name))
             }
-            _ => return Err(bag.unknown(TEXTURES)),
+            _ => return Err(bag.unknown(TEXTURES.into_iter().chain(SPECTRA))),
         };
         bag.finish()?;
         let name = self.name_for(index);

@@ -16,7 +16,7 @@
 //! half floats carries the variance of its rounding besides.
 //!
 //! Both tests want pixels that are independent: a box filter, or filters by importance sampling. Light that is dealt to all
-//! pixels which a filter covers is not; a file says by how much more the sum of its pixels varies ([`SHARED_ERRORS`]).
+//! pixels which a filter covers is not; a file says by how much more the sum of its pixels varies ([`crate::film::exr::SHARED_ERRORS`]).
 
 mod channels;
 mod noise;

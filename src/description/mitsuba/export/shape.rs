@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use glam::{DMat4, DVec3, DVec4};
+use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
 
 use super::super::super::medium::{UNCHANGED, VACUUM};
 use super::super::super::shape::{
-    Caps, Cone, Cube, CurveBasis, Geometry, Layout, Normals, SdfNormals, Shape, Sphere, Winding,
+    Caps, Cone, Cube, CurveBasis, Geometry, Layout, Normals, Plane, SdfNormals, Shape, Sphere, Winding,
 };
 use super::super::super::spectrum::SpectrumOrTexture;
 use super::Export;
@@ -66,18 +66,23 @@ impl Export<'_> {
             }
             Geometry::Cone(cone) => {
                 self.open("ply", shape);
-                let name = format!("{}shape{}.ply", self.stem, self.files.len());
-                self.xml.value("string", "filename", &name);
-                self.files.push((name, cone_mesh(cone).into_bytes()));
+                self.mesh(cone_mesh(cone));
                 self.placing(world);
             }
             Geometry::Disk(disk) => {
                 self.open("disk", shape);
                 self.placing(world * placed(disk.center.into(), disk.normal.into(), disk.radius));
             }
+            // A picture on it repeats by the metre, which the coordinates of a rectangle cannot say.
+            Geometry::Plane(plane) if self.is_textured(shape) => {
+                self.open("ply", shape);
+                self.mesh(plane_mesh(&standing(plane, world)));
+            }
             Geometry::Plane(plane) => {
                 self.open("rectangle", shape);
-                self.placing(world * placed(plane.point.into(), plane.normal.into(), PLANE));
+                let DAffine3 { matrix3, translation } = standing(plane, world);
+                let scaled = DMat3::from_cols(matrix3.x_axis * PLANE, matrix3.y_axis * PLANE, matrix3.z_axis);
+                self.placing(DAffine3 { matrix3: scaled, translation }.into());
             }
             Geometry::Rectangle(rectangle) => {
                 self.open("rectangle", shape);
@@ -183,6 +188,18 @@ impl Export<'_> {
         }
     }
 
+    /// A mesh in a file of its own.
+    fn mesh(&mut self, ply: String) {
+        let name = format!("{}shape{}.ply", self.stem, self.files.len());
+        self.xml.value("string", "filename", &name);
+        self.files.push((name, ply.into_bytes()));
+    }
+
+    /// Whether what covers it or shines from it depends on its texture coordinates.
+    fn is_textured(&self, shape: &Shape) -> bool {
+        self.follows_uv(&shape.material) || matches!(shape.emission, Some(SpectrumOrTexture::Texture(_)))
+    }
+
     fn open(&mut self, plugin: &str, shape: &Shape) {
         match shape.name.as_ref().map(|name| self.id(name, "shape")) {
             Some(id) if self.ids.insert(id.clone()) => self.xml.open("shape", &[("type", plugin), ("id", &id)]),
@@ -202,19 +219,20 @@ impl Export<'_> {
     /// What Mitsuba gets in place of a shape that it cannot express.
     fn shape_shortfall(&self, shape: &Shape) -> Option<String> {
         let said = |text: &str| Some(text.to_owned());
-        let textured =
-            self.follows_uv(&shape.material) || matches!(shape.emission, Some(SpectrumOrTexture::Texture(_)));
+        let textured = self.is_textured(shape);
         let grey = shape.emission.as_ref().and_then(|emission| self.shining_shortfall(emission)).map(str::to_owned);
         let own = match &shape.geometry {
             Geometry::Rectangle(_) => None,
             Geometry::Plane(_) => said("a square of 20 km: Mitsuba has no plane without end"),
             Geometry::Cone(cone) => Some(format!(
-                "a mesh of {SEGMENTS} sides, at most {:.2e} m inside: Mitsuba has no cone",
+                "a mesh of {SEGMENTS} sides{}, at most {:.2e} m inside: Mitsuba has no cone",
+                if textured { " without texture coordinates" } else { "" },
                 cone.radius * (1.0 - libm::cos(std::f64::consts::PI / f64::from(SEGMENTS)))
             )),
-            Geometry::Cylinder(c) if c.caps != Caps::None => {
-                said("a tube and disks at its ends: Mitsuba's cylinder has none")
-            }
+            Geometry::Cylinder(c) if c.caps != Caps::None => Some(format!(
+                "a tube and disks at its ends{}: Mitsuba's cylinder has none",
+                if textured { ", with Mitsuba's texture coordinates" } else { "" }
+            )),
             Geometry::Sphere(Sphere { layout: Layout::ZUp, .. }) | Geometry::Cube(Cube { layout: Layout::ZUp, .. }) => {
                 None
             }
@@ -302,6 +320,27 @@ fn cone_mesh(cone: &Cone) -> String {
         text.push_str(&format!("3 {i} {} {}\n", i + 1, i + 2));
     }
     text
+}
+
+/// Where a plane stands and which way u and v run on it, a metre each: it is moved and turned by `world`, but not stretched.
+fn standing(plane: &Plane, world: DMat4) -> DAffine3 {
+    let linear = DMat3::from_mat4(world);
+    let normal = (linear.inverse().transpose() * DVec3::from(plane.normal)).normalize_or_zero();
+    let tangent = plane.tangent.map_or(DVec3::ZERO, |tangent| linear * DVec3::from(tangent));
+    let Frame { s, t, n } = Frame::from_normal_and_tangent(normal, tangent);
+    DAffine3::from_cols(s, t, n, world.transform_point3(plane.point.into()))
+}
+
+/// The square that stands for a plane as a PLY whose texture coordinates are metres.
+fn plane_mesh(placement: &DAffine3) -> String {
+    let mut text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n\
+         property double u\nproperty double v\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
+        .to_owned();
+    for (u, v) in [(-PLANE, -PLANE), (PLANE, -PLANE), (PLANE, PLANE), (-PLANE, PLANE)] {
+        let p = placement.transform_point3(DVec3::new(u, v, 0.0));
+        text.push_str(&format!("{} {} {} {u} {v}\n", p.x, p.y, p.z));
+    }
+    text + "3 0 1 2\n3 0 2 3\n"
 }
 
 /// The unit square or disk across z, moved, turned and scaled.
