@@ -2,19 +2,27 @@
 //!
 //! On the surface itself rounding decides, ray by ray, whether it lies before or behind them. Points of surfaces and distances to
 //! them are exact to some 2⁻⁵² of the largest coordinate or length, and rays that leave surfaces begin 2⁻⁴⁶ of it off them (see
-//! [`Ray::leaving`]). A step along the normal of 2⁻³³ of the size of the scene leaves no ray in doubt that comes from as far as
-//! 8192 sizes, on planes without end, and is nothing to see.
+//! [`Ray::leaving`]). A step along the normal of 2⁻³³ of what the surface measures, and of the distance from which a lamp is seen,
+//! leaves no ray in doubt that comes from as far as 8192 times that, on planes without end, and is nothing to see. Where something
+//! else is near, it goes half the way there.
+//!
+//! Corners of meshes are rounded to f32 (see [`super::mesh`]): what lies on one as it is written may lie beneath it as it is. So what
+//! is within that rounding of a mesh, on the wrong side, is on it.
 
 use super::light::Light;
-use super::{Hit, Scene};
+use super::shape::SurfacePoint;
+use super::{Geometry, Hit, Object, Scene};
 use crate::math::Ray;
 use glam::DVec3;
 
-/// The step, relative to the largest coordinate or length.
+/// The step, relative to the largest coordinate or length at hand.
 const STEP: f64 = 1.0 / (1u64 << 33) as f64;
 
 /// Surfaces that are nearer, relative to the same, are lain on: four steps of rays that leave surfaces.
 const NEAR: f64 = 1.0 / (1u64 << 44) as f64;
+
+/// Meshes, by the largest coordinate of their corners: three roundings to f32, and to spare.
+const NEAR_MESH: f64 = 1.0 / (1u64 << 23) as f64;
 
 /// Surfaces that a probe meets at the most; a bound on time.
 const MOST: usize = 64;
@@ -31,7 +39,7 @@ enum Side {
 /// A surface through a point.
 struct Lain {
     hit: Hit,
-    normal: DVec3,
+    surface: SurfacePoint,
     scale: f64,
 }
 
@@ -41,23 +49,26 @@ impl Scene {
     pub(super) fn put_beside(&mut self) -> Vec<(Option<usize>, u32)> {
         let mut moved = Vec::new();
         let eye = self.camera.eye();
-        if let Some((step, object)) = self.step_off(eye, Side::Along(self.camera.forward())) {
+        let rounded = |o: &&Object| matches!(o.geometry, Geometry::Mesh(_) | Geometry::Instance(_));
+        let extents = self.objects.iter().filter(rounded).map(Object::bounds).map(|b| (b.max - b.min).max_element());
+        let extent = extents.filter(|extent| extent.is_finite()).fold(0.0, f64::max);
+        // A mesh that is not moved to the origin has coordinates of at most 4.5 times its size.
+        let rounding = 5.0 * NEAR_MESH * extent;
+        let ahead = Side::Along(self.camera.forward());
+        if let Some((step, object)) = self.step_off(eye, ahead, self.near_eye(eye), rounding) {
             self.camera = self.camera.moved(step);
             moved.push((None, object));
         }
         let eye = self.camera.eye();
         for i in 0..self.lights.len() {
-            let (position, side) = match &self.lights[i] {
-                Light::Point { position, .. } => (*position, Side::SeenFrom(eye)),
-                Light::Spot { position, axis, .. } => (*position, Side::Along(*axis)),
-                Light::Projector(projector) => (projector.position(), Side::Along(projector.axis())),
-                Light::Directional { .. }
-                | Light::Constant { .. }
-                | Light::Environment(_)
-                | Light::Area { .. }
-                | Light::AlongNormal { .. } => continue,
+            let Some(position) = self.lights[i].position() else { continue };
+            let side = match &self.lights[i] {
+                Light::Spot { axis, .. } => Side::Along(*axis),
+                Light::Projector(projector) => Side::Along(projector.axis()),
+                _ => Side::SeenFrom(eye),
             };
-            let Some((step, object)) = self.step_off(position, side) else { continue };
+            let reach = (eye - position).length();
+            let Some((step, object)) = self.step_off(position, side, reach, rounding) else { continue };
             match &mut self.lights[i] {
                 Light::Point { position, .. } | Light::Spot { position, .. } => *position += step,
                 Light::Projector(projector) => projector.shift(step),
@@ -68,30 +79,49 @@ impl Scene {
         moved
     }
 
-    /// The step off all surfaces that `point` lies on, and one of them; `None` if there is none.
-    fn step_off(&self, point: DVec3, side: Side) -> Option<(DVec3, u32)> {
+    /// How far the nearest lamp without extent is; without lamps, and coordinates that say what a length is, the nearest thing.
+    fn near_eye(&self, eye: DVec3) -> f64 {
+        let least = |places: &mut dyn Iterator<Item = DVec3>| {
+            let far = places.map(|place| (place - eye).length()).filter(|far| *far > 0.0 && far.is_finite());
+            far.reduce(f64::min)
+        };
+        let lamps = least(&mut self.lights.iter().filter_map(Light::position));
+        let boxes = self.objects.iter().map(Object::bounds);
+        let things = || if eye == DVec3::ZERO { least(&mut boxes.map(|b| 0.5 * (b.min + b.max))) } else { None };
+        lamps.or_else(things).unwrap_or(0.0)
+    }
+
+    /// The step off all surfaces that `point` lies on, and one of them; `None` if there is none. It is seen, or sees what counts,
+    /// `reach` metres away; corners of meshes are rounded by less than `rounding` metres.
+    fn step_off(&self, point: DVec3, side: Side, reach: f64, rounding: f64) -> Option<(DVec3, u32)> {
         let (mut step, mut first) = (DVec3::ZERO, None);
-        for Lain { hit, normal, scale } in self.through(point) {
+        for Lain { hit, surface, scale } in self.through(point, reach, rounding) {
             let forward = match side {
-                Side::Along(direction) => normal.dot(direction) >= 0.0,
+                Side::Along(direction) => surface.normal.dot(direction) >= 0.0,
                 Side::SeenFrom(eye) => self.shows_front(&hit, eye, point),
             };
-            step += normal * if forward { STEP * scale } else { -STEP * scale };
-            first = first.or(Some(hit.object));
+            let off = if forward { surface.normal } else { -surface.normal };
+            let next = self.closest(&self.leave(&surface, &hit, off), 2.0 * STEP * scale);
+            let height = next.map_or(STEP * scale, |next| 0.5 * next.t);
+            let more = height - (point - surface.point).dot(off);
+            if more > 0.0 {
+                step += off * more;
+                first = first.or(Some(hit.object));
+            }
         }
         first.map(|object| (step, object))
     }
 
-    /// The surfaces that go through a point to within rounding, each normal once. One of the three axes crosses each of them at
-    /// less than 55° to its normal.
-    fn through(&self, point: DVec3) -> Vec<Lain> {
-        let size = point.abs().max_element().max(self.center.abs().max_element() + self.radius);
+    /// The surfaces that go through a point to within rounding, each normal once. One of the three axes crosses each of them at less
+    /// than 55° to its normal.
+    fn through(&self, point: DVec3, reach: f64, rounding: f64) -> Vec<Lain> {
+        let size = point.abs().max_element().max(reach);
         let mut found: Vec<Lain> = Vec::new();
         if size == 0.0 || !size.is_finite() {
             return found;
         }
         // Long against what is near, so that it begins before all of that.
-        let reach = 4.0 * STEP * size;
+        let reach = (4.0 * STEP * size).max(2.0 * rounding);
         for axis in DVec3::AXES {
             for direction in [axis, -axis] {
                 let mut ray = Ray::new(point - direction * reach, direction);
@@ -102,16 +132,27 @@ impl Scene {
                     let scale = surface.scale.max(size);
                     let away = (surface.point - point).dot(surface.normal).abs();
                     let known = |other: &Lain| {
-                        other.hit.object == hit.object && other.normal.dot(surface.normal).abs() > 1.0 - 1e-9
+                        other.hit.object == hit.object && other.surface.normal.dot(surface.normal).abs() > 1.0 - 1e-9
                     };
-                    if away <= NEAR * scale && !found.iter().any(known) {
-                        found.push(Lain { hit, normal: surface.normal, scale });
+                    if away <= (NEAR * scale).max(self.rounding(&hit)) && !found.iter().any(known) {
+                        found.push(Lain { hit, surface: surface.clone(), scale });
                     }
                     ray = self.leave(&surface, &hit, direction);
                 }
             }
         }
         found
+    }
+
+    /// How far corners of what was met may lie off where they are written.
+    fn rounding(&self, hit: &Hit) -> f64 {
+        let Geometry::Mesh(mesh) = &self.objects[hit.object as usize].geometry else { return 0.0 };
+        let corners = mesh.mesh.vertices(hit.part).map(|corner| corner.abs().max_element());
+        let stretch = self.instance_map(hit).map_or(1.0, |map| {
+            let m = map.world_from_object().matrix3;
+            m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length())
+        });
+        NEAR_MESH * stretch * corners.into_iter().fold(0.0, f64::max)
     }
 
     /// Whether the first that is seen from `eye` toward `point` of the object of `hit` is its front; true where nothing of it is.
@@ -134,6 +175,7 @@ impl Scene {
 mod tests {
     use crate::description::SceneDescription;
     use crate::scene::compile::compile;
+    use crate::scene::light::Light;
 
     #[test]
     fn what_is_moved_is_told_where_it_is_written() {
@@ -147,5 +189,47 @@ mod tests {
             "s.yaml:5:10: lights[1].point: lies on wall: it shines from the side that it is aimed at, or that is seen",
         ];
         assert_eq!(notes, told);
+    }
+
+    fn lamp(y: f64, more: &str) -> (f64, usize) {
+        let text = format!(
+            "camera: {{origin: [0, 1, 5], target: [0, 0.3, 0], fov_deg: 40}}\n\
+             shapes:\n- rectangle: {{corner: [-1, 2, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2]}}\n{more}\
+             lights: [point: {{position: [0, {y}, 0], intensity: 1}}]\n"
+        );
+        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
+        let scene = compile(&description, "s").unwrap();
+        (scene.lights.iter().find_map(Light::position).unwrap().y, scene.notes.len())
+    }
+
+    /// The corners of a mesh at 0.3 lie 1.2·10⁻⁸ above it.
+    #[test]
+    fn lamps_on_meshes_are_beside_them_as_they_are_rounded() {
+        let directory = tempfile::tempdir().unwrap();
+        let table = "v -1 0.3 -1\nv -1 0.3 1\nv 1 0.3 1\nv 1 0.3 -1\nf 1 2 3 4\n";
+        std::fs::write(directory.path().join("table.obj"), table).unwrap();
+        for (placed, y) in [("", 0.3), (", transform: [translate: [0, 0.8, 0]]", 1.1)] {
+            let text = format!(
+                "camera: {{origin: [0, 3, 5], target: [0, 0.3, 0], fov_deg: 40}}\n\
+                 shapes:\n- mesh: {{file: table.obj{placed}}}\nlights: [point: {{position: [0.2, {y}, 0], intensity: 1}}]\n"
+            );
+            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
+            let scene = compile(&description, "s").unwrap();
+            let above = scene.lights[0].position().unwrap().y - f64::from(y as f32);
+            assert!(above > 0.0 && above < 1e-8, "{y}: {above}");
+        }
+    }
+
+    /// What is far away does not make the steps long, and the next surface is not stepped over.
+    #[test]
+    fn steps_are_small_against_what_is_near() {
+        let sun = "- sphere: {center: [0, -1.2e11, 9e10], radius: 7.5e8, emission: 1}\n";
+        assert_eq!(lamp(2.0 - 1e-6, sun), (2.0 - 1e-6, 0));
+        let (below, told) = lamp(2.0, sun);
+        assert!(below < 2.0 && below > 2.0 - 1e-8 && told == 1, "{below}");
+        let shelf = "- rectangle: {corner: [-1, 1.9999999999, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2]}\n";
+        let (between, _) = lamp(2.0, shelf);
+        // Rays begin 2⁻⁴⁶ of some 5 m off the surface.
+        assert!((between - (2.0 - 0.5e-10)).abs() < 1e-13, "{between}");
     }
 }

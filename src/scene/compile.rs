@@ -19,6 +19,7 @@ mod shapes;
 mod spectra;
 mod surface;
 
+use super::apart::put_apart;
 use super::bvh::{Aabb, Bvh};
 use super::camera::Camera;
 use super::choice::Choice;
@@ -285,6 +286,7 @@ impl<'a> Compiler<'a> {
             return Err(Error::Config(String::new()));
         }
 
+        let contacts = put_apart(&mut objects, &self.materials);
         let boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
         let all: Vec<u32> = (0..objects.len() as u32).collect();
         // The box of one small mesh among few things is met side by side with theirs.
@@ -374,6 +376,7 @@ impl<'a> Compiler<'a> {
         self.note_beside(&mut scene, &light_names);
         scene.light_exponent = scene.film_exponent(&powers);
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
+        self.note_contacts(&mut scene, &contacts);
         self.note_overlaps(&mut scene);
         self.note_lost_light(&mut scene, &light_names);
         scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);

@@ -178,6 +178,20 @@ impl Light {
         self.is_environment() || matches!(self, Light::Area { .. })
     }
 
+    /// Where a lamp without extent is.
+    #[must_use]
+    pub fn position(&self) -> Option<DVec3> {
+        match self {
+            Light::Point { position, .. } | Light::Spot { position, .. } => Some(*position),
+            Light::Projector(projector) => Some(projector.position()),
+            Light::Directional { .. }
+            | Light::Constant { .. }
+            | Light::Environment(_)
+            | Light::Area { .. }
+            | Light::AlongNormal { .. } => None,
+        }
+    }
+
     /// True for light from infinity.
     #[must_use]
     pub fn is_distant(&self) -> bool {

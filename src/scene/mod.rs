@@ -6,6 +6,7 @@
 
 pub mod ahead;
 pub mod along_normal;
+mod apart;
 pub mod bands;
 mod beside;
 mod brightness;
@@ -250,6 +251,16 @@ pub struct TriangleMesh {
     pub tree: Option<MeshTree>,
     /// For light; of none where the mesh does not shine.
     pub areas: AreaTable,
+}
+
+impl TriangleMesh {
+    /// Moves it.
+    fn shift(&mut self, by: DVec3) {
+        self.mesh.origin += by;
+        if let Some(tree) = &mut self.tree {
+            tree.shift(by);
+        }
+    }
 }
 
 /// Fog that thickens with the distance from the picture plane: what a compositor does with a

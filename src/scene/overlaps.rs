@@ -158,11 +158,13 @@ mod tests {
     use crate::description::SceneDescription;
     use crate::scene::compile::compile;
 
-    /// Notes of a scene of these shapes.
+    /// Notes of overlaps in a scene of these shapes.
     fn notes(shapes: &str) -> Vec<String> {
         let text = format!("camera: {{origin: [0, 0.3, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n{shapes}");
         let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-        compile(&description, "s").unwrap().notes
+        let mut notes = compile(&description, "s").unwrap().notes;
+        notes.retain(|note| note.contains(": overlaps "));
+        notes
     }
 
     fn sphere(x: f64, radius: f64, more: &str) -> String {

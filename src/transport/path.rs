@@ -105,7 +105,7 @@ impl Tracer<'_> {
     /// Follows a path to its end, first no farther than `reach`; coverage and depth of what it meets first.
     fn follow<const CHROMATIC: bool, const MEDIA: bool>(&self, path: &mut Path, mut reach: f64) -> (f32, f64) {
         let scene = self.scene;
-        let mut walk = Walk::NEW;
+        let mut walk = Walk::begin(self.scene, self.settings);
         let mut ahead = Ahead::UNKNOWN;
 
         loop {
@@ -172,9 +172,6 @@ impl Tracer<'_> {
         let scene = self.scene;
         let Some(hit) = hit else {
             self.add_background::<CHROMATIC>(path);
-            if self.settings.opaque_sky && !self.settings.hide_emitters && scene.has_sky {
-                walk.alpha = 1.0;
-            }
             return Step::Ended;
         };
         let surface = scene.surface(&path.ray, &hit);

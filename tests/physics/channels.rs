@@ -291,6 +291,17 @@ fn lights_without_power_are_left_out() {
         );
         assert_eq!(bench_with(&scene, &[]).sample([0, 0], 0).alpha, alpha, "{setting}");
     }
+    // Behind panes, too, where a bound to depth ends the path before it gets there.
+    let panes: String = (0..4)
+        .map(|z| format!("- rectangle: {{corner: [-9, -9, {z}], edge_u: [18, 0, 0], edge_v: [0, 18, 0], material: {{boundary: {{}}}}}}\n"))
+        .collect();
+    let scene = format!(
+        "{PARALLEL}image: {{width: 1, height: 1}}\nintegrator: {{path: {{opaque_sky: true, max_depth: 2, count_crossings: true}}}}\n\
+         lights: [{{constant: {{radiance: 1}}}}]\nshapes:\n{panes}"
+    );
+    let scene = bench_with(&scene, &[]);
+    assert_eq!(scene.sample([0, 0], 0).alpha, 1.0);
+    assert_eq!(scene.picture().alpha, [1.0]);
 }
 
 /// Light of a bare boundary is added to what lies behind it, and covers nothing: 2 over a sky of 3.

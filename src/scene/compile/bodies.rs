@@ -2,6 +2,7 @@
 
 use super::Compiler;
 use crate::description as written;
+use crate::scene::apart::Contact;
 use crate::scene::material::Material;
 use crate::scene::shape::Shape;
 use crate::scene::{Geometry, Scene};
@@ -23,6 +24,28 @@ impl Compiler<'_> {
         }
         if pairs.len() > TOLD {
             scene.notes.push(format!("{} more pairs of bodies overlap without priorities", pairs.len() - TOLD));
+        }
+    }
+
+    /// Notes which bodies share faces, and what was done.
+    pub(super) fn note_contacts(&self, scene: &mut Scene, contacts: &[Contact]) {
+        for Contact { body, other, by } in contacts.iter().take(TOLD) {
+            let at = format!("shapes[{body}].{}", self.description.shapes[*body as usize].geometry.kind());
+            let done = match by {
+                Some(by) if *by < 0.0 => {
+                    format!("it reaches {:.0e} m into it, as bodies with a priority may", -by)
+                }
+                Some(by) => {
+                    format!("it is put off by {by:.0e} m, so that rays meet both, with empty space between")
+                }
+                None => "it has no room to be put off, and rays may miss one of the two; leave a gap".to_owned(),
+            };
+            scene.notes.push(self.description.fault(&at, &format!("shares a face with shapes[{other}]: {done}")));
+        }
+        if contacts.len() > TOLD {
+            scene
+                .notes
+                .push(format!("{} more pairs of shapes share faces and are put off each other", contacts.len() - TOLD));
         }
     }
 

@@ -207,6 +207,18 @@ impl Mesh {
         Ok(mesh)
     }
 
+    /// Whether it encloses a volume: the areas of a closed mesh add up to nothing, as vectors. Corners are rounded to f32, 2⁻²⁴,
+    /// and so are areas.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        let areas = (0..self.triangles.len() as u32).map(|i| {
+            let [a, b, c] = self.vertices(i);
+            (b - a).cross(c - a)
+        });
+        let (sum, all) = areas.fold((DVec3::ZERO, 0.0), |(sum, all), area| (sum + area, all + area.length()));
+        sum.length() <= 1e-6 * all
+    }
+
     /// The corners of triangle `i`, relative to [`Mesh::origin`].
     #[must_use]
     pub fn vertices(&self, i: u32) -> [DVec3; 3] {

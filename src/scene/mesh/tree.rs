@@ -98,6 +98,11 @@ impl MeshTree {
         MeshTree::over(mesh, Bvh::build_blocks(&boxes(mesh)))
     }
 
+    /// Moves it.
+    pub fn shift(&mut self, by: DVec3) {
+        self.origin += by;
+    }
+
     /// A hierarchy over `mesh` of the shape that this one has: cheaper than a new one, and as good where both are
     /// meshes of one file, turned, moved or resized. A new one where they have not as many triangles.
     #[must_use]

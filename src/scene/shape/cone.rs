@@ -83,6 +83,18 @@ impl Cone {
         Ok(Cone { frame, rows, turn: if mirrored { -1.0 } else { 1.0 }, ..self })
     }
 
+    /// See [`super::Shape::inset`].
+    pub(super) fn inset(&self, by: f64) -> Option<Cone> {
+        let Frame { s, t, n } = self.frame;
+        // How far the apex comes down as the side moves in.
+        let down = by * self.slant / self.radius;
+        let height = super::less(self.height, by + down)?;
+        let (base, radius) = (self.base + n * by, self.radius * (height / self.height));
+        let slant = (radius * radius + height * height).sqrt();
+        let rows = [s / radius, t / radius, -n / height];
+        Some(Cone { base, apex: self.apex - n * down, height, radius, slant, rows, ..self.clone() })
+    }
+
     pub(super) fn plain(&self) -> Plain {
         let caps = [None, (self.present >> BASE & 1 == 1).then_some(BASE)];
         let rows = self.rows.map(|row| row.as_vec3());

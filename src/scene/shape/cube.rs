@@ -100,6 +100,17 @@ impl Cube {
         })
     }
 
+    /// See [`super::Shape::inset`].
+    pub(super) fn inset(&self, by: f64) -> Option<Cube> {
+        let mut edges = self.half_edges;
+        for (edge, dual) in edges.iter_mut().zip(self.duals()) {
+            let height = 1.0 / dual.length();
+            *edge *= super::less(height, by)? / height;
+        }
+        let cube = Cube::new(self.center, edges).ok()?;
+        Some(Cube { pictures: self.pictures, ..cube })
+    }
+
     /// The cube with its texture laid out so.
     #[must_use]
     pub fn with_layout(self, layout: Layout) -> Cube {

@@ -86,6 +86,21 @@ impl Cylinder {
         Ok(Cylinder { frame, rows, turn: if mirrored { -1.0 } else { 1.0 }, ..self })
     }
 
+    /// See [`super::Shape::inset`].
+    pub(super) fn inset(&self, by: f64) -> Option<Cylinder> {
+        let Frame { s, t, n } = self.frame;
+        let radius = super::less(self.radius, by)?;
+        let length = super::less(self.length, 2.0 * by)?;
+        Some(Cylinder {
+            base: self.base + n * by,
+            length,
+            radius,
+            rows: [s / radius, t / radius, n / length],
+            heights: (0.0, length),
+            ..self.clone()
+        })
+    }
+
     pub(super) fn plain(&self) -> Plain {
         let caps = [BASE, TOP].map(|face| (self.present >> face & 1 == 1).then_some(face));
         let rows = self.rows.map(|row| row.as_vec3());

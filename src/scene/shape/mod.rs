@@ -138,6 +138,14 @@ pub struct AreaSample {
     pub pdf_area: f64,
 }
 
+/// Insets are at most this part of a length, so that what is left is the same to the eye.
+const INSET: f64 = 1.0 / (1u64 << 20) as f64;
+
+/// `length` less `by`, where that is a small part of it.
+fn less(length: f64, by: f64) -> Option<f64> {
+    (by.abs() <= INSET * length).then_some(length - by)
+}
+
 /// A point of a surface, drawn to be looked at from another point.
 #[derive(Clone, Copy, Debug)]
 pub struct TowardSample {
@@ -266,6 +274,19 @@ impl Shape {
             Shape::Plane(_) | Shape::Disk(_) | Shape::Rectangle(_) => false,
             Shape::Cylinder(s) => s.is_closed(),
             Shape::Cone(s) => s.is_closed(),
+        }
+    }
+
+    /// A closed shape whose faces lie `by` metres further in, or out where that is negative; `None` where that is more than a
+    /// small part of its size.
+    #[must_use]
+    pub fn inset(&self, by: f64) -> Option<Shape> {
+        match self {
+            Shape::Sphere(s) => s.inset(by).map(Shape::Sphere),
+            Shape::Cube(s) => s.inset(by).map(Shape::Cube),
+            Shape::Cylinder(s) if s.is_closed() => s.inset(by).map(Shape::Cylinder),
+            Shape::Cone(s) if s.is_closed() => s.inset(by).map(Shape::Cone),
+            Shape::Cylinder(_) | Shape::Cone(_) | Shape::Plane(_) | Shape::Disk(_) | Shape::Rectangle(_) => None,
         }
     }
 

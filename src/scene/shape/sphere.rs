@@ -63,6 +63,12 @@ impl Sphere {
         Ok(Sphere { center, radius, radius_squared, world_from_object, from_north: false })
     }
 
+    /// See [`super::Shape::inset`].
+    pub(super) fn inset(&self, by: f64) -> Option<Sphere> {
+        let radius = super::less(self.radius, by)?;
+        Some(Sphere { radius, radius_squared: radius * radius, ..self.clone() })
+    }
+
     /// The sphere with its texture laid out so.
     #[must_use]
     pub fn with_layout(self, layout: Layout) -> Sphere {

@@ -1,12 +1,12 @@
 //! What a path carries from vertex to vertex, and what it knows of the one that it is at.
 
-use super::Incoming;
+use super::{Incoming, PathSettings};
 use crate::math::sampler::{Sampler, Set};
 use crate::math::{Frame, Ray};
 use crate::optics::bsdf::Lobes;
 use crate::scene::compound::Slopes;
 use crate::scene::nested::Crossing;
-use crate::scene::{Hit, Inside, Object, SurfacePoint};
+use crate::scene::{Hit, Inside, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes};
 use glam::DVec3;
 use std::cell::Cell;
@@ -73,6 +73,12 @@ pub(super) struct Walk {
 
 impl Walk {
     pub(super) const NEW: Walk = Walk { alpha: 0.0, depth: f64::INFINITY, first: true, crossings: 0 };
+
+    /// [`Walk::NEW`] in a scene: an opaque sky covers all of it, wherever it ends.
+    pub(super) fn begin(scene: &Scene, settings: &PathSettings) -> Walk {
+        let covered = settings.opaque_sky && !settings.hide_emitters && scene.has_sky;
+        Walk { alpha: if covered { 1.0 } else { 0.0 }, ..Walk::NEW }
+    }
 
     /// Something that covers what is behind it, `depth` away.
     #[inline]

@@ -71,6 +71,7 @@ fn trace<'a, const CHROMATIC: bool>(
         let ray = wanted(i).ray;
         (path.ray.origin, path.ray.direction) = (ray.origin, ray.direction);
         reach[i] = scene.camera.reach(ray);
+        walks[i] = Walk::begin(scene, settings);
     }
     // Those that go on, in order.
     let mut on: [usize; MOST] = std::array::from_fn(|i| i);

@@ -1,0 +1,309 @@
+//! Bodies that light goes into and that share a face with something else: they are put apart.
+//!
+//! Rays that leave a surface begin a step off it ([`Ray::leaving`]), which leads over whatever lies on the very same face: a path
+//! out of one block of smoke would miss the way into the next, and one out of a glass the table that it stands on. Rounding
+//! decides which of the two is met first. So one of them is made smaller, by 2⁻⁴² of the largest coordinate or length, which
+//! is sixteen steps and nothing to see: empty space is then between them, as between things that lie on each other. Meshes,
+//! whose corners have no such digits, are moved by as much. Bodies with a priority are there to share a place: they reach into
+//! each other instead.
+//!
+//! Points drawn on the faces of bodies find what else goes through them. Faces are found that are more than a hundredth of a
+//! body's, but for one in 10⁴; of meshes those of one triangle in as many as there are above a thousand. Copies of groups are not
+//! looked at, nor sheets, which have no inside to withdraw to.
+
+use super::bvh::Aabb;
+use super::instance::PartHit;
+use super::material::Material;
+use super::shape::Detail;
+use super::{Geometry, Hit, Object, TriangleMesh};
+use crate::math::Ray;
+use glam::{DVec2, DVec3};
+
+/// By how much a body is made smaller, relative to the largest coordinate or length.
+const APART: f64 = 1.0 / (1u64 << 42) as f64;
+
+/// Faces that are nearer, relative to the same, are one: four steps of rays that leave surfaces.
+const NEAR: f64 = 1.0 / (1u64 << 44) as f64;
+
+/// A probe's length on either side.
+const REACH: f64 = 1.0 / (1u64 << 36) as f64;
+
+/// Bodies that are looked at; a bound on time, as are the following.
+const MOST_BODIES: usize = 1024;
+
+/// Pairs of boxes.
+const MOST_PAIRS: usize = 1 << 26;
+
+/// Points on all bodies, and on one.
+const POINTS: usize = 1 << 16;
+const POINTS_OF_ONE: usize = 1 << 10;
+
+/// Two objects of which one was put off the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Contact {
+    /// The body that was to withdraw.
+    pub(super) body: u32,
+    /// What it touches.
+    pub(super) other: u32,
+    /// By how much it was put off, metres; negative where it reaches into the other. None where it has no room, or is held
+    /// between two others.
+    pub(super) by: Option<f64>,
+}
+
+/// A point of a surface.
+struct Probe {
+    point: DVec3,
+    normal: DVec3,
+    scale: f64,
+}
+
+/// What a body is to do.
+#[derive(Default)]
+struct Withdrawal {
+    others: Vec<u32>,
+    normals: Vec<DVec3>,
+    scale: f64,
+    /// Whether something that it touches has no priority, so that it has to be left.
+    leaves: bool,
+}
+
+/// Puts bodies apart that share faces, and says which.
+pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<Contact> {
+    let is_body = |o: &Object| {
+        let closed = match &o.geometry {
+            Geometry::Shape(shape) => shape.is_closed(),
+            Geometry::Mesh(mesh) => mesh.mesh.is_closed(),
+            Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
+        };
+        o.light.is_none() && materials[o.material as usize].transmits() && closed
+    };
+    let bodies: Vec<usize> = (0..objects.len()).filter(|&i| is_body(&objects[i])).take(MOST_BODIES).collect();
+    if bodies.is_empty() || objects.len() < 2 {
+        return Vec::new();
+    }
+    let boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
+    let volume = |i: usize| (boxes[i].max - boxes[i].min).element_product();
+    let ranked = |i: usize| materials[objects[i].material as usize].body().is_ok_and(|body| body.is_some());
+    let points = (POINTS / bodies.len()).min(POINTS_OF_ONE);
+
+    let mut found: Vec<(usize, Withdrawal)> = Vec::new();
+    let mut withdraw = |body: usize, other: usize, normal: DVec3, scale: f64, leaves: bool| {
+        let at = found.iter().position(|(i, _)| *i == body).unwrap_or_else(|| {
+            found.push((body, Withdrawal::default()));
+            found.len() - 1
+        });
+        let one = &mut found[at].1;
+        one.scale = one.scale.max(scale);
+        one.leaves |= leaves;
+        if !one.others.contains(&(other as u32)) {
+            one.others.push(other as u32);
+        }
+        if !one.normals.iter().any(|known| known.dot(normal) > 1.0 - 1e-9) {
+            one.normals.push(normal);
+        }
+    };
+    for &body in bodies.iter().take(MOST_PAIRS / objects.len()) {
+        let pad = REACH * boxes[body].min.abs().max(boxes[body].max.abs()).max_element();
+        let near = |b: &Aabb, min: DVec3, max: DVec3| b.min.cmple(max + pad).all() && b.max.cmpge(min - pad).all();
+        let others: Vec<usize> =
+            (0..objects.len()).filter(|&i| i != body && near(&boxes[i], boxes[body].min, boxes[body].max)).collect();
+        if others.is_empty() {
+            continue;
+        }
+        for probe in probes(&objects[body].geometry, points) {
+            for &other in others.iter().filter(|&&i| near(&boxes[i], probe.point, probe.point)) {
+                let Some((normal, scale)) = met(&objects[other], &probe) else { continue };
+                let both = bodies.contains(&other);
+                let first = !both
+                    || match (ranked(body), ranked(other)) {
+                        (false, true) => true,
+                        (true, false) => false,
+                        _ => (volume(body), other) < (volume(other), body),
+                    };
+                let leaves = !(ranked(body) && ranked(other));
+                match first {
+                    true => withdraw(body, other, probe.normal, scale, leaves),
+                    false => withdraw(other, body, normal, scale, leaves),
+                }
+            }
+        }
+    }
+    // Of two that lie in one another the smaller withdraws by more; what touches shares a scale.
+    found.sort_by(|(a, _), (b, _)| volume(*b).total_cmp(&volume(*a)).then(a.cmp(b)));
+    while let Some((i, scale)) = larger_scale(&found) {
+        found[i].1.scale = scale;
+    }
+    let mut contacts = Vec::new();
+    for (rank, (body, one)) in found.into_iter().enumerate() {
+        let by = APART * one.scale * (rank + 1) as f64 * if one.leaves { 1.0 } else { -1.0 };
+        let done = match &mut objects[body].geometry {
+            Geometry::Shape(shape) => shape.inset(by).map(|smaller| *shape = smaller),
+            Geometry::Mesh(mesh) => {
+                let inward: DVec3 = one.normals.iter().map(|n| -*n).sum();
+                (inward.length() > 0.5).then(|| mesh.shift(inward * by))
+            }
+            Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => None,
+        };
+        let by = done.map(|()| by);
+        contacts.extend(one.others.into_iter().map(|other| Contact { body: body as u32, other, by }));
+    }
+    contacts
+}
+
+/// One of `found` that touches another of larger scale, and that scale.
+fn larger_scale(found: &[(usize, Withdrawal)]) -> Option<(usize, f64)> {
+    let touches = |a: &(usize, Withdrawal), b: &(usize, Withdrawal)| {
+        a.1.others.contains(&(b.0 as u32)) || b.1.others.contains(&(a.0 as u32))
+    };
+    found.iter().enumerate().find_map(|(i, a)| {
+        let scale = found.iter().filter(|b| touches(a, b)).map(|b| b.1.scale).fold(0.0, f64::max);
+        (scale > a.1.scale).then_some((i, scale))
+    })
+}
+
+/// Points all over a shape or mesh.
+fn probes(geometry: &Geometry, points: usize) -> Vec<Probe> {
+    // Multiples of the inverse powers of the root of x³ = x + 1 (the generalised golden ratio).
+    const GOLDEN: f64 = 1.324_717_957_244_746;
+    // It never draws the middle of anything, where bodies touch in a point.
+    let lattice = |i: usize| (DVec2::splat(i as f64 + 1.0) / DVec2::new(GOLDEN, GOLDEN * GOLDEN)).fract();
+    match geometry {
+        Geometry::Shape(shape) => (0..points)
+            .map(|i| shape.sample_area(lattice(i)))
+            .map(|s| Probe { point: s.point, normal: s.normal, scale: s.scale })
+            .collect(),
+        Geometry::Mesh(mesh) => {
+            let all = mesh.mesh.triangles.len();
+            let chosen = |i: usize| if all > points { i * all / points } else { i % all };
+            (0..points).filter_map(|i| inner_point(mesh, chosen(i) as u32, lattice(i))).collect()
+        }
+        Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => Vec::new(),
+    }
+}
+
+/// A point within a triangle; `None` for one without area.
+fn inner_point(mesh: &TriangleMesh, triangle: u32, u: DVec2) -> Option<Probe> {
+    let [a, b, c] = mesh.mesh.vertices(triangle);
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    let u = if u.x + u.y > 1.0 { 1.0 - u } else { u };
+    let origin = mesh.mesh.origin;
+    let scale = [a, b, c, origin].into_iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    Some(Probe { point: a + (b - a) * u.x + (c - a) * u.y + origin, normal, scale })
+}
+
+/// The normal of an object where its surface goes through a point of another's, and the larger scale.
+fn met(object: &Object, probe: &Probe) -> Option<(DVec3, f64)> {
+    let reach = REACH * probe.scale;
+    let ray = Ray::new(probe.point + probe.normal * reach, -probe.normal);
+    let PartHit { t, part, barycentric } = object.geometry.meet(&ray, 2.0 * reach, None)?;
+    let hit = Hit { t, object: 0, part, barycentric, instance: None };
+    let surface = object.geometry.surface(ray.at(t), &hit, Detail::Geometry);
+    let scale = surface.scale.max(probe.scale);
+    ((t - reach).abs() <= NEAR * scale).then_some((surface.normal, scale))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile;
+
+    /// The notes and boxes of a scene of these shapes.
+    fn compiled(shapes: &str) -> (Vec<String>, Vec<Aabb>) {
+        let text = format!(
+            "camera: {{origin: [0, 0.3, 5], target: [0, 0, 0], fov_deg: 40}}\nmedia: {{smoke: {{homogeneous: {{absorption: 1}}}}}}\n\
+             materials:\n  glass: {{dielectric: {{ior: 1.5}}}}\n  water: {{dielectric: {{ior: 1.33, priority: 1}}}}\n  \
+             ice: {{dielectric: {{ior: 1.31, priority: 2}}}}\nshapes:\n{shapes}"
+        );
+        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
+        let scene = compile(&description, "s").unwrap();
+        (scene.notes.clone(), scene.objects.iter().map(Object::bounds).collect())
+    }
+
+    const TABLE: &str = "- rectangle: {corner: [-2, 0, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4]}\n";
+
+    /// Which of two bodies withdraws, and to which side, for whatever they are, and the table first or last.
+    #[test]
+    fn bodies_withdraw_from_what_they_stand_on() {
+        for body in [
+            "cube: {center: [0, 0.5, 0], size: 1, material: glass}",
+            "cylinder: {base: [0, 0, 0], top: [0, 1, 0], radius: 0.1, material: glass}",
+            "cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 0.3, material: glass}",
+            "cube: {center: [0, 0.5, 0], size: 1, material: {mask: {opacity: 0, material: glass}}}",
+            "cube: {center: [0, 0.5, 0], size: 1, material: {boundary: {}}, inside: smoke, outside: vacuum}",
+            "cube: {center: [0, 0.5, 0], size: 1, material: water}",
+        ] {
+            for (at, shapes) in [(1, format!("{TABLE}- {body}\n")), (0, format!("- {body}\n{TABLE}"))] {
+                let (notes, boxes) = compiled(&shapes);
+                assert_eq!(notes.len(), 1, "{notes:?}");
+                assert!(notes[0].contains(&format!("shares a face with shapes[{}]", 1 - at)), "{notes:?}");
+                let gap = boxes[at].min.y;
+                assert!(gap > 4.0 * 2f64.powi(-46) && gap < 1e-11, "{body}: {gap}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_touch_or_is_opaque_stays() {
+        for shapes in [
+            "- cube: {center: [0, 0.501, 0], size: 1, material: glass}\n",
+            "- cube: {center: [0, 0.499, 0], size: 1, material: glass}\n",
+            "- sphere: {center: [0, 0.5, 0], radius: 0.5, material: glass}\n",
+            "- cube: {center: [0, 0.5, 0], size: 1}\n",
+            "- rectangle: {corner: [-1, 0, 1], edge_u: [1, 0, 0], edge_v: [0, 0, -1], material: {thin_dielectric: {ior: 1.5}}}\n",
+        ] {
+            let (notes, boxes) = compiled(&format!("{TABLE}{shapes}"));
+            assert_eq!(notes, [""; 0], "{shapes}");
+            assert_eq!(boxes[1], compiled(shapes).1[0]);
+        }
+    }
+
+    /// Seven in a row; one that fills another; three in one another; and bodies with priorities, which overlap.
+    #[test]
+    fn bodies_withdraw_from_each_other() {
+        let cube = |y: f64, size: f64, material: &str| {
+            format!("- cube: {{center: [0.1, {y}, 0.2], size: {size}, material: {material}}}\n")
+        };
+        let row: String = (0..7).map(|i| cube(f64::from(i), 1.0, "glass")).collect();
+        let (notes, boxes) = compiled(&row);
+        assert_eq!(notes.len(), 6, "{notes:?}");
+        for pair in boxes.windows(2) {
+            let gap = pair[1].min.y - pair[0].max.y;
+            assert!(gap > 8.0 * 2f64.powi(-46) * 6.0 && gap < 1e-10, "{gap}");
+        }
+        // In one another, the outermost last.
+        let nest: String = (0..3).map(|i| cube(f64::from(i) / 2.0, 1.0 + f64::from(i), "glass")).collect();
+        let (_, boxes) = compiled(&nest);
+        for pair in boxes.windows(2) {
+            let gap = pair[0].min.y - pair[1].min.y;
+            assert!(gap > 8.0 * 2f64.powi(-46) * 2.0 && gap < 1e-10, "{gap}");
+        }
+        let (notes, boxes) = compiled(&(cube(0.0, 1.0, "water") + &cube(1.0, 1.0, "ice")));
+        assert!(notes[0].contains("reaches"), "{notes:?}");
+        assert!(boxes[0].max.y > boxes[1].min.y + 8.0 * 2f64.powi(-46), "{boxes:?}");
+    }
+
+    /// A mesh stands on a table at a height that f32 has, and beside another of the same corners.
+    #[test]
+    fn meshes_move_out_of_the_way() {
+        let directory = tempfile::tempdir().unwrap();
+        let cube = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv -1 2 -1\nv 1 2 -1\nv 1 2 1\nv -1 2 1\n\
+            f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n";
+        std::fs::write(directory.path().join("cube.obj"), cube).unwrap();
+        let text = format!(
+            "camera: {{origin: [0, 0.3, 5], target: [0, 0, 0], fov_deg: 40}}\nmaterials: {{glass: {{dielectric: {{ior: 1.5}}}}}}\n\
+             shapes:\n{TABLE}- mesh: {{file: cube.obj, material: glass}}\n"
+        );
+        let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
+        let scene = compile(&description, "s").unwrap();
+        let bottom = scene.objects[1].bounds().min.y;
+        assert!(bottom > 4.0 * 2f64.powi(-46) && bottom < 1e-11, "{bottom}");
+        let ray = Ray::new(DVec3::new(0.1, 5.0, 0.2), -DVec3::Y);
+        let top = scene.closest(&ray, f64::INFINITY).unwrap();
+        let inside = scene.leave(&scene.surface(&ray, &top), &top, -DVec3::Y);
+        let met = scene.closest(&inside, f64::INFINITY).unwrap();
+        assert_eq!(met.object, 1);
+        let below = scene.leave(&scene.surface(&inside, &met), &met, -DVec3::Y);
+        assert_eq!(scene.closest(&below, f64::INFINITY).unwrap().object, 0);
+    }
+}
