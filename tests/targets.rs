@@ -276,6 +276,13 @@ fn another_build_has_a_row_of_its_own() {
     assert_eq!(code, 0, "{said}");
     let rows = &place.json("file/accuracy.json")[0]["rows"];
     assert_eq!(rows.as_array().unwrap().iter().map(|row| &row["knob"]).collect::<Vec<_>>(), ["chosen", "file"]);
+    assert_eq!(rows[1]["value"], "half");
+    // What half cannot hold is written in float, and loses nothing.
+    let (code, said) =
+        abbe(&place, "accuracy scene.yaml -o file --rounds 2 --knob file --set shapes[2].sphere.emission=1e6");
+    let row = &place.json("file/accuracy.json")[0]["rows"][1];
+    assert!(code == 0 && said.contains("files are in float") && !said.contains("NaN"), "{code} {said}");
+    assert_eq!((&row["value"], &row["bias_squared"]["value"]), (&"float".into(), &0.0.into()));
     // A program that is not Abbe is told before anything is rendered, and the sheet that is there stays.
     for (program, found) in [("./nothing", "./nothing: "), ("/bin/sh", "/bin/sh: another program")] {
         let (code, said) = abbe(&place, &format!("accuracy scene.yaml -o sheet --knob depth --beside {program}"));

@@ -248,8 +248,13 @@ pub fn sheet(
         rows.push(row(trial, tally, &tallies[0], &reference, target, png));
     }
     if settings.moves(knobs::FILE) {
-        let bias_squared = Figure { value: images[0].as_ref().map_or(0.0, rounding), error: 0.0 };
-        rows.push(Row { knob: knobs::FILE, value: "half".into(), chosen: false, bias_squared, ..rows[0].clone() });
+        // What half cannot hold is written in full.
+        let rounded = images[0].as_ref().and_then(rounding);
+        let value = rounded.map_or(knobs::FULL, |_| "half").into();
+        let bias_squared = Figure { value: rounded.unwrap_or(0.0), error: 0.0 };
+        let mut row = Row { knob: knobs::FILE, value, chosen: false, bias_squared, ..rows[0].clone() };
+        row.to_target = row.reaches(target, rows[0].bias().unwrap_or(0.0));
+        rows.push(row);
     }
     let advice = advice::sentences(&rows);
     let reference = settings.truth.is_none().then_some((more, reference.noise));
@@ -266,12 +271,16 @@ const REFERENCE: u32 = 16;
 /// Its random numbers are others.
 const SEED_OF_THE_REFERENCE: u64 = 0x7265_6665_7265_6e63;
 
-/// relMSE of a file of half precision against `image`: the same samples, so nothing of it is noise.
-fn rounding(image: &Image) -> f64 {
+/// relMSE of a file of half precision against `image`: the same samples, so nothing of it is noise. None where half precision
+/// cannot hold it.
+fn rounding(image: &Image) -> Option<f64> {
+    if image.rgb.iter().flatten().any(|&x| x.is_finite() && f16::from_f32(x).is_infinite()) {
+        return None;
+    }
     let values = image.rgb.iter().flatten().map(|&x| (f64::from(x), f64::from(f16::from_f32(x).to_f32())));
     let floor = error::floor(image);
     let all: Moments = values.map(|(x, rounded)| (rounded - x).powi(2) / (x * x + floor)).collect();
-    all.mean
+    Some(all.mean)
 }
 
 fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, target: f64, png: Vec<u8>) -> Row {
@@ -303,11 +312,7 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
         curve,
         png,
     };
-    let left = target * target - row.bias().unwrap_or(0.0).powi(2);
-    let samples = f64::from(end.samples);
-    // The slope is that from a quarter of the samples on: in the middle half of them.
-    let fit = Fit::with_slope(samples, end.noise[0], row.exponent(), 0.5 * samples);
-    row.to_target = (left > 0.0).then(|| end.seconds * fit.samples_for(left.sqrt()) / samples);
+    row.to_target = row.reaches(target, 0.0);
     row
 }
 
@@ -321,6 +326,15 @@ impl Row {
             let fallen = 2.0 * libm::log(p.noise[0] / end.noise[0]);
             (fallen / libm::log(f64::from(end.samples) / f64::from(p.samples))).clamp(1.0, 2.0)
         })
+    }
+
+    /// Seconds to an error of `target` beside a bias of `more` than its own; none where that is more than the target.
+    fn reaches(&self, target: f64, more: f64) -> Option<f64> {
+        let left = target * target - self.bias().unwrap_or(0.0).powi(2) - more * more;
+        let samples = f64::from(self.samples);
+        // The slope is that from a quarter of the samples on: in the middle half of them.
+        let fit = Fit::with_slope(samples, self.noise[0], self.exponent(), 0.5 * samples);
+        (left > 0.0).then(|| self.seconds * fit.samples_for(left.sqrt()) / samples)
     }
 
     /// √relMSE of the bias, where it stands out.

@@ -135,7 +135,7 @@ impl Scene {
                         other.hit.object == hit.object && other.surface.normal.dot(surface.normal).abs() > 1.0 - 1e-9
                     };
                     if away <= (NEAR * scale).max(self.rounding(&hit)) && !found.iter().any(known) {
-                        found.push(Lain { hit, surface: surface.clone(), scale });
+                        found.push(Lain { hit, surface, scale });
                     }
                     ray = self.leave(&surface, &hit, direction);
                 }

@@ -221,6 +221,24 @@ fn a_report_in_the_place_of_what_a_later_scene_reads_costs_no_picture() {
     assert!(["good.exr", "lit.exr", "report.json"].iter().all(|name| place.path("o").join(name).is_file()));
 }
 
+/// The decoder divided by its width. The other scene of the batch is rendered.
+#[test]
+fn a_picture_without_pixels_is_refused() {
+    let place = batch();
+    for size in ["-Y 8 +X 0", "-Y 0 +X 8"] {
+        std::fs::write(place.path("scenes/none.hdr"), format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{size}\n"))
+            .unwrap();
+        let lit =
+            "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nlights: [{environment: {file: none.hdr}}]\n";
+        std::fs::write(place.path("scenes/lit.yaml"), lit).unwrap();
+        std::fs::write(place.path("two.yaml"), "scenes: [{file: scenes/lit.yaml}, {file: scenes/good.yaml}]\n").unwrap();
+        let ran = place.run(&["render", "two.yaml", "-q", "-o", "two"]);
+        assert!(ran.err.contains("none.hdr: expected a picture of one pixel or more, found"), "{}", ran.err);
+        assert_eq!(ran.code, 3);
+        assert!(place.path("two/good.exr").is_file());
+    }
+}
+
 /// It made a directory of that name.
 #[test]
 fn merge_refuses_names_of_other_pictures_as_render_does() {

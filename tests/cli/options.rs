@@ -70,6 +70,11 @@ fn scenes_are_chosen_by_name() {
         "error: -o one.PNG: expected a directory or a file name that ends in .exr, beside which the PNG is written\n";
     assert_eq!((ran.code, ran.err.as_str()), (2, expected));
     assert_eq!(place.names("sub"), ["one.exr", "one.png", "report.other.json"]);
+    // A name that ends in a slash is a directory, whatever else it ends in.
+    assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "new.exr/"]).code, 0);
+    assert_eq!(place.names("new.exr"), ["good.exr", "good.png", "report.json"]);
+    let ran = place.run(&["render", "scenes/good.yaml", "--time", "0s"]);
+    assert!(ran.code == 2 && ran.err.contains("--time") && ran.err.contains("expected a time above 0"), "{}", ran.err);
 }
 
 #[test]

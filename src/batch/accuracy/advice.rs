@@ -10,6 +10,9 @@ pub fn sentences(rows: &[Row]) -> Vec<(&'static str, String)> {
     let of = |rows: &[Row]| {
         let knob = rows[0].knob;
         let words = match knob {
+            "file" if rows[0].value == knobs::FULL => {
+                "half precision cannot hold the brightest pixels: files are in float".to_owned()
+            }
             "file" => format!("half precision adds an error of {:.3} %", 100.0 * rows[0].bias_squared.value.sqrt()),
             "samples" => convergence(chosen, rows),
             _ => trade(chosen, rows),

@@ -104,6 +104,9 @@ pub const CHOSEN: &str = "chosen";
 /// The knob that takes no render: how precisely the picture is written.
 pub const FILE: &str = "file";
 
+/// The precision of a file that half cannot hold.
+pub const FULL: &str = "float";
+
 /// The chosen setting, then each knob at other values.
 #[must_use]
 pub fn trials(chosen: &Prepared) -> Vec<Trial> {
