@@ -279,7 +279,7 @@ fn another_build_has_a_row_of_its_own() {
     assert_eq!(rows[1]["value"], "half");
     // What half cannot hold is written in float, and loses nothing.
     let (code, said) =
-        abbe(&place, "accuracy scene.yaml -o file --rounds 2 --knob file --set shapes[2].sphere.emission=1e6");
+        abbe(&place, "accuracy scene.yaml -o file --rounds 2 --knob file --set shapes[2].sphere.emission=1e9");
     let row = &place.json("file/accuracy.json")[0]["rows"][1];
     assert!(code == 0 && said.contains("files are in float") && !said.contains("NaN"), "{code} {said}");
     assert_eq!((&row["value"], &row["bias_squared"]["value"]), (&"float".into(), &0.0.into()));
