@@ -8,16 +8,17 @@
 //! each other instead.
 //!
 //! Points drawn on the faces of bodies find what else goes through them. Faces are found that are more than a hundredth of a
-//! body's, but for one in 10⁴; of meshes those of one triangle in as many as there are above a thousand. Copies of groups are not
-//! looked at, nor sheets, which have no inside to withdraw to.
+//! body's, but for one in 10⁴; of meshes those of one triangle in as many as there are above a thousand. Sheets have no inside
+//! to withdraw to: what lies on one is told. Copies of groups are not looked at.
 
 use super::bvh::Aabb;
 use super::instance::PartHit;
 use super::material::Material;
-use super::shape::Detail;
+use super::shape::{Detail, Shape};
 use super::{Geometry, Hit, Object, TriangleMesh};
 use crate::math::Ray;
 use glam::{DVec2, DVec3};
+use std::cmp::Ordering;
 
 /// By how much a body is made smaller, relative to the largest coordinate or length.
 const APART: f64 = 1.0 / (1u64 << 42) as f64;
@@ -45,7 +46,7 @@ pub(super) struct Contact {
     pub(super) body: u32,
     /// What it touches.
     pub(super) other: u32,
-    /// By how much it was put off, metres; negative where it reaches into the other. None where it has no room, or is held
+    /// By how much it was put off, metres; negative where it reaches into the other. None where it has no room: a sheet, or a mesh
     /// between two others.
     pub(super) by: Option<f64>,
 }
@@ -70,12 +71,12 @@ struct Withdrawal {
 /// Puts bodies apart that share faces, and says which.
 pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<Contact> {
     let is_body = |o: &Object| {
-        let closed = match &o.geometry {
-            Geometry::Shape(shape) => shape.is_closed(),
-            Geometry::Mesh(mesh) => mesh.mesh.is_closed(),
+        let looked_at = match &o.geometry {
+            Geometry::Shape(shape) => !matches!(shape, Shape::Plane(_)),
+            Geometry::Mesh(_) => true,
             Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
         };
-        o.light.is_none() && materials[o.material as usize].transmits() && closed
+        looked_at && o.light.is_none() && materials[o.material as usize].transmits()
     };
     let bodies: Vec<usize> = (0..objects.len()).filter(|&i| is_body(&objects[i])).take(MOST_BODIES).collect();
     if bodies.is_empty() || objects.len() < 2 {
@@ -84,6 +85,7 @@ pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<C
     let boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
     let volume = |i: usize| (boxes[i].max - boxes[i].min).element_product();
     let ranked = |i: usize| materials[objects[i].material as usize].body().is_ok_and(|body| body.is_some());
+    let closed: Vec<bool> = bodies.iter().map(|&i| is_closed(&objects[i].geometry)).collect();
     let points = (POINTS / bodies.len()).min(POINTS_OF_ONE);
 
     let mut found: Vec<(usize, Withdrawal)> = Vec::new();
@@ -113,13 +115,16 @@ pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<C
         for probe in probes(&objects[body].geometry, points) {
             for &other in others.iter().filter(|&&i| near(&boxes[i], probe.point, probe.point)) {
                 let Some((normal, scale)) = met(&objects[other], &probe) else { continue };
-                let both = bodies.contains(&other);
-                let first = !both
-                    || match (ranked(body), ranked(other)) {
-                        (false, true) => true,
-                        (true, false) => false,
-                        _ => (volume(body), other) < (volume(other), body),
-                    };
+                // A sheet has no inside to withdraw to; a body with a priority stays, if it may.
+                let stays = |i: usize| {
+                    let at = bodies.iter().position(|&body| body == i);
+                    at.map_or([true; 3], |at| [false, !closed[at], ranked(i)])
+                };
+                let first = match stays(body).cmp(&stays(other)) {
+                    Ordering::Less => true,
+                    Ordering::Greater => false,
+                    Ordering::Equal => (volume(body), other) < (volume(other), body),
+                };
                 let leaves = !(ranked(body) && ranked(other));
                 match first {
                     true => withdraw(body, other, probe.normal, scale, leaves),
@@ -138,16 +143,25 @@ pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<C
         let by = APART * one.scale * (rank + 1) as f64 * if one.leaves { 1.0 } else { -1.0 };
         let done = match &mut objects[body].geometry {
             Geometry::Shape(shape) => shape.inset(by).map(|smaller| *shape = smaller),
-            Geometry::Mesh(mesh) => {
+            Geometry::Mesh(mesh) if mesh.mesh.is_closed() => {
                 let inward: DVec3 = one.normals.iter().map(|n| -*n).sum();
                 (inward.length() > 0.5).then(|| mesh.shift(inward * by))
             }
-            Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => None,
+            Geometry::Mesh(_) | Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => None,
         };
         let by = done.map(|()| by);
         contacts.extend(one.others.into_iter().map(|other| Contact { body: body as u32, other, by }));
     }
     contacts
+}
+
+/// Whether it has an inside.
+fn is_closed(geometry: &Geometry) -> bool {
+    match geometry {
+        Geometry::Shape(shape) => shape.is_closed(),
+        Geometry::Mesh(mesh) => mesh.mesh.is_closed(),
+        Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
+    }
 }
 
 /// One of `found` that touches another of larger scale, and that scale.
@@ -250,12 +264,29 @@ mod tests {
             "- cube: {center: [0, 0.499, 0], size: 1, material: glass}\n",
             "- sphere: {center: [0, 0.5, 0], radius: 0.5, material: glass}\n",
             "- cube: {center: [0, 0.5, 0], size: 1}\n",
-            "- rectangle: {corner: [-1, 0, 1], edge_u: [1, 0, 0], edge_v: [0, 0, -1], material: {thin_dielectric: {ior: 1.5}}}\n",
+            "- rectangle: {corner: [-1, 0.01, 1], edge_u: [1, 0, 0], edge_v: [0, 0, -1], material: {thin_dielectric: {ior: 1.5}}}\n",
         ] {
             let (notes, boxes) = compiled(&format!("{TABLE}{shapes}"));
             assert_eq!(notes, [""; 0], "{shapes}");
             assert_eq!(boxes[1], compiled(shapes).1[0]);
         }
+    }
+
+    /// On a sheet of glass a block withdraws; a sheet on a table cannot.
+    #[test]
+    fn sheets_that_lie_on_something_are_told() {
+        let sheet = TABLE.replace("}", ", material: {thin_dielectric: {ior: 1.5}}}");
+        let (notes, boxes) = compiled(&format!("{sheet}- cube: {{center: [0, 0.5, 0], size: 1, material: glass}}\n"));
+        assert!(
+            notes.len() == 1 && notes[0].contains("shapes[1].cube: shares a face with shapes[0]: it is put"),
+            "{notes:?}"
+        );
+        assert!(boxes[1].min.y > 0.0);
+        let (notes, _) = compiled(&format!("{TABLE}{sheet}"));
+        assert!(
+            notes.len() == 1 && notes[0].contains("shapes[1].rectangle: shares a face with shapes[0]: it has no room"),
+            "{notes:?}"
+        );
     }
 
     /// Seven in a row; one that fills another; three in one another; and bodies with priorities, which overlap.

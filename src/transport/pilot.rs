@@ -53,6 +53,10 @@ pub struct Wishes {
 /// Rounds of paths from the lights: each is aimed by what those before it have learnt.
 const ROUNDS: u32 = 4;
 
+/// Share of the rays of the picture after which light that nothing else finds is no longer looked for by further rounds, and paths
+/// from the lights for each from the camera where it was not found: it may be there all the same, and is then found by these.
+const PATIENCE: f64 = 1.0 / 8.0;
+
 /// Share of the rays of the picture that a round may take beyond the least number of paths.
 const SHARE: f64 = 1.0 / 256.0;
 
@@ -244,10 +248,12 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let mut weights = relative(&camera.means);
     let mut learnt = vec![Vec::new(); caustics.sources.len()];
     let most_rays = SHARE * trial.paths() * camera.rays;
-    let (mut found, mut followed) = (Round::default(), 0);
+    let (mut found, mut followed, mut rays) = (Round::default(), 0, 0.0);
+    let possible = endless_odds(scene, &caustics) && (trial.casters.single || trial.in_part.single);
+    let patience = PATIENCE * trial.paths() * camera.rays;
     // As soon as one path has found light that no path from the camera could, it is traced.
     let (mut unfound, mut unfound_gathered) = (false, false);
-    for number in 0..ROUNDS {
+    for number in 0.. {
         let paths = LightPaths {
             scene,
             moments,
@@ -260,6 +266,7 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
         };
         found = trial.round(&paths, seen.as_ref(), number, &weights, most_rays, &mut learnt);
         followed += found.paths;
+        rays += found.rays * found.paths as f64;
         unfound |= found.unfound;
         unfound_gathered |= found.unfound_gathered;
         caustics.learn(&mut learnt);
@@ -267,9 +274,11 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
         let means: Vec<f64> = camera.means.iter().zip(&found.thrown).map(|(a, b)| a + b).collect();
         if number + 1 < ROUNDS {
             weights = relative(&means);
+        } else if !possible || unfound || found.came() || rays >= patience {
+            break;
         }
     }
-    if found.splatted + found.collected <= 0.0 && !unfound && wishes.light_tracing == Use::Auto {
+    if !found.came() && !unfound && !possible && wishes.light_tracing == Use::Auto {
         return left_off(&format!(
             "of {followed} paths from the lights none came to the picture over {}",
             trial.throwers()
@@ -307,12 +316,13 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let (a, b) = (camera.rays, found.rays);
     let thrown = (found.splatted + if merges { found.collected } else { 0.0 }) / (pixels * pixels);
     let ratio = (thrown * a / (kept.max(f64::MIN_POSITIVE) * b)).sqrt();
-    caustics.ratio = ratio.clamp(1.0 / 64.0, 16.0);
+    let least = if possible && !found.came() { PATIENCE } else { 1.0 / 64.0 };
+    caustics.ratio = ratio.clamp(least, 16.0);
     let k = caustics.ratio;
     let (left, overhead) = if merges { (0.0, OVERHEAD) } else { (mirrored, 1.0) };
     let with = overhead * (kept + left + thrown / k) * (a + k * b);
     let measured = if camera.met >= ENOUGH { average(&camera.all, &weights) } else { f64::INFINITY };
-    let without = match unfound {
+    let without = match unfound || possible && !found.came() {
         true => f64::INFINITY,
         false => measured.min(kept + mirrored + by_chance(&found.thrown, camera.met)) * a,
     };

@@ -231,7 +231,8 @@ fn a_picture_without_pixels_is_refused() {
         let lit =
             "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nlights: [{environment: {file: none.hdr}}]\n";
         std::fs::write(place.path("scenes/lit.yaml"), lit).unwrap();
-        std::fs::write(place.path("two.yaml"), "scenes: [{file: scenes/lit.yaml}, {file: scenes/good.yaml}]\n").unwrap();
+        std::fs::write(place.path("two.yaml"), "scenes: [{file: scenes/lit.yaml}, {file: scenes/good.yaml}]\n")
+            .unwrap();
         let ran = place.run(&["render", "two.yaml", "-q", "-o", "two"]);
         assert!(ran.err.contains("none.hdr: expected a picture of one pixel or more, found"), "{}", ran.err);
         assert_eq!(ran.code, 3);

@@ -457,6 +457,18 @@ fn light_that_nothing_else_finds_is_traced_for_every_seed() {
             assert!(on, "{what}, {seed}: {why}");
         }
     }
+    // A patch of 20 cm of what a mirror of 4 m lights: one path in 20,000 comes there.
+    for seed in 0..12 {
+        let close = format!(
+            "camera: {{origin: [0, 2, 0], target: [0, 0, 0], up: [0, 0, 1], orthographic_height: 0.2}}\n\
+             image: {{width: 32, height: 32}}\nrender: {{samples: 64, seed: {seed}}}\nshapes:\n\
+             - rectangle: {{corner: [-4, 0, 4], edge_u: [8, 0, 0], edge_v: [0, 0, -8]}}\n\
+             - rectangle: {{corner: [2, 0, 2], edge_u: [0, 4, 0], edge_v: [0, 0, -4], material: {mirror}}}\n\
+             lights: [point: {{position: [0.5, 2.5, 0], intensity: 10}}]\n"
+        );
+        let (on, _, why) = techniques(&bench_with(&close, &[]));
+        assert!(on, "{seed}: {why}");
+    }
 }
 
 /// Light without extent, which no path from the camera finds behind glass, against the tracer of all paths from the

@@ -98,6 +98,13 @@ pub(super) struct Round {
     pub unfound_gathered: bool,
 }
 
+impl Round {
+    /// Whether anything came to the picture.
+    pub(super) fn came(&self) -> bool {
+        self.splatted + self.collected > 0.0
+    }
+}
+
 impl Trial<'_> {
     /// Follows paths from the lights, as many as the picture is worth, and adds what sources and cells sent to `learnt`.
     pub(super) fn round(
