@@ -390,9 +390,9 @@
 //! - file: scenes/c.xml            # a Mitsuba scene
 //!   define: {res: 64, integrator: path}         # its parameters, as -D on the command line
 //! ```
-//! A setting names a field by its path and gives it a new value, whole; null takes it away. The path
-//! may lead to a field that is not written yet, as long as the grammar has it. Later wins: default,
-//! scene, batch, `set` of the entry, `--set KEY=VALUE` of the command line.
+//! A setting names a field by its path and gives it a new value, whole; null takes it away, but for an
+//! element of a list. The path may lead to a field that is not written yet, as long as the grammar has it.
+//! Later wins: default, scene, batch, `set` of the entry, `--set KEY=VALUE` of the command line.
 //!
 //! # Mitsuba scenes
 //! A file whose name ends in `.xml` is a scene of Mitsuba 3 and is translated into this grammar: `mitsuba`. All that

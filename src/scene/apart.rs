@@ -19,6 +19,7 @@ use super::{Geometry, Hit, Object, TriangleMesh};
 use crate::math::Ray;
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
+use std::collections::HashMap;
 
 /// By how much a body is made smaller, relative to the largest coordinate or length.
 const APART: f64 = 1.0 / (1u64 << 42) as f64;
@@ -135,9 +136,7 @@ pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<C
     }
     // Of two that lie in one another the smaller withdraws by more; what touches shares a scale.
     found.sort_by(|(a, _), (b, _)| volume(*b).total_cmp(&volume(*a)).then(a.cmp(b)));
-    while let Some((i, scale)) = larger_scale(&found) {
-        found[i].1.scale = scale;
-    }
+    share_scales(&mut found);
     let mut contacts = Vec::new();
     for (rank, (body, one)) in found.into_iter().enumerate() {
         let by = APART * one.scale * (rank + 1) as f64 * if one.leaves { 1.0 } else { -1.0 };
@@ -164,15 +163,29 @@ fn is_closed(geometry: &Geometry) -> bool {
     }
 }
 
-/// One of `found` that touches another of larger scale, and that scale.
-fn larger_scale(found: &[(usize, Withdrawal)]) -> Option<(usize, f64)> {
-    let touches = |a: &(usize, Withdrawal), b: &(usize, Withdrawal)| {
-        a.1.others.contains(&(b.0 as u32)) || b.1.others.contains(&(a.0 as u32))
-    };
-    found.iter().enumerate().find_map(|(i, a)| {
-        let scale = found.iter().filter(|b| touches(a, b)).map(|b| b.1.scale).fold(0.0, f64::max);
-        (scale > a.1.scale).then_some((i, scale))
-    })
+/// Gives bodies that touch, and those that these touch, the largest scale among them.
+fn share_scales(found: &mut [(usize, Withdrawal)]) {
+    let place: HashMap<u32, usize> = found.iter().enumerate().map(|(k, (body, _))| (*body as u32, k)).collect();
+    let mut neighbours = vec![Vec::new(); found.len()];
+    for (k, (_, one)) in found.iter().enumerate() {
+        for &other in one.others.iter().filter_map(|other| place.get(other)) {
+            neighbours[k].push(other);
+            neighbours[other].push(k);
+        }
+    }
+    let mut met = vec![false; found.len()];
+    for start in 0..found.len() {
+        let (mut group, mut next) = (vec![start], 0);
+        if std::mem::replace(&mut met[start], true) {
+            continue;
+        }
+        while let Some(&k) = group.get(next) {
+            group.extend(neighbours[k].iter().filter(|&&other| !std::mem::replace(&mut met[other], true)));
+            next += 1;
+        }
+        let scale = group.iter().map(|&k| found[k].1.scale).fold(0.0, f64::max);
+        group.iter().for_each(|&k| found[k].1.scale = scale);
+    }
 }
 
 /// Points all over a shape or mesh.
