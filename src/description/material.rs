@@ -534,9 +534,9 @@ mod tests {
         assert_eq!(
             conductor("eta: -1, k: -2, tint: 3, roughness: -1"),
             "dir/s.yaml:3:24: materials.a.conductor.eta: expected a number from 0 to 1e6, found -1\n\
-             dir/s.yaml:3:31: materials.a.conductor.k: expected a number of 0 or more, found -2\n\
+             dir/s.yaml:3:31: materials.a.conductor.k: expected a number from 0 to 1e6, found -2\n\
              dir/s.yaml:3:41: materials.a.conductor.tint: expected a number from 0 to 1, found 3\n\
-             dir/s.yaml:3:55: materials.a.conductor.roughness: expected a number of 0 or more, found -1"
+             dir/s.yaml:3:55: materials.a.conductor.roughness: expected a roughness, a number from 0 to 10, found -1"
         );
     }
 
@@ -560,7 +560,7 @@ mod tests {
             a("plastic: {reflectance: 2, ior: 0, roughness: -1}"),
             "dir/s.yaml:3:30: materials.a.plastic.reflectance: expected a number from 0 to 1, found 2\n\
              dir/s.yaml:3:38: materials.a.plastic.ior: expected an index of refraction, a number from 1e-6 to 1e6, found 0\n\
-             dir/s.yaml:3:52: materials.a.plastic.roughness: expected a number of 0 or more, found -1"
+             dir/s.yaml:3:52: materials.a.plastic.roughness: expected a roughness, a number from 0 to 10, found -1"
         );
     }
 

@@ -316,7 +316,7 @@ fn words(path: &Path, e: &std::io::Error) -> String {
     let directory =
         if directory == Path::new(".") { "the working directory".into() } else { directory.to_string_lossy() };
     match e.kind() {
-        ErrorKind::NotFound if !there => format!("{directory} does not exist"),
+        ErrorKind::NotFound if !there => format!("the directory {directory} does not exist"),
         ErrorKind::PermissionDenied => format!("no permission to write in {directory}"),
         ErrorKind::NotADirectory => format!("{directory} is not a directory"),
         ErrorKind::InvalidFilename => "the name is too long, with the endings of what is written beside it".into(),
@@ -431,6 +431,6 @@ mod tests {
     fn a_full_disk_is_named() {
         let e = std::io::Error::from(ErrorKind::StorageFull);
         assert_eq!(words(Path::new("out/a.exr"), &e), "the disk that holds out is full");
-        assert_eq!(words(Path::new("a.exr"), &e), "the disk that holds . is full");
+        assert_eq!(words(Path::new("a.exr"), &e), "the disk that holds the working directory is full");
     }
 }

@@ -79,16 +79,19 @@ impl Scene {
         moved
     }
 
-    /// How far the nearest lamp without extent is; without lamps, and coordinates that say what a length is, the nearest thing.
+    /// How far the nearest lamp without extent is; without lamps, and coordinates that say what a length is, the nearest thing,
+    /// or what there is in all.
     fn near_eye(&self, eye: DVec3) -> f64 {
         let least = |places: &mut dyn Iterator<Item = DVec3>| {
             let far = places.map(|place| (place - eye).length()).filter(|far| *far > 0.0 && far.is_finite());
             far.reduce(f64::min)
         };
         let lamps = least(&mut self.lights.iter().filter_map(Light::position));
-        let boxes = self.objects.iter().map(Object::bounds);
-        let things = || if eye == DVec3::ZERO { least(&mut boxes.map(|b| 0.5 * (b.min + b.max))) } else { None };
-        lamps.or_else(things).unwrap_or(0.0)
+        if eye != DVec3::ZERO {
+            return lamps.unwrap_or(0.0);
+        }
+        let boxes = || least(&mut self.objects.iter().map(Object::bounds).map(|b| 0.5 * (b.min + b.max)));
+        lamps.or_else(boxes).unwrap_or(self.center.abs().max_element() + self.radius)
     }
 
     /// The step off all surfaces that `point` lies on, and one of them; `None` if there is none. It is seen, or sees what counts,
