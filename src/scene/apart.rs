@@ -19,7 +19,7 @@ use super::{Geometry, Hit, Object, TriangleMesh};
 use crate::math::Ray;
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// By how much a body is made smaller, relative to the largest coordinate or length.
 const APART: f64 = 1.0 / (1u64 << 42) as f64;
@@ -50,6 +50,8 @@ pub(super) struct Contact {
     /// By how much it was put off, metres; negative where it reaches into the other. None where it has no room: a sheet, or a mesh
     /// between two others.
     pub(super) by: Option<f64>,
+    /// Whether both have a priority and should overlap, but one of them had to leave something else.
+    pub(super) parted: bool,
 }
 
 /// A point of a surface.
@@ -60,13 +62,15 @@ struct Probe {
 }
 
 /// What a body is to do.
-#[derive(Default)]
 struct Withdrawal {
-    others: Vec<u32>,
-    normals: Vec<DVec3>,
+    body: usize,
+    /// What it touches, and its own normal there; of one thing once for each of its faces.
+    touched: Vec<(u32, DVec3)>,
     scale: f64,
     /// Whether something that it touches has no priority, so that it has to be left.
     leaves: bool,
+    /// Its place among those that touch each other, from the largest.
+    rank: usize,
 }
 
 /// Puts bodies apart that share faces, and says which.
@@ -85,24 +89,21 @@ pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<C
     }
     let boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
     let volume = |i: usize| (boxes[i].max - boxes[i].min).element_product();
-    let ranked = |i: usize| materials[objects[i].material as usize].body().is_ok_and(|body| body.is_some());
-    let closed: Vec<bool> = bodies.iter().map(|&i| is_closed(&objects[i].geometry)).collect();
+    let ranked: Vec<bool> =
+        objects.iter().map(|o| materials[o.material as usize].body().is_ok_and(|body| body.is_some())).collect();
+    // Opaque, or a sheet, which has no inside to withdraw to.
+    let mut stays = vec![[true, true]; objects.len()];
+    bodies.iter().for_each(|&i| stays[i] = [false, !is_closed(&objects[i].geometry)]);
     let points = (POINTS / bodies.len()).min(POINTS_OF_ONE);
 
-    let mut found: Vec<(usize, Withdrawal)> = Vec::new();
+    let mut found: BTreeMap<usize, Withdrawal> = BTreeMap::new();
     let mut withdraw = |body: usize, other: usize, normal: DVec3, scale: f64, leaves: bool| {
-        let at = found.iter().position(|(i, _)| *i == body).unwrap_or_else(|| {
-            found.push((body, Withdrawal::default()));
-            found.len() - 1
-        });
-        let one = &mut found[at].1;
+        let none = || Withdrawal { body, touched: Vec::new(), scale: 0.0, leaves: false, rank: 0 };
+        let one = found.entry(body).or_insert_with(none);
         one.scale = one.scale.max(scale);
         one.leaves |= leaves;
-        if !one.others.contains(&(other as u32)) {
-            one.others.push(other as u32);
-        }
-        if !one.normals.iter().any(|known| known.dot(normal) > 1.0 - 1e-9) {
-            one.normals.push(normal);
+        if !one.touched.iter().any(|(known, n)| *known == other as u32 && n.dot(normal) > 1.0 - 1e-9) {
+            one.touched.push((other as u32, normal));
         }
     };
     for &body in bodies.iter().take(MOST_PAIRS / objects.len()) {
@@ -116,17 +117,16 @@ pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<C
         for probe in probes(&objects[body].geometry, points) {
             for &other in others.iter().filter(|&&i| near(&boxes[i], probe.point, probe.point)) {
                 let Some((normal, scale)) = met(&objects[other], &probe) else { continue };
-                // A sheet has no inside to withdraw to; a body with a priority stays, if it may.
-                let stays = |i: usize| {
-                    let at = bodies.iter().position(|&body| body == i);
-                    at.map_or([true; 3], |at| [false, !closed[at], ranked(i)])
-                };
-                let first = match stays(body).cmp(&stays(other)) {
+                // Of two that look away from each other a body with a priority stays, if it may; of two in one another the
+                // larger does.
+                let apart = probe.normal.dot(normal) < 0.0;
+                let order = |i: usize| (stays[i], apart && ranked[i]);
+                let first = match order(body).cmp(&order(other)) {
                     Ordering::Less => true,
                     Ordering::Greater => false,
                     Ordering::Equal => (volume(body), other) < (volume(other), body),
                 };
-                let leaves = !(ranked(body) && ranked(other));
+                let leaves = !(ranked[body] && ranked[other]);
                 match first {
                     true => withdraw(body, other, probe.normal, scale, leaves),
                     false => withdraw(other, body, normal, scale, leaves),
@@ -135,21 +135,36 @@ pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<C
         }
     }
     // Of two that lie in one another the smaller withdraws by more; what touches shares a scale.
-    found.sort_by(|(a, _), (b, _)| volume(*b).total_cmp(&volume(*a)).then(a.cmp(b)));
+    let mut found: Vec<Withdrawal> = found.into_values().collect();
+    found.sort_by(|a, b| volume(b.body).total_cmp(&volume(a.body)).then(a.body.cmp(&b.body)));
     share_scales(&mut found);
+    let leaving: HashSet<u32> = found.iter().filter(|one| one.leaves).map(|one| one.body as u32).collect();
     let mut contacts = Vec::new();
-    for (rank, (body, one)) in found.into_iter().enumerate() {
-        let by = APART * one.scale * (rank + 1) as f64 * if one.leaves { 1.0 } else { -1.0 };
-        let done = match &mut objects[body].geometry {
+    for one in found {
+        let by = APART * one.scale * (one.rank + 1) as f64 * if one.leaves { 1.0 } else { -1.0 };
+        // Into which direction a mesh moves that much from each face, if it can.
+        let inward: DVec3 = one.touched.iter().map(|(_, normal)| -*normal).sum();
+        let least = one.touched.iter().map(|(_, n)| -n.dot(inward)).filter(|d| *d > 0.1).fold(f64::INFINITY, f64::min);
+        let done = match &mut objects[one.body].geometry {
             Geometry::Shape(shape) => shape.inset(by).map(|smaller| *shape = smaller),
-            Geometry::Mesh(mesh) if mesh.mesh.is_closed() => {
-                let inward: DVec3 = one.normals.iter().map(|n| -*n).sum();
-                (inward.length() > 0.5).then(|| mesh.shift(inward * by))
+            Geometry::Mesh(mesh) if mesh.mesh.is_closed() && least.is_finite() => {
+                mesh.shift(inward * (by / least));
+                Some(())
             }
             Geometry::Mesh(_) | Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => None,
         };
-        let by = done.map(|()| by);
-        contacts.extend(one.others.into_iter().map(|other| Contact { body: body as u32, other, by }));
+        let is_mesh = matches!(objects[one.body].geometry, Geometry::Mesh(_));
+        let mut told = Vec::new();
+        for (other, normal) in one.touched {
+            let left = !is_mesh || -normal.dot(inward) > 0.1;
+            // Of bodies with priorities one may have had to leave something else.
+            let parted = ranked[one.body] && ranked[other as usize] && (one.leaves || leaving.contains(&other));
+            let by = done.map(|()| by).filter(|_| left && !parted);
+            if !told.contains(&(other, by.is_some())) {
+                told.push((other, by.is_some()));
+                contacts.push(Contact { body: one.body as u32, other, by, parted });
+            }
+        }
     }
     contacts
 }
@@ -163,12 +178,12 @@ fn is_closed(geometry: &Geometry) -> bool {
     }
 }
 
-/// Gives bodies that touch, and those that these touch, the largest scale among them.
-fn share_scales(found: &mut [(usize, Withdrawal)]) {
-    let place: HashMap<u32, usize> = found.iter().enumerate().map(|(k, (body, _))| (*body as u32, k)).collect();
+/// Gives bodies that touch, and those that these touch, the largest scale among them, and each of them a rank.
+fn share_scales(found: &mut [Withdrawal]) {
+    let place: HashMap<u32, usize> = found.iter().enumerate().map(|(k, one)| (one.body as u32, k)).collect();
     let mut neighbours = vec![Vec::new(); found.len()];
-    for (k, (_, one)) in found.iter().enumerate() {
-        for &other in one.others.iter().filter_map(|other| place.get(other)) {
+    for (k, one) in found.iter().enumerate() {
+        for &other in one.touched.iter().filter_map(|(other, _)| place.get(other)) {
             neighbours[k].push(other);
             neighbours[other].push(k);
         }
@@ -183,8 +198,9 @@ fn share_scales(found: &mut [(usize, Withdrawal)]) {
             group.extend(neighbours[k].iter().filter(|&&other| !std::mem::replace(&mut met[other], true)));
             next += 1;
         }
-        let scale = group.iter().map(|&k| found[k].1.scale).fold(0.0, f64::max);
-        group.iter().for_each(|&k| found[k].1.scale = scale);
+        group.sort_unstable();
+        let scale = group.iter().map(|&k| found[k].scale).fold(0.0, f64::max);
+        group.iter().enumerate().for_each(|(rank, &k)| (found[k].scale, found[k].rank) = (scale, rank));
     }
 }
 
@@ -322,6 +338,14 @@ mod tests {
             let gap = pair[0].min.y - pair[1].min.y;
             assert!(gap > 8.0 * 2f64.powi(-46) * 2.0 && gap < 1e-10, "{gap}");
         }
+        // The smaller is within, whatever has a priority.
+        for (inner, outer) in [("water", "glass"), ("glass", "water")] {
+            let (_, boxes) = compiled(&(cube(0.0, 1.0, inner) + &cube(0.5, 2.0, outer)));
+            assert!(boxes[0].min.y > boxes[1].min.y + 8.0 * 2f64.powi(-46), "{boxes:?}");
+        }
+        // Two of which one has to leave a table, as well, are told.
+        let (notes, _) = compiled(&(TABLE.to_owned() + &cube(0.5, 1.0, "water") + &cube(1.5, 1.0, "ice")));
+        assert!(notes.iter().any(|note| note.contains("no priority; leave a gap there")), "{notes:?}");
         let (notes, boxes) = compiled(&(cube(0.0, 1.0, "water") + &cube(1.0, 1.0, "ice")));
         assert!(notes[0].contains("reaches"), "{notes:?}");
         assert!(boxes[0].max.y > boxes[1].min.y + 8.0 * 2f64.powi(-46), "{boxes:?}");
@@ -349,5 +373,14 @@ mod tests {
         assert_eq!(met.object, 1);
         let below = scene.leave(&scene.surface(&inside, &met), &met, -DVec3::Y);
         assert_eq!(scene.closest(&below, f64::INFINITY).unwrap().object, 0);
+
+        // Between walls it can leave the table alone.
+        let walls = "- rectangle: {corner: [1, 0, 1], edge_u: [0, 2, 0], edge_v: [0, 0, -2]}\n\
+            - rectangle: {corner: [-1, 0, 1], edge_u: [0, 2, 0], edge_v: [0, 0, -2]}\n";
+        let held = text.replace("shapes:\n", &format!("shapes:\n{walls}"));
+        let description = SceneDescription::parse(&held, &directory.path().join("s.yaml")).unwrap();
+        let notes = compile(&description, "s").unwrap().notes;
+        let told = |what: &str| notes.iter().filter(|note| note.contains(what)).count();
+        assert_eq!((told("shapes[2]: it is put off"), told("it has no room"), notes.len()), (1, 2, 3), "{notes:?}");
     }
 }

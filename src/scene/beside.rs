@@ -24,6 +24,9 @@ const NEAR: f64 = 1.0 / (1u64 << 44) as f64;
 /// Meshes, by the largest coordinate of their corners: three roundings to f32, and to spare.
 const NEAR_MESH: f64 = 1.0 / (1u64 << 23) as f64;
 
+/// Surfaces that lie ahead within this are lain on, as well: sixteen times the gap of [`super::apart`].
+const ON_TOO: f64 = 1.0 / (1u64 << 38) as f64;
+
 /// Surfaces that a probe meets at the most; a bound on time.
 const MOST: usize = 64;
 
@@ -97,15 +100,19 @@ impl Scene {
     /// The step off all surfaces that `point` lies on, and one of them; `None` if there is none. It is seen, or sees what counts,
     /// `reach` metres away; corners of meshes are rounded by less than `rounding` metres.
     fn step_off(&self, point: DVec3, side: Side, reach: f64, rounding: f64) -> Option<(DVec3, u32)> {
-        let (mut step, mut first) = (DVec3::ZERO, None);
+        let (mut step, mut first, mut offs) = (DVec3::ZERO, None, Vec::new());
         for Lain { hit, surface, scale } in self.through(point, reach, rounding) {
             let forward = match side {
                 Side::Along(direction) => surface.normal.dot(direction) >= 0.0,
                 Side::SeenFrom(eye) => self.shows_front(&hit, eye, point),
             };
             let off = if forward { surface.normal } else { -surface.normal };
-            let next = self.closest(&self.leave(&surface, &hit, off), 2.0 * STEP * scale);
-            let height = next.map_or(STEP * scale, |next| 0.5 * next.t);
+            // Of two faces that look at each other, as of bodies that touch, the first decides.
+            if offs.iter().any(|known: &DVec3| known.dot(off) < -0.5) {
+                continue;
+            }
+            offs.push(off);
+            let height = self.room(&self.leave(&surface, &hit, off), 2.0 * STEP * scale) * 0.5;
             let more = height - (point - surface.point).dot(off);
             if more > 0.0 {
                 step += off * more;
@@ -113,6 +120,21 @@ impl Scene {
             }
         }
         first.map(|object| (step, object))
+    }
+
+    /// How far `ray` leads to the next thing, up to `most`; what is as near as bodies that were put apart is lain on, too.
+    fn room(&self, ray: &Ray, most: f64) -> f64 {
+        let (mut at, mut gone) = (*ray, 0.0);
+        for _ in 0..MOST {
+            let Some(hit) = self.closest(&at, most - gone) else { break };
+            gone += hit.t;
+            let surface = self.surface(&at, &hit);
+            if gone > ON_TOO * surface.scale {
+                return gone;
+            }
+            at = self.leave(&surface, &hit, ray.direction);
+        }
+        most
     }
 
     /// The surfaces that go through a point to within rounding, each normal once. One of the three axes crosses each of them at less
@@ -203,6 +225,24 @@ mod tests {
         let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
         let scene = compile(&description, "s").unwrap();
         (scene.lights.iter().find_map(Light::position).unwrap().y, scene.notes.len())
+    }
+
+    /// On the face of two bodies the eye is in the one to which it looks, whichever was put off the other.
+    #[test]
+    fn an_eye_between_two_bodies_is_in_one() {
+        let halves = [
+            "- cube: {center: [0, 0, 0.5], size: 1, material: glass}\n",
+            "- cube: {center: [0, 0, -0.5], size: 1, material: glass}\n",
+        ];
+        for shapes in [halves.concat(), [halves[1], halves[0]].concat()] {
+            let text = format!(
+                "camera: {{origin: [0.1, 0.2, 0], target: [0.1, 0.2, -1], fov_deg: 40}}\n\
+                 materials: {{glass: {{dielectric: {{ior: 1.5}}}}}}\nshapes:\n{shapes}"
+            );
+            let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
+            let eye = compile(&description, "s").unwrap().camera.eye();
+            assert!(eye.z < -1e-11 && eye.z > -1e-8, "{eye}");
+        }
     }
 
     /// The corners of a mesh at 0.3 lie 1.2·10⁻⁸ above it.

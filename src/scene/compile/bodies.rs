@@ -29,7 +29,7 @@ impl Compiler<'_> {
 
     /// Notes which bodies share faces, and what was done.
     pub(super) fn note_contacts(&self, scene: &mut Scene, contacts: &[Contact]) {
-        for Contact { body, other, by } in contacts.iter().take(TOLD) {
+        for Contact { body, other, by, parted } in contacts.iter().take(TOLD) {
             let at = format!("shapes[{body}].{}", self.description.shapes[*body as usize].geometry.kind());
             let done = match by {
                 Some(by) if *by < 0.0 => {
@@ -38,14 +38,17 @@ impl Compiler<'_> {
                 Some(by) => {
                     format!("it is put off by {by:.0e} m, so that rays meet both, with empty space between")
                 }
+                None if *parted => {
+                    "it is put off with empty space between, as one of them shares a face with something that has no \
+                                    priority; leave a gap there"
+                        .to_owned()
+                }
                 None => "it has no room to be put off, and rays may miss one of the two; leave a gap".to_owned(),
             };
             scene.notes.push(self.description.fault(&at, &format!("shares a face with shapes[{other}]: {done}")));
         }
         if contacts.len() > TOLD {
-            scene
-                .notes
-                .push(format!("{} more pairs of shapes share faces and are put off each other", contacts.len() - TOLD));
+            scene.notes.push(format!("{} more pairs of shapes share faces", contacts.len() - TOLD));
         }
     }
 
