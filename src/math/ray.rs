@@ -41,7 +41,7 @@ pub struct Ray {
 /// which touch it: 2⁻⁴⁶ of the largest coordinate or length that went into the hit point. Hit
 /// points are exact to a few 2⁻⁵² of it, so the step is some 16 times the error, and still
 /// 2²² times finer than an f32.
-const NEIGHBOUR_STEP: f64 = 1.0 / (1u64 << 46) as f64;
+pub const NEIGHBOUR_STEP: f64 = 1.0 / (1u64 << 46) as f64;
 
 impl Ray {
     /// A ray from free space.

@@ -7,25 +7,27 @@
 //! whose corners have no such digits, are moved by as much. Bodies with a priority are there to share a place: they reach into
 //! each other instead.
 //!
-//! Points drawn on the faces of bodies find what else goes through them. Faces are found that are more than a hundredth of a
-//! body's, but for one in 10⁴; of meshes those of one triangle in as many as there are above a thousand. Sheets have no inside
-//! to withdraw to: what lies on one is told. Copies of groups are not looked at.
+//! Points all over the faces of bodies find what else goes through them: a thousand on each, so that what touches a hundredth of a
+//! body's faces is met by some ten; of more than 64 bodies fewer, down to 64. Of meshes of more triangles one in as many is
+//! looked at. Sheets have no inside to withdraw to: what lies on one is told. Copies of groups are not looked at.
 
 use super::bvh::Aabb;
 use super::instance::PartHit;
 use super::material::Material;
 use super::shape::{Detail, Shape};
 use super::{Geometry, Hit, Object, TriangleMesh};
-use crate::math::Ray;
+use crate::math::ray::NEIGHBOUR_STEP;
+use crate::math::sampler::GOLDEN;
+use crate::math::{Ray, warp};
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// By how much a body is made smaller, relative to the largest coordinate or length.
-const APART: f64 = 1.0 / (1u64 << 42) as f64;
+pub(super) const APART: f64 = 16.0 * NEIGHBOUR_STEP;
 
 /// Faces that are nearer, relative to the same, are one: four steps of rays that leave surfaces.
-const NEAR: f64 = 1.0 / (1u64 << 44) as f64;
+pub(super) const NEAR: f64 = 4.0 * NEIGHBOUR_STEP;
 
 /// A probe's length on either side.
 const REACH: f64 = 1.0 / (1u64 << 36) as f64;
@@ -73,8 +75,8 @@ struct Withdrawal {
     rank: usize,
 }
 
-/// Puts bodies apart that share faces, and says which.
-pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<Contact> {
+/// Puts bodies apart that share faces, and says which; `boxes` are the objects'.
+pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &[Material]) -> Vec<Contact> {
     let is_body = |o: &Object| {
         let looked_at = match &o.geometry {
             Geometry::Shape(shape) => !matches!(shape, Shape::Plane(_)),
@@ -87,7 +89,6 @@ pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<C
     if bodies.is_empty() || objects.len() < 2 {
         return Vec::new();
     }
-    let boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
     let volume = |i: usize| (boxes[i].max - boxes[i].min).element_product();
     let ranked: Vec<bool> =
         objects.iter().map(|o| materials[o.material as usize].body().is_ok_and(|body| body.is_some())).collect();
@@ -153,6 +154,7 @@ pub(super) fn put_apart(objects: &mut [Object], materials: &[Material]) -> Vec<C
             }
             Geometry::Mesh(_) | Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => None,
         };
+        boxes[one.body] = objects[one.body].bounds();
         let is_mesh = matches!(objects[one.body].geometry, Geometry::Mesh(_));
         let mut told = Vec::new();
         for (other, normal) in one.touched {
@@ -206,10 +208,8 @@ fn share_scales(found: &mut [Withdrawal]) {
 
 /// Points all over a shape or mesh.
 fn probes(geometry: &Geometry, points: usize) -> Vec<Probe> {
-    // Multiples of the inverse powers of the root of x³ = x + 1 (the generalised golden ratio).
-    const GOLDEN: f64 = 1.324_717_957_244_746;
     // It never draws the middle of anything, where bodies touch in a point.
-    let lattice = |i: usize| (DVec2::splat(i as f64 + 1.0) / DVec2::new(GOLDEN, GOLDEN * GOLDEN)).fract();
+    let lattice = |i: usize| DVec2::new((i as f64 + 0.5) / points as f64, ((i + 1) as f64 * GOLDEN).fract());
     match geometry {
         Geometry::Shape(shape) => (0..points)
             .map(|i| shape.sample_area(lattice(i)))
@@ -227,8 +227,8 @@ fn probes(geometry: &Geometry, points: usize) -> Vec<Probe> {
 /// A point within a triangle; `None` for one without area.
 fn inner_point(mesh: &TriangleMesh, triangle: u32, u: DVec2) -> Option<Probe> {
     let [a, b, c] = mesh.mesh.vertices(triangle);
-    let normal = (b - a).cross(c - a).try_normalize()?;
-    let u = if u.x + u.y > 1.0 { 1.0 - u } else { u };
+    let normal = mesh.mesh.area_vector(triangle).try_normalize()?;
+    let u = warp::triangle(u);
     let origin = mesh.mesh.origin;
     let scale = [a, b, c, origin].into_iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
     Some(Probe { point: a + (b - a) * u.x + (c - a) * u.y + origin, normal, scale })

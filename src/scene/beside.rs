@@ -9,23 +9,22 @@
 //! Corners of meshes are rounded to f32 (see [`super::mesh`]): what lies on one as it is written may lie beneath it as it is. So what
 //! is within that rounding of a mesh, on the wrong side, is on it.
 
+use super::apart::{APART, NEAR};
+use super::bvh::Aabb;
 use super::light::Light;
 use super::shape::SurfacePoint;
-use super::{Geometry, Hit, Object, Scene};
+use super::{Geometry, Hit, Scene};
 use crate::math::Ray;
 use glam::DVec3;
 
 /// The step, relative to the largest coordinate or length at hand.
 const STEP: f64 = 1.0 / (1u64 << 33) as f64;
 
-/// Surfaces that are nearer, relative to the same, are lain on: four steps of rays that leave surfaces.
-const NEAR: f64 = 1.0 / (1u64 << 44) as f64;
-
 /// Meshes, by the largest coordinate of their corners: three roundings to f32, and to spare.
 const NEAR_MESH: f64 = 1.0 / (1u64 << 23) as f64;
 
 /// Surfaces that lie ahead within this are lain on, as well: sixteen times the gap of [`super::apart`].
-const ON_TOO: f64 = 1.0 / (1u64 << 38) as f64;
+const ON_TOO: f64 = 16.0 * APART;
 
 /// Surfaces that a probe meets at the most; a bound on time.
 const MOST: usize = 64;
@@ -48,17 +47,19 @@ struct Lain {
 
 impl Scene {
     /// Puts the eye and lamps beside the surfaces that they lie on. For each that was moved `None`, for the eye, or which light, and
-    /// the object it lay on.
-    pub(super) fn put_beside(&mut self) -> Vec<(Option<usize>, u32)> {
+    /// the object it lay on. `boxes` are those of the objects that stand in the scene itself.
+    pub(super) fn put_beside(&mut self, boxes: &[Aabb]) -> Vec<(Option<usize>, u32)> {
         let mut moved = Vec::new();
         let eye = self.camera.eye();
-        let rounded = |o: &&Object| matches!(o.geometry, Geometry::Mesh(_) | Geometry::Instance(_));
-        let extents = self.objects.iter().filter(rounded).map(Object::bounds).map(|b| (b.max - b.min).max_element());
-        let extent = extents.filter(|extent| extent.is_finite()).fold(0.0, f64::max);
+        let rounded = self.objects.iter().zip(boxes).filter_map(|(object, b)| match object.geometry {
+            Geometry::Mesh(_) | Geometry::Instance(_) => Some((b.max - b.min).max_element()),
+            Geometry::Shape(_) | Geometry::Sdf(_) | Geometry::Curves(_) => None,
+        });
+        let extent = rounded.filter(|extent| extent.is_finite()).fold(0.0, f64::max);
         // A mesh that is not moved to the origin has coordinates of at most 4.5 times its size.
         let rounding = 5.0 * NEAR_MESH * extent;
         let ahead = Side::Along(self.camera.forward());
-        if let Some((step, object)) = self.step_off(eye, ahead, self.near_eye(eye), rounding) {
+        if let Some((step, object)) = self.step_off(eye, ahead, self.near_eye(eye, boxes), rounding) {
             self.camera = self.camera.moved(step);
             moved.push((None, object));
         }
@@ -84,7 +85,7 @@ impl Scene {
 
     /// How far the nearest lamp without extent is; without lamps, and coordinates that say what a length is, the nearest thing,
     /// or what there is in all.
-    fn near_eye(&self, eye: DVec3) -> f64 {
+    fn near_eye(&self, eye: DVec3, boxes: &[Aabb]) -> f64 {
         let least = |places: &mut dyn Iterator<Item = DVec3>| {
             let far = places.map(|place| (place - eye).length()).filter(|far| *far > 0.0 && far.is_finite());
             far.reduce(f64::min)
@@ -93,8 +94,8 @@ impl Scene {
         if eye != DVec3::ZERO {
             return lamps.unwrap_or(0.0);
         }
-        let boxes = || least(&mut self.objects.iter().map(Object::bounds).map(|b| 0.5 * (b.min + b.max)));
-        lamps.or_else(boxes).unwrap_or(self.center.abs().max_element() + self.radius)
+        let things = || least(&mut boxes.iter().map(|b| 0.5 * (b.min + b.max)));
+        lamps.or_else(things).unwrap_or(self.center.abs().max_element() + self.radius)
     }
 
     /// The step off all surfaces that `point` lies on, and one of them; `None` if there is none. It is seen, or sees what counts,

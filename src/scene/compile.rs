@@ -286,8 +286,8 @@ impl<'a> Compiler<'a> {
             return Err(Error::Config(String::new()));
         }
 
-        let contacts = put_apart(&mut objects, &self.materials);
-        let boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
+        let mut boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
+        let contacts = put_apart(&mut objects, &mut boxes, &self.materials);
         let all: Vec<u32> = (0..objects.len() as u32).collect();
         // The box of one small mesh among few things is met side by side with theirs.
         let mut meshes = objects.iter().filter_map(|object| match &object.geometry {
@@ -373,7 +373,7 @@ impl<'a> Compiler<'a> {
             notes: self.told_notes(),
             watch: None,
         };
-        self.note_beside(&mut scene, &light_names);
+        self.note_beside(&mut scene, &boxes, &light_names);
         scene.light_exponent = scene.film_exponent(&powers);
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         self.note_contacts(&mut scene, &contacts);

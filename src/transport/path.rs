@@ -105,7 +105,7 @@ impl Tracer<'_> {
     /// Follows a path to its end, first no farther than `reach`; coverage and depth of what it meets first.
     fn follow<const CHROMATIC: bool, const MEDIA: bool>(&self, path: &mut Path, mut reach: f64) -> (f32, f64) {
         let scene = self.scene;
-        let mut walk = Walk::begin(self.scene, self.settings);
+        let mut walk = Walk::begin(scene, self.settings);
         let mut ahead = Ahead::UNKNOWN;
 
         loop {

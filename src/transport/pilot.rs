@@ -249,7 +249,8 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let mut learnt = vec![Vec::new(); caustics.sources.len()];
     let most_rays = SHARE * trial.paths() * camera.rays;
     let (mut found, mut followed, mut rays) = (Round::default(), 0, 0.0);
-    let possible = endless_odds(scene, &caustics) && (trial.casters.single || trial.in_part.single);
+    let endless = endless_odds(scene, &caustics);
+    let possible = endless && (trial.casters.single || trial.in_part.single);
     let patience = PATIENCE * trial.paths() * camera.rays;
     // As soon as one path has found light that no path from the camera could, it is traced.
     let (mut unfound, mut unfound_gathered) = (false, false);
@@ -278,6 +279,8 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
             break;
         }
     }
+    // It may be there all the same.
+    let missing = possible && !found.came();
     if !found.came() && !unfound && !possible && wishes.light_tracing == Use::Auto {
         return left_off(&format!(
             "of {followed} paths from the lights none came to the picture over {}",
@@ -287,7 +290,6 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
 
     // Paths from the camera that find light of mean m with a probability p have a variance of m² / p, whether or not so
     // few paths met it; for a lamp without extent p is zero.
-    let endless = endless_odds(scene, &caustics);
     let square = |means: &[f64]| means.iter().zip(&weights).map(|(m, w)| w * m * m).sum::<f64>() / means.len() as f64;
     let by_chance = |means: &[f64], met: usize| match square(means) {
         square if square > 0.0 && endless => f64::INFINITY,
@@ -316,13 +318,13 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let (a, b) = (camera.rays, found.rays);
     let thrown = (found.splatted + if merges { found.collected } else { 0.0 }) / (pixels * pixels);
     let ratio = (thrown * a / (kept.max(f64::MIN_POSITIVE) * b)).sqrt();
-    let least = if possible && !found.came() { PATIENCE } else { 1.0 / 64.0 };
+    let least = if missing { PATIENCE } else { 1.0 / 64.0 };
     caustics.ratio = ratio.clamp(least, 16.0);
     let k = caustics.ratio;
     let (left, overhead) = if merges { (0.0, OVERHEAD) } else { (mirrored, 1.0) };
     let with = overhead * (kept + left + thrown / k) * (a + k * b);
     let measured = if camera.met >= ENOUGH { average(&camera.all, &weights) } else { f64::INFINITY };
-    let without = match unfound || possible && !found.came() {
+    let without = match unfound || missing {
         true => f64::INFINITY,
         false => measured.min(kept + mirrored + by_chance(&found.thrown, camera.met)) * a,
     };

@@ -3,6 +3,7 @@
 use super::Compiler;
 use crate::description as written;
 use crate::scene::apart::Contact;
+use crate::scene::bvh::Aabb;
 use crate::scene::material::Material;
 use crate::scene::shape::Shape;
 use crate::scene::{Geometry, Scene};
@@ -53,8 +54,8 @@ impl Compiler<'_> {
     }
 
     /// Puts the eye and lamps beside the surfaces that they lie on, and says so.
-    pub(super) fn note_beside(&self, scene: &mut Scene, light_names: &[String]) {
-        for (light, object) in scene.put_beside() {
+    pub(super) fn note_beside(&self, scene: &mut Scene, boxes: &[Aabb], light_names: &[String]) {
+        for (light, object) in scene.put_beside(boxes) {
             let on = &scene.objects[object as usize].name;
             let lamps = self.description.lights.iter().enumerate();
             let lamp = |i: usize| lamps.clone().find(|(k, lamp)| lamp.name_or_kind(*k) == light_names[i]);

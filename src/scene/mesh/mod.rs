@@ -211,10 +211,7 @@ impl Mesh {
     /// and so are areas.
     #[must_use]
     pub fn is_closed(&self) -> bool {
-        let areas = (0..self.triangles.len() as u32).map(|i| {
-            let [a, b, c] = self.vertices(i);
-            (b - a).cross(c - a)
-        });
+        let areas = (0..self.triangles.len() as u32).map(|i| self.area_vector(i));
         let (sum, all) = areas.fold((DVec3::ZERO, 0.0), |(sum, all), area| (sum + area, all + area.length()));
         sum.length() <= 1e-6 * all
     }
