@@ -220,7 +220,7 @@ fn what_mitsuba_lacks_is_told_by_name() {
             "materials.flint: the index at 587.5618 nm, 1.7847 over 1.0000: Mitsuba has no dispersion",
             // 1 - cos(pi/256) = 7.53e-5.
             "shapes[0]: a mesh of 256 sides, at most 7.53e-5 m inside: Mitsuba has no cone",
-            "shapes[1]: a square of 20 km: Mitsuba has no plane without end",
+            "shapes[1]: a square of 5 km: Mitsuba has no plane without end",
         ]
     );
     assert_eq!(exported.files.len(), 1);
@@ -447,5 +447,155 @@ fn pictures_on_planes_stay_where_they_are() {
         let (_, exported) = prepared(&yaml, directory.path(), false);
         let losses: Vec<String> = exported.losses.iter().map(|loss| format!("{loss:?}")).collect();
         assert!(losses.iter().any(|loss| loss.contains(told)), "{losses:?}");
+    }
+}
+
+/// The losses of a scene of a floor under an even sky, `head` and `shape`, and its text for Mitsuba; read back it is the same.
+fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    for (name, bytes) in [
+        ("red.csv", "400,0.1\n550,0.1\n600,0.7\n700,0.8\n"),
+        ("inky.csv", "wl,n,k\n0.3,1.5,1e-7\n0.9,1.5,2e-7\n"),
+        ("hair.txt", "-0.4 0.2 0 0.1\n0 0.6 0 0.1\n0.3 0.7 0 0.1\n0.6 0.2 0 0.1\n"),
+    ] {
+        common::write(&directory.path().join(name), bytes.as_bytes());
+    }
+    let parts = [
+        ("camera: ", "camera: {origin: [0, 1, 4], target: [0, 0.5, 0], fov_deg: 40}\n"),
+        ("integrator: ", "integrator: {path: {delta_caustics: false, opaque_sky: true, max_depth: 6}}\n"),
+        ("lights: ", "lights: [{constant: {radiance: 0.5}}]\n"),
+    ];
+    let missing: String = parts.iter().filter(|(key, _)| !head.contains(key)).map(|(_, part)| *part).collect();
+    let floor = "rectangle: {corner: [-2, 0, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4]}";
+    let head = head.replace("EARTH", concat!(env!("CARGO_MANIFEST_DIR"), "/textures/earth.jpg"));
+    common::write(&yaml, format!("{missing}{head}shapes:\n- {floor}\n- {shape}\n").as_bytes());
+    let (_, exported) = prepared(&yaml, directory.path(), false);
+    same_picture(&yaml);
+    (exported.losses.into_iter().map(|loss| format!("{}: {}", loss.field, loss.instead)).collect(), exported.xml)
+}
+
+/// Outside a body whose outside is not written is what the camera is in; for Mitsuba it would be empty.
+#[test]
+fn bodies_in_the_fog_of_the_camera_keep_it_around_them() {
+    let fog = "media: {fog: {homogeneous: {absorption: 0.4}}, ink: {homogeneous: {absorption: 0.1}}}\nmedium: fog\n\
+               lights: [point: {position: [0, 3, 2], intensity: 5}]\n";
+    for (more, interior, exterior) in
+        [("inside: ink", "ink", "fog"), ("outside: ink, flip_normals: true", "fog", "ink")]
+    {
+        let ball = format!("sphere: {{center: [0, 0.5, 0], radius: 0.5, material: {{boundary: {{}}}}, {more}}}");
+        let (told, xml) = exported_with(fog, &ball);
+        assert_eq!(told, [""; 0], "{more}");
+        for side in [format!("name=\"interior\" id=\"{interior}\""), format!("name=\"exterior\" id=\"{exterior}\"")] {
+            assert!(xml.contains(&side), "{more}: {side} in {xml}");
+        }
+    }
+}
+
+/// A file that Mitsuba refuses, or another picture without a word, is none: what it has no words for is told, all of it.
+#[test]
+fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
+    let card = |material: &str| {
+        format!("rectangle: {{corner: [-1, 0, 0], edge_u: [2, 0, 0], edge_v: [0, 1, 0], material: {{{material}}}}}")
+    };
+    let textures = "textures: {earth: {image: {file: EARTH}}, data: {image: {file: EARTH, raw: true}}, \
+                    board: {checkerboard: {a: {texture: earth}, b: 0.3}}}\n";
+    let grey = card("diffuse: {}");
+    let cases: &[(&str, &str, &[&str], &[&str])] = &[
+        (
+            "",
+            "curves: {file: hair.txt, basis: bspline, flip_normals: true}",
+            &["shapes[1]: the same shape with its normals outward: Mitsuba's has no others"],
+            &[],
+        ),
+        (
+            "image: {filter: {lanczos: {radius: 2.5}}}\n",
+            &grey,
+            &["image.filter: 3 lobes: Mitsuba's are whole"],
+            &["<integer name=\"lobes\" value=\"3\"/>"],
+        ),
+        (
+            "image: {filter: {mitchell: {b: 0.9, c: 0.05}}, sensitivity: 3}\n",
+            &grey,
+            &["image.sensitivity: a film of sensitivity 1"],
+            &["<float name=\"B\" value=\"0.9\"/>", "<float name=\"C\" value=\"0.05\"/>"],
+        ),
+        (
+            "camera: {origin: [0, 1, 4], target: [0, 0.5, 0], orthographic_height: 3, principal_point: [0.2, -0.1], \
+             lens: {radius: 0.2, focus_distance: 4}}\n",
+            &grey,
+            &[
+                "camera.lens: none: Mitsuba's orthographic camera has no lens",
+                "camera.principal_point: the middle of the picture: Mitsuba has another for a pinhole with a perspective alone",
+            ],
+            &[],
+        ),
+        (
+            "",
+            // 1.5 + 4000 / 587.5618² = 1.51159.
+            &card("plastic: {roughness: 0.3, ior: {cauchy: [1.5, 0.004]}, reflectance: {file: red.csv}}"),
+            &[
+                "shapes[1].rectangle.material: the index at 587.5618 nm, 1.5116 over 1.0000: Mitsuba has no dispersion; \
+               grey in place of a spectrum; the coat's mean over 64 cosines, which makes the base darker by up to 2 %",
+            ],
+            &[],
+        ),
+        (
+            "",
+            "sphere: {radius: 0.5, material: {dielectric: {ior: {file: inky.csv}}}}",
+            &["shapes[1].sphere.material: the index at 587.5618 nm, 1.5000 over 1.0000: Mitsuba has no dispersion; \
+               no absorption inside, which Mitsuba has in media only"],
+            &[],
+        ),
+        (
+            "",
+            // 0.5 (1 - cos(pi/256)) = 3.765e-5.
+            "cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 0.5, emission: {lines: [{nm: 589, power: 1}]}}",
+            &["shapes[1]: a mesh of 256 sides, at most 3.76e-5 m inside: Mitsuba has no cone; a grey light"],
+            &[],
+        ),
+        (
+            textures,
+            &card("mask: {opacity: {texture: earth}, material: {diffuse: {}}}"),
+            &["textures.earth: its numbers as they are stored: Mitsuba takes them from raw pictures alone"],
+            &["<boolean name=\"raw\" value=\"true\"/>"],
+        ),
+        (
+            textures,
+            &card("diffuse: {reflectance: {texture: data}}"),
+            &["textures.data: its colours by the curve of sRGB: Mitsuba takes raw ones for numbers alone"],
+            &[],
+        ),
+        (
+            textures,
+            &card("bump: {height: {texture: board}, material: {diffuse: {}}}"),
+            &["shapes[1].rectangle.material: what it covers: Mitsuba has no slopes but of pictures"],
+            &["<bsdf type=\"mask\">"],
+        ),
+        (
+            textures,
+            &card("diffuse: {}").replace("material: {diffuse: {}}", "emission: {texture: board}"),
+            &["shapes[1]: the picture as the spectra of its colours, without its illuminant"],
+            &[],
+        ),
+        (
+            "lights: [{constant: {radiance: {scaled: {by: 2, of: {scaled: {by: 0.3, of: {illuminant: D65}}}}}}}]\n",
+            &grey,
+            &[],
+            &[],
+        ),
+        (
+            "",
+            "cylinder: {base: [0, 0.5, 0], top: [0, 1, 0], radius: 0.2, caps: none, emission: 1, transform: [scale: [-2, 2, 2]]}",
+            &[],
+            &["<float name=\"radius\" value=\"0.4\"/>"],
+        ),
+    ];
+    for (head, shape, losses, said) in cases {
+        let (told, xml) = exported_with(head, shape);
+        assert_eq!(told, *losses, "{head}{shape}");
+        assert!(said.iter().all(|part| xml.contains(part)), "{head}{shape}: {said:?} in {xml}");
+        let for_mitsuba = xml.split("<?abbe").map(|part| part.split_once("?>").map_or(part, |(_, after)| after));
+        assert!(for_mitsuba.into_iter().all(|part| !part.contains("flip_normals")), "{xml}");
     }
 }

@@ -281,11 +281,12 @@ impl<'a> Builder<'a, '_> {
         if self.replaced.as_ref().is_some_and(|replaced| replaced.level == level)
             && let Some(parent) = self.open.last_mut()
         {
-            // Only its id is kept, for those who refer to it.
-            if let (Some(id), Some(made)) = (element.attribute("id"), parent.children.last_mut())
-                && made.attribute("id").is_none()
-            {
-                made.attributes.push(id.clone());
+            // Its id is kept, for those who refer to it, and its name, for what it is in.
+            if let Some(made) = parent.children.last_mut() {
+                for key in ["id", "name"] {
+                    let kept = element.attribute(key).filter(|_| made.attribute(key).is_none()).cloned();
+                    made.attributes.extend(kept);
+                }
             }
             return;
         }

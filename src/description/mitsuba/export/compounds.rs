@@ -5,9 +5,9 @@ use super::super::super::hair::{Hair, HairColour};
 use super::super::super::material::{Material, MaterialRef};
 use super::super::super::principled::{Contrast, Luminance, Principled, PrincipledThin};
 use super::super::super::spectrum::SpectrumOrTexture;
-use super::Export;
 use super::spectra::Role;
 use super::surface::Attributes;
+use super::{Export, joined};
 use crate::spectrum::upsample;
 
 /// Absorption of the two pigments of concentration one in red, green and blue: d'Eon et al. 2011.
@@ -135,18 +135,34 @@ impl Export<'_> {
     }
 
     pub(super) fn bump(&mut self, field: &str, m: &Bump, attributes: &Attributes) {
-        self.open_owned("bsdf", attributes);
-        self.numbers_of(None, &m.height.texture);
-        self.xml.value("float", "scale", m.scale);
-        self.relief(m.turn, m.shadowing);
+        if self.has_relief(&m.height.texture) {
+            self.open_owned("bsdf", attributes);
+            self.numbers_of(None, &m.height.texture);
+            self.xml.value("float", "scale", m.scale);
+            self.relief(m.turn, m.shadowing);
+        } else {
+            self.as_it_is(attributes);
+        }
         self.material_ref(&format!("{field}.bump.material"), &m.material);
     }
 
     pub(super) fn normal_map(&mut self, field: &str, m: &NormalMap, attributes: &Attributes) {
-        self.open_owned("bsdf", attributes);
-        self.numbers_of(Some("normalmap"), &m.normals.texture);
-        self.relief(m.turn, m.shadowing);
+        if self.has_relief(&m.normals.texture) {
+            self.open_owned("bsdf", attributes);
+            self.numbers_of(Some("normalmap"), &m.normals.texture);
+            self.relief(m.turn, m.shadowing);
+        } else {
+            self.as_it_is(attributes);
+        }
         self.material_ref(&format!("{field}.normal_map.material"), &m.material);
+    }
+
+    /// Begins a plugin that leaves the material in it as it is.
+    fn as_it_is(&mut self, attributes: &Attributes) {
+        let id = attributes.iter().filter(|(name, _)| *name == "id").cloned();
+        let all: Vec<(&'static str, String)> = std::iter::once(("type", "mask".to_owned())).chain(id).collect();
+        self.open_owned("bsdf", &all);
+        self.xml.value("float", "opacity", 1.0);
     }
 
     fn relief(&mut self, turn: bool, shadowing: bool) {
@@ -213,8 +229,12 @@ impl Export<'_> {
             bright.then(|| "tints over the luminance that Mitsuba takes, about 2.6 times as bright".to_owned())
         };
         match material {
-            Material::Principled(m) => colour(&m.base_color).or(tinted(m.luminance, [&m.spec_tint, &m.sheen_tint])),
-            Material::PrincipledThin(m) => colour(&m.base_color).or(tinted(m.luminance, [&m.spec_tint, &m.sheen_tint])),
+            Material::Principled(m) => {
+                joined([colour(&m.base_color), tinted(m.luminance, [&m.spec_tint, &m.sheen_tint])])
+            }
+            Material::PrincipledThin(m) => {
+                joined([colour(&m.base_color), tinted(m.luminance, [&m.spec_tint, &m.sheen_tint])])
+            }
             Material::Hair(m) => match &m.colour {
                 HairColour::Pigments { .. } => {
                     Some("the absorption of its pigments at every fifth nanometre".to_owned())
@@ -226,6 +246,10 @@ impl Export<'_> {
                 let through = sides.into_iter().flatten().any(|side| self.transmits(side));
                 through.then(|| "two sides of grey: Mitsuba's twosided lets no light through".to_owned())
             }
+            Material::Bump(m) => (!self.has_relief(&m.height.texture))
+                .then(|| "what it covers: Mitsuba has no slopes but of pictures".to_owned()),
+            Material::NormalMap(m) => (!self.has_relief(&m.normals.texture))
+                .then(|| "what it covers: Mitsuba has no normals but of pictures".to_owned()),
             _ => None,
         }
     }

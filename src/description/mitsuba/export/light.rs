@@ -25,7 +25,10 @@ impl Export<'_> {
         }
         let why = match light {
             Light::Point(l) => Export::light_shortfall(&l.intensity),
-            Light::Spot(l) => Export::light_shortfall(&l.intensity),
+            Light::Spot(l) => {
+                let slide = l.texture.as_ref().and_then(|texture| self.pictures_shortfall(texture));
+                Export::light_shortfall(&l.intensity).or(slide)
+            }
             Light::Directional(l) => Export::light_shortfall(&l.irradiance),
             Light::Constant(l) => Export::light_shortfall(&l.radiance),
             Light::Environment(l) if l.mapping == EnvironmentMapping::Mitsuba => None,
@@ -169,13 +172,40 @@ impl Export<'_> {
     pub(super) fn shining_shortfall(&self, value: &SpectrumOrTexture) -> Option<&'static str> {
         match value {
             SpectrumOrTexture::Spectrum(spectrum) => Export::light_shortfall(spectrum),
-            SpectrumOrTexture::Texture(texture) => matches!(self.illuminant_of(texture), Some(Lit::Otherwise))
-                .then_some("the picture as the spectra of its colours, without its illuminant"),
+            SpectrumOrTexture::Texture(texture) => self.pictures_shortfall(texture).or_else(|| {
+                let lost = match self.illuminant_of(texture) {
+                    Some(lit) => lit == Lit::Otherwise,
+                    None => self.shines_by_squares(texture),
+                };
+                lost.then_some("the picture as the spectra of its colours, without its illuminant")
+            }),
         }
+    }
+
+    /// Whether a picture may shine where Mitsuba has no words for what multiplies it.
+    pub(super) fn loses_illuminant(&self, picture: &str) -> bool {
+        let within = |texture: &Texture| match texture {
+            Texture::Checkerboard(board) => [&board.a, &board.b].into_iter().any(|side| side.name() == Some(picture)),
+            Texture::Image(_) | Texture::Volume(_) | Texture::MeshAttribute(_) => false,
+        };
+        match self.illuminant_of(picture) {
+            Some(Lit::Otherwise) => true,
+            Some(Lit::Daylight(_)) => self.scene.textures.values().any(within),
+            Some(Lit::AsItIs) | None => false,
+        }
+    }
+
+    /// Whether a checkerboard has pictures in it that something multiplies where they shine.
+    fn shines_by_squares(&self, texture: &str) -> bool {
+        let Some(Texture::Checkerboard(board)) = self.scene.textures.get(texture) else { return false };
+        [&board.a, &board.b].into_iter().filter_map(SpectrumOrTexture::name).any(|inner| {
+            self.illuminant_of(inner).is_some_and(|lit| lit != Lit::AsItIs) || self.shines_by_squares(inner)
+        })
     }
 }
 
 /// What multiplies a picture where it shines.
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Lit {
     /// D65 of this luminance.
     Daylight(f64),

@@ -29,14 +29,14 @@ mod xml;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::super::camera::{Band, Camera, Clip, Filter, FovAxis, Image, Pose, Projection};
+use super::super::camera::{Band, Camera, Clip, Filter, FovAxis, Image, Lens, Pose, Projection};
 use super::super::light::Light;
 use super::super::node::{Node, Sources, Value};
 use super::super::path::{self, Segment};
 use super::super::print::{Printer, relative};
 use super::super::scene::SceneDescription;
 use super::super::settings::{Coverage, Integrator, Technique};
-use super::DAYLIGHT;
+use super::{DAYLIGHT, FILM};
 use spectra::can_be_band;
 use xml::Xml;
 
@@ -75,7 +75,8 @@ pub fn export(scene: &SceneDescription, path: &Path) -> Exported {
     export.scene();
     export.missing_light();
     let Export { xml, mut losses, files, .. } = export;
-    losses.dedup();
+    let mut told = BTreeSet::new();
+    losses.retain(|loss| told.insert((loss.field.clone(), loss.instead.clone())));
     Exported { xml: xml.finish(), losses, files }
 }
 
@@ -98,6 +99,12 @@ struct Export<'a> {
 /// Settings that are about the work and the files, not about the light: Mitsuba has other words for
 /// some, but the same ones mean other things.
 const SETTINGS: [&str; 6] = ["render", "output", "fog", "layers", "light_groups", "assets"];
+
+/// All that is said, in one sentence; `None` of nothing.
+fn joined(said: impl IntoIterator<Item = Option<String>>) -> Option<String> {
+    let all: Vec<String> = said.into_iter().flatten().collect();
+    (!all.is_empty()).then(|| all.join("; "))
+}
 
 /// The path of a field.
 fn field(keys: &[&str]) -> String {
@@ -226,6 +233,11 @@ impl<'a> Export<'a> {
     /// Begins what stands for a field that Mitsuba cannot express; `end` closes it.
     fn instead(&mut self, tag: &str, field: &str, instead: impl Into<String>) {
         self.lose(field, instead);
+        self.restate(tag, field);
+    }
+
+    /// Begins what says a field in another way, which reading it back shall not take; `end` closes it.
+    fn restate(&mut self, tag: &str, field: &str) {
         let node = path::parse(field).ok().and_then(|path| self.root.find(&path));
         if let Some(node) = node {
             self.mention(node);
@@ -341,6 +353,9 @@ impl<'a> Export<'a> {
             self.lose("camera.shutter", "the scene at its frame: what is exported does not move");
         }
         let Image { width, height, filter, crop, overscan, sample_border, sensitivity, .. } = &self.scene.image;
+        if ![1.0, FILM].contains(sensitivity) {
+            self.lose("image.sensitivity", "a film of sensitivity 1");
+        }
         if *overscan > 0 {
             self.lose("image.overscan", "the frame: Mitsuba's film ends at its edge");
             self.xml.instruction(&format!("set image.overscan: {overscan}"));
@@ -356,13 +371,13 @@ impl<'a> Export<'a> {
         };
         self.xml.open("sensor", &[("type", plugin)]);
         self.xml.open("transform", &[("name", "to_world")]);
-        if let Projection::Orthographic { height: shown } = projection {
-            // Theirs shows −1 to 1 across the width.
-            let half = 0.5 * shown * f64::from(*width) / f64::from(*height);
+        // Theirs shows −1 to 1 across the width.
+        let half = match projection {
+            Projection::Orthographic { height: shown } => 0.5 * shown * f64::from(*width) / f64::from(*height),
+            Projection::Perspective { .. } => 1.0,
+        };
+        if let Projection::Orthographic { .. } = projection {
             self.xml.leaf("scale", &[("x", &half.to_string()), ("y", &half.to_string())]);
-            if lens.is_some() {
-                self.lose("camera.lens", "none: Mitsuba's orthographic camera has no lens");
-            }
         }
         match pose {
             Pose::LookAt { origin, target, up } => {
@@ -376,6 +391,13 @@ impl<'a> Export<'a> {
             }
         }
         self.xml.close();
+        if let (Projection::Orthographic { .. }, Some(lens)) = (projection, lens) {
+            self.lose("camera.lens", "none: Mitsuba's orthographic camera has no lens");
+            // It is made larger with the rest of the camera.
+            let Lens { radius, focus_distance } = lens;
+            let radius = radius / half;
+            self.xml.instruction(&format!("set camera.lens: {{radius: {radius}, focus_distance: {focus_distance}}}"));
+        }
         if let Projection::Perspective { fov_deg, fov_axis } = projection {
             let axis = match fov_axis {
                 FovAxis::X => "x",
@@ -386,14 +408,15 @@ impl<'a> Export<'a> {
             };
             self.xml.value("float", "fov", fov_deg);
             self.xml.value("string", "fov_axis", axis);
-            if *principal_point != [0.0; 2] && lens.is_none() {
-                // Theirs says where the middle of the picture looks, ours where the axis falls on it.
-                self.xml.value("float", "principal_point_offset_x", -principal_point[0]);
-                self.xml.value("float", "principal_point_offset_y", -principal_point[1]);
-            } else if *principal_point != [0.0; 2] {
-                self.lose("camera.principal_point", "the middle of the picture: Mitsuba's lens has no other");
-                self.xml.instruction(&format!("set camera.principal_point: {principal_point:?}"));
-            }
+        }
+        if *principal_point != [0.0; 2] && plugin == "perspective" {
+            // Theirs says where the middle of the picture looks, ours where the axis falls on it.
+            self.xml.value("float", "principal_point_offset_x", -principal_point[0]);
+            self.xml.value("float", "principal_point_offset_y", -principal_point[1]);
+        } else if *principal_point != [0.0; 2] {
+            let what = "the middle of the picture: Mitsuba has another for a pinhole with a perspective alone";
+            self.lose("camera.principal_point", what);
+            self.xml.instruction(&format!("set camera.principal_point: {principal_point:?}"));
         }
         if *clip == Clip::default() {
             // Theirs always ends somewhere.
@@ -456,17 +479,25 @@ impl<'a> Export<'a> {
     }
 
     fn filter(&mut self, filter: Filter) {
-        let (plugin, field): (&str, Option<(&str, String)>) = match filter {
-            Filter::Box => ("box", None),
-            Filter::Tent { radius } => ("tent", Some(("radius", radius.to_string()))),
-            Filter::Gaussian { stddev, .. } => ("gaussian", Some(("stddev", stddev.to_string()))),
-            Filter::Mitchell { .. } => ("mitchell", None),
-            Filter::CatmullRom => ("catmullrom", None),
-            Filter::Lanczos { radius } => ("lanczos", Some(("lobes", radius.to_string()))),
+        let (plugin, fields): (&str, &[(&str, f64)]) = match filter {
+            Filter::Box => ("box", &[]),
+            Filter::Tent { radius } => ("tent", &[("radius", radius)]),
+            Filter::Gaussian { stddev, .. } => ("gaussian", &[("stddev", stddev)]),
+            Filter::Mitchell { b, c } => ("mitchell", &[("B", b), ("C", c)]),
+            Filter::CatmullRom => ("catmullrom", &[]),
+            Filter::Lanczos { .. } => ("lanczos", &[]),
         };
         self.xml.open("rfilter", &[("type", plugin)]);
-        if let Some((name, value)) = field {
-            self.xml.value(if name == "lobes" { "integer" } else { "float" }, name, value);
+        for (name, value) in fields {
+            self.xml.value("float", name, value);
+        }
+        if let Filter::Lanczos { radius } = filter {
+            let lobes = radius.round().max(1.0);
+            self.xml.value("integer", "lobes", lobes);
+            if lobes != radius {
+                self.lose("image.filter", format!("{lobes} lobes: Mitsuba's are whole"));
+                self.xml.instruction(&format!("set image.filter: {{lanczos: {{radius: {radius}}}}}"));
+            }
         }
         self.xml.close();
     }

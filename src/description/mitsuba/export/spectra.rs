@@ -28,11 +28,10 @@ impl Export<'_> {
             Spectrum::Number(_) | Spectrum::Rgb(_) | Spectrum::Table(_) => true,
             Spectrum::Illuminant(illuminant) => illuminant.name.eq_ignore_ascii_case("D65"),
             Spectrum::Blackbody(body) => !body.normalised && body.scale == 1.0,
-            Spectrum::Scaled(scaled) => match &*scaled.of {
-                Spectrum::Illuminant(_) | Spectrum::Rgb(_) | Spectrum::Number(_) | Spectrum::Table(_) => {
-                    Export::can_say(&scaled.of)
-                }
-                _ => false,
+            Spectrum::Scaled(scaled) => match unscaled(&scaled.of).1 {
+                Spectrum::Blackbody(_) => false,
+                Spectrum::ZeroOutside(inner) => matches!(**inner, Spectrum::Table(_)),
+                inner => Export::can_say(inner),
             },
             Spectrum::ZeroOutside(inner) => match &**inner {
                 Spectrum::Table(_) => true,
@@ -103,10 +102,7 @@ impl Export<'_> {
 
     /// The response of a band, zero beyond the ends of a table; a number is a table of the whole band.
     pub(super) fn band(&mut self, name: &str, response: &Spectrum) {
-        let (by, inner) = match response {
-            Spectrum::Scaled(scaled) => (scaled.by, &*scaled.of),
-            other => (1.0, other),
-        };
+        let (by, inner) = unscaled(response);
         match inner {
             Spectrum::Number(value) => self.table(name, &BAND_NM.map(|nm| [nm, *value]), by, Ends::Zero),
             _ => self.scaled_spectrum(name, inner, Role::Emission, by),
@@ -126,11 +122,7 @@ impl Export<'_> {
 
     /// What Mitsuba gets in place of a light that it has no words for.
     pub(super) fn light_shortfall(spectrum: &Spectrum) -> Option<&'static str> {
-        let inner = match spectrum {
-            Spectrum::Scaled(scaled) => &scaled.of,
-            other => other,
-        };
-        match (Export::can_say(spectrum), sampled(inner)) {
+        match (Export::can_say(spectrum), sampled(unscaled(spectrum).1)) {
             (true, _) => None,
             (false, Some(_)) => Some("its spectrum at every fifth nanometre"),
             (false, None) => Some("a grey light"),
@@ -156,13 +148,8 @@ impl Export<'_> {
     pub(super) fn spectrum_or_texture(&mut self, name: &str, value: &SpectrumOrTexture, role: Role) {
         match value {
             SpectrumOrTexture::Spectrum(spectrum) => self.spectrum(name, spectrum, role),
-            SpectrumOrTexture::Texture(texture) => self.texture_ref(name, texture),
+            SpectrumOrTexture::Texture(texture) => self.colours_of(name, texture),
         }
-    }
-
-    pub(super) fn texture_ref(&mut self, name: &str, texture: &str) {
-        let id = self.id(texture, "texture");
-        self.xml.leaf("ref", &[("name", name), ("id", &id)]);
     }
 
     pub(super) fn can_say_either(value: &SpectrumOrTexture) -> bool {
@@ -170,6 +157,17 @@ impl Export<'_> {
             SpectrumOrTexture::Spectrum(spectrum) => Export::can_say(spectrum),
             SpectrumOrTexture::Texture(_) => true,
         }
+    }
+}
+
+/// A spectrum without the factors before it, and their product.
+fn unscaled(spectrum: &Spectrum) -> (f64, &Spectrum) {
+    match spectrum {
+        Spectrum::Scaled(scaled) => {
+            let (by, inner) = unscaled(&scaled.of);
+            (by * scaled.by, inner)
+        }
+        other => (1.0, other),
     }
 }
 
@@ -188,7 +186,7 @@ fn colour_beyond(spectrum: &Spectrum, by: f64) -> Option<Curve> {
 pub(super) fn can_be_band(spectrum: &Spectrum) -> bool {
     match spectrum {
         Spectrum::Rgb(_) | Spectrum::Blackbody(_) => false,
-        Spectrum::Scaled(scaled) => Export::can_say(spectrum) && can_be_band(&scaled.of),
+        Spectrum::Scaled(_) => Export::can_say(spectrum) && can_be_band(unscaled(spectrum).1),
         other => Export::can_say(other),
     }
 }

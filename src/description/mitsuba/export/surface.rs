@@ -1,5 +1,6 @@
 //! Materials and textures.
 
+use super::super::super::absorption::Absorption;
 use super::super::super::compound::Roughness;
 use super::super::super::material::{
     Conductor, ConductorIndex, Dielectric, DiffuseMean, Distribution, Fresnel, Material, MaterialRef, Plastic,
@@ -7,8 +8,8 @@ use super::super::super::material::{
 };
 use super::super::super::optical_data::optical_data;
 use super::super::super::spectrum::{Index, Spectrum, SpectrumOrTexture};
-use super::Export;
 use super::spectra::Role;
+use super::{Export, joined};
 use crate::spectrum::{self, Outside, RefractiveIndex, catalogue};
 
 /// The wavelength at which a dispersive index is taken where there can be only one: the d line, nm.
@@ -217,9 +218,10 @@ fn plain_shortfall(material: &Material) -> Option<String> {
     };
     let film = |given: bool| given.then(|| "no interference: Mitsuba has no thin films".to_owned());
     match material {
-        Material::Diffuse(m) => highlight(m.highlight.is_some()).or(spectra(&[&m.reflectance])),
+        Material::Diffuse(m) => joined([highlight(m.highlight.is_some()), spectra(&[&m.reflectance])]),
         Material::Mirror(m) => {
-            highlight(m.highlight.is_some()).or((!Export::can_say(&m.reflectance)).then(|| "a grey mirror".into()))
+            let grey = (!Export::can_say(&m.reflectance)).then(|| "a grey mirror".into());
+            joined([highlight(m.highlight.is_some()), grey])
         }
         Material::Conductor(m) => {
             let index = match &m.index {
@@ -231,31 +233,34 @@ fn plain_shortfall(material: &Material) -> Option<String> {
                 }
             };
             let film = film(m.film.is_some());
-            highlight(m.highlight.is_some()).or(schlick(m.fresnel)).or(film).or(index).or(spectra(&[&m.tint]))
+            joined([highlight(m.highlight.is_some()), schlick(m.fresnel), film, index, spectra(&[&m.tint])])
         }
         Material::Dielectric(m) => {
             let said = |given: bool, what: &str| given.then(|| what.to_owned());
-            let all = [
+            joined([
                 highlight(m.highlight.is_some()),
                 schlick(m.fresnel),
                 film(m.film.is_some()),
                 dispersive(&m.ior, &m.exterior_ior),
-                said(m.absorption.is_some(), "no absorption inside, which Mitsuba has in media only"),
+                said(absorbs(m), "no absorption inside, which Mitsuba has in media only"),
                 said(m.priority.is_some(), "no priority: in Mitsuba bodies that overlap are wrong"),
                 spectra(&[&m.reflection_tint, &m.transmission_tint]),
-            ];
-            let all: Vec<String> = all.into_iter().flatten().collect();
-            (!all.is_empty()).then(|| all.join("; "))
+            ])
         }
-        Material::ThinDielectric(m) => film(m.thickness_nm.is_some())
-            .or(dispersive(&m.ior, &m.exterior_ior))
-            .or(spectra(&[&m.reflection_tint, &m.transmission_tint])),
-        Material::Plastic(m) if m.roughness > 0.0 && m.diffuse_mean == DiffuseMean::Integral => {
-            Some("the coat's mean over 64 cosines, which makes the base darker by up to 2 %".to_owned())
+        Material::ThinDielectric(m) => joined([
+            film(m.thickness_nm.is_some()),
+            dispersive(&m.ior, &m.exterior_ior),
+            spectra(&[&m.reflection_tint, &m.transmission_tint]),
+        ]),
+        Material::Plastic(m) => {
+            let few = m.roughness > 0.0 && m.diffuse_mean == DiffuseMean::Integral;
+            joined([
+                highlight(m.highlight.is_some()),
+                dispersive(&m.ior, &m.exterior_ior),
+                spectra(&[&m.reflectance, &m.tint]),
+                few.then(|| "the coat's mean over 64 cosines, which makes the base darker by up to 2 %".to_owned()),
+            ])
         }
-        Material::Plastic(m) => highlight(m.highlight.is_some())
-            .or(dispersive(&m.ior, &m.exterior_ior))
-            .or(spectra(&[&m.reflectance, &m.tint])),
         _ => None,
     }
 }
@@ -281,6 +286,15 @@ fn dispersive(inside: &Index, outside: &Index) -> Option<String> {
     (!constant(inside) || !constant(outside)).then(|| {
         format!("the index at {D_LINE_NM} nm, {:.4} over {:.4}: Mitsuba has no dispersion", at_d(inside), at_d(outside))
     })
+}
+
+/// Whether a body takes light away inside: by what is written, else by the file of its index.
+fn absorbs(m: &Dielectric) -> bool {
+    match (&m.absorption, &m.ior) {
+        (Some(absorption), _) => *absorption != Absorption::None,
+        (None, Index::File(file)) => optical_data(file).is_ok_and(|data| data.k.is_some()),
+        (None, _) => false,
+    }
 }
 
 /// The index at the d line; 1.5 where it cannot be had, which the compiler will say.

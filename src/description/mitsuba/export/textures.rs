@@ -1,11 +1,23 @@
 //! Textures.
 
+use std::io::BufReader;
+use std::path::Path;
+
+use image::{ImageDecoder, ImageReader};
+
 use super::super::super::compound::{NumberOrTexture, Roughness};
 use super::super::super::spectrum::{Spectrum, SpectrumOrTexture};
 use super::super::super::texture::{Checkerboard, ImageTexture, Texture, TextureFilter, Wrap};
 use super::Export;
 use super::spectra::Role;
 use super::xml::numbers;
+
+/// What a texture is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Asked {
+    Colours,
+    Numbers,
+}
 
 /// Which way v grows where a texture is used, against where it is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,28 +41,42 @@ impl Export<'_> {
         if let Some(why) = why {
             self.instead("texture", &super::field(&["textures", name]), why);
         }
-        self.texture_as(("id", &id), texture, Stands::Upright);
+        self.texture_as(&[("id", &id)], texture, Stands::Upright);
         if why.is_some() {
             self.end();
+        } else if self.loses_illuminant(name) {
+            let written = self.root.get("textures").and_then(|all| all.get(name)?.get("image")?.get("illuminant"));
+            let yaml = written.map_or("D65".to_owned(), |node| self.yaml(node));
+            self.xml.instruction(&format!("set {}: {yaml}", super::field(&["textures", name, "image", "illuminant"])));
         }
     }
 
-    /// A texture with one attribute beside its type.
-    fn texture_as(&mut self, attribute: (&str, &str), texture: &Texture, stands: Stands) {
+    /// A texture with these attributes beside its type.
+    fn texture_as(&mut self, attributes: &[(&str, &str)], texture: &Texture, stands: Stands) {
         match texture {
-            Texture::Image(image) => self.bitmap(attribute, image, stands),
+            Texture::Image(image) => {
+                self.bitmap(attributes, image, image.raw, stands);
+                return;
+            }
             Texture::Checkerboard(board) => {
-                self.xml.open("texture", &[("type", "checkerboard"), attribute]);
-                self.spectrum_or_texture("color0", &board.a, Role::Reflectance);
-                self.spectrum_or_texture("color1", &board.b, Role::Reflectance);
+                self.open_texture("checkerboard", attributes);
+                for (key, colour) in [("color0", &board.a), ("color1", &board.b)] {
+                    match colour {
+                        // Elsewhere it stands upright.
+                        SpectrumOrTexture::Texture(inner) if stands == Stands::OnItsHead => {
+                            self.thrown(key, inner, stands);
+                        }
+                        colour => self.spectrum_or_texture(key, colour, Role::Reflectance),
+                    }
+                }
                 self.board_map(board, stands);
             }
             Texture::Volume(volume) => {
-                self.xml.open("texture", &[("type", "volume"), attribute]);
+                self.open_texture("volume", attributes);
                 self.volume("volume", volume);
             }
             Texture::MeshAttribute(mesh) => {
-                self.xml.open("texture", &[("type", "mesh_attribute"), attribute]);
+                self.open_texture("mesh_attribute", attributes);
                 self.xml.value("string", "name", &mesh.name);
                 self.xml.value("float", "scale", mesh.scale);
             }
@@ -58,8 +84,13 @@ impl Export<'_> {
         self.xml.close();
     }
 
-    fn bitmap(&mut self, attribute: (&str, &str), image: &ImageTexture, stands: Stands) {
-        self.xml.open("texture", &[("type", "bitmap"), attribute]);
+    fn open_texture(&mut self, plugin: &str, attributes: &[(&str, &str)]) {
+        let all: Vec<(&str, &str)> = [("type", plugin)].iter().chain(attributes).copied().collect();
+        self.xml.open("texture", &all);
+    }
+
+    fn bitmap(&mut self, attributes: &[(&str, &str)], image: &ImageTexture, raw: bool, stands: Stands) {
+        self.open_texture("bitmap", attributes);
         let file = self.file(&image.file);
         self.xml.value("string", "filename", file);
         let filter = match image.filter {
@@ -73,10 +104,47 @@ impl Export<'_> {
             Wrap::Clamp => "clamp",
         };
         self.xml.value("string", "wrap_mode", wrap);
-        self.xml.value("boolean", "raw", image.raw);
+        self.xml.value("boolean", "raw", raw);
         // Their pictures begin at the top.
         let [u, [d, e, f]] = turned(affine(image.uv, image.scale, image.offset), stands);
         self.uv_map([u, [-d, -e, 1.0 - f]]);
+        self.xml.close();
+    }
+
+    /// The picture of this name where Mitsuba refuses it as it is written: of three channels it takes those that are raw for
+    /// numbers alone, and no others for them.
+    fn refused(&self, texture: &str, asked: Asked) -> Option<&ImageTexture> {
+        let raw = asked == Asked::Numbers;
+        match self.scene.textures.get(texture) {
+            Some(Texture::Image(image)) => (image.raw != raw && has_colours(&image.file)).then_some(image),
+            _ => None,
+        }
+    }
+
+    /// A picture as Mitsuba takes it, told where its values are others then.
+    fn picture(&mut self, attributes: &[(&str, &str)], texture: &str, image: &ImageTexture) {
+        let why = stored_otherwise(image);
+        if let Some(why) = why {
+            self.instead("texture", &super::field(&["textures", texture]), why);
+        }
+        self.bitmap(attributes, image, !image.raw, Stands::Upright);
+        if why.is_some() {
+            self.end();
+        }
+    }
+
+    /// A texture that is asked for colours.
+    pub(super) fn colours_of(&mut self, name: &str, texture: &str) {
+        match self.refused(texture, Asked::Colours).cloned() {
+            Some(image) => self.picture(&[("name", name)], texture, &image),
+            None => self.texture_ref(&[("name", name)], texture),
+        }
+    }
+
+    fn texture_ref(&mut self, attributes: &[(&str, &str)], texture: &str) {
+        let id = self.id(texture, "texture");
+        let all: Vec<(&str, &str)> = attributes.iter().copied().chain([("id", id.as_str())]).collect();
+        self.xml.leaf("ref", &all);
     }
 
     fn board_map(&mut self, board: &Checkerboard, stands: Stands) {
@@ -85,17 +153,15 @@ impl Export<'_> {
 
     /// A texture that is asked for numbers. Mitsuba's checkerboard then has its colours the other way round.
     pub(super) fn numbers_of(&mut self, name: Option<&str>, texture: &str) {
-        let Some(Texture::Checkerboard(board)) = self.scene.textures.get(texture) else {
-            let id = self.id(texture, "texture");
-            let named = name.map(|name| ("name", name));
-            let attributes: Vec<(&str, &str)> = named.into_iter().chain([("id", id.as_str())]).collect();
-            self.xml.leaf("ref", &attributes);
-            return;
-        };
         // Without a name where the plugin takes any texture for what it needs.
-        let named = name.map(|name| ("name", name));
-        let attributes: Vec<(&str, &str)> = [("type", "checkerboard")].into_iter().chain(named).collect();
-        self.xml.open("texture", &attributes);
+        let attributes: Vec<(&str, &str)> = name.map(|name| ("name", name)).into_iter().collect();
+        let Some(Texture::Checkerboard(board)) = self.scene.textures.get(texture) else {
+            return match self.refused(texture, Asked::Numbers).cloned() {
+                Some(image) => self.picture(&attributes, texture, &image),
+                None => self.texture_ref(&attributes, texture),
+            };
+        };
+        self.open_texture("checkerboard", &attributes);
         for (key, colour) in [("color0", &board.b), ("color1", &board.a)] {
             match colour {
                 SpectrumOrTexture::Spectrum(Spectrum::Number(x)) => self.xml.value("float", key, x),
@@ -107,12 +173,31 @@ impl Export<'_> {
         self.xml.close();
     }
 
-    /// A texture that a light throws. Their v grows downward there.
+    /// A texture that shines or that a light throws; the light tells what is lost. Their v grows downward in slides.
     pub(super) fn thrown(&mut self, name: &str, texture: &str, stands: Stands) {
-        match (self.scene.textures.get(texture), stands) {
-            (Some(written), Stands::OnItsHead) => self.texture_as(("name", name), written, stands),
-            _ => self.texture_ref(name, texture),
+        let attributes = [("name", name)];
+        match (self.refused(texture, Asked::Colours).cloned(), self.scene.textures.get(texture), stands) {
+            (Some(image), ..) => self.bitmap(&attributes, &image, false, stands),
+            (None, Some(written), Stands::OnItsHead) => self.texture_as(&attributes, written, stands),
+            _ => self.texture_ref(&attributes, texture),
         }
+    }
+
+    /// What Mitsuba gets in place of the pictures that shine, in `texture` or in its squares.
+    pub(super) fn pictures_shortfall(&self, texture: &str) -> Option<&'static str> {
+        match self.scene.textures.get(texture)? {
+            Texture::Image(_) => self.refused(texture, Asked::Colours).and_then(stored_otherwise),
+            Texture::Checkerboard(board) => {
+                let mut inner = [&board.a, &board.b].into_iter().filter_map(SpectrumOrTexture::name);
+                inner.find_map(|texture| self.pictures_shortfall(texture))
+            }
+            Texture::Volume(_) | Texture::MeshAttribute(_) => None,
+        }
+    }
+
+    /// Whether Mitsuba finds slopes and normals in it.
+    pub(super) fn has_relief(&self, texture: &str) -> bool {
+        matches!(self.scene.textures.get(texture), None | Some(Texture::Image(_)))
     }
 
     /// Whether what it shows depends on how u and v run.
@@ -141,6 +226,24 @@ impl Export<'_> {
         self.xml.leaf("matrix", &[("value", &numbers(&rows))]);
         self.xml.close();
     }
+}
+
+/// Whether the values of a picture depend on `raw`, and what they are with it the other way.
+fn stored_otherwise(image: &ImageTexture) -> Option<&'static str> {
+    let is = |extension: &str| image.file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
+    match (is("exr") || is("hdr"), image.raw) {
+        (true, _) => None,
+        (false, true) => Some("its colours by the curve of sRGB: Mitsuba takes raw ones for numbers alone"),
+        (false, false) => Some("its numbers as they are stored: Mitsuba takes them from raw pictures alone"),
+    }
+}
+
+/// Whether a picture has more than grey. One that cannot be read has.
+fn has_colours(file: &Path) -> bool {
+    let reader = crate::input::open(file).map(|file| ImageReader::new(BufReader::new(file)));
+    let decoder = reader.and_then(|reader| Ok(reader.with_guessed_format()?.into_decoder()));
+    let channels = decoder.ok().and_then(|decoder| Some(decoder.ok()?.color_type().channel_count()));
+    channels.is_none_or(|channels| channels > 2)
 }
 
 /// The map after v ↦ 1 − v.
