@@ -24,6 +24,7 @@ use super::{BatchEntry, Overrides, develop};
 use crate::description;
 use crate::error::{Error, Result};
 use crate::film::error;
+use crate::film::exr::half_loses;
 use crate::film::png;
 use crate::film::resolve::Image;
 use crate::math::statistics::Moments;
@@ -274,7 +275,7 @@ const SEED_OF_THE_REFERENCE: u64 = 0x7265_6665_7265_6e63;
 /// relMSE of a file of half precision against `image`: the same samples, so nothing of it is noise. None where half precision
 /// cannot hold it.
 fn rounding(image: &Image) -> Option<f64> {
-    if image.rgb.iter().flatten().any(|&x| x.is_finite() && f16::from_f32(x).is_infinite()) {
+    if half_loses(&image.rgb.each_ref()).is_some() {
         return None;
     }
     let values = image.rgb.iter().flatten().map(|&x| (f64::from(x), f64::from(f16::from_f32(x).to_f32())));

@@ -27,6 +27,9 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+/// Bands stand in place of the colours in the file, but the error is of these.
+const ERROR_OF_COLOURS: &str = "the error that is told, and aimed at, is that of the colours, as the PNG has them; output.exr.stderr writes that of each band";
+
 /// What the files of a picture need besides its sums.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -140,6 +143,7 @@ impl Finish {
         let (white, note) = develop::white(&description.output.png, scene);
         let asked = |content: &LayerContent| description.layers.iter().any(|layer| layer.content == *content);
         let splats = plan.caustics.is_some() || matches!(plan.integrator, Integrator::Light(_));
+        let of_colours = !description.image.bands.is_empty() && !matches!(plan.integrator, Integrator::Whitted(_));
         // Where the files go is no matter of what is in them.
         let mut output = Output { dir: PathBuf::new(), contact_sheet: true, ..description.output.clone() };
         output.exr.stderr = layers::wants_errors(description);
@@ -158,7 +162,14 @@ impl Finish {
             techniques: plan.techniques.clone(),
             lit: plan.lit,
             wavelengths: scene.wavelengths.describe().to_owned(),
-            notes: scene.notes.iter().cloned().chain(note).chain(mattes::shared_names(description)).collect(),
+            notes: scene
+                .notes
+                .iter()
+                .cloned()
+                .chain(note)
+                .chain(mattes::shared_names(description))
+                .chain(of_colours.then(|| ERROR_OF_COLOURS.to_owned()))
+                .collect(),
             world_to_camera: finite(scene.camera.camera_from_world()),
             world_to_ndc: finite(scene.camera.ndc_from_world()),
             white,

@@ -75,18 +75,21 @@ impl Stop {
     pub fn pass_end(&self, milestones: &[Milestone], most: u32) -> Option<u32> {
         let replicates = REPLICATES as u32;
         let Some(last) = milestones.last() else { return Some(replicates.min(most)) };
+        // The time is a bound.
+        let most = match (self.time, seconds_a_sample(milestones)) {
+            (Some(time), Some(rate)) => {
+                let left = (time.saturating_sub(last.elapsed).as_secs_f64() / rate) as u32;
+                if left < replicates {
+                    return None;
+                }
+                let end = last.samples.saturating_add(left);
+                most.min((end - end % replicates).max(last.samples + replicates))
+            }
+            _ => most,
+        };
         let mut end = f64::from(last.samples.saturating_mul(2));
         if let (Some(target), Some(fit)) = (self.target(), Fit::of(milestones)) {
             end = end.min(fit.samples_for(target).max(f64::from(last.samples) * (1.0 + SHORTEST)));
-        }
-        if let (Some(time), Some(rate)) = (self.time, seconds_a_sample(milestones)) {
-            let left = time.saturating_sub(last.elapsed).as_secs_f64();
-            end = end.min(f64::from(last.samples) + left / rate);
-            if end < f64::from(last.samples + replicates) {
-                return None;
-            }
-            // Rounded down: the time is a bound.
-            end -= f64::from(replicates - 1);
         }
         let end = (end.ceil() as u32).next_multiple_of(replicates).max(last.samples + replicates);
         Some(end.min(most))
@@ -111,7 +114,9 @@ impl Stop {
                     self.floor
                 )));
             }
-            if last.error.is_none_or(|e| e.rel_rmse > asked) && !self.samples_wanted && self.time.is_none() {
+            // A time ends a render where less is left of it than four samples take, which is no more than what has passed.
+            let in_time = self.time.is_none_or(|time| last.elapsed < time.mul_f64(0.5));
+            if last.error.is_none_or(|e| e.rel_rmse > asked) && !self.samples_wanted && in_time {
                 return Err(Error::Render(format!(
                     "stop.error: {asked:e} was not reached with {} samples a pixel; {found}",
                     last.samples
@@ -305,6 +310,21 @@ mod tests {
         assert!(others.iter().all(|stop| !stop.reached(&known)));
     }
 
+    /// A time that is far away does not excuse an error that was not reached, where the most samples ended the render.
+    #[test]
+    fn what_ends_before_its_time_without_its_error_is_told() {
+        let known = milestones(&[16_384, 32_768, 65_536], 1.0);
+        let stop = |seconds| Stop {
+            error: Some(1e-9),
+            time: Some(Duration::from_secs(seconds)),
+            samples_wanted: false,
+            floor: 0.0,
+        };
+        assert!(stop(3600).check(&known).unwrap_err().to_string().contains("was not reached with 65536 samples"));
+        stop(66).check(&known).unwrap();
+        Stop { samples_wanted: true, ..stop(3600) }.check(&known).unwrap();
+    }
+
     const FREE: Stop = Stop { error: None, time: None, samples_wanted: true, floor: 0.0 };
 
     #[test]
@@ -324,6 +344,11 @@ mod tests {
         assert_eq!(stop.pass_end(&milestones(&[16, 32, 64], 1.0), 1 << 16), Some(100));
         assert_eq!(stop.pass_end(&milestones(&[4, 8, 16], 1.5), 1 << 16), Some(24));
         assert!(stop.reached(&milestones(&[32, 64, 100], 1.0)) && !stop.reached(&milestones(&[32, 64, 99], 1.0)));
+        // A time that is far away changes none of that, though what the error asks for is less than four samples more.
+        let long = Stop { time: Some(Duration::from_secs(60)), ..stop };
+        assert_eq!(long.pass_end(&milestones(&[16, 32, 64], 1.0), 1 << 16), Some(100));
+        let near = Stop { error: Some(0.245), ..long };
+        assert_eq!(near.pass_end(&milestones(&[4, 8, 16], 1.0), 1 << 16), Some(20));
         // Just missed: a thirty-second more, not four samples.
         let stop = Stop { error: Some(0.03), ..FREE };
         assert_eq!(stop.pass_end(&milestones(&[272, 544, 1088], 1.0), 1 << 16), Some(1124));

@@ -114,7 +114,7 @@ fn table(path: &Path, sources: &mut Sources) -> Result<Vec<Node>, String> {
     let text = str::from_utf8(&bytes).map_err(|_| "expected text in UTF-8".to_owned())?;
     let source = sources.add_file(path);
     let mut rows = Vec::new();
-    for (line, text) in (1..).zip(text.lines()) {
+    for (line, text) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
         let fields: Vec<&str> = text.split(',').map(str::trim).collect();
         if fields[0].starts_with('#') || fields == [""] {
             continue;

@@ -210,7 +210,7 @@
 //!                                                # written in place
 //!   worn: {blend: {weight: 0.5, first: clay, second: ring}}          # ~ of the second
 //!   card: {two_sided: {front: clay, back: lacquer}}                  # ~ back is the front's; no glass
-//!   waves: {bump: {height: {texture: floor}, scale: 1, material: clay}}
+//!   waves: {bump: {height: {texture: earth}, scale: 1, material: clay}}
 //!                                                # ~ scale; metres along the normal
 //!   scales: {normal_map: {normals: {texture: earth}, material: clay}}
 //!                                                # both: turn: true, shadowing: true

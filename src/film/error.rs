@@ -57,7 +57,8 @@ pub struct ErrorEstimate {
     /// Whether the interval can be believed; where it is false the picture has not converged. False where so few pixels
     /// carry the error that fewer than [`EFFECTIVE_PIXELS`] equally noisy ones would scatter as much, or where most of
     /// it comes from single replicates ([`HEAVY_SHARE`]): rare paths that carry much light, of which others are yet to come; or
-    /// where pixels are so noisy that what they are divided by is not known ([`FURTHER_SHARE`]).
+    /// where pixels are so noisy that what they are divided by is not known ([`FURTHER_SHARE`]). False as well of 5 to 7 samples a
+    /// pixel, of which some replicates have two and some one: evenly spread ones differ by more than twice then.
     pub valid: bool,
 }
 
@@ -134,6 +135,8 @@ struct Sums {
     noisy: u64,
     /// Pixels without any light.
     black: u64,
+    /// Pixels of which one replicate has at least twice the samples of another.
+    uneven: u64,
     /// Σ q, q a pixel's expected relative squared error.
     error: f64,
     /// What is taken off for the noise of the values that variances are divided by.
@@ -187,6 +190,9 @@ pub fn relative_error(
                 for x in column..(column + side).min(window.width) {
                     let index = y as usize * window.width as usize + x as usize;
                     if let Some(replicates) = replicate_light(film, splats.as_ref(), index, rgb_from_xyz) {
+                        let counts = film.cells()[index].each_ref().map(|cell| cell.count);
+                        let [least, most] = [counts.iter().min(), counts.iter().max()].map(|n| n.copied().unwrap_or(0));
+                        sums.uneven += u64::from(most >= 2 * least);
                         sums.add(&replicates, image.rgb.each_ref().map(|plane| f64::from(plane[index])), floor);
                     }
                 }
@@ -200,6 +206,7 @@ pub fn relative_error(
         all.pixels += block.pixels;
         all.noisy += block.noisy;
         all.black += block.black;
+        all.uneven += block.uneven;
         all.error += block.error;
         all.further += block.further;
         all.squares += block.squares;
@@ -231,7 +238,10 @@ pub fn relative_error(
         high: rel_mse.sqrt() * stretch,
         pixels: all.pixels,
         valid: all.error == 0.0
-            || (effective >= EFFECTIVE_PIXELS && all.heavy <= HEAVY_SHARE * all.error && share.abs() <= FURTHER_SHARE),
+            || (2 * all.uneven <= all.pixels
+                && effective >= EFFECTIVE_PIXELS
+                && all.heavy <= HEAVY_SHARE * all.error
+                && share.abs() <= FURTHER_SHARE),
     })
 }
 
@@ -440,6 +450,23 @@ mod tests {
         assert_eq!(estimate(&half).unwrap_err(), NoEstimate::Unmet);
         let noisy = film_of(|pixel, replicate| if pixel == 5 { 1.0 + replicate as f32 } else { 1.0 });
         assert!(estimate(&noisy).unwrap().1.rel_rmse > 0.0);
+    }
+
+    /// 4, 5, 6, 7, 8 and 9 samples of each pixel.
+    #[test]
+    fn replicates_of_one_and_of_two_samples_tell_no_interval() {
+        let valid = |samples: usize| {
+            let window = Window::full(16, 16);
+            let mut tile = TileBuffer::new(window);
+            for (pixel, i) in (0..window.pixels()).flat_map(|pixel| (0..samples).map(move |i| (pixel, i))) {
+                let x = 1.0 + 0.1 * uniform(7, (pixel * samples + i) as u64) as f32;
+                tile.add([(pixel % 16) as i32, (pixel / 16) as i32], i % REPLICATES, [x; 3], 1.0);
+            }
+            let mut film = Film::new([16, 16], window).unwrap();
+            film.merge_tile(&tile);
+            estimate(&film).unwrap().1.valid
+        };
+        assert_eq!([4, 5, 6, 7, 8, 9].map(valid), [true, false, false, false, true, true]);
     }
 
     /// One pixel of 256 carries all of the error; or every pixel has light that comes once in 200 samples, of which it has

@@ -8,8 +8,8 @@
 //! each other instead.
 //!
 //! Points all over the faces of bodies find what else goes through them: a thousand on each, so that what touches a hundredth of a
-//! body's faces is met by some ten; of more than 64 bodies fewer, down to 64. Of meshes of more triangles one in as many is
-//! looked at. Sheets have no inside to withdraw to: what lies on one is told. Copies of groups are not looked at.
+//! body's faces is met by some ten; of more than 64 bodies fewer, down to 64. Points on what stands on a body find it where
+//! those of the body have not, as a die on a block. Of meshes of more triangles one in as many is looked at. Sheets have no inside to withdraw to: what lies on one is told. Copies of groups are not looked at.
 
 use super::bvh::Aabb;
 use super::instance::PartHit;
@@ -41,6 +41,9 @@ const MOST_PAIRS: usize = 1 << 26;
 /// Points on all bodies, and on one.
 const POINTS: usize = 1 << 16;
 const POINTS_OF_ONE: usize = 1 << 10;
+
+/// Points on something that stands on a body.
+const POINTS_OF_GUEST: usize = 1 << 8;
 
 /// Two objects of which one was put off the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,8 +78,8 @@ struct Withdrawal {
     rank: usize,
 }
 
-/// Puts bodies apart that share faces, and says which; `boxes` are the objects'.
-pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &[Material]) -> Vec<Contact> {
+/// Puts bodies apart that share faces, and says which, and how many more bodies were not looked at; `boxes` are the objects'.
+pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &[Material]) -> (Vec<Contact>, usize) {
     let is_body = |o: &Object| {
         let looked_at = match &o.geometry {
             Geometry::Shape(shape) => !matches!(shape, Shape::Plane(_)),
@@ -85,9 +88,11 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
         };
         looked_at && o.light.is_none() && materials[o.material as usize].transmits()
     };
-    let bodies: Vec<usize> = (0..objects.len()).filter(|&i| is_body(&objects[i])).take(MOST_BODIES).collect();
+    let mut bodies: Vec<usize> = (0..objects.len()).filter(|&i| is_body(&objects[i])).collect();
+    let all = bodies.len();
+    bodies.truncate(MOST_BODIES.min(MOST_PAIRS / objects.len().max(1)));
     if bodies.is_empty() || objects.len() < 2 {
-        return Vec::new();
+        return (Vec::new(), all - bodies.len());
     }
     let volume = |i: usize| (boxes[i].max - boxes[i].min).element_product();
     let ranked: Vec<bool> =
@@ -107,7 +112,8 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
             one.touched.push((other as u32, normal));
         }
     };
-    for &body in bodies.iter().take(MOST_PAIRS / objects.len()) {
+    let mut points_of_guests = POINTS;
+    for &body in &bodies {
         let pad = REACH * boxes[body].min.abs().max(boxes[body].max.abs()).max_element();
         let near = |b: &Aabb, min: DVec3, max: DVec3| b.min.cmple(max + pad).all() && b.max.cmpge(min - pad).all();
         let others: Vec<usize> =
@@ -115,9 +121,11 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
         if others.is_empty() {
             continue;
         }
+        let mut met_others = HashSet::new();
         for probe in probes(&objects[body].geometry, points) {
             for &other in others.iter().filter(|&&i| near(&boxes[i], probe.point, probe.point)) {
                 let Some((normal, scale)) = met(&objects[other], &probe) else { continue };
+                met_others.insert(other);
                 // Of two that look away from each other a body with a priority stays, if it may; of two in one another the
                 // larger does.
                 let apart = probe.normal.dot(normal) < 0.0;
@@ -131,6 +139,20 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
                 match first {
                     true => withdraw(body, other, probe.normal, scale, leaves),
                     false => withdraw(other, body, normal, scale, leaves),
+                }
+            }
+        }
+        for &guest in others.iter().filter(|&&i| stays[i][0] && !met_others.contains(&i)) {
+            if points_of_guests == 0 || matches!(objects[guest].geometry, Geometry::Shape(Shape::Plane(_))) {
+                continue;
+            }
+            let points = points_of_guests.min(POINTS_OF_GUEST);
+            points_of_guests -= points;
+            for probe in probes(&objects[guest].geometry, points) {
+                if near(&boxes[body], probe.point, probe.point)
+                    && let Some((normal, scale)) = met(&objects[body], &probe)
+                {
+                    withdraw(body, guest, normal, scale, true);
                 }
             }
         }
@@ -168,7 +190,7 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
             }
         }
     }
-    contacts
+    (contacts, all - bodies.len())
 }
 
 /// Whether it has an inside.
@@ -282,6 +304,25 @@ mod tests {
                 assert!(notes[0].contains(&format!("shares a face with shapes[{}]", 1 - at)), "{notes:?}");
                 let gap = boxes[at].min.y;
                 assert!(gap > 4.0 * 2f64.powi(-46) && gap < 1e-11, "{body}: {gap}");
+            }
+        }
+    }
+
+    /// A die on a block ten times as wide, on its top and on its side.
+    #[test]
+    fn bodies_withdraw_from_what_stands_on_them() {
+        let block = "- cube: {center: [0, 0.5, 0], size: 1, material: glass}\n";
+        for (die, axis) in [
+            ("cube: {center: [0.31, 1.02, 0.17], size: 0.04}", 1),
+            ("disk: {center: [0.31, 1, 0.17], normal: [0, 1, 0], radius: 0.02, emission: 1}", 1),
+            ("cylinder: {base: [0.5, 0.31, 0.17], top: [0.6, 0.31, 0.17], radius: 0.02}", 0),
+        ] {
+            for (at, shapes) in [(0, format!("{block}- {die}\n")), (1, format!("- {die}\n{block}"))] {
+                let (notes, boxes) = compiled(&shapes);
+                assert!(notes.len() == 1 && notes[0].contains("shares a face with"), "{die}: {notes:?}");
+                let face = [0.5, 1.0][axis];
+                let gap = face - boxes[at].max[axis];
+                assert!(gap > 4.0 * 2f64.powi(-46) && gap < 1e-11, "{die}: {gap}");
             }
         }
     }

@@ -11,6 +11,10 @@ use std::f64::consts::PI;
 /// Rays that look for what a lamp without extent lights.
 const LOOKS: u32 = 64;
 
+/// What is smaller than this part of its distance from the camera is not seen: a pixel of a picture of 65,536 columns is a
+/// hundred thousand times as wide. Lamps on surfaces are put beside them by as much.
+const SPOT: f64 = 1.0 / (1u64 << 33) as f64;
+
 /// Lamps without extent, the strongest, that are asked.
 const ASKED: usize = 64;
 
@@ -58,7 +62,12 @@ impl Scene {
             self.closest(&ray, f64::INFINITY).map_or(f64::INFINITY, |hit| hit.t)
         });
         let nearest = looks.fold(f64::INFINITY, f64::min);
-        let distance = if nearest.is_finite() { nearest } else { (self.center - position).length().max(self.radius) };
+        // A lamp that lies on something, or where two things meet, lights a spot beside it that no pixel sees.
+        let seen = SPOT * (self.camera.world_from_camera.translation - position).length();
+        let distance = match nearest.is_finite() {
+            true => nearest.max(seen),
+            false => (self.center - position).length().max(self.radius),
+        };
         power / (2.0 * PI * spread * distance * distance) / PI
     }
 }
@@ -95,6 +104,19 @@ mod tests {
         let text = format!("camera: {{origin: [0, 5, 9], target: [0, 0, 0], fov_deg: 40}}\n{text}");
         let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
         compile(&description, "s").unwrap().light_exponent
+    }
+
+    /// A lamp where a ball touches the top of a pole, in whichever order: it lights nothing there that is seen, and the sky of 0.1
+    /// has to be counted, too.
+    #[test]
+    fn a_lamp_where_two_bodies_meet_leaves_the_rest_its_light() {
+        let ball = "sphere: {center: [0.1, 2, 0], radius: 0.1}";
+        let pole = "cylinder: {base: [0, 0, 0], top: [0, 2, 0], radius: 0.1}";
+        for shapes in [[ball, pole], [pole, ball]] {
+            let lights = "lights: [constant: {radiance: 0.1}, point: {position: [0, 2, 0], intensity: 10}]";
+            let found = exponent(&format!("shapes: [{}, {}]\n{lights}\n", shapes[0], shapes[1]));
+            assert!(found <= 27, "{found}");
+        }
     }
 
     /// A lamp of intensity d² at d over a plane lights it by 1 below, whatever d: the film counts as ever. So it does where the

@@ -287,7 +287,7 @@ impl<'a> Compiler<'a> {
         }
 
         let mut boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
-        let contacts = put_apart(&mut objects, &mut boxes, &self.materials);
+        let (contacts, passed_over) = put_apart(&mut objects, &mut boxes, &self.materials);
         let all: Vec<u32> = (0..objects.len() as u32).collect();
         // The box of one small mesh among few things is met side by side with theirs.
         let mut meshes = objects.iter().filter_map(|object| match &object.geometry {
@@ -376,7 +376,7 @@ impl<'a> Compiler<'a> {
         self.note_beside(&mut scene, &boxes, &light_names);
         scene.light_exponent = scene.film_exponent(&powers);
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
-        self.note_contacts(&mut scene, &contacts);
+        self.note_contacts(&mut scene, &contacts, passed_over);
         self.note_overlaps(&mut scene);
         self.note_lost_light(&mut scene, &light_names);
         scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);

@@ -416,7 +416,7 @@ pub fn samples(path: &Path) -> std::result::Result<Vec<(f64, f64)>, String> {
     let text = String::from_utf8(bytes).map_err(|_| "expected text, found other bytes")?;
     let has_comments = extension(path) == "spd";
     let mut samples = Vec::new();
-    for (i, line) in text.lines().enumerate() {
+    for (i, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let line = line.split('#').next().unwrap_or_default().trim();
         if line.is_empty() {
             continue;
@@ -426,8 +426,8 @@ pub fn samples(path: &Path) -> std::result::Result<Vec<(f64, f64)>, String> {
         let numbers: Vec<Option<f64>> = fields.iter().map(|f| f.parse().ok().filter(|x: &f64| x.is_finite())).collect();
         match numbers.as_slice() {
             [Some(nm), Some(value), rest @ ..] if rest.is_empty() || has_comments => samples.push((*nm, *value)),
-            // A heading may stand before the first numbers.
-            _ if samples.is_empty() && numbers.first().is_none_or(Option::is_none) => {}
+            // A heading may stand before the first numbers; a wavelength that is none is not one.
+            _ if samples.is_empty() && numbers.iter().take(2).all(Option::is_none) => {}
             _ => return Err(format!("line {}: expected a wavelength and a value, found \"{line}\"", i + 1)),
         }
     }
@@ -445,6 +445,10 @@ mod tests {
         let path = dir.path().join("curve.csv");
         std::fs::write(&path, "# source\nnm,value\n400, 0.1\n500;0.2\n\n600\t3e-1\n").unwrap();
         assert_eq!(samples(&path).unwrap(), [(400.0, 0.1), (500.0, 0.2), (600.0, 0.3)]);
+        std::fs::write(&path, "\u{feff}400,0.1\n500,0.2\n").unwrap();
+        assert_eq!(samples(&path).unwrap(), [(400.0, 0.1), (500.0, 0.2)]);
+        std::fs::write(&path, "4OO,0.1\n500,0.2\n600,0.3\n").unwrap();
+        assert_eq!(samples(&path).unwrap_err(), "line 1: expected a wavelength and a value, found \"4OO,0.1\"");
         std::fs::write(&path, "400 0.1 # dark\n500 0.2#\n").unwrap();
         assert_eq!(samples(&path).unwrap(), [(400.0, 0.1), (500.0, 0.2)]);
         let wide = "400 0.1 7\n500 0.2 lit by day\n";

@@ -424,7 +424,8 @@ pub fn beauty(
 }
 
 /// Why 16-bit floats cannot hold the planes, if they cannot.
-fn half_loses(planes: &[&Vec<f32>]) -> Option<String> {
+#[must_use]
+pub fn half_loses(planes: &[&Vec<f32>]) -> Option<String> {
     let values = planes.iter().copied().flatten();
     let too_large = values.clone().filter(|v| v.is_finite() && f16::from_f32(**v).is_infinite()).count();
     if too_large > 0 {

@@ -29,7 +29,7 @@ impl Compiler<'_> {
     }
 
     /// Notes which bodies share faces, and what was done.
-    pub(super) fn note_contacts(&self, scene: &mut Scene, contacts: &[Contact]) {
+    pub(super) fn note_contacts(&self, scene: &mut Scene, contacts: &[Contact], passed_over: usize) {
         for Contact { body, other, by, parted } in contacts.iter().take(TOLD) {
             let at = format!("shapes[{body}].{}", self.description.shapes[*body as usize].geometry.kind());
             let done = match by {
@@ -50,6 +50,10 @@ impl Compiler<'_> {
         }
         if contacts.len() > TOLD {
             scene.notes.push(format!("{} more pairs of shapes share faces", contacts.len() - TOLD));
+        }
+        if passed_over > 0 {
+            let note = "more bodies that light goes into are not looked at for faces that they share; leave gaps there";
+            scene.notes.push(format!("{passed_over} {note}"));
         }
     }
 

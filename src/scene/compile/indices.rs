@@ -137,6 +137,7 @@ impl<'a> Compiler<'a> {
             (Some(written::Absorption::Color(c)), _) => {
                 let at = at("absorption.color");
                 let color = self.written_spectrum(&at, &c.color, Outside::Hold, Role::Reflectance);
+                self.check_file_of_shares(&at, &c.color, &color);
                 if let Some(nm) = nanometres().find(|&nm| color.at(nm) <= 0.0) {
                     self.fault(
                         &at,

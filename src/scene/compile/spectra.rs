@@ -20,6 +20,9 @@ impl Compiler<'_> {
     /// What `s` is carried as.
     pub(super) fn spectrum(&mut self, at: &str, s: &written::Spectrum, outside: Outside, role: Role) -> Spectrum {
         let spectrum = self.written_spectrum(at, s, outside, role);
+        if matches!(role, Role::Reflectance) {
+            self.check_file_of_shares(at, s, &spectrum);
+        }
         let carried = self.shelf.carried;
         match role {
             Role::Reflectance => carried.reflectance(spectrum),
@@ -77,6 +80,30 @@ impl Compiler<'_> {
             written::Spectrum::Scaled(s) => {
                 self.written_spectrum(&format!("{at}.scaled.of"), &s.of, outside, role).scaled(s.by)
             }
+        }
+    }
+
+    /// Refuses a file of more than all light where `s` names one for a share of it; what is written itself has been checked.
+    pub(super) fn check_file_of_shares(&mut self, at: &str, s: &written::Spectrum, spectrum: &Spectrum) {
+        let (mut named, mut by) = (s, 1.0);
+        let file = loop {
+            match named {
+                written::Spectrum::ZeroOutside(inner) => named = inner,
+                written::Spectrum::Scaled(scaled) => (named, by) = (&scaled.of, by * scaled.by),
+                written::Spectrum::File(file) => break file,
+                _ => return,
+            }
+        };
+        let [from, to] = BAND_NM;
+        let beyond = (from as u32..=to as u32).map(f64::from).find(|&nm| spectrum.at(nm) > 1.0);
+        if let Some(nm) = beyond {
+            let found = in_short(spectrum.at(nm));
+            let times = if by == 1.0 { String::new() } else { format!(" times {}", in_short(by)) };
+            let message = format!(
+                "expected values{times} from 0 to 1 for a share of light (not per cent), found {found} at {nm} nm"
+            );
+            let error = self.asked(at, Error::input(file, message));
+            self.unread.get_or_insert(error);
         }
     }
 
@@ -150,4 +177,33 @@ fn beyond_the_band(response: &written::Spectrum) -> Option<[f64; 2]> {
         (counts && (from[0] < BAND_NM[0] || to[0] > BAND_NM[1])).then_some([from[0], to[0]])
     };
     samples.windows(2).find_map(|pair| beyond([pair[0], pair[1]]))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile;
+
+    /// Reflectances in per cent, as they stand, scaled to what they are, and beyond.
+    #[test]
+    fn a_file_of_more_than_all_light_is_no_reflectance() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("paint.csv"), "400,50\n700,80\n").unwrap();
+        let fault = |reflectance: &str| {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n\
+                 - sphere: {{radius: 1, material: {{diffuse: {{reflectance: {reflectance}}}}}}}\n"
+            );
+            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
+            compile(&description, "s").err().map(|error| error.to_string())
+        };
+        let told = fault("{file: paint.csv}").unwrap();
+        assert!(
+            told.contains("paint.csv: expected values from 0 to 1") && told.contains("found 50 at 360 nm"),
+            "{told}"
+        );
+        assert_eq!(fault("{scaled: {by: 0.01, of: {file: paint.csv}}}"), None);
+        let told = fault("{scaled: {by: 0.02, of: {zero_outside: {file: paint.csv}}}}");
+        assert!(told.as_ref().is_some_and(|told| told.contains("times 0.02 from 0 to 1")), "{told:?}");
+    }
 }

@@ -25,7 +25,7 @@ pub fn load(path: &Path) -> Result<Vec<Vec<ControlPoint>>> {
 pub fn parse(text: &str) -> std::result::Result<Vec<Vec<ControlPoint>>, String> {
     let mut curves: Vec<Vec<ControlPoint>> = Vec::new();
     let mut open = false;
-    for (i, line) in text.lines().enumerate() {
+    for (i, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let line = line.trim();
         if line.is_empty() {
             open = false;
