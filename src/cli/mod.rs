@@ -87,10 +87,7 @@ struct SceneArguments {
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = name_value)]
     define: Vec<(String, String)>,
     /// Samples a pixel
-    #[arg(
-        long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(SAMPLES_LIMIT)),
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "N", value_parser = spp, allow_negative_numbers = true)]
     spp: Option<u32>,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
@@ -354,6 +351,14 @@ fn threads(text: &str) -> std::result::Result<usize, String> {
         Ok(n) if n <= MOST_THREADS => Ok(n),
         Ok(n) => Err(format!("{n} is not in 0..={MOST_THREADS}")),
         Err(_) => Err(format!("expected a whole number from 0 to {MOST_THREADS}")),
+    }
+}
+
+fn spp(text: &str) -> std::result::Result<u32, String> {
+    match text.parse::<i64>() {
+        Ok(n) if (1..=i64::from(SAMPLES_LIMIT)).contains(&n) => Ok(n as u32),
+        Ok(n) => Err(format!("{n} is not in 1..={SAMPLES_LIMIT}")),
+        Err(_) => Err(format!("expected a whole number from 1 to {SAMPLES_LIMIT}")),
     }
 }
 

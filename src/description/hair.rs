@@ -17,9 +17,9 @@ pub struct Hair {
     pub ior: f64,
     /// Index outside; default 1.
     pub exterior_ior: f64,
-    /// Roughness along the fibre, 0 to 1; default 0.3.
+    /// Roughness along the fibre, 0.01 to 1; default 0.3.
     pub roughness_along: f64,
-    /// Roughness around the fibre, 0 to 1; default 0.3.
+    /// Roughness around the fibre, 0.01 to 1; default 0.3.
     pub roughness_around: f64,
     /// Angle of the scales, degrees; default 2.
     pub tilt_deg: f64,

@@ -192,10 +192,11 @@
 //!       sampling: {specular: 1, clearcoat: 1, diffuse: 1}          # ~ how often lobes are sampled, specular above 0
 //!       two_sided: true                          # ~ without spec_trans
 //!   petal: {principled_thin: {base_color: 0.5, roughness: 0.5, spec_trans: 0, diff_trans: 1, eta: 1.5}}
-//!                                                # a sheet; diff_trans up to 2: all diffuse light crosses; numbers
-//!                                                # may be textures; and as above anisotropic, spec_tint, sheen,
-//!                                                # sheen_tint, flatness, luminance, sampling: {reflection: 1,
-//!                                                # transmission: 1, diffuse_reflection: 1, diffuse_transmission: 1}
+//!                                                # a sheet; ~ all, but diff_trans is 0 by default, and up to 2,
+//!                                                # where all diffuse light crosses; numbers may be textures; and as
+//!                                                # above anisotropic, spec_tint, sheen, sheen_tint, flatness,
+//!                                                # luminance, sampling: {reflection: 1, transmission: 1,
+//!                                                # diffuse_reflection: 1, diffuse_transmission: 1}
 //!   fur:
 //!     hair:                                      # for curves and cylinders: fibres along ∂p/∂v
 //!       eumelanin: 1.3                           # ~ pigments; or absorption: SPECTRUM, times the fibre's radius

@@ -83,6 +83,14 @@ impl Compiler<'_> {
         }
     }
 
+    fn albedo(&mut self, at: &str, s: &written::SpectrumOrVolume) -> Volume {
+        let albedo = self.spectrum_or_volume(at, s);
+        if let (written::SpectrumOrVolume::Spectrum(written), Volume::Constant { value, .. }) = (s, &albedo) {
+            self.check_file_of_shares(at, written, value);
+        }
+        albedo
+    }
+
     pub(super) fn medium(&mut self, at: &str, medium: &written::Medium) -> Medium {
         let at = |field: &str| format!("{at}.{}.{field}", medium.kind());
         match medium {
@@ -93,7 +101,7 @@ impl Compiler<'_> {
                         scattering: self.spectrum(&at("scattering"), scattering, Outside::Hold, Role::Coefficient),
                     },
                     written::Coefficients::Sum { extinction, albedo, scale } => {
-                        let albedo = self.spectrum_or_volume(&at("albedo"), albedo);
+                        let albedo = self.albedo(&at("albedo"), albedo);
                         Filling::EvenExtinction {
                             extinction: self.coefficient(&at("extinction"), extinction).scaled(*scale),
                             scatters: albedo.max() > 0.0,
@@ -105,7 +113,7 @@ impl Compiler<'_> {
             }
             written::Medium::Heterogeneous(m) => {
                 let extinction = self.spectrum_or_volume(&at("extinction"), &m.extinction);
-                let albedo = self.spectrum_or_volume(&at("albedo"), &m.albedo);
+                let albedo = self.albedo(&at("albedo"), &m.albedo);
                 Medium {
                     filling: Filling::Varying(Box::new(Varying::new(extinction, m.scale, albedo))),
                     phase: self.phase(&at("phase"), &m.phase),

@@ -184,26 +184,27 @@ mod tests {
     use crate::description::SceneDescription;
     use crate::scene::compile::compile;
 
-    /// Reflectances in per cent, as they stand, scaled to what they are, and beyond.
+    /// Reflectances and albedos in per cent, as they stand, scaled to what they are, and beyond.
     #[test]
     fn a_file_of_more_than_all_light_is_no_reflectance() {
         let directory = tempfile::tempdir().unwrap();
         std::fs::write(directory.path().join("paint.csv"), "400,50\n700,80\n").unwrap();
-        let fault = |reflectance: &str| {
+        let fault = |reflectance: &str, albedo: &str| {
             let text = format!(
                 "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n\
-                 - sphere: {{radius: 1, material: {{diffuse: {{reflectance: {reflectance}}}}}}}\n"
+                 - sphere: {{radius: 1, material: {{diffuse: {{reflectance: {reflectance}}}}}}}\n\
+                 media: {{smoke: {{homogeneous: {{extinction: 1, albedo: {albedo}}}}}}}\n"
             );
             let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-            compile(&description, "s").err().map(|error| error.to_string())
+            compile(&description, "s").err().map(|error| error.to_string()).unwrap_or_default()
         };
-        let told = fault("{file: paint.csv}").unwrap();
-        assert!(
-            told.contains("paint.csv: expected values from 0 to 1") && told.contains("found 50 at 360 nm"),
-            "{told}"
-        );
-        assert_eq!(fault("{scaled: {by: 0.01, of: {file: paint.csv}}}"), None);
-        let told = fault("{scaled: {by: 0.02, of: {zero_outside: {file: paint.csv}}}}");
-        assert!(told.as_ref().is_some_and(|told| told.contains("times 0.02 from 0 to 1")), "{told:?}");
+        let scaled = "{scaled: {by: 0.01, of: {file: paint.csv}}}";
+        assert_eq!(fault(scaled, scaled), "");
+        for told in [fault("{file: paint.csv}", "0.5"), fault("0.5", "{file: paint.csv}")] {
+            let parts = ["paint.csv: expected values from 0 to 1", "found 50 at 360 nm", "named at"];
+            assert!(parts.iter().all(|part| told.contains(part)), "{told}");
+        }
+        let told = fault("{scaled: {by: 0.02, of: {zero_outside: {file: paint.csv}}}}", "0.5");
+        assert!(told.contains("times 0.02 from 0 to 1"), "{told}");
     }
 }
