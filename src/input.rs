@@ -34,6 +34,12 @@ pub fn open(path: &Path) -> Result<File> {
     File::open(path)
 }
 
+/// Bytes without the mark of UTF-8 at their beginning, as spreadsheets write it.
+#[must_use]
+pub fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes)
+}
+
 /// All bytes of a regular file.
 ///
 /// # Errors

@@ -28,7 +28,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Bands stand in place of the colours in the file, but the error is of these.
-const ERROR_OF_COLOURS: &str = "the error that is told, and aimed at, is that of the colours, as the PNG has them; output.exr.stderr writes that of each band";
+const ERROR_OF_COLOURS: &str = "the error that is told, and aimed at, is that of the colours, as the PNG has them; \
+                                output.exr.stderr writes that of each band";
 
 /// What the files of a picture need besides its sums.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -143,7 +144,8 @@ impl Finish {
         let (white, note) = develop::white(&description.output.png, scene);
         let asked = |content: &LayerContent| description.layers.iter().any(|layer| layer.content == *content);
         let splats = plan.caustics.is_some() || matches!(plan.integrator, Integrator::Light(_));
-        let of_colours = !description.image.bands.is_empty() && !matches!(plan.integrator, Integrator::Whitted(_));
+        let bands = !description.image.bands.is_empty();
+        let of_colours = bands && !matches!(plan.integrator, Integrator::Whitted(_));
         // Where the files go is no matter of what is in them.
         let mut output = Output { dir: PathBuf::new(), contact_sheet: true, ..description.output.clone() };
         output.exr.stderr = layers::wants_errors(description);
@@ -180,7 +182,7 @@ impl Finish {
                 _ if splats => Sharing::Span(filter(&description.image.filter).span()),
                 _ => Sharing::Span(1.0),
             },
-            bands: !description.image.bands.is_empty(),
+            bands,
             layers: plan.layers.channels(),
             kept: plan.layers.kept,
             variance: asked(&LayerContent::Variance),

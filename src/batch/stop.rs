@@ -76,16 +76,13 @@ impl Stop {
         let replicates = REPLICATES as u32;
         let Some(last) = milestones.last() else { return Some(replicates.min(most)) };
         // The time is a bound.
-        let most = match (self.time, seconds_a_sample(milestones)) {
-            (Some(time), Some(rate)) => {
-                let left = (time.saturating_sub(last.elapsed).as_secs_f64() / rate) as u32;
-                if left < replicates {
-                    return None;
-                }
-                let end = last.samples.saturating_add(left);
+        let most = match self.samples_left(milestones) {
+            Some(left) if left < f64::from(replicates) => return None,
+            Some(left) => {
+                let end = last.samples.saturating_add(left as u32);
                 most.min((end - end % replicates).max(last.samples + replicates))
             }
-            _ => most,
+            None => most,
         };
         let mut end = f64::from(last.samples.saturating_mul(2));
         if let (Some(target), Some(fit)) = (self.target(), Fit::of(milestones)) {
@@ -93,6 +90,12 @@ impl Stop {
         }
         let end = (end.ceil() as u32).next_multiple_of(replicates).max(last.samples + replicates);
         Some(end.min(most))
+    }
+
+    /// How many more samples the time leaves room for after `milestones`; none where there is no such bound.
+    fn samples_left(&self, milestones: &[Milestone]) -> Option<f64> {
+        let left = self.time?.saturating_sub(milestones.last()?.elapsed);
+        Some(left.as_secs_f64() / seconds_a_sample(milestones)?)
     }
 
     /// What keeps the targets from being met, if they are not.
@@ -248,8 +251,8 @@ impl Forecast {
         if let Some(target) = stop.target() {
             samples = samples.min(fit.samples_for(target).max(now));
         }
-        if let Some(time) = stop.time {
-            samples = samples.min(now + (time.as_secs_f64() - elapsed).max(0.0) / rate);
+        if let Some(left) = stop.samples_left(milestones) {
+            samples = samples.min(now + left);
         }
         let seconds = elapsed + (samples - now) * rate;
         Some(Forecast { made_at: last.samples, samples, seconds, error: fit.error_at(samples) })

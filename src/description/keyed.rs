@@ -111,10 +111,10 @@ pub(crate) fn read_tables(root: &mut Node, sources: &mut Sources) -> Result<bool
 /// lines and those that begin with # say nothing, nor does a first line of names.
 fn table(path: &Path, sources: &mut Sources) -> Result<Vec<Node>, String> {
     let bytes = read_bytes(path).map_err(|error| format!("cannot be read: {error}"))?;
-    let text = str::from_utf8(&bytes).map_err(|_| "expected text in UTF-8".to_owned())?;
+    let text = str::from_utf8(crate::input::without_mark(&bytes)).map_err(|_| "expected text in UTF-8".to_owned())?;
     let source = sources.add_file(path);
     let mut rows = Vec::new();
-    for (line, text) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
+    for (line, text) in (1..).zip(text.lines()) {
         let fields: Vec<&str> = text.split(',').map(str::trim).collect();
         if fields[0].starts_with('#') || fields == [""] {
             continue;

@@ -60,7 +60,7 @@ pub fn optical_data(path: &Path) -> Result<OpticalData> {
     let read = if ending.is_some_and(|e| e == "yml" || e == "yaml") {
         yaml::read(&bytes, source).and_then(|root| of_yaml(&root))
     } else {
-        of_csv(&String::from_utf8_lossy(&bytes), source)
+        of_csv(&String::from_utf8_lossy(crate::input::without_mark(&bytes)), source)
     };
     read.map_err(|fault| {
         let Place { line, column, .. } = fault.place.unwrap_or_default();
@@ -265,7 +265,7 @@ fn of_csv(text: &str, source: u32) -> std::result::Result<OpticalData, Fault> {
         Some((columns, line, rows)) => tables.add(columns, place(line), "", &rows),
         None => Ok(()),
     };
-    for (line, written) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
+    for (line, written) in (1..).zip(text.lines()) {
         let fields: Vec<&str> = written.split([',', ';', '\t']).map(|f| f.trim().trim_matches('"')).collect();
         if fields.iter().all(|f| f.is_empty()) || written.starts_with('#') {
             continue;

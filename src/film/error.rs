@@ -38,7 +38,7 @@
 //! everywhere show that there is no noise only where they agree on light: a black pixel may be one whose light nobody has met.
 
 use super::accumulate::{Film, REPLICATES};
-use super::resolve::{Image, Splats, replicate_light};
+use super::resolve::{Image, Splats, counts, replicate_light};
 use crate::math::statistics::student_t_half_width;
 use rayon::prelude::*;
 use std::fmt;
@@ -190,7 +190,7 @@ pub fn relative_error(
                 for x in column..(column + side).min(window.width) {
                     let index = y as usize * window.width as usize + x as usize;
                     if let Some(replicates) = replicate_light(film, splats.as_ref(), index, rgb_from_xyz) {
-                        let counts = film.cells()[index].each_ref().map(|cell| cell.count);
+                        let counts = counts(&film.cells()[index]);
                         let [least, most] = [counts.iter().min(), counts.iter().max()].map(|n| n.copied().unwrap_or(0));
                         sums.uneven += u64::from(most >= 2 * least);
                         sums.add(&replicates, image.rgb.each_ref().map(|plane| f64::from(plane[index])), floor);

@@ -9,7 +9,8 @@
 //!
 //! Points all over the faces of bodies find what else goes through them: a thousand on each, so that what touches a hundredth of a
 //! body's faces is met by some ten; of more than 64 bodies fewer, down to 64. Points on what stands on a body find it where
-//! those of the body have not, as a die on a block. Of meshes of more triangles one in as many is looked at. Sheets have no inside to withdraw to: what lies on one is told. Copies of groups are not looked at.
+//! those of the body have not, as a die on a block. Of meshes of more triangles one in as many is looked at. Sheets have no
+//! inside to withdraw to: what lies on one is told. Copies of groups are not looked at.
 
 use super::bvh::Aabb;
 use super::instance::PartHit;
@@ -80,14 +81,8 @@ struct Withdrawal {
 
 /// Puts bodies apart that share faces, and says which, and how many more bodies were not looked at; `boxes` are the objects'.
 pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &[Material]) -> (Vec<Contact>, usize) {
-    let is_body = |o: &Object| {
-        let looked_at = match &o.geometry {
-            Geometry::Shape(shape) => !matches!(shape, Shape::Plane(_)),
-            Geometry::Mesh(_) => true,
-            Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
-        };
-        looked_at && o.light.is_none() && materials[o.material as usize].transmits()
-    };
+    let is_body =
+        |o: &Object| has_points(&o.geometry) && o.light.is_none() && materials[o.material as usize].transmits();
     let mut bodies: Vec<usize> = (0..objects.len()).filter(|&i| is_body(&objects[i])).collect();
     let all = bodies.len();
     bodies.truncate(MOST_BODIES.min(MOST_PAIRS / objects.len().max(1)));
@@ -142,10 +137,8 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
                 }
             }
         }
-        for &guest in others.iter().filter(|&&i| stays[i][0] && !met_others.contains(&i)) {
-            if points_of_guests == 0 || matches!(objects[guest].geometry, Geometry::Shape(Shape::Plane(_))) {
-                continue;
-            }
+        let is_guest = |i: usize| stays[i][0] && has_points(&objects[i].geometry) && !met_others.contains(&i);
+        for &guest in others.iter().filter(|&&i| is_guest(i)) {
             let points = points_of_guests.min(POINTS_OF_GUEST);
             points_of_guests -= points;
             for probe in probes(&objects[guest].geometry, points) {
@@ -191,6 +184,15 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
         }
     }
     (contacts, all - bodies.len())
+}
+
+/// Whether points are drawn on it.
+fn has_points(geometry: &Geometry) -> bool {
+    match geometry {
+        Geometry::Shape(shape) => !matches!(shape, Shape::Plane(_)),
+        Geometry::Mesh(_) => true,
+        Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
+    }
 }
 
 /// Whether it has an inside.

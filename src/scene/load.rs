@@ -413,10 +413,11 @@ pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<(DataImage
 /// In words, with the line.
 pub fn samples(path: &Path) -> std::result::Result<Vec<(f64, f64)>, String> {
     let bytes = crate::input::read(path).map_err(|e| words(&e))?;
-    let text = String::from_utf8(bytes).map_err(|_| "expected text, found other bytes")?;
+    let text =
+        std::str::from_utf8(crate::input::without_mark(&bytes)).map_err(|_| "expected text, found other bytes")?;
     let has_comments = extension(path) == "spd";
     let mut samples = Vec::new();
-    for (i, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+    for (i, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or_default().trim();
         if line.is_empty() {
             continue;

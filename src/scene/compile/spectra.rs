@@ -2,6 +2,7 @@
 
 use super::super::{Band, load};
 use super::Compiler;
+use super::indices::nanometres;
 use crate::description as written;
 use crate::error::{Error, in_short};
 use crate::spectrum::{BAND_NM, Outside, Spectrum, illuminant, upsample};
@@ -94,9 +95,7 @@ impl Compiler<'_> {
                 _ => return,
             }
         };
-        let [from, to] = BAND_NM;
-        let beyond = (from as u32..=to as u32).map(f64::from).find(|&nm| spectrum.at(nm) > 1.0);
-        if let Some(nm) = beyond {
+        if let Some(nm) = nanometres().find(|&nm| spectrum.at(nm) > 1.0) {
             let found = in_short(spectrum.at(nm));
             let times = if by == 1.0 { String::new() } else { format!(" times {}", in_short(by)) };
             let message = format!(

@@ -14,8 +14,9 @@ pub type ControlPoint = [f64; 4];
 /// curve at all.
 pub fn load(path: &Path) -> Result<Vec<Vec<ControlPoint>>> {
     let bytes = crate::input::read(path).map_err(|e| Error::input(path, format!("cannot read: {e}")))?;
-    let text = String::from_utf8(bytes).map_err(|_| Error::input(path, "expected text, found other bytes"))?;
-    parse(&text).map_err(|message| Error::input(path, message))
+    let text = std::str::from_utf8(crate::input::without_mark(&bytes));
+    let text = text.map_err(|_| Error::input(path, "expected text, found other bytes"))?;
+    parse(text).map_err(|message| Error::input(path, message))
 }
 
 /// Reads the text of such a file. As in Mitsuba, what follows the four numbers of a line is passed over.
@@ -25,7 +26,7 @@ pub fn load(path: &Path) -> Result<Vec<Vec<ControlPoint>>> {
 pub fn parse(text: &str) -> std::result::Result<Vec<Vec<ControlPoint>>, String> {
     let mut curves: Vec<Vec<ControlPoint>> = Vec::new();
     let mut open = false;
-    for (i, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+    for (i, line) in text.lines().enumerate() {
         let line = line.trim();
         if line.is_empty() {
             open = false;

@@ -26,7 +26,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
     let mut normals: Vec<DVec3> = Vec::new();
     let mut faces = Faces::default();
     let mut carried: Vec<u8> = Vec::new();
-    let mut rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut rest = crate::input::without_mark(bytes);
     for number in 1.. {
         if rest.is_empty() {
             break;

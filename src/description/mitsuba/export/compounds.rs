@@ -135,39 +135,40 @@ impl Export<'_> {
     }
 
     pub(super) fn bump(&mut self, field: &str, m: &Bump, attributes: &Attributes) {
-        if self.has_relief(&m.height.texture) {
-            self.open_owned("bsdf", attributes);
-            self.numbers_of(None, &m.height.texture);
+        if self.relief(attributes, None, &m.height.texture, m.turn, m.shadowing) {
             self.xml.value("float", "scale", m.scale);
-            self.relief(m.turn, m.shadowing);
-        } else {
-            self.as_it_is(attributes);
         }
         self.material_ref(&format!("{field}.bump.material"), &m.material);
     }
 
     pub(super) fn normal_map(&mut self, field: &str, m: &NormalMap, attributes: &Attributes) {
-        if self.has_relief(&m.normals.texture) {
-            self.open_owned("bsdf", attributes);
-            self.numbers_of(Some("normalmap"), &m.normals.texture);
-            self.relief(m.turn, m.shadowing);
-        } else {
-            self.as_it_is(attributes);
-        }
+        self.relief(attributes, Some("normalmap"), &m.normals.texture, m.turn, m.shadowing);
         self.material_ref(&format!("{field}.normal_map.material"), &m.material);
     }
 
-    /// Begins a plugin that leaves the material in it as it is.
-    fn as_it_is(&mut self, attributes: &Attributes) {
-        let id = attributes.iter().filter(|(name, _)| *name == "id").cloned();
-        let all: Vec<(&'static str, String)> = std::iter::once(("type", "mask".to_owned())).chain(id).collect();
-        self.open_owned("bsdf", &all);
-        self.xml.value("float", "opacity", 1.0);
-    }
-
-    fn relief(&mut self, turn: bool, shadowing: bool) {
-        self.xml.value("boolean", "flip_invalid_normals", turn);
-        self.xml.value("boolean", "use_shadowing_function", shadowing);
+    /// Begins a relief of `texture`, which the plugin knows by `name`; where Mitsuba has none, and the answer is no, a plugin that
+    /// leaves the material in it as it is.
+    fn relief(
+        &mut self,
+        attributes: &Attributes,
+        name: Option<&str>,
+        texture: &str,
+        turn: bool,
+        shadowing: bool,
+    ) -> bool {
+        let has_relief = self.has_relief(texture);
+        if has_relief {
+            self.open_owned("bsdf", attributes);
+            self.numbers_of(name, texture);
+            self.xml.value("boolean", "flip_invalid_normals", turn);
+            self.xml.value("boolean", "use_shadowing_function", shadowing);
+        } else {
+            let id = attributes.iter().filter(|(name, _)| *name == "id").cloned();
+            let all: Vec<(&'static str, String)> = std::iter::once(("type", "mask".to_owned())).chain(id).collect();
+            self.open_owned("bsdf", &all);
+            self.xml.value("float", "opacity", 1.0);
+        }
+        has_relief
     }
 
     /// The material that a reference means.

@@ -12,7 +12,7 @@ use super::super::super::transform::{matrix_of, rotation};
 use super::spectra::Role;
 use super::textures::Stands;
 use super::xml::numbers;
-use super::{DAYLIGHT, Export};
+use super::{DAYLIGHT, Export, joined};
 
 impl Export<'_> {
     /// A light of the scene's list.
@@ -27,16 +27,16 @@ impl Export<'_> {
             Light::Point(l) => Export::light_shortfall(&l.intensity),
             Light::Spot(l) => {
                 let slide = l.texture.as_ref().and_then(|texture| self.pictures_shortfall(texture));
-                Export::light_shortfall(&l.intensity).or(slide)
+                joined([Export::light_shortfall(&l.intensity), slide.map(str::to_owned)])
             }
             Light::Directional(l) => Export::light_shortfall(&l.irradiance),
             Light::Constant(l) => Export::light_shortfall(&l.radiance),
-            Light::Environment(l) if l.mapping == EnvironmentMapping::Mitsuba => None,
-            Light::Environment(_) => Some("the same image on Mitsuba's grid, shifted by half a row toward the poles"),
+            Light::Environment(l) => (l.mapping != EnvironmentMapping::Mitsuba)
+                .then(|| "the same image on Mitsuba's grid, shifted by half a row toward the poles".to_owned()),
             Light::Projector(l) => self.shining_shortfall(&l.irradiance),
         };
-        if let Some(why) = why {
-            self.instead("emitter", &format!("lights[{i}]"), why);
+        if let Some(why) = &why {
+            self.instead("emitter", &format!("lights[{i}]"), why.as_str());
         }
         let id = light.name().and_then(|name| self.emitter_id(name));
         let open = |plugin| {
@@ -169,36 +169,34 @@ impl Export<'_> {
     }
 
     /// What Mitsuba gets in place of what shines, where it cannot express it.
-    pub(super) fn shining_shortfall(&self, value: &SpectrumOrTexture) -> Option<&'static str> {
-        match value {
-            SpectrumOrTexture::Spectrum(spectrum) => Export::light_shortfall(spectrum),
-            SpectrumOrTexture::Texture(texture) => self.pictures_shortfall(texture).or_else(|| {
-                let lost = match self.illuminant_of(texture) {
-                    Some(lit) => lit == Lit::Otherwise,
-                    None => self.shines_by_squares(texture),
-                };
-                lost.then_some("the picture as the spectra of its colours, without its illuminant")
-            }),
-        }
+    pub(super) fn shining_shortfall(&self, value: &SpectrumOrTexture) -> Option<String> {
+        let texture = match value {
+            SpectrumOrTexture::Spectrum(spectrum) => return Export::light_shortfall(spectrum),
+            SpectrumOrTexture::Texture(texture) => texture,
+        };
+        let lost = match self.illuminant_of(texture) {
+            Some(lit) => lit == Lit::Otherwise,
+            None => self.shines_by_squares(texture),
+        };
+        joined([
+            self.pictures_shortfall(texture).map(str::to_owned),
+            lost.then(|| "the picture as the spectra of its colours, without its illuminant".to_owned()),
+        ])
     }
 
     /// Whether a picture may shine where Mitsuba has no words for what multiplies it.
     pub(super) fn loses_illuminant(&self, picture: &str) -> bool {
-        let within = |texture: &Texture| match texture {
-            Texture::Checkerboard(board) => [&board.a, &board.b].into_iter().any(|side| side.name() == Some(picture)),
-            Texture::Image(_) | Texture::Volume(_) | Texture::MeshAttribute(_) => false,
-        };
         match self.illuminant_of(picture) {
             Some(Lit::Otherwise) => true,
-            Some(Lit::Daylight(_)) => self.scene.textures.values().any(within),
+            Some(Lit::Daylight(_)) => self.scene.textures.values().any(|texture| texture.inner().contains(&picture)),
             Some(Lit::AsItIs) | None => false,
         }
     }
 
     /// Whether a checkerboard has pictures in it that something multiplies where they shine.
     fn shines_by_squares(&self, texture: &str) -> bool {
-        let Some(Texture::Checkerboard(board)) = self.scene.textures.get(texture) else { return false };
-        [&board.a, &board.b].into_iter().filter_map(SpectrumOrTexture::name).any(|inner| {
+        let inner = self.scene.textures.get(texture).map(Texture::inner).unwrap_or_default();
+        inner.into_iter().any(|inner| {
             self.illuminant_of(inner).is_some_and(|lit| lit != Lit::AsItIs) || self.shines_by_squares(inner)
         })
     }

@@ -106,6 +106,11 @@ fn joined(said: impl IntoIterator<Item = Option<String>>) -> Option<String> {
     (!all.is_empty()).then(|| all.join("; "))
 }
 
+/// Whether a file has this extension.
+fn ends_in(file: &Path, extension: &str) -> bool {
+    file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}
+
 /// The path of a field.
 fn field(keys: &[&str]) -> String {
     let keys: Vec<Segment> = keys.iter().map(|key| Segment::Key((*key).to_owned())).collect();
@@ -373,10 +378,10 @@ impl<'a> Export<'a> {
         self.xml.open("transform", &[("name", "to_world")]);
         // Theirs shows −1 to 1 across the width.
         let half = match projection {
-            Projection::Orthographic { height: shown } => 0.5 * shown * f64::from(*width) / f64::from(*height),
-            Projection::Perspective { .. } => 1.0,
+            Projection::Orthographic { height: shown } => Some(0.5 * shown * f64::from(*width) / f64::from(*height)),
+            Projection::Perspective { .. } => None,
         };
-        if let Projection::Orthographic { .. } = projection {
+        if let Some(half) = half {
             self.xml.leaf("scale", &[("x", &half.to_string()), ("y", &half.to_string())]);
         }
         match pose {
@@ -391,7 +396,7 @@ impl<'a> Export<'a> {
             }
         }
         self.xml.close();
-        if let (Projection::Orthographic { .. }, Some(lens)) = (projection, lens) {
+        if let (Some(half), Some(lens)) = (half, lens) {
             self.lose("camera.lens", "none: Mitsuba's orthographic camera has no lens");
             // It is made larger with the rest of the camera.
             let Lens { radius, focus_distance } = lens;

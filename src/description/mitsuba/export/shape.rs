@@ -9,8 +9,9 @@ use super::super::super::shape::{
     Caps, Cone, Cube, CurveBasis, Geometry, Layout, Normals, Plane, SdfNormals, Shape, Sphere, Winding,
 };
 use super::super::super::spectrum::SpectrumOrTexture;
+use super::super::super::transform::is_similarity;
 use super::xml::numbers;
-use super::{Export, joined};
+use super::{Export, ends_in, joined};
 use crate::math::Frame;
 use crate::math::trig::sin_cos_turn;
 
@@ -223,7 +224,8 @@ impl Export<'_> {
     fn mirrored_tube(&self, shape: &Shape) -> Option<f64> {
         let world = shape.world_from_object();
         let mirrored = matches!(shape.geometry, Geometry::Cylinder(_)) && world.determinant() < 0.0;
-        if mirrored && !self.is_textured(shape) { even_scale(world) } else { None }
+        let linear = DMat3::from_mat4(world);
+        (mirrored && !self.is_textured(shape) && is_similarity(linear)).then(|| linear.x_axis.length())
     }
 
     /// A mesh in a file of its own.
@@ -258,7 +260,7 @@ impl Export<'_> {
     fn shape_shortfall(&self, shape: &Shape) -> Option<String> {
         let said = |text: &str| Some(text.to_owned());
         let textured = self.is_textured(shape);
-        let grey = shape.emission.as_ref().and_then(|emission| self.shining_shortfall(emission)).map(str::to_owned);
+        let grey = shape.emission.as_ref().and_then(|emission| self.shining_shortfall(emission));
         let own = match &shape.geometry {
             Geometry::Rectangle(_) => None,
             Geometry::Plane(_) => said("a square of 5 km: Mitsuba has no plane without end"),
@@ -317,22 +319,11 @@ fn can_be_flipped(geometry: &Geometry) -> bool {
     !matches!(geometry, Geometry::SdfGrid(_) | Geometry::Curves(_))
 }
 
-/// By how much a map makes everything larger, if it is by the same in each direction.
-fn even_scale(world: DMat4) -> Option<f64> {
-    let linear = DMat3::from_mat4(world);
-    let scale = linear.x_axis.length();
-    let uneven = linear.transpose() * linear - DMat3::from_diagonal(DVec3::splat(scale * scale));
-    let worst = uneven.to_cols_array().into_iter().fold(0.0, |most: f64, entry| most.max(entry.abs()));
-    // What rounding leaves of a turn.
-    (worst <= 1e-12 * scale * scale).then_some(scale)
-}
-
 /// The plugin that reads a mesh.
 fn mesh_plugin(file: &Path) -> &'static str {
-    let is = |extension: &str| file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
-    if is("ply") {
+    if ends_in(file, "ply") {
         "ply"
-    } else if is("serialized") {
+    } else if ends_in(file, "serialized") {
         "serialized"
     } else {
         "obj"

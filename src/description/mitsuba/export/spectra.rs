@@ -5,7 +5,7 @@ use std::path::Path;
 use super::super::super::spectrum::{Spectrum, SpectrumOrTexture};
 pub(super) use super::super::spectra::at;
 use super::xml::numbers;
-use super::{DAYLIGHT, Export};
+use super::{DAYLIGHT, Export, ends_in};
 use crate::spectrum::{BAND_NM, Spectrum as Curve, illuminant, upsample};
 
 /// What a spectrum is of.
@@ -121,11 +121,11 @@ impl Export<'_> {
     }
 
     /// What Mitsuba gets in place of a light that it has no words for.
-    pub(super) fn light_shortfall(spectrum: &Spectrum) -> Option<&'static str> {
+    pub(super) fn light_shortfall(spectrum: &Spectrum) -> Option<String> {
         match (Export::can_say(spectrum), sampled(unscaled(spectrum).1)) {
             (true, _) => None,
-            (false, Some(_)) => Some("its spectrum at every fifth nanometre"),
-            (false, None) => Some("a grey light"),
+            (false, Some(_)) => Some("its spectrum at every fifth nanometre".to_owned()),
+            (false, None) => Some("a grey light".to_owned()),
         }
     }
 
@@ -193,7 +193,7 @@ pub(super) fn can_be_band(spectrum: &Spectrum) -> bool {
 
 /// Whether Mitsuba reads such a file of two columns: one between which are blanks.
 fn reads(file: &Path) -> bool {
-    file.extension().is_some_and(|e| e.eq_ignore_ascii_case("spd"))
+    ends_in(file, "spd")
 }
 
 /// A coefficient as a function of the wavelength, where it is numbers.

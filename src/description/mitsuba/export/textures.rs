@@ -8,9 +8,9 @@ use image::{ImageDecoder, ImageReader};
 use super::super::super::compound::{NumberOrTexture, Roughness};
 use super::super::super::spectrum::{Spectrum, SpectrumOrTexture};
 use super::super::super::texture::{Checkerboard, ImageTexture, Texture, TextureFilter, Wrap};
-use super::Export;
 use super::spectra::Role;
 use super::xml::numbers;
+use super::{Export, ends_in};
 
 /// What a texture is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +26,7 @@ pub(super) enum Stands {
     OnItsHead,
 }
 
-impl Export<'_> {
+impl<'a> Export<'a> {
     /// A texture of the scene's list.
     pub(super) fn texture(&mut self, name: &str, texture: &Texture) {
         let id = self.id(name, "texture");
@@ -113,7 +113,7 @@ impl Export<'_> {
 
     /// The picture of this name where Mitsuba refuses it as it is written: of three channels it takes those that are raw for
     /// numbers alone, and no others for them.
-    fn refused(&self, texture: &str, asked: Asked) -> Option<&ImageTexture> {
+    fn refused(&self, texture: &str, asked: Asked) -> Option<&'a ImageTexture> {
         let raw = asked == Asked::Numbers;
         match self.scene.textures.get(texture) {
             Some(Texture::Image(image)) => (image.raw != raw && has_colours(&image.file)).then_some(image),
@@ -135,8 +135,8 @@ impl Export<'_> {
 
     /// A texture that is asked for colours.
     pub(super) fn colours_of(&mut self, name: &str, texture: &str) {
-        match self.refused(texture, Asked::Colours).cloned() {
-            Some(image) => self.picture(&[("name", name)], texture, &image),
+        match self.refused(texture, Asked::Colours) {
+            Some(image) => self.picture(&[("name", name)], texture, image),
             None => self.texture_ref(&[("name", name)], texture),
         }
     }
@@ -156,8 +156,8 @@ impl Export<'_> {
         // Without a name where the plugin takes any texture for what it needs.
         let attributes: Vec<(&str, &str)> = name.map(|name| ("name", name)).into_iter().collect();
         let Some(Texture::Checkerboard(board)) = self.scene.textures.get(texture) else {
-            return match self.refused(texture, Asked::Numbers).cloned() {
-                Some(image) => self.picture(&attributes, texture, &image),
+            return match self.refused(texture, Asked::Numbers) {
+                Some(image) => self.picture(&attributes, texture, image),
                 None => self.texture_ref(&attributes, texture),
             };
         };
@@ -176,8 +176,8 @@ impl Export<'_> {
     /// A texture that shines or that a light throws; the light tells what is lost. Their v grows downward in slides.
     pub(super) fn thrown(&mut self, name: &str, texture: &str, stands: Stands) {
         let attributes = [("name", name)];
-        match (self.refused(texture, Asked::Colours).cloned(), self.scene.textures.get(texture), stands) {
-            (Some(image), ..) => self.bitmap(&attributes, &image, false, stands),
+        match (self.refused(texture, Asked::Colours), self.scene.textures.get(texture), stands) {
+            (Some(image), ..) => self.bitmap(&attributes, image, false, stands),
             (None, Some(written), Stands::OnItsHead) => self.texture_as(&attributes, written, stands),
             _ => self.texture_ref(&attributes, texture),
         }
@@ -185,14 +185,9 @@ impl Export<'_> {
 
     /// What Mitsuba gets in place of the pictures that shine, in `texture` or in its squares.
     pub(super) fn pictures_shortfall(&self, texture: &str) -> Option<&'static str> {
-        match self.scene.textures.get(texture)? {
-            Texture::Image(_) => self.refused(texture, Asked::Colours).and_then(stored_otherwise),
-            Texture::Checkerboard(board) => {
-                let mut inner = [&board.a, &board.b].into_iter().filter_map(SpectrumOrTexture::name);
-                inner.find_map(|texture| self.pictures_shortfall(texture))
-            }
-            Texture::Volume(_) | Texture::MeshAttribute(_) => None,
-        }
+        let inner = self.scene.textures.get(texture)?.inner();
+        let own = self.refused(texture, Asked::Colours).and_then(stored_otherwise);
+        own.or_else(|| inner.into_iter().find_map(|texture| self.pictures_shortfall(texture)))
     }
 
     /// Whether Mitsuba finds slopes and normals in it.
@@ -230,8 +225,7 @@ impl Export<'_> {
 
 /// Whether the values of a picture depend on `raw`, and what they are with it the other way.
 fn stored_otherwise(image: &ImageTexture) -> Option<&'static str> {
-    let is = |extension: &str| image.file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
-    match (is("exr") || is("hdr"), image.raw) {
+    match (ends_in(&image.file, "exr") || ends_in(&image.file, "hdr"), image.raw) {
         (true, _) => None,
         (false, true) => Some("its colours by the curve of sRGB: Mitsuba takes raw ones for numbers alone"),
         (false, false) => Some("its numbers as they are stored: Mitsuba takes them from raw pictures alone"),
