@@ -164,6 +164,9 @@ fn a_picture_that_has_not_converged_says_so() {
 /// each other, the two have the same mean. Their difference is independent from seed to seed, so that its scatter tells the standard error
 /// of its mean: asked for are 4 of them, and that they are less than a tenth of the variance itself, so that errors told wrong by
 /// a quarter of themselves would show. A band is the same whether its error is asked for or not.
+///
+/// The error of such a picture is that of its bands, each over its own light: (x − m)² n/(n − 1) over m² and a hundredth of the
+/// square of the band's mean; asked for are the same measures.
 #[test]
 fn bands_know_their_errors() {
     const SEEDS: u64 = 48;
@@ -176,10 +179,11 @@ fn bands_know_their_errors() {
         let bench = bench_with(&format!("{yaml}output: {{exr: {{stderr: true}}}}\n"), &[]);
         let plain = frame_of(&bench_with(&yaml, &[]), 0);
         let frames: Vec<Frame> = (0..SEEDS).map(|seed| frame_of(&bench, seed)).collect();
+        let mut own = vec![0.0; frames.len()];
         for band in 0..3 {
             let values: Vec<Vec<f32>> = frames.iter().map(|frame| frame.layer(band)).collect();
             assert_eq!(values[0], plain.layer(band), "{name}: the band itself");
-            assert!(plain.layer_error(band).iter().all(|e| e.is_nan()), "{name}: nobody asked");
+            assert_eq!(frames[0].layer_error(band), plain.layer_error(band), "{name}: and its error");
             let n = SEEDS as f64;
             let mean = |i: usize| values.iter().map(|x| f64::from(x[i])).sum::<f64>() / n;
             let means: Vec<f64> = (0..values[0].len()).map(mean).collect();
@@ -187,12 +191,23 @@ fn bands_know_their_errors() {
                 x.iter().zip(&means).map(|(x, m)| (f64::from(*x) - m).powi(2) * n / (n - 1.0)).sum()
             };
             let stated = |frame: &Frame| -> f64 { frame.layer_error(band).iter().map(|e| f64::from(*e).powi(2)).sum() };
+            let pixels = means.len() as f64;
+            let floor = 0.01 * (means.iter().sum::<f64>() / pixels).powi(2);
+            for (own, x) in own.iter_mut().zip(&values) {
+                let of = |(x, m): (&f32, &f64)| (f64::from(*x) - m).powi(2) / (m * m + floor);
+                *own += x.iter().zip(&means).map(of).sum::<f64>() * n / (n - 1.0) / pixels / 3.0;
+            }
             let variance = values.iter().map(found).sum::<f64>() / n;
             let difference: Moments = frames.iter().zip(&values).map(|(f, x)| stated(f) - found(x)).collect();
             let (ratio, sharp) = (difference.mean / variance, difference.standard_error() / variance);
             println!("{name}, band {band}: stated beyond found {ratio:.3} ± {sharp:.3}");
             assert!(ratio.abs() < 4.0 * sharp && sharp < 0.1, "{name}, band {band}: {ratio} ± {sharp}");
         }
+        let stated = |frame: &Frame| frame.milestones.last().unwrap().error.unwrap().rel_rmse.powi(2);
+        let mean = own.iter().sum::<f64>() / own.len() as f64;
+        let beyond: Moments = frames.iter().zip(&own).map(|(frame, own)| stated(frame) / mean - own / mean).collect();
+        println!("{name}: relMSE {mean:.3e}, stated beyond that {:.3} ± {:.3}", beyond.mean, beyond.standard_error());
+        assert!(beyond.mean.abs() < 4.0 * beyond.standard_error() && beyond.standard_error() < 0.1, "{beyond:?}");
     }
 }
 

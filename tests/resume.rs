@@ -268,6 +268,30 @@ fn what_is_there_is_skipped_only_if_it_holds() {
     }
 }
 
+/// The samples that an error took, the error and the pixels are those of the render, whose report is long gone.
+#[test]
+fn the_report_of_what_was_there_already_says_what_its_header_says() {
+    let place = Place::of(&scene("off"));
+    let report = || -> serde_json::Value {
+        let done = run(&place, "out/a.exr", &["--error", "20%", "--skip-existing"]);
+        assert_eq!(done.code, 0, "{}", done.err);
+        let text = std::fs::read_to_string(place.path("out/report.json")).unwrap();
+        serde_json::from_str::<serde_json::Value>(&text).unwrap()["scenes"][0].take()
+    };
+    let (first, second) = (report(), report());
+    assert_eq!((&first["status"], &second["status"]), (&"done".into(), &"skipped".into()));
+    for field in ["samples", "pixel_hash", "halving_seconds"] {
+        assert!(!first[field].is_null() && first[field] == second[field], "{field}: {first} {second}");
+    }
+    let number = |scene: &serde_json::Value, field: &str| scene["error"][field].as_f64().unwrap();
+    for (field, off) in [("rel_rmse", 0.0), ("low", 1e-3), ("high", 1e-3), ("pixels", 0.0)] {
+        let (a, b) = (number(&first, field), number(&second, field));
+        // Ends are written with four figures.
+        assert!((a / b - 1.0).abs() <= off, "{field}: {a} {b}");
+    }
+    assert_eq!(first["error"]["valid"], second["error"]["valid"]);
+}
+
 /// The EXR is written first: where the process dies before the PNG, that of an earlier render lies beside it. It is of the
 /// same size and undamaged, but of another scene, seed or exposure.
 #[test]

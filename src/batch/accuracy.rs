@@ -141,6 +141,8 @@ pub struct Sheet {
     pub advice: Vec<(&'static str, String)>,
     /// Why there is no row of another build, where there should be.
     pub failed: Option<String>,
+    /// Whether the scene's file has bands of the spectrum in place of the colours, of which all this is.
+    pub bands: bool,
 }
 
 /// The sheet of a scene, or why there is none: what has no noise has nothing to weigh, nor has what is black.
@@ -260,11 +262,15 @@ pub fn sheet(
     let advice = advice::sentences(&rows);
     let reference = settings.truth.is_none().then_some((more, reference.noise));
     let png = png::encode_png(&full.image, &settings_of_png).map_err(Error::Render)?;
-    Ok(Ok(Sheet { scene: chosen.scene.name, size, target, reference, png, rows, advice, failed }))
+    let bands = finish.bands;
+    Ok(Ok(Sheet { scene: chosen.scene.name, size, target, reference, png, rows, advice, failed, bands }))
 }
 
 /// relMSE of what has no noise and no bias, at most: sums in f32 and the inverse of a matrix are off by 1e-5.
 const ROUNDING: f64 = 1e-10;
+
+/// What more or less of a colour is worth a word.
+const SHIFT: f64 = 0.005;
 
 /// The reference has as many times the samples.
 const REFERENCE: u32 = 16;
@@ -351,11 +357,21 @@ impl Row {
         (self.bias_squared.value.max(0.0) + SIGNIFICANT * self.bias_squared.error).sqrt()
     }
 
+    /// Whether this cannot be told from `other` by its light: neither bias nor colours differ by what stands out.
+    #[must_use]
+    fn finds_as(&self, other: &Row) -> bool {
+        let near = |a: &Figure, b: &Figure, least: f64| {
+            (a.value - b.value).abs() <= (SIGNIFICANT * a.error.hypot(b.error)).max(least)
+        };
+        near(&self.bias_squared, &other.bias_squared, ROUNDING)
+            && self.light.iter().zip(&other.light).all(|(a, b)| near(a, b, SHIFT))
+    }
+
     /// What is more or less of red, green and blue, where that stands out and is half a per cent or more.
     #[must_use]
     pub fn colour_shift(&self) -> Vec<(&'static str, f64)> {
         let all = ["red", "green", "blue"].into_iter().zip(&self.light);
-        let stands_out = |f: &Figure| (f.value - 1.0).abs() > (SIGNIFICANT * f.error).max(0.005);
+        let stands_out = |f: &Figure| (f.value - 1.0).abs() > (SIGNIFICANT * f.error).max(SHIFT);
         all.filter(|(_, f)| stands_out(f)).map(|(name, f)| (name, f.value - 1.0)).collect()
     }
 }

@@ -3,12 +3,12 @@
 //! A part carries its [`Finish`], so that `abbe merge` needs no scene, and writes what the one process would have written.
 
 use super::adaptive;
-use super::frame::{self, Frame};
+use super::frame::{self, Frame, Gauge};
 use super::header::attributes;
 use super::prepare::{Prepared, colour_space, filter, window};
 use super::report::{Developed, SceneReport};
 use super::{contact, develop, layers, mattes};
-use crate::description::{self, LayerContent, Output, Shutter};
+use crate::description::{self, LayerContent, Output, SceneDescription, Shutter};
 use crate::error::Result;
 use crate::film::Window;
 use crate::film::accumulate::PixelCells;
@@ -21,15 +21,11 @@ use crate::film::resolve::Image;
 use crate::scene::camera::{Camera, Projection};
 use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Channel, Holds};
-use crate::transport::plan::{Effect, Integrator};
+use crate::transport::plan::{Effect, EffectPlan, Integrator};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-/// Bands stand in place of the colours in the file, but the error is of these.
-const ERROR_OF_COLOURS: &str = "the error that is told, and aimed at, is that of the colours, as the PNG has them; \
-                                output.exr.stderr writes that of each band";
 
 /// What the files of a picture need besides its sums.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -101,8 +97,29 @@ pub struct Finish {
 pub enum Sharing {
     /// All: where photons are merged, the samples of one number share their wavelengths in all pixels.
     All,
-    /// Those under the filter, of what is splatted: [`crate::film::filter::Filter::span`], 1 where nothing is.
-    Span(f64),
+    /// Those under the filter, of what is splatted.
+    Filter {
+        /// [`Filter::span`](crate::film::filter::Filter::span), 1 where nothing is.
+        span: f64,
+        /// [`Filter::overlap`](crate::film::filter::Filter::overlap), likewise.
+        overlap: f64,
+    },
+}
+
+impl Sharing {
+    /// What light by `plan` comes to under the filter of `description`.
+    #[must_use]
+    pub fn of(plan: &EffectPlan, description: &SceneDescription) -> Sharing {
+        let splats = plan.caustics.is_some() || matches!(plan.integrator, Integrator::Light(_));
+        match &plan.caustics {
+            Some(caustics) if caustics.merging.is_some() => Sharing::All,
+            _ if splats => {
+                let filter = filter(&description.image.filter);
+                Sharing::Filter { span: filter.span(), overlap: filter.overlap() }
+            }
+            _ => Sharing::Filter { span: 1.0, overlap: 1.0 },
+        }
+    }
 }
 
 /// The lens of a camera whose picture were on film 36 mm wide.
@@ -143,9 +160,6 @@ impl Finish {
         let Prepared { description, scene, plan, samples, hash, .. } = prepared;
         let (white, note) = develop::white(&description.output.png, scene);
         let asked = |content: &LayerContent| description.layers.iter().any(|layer| layer.content == *content);
-        let splats = plan.caustics.is_some() || matches!(plan.integrator, Integrator::Light(_));
-        let bands = !description.image.bands.is_empty();
-        let of_colours = bands && !matches!(plan.integrator, Integrator::Whitted(_));
         // Where the files go is no matter of what is in them.
         let mut output = Output { dir: PathBuf::new(), contact_sheet: true, ..description.output.clone() };
         output.exr.stderr = layers::wants_errors(description);
@@ -164,25 +178,14 @@ impl Finish {
             techniques: plan.techniques.clone(),
             lit: plan.lit,
             wavelengths: scene.wavelengths.describe().to_owned(),
-            notes: scene
-                .notes
-                .iter()
-                .cloned()
-                .chain(note)
-                .chain(mattes::shared_names(description))
-                .chain(of_colours.then(|| ERROR_OF_COLOURS.to_owned()))
-                .collect(),
+            notes: scene.notes.iter().cloned().chain(note).chain(mattes::shared_names(description)).collect(),
             world_to_camera: finite(scene.camera.camera_from_world()),
             world_to_ndc: finite(scene.camera.ndc_from_world()),
             white,
             output,
             sensitivity: description.image.sensitivity,
-            sharing: match &plan.caustics {
-                Some(caustics) if caustics.merging.is_some() => Sharing::All,
-                _ if splats => Sharing::Span(filter(&description.image.filter).span()),
-                _ => Sharing::Span(1.0),
-            },
-            bands,
+            sharing: Sharing::of(plan, description),
+            bands: !description.image.bands.is_empty(),
             layers: plan.layers.channels(),
             kept: plan.layers.kept,
             variance: asked(&LayerContent::Variance),
@@ -209,6 +212,13 @@ impl Finish {
     #[must_use]
     pub fn is_random(&self) -> bool {
         self.integrator != "whitted"
+    }
+
+    /// How the error is told.
+    #[must_use]
+    pub fn gauge(&self) -> Gauge {
+        let bands = if self.bands { self.spectral_channels().start } else { 0 };
+        Gauge { random: self.is_random(), lit: self.lit, bands, sharing: self.sharing }
     }
 
     /// Rows of the frame that no part cuts.

@@ -11,7 +11,7 @@ use super::stop::{Forecast, Stop};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, TileBuffer};
-use crate::film::error::{self, ErrorEstimate, NoEstimate};
+use crate::film::error::{self, ErrorEstimate, NoEstimate, Values};
 use crate::film::filter::FilterSampler;
 use crate::film::layers::Layout;
 use crate::film::resolve::{self, Image};
@@ -22,7 +22,7 @@ use crate::spectrum::ColourSpace;
 use crate::transport::layers::Source;
 use crate::transport::merge::Collection;
 use crate::transport::middle;
-use crate::transport::plan::{EffectPlan, Integrator};
+use crate::transport::plan::EffectPlan;
 use crate::transport::{PixelSample, Samples, Shot, moment, scene_at};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -57,6 +57,21 @@ pub struct FrameJob<'a> {
     pub tile: u32,
     /// Whether samples have nothing in common, in place of being spread evenly: to see what that gains.
     pub independent: bool,
+    /// How the error is told.
+    pub gauge: Gauge,
+}
+
+/// What there is to know of a picture whose error is told.
+#[derive(Clone, Copy, Debug)]
+pub struct Gauge {
+    /// Whether samples differ by chance, so that there is noise.
+    pub random: bool,
+    /// Whether anything shines.
+    pub lit: bool,
+    /// How many bands of the spectrum it holds in place of colours.
+    pub bands: usize,
+    /// Which pixels share their errors.
+    pub sharing: Sharing,
 }
 
 /// The error after a pass.
@@ -106,25 +121,16 @@ pub struct Progress {
 }
 
 impl Frame {
-    /// The frame of `samples` of each pixel that were added up elsewhere in `elapsed`; `random` if replicates differ, `lit` if
-    /// anything shines.
+    /// The frame of `samples` of each pixel that were added up elsewhere in `elapsed`, whose error `gauge` tells.
     #[must_use]
-    pub fn of(
-        film: Film,
-        splats: Option<SplatFilm>,
-        samples: u32,
-        elapsed: Duration,
-        random: bool,
-        lit: bool,
-    ) -> Frame {
-        let (error, resolved) = if random {
-            let (error, image) = estimate(&film, splats.as_ref(), lit);
-            (error, Some(image))
-        } else {
-            (None, None)
+    pub fn of(film: Film, splats: Option<SplatFilm>, samples: u32, elapsed: Duration, gauge: &Gauge) -> Frame {
+        let estimate = gauge.random.then(|| estimate(&film, splats.as_ref(), gauge));
+        let milestone = Milestone { samples, elapsed, error: None, black: false };
+        let (milestone, resolved) = match estimate {
+            Some(Estimate { error, black, resolved }) => (Milestone { error, black, ..milestone }, Some(resolved)),
+            None => (milestone, None),
         };
-        let milestones = vec![Milestone { samples, elapsed, error, black: is_black(resolved.as_ref()) }];
-        Frame { film, splats, elapsed, milestones, resolved }
+        Frame { film, splats, elapsed, milestones: vec![milestone], resolved }
     }
 
     /// Samples of a pixel.
@@ -150,7 +156,7 @@ impl Frame {
         let splats = self.splats.as_ref().map(SplatFilm::splats);
         match sharing {
             Sharing::All => resolve::errors_shared_by_all(image, &self.film, splats.as_ref(), rgb_from_xyz),
-            Sharing::Span(span) => {
+            Sharing::Filter { span, .. } => {
                 splats.map_or(1.0, |splats| resolve::shared_errors(image, &splats, rgb_from_xyz, span))
             }
         }
@@ -165,14 +171,7 @@ impl Frame {
     /// The further channel `channel`, its mean over samples; bands and light by its ways come first.
     #[must_use]
     pub fn layer(&self, channel: usize) -> Vec<f32> {
-        let mut plane = self.film.layers.plane(channel);
-        if let Some(splats) = self.splats.as_ref().filter(|s| channel < s.film.layers.channels()) {
-            let paths: u64 = splats.paths.iter().sum();
-            for (x, sum) in plane.iter_mut().zip(splats.film.layers.sums_of(channel)) {
-                *x += (sum / paths.max(1) as f64) as f32;
-            }
-        }
-        plane
+        resolve::layer(&self.film, self.splats.as_ref().map(SplatFilm::splats).as_ref(), channel)
     }
 
     /// The standard errors of [`Frame::layer`], where sums are kept by replicate; else NaN.
@@ -385,7 +384,6 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
     let done = AtomicU64::new(done);
     let job = part.job();
     let whole = part.share().is_all(job.samples);
-    let random = !matches!(job.plan.integrator, Integrator::Whitted(_));
 
     let Range { start: first, end: most } = part.share().samples;
     let pixels = job.window.pixels() as f64;
@@ -414,15 +412,14 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
         while !part.add(pass.clone(), breaks, &finished) {
             breaks.take(part, &begun.milestones, before + start.elapsed())?;
         }
-        let error = if random && whole {
-            let (error, image) = part.look(|film, splats| estimate(film, splats, job.plan.lit));
-            begun.resolved = Some(image);
-            error
-        } else {
-            None
-        };
-        let black = is_black(begun.resolved.as_ref());
-        begun.milestones.push(Milestone { samples: pass.end, elapsed: before + start.elapsed(), error, black });
+        let mut milestone = Milestone { samples: pass.end, elapsed: Duration::ZERO, error: None, black: false };
+        if job.gauge.random && whole {
+            let Estimate { error, black, resolved } = part.look(|film, splats| estimate(film, splats, &job.gauge));
+            begun.resolved = Some(resolved);
+            (milestone.error, milestone.black) = (error, black);
+        }
+        milestone.elapsed = before + start.elapsed();
+        begun.milestones.push(milestone);
     }
     begun.elapsed = before + start.elapsed();
     Ok(begun)
@@ -431,21 +428,32 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
 /// A picture and the matrix from XYZ to its colours.
 type Resolved = ([[f64; 3]; 3], Image);
 
-/// Whether no light is in a picture, where there is one.
-fn is_black(resolved: Option<&Resolved>) -> bool {
-    resolved.is_some_and(|(_, image)| image.rgb.iter().flatten().all(|x| *x == 0.0))
+/// What the replicates tell of a picture.
+struct Estimate {
+    /// Its error, where they tell one; it is known where nothing shines.
+    error: Option<ErrorEstimate>,
+    /// Whether there is no light in it.
+    black: bool,
+    /// The picture.
+    resolved: Resolved,
 }
 
-/// The error of a picture, and the picture that it was estimated from. It is known where nothing shines.
-fn estimate(film: &Film, splats: Option<&SplatFilm>, lit: bool) -> (Option<ErrorEstimate>, Resolved) {
+fn estimate(film: &Film, splats: Option<&SplatFilm>, gauge: &Gauge) -> Estimate {
     let photons = splats.map(SplatFilm::splats);
     let space = ColourSpace::Rec709.matrix_from_xyz();
     let image = resolve::resolve(film, photons, &space);
-    let error = match error::relative_error(film, photons, &space, &image) {
-        Err(NoEstimate::Black) if !lit => Some(ErrorEstimate::none(image.window.pixels() as u64)),
-        estimate => estimate.ok(),
+    let values = match gauge.bands {
+        0 => Values::Colours(&space, &image),
+        bands => Values::Bands(bands),
     };
-    (error, (space, image))
+    let overlap = match gauge.sharing {
+        Sharing::Filter { overlap, .. } => overlap,
+        Sharing::All => 1.0,
+    };
+    let found = error::relative_error(film, photons, values, overlap);
+    let black = found == Err(NoEstimate::Black);
+    let error = if black && !gauge.lit { Some(ErrorEstimate::none(image.window.pixels() as u64)) } else { found.ok() };
+    Estimate { error, black, resolved: (space, image) }
 }
 
 /// An error where too many samples were invalid to trust the picture.

@@ -26,7 +26,10 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
         sample_distance: 1.0 / f64::from(samples).sqrt(),
         ..LayerPlan::default()
     };
-    if wants_errors(description) && !scene.bands.is_empty() {
+    // By them the error of a picture is told that has bands in place of colours.
+    let random = !matches!(description.integrator, description::Integrator::Whitted(_));
+    let told = random && !description.image.bands.is_empty();
+    if told || wants_errors(description) && !scene.bands.is_empty() {
         plan.kept = Kept::ByReplicate;
     }
     for (i, band) in scene.bands.iter().enumerate() {

@@ -93,7 +93,7 @@ pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Re
 
     let seconds: f64 = parts.iter().map(|part| part.header.seconds).sum();
     let elapsed = Duration::try_from_secs_f64(seconds).unwrap_or_default();
-    let frame = Frame::of(film, splats, finish.samples, elapsed, finish.is_random(), finish.lit);
+    let frame = Frame::of(film, splats, finish.samples, elapsed, &finish.gauge());
     let mut scene = SceneReport::new(&finish.name, finish.frame_number);
     scene.describe(finish, start.elapsed());
     scene.measure(finish, &frame, sum(parts.iter().filter_map(|part| part.header.numerics)));

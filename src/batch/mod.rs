@@ -202,6 +202,9 @@ fn render_and_write(
     if let Some(ended) = checkpoint::ended(&overrides.keep, &exr_path, &identity, part) {
         checkpoint::remove_left_over(&exr_path, &identity)?;
         report.status = Status::Skipped;
+        if part.is_none() {
+            report.recall(finish, &exr_path);
+        }
         report.files = vec![exr_path];
         return ended;
     }

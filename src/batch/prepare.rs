@@ -1,8 +1,8 @@
 //! From what was written to what is rendered: a scene compiled and planned, with the hash of all that decides about it.
 
 use super::adaptive;
-use super::finish::{self, Finish};
-use super::frame::{Frame, FrameJob};
+use super::finish::{self, Finish, Sharing};
+use super::frame::{Frame, FrameJob, Gauge};
 use super::stop::{self, Stop};
 use super::{Overrides, layers, motion, names};
 use crate::description::{self, BatchEntry, LayerContent, SceneDescription};
@@ -72,6 +72,12 @@ impl Prepared {
             seed: description.render.seed,
             tile: description.render.tile,
             independent: false,
+            gauge: Gauge {
+                random: !matches!(plan.integrator, Integrator::Whitted(_)),
+                lit: plan.lit,
+                bands: description.image.bands.len(),
+                sharing: Sharing::of(plan, description),
+            },
         }
     }
 }
@@ -179,9 +185,10 @@ fn check_files(prepared: &Prepared) -> Result<()> {
     names::check(&description.output.dir)
         .map_err(|message| Error::Config(description.fault("output.dir", &message)))?;
     let one = Film::new(scene.camera.resolution, Window::full(1, 1))?.with_layers(plan.layers.layout());
-    let frame = Frame::of(one, None, 0, Duration::ZERO, false, true);
+    let finish = Finish::of(prepared);
+    let frame = Frame::of(one, None, 0, Duration::ZERO, &Gauge { random: false, ..finish.gauge() });
     let field = if description.layers.is_empty() { "output.exr" } else { "layers" };
-    finish::check_files(&Finish::of(prepared), &frame).map_err(|message| {
+    finish::check_files(&finish, &frame).map_err(|message| {
         Error::Config(description.fault(field, &format!("expected a file that can be written: {message}")))
     })
 }

@@ -7,6 +7,7 @@ use super::stop::{Fit, Forecast};
 use crate::error::Error;
 use crate::film::accumulate::{Film, InvalidCounts, PixelCells};
 use crate::film::error::ErrorEstimate;
+use crate::film::exr::header::read_headers;
 use crate::film::heat::Small;
 use crate::film::output;
 use crate::scene::watch::Counts;
@@ -127,7 +128,7 @@ pub struct SceneReport {
     /// Which frame of it, where it has frames.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame: Option<i32>,
-    /// How it ended.
+    /// How it ended; what is said of one that was there already, its header says.
     pub status: Status,
     /// `path` or `whitted`.
     pub integrator: String,
@@ -323,6 +324,24 @@ impl SceneReport {
             self.notes.push(
                 "too few samples, light that they have hardly met, or black: the error cannot be estimated".into(),
             );
+        }
+    }
+
+    /// Notes what the header of a picture at `path` says, which was there already.
+    pub fn recall(&mut self, finish: &Finish, path: &Path) {
+        // It has just been read in full.
+        let Ok(headers) = read_headers(path) else { return };
+        let header = &headers.parts[0];
+        self.samples = header.number("abbe/samples").map_or(self.samples, |samples| samples as u32);
+        self.seconds.rendering = header.number("abbe/renderSeconds").unwrap_or(0.0);
+        self.pixel_hash = header.text("abbe/pixelHash").unwrap_or_default().to_owned();
+        self.halving_seconds = header.number("abbe/secondsToHalveError");
+        let interval = header.text("abbe/relativeErrorInterval95").unwrap_or_default();
+        let ends: Vec<f64> = interval.split(' ').filter_map(|end| end.parse().ok()).collect();
+        if let (Some(rel_rmse), [low, high]) = (header.number("abbe/relativeError"), ends.as_slice()) {
+            let valid = header.text("abbe/relativeErrorState") == Some("valid");
+            let pixels = finish.window.pixels() as u64;
+            self.error = Some(ErrorEstimate { rel_rmse, low: *low, high: *high, pixels, valid });
         }
     }
 

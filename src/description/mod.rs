@@ -43,7 +43,7 @@
 //!   sample_border: true             # default; false: the filter is cut where the picture ends, and takes no light from beyond
 //!   bands: []                       # ~ the OpenEXR file holds bands of the spectrum instead of colour:
 //!                                   #   {name: blue, response: SPECTRUM}: ∫ radiance · response dλ, nm,
-//!                                   #   whatever the sensitivity
+//!                                   #   whatever the sensitivity; its error is that of the bands
 //!   sensitivity: 1                  # default; factor on colours: of the picture, of layers of light, of the PNG
 //! integrator: path                  # default; or, with their defaults,
 //!                                   #   {path: {max_depth: null, roulette_depth: 5, hide_emitters: false,

@@ -76,6 +76,21 @@ impl Filter {
         (sum * sum * step / squares).powi(2)
     }
 
+    /// What light that is dealt to all that the filter covers makes of pairs of pixels: Σ ρ² over all places k of one pixel beside
+    /// another, with ρ(k) = ∫h(x) h(x + k) / ∫h² the correlation of the two. One where no pixel shares with another.
+    #[must_use]
+    pub fn overlap(&self) -> f64 {
+        const STEPS: u32 = 4096;
+        let step = 2.0 * self.radius() / f64::from(STEPS);
+        let product = |k: f64| {
+            let x = (0..STEPS).map(|i| (f64::from(i) + 0.5) * step - self.radius());
+            x.map(|x| self.eval(x) * self.eval(x + k)).sum::<f64>()
+        };
+        let apart = (2.0 * self.radius()).ceil() as u32;
+        let beside: f64 = (1..apart).map(|k| (product(f64::from(k)) / product(0.0)).powi(2)).sum();
+        (1.0 + 2.0 * beside).powi(2)
+    }
+
     /// The filter along an axis at distance `x` from the centre, up to a factor.
     #[must_use]
     pub fn eval(&self, x: f64) -> f64 {
@@ -502,6 +517,20 @@ mod tests {
         near(Filter::Tent { radius: 2.0 }, 9.0, 1e-5);
         // What is cut off is 3e-4 at the middle and 8 / √(2π) of that in all.
         near(Filter::Gaussian { stddev: 0.7 }, 4.0 * std::f64::consts::PI * 0.49, 3e-3);
+    }
+
+    /// Of a box no pixel shares with another. A tent of radius 1 has ρ(1) = (1/6)/(2/3); a Gaussian exp(−k²/4σ²), where what is cut off
+    /// counts as above.
+    #[test]
+    fn overlaps_are_those_of_the_correlations() {
+        let near = |filter: Filter, expected: f64, off: f64| {
+            let overlap = filter.overlap();
+            assert!((overlap / expected - 1.0).abs() < off, "{filter:?}: {overlap} for {expected}");
+        };
+        near(Filter::Box, 1.0, 1e-12);
+        near(Filter::Tent { radius: 1.0 }, 1.125 * 1.125, 1e-5);
+        let gaussian: f64 = (-9..=9).map(|k: i32| f64::from(-k * k) / (2.0 * 0.64)).map(f64::exp).sum();
+        near(Filter::Gaussian { stddev: 0.8 }, gaussian * gaussian, 3e-3);
     }
 
     /// E[weight · g(offset)] = ∫f·g / ∫f for g = cos(kx): the Fourier transform of the filter, against Simpson's rule

@@ -235,6 +235,25 @@ impl LayerSums {
         self.sets_of(channel).map(|sets| value(sets) as f32).collect()
     }
 
+    /// The mean of each replicate of a channel of the pixel at `index`, its sums over `divisors` or how many samples it has; `None`
+    /// where one has none, and where sums are not kept by replicate.
+    #[must_use]
+    pub fn replicates(
+        &self,
+        index: usize,
+        channel: usize,
+        divisors: Option<[u64; REPLICATES]>,
+    ) -> Option<[f64; REPLICATES]> {
+        let Layout { channels, kept: Kept::ByReplicate } = self.layout else { return None };
+        let mean = |replicate| {
+            let place = self.place(index, replicate);
+            let n = divisors.map_or(u64::from(self.counts[place]), |all| all[replicate]);
+            self.sums[place * channels + channel].value() / n as f64
+        };
+        let means = std::array::from_fn(mean);
+        means.iter().all(|x: &f64| x.is_finite()).then_some(means)
+    }
+
     /// The variances of the means of one channel, pixel by pixel, from the spread of the replicates as
     /// [`resolve`](super::resolve) has it. `divisors` are what the sums of a pixel's replicates are divided by, where that
     /// is not how many samples they have.

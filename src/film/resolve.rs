@@ -31,6 +31,16 @@ pub struct Splats<'a> {
     pub photons: [u64; REPLICATES],
 }
 
+impl Splats<'_> {
+    /// As [`replicate_light`], of what was splatted alone.
+    #[must_use]
+    pub fn replicates(&self, index: usize, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
+        let unit = 2f64.powi(self.film.exponent());
+        let light = replicate_means(&self.film.cells()[index], self.photons, rgb_from_xyz)?;
+        Some(light.map(|light| light.map(|x| x * unit)))
+    }
+}
+
 /// A linear picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
@@ -284,14 +294,28 @@ pub fn replicate_light(
 ) -> Option<[[f64; 3]; REPLICATES]> {
     let cells = &film.cells()[index];
     let mut means = replicate_means(cells, counts(cells), rgb_from_xyz)?;
+    let unit = 2f64.powi(film.exponent());
+    means.iter_mut().flatten().for_each(|x| *x *= unit);
     if let Some(splats) = splats {
-        let light = replicate_means(&splats.film.cells()[index], splats.photons, rgb_from_xyz)?;
+        let light = splats.replicates(index, rgb_from_xyz)?;
         for (mean, light) in means.iter_mut().flatten().zip(light.iter().flatten()) {
             *mean += light;
         }
     }
-    let unit = 2f64.powi(film.exponent());
-    Some(means.map(|mean| mean.map(|x| x * unit)))
+    Some(means)
+}
+
+/// A further channel of `film`, its mean over samples, with `splats` added.
+#[must_use]
+pub fn layer(film: &Film, splats: Option<&Splats>, channel: usize) -> Vec<f32> {
+    let mut plane = film.layers.plane(channel);
+    if let Some(splats) = splats.filter(|splats| channel < splats.film.layers.channels()) {
+        let photons = splats.photons.iter().sum::<u64>().max(1) as f64;
+        for (x, sum) in plane.iter_mut().zip(splats.film.layers.sums_of(channel)) {
+            *x += (sum / photons) as f32;
+        }
+    }
+    plane
 }
 
 /// [`replicate_light`] of every pixel.

@@ -59,10 +59,11 @@ fn convergence(chosen: &Row, rows: &[Row]) -> String {
     )
 }
 
-/// What is lost, what is the same, and what comes to the same noise sooner or later.
+/// What is lost, what is the same, and what comes to the same noise sooner or later. What the chosen setting lacks as well is no
+/// matter of the knob.
 fn trade(chosen: &Row, rows: &[Row]) -> String {
     let mut parts: Vec<String> = Vec::new();
-    let mut same: Vec<String> = Vec::new();
+    let (mut same, mut as_chosen): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
     let mut speed: Vec<String> = Vec::new();
     for row in rows {
         let shift = row.colour_shift();
@@ -72,27 +73,35 @@ fn trade(chosen: &Row, rows: &[Row]) -> String {
             .map(|(name, x)| format!("{:.1} % {} {name}", 100.0 * x.abs(), if *x < 0.0 { "less" } else { "more" }))
             .collect();
         match (shift.is_empty(), row.bias()) {
+            (true, None) => same.push(row.value.clone()),
+            _ if row.finds_as(chosen) => as_chosen.push(row.value.clone()),
             (false, Some(bias)) => {
                 let (value, shifts) = (&row.value, list(&shifts));
                 parts.push(format!("{value} finds {shifts} (bias {:.1} %) in {time} of the time", 100.0 * bias));
+                continue;
             }
-            (false, None) => parts.push(format!("{} finds {} in {time} of the time", row.value, list(&shifts))),
+            (false, None) => {
+                parts.push(format!("{} finds {} in {time} of the time", row.value, list(&shifts)));
+                continue;
+            }
             (true, Some(bias)) => {
                 parts.push(format!("{} has a bias of {:.1} % in {time} of the time", row.value, 100.0 * bias));
-            }
-            (true, None) => {
-                same.push(row.value.clone());
-                if !row.efficiency.value.is_finite() {
-                    speed.push(format!("{} has no noise", row.value));
-                } else if (row.efficiency.value - 1.0).abs() > SIGNIFICANT * row.efficiency.error {
-                    speed.push(format!("{} takes {} of the time", row.value, figures(1.0 / row.efficiency.value)));
-                }
+                continue;
             }
         }
+        if !row.efficiency.value.is_finite() {
+            speed.push(format!("{} has no noise", row.value));
+        } else if (row.efficiency.value - 1.0).abs() > SIGNIFICANT * row.efficiency.error {
+            speed.push(format!("{} takes {} of the time", row.value, figures(1.0 / row.efficiency.value)));
+        }
     }
-    if !same.is_empty() {
-        let verb = if same.len() == 1 { "finds" } else { "find" };
-        parts.push(format!("{} {verb} the same light", list(&same)));
+    for (values, what) in [(&same, "the same light"), (&as_chosen, "what the chosen setting finds")] {
+        if !values.is_empty() {
+            let verb = if values.len() == 1 { "finds" } else { "find" };
+            parts.push(format!("{} {verb} {what}", list(values)));
+        }
+    }
+    if !same.is_empty() || !as_chosen.is_empty() {
         parts.push(match speed.as_slice() {
             [] => "what that takes to the same noise cannot be told from the chosen setting".to_owned(),
             told => format!("to the same noise {}", list(told)),
@@ -143,6 +152,26 @@ mod tests {
         assert_eq!(
             sentences[1].1,
             "all finds the same light; what that takes to the same noise cannot be told from the chosen setting."
+        );
+    }
+
+    #[test]
+    fn a_knob_is_not_blamed_for_what_the_chosen_setting_lacks() {
+        let rows = [
+            row("chosen", "as written", 1.0, 1.0, 0.04, 0.7),
+            row("sampler", "independent", 2.0, 1.0, 0.04, 0.7005),
+            row("depth", "8", 2.0, 1.0, 0.0, 1.0),
+            row("depth", "1", 0.5, 1.0, 0.09, 0.5),
+        ];
+        let sentences = sentences(&rows);
+        assert_eq!(
+            sentences[0].1,
+            "independent finds what the chosen setting finds; to the same noise independent takes 2.00 of the time."
+        );
+        assert_eq!(
+            sentences[1].1,
+            "1 finds 50.0 % less green (bias 30.0 %) in 0.50 of the time; 8 finds the same light; to the same noise 8 \
+             takes 2.00 of the time."
         );
     }
 

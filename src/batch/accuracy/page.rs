@@ -147,10 +147,11 @@ fn section(out: &mut String, number: usize, sheet: &Sheet) {
 /// What the scene's pictures are held against.
 #[must_use]
 pub fn held_against(sheet: &Sheet) -> String {
-    match sheet.reference {
+    let truth = match sheet.reference {
         Some((samples, noise)) => format!("reference of {samples} samples a pixel, noise {:.2} %", 100.0 * noise),
         None => "the truth is known in closed form".to_owned(),
-    }
+    };
+    truth + if sheet.bands { "; of the colours, as the PNG has them, not of image.bands" } else { "" }
 }
 
 /// The columns of the table.

@@ -9,7 +9,6 @@ mod page;
 
 use super::report::{Report, SceneReport, Status};
 use crate::error::{Error, Result};
-use crate::film::exr::header::read_headers;
 use crate::film::heat::{Small, blocks};
 use crate::film::output::{directory_of, write_atomically, write_pieces};
 use crate::film::png::inspect;
@@ -35,8 +34,6 @@ struct Card {
     png: PathBuf,
     thumbnail: Small,
     error_map: Option<Small>,
-    /// What the header of a picture that was there already says.
-    past: Option<Figures>,
 }
 
 /// Gathers what a sheet needs while a batch is rendered.
@@ -61,11 +58,7 @@ impl Contact {
         let png = exr.with_extension("png");
         // A picture that someone has taken away meanwhile is not on the sheet.
         let Some(thumbnail) = thumbnail(&png, self.side) else { return };
-        let past = match report.status {
-            Status::Skipped => read_headers(exr).ok().map(|headers| Figures::past(&headers.parts[0])),
-            Status::Done | Status::Failed { .. } => None,
-        };
-        self.cards.push(Card { scene, exr: exr.clone(), png, thumbnail, error_map, past });
+        self.cards.push(Card { scene, exr: exr.clone(), png, thumbnail, error_map });
         let most = EMBEDDED * (SIDE / self.side) * (SIDE / self.side);
         if self.cards.len() > most && self.side > LEAST_SIDE {
             self.side /= 2;
@@ -126,7 +119,7 @@ impl Contact {
                 out.rgb[start..start + line.len()].copy_from_slice(line);
             }
             if labelled {
-                let facts = Figures::of(card, &report.scenes[card.scene]);
+                let facts = Figures::of(&report.scenes[card.scene]);
                 write_text(&mut out, [x, y + tallest + 4], cell[0], &report.scenes[card.scene].label(), 225);
                 write_text(&mut out, [x, y + tallest + 4 + LINE], cell[0], &facts.short(), 150);
             }

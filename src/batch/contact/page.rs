@@ -3,16 +3,15 @@
 use super::{Card, EMBEDDED, encode, link};
 use crate::batch::accuracy::page::base64;
 use crate::batch::report::{Report, SceneReport, Status};
-use crate::film::exr::header::Header;
 use crate::film::heat::Small;
 use crate::transport::plan::Effect;
 use std::io::Write;
 use std::path::Path;
 
-/// Figures of a picture, from its report or, where it was there already, from its header.
+/// Figures of a picture.
 #[derive(Clone, Copy)]
 pub(super) struct Figures {
-    samples: f64,
+    samples: u32,
     seconds: f64,
     /// The error and the ends of its interval.
     error: Option<[f64; 3]>,
@@ -21,31 +20,14 @@ pub(super) struct Figures {
 }
 
 impl Figures {
-    pub(super) fn of(card: &Card, scene: &SceneReport) -> Figures {
+    pub(super) fn of(scene: &SceneReport) -> Figures {
         let valid = scene.error.is_some_and(|e| e.valid);
-        card.past.unwrap_or_else(|| Figures {
-            samples: f64::from(scene.samples),
+        Figures {
+            samples: scene.samples,
             seconds: scene.seconds.rendering,
             error: scene.error.map(|e| [e.rel_rmse, e.low, e.high]),
             valid,
             halving_seconds: scene.halving_seconds.filter(|s| s.is_finite() && valid),
-        })
-    }
-
-    /// Of a picture that was there already.
-    pub(super) fn past(header: &Header) -> Figures {
-        let interval = header.text("abbe/relativeErrorInterval95").unwrap_or("");
-        let ends: Vec<f64> = interval.split(' ').filter_map(|end| end.parse().ok()).collect();
-        let valid = header.text("abbe/relativeErrorState") == Some("valid");
-        Figures {
-            samples: header.number("abbe/samples").unwrap_or(0.0),
-            seconds: header.number("abbe/renderSeconds").unwrap_or(0.0),
-            error: match (header.number("abbe/relativeError"), ends.as_slice()) {
-                (Some(error), [low, high]) => Some([error, *low, *high]),
-                _ => None,
-            },
-            valid,
-            halving_seconds: header.number("abbe/secondsToHalveError").filter(|s| s.is_finite() && valid),
         }
     }
 
@@ -137,7 +119,7 @@ pub(super) fn write(out: &mut dyn Write, cards: &[Card], dir: &Path, report: &Re
             }
             "rows" => {
                 for (i, card) in cards.iter().enumerate() {
-                    out.write_all(row(i, card, scene(card)).as_bytes())?;
+                    out.write_all(row(i, scene(card)).as_bytes())?;
                 }
             }
             "figures" => {
@@ -155,7 +137,7 @@ pub(super) fn write(out: &mut dyn Write, cards: &[Card], dir: &Path, report: &Re
 
 /// How many pictures, in what time, and of which version.
 fn about(cards: &[Card], report: &Report) -> String {
-    let there = cards.iter().filter(|card| card.past.is_some()).count();
+    let there = cards.iter().filter(|card| matches!(report.scenes[card.scene].status, Status::Skipped)).count();
     let mut about = vec![
         plural(cards.len(), "picture"),
         format!("{} on {}", time(report.seconds), plural(report.threads, "thread")),
@@ -182,10 +164,8 @@ fn faults(report: &Report) -> String {
 
 /// What the figures say together: which picture is the noisiest, and what it would cost to halve all errors.
 fn summary(cards: &[Card], report: &Report) -> String {
-    let all: Vec<(String, Figures)> = cards
-        .iter()
-        .map(|card| (report.scenes[card.scene].label(), Figures::of(card, &report.scenes[card.scene])))
-        .collect();
+    let all: Vec<(String, Figures)> =
+        cards.iter().map(|card| (report.scenes[card.scene].label(), Figures::of(&report.scenes[card.scene]))).collect();
     let mut sentences = Vec::new();
     let known = || all.iter().filter_map(|(name, f)| Some((name, f.error.filter(|_| f.valid)?[0])));
     let by_error = |a: &(&String, f64), b: &(&String, f64)| a.1.total_cmp(&b.1);
@@ -230,7 +210,7 @@ fn data(small: &Small) -> String {
 }
 
 fn figure(i: usize, card: &Card, scene: &SceneReport, dir: &Path, embed: bool) -> String {
-    let figures = Figures::of(card, scene);
+    let figures = Figures::of(scene);
     let name = html(&scene.label());
     let full = html(&link(dir, &card.png));
     let source = if embed { data(&card.thumbnail) } else { full.clone() };
@@ -273,15 +253,15 @@ fn figure(i: usize, card: &Card, scene: &SceneReport, dir: &Path, embed: bool) -
 }
 
 /// A line of the table; numbers to sort by stand in `data-v`.
-fn row(i: usize, card: &Card, scene: &SceneReport) -> String {
-    let figures = Figures::of(card, scene);
+fn row(i: usize, scene: &SceneReport) -> String {
+    let figures = Figures::of(scene);
     let [width, height] = scene.resolution;
     let pixels = f64::from(width) * f64::from(height);
     let cell = |value: f64, text: &str| format!("<td data-v=\"{value}\">{text}");
     let on: Vec<&str> = scene.effects_in_force();
     let mut out = format!("<tr><td data-v=\"{i}\"><a href=\"#f{i}\">{}</a>", html(&scene.label()));
     out += &cell(pixels, &format!("{width} × {height}"));
-    out += &cell(figures.samples, &figures.samples.to_string());
+    out += &cell(f64::from(figures.samples), &figures.samples.to_string());
     out += &cell(figures.seconds, &time(figures.seconds));
     out += &cell(figures.error.map_or(-1.0, |e| e[0]), &html(&figures.error(scene)));
     let half = figures.halving_seconds;
