@@ -67,6 +67,13 @@ fn check_pictures(arguments: &FarmArguments, job: &Job) -> Result<()> {
     };
     let mark = |path: &Path| names::mark(&path.to_string_lossy(), job.has_frames()).map(str::to_owned);
     let (what, written) = match &arguments.pictures {
+        // One that is rendered again may be an EXR file.
+        Some(pictures) if pictures.is_file() && pictures.extension().is_none_or(|e| !e.eq_ignore_ascii_case("exr")) => {
+            return Err(Error::Config(format!(
+                "--pictures {}: expected a directory, found a file",
+                pictures.display()
+            )));
+        }
         Some(pictures) => ("--pictures", pictures),
         // In the directory of the job.
         None => ("-o", &arguments.output),

@@ -10,6 +10,7 @@ use super::path::At;
 use super::spectrum::{Role, Spectrum, Vec3, one, yes};
 use super::transform::{TransformStep, check_view, is_similarity, parallel};
 use crate::error::in_short;
+use crate::math::LENGTHS;
 
 /// `camera: {origin: [0, 3.2, 12], target: [0, 1.1, 0], fov_deg: 38}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -413,17 +414,20 @@ impl Camera {
         }
         if let Some(lens) = self.lens {
             let at = at.key("lens");
-            checker.not_negative(at.key("radius"), lens.radius);
+            checker.require((0.0..=*LENGTHS.end()).contains(&lens.radius), at.key("radius"), LENGTH, lens.radius);
             checker.positive(at.key("focus_distance"), lens.focus_distance);
         }
         if let Some(shutter) = &self.shutter {
             shutter.check(at.key("shutter"), checker);
         }
         let clip = at.key("clip");
-        checker.not_negative(clip.key("near"), self.clip.near);
+        checker.require((0.0..=*LENGTHS.end()).contains(&self.clip.near), clip.key("near"), LENGTH, self.clip.near);
         checker.require(self.clip.far > self.clip.near, clip.key("far"), "more than near", self.clip.far);
     }
 }
+
+/// A length or none.
+const LENGTH: &str = "a number from 0 to 1e60";
 
 impl Image {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
@@ -535,7 +539,7 @@ mod tests {
     fn a_lens_has_a_focus() {
         assert_eq!(
             camera("origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 9, lens: {radius: -1, focus_distance: 0}"),
-            "dir/s.yaml:1:75: camera.lens.radius: expected a number of 0 or more, found -1\n\
+            "dir/s.yaml:1:75: camera.lens.radius: expected a number from 0 to 1e60, found -1\n\
              dir/s.yaml:1:95: camera.lens.focus_distance: expected a number greater than 0, found 0"
         );
     }

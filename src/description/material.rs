@@ -459,7 +459,13 @@ impl Material {
             }
             Material::Dielectric(dielectric) => {
                 dielectric.ior.check(at.key("ior"), checker);
-                dielectric.exterior_ior.check(at.key("exterior_ior"), checker);
+                let alone = dielectric.priority.is_none() || dielectric.exterior_ior == vacuum();
+                if alone {
+                    dielectric.exterior_ior.check(at.key("exterior_ior"), checker);
+                } else {
+                    let expected = "none beside priority: the index outside is that of the body around";
+                    checker.require(false, at.key("exterior_ior"), expected, "one");
+                }
                 dielectric.roughness.check(at.key("roughness"), checker);
                 dielectric.reflection_tint.check(Role::Reflectance, at.key("reflection_tint"), checker);
                 dielectric.transmission_tint.check(Role::Reflectance, at.key("transmission_tint"), checker);
@@ -467,9 +473,6 @@ impl Material {
                     absorption.check(at.key("absorption"), checker);
                 }
                 check_film(dielectric.film.as_ref(), dielectric.fresnel, at, checker);
-                let alone = dielectric.priority.is_none() || dielectric.exterior_ior == vacuum();
-                let expected = "none beside priority: the index outside is that of the body around";
-                checker.require(alone, at.key("exterior_ior"), expected, "one");
                 check_highlight(dielectric.highlight, at, checker);
             }
             Material::ThinDielectric(sheet) => {

@@ -178,8 +178,9 @@ impl Medium {
                 if let SpectrumOrVolume::Spectrum(_) = &medium.extinction {
                     let expected = "{volume: name}; a medium of one extinction is homogeneous";
                     checker.require(false, at.key("extinction"), expected, "a spectrum");
+                } else {
+                    medium.extinction.check(Role::Coefficient, at.key("extinction"), checker);
                 }
-                medium.extinction.check(Role::Coefficient, at.key("extinction"), checker);
                 medium.albedo.check(Role::Reflectance, at.key("albedo"), checker);
                 checker.not_negative(at.key("scale"), medium.scale);
                 medium.phase.check(at.key("phase"), checker);

@@ -251,12 +251,23 @@ pub(crate) fn near_miss<'a>(found: &str, candidates: impl IntoIterator<Item = &'
     let folded = found.to_lowercase();
     let sorted: BTreeSet<&str> = candidates.into_iter().collect();
     sorted
-        .into_iter()
+        .iter()
+        .copied()
         .filter(|candidate| candidate.len() <= 4 * LONGEST)
         .map(|candidate| (strsim::damerau_levenshtein(&folded, &candidate.to_lowercase()), candidate))
         .filter(|(distance, candidate)| *distance <= (letters.max(candidate.chars().count()) / 3).max(1))
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
+        .or_else(|| begun(&folded, &sorted))
+}
+
+/// The shortest candidate that begins with `found`, or else the longest with which `found` begins; of three letters or more.
+fn begun<'a>(found: &str, candidates: &BTreeSet<&'a str>) -> Option<&'a str> {
+    let long = |name: &str| name.chars().nth(2).is_some();
+    let begins = |all: &str, start: &str| long(start) && all.to_lowercase().starts_with(start);
+    let longer = candidates.iter().filter(|name| begins(name, found)).min_by_key(|name| name.len());
+    let shorter = || candidates.iter().filter(|name| begins(found, &name.to_lowercase())).max_by_key(|name| name.len());
+    longer.or_else(shorter).copied()
 }
 
 /// `; did you mean "flint"?`, or nothing.
@@ -275,6 +286,12 @@ mod tests {
         assert_eq!(near_miss("Glass", names), Some("glass"));
         assert_eq!(near_miss("galss", names), Some("glass"));
         assert_eq!(near_miss("mirror", names), None);
+        let fields = ["fov_axis", "fov_deg", "path", "up"];
+        let near = |found| near_miss(found, fields);
+        assert_eq!(
+            [near("fov"), near("FOV"), near("pathtracer"), near("upper"), near("fo")].map(|n| n.unwrap_or("")),
+            ["fov_deg", "fov_deg", "path", "", ""]
+        );
         assert_eq!(near_miss(&"flint".repeat(1000), names), None);
     }
 

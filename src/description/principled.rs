@@ -273,7 +273,6 @@ impl PrincipledThin {
             ("anisotropic", &self.anisotropic, 1.0),
             ("spec_trans", &self.spec_trans, 1.0),
             ("diff_trans", &self.diff_trans, 2.0),
-            ("eta", &self.eta, f64::INFINITY),
             ("spec_tint", &self.spec_tint, 1.0),
             ("sheen", &self.sheen, f64::INFINITY),
             ("sheen_tint", &self.sheen_tint, 1.0),
@@ -282,8 +281,9 @@ impl PrincipledThin {
         for (key, number, most) in ranges {
             number.check(most, at.key(key), checker);
         }
-        if let NumberOrTexture::Number(eta) = self.eta {
-            checker.index(at.key("eta"), eta);
+        match self.eta {
+            NumberOrTexture::Number(eta) => checker.index(at.key("eta"), eta),
+            NumberOrTexture::Texture(_) => self.eta.check(f64::INFINITY, at.key("eta"), checker),
         }
         let at = at.key("sampling");
         let ThinSampling { reflection, transmission, diffuse_reflection, diffuse_transmission } = self.sampling;

@@ -270,6 +270,9 @@ pub(crate) enum Role {
 /// The largest index of refraction; its inverse is the smallest. Fresnel's equations take fourth powers of it.
 const MOST_INDEX: f64 = 1e6;
 
+/// What a lane of light can hold.
+const MOST_LIGHT: f64 = f32::MAX as f64;
+
 impl Spectrum {
     pub(crate) fn check(&self, role: Role, at: At<'_>, checker: &mut Checker<'_>) {
         self.check_times(1.0, role, at, checker);
@@ -281,6 +284,7 @@ impl Spectrum {
             let times = if by == 1.0 { String::new() } else { format!(" times {}", in_short(by)) };
             let (holds, expected) = match role {
                 Role::Reflectance => ((0.0..=1.0).contains(&(value * by)), "a number from 0 to 1"),
+                Role::Emission | Role::Coefficient if value * by > MOST_LIGHT => (false, "a number from 0 to 3.4e38"),
                 Role::Emission | Role::Coefficient => (value * by >= 0.0, "a number of 0 or more"),
                 Role::OpticalConstant => ((0.0..=MOST_INDEX).contains(&(value * by)), "a number from 0 to 1e6"),
             };

@@ -1,6 +1,7 @@
 //! How bright the brightest of a scene is: by which power of two its film counts.
 
 use super::Scene;
+use super::bvh::Aabb;
 use super::light::Light;
 use crate::math::sampler::GOLDEN;
 use crate::math::warp::uniform_cone;
@@ -11,23 +12,30 @@ use std::f64::consts::PI;
 /// Rays that look for what a lamp without extent lights.
 const LOOKS: u32 = 64;
 
-/// What is smaller than this part of its distance from the camera is not seen: a pixel of a picture of 65,536 columns is a
-/// hundred thousand times as wide. Lamps on surfaces are put beside them by as much.
-const SPOT: f64 = 1.0 / (1u64 << 33) as f64;
+/// What is smaller than this part of its distance from the camera is met by no more than one sample in a million: a pixel of a
+/// picture of 65,536 columns is a thousand times as wide and as high.
+const SPOT: f64 = 1.0 / (1u64 << 27) as f64;
 
 /// Lamps without extent, the strongest, that are asked.
 const ASKED: usize = 64;
 
+/// Above the brightest that is judged there are 2¹⁸ more: what glass gathers, a single path of much weight, the one texel of a sun.
+const MOST: i32 = 20;
+
 impl Scene {
     /// The power of two by which a film divides the light of the scene, [`crate::film::accumulate::Film::exponent`]: 0 where
-    /// the brightest of what its lights, of [`Light::power`] `powers`, show lies between 2⁻²⁴ and 2³⁶. A darker scene is raised
-    /// to one, with 2³⁸ left above; of brighter lamps the film just holds what they show, and what they light beside as
-    /// finely as may be.
-    pub(super) fn film_exponent(&self, powers: &[f64]) -> i32 {
+    /// the brightest of what its lights, of [`Light::power`] `powers`, and its fog show, objects in `boxes`, lies between 2⁻²⁴ and 2²⁰. A darker scene is
+    /// raised to one, with 2³⁸ left above; a brighter one lowered to 2²⁰, so that all of 2⁻⁶⁰ of the brightest or more keeps its
+    /// mantissa.
+    pub(super) fn film_exponent(&self, powers: &[f64], boxes: &[Aabb]) -> i32 {
         let lamps = || self.lights.iter().zip(powers.iter().copied());
         let shown = lamps().filter_map(|(light, power)| match light {
             Light::Area { object, .. } | Light::AlongNormal { object, .. } => {
-                Some(power / (PI * self.objects[*object as usize].geometry.area()))
+                let Aabb { min, max } = boxes[*object as usize];
+                // Of one too small to be seen, what the least that is seen shows. Planes are anywhere.
+                let seen = self.seen_at(0.5 * min + 0.5 * max);
+                let area = self.objects[*object as usize].geometry.area();
+                Some(power / (PI * area.max(seen * seen)))
             }
             Light::Directional { .. } | Light::Constant { .. } | Light::Environment(_) => {
                 Some(power / (4.0 * PI * PI * self.radius * self.radius))
@@ -38,7 +46,8 @@ impl Scene {
             lamps().filter_map(|(light, power)| Some((Cone::of(light)?, power))).collect();
         cones.sort_by(|a, b| b.1.total_cmp(&a.1));
         let lit = cones.iter().take(ASKED).map(|(cone, power)| self.lit(cone, *power));
-        let brightness = shown.chain(lit);
+        let fog = self.fog.as_ref().map(|fog| fog.colour.luminance());
+        let brightness = shown.chain(lit).chain(fog);
         let brightest = brightness.filter(|b| b.is_finite()).fold(0.0, f64::max);
         if brightest < f64::MIN_POSITIVE {
             return 0;
@@ -47,9 +56,14 @@ impl Scene {
         let log2 = (brightest.to_bits() >> 52) as i32 - 1023;
         match log2 {
             ..-24 => log2.max(-100),
-            36.. => (log2 - 36).min(100),
+            MOST.. => (log2 - MOST).min(100),
             _ => 0,
         }
+    }
+
+    /// How large the least thing is that is seen at `position`, metres.
+    fn seen_at(&self, position: DVec3) -> f64 {
+        SPOT * (self.camera.world_from_camera.translation - position).length()
     }
 
     /// About how bright a white wall is where a lamp of `power` lights the nearest thing, film units.
@@ -63,7 +77,7 @@ impl Scene {
         });
         let nearest = looks.fold(f64::INFINITY, f64::min);
         // A lamp that lies on something, or where two things meet, lights a spot beside it that no pixel sees.
-        let seen = SPOT * (self.camera.world_from_camera.translation - position).length();
+        let seen = self.seen_at(position);
         let distance = match nearest.is_finite() {
             true => nearest.max(seen),
             false => (self.center - position).length().max(self.radius),
@@ -115,16 +129,16 @@ mod tests {
         for shapes in [[ball, pole], [pole, ball]] {
             let lights = "lights: [constant: {radiance: 0.1}, point: {position: [0, 2, 0], intensity: 10}]";
             let found = exponent(&format!("shapes: [{}, {}]\n{lights}\n", shapes[0], shapes[1]));
-            assert!(found <= 27, "{found}");
+            assert!(found <= 31, "{found}");
         }
     }
 
     /// A lamp of intensity d² at d over a plane lights it by 1 below, whatever d: the film counts as ever. So it does where the
-    /// ground is larger than the lamp is far by many orders, and where the lamp is a spot. Nearer than 2⁻⁴⁴ of what the camera is
-    /// far, a lamp lies on the plane, and is put beside it.
+    /// ground is larger than the lamp is far by many orders, and where the lamp is a spot. Nearer than 2⁻²⁷ of what the camera is
+    /// far it lights a spot that no pixel sees, and the rest of the plane is dark.
     #[test]
     fn what_a_lamp_lights_is_judged_by_how_far_it_is() {
-        for d in [1e-12, 1e-6, 1.0, 1e6, 1e12, 1e18] {
+        for d in [1e-6, 1.0, 1e6, 1e12, 1e18] {
             let lamp = format!("point: {{position: [0, {d:e}, 0], intensity: {:e}}}", d * d);
             assert_eq!(exponent(&format!("shapes: [plane: {{normal: [0, 1, 0]}}]\nlights: [{lamp}]\n")), 0, "{d:e}");
         }
@@ -144,6 +158,12 @@ mod tests {
         };
         // ρ/π is left out: 2⁻⁵⁰/π, and the nearest of the looks is a little aslant.
         assert!((-53..=-51).contains(&lamp(2f64.powi(-50))), "{}", lamp(2f64.powi(-50)));
-        assert!((11..=13).contains(&lamp(2f64.powi(50))), "{}", lamp(2f64.powi(50)));
+        assert!((27..=29).contains(&lamp(2f64.powi(50))), "{}", lamp(2f64.powi(50)));
+        // Fog shines, too: its luminance is near its number.
+        let fog = |colour: f64| {
+            exponent(&format!("shapes: [plane: {{normal: [0, 1, 0]}}]\nfog: {{colour: {colour:e}, density: 0.1}}\n"))
+        };
+        assert!((29..=31).contains(&fog(2f64.powi(50))), "{}", fog(2f64.powi(50)));
+        assert!((-51..=-49).contains(&fog(2f64.powi(-50))), "{}", fog(2f64.powi(-50)));
     }
 }

@@ -179,7 +179,11 @@ impl<'a> Compiler<'a> {
     }
 
     fn fault(&mut self, at: &str, message: impl AsRef<str>) {
-        self.faults.push(self.description.fault(at, message.as_ref()));
+        let fault = self.description.fault(at, message.as_ref());
+        // What many use is told once.
+        if !self.faults.contains(&fault) {
+            self.faults.push(fault);
+        }
     }
 
     /// An error about a file that the field `at` names: the message says so.
@@ -374,7 +378,7 @@ impl<'a> Compiler<'a> {
             watch: None,
         };
         self.note_beside(&mut scene, &boxes, &light_names);
-        scene.light_exponent = scene.film_exponent(&powers);
+        scene.light_exponent = scene.film_exponent(&powers, &boxes);
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         self.note_contacts(&mut scene, &contacts, passed_over);
         self.note_overlaps(&mut scene);

@@ -235,3 +235,61 @@ fn scenes_of_every_kind_look_the_same_at_any_size_and_place() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
+
+/// Light of any size: a closed box with a glass ball under each kind of lamp, and fog, from 2⁻⁷⁰ to 2⁹⁰. Powers of two change no
+/// mantissa, so nothing but the film's counting differs: a sample is off by half of its unit, 2⁻⁶⁴ of 2²⁰ at the most where the
+/// scene is bright, and pixels by a thousandth of that of their mean. Nothing is dropped.
+#[test]
+fn a_scene_in_light_of_any_size_is_the_same_picture() {
+    let lamps: [(&str, &dyn Fn(f64) -> String); 6] = [
+        ("area", &|e| {
+            format!(
+                "- rectangle: {{corner: [-0.4, 1.999, -0.4], edge_u: [0.8, 0, 0], edge_v: [0, 0, 0.8], emission: {e:e}}}\n"
+            )
+        }),
+        ("small", &|e| format!("- sphere: {{center: [0.3, 1.5, 0.4], radius: 0.01, emission: {e:e}}}\n")),
+        ("point", &|e| format!("lights: [point: {{position: [0.3, 1.5, 0.4], intensity: {e:e}}}]\n")),
+        ("spot", &|e| {
+            format!(
+                "lights: [spot: {{position: [0, 1.9, 0.4], target: [0.4, 0.35, 0.35], cutoff_deg: 30, intensity: {e:e}}}]\n"
+            )
+        }),
+        ("sky", &|e| {
+            format!(
+                "lights: [constant: {{radiance: {e:e}}}, directional: {{direction: [-0.2, -1, -0.7], irradiance: {e:e}}}]\n"
+            )
+        }),
+        ("fog", &|e| format!("fog: {{colour: {e:e}, density: 0.3}}\n")),
+    ];
+    for (name, lamp) in lamps {
+        let picture = |power: i32| {
+            let text = format!(
+                "camera: {{origin: [0, 1, 4.6], target: [0, 1, 0], fov_deg: 31}}\nimage: {{width: 24, height: 24}}\n\
+                 render: {{samples: 64}}\nshapes:\n\
+                 - rectangle: {{corner: [-1, 0, 1], edge_u: [2, 0, 0], edge_v: [0, 0, -2]}}\n\
+                 - rectangle: {{corner: [-1, 2, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2]}}\n\
+                 - rectangle: {{corner: [-1, 0, -1], edge_u: [2, 0, 0], edge_v: [0, 2, 0]}}\n\
+                 - sphere: {{center: [0.4, 0.35, 0.35], radius: 0.35, material: {{dielectric: {{ior: 1.5}}}}}}\n{}",
+                lamp(2f64.powi(power))
+            );
+            let bench = bench_with(&text, &[]);
+            let frame = bench.frame();
+            assert_eq!(frame.invalid().total(), 0, "{name} times 2^{power}");
+            let image = frame.resolve(&abbe::spectrum::ColourSpace::Rec709.matrix_from_xyz());
+            let unit = 2f64.powi(-power);
+            image.rgb.iter().flatten().map(|&x| f64::from(x) * unit).collect::<Vec<f64>>()
+        };
+        let one = picture(0);
+        let mean = one.iter().sum::<f64>() / one.len() as f64;
+        assert!(mean > 1e-4, "{name}: {mean}");
+        for power in [-70, -20, 20, 50, 90] {
+            let worst = picture(power)
+                .iter()
+                .zip(&one)
+                .map(|(a, b)| (a - b).abs() / b.abs().max(1e-3 * mean))
+                .fold(0.0, f64::max);
+            println!("{name} times 2^{power}: {worst:.1e}");
+            assert!(worst < 1e-6, "{name} times 2^{power}: {worst}");
+        }
+    }
+}

@@ -154,9 +154,7 @@ def abbe(binary: Path, xml: Path, spp: int) -> np.ndarray:
 
 
 def mitsuba(peer: Mitsuba, xml: Path, spp: int) -> np.ndarray:
-    scene = peer.mi.load_file(str(xml))
-    pictures = [np.array(peer.mi.render(scene, spp=spp, seed=s), dtype=np.float64)[..., :3] for s in range(SEEDS)]
-    return np.array([luminance(p).mean() for p in pictures])
+    return np.array([luminance(p[..., :3]).mean() for p in peer.pictures(xml, spp, range(SEEDS))])
 
 
 def main() -> int:

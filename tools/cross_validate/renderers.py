@@ -1,9 +1,12 @@
 """Runs the two renderers and reads what they made."""
 
+import multiprocessing
 import os
 import re
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
@@ -80,29 +83,87 @@ def choose_variant() -> str:
 
 
 class Mitsuba:
-    """Mitsuba in this process."""
+    """Mitsuba in a process of its own, which is started anew where it dies: some renders end in a segmentation fault for some
+    seeds (`hair_curves` at thousands of samples a pixel), and took all verdicts with them."""
+
+    # So many sets of seeds are tried.
+    TRIES = 4
 
     def __init__(self, variant: str):
-        import mitsuba
-
-        self.mi = mitsuba
-        self.mi.set_variant(variant)
-        self.mi.set_log_level(self.mi.LogLevel.Error)
-        self.name = f"Mitsuba {mitsuba.__version__} {variant}"
+        self.variant = variant
+        self.pool = None
+        self.name = self._call(_name)
 
     def replicates(self, scene: dict, path: Path, samples: int, seeds) -> np.ndarray:
         """Independent renders of `scene`, (passes, h, w, 3); `samples` is their sum."""
         Writer(scene, path.parent).write(path)
-        loaded = self.mi.load_file(str(path))
-        pictures = []
-        for seed in seeds:
-            picture = self.mi.render(loaded, spp=max(1, samples // len(seeds)), seed=int(seed))
-            pictures.append(np.array(picture, dtype=np.float64))
-        pictures = np.stack(pictures) * PIXEL_FACTOR
+        pictures = self.pictures(path, max(1, samples // len(seeds)), seeds) * PIXEL_FACTOR
         header = {"compression": OpenEXR.ZIPS_COMPRESSION, "type": OpenEXR.scanlineimage}
         mean = pictures.mean(0).astype(np.float32)
         OpenEXR.File(header, {"RGB": mean}).write(str(path.with_suffix(".mitsuba.exr")))
         return pictures
+
+    def pictures(self, path: Path, spp: int, seeds) -> np.ndarray:
+        """Independent renders of a file, (passes, h, w, channels)."""
+        return self._of_seeds(_pictures, path, spp, seeds)
+
+    def channels(self, path: Path, spp: int, seeds) -> dict:
+        """The channels of independent renders by name, (passes, h, w) each; colours as R, G, B whatever the film's own
+        format."""
+        return self._of_seeds(_channels, path, spp, seeds)
+
+    def _of_seeds(self, render, path: Path, spp: int, seeds):
+        for attempt in range(self.TRIES):
+            try:
+                return self._call(render, str(path), spp, [int(seed) + attempt for seed in seeds])
+            except BrokenProcessPool:
+                self.pool = None
+                print(f"{path.stem}: Mitsuba's process died; once more with other seeds", flush=True)
+        raise RenderError(f"Mitsuba's process died {self.TRIES} times")
+
+    def _call(self, function, *arguments):
+        if self.pool is None:
+            context = multiprocessing.get_context("spawn")
+            self.pool = ProcessPoolExecutor(1, context, _start, [self.variant])
+        return self.pool.submit(function, *arguments).result()
+
+
+# What follows runs in that process.
+
+
+def _start(variant: str) -> None:
+    import mitsuba
+
+    mitsuba.set_variant(variant)
+    mitsuba.set_log_level(mitsuba.LogLevel.Error)
+
+
+def _name() -> str:
+    import mitsuba
+
+    return f"Mitsuba {mitsuba.__version__} {mitsuba.variant()}"
+
+
+def _pictures(path: str, spp: int, seeds: list[int]) -> np.ndarray:
+    import mitsuba
+
+    scene = mitsuba.load_file(path)
+    return np.stack([np.array(mitsuba.render(scene, spp=spp, seed=seed), dtype=np.float64) for seed in seeds])
+
+
+def _channels(path: str, spp: int, seeds: list[int]) -> dict:
+    import mitsuba
+
+    scene = mitsuba.load_file(path)
+    stacks: dict[str, list] = {}
+    for seed in seeds:
+        scene.integrator().render(scene, seed=seed, spp=spp, develop=False)
+        bitmap = scene.sensors()[0].film().bitmap(raw=False)
+        pixels = np.array(bitmap, dtype=np.float64)
+        pixels = pixels.reshape(*pixels.shape[:2], -1)
+        for i, part in enumerate(bitmap.struct_()):
+            stacks.setdefault(part.name, []).append(pixels[..., i])
+    return {name: np.stack(stack) for name, stack in stacks.items()}
 
 
 # -- one comparison -----------------------------------------------------------------------------------

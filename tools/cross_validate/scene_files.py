@@ -90,22 +90,6 @@ def abbe_channels(binary: Path, case: SceneFile, exr: Path, spp: int, seed: int)
         return {name: c.pixels.astype(np.float64) for name, c in file.channels().items()}
 
 
-def mitsuba_channels(mitsuba: Mitsuba, case: SceneFile, spp: int, seeds) -> dict:
-    """The channels of independent renders by name, (passes, h, w) each; colours as R, G, B whatever the film's
-    own format."""
-    mi = mitsuba.mi
-    scene = mi.load_file(str(case.path))
-    stacks: dict[str, list] = {}
-    for seed in seeds:
-        scene.integrator().render(scene, seed=int(seed), spp=spp, develop=False)
-        bitmap = scene.sensors()[0].film().bitmap(raw=False)
-        pixels = np.array(bitmap, dtype=np.float64)
-        pixels = pixels.reshape(*pixels.shape[:2], -1)
-        for i, part in enumerate(bitmap.struct_()):
-            stacks.setdefault(part.name, []).append(pixels[..., i])
-    return {name: np.stack(stack) for name, stack in stacks.items()}
-
-
 def groups(names) -> list[list[str]]:
     """Channels that are measured by one scale: the colours of one picture; any other channel alone."""
     found: dict[str, list[str]] = {}
@@ -124,7 +108,7 @@ def compare(case: SceneFile, binary: Path, mitsuba: Mitsuba, folder: Path, effor
     runs = [abbe_channels(binary, case, folder / f"{i}.exr", spp, seed) for i, seed in enumerate(seeds[:SEEDS])]
     ours = {name: np.stack([run[name] for run in runs]) for name in runs[0]}
     peer_spp = max(1, PEER_FACTOR * case.spp * effort // PASSES)
-    theirs = mitsuba_channels(mitsuba, case, peer_spp, seeds[SEEDS:])
+    theirs = mitsuba.channels(case.path, peer_spp, seeds[SEEDS:])
 
     wanted = [name for name in theirs if name not in case.skip]
     if missing := [name for name in wanted if name not in ours]:
