@@ -30,7 +30,8 @@
 //! tails make larger, so that the interval is rather too wide; and what neighbours share (one path from a light touches
 //! several pixels, collected photons many): two differences of replicates that have nothing in common, u = x₁ − x₂ and
 //! v = x₃ − x₄, have E (uᵀWv)² = 4R² tr(WΣ)², so that (Σ uᵀWv)² − Σ (uᵀWv)² over the pixels of a block, in the mean over the
-//! three ways to pair four, is that of different pixels. The next order of the size, about four times the square of
+//! three ways to pair four, is that of different pixels. Of light that is dealt to all pixels under a filter it is known what they
+//! share, and pairs of them may lie in two blocks: it is that at the least. The next order of the size, about four times the square of
 //! what the second takes off, is allowed for.
 //!
 //! **Where it is unknown.** What is taken off can be more than there is, where light is so rare that its pixels have it in
@@ -58,8 +59,8 @@ pub struct ErrorEstimate {
     /// carry the error that fewer than [`EFFECTIVE_PIXELS`] equally noisy ones would scatter as much, or where most of
     /// it comes from single replicates ([`HEAVY_SHARE`]): rare paths that carry much light, of which others are yet to come; or
     /// where pixels are so noisy that what they are divided by is not known ([`FURTHER_SHARE`], [`FURTHER_OF_PIXELS`],
-    /// [`CROSSED_SHARE`]). False as well of 5 to 7 samples a pixel, of which some replicates have two and some one: evenly spread ones
-    /// differ by more than twice then.
+    /// [`CROSSED_SHARE`]). False as well of 5 to 7 samples a pixel, of which some replicates have two and some one: evenly
+    /// spread ones differ by more than twice then.
     pub valid: bool,
 }
 
@@ -95,8 +96,9 @@ pub const FURTHER_SHARE: f64 = 0.1;
 /// See [`ErrorEstimate::valid`]: the same, of either sign in every pixel, all of them added up.
 pub const FURTHER_OF_PIXELS: f64 = 0.25;
 
-/// See [`ErrorEstimate::valid`]: how far the size may be from what it is with variances divided by values of other replicates. A bright
-/// path makes a pixel brighter and noisier at once, and seems to be no more than its share; to the replicates without it it does not.
+/// See [`ErrorEstimate::valid`]: how far the size may be from what it is with variances divided by values of other
+/// replicates. A bright path makes a pixel brighter and noisier at once, so that it looks like little by its own value; by
+/// those of the replicates without it it does not.
 pub const CROSSED_SHARE: f64 = 0.1;
 
 /// The next order in units of the square of what the second takes off, which is what the interval allows for.
@@ -187,8 +189,8 @@ fn floor_of(values: impl Iterator<Item = f32>, count: usize) -> f64 {
 pub enum Values<'a> {
     /// Of its colours: the matrix that makes them of XYZ, and the picture in them. One f is of them all.
     Colours(&'a [[f64; 3]; 3], &'a Image),
-    /// Of so many bands of the spectrum, its first layers, summed by replicate. Each has an f of its own, as they have nothing to do
-    /// with each other's units; one without any light is left out.
+    /// Of so many bands of the spectrum, its first layers, summed by replicate. Each has an f of its own, as they have nothing
+    /// to do with each other's units; one without any light is left out.
     Bands(usize),
 }
 
@@ -199,8 +201,8 @@ struct Value {
     mean: f64,
     /// And by each replicate.
     replicates: [f64; REPLICATES],
-    /// What was splatted of that.
-    splatted: [f64; REPLICATES],
+    /// What was splatted of that, where it matters.
+    splatted: Option<[f64; REPLICATES]>,
 }
 
 /// What is measured of a picture.
@@ -240,19 +242,19 @@ impl<'a> Measured<'a> {
                 into.extend((0..3).map(|c| Value {
                     mean: f64::from(image.rgb[c][index]),
                     replicates: light.map(|light| light[c]),
-                    splatted: splatted.map_or([0.0; REPLICATES], |light| light.map(|light| light[c])),
+                    splatted: splatted.map(|light| light.map(|light| light[c])),
                 }));
             }
             Values::Bands(_) => {
                 for (band, plane) in self.bands.iter().enumerate() {
                     let Some(mut replicates) = self.film.layers.replicates(index, band, None) else { return false };
-                    let mut splatted = [0.0; REPLICATES];
+                    let mut splatted = None;
                     if let Some(splats) = splats {
                         let Some(light) = splats.film.layers.replicates(index, band, Some(splats.photons)) else {
                             return false;
                         };
                         (0..REPLICATES).for_each(|r| replicates[r] += light[r]);
-                        splatted = light;
+                        splatted = Some(light).filter(|_| self.apart);
                     }
                     into.push(Value { mean: f64::from(plane[index]), replicates, splatted });
                 }
@@ -388,8 +390,10 @@ impl Sums {
                 *share += d * d * g;
             }
             own.add(deviations, g / channels);
-            let mean = value.splatted.iter().sum::<f64>() / REPLICATES as f64;
-            splatted.add(value.splatted.map(|x| x - mean), g / channels);
+            if let Some(x) = value.splatted {
+                let mean = x.iter().sum::<f64>() / REPLICATES as f64;
+                splatted.add(x.map(|x| x - mean), g / channels);
+            }
         }
         self.error += error;
         self.further += further;
@@ -409,8 +413,8 @@ impl Sums {
     }
 }
 
-/// q of a value with replicates `x`, the variance σ² of their mean told by two of them and divided by what the other two show, y. That varies by
-/// 2σ², so that E g(y) is g(μ) + g″(μ) σ² to second order, whatever σ² was told from: the latter is taken off.
+/// q of a value with replicates `x`, the variance σ² of their mean told by two of them and divided by what the other two show,
+/// y. That varies by 2σ², so that E g(y) is g(μ) + g″(μ) σ² to second order, whatever σ² was told from: the latter is taken off.
 fn crossed(x: [f64; REPLICATES], floor: f64) -> f64 {
     let ways = PAIRINGS.iter().flat_map(|&[i, j, k, l]| [[i, j, k, l], [k, l, i, j]]);
     let q = |[i, j, k, l]: [usize; REPLICATES]| {
@@ -620,8 +624,8 @@ mod tests {
         assert!(!estimate(&rare).unwrap().1.valid);
     }
 
-    /// One replicate of four has X: by the spread of all, v = X²/16; by two of them, the others dark, (X²/8)/f for half of the ways
-    /// to choose and nothing for the rest. Of noise of 1e-4 it is as if the divisor were known: within 2e-4, as that is its square.
+    /// One replicate of four has X: by the spread of all, v = X²/16; by two of them, the others dark, (X²/8)/f for half of the
+    /// ways to choose and nothing for the rest. Of noise of 1e-4 it is as if the divisor were known, within twice the noise.
     #[test]
     fn crossed_values_do_not_know_of_a_bright_path() {
         assert_eq!(crossed([4.0, 0.0, 0.0, 0.0], 0.25), 4.0);

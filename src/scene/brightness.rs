@@ -19,14 +19,15 @@ const SPOT: f64 = 1.0 / (1u64 << 27) as f64;
 /// Lamps without extent, the strongest, that are asked.
 const ASKED: usize = 64;
 
-/// Above the brightest that is judged there are 2¹⁸ more: what glass gathers, a single path of much weight, the one texel of a sun.
+/// Above the brightest that is judged there are 2¹⁸ more: what glass gathers, a single path of much weight, the one texel of
+/// a sun.
 const MOST: i32 = 20;
 
 impl Scene {
     /// The power of two by which a film divides the light of the scene, [`crate::film::accumulate::Film::exponent`]: 0 where
-    /// the brightest of what its lights, of [`Light::power`] `powers`, and its fog show, objects in `boxes`, lies between 2⁻²⁴ and 2²⁰. A darker scene is
-    /// raised to one, with 2³⁸ left above; a brighter one lowered to 2²⁰, so that all of 2⁻⁶⁰ of the brightest or more keeps its
-    /// mantissa.
+    /// the brightest of what its lights, of [`Light::power`] `powers`, and its fog show lies between 2⁻²⁴ and 2²⁰. A darker
+    /// scene is raised to one, with 2³⁸ left above; a brighter one lowered to 2²⁰, so that all of 2⁻⁶⁰ of the brightest or
+    /// more keeps its mantissa. `boxes` are those of the objects.
     pub(super) fn film_exponent(&self, powers: &[f64], boxes: &[Aabb]) -> i32 {
         let lamps = || self.lights.iter().zip(powers.iter().copied());
         let shown = lamps().filter_map(|(light, power)| match light {
