@@ -357,13 +357,14 @@ impl Row {
         (self.bias_squared.value.max(0.0) + SIGNIFICANT * self.bias_squared.error).sqrt()
     }
 
-    /// Whether this cannot be told from `other` by its light: neither bias nor colours differ by what stands out.
+    /// Whether this cannot be told from `other` by its light: neither bias nor colours differ by what stands out and is half a per
+    /// cent or more.
     #[must_use]
     fn finds_as(&self, other: &Row) -> bool {
         let near = |a: &Figure, b: &Figure, least: f64| {
             (a.value - b.value).abs() <= (SIGNIFICANT * a.error.hypot(b.error)).max(least)
         };
-        near(&self.bias_squared, &other.bias_squared, ROUNDING)
+        near(&self.bias_squared, &other.bias_squared, ROUNDING.max(2.0 * SHIFT * other.bias_squared.value))
             && self.light.iter().zip(&other.light).all(|(a, b)| near(a, b, SHIFT))
     }
 
