@@ -124,13 +124,9 @@ impl Frame {
     /// The frame of `samples` of each pixel that were added up elsewhere in `elapsed`, whose error `gauge` tells.
     #[must_use]
     pub fn of(film: Film, splats: Option<SplatFilm>, samples: u32, elapsed: Duration, gauge: &Gauge) -> Frame {
-        let estimate = gauge.random.then(|| estimate(&film, splats.as_ref(), gauge));
-        let milestone = Milestone { samples, elapsed, error: None, black: false };
-        let (milestone, resolved) = match estimate {
-            Some(Estimate { error, black, resolved }) => (Milestone { error, black, ..milestone }, Some(resolved)),
-            None => (milestone, None),
-        };
-        Frame { film, splats, elapsed, milestones: vec![milestone], resolved }
+        let Estimate { error, black, resolved } = estimate(&film, splats.as_ref(), gauge);
+        let milestones = vec![Milestone { samples, elapsed, error, black }];
+        Frame { film, splats, elapsed, milestones, resolved }
     }
 
     /// Samples of a pixel.
@@ -412,14 +408,12 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
         while !part.add(pass.clone(), breaks, &finished) {
             breaks.take(part, &begun.milestones, before + start.elapsed())?;
         }
-        let mut milestone = Milestone { samples: pass.end, elapsed: Duration::ZERO, error: None, black: false };
-        if job.gauge.random && whole {
-            let Estimate { error, black, resolved } = part.look(|film, splats| estimate(film, splats, &job.gauge));
-            begun.resolved = Some(resolved);
-            (milestone.error, milestone.black) = (error, black);
-        }
-        milestone.elapsed = before + start.elapsed();
-        begun.milestones.push(milestone);
+        let Estimate { error, black, resolved } = match whole {
+            true => part.look(|film, splats| estimate(film, splats, &job.gauge)),
+            false => Estimate::default(),
+        };
+        begun.resolved = resolved;
+        begun.milestones.push(Milestone { samples: pass.end, elapsed: before + start.elapsed(), error, black });
     }
     begun.elapsed = before + start.elapsed();
     Ok(begun)
@@ -428,17 +422,21 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
 /// A picture and the matrix from XYZ to its colours.
 type Resolved = ([[f64; 3]; 3], Image);
 
-/// What the replicates tell of a picture.
+/// What the replicates tell of a picture; nothing where they do not differ by chance.
+#[derive(Default)]
 struct Estimate {
     /// Its error, where they tell one; it is known where nothing shines.
     error: Option<ErrorEstimate>,
     /// Whether there is no light in it.
     black: bool,
     /// The picture.
-    resolved: Resolved,
+    resolved: Option<Resolved>,
 }
 
 fn estimate(film: &Film, splats: Option<&SplatFilm>, gauge: &Gauge) -> Estimate {
+    if !gauge.random {
+        return Estimate::default();
+    }
     let photons = splats.map(SplatFilm::splats);
     let space = ColourSpace::Rec709.matrix_from_xyz();
     let image = resolve::resolve(film, photons, &space);
@@ -453,7 +451,7 @@ fn estimate(film: &Film, splats: Option<&SplatFilm>, gauge: &Gauge) -> Estimate 
     let found = error::relative_error(film, photons, values, overlap);
     let black = found == Err(NoEstimate::Black);
     let error = if black && !gauge.lit { Some(ErrorEstimate::none(image.window.pixels() as u64)) } else { found.ok() };
-    Estimate { error, black, resolved: (space, image) }
+    Estimate { error, black, resolved: Some((space, image)) }
 }
 
 /// An error where too many samples were invalid to trust the picture.

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use super::camera::FovAxis;
 use super::fault::Checker;
 use super::path::At;
-use super::spectrum::{FilePath, Role, SpectrumOrTexture, Vec3, one};
+use super::spectrum::{FilePath, Role, Spectrum, SpectrumOrTexture, Vec3, one};
 use super::transform::{TransformStep, check_view, is_similarity, parallel};
 
 /// `environment: {file: sky.exr}`
@@ -126,7 +126,7 @@ impl EnvironmentLight {
     }
 
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
-        checker.not_negative(at.key("scale"), self.scale);
+        Spectrum::Number(self.scale).check(Role::Emission, at.key("scale"), checker);
         let at = at.key("transform");
         let before = checker.count();
         for (i, step) in self.transform.iter().enumerate() {
@@ -149,7 +149,7 @@ impl ProjectorLight {
         }
         let within = self.fov_deg > 0.0 && self.fov_deg < 180.0;
         checker.require(within, at.key("fov_deg"), "an angle between 0 and 180 degrees", self.fov_deg);
-        checker.not_negative(at.key("scale"), self.scale);
+        Spectrum::Number(self.scale).check(Role::Emission, at.key("scale"), checker);
         match &self.irradiance {
             SpectrumOrTexture::Spectrum(spectrum) => spectrum.check(Role::Emission, at.key("irradiance"), checker),
             SpectrumOrTexture::Texture(name) => checker.texture(at.key("irradiance").key("texture"), name),

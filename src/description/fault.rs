@@ -350,7 +350,6 @@ impl<'a> Checker<'a> {
         }
         self.faults.sort_by_key(|fault| fault.place);
         let mut lines: Vec<String> = self.faults.iter().map(|fault| fault.write(sources)).collect();
-        lines.dedup();
         if self.untold > 0 {
             lines.push(format!("and {} more", self.untold));
         }

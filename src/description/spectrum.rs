@@ -280,7 +280,7 @@ impl Spectrum {
 
     /// Checks the spectrum times `by`.
     fn check_times(&self, by: f64, role: Role, at: At<'_>, checker: &mut Checker<'_>) {
-        let value = |value: f64, at: At<'_>, checker: &mut Checker<'_>| {
+        let number = |role: Role, value: f64, at: At<'_>, checker: &mut Checker<'_>| {
             let times = if by == 1.0 { String::new() } else { format!(" times {}", in_short(by)) };
             let (holds, expected) = match role {
                 Role::Reflectance => ((0.0..=1.0).contains(&(value * by)), "a number from 0 to 1"),
@@ -290,6 +290,7 @@ impl Spectrum {
             };
             checker.require(holds, at, expected, format_args!("{}{times}", in_short(value)));
         };
+        let value = |value: f64, at: At<'_>, checker: &mut Checker<'_>| number(role, value, at, checker);
         let emits = |kind: &str, checker: &mut Checker<'_>| {
             if role != Role::Emission {
                 let expected = "a spectrum that does not emit (number, rgb, table, file)";
@@ -316,11 +317,11 @@ impl Spectrum {
                 emits("blackbody", checker);
                 let at = at.key("blackbody");
                 checker.positive(at.key("kelvin"), blackbody.kelvin);
-                checker.not_negative(at.key("scale"), blackbody.scale);
+                number(Role::Emission, blackbody.scale, at.key("scale"), checker);
             }
             Spectrum::Illuminant(illuminant) => {
                 emits("illuminant", checker);
-                checker.not_negative(at.key("illuminant").key("scale"), illuminant.scale);
+                number(Role::Emission, illuminant.scale, at.key("illuminant").key("scale"), checker);
             }
             Spectrum::Lines(lines) => {
                 emits("lines", checker);
@@ -329,7 +330,7 @@ impl Spectrum {
                 for (i, line) in lines.iter().enumerate() {
                     let at = at.index(i);
                     checker.positive(at.key("nm"), line.nm);
-                    checker.not_negative(at.key("power"), line.power);
+                    number(Role::Emission, line.power, at.key("power"), checker);
                     checker.positive(at.key("width_nm"), line.width_nm);
                 }
             }
@@ -522,6 +523,12 @@ mod tests {
         assert_eq!(
             emission("{illuminant: {name: D65, scale: -3}}"),
             format!("dir/s.yaml:4:47: {LIGHT}.illuminant.scale: expected a number of 0 or more, found -3")
+        );
+        assert_eq!(
+            emission("{scaled: {by: 1e30, of: {illuminant: {name: D65, scale: 1e9}}}}"),
+            format!(
+                "dir/s.yaml:4:71: {LIGHT}.scaled.of.illuminant.scale: expected a number from 0 to 3.4e38, found 1000000000 times 1e30"
+            )
         );
         assert_eq!(
             emission("{lines: []}"),

@@ -87,7 +87,8 @@ impl Filter {
             x.map(|x| self.eval(x) * self.eval(x + k)).sum::<f64>()
         };
         let apart = (2.0 * self.radius()).ceil() as u32;
-        let beside: f64 = (1..apart).map(|k| (product(f64::from(k)) / product(0.0)).powi(2)).sum();
+        let whole = product(0.0);
+        let beside: f64 = (1..apart).map(|k| (product(f64::from(k)) / whole).powi(2)).sum();
         (1.0 + 2.0 * beside).powi(2)
     }
 
@@ -506,27 +507,25 @@ mod tests {
         (s.offset.x, f64::from(s.weight))
     }
 
+    fn assert_near(filter: Filter, found: f64, expected: f64, off: f64) {
+        assert!((found / expected - 1.0).abs() < off, "{filter:?}: {found} for {expected}");
+    }
+
     /// Closed forms of (∫f)²/∫f², squared for the plane: 1; a tent of radius r 3r/2; a Gaussian 2√π σ, cut at 4σ.
     #[test]
     fn spans_are_those_of_the_squares() {
-        let near = |filter: Filter, expected: f64, off: f64| {
-            let span = filter.span();
-            assert!((span / expected - 1.0).abs() < off, "{filter:?}: {span} for {expected}");
-        };
+        let near = |filter: Filter, expected, off| assert_near(filter, filter.span(), expected, off);
         near(Filter::Box, 1.0, 1e-12);
         near(Filter::Tent { radius: 2.0 }, 9.0, 1e-5);
         // What is cut off is 3e-4 at the middle and 8 / √(2π) of that in all.
         near(Filter::Gaussian { stddev: 0.7 }, 4.0 * std::f64::consts::PI * 0.49, 3e-3);
     }
 
-    /// Of a box no pixel shares with another. A tent of radius 1 has ρ(1) = (1/6)/(2/3); a Gaussian exp(−k²/4σ²), where what is cut off
-    /// counts as above.
+    /// Of a box no pixel shares with another. A tent of radius 1 has ρ(1) = (1/6)/(2/3); a Gaussian exp(−k²/4σ²), where what is
+    /// cut off counts as above.
     #[test]
     fn overlaps_are_those_of_the_correlations() {
-        let near = |filter: Filter, expected: f64, off: f64| {
-            let overlap = filter.overlap();
-            assert!((overlap / expected - 1.0).abs() < off, "{filter:?}: {overlap} for {expected}");
-        };
+        let near = |filter: Filter, expected, off| assert_near(filter, filter.overlap(), expected, off);
         near(Filter::Box, 1.0, 1e-12);
         near(Filter::Tent { radius: 1.0 }, 1.125 * 1.125, 1e-5);
         let gaussian: f64 = (-9..=9).map(|k: i32| f64::from(-k * k) / (2.0 * 0.64)).map(f64::exp).sum();

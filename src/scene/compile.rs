@@ -45,7 +45,7 @@ use attributes::Surface;
 use glam::DVec3;
 use meshes::Meshes;
 use spectra::Role;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -179,11 +179,7 @@ impl<'a> Compiler<'a> {
     }
 
     fn fault(&mut self, at: &str, message: impl AsRef<str>) {
-        let fault = self.description.fault(at, message.as_ref());
-        // What many use is told once.
-        if !self.faults.contains(&fault) {
-            self.faults.push(fault);
-        }
+        self.faults.push(self.description.fault(at, message.as_ref()));
     }
 
     /// An error about a file that the field `at` names: the message says so.
@@ -202,7 +198,11 @@ impl<'a> Compiler<'a> {
     /// could not be read.
     fn finish<T>(self, made: Result<T>) -> Result<T> {
         if !self.faults.is_empty() {
-            return Err(Error::Config(self.faults.join("\n")));
+            // What many use is told once.
+            let mut told = HashSet::new();
+            let faults: Vec<&str> =
+                self.faults.iter().map(String::as_str).filter(|fault| told.insert(*fault)).collect();
+            return Err(Error::Config(faults.join("\n")));
         }
         match self.unread {
             Some(error) => Err(error),

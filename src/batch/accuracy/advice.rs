@@ -59,6 +59,23 @@ fn convergence(chosen: &Row, rows: &[Row]) -> String {
     )
 }
 
+/// What a setting finds in place of the truth, and in what time; nothing if no more than that.
+fn off(chosen: &Row, row: &Row) -> Option<String> {
+    let shifts: Vec<String> = row
+        .colour_shift()
+        .iter()
+        .map(|(name, x)| format!("{:.1} % {} {name}", 100.0 * x.abs(), if *x < 0.0 { "less" } else { "more" }))
+        .collect();
+    let bias = row.bias().map(|bias| format!("{:.1} %", 100.0 * bias));
+    let found = match (shifts.as_slice(), bias) {
+        ([], None) => return None,
+        ([], Some(bias)) => format!("has a bias of {bias}"),
+        (shifts, Some(bias)) => format!("finds {} (bias {bias})", list(shifts)),
+        (shifts, None) => format!("finds {}", list(shifts)),
+    };
+    Some(format!("{} {found} in {} of the time", row.value, figures(row.seconds / chosen.seconds)))
+}
+
 /// What is lost, what is the same, and what comes to the same noise sooner or later. What the chosen setting lacks as well is no
 /// matter of the knob.
 fn trade(chosen: &Row, rows: &[Row]) -> String {
@@ -66,29 +83,15 @@ fn trade(chosen: &Row, rows: &[Row]) -> String {
     let (mut same, mut as_chosen): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
     let mut speed: Vec<String> = Vec::new();
     for row in rows {
-        let shift = row.colour_shift();
-        let time = figures(row.seconds / chosen.seconds);
-        let shifts: Vec<String> = shift
-            .iter()
-            .map(|(name, x)| format!("{:.1} % {} {name}", 100.0 * x.abs(), if *x < 0.0 { "less" } else { "more" }))
-            .collect();
-        match (shift.is_empty(), row.bias()) {
-            (true, None) => same.push(row.value.clone()),
-            _ if row.finds_as(chosen) => as_chosen.push(row.value.clone()),
-            (false, Some(bias)) => {
-                let (value, shifts) = (&row.value, list(&shifts));
-                parts.push(format!("{value} finds {shifts} (bias {:.1} %) in {time} of the time", 100.0 * bias));
+        let alike = match off(chosen, row) {
+            None => &mut same,
+            Some(_) if row.finds_as(chosen) => &mut as_chosen,
+            Some(words) => {
+                parts.push(words);
                 continue;
             }
-            (false, None) => {
-                parts.push(format!("{} finds {} in {time} of the time", row.value, list(&shifts)));
-                continue;
-            }
-            (true, Some(bias)) => {
-                parts.push(format!("{} has a bias of {:.1} % in {time} of the time", row.value, 100.0 * bias));
-                continue;
-            }
-        }
+        };
+        alike.push(row.value.clone());
         if !row.efficiency.value.is_finite() {
             speed.push(format!("{} has no noise", row.value));
         } else if (row.efficiency.value - 1.0).abs() > SIGNIFICANT * row.efficiency.error {
