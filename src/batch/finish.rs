@@ -423,7 +423,8 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
     let colour = ColourEncoding::of(colour_space(finish.output.colour));
     let mut beauty = exr::beauty(image, finish.base(), own, colour, precision, error, compression);
     if frame.film.layers.invalid.total() > 0 {
-        report.notes.push(format!("{} samples of layers could not be added", frame.film.layers.invalid.total()));
+        let samples = frame.film.layers.invalid.total();
+        report.notes.push(format!("in {samples} samples a number of a layer could not be added, and counts as zero"));
     }
     let as_asked = beauty.note.is_none();
     report.notes.extend(beauty.note.take());

@@ -124,7 +124,8 @@ impl LayerSums {
         (&mut self.sums, &mut self.counts)
     }
 
-    /// Adds a sample of `replicate` of the pixel at `index`: its numbers times the filter's `weight`.
+    /// Adds a sample of `replicate` of the pixel at `index`: its numbers times the filter's `weight`. One that no sum can hold
+    /// is nothing, and the sample is counted among the invalid ones; the others are none the worse for it.
     ///
     /// # Panics
     /// If there are not as many numbers as channels.
@@ -136,7 +137,6 @@ impl LayerSums {
         }
         if let Some(cause) = values.iter().find_map(|x| fault(x * weight)) {
             self.invalid.record(cause);
-            return;
         }
         let place = self.place(index, replicate);
         if self.counts[place] >= SAMPLES_LIMIT {
@@ -144,7 +144,7 @@ impl LayerSums {
             return;
         }
         for (sum, x) in self.sums[place * channels..][..channels].iter_mut().zip(values) {
-            // The check above leaves nothing to refuse.
+            // What is refused is counted above.
             let _ = sum.add(x * weight);
         }
         self.counts[place] += 1;

@@ -1,5 +1,6 @@
 //! How texture coordinates run over a surface.
 
+use super::shape::exact::difference_of_products;
 use super::shape::{Detail, SurfacePoint};
 use super::{Geometry, Hit, Scene};
 use crate::math::Ray;
@@ -14,6 +15,8 @@ pub struct UvGradient {
     pub t: DVec3,
     /// Columns: ∂(u, v)/∂s and ∂(u, v)/∂t.
     pub gradient: DMat2,
+    /// Columns: ∂p/∂u and ∂p/∂v in those axes, m; `None` where u and v do not tell points apart.
+    along: Option<DMat2>,
 }
 
 impl UvGradient {
@@ -21,11 +24,8 @@ impl UvGradient {
     /// without texture coordinates of its own).
     #[must_use]
     pub fn partials(&self) -> [DVec3; 2] {
-        let inverse = self.gradient.inverse();
-        if !inverse.is_finite() {
-            return [self.s, self.t];
-        }
-        [inverse.x_axis, inverse.y_axis].map(|d| self.s * d.x + self.t * d.y)
+        let Some(along) = self.along else { return [self.s, self.t] };
+        [along.x_axis, along.y_axis].map(|d| self.s * d.x + self.t * d.y)
     }
 
     /// How much (u, v) changes over `offset` in the tangent plane.
@@ -74,18 +74,25 @@ impl Scene {
                 differences(point, axes, size, true, uv)
             }
             Geometry::Mesh(mesh) => {
-                let corner = |b1, b2| mesh.mesh.surface(hit.part, b1, b2);
-                let (a, b, c) = (corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0));
+                let [a, b, c] = mesh.mesh.vertices(hit.part);
+                let [of_a, of_b, of_c] = mesh.mesh.texture_corners(hit.part);
                 let flat = |d: DVec3| {
                     let d = map.map_or(d, |m| m.world_from_object().transform_vector3(d));
                     DVec2::new(d.dot(s), d.dot(t))
                 };
-                let edges = DMat2::from_cols(flat(b.point - a.point), flat(c.point - a.point));
-                DMat2::from_cols(b.uv - a.uv, c.uv - a.uv) * edges.inverse()
+                let edges = DMat2::from_cols(flat(b - a), flat(c - a));
+                let (u, v) = (of_b - of_a, of_c - of_a);
+                let gradient = DMat2::from_cols(u, v) * edges.inverse();
+                // Texture coordinates on a line are told by their own determinant, which is zero then: that of the gradient is
+                // what rounding leaves.
+                let det = difference_of_products(u.x, v.y, u.y, v.x);
+                let adjugate = DMat2::from_cols(DVec2::new(v.y, -u.y), DVec2::new(-v.x, u.x));
+                let along = edges * adjugate * (1.0 / det);
+                return UvGradient { s, t, gradient, along: Some(along).filter(DMat2::is_finite) };
             }
             Geometry::Instance(_) => DMat2::ZERO,
         };
-        UvGradient { s, t, gradient }
+        UvGradient { s, t, gradient, along: Some(gradient.inverse()).filter(DMat2::is_finite) }
     }
 }
 

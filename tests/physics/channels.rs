@@ -453,6 +453,32 @@ fn layers_of_surfaces_are_their_closed_forms() {
     assert!((length(12) - PI * 1.5).abs() < 1e-4, "{}", length(12));
 }
 
+/// Texture coordinates on a line tell no points apart: of them follow the axes of the surface, of length one, however the triangle
+/// is turned. A number that no sum can hold (∂p/∂u of 1e13 m) takes none of the others with it.
+#[test]
+fn triangles_without_a_plane_of_texture_coordinates_have_layers() {
+    let scene = format!(
+        "{PARALLEL}image: {{width: 2, height: 2}}\nrender: {{samples: 16}}\nintegrator: none\n\
+         layers:\n- {{name: d, surface: depth}}\n- {{name: u, surface: dp_du}}\n- {{name: v, surface: dp_dv}}\n\
+         shapes:\n- mesh: {{file: a.obj, transform: [{{rotate: {{axis: [1, 2, 30], deg: 37}}}}]}}\n"
+    );
+    let of = |third: &str| {
+        let corners = "v -9 -9 0\nv 9 -9 0\nv 0 9 0\n";
+        let mesh = format!("{corners}vt 0 0\nvt 0.3 0.7\nvt {third}\nf 1/1 2/2 3/3\n");
+        let frame = render_with(&bench_with(&scene, &[("a.obj", mesh.as_bytes())]).grey(), Filter::Box, 32);
+        let length = |from: usize| (0..3).map(|c| f64::from(frame.layer(from + c)[0]).powi(2)).sum::<f64>().sqrt();
+        (f64::from(frame.layer(0)[0]), [length(1), length(4)], frame.film.layers.invalid.total())
+    };
+    let (depth, along, dropped) = of("0.3 0.7");
+    assert_eq!(dropped, 0);
+    assert!(along.iter().all(|length| (length - 1.0).abs() < 1e-6), "{along:?}");
+    let (plain, along, dropped) = of("1 0");
+    assert!(along.iter().all(|length| *length > 2.0 && *length < 100.0) && dropped == 0, "{along:?} {dropped}");
+    let (same, _, dropped) = of("-1e-13 1e-13");
+    assert!(dropped > 0);
+    assert_eq!([plain, same], [depth; 2]);
+}
+
 /// A number that is 0 or 1 is its own square: the mean of the squares of the coverage is the coverage. A radiance c
 /// without noise has the mean square c².
 #[test]

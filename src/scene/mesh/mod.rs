@@ -222,6 +222,17 @@ impl Mesh {
         self.triangles[i as usize].map(|v| DVec3::from(self.positions[v as usize].map(f64::from)))
     }
 
+    /// (u, v) at the corners of triangle `i`, as they are stored: where a mesh has none, u and v are the weights of the file's
+    /// second and third corner.
+    #[must_use]
+    pub fn texture_corners(&self, i: u32) -> [DVec2; 3] {
+        match (self.uvs.is_empty(), self.swapped) {
+            (false, _) => self.triangles[i as usize].map(|v| DVec2::from(self.uvs[v as usize].map(f64::from))),
+            (true, false) => [DVec2::ZERO, DVec2::X, DVec2::Y],
+            (true, true) => [DVec2::ZERO, DVec2::Y, DVec2::X],
+        }
+    }
+
     /// The box of the mesh in world space.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
@@ -278,7 +289,7 @@ impl Mesh {
             // u and v are the weights of the file's second and third corner.
             if self.swapped { (DVec2::new(b2, b1), e2) } else { (DVec2::new(b1, b2), e1) }
         } else {
-            let [t0, t1, t2] = corners.map(|v| DVec2::from(self.uvs[v].map(f64::from)));
+            let [t0, t1, t2] = self.texture_corners(i);
             let (d1, d2) = (t1 - t0, t2 - t0);
             // e1 = d1.x ∂p/∂u + d1.y ∂p/∂v and likewise e2, solved for ∂p/∂u.
             let tangent = (e1 * d2.y - e2 * d1.y) / d1.perp_dot(d2);
