@@ -147,6 +147,44 @@ fn a_job_for_a_farm_is_refused_where_its_tasks_would_be() {
     assert!(message.contains("none.yaml: cannot be read") && message.lines().count() == 2, "{message}");
 }
 
+/// Each task knows its own picture alone, and would write it over those of the others.
+#[test]
+fn a_job_for_a_farm_has_a_place_for_each_picture() {
+    let two = "scenes: [{file: scene.yaml, name: a}, {file: scene.yaml, name: b}]\n";
+    let odd = "scenes: [{file: scene.yaml, name: n.exr}]\n";
+    let place = Place::with(&[("scene.yaml", SCENE), ("two.yaml", two), ("odd.yaml", odd)]);
+    let farm = |arguments: &str| {
+        let all = format!("farm --format slurm -q -o job {arguments}");
+        let ran = place.run(&all.split(' ').collect::<Vec<_>>());
+        (ran.code, ran.err)
+    };
+    let refused = |message: &str| (2, format!("error: {message}\n"));
+    assert_eq!(
+        farm("scene.yaml --frames 1-2 --pictures a.exr"),
+        refused(
+            "--pictures a.exr: expected a directory for 2 frames, or a pattern as a.####.exr, a.%04d.exr or \
+             {scene}.{frame:04}.exr, found the name of one file"
+        )
+    );
+    let scenes = "expected a directory for 2 scenes, or a pattern with {scene}, found the name of one file";
+    assert_eq!(farm("two.yaml --pictures a.exr"), refused(&format!("--pictures a.exr: {scenes}")));
+    assert_eq!(
+        farm("two.yaml --frames 1-2 --pictures a.####.exr"),
+        refused(&format!("--pictures a.####.exr: {scenes}"))
+    );
+    assert_eq!(
+        farm("scene.yaml --tiles 2 --pictures a.exr"),
+        refused("--pictures a.exr: expected a directory for parts of pictures, found the name of one file")
+    );
+    assert_eq!(
+        farm("odd.yaml --tiles 2"),
+        refused("n.exr: expected a name that does not end in .exr, for the directory of its parts")
+    );
+    for well in ["scene.yaml --pictures a.exr", "two.yaml --frames 1-2 --pictures {scene}.####.exr", "odd.yaml"] {
+        assert_eq!(farm(well), (0, String::new()), "{well}");
+    }
+}
+
 /// A task takes what it is told with `-o` for a pattern; the merge, that looks for parts, takes it as it stands.
 #[test]
 fn a_job_for_a_farm_whose_names_are_patterns_is_refused() {

@@ -6,7 +6,7 @@ use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::output::Inputs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Refuses a picture whose sums, of `rows` and `needed` bytes, are more than the machine's memory or `limit`, before it is begun.
 pub(super) fn memory(description: &SceneDescription, rows: Window, needed: u64, limit: Option<u64>) -> Result<()> {
@@ -41,26 +41,26 @@ fn machine_memory() -> Option<u64> {
     Some(1024 * (kilobytes("MemTotal:")? + kilobytes("SwapTotal:").unwrap_or(0)))
 }
 
-/// The place of `-o` for `scenes` scenes.
+/// The place that `option` gives for `scenes` scenes.
 ///
 /// # Errors
 /// [`Error::Config`] for the name of another kind of file, for a word in braces that stands for nothing, and for one file for
 /// all scenes.
-pub(super) fn output_place(output: Option<&Path>, scenes: usize) -> Result<()> {
+pub(super) fn output_place(option: &str, output: Option<&Path>, scenes: usize) -> Result<()> {
     const OTHERS: [&str; 7] = ["png", "jpg", "jpeg", "tif", "tiff", "hdr", "pfm"];
     if let Some(file) = output.filter(|path| ends_in(path, &OTHERS) && !path.is_dir()) {
         return Err(Error::Config(format!(
-            "-o {}: expected a directory or a file name that ends in .exr, beside which the PNG is written",
+            "{option} {}: expected a directory or a file name that ends in .exr, beside which the PNG is written",
             file.display()
         )));
     }
     if let Some((output, Err(message))) = output.map(|output| (output, names::check(output))) {
-        return Err(Error::Config(format!("-o {}: {message}", output.display())));
+        return Err(Error::Config(format!("{option} {}: {message}", output.display())));
     }
     let file = output.filter(|path| ends_in(path, &["exr"]));
     match file.filter(|file| scenes > 1 && !names::tells(file).scenes) {
         Some(file) => Err(Error::Config(format!(
-            "-o {}: expected a directory for {scenes} scenes, or a pattern with {{scene}}, found the name of one file",
+            "{option} {}: expected a directory for {scenes} scenes, or a pattern with {{scene}}, found the name of one file",
             file.display()
         ))),
         None => Ok(()),
@@ -79,11 +79,11 @@ pub(super) fn places(prepared: &Prepared, overrides: &Overrides, read: &mut Inpu
 }
 
 /// [`output_place`] for the frames of a scene.
-pub(super) fn frames(output: Option<&PathBuf>, frames: usize) -> Result<()> {
+pub(super) fn frames(option: &str, output: Option<&Path>, frames: usize) -> Result<()> {
     let file = output.filter(|path| ends_in(path, &["exr"]));
     match file.filter(|file| frames > 1 && !names::tells(file).frames) {
         Some(file) => Err(Error::Config(format!(
-            "-o {}: expected a directory for {frames} frames, or a pattern as a.####.exr, a.%04d.exr or \
+            "{option} {}: expected a directory for {frames} frames, or a pattern as a.####.exr, a.%04d.exr or \
              {{scene}}.{{frame:04}}.exr, found the name of one file",
             file.display()
         ))),

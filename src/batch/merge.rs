@@ -51,7 +51,7 @@ pub fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 /// once; [`Error::Config`] for a place that is that of a part or not one for pictures, and where a further `report` would take
 /// the picture's; [`Error::Output`]; [`Error::Render`] as the render itself.
 pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Report, Result<()>)> {
-    checks::output_place(Some(out), 1)?;
+    checks::output_place("-o", Some(out), 1)?;
     let start = Instant::now();
     let mut opened: Vec<(PathBuf, Result<Written>)> =
         files(paths)?.into_par_iter().map(|path| (path.clone(), part_file::open(&path))).collect();

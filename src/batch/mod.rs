@@ -242,7 +242,7 @@ fn render_and_write(
 /// What keeps the batch from beginning. What goes wrong in a scene is in the report.
 pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, stop: &AtomicBool) -> Result<Report> {
     let entries = entries(path, overrides)?;
-    checks::output_place(overrides.output.as_deref(), entries.len())?;
+    checks::output_place("-o", overrides.output.as_deref(), entries.len())?;
     clashes::check(&entries, overrides)?;
     let start = Instant::now();
     let mut scenes = Vec::new();
@@ -257,7 +257,7 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
         let animation = entry.animation(&overrides.set);
         read.add(animation.iter().flat_map(|animation| animation.files()));
         let frames = animation.as_ref().map_or(1, |animation| animation.frames().len().max(1));
-        let animation = animation.and_then(|a| checks::frames(overrides.output.as_ref(), frames).map(|()| a));
+        let animation = animation.and_then(|a| checks::frames("-o", overrides.output.as_deref(), frames).map(|()| a));
         // One that cannot be read is a picture that fails.
         let pictures: Box<dyn Iterator<Item = (Option<i32>, Result<SceneDescription>)>> = match animation {
             Ok(animation) => Box::new(animation.into_scenes()),

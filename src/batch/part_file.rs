@@ -49,6 +49,7 @@ pub struct Header {
     /// Hash of `finish` without its notes.
     pub settings_hash: String,
     /// The file that was rendered.
+    #[serde(serialize_with = "super::report::in_text")]
     pub source: PathBuf,
     /// Light is counted over 2 to this power.
     pub exponent: i32,

@@ -23,6 +23,7 @@ pub struct Report {
     /// Version of Abbe.
     pub version: &'static str,
     /// The batch or scene file.
+    #[serde(serialize_with = "in_text")]
     pub source: PathBuf,
     /// Wall time of everything.
     pub seconds: f64,
@@ -31,7 +32,7 @@ pub struct Report {
     /// Each scene.
     pub scenes: Vec<SceneReport>,
     /// The page of the contact sheet.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "sheet_in_text")]
     pub contact_sheet: Option<PathBuf>,
     /// Where this report is written.
     #[serde(skip)]
@@ -178,6 +179,7 @@ pub struct SceneReport {
     /// What a person should know.
     pub notes: Vec<String>,
     /// Files written.
+    #[serde(serialize_with = "all_in_text")]
     pub files: Vec<PathBuf>,
     /// What is wrong with the picture although it is written, which its header tells.
     #[serde(skip)]
@@ -187,6 +189,19 @@ pub struct SceneReport {
 /// What `serde` does for an [`Arc`] only with its feature `rc`.
 fn shared<S: Serializer>(effects: &Arc<[Effect]>, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(effects.iter())
+}
+
+/// A path in JSON, which knows text alone: what is no UTF-8 of a name becomes U+FFFD, as on the terminal.
+pub(super) fn in_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
+}
+
+fn sheet_in_text<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
+    path.as_ref().map(|path| path.to_string_lossy()).serialize(serializer)
+}
+
+fn all_in_text<S: Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(paths.iter().map(|path| path.to_string_lossy()))
 }
 
 /// Copies what reports hold to one place. Effects and techniques, most of a report, are one for all in a row that have the

@@ -81,7 +81,10 @@ fn check_pictures(arguments: &FarmArguments, job: &Job) -> Result<()> {
     if let (true, Some(mark)) = (job.cut.parts() || arguments.pictures.is_none(), mark(written)) {
         return refuse(what, written, &mark);
     }
-    names::check(written).map_err(|message| Error::Config(format!("{what} {}: {message}", written.display())))?;
+    match &arguments.pictures {
+        Some(pictures) => job.check_place(what, pictures)?,
+        None => names::check(written).map_err(|e| Error::Config(format!("{what} {}: {e}", written.display())))?,
+    }
     let here = std::env::current_dir().ok().filter(|_| written.is_relative());
     match here.and_then(|here| Some((mark(&here)?, here))) {
         Some((mark, here)) => refuse("the working directory", &here, &mark),

@@ -558,10 +558,22 @@ impl Verb {
 fn use_threads(asked: Option<usize>) -> Result<()> {
     let granted = ["SLURM_CPUS_PER_TASK", "CUE_THREADS", "OMP_NUM_THREADS"];
     let granted = || {
-        let number = |v: &str| std::env::var(v).ok()?.parse::<usize>().ok().filter(|&n| n > 0);
-        granted.iter().find_map(|v| Some((*v, number(v)?)))
+        let is_set = |v: &&str| std::env::var_os(v).is_some_and(|text| !text.is_empty());
+        let Some(by) = granted.into_iter().find(is_set) else { return Ok(None) };
+        let text = std::env::var_os(by).unwrap_or_default();
+        let text = text.to_string_lossy();
+        // Of a list, as of OpenMP, the first is for what begins.
+        match text.split(',').next().unwrap_or_default().trim().parse() {
+            Ok(0) => Ok(None),
+            Ok(n) => Ok(Some((by, n))),
+            Err(_) => Err(Error::Config(format!("{by}: expected a number of threads, found {text:?}"))),
+        }
     };
-    let wanted = asked.and_then(|n| Some(("--threads", n)).filter(|_| n > 0).or_else(granted));
+    let wanted = match asked {
+        None => None,
+        Some(0) => granted()?,
+        Some(n) => Some(("--threads", n)),
+    };
     let threads = match wanted {
         Some((by, n)) if n > MOST_THREADS => {
             return Err(Error::Config(format!("{by}: expected at most {MOST_THREADS} threads, found {n}")));

@@ -227,14 +227,19 @@ impl<'de> Deserializer<'de> for De<'_> {
         visitor: V,
     ) -> Result<V::Value, Fault> {
         let Value::Map(entries) = &self.node.value else {
-            let fields = enumerate(fields.iter().copied());
-            return Err(Fault::expected(self.node, format_args!("a map with fields among {fields}")));
+            let map = format!("a map with fields among {}", enumerate(fields.iter().copied()));
+            return Err(Fault::none_of(self.node, [map.as_str()]));
         };
         if let Some(entry) = entries.iter().find(|entry| !fields.contains(&entry.key.as_str())) {
             let fault = Fault::unknown(entry.key_place, &entry.key, fields.iter().copied());
             return Err(fault.under(Segment::Key(entry.key.clone())));
         }
-        visitor.visit_map(Entries::new(self, entries, Nulls::Skipped)).map_err(|fault| fault.or_at(self.node.place))
+        visitor.visit_map(Entries::new(self, entries, Nulls::Skipped)).map_err(|fault| {
+            // A field that is there without value was perhaps taken away by a setting, which then is what to look at.
+            let is_empty = |entry: &&Entry| matches!(entry.node.value, Value::Null) && fault.misses(&entry.key);
+            let place = entries.iter().find(is_empty).map_or(self.node.place, |entry| entry.node.place);
+            fault.or_at(place)
+        })
     }
 
     fn deserialize_enum<V: Visitor<'de>>(
@@ -564,7 +569,7 @@ mod tests {
         // A field without value is a field that is not written.
         assert_eq!(
             faults("shapes:\n- sphere: {radius: }"),
-            "dir/s.yaml:3:11: shapes[0].sphere: expected the field \"radius\", found none"
+            "dir/s.yaml:3:18: shapes[0].sphere: expected the field \"radius\", found none"
         );
     }
 

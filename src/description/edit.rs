@@ -208,13 +208,18 @@ impl Setting {
         }
     }
 
-    /// A setting of the command line, `KEY=VALUE`.
+    /// A setting of the command line, `KEY=VALUE`. In a file a field without value is one that is not written; here it is
+    /// more likely that a shell's variable is empty.
     ///
     /// # Errors
     /// If key or value cannot be read.
     pub(crate) fn of_argument(key: &str, value: &str, sources: &mut Sources) -> std::result::Result<Setting, Fault> {
         let source = sources.add_argument(format!("--set {key}={value}"));
         let place = Place { source, line: 0, column: 0 };
+        if value.trim().is_empty() {
+            let message = "expected a value, or null to take the field away, found nothing";
+            return Err(Fault::at_place(place, message).under_path(&path::parse(key).unwrap_or_default()));
+        }
         let mut node = yaml::read(value.as_bytes(), source).map_err(|mut fault| {
             // Lines and columns within an argument help nobody.
             fault.place = Some(place);
@@ -410,7 +415,7 @@ mod tests {
     #[test]
     fn a_setting_replaces_adds_and_takes_away() {
         let scene = set(&[
-            ("fog", ""),
+            ("fog", "null"),
             ("render.samples", "16"),
             ("shapes[0].sphere.radius", "2"),
             ("shapes[0].sphere.material.mirror", "{}"),
@@ -488,6 +493,16 @@ mod tests {
         assert_eq!(
             says("render", "[1"),
             "--set render=[1: expected YAML, found a fault of syntax: unclosed bracket '['"
+        );
+        assert_eq!(
+            says("image.width", ""),
+            "--set image.width=: image.width: expected a value, or null to take the field away, found nothing"
+        );
+        assert_eq!(says("camera", "null"), "--set camera=null: expected the field \"camera\", found none");
+        assert_eq!(
+            says("camera.shutter", "abc"),
+            "--set camera.shutter=abc: camera.shutter: expected one of a number, a map with fields among open, close, moments, \
+             found the text \"abc\""
         );
         assert_eq!(
             says("render..x", "1"),

@@ -90,9 +90,22 @@ impl Fault {
         if self.steps.len() <= 1
             && let Message::NoneOf { expected, .. } = &mut self.message
         {
-            expected.extend(others.into_iter().map(str::to_owned));
+            // Forms in words, as "a number", are read more easily before the others.
+            let (forms, names): (Vec<_>, Vec<_>) = others.into_iter().partition(|other| other.starts_with("a "));
+            expected.splice(0..0, forms.into_iter().map(str::to_owned));
+            expected.extend(names.into_iter().map(str::to_owned));
         }
         self
+    }
+
+    /// A required field that is not there.
+    fn missing(field: &str) -> Fault {
+        serde::de::Error::custom(format!("expected the field {field:?}, found none"))
+    }
+
+    /// Whether it is that `field` is not there.
+    pub(crate) fn misses(&self, field: &str) -> bool {
+        self.steps.is_empty() && self.to_string() == Fault::missing(field).to_string()
     }
 
     /// Writes the fault on one line.
@@ -168,7 +181,7 @@ impl serde::de::Error for Fault {
     }
 
     fn missing_field(field: &'static str) -> Fault {
-        Fault::custom(format!("expected the field {field:?}, found none"))
+        Fault::missing(field)
     }
 
     fn duplicate_field(field: &'static str) -> Fault {

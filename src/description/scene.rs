@@ -16,7 +16,7 @@ use super::layer::{Layer, LayerContent};
 use super::light::{Fog, Light};
 use super::material::Material;
 use super::medium::{Medium, UNCHANGED, VACUUM};
-use super::node::{Node, Sources, quote};
+use super::node::{Node, Sources, Value, quote};
 use super::output::Output;
 use super::path::{self, At};
 use super::settings::{Integrator, Render, Technique};
@@ -145,7 +145,8 @@ impl SceneDescription {
         let decoded: std::result::Result<SceneDescription, Fault> = decode(&root, &sources);
         let mut scene = decoded.map_err(|fault| {
             // Without a camera it may have been meant for a batch.
-            let batch = root.get("camera").is_none() && root.get("scenes").is_none();
+            let batch =
+                matches!(root.value, Value::Map(_)) && root.get("camera").is_none() && root.get("scenes").is_none();
             let fault = if batch { fault.or_one_of(["scenes"]) } else { fault };
             fault.into_error(&sources)
         })?;
@@ -527,7 +528,8 @@ mod tests {
             parse("image: {}").unwrap_err().to_string(),
             "dir/s.yaml:1:1: expected the field \"camera\", found none"
         );
-        assert!(parse("").unwrap_err().to_string().starts_with("dir/s.yaml:1:1: expected a map with fields among "));
+        let empty = parse("").unwrap_err().to_string();
+        assert!(empty.starts_with("dir/s.yaml:1:1: expected a map with fields among "), "{empty}");
     }
 
     /// Every line of a fault has a place.

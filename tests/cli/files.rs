@@ -240,6 +240,23 @@ fn a_picture_without_pixels_is_refused() {
     }
 }
 
+/// The pictures were there, and the report, which is JSON, never was.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_scene_whose_name_is_no_text_has_a_report() {
+    use std::os::unix::ffi::OsStrExt;
+    let place = batch();
+    let name = std::ffi::OsStr::from_bytes(b"bad\xff.yaml");
+    std::fs::copy(place.path("scenes/good.yaml"), place.path(".").join(name)).unwrap();
+    for further in [&[][..], &["--skip-existing"], &["--tile", "0/2"]] {
+        let mut command = place.command(&["render", "-q", "-o", "out"]);
+        let done = command.arg(name).args(further).output().unwrap();
+        assert!(done.status.success(), "{further:?}: {}", String::from_utf8_lossy(&done.stderr));
+    }
+    let source = place.json("out/report.json")["source"].to_string();
+    assert!(source.contains("bad\u{fffd}.yaml"), "{source}");
+}
+
 /// It made a directory of that name.
 #[test]
 fn merge_refuses_names_of_other_pictures_as_render_does() {

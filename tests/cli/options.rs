@@ -149,6 +149,19 @@ fn more_threads_than_processors_can_be_are_refused() {
     assert_eq!(ran.code, 2);
     // What renders nothing asks for none.
     assert_eq!(granted("plan").code, 0);
+    let render = |threads: &str| {
+        let arguments = ["render", "scenes/good.yaml", "--spp", "4", "-o", "threads"];
+        Ran::of(place.command(&arguments).env("OMP_NUM_THREADS", threads).output().unwrap())
+    };
+    let ran = render("many");
+    assert_eq!(
+        (ran.err.as_str(), ran.code),
+        ("error: OMP_NUM_THREADS: expected a number of threads, found \"many\"\n", 2)
+    );
+    // OpenMP's list, of which the first is for what begins.
+    for list in ["1,2", " 1 "] {
+        assert!(render(list).out.contains(" on 1 threads;"), "{list}: {}", render(list).out);
+    }
     for verb in ["render", "merge", "accuracy"] {
         let help = place.run(&[verb, "--help"]).out.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(help.contains("SLURM_CPUS_PER_TASK, CUE_THREADS or OMP_NUM_THREADS"), "{help}");

@@ -10,7 +10,7 @@ pub mod slurm;
 
 use super::adaptive::SIDE;
 use super::part::bands;
-use super::{Overrides, clashes, entries, names, prepare, window};
+use super::{Overrides, checks, clashes, ends_in, entries, names, prepare, window};
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::scene::compile;
@@ -121,6 +121,12 @@ impl Job {
                 if entry.name.contains("{{") {
                     return Err(Error::Config(format!("{}: expected a name without {{{{, found one", entry.name)));
                 }
+                if cut.parts() && frames.is_empty() && ends_in(Path::new(&entry.name), &["exr"]) {
+                    return Err(Error::Config(format!(
+                        "{}: expected a name that does not end in .exr, for the directory of its parts",
+                        entry.name
+                    )));
+                }
                 if let Some(mark) = names::mark(&entry.name, !frames.is_empty()).filter(|_| cut.parts()) {
                     return Err(Error::Config(format!(
                         "{}: expected a name of plain text, which is part of the pattern for its parts, found one with {mark}",
@@ -164,6 +170,21 @@ impl Job {
     #[must_use]
     pub fn has_frames(&self) -> bool {
         self.groups.iter().any(|group| !group.frames.is_empty())
+    }
+
+    /// Whether `pictures`, which `option` gives, has a place for each of its pictures.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for what `render` refuses by `-o`, and for the name of one file where there are parts.
+    pub fn check_place(&self, option: &str, pictures: &Path) -> Result<()> {
+        if self.cut.parts() && ends_in(pictures, &["exr"]) {
+            return Err(Error::Config(format!(
+                "{option} {}: expected a directory for parts of pictures, found the name of one file",
+                pictures.display()
+            )));
+        }
+        checks::output_place(option, Some(pictures), self.groups.iter().map(|group| group.scenes.len()).sum())?;
+        self.groups.iter().try_for_each(|group| checks::frames(option, Some(pictures), group.frames.len()))
     }
 
     /// Pictures, all frames counted.

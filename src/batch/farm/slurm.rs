@@ -77,7 +77,9 @@ fn head(job: &Job, name: &str, directives: &str) -> String {
          own_abbe={}\n\
          own_pictures={}\n\
          abbe=\"${{ABBE:-$own_abbe}}\"\n\
-         pictures=\"${{ABBE_PICTURES:-$own_pictures}}\"\n",
+         pictures=\"${{ABBE_PICTURES:-$own_pictures}}\"\n\
+         # From Slurm 22.05 on a step has one core where it does not ask for those of its job.\n\
+         [ -z \"${{SLURM_CPUS_PER_TASK:-}}\" ] || export SRUN_CPUS_PER_TASK=\"$SLURM_CPUS_PER_TASK\"\n",
         word(&job.program),
         word(&job.pictures.display().to_string())
     )
