@@ -124,13 +124,15 @@ impl Environment {
         world_from_map: DMat3,
         carried: Carried,
     ) -> Environment {
+        // Mitsuba repeats the last row until there are three.
+        let missing = if mapping == Mapping::Poles { 3usize.saturating_sub(height) } else { 0 };
+        let last = &pixels[pixels.len() - width..];
+        let padded = [pixels, &last.repeat(missing)].concat();
+        let (pixels, height) = (&padded[..], height + missing);
         let row_angle = |y: usize| match mapping {
             Mapping::Texels => PI * (y as f64 + 0.5) / height as f64,
-            Mapping::Poles => PI * y as f64 / (height.max(2) - 1) as f64,
+            Mapping::Poles => PI * y as f64 / (height - 1) as f64,
         };
-        // A single row stands for both poles.
-        let doubled = mapping == Mapping::Poles && height == 1;
-        let (pixels, height) = if doubled { (&[pixels, pixels].concat()[..], 2) } else { (pixels, height) };
         let texels = upsampled(pixels, scale as f32, mapping, carried);
         let table = match mapping {
             Mapping::Texels => Table::Constant(neighbourhood(pixels, width, height)),
@@ -215,7 +217,9 @@ impl Environment {
     fn light(&self, corners: &Corners, nm: Lanes) -> Lanes {
         if let Some(bands) = &self.bands {
             // A single row stands for both poles.
-            let texel = |i: usize| bands.eval(if i < bands.len() { i } else { i - bands.len() }, nm);
+            // Rows beyond those of the file are its last.
+            let texel =
+                |i: usize| bands.eval(if i < bands.len() { i } else { bands.len() - self.width + i % self.width }, nm);
             return corners.between(corners.numbers.map(texel));
         }
         let value = match self.mapping {
@@ -505,6 +509,23 @@ mod tests {
         for (direction, expected) in cases {
             // Greys are flat spectra: f32 sigmoids and D65's f32 table.
             assert!((find(direction) / expected - 1.0).abs() < 1e-5, "{direction} {} {expected}", find(direction));
+        }
+    }
+
+    /// One row and two: the last one again. Halfway from the first to the second the equator is not yet.
+    #[test]
+    fn the_last_row_is_repeated_until_there_are_three() {
+        let at = |rows: &[f32], angle: f64| {
+            let pixels: Vec<_> = rows.iter().flat_map(|g| [[*g; 3]; 2]).collect();
+            let size = [2, rows.len()];
+            let map = Environment::new(&pixels, size, 1.0, Mapping::Poles, DMat3::IDENTITY, Carried::Spectra);
+            let (sin, cos) = angle.to_radians().sin_cos();
+            green(&map, DVec3::new(0.0, cos, -sin)) / map.illuminant.at(550.0)
+        };
+        for (rows, angle, expected) in
+            [(&[1.0, 2.0][..], 0.0, 1.0), (&[1.0, 2.0], 45.0, 1.5), (&[1.0, 2.0], 91.0, 2.0), (&[3.0], 60.0, 3.0)]
+        {
+            assert!((at(rows, angle) / expected - 1.0).abs() < 1e-5, "{rows:?} {angle}: {}", at(rows, angle));
         }
     }
 

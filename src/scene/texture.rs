@@ -151,11 +151,16 @@ impl Grid {
     /// The value at `uv`, of the values that `texel` gives by index.
     fn value<T: Copy + Add<Output = T> + Mul<f32, Output = T>>(&self, uv: DVec2, texel: impl Fn(usize) -> T) -> T {
         match self.interpolation {
-            // Rows are counted from the bottom, so that v = 0 is in the last one, not in the first again.
+            // A row begins where v of the surface comes to it: at v = 0 as at v = 1 is the first, be it the bottom one or, where v
+            // runs down the picture, as in Mitsuba, the top one.
             Interpolation::Nearest => {
+                let (x_axis, y_axis) = (self.uv.matrix2.x_axis, self.uv.matrix2.y_axis);
+                let down = y_axis.y < 0.0 || y_axis.y == 0.0 && x_axis.y < 0.0;
                 let uv = self.uv.transform_point2(uv);
                 let (x, up) = (uv.x * self.width as f64, uv.y * self.height as f64);
-                let row = wrapped(self.height as f64 - 1.0 - up.floor(), self.height, self.wrap[1]);
+                let height = self.height as f64;
+                let row = if down { (height - up).floor() } else { height - 1.0 - up.floor() };
+                let row = wrapped(row, self.height, self.wrap[1]);
                 texel(row * self.width + wrapped(x.floor(), self.width, self.wrap[0]))
             }
             Interpolation::Bilinear => {
@@ -543,6 +548,15 @@ mod tests {
         // Half a turn about the middle.
         let turned = DAffine2::from_cols(-DVec2::X, -DVec2::Y, DVec2::ONE);
         assert!((numbers(Interpolation::Nearest, turned).eval(&point(0.2, 0.8)) - 0.9).abs() < 1e-7);
+    }
+
+    /// Mitsuba's v runs down the picture, and its first row is the one at v = 0 and, repeated, at v = 1.
+    #[test]
+    fn a_row_begins_where_v_comes_to_it() {
+        let up = Grid { interpolation: Interpolation::Nearest, ..Grid::new(1, 2) };
+        let down = Grid { uv: DAffine2::from_cols(DVec2::X, -DVec2::Y, DVec2::Y), ..up };
+        let rows = |v: f64| [up, down].map(|grid| grid.value(DVec2::new(0.2, v), |row| row as f32));
+        assert_eq!([-1.0, 0.0, 0.5, 1.0].map(rows), [[1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]);
     }
 
     /// The bilinear form is quadratic, so that central differences are its derivatives but for rounding
