@@ -1,6 +1,6 @@
 //! No two pictures of a job go to one file, and no report: what would be written twice is told before anything is rendered.
 
-use super::{Overrides, checkpoint, finish, names, place, spectral_path};
+use super::{Overrides, about_place, checkpoint, finish, names, place, spectral_path};
 use crate::description::{Animation, BatchEntry};
 use crate::error::{Error, Result};
 use crate::film::output::{self, Inputs};
@@ -101,7 +101,7 @@ impl Look {
         let told = pictures.frames.is_empty() || probe[0] == probe[1];
         let first = pictures.frames.first().copied();
         let keys = [Key::BeforeNumber, Key::Letters].map(|key| keys_of(key, first));
-        let sheet = pictures.sheet.then(|| sheet_place(&pictures, &entry.name, overrides));
+        let sheet = pictures.sheet.then(|| sheet_place(&pictures, overrides));
         Some(Look { told, keys, sheet })
     }
 }
@@ -175,9 +175,9 @@ fn clashes(
 }
 
 /// The contact sheet beside `pictures`, as if it were an EXR.
-fn sheet_place(pictures: &Pictures, name: &str, overrides: &Overrides) -> PathBuf {
-    let picture = place(&pictures.directory, name, pictures.frames.first().copied(), overrides);
-    picture.with_file_name(names::about(overrides, "contact-sheet", "exr"))
+fn sheet_place(pictures: &Pictures, overrides: &Overrides) -> PathBuf {
+    let directory = about_place(&pictures.directory, !pictures.frames.is_empty(), overrides);
+    directory.join(names::about(overrides, "contact-sheet", "exr"))
 }
 
 /// Refuses a report in the place of a picture, of what is written beside it, or of a file from which scenes are read.
@@ -201,7 +201,7 @@ pub(super) fn check_report(entries: &[BatchEntry], overrides: &Overrides) -> Res
     }
     // The sheet lies beside the first picture.
     let sheet = found.clone().find(|(_, pictures)| pictures.sheet);
-    let sheet = sheet.map(|(entry, pictures)| sheet_place(pictures, &entry.name, overrides));
+    let sheet = sheet.map(|(_, pictures)| sheet_place(pictures, overrides));
     let several = found.map(|(_, pictures)| pictures.frames().count()).sum::<usize>() > 1;
     let mut files = sheet.iter().flat_map(|sheet| ["png", "html"].map(|ending| sheet.with_extension(ending)));
     match several && files.any(|file| is_place_of(report, &file)) {

@@ -148,6 +148,18 @@ fn place(directory: &Path, name: &str, frame: Option<i32>, overrides: &Overrides
     }
 }
 
+/// Where the report and the contact sheet lie: with the pictures of a scene that go to `directory`, frames or one; of a pattern
+/// whose directories have names of scenes or frames in the one above those.
+fn about_place(directory: &Path, frames: bool, overrides: &Overrides) -> PathBuf {
+    let pictures = match &overrides.output {
+        Some(path) if ends_in(path, &["exr"]) => path.parent().unwrap_or(Path::new("")),
+        Some(path) => path,
+        None => directory,
+    };
+    let plain = |place: &&Path| names::mark(&place.to_string_lossy(), frames).is_none();
+    pictures.ancestors().find(plain).unwrap_or(Path::new("")).to_path_buf()
+}
+
 /// Renders a prepared scene and writes its pictures.
 ///
 /// # Errors
@@ -283,8 +295,9 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
             }
             let mut report = match prepared {
                 Ok(prepared) => {
-                    let dir = output_path(&prepared, overrides);
-                    report_dir.get_or_insert_with(|| dir.parent().unwrap_or(Path::new(".")).to_path_buf());
+                    let Prepared { description, .. } = &prepared;
+                    let dir = || about_place(&description.output.dir, description.frame.is_some(), overrides);
+                    report_dir.get_or_insert_with(dir);
                     let mut report = render_scene(&prepared, overrides, loading.elapsed(), watcher, stop).0;
                     let several = entries.len() > 1 || frames > 1;
                     if several && prepared.description.output.contact_sheet && overrides.portion.is_all() {

@@ -390,8 +390,8 @@ fn relative_error(text: &str) -> std::result::Result<f64, String> {
         Some(number) => (number.trim(), 0.01),
         None => (text.trim(), 1.0),
     };
-    let share = number.parse::<f64>().ok().map(|x| x * unit).filter(|x| *x > 0.0 && x.is_finite());
-    share.ok_or_else(|| "expected an error above 0, as 0.01 or 1%".into())
+    let share = number.parse::<f64>().ok().map(|x| x * unit).filter(|x| *x > 0.0 && *x < 1.0);
+    share.ok_or_else(|| "expected an error above 0 and below 1, as 0.01 or 1%".into())
 }
 
 /// Two whole numbers around a mark.

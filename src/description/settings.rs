@@ -394,7 +394,9 @@ impl Render {
         checker.whole_between(at.key("tile"), self.tile, 1, MAX_SIDE);
         let stop = at.key("stop");
         if let Some(error) = self.stop.error {
-            checker.positive(stop.key("error"), error);
+            // A share of the light: 4 was meant for 4 %.
+            let is_share = error > 0.0 && error < 1.0;
+            checker.require(is_share, stop.key("error"), "a number above 0 and below 1 (1 % is 0.01)", error);
         }
         if let Some(time) = &self.stop.time {
             let found = match time {
@@ -468,7 +470,7 @@ mod tests {
     fn targets_are_above_zero_and_times_have_units() {
         assert_eq!(
             faults("render: {stop: {error: 0, time: 5 days, samples: 0}}"),
-            "dir/s.yaml:2:24: render.stop.error: expected a number greater than 0, found 0\n\
+            "dir/s.yaml:2:24: render.stop.error: expected a number above 0 and below 1 (1 % is 0.01), found 0\n\
              dir/s.yaml:2:33: render.stop.time: expected a time greater than 0, as 60, 90s, 10m or 2h, found \"5 days\"\n\
              dir/s.yaml:2:50: render.stop.samples: expected a whole number from 1 to 134217728, found 0"
         );

@@ -117,6 +117,26 @@ fn what_scenes_of_a_batch_share_is_the_same_for_each() {
 }
 
 /// Each batch, what is asked of it, and the file that two would write.
+/// The report and the contact sheet of all scenes lay in the directory of the first.
+#[test]
+fn what_is_said_of_a_batch_lies_above_the_directories_of_its_scenes() {
+    let batch = "scenes: [{file: s.yaml, name: a}, {file: s.yaml, name: b}]\n";
+    let place = Place::with(&[("batch.yaml", batch), ("s.yaml", &format!("{SMALL}{BALL}"))]);
+    let all = ["contact-sheet.html", "contact-sheet.png", "report.json"];
+    for (pattern, above) in [("p/{scene}/x.exr", "p"), ("q/{scene}", "q"), ("r/s/{scene}.exr", "r/s")] {
+        let ran = place.run(&["render", "batch.yaml", "-q", "-o", pattern]);
+        assert_eq!((ran.code, ran.err.as_str()), (0, ""));
+        let names = place.names(above);
+        assert!(all.iter().all(|name| names.iter().any(|n| n == name)), "{pattern}: {names:?}");
+        assert!(!place.path(above).join("a/report.json").exists());
+    }
+    let page = std::fs::read_to_string(place.path("p/contact-sheet.html")).unwrap();
+    assert!(page.contains("a/x.png") && page.contains("b/x.png"));
+    let message = "error: --report p/contact-sheet.html: ";
+    let ran = place.run(&["render", "batch.yaml", "-q", "-o", "p/{scene}/x.exr", "--report", "p/contact-sheet.html"]);
+    assert!(ran.code == 2 && ran.err.starts_with(message), "{} {}", ran.code, ran.err);
+}
+
 #[test]
 fn two_pictures_of_one_file_are_refused_before_the_work() {
     let entry = |name: &str, set: &str| format!("- {{file: s.yaml, name: {name}, set: {{{set}}}}}\n");
