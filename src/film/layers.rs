@@ -365,12 +365,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_number_is_counted_and_left_out() {
+    fn what_is_not_a_number_is_counted_and_is_nothing_of_its_own_channel_alone() {
         let mut sums = LayerSums::new(Layout { channels: 2, kept: Kept::Together }, 1);
         sums.add(0, 0, 1.0, &[1.0, f32::NAN]);
         sums.add(0, 1, 1.0, &[f32::INFINITY, 1.0]);
         sums.add(0, 2, 2.0, &[1.5, -1.0]);
-        assert_eq!((sums.plane(0), sums.plane(1)), (vec![3.0], vec![-2.0]));
+        // (1 + 0 + 3) / 3 and (0 + 1 − 2) / 3.
+        assert_eq!((sums.plane(0), sums.plane(1)), (vec![4.0 / 3.0], vec![-1.0 / 3.0]));
         assert_eq!(sums.invalid, InvalidCounts { nan: 1, infinite: 1, negative: 0, overflow: 0 });
     }
 
