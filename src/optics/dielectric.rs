@@ -40,6 +40,19 @@ impl RelativeIndex {
         }
     }
 
+    /// The same with no index closer to one than 2⁻⁴⁰. The half vector of refraction (Walter et al. 2007, eq. 16) is as long as
+    /// the index differs from one: of equal indices there is none, and of closer ones rounding, 2⁻⁵³, would leave it fewer
+    /// than 13 bits.
+    #[must_use]
+    pub fn apart_from_one(self) -> RelativeIndex {
+        const CLOSEST: f64 = 1.0 / (1u64 << 40) as f64;
+        let apart = |eta: f64| if (eta - 1.0).abs() < CLOSEST { 1.0 + CLOSEST } else { eta };
+        match self {
+            RelativeIndex::Constant(eta) => RelativeIndex::Constant(apart(eta)),
+            RelativeIndex::Dispersive(all) => RelativeIndex::Dispersive(all.map(apart)),
+        }
+    }
+
     /// `f` of each lane's index; once where all are the same.
     pub fn lanes(&self, f: impl Fn(f64) -> f64) -> Lanes {
         match self {

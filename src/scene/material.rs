@@ -435,7 +435,10 @@ impl Material {
                 let film = film.as_ref().map(|film| film.at(at, nm, exterior));
                 let tint = Tints::at(tints.as_deref(), at, nm);
                 match facets {
-                    Some(facets) => Bsdf::RoughDielectric(RoughDielectric { eta, facets: facets.at(at), tint, film }),
+                    Some(facets) => {
+                        let (eta, facets) = (eta.apart_from_one(), facets.at(at));
+                        Bsdf::RoughDielectric(RoughDielectric { eta, facets, tint, film })
+                    }
                     None => Bsdf::Dielectric(Dielectric { eta, fresnel: *fresnel, tint, film }),
                 }
             }
