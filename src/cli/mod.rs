@@ -558,9 +558,8 @@ impl Verb {
 fn use_threads(asked: Option<usize>) -> Result<()> {
     let granted = ["SLURM_CPUS_PER_TASK", "CUE_THREADS", "OMP_NUM_THREADS"];
     let granted = || {
-        let is_set = |v: &&str| std::env::var_os(v).is_some_and(|text| !text.is_empty());
-        let Some(by) = granted.into_iter().find(is_set) else { return Ok(None) };
-        let text = std::env::var_os(by).unwrap_or_default();
+        let set = |v| Some((v, std::env::var_os(v).filter(|text| !text.is_empty())?));
+        let Some((by, text)) = granted.into_iter().find_map(set) else { return Ok(None) };
         let text = text.to_string_lossy();
         // Of a list, as of OpenMP, the first is for what begins.
         match text.split(',').next().unwrap_or_default().trim().parse() {

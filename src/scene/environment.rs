@@ -126,11 +126,9 @@ impl Environment {
     ) -> Environment {
         // Mitsuba repeats the last row until there are three.
         let missing = if mapping == Mapping::Poles { 3usize.saturating_sub(height) } else { 0 };
-        let mut padded = Vec::new();
-        if missing > 0 {
-            padded = [pixels, &pixels[pixels.len() - width..].repeat(missing)].concat();
-        }
-        let (pixels, height) = (if missing > 0 { &padded[..] } else { pixels }, height + missing);
+        let last = &pixels[pixels.len() - width..];
+        let padded = (missing > 0).then(|| [pixels, &last.repeat(missing)].concat());
+        let (pixels, height) = (padded.as_deref().unwrap_or(pixels), height + missing);
         let row_angle = |y: usize| match mapping {
             Mapping::Texels => PI * (y as f64 + 0.5) / height as f64,
             Mapping::Poles => PI * y as f64 / (height - 1) as f64,
