@@ -86,7 +86,7 @@ fn scenes() -> Vec<(&'static str, String)> {
 
 fn scene(text: &str, integrator: &str, render: &str) -> Bench {
     let map = grey_png(16, 8, |x, y| (x * 15 + y * 2) as u8);
-    let text = format!("{FRAME}integrator: {integrator}\nrender: {{samples: 8, {render}}}\n{text}");
+    let text = format!("{FRAME}{}{text}", settings(integrator, render));
     bench_with(&text, &[("map.png", &map)])
 }
 
@@ -100,7 +100,15 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
 }
 
-const INTEGRATORS: [&str; 2] = ["path", "{whitted: {grid: 3, ambient: 0.1}}"];
+/// What computes the light; [`SHARED`] has paths share what they find wherever they can.
+const INTEGRATORS: [&str; 3] = ["path", SHARED, "{whitted: {grid: 3, ambient: 0.1}}"];
+
+const SHARED: &str = "{path: {}}";
+
+fn settings(integrator: &str, render: &str) -> String {
+    let reuse = if integrator == SHARED { "on" } else { "off" };
+    format!("integrator: {integrator}\nrender: {{samples: 8, techniques: {{reuse: {reuse}}}, {render}}}\n")
+}
 
 #[test]
 fn threads_and_tiles_do_not_change_a_bit() {
@@ -151,7 +159,7 @@ fn a_crop_shows_the_very_pixels_of_the_frame() {
             let cropped = text.clone() + "image: {width: 20, height: 14, crop: {x: 3, y: 5, width: 9, height: 7}}\n";
             let map = grey_png(16, 8, |x, y| (x * 15 + y * 2) as u8);
             let camera = FRAME.lines().next().unwrap();
-            let yaml = format!("{camera}\nintegrator: {integrator}\nrender: {{samples: 8, tile: 8}}\n{cropped}");
+            let yaml = format!("{camera}\n{}{cropped}", settings(integrator, "tile: 8"));
             let part = bench_with(&yaml, &[("map.png", &map)]).film();
             assert_eq!(part.window(), crop);
             for y in crop.y..crop.y + crop.height as i32 {
@@ -173,7 +181,7 @@ fn all_effects_give_the_bits_of_those_the_scene_calls_for() {
         for (name, text) in scenes() {
             let auto = scene(&text, integrator, "effects: auto");
             let all = scene(&text, integrator, "effects: all");
-            assert!(all.prepared.plan.effects.iter().all(|e| e.on || !integrator.starts_with("path")));
+            assert!(all.prepared.plan.effects.iter().all(|e| e.on || integrator.contains("whitted")));
             assert!(auto.prepared.plan.effects.iter().any(|e| !e.on), "{name} lacks something");
             let (auto, all) = (auto.film(), all.film());
             let differ = sums(&auto).iter().zip(sums(&all)).filter(|(a, b)| **a != *b).count();

@@ -132,6 +132,12 @@ impl Grid {
     }
 }
 
+/// The first pixel of each cell of `window`, which may lie beyond it.
+pub fn corners(window: Window) -> impl Iterator<Item = [i32; 2]> {
+    let grid = Grid::of(window);
+    (0..grid.cells()).map(move |cell| grid.corner(cell))
+}
+
 /// The cells of `window`.
 #[must_use]
 pub fn cells(window: Window) -> usize {

@@ -14,6 +14,7 @@ use crate::film::Window;
 use crate::film::accumulate::PixelCells;
 use crate::film::cryptomatte::Matte;
 use crate::film::exr::{self, Attribute, ChannelData, ColourEncoding, ExrImage, LayerPlane, stderr_name};
+use crate::film::filter::Filter;
 use crate::film::heat;
 use crate::film::layers::{Kept, Layout};
 use crate::film::png::{self, PngSettings};
@@ -21,6 +22,7 @@ use crate::film::resolve::Image;
 use crate::scene::camera::{Camera, Projection};
 use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Channel, Holds};
+use crate::transport::path::reuse;
 use crate::transport::plan::{Effect, EffectPlan, Integrator};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -97,12 +99,14 @@ pub struct Finish {
 pub enum Sharing {
     /// All: where photons are merged, the samples of one number share their wavelengths in all pixels.
     All,
-    /// Those under the filter, of what is splatted.
-    Filter {
-        /// [`Filter::span`](crate::film::filter::Filter::span), 1 where nothing is.
+    /// Those near each other.
+    Near {
+        /// [`Filter::span`](crate::film::filter::Filter::span), where light is splatted; else 1.
         span: f64,
         /// [`Filter::overlap`](crate::film::filter::Filter::overlap), likewise.
         overlap: f64,
+        /// Side of the cells, aligned to the frame, in which paths share what they find; 1 where they do not.
+        cell: u32,
     },
 }
 
@@ -111,14 +115,14 @@ impl Sharing {
     #[must_use]
     pub fn of(plan: &EffectPlan, description: &SceneDescription) -> Sharing {
         let splats = plan.caustics.is_some() || matches!(plan.integrator, Integrator::Light(_));
-        match &plan.caustics {
-            Some(caustics) if caustics.merging.is_some() => Sharing::All,
-            _ if splats => {
-                let filter = filter(&description.image.filter);
-                Sharing::Filter { span: filter.span(), overlap: filter.overlap() }
-            }
-            _ => Sharing::Filter { span: 1.0, overlap: 1.0 },
+        let merging = plan.caustics.as_ref().is_some_and(|caustics| caustics.merging.is_some());
+        if merging {
+            return Sharing::All;
         }
+        let filter = splats.then(|| filter(&description.image.filter));
+        let of = |part: fn(&Filter) -> f64| filter.as_ref().map_or(1.0, part);
+        let cell = if plan.reuse { reuse::SIDE as u32 } else { 1 };
+        Sharing::Near { span: of(Filter::span), overlap: of(Filter::overlap), cell }
     }
 }
 

@@ -4,7 +4,7 @@
 //! integers, so the picture does not depend on it. Samples come in passes that double their number,
 //! and after each pass the error so far is known.
 
-use super::adaptive::Allocation;
+use super::adaptive::{self, Allocation};
 use super::finish::Sharing;
 use super::part::{Breaks, Part, Share, SplatFilm};
 use super::stop::{Forecast, Stop};
@@ -22,8 +22,9 @@ use crate::spectrum::ColourSpace;
 use crate::transport::layers::Source;
 use crate::transport::merge::Collection;
 use crate::transport::middle;
+use crate::transport::path::reuse;
 use crate::transport::plan::EffectPlan;
-use crate::transport::{PixelSample, Samples, Shot, moment, scene_at};
+use crate::transport::{Address, PixelSample, Samples, Shot, moment, scene_at};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Mutex;
@@ -146,14 +147,17 @@ impl Frame {
     }
 
     /// How many times the variance of the sum of all pixels of `image` is that of independent ones, at the most; see
-    /// [`resolve::shared_errors`] and, for samples that share their wavelengths, [`resolve::errors_shared_by_all`].
+    /// [`resolve::shared_errors`] and, for samples that share more than a filter, [`resolve::errors_shared_in_cells`].
     #[must_use]
     pub fn shared_errors(&self, image: &Image, rgb_from_xyz: &[[f64; 3]; 3], sharing: Sharing) -> f64 {
         let splats = self.splats.as_ref().map(SplatFilm::splats);
+        let in_cells = |cell| resolve::errors_shared_in_cells(image, &self.film, splats.as_ref(), rgb_from_xyz, cell);
         match sharing {
-            Sharing::All => resolve::errors_shared_by_all(image, &self.film, splats.as_ref(), rgb_from_xyz),
-            Sharing::Filter { span, .. } => {
-                splats.map_or(1.0, |splats| resolve::shared_errors(image, &splats, rgb_from_xyz, span))
+            Sharing::All => in_cells(None),
+            Sharing::Near { span, cell, .. } => {
+                let by_filter = splats.map_or(1.0, |splats| resolve::shared_errors(image, &splats, rgb_from_xyz, span));
+                let by_paths = if cell > 1 { in_cells(Some(cell)) } else { 1.0 };
+                by_filter + by_paths - 1.0
             }
         }
     }
@@ -223,79 +227,149 @@ pub(super) fn render_unit(
         Some(shared) => &moments[shared..=shared],
         None => moments,
     };
-    let window = tile.window();
-    let mut memory = Samples::default();
-    let mut layer_runs: [LayerRun; REPLICATES] = std::array::from_fn(|_| LayerRun::default());
-    let mut wanted = Vec::new();
-    let middles = plan.layers.layers.iter().any(|layer| matches!(layer.source, Source::Middle(_)));
-    for y in window.y..window.y + window.height as i32 {
-        for x in window.x..window.x + window.width as i32 {
-            // Who renders the first sample adds what stands in the pixel once.
-            if let (true, 0, Some(index)) = (middles, samples.start, window.index([x, y])) {
-                middle::middle(scene, job.next, plan, [x, y], |channel, value| {
-                    tile.layers.add_once(index, [(channel, value)])
-                });
+    // Who renders the first sample adds what stands in the pixels once.
+    if samples.start == 0 && plan.layers.layers.iter().any(|layer| matches!(layer.source, Source::Middle(_))) {
+        for (index, pixel) in tile.window().iter().enumerate() {
+            middle::middle(scene, job.next, plan, pixel, |channel, value| {
+                tile.layers.add_once(index, [(channel, value)])
+            });
+        }
+    }
+    // A scrambling for each replicate, and the number of a sample in it.
+    let mut wanted: Vec<(u32, u32)> = Vec::new();
+    let want = |pixel: [i32; 2], wanted: &mut Vec<(u32, u32)>| {
+        wanted.clear();
+        for replicate in 0..REPLICATES as u32 {
+            // Samples take turns among the replicates.
+            let turns = |s: u32| s.saturating_sub(replicate).div_ceil(REPLICATES as u32);
+            let indices = match shares {
+                Some(shares) => shares.turns(pixel, replicate, &samples),
+                None => turns(samples.start)..turns(samples.end),
+            };
+            // Or a scrambling for each sample, of which it is the first point.
+            let address = |i| if job.independent { (replicate + REPLICATES as u32 * i, 0) } else { (replicate, i) };
+            wanted.extend(indices.map(address));
+        }
+    };
+    let mut unit = Unit { shot, moments, tile, memory: Samples::default(), runs: Runs::default() };
+    let window = unit.tile.window();
+    if plan.reuse {
+        for corner in adaptive::corners(window) {
+            for group in reuse::groups(corner, scene.camera.resolution) {
+                if group.pixels().iter().any(|pixel| window.index(*pixel).is_some()) {
+                    // A cell has samples of the same numbers in all its pixels.
+                    want(corner, &mut wanted);
+                    wanted.chunks(LONGEST as usize).for_each(|run| unit.render_group(group.pixels(), run));
+                }
             }
-            wanted.clear();
-            for replicate in 0..REPLICATES as u32 {
-                // Samples take turns among the replicates.
-                let turns = |s: u32| s.saturating_sub(replicate).div_ceil(REPLICATES as u32);
-                let indices = match shares {
-                    Some(shares) => shares.turns([x, y], replicate, &samples),
-                    None => turns(samples.start)..turns(samples.end),
-                };
-                // A scrambling for each replicate; or for each sample, of which it is the first point.
-                let address = |i| if job.independent { (replicate + REPLICATES as u32 * i, 0) } else { (replicate, i) };
-                wanted.extend(indices.map(address));
-            }
-            for run in wanted.chunks(LONGEST as usize) {
-                render_run((&shot, moments), tile, &mut memory, &mut layer_runs, [x, y], run);
-            }
+        }
+    } else {
+        for pixel in window.iter() {
+            want(pixel, &mut wanted);
+            wanted.chunks(LONGEST as usize).for_each(|run| unit.render_pixel(pixel, run));
         }
     }
 }
 
-/// Renders `samples` of `pixel`, at most [`LONGEST`]: each the number of a scrambling, which take turns among the replicates, and
-/// an index in it. Each sees its own of `moments`, if there are any.
-fn render_run(
-    (shot, moments): (&Shot, &[Scene]),
-    tile: &mut TileBuffer,
-    memory: &mut Samples,
-    layers: &mut [LayerRun; REPLICATES],
-    pixel: [i32; 2],
-    samples: &[(u32, u32)],
-) {
-    let index = tile.window().index(pixel).expect("the pixel lies in the tile");
-    let Layout { channels, kept } = tile.layers.layout();
-    let layers = &mut layers[..kept.sets()];
-    let unit = light_unit(shot.scene);
-    let mut runs = [Run::default(); REPLICATES];
-    layers.iter_mut().for_each(|run| run.reset(channels));
-    // Overscan makes negative coordinates; as addresses they wrap.
-    let address = pixel.map(|x| x as u32);
-    // Those that are rendered together see one moment.
-    let together = if moments.is_empty() { Octet::SAMPLES } else { 1 };
-    for octet in samples.chunks(together) {
-        let (stream, i) = octet[0];
-        let scene = scene_at(shot.scene, moments, |count| moment(shot.seed, address, stream, i, count));
-        memory.render(&Shot { scene, ..*shot }, address, octet, |lane, sample, values, covered| {
+/// A work unit that is being rendered.
+struct Unit<'a> {
+    shot: Shot<'a>,
+    /// Of which each sample sees its own, if there are any.
+    moments: &'a [Scene],
+    tile: &'a mut TileBuffer,
+    memory: Samples,
+    runs: Runs,
+}
+
+/// Sums of pixels by replicate.
+#[derive(Default)]
+struct Runs {
+    light: [[Run; REPLICATES]; reuse::SIDE],
+    layers: [[LayerRun; REPLICATES]; reuse::SIDE],
+}
+
+/// A pixel as addresses have it: overscan makes negative coordinates, which wrap.
+fn address(pixel: [i32; 2]) -> [u32; 2] {
+    pixel.map(|x| x as u32)
+}
+
+impl Unit<'_> {
+    /// Renders `samples` of `pixel`, at most [`LONGEST`]: each the number of a scrambling, which take turns among the replicates,
+    /// and an index in it.
+    fn render_pixel(&mut self, pixel: [i32; 2], samples: &[(u32, u32)]) {
+        self.begin(1);
+        // Those that are rendered together see one moment.
+        let together = if self.moments.is_empty() { Octet::SAMPLES } else { 1 };
+        for octet in samples.chunks(together) {
+            let (stream, i) = octet[0];
+            let scene = scene_at(self.shot.scene, self.moments, |count| {
+                moment(self.shot.seed, address(pixel), stream, i, count)
+            });
+            let mut addresses = [Address { pixel: address(pixel), replicate: 0, index: 0 }; Octet::SAMPLES];
+            for (to, &(replicate, index)) in addresses.iter_mut().zip(octet) {
+                (to.replicate, to.index) = (replicate, index);
+            }
+            self.render(scene, &addresses[..octet.len()], |_| (pixel, 0));
+        }
+        self.end(&[pixel]);
+    }
+
+    /// Renders `samples`, at most [`LONGEST`], of all pixels of a group.
+    fn render_group(&mut self, pixels: &[[i32; 2]], samples: &[(u32, u32)]) {
+        self.begin(pixels.len());
+        for &(replicate, index) in samples {
+            let mut addresses = [Address { pixel: [0; 2], replicate, index }; Octet::SAMPLES];
+            for (to, pixel) in addresses.iter_mut().zip(pixels) {
+                to.pixel = address(*pixel);
+            }
+            self.render(self.shot.scene, &addresses[..pixels.len()], |lane| (pixels[lane], lane));
+        }
+        self.end(pixels);
+    }
+
+    /// Renders samples into the runs, of which each belongs to the pixel and the place that `of` tells.
+    fn render(&mut self, scene: &Scene, samples: &[Address], of: impl Fn(usize) -> ([i32; 2], usize)) {
+        let Unit { shot, tile, memory, runs, .. } = self;
+        let Layout { channels, kept } = tile.layers.layout();
+        let unit = light_unit(shot.scene);
+        memory.render(&Shot { scene, ..*shot }, samples, |lane, sample, values, covered| {
+            let (pixel, place) = of(lane);
+            // Some of a group may lie beyond the tile.
+            let Some(index) = tile.window().index(pixel) else { return };
             if let Some(number) = covered {
                 let pixels = tile.window().pixels();
                 tile.layers.mattes.add(index, pixels, number, 1);
             }
-            let replicate = octet[lane].0 as usize % REPLICATES;
-            if channels > 0 && !layers[kept.set(replicate)].add(sample.weight, values) {
+            let replicate = samples[lane].replicate as usize % REPLICATES;
+            if channels > 0 && !runs.layers[place][kept.set(replicate)].add(sample.weight, values) {
                 tile.layers.add(index, replicate, sample.weight, values);
             }
-            record(tile, &mut runs[replicate], unit, pixel, replicate, sample);
+            record(tile, &mut runs.light[place][replicate], unit, pixel, replicate, sample);
         });
     }
-    for (replicate, run) in runs.iter().enumerate() {
-        tile.add_run(pixel, replicate, run);
+
+    /// Empties the runs of so many pixels.
+    fn begin(&mut self, pixels: usize) {
+        let channels = self.tile.layers.layout().channels;
+        for place in 0..pixels {
+            self.runs.light[place] = [Run::default(); REPLICATES];
+            self.runs.layers[place].iter_mut().for_each(|run| run.reset(channels));
+        }
     }
-    if channels > 0 {
-        for (replicate, run) in layers.iter().enumerate() {
-            tile.layers.add_run(index, replicate, run);
+
+    /// Adds the runs to their pixels.
+    fn end(&mut self, pixels: &[[i32; 2]]) {
+        let Layout { channels, kept } = self.tile.layers.layout();
+        for (place, &pixel) in pixels.iter().enumerate() {
+            let Some(index) = self.tile.window().index(pixel) else { continue };
+            for (replicate, run) in self.runs.light[place].iter().enumerate() {
+                self.tile.add_run(pixel, replicate, run);
+            }
+            if channels > 0 {
+                for (replicate, run) in self.runs.layers[place].iter().enumerate().take(kept.sets()) {
+                    self.tile.layers.add_run(index, replicate, run);
+                }
+            }
         }
     }
 }
@@ -444,11 +518,11 @@ fn estimate(film: &Film, splats: Option<&SplatFilm>, gauge: &Gauge) -> Estimate 
         0 => Values::Colours(&space, &image),
         bands => Values::Bands(bands),
     };
-    let overlap = match gauge.sharing {
-        Sharing::Filter { overlap, .. } => overlap,
-        Sharing::All => 1.0,
+    let (overlap, cell) = match gauge.sharing {
+        Sharing::Near { overlap, cell, .. } => (overlap, cell),
+        Sharing::All => (1.0, 1),
     };
-    let found = error::relative_error(film, photons, values, overlap);
+    let found = error::relative_error(film, photons, values, overlap, cell);
     let black = found == Err(NoEstimate::Black);
     let error = if black && !gauge.lit { Some(ErrorEstimate::none(image.window.pixels() as u64)) } else { found.ok() };
     Estimate { error, black, resolved: Some((space, image)) }

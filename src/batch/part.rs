@@ -20,6 +20,7 @@ use crate::film::accumulate::{Film, REPLICATES, TileBuffer};
 use crate::film::layers::Layout;
 use crate::transport::light::LightPaths;
 use crate::transport::merge::{self, Collection};
+use crate::transport::path::reuse;
 pub use lights::SplatFilm;
 use lights::{LightsDone, PATHS_OF_A_UNIT, light_paths, paths_of_a_sample};
 use rayon::prelude::*;
@@ -258,7 +259,8 @@ impl<'a> Part<'a> {
         };
         let film = Mutex::new(film(window, layers)?);
         let start = share.samples.start;
-        let tiles = shares(window, job.tile, rayon::current_num_threads());
+        let least = if job.plan.reuse { reuse::SIDE as u32 } else { 4 };
+        let tiles = shares(window, job.tile, least, rayon::current_num_threads());
         let tiles = tiles.into_iter().map(|window| Tile { window, done: AtomicU32::new(start) }).collect();
         let lights = Mutex::new(LightsDone { below: start, more: Vec::new() });
         Ok(Part { job, share, window, film, splats, tiles, lights, layers, allocation: OnceLock::new() })
@@ -504,10 +506,10 @@ pub fn tiles(window: Window, side: u32) -> Vec<Window> {
         .collect()
 }
 
-/// Tiles of at most `side` pixels, halved until every thread has 32 or they are 4 pixels wide: a
+/// Tiles of at most `side` pixels, halved until every thread has 32 or they are `least` pixels wide: a
 /// small picture keeps all threads busy to its end. How it is cut changes no bit of it.
-fn shares(window: Window, side: u32, threads: usize) -> Vec<Window> {
-    let halves = std::iter::successors(Some(side), |side| (*side >= 8).then_some(side / 2));
+fn shares(window: Window, side: u32, least: u32, threads: usize) -> Vec<Window> {
+    let halves = std::iter::successors(Some(side), |side| (*side >= 2 * least).then_some(side / 2));
     let cuts = halves.map(|side| tiles(window, side));
     let mut last = Vec::new();
     for cut in cuts {
@@ -555,10 +557,10 @@ mod tests {
     fn a_small_picture_is_cut_for_all_threads() {
         let window = |side: u32| Window { x: 0, y: 0, width: side, height: side };
         // 16 × 16 pixels make 16 tiles of 4 × 4, as small as they get; 1024 × 1024 stay whole tiles.
-        assert_eq!(shares(window(16), 32, 8).len(), 16);
-        assert_eq!(shares(window(48), 32, 2).len(), 144);
-        assert_eq!(shares(window(256), 32, 2).len(), 64);
-        assert_eq!(shares(window(1024), 32, 2).len(), 1024);
+        assert_eq!(shares(window(16), 32, 4, 8).len(), 16);
+        assert_eq!(shares(window(48), 32, 4, 2).len(), 144);
+        assert_eq!(shares(window(256), 32, 4, 2).len(), 64);
+        assert_eq!(shares(window(1024), 32, 4, 2).len(), 1024);
     }
 
     #[test]

@@ -20,7 +20,7 @@ use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{
     Coverage, EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings,
 };
-use crate::transport::trial;
+use crate::transport::{Spread, trial};
 use glam::DVec2;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -124,7 +124,8 @@ pub(super) fn prepare_scene(
     let exponents = moments.iter().map(|moment| moment.light_exponent);
     scene.light_exponent = exponents.fold(scene.light_exponent, i32::max);
     moments.iter_mut().for_each(|moment| moment.light_exponent = scene.light_exponent);
-    let mut plan = EffectPlan::of(&motion::census(&scene, &moments), integrator, mode);
+    let census = motion::census(&scene, &moments);
+    let mut plan = EffectPlan::of(&census, integrator, mode);
     plan.effects.extend(blur.said);
     plan.layers = layers::plan(&description, &scene, planned)?;
     let filter = sampler(&description)?;
@@ -136,6 +137,18 @@ pub(super) fn prepare_scene(
     let (caustics, said) = pilot::decide(&scene, &moments, &plan, &filter, seed, planned, wishes);
     plan.caustics = caustics;
     plan.techniques.extend(said);
+    let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
+    plan.adaptive = first;
+    if first.is_some() {
+        // The halves of the replicates weigh alike, whatever their counts.
+        plan.layers.kept = Kept::ByReplicate;
+    }
+    plan.techniques.extend(said);
+    let wish_reuse = wish(description.render.techniques.reuse);
+    if let Some((reuse, said)) = trial::reuse(&scene, &census, &moments, &plan, &filter, seed, planned, wish_reuse) {
+        plan.reuse = reuse;
+        plan.techniques.push(said);
+    }
     if overrides.check_numerics && !moments.is_empty() {
         let expected = "--check-numerics: expected a scene in which nothing moves, or --set camera.shutter=null";
         return Err(Error::Config(format!("{expected}, found motion blur")));
@@ -151,13 +164,6 @@ pub(super) fn prepare_scene(
         scene.watch = Some(Box::default());
         plan.layers.layers.push(Layer { name: name.into(), source: Source::Numerics, squares: None });
     }
-    let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
-    plan.adaptive = first;
-    if first.is_some() {
-        // The halves of the replicates weigh alike, whatever their counts.
-        plan.layers.kept = Kept::ByReplicate;
-    }
-    plan.techniques.extend(said);
     let moving =
         description.layers.iter().any(|layer| layer.content == LayerContent::Middle(description::Data::Motion));
     let files = scene.files.iter().chain(moments.iter().flat_map(|moment| &moment.files));
@@ -248,6 +254,7 @@ pub(super) fn integrator(description: &SceneDescription, written: &description::
         description::Integrator::Whitted(w) => Integrator::Whitted(WhittedSettings {
             max_depth: w.max_depth,
             grid: w.grid,
+            wavelengths: Spread::of_wavelengths(WhittedSettings::samples_of(w.grid)),
             ambient: compile::ambient(description, &w.ambient)?,
             transparent_shadows: w.transparent_shadows,
         }),

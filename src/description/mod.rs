@@ -95,10 +95,11 @@
 //!   effects: auto                   # auto, all: the same picture
 //!   tile: 32                        # pixels
 //!   wavelengths: auto               # auto, visible, uniform
-//!   techniques: {light_tracing: auto, packets: auto, merging: auto, adaptive: auto}  # auto, on, off: light of mirrors
-//!                                   # and glass traced from the lights, wavelengths that part followed together, photons
-//!                                   # collected where that light is seen in mirrors and through glass, more samples where
-//!                                   # the picture is noisier at the same mean (auto: off)
+//!   techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, adaptive: auto}  # auto, on, off: light of
+//!                                   # mirrors and glass traced from the lights, wavelengths that part followed together,
+//!                                   # photons collected where that light is seen in mirrors and through glass, indirect
+//!                                   # light shared by pixels near each other, more samples where the picture is noisier
+//!                                   # at the same mean (auto: off)
 //!   frames: ~                       # which, where values change over frames: 12, 1-100, 1-100x5, 1-10,20,30-40
 //!   seed_per_frame: true            # the frame is added to the seed, so that noise does not stand still
 //!   frames_per_second: ~            # for those who show the pictures

@@ -293,7 +293,7 @@ pub fn duration(text: &str) -> Option<Duration> {
     Duration::try_from_secs_f64(seconds * unit).ok()
 }
 
-/// `techniques: {light_tracing: auto, packets: auto, merging: auto, adaptive: auto}`
+/// `techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, adaptive: auto}`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Techniques {
@@ -307,6 +307,9 @@ pub struct Techniques {
     /// it that light is left to chance; with it, it is blurred a little.
     #[serde(default)]
     pub merging: Technique,
+    /// Whether paths of pixels that lie near each other share what they find from their second vertices on.
+    #[serde(default)]
+    pub reuse: Technique,
     /// Whether pixels get more samples where the picture is noisier, at the same mean.
     #[serde(default)]
     pub adaptive: Technique,

@@ -265,7 +265,8 @@ impl<'a> Measured<'a> {
 }
 
 /// How noisy the picture is that `film` and `splats` hold, in `values`; on the current rayon pool. What is splatted has
-/// `overlap` ([`Filter::overlap`](super::filter::Filter::overlap)) with its neighbours.
+/// `overlap` ([`Filter::overlap`](super::filter::Filter::overlap)) with its neighbours; pixels of each cell of so many on a side,
+/// aligned to the frame, may share what they find.
 ///
 /// # Errors
 /// Why there is nothing to say.
@@ -274,21 +275,25 @@ pub fn relative_error(
     splats: Option<Splats>,
     values: Values,
     overlap: f64,
+    cell: u32,
 ) -> Result<ErrorEstimate, NoEstimate> {
     let window = film.window();
     let pixels = window.pixels();
     let measured = Measured::new(film, splats, values, overlap > 1.0);
-    let side = ((pixels as f64 / BLOCKS as f64).sqrt() as u32).max(1);
-    let rows = window.height.div_ceil(side);
-    let columns = window.width.div_ceil(side);
+    // No cell lies in two blocks.
+    let side = ((pixels as f64 / BLOCKS as f64).sqrt() as u32 / cell * cell).max(cell);
+    let before = [window.x, window.y].map(|x| x.rem_euclid(cell as i32) as u32);
+    let rows = (before[1] + window.height).div_ceil(side);
+    let columns = (before[0] + window.width).div_ceil(side);
     let blocks: Vec<Sums> = (0..rows * columns)
         .into_par_iter()
         .map(|block| {
             let mut sums = Sums::default();
             let mut values = Vec::new();
-            let (row, column) = (block / columns * side, block % columns * side);
-            for y in row..(row + side).min(window.height) {
-                for x in column..(column + side).min(window.width) {
+            let span =
+                |i: u32, before: u32, size: u32| (i * side).saturating_sub(before)..((i + 1) * side - before).min(size);
+            for y in span(block / columns, before[1], window.height) {
+                for x in span(block % columns, before[0], window.width) {
                     let index = y as usize * window.width as usize + x as usize;
                     if measured.read(index, &mut values) {
                         let counts = counts(&film.cells()[index]);
@@ -486,7 +491,7 @@ mod tests {
 
     fn estimate(film: &Film) -> Result<(Image, ErrorEstimate), NoEstimate> {
         let image = resolve(film, None, &IDENTITY);
-        let error = relative_error(film, None, Values::Colours(&IDENTITY, &image), 1.0)?;
+        let error = relative_error(film, None, Values::Colours(&IDENTITY, &image), 1.0, 1)?;
         Ok((image, error))
     }
 
@@ -680,7 +685,7 @@ mod tests {
             let image = resolve(&dark, Some(splats), &IDENTITY);
             let own = own(&image, |_| 1.0).sqrt();
             let holds = |overlap| {
-                let e = relative_error(&dark, Some(splats), Values::Colours(&IDENTITY, &image), overlap).unwrap();
+                let e = relative_error(&dark, Some(splats), Values::Colours(&IDENTITY, &image), overlap, 1).unwrap();
                 u64::from(e.low <= own && own <= e.high)
             };
             held += holds(filter.overlap());

@@ -42,6 +42,12 @@ impl Window {
         Window { x: 0, y: 0, width, height }
     }
 
+    /// Its pixels, row by row.
+    pub fn iter(self) -> impl Iterator<Item = [i32; 2]> {
+        let row = move |y: u32| (0..self.width).map(move |x| [self.x + x as i32, self.y + y as i32]);
+        (0..self.height).flat_map(row)
+    }
+
     /// How many pixels.
     #[must_use]
     pub fn pixels(&self) -> usize {

@@ -98,7 +98,7 @@ impl Sampler<'_> {
 /// Sets that an [`Octet`] keeps: those of the camera and of five vertices.
 const SHARED_SETS: u32 = 17;
 
-/// The numbers of up to eight samples of one pixel. The first that asks for a set has it made for all: eight side by
+/// The numbers of up to eight samples. The first that asks for a set has it made for all: eight side by
 /// side take little longer than one.
 #[derive(Debug)]
 pub struct Octet {
@@ -107,7 +107,7 @@ pub struct Octet {
     /// Index of each sample within its replicate.
     indices: [u32; Octet::SAMPLES],
     count: usize,
-    /// Whether all are of one replicate.
+    /// Whether all are of one replicate of one pixel.
     alike: bool,
     /// One bit a set: whether it is made.
     made: Cell<u32>,
@@ -126,22 +126,25 @@ impl Octet {
     /// How many samples share their sets at the most.
     pub const SAMPLES: usize = 8;
 
-    /// Moves to `samples` of `pixel`, each a replicate and an index in it, for a render with `seed`.
+    /// Moves to `samples`, each a pixel, a replicate and an index in it, for a render with `seed`.
     ///
     /// # Panics
     /// If they are more than eight.
-    pub fn reset(&mut self, seed: u64, pixel: [u32; 2], samples: &[(u32, u32)]) {
+    pub fn reset(&mut self, seed: u64, samples: impl ExactSizeIterator<Item = ([u32; 2], u32, u32)>) {
         assert!(samples.len() <= Octet::SAMPLES, "at most eight samples");
         self.count = samples.len();
         self.made.set(0);
-        self.alike = samples.windows(2).all(|two| two[0].0 == two[1].0);
+        self.alike = true;
         let mut last = None;
-        for (lane, &(replicate, index)) in samples.iter().enumerate() {
+        for (lane, (pixel, replicate, index)) in samples.enumerate() {
             let of = match last {
-                Some((known, stream)) if known == replicate => stream,
-                _ => stream(seed, pixel, replicate),
+                Some((known, stream)) if known == (pixel, replicate) => stream,
+                _ => {
+                    self.alike &= lane == 0;
+                    stream(seed, pixel, replicate)
+                }
             };
-            last = Some((replicate, of));
+            last = Some(((pixel, replicate), of));
             (self.streams[lane], self.indices[lane]) = (of, index);
         }
     }
@@ -498,7 +501,7 @@ mod tests {
     fn numbers_of_neighbours_are_announced_once() {
         let mut octet = Octet::default();
         let samples: Vec<(u32, u32)> = (0..5).map(|i| (i % 2, i)).collect();
-        octet.reset(7, [3, 4], &samples);
+        octet.reset(7, samples.iter().map(|&(replicate, index)| ([3, 4], replicate, index)));
         let set = Set::Scatter(2);
         let mut told = Vec::new();
         octet.sampler(1).announce(set, |all| told = all.iter().map(|numbers| numbers.map(unit)).collect());
@@ -519,7 +522,7 @@ mod tests {
         let neighbours =
             [([3, u32::MAX], row(1, 8)), ([3, 4], row(0, 3)), ([3, 4], row(3, 0xffff_fff8)), ([5, 4], mixed)];
         for (pixel, samples) in neighbours {
-            octet.reset(9, pixel, &samples);
+            octet.reset(9, samples.iter().map(|&(replicate, index)| (pixel, replicate, index)));
             for set in (0..8).flat_map(|v| [Set::Camera, Set::Lens, Set::Scatter(v), Set::Choice(v), Set::Extra(v)]) {
                 for lane in [2, 0, 5] {
                     let (replicate, index) = samples[lane];

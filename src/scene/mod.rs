@@ -443,6 +443,28 @@ impl Scene {
         }
     }
 
+    /// Whether [`Scene::occluded`] tells of every ray if it reaches the face of `hit`, which is seen from the side of its normal or
+    /// not; of the latter's shapes together with [`Scene::enters_on_the_way`].
+    #[must_use]
+    pub fn can_be_aimed_at(&self, hit: &Hit, from_outside: bool) -> bool {
+        let object = &self.objects[hit.object as usize];
+        hit.instance.is_none()
+            && match object.geometry {
+                Geometry::Mesh(_) => true,
+                Geometry::Shape(_) => from_outside || !object.flipped,
+                Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
+            }
+    }
+
+    /// Whether `ray` enters the shape `object` before `distance`: then it meets the inside of none of its faces.
+    #[must_use]
+    pub fn enters_on_the_way(&self, ray: &Ray, object: u32, distance: f64) -> bool {
+        let Geometry::Shape(shape) = &self.objects[object as usize].geometry else { return false };
+        let departing = ray.departure.filter(|d| d.object == object).map(|d| d.part as u8);
+        let first = shape.intersect(ray, distance, departing);
+        first.is_some_and(|hit| enters(shape, ray, hit.t, hit.face))
+    }
+
     /// The object of `target`, where it stands in the scene itself.
     #[inline]
     fn aimed(&self, target: Option<Departure>) -> Option<u32> {

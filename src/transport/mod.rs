@@ -105,11 +105,14 @@ fn depth_fog<'a>(scene: &'a Scene, plan: &EffectPlan) -> Option<&'a DepthFog> {
 }
 
 /// Where the random numbers of a sample come from.
-#[derive(Clone, Copy)]
-struct Address {
-    pixel: [u32; 2],
-    replicate: u32,
-    index: u32,
+#[derive(Clone, Copy, Debug)]
+pub struct Address {
+    /// Its pixel; coordinates of overscan wrap.
+    pub pixel: [u32; 2],
+    /// Which scrambling.
+    pub replicate: u32,
+    /// Its number in that.
+    pub index: u32,
 }
 
 impl Address {
@@ -146,6 +149,8 @@ struct Begun {
     sample: PixelSample,
     /// What was counted on its way, where that is asked for.
     counted: Counts,
+    /// See [`Incoming::events`].
+    events: u32,
 }
 
 impl Begun {
@@ -158,6 +163,7 @@ impl Begun {
             ray: Ray::new(DVec3::ZERO, DVec3::Z),
             sample: PixelSample { radiance: zero, wavelengths, xyz: [0.0; 3], alpha: 0.0, weight: 1.0 },
             counted: Counts::default(),
+            events: 0,
         }
     }
 
@@ -170,13 +176,13 @@ impl Begun {
         let corner = DVec2::new(f64::from(at.pixel[0] as i32), f64::from(at.pixel[1] as i32));
         if let Integrator::Whitted(settings) = &plan.integrator {
             // A regular grid, the same for every pixel. The wavelengths of all samples together make one
-            // lattice: a step of the lanes' own distance over their number.
+            // lattice: a step of the lanes' own distance over their number; those of any part of the pixel are spread over it.
             let n = settings.grid;
             let s = at.in_turn();
             let cell = s % (n * n);
             let offset = DVec2::new(f64::from(cell % n) + 0.5, f64::from(cell / n) + 0.5) / f64::from(n);
-            let nodes = f64::from(settings.samples()) * LANES as f64;
-            self.sample.wavelengths = scene.wavelengths.sample((f64::from(s) + 0.5) / nodes);
+            let turn = settings.wavelengths.at(s) / LANES as f64;
+            self.sample.wavelengths = scene.wavelengths.sample(turn);
             self.place = corner + offset;
             self.ray = scene.camera.ray(self.place, || DVec2::splat(0.5));
             self.sample.weight = 1.0;
@@ -304,6 +310,7 @@ impl Begun {
     fn see(&mut self, light: &Incoming) {
         self.sample.radiance = light.radiance;
         self.sample.alpha = light.alpha;
+        self.events = light.events;
     }
 
     /// What the film needs of the light.
@@ -345,7 +352,7 @@ pub fn sample(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Pixe
     let light = begun.light(shot, &sampler, &shot.plan.integrator, shot.fog(), None);
     begun.see(&light);
     begun.finish();
-    (begun.sample, light.events)
+    (begun.sample, begun.events)
 }
 
 /// A place in block `block` of the `side` × `side` that the picture is cut into, in pixels.
@@ -369,6 +376,8 @@ pub struct Samples {
     layers: layers::Values,
     /// One for each, where light is parted.
     ledgers: Vec<Ledger>,
+    /// Pairs of vertices that were asked whether they see each other.
+    pairs: u32,
 }
 
 impl Default for Samples {
@@ -378,40 +387,51 @@ impl Default for Samples {
             begun: std::array::from_fn(|_| Begun::blank()),
             layers: layers::Values::default(),
             ledgers: Vec::new(),
+            pairs: 0,
         }
     }
 }
 
 impl Samples {
-    /// Renders `samples` of `pixel`, each a replicate and an index in it, and gives each by its place among them, with the
-    /// numbers of its layers and what covers it, where there are mattes.
+    /// What the samples of the last call, so many of `scene`, took, in rays.
+    fn rays(&self, scene: &Scene, samples: usize) -> f64 {
+        // A ray to the next vertex and one to a light from each.
+        let paths: u32 = self.begun[..samples].iter().map(|begun| 1 + 2 * begun.events).sum();
+        f64::from(paths) + path::reuse::cost_of_a_pair(scene) * f64::from(self.pairs)
+    }
+
+    /// Renders `samples` and gives each by its place among them, with the numbers of its layers and what covers it, where there
+    /// are mattes. Where the plan has paths share what they find they are those of a group, else any.
     ///
     /// # Panics
     /// If they are more than [`Octet::SAMPLES`].
     pub fn render(
         &mut self,
         shot: &Shot,
-        pixel: [u32; 2],
-        samples: &[(u32, u32)],
+        samples: &[Address],
         mut give: impl FnMut(usize, &PixelSample, &[f32], Option<u64>),
     ) {
-        let Samples { octet, begun, layers, ledgers } = self;
+        let Samples { octet, begun, layers, ledgers, pairs } = self;
         let begun = &mut begun[..samples.len()];
-        octet.reset(shot.seed, pixel, samples);
+        octet.reset(shot.seed, samples.iter().map(|at| (at.pixel, at.replicate, at.index)));
         // Step by step: in all but the second no sample waits for the one before, so that they overlap.
-        for (i, (begun, &(replicate, index))) in begun.iter_mut().zip(samples).enumerate() {
-            begun.begin(shot, Address { pixel, replicate, index }, &octet.sampler(i));
+        for (i, (begun, &at)) in begun.iter_mut().zip(samples).enumerate() {
+            begun.begin(shot, at, &octet.sampler(i));
         }
+        if shot.plan.layers.parts_light() && ledgers.is_empty() {
+            let ledger = |_| Ledger::new(shot.scene.light_groups.count().into());
+            ledgers.extend((0..Octet::SAMPLES).map(ledger));
+        }
+        ledgers.iter().for_each(Ledger::clear);
+        *pairs = 0;
         match &shot.plan.integrator {
+            Integrator::Path(settings) if shot.plan.reuse => {
+                *pairs = follow_shared(begun, shot, settings, octet, ledgers);
+            }
             Integrator::Path(settings) if path::together::possible(shot, settings) && begun.len() > 1 => {
                 follow_together(begun, shot, settings, octet);
             }
             _ => {
-                if shot.plan.layers.parts_light() && ledgers.is_empty() {
-                    let ledger = |_| Ledger::new(shot.scene.light_groups.count().into());
-                    ledgers.extend((0..Octet::SAMPLES).map(ledger));
-                }
-                ledgers.iter().for_each(Ledger::clear);
                 for (i, begun) in begun.iter_mut().enumerate() {
                     begun.follow(shot, &octet.sampler(i), ledgers.get(i));
                 }
@@ -441,41 +461,95 @@ impl Samples {
 /// its number behind a hole.
 fn deciding(shot: &Shot, sampler: &Sampler, at: Address, crossing: u32, left: Option<f64>) -> f64 {
     match &shot.plan.integrator {
-        Integrator::Whitted(settings) => left.unwrap_or_else(|| spread(at.in_turn(), settings.samples())),
+        Integrator::Whitted(settings) => {
+            left.unwrap_or_else(|| Spread::new(settings.samples(), GOLDEN).at(at.in_turn()))
+        }
         _ => sampler.set(Set::Extra(crossing << 16))[2],
     }
 }
 
-/// Of the numbers (k + 1/2)/n that of sample `s`, k = s·g mod n. With g next to the golden part of n and coprime, the numbers of
-/// neighbouring rows or columns of a pixel are spread nearly as evenly as all, so that what covers them meets its share.
-fn spread(s: u32, n: u32) -> f64 {
-    let is_coprime = |step: &u32| {
-        let (mut a, mut b) = (*step, n);
-        while b > 0 {
-            (a, b) = (b, a % b);
-        }
-        a == 1
-    };
-    let golden = (GOLDEN * f64::from(n)).round() as u32;
-    // n + 1 is.
-    let step = (golden..=n + 1).find(is_coprime).unwrap_or(1);
-    let k = u64::from(s) * u64::from(step) % u64::from(n);
-    (k as f64 + 0.5) / f64::from(n)
+/// The inverse of the plastic number, the real root of x³ = x + 1: its multiples are spread as evenly, and have little to do with
+/// those of [`GOLDEN`].
+const PLASTIC: f64 = 0.754_877_666_246_692_8;
+
+/// How the numbers of samples are spread over [0, 1).
+#[derive(Clone, Copy, Debug)]
+pub struct Spread {
+    count: u32,
+    step: u32,
+}
+
+impl Spread {
+    /// Of `count` samples, by steps next to `part` of them and coprime. With a part that fractions approximate badly the numbers of
+    /// neighbouring rows or columns of a pixel are spread nearly as evenly as all, so that what covers them meets its share.
+    fn new(count: u32, part: f64) -> Spread {
+        let is_coprime = |step: &u32| {
+            let (mut a, mut b) = (*step, count);
+            while b > 0 {
+                (a, b) = (b, a % b);
+            }
+            a == 1
+        };
+        let near = (part * f64::from(count)).round() as u32;
+        // count + 1 is.
+        let step = (near..=count + 1).find(is_coprime).unwrap_or(1);
+        Spread { count, step }
+    }
+
+    /// That of wavelengths.
+    #[must_use]
+    pub fn of_wavelengths(count: u32) -> Spread {
+        Spread::new(count, PLASTIC)
+    }
+
+    /// Of the numbers (k + 1/2)/n that of sample `s`: k = s · step mod n.
+    fn at(self, s: u32) -> f64 {
+        let k = u64::from(s) * u64::from(self.step) % u64::from(self.count);
+        (k as f64 + 0.5) / f64::from(self.count)
+    }
 }
 
 /// [`Begun::follow`] of several samples whose paths go together.
 fn follow_together(begun: &mut [Begun], shot: &Shot, settings: &PathSettings, octet: &Octet) {
     let mut light = [Incoming::NONE; Octet::SAMPLES];
-    let wanted = |i: usize| {
-        let Begun { ray, sample: PixelSample { wavelengths, .. }, .. } = &begun[i];
-        Wanted { sampler: octet.sampler(i), nm: wavelengths.nm, ray }
-    };
-    let Shot { scene, plan, photons, .. } = *shot;
-    let map = photons.map(|p| p.map);
-    path::together::radiance(scene, plan, settings, map, begun.len(), wanted, |i, found| light[i] = found);
+    path::together::radiance(shot, settings, begun.len(), wanted(begun, octet), |i, found| light[i] = found);
     for (begun, mut light) in begun.iter_mut().zip(light) {
         veil(shot.fog(), &mut light, begun.sample.wavelengths.nm, None);
         begun.see(&light);
+    }
+}
+
+/// [`Begun::follow`] of samples of a group of pixels whose paths share what they find.
+///
+/// How many pairs of their vertices were asked whether they see each other.
+fn follow_shared(begun: &mut [Begun], shot: &Shot, settings: &PathSettings, octet: &Octet, ledgers: &[Ledger]) -> u32 {
+    let watched = shot.scene.watch.is_some();
+    if watched {
+        // What came before belongs to no sample.
+        let _ = watch::take();
+    }
+    let shared = begun[0].sample.wavelengths;
+    begun.iter_mut().for_each(|begun| begun.sample.wavelengths = shared);
+    let mut light = [Incoming::NONE; Octet::SAMPLES];
+    let give = |i: usize, found| light[i] = found;
+    let pairs = path::reuse::radiance(shot, settings, ledgers, begun.len(), wanted(begun, octet), give);
+    for (i, (begun, mut light)) in begun.iter_mut().zip(light).enumerate() {
+        veil(shot.fog(), &mut light, shared.nm, ledgers.get(i));
+        begun.see(&light);
+        begun.counted = Counts::default();
+    }
+    if watched {
+        // They work for all: the first answers for them.
+        begun[0].counted = watch::take();
+    }
+    pairs
+}
+
+/// What the paths of samples need.
+fn wanted<'a>(begun: &'a [Begun], octet: &'a Octet) -> impl Fn(usize) -> Wanted<'a> {
+    |i: usize| {
+        let Begun { ray, sample: PixelSample { wavelengths, .. }, .. } = &begun[i];
+        Wanted { sampler: octet.sampler(i), nm: wavelengths.nm, ray }
     }
 }
 

@@ -12,6 +12,7 @@
 
 mod lights;
 mod parting;
+pub mod reuse;
 mod state;
 pub mod together;
 
@@ -32,6 +33,7 @@ use crate::scene::{Hit, Inside, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::DVec3;
 use lights::{Asked, power_heuristic};
+use reuse::Joint;
 use state::{Choice, Leaving, Path, Previous, Step, Walk};
 use std::cell::Cell;
 
@@ -98,12 +100,17 @@ impl Tracer<'_> {
         let inside = if MEDIA { scene.camera_inside } else { Inside::NOTHING };
         let mut path = Path { ray: *ray, inside, ..Path::BLANK };
         // The camera does not see beyond its clipping plane; what it sees lies in everything's light.
-        let (alpha, depth) = self.follow::<CHROMATIC, MEDIA>(&mut path, scene.camera.reach(ray));
-        path.incoming(alpha, depth)
+        let walk = self.follow::<CHROMATIC, MEDIA>(&mut path, scene.camera.reach(ray), None);
+        path.incoming(walk.alpha, walk.depth)
     }
 
-    /// Follows a path to its end, first no farther than `reach`; coverage and depth of what it meets first.
-    fn follow<const CHROMATIC: bool, const MEDIA: bool>(&self, path: &mut Path, mut reach: f64) -> (f32, f64) {
+    /// Follows a path to its end, first no farther than `reach`. Its first vertices may be noted in a `joint`.
+    fn follow<const CHROMATIC: bool, const MEDIA: bool>(
+        &self,
+        path: &mut Path,
+        mut reach: f64,
+        mut joint: Option<&mut Joint>,
+    ) -> Walk {
         let scene = self.scene;
         let mut walk = Walk::begin(scene, self.settings);
         let mut ahead = Ahead::UNKNOWN;
@@ -151,16 +158,17 @@ impl Tracer<'_> {
                 }
             }
 
-            match self.meet::<CHROMATIC, MEDIA>(path, &mut walk, hit, None) {
+            match self.meet::<CHROMATIC, MEDIA>(path, &mut walk, hit, None, joint.as_deref_mut()) {
                 Step::Ended => break,
                 Step::Straight(distance) => ahead.go_on(distance),
                 Step::Scattered => {}
             }
         }
-        (walk.alpha, walk.depth)
+        walk
     }
 
-    /// What a path does with what it meets. A shadow ray is left to `later`, where there is such a place.
+    /// What a path does with what it meets. A shadow ray is left to `later`, where there is such a place; its first vertices are
+    /// noted in a `joint`.
     #[inline(always)]
     fn meet<const CHROMATIC: bool, const MEDIA: bool>(
         &self,
@@ -168,6 +176,7 @@ impl Tracer<'_> {
         walk: &mut Walk,
         hit: Option<Hit>,
         later: Option<&mut Option<Asked>>,
+        joint: Option<&mut Joint>,
     ) -> Step {
         let scene = self.scene;
         let Some(hit) = hit else {
@@ -308,6 +317,15 @@ impl Tracer<'_> {
             choice: &choice,
         };
         let at = hit.texture_point(&surface);
+        if let Some(joint) = joint {
+            match &material.kind {
+                Kind::Diffuse { reflectance } if leaf.is_none() && straight.is_none() => {
+                    let vertex = reuse::Vertex { hit, surface, up: frame.n, flip, wo: wo_world };
+                    joint.meet(path, &vertex, || reflectance.eval(&at, self.nm), scene, self.ledger);
+                }
+                _ => joint.part(),
+            }
+        }
         // The most common of all has code of its own.
         let goes_on = match &material.kind {
             Kind::Diffuse { reflectance } if !MEDIA => {
@@ -621,6 +639,10 @@ fn sided_normal(material: &Material, frame: &Frame) -> Option<DVec3> {
 /// The shading normal; the true one where the viewer sees the surface from one side and the shading normal's from
 /// the other.
 pub(super) fn seen_normal(surface: &SurfacePoint, wo: DVec3) -> DVec3 {
-    let normal = surface.shading_normal;
-    if normal.dot(wo) * surface.normal.dot(wo) <= 0.0 { surface.normal } else { normal }
+    if sides_differ(surface, wo) { surface.normal } else { surface.shading_normal }
+}
+
+/// Whether `wo` is on one side of the surface and on the other of its shading normal's.
+fn sides_differ(surface: &SurfacePoint, wo: DVec3) -> bool {
+    surface.shading_normal.dot(wo) * surface.normal.dot(wo) <= 0.0
 }

@@ -5,6 +5,7 @@
 //! on and is the proof. A *technique* is how an effect is computed; it changes noise and time,
 //! never the mean.
 
+use super::Spread;
 use super::caustics::Caustics;
 use super::layers::LayerPlan;
 use crate::scene::census::Census;
@@ -111,6 +112,8 @@ pub struct WhittedSettings {
     pub max_depth: u32,
     /// Points of a pixel along each side.
     pub grid: u32,
+    /// How the wavelengths of a pixel's samples are spread.
+    pub wavelengths: Spread,
     /// Radiance that surfaces get from everywhere, times their reflectance.
     pub ambient: Spectrum,
     /// True where transparent objects let light through in a straight line, dimmed and tinted by
@@ -124,7 +127,13 @@ impl WhittedSettings {
     /// 10 %; with one point it is traced four times.
     #[must_use]
     pub fn samples(&self) -> u32 {
-        (self.grid * self.grid).max(4)
+        WhittedSettings::samples_of(self.grid)
+    }
+
+    /// The same of a `grid`.
+    #[must_use]
+    pub fn samples_of(grid: u32) -> u32 {
+        (grid * grid).max(4)
     }
 }
 
@@ -168,6 +177,8 @@ pub struct EffectPlan {
     pub lit: bool,
     /// Wavelengths that part at glass that the camera looks at are followed together.
     pub packets: bool,
+    /// Paths of pixels near each other share what they find.
+    pub reuse: bool,
     /// Every glass is computed as if it were dispersive.
     pub all_dispersive: bool,
     /// Light of mirrors and glass that is traced from the lights.
@@ -335,6 +346,7 @@ impl EffectPlan {
             nested,
             depth_fog,
             packets: path && !census.dispersive.is_empty(),
+            reuse: false,
             all_dispersive: mode == EffectMode::All,
             caustics: None,
             adaptive: None,

@@ -1,15 +1,19 @@
-//! A trial before the render: whether wavelengths that part at the glass before the camera are worth following together.
+//! Trials before the render: whether wavelengths that part at the glass before the camera are worth following together, and
+//! whether paths are worth sharing by pixels.
 //!
 //! Two ways to spend time are equal where variance times cost is. Both are rendered at places spread over the picture, with as
 //! many evenly spread samples as a replicate of the render has (sixteen at the most), because a hero's colours average out over its
 //! samples; two replicates tell the variance. Costs are counted in rays, so that every machine decides alike.
 
+use super::layers::LayerPlan;
+use super::path::reuse;
 use super::plan::{Effect, EffectPlan, Integrator};
-use super::{Incoming, Shot};
+use super::{Address, Incoming, Samples, Shot};
 use crate::film::accumulate::REPLICATES;
 use crate::film::filter::FilterSampler;
-use crate::math::sampler::{Sampler, Set, pairs};
+use crate::math::sampler::{Octet, Sampler, Set, pairs};
 use crate::scene::Scene;
+use crate::scene::census::Census;
 use crate::spectrum::{ColourSpace, observer};
 use crate::transport::pilot::Use;
 use rayon::prelude::*;
@@ -32,6 +36,8 @@ struct Tried {
     /// Linear Rec. 709 of two replicates.
     colours: Vec<[[f64; 3]; 2]>,
     rays: f64,
+    /// Pairs of vertices that were asked whether they see each other.
+    pairs: u64,
 }
 
 /// Whether packets pay, and what to say of it; nothing where no smooth glass disperses.
@@ -70,6 +76,97 @@ pub fn packets(
     said(ratio < 1.0, reason)
 }
 
+/// Share of the samples of the picture that either way takes in the trial of [`reuse`].
+const SHARE: f64 = 1.0 / 128.0;
+/// The least and most groups of pixels that are tried.
+const GROUPS: (f64, f64) = (9.0, 256.0);
+/// How much less the time to an error has to be for paths to be shared.
+const WORTH_IT: f64 = 0.9;
+
+/// Whether pixels share what their paths find, and what to say of it; nothing but for paths from the camera.
+#[must_use]
+#[expect(clippy::too_many_arguments, reason = "all that a picture is made of")]
+pub fn reuse(
+    scene: &Scene,
+    census: &Census,
+    moments: &[Scene],
+    plan: &EffectPlan,
+    filter: &FilterSampler,
+    seed: u64,
+    samples: u32,
+    wish: Use,
+) -> Option<(bool, Effect)> {
+    let Integrator::Path(settings) = &plan.integrator else { return None };
+    let said = |on, reason: String| Some((on, Effect { name: "paths shared by pixels".into(), on, reason }));
+    if let Some(obstacle) = reuse::obstacle(scene, census, settings, moments.len()) {
+        return said(false, obstacle.into());
+    }
+    // Its own pilot asks pixels one by one.
+    if plan.adaptive.is_some() {
+        return said(false, "samples are shared out by noise".into());
+    }
+    match wish {
+        Use::Auto => {}
+        Use::On => return said(true, "the scene says so".into()),
+        Use::Off => return said(false, "the scene says so".into()),
+    }
+    let [alone, together] = [false, true].map(|reuse| {
+        let plan = EffectPlan { reuse, layers: LayerPlan::default(), ..plan.clone() };
+        try_groups(&Shot { scene, plan: &plan, filter, seed: seed ^ STREAM, photons: None }, samples)
+    });
+    if together.pairs == 0 {
+        return said(false, "no path goes from one diffuse surface to another".into());
+    }
+    let ratio = cost_of_error(&together) / cost_of_error(&alone);
+    if ratio.is_nan() {
+        return said(false, "the trial sees no light".into());
+    }
+    said(ratio < WORTH_IT, format!("the trial expects {ratio:.2} times the time to the same error"))
+}
+
+/// Renders groups of pixels.
+fn try_groups(shot: &Shot, samples: u32) -> Tried {
+    let each = (samples / REPLICATES as u32).clamp(1, MOST);
+    let [width, height] = shot.scene.camera.resolution;
+    let all = f64::from(width) * f64::from(height) * f64::from(samples);
+    let wanted = SHARE * all / f64::from(2 * each * reuse::SIDE as u32);
+    let side = wanted.clamp(GROUPS.0, GROUPS.1).sqrt() as usize;
+    let groups: Vec<_> = (0..side * side)
+        .into_par_iter()
+        .map(|k| {
+            let u = pairs(Sampler::new(shot.seed, [k as u32, 0], 0, 0).set(Set::Lens)).0;
+            let place = super::place_in(shot.scene, side, k, u);
+            let cell = [place.x, place.y].map(|x| x as i32 / reuse::SIDE as i32 * reuse::SIDE as i32);
+            // Of those inside, of which there are some.
+            let group =
+                reuse::groups(cell, [width, height]).find(|group| group.holds([place.x as i32, place.y as i32]));
+            let pixels = group.as_ref().map_or(&[][..], |group| group.pixels());
+            let mut tried = Tried { colours: vec![[[0.0; 3]; 2]; pixels.len()], ..Tried::default() };
+            let mut memory = Samples::default();
+            for (replicate, index) in (0..2).flat_map(|replicate| (0..each).map(move |index| (replicate, index))) {
+                let mut addresses = [Address { pixel: [0; 2], replicate, index }; Octet::SAMPLES];
+                for (to, pixel) in addresses.iter_mut().zip(pixels) {
+                    to.pixel = pixel.map(|x| x as u32);
+                }
+                memory.render(shot, &addresses[..pixels.len()], |lane, sample, _, _| {
+                    let rgb = ColourSpace::Rec709.from_xyz(sample.xyz);
+                    for (sum, value) in tried.colours[lane][replicate as usize].iter_mut().zip(rgb) {
+                        *sum += f64::from(value * sample.weight) / f64::from(each);
+                    }
+                });
+                tried.rays += memory.rays(shot.scene, pixels.len());
+                tried.pairs += u64::from(memory.pairs);
+            }
+            tried
+        })
+        .collect();
+    Tried {
+        rays: groups.iter().map(|group| group.rays).sum(),
+        pairs: groups.iter().map(|group| group.pairs).sum(),
+        colours: groups.into_iter().flat_map(|group| group.colours).collect(),
+    }
+}
+
 /// Renders the places.
 fn try_out(shot: &Shot, each: u32) -> Tried {
     let [width, height] = shot.scene.camera.resolution.map(f64::from);
@@ -97,7 +194,8 @@ fn try_out(shot: &Shot, each: u32) -> Tried {
             (colours, rays)
         })
         .collect();
-    Tried { rays: places.iter().map(|p| p.1).sum(), colours: places.into_iter().map(|p| p.0).collect() }
+    let rays = places.iter().map(|p| p.1).sum();
+    Tried { rays, colours: places.into_iter().map(|p| p.0).collect(), pairs: 0 }
 }
 
 /// Variance, relative as that of a picture is, times cost.

@@ -90,6 +90,8 @@ pub struct Ledger {
     sums: RefCell<Vec<Lanes>>,
     /// The same of paths that are behind depth fog already.
     veiled: RefCell<Vec<Lanes>>,
+    /// What is set aside from `sums`.
+    aside: RefCell<Vec<Lanes>>,
     first: Cell<First>,
     /// Whether the vertex that the path is at is on something sharp.
     here: Cell<bool>,
@@ -117,6 +119,7 @@ impl Ledger {
         Ledger {
             sums: RefCell::new(vec![Lanes::ZERO; WAYS * groups]),
             veiled: RefCell::new(vec![Lanes::ZERO; WAYS * groups]),
+            aside: RefCell::new(vec![Lanes::ZERO; WAYS * groups]),
             first: Cell::new(First::Media),
             here: Cell::new(false),
             sharp: Cell::new(false),
@@ -214,6 +217,27 @@ impl Ledger {
             *veiled += std::mem::replace(light, Lanes::ZERO) * factor;
         }
         veiled[Way::MediaDirect as usize] += veil;
+    }
+
+    /// Sets aside what was entered so far; what comes is for others, too.
+    pub fn set_aside(&self) {
+        self.sums.swap(&self.aside);
+    }
+
+    /// Adds the `share` of what was entered in another to what is set aside.
+    pub fn gain(&self, other: &Ledger, share: Lanes) {
+        let mut aside = self.aside.borrow_mut();
+        aside.iter_mut().zip(other.sums.borrow().iter()).for_each(|(own, light)| *own += share * *light);
+    }
+
+    /// Takes back what was set aside and gained: in place of what was entered since, where that was `shared` among all.
+    pub fn put_back(&self, shared: bool) {
+        if shared {
+            self.sums.borrow_mut().fill(Lanes::ZERO);
+        }
+        for (light, aside) in self.sums.borrow_mut().iter_mut().zip(self.aside.borrow_mut().iter_mut()) {
+            *light += std::mem::replace(aside, Lanes::ZERO);
+        }
     }
 
     /// Multiplies all with `factor`.

@@ -4,6 +4,7 @@
 
 pub mod place;
 
+use abbe::batch::finish::Sharing;
 use abbe::batch::frame::{self, Frame};
 use abbe::batch::{self, Overrides, Prepared};
 use abbe::film::Window;
@@ -13,6 +14,7 @@ use abbe::math::Ray;
 use abbe::math::sampler::{Sampler, Set, pairs};
 use abbe::math::statistics::Moments;
 use abbe::spectrum::{ColourSpace, LANES, Lanes, SampledWavelengths, WavelengthDistribution, observer};
+use abbe::transport::path::reuse;
 use abbe::transport::plan::{EffectPlan, Integrator};
 use abbe::transport::{self, Incoming, path, whitted};
 use glam::{DVec2, DVec3};
@@ -45,6 +47,8 @@ pub struct Picture {
     pub alpha: Vec<f64>,
     /// Samples that were dropped.
     pub invalid: u64,
+    /// How many times the variance of the sum of all pixels is that of independent ones, at the most.
+    pub shared: f64,
 }
 
 /// A mean with its standard error.
@@ -217,6 +221,9 @@ impl Bench {
     pub fn picture(&self) -> Picture {
         let frame = self.frame();
         let film = &frame.film;
+        // The filter is a box: what is splatted falls into one pixel.
+        let cell = if self.prepared.plan.reuse { reuse::SIDE as u32 } else { 1 };
+        let sharing = Sharing::Near { span: 1.0, overlap: 1.0, cell };
         let xyz = frame.resolve(&ColourSpace::Xyz.matrix_from_xyz());
         let rgb = frame.resolve(&ColourSpace::Rec709.matrix_from_xyz());
         let wavelengths = &self.prepared.scene.wavelengths;
@@ -229,6 +236,7 @@ impl Bench {
         Picture {
             window: film.window(),
             invalid: film.invalid.total(),
+            shared: frame.shared_errors(&xyz, &ColourSpace::Xyz.matrix_from_xyz(), sharing),
             y: xyz.rgb[1].iter().map(|y| f64::from(*y) / unit).collect(),
             error: xyz.standard_error[1].iter().map(|y| f64::from(*y) / unit).collect(),
             alpha: xyz.alpha.iter().map(|a| f64::from(*a)).collect(),
@@ -274,10 +282,10 @@ impl Picture {
         assert!(bad == 0, "{bad} of {} pixels are off {expected} by more than {tolerance}: {worst}", self.y.len());
     }
 
-    /// The mean pixel. Pixels are independent, so their errors add in squares.
+    /// The mean pixel. Errors of pixels add in squares, but for what they share.
     pub fn mean(&self) -> Estimate {
         let n = self.y.len() as f64;
-        let variance: f64 = self.error.iter().map(|e| e * e).sum();
+        let variance = self.shared * self.error.iter().map(|e| e * e).sum::<f64>();
         Estimate { mean: self.y.iter().sum::<f64>() / n, error: variance.sqrt() / n }
     }
 }

@@ -17,6 +17,7 @@ mod indices;
 mod lights;
 mod media;
 mod nested;
+mod reuse;
 mod techniques;
 mod volumes;
 

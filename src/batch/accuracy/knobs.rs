@@ -1,10 +1,11 @@
 //! Which knobs a sheet moves, and to what.
 
-use super::super::{Prepared, adaptive};
+use super::super::{Prepared, adaptive, motion};
 use super::Settings;
 use crate::error::{Error, Result};
 use crate::film::accumulate::REPLICATES;
 use crate::spectrum::Carried;
+use crate::transport::path::reuse;
 use crate::transport::pilot::Use;
 use crate::transport::plan::Integrator;
 
@@ -152,10 +153,13 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
     let caustics = chosen.plan.caustics.as_deref();
     let about = |words: &str| chosen.plan.techniques.iter().any(|t| t.name.contains(words));
     let shared = adaptive::choose(Use::On, false, &chosen.plan, samples).0.is_some();
+    let census = motion::census(&chosen.scene, &chosen.moments);
+    let joined = reuse::obstacle(&chosen.scene, &census, path, chosen.moments.len()).is_none();
     for (knob, key, on, cause) in [
         ("light tracing", "light_tracing", caustics.is_some(), about("light tracing")),
         ("packets", "packets", chosen.plan.packets || caustics.is_some(), about("packets")),
         ("merging", "merging", caustics.is_some_and(|c| c.merging.is_some()), about("merging")),
+        ("path reuse", "reuse", chosen.plan.reuse, joined),
         ("adaptive", "adaptive", chosen.plan.adaptive.is_some(), shared),
     ] {
         if cause {

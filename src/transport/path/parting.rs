@@ -44,7 +44,7 @@ impl Tracer<'_> {
             // One wavelength in all lanes: nothing depends on which of them leads.
             let tracer = Tracer { nm: Lanes::splat(nm[lane]), ..*self };
             if tracer.leave::<false, MEDIA>(&mut alone, &sample, || Lanes::ZERO, at) {
-                tracer.follow::<false, MEDIA>(&mut alone, f64::INFINITY);
+                tracer.follow::<false, MEDIA>(&mut alone, f64::INFINITY, None);
             }
             radiance[lane] += alone.radiance.to_array()[0];
             left[lane] += alone.left.to_array()[0];

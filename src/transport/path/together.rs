@@ -4,13 +4,12 @@
 //! What a path does is `Tracer::meet`, as for one alone, with the same numbers in the same order: the bits are the same.
 
 use super::lights::Asked;
+use super::reuse::Joint;
 use super::{Path, Step, Tracer, Walk};
 use crate::math::Ray;
 use crate::math::sampler::Sampler;
-use crate::scene::Scene;
 use crate::spectrum::Lanes;
-use crate::transport::photons::PhotonMap;
-use crate::transport::plan::{EffectPlan, PathSettings};
+use crate::transport::plan::PathSettings;
 use crate::transport::{Incoming, Shot};
 
 /// How many paths go together at the most.
@@ -39,35 +38,50 @@ pub struct Wanted<'a> {
 
 /// The light of `count` samples, at most [`MOST`]: of the `i`th, which `wanted` tells, `give` gets it.
 pub fn radiance<'a>(
-    scene: &'a Scene,
-    plan: &'a EffectPlan,
+    shot: &'a Shot,
     settings: &'a PathSettings,
-    photons: Option<&'a PhotonMap>,
-    count: usize,
-    wanted: impl Fn(usize) -> Wanted<'a>,
-    give: impl FnMut(usize, Incoming),
-) {
-    match plan.chromatic {
-        true => trace::<true>(scene, plan, settings, photons, count, wanted, give),
-        false => trace::<false>(scene, plan, settings, photons, count, wanted, give),
-    }
-}
-
-fn trace<'a, const CHROMATIC: bool>(
-    scene: &'a Scene,
-    plan: &'a EffectPlan,
-    settings: &'a PathSettings,
-    photons: Option<&'a PhotonMap>,
     count: usize,
     wanted: impl Fn(usize) -> Wanted<'a>,
     mut give: impl FnMut(usize, Incoming),
 ) {
     let mut paths = [const { Path::BLANK }; MOST];
     let mut walks = [const { Walk::NEW }; MOST];
+    let (paths, walks) = (&mut paths[..count], &mut walks[..count]);
+    follow(shot, settings, wanted, paths, walks, None);
+    for (i, (path, walk)) in paths.iter().zip(walks).enumerate() {
+        give(i, path.incoming(walk.alpha, walk.depth));
+    }
+}
+
+/// Follows blank `paths`, at most [`MOST`], to their ends; the first vertices of each may be noted in `joints`.
+pub(super) fn follow<'a>(
+    shot: &'a Shot,
+    settings: &'a PathSettings,
+    wanted: impl Fn(usize) -> Wanted<'a>,
+    paths: &mut [Path],
+    walks: &mut [Walk],
+    joints: Option<&mut [Joint]>,
+) {
+    match shot.plan.chromatic {
+        true => trace::<true>(shot, settings, wanted, paths, walks, joints),
+        false => trace::<false>(shot, settings, wanted, paths, walks, joints),
+    }
+}
+
+fn trace<'a, const CHROMATIC: bool>(
+    shot: &'a Shot,
+    settings: &'a PathSettings,
+    wanted: impl Fn(usize) -> Wanted<'a>,
+    paths: &mut [Path],
+    walks: &mut [Walk],
+    mut joints: Option<&mut [Joint]>,
+) {
+    let Shot { scene, plan, photons, .. } = *shot;
+    let photons = photons.map(|p| p.map);
     let mut asked: [Option<Asked>; MOST] = [const { None }; MOST];
     // The camera does not see beyond its clipping plane.
     let mut reach = [f64::INFINITY; MOST];
-    for (i, path) in paths.iter_mut().enumerate().take(count) {
+    for (i, path) in paths.iter_mut().enumerate() {
         let ray = wanted(i).ray;
         (path.ray.origin, path.ray.direction) = (ray.origin, ray.direction);
         reach[i] = scene.camera.reach(ray);
@@ -75,7 +89,7 @@ fn trace<'a, const CHROMATIC: bool>(
     }
     // Those that go on, in order.
     let mut on: [usize; MOST] = std::array::from_fn(|i| i);
-    let mut left = count;
+    let mut left = paths.len();
     while left > 0 {
         let mut hits = [None; MOST];
         for (group, hits) in on[..left].chunks(4).zip(hits.chunks_mut(4)) {
@@ -92,7 +106,9 @@ fn trace<'a, const CHROMATIC: bool>(
             let i = on[k];
             let Wanted { sampler, nm, .. } = wanted(i);
             let tracer = Tracer { scene, plan, settings, sampler, nm, photons, ledger: None };
-            let step = tracer.meet::<CHROMATIC, false>(&mut paths[i], &mut walks[i], hits[k], Some(&mut asked[i]));
+            let joint = joints.as_deref_mut().map(|joints| &mut joints[i]);
+            let (path, walk) = (&mut paths[i], &mut walks[i]);
+            let step = tracer.meet::<CHROMATIC, false>(path, walk, hits[k], Some(&mut asked[i]), joint);
             if asked[i].is_some() {
                 asking[questions] = i;
                 questions += 1;
@@ -117,19 +133,16 @@ fn trace<'a, const CHROMATIC: bool>(
             }
         }
     }
-    for (i, (path, walk)) in paths.iter().zip(&walks).enumerate().take(count) {
-        give(i, path.incoming(walk.alpha, walk.depth));
-    }
 }
 
 /// What each of `group` has, and for the lanes beyond what the first has.
 #[inline(always)]
-fn from_lanes<T>(group: &[usize], of: impl Fn(usize) -> T) -> [T; 4] {
+pub(super) fn from_lanes<T>(group: &[usize], of: impl Fn(usize) -> T) -> [T; 4] {
     let at = |lane: usize| of(*group.get(lane).unwrap_or(&group[0]));
     [at(0), at(1), at(2), at(3)]
 }
 
 #[inline(always)]
-fn all_of<T>([a, b, c, d]: [Option<T>; 4]) -> Option<[T; 4]> {
+pub(super) fn all_of<T>([a, b, c, d]: [Option<T>; 4]) -> Option<[T; 4]> {
     Some([a?, b?, c?, d?])
 }
