@@ -25,14 +25,15 @@ use crate::film::accumulate::{Film, Invalid, REPLICATES, SAMPLES_LIMIT};
 use crate::film::resolve::{counts, replicate_means};
 use crate::math::sampler::mix64;
 use crate::spectrum::ColourSpace;
+use crate::transport::path::reuse;
 use crate::transport::pilot::Use;
 use crate::transport::plan::{Effect, EffectPlan, Integrator};
 use crate::transport::{self, Shot};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Side of a cell in pixels.
-pub const SIDE: u32 = 8;
+/// Side of a cell in pixels: that of the cells in which paths are shared.
+pub const SIDE: u32 = reuse::SIDE as u32;
 
 /// Halves of the replicates.
 pub const HALVES: usize = 2;

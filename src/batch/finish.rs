@@ -22,7 +22,6 @@ use crate::film::resolve::Image;
 use crate::scene::camera::{Camera, Projection};
 use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Channel, Holds};
-use crate::transport::path::reuse;
 use crate::transport::plan::{Effect, EffectPlan, Integrator};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -121,7 +120,7 @@ impl Sharing {
         }
         let filter = splats.then(|| filter(&description.image.filter));
         let of = |part: fn(&Filter) -> f64| filter.as_ref().map_or(1.0, part);
-        let cell = if plan.reuse { reuse::SIDE as u32 } else { 1 };
+        let cell = if plan.reuse { adaptive::SIDE } else { 1 };
         Sharing::Near { span: of(Filter::span), overlap: of(Filter::overlap), cell }
     }
 }

@@ -22,9 +22,9 @@ use crate::spectrum::ColourSpace;
 use crate::transport::layers::Source;
 use crate::transport::merge::Collection;
 use crate::transport::middle;
-use crate::transport::path::reuse;
+use crate::transport::path::reuse::{self, Group};
 use crate::transport::plan::EffectPlan;
-use crate::transport::{Address, PixelSample, Samples, Shot, moment, scene_at};
+use crate::transport::{Address, PixelSample, Samples, Shot, address, moment, scene_at};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Mutex;
@@ -259,7 +259,7 @@ pub(super) fn render_unit(
                 if group.pixels().iter().any(|pixel| window.index(*pixel).is_some()) {
                     // A cell has samples of the same numbers in all its pixels.
                     want(corner, &mut wanted);
-                    wanted.chunks(LONGEST as usize).for_each(|run| unit.render_group(group.pixels(), run));
+                    wanted.chunks(LONGEST as usize).for_each(|run| unit.render_group(&group, run));
                 }
             }
         }
@@ -288,11 +288,6 @@ struct Runs {
     layers: [[LayerRun; REPLICATES]; reuse::SIDE],
 }
 
-/// A pixel as addresses have it: overscan makes negative coordinates, which wrap.
-fn address(pixel: [i32; 2]) -> [u32; 2] {
-    pixel.map(|x| x as u32)
-}
-
 impl Unit<'_> {
     /// Renders `samples` of `pixel`, at most [`LONGEST`]: each the number of a scrambling, which take turns among the replicates,
     /// and an index in it.
@@ -315,14 +310,12 @@ impl Unit<'_> {
     }
 
     /// Renders `samples`, at most [`LONGEST`], of all pixels of a group.
-    fn render_group(&mut self, pixels: &[[i32; 2]], samples: &[(u32, u32)]) {
+    fn render_group(&mut self, group: &Group, samples: &[(u32, u32)]) {
+        let pixels = group.pixels();
         self.begin(pixels.len());
         for &(replicate, index) in samples {
-            let mut addresses = [Address { pixel: [0; 2], replicate, index }; Octet::SAMPLES];
-            for (to, pixel) in addresses.iter_mut().zip(pixels) {
-                to.pixel = address(*pixel);
-            }
-            self.render(self.shot.scene, &addresses[..pixels.len()], |lane| (pixels[lane], lane));
+            let addresses = &group.samples(replicate, index)[..pixels.len()];
+            self.render(self.shot.scene, addresses, |lane| (pixels[lane], lane));
         }
         self.end(pixels);
     }

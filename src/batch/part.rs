@@ -20,7 +20,6 @@ use crate::film::accumulate::{Film, REPLICATES, TileBuffer};
 use crate::film::layers::Layout;
 use crate::transport::light::LightPaths;
 use crate::transport::merge::{self, Collection};
-use crate::transport::path::reuse;
 pub use lights::SplatFilm;
 use lights::{LightsDone, PATHS_OF_A_UNIT, light_paths, paths_of_a_sample};
 use rayon::prelude::*;
@@ -259,7 +258,7 @@ impl<'a> Part<'a> {
         };
         let film = Mutex::new(film(window, layers)?);
         let start = share.samples.start;
-        let least = if job.plan.reuse { reuse::SIDE as u32 } else { 4 };
+        let least = if job.plan.reuse { adaptive::SIDE } else { 4 };
         let tiles = shares(window, job.tile, least, rayon::current_num_threads());
         let tiles = tiles.into_iter().map(|window| Tile { window, done: AtomicU32::new(start) }).collect();
         let lights = Mutex::new(LightsDone { below: start, more: Vec::new() });

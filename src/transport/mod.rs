@@ -115,6 +115,12 @@ pub struct Address {
     pub index: u32,
 }
 
+/// A pixel as addresses have it: overscan makes negative coordinates, which wrap.
+#[must_use]
+pub fn address(pixel: [i32; 2]) -> [u32; 2] {
+    pixel.map(|x| x as u32)
+}
+
 impl Address {
     /// Its number among all samples of the pixel, of whose replicates one comes after the other.
     fn in_turn(self) -> u32 {

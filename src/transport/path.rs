@@ -29,7 +29,7 @@ use crate::scene::ahead::Ahead;
 use crate::scene::compound::{Compound, Leaf, Vertex};
 use crate::scene::material::{Kind, Material, Straight};
 use crate::scene::medium::Medium;
-use crate::scene::{Hit, Inside, Scene, SurfacePoint};
+use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::DVec3;
 use lights::{Asked, power_heuristic};
@@ -74,13 +74,9 @@ pub fn radiance(
     ledger: Option<&Ledger>,
 ) -> Incoming {
     let tracer = Tracer { scene, plan, settings, sampler: *sampler, nm: wavelengths.nm, photons, ledger };
-    // The plan chooses the kernel: what a scene lacks is not in the code that runs.
-    match (plan.chromatic, plan.media || plan.nested) {
-        (false, false) => tracer.trace::<false, false>(ray),
-        (true, false) => tracer.trace::<true, false>(ray),
-        (false, true) => tracer.trace::<false, true>(ray),
-        (true, true) => tracer.trace::<true, true>(ray),
-    }
+    let mut path = Path::BLANK;
+    let walk = tracer.trace(ray, &mut path, None);
+    path.incoming(walk.alpha, walk.depth)
 }
 
 struct Tracer<'a> {
@@ -95,13 +91,19 @@ struct Tracer<'a> {
 }
 
 impl Tracer<'_> {
-    fn trace<const CHROMATIC: bool, const MEDIA: bool>(&self, ray: &Ray) -> Incoming {
-        let scene = self.scene;
-        let inside = if MEDIA { scene.camera_inside } else { Inside::NOTHING };
-        let mut path = Path { ray: *ray, inside, ..Path::BLANK };
+    /// Follows a blank `path` along a ray of the camera to its end. Its first vertices may be noted in a `joint`.
+    fn trace(&self, ray: &Ray, path: &mut Path, joint: Option<&mut Joint>) -> Walk {
+        let Tracer { scene, plan, .. } = *self;
+        (path.ray, path.inside) = (*ray, scene.camera_inside);
         // The camera does not see beyond its clipping plane; what it sees lies in everything's light.
-        let walk = self.follow::<CHROMATIC, MEDIA>(&mut path, scene.camera.reach(ray), None);
-        path.incoming(walk.alpha, walk.depth)
+        let reach = scene.camera.reach(ray);
+        // The plan chooses the kernel: what a scene lacks is not in the code that runs.
+        match (plan.chromatic, plan.media || plan.nested) {
+            (false, false) => self.follow::<false, false>(path, reach, joint),
+            (true, false) => self.follow::<true, false>(path, reach, joint),
+            (false, true) => self.follow::<false, true>(path, reach, joint),
+            (true, true) => self.follow::<true, true>(path, reach, joint),
+        }
     }
 
     /// Follows a path to its end, first no farther than `reach`. Its first vertices may be noted in a `joint`.

@@ -8,10 +8,10 @@
 use super::layers::LayerPlan;
 use super::path::reuse;
 use super::plan::{Effect, EffectPlan, Integrator};
-use super::{Address, Incoming, Samples, Shot};
+use super::{Incoming, Samples, Shot};
 use crate::film::accumulate::REPLICATES;
 use crate::film::filter::FilterSampler;
-use crate::math::sampler::{Octet, Sampler, Set, pairs};
+use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::Scene;
 use crate::scene::census::Census;
 use crate::spectrum::{ColourSpace, observer};
@@ -55,10 +55,8 @@ pub fn packets(
         return None;
     }
     let said = |on, reason| Some((on, Effect { name: "wavelength packets from the camera".into(), on, reason }));
-    match wish {
-        Use::Auto => {}
-        Use::On => return said(true, "the scene says so".into()),
-        Use::Off => return said(false, "the scene says so".into()),
+    if let Some(on) = decided(wish) {
+        return said(on, "the scene says so".into());
     }
     let each = (samples / REPLICATES as u32).clamp(1, MOST);
     let [alone, together] = [false, true].map(|packets| {
@@ -68,12 +66,25 @@ pub fn packets(
     if together.rays == alone.rays {
         return said(false, "no path from the camera parts".into());
     }
-    let ratio = SIDE_BY_SIDE * cost_of_error(&together) / cost_of_error(&alone);
-    if ratio.is_nan() {
-        return said(false, "the trial sees no light".into());
+    let (on, reason) = judge(SIDE_BY_SIDE * cost_of_error(&together) / cost_of_error(&alone), 1.0);
+    said(on, reason)
+}
+
+/// What the scene says of a technique, where it does.
+fn decided(wish: Use) -> Option<bool> {
+    match wish {
+        Use::Auto => None,
+        Use::On => Some(true),
+        Use::Off => Some(false),
     }
-    let reason = format!("the trial expects {ratio:.2} times the time to the same error");
-    said(ratio < 1.0, reason)
+}
+
+/// Whether what takes `ratio` times the time to the same error is worth it, as it is below `bound`, and why.
+fn judge(ratio: f64, bound: f64) -> (bool, String) {
+    match ratio.is_nan() {
+        true => (false, "the trial sees no light".into()),
+        false => (ratio < bound, format!("the trial expects {ratio:.2} times the time to the same error")),
+    }
 }
 
 /// Share of the samples of the picture that either way takes in the trial of [`reuse`].
@@ -96,19 +107,13 @@ pub fn reuse(
     samples: u32,
     wish: Use,
 ) -> Option<(bool, Effect)> {
-    let Integrator::Path(settings) = &plan.integrator else { return None };
+    let Integrator::Path(_) = &plan.integrator else { return None };
     let said = |on, reason: String| Some((on, Effect { name: "paths shared by pixels".into(), on, reason }));
-    if let Some(obstacle) = reuse::obstacle(scene, census, settings, moments.len()) {
+    if let Some(obstacle) = reuse::obstacle(scene, census, plan, moments.len()) {
         return said(false, obstacle.into());
     }
-    // Its own pilot asks pixels one by one.
-    if plan.adaptive.is_some() {
-        return said(false, "samples are shared out by noise".into());
-    }
-    match wish {
-        Use::Auto => {}
-        Use::On => return said(true, "the scene says so".into()),
-        Use::Off => return said(false, "the scene says so".into()),
+    if let Some(on) = decided(wish) {
+        return said(on, "the scene says so".into());
     }
     let [alone, together] = [false, true].map(|reuse| {
         let plan = EffectPlan { reuse, layers: LayerPlan::default(), ..plan.clone() };
@@ -117,11 +122,8 @@ pub fn reuse(
     if together.pairs == 0 {
         return said(false, "no path goes from one diffuse surface to another".into());
     }
-    let ratio = cost_of_error(&together) / cost_of_error(&alone);
-    if ratio.is_nan() {
-        return said(false, "the trial sees no light".into());
-    }
-    said(ratio < WORTH_IT, format!("the trial expects {ratio:.2} times the time to the same error"))
+    let (on, reason) = judge(cost_of_error(&together) / cost_of_error(&alone), WORTH_IT);
+    said(on, reason)
 }
 
 /// Renders groups of pixels.
@@ -137,18 +139,15 @@ fn try_groups(shot: &Shot, samples: u32) -> Tried {
             let u = pairs(Sampler::new(shot.seed, [k as u32, 0], 0, 0).set(Set::Lens)).0;
             let place = super::place_in(shot.scene, side, k, u);
             let cell = [place.x, place.y].map(|x| x as i32 / reuse::SIDE as i32 * reuse::SIDE as i32);
-            // Of those inside, of which there are some.
-            let group =
-                reuse::groups(cell, [width, height]).find(|group| group.holds([place.x as i32, place.y as i32]));
-            let pixels = group.as_ref().map_or(&[][..], |group| group.pixels());
+            let pixel = [place.x as i32, place.y as i32];
+            let group = reuse::groups(cell, [width, height]).find(|group| group.holds(pixel));
+            let group = group.expect("each pixel of a cell is in a group");
+            let pixels = group.pixels();
             let mut tried = Tried { colours: vec![[[0.0; 3]; 2]; pixels.len()], ..Tried::default() };
             let mut memory = Samples::default();
             for (replicate, index) in (0..2).flat_map(|replicate| (0..each).map(move |index| (replicate, index))) {
-                let mut addresses = [Address { pixel: [0; 2], replicate, index }; Octet::SAMPLES];
-                for (to, pixel) in addresses.iter_mut().zip(pixels) {
-                    to.pixel = pixel.map(|x| x as u32);
-                }
-                memory.render(shot, &addresses[..pixels.len()], |lane, sample, _, _| {
+                let addresses = &group.samples(replicate, index)[..pixels.len()];
+                memory.render(shot, addresses, |lane, sample, _, _| {
                     let rgb = ColourSpace::Rec709.from_xyz(sample.xyz);
                     for (sum, value) in tried.colours[lane][replicate as usize].iter_mut().zip(rgb) {
                         *sum += f64::from(value * sample.weight) / f64::from(each);

@@ -154,7 +154,7 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
     let about = |words: &str| chosen.plan.techniques.iter().any(|t| t.name.contains(words));
     let shared = adaptive::choose(Use::On, false, &chosen.plan, samples).0.is_some();
     let census = motion::census(&chosen.scene, &chosen.moments);
-    let joined = reuse::obstacle(&chosen.scene, &census, path, chosen.moments.len()).is_none();
+    let joined = reuse::obstacle(&chosen.scene, &census, &chosen.plan, chosen.moments.len()).is_none();
     for (knob, key, on, cause) in [
         ("light tracing", "light_tracing", caustics.is_some(), about("light tracing")),
         ("packets", "packets", chosen.plan.packets || caustics.is_some(), about("packets")),

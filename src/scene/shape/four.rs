@@ -10,7 +10,22 @@ use crate::scene::shape::flat::Patch;
 use glam::DVec3;
 use wide::f64x4;
 
-type Vec4 = [f64x4; 3];
+/// A vector in each lane.
+pub type Vec4 = [f64x4; 3];
+
+/// `v` in each lane.
+#[inline(always)]
+#[must_use]
+pub fn splat(v: DVec3) -> Vec4 {
+    [f64x4::splat(v.x), f64x4::splat(v.y), f64x4::splat(v.z)]
+}
+
+/// A vector for each lane.
+#[inline(always)]
+#[must_use]
+pub fn lanes([a, b, c, d]: [DVec3; 4]) -> Vec4 {
+    [f64x4::new([a.x, b.x, c.x, d.x]), f64x4::new([a.y, b.y, c.y, d.y]), f64x4::new([a.z, b.z, c.z, d.z])]
+}
 
 /// A ray in each lane: the same for four shapes, or four for a shape that is the same in each lane.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +39,6 @@ impl FourRays {
     #[inline(always)]
     #[must_use]
     pub fn new(ray: &Ray) -> FourRays {
-        let splat = |v: DVec3| [f64x4::splat(v.x), f64x4::splat(v.y), f64x4::splat(v.z)];
         FourRays { origin: splat(ray.origin), direction: splat(ray.direction) }
     }
 
@@ -32,24 +46,24 @@ impl FourRays {
     #[inline(always)]
     #[must_use]
     pub fn of([a, b, c, d]: [&Ray; 4]) -> FourRays {
-        let lanes = |a: DVec3, b: DVec3, c: DVec3, d: DVec3| {
-            [f64x4::new([a.x, b.x, c.x, d.x]), f64x4::new([a.y, b.y, c.y, d.y]), f64x4::new([a.z, b.z, c.z, d.z])]
-        };
         FourRays {
-            origin: lanes(a.origin, b.origin, c.origin, d.origin),
-            direction: lanes(a.direction, b.direction, c.direction, d.direction),
+            origin: lanes([a.origin, b.origin, c.origin, d.origin]),
+            direction: lanes([a.direction, b.direction, c.direction, d.direction]),
         }
     }
 }
 
 /// As [`super::exact::dot`].
 #[inline(always)]
-fn dot(a: &Vec4, b: &Vec4) -> f64x4 {
+#[must_use]
+pub fn dot(a: &Vec4, b: &Vec4) -> f64x4 {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
+/// The difference in each lane.
 #[inline(always)]
-fn minus(a: &Vec4, b: &Vec4) -> Vec4 {
+#[must_use]
+pub fn minus(a: &Vec4, b: &Vec4) -> Vec4 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 

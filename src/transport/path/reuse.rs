@@ -21,14 +21,15 @@
 //! so that overscan changes nothing inside.
 
 use super::state::{Path, Walk};
-use super::together::{self, MOST, Wanted};
+use super::together::{self, MOST, Wanted, from_lanes};
 use super::{Tracer, sides_differ};
 use crate::scene::census::Census;
+use crate::scene::shape::four::{self, Vec4, dot, minus, splat};
 use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::Lanes;
-use crate::transport::plan::PathSettings;
+use crate::transport::plan::{EffectPlan, Integrator, PathSettings};
 use crate::transport::ways::Ledger;
-use crate::transport::{Incoming, Shot};
+use crate::transport::{Address, Incoming, Shot, address};
 use glam::{DVec2, DVec3};
 use wide::f64x4;
 
@@ -45,15 +46,19 @@ pub fn cost_of_a_pair(scene: &Scene) -> f64 {
     if scene.few.is_some() { 0.7 } else { 1.3 }
 }
 
-/// Why paths cannot share what they find in a scene of so many `moments` while the shutter is open; `None` where they can.
+/// Why paths by `plan` cannot share what they find in a scene of so many `moments` while the shutter is open; `None` where they can.
 #[must_use]
-pub fn obstacle(scene: &Scene, census: &Census, settings: &PathSettings, moments: usize) -> Option<&'static str> {
+pub fn obstacle(scene: &Scene, census: &Census, plan: &EffectPlan, moments: usize) -> Option<&'static str> {
+    let Integrator::Path(settings) = &plan.integrator else { return Some("no paths start from the camera") };
     if census.media > 0 || !census.nested.is_empty() {
         Some("there is more than empty space between surfaces")
     } else if scene.has_boundaries {
         Some("some surfaces let light straight through")
     } else if moments > 0 {
         Some("things move while the shutter is open")
+    } else if plan.adaptive.is_some() {
+        // Its own pilot asks pixels one by one.
+        Some("samples are shared out by noise")
     } else if settings.light_samples != 1 || settings.scatter_samples != 1 {
         Some("samples have several paths, or look for light in one way only")
     } else if settings.roulette_depth <= 2 {
@@ -94,6 +99,12 @@ impl Group {
     #[must_use]
     pub fn holds(&self, pixel: [i32; 2]) -> bool {
         self.pixels().contains(&pixel)
+    }
+
+    /// Sample `index` of `replicate` of each pixel: as many of these as there are pixels.
+    #[must_use]
+    pub fn samples(&self, replicate: u32, index: u32) -> [Address; SIDE] {
+        self.pixels.map(|pixel| Address { pixel: address(pixel), replicate, index })
     }
 
     /// Its pixels.
@@ -228,8 +239,11 @@ pub fn radiance<'a>(
     if together::possible(shot, settings) && count > 1 {
         together::follow(shot, settings, wanted, paths, walks, Some(joints));
     } else {
+        let Shot { scene, plan, photons, .. } = *shot;
         for (i, joint) in joints.iter_mut().enumerate() {
-            walks[i] = one(shot, settings, &wanted(i), ledgers.get(i), &mut paths[i], joint);
+            let (Wanted { sampler, nm, ray }, ledger) = (wanted(i), ledgers.get(i));
+            let tracer = Tracer { scene, plan, settings, sampler, nm, photons: photons.map(|p| p.map), ledger };
+            walks[i] = tracer.trace(ray, &mut paths[i], Some(joint));
         }
     }
     let asked = share(shot.scene, paths, joints, ledgers);
@@ -237,28 +251,6 @@ pub fn radiance<'a>(
         give(i, path.incoming(walk.alpha, walk.depth));
     }
     asked
-}
-
-/// Follows a blank `path` to its end.
-fn one(
-    shot: &Shot,
-    settings: &PathSettings,
-    wanted: &Wanted,
-    ledger: Option<&Ledger>,
-    path: &mut Path,
-    joint: &mut Joint,
-) -> Walk {
-    let Shot { scene, plan, photons, .. } = *shot;
-    let Wanted { sampler, nm, ray } = *wanted;
-    let tracer = Tracer { scene, plan, settings, sampler, nm, photons: photons.map(|p| p.map), ledger };
-    (path.ray, path.inside) = (*ray, scene.camera_inside);
-    let reach = scene.camera.reach(ray);
-    match (plan.chromatic, plan.media || plan.nested) {
-        (false, false) => tracer.follow::<false, false>(path, reach, Some(joint)),
-        (true, false) => tracer.follow::<true, false>(path, reach, Some(joint)),
-        (false, true) => tracer.follow::<false, true>(path, reach, Some(joint)),
-        (true, true) => tracer.follow::<true, true>(path, reach, Some(joint)),
-    }
 }
 
 /// How likely the path of each member was to go on from x to the second vertex of another, by area, times π; a row for each of
@@ -313,36 +305,25 @@ fn densities(scene: &Scene, paths: &[Path], joints: &[Joint]) -> (Densities, u32
         let outside = y.look(y.wo).0;
         let seen = fours.each_ref().map(|four| four.toward(y));
         of[q] = seen[q / 4].density[q % 4];
-        let open = (0..joints.len()).filter(|&k| k != q && seen[k / 4].open >> (k % 4) & 1 == 1);
-        let (mut of_four, mut count) = ([0; 4], 0);
-        let mut answer = |of_four: [usize; 4], count: usize| {
-            let rays = of_four.map(|k| {
-                let Seen { wi: [x, y, z], .. } = &seen[k / 4];
-                let (from, wi) = (&joints[k].x, DVec3::new(x[k % 4], y[k % 4], z[k % 4]));
-                scene.leave(&from.surface, &from.hit, wi)
+        let (mut open, mut count) = ([0; MOST], 0);
+        for k in (0..joints.len()).filter(|&k| k != q && seen[k / 4].open >> (k % 4) & 1 == 1) {
+            (open[count], count) = (k, count + 1);
+        }
+        asked += count as u32;
+        for group in open[..count].chunks(4) {
+            let distances = from_lanes(group, |k| seen[k / 4].distance[k % 4]);
+            let [a, b, c, d] = &from_lanes(group, |k| {
+                let from = &joints[k].x;
+                scene.leave(&from.surface, &from.hit, DVec3::from_array(seen[k / 4].wi.map(|x| x[k % 4])))
             });
-            let distances = of_four.map(|k| seen[k / 4].distance[k % 4]);
-            let [a, b, c, d] = &rays;
-            let hidden = scene.occluded_of_four([a, b, c, d], distances, [Some(y.hit.departure()); 4], count);
-            for (lane, k) in of_four.into_iter().enumerate().take(count) {
-                let enters = || scene.enters_on_the_way(&rays[lane], y.hit.object, distances[lane]);
+            let rays = [a, b, c, d];
+            let hidden = scene.occluded_of_four(rays, distances, [Some(y.hit.departure()); 4], group.len());
+            for (lane, &k) in group.iter().enumerate() {
+                let enters = || scene.enters_on_the_way(rays[lane], y.hit.object, distances[lane]);
                 if hidden >> lane & 1 == 0 && (outside || !enters()) {
                     of[k] = seen[k / 4].density[k % 4];
                 }
             }
-        };
-        for k in open {
-            (of_four[count], count) = (k, count + 1);
-            if count == 4 {
-                answer(of_four, 4);
-                (asked, count) = (asked + 4, 0);
-            }
-        }
-        if count > 0 {
-            let first = of_four[0];
-            of_four[count..].fill(first);
-            answer(of_four, count);
-            asked += count as u32;
         }
         // A path that by rounding does not see what it has met keeps it.
         if !(of[q] > 0.0 && of.iter().sum::<f64>().is_finite()) {
@@ -351,12 +332,6 @@ fn densities(scene: &Scene, paths: &[Path], joints: &[Joint]) -> (Densities, u32
         }
     }
     (densities, asked)
-}
-
-type Vec4 = [f64x4; 3];
-
-fn dot([ax, ay, az]: Vec4, [bx, by, bz]: Vec4) -> f64x4 {
-    ax.mul_add(bx, ay.mul_add(by, az * bz))
 }
 
 /// The first vertices of four paths.
@@ -383,8 +358,7 @@ struct Seen {
 impl Four {
     fn of(joints: &[Joint], first: usize) -> Four {
         let lanes = |of: &dyn Fn(&Vertex) -> DVec3| {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|i| joints.get(first + i).map_or(DVec3::Z, |joint| of(&joint.x)));
-            [f64x4::new([a.x, b.x, c.x, d.x]), f64x4::new([a.y, b.y, c.y, d.y]), f64x4::new([a.z, b.z, c.z, d.z])]
+            four::lanes([0, 1, 2, 3].map(|i| joints.get(first + i).map_or(DVec3::Z, |joint| of(&joint.x))))
         };
         let is_sampled = |joint: &Joint| joint.throughput.simd_gt(Lanes::ZERO).any();
         let bit = |i: usize| u32::from(joints.get(first + i).is_some_and(is_sampled)) << i;
@@ -397,16 +371,15 @@ impl Four {
     }
 
     fn toward(&self, y: &Vertex) -> Seen {
-        let splat = |v: DVec3| [f64x4::splat(v.x), f64x4::splat(v.y), f64x4::splat(v.z)];
-        let ([tx, ty, tz], [px, py, pz]) = (splat(y.surface.point), self.points);
-        let away = [tx - px, ty - py, tz - pz];
-        let square = dot(away, away);
+        let away = minus(&splat(y.surface.point), &self.points);
+        let square = dot(&away, &away);
         let distance = square.sqrt();
         let wi = away.map(|x| x / distance);
         let zero = f64x4::ZERO;
-        let (at_x, side) = (dot(wi, self.up), dot(wi, self.normals));
+        let (at_x, side) = (dot(&wi, &self.up), dot(&wi, &self.normals));
         // As `Vertex::look`, of -wi.
-        let (true_side, shading_side) = (dot(wi, splat(y.surface.normal)), dot(wi, splat(y.surface.shading_normal)));
+        let (true_side, shading_side) =
+            (dot(&wi, &splat(y.surface.normal)), dot(&wi, &splat(y.surface.shading_normal)));
         let (outside, differ) = y.look(y.wo);
         let outside_of = true_side.simd_lt(zero);
         let differ_of = (true_side * shading_side).simd_le(zero);
