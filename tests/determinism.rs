@@ -100,14 +100,15 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
 }
 
-/// What computes the light; [`SHARED`] has paths share what they find wherever they can.
+/// What computes the light; [`SHARED`] has paths share what they find wherever they can, and send several shadow rays.
 const INTEGRATORS: [&str; 3] = ["path", SHARED, "{whitted: {grid: 3, ambient: 0.1}}"];
 
 const SHARED: &str = "{path: {}}";
 
 fn settings(integrator: &str, render: &str) -> String {
-    let reuse = if integrator == SHARED { "on" } else { "off" };
-    format!("integrator: {integrator}\nrender: {{samples: 8, techniques: {{reuse: {reuse}}}, {render}}}\n")
+    let (reuse, rays) = if integrator == SHARED { ("on", 3) } else { ("off", 1) };
+    let techniques = format!("{{reuse: {reuse}, shadow_rays: {rays}}}");
+    format!("integrator: {integrator}\nrender: {{samples: 8, techniques: {techniques}, {render}}}\n")
 }
 
 #[test]

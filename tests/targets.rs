@@ -11,7 +11,7 @@ use serde_json::Value;
 const SCENE: &str = "\
 camera: {origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}
 image: {width: 24, height: 24}
-render: {samples: 16, techniques: {reuse: on}}
+render: {samples: 16, techniques: {reuse: on, shadow_rays: 4}}
 shapes:
 - sphere: {radius: 0.7}
 - rectangle: {corner: [-3, -1, -2], edge_u: [0, 0, 5], edge_v: [6, 0, 0]}

@@ -15,12 +15,13 @@ use crate::scene::Scene;
 use crate::scene::compile;
 use crate::scene::shelf::Shelf;
 use crate::spectrum::ColourSpace;
+use crate::transport::Spread;
 use crate::transport::layers::{Channel, Layer, Source};
 use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{
     Coverage, EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings,
 };
-use crate::transport::{Spread, trial};
+use crate::transport::trial::{self, first};
 use glam::DVec2;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -144,10 +145,9 @@ pub(super) fn prepare_scene(
         plan.layers.kept = Kept::ByReplicate;
     }
     plan.techniques.extend(said);
-    let wish_reuse = wish(description.render.techniques.reuse);
-    if let Some((reuse, said)) = trial::reuse(&scene, &census, &moments, &plan, &filter, seed, planned, wish_reuse) {
-        plan.reuse = reuse;
-        plan.techniques.push(said);
+    if let Some(first) = first::decide(&scene, &census, &moments, &plan, &filter, seed, planned, wishes) {
+        (plan.reuse, plan.shadow_rays) = (first.reuse, first.shadow_rays);
+        plan.techniques.extend(first.said);
     }
     if overrides.check_numerics && !moments.is_empty() {
         let expected = "--check-numerics: expected a scene in which nothing moves, or --set camera.shutter=null";
@@ -230,6 +230,11 @@ fn wishes(description: &SceneDescription) -> Wishes {
         light_tracing: wish(written.light_tracing),
         packets: wish(written.packets),
         merging: wish(written.merging),
+        reuse: wish(written.reuse),
+        shadow_rays: match written.shadow_rays {
+            description::ShadowRays::Auto => None,
+            description::ShadowRays::Number(count) => Some(count),
+        },
     }
 }
 

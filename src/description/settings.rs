@@ -12,6 +12,7 @@ use super::light::nothing;
 use super::path::At;
 use super::spectrum::{Role, Spectrum};
 use crate::error::in_short;
+use crate::math::sampler::PARTS;
 
 /// `integrator: path` or `integrator: {path: {max_depth: 8}}`
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -293,7 +294,7 @@ pub fn duration(text: &str) -> Option<Duration> {
     Duration::try_from_secs_f64(seconds * unit).ok()
 }
 
-/// `techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, adaptive: auto}`
+/// `techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, shadow_rays: auto, adaptive: auto}`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Techniques {
@@ -310,9 +311,24 @@ pub struct Techniques {
     /// Whether paths of pixels that lie near each other share what they find from their second vertices on.
     #[serde(default)]
     pub reuse: Technique,
+    /// How many shadow rays paths send from their first vertices; default as many as pay.
+    #[serde(default)]
+    pub shadow_rays: ShadowRays,
     /// Whether pixels get more samples where the picture is noisier, at the same mean.
     #[serde(default)]
     pub adaptive: Technique,
+}
+
+/// How many shadow rays a path sends from its first vertex that looks for light; the picture is the same but for its noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ShadowRays {
+    /// As many as pay.
+    #[default]
+    Auto,
+    /// So many, 1 to 8.
+    #[serde(deserialize_with = "whole::<_, 1, PARTS>")]
+    Number(u32),
 }
 
 /// Whether a technique is used; the picture is the same but for its noise.
@@ -394,6 +410,9 @@ impl Integrator {
 impl Render {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         checker.whole_between(at.key("samples"), self.samples, 1, SAMPLES_LIMIT);
+        if let ShadowRays::Number(count) = self.techniques.shadow_rays {
+            checker.whole_between(at.key("techniques").key("shadow_rays"), count, 1, PARTS);
+        }
         checker.whole_between(at.key("tile"), self.tile, 1, MAX_SIDE);
         let stop = at.key("stop");
         if let Some(error) = self.stop.error {

@@ -73,13 +73,33 @@ pub struct Choice {
     scale: f64,
 }
 
+/// A point that asks for light, and how it judges the lights.
+#[derive(Clone, Debug)]
+pub struct Asker {
+    /// Where it is.
+    pub point: DVec3,
+    /// The normal of the side that it asks for, if it is of one.
+    pub normal: Option<DVec3>,
+    judged: Option<(Asking, Root)>,
+}
+
+impl Asker {
+    /// What all lights together may give, as they are judged; zero where one need not choose.
+    #[must_use]
+    pub fn judged(&self) -> f32 {
+        self.judged.as_ref().map_or(0.0, |(_, root)| root.sum)
+    }
+}
+
 /// A point that asks, in coordinates of the tree, and the normal of the side that it asks for.
+#[derive(Clone, Debug)]
 struct Asking {
     point: Vec3,
     normal: Option<Vec3>,
 }
 
 /// The weights at the root: of eight children, of each light from infinity, and their sum.
+#[derive(Clone, Debug)]
 struct Root {
     near: [f32; 8],
     sum: f32,
@@ -173,6 +193,12 @@ impl Choice {
 
     fn asking(&self, point: DVec3, normal: Option<DVec3>) -> Asking {
         Asking { point: ((point - self.center) * self.scale).as_vec3(), normal: normal.map(|n| n.as_vec3()) }
+    }
+
+    #[inline(never)]
+    fn judge(&self, point: DVec3, normal: Option<DVec3>) -> Option<(Asking, Root)> {
+        let asking = self.asking(point, normal);
+        self.root(&asking).map(|root| (asking, root))
     }
 
     fn root(&self, asking: &Asking) -> Option<Root> {
@@ -377,44 +403,39 @@ impl Node {
 }
 
 impl Scene {
-    /// A light chosen by `u` in [0, 1) for `point`, and the probability of that. With `normal` light is wanted on that
-    /// side of a surface only. `judged` becomes what all lights together may give, as they are judged for it; it stays zero
-    /// where one need not choose.
+    /// Judges the lights from `point`. With `normal` light is wanted on that side of a surface only.
     #[must_use]
     #[inline(always)]
-    pub fn choose_light_at(
-        &self,
-        point: DVec3,
-        normal: Option<DVec3>,
-        u: impl FnOnce() -> f64,
-        judged: &mut f32,
-    ) -> Option<(usize, f64)> {
+    pub fn asker(&self, point: DVec3, normal: Option<DVec3>) -> Asker {
+        Asker { point, normal, judged: self.choice.as_ref().and_then(|choice| choice.judge(point, normal)) }
+    }
+
+    /// A light chosen by `u` in [0, 1) for `asker`, and the probability of that.
+    #[must_use]
+    #[inline(always)]
+    pub fn choose_light_for(&self, asker: &Asker, u: impl FnOnce() -> f64) -> Option<(usize, f64)> {
         // One alone needs no number.
         if let [all] = self.light_cdf[..]
             && all >= 1.0
         {
             return Some((0, all));
         }
-        self.choose_among(point, normal, u(), judged)
+        self.choose_among(asker, u())
     }
 
     #[inline(never)]
-    fn choose_among(&self, point: DVec3, normal: Option<DVec3>, u: f64, judged: &mut f32) -> Option<(usize, f64)> {
-        let Some(choice) = &self.choice else { return self.choose_light(u) };
-        let asking = choice.asking(point, normal);
-        let root = choice.root(&asking);
-        *judged = root.as_ref().map_or(0.0, |root| root.sum);
-        let Some(root) = root else { return self.choose_light(u) };
+    fn choose_among(&self, asker: &Asker, u: f64) -> Option<(usize, f64)> {
+        let (Some(choice), Some((asking, root))) = (&self.choice, &asker.judged) else { return self.choose_light(u) };
         let mixed = |i: usize, there: f64| mixed(self.light_probability(i), there);
         if u < BY_POWER {
             let (i, _) = self.choose_light(u / BY_POWER)?;
-            return Some((i, mixed(i, choice.probability(&asking, &root, i as u32))));
+            return Some((i, mixed(i, choice.probability(asking, root, i as u32))));
         }
-        let (i, there) = choice.choose(&asking, &root, (u - BY_POWER) / (1.0 - BY_POWER))?;
+        let (i, there) = choice.choose(asking, root, (u - BY_POWER) / (1.0 - BY_POWER))?;
         Some((i as usize, mixed(i as usize, there)))
     }
 
-    /// The probability of [`Scene::choose_light_at`] for light `i`, and what that `judged`: zero where it is not known.
+    /// The probability of [`Scene::choose_light_for`] for light `i`, and what that `judged`: zero where it is not known.
     #[must_use]
     pub fn light_probability_at(&self, i: usize, point: DVec3, normal: Option<DVec3>, judged: f32) -> f64 {
         let alone = self.light_probability(i);
@@ -492,11 +513,11 @@ mod tests {
                 let at = random.direction() * 6.0 * random.uniform();
                 let normal = (k % 2 == 0).then(|| random.direction());
                 let mut counts = vec![0u32; scene.lights.len()];
+                let asker = scene.asker(at, normal);
                 for j in 0..N {
                     let u = (f64::from(j) + 0.5) / f64::from(N);
-                    let mut judged = 0.0;
-                    let Some((i, p)) = scene.choose_light_at(at, normal, || u, &mut judged) else { continue };
-                    for known in [judged, 0.0] {
+                    let Some((i, p)) = scene.choose_light_for(&asker, || u) else { continue };
+                    for known in [asker.judged(), 0.0] {
                         let said = scene.light_probability_at(i, at, normal, known);
                         assert!((p / said - 1.0).abs() < 1e-12, "{p} {said}");
                     }

@@ -46,6 +46,8 @@ pub struct Incoming {
     pub left: Lanes,
     /// Vertices of the path, and surfaces that it went straight through.
     pub events: u32,
+    /// Shadow rays beyond one from each vertex.
+    pub further: u32,
     /// Whether the first of them was on something sharp.
     pub mirrored: bool,
 }
@@ -58,6 +60,7 @@ impl Incoming {
         depth: f64::INFINITY,
         left: Lanes::ZERO,
         events: 0,
+        further: 0,
         mirrored: false,
     };
 }
@@ -157,6 +160,8 @@ struct Begun {
     counted: Counts,
     /// See [`Incoming::events`].
     events: u32,
+    /// See [`Incoming::further`].
+    further: u32,
 }
 
 impl Begun {
@@ -170,6 +175,7 @@ impl Begun {
             sample: PixelSample { radiance: zero, wavelengths, xyz: [0.0; 3], alpha: 0.0, weight: 1.0 },
             counted: Counts::default(),
             events: 0,
+            further: 0,
         }
     }
 
@@ -316,7 +322,7 @@ impl Begun {
     fn see(&mut self, light: &Incoming) {
         self.sample.radiance = light.radiance;
         self.sample.alpha = light.alpha;
-        self.events = light.events;
+        (self.events, self.further) = (light.events, light.further);
     }
 
     /// What the film needs of the light.
@@ -375,6 +381,9 @@ fn probe(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Incoming,
     (begun.light(shot, &sampler, &shot.plan.integrator, None, None), begun.sample.wavelengths)
 }
 
+/// What a further shadow ray costs with all that it takes to find its light, in rays of a path: 0.6 to 0.9 in six scenes.
+const FURTHER: f64 = 0.75;
+
 /// The memory of samples that are rendered one after the other.
 pub struct Samples {
     octet: Octet,
@@ -402,8 +411,9 @@ impl Samples {
     /// What the samples of the last call, so many of `scene`, took, in rays.
     fn rays(&self, scene: &Scene, samples: usize) -> f64 {
         // A ray to the next vertex and one to a light from each.
-        let paths: u32 = self.begun[..samples].iter().map(|begun| 1 + 2 * begun.events).sum();
-        f64::from(paths) + path::reuse::cost_of_a_pair(scene) * f64::from(self.pairs)
+        let ray = |begun: &Begun| f64::from(1 + 2 * begun.events) + FURTHER * f64::from(begun.further);
+        let paths: f64 = self.begun[..samples].iter().map(ray).sum();
+        paths + path::reuse::cost_of_a_pair(scene) * f64::from(self.pairs)
     }
 
     /// Renders `samples` and gives each by its place among them, with the numbers of its layers and what covers it, where there

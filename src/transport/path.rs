@@ -32,7 +32,7 @@ use crate::scene::medium::Medium;
 use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use glam::DVec3;
-use lights::{Asked, power_heuristic};
+use lights::{Questions, power_heuristic};
 use reuse::Joint;
 use state::{Choice, Leaving, Path, Previous, Step, Walk};
 use std::cell::Cell;
@@ -177,7 +177,7 @@ impl Tracer<'_> {
         path: &mut Path,
         walk: &mut Walk,
         hit: Option<Hit>,
-        later: Option<&mut Option<Asked>>,
+        later: Option<&mut Questions>,
         joint: Option<&mut Joint>,
     ) -> Step {
         let scene = self.scene;
@@ -356,7 +356,7 @@ impl Tracer<'_> {
         path: &mut Path,
         at: &Leaving,
         bsdf: &B,
-        later: Option<&mut Option<Asked>>,
+        mut later: Option<&mut Questions>,
     ) -> bool {
         let Leaving { hit, surface, object, frame, .. } = *at;
         let scene = self.scene;
@@ -366,24 +366,32 @@ impl Tracer<'_> {
         if !bsdf.is_discrete() && self.settings.light_samples > 0 {
             let toward = path.ray.direction.dot(surface.normal);
             let inside = path.inside;
-            self.add_light::<CHROMATIC, MEDIA>(
-                path,
-                (surface.point, at.sided),
-                u_light,
-                || at.choice.draw(0),
-                |wi| at.eval(bsdf, wo, wi),
-                |wi| match wi.dot(surface.normal) * toward > 0.0 {
-                    true => First::Transmitted,
-                    false => First::Reflected(bsdf.diffuse_share(wo, frame.to_local(wi))),
-                },
-                // Light from the other side comes through what is there.
-                |wi| match MEDIA && wi.dot(surface.normal) * toward > 0.0 {
-                    true => scene.beyond(object, surface, wi, inside),
-                    false => inside,
-                },
-                |wi| scene.leave(surface, hit, wi),
-                later,
-            );
+            let count = self.shadow_rays(path);
+            path.further += count - 1;
+            let asker = scene.asker(surface.point, at.sided);
+            let parts = (count > 1).then(|| self.sampler.parts(Set::Shadows(path.vertices), count));
+            for i in 0..count {
+                let part = parts.as_ref().map(|parts| parts[i as usize]);
+                self.add_light::<CHROMATIC, MEDIA>(
+                    path,
+                    &asker,
+                    (i, count),
+                    part.map_or(u_light, |u| pairs(u).0),
+                    || part.map_or_else(|| at.choice.draw(0), |u| u[2]),
+                    |wi| at.eval(bsdf, wo, wi),
+                    |wi| match wi.dot(surface.normal) * toward > 0.0 {
+                        true => First::Transmitted,
+                        false => First::Reflected(bsdf.diffuse_share(wo, frame.to_local(wi))),
+                    },
+                    // Light from the other side comes through what is there.
+                    |wi| match MEDIA && wi.dot(surface.normal) * toward > 0.0 {
+                        true => scene.beyond(object, surface, wi, inside),
+                        false => inside,
+                    },
+                    |wi| scene.leave(surface, hit, wi),
+                    later.as_deref_mut(),
+                );
+            }
         }
 
         if let Some(map) = self.photons
@@ -456,7 +464,7 @@ impl Tracer<'_> {
             Chosen::Density(density) if self.settings.light_samples > 0 => Some(Previous {
                 point: surface.point,
                 normal: at.sided,
-                rho: path.rho_sum::<CHROMATIC>(),
+                rho: path.rho_sum::<CHROMATIC>() * f64::from(self.shadow_rays(path)),
                 density,
                 distance: 0.0,
             }),
@@ -532,6 +540,11 @@ impl Tracer<'_> {
         compound.resolve(&vertex, seen_normal(surface, wo), u)
     }
 
+    /// Shadow rays from where the path is, if it looks for light there.
+    fn shadow_rays(&self, path: &Path) -> u32 {
+        if path.specular { self.plan.shadow_rays } else { 1 }
+    }
+
     /// Segments so far, less one: events that count for `max_depth`.
     fn events(&self, path: &Path) -> u32 {
         path.vertices + if self.settings.count_crossings { path.crossings } else { 0 }
@@ -582,7 +595,8 @@ impl Tracer<'_> {
             };
             self.add_light::<CHROMATIC, MEDIA>(
                 path,
-                (point, None),
+                &self.scene.asker(point, None),
+                (0, 1),
                 u_light,
                 || choice[0],
                 eval,

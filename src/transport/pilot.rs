@@ -48,6 +48,10 @@ pub struct Wishes {
     pub packets: Use,
     /// Photons collected where mirrors and glass are seen.
     pub merging: Use,
+    /// Paths that pixels share.
+    pub reuse: Use,
+    /// How many shadow rays first vertices send.
+    pub shadow_rays: Option<u32>,
 }
 
 /// Rounds of paths from the lights: each is aimed by what those before it have learnt.

@@ -179,6 +179,8 @@ pub struct EffectPlan {
     pub packets: bool,
     /// Paths of pixels near each other share what they find.
     pub reuse: bool,
+    /// Shadow rays from the first vertex of each path that looks for light, at most [`PARTS`](crate::math::sampler::PARTS).
+    pub shadow_rays: u32,
     /// Every glass is computed as if it were dispersive.
     pub all_dispersive: bool,
     /// Light of mirrors and glass that is traced from the lights.
@@ -347,6 +349,7 @@ impl EffectPlan {
             depth_fog,
             packets: path && !census.dispersive.is_empty(),
             reuse: false,
+            shadow_rays: 1,
             all_dispersive: mode == EffectMode::All,
             caustics: None,
             adaptive: None,

@@ -1,19 +1,18 @@
-//! Trials before the render: whether wavelengths that part at the glass before the camera are worth following together, and
-//! whether paths are worth sharing by pixels.
+//! Trials before the render: whether wavelengths that part at the glass before the camera are worth following together, whether
+//! paths are worth sharing by pixels, and how many shadow rays their first vertices are to send.
 //!
 //! Two ways to spend time are equal where variance times cost is. Both are rendered at places spread over the picture, with as
 //! many evenly spread samples as a replicate of the render has (sixteen at the most), because a hero's colours average out over its
 //! samples; two replicates tell the variance. Costs are counted in rays, so that every machine decides alike.
 
-use super::layers::LayerPlan;
-use super::path::reuse;
+pub mod first;
+
 use super::plan::{Effect, EffectPlan, Integrator};
-use super::{Incoming, Samples, Shot};
+use super::{Incoming, Shot};
 use crate::film::accumulate::REPLICATES;
 use crate::film::filter::FilterSampler;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::Scene;
-use crate::scene::census::Census;
 use crate::spectrum::{ColourSpace, observer};
 use crate::transport::pilot::Use;
 use rayon::prelude::*;
@@ -87,85 +86,6 @@ fn judge(ratio: f64, bound: f64) -> (bool, String) {
     }
 }
 
-/// Share of the samples of the picture that either way takes in the trial of [`reuse`].
-const SHARE: f64 = 1.0 / 128.0;
-/// The least and most groups of pixels that are tried.
-const GROUPS: (f64, f64) = (9.0, 256.0);
-/// How much less the time to an error has to be for paths to be shared.
-const WORTH_IT: f64 = 0.9;
-
-/// Whether pixels share what their paths find, and what to say of it; nothing but for paths from the camera.
-#[must_use]
-#[expect(clippy::too_many_arguments, reason = "all that a picture is made of")]
-pub fn reuse(
-    scene: &Scene,
-    census: &Census,
-    moments: &[Scene],
-    plan: &EffectPlan,
-    filter: &FilterSampler,
-    seed: u64,
-    samples: u32,
-    wish: Use,
-) -> Option<(bool, Effect)> {
-    let Integrator::Path(_) = &plan.integrator else { return None };
-    let said = |on, reason: String| Some((on, Effect { name: "paths shared by pixels".into(), on, reason }));
-    if let Some(obstacle) = reuse::obstacle(scene, census, plan, moments.len()) {
-        return said(false, obstacle.into());
-    }
-    if let Some(on) = decided(wish) {
-        return said(on, "the scene says so".into());
-    }
-    let [alone, together] = [false, true].map(|reuse| {
-        let plan = EffectPlan { reuse, layers: LayerPlan::default(), ..plan.clone() };
-        try_groups(&Shot { scene, plan: &plan, filter, seed: seed ^ STREAM, photons: None }, samples)
-    });
-    if together.pairs == 0 {
-        return said(false, "no path goes from one diffuse surface to another".into());
-    }
-    let (on, reason) = judge(cost_of_error(&together) / cost_of_error(&alone), WORTH_IT);
-    said(on, reason)
-}
-
-/// Renders groups of pixels.
-fn try_groups(shot: &Shot, samples: u32) -> Tried {
-    let each = (samples / REPLICATES as u32).clamp(1, MOST);
-    let [width, height] = shot.scene.camera.resolution;
-    let all = f64::from(width) * f64::from(height) * f64::from(samples);
-    let wanted = SHARE * all / f64::from(2 * each * reuse::SIDE as u32);
-    let side = wanted.clamp(GROUPS.0, GROUPS.1).sqrt() as usize;
-    let groups: Vec<_> = (0..side * side)
-        .into_par_iter()
-        .map(|k| {
-            let u = pairs(Sampler::new(shot.seed, [k as u32, 0], 0, 0).set(Set::Lens)).0;
-            let place = super::place_in(shot.scene, side, k, u);
-            let cell = [place.x, place.y].map(|x| x as i32 / reuse::SIDE as i32 * reuse::SIDE as i32);
-            let pixel = [place.x as i32, place.y as i32];
-            let group = reuse::groups(cell, [width, height]).find(|group| group.holds(pixel));
-            let group = group.expect("each pixel of a cell is in a group");
-            let pixels = group.pixels();
-            let mut tried = Tried { colours: vec![[[0.0; 3]; 2]; pixels.len()], ..Tried::default() };
-            let mut memory = Samples::default();
-            for (replicate, index) in (0..2).flat_map(|replicate| (0..each).map(move |index| (replicate, index))) {
-                let addresses = &group.samples(replicate, index)[..pixels.len()];
-                memory.render(shot, addresses, |lane, sample, _, _| {
-                    let rgb = ColourSpace::Rec709.from_xyz(sample.xyz);
-                    for (sum, value) in tried.colours[lane][replicate as usize].iter_mut().zip(rgb) {
-                        *sum += f64::from(value * sample.weight) / f64::from(each);
-                    }
-                });
-                tried.rays += memory.rays(shot.scene, pixels.len());
-                tried.pairs += u64::from(memory.pairs);
-            }
-            tried
-        })
-        .collect();
-    Tried {
-        rays: groups.iter().map(|group| group.rays).sum(),
-        pairs: groups.iter().map(|group| group.pairs).sum(),
-        colours: groups.into_iter().flat_map(|group| group.colours).collect(),
-    }
-}
-
 /// Renders the places.
 fn try_out(shot: &Shot, each: u32) -> Tried {
     let [width, height] = shot.scene.camera.resolution.map(f64::from);
@@ -197,8 +117,13 @@ fn try_out(shot: &Shot, each: u32) -> Tried {
     Tried { rays, colours: places.into_iter().map(|p| p.0).collect(), pairs: 0 }
 }
 
-/// Variance, relative as that of a picture is, times cost.
+/// Variance times cost.
 fn cost_of_error(tried: &Tried) -> f64 {
+    variance(tried) * tried.rays
+}
+
+/// Variance, relative as that of a picture is; the sum of all places.
+fn variance(tried: &Tried) -> f64 {
     let values = || tried.colours.iter().flatten().flatten();
     let mean = values().sum::<f64>() / values().count() as f64;
     let floor = 0.01 * mean * mean;
@@ -209,5 +134,5 @@ fn cost_of_error(tried: &Tried) -> f64 {
         .collect();
     squares.sort_by(f64::total_cmp);
     let most = FIREFLY * squares[squares.len() - squares.len() / 100 - 1];
-    squares.iter().map(|square| square.min(most)).sum::<f64>() * tried.rays
+    squares.iter().map(|square| square.min(most)).sum()
 }

@@ -18,6 +18,7 @@ mod lights;
 mod media;
 mod nested;
 mod reuse;
+mod shadow_rays;
 mod techniques;
 mod volumes;
 

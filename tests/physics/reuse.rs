@@ -24,7 +24,7 @@ fn lit(reuse: &str, shapes: &str, before: &str) -> Bench {
 }
 
 /// Luminance of each pixel, and of their mean, over seeds.
-fn over_seeds(mut bench: Bench, seeds: Range<u64>) -> (Vec<Moments>, Moments) {
+pub fn over_seeds(mut bench: Bench, seeds: Range<u64>) -> (Vec<Moments>, Moments) {
     let mut pixels = vec![Moments::default(); bench.window().pixels()];
     let mut all = Moments::default();
     for seed in seeds {
@@ -38,7 +38,7 @@ fn over_seeds(mut bench: Bench, seeds: Range<u64>) -> (Vec<Moments>, Moments) {
 }
 
 /// Student's t of the difference of two means.
-fn t(a: &Moments, b: &Moments) -> f64 {
+pub fn t(a: &Moments, b: &Moments) -> f64 {
     (a.mean - b.mean).abs() / a.standard_error().hypot(b.standard_error())
 }
 

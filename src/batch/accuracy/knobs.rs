@@ -8,6 +8,7 @@ use crate::spectrum::Carried;
 use crate::transport::path::reuse;
 use crate::transport::pilot::Use;
 use crate::transport::plan::Integrator;
+use crate::transport::trial::first;
 
 /// A value of a knob.
 #[derive(Clone, Debug)]
@@ -165,6 +166,14 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
         if cause {
             let value = if on { "off" } else { "on" };
             all.push(trial(knob, value, &[(&format!("render.techniques.{key}"), value)]));
+        }
+    }
+    if let Integrator::Path(settings) = &chosen.plan.integrator
+        && first::single(&census, settings).is_none()
+    {
+        for count in [1, 2, 4, 8].into_iter().filter(|count| *count != chosen.plan.shadow_rays) {
+            let count = count.to_string();
+            all.push(trial("shadow rays", &count, &[("render.techniques.shadow_rays", &count)]));
         }
     }
     all.push(trial("effects", "all", &[("render.effects", "all")]));

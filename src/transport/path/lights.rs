@@ -1,12 +1,16 @@
 //! Light that a path finds: sent by what it meets, from infinity, and of lights that its vertices ask.
 
+use super::together::MOST;
 use super::{Path, Tracer};
+use crate::math::sampler::PARTS;
 use crate::math::{Departure, Ray};
 use crate::scene::Inside;
+use crate::scene::choice::Asker;
 use crate::scene::light::free;
 use crate::spectrum::Lanes;
 use crate::transport::shadow::Shadow;
 use crate::transport::ways::{First, Found};
+use arrayvec::ArrayVec;
 use glam::{DVec2, DVec3};
 
 /// The power heuristic for densities `a` and `b`, safe for any values that are not both infinite.
@@ -17,6 +21,9 @@ pub(super) fn power_heuristic(a: f64, b: f64) -> f64 {
     let r = b / a;
     1.0 / r.mul_add(r, 1.0)
 }
+
+/// What the vertices of paths that go together ask for.
+pub(super) type Questions = ArrayVec<Asked, { MOST * PARTS as usize }>;
 
 /// Light that a vertex has asked for, and that arrives if nothing stands in the way.
 #[derive(Clone, Copy)]
@@ -84,32 +91,37 @@ impl Tracer<'_> {
         }
     }
 
-    /// Next-event estimation: light from one point of one light, at a point with the normal of the side that is asked
-    /// for. `eval` tells f · |cos| and densities toward a direction, `first` what scatters light from there.
+    /// Next-event estimation: light from one point of one light for `asker`, the `i`th time of `count`. `eval` tells f · |cos| and
+    /// densities toward a direction, `first` what scatters light from there.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the state of a vertex, split by borrow")]
     pub(super) fn add_light<const CHROMATIC: bool, const MEDIA: bool>(
         &self,
         path: &mut Path,
-        (point, normal): (DVec3, Option<DVec3>),
+        asker: &Asker,
+        (i, count): (u32, u32),
         u: DVec2,
         u_light: impl FnOnce() -> f64,
         eval: impl Fn(DVec3) -> (Lanes, Lanes),
         first: impl Fn(DVec3) -> First,
         inside: impl Fn(DVec3) -> Inside,
         leave: impl FnOnce(DVec3) -> Ray,
-        later: Option<&mut Option<Asked>>,
+        later: Option<&mut Questions>,
     ) {
         let scene = self.scene;
-        let Some((i, probability)) = scene.choose_light_at(point, normal, u_light, &mut path.judged) else { return };
-        let Some(light) = scene.lights[i].arriving(&scene.objects, point, normal, u, self.nm) else { return };
+        let Asker { point, normal, .. } = *asker;
+        path.judged = asker.judged();
+        let Some((lamp, chance)) = scene.choose_light_for(asker, u_light) else { return };
+        // How often it is chosen.
+        let probability = chance * f64::from(count);
+        let Some(light) = scene.lights[lamp].arriving(&scene.objects, point, normal, u, self.nm) else { return };
         let (f, pdf) = eval(light.wi);
         if f.simd_eq(Lanes::ZERO).all() {
             return;
         }
         let ray = leave(light.wi);
         let distance = free(light.distance, light.target, point, &ray);
-        let traced = self.leaves(path, i as u32);
+        let traced = self.leaves(path, lamp as u32);
         let value = f * light.radiance;
         let led = if CHROMATIC { path.rho * pdf } else { pdf };
         let weight = |passing: Option<Lanes>| match light.density {
@@ -126,12 +138,19 @@ impl Tracer<'_> {
             && !scene.has_boundaries
         {
             let light_found = path.share_of::<CHROMATIC>(value, weight(None));
-            *later = Some(Asked { ray, distance, target: light.target, light: light_found, traced });
+            later.push(Asked { ray, distance, target: light.target, light: light_found, traced });
             return;
         }
+        let part;
+        let sampler = if count == 1 {
+            &self.sampler
+        } else {
+            part = self.sampler.part(i, count);
+            &part
+        };
         let shadow = Shadow {
             scene,
-            sampler: &self.sampler,
+            sampler,
             nm: self.nm,
             vertex: path.vertices,
             inside: inside(light.wi),
@@ -148,7 +167,7 @@ impl Tracer<'_> {
         let share = path.share_of::<CHROMATIC>(value * through, weight);
         path.radiance += share;
         if let Some(ledger) = self.ledger {
-            let found = self.found(path, share, i as u32);
+            let found = self.found(path, share, lamp as u32);
             match path.vertices {
                 0 => ledger.scattered_by(first(light.wi), found, 1),
                 vertex if ledger.is_caustic_from_here(vertex) => ledger.caustic(found),

@@ -17,7 +17,7 @@ pub(super) struct Previous {
     pub(super) point: DVec3,
     /// Shading normal, where the light sample was asked with one.
     pub(super) normal: Option<DVec3>,
-    /// Σ ρ before scattering.
+    /// Σ ρ before scattering, times how many shadow rays were sent.
     pub(super) rho: f64,
     /// The hero's density of the direction taken, sr⁻¹, times that of the flight since.
     pub(super) density: f64,
@@ -43,6 +43,8 @@ pub(super) struct Path {
     pub(super) vertices: u32,
     /// Surfaces so far that it went straight through.
     pub(super) crossings: u32,
+    /// Shadow rays so far beyond one from each vertex.
+    pub(super) further: u32,
     /// Whether it has met mirrors and glass only.
     pub(super) specular: bool,
     /// Whether paths from the lights can be joined to it: by the camera at its first vertex, by merging behind mirrors
@@ -161,6 +163,7 @@ impl Path {
         radiance: Lanes::ZERO,
         vertices: 0,
         crossings: 0,
+        further: 0,
         specular: true,
         seen: false,
         mirrored: false,
@@ -173,7 +176,8 @@ impl Path {
     /// What has come of it.
     pub(super) fn incoming(&self, alpha: f32, depth: f64) -> Incoming {
         let events = self.vertices + self.crossings;
-        Incoming { radiance: self.radiance, alpha, depth, left: self.left, events, mirrored: self.mirrored }
+        let Path { radiance, left, further, mirrored, .. } = *self;
+        Incoming { radiance, alpha, depth, left, events, further, mirrored }
     }
 
     pub(super) fn rho_sum<const CHROMATIC: bool>(&self) -> f64 {

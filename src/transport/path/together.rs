@@ -3,11 +3,11 @@
 //!
 //! What a path does is `Tracer::meet`, as for one alone, with the same numbers in the same order: the bits are the same.
 
-use super::lights::Asked;
+use super::lights::{Asked, Questions};
 use super::reuse::Joint;
 use super::{Path, Step, Tracer, Walk};
 use crate::math::Ray;
-use crate::math::sampler::Sampler;
+use crate::math::sampler::{PARTS, Sampler};
 use crate::spectrum::Lanes;
 use crate::transport::plan::PathSettings;
 use crate::transport::{Incoming, Shot};
@@ -78,7 +78,9 @@ fn trace<'a, const CHROMATIC: bool>(
 ) {
     let Shot { scene, plan, photons, .. } = *shot;
     let photons = photons.map(|p| p.map);
-    let mut asked: [Option<Asked>; MOST] = [const { None }; MOST];
+    let mut asked = Questions::new();
+    // Whose they are.
+    let mut asking = [0; MOST * PARTS as usize];
     // The camera does not see beyond its clipping plane.
     let mut reach = [f64::INFINITY; MOST];
     for (i, path) in paths.iter_mut().enumerate() {
@@ -101,37 +103,34 @@ fn trace<'a, const CHROMATIC: bool>(
         // Each its own way: it scatters, and asks a light.
         let going = left;
         left = 0;
-        let (mut asking, mut questions) = ([0; MOST], 0);
         for k in 0..going {
             let i = on[k];
             let Wanted { sampler, nm, .. } = wanted(i);
             let tracer = Tracer { scene, plan, settings, sampler, nm, photons, ledger: None };
             let joint = joints.as_deref_mut().map(|joints| &mut joints[i]);
             let (path, walk) = (&mut paths[i], &mut walks[i]);
-            let step = tracer.meet::<CHROMATIC, false>(path, walk, hits[k], Some(&mut asked[i]), joint);
-            if asked[i].is_some() {
-                asking[questions] = i;
-                questions += 1;
-            }
+            let known = asked.len();
+            let step = tracer.meet::<CHROMATIC, false>(path, walk, hits[k], Some(&mut asked), joint);
+            asking[known..asked.len()].fill(i);
             if !matches!(step, Step::Ended) {
                 on[left] = i;
                 left += 1;
             }
         }
 
-        for group in asking[..questions].chunks(4) {
-            let Some(toward) = all_of(from_lanes(group, |i| asked[i].as_ref())) else { break };
+        for (toward, asking) in asked.chunks(4).zip(asking.chunks(4)) {
+            let count = toward.len();
+            let toward: [&Asked; 4] = std::array::from_fn(|lane| toward.get(lane).unwrap_or(&toward[0]));
             let (distances, targets) = (toward.map(|to| to.distance), toward.map(|to| to.target));
-            let hidden = scene.occluded_of_four(toward.map(|to| &to.ray), distances, targets, group.len());
-            for (lane, &i) in group.iter().enumerate() {
-                if let Some(Asked { light, traced, .. }) = asked[i].take()
-                    && hidden >> lane & 1 == 0
-                {
+            let hidden = scene.occluded_of_four(toward.map(|to| &to.ray), distances, targets, count);
+            for (lane, (&i, to)) in asking.iter().zip(toward).take(count).enumerate() {
+                if hidden >> lane & 1 == 0 {
                     let path = &mut paths[i];
-                    *(if traced { &mut path.left } else { &mut path.radiance }) += light;
+                    *(if to.traced { &mut path.left } else { &mut path.radiance }) += to.light;
                 }
             }
         }
+        asked.clear();
     }
 }
 
@@ -140,9 +139,4 @@ fn trace<'a, const CHROMATIC: bool>(
 pub(super) fn from_lanes<T>(group: &[usize], of: impl Fn(usize) -> T) -> [T; 4] {
     let at = |lane: usize| of(*group.get(lane).unwrap_or(&group[0]));
     [at(0), at(1), at(2), at(3)]
-}
-
-#[inline(always)]
-pub(super) fn all_of<T>([a, b, c, d]: [Option<T>; 4]) -> Option<[T; 4]> {
-    Some([a?, b?, c?, d?])
 }

@@ -1,0 +1,189 @@
+//! What the first vertices of paths do: whether they share what paths find, and how many shadow rays they send.
+
+use super::{MOST, STREAM, Tried, decided, variance};
+use crate::film::accumulate::REPLICATES;
+use crate::film::filter::FilterSampler;
+use crate::math::sampler::{PARTS, Sampler, Set, pairs};
+use crate::scene::Scene;
+use crate::scene::census::Census;
+use crate::spectrum::ColourSpace;
+use crate::transport::layers::LayerPlan;
+use crate::transport::path::reuse;
+use crate::transport::pilot::Wishes;
+use crate::transport::plan::{Effect, EffectPlan, Integrator, PathSettings};
+use crate::transport::{Samples, Shot, place_in};
+use rayon::prelude::*;
+
+/// Share of the samples of the picture that each way takes in the trial.
+const SHARE: f64 = 1.0 / 128.0;
+/// The least and most groups of pixels that are tried.
+const GROUPS: (f64, f64) = (9.0, 256.0);
+/// How much less the time to an error has to be for a technique to be used.
+const WORTH_IT: f64 = 0.9;
+/// How many shadow rays are tried beside one. What others cost and gain follows.
+const PROBED: u32 = 4;
+
+/// What first vertices do.
+#[derive(Clone, Debug)]
+pub struct First {
+    /// Whether they share what paths find.
+    pub reuse: bool,
+    /// How many shadow rays each sends.
+    pub shadow_rays: u32,
+    /// What to say of it.
+    pub said: Vec<Effect>,
+}
+
+/// Paths that share, or do not.
+struct Way {
+    shadow_rays: u32,
+    /// Variance times cost.
+    cost: f64,
+    /// That over what it is with one shadow ray, if several are tried; the least of all where it is one that pays.
+    ratio: Option<f64>,
+    /// Whether vertices of different pixels saw each other.
+    meets: bool,
+}
+
+/// Why one shadow ray from a vertex is all that can be wanted; `None` where several may be.
+#[must_use]
+pub fn single(census: &Census, settings: &PathSettings) -> Option<&'static str> {
+    if settings.light_samples != 1 || settings.scatter_samples != 1 {
+        Some("samples have several paths, or look for light in one way only")
+    } else if census.lights() == 0 {
+        Some("there are no lights")
+    } else if census.lights() == 1 && census.delta_lights == 1 {
+        Some("the only light has no extent")
+    } else {
+        None
+    }
+}
+
+/// What the first vertices of paths are to do; nothing but for paths from the camera.
+#[must_use]
+#[expect(clippy::too_many_arguments, reason = "all that a picture is made of")]
+pub fn decide(
+    scene: &Scene,
+    census: &Census,
+    moments: &[Scene],
+    plan: &EffectPlan,
+    filter: &FilterSampler,
+    seed: u64,
+    samples: u32,
+    wishes: Wishes,
+) -> Option<First> {
+    let Integrator::Path(settings) = &plan.integrator else { return None };
+    let try_out = |reuse, shadow_rays| {
+        let plan = EffectPlan { reuse, shadow_rays, layers: LayerPlan::default(), ..plan.clone() };
+        try_groups(&Shot { scene, plan: &plan, filter, seed: seed ^ STREAM, photons: None }, samples)
+    };
+    let single = single(census, settings);
+    let fixed = single.map_or(wishes.shadow_rays, |_| Some(1));
+    let way = |reuse| Way::find(fixed, |shadow_rays| try_out(reuse, shadow_rays));
+    let obstacle = reuse::obstacle(scene, census, plan, moments.len());
+    let wish = obstacle.map_or_else(|| decided(wishes.reuse), |_| Some(false));
+
+    // What is settled needs no trial.
+    let settled = |reuse: bool| match fixed {
+        Some(shadow_rays) => Way { shadow_rays, cost: f64::NAN, ratio: None, meets: true },
+        None => way(reuse),
+    };
+    let (reuse, why, way) = match wish {
+        Some(reuse) => (reuse, obstacle.unwrap_or("the scene says so").to_owned(), settled(reuse)),
+        None => {
+            let (alone, together) = (way(false), way(true));
+            let (on, reason) = super::judge(together.cost / alone.cost, WORTH_IT);
+            match together.meets {
+                true if on => (true, reason, together),
+                true => (false, reason, alone),
+                false => (false, "no path goes from one diffuse surface to another".into(), alone),
+            }
+        }
+    };
+    let count = way.shadow_rays;
+    let rays = match count {
+        1 => "several shadow rays from the first vertex".into(),
+        _ => format!("{count} shadow rays from the first vertex").into(),
+    };
+    let of_rays = match (single, wishes.shadow_rays, way.ratio) {
+        (Some(reason), ..) => reason.into(),
+        (None, Some(_), _) => "the scene says so".into(),
+        (None, None, Some(ratio)) => format!("the trial expects {ratio:.2} times the time to the same error"),
+        (None, None, None) => "the trial sees no light".into(),
+    };
+    Some(First {
+        reuse,
+        shadow_rays: count,
+        said: vec![
+            Effect { name: "paths shared by pixels".into(), on: reuse, reason: why },
+            Effect { name: rays, on: count > 1, reason: of_rays },
+        ],
+    })
+}
+
+impl Way {
+    /// Finds how many shadow rays are best, if the number is not `fixed`, by rendering with some.
+    fn find(fixed: Option<u32>, try_out: impl Fn(u32) -> Tried) -> Way {
+        let one = try_out(fixed.unwrap_or(1));
+        let way = |shadow_rays, cost, ratio| Way { shadow_rays, cost, ratio, meets: one.pairs > 0 };
+        let (variance_of_one, cost) = (variance(&one), super::cost_of_error(&one));
+        if let Some(shadow_rays) = fixed {
+            return way(shadow_rays, cost, None);
+        }
+        if variance_of_one.is_nan() || variance_of_one <= 0.0 {
+            return way(1, cost, None);
+        }
+        let several = try_out(PROBED);
+        // V = a + b/n and C = c + d (n − 1) of n rays, over those of one ray.
+        let b = (1.0 - variance(&several) / variance_of_one) / (1.0 - 1.0 / f64::from(PROBED));
+        let d = (several.rays / one.rays - 1.0) / f64::from(PROBED - 1);
+        let ratio = |n: u32| (1.0 - b.min(1.0) * (1.0 - 1.0 / f64::from(n))) * (1.0 + d * f64::from(n - 1));
+        let counts = (1..).map(|power| 1 << power).take_while(|n| *n <= PARTS);
+        let best = counts.min_by(|a, b| ratio(*a).total_cmp(&ratio(*b))).unwrap_or(1);
+        let least = ratio(best);
+        match least < WORTH_IT {
+            true => way(best, cost * least, Some(least)),
+            false => way(1, cost, Some(least)),
+        }
+    }
+}
+
+/// Renders groups of pixels.
+fn try_groups(shot: &Shot, samples: u32) -> Tried {
+    let each = (samples / REPLICATES as u32).clamp(1, MOST);
+    let [width, height] = shot.scene.camera.resolution;
+    let all = f64::from(width) * f64::from(height) * f64::from(samples);
+    let wanted = SHARE * all / f64::from(2 * each * reuse::SIDE as u32);
+    let side = wanted.clamp(GROUPS.0, GROUPS.1).sqrt() as usize;
+    let groups: Vec<_> = (0..side * side)
+        .into_par_iter()
+        .map(|k| {
+            let u = pairs(Sampler::new(shot.seed, [k as u32, 0], 0, 0).set(Set::Lens)).0;
+            let place = place_in(shot.scene, side, k, u);
+            let cell = [place.x, place.y].map(|x| x as i32 / reuse::SIDE as i32 * reuse::SIDE as i32);
+            let pixel = [place.x as i32, place.y as i32];
+            let group = reuse::groups(cell, [width, height]).find(|group| group.holds(pixel));
+            let group = group.expect("each pixel of a cell is in a group");
+            let pixels = group.pixels();
+            let mut tried = Tried { colours: vec![[[0.0; 3]; 2]; pixels.len()], ..Tried::default() };
+            let mut memory = Samples::default();
+            for (replicate, index) in (0..2).flat_map(|replicate| (0..each).map(move |index| (replicate, index))) {
+                let addresses = &group.samples(replicate, index)[..pixels.len()];
+                memory.render(shot, addresses, |lane, sample, _, _| {
+                    let rgb = ColourSpace::Rec709.from_xyz(sample.xyz);
+                    for (sum, value) in tried.colours[lane][replicate as usize].iter_mut().zip(rgb) {
+                        *sum += f64::from(value * sample.weight) / f64::from(each);
+                    }
+                });
+                tried.rays += memory.rays(shot.scene, pixels.len());
+                tried.pairs += u64::from(memory.pairs);
+            }
+            tried
+        })
+        .collect();
+    Tried {
+        rays: groups.iter().map(|group| group.rays).sum(),
+        pairs: groups.iter().map(|group| group.pairs).sum(),
+        colours: groups.into_iter().flat_map(|group| group.colours).collect(),
+    }
+}

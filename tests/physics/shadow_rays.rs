@@ -1,0 +1,122 @@
+//! Several shadow rays from the first vertex of a path change the noise, never the mean.
+
+use super::common::{Bench, bench_with, grey_png, room};
+use super::reuse::{over_seeds, t};
+use abbe::math::statistics::{Moments, student_t_half_width};
+use abbe::spectrum::ColourSpace;
+
+const LAMPS: &str = "- rectangle: {corner: [-0.6, 0.9, -0.6], edge_u: [1.2, 0, 0], edge_v: [0, 0, 1.2], emission: 3}\n\
+                     - sphere: {center: [-0.7, 0.2, -0.6], radius: 0.15, emission: {rgb: [8, 3, 1]}}\n";
+
+/// Lamps among `shapes`, seen from within a room.
+fn lit(shadow_rays: u32, shapes: &str, before: &str, techniques: &str) -> Bench {
+    let yaml = format!(
+        "camera: {{origin: [0, 0, 0.95], target: [0, -0.1, -1], fov_deg: 80}}\nimage: {{width: 20, height: 16}}\n\
+         materials: {{chalk: {{diffuse: {{reflectance: 0.7}}}}}}\nintegrator: {{path: {{max_depth: 3}}}}\nrender: {{samples: 16, \
+         techniques: {{shadow_rays: {shadow_rays}, light_tracing: off, {techniques}}}}}\n{before}{shapes}{LAMPS}"
+    );
+    bench_with(&yaml, &[("sky.png", &grey_png(16, 8, |x, y| (100 + x * 9 + y) as u8))])
+}
+
+/// Each pixel over 24 seeds, by Student's t of the difference with one and with several: of 24 + 24 numbers of about normal law it
+/// has at least 23 degrees of freedom (Welch). The level is 1e-3 for all pixels of a scene together, and again for their mean.
+#[test]
+fn several_shadow_rays_bring_the_light_of_one() {
+    let walls = room("material: {diffuse: {reflectance: 0.7}}");
+    let ball = |x: f64, material: &str| {
+        format!("- sphere: {{center: [{x}, -0.6, -0.3], radius: 0.4, material: {material}}}\n")
+    };
+    let solids =
+        walls.clone() + &ball(-0.5, "{plastic: {}}") + &ball(0.5, "{conductor: {metal: gold, roughness: 0.2}}");
+    let under_a_sky = "shapes:\n- plane: {point: [0, -1, 0], normal: [0, 1, 0], material: chalk}\n".to_owned()
+        + &ball(0.0, "{dielectric: {ior: 1.5, roughness: 0.3}}");
+    let sky = "lights: [{environment: {file: sky.png}}, {point: {position: [0, 0.5, 0], intensity: 1}}]\n";
+    let fog = "media: {fog: {homogeneous: {scattering: {rgb: [0.2, 0.5, 0.3]}, absorption: 0.1}}}\nmedium: fog\n";
+    let pane = "- rectangle: {corner: [-0.9, -0.9, 0.1], edge_u: [1, 0, 0], edge_v: [0, 1, 0], material: ";
+    let open = walls.clone()
+        + pane
+        + "{thin_dielectric: {ior: 1.5}}}\n"
+        + &ball(0.5, "{mask: {opacity: 0.5, material: chalk}}");
+    let behind = walls + &ball(-0.5, "{dielectric: {ior: {glass: N-SF11}}}") + &ball(0.5, "{mirror: {}}");
+    for (name, before, shapes, techniques) in [
+        ("solids", "", &solids, "reuse: off"),
+        ("solids that share paths", "", &solids, "reuse: on"),
+        ("a sky, a point and rough glass", sky, &under_a_sky, "reuse: off"),
+        ("fog", fog, &solids, "reuse: off"),
+        ("a pane and a mask", "", &open, "reuse: off"),
+        ("behind glass and a mirror", "", &behind, "reuse: off, packets: on"),
+        ("behind glass and a mirror, lane by lane", "", &behind, "reuse: off, packets: off"),
+    ] {
+        let (one, one_all) = over_seeds(lit(1, shapes, before, techniques), 0..24);
+        for (rays, first) in [(3, 100), (8, 200)] {
+            let bench = lit(rays, shapes, before, techniques);
+            assert_eq!(bench.prepared.plan.shadow_rays, rays, "{name}");
+            let (several, several_all) = over_seeds(bench, first..first + 24);
+            let most = student_t_half_width(1.0 - 1e-3 / one.len() as f64, 23.0);
+            let worst = one.iter().zip(&several).map(|(a, b)| t(a, b)).fold(0.0, f64::max);
+            let mean = t(&one_all, &several_all);
+            let precision = one_all.standard_error().hypot(several_all.standard_error()) / one_all.mean;
+            let variance = |pixels: &[Moments]| pixels.iter().map(Moments::variance).sum::<f64>();
+            let ratio = variance(&several) / variance(&one);
+            println!(
+                "{name}, {rays}: worst {worst:.2} of {most:.2}, mean {mean:.2} ({precision:.1e}), variance {ratio:.2}"
+            );
+            assert!(worst < most, "{name}, {rays}: {worst} standard errors, {most} allowed");
+            assert!(
+                mean < student_t_half_width(1.0 - 1e-3, 23.0) && precision < 1e-2,
+                "{name}, {rays}: {mean}, {precision}"
+            );
+            // In fog little of the noise is that of first vertices on surfaces.
+            assert!(name == "fog" || ratio < 0.95, "{name}, {rays}: {ratio}");
+        }
+    }
+}
+
+/// L = 1 + ½ L everywhere in a room whose walls shine with 1 and reflect ½.
+#[test]
+fn a_furnace_of_several_shadow_rays_is_as_bright_as_it_has_to_be() {
+    let walls = room("emission: 1, material: {diffuse: {reflectance: 0.5}}");
+    let yaml = format!(
+        "camera: {{origin: [0.1, 0.2, 0.3], target: [0, 0, -1], fov_deg: 100}}\nimage: {{width: 16, height: 16}}\n\
+         render: {{samples: 64, techniques: {{shadow_rays: 8}}}}\n{walls}"
+    );
+    bench_with(&yaml, &[]).grey().picture().mean().assert_is(2.0, 3e-3);
+}
+
+/// Layers of light change no bit of the picture, and add up to it: each sum of them is rounded to an f32 once a sample, and
+/// a pixel has 16.
+#[test]
+fn layers_of_several_shadow_rays_add_up_to_the_picture_that_they_leave_as_it_is() {
+    let things = room("material: {diffuse: {reflectance: 0.7}}")
+        + "- sphere: {center: [-0.4, -0.6, -0.3], radius: 0.4, material: {plastic: {}}, name: ball}\n";
+    let plain = lit(4, &things, "", "reuse: off");
+    let parted = lit(4, &things, "layers: [emission, direct, indirect, caustic]\n", "reuse: off");
+    let (plain, parted) = (plain.frame(), parted.frame());
+    let matrix = ColourSpace::Rec709.matrix_from_xyz();
+    let (picture, with) = (plain.resolve(&matrix), parted.resolve(&matrix));
+    assert!(picture == with);
+    for c in 0..3 {
+        let layers: Vec<_> = (0..4).map(|layer| parted.layer(3 * layer + c)).collect();
+        for (i, all) in with.rgb[c].iter().enumerate() {
+            let sum: f32 = layers.iter().map(|layer| layer[i]).sum();
+            assert!((sum - all).abs() <= 16.0 * f32::EPSILON * all.abs().max(0.1), "pixel {i}: {sum}, {all}");
+        }
+    }
+}
+
+/// A lamp that fills the sky has more light to tell of than one ray brings; a point has not.
+#[test]
+fn a_trial_sends_several_rays_where_they_pay() {
+    let with = |light: &str, rest: &str| {
+        let yaml = format!(
+            "camera: {{origin: [0, 2, 4], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 64, height: 64}}\n\
+             integrator: {{path: {{max_depth: 2}}}}\nrender: {{samples: 16}}\n{light}shapes:\n- plane: {{normal: [0, 1, 0]}}\n\
+             - cube: {{center: [0, 0.5, 0], size: 1}}\n{rest}"
+        );
+        bench_with(&yaml, &[]).prepared.plan.shadow_rays
+    };
+    let lamp = "- rectangle: {corner: [-1, 3, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2], emission: 3}\n";
+    assert!(with("", lamp) > 1);
+    assert_eq!(with("lights: [{point: {position: [1, 3, 1], intensity: 9}}]\n", ""), 1);
+    assert_eq!(with("lights: [{constant: {radiance: 0}}]\n", ""), 1);
+}
