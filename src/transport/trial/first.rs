@@ -79,7 +79,7 @@ pub fn decide(
     };
     let single = single(census, settings);
     let fixed = single.map_or(wishes.shadow_rays, |_| Some(1));
-    let way = |reuse| Way::find(fixed, |shadow_rays| try_out(reuse, shadow_rays));
+    let way = |reuse| Way::find(fixed, reuse, |shadow_rays| try_out(reuse, shadow_rays));
     let obstacle = reuse::obstacle(scene, census, plan, moments.len());
     let wish = obstacle.map_or_else(|| decided(wishes.reuse), |_| Some(false));
 
@@ -123,21 +123,24 @@ pub fn decide(
 
 impl Way {
     /// Finds how many shadow rays are best, if the number is not `fixed`, by rendering with some.
-    fn find(fixed: Option<u32>, try_out: impl Fn(u32) -> Tried) -> Way {
+    fn find(fixed: Option<u32>, reuse: bool, try_out: impl Fn(u32) -> Tried) -> Way {
         let one = try_out(fixed.unwrap_or(1));
-        let way = |shadow_rays, cost, ratio| Way { shadow_rays, cost, ratio, meets: one.pairs > 0 };
+        let meets = one.pairs > 0;
+        let way = |shadow_rays, cost, ratio| Way { shadow_rays, cost, ratio, meets };
         let (variance_of_one, cost) = (variance(&one), super::cost_of_error(&one));
         if let Some(shadow_rays) = fixed {
             return way(shadow_rays, cost, None);
         }
-        if variance_of_one.is_nan() || variance_of_one <= 0.0 {
+        if variance_of_one.is_nan() || variance_of_one <= 0.0 || reuse && !meets {
             return way(1, cost, None);
         }
         let several = try_out(PROBED);
-        // V = a + b/n and C = c + d (n − 1) of n rays, over those of one ray.
-        let b = (1.0 - variance(&several) / variance_of_one) / (1.0 - 1.0 / f64::from(PROBED));
+        // V = a + b n^-1.5 and C = c + d (n − 1) of n rays, over those of one ray: what evenly spread rays find at the edge of a
+        // shadow varies so.
+        let fall = |n: u32| 1.0 - f64::from(n).powf(-1.5);
+        let b = (1.0 - variance(&several) / variance_of_one) / fall(PROBED);
         let d = (several.rays / one.rays - 1.0) / f64::from(PROBED - 1);
-        let ratio = |n: u32| (1.0 - b.min(1.0) * (1.0 - 1.0 / f64::from(n))) * (1.0 + d * f64::from(n - 1));
+        let ratio = |n: u32| (1.0 - b.min(1.0) * fall(n)) * (1.0 + d * f64::from(n - 1));
         let counts = (1..).map(|power| 1 << power).take_while(|n| *n <= PARTS);
         let best = counts.min_by(|a, b| ratio(*a).total_cmp(&ratio(*b))).unwrap_or(1);
         let least = ratio(best);
