@@ -587,24 +587,31 @@ impl Tracer<'_> {
         self.scene.foresee(&self.sampler, Set::Scatter(path.vertices));
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
         let next_event = self.settings.light_samples > 0 && medium.shadow_rays;
+        let count = self.shadow_rays(path);
         if next_event {
             let inside = path.inside;
             let eval = |wi| {
                 let p = Lanes::splat(medium.phase.eval(point, wo, wi) as f32);
                 (p, p)
             };
-            self.add_light::<CHROMATIC, MEDIA>(
-                path,
-                &self.scene.asker(point, None),
-                (0, 1),
-                u_light,
-                || choice[0],
-                eval,
-                |_| First::Media,
-                |_| inside,
-                |wi| Ray::new(point, wi),
-                None,
-            );
+            path.further += count - 1;
+            let asker = self.scene.asker(point, None);
+            let parts = (count > 1).then(|| self.sampler.parts(Set::Shadows(path.vertices), count));
+            for i in 0..count {
+                let part = parts.as_ref().map(|parts| parts[i as usize]);
+                self.add_light::<CHROMATIC, MEDIA>(
+                    path,
+                    &asker,
+                    (i, count),
+                    part.map_or(u_light, |u| pairs(u).0),
+                    || part.map_or(choice[0], |u| u[2]),
+                    eval,
+                    |_| First::Media,
+                    |_| inside,
+                    |wi| Ray::new(point, wi),
+                    None,
+                );
+            }
         }
         if !path.goes_on() {
             return false;
@@ -616,7 +623,7 @@ impl Tracer<'_> {
         path.previous = next_event.then(|| Previous {
             point,
             normal: None,
-            rho: path.rho_sum::<CHROMATIC>(),
+            rho: path.rho_sum::<CHROMATIC>() * f64::from(count),
             density: medium.phase.eval(point, wo, wi),
             distance: 0.0,
         });

@@ -72,15 +72,20 @@ fn several_shadow_rays_bring_the_light_of_one() {
     }
 }
 
-/// L = 1 + ½ L everywhere in a room whose walls shine with 1 and reflect ½.
+/// L = 1 + ½ L everywhere in a room whose walls shine with 1 and reflect ½; and smoke that takes nothing away is as bright as the
+/// sky that it stands before.
 #[test]
 fn a_furnace_of_several_shadow_rays_is_as_bright_as_it_has_to_be() {
     let walls = room("emission: 1, material: {diffuse: {reflectance: 0.5}}");
-    let yaml = format!(
-        "camera: {{origin: [0.1, 0.2, 0.3], target: [0, 0, -1], fov_deg: 100}}\nimage: {{width: 16, height: 16}}\n\
-         render: {{samples: 64, techniques: {{shadow_rays: 8}}}}\n{walls}"
-    );
-    bench_with(&yaml, &[]).grey().picture().mean().assert_is(2.0, 3e-3);
+    let smoke = "media: {smoke: {homogeneous: {scattering: 2, phase: {hg: 0.5}}}}\nlights: [{constant: {radiance: 1}}]\nshapes:\n\
+                 - sphere: {center: [0, 0, -2], radius: 1.5, material: {boundary: {}}, inside: smoke}\n";
+    for (scene, expected) in [(walls.as_str(), 2.0), (smoke, 1.0)] {
+        let yaml = format!(
+            "camera: {{origin: [0.1, 0.2, 0.3], target: [0, 0, -1], fov_deg: 100}}\nimage: {{width: 16, height: 16}}\n\
+             render: {{samples: 64, techniques: {{shadow_rays: 8}}}}\n{scene}"
+        );
+        bench_with(&yaml, &[]).grey().picture().mean().assert_is(expected, 3e-3);
+    }
 }
 
 /// Layers of light change no bit of the picture, and add up to it: each sum of them is rounded to an f32 once a sample, and
