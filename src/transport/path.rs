@@ -356,7 +356,7 @@ impl Tracer<'_> {
         path: &mut Path,
         at: &Leaving,
         bsdf: &B,
-        mut later: Option<&mut Questions>,
+        later: Option<&mut Questions>,
     ) -> bool {
         let Leaving { hit, surface, object, frame, .. } = *at;
         let scene = self.scene;
@@ -366,32 +366,24 @@ impl Tracer<'_> {
         if !bsdf.is_discrete() && self.settings.light_samples > 0 {
             let toward = path.ray.direction.dot(surface.normal);
             let inside = path.inside;
-            let count = self.shadow_rays(path);
-            path.further += count - 1;
-            let asker = scene.asker(surface.point, at.sided);
-            let parts = (count > 1).then(|| self.sampler.parts(Set::Shadows(path.vertices), count));
-            for i in 0..count {
-                let part = parts.as_ref().map(|parts| parts[i as usize]);
-                self.add_light::<CHROMATIC, MEDIA>(
-                    path,
-                    &asker,
-                    (i, count),
-                    part.map_or(u_light, |u| pairs(u).0),
-                    || part.map_or_else(|| at.choice.draw(0), |u| u[2]),
-                    |wi| at.eval(bsdf, wo, wi),
-                    |wi| match wi.dot(surface.normal) * toward > 0.0 {
-                        true => First::Transmitted,
-                        false => First::Reflected(bsdf.diffuse_share(wo, frame.to_local(wi))),
-                    },
-                    // Light from the other side comes through what is there.
-                    |wi| match MEDIA && wi.dot(surface.normal) * toward > 0.0 {
-                        true => scene.beyond(object, surface, wi, inside),
-                        false => inside,
-                    },
-                    |wi| scene.leave(surface, hit, wi),
-                    later.as_deref_mut(),
-                );
-            }
+            self.ask_lights::<CHROMATIC, MEDIA>(
+                path,
+                (surface.point, at.sided),
+                u_light,
+                || at.choice.draw(0),
+                |wi| at.eval(bsdf, wo, wi),
+                |wi| match wi.dot(surface.normal) * toward > 0.0 {
+                    true => First::Transmitted,
+                    false => First::Reflected(bsdf.diffuse_share(wo, frame.to_local(wi))),
+                },
+                // Light from the other side comes through what is there.
+                |wi| match MEDIA && wi.dot(surface.normal) * toward > 0.0 {
+                    true => scene.beyond(object, surface, wi, inside),
+                    false => inside,
+                },
+                |wi| scene.leave(surface, hit, wi),
+                later,
+            );
         }
 
         if let Some(map) = self.photons
@@ -540,11 +532,6 @@ impl Tracer<'_> {
         compound.resolve(&vertex, seen_normal(surface, wo), u)
     }
 
-    /// Shadow rays from where the path is, if it looks for light there.
-    fn shadow_rays(&self, path: &Path) -> u32 {
-        if path.specular { self.plan.shadow_rays } else { 1 }
-    }
-
     /// Segments so far, less one: events that count for `max_depth`.
     fn events(&self, path: &Path) -> u32 {
         path.vertices + if self.settings.count_crossings { path.crossings } else { 0 }
@@ -587,31 +574,23 @@ impl Tracer<'_> {
         self.scene.foresee(&self.sampler, Set::Scatter(path.vertices));
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
         let next_event = self.settings.light_samples > 0 && medium.shadow_rays;
-        let count = self.shadow_rays(path);
         if next_event {
             let inside = path.inside;
             let eval = |wi| {
                 let p = Lanes::splat(medium.phase.eval(point, wo, wi) as f32);
                 (p, p)
             };
-            path.further += count - 1;
-            let asker = self.scene.asker(point, None);
-            let parts = (count > 1).then(|| self.sampler.parts(Set::Shadows(path.vertices), count));
-            for i in 0..count {
-                let part = parts.as_ref().map(|parts| parts[i as usize]);
-                self.add_light::<CHROMATIC, MEDIA>(
-                    path,
-                    &asker,
-                    (i, count),
-                    part.map_or(u_light, |u| pairs(u).0),
-                    || part.map_or(choice[0], |u| u[2]),
-                    eval,
-                    |_| First::Media,
-                    |_| inside,
-                    |wi| Ray::new(point, wi),
-                    None,
-                );
-            }
+            self.ask_lights::<CHROMATIC, MEDIA>(
+                path,
+                (point, None),
+                u_light,
+                || choice[0],
+                eval,
+                |_| First::Media,
+                |_| inside,
+                |wi| Ray::new(point, wi),
+                None,
+            );
         }
         if !path.goes_on() {
             return false;
@@ -623,7 +602,7 @@ impl Tracer<'_> {
         path.previous = next_event.then(|| Previous {
             point,
             normal: None,
-            rho: path.rho_sum::<CHROMATIC>() * f64::from(count),
+            rho: path.rho_sum::<CHROMATIC>() * f64::from(self.shadow_rays(path)),
             density: medium.phase.eval(point, wo, wi),
             distance: 0.0,
         });

@@ -145,6 +145,11 @@ fn layers_of_shared_light_add_up_to_the_picture_that_they_leave_as_it_is() {
     let things = walls + "- sphere: {center: [-0.4, -0.6, -0.3], radius: 0.4, material: {plastic: {}}, name: ball}\n";
     let plain = lit("on", &things, "");
     let parted = lit("on", &things, "layers: [emission, direct, indirect, caustic]\n");
+    assert_layers_add_up(&plain, &parted);
+}
+
+/// Of `parted`, which has four layers more than `plain`: they leave the picture as it is, and add up to it.
+pub fn assert_layers_add_up(plain: &Bench, parted: &Bench) {
     let (plain, parted) = (plain.frame(), parted.frame());
     let matrix = ColourSpace::Rec709.matrix_from_xyz();
     let (picture, with) = (plain.resolve(&matrix), parted.resolve(&matrix));

@@ -1,9 +1,8 @@
 //! Several shadow rays from the first vertex of a path change the noise, never the mean.
 
 use super::common::{Bench, bench_with, grey_png, room};
-use super::reuse::{over_seeds, t};
+use super::reuse::{assert_layers_add_up, over_seeds, t};
 use abbe::math::statistics::{Moments, student_t_half_width};
-use abbe::spectrum::ColourSpace;
 
 const LAMPS: &str = "- rectangle: {corner: [-0.6, 0.9, -0.6], edge_u: [1.2, 0, 0], edge_v: [0, 0, 1.2], emission: 3}\n\
                      - sphere: {center: [-0.7, 0.2, -0.6], radius: 0.15, emission: {rgb: [8, 3, 1]}}\n";
@@ -96,17 +95,7 @@ fn layers_of_several_shadow_rays_add_up_to_the_picture_that_they_leave_as_it_is(
         + "- sphere: {center: [-0.4, -0.6, -0.3], radius: 0.4, material: {plastic: {}}, name: ball}\n";
     let plain = lit(4, &things, "", "reuse: off");
     let parted = lit(4, &things, "layers: [emission, direct, indirect, caustic]\n", "reuse: off");
-    let (plain, parted) = (plain.frame(), parted.frame());
-    let matrix = ColourSpace::Rec709.matrix_from_xyz();
-    let (picture, with) = (plain.resolve(&matrix), parted.resolve(&matrix));
-    assert!(picture == with);
-    for c in 0..3 {
-        let layers: Vec<_> = (0..4).map(|layer| parted.layer(3 * layer + c)).collect();
-        for (i, all) in with.rgb[c].iter().enumerate() {
-            let sum: f32 = layers.iter().map(|layer| layer[i]).sum();
-            assert!((sum - all).abs() <= 16.0 * f32::EPSILON * all.abs().max(0.1), "pixel {i}: {sum}, {all}");
-        }
-    }
+    assert_layers_add_up(&plain, &parted);
 }
 
 /// A lamp that fills the sky has more light to tell of than one ray brings; a point has not.

@@ -2,7 +2,7 @@
 
 use super::together::MOST;
 use super::{Path, Tracer};
-use crate::math::sampler::PARTS;
+use crate::math::sampler::{PARTS, Set, pairs};
 use crate::math::{Departure, Ray};
 use crate::scene::Inside;
 use crate::scene::choice::Asker;
@@ -91,11 +91,54 @@ impl Tracer<'_> {
         }
     }
 
-    /// Next-event estimation: light from one point of one light for `asker`, the `i`th time of `count`. `eval` tells f · |cos| and
+    /// Shadow rays from where the path is, if it looks for light there.
+    pub(super) fn shadow_rays(&self, path: &Path) -> u32 {
+        if path.specular { self.plan.shadow_rays } else { 1 }
+    }
+
+    /// Next-event estimation: as many times as the path sends shadow rays from here light from one point of one light, at a point
+    /// with the normal of the side that is asked for. `u` and `u_light` are the numbers of a single time; `eval` tells f · |cos| and
     /// densities toward a direction, `first` what scatters light from there.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the state of a vertex, split by borrow")]
-    pub(super) fn add_light<const CHROMATIC: bool, const MEDIA: bool>(
+    pub(super) fn ask_lights<const CHROMATIC: bool, const MEDIA: bool>(
+        &self,
+        path: &mut Path,
+        (point, normal): (DVec3, Option<DVec3>),
+        u: DVec2,
+        u_light: impl Fn() -> f64,
+        eval: impl Fn(DVec3) -> (Lanes, Lanes),
+        first: impl Fn(DVec3) -> First,
+        inside: impl Fn(DVec3) -> Inside,
+        leave: impl Fn(DVec3) -> Ray,
+        mut later: Option<&mut Questions>,
+    ) {
+        let count = self.shadow_rays(path);
+        path.further += count - 1;
+        let asker = self.scene.asker(point, normal);
+        path.judged = asker.judged();
+        let parts = (count > 1).then(|| self.sampler.parts(Set::Shadows(path.vertices), count));
+        for i in 0..count {
+            let part = parts.as_ref().map(|parts| parts[i as usize]);
+            self.add_light::<CHROMATIC, MEDIA>(
+                path,
+                &asker,
+                (i, count),
+                part.map_or(u, |u| pairs(u).0),
+                || part.map_or_else(&u_light, |u| u[2]),
+                &eval,
+                &first,
+                &inside,
+                &leave,
+                later.as_deref_mut(),
+            );
+        }
+    }
+
+    /// Light from one point of one light for `asker`, the `i`th time of `count`.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "the state of a vertex, split by borrow")]
+    fn add_light<const CHROMATIC: bool, const MEDIA: bool>(
         &self,
         path: &mut Path,
         asker: &Asker,
@@ -110,7 +153,6 @@ impl Tracer<'_> {
     ) {
         let scene = self.scene;
         let Asker { point, normal, .. } = *asker;
-        path.judged = asker.judged();
         let Some((lamp, chance)) = scene.choose_light_for(asker, u_light) else { return };
         // How often it is chosen.
         let probability = chance * f64::from(count);
