@@ -15,13 +15,13 @@ use crate::scene::Scene;
 use crate::scene::compile;
 use crate::scene::shelf::Shelf;
 use crate::spectrum::ColourSpace;
-use crate::transport::Spread;
 use crate::transport::layers::{Channel, Layer, Source};
 use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{
     Coverage, EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings,
 };
 use crate::transport::trial::{self, first};
+use crate::transport::{Shot, Spread};
 use glam::DVec2;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -145,7 +145,8 @@ pub(super) fn prepare_scene(
         plan.layers.kept = Kept::ByReplicate;
     }
     plan.techniques.extend(said);
-    if let Some(first) = first::decide(&scene, &census, &moments, &plan, &filter, seed, planned, wishes) {
+    let shot = Shot { scene: &scene, plan: &plan, filter: &filter, seed, photons: None };
+    if let Some(first) = first::decide(&shot, &census, &moments, planned, wishes) {
         (plan.reuse, plan.shadow_rays) = (first.reuse, first.shadow_rays);
         plan.techniques.extend(first.said);
     }

@@ -101,9 +101,16 @@ impl Sampler<'_> {
     /// The numbers of `set` of the first [`PARTS`] of `count` [`Sampler::part`]s.
     #[must_use]
     pub fn parts(&self, set: Set, count: u32) -> [[f64; 4]; PARTS as usize] {
-        let first = self.index.wrapping_mul(count);
-        let indices = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| first.wrapping_add(i));
-        points([key(self.stream, set); 8], indices).map(|bits| bits.map(unit))
+        let mut indices = [self.index.wrapping_mul(count); PARTS as usize];
+        for (index, i) in indices.iter_mut().zip(0..) {
+            *index = index.wrapping_add(i);
+        }
+        let mut numbers = [[0.0; 4]; PARTS as usize];
+        let points = points([key(self.stream, set); PARTS as usize], indices);
+        for (numbers, bits) in numbers.iter_mut().flatten().zip(points.as_flattened()) {
+            *numbers = unit(*bits);
+        }
+        numbers
     }
 
     /// Tells `all` the numbers of the samples that share theirs with this one, if none of them has asked for `set` yet:

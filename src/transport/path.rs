@@ -361,7 +361,7 @@ impl Tracer<'_> {
         let Leaving { hit, surface, object, frame, .. } = *at;
         let scene = self.scene;
         let wo = frame.to_local(at.wo);
-        scene.foresee(&self.sampler, Set::Scatter(path.vertices));
+        self.foresee(path);
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
         if !bsdf.is_discrete() && self.settings.light_samples > 0 {
             let toward = path.ray.direction.dot(surface.normal);
@@ -571,7 +571,7 @@ impl Tracer<'_> {
         }
         let choice = self.sampler.set(Set::Choice(path.vertices));
         let wo = -path.ray.direction;
-        self.scene.foresee(&self.sampler, Set::Scatter(path.vertices));
+        self.foresee(path);
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
         let next_event = self.settings.light_samples > 0 && medium.shadow_rays;
         if next_event {

@@ -38,12 +38,30 @@ pub fn over_seeds(mut bench: Bench, seeds: Range<u64>) -> (Vec<Moments>, Moments
 }
 
 /// Student's t of the difference of two means.
-pub fn t(a: &Moments, b: &Moments) -> f64 {
+fn t(a: &Moments, b: &Moments) -> f64 {
     (a.mean - b.mean).abs() / a.standard_error().hypot(b.standard_error())
 }
 
-/// Each pixel over 24 seeds, by Student's t of the difference with and without: of 24 + 24 numbers of about normal law it has at
-/// least 23 degrees of freedom (Welch). The level is 1e-3 for all pixels of a room together, and again for their mean.
+/// Holds what two ways make of a scene over 24 seeds each to the same light, each pixel by Student's t of the difference: of 24 + 24
+/// numbers of about normal law it has at least 23 degrees of freedom (Welch). The level is 1e-3 for all pixels of the scene
+/// together, and again for their mean. The variance of all pixels by the second way over that by the first.
+pub fn assert_same_light(
+    name: &str,
+    (a, a_all): &(Vec<Moments>, Moments),
+    (b, b_all): &(Vec<Moments>, Moments),
+) -> f64 {
+    let most = student_t_half_width(1.0 - 1e-3 / a.len() as f64, 23.0);
+    let worst = a.iter().zip(b).map(|(a, b)| t(a, b)).fold(0.0, f64::max);
+    let mean = t(a_all, b_all);
+    let precision = a_all.standard_error().hypot(b_all.standard_error()) / a_all.mean;
+    let variance = |pixels: &[Moments]| pixels.iter().map(Moments::variance).sum::<f64>();
+    let ratio = variance(b) / variance(a);
+    println!("{name}: worst {worst:.2} of {most:.2}, mean {mean:.2}, told to {precision:.1e}, variance {ratio:.2}");
+    assert!(worst < most, "{name}: {worst} standard errors, {most} allowed");
+    assert!(mean < student_t_half_width(1.0 - 1e-3, 23.0) && precision < 1e-2, "{name}: {mean}, {precision}");
+    ratio
+}
+
 #[test]
 fn pixels_that_share_paths_have_the_light_of_those_that_do_not() {
     let walls = room("material: {diffuse: {reflectance: 0.7}}");
@@ -103,22 +121,13 @@ fn pixels_that_share_paths_have_the_light_of_those_that_do_not() {
         ),
     ];
     for (name, before, shapes) in cases {
-        let [(apart, apart_all), (shared, shared_all)] = [("off", 0), ("on", 100)].map(|(reuse, first)| {
+        let [apart, shared] = [("off", 0), ("on", 100)].map(|(reuse, first)| {
             let bench = lit(reuse, &shapes, before);
             assert_eq!(bench.prepared.plan.reuse, reuse == "on", "{name}");
             over_seeds(bench, first..first + 24)
         });
-        let most = student_t_half_width(1.0 - 1e-3 / apart.len() as f64, 23.0);
-        let worst = apart.iter().zip(&shared).map(|(a, b)| t(a, b)).fold(0.0, f64::max);
-        let mean = t(&apart_all, &shared_all);
-        let precision = apart_all.standard_error().hypot(shared_all.standard_error()) / apart_all.mean;
-        println!("{name}: worst {worst:.2} of {most:.2}, mean {mean:.2}, told to {precision:.1e}");
-        assert!(worst < most, "{name}: {worst} standard errors, {most} allowed");
-        assert!(mean < student_t_half_width(1.0 - 1e-3, 23.0) && precision < 1e-2, "{name}: {mean}, {precision}");
-        // It is worth something: variances of pixels.
-        let variance = |pixels: &[Moments]| pixels.iter().map(Moments::variance).sum::<f64>();
-        let ratio = variance(&shared) / variance(&apart);
-        println!("    variance {ratio:.2}");
+        // It is worth something.
+        let ratio = assert_same_light(name, &apart, &shared);
         assert!(ratio < 0.9, "{name}: {ratio}");
     }
 }

@@ -1,8 +1,7 @@
 //! Several shadow rays from the first vertex of a path change the noise, never the mean.
 
 use super::common::{Bench, bench_with, grey_png, room};
-use super::reuse::{assert_layers_add_up, over_seeds, t};
-use abbe::math::statistics::{Moments, student_t_half_width};
+use super::reuse::{assert_layers_add_up, assert_same_light, over_seeds};
 
 const LAMPS: &str = "- rectangle: {corner: [-0.6, 0.9, -0.6], edge_u: [1.2, 0, 0], edge_v: [0, 0, 1.2], emission: 3}\n\
                      - sphere: {center: [-0.7, 0.2, -0.6], radius: 0.15, emission: {rgb: [8, 3, 1]}}\n";
@@ -17,8 +16,6 @@ fn lit(shadow_rays: u32, shapes: &str, before: &str, techniques: &str) -> Bench 
     bench_with(&yaml, &[("sky.png", &grey_png(16, 8, |x, y| (100 + x * 9 + y) as u8))])
 }
 
-/// Each pixel over 24 seeds, by Student's t of the difference with one and with several: of 24 + 24 numbers of about normal law it
-/// has at least 23 degrees of freedom (Welch). The level is 1e-3 for all pixels of a scene together, and again for their mean.
 #[test]
 fn several_shadow_rays_bring_the_light_of_one() {
     let walls = room("material: {diffuse: {reflectance: 0.7}}");
@@ -46,25 +43,12 @@ fn several_shadow_rays_bring_the_light_of_one() {
         ("behind glass and a mirror", "", &behind, "reuse: off, packets: on"),
         ("behind glass and a mirror, lane by lane", "", &behind, "reuse: off, packets: off"),
     ] {
-        let (one, one_all) = over_seeds(lit(1, shapes, before, techniques), 0..24);
+        let one = over_seeds(lit(1, shapes, before, techniques), 0..24);
         for (rays, first) in [(3, 100), (8, 200)] {
             let bench = lit(rays, shapes, before, techniques);
             assert_eq!(bench.prepared.plan.shadow_rays, rays, "{name}");
-            let (several, several_all) = over_seeds(bench, first..first + 24);
-            let most = student_t_half_width(1.0 - 1e-3 / one.len() as f64, 23.0);
-            let worst = one.iter().zip(&several).map(|(a, b)| t(a, b)).fold(0.0, f64::max);
-            let mean = t(&one_all, &several_all);
-            let precision = one_all.standard_error().hypot(several_all.standard_error()) / one_all.mean;
-            let variance = |pixels: &[Moments]| pixels.iter().map(Moments::variance).sum::<f64>();
-            let ratio = variance(&several) / variance(&one);
-            println!(
-                "{name}, {rays}: worst {worst:.2} of {most:.2}, mean {mean:.2} ({precision:.1e}), variance {ratio:.2}"
-            );
-            assert!(worst < most, "{name}, {rays}: {worst} standard errors, {most} allowed");
-            assert!(
-                mean < student_t_half_width(1.0 - 1e-3, 23.0) && precision < 1e-2,
-                "{name}, {rays}: {mean}, {precision}"
-            );
+            let several = over_seeds(bench, first..first + 24);
+            let ratio = assert_same_light(&format!("{name}, {rays}"), &one, &several);
             // In fog little of the noise is that of first vertices on surfaces.
             assert!(name == "fog" || ratio < 0.95, "{name}, {rays}: {ratio}");
         }

@@ -171,7 +171,7 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
     if let Integrator::Path(settings) = &chosen.plan.integrator
         && first::single(&census, settings).is_none()
     {
-        for count in [1, 2, 4, 8].into_iter().filter(|count| *count != chosen.plan.shadow_rays) {
+        for count in first::counts().filter(|count| *count != chosen.plan.shadow_rays) {
             let count = count.to_string();
             all.push(trial("shadow rays", &count, &[("render.techniques.shadow_rays", &count)]));
         }

@@ -96,6 +96,13 @@ impl Tracer<'_> {
         if path.specular { self.plan.shadow_rays } else { 1 }
     }
 
+    /// Has the sky that a single shadow ray looks at fetched ahead; several have numbers of their own.
+    pub(super) fn foresee(&self, path: &Path) {
+        if self.shadow_rays(path) == 1 {
+            self.scene.foresee(&self.sampler, Set::Scatter(path.vertices));
+        }
+    }
+
     /// Next-event estimation: as many times as the path sends shadow rays from here light from one point of one light, at a point
     /// with the normal of the side that is asked for. `u` and `u_light` are the numbers of a single time; `eval` tells f · |cos| and
     /// densities toward a direction, `first` what scatters light from there.

@@ -1,8 +1,7 @@
 //! What the first vertices of paths do: whether they share what paths find, and how many shadow rays they send.
 
-use super::{MOST, STREAM, Tried, decided, variance};
+use super::{MOST, STREAM, Tried, decided, judge, variance};
 use crate::film::accumulate::REPLICATES;
-use crate::film::filter::FilterSampler;
 use crate::math::sampler::{PARTS, Sampler, Set, pairs};
 use crate::scene::Scene;
 use crate::scene::census::Census;
@@ -13,6 +12,7 @@ use crate::transport::pilot::Wishes;
 use crate::transport::plan::{Effect, EffectPlan, Integrator, PathSettings};
 use crate::transport::{Samples, Shot, place_in};
 use rayon::prelude::*;
+use std::iter;
 
 /// Share of the samples of the picture that each way takes in the trial.
 const SHARE: f64 = 1.0 / 128.0;
@@ -39,10 +39,15 @@ struct Way {
     shadow_rays: u32,
     /// Variance times cost.
     cost: f64,
-    /// That over what it is with one shadow ray, if several are tried; the least of all where it is one that pays.
-    ratio: Option<f64>,
+    /// That over what it is with one shadow ray; where one is best, what the best of several would have. Not a number where that is not known.
+    ratio: f64,
     /// Whether vertices of different pixels saw each other.
     meets: bool,
+}
+
+/// The numbers of shadow rays among which is chosen: powers of two, so that aligned blocks of samples keep their strata.
+pub fn counts() -> impl Iterator<Item = u32> {
+    iter::successors(Some(1), |count| Some(2 * count)).take_while(|count| *count <= PARTS)
 }
 
 /// Why one shadow ray from a vertex is all that can be wanted; `None` where several may be.
@@ -61,21 +66,12 @@ pub fn single(census: &Census, settings: &PathSettings) -> Option<&'static str> 
 
 /// What the first vertices of paths are to do; nothing but for paths from the camera.
 #[must_use]
-#[expect(clippy::too_many_arguments, reason = "all that a picture is made of")]
-pub fn decide(
-    scene: &Scene,
-    census: &Census,
-    moments: &[Scene],
-    plan: &EffectPlan,
-    filter: &FilterSampler,
-    seed: u64,
-    samples: u32,
-    wishes: Wishes,
-) -> Option<First> {
+pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wishes: Wishes) -> Option<First> {
+    let Shot { scene, plan, seed, .. } = *shot;
     let Integrator::Path(settings) = &plan.integrator else { return None };
     let try_out = |reuse, shadow_rays| {
         let plan = EffectPlan { reuse, shadow_rays, layers: LayerPlan::default(), ..plan.clone() };
-        try_groups(&Shot { scene, plan: &plan, filter, seed: seed ^ STREAM, photons: None }, samples)
+        try_groups(&Shot { plan: &plan, seed: seed ^ STREAM, ..*shot }, samples)
     };
     let single = single(census, settings);
     let fixed = single.map_or(wishes.shadow_rays, |_| Some(1));
@@ -85,14 +81,14 @@ pub fn decide(
 
     // What is settled needs no trial.
     let settled = |reuse: bool| match fixed {
-        Some(shadow_rays) => Way { shadow_rays, cost: f64::NAN, ratio: None, meets: true },
+        Some(shadow_rays) => Way { shadow_rays, cost: f64::NAN, ratio: f64::NAN, meets: true },
         None => way(reuse),
     };
     let (reuse, why, way) = match wish {
         Some(reuse) => (reuse, obstacle.unwrap_or("the scene says so").to_owned(), settled(reuse)),
         None => {
             let (alone, together) = (way(false), way(true));
-            let (on, reason) = super::judge(together.cost / alone.cost, WORTH_IT);
+            let (on, reason) = judge(together.cost / alone.cost, WORTH_IT);
             match together.meets {
                 true if on => (true, reason, together),
                 true => (false, reason, alone),
@@ -105,11 +101,10 @@ pub fn decide(
         1 => "several shadow rays from the first vertex".into(),
         _ => format!("{count} shadow rays from the first vertex").into(),
     };
-    let of_rays = match (single, wishes.shadow_rays, way.ratio) {
-        (Some(reason), ..) => reason.into(),
-        (None, Some(_), _) => "the scene says so".into(),
-        (None, None, Some(ratio)) => format!("the trial expects {ratio:.2} times the time to the same error"),
-        (None, None, None) => "the trial sees no light".into(),
+    let of_rays = match (single, wishes.shadow_rays) {
+        (Some(reason), _) => reason.into(),
+        (None, Some(_)) => "the scene says so".into(),
+        (None, None) => judge(way.ratio, WORTH_IT).1,
     };
     Some(First {
         reuse,
@@ -127,12 +122,13 @@ impl Way {
         let one = try_out(fixed.unwrap_or(1));
         let meets = one.pairs > 0;
         let way = |shadow_rays, cost, ratio| Way { shadow_rays, cost, ratio, meets };
-        let (variance_of_one, cost) = (variance(&one), super::cost_of_error(&one));
+        let variance_of_one = variance(&one);
+        let cost = variance_of_one * one.rays;
         if let Some(shadow_rays) = fixed {
-            return way(shadow_rays, cost, None);
+            return way(shadow_rays, cost, f64::NAN);
         }
         if variance_of_one.is_nan() || variance_of_one <= 0.0 || reuse && !meets {
-            return way(1, cost, None);
+            return way(1, cost, f64::NAN);
         }
         let several = try_out(PROBED);
         // V = a + b n^-1.5 and C = c + d (n − 1) of n rays, over those of one ray: what evenly spread rays find at the edge of a
@@ -141,12 +137,11 @@ impl Way {
         let b = (1.0 - variance(&several) / variance_of_one) / fall(PROBED);
         let d = (several.rays / one.rays - 1.0) / f64::from(PROBED - 1);
         let ratio = |n: u32| (1.0 - b.min(1.0) * fall(n)) * (1.0 + d * f64::from(n - 1));
-        let counts = (1..).map(|power| 1 << power).take_while(|n| *n <= PARTS);
-        let best = counts.min_by(|a, b| ratio(*a).total_cmp(&ratio(*b))).unwrap_or(1);
+        let best = counts().skip(1).min_by(|a, b| ratio(*a).total_cmp(&ratio(*b))).unwrap_or(1);
         let least = ratio(best);
-        match least < WORTH_IT {
-            true => way(best, cost * least, Some(least)),
-            false => way(1, cost, Some(least)),
+        match judge(least, WORTH_IT).0 {
+            true => way(best, cost * least, least),
+            false => way(1, cost, least),
         }
     }
 }
