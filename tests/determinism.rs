@@ -9,7 +9,6 @@ use abbe::batch::{self, Overrides};
 use abbe::film::Window;
 use abbe::film::accumulate::Film;
 use abbe::film::exr::{ExrFile, read_exr};
-use abbe::film::filter::{Filter, FilterSampler};
 use common::{Bench, bench_with, grey_png, try_bench, write};
 use std::ops::Range;
 use std::path::Path;
@@ -86,24 +85,35 @@ fn scenes() -> Vec<(&'static str, String)> {
 
 fn scene(text: &str, integrator: &str, render: &str) -> Bench {
     let map = grey_png(16, 8, |x, y| (x * 15 + y * 2) as u8);
-    let text = format!("{FRAME}{}{text}", settings(integrator, render));
+    let frame = FRAME.replace("width", &format!("{}width", image(integrator)));
+    let text = format!("{frame}{}{text}", settings(integrator, render));
     bench_with(&text, &[("map.png", &map)])
 }
 
 /// The bits of all sums of a film.
 fn sums(film: &Film) -> Vec<([i128; 3], i64, u32, u32)> {
     let cells = film.cells().iter().flatten();
-    cells.map(|c| (c.xyz.each_ref().map(|s| s.0), c.alpha, c.count, c.dropped)).collect()
+    let own = cells.map(|c| (c.xyz.each_ref().map(|s| s.0), c.alpha, c.count, c.dropped));
+    let weights = film.layers.weight_units().iter().map(|units| ([0; 3], *units, 0, 0));
+    own.chain(weights).collect()
 }
 
 fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
 }
 
-/// What computes the light; [`SHARED`] has paths share what they find wherever they can, and send several shadow rays.
-const INTEGRATORS: [&str; 3] = ["path", SHARED, "{whitted: {grid: 3, ambient: 0.1}}"];
+/// What computes the light; [`SHARED`] has paths share what they find wherever they can, and send several shadow rays, [`DEALT`]
+/// has samples count for all pixels that a wide filter reaches.
+const INTEGRATORS: [&str; 4] = ["path", SHARED, DEALT, "{whitted: {grid: 3, ambient: 0.1}}"];
 
 const SHARED: &str = "{path: {}}";
+
+const DEALT: &str = "{path: {hide_emitters: false}}";
+
+/// What is said of the picture besides its size.
+fn image(integrator: &str) -> &str {
+    if integrator == DEALT { "filter: {gaussian: {stddev: 0.6}}, " } else { "" }
+}
 
 fn settings(integrator: &str, render: &str) -> String {
     let (reuse, rays) = if integrator == SHARED { ("on", 3) } else { ("off", 1) };
@@ -126,10 +136,10 @@ fn threads_and_tiles_do_not_change_a_bit() {
 
 /// Renders `ranges` of samples in their order, each into a film of its own, and merges the films.
 fn in_parts(bench: &Bench, ranges: &[Range<u32>], side: u32) -> Film {
-    let filter = FilterSampler::new(Filter::Box).unwrap();
+    let filter = bench.prepared.sampler().unwrap();
     let job = FrameJob { tile: side, ..bench.prepared.job(&filter) };
     let frame = job.scene.camera.resolution;
-    let mut whole = Film::new(frame, job.window).unwrap();
+    let mut whole = Film::new(frame, job.window).unwrap().with_layers(job.plan.layers.layout());
     for range in ranges {
         let (part, _) = render_part(&job, range.clone()).unwrap();
         whole.merge(&part).unwrap();
@@ -157,7 +167,9 @@ fn a_crop_shows_the_very_pixels_of_the_frame() {
         for (name, text) in scenes() {
             let whole = scene(&text, integrator, "tile: 8").film();
             let crop = Window { x: 3, y: 5, width: 9, height: 7 };
-            let cropped = text.clone() + "image: {width: 20, height: 14, crop: {x: 3, y: 5, width: 9, height: 7}}\n";
+            let more = image(integrator);
+            let size = "width: 20, height: 14, crop: {x: 3, y: 5, width: 9, height: 7}";
+            let cropped = format!("{text}image: {{{more}{size}}}\n");
             let map = grey_png(16, 8, |x, y| (x * 15 + y * 2) as u8);
             let camera = FRAME.lines().next().unwrap();
             let yaml = format!("{camera}\n{}{cropped}", settings(integrator, "tile: 8"));
@@ -168,6 +180,8 @@ fn a_crop_shows_the_very_pixels_of_the_frame() {
                     let a = &whole.cells()[whole.window().index([x, y]).unwrap()];
                     let b = &part.cells()[crop.index([x, y]).unwrap()];
                     assert!(a == b, "{name}, {integrator}: pixel ({x}, {y})");
+                    let weights = |film: &Film| film.layers.weights(film.window().index([x, y]).unwrap());
+                    assert!(weights(&whole) == weights(&part), "{name}, {integrator}: pixel ({x}, {y})");
                 }
             }
         }

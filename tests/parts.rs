@@ -36,6 +36,7 @@ fn scenes() -> Vec<(&'static str, String)> {
         ("whitted", render("") + "integrator: {whitted: {grid: 3}}\n" + &cropped),
         ("layers", render("") + layers + &cropped),
         ("bands", caustics("on") + CAUSTIC),
+        ("dealt", caustics("off") + "layers: [direct, caustic, Z]\n" + CAUSTIC),
         (
             "ways",
             caustics("on") + "layers: [direct, caustic, light_groups, Z, P, sampleCount, crypto_object]\n" + CAUSTIC,
@@ -46,7 +47,11 @@ fn scenes() -> Vec<(&'static str, String)> {
 /// The scene of [`scenes`] with this name.
 fn yaml(name: &str, text: &str) -> String {
     let bands = "height: 14, bands: [{name: red, response: {table: [[600, 1], [700, 1]]}}, {name: all, response: 2}]";
-    let frame = if name == "bands" { FRAME.replace("height: 14", bands) } else { FRAME.to_owned() };
+    let frame = match name {
+        "bands" => FRAME.replace("height: 14", bands),
+        "dealt" => FRAME.replace("height: 14", "height: 14, filter: {gaussian: {stddev: 0.6}}"),
+        _ => FRAME.to_owned(),
+    };
     frame + text
 }
 

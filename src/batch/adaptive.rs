@@ -22,7 +22,7 @@ use super::frame::{FrameJob, light_unit};
 use super::part::Breaks;
 use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, REPLICATES, SAMPLES_LIMIT};
-use crate::film::resolve::{counts, replicate_means};
+use crate::film::resolve::replicate_means;
 use crate::math::sampler::mix64;
 use crate::spectrum::ColourSpace;
 use crate::transport::path::reuse;
@@ -336,8 +336,7 @@ pub fn decide(job: &FrameJob, first: u32, film: &Film, scale: &Scale) -> Allocat
         for dy in 0..SIDE as i32 {
             for dx in 0..SIDE as i32 {
                 if let Some(index) = window.index([x + dx, y + dy]) {
-                    let cells = &film.cells()[index];
-                    pixels.extend(replicate_means(cells, counts(cells), &rgb_from_xyz));
+                    pixels.extend(replicate_means(film, index, &rgb_from_xyz));
                 }
             }
         }

@@ -104,7 +104,8 @@ pub enum Sharing {
         span: f64,
         /// [`Filter::overlap`](crate::film::filter::Filter::overlap), likewise.
         overlap: f64,
-        /// Side of the cells, aligned to the frame, in which paths share what they find; 1 where they do not.
+        /// Side of the cells, aligned to the frame, in which paths share what they find or pixels their samples; 1 where they do
+        /// not.
         cell: u32,
     },
 }
@@ -120,7 +121,7 @@ impl Sharing {
         }
         let filter = splats.then(|| filter(&description.image.filter));
         let of = |part: fn(&Filter) -> f64| filter.as_ref().map_or(1.0, part);
-        let cell = if plan.reuse { adaptive::SIDE } else { 1 };
+        let cell = if plan.shares_cells() { adaptive::SIDE } else { 1 };
         Sharing::Near { span: of(Filter::span), overlap: of(Filter::overlap), cell }
     }
 }

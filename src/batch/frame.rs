@@ -4,27 +4,18 @@
 //! integers, so the picture does not depend on it. Samples come in passes that double their number,
 //! and after each pass the error so far is known.
 
-use super::adaptive::{self, Allocation};
 use super::finish::Sharing;
 use super::part::{Breaks, Part, Share, SplatFilm};
 use super::stop::{Forecast, Stop};
 use crate::error::{Error, Result};
 use crate::film::Window;
-use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, TileBuffer};
+use crate::film::accumulate::{Film, InvalidCounts, REPLICATES};
 use crate::film::error::{self, ErrorEstimate, NoEstimate, Values};
 use crate::film::filter::FilterSampler;
-use crate::film::layers::Layout;
 use crate::film::resolve::{self, Image};
-use crate::film::run::{LONGEST, LayerRun, Run};
-use crate::math::sampler::Octet;
 use crate::scene::Scene;
 use crate::spectrum::ColourSpace;
-use crate::transport::layers::Source;
-use crate::transport::merge::Collection;
-use crate::transport::middle;
-use crate::transport::path::reuse::{self, Group};
 use crate::transport::plan::EffectPlan;
-use crate::transport::{Address, PixelSample, Samples, Shot, address, moment, scene_at};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Mutex;
@@ -211,173 +202,6 @@ pub const INVALID_LIMIT: f64 = 1e-6;
 pub fn pass_end(at: u32, most: u32) -> u32 {
     let doublings = std::iter::successors(Some(REPLICATES as u32), |end| end.checked_mul(2));
     doublings.into_iter().find(|end| *end > at).unwrap_or(most).min(most)
-}
-
-/// Renders one work unit into `tile`: `samples` of each pixel, or where they are shared out what that is for each.
-pub(super) fn render_unit(
-    job: &FrameJob,
-    samples: Range<u32>,
-    shares: Option<&Allocation>,
-    photons: Option<Collection>,
-    tile: &mut TileBuffer,
-) {
-    let FrameJob { scene, moments, plan, filter, seed, .. } = *job;
-    let shot = Shot { scene, plan, filter, seed, photons };
-    let moments = match photons.and_then(|photons| photons.moment) {
-        Some(shared) => &moments[shared..=shared],
-        None => moments,
-    };
-    // Who renders the first sample adds what stands in the pixels once.
-    if samples.start == 0 && plan.layers.layers.iter().any(|layer| matches!(layer.source, Source::Middle(_))) {
-        for (index, pixel) in tile.window().iter().enumerate() {
-            middle::middle(scene, job.next, plan, pixel, |channel, value| {
-                tile.layers.add_once(index, [(channel, value)])
-            });
-        }
-    }
-    // A scrambling for each replicate, and the number of a sample in it.
-    let mut wanted: Vec<(u32, u32)> = Vec::new();
-    let want = |pixel: [i32; 2], wanted: &mut Vec<(u32, u32)>| {
-        wanted.clear();
-        for replicate in 0..REPLICATES as u32 {
-            // Samples take turns among the replicates.
-            let turns = |s: u32| s.saturating_sub(replicate).div_ceil(REPLICATES as u32);
-            let indices = match shares {
-                Some(shares) => shares.turns(pixel, replicate, &samples),
-                None => turns(samples.start)..turns(samples.end),
-            };
-            // Or a scrambling for each sample, of which it is the first point.
-            let address = |i| if job.independent { (replicate + REPLICATES as u32 * i, 0) } else { (replicate, i) };
-            wanted.extend(indices.map(address));
-        }
-    };
-    let mut unit = Unit { shot, moments, tile, memory: Samples::default(), runs: Runs::default() };
-    let window = unit.tile.window();
-    if plan.reuse {
-        for corner in adaptive::corners(window) {
-            for group in reuse::groups(corner, scene.camera.resolution) {
-                if group.pixels().iter().any(|pixel| window.index(*pixel).is_some()) {
-                    // A cell has samples of the same numbers in all its pixels.
-                    want(corner, &mut wanted);
-                    wanted.chunks(LONGEST as usize).for_each(|run| unit.render_group(&group, run));
-                }
-            }
-        }
-    } else {
-        for pixel in window.iter() {
-            want(pixel, &mut wanted);
-            wanted.chunks(LONGEST as usize).for_each(|run| unit.render_pixel(pixel, run));
-        }
-    }
-}
-
-/// A work unit that is being rendered.
-struct Unit<'a> {
-    shot: Shot<'a>,
-    /// Of which each sample sees its own, if there are any.
-    moments: &'a [Scene],
-    tile: &'a mut TileBuffer,
-    memory: Samples,
-    runs: Runs,
-}
-
-/// Sums of pixels by replicate.
-#[derive(Default)]
-struct Runs {
-    light: [[Run; REPLICATES]; reuse::SIDE],
-    layers: [[LayerRun; REPLICATES]; reuse::SIDE],
-}
-
-impl Unit<'_> {
-    /// Renders `samples` of `pixel`, at most [`LONGEST`]: each the number of a scrambling, which take turns among the replicates,
-    /// and an index in it.
-    fn render_pixel(&mut self, pixel: [i32; 2], samples: &[(u32, u32)]) {
-        self.begin(1);
-        // Those that are rendered together see one moment.
-        let together = if self.moments.is_empty() { Octet::SAMPLES } else { 1 };
-        for octet in samples.chunks(together) {
-            let (stream, i) = octet[0];
-            let scene = scene_at(self.shot.scene, self.moments, |count| {
-                moment(self.shot.seed, address(pixel), stream, i, count)
-            });
-            let mut addresses = [Address { pixel: address(pixel), replicate: 0, index: 0 }; Octet::SAMPLES];
-            for (to, &(replicate, index)) in addresses.iter_mut().zip(octet) {
-                (to.replicate, to.index) = (replicate, index);
-            }
-            self.render(scene, &addresses[..octet.len()], |_| (pixel, 0));
-        }
-        self.end(&[pixel]);
-    }
-
-    /// Renders `samples`, at most [`LONGEST`], of all pixels of a group.
-    fn render_group(&mut self, group: &Group, samples: &[(u32, u32)]) {
-        let pixels = group.pixels();
-        self.begin(pixels.len());
-        for &(replicate, index) in samples {
-            let addresses = &group.samples(replicate, index)[..pixels.len()];
-            self.render(self.shot.scene, addresses, |lane| (pixels[lane], lane));
-        }
-        self.end(pixels);
-    }
-
-    /// Renders samples into the runs, of which each belongs to the pixel and the place that `of` tells.
-    fn render(&mut self, scene: &Scene, samples: &[Address], of: impl Fn(usize) -> ([i32; 2], usize)) {
-        let Unit { shot, tile, memory, runs, .. } = self;
-        let Layout { channels, kept } = tile.layers.layout();
-        let unit = light_unit(shot.scene);
-        memory.render(&Shot { scene, ..*shot }, samples, |lane, sample, values, covered| {
-            let (pixel, place) = of(lane);
-            // Some of a group may lie beyond the tile.
-            let Some(index) = tile.window().index(pixel) else { return };
-            if let Some(number) = covered {
-                let pixels = tile.window().pixels();
-                tile.layers.mattes.add(index, pixels, number, 1);
-            }
-            let replicate = samples[lane].replicate as usize % REPLICATES;
-            if channels > 0 && !runs.layers[place][kept.set(replicate)].add(sample.weight, values) {
-                tile.layers.add(index, replicate, sample.weight, values);
-            }
-            record(tile, &mut runs.light[place][replicate], unit, pixel, replicate, sample);
-        });
-    }
-
-    /// Empties the runs of so many pixels.
-    fn begin(&mut self, pixels: usize) {
-        let channels = self.tile.layers.layout().channels;
-        for place in 0..pixels {
-            self.runs.light[place] = [Run::default(); REPLICATES];
-            self.runs.layers[place].iter_mut().for_each(|run| run.reset(channels));
-        }
-    }
-
-    /// Adds the runs to their pixels.
-    fn end(&mut self, pixels: &[[i32; 2]]) {
-        let Layout { channels, kept } = self.tile.layers.layout();
-        for (place, &pixel) in pixels.iter().enumerate() {
-            let Some(index) = self.tile.window().index(pixel) else { continue };
-            for (replicate, run) in self.runs.light[place].iter().enumerate() {
-                self.tile.add_run(pixel, replicate, run);
-            }
-            if channels > 0 {
-                for (replicate, run) in self.runs.layers[place].iter().enumerate().take(kept.sets()) {
-                    self.tile.layers.add_run(index, replicate, run);
-                }
-            }
-        }
-    }
-}
-
-#[inline]
-fn record(tile: &mut TileBuffer, run: &mut Run, unit: f32, pixel: [i32; 2], replicate: usize, sample: &PixelSample) {
-    if let Some(cause) = Invalid::of(sample.radiance) {
-        tile.drop_sample(pixel, replicate, cause);
-        return;
-    }
-    let xyz = sample.xyz.map(|x| x * unit * sample.weight);
-    let alpha = sample.alpha * sample.weight;
-    if !run.add(xyz, alpha) {
-        tile.add(pixel, replicate, xyz, alpha);
-    }
 }
 
 /// What light is multiplied by on its way to the film; a power of two.

@@ -23,8 +23,10 @@ pub mod part_file;
 mod portion;
 mod prepare;
 pub mod report;
+pub mod splatting;
 pub mod stop;
 pub mod tev;
+mod unit;
 
 use crate::description::{self, BatchEntry, PathMap, SceneDescription};
 use crate::error::{Error, Result};
@@ -199,7 +201,7 @@ fn render_and_write(
             output::prepare_place(&spectral_path(&exr_path))?;
         }
     }
-    let filter = prepare::sampler(description)?;
+    let filter = prepared.sampler()?;
     let job = prepared.job(&filter);
     let portion = &overrides.portion;
     if prepared.stop.is_open() && !portion.is_all() {

@@ -13,7 +13,8 @@
 mod lights;
 
 use super::adaptive::{self, Allocation};
-use super::frame::{FrameJob, Milestone, lock, render_unit};
+use super::frame::{FrameJob, Milestone, lock};
+use super::unit::render_unit;
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::{Film, REPLICATES, TileBuffer};
@@ -225,7 +226,7 @@ pub struct Part<'a> {
 
 /// The layers to which paths from the lights add.
 fn light_layers(job: &FrameJob) -> Layout {
-    Layout { channels: job.plan.layers.light_channels(), ..job.plan.layers.layout() }
+    Layout { channels: job.plan.layers.light_channels(), kept: job.plan.layers.kept.without_weights() }
 }
 
 impl<'a> Part<'a> {
@@ -258,7 +259,7 @@ impl<'a> Part<'a> {
         };
         let film = Mutex::new(film(window, layers)?);
         let start = share.samples.start;
-        let least = if job.plan.reuse { adaptive::SIDE } else { 4 };
+        let least = if job.plan.shares_cells() { adaptive::SIDE } else { 4 };
         let tiles = shares(window, job.tile, least, rayon::current_num_threads());
         let tiles = tiles.into_iter().map(|window| Tile { window, done: AtomicU32::new(start) }).collect();
         let lights = Mutex::new(LightsDone { below: start, more: Vec::new() });

@@ -135,6 +135,7 @@ enum Kind {
     Alpha(usize),
     Count(usize),
     Dropped(usize),
+    Weight(usize),
     /// Of a set of sums, see [`LayerSums::place`](crate::film::layers::LayerSums::place), and a channel.
     Layer(usize, usize),
     LayerCount(usize),
@@ -151,12 +152,15 @@ fn kinds(prefix: &str, layers: Layout) -> Vec<(Kind, String)> {
         all.push((Kind::Alpha(r), format!("{prefix}{r}.A")));
         all.push((Kind::Count(r), format!("{prefix}{r}.n")));
         all.push((Kind::Dropped(r), format!("{prefix}{r}.dropped")));
+        if layers.kept == Kept::Weighed {
+            all.push((Kind::Weight(r), format!("{prefix}{r}.weight")));
+        }
     }
     if layers.channels > 0 {
         for set in 0..layers.kept.sets() {
             let of = match layers.kept {
                 Kept::Together => format!("{prefix}Layers"),
-                Kept::ByReplicate => format!("{prefix}Layers{set}"),
+                Kept::ByReplicate | Kept::Weighed => format!("{prefix}Layers{set}"),
             };
             all.extend((0..layers.channels).map(|i| (Kind::Layer(set, i), format!("{of}.{i}"))));
             all.push((Kind::LayerCount(set), format!("{of}.n")));
@@ -206,6 +210,7 @@ impl Numbers for Sums<'_> {
                 Kind::Alpha(r) => cells[i][r].alpha.into(),
                 Kind::Count(r) => cells[i][r].count.into(),
                 Kind::Dropped(r) => cells[i][r].dropped.into(),
+                Kind::Weight(r) => film.layers.weight_units()[(start + i) * REPLICATES + r].into(),
                 Kind::Layer(set, c) => sums[film.layers.place(start + i, set) * channels + c].0,
                 Kind::LayerCount(set) => counts[film.layers.place(start + i, set)].into(),
                 Kind::Matte(rank) => {
@@ -505,7 +510,7 @@ impl Written {
 
     /// Channels of bands and of light by its ways come first among the layers, and paths from the lights have those alone.
     fn light_layers(&self) -> Layout {
-        let kept = self.header.finish.layout().kept;
+        let kept = self.header.finish.layout().kept.without_weights();
         let sums = |p: &&Plane| p.name.starts_with("lightsLayers") && !p.name.ends_with(".n");
         Layout { channels: self.header.planes.iter().filter(sums).count() / kept.sets(), kept }
     }
@@ -583,6 +588,13 @@ fn add_row(film: &mut Film, kind: Kind, start: usize, row: &[i128]) -> Option<()
                 *count = count_of(*count, *x)?;
             }
         }
+        Kind::Weight(r) => {
+            for (units, x) in
+                film.layers.weight_units_mut().iter_mut().skip(start * REPLICATES + r).step_by(REPLICATES).zip(row)
+            {
+                *units = units.checked_add(i64::try_from(*x).ok()?)?;
+            }
+        }
         Kind::Xyz(..) | Kind::Alpha(_) | Kind::Count(_) | Kind::Dropped(_) => {
             let add = |cell: &mut Cell, x: i128| -> Option<()> {
                 match kind {
@@ -590,7 +602,7 @@ fn add_row(film: &mut Film, kind: Kind, start: usize, row: &[i128]) -> Option<()
                     Kind::Alpha(_) => cell.alpha = cell.alpha.checked_add(i64::try_from(x).ok()?)?,
                     Kind::Count(_) => cell.count = count_of(cell.count, x)?,
                     Kind::Dropped(_) => cell.dropped = cell.dropped.saturating_add(u32::try_from(x).ok()?),
-                    Kind::Layer(..) | Kind::LayerCount(_) | Kind::Matte(_) => {}
+                    Kind::Weight(_) | Kind::Layer(..) | Kind::LayerCount(_) | Kind::Matte(_) => {}
                 }
                 Some(())
             };

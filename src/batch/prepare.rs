@@ -4,7 +4,7 @@ use super::adaptive;
 use super::finish::{self, Finish, Sharing};
 use super::frame::{Frame, FrameJob, Gauge};
 use super::stop::{self, Stop};
-use super::{Overrides, layers, motion, names};
+use super::{Overrides, layers, motion, names, splatting};
 use crate::description::{self, BatchEntry, LayerContent, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
@@ -56,6 +56,14 @@ pub struct Prepared {
 }
 
 impl Prepared {
+    /// Its filter, ready for sampling.
+    ///
+    /// # Errors
+    /// As [`FilterSampler::new`] and [`FilterSampler::within`].
+    pub fn sampler(&self) -> Result<FilterSampler> {
+        sampler(&self.description)
+    }
+
     /// The whole picture, sampled by `filter`.
     #[must_use]
     pub fn job<'a>(&'a self, filter: &'a FilterSampler) -> FrameJob<'a> {
@@ -143,6 +151,12 @@ pub(super) fn prepare_scene(
     if first.is_some() {
         // The halves of the replicates weigh alike, whatever their counts.
         plan.layers.kept = Kept::ByReplicate;
+    }
+    plan.techniques.extend(said);
+    let (splatting, said) = splatting::choose(wish(description.render.techniques.splatting), &plan, &filter);
+    plan.splatting = splatting;
+    if splatting {
+        plan.layers.kept = Kept::Weighed;
     }
     plan.techniques.extend(said);
     let shot = Shot { scene: &scene, plan: &plan, filter: &filter, seed, photons: None };
@@ -351,7 +365,7 @@ pub(super) fn filter(filter: &description::Filter) -> Filter {
 }
 
 /// The filter of a picture, ready for sampling.
-pub(super) fn sampler(description: &SceneDescription) -> Result<FilterSampler> {
+fn sampler(description: &SceneDescription) -> Result<FilterSampler> {
     let sampler = FilterSampler::new(filter(&description.image.filter))?;
     if description.image.sample_border {
         return Ok(sampler);

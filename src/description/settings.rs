@@ -294,7 +294,7 @@ pub fn duration(text: &str) -> Option<Duration> {
     Duration::try_from_secs_f64(seconds * unit).ok()
 }
 
-/// `techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, shadow_rays: auto, adaptive: auto}`
+/// `techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, splatting: auto, shadow_rays: auto, adaptive: auto}`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Techniques {
@@ -311,6 +311,9 @@ pub struct Techniques {
     /// Whether paths of pixels that lie near each other share what they find from their second vertices on.
     #[serde(default)]
     pub reuse: Technique,
+    /// Whether a sample counts for all pixels near it whose filters hold it, in place of its own alone.
+    #[serde(default)]
+    pub splatting: Technique,
     /// How many shadow rays paths send from their first vertices; default as many as pay.
     #[serde(default)]
     pub shadow_rays: ShadowRays,

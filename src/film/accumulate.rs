@@ -316,15 +316,17 @@ impl TileBuffer {
     }
 
     /// Adds a sample to `replicate` of `pixel` (in the full frame). `xyz` and `alpha` come multiplied by the filter
-    /// weight, and `xyz` by alpha where the background is transparent (premultiplied).
+    /// weight, and `xyz` by alpha where the background is transparent (premultiplied). False where it was dropped.
     ///
     /// # Panics
     /// If the pixel lies outside the window or there is no such replicate.
-    pub fn add(&mut self, pixel: [i32; 2], replicate: usize, xyz: [f32; 3], alpha: f32) {
+    pub fn add(&mut self, pixel: [i32; 2], replicate: usize, xyz: [f32; 3], alpha: f32) -> bool {
         let index = self.window.index(pixel).expect("the pixel lies in the tile");
-        if let Err(cause) = self.cells[index][replicate].add(xyz, alpha) {
+        let added = self.cells[index][replicate].add(xyz, alpha);
+        if let Err(cause) = added {
             self.invalid.record(cause);
         }
+        added.is_ok()
     }
 
     /// Adds the samples of a run to `replicate` of `pixel` (in the full frame).
@@ -334,6 +336,7 @@ impl TileBuffer {
     pub fn add_run(&mut self, pixel: [i32; 2], replicate: usize, run: &Run) {
         let index = self.window.index(pixel).expect("the pixel lies in the tile");
         self.cells[index][replicate].merge(&run.cell(), &mut self.invalid);
+        self.layers.weigh(index, replicate, run.weight_units());
     }
 }
 

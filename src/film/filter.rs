@@ -17,6 +17,7 @@
 
 use crate::error::{Error, Result};
 use glam::DVec2;
+use wide::f32x8;
 
 /// Cells of the table from the centre to the radius.
 const CELLS: usize = 1024;
@@ -288,6 +289,45 @@ impl FilterSampler {
         self.filter.radius()
     }
 
+    /// Whether no place counts against a pixel.
+    #[must_use]
+    pub fn is_positive(&self) -> bool {
+        match &self.axis {
+            Axis::Box | Axis::Tent(_) => true,
+            Axis::Table(table) => !table.negative.contains(&true),
+        }
+    }
+
+    /// Upper left and lower right corner of what counts, in pixels; `None` where all does.
+    #[must_use]
+    pub fn bounds(&self) -> Option<[DVec2; 2]> {
+        self.within
+    }
+
+    /// With what densities along an axis samples lie at `x` from the centres of their pixels where nothing cuts the filter, up to a
+    /// factor; of one that [`is_positive`](FilterSampler::is_positive). With 24 bits of x that is to 2⁻²⁴ of how far the filter
+    /// reaches.
+    #[inline]
+    #[must_use]
+    pub fn densities(&self, x: f32x8) -> f32x8 {
+        match &self.axis {
+            Axis::Box => x.abs().simd_le(f32x8::splat(0.5)).select(f32x8::ONE, f32x8::ZERO),
+            Axis::Tent(radius) => (f32x8::ONE - x.abs() / f32x8::splat(*radius as f32)).max(f32x8::ZERO),
+            Axis::Table(table) => table.densities(x.abs()),
+        }
+    }
+
+    /// How many times as dense they lie in what counts about pixel `pixel` of an `axis`, x or y.
+    #[must_use]
+    pub fn gain(&self, axis: usize, pixel: i32) -> f64 {
+        let centre = f64::from(pixel) + 0.5;
+        match self.within {
+            // Each of two sides has one.
+            Some([low, high]) => 2.0 / self.axis.between(low[axis] - centre, high[axis] - centre).magnitude,
+            None => 1.0,
+        }
+    }
+
     /// Deals light that falls on `place` (continuous, in pixels) to the pixels whose filters hold it. The shares add up to
     /// one; those of a filter with gaps do so in the mean over places. Pixels at an edge that cuts the filter are given as
     /// much more as it took from them.
@@ -390,6 +430,10 @@ struct Table {
     negative: Vec<bool>,
     /// For u in [i, i + 1) / CELLS: the first cell that can hold it.
     guide: Vec<u32>,
+    /// The density at the positions, if they are evenly spaced, and how much it grows to the next; nothing at the last.
+    steps: Vec<[f32; 2]>,
+    /// How many of these a pixel has.
+    steps_of_a_pixel: f32,
     /// ∫f over both halves.
     integral: f64,
     /// (∫|f| / ∫f)², the magnitude of the weight in two dimensions.
@@ -442,7 +486,9 @@ impl Table {
         for c in cumulative.iter_mut().chain(&mut sums) {
             *c /= total;
         }
-        let density = value.iter().map(|v| v.abs() / total).collect();
+        let density: Vec<f64> = value.iter().map(|v| v.abs() / total).collect();
+        let step = |pair: &[f64]| [pair[0] as f32, (pair[1] - pair[0]) as f32];
+        let steps = density.windows(2).map(step).chain([[0.0; 2]]).collect();
         let cells = cumulative.len() - 1;
         let guide = (0..CELLS)
             .map(|i| cumulative[1..cells].partition_point(|&c| c <= i as f64 / CELLS as f64) as u32)
@@ -450,7 +496,19 @@ impl Table {
         let axis = total / signed;
         // Non-negative filters: signed and total are the same sums of the same areas, so axis is 1 exactly.
         let weight = (axis * axis) as f32;
-        Ok(Table { x, density, cumulative, signed: sums, negative, guide, integral: 2.0 * signed, weight })
+        let steps_of_a_pixel = (CELLS as f64 / radius) as f32;
+        Ok(Table {
+            x,
+            density,
+            cumulative,
+            signed: sums,
+            negative,
+            guide,
+            integral: 2.0 * signed,
+            weight,
+            steps,
+            steps_of_a_pixel,
+        })
     }
 
     /// What lies between the centre and `x` of 0 or more.
@@ -465,6 +523,18 @@ impl Table {
         let area = step * (a + 0.5 * (b - a) * step / width);
         let signed = if self.negative[cell] { -area } else { area };
         Portion { magnitude: self.cumulative[cell] + area, signed: self.signed[cell] + signed }
+    }
+
+    /// The densities at `x` of 0 or more of a filter without zeros: positions are evenly spaced.
+    #[inline]
+    fn densities(&self, x: f32x8) -> f32x8 {
+        let at = (x * self.steps_of_a_pixel).min(f32x8::splat(CELLS as f32));
+        let cells = at.fast_trunc_int();
+        let (mut values, mut slopes) = ([0.0; 8], [0.0; 8]);
+        for ((value, slope), cell) in values.iter_mut().zip(&mut slopes).zip(cells.to_array()) {
+            [*value, *slope] = self.steps[cell as usize];
+        }
+        (at - f32x8::from_i32x8(cells)).mul_add(f32x8::new(slopes), f32x8::new(values))
     }
 
     /// The position at `u` in [0, 1), and whether f is negative there.

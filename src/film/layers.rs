@@ -7,9 +7,9 @@
 //! all layers of its pixel and counted by cause; colour does not hear of it.
 
 use super::Window;
-use super::accumulate::{Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum};
+use super::accumulate::{ALPHA_QUANTUM, Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum};
 use super::mattes::Mattes;
-use super::resolve::HALF;
+use super::resolve::{HALF, even};
 use super::run::LayerRun;
 
 /// How many sums a pixel has.
@@ -30,6 +30,9 @@ pub enum Kept {
     Together,
     /// Those of a replicate, so that the spread of the replicates tells the error.
     ByReplicate,
+    /// Those of a replicate, where they count by weights, as a sample does that goes to several pixels: see
+    /// [`resolve`](super::resolve).
+    Weighed,
 }
 
 impl Kept {
@@ -38,7 +41,7 @@ impl Kept {
     pub fn sets(self) -> usize {
         match self {
             Kept::Together => 1,
-            Kept::ByReplicate => REPLICATES,
+            Kept::ByReplicate | Kept::Weighed => REPLICATES,
         }
     }
 
@@ -47,8 +50,14 @@ impl Kept {
     pub fn set(self, replicate: usize) -> usize {
         match self {
             Kept::Together => 0,
-            Kept::ByReplicate => replicate,
+            Kept::ByReplicate | Kept::Weighed => replicate,
         }
+    }
+
+    /// How sums are kept to which no sample goes by a weight.
+    #[must_use]
+    pub fn without_weights(self) -> Kept {
+        if self == Kept::Weighed { Kept::ByReplicate } else { self }
     }
 }
 
@@ -58,6 +67,8 @@ pub struct LayerSums {
     layout: Layout,
     sums: Vec<Sum>,
     counts: Vec<u32>,
+    /// What the samples of each replicate of each pixel count for together, in [`ALPHA_QUANTUM`], colour and layers alike.
+    weights: Vec<i64>,
     /// Who covers the pixels.
     pub mattes: Mattes,
     /// Samples that were left out.
@@ -78,6 +89,7 @@ impl LayerSums {
         self.layout = layout;
         self.sums.clear();
         self.counts.clear();
+        self.weights.clear();
         self.mattes.clear();
         self.invalid = InvalidCounts::default();
         if layout.channels > 0 {
@@ -85,13 +97,17 @@ impl LayerSums {
             self.sums.resize(layout.channels * sets, Sum::default());
             self.counts.resize(sets, 0);
         }
+        if layout.kept == Kept::Weighed {
+            self.weights.resize(REPLICATES * pixels, 0);
+        }
     }
 
     /// The memory that they take.
     #[must_use]
     pub fn bytes(Layout { channels, kept }: Layout, pixels: usize) -> u64 {
-        let set = if channels == 0 { 0 } else { size_of::<Sum>() * channels + size_of::<u32>() };
-        pixels as u64 * kept.sets() as u64 * set as u64
+        let sums = if channels == 0 { 0 } else { size_of::<Sum>() * channels + size_of::<u32>() };
+        let weight = if kept == Kept::Weighed { size_of::<i64>() } else { 0 };
+        pixels as u64 * kept.sets() as u64 * (sums + weight) as u64
     }
 
     /// How many numbers a sample has, and whose sums they are in.
@@ -122,6 +138,31 @@ impl LayerSums {
     /// [`LayerSums::parts`], for sums that were read from a file.
     pub fn parts_mut(&mut self) -> (&mut [Sum], &mut [u32]) {
         (&mut self.sums, &mut self.counts)
+    }
+
+    /// What the samples of each replicate of the pixel at `index` count for together, where they count by weights.
+    #[must_use]
+    pub fn weights(&self, index: usize) -> Option<[f64; REPLICATES]> {
+        let own = self.weights.get(index * REPLICATES..)?.first_chunk::<REPLICATES>()?;
+        Some(own.map(|units| units as f64 * ALPHA_QUANTUM))
+    }
+
+    /// Those of all pixels, replicate by replicate, in [`ALPHA_QUANTUM`].
+    #[must_use]
+    pub fn weight_units(&self) -> &[i64] {
+        &self.weights
+    }
+
+    /// [`LayerSums::weight_units`], for sums that were read from a file.
+    pub fn weight_units_mut(&mut self) -> &mut [i64] {
+        &mut self.weights
+    }
+
+    /// Adds what samples of `replicate` of the pixel at `index` count for, in [`ALPHA_QUANTUM`], if they count by weights.
+    pub fn weigh(&mut self, index: usize, replicate: usize, units: i64) {
+        if let Some(weight) = self.weights.get_mut(index * REPLICATES + replicate) {
+            *weight += units;
+        }
     }
 
     /// Adds a sample of `replicate` of the pixel at `index`: its numbers times the filter's `weight`. One that no sum can hold
@@ -188,13 +229,19 @@ impl LayerSums {
         self.invalid += part.invalid;
         self.mattes.merge(window, &part.mattes, inner);
         let Layout { channels, kept } = self.layout;
-        if channels == 0 {
+        if channels == 0 && kept != Kept::Weighed {
             return;
         }
         for pixel in 0..inner.pixels() {
             let (column, row) = (pixel % inner.width as usize, pixel / inner.width as usize);
             let place = [inner.x + column as i32, inner.y + row as i32];
             let to = window.index(place).expect("the part lies in the window");
+            for (replicate, units) in part.weights.iter().skip(pixel * REPLICATES).take(REPLICATES).enumerate() {
+                self.weigh(to, replicate, *units);
+            }
+            if channels == 0 {
+                continue;
+            }
             for set in 0..kept.sets() {
                 let (from, to) = (part.place(pixel, set), self.place(to, set));
                 if self.counts[to] + part.counts[from] > SAMPLES_LIMIT {
@@ -219,6 +266,22 @@ impl LayerSums {
         })
     }
 
+    /// The sums of the `sets` of the pixel at `index` and their samples, with what the weights lack made up for, where samples
+    /// count by weights.
+    fn evened(
+        &self,
+        index: usize,
+        sets: &(impl Iterator<Item = (Sum, u32)> + Clone),
+    ) -> Option<[(f64, u64); REPLICATES]> {
+        let weights = self.weights(index)?;
+        let (mut means, mut counts) = ([[0.0]; REPLICATES], [0; REPLICATES]);
+        for (r, (sum, n)) in sets.clone().enumerate().filter(|(_, (_, n))| *n > 0) {
+            (means[r], counts[r]) = ([sum.value() / f64::from(n)], u64::from(n));
+        }
+        even(&mut means, counts, weights);
+        Some(std::array::from_fn(|r| (means[r][0] * counts[r] as f64, counts[r])))
+    }
+
     /// The sums of one channel, pixel by pixel.
     pub fn sums_of(&self, channel: usize) -> impl Iterator<Item = f64> {
         self.sets_of(channel).map(|sets| total(sets).0)
@@ -228,11 +291,13 @@ impl LayerSums {
     #[must_use]
     pub fn plane(&self, channel: usize) -> Vec<f32> {
         let mean = |(sum, n): (f64, u64)| if n == 0 { 0.0 } else { sum / n as f64 };
-        let value = |sets| match halves(&sets) {
-            Some([a, b]) => 0.5 * (mean(a) + mean(b)),
-            None => mean(total(sets)),
+        let value = |(index, sets)| match (self.evened(index, &sets), halves(&sets)) {
+            (None, Some([a, b])) => 0.5 * (mean(a) + mean(b)),
+            (None, None) => mean(total(sets)),
+            (Some(own), Some(_)) => 0.5 * (mean(all(&own[..HALF])) + mean(all(&own[HALF..]))),
+            (Some(own), None) => mean(all(&own)),
         };
-        self.sets_of(channel).map(|sets| value(sets) as f32).collect()
+        self.sets_of(channel).enumerate().map(|pixel| value(pixel) as f32).collect()
     }
 
     /// The mean of each replicate of a channel of the pixel at `index`, its sums over `divisors` or how many samples it has; `None`
@@ -244,14 +309,15 @@ impl LayerSums {
         channel: usize,
         divisors: Option<[u64; REPLICATES]>,
     ) -> Option<[f64; REPLICATES]> {
-        let Layout { channels, kept: Kept::ByReplicate } = self.layout else { return None };
-        let mean = |replicate| {
-            let place = self.place(index, replicate);
-            let n = divisors.map_or(u64::from(self.counts[place]), |all| all[replicate]);
-            self.sums[place * channels + channel].value() / n as f64
-        };
-        let means = std::array::from_fn(mean);
-        means.iter().all(|x: &f64| x.is_finite()).then_some(means)
+        let Layout { channels, kept: Kept::ByReplicate | Kept::Weighed } = self.layout else { return None };
+        let place = |replicate| self.place(index, replicate);
+        let counts = divisors.unwrap_or_else(|| std::array::from_fn(|r| u64::from(self.counts[place(r)])));
+        let mean = |replicate| self.sums[place(replicate) * channels + channel].value() / counts[replicate] as f64;
+        let mut means = std::array::from_fn(|replicate| [mean(replicate)]);
+        if let Some(weights) = self.weights(index) {
+            even(&mut means, counts, weights);
+        }
+        means.iter().all(|[x]: &[f64; 1]| x.is_finite()).then(|| means.map(|[x]| x))
     }
 
     /// The variances of the means of one channel, pixel by pixel, from the spread of the replicates as
@@ -260,14 +326,23 @@ impl LayerSums {
     ///
     /// NaN where fewer than two replicates have samples, and where sums are not kept by replicate.
     pub fn variances_of(&self, channel: usize, divisors: Option<[u64; REPLICATES]>) -> impl Iterator<Item = f64> {
-        self.sets_of(channel).map(move |sets| {
+        self.sets_of(channel).enumerate().map(move |(index, sets)| {
             let alike = divisors.is_none() && halves(&sets).is_some();
-            let own = sets.enumerate().map(|(r, (sum, n))| (sum.value(), divisors.map_or(u64::from(n), |all| all[r])));
+            let evened = self.evened(index, &sets);
+            let own = sets.enumerate().map(|(r, (sum, n))| match evened {
+                Some(evened) => evened[r],
+                None => (sum.value(), divisors.map_or(u64::from(n), |all| all[r])),
+            });
             // Where the halves weigh alike, so do their replicates, which take turns.
             let weight = |n: u64| if alike { 1.0 } else { n as f64 };
             variance_of_mean(own.filter(|(_, n)| *n > 0).map(|(sum, n)| (sum / n as f64, weight(n))))
         })
     }
+}
+
+/// Sums and samples of several sets together.
+fn all(sets: &[(f64, u64)]) -> (f64, u64) {
+    sets.iter().fold((0.0, 0), |(sum, n), (own, count)| (sum + own, n + count))
 }
 
 /// The sum of all sets, rounded once, and its samples.
@@ -296,7 +371,8 @@ fn variance_of_mean(replicates: impl Iterator<Item = (f64, f64)> + Clone) -> f64
 }
 
 /// Why `x` cannot be added, if it cannot.
-fn fault(x: f32) -> Option<Invalid> {
+#[must_use]
+pub fn fault(x: f32) -> Option<Invalid> {
     if x.abs() < SAMPLE_LIMIT {
         None
     } else if x.is_nan() {

@@ -13,6 +13,10 @@
 //!
 //! Where samples were shared out by noise, replicates 0 and 1 of a pixel may have other counts than 2 and 3. The value is
 //! then the mean of the means of the two halves, its variance Σᵣ (mᵣ − m)² / (R(R − 1)): unbiased whatever the counts.
+//!
+//! Where a sample goes to several pixels, by weights with an expected sum of n for n samples, what it adds up to in a pixel is W.
+//! The usual S/W has a bias of order 1/n. Here a replicate has mᵣ = (Sᵣ + c (nᵣ − Wᵣ))/nᵣ, with c = ΣS/ΣW of the others:
+//! they know nothing of Wᵣ, so that there is none, and light that is alike everywhere comes out as it is, as by S/W.
 
 use crate::film::Window;
 use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES, Sum};
@@ -37,7 +41,7 @@ impl Splats<'_> {
     #[must_use]
     pub fn replicates(&self, index: usize, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
         let unit = 2f64.powi(self.film.exponent());
-        let light = replicate_means(&self.film.cells()[index], self.photons, rgb_from_xyz)?;
+        let light = means_by(&self.film.cells()[index], self.photons, None, rgb_from_xyz)?;
         Some(light.map(|light| light.map(|x| x * unit)))
     }
 }
@@ -73,15 +77,15 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
         .with_min_len(1024)
         .map(|index| {
             let cells = &film.cells()[index];
-            let counts = counts(cells);
+            let (counts, weights) = (counts(cells), film.layers.weights(index));
             let halves = in_halves(cells);
             let mut pixel = match halves {
-                true => mean_of_halves(cells, counts, rgb_from_xyz),
-                false => mean_of(cells, counts, rgb_from_xyz),
+                true => mean_of_halves(cells, counts, weights, rgb_from_xyz),
+                false => mean_of(cells, counts, weights, rgb_from_xyz),
             };
             if let Some(splats) = &splats {
                 // Two independent estimates of two parts of the light: means and variances add.
-                let light = mean_of(&splats.film.cells()[index], splats.photons, rgb_from_xyz);
+                let light = mean_of(&splats.film.cells()[index], splats.photons, None, rgb_from_xyz);
                 for c in 0..3 {
                     pixel.rgb[c] += light.rgb[c];
                     pixel.variance[c] += light.variance[c];
@@ -91,7 +95,7 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
             Resolved {
                 rgb: pixel.rgb.map(|x| (x * unit) as f32),
                 standard_error: pixel.variance.map(|v| (v.sqrt() * unit) as f32),
-                alpha: alpha(cells) as f32,
+                alpha: alpha(cells, weights) as f32,
             }
         })
         .collect();
@@ -115,7 +119,7 @@ pub fn shared_errors(image: &Image, splats: &Splats, rgb_from_xyz: &[[f64; 3]; 3
     let unit = 2f64.powi(splats.film.exponent());
     let (mut all, mut own) = ([0.0; 3], [0.0; 3]);
     for (i, cells) in splats.film.cells().iter().enumerate() {
-        let splatted = mean_of(cells, splats.photons, rgb_from_xyz).variance;
+        let splatted = mean_of(cells, splats.photons, None, rgb_from_xyz).variance;
         for c in 0..3 {
             let error = f64::from(image.standard_error[c][i]);
             if error.is_finite() && splatted[c].is_finite() {
@@ -215,12 +219,65 @@ fn in_halves(cells: &PixelCells) -> bool {
     of(&cells[..HALF]).abs_diff(of(&cells[HALF..])) > HALF as u64
 }
 
-/// Coverage of a pixel.
-fn alpha(cells: &PixelCells) -> f64 {
+/// Coverage of a pixel whose samples count by `weights`, or each for one.
+fn alpha(cells: &PixelCells, weights: Option<Weights>) -> f64 {
+    if let Some(weights) = weights {
+        let counts = counts(cells);
+        let own = |r: usize| if counts[r] == 0 { 0.0 } else { cells[r].alpha_sum() / counts[r] as f64 };
+        let mut means = std::array::from_fn(|r| [own(r)]);
+        even(&mut means, counts, weights);
+        let [alpha] = match in_halves(cells) {
+            true => mean_of_two(&means, counts),
+            false => weighed(&means, counts),
+        };
+        return alpha;
+    }
     match in_halves(cells) {
         true => 0.5 * (mean_alpha(&cells[..HALF]) + mean_alpha(&cells[HALF..])),
         false => mean_alpha(cells),
     }
+}
+
+/// What the samples of each replicate count for together.
+type Weights = [f64; REPLICATES];
+
+/// Makes up for what the `weights` of replicates lack: see above. `means` are their sums over `counts`. What has no others is
+/// divided by its own weight.
+pub(super) fn even<const N: usize>(
+    means: &mut [[f64; N]; REPLICATES],
+    counts: [u64; REPLICATES],
+    weights: [f64; REPLICATES],
+) {
+    let sums: [[f64; N]; REPLICATES] = std::array::from_fn(|r| means[r].map(|mean| mean * counts[r] as f64));
+    for (r, mean) in means.iter_mut().enumerate().filter(|(r, _)| counts[*r] > 0) {
+        let others = || (0..REPLICATES).filter(|&s| s != r && counts[s] > 0);
+        let all: f64 = others().map(|s| weights[s]).sum();
+        let lack = 1.0 - weights[r] / counts[r] as f64;
+        for (channel, mean) in mean.iter_mut().enumerate() {
+            if all > 0.0 {
+                *mean += others().map(|s| sums[s][channel]).sum::<f64>() / all * lack;
+            } else if weights[r] > 0.0 {
+                *mean = sums[r][channel] / weights[r];
+            }
+        }
+    }
+}
+
+/// The mean of the samples of all replicates, given the `means` of each.
+fn weighed<const N: usize>(means: &[[f64; N]], counts: impl IntoIterator<Item = u64>) -> [f64; N] {
+    let (mut sums, mut total) = ([0.0; N], 0);
+    for (mean, n) in means.iter().zip(counts) {
+        total += n;
+        sums.iter_mut().zip(mean).for_each(|(sum, mean)| *sum += n as f64 * mean);
+    }
+    sums.map(|sum| sum / total.max(1) as f64)
+}
+
+/// The mean of the means of the halves.
+fn mean_of_two<const N: usize>(means: &[[f64; N]; REPLICATES], counts: [u64; REPLICATES]) -> [f64; N] {
+    let half = |of: Range<usize>| weighed(&means[of.clone()], counts[of].iter().copied());
+    let (a, b) = (half(0..HALF), half(HALF..REPLICATES));
+    std::array::from_fn(|c| 0.5 * (a[c] + b[c]))
 }
 
 fn samples(cells: &[Cell]) -> u64 {
@@ -243,18 +300,27 @@ pub(super) fn coverage_of_halves(cells: &PixelCells) -> f64 {
     }
     let weight = |half: &[Cell]| 0.5 * samples(cells) as f64 / samples(half) as f64;
     let (a, b) = (weight(&cells[..HALF]), weight(&cells[HALF..]));
-    (alpha(cells) / mean).clamp(a.min(b), a.max(b))
+    (alpha(cells, None) / mean).clamp(a.min(b), a.max(b))
 }
 
 /// As [`mean_of`], where the halves weigh alike: how far one went on was for the other to say, so that it is no measure
 /// of how much it should count.
-fn mean_of_halves(cells: &PixelCells, counts: [u64; REPLICATES], rgb_from_xyz: &[[f64; 3]; 3]) -> PixelMean {
-    let Some(means) = replicate_means(cells, counts, rgb_from_xyz) else {
-        return mean_of(cells, counts, rgb_from_xyz);
+fn mean_of_halves(
+    cells: &PixelCells,
+    counts: [u64; REPLICATES],
+    weights: Option<Weights>,
+    rgb_from_xyz: &[[f64; 3]; 3],
+) -> PixelMean {
+    let Some(means) = means_by(cells, counts, weights, rgb_from_xyz) else {
+        return mean_of(cells, counts, weights, rgb_from_xyz);
     };
     let half = |of: Range<usize>| colours(&cells[of.clone()], counts[of].iter().sum(), rgb_from_xyz);
-    let (a, b) = (half(0..HALF), half(HALF..REPLICATES));
-    let rgb = [0, 1, 2].map(|c| 0.5 * (a[c] + b[c]));
+    let rgb = if weights.is_some() {
+        mean_of_two(&means, counts)
+    } else {
+        let (a, b) = (half(0..HALF), half(HALF..REPLICATES));
+        [0, 1, 2].map(|c| 0.5 * (a[c] + b[c]))
+    };
     let mut variance = [0.0; 3];
     for own in means {
         for c in 0..3 {
@@ -264,21 +330,32 @@ fn mean_of_halves(cells: &PixelCells, counts: [u64; REPLICATES], rgb_from_xyz: &
     PixelMean { rgb, variance }
 }
 
-/// Mean and variance of the mean of a pixel whose replicates are divided by `divisors`.
-fn mean_of(cells: &PixelCells, divisors: [u64; REPLICATES], rgb_from_xyz: &[[f64; 3]; 3]) -> PixelMean {
+/// Mean and variance of the mean of a pixel whose replicates are divided by `divisors`, and whose samples count by `weights` or
+/// each for one.
+fn mean_of(
+    cells: &PixelCells,
+    divisors: [u64; REPLICATES],
+    weights: Option<Weights>,
+    rgb_from_xyz: &[[f64; 3]; 3],
+) -> PixelMean {
     let total: u64 = divisors.iter().sum();
     let replicates = divisors.iter().filter(|&&n| n > 0).count();
     if total == 0 {
         return PixelMean { rgb: [0.0; 3], variance: [f64::NAN; 3] };
     }
-    let rgb = colours(cells, total, rgb_from_xyz);
+    let own = |r: usize| if divisors[r] > 0 { colours(&cells[r..=r], divisors[r], rgb_from_xyz) } else { [0.0; 3] };
+    let mut means = std::array::from_fn(own);
+    let rgb = match weights {
+        Some(weights) => {
+            even(&mut means, divisors, weights);
+            weighed(&means, divisors)
+        }
+        None => colours(cells, total, rgb_from_xyz),
+    };
     let mut variance = [0.0; 3];
-    for (cell, &n) in cells.iter().zip(&divisors) {
-        if n > 0 {
-            let own = colours(std::slice::from_ref(cell), n, rgb_from_xyz);
-            for c in 0..3 {
-                variance[c] += n as f64 * (own[c] - rgb[c]) * (own[c] - rgb[c]);
-            }
+    for (own, &n) in means.iter().zip(&divisors) {
+        for c in 0..3 {
+            variance[c] += n as f64 * (own[c] - rgb[c]) * (own[c] - rgb[c]);
         }
     }
     let variance = variance
@@ -304,15 +381,29 @@ pub fn counts(cells: &PixelCells) -> [u64; REPLICATES] {
     cells.each_ref().map(|cell| u64::from(cell.count))
 }
 
-/// The mean of each replicate of a pixel, its sums over `divisors`, in the units of the film; `None` where one has none.
+/// The mean of each replicate of a pixel of `film`, in its units; `None` where one has no sample.
 #[must_use]
-pub fn replicate_means(
+pub fn replicate_means(film: &Film, index: usize, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
+    let cells = &film.cells()[index];
+    means_by(cells, counts(cells), film.layers.weights(index), rgb_from_xyz)
+}
+
+/// The mean of each replicate of a pixel, its sums over `divisors`, whose samples count by `weights` or each for one; `None` where
+/// one has none.
+fn means_by(
     cells: &PixelCells,
     divisors: [u64; REPLICATES],
+    weights: Option<Weights>,
     rgb_from_xyz: &[[f64; 3]; 3],
 ) -> Option<[[f64; 3]; REPLICATES]> {
-    let mean = |r: usize| colours(&cells[r..=r], divisors[r], rgb_from_xyz);
-    (!divisors.contains(&0)).then(|| std::array::from_fn(mean))
+    if divisors.contains(&0) {
+        return None;
+    }
+    let mut means = std::array::from_fn(|r| colours(&cells[r..=r], divisors[r], rgb_from_xyz));
+    if let Some(weights) = weights {
+        even(&mut means, divisors, weights);
+    }
+    Some(means)
 }
 
 /// The light of each replicate of a pixel of `film` and `splats`, in the scene's units; `None` where one has none.
@@ -323,8 +414,7 @@ pub fn replicate_light(
     index: usize,
     rgb_from_xyz: &[[f64; 3]; 3],
 ) -> Option<[[f64; 3]; REPLICATES]> {
-    let cells = &film.cells()[index];
-    let mut means = replicate_means(cells, counts(cells), rgb_from_xyz)?;
+    let mut means = replicate_means(film, index, rgb_from_xyz)?;
     let unit = 2f64.powi(film.exponent());
     means.iter_mut().flatten().for_each(|x| *x *= unit);
     if let Some(splats) = splats {

@@ -63,6 +63,8 @@ impl Quad {
 pub struct Run {
     sums: Quad,
     count: u32,
+    /// What the samples count for, a whole number of [`ALPHA_QUANTUM`], where they do by weights.
+    weight: f64,
 }
 
 impl Run {
@@ -83,6 +85,18 @@ impl Run {
         true
     }
 
+    /// What the last sample counts for.
+    #[inline]
+    pub fn weigh(&mut self, weight: f32) {
+        self.weight += rounded(weight);
+    }
+
+    /// What the samples count for, in [`ALPHA_QUANTUM`].
+    #[must_use]
+    pub fn weight_units(&self) -> i64 {
+        (self.weight / ALPHA_QUANTUM) as i64
+    }
+
     /// The sums of the run as those of a cell.
     #[must_use]
     pub fn cell(&self) -> Cell {
@@ -90,6 +104,11 @@ impl Run {
         let alpha = (self.sums.high.to_array()[3] / ALPHA_QUANTUM) as i64;
         Cell { xyz: [x, y, z], alpha, count: self.count, dropped: 0 }
     }
+}
+
+/// `weight` to the nearest multiple of [`ALPHA_QUANTUM`], as coverage is.
+fn rounded(weight: f32) -> f64 {
+    (f64::from(weight) + rounder(ALPHA_QUANTUM)) - rounder(ALPHA_QUANTUM)
 }
 
 /// The layers of a pixel.

@@ -78,6 +78,8 @@ pub struct PixelSample {
     pub alpha: f32,
     /// Weight of the reconstruction filter: ±1 up to its norm.
     pub weight: f32,
+    /// On the picture, in pixels.
+    pub place: DVec2,
 }
 
 /// What all samples of a picture share.
@@ -152,8 +154,6 @@ fn moment_at(u: f64, moments: usize) -> usize {
 /// A sample on its way.
 struct Begun {
     at: Address,
-    /// On the picture, in pixels.
-    place: DVec2,
     ray: Ray,
     sample: PixelSample,
     /// What was counted on its way, where that is asked for.
@@ -170,9 +170,15 @@ impl Begun {
         let wavelengths = SampledWavelengths { nm: zero, inv_pdf: zero };
         Begun {
             at: Address { pixel: [0; 2], replicate: 0, index: 0 },
-            place: DVec2::ZERO,
             ray: Ray::new(DVec3::ZERO, DVec3::Z),
-            sample: PixelSample { radiance: zero, wavelengths, xyz: [0.0; 3], alpha: 0.0, weight: 1.0 },
+            sample: PixelSample {
+                radiance: zero,
+                wavelengths,
+                xyz: [0.0; 3],
+                alpha: 0.0,
+                weight: 1.0,
+                place: DVec2::ZERO,
+            },
             counted: Counts::default(),
             events: 0,
             further: 0,
@@ -195,8 +201,8 @@ impl Begun {
             let offset = DVec2::new(f64::from(cell % n) + 0.5, f64::from(cell / n) + 0.5) / f64::from(n);
             let turn = settings.wavelengths.at(s) / LANES as f64;
             self.sample.wavelengths = scene.wavelengths.sample(turn);
-            self.place = corner + offset;
-            self.ray = scene.camera.ray(self.place, || DVec2::splat(0.5));
+            self.sample.place = corner + offset;
+            self.ray = scene.camera.ray(self.sample.place, || DVec2::splat(0.5));
             self.sample.weight = 1.0;
             return;
         }
@@ -206,7 +212,7 @@ impl Begun {
         let place = centre + chosen.offset;
         self.sample.wavelengths = scene.wavelengths.sample(shot.photons.map_or(u_time.x, |p| p.wavelength));
         self.sample.weight = chosen.weight;
-        self.place = place;
+        self.sample.place = place;
         // Rays of the camera leave no surface, and never did here: two vectors are stored, no enum is copied.
         let ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
         (self.ray.origin, self.ray.direction) = (ray.origin, ray.direction);
@@ -334,7 +340,7 @@ impl Begun {
     /// Appends the numbers of the layers of the finished sample.
     #[inline]
     fn layers(&self, shot: &Shot, sampler: &Sampler, ledger: Option<&Ledger>, values: &mut layers::Values) {
-        let Begun { place, ray, sample: PixelSample { radiance, wavelengths, xyz, alpha, weight }, counted, .. } =
+        let Begun { ray, sample: PixelSample { radiance, wavelengths, xyz, alpha, weight, place }, counted, .. } =
             *self;
         values.append(
             shot.scene,

@@ -179,6 +179,8 @@ pub struct EffectPlan {
     pub packets: bool,
     /// Paths of pixels near each other share what they find.
     pub reuse: bool,
+    /// Each sample goes to all pixels of its cell whose filters hold it.
+    pub splatting: bool,
     /// Shadow rays from the first vertex of each path that looks for light, at most [`PARTS`](crate::math::sampler::PARTS).
     pub shadow_rays: u32,
     /// Every glass is computed as if it were dispersive.
@@ -240,6 +242,12 @@ fn path_techniques(census: &Census, chromatic: bool) -> Vec<Effect> {
 }
 
 impl EffectPlan {
+    /// Whether pixels of a cell have errors in common.
+    #[must_use]
+    pub fn shares_cells(&self) -> bool {
+        self.reuse || self.splatting
+    }
+
     /// Decides from the census of a scene.
     #[must_use]
     pub fn of(census: &Census, integrator: Integrator, mode: EffectMode) -> EffectPlan {
@@ -349,6 +357,7 @@ impl EffectPlan {
             depth_fog,
             packets: path && !census.dispersive.is_empty(),
             reuse: false,
+            splatting: false,
             shadow_rays: 1,
             all_dispersive: mode == EffectMode::All,
             caustics: None,

@@ -9,7 +9,6 @@ use abbe::batch::frame::{self, Frame};
 use abbe::batch::{self, Overrides, Prepared};
 use abbe::film::Window;
 use abbe::film::accumulate::{Film, REPLICATES};
-use abbe::film::filter::{Filter, FilterSampler};
 use abbe::math::Ray;
 use abbe::math::sampler::{Sampler, Set, pairs};
 use abbe::math::statistics::Moments;
@@ -212,7 +211,7 @@ impl Bench {
 
     /// Renders the picture on the current threads.
     pub fn frame(&self) -> Frame {
-        let filter = FilterSampler::new(Filter::Box).unwrap();
+        let filter = self.prepared.sampler().unwrap();
         let job = self.prepared.job(&filter);
         frame::render(&job, &|_| {}, &AtomicBool::new(false)).unwrap()
     }
@@ -221,8 +220,8 @@ impl Bench {
     pub fn picture(&self) -> Picture {
         let frame = self.frame();
         let film = &frame.film;
-        // The filter is a box: what is splatted falls into one pixel.
-        let cell = if self.prepared.plan.reuse { reuse::SIDE as u32 } else { 1 };
+        // What paths from the lights bring is taken to fall into one pixel: their tests have a box for a filter.
+        let cell = if self.prepared.plan.shares_cells() { reuse::SIDE as u32 } else { 1 };
         let sharing = Sharing::Near { span: 1.0, overlap: 1.0, cell };
         let xyz = frame.resolve(&ColourSpace::Xyz.matrix_from_xyz());
         let rgb = frame.resolve(&ColourSpace::Rec709.matrix_from_xyz());
@@ -256,7 +255,7 @@ impl Bench {
 
     fn traced(&self, pixel: [u32; 2], index: u32) -> (transport::PixelSample, u32) {
         let Prepared { scene, plan, .. } = &self.prepared;
-        let filter = FilterSampler::new(Filter::Box).unwrap();
+        let filter = self.prepared.sampler().unwrap();
         let replicates = REPLICATES as u32;
         let shot = transport::Shot { scene, plan, filter: &filter, seed: 0, photons: None };
         transport::sample(&shot, pixel, index % replicates, index / replicates)

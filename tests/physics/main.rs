@@ -19,6 +19,7 @@ mod media;
 mod nested;
 mod reuse;
 mod shadow_rays;
+mod splatting;
 mod techniques;
 mod volumes;
 

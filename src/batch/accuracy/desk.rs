@@ -5,7 +5,7 @@ use super::knobs::{self, Trial, Way};
 use super::{FEWEST, REFERENCE, Settings};
 use crate::batch::frame::{FrameJob, pass_end};
 use crate::batch::part::{Part, Share, SplatFilm};
-use crate::batch::{self, BatchEntry, Overrides, Prepared, prepare_scene};
+use crate::batch::{BatchEntry, Overrides, Prepared, prepare_scene};
 use crate::error::{Error, Result};
 use crate::film::resolve::{self, Image};
 use crate::scene::Scene;
@@ -120,7 +120,7 @@ impl<'a> Desk<'a> {
     /// spread of replicates is that of independent means, whatever the copies have in common.
     fn follow(&self, prepared: &[Prepared], way: Way, reference: Option<&Reference>) -> Result<Outcome> {
         let independent = way == Way::Independent;
-        let filter = batch::prepare::sampler(&prepared[0].description)?;
+        let filter = prepared[0].sampler()?;
         let jobs: Vec<FrameJob> = prepared.iter().map(|p| FrameJob { independent, ..p.job(&filter) }).collect();
         let samples = jobs[0].samples;
         let parts = jobs.iter().map(|job| Part::new(job, Share::all(samples))).collect::<Result<Vec<Part>>>()?;

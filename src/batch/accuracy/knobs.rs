@@ -1,6 +1,6 @@
 //! Which knobs a sheet moves, and to what.
 
-use super::super::{Prepared, adaptive, motion};
+use super::super::{Prepared, adaptive, motion, splatting};
 use super::Settings;
 use crate::error::{Error, Result};
 use crate::film::accumulate::REPLICATES;
@@ -156,11 +156,13 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
     let shared = adaptive::choose(Use::On, false, &chosen.plan, samples).0.is_some();
     let census = motion::census(&chosen.scene, &chosen.moments);
     let joined = reuse::obstacle(&chosen.scene, &census, &chosen.plan, chosen.moments.len()).is_none();
+    let dealt = chosen.sampler().is_ok_and(|filter| splatting::choose(Use::On, &chosen.plan, &filter).0);
     for (knob, key, on, cause) in [
         ("light tracing", "light_tracing", caustics.is_some(), about("light tracing")),
         ("packets", "packets", chosen.plan.packets || caustics.is_some(), about("packets")),
         ("merging", "merging", caustics.is_some_and(|c| c.merging.is_some()), about("merging")),
         ("path reuse", "reuse", chosen.plan.reuse, joined),
+        ("splatting", "splatting", chosen.plan.splatting, dealt),
         ("adaptive", "adaptive", chosen.plan.adaptive.is_some(), shared),
     ] {
         if cause {
