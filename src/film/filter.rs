@@ -1,10 +1,10 @@
-//! Reconstruction filters by importance sampling: one sample touches one pixel.
+//! Reconstruction filters by importance sampling: a sample is drawn for one pixel.
 //!
 //! The position of a camera sample is drawn with density |f| about the centre of its pixel (Ernst,
 //! Stamminger and Greiner 2006, "Filter Importance Sampling"); its weight is sign(f)·c with c = ∫|f| / ∫f, so the
 //! mean weight is one and the mean of the samples is the filtered picture. Filters without negative
-//! lobes have weight one. Pixels stay independent, so tiles need no border and per-pixel error bars
-//! hold for every filter.
+//! lobes have weight one. Tiles need no border, and errors of each pixel hold for every filter. The densities
+//! tell for which other pixels a sample may count (`batch/splatting.rs`).
 //!
 //! All filters are separable; an axis is sampled by inverting its distribution function, in closed
 //! form for box and tent, from a piecewise linear table of the density for the rest. With
@@ -600,6 +600,43 @@ mod tests {
         near(Filter::Tent { radius: 1.0 }, 1.125 * 1.125, 1e-5);
         let gaussian: f64 = (-9..=9).map(|k: i32| f64::from(-k * k) / (2.0 * 0.64)).map(f64::exp).sum();
         near(Filter::Gaussian { stddev: 0.8 }, gaussian * gaussian, 3e-3);
+    }
+
+    /// Densities of a row of pixels are those that samples are drawn by: the share of 2¹⁶ even numbers in each of 64 parts of the
+    /// filter is the integral of the density over it, by Simpson's rule, to the two numbers at its ends and the 2e-6 of the table.
+    #[test]
+    fn densities_are_those_of_the_samples() {
+        for filter in FILTERS.into_iter().chain([Filter::Mitchell { b: 1.0, c: 0.0 }]) {
+            let sampler = FilterSampler::new(filter).unwrap();
+            if !sampler.is_positive() {
+                continue;
+            }
+            const PARTS: usize = 64;
+            let (n, radius) = (65_536, filter.radius());
+            let mut found = [0.0; PARTS];
+            for i in 0..n {
+                let x = axis(&sampler, (f64::from(i) + 0.5) / f64::from(n)).0;
+                found[((x / radius + 1.0) * 0.5 * PARTS as f64) as usize] += 1.0 / f64::from(n);
+            }
+            let density = |x: f64| f64::from(sampler.densities(f32x8::splat(x as f32)).as_array()[3]);
+            let width = 2.0 * radius / PARTS as f64;
+            let of_part = |i: usize| {
+                let low = width * i as f64 - radius;
+                // A box ends with its last part.
+                let (a, b, c) =
+                    (density(low + 1e-6 * width), density(low + 0.5 * width), density(low + (1.0 - 1e-6) * width));
+                (a + 4.0 * b + c) * width / 6.0
+            };
+            let parts: Vec<f64> = (0..PARTS).map(of_part).collect();
+            let whole: f64 = parts.iter().sum();
+            for (found, part) in found.into_iter().zip(parts) {
+                assert!(
+                    (found - part / whole).abs() < 2.0 / f64::from(n) + 4e-6,
+                    "{filter:?}: {found}, {}",
+                    part / whole
+                );
+            }
+        }
     }
 
     /// E[weight · g(offset)] = ∫f·g / ∫f for g = cos(kx): the Fourier transform of the filter, against Simpson's rule

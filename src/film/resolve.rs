@@ -527,6 +527,23 @@ mod tests {
         assert!((f64::from(image.rgb[1][0]) - 59.0 / 11.0).abs() < 1e-6);
     }
 
+    /// Sums of two samples each with weights of 1, 3, 2 and 2 in all: where light is 5 everywhere each replicate has 5. Where it is
+    /// 4, 8, 0 and 0 in all, the first lacks 1 of 2 times 8/7 of the others, the second has 1 too many of 4/5, the others none.
+    /// Alone, a replicate is divided by its own weight.
+    #[test]
+    fn what_weights_lack_is_made_up_for_by_the_others() {
+        let evened = |sums: [f64; 4], counts: [u64; 4]| {
+            let mut means = std::array::from_fn(|r| [sums[r] / counts[r].max(1) as f64]);
+            even(&mut means, counts, [1.0, 3.0, 2.0, 2.0]);
+            means.map(|[x]| x)
+        };
+        assert_eq!(evened([5.0, 15.0, 10.0, 10.0], [2; 4]), [5.0; 4]);
+        let expected = [2.0 + 0.5 * 8.0 / 7.0, 4.0 - 0.5 * 4.0 / 5.0, 0.0, 0.0];
+        let found = evened([4.0, 8.0, 0.0, 0.0], [2; 4]);
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{found:?}");
+        assert_eq!(evened([0.0, 6.0, 0.0, 0.0], [0, 2, 0, 0]), [0.0, 2.0, 0.0, 0.0]);
+    }
+
     /// Camera light 2 ± s₁ and splats of total 12 over 4·3 photons: 1 ± s₂. Means add, variances add; all in units of 2³.
     #[test]
     fn splats_are_divided_by_photons_and_their_variance_adds() {
