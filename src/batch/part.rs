@@ -259,8 +259,12 @@ impl<'a> Part<'a> {
         };
         let film = Mutex::new(film(window, layers)?);
         let start = share.samples.start;
-        let least = if job.plan.shares_cells() { adaptive::SIDE } else { 4 };
-        let tiles = shares(window, job.tile, least, rayon::current_num_threads());
+        // Who has part of a cell of pixels that share renders all of it: tiles are of whole ones, halved or not.
+        let (side, least) = match job.plan.shares_cells() {
+            true => (job.tile.next_power_of_two().max(adaptive::SIDE), adaptive::SIDE),
+            false => (job.tile, 4),
+        };
+        let tiles = shares(window, side, least, rayon::current_num_threads());
         let tiles = tiles.into_iter().map(|window| Tile { window, done: AtomicU32::new(start) }).collect();
         let lights = Mutex::new(LightsDone { below: start, more: Vec::new() });
         Ok(Part { job, share, window, film, splats, tiles, lights, layers, allocation: OnceLock::new() })

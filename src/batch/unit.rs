@@ -126,7 +126,7 @@ impl Unit<'_> {
         sums.begin(pixels.len());
         pools.resize_with(Octet::SAMPLES, Pool::default);
         for some in samples.chunks(Octet::SAMPLES) {
-            pools.iter_mut().for_each(|pool| pool.reset(channels));
+            pools.iter_mut().take(some.len()).for_each(|pool| pool.reset(channels));
             let mut give = |i: usize, pixel: [i32; 2], sample: &PixelSample, values: &[f32]| {
                 if sums.is_valid(pixel, some[i].0, sample) {
                     let light = (sample.xyz.map(|x| x * sums.unit * sample.weight), sample.alpha * sample.weight);
