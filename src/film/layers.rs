@@ -9,7 +9,7 @@
 use super::Window;
 use super::accumulate::{ALPHA_QUANTUM, Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum};
 use super::mattes::Mattes;
-use super::resolve::{HALF, even};
+use super::resolve::{HALF, even, mean_of_replicates};
 use super::run::LayerRun;
 
 /// How many sums a pixel has.
@@ -266,20 +266,20 @@ impl LayerSums {
         })
     }
 
-    /// The sums of the `sets` of the pixel at `index` and their samples, with what the weights lack made up for, where samples
+    /// The means of the `sets` of the pixel at `index`, with what the weights lack made up for, and their samples, where samples
     /// count by weights.
     fn evened(
         &self,
         index: usize,
         sets: &(impl Iterator<Item = (Sum, u32)> + Clone),
-    ) -> Option<[(f64, u64); REPLICATES]> {
+    ) -> Option<([[f64; 1]; REPLICATES], [u64; REPLICATES])> {
         let weights = self.weights(index)?;
         let (mut means, mut counts) = ([[0.0]; REPLICATES], [0; REPLICATES]);
         for (r, (sum, n)) in sets.clone().enumerate().filter(|(_, (_, n))| *n > 0) {
             (means[r], counts[r]) = ([sum.value() / f64::from(n)], u64::from(n));
         }
         even(&mut means, counts, weights);
-        Some(std::array::from_fn(|r| (means[r][0] * counts[r] as f64, counts[r])))
+        Some((means, counts))
     }
 
     /// The sums of one channel, pixel by pixel.
@@ -294,8 +294,7 @@ impl LayerSums {
         let value = |(index, sets)| match (self.evened(index, &sets), halves(&sets)) {
             (None, Some([a, b])) => 0.5 * (mean(a) + mean(b)),
             (None, None) => mean(total(sets)),
-            (Some(own), Some(_)) => 0.5 * (mean(all(&own[..HALF])) + mean(all(&own[HALF..]))),
-            (Some(own), None) => mean(all(&own)),
+            (Some((means, counts)), halves) => mean_of_replicates(&means, counts, halves.is_some())[0],
         };
         self.sets_of(channel).enumerate().map(|pixel| value(pixel) as f32).collect()
     }
@@ -330,19 +329,17 @@ impl LayerSums {
             let alike = divisors.is_none() && halves(&sets).is_some();
             let evened = self.evened(index, &sets);
             let own = sets.enumerate().map(|(r, (sum, n))| match evened {
-                Some(evened) => evened[r],
-                None => (sum.value(), divisors.map_or(u64::from(n), |all| all[r])),
+                Some((means, counts)) => (means[r][0], counts[r]),
+                None => {
+                    let n = divisors.map_or(u64::from(n), |all| all[r]);
+                    (sum.value() / n as f64, n)
+                }
             });
             // Where the halves weigh alike, so do their replicates, which take turns.
             let weight = |n: u64| if alike { 1.0 } else { n as f64 };
-            variance_of_mean(own.filter(|(_, n)| *n > 0).map(|(sum, n)| (sum / n as f64, weight(n))))
+            variance_of_mean(own.filter(|(_, n)| *n > 0).map(|(mean, n)| (mean, weight(n))))
         })
     }
-}
-
-/// Sums and samples of several sets together.
-fn all(sets: &[(f64, u64)]) -> (f64, u64) {
-    sets.iter().fold((0.0, 0), |(sum, n), (own, count)| (sum + own, n + count))
 }
 
 /// The sum of all sets, rounded once, and its samples.

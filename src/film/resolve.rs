@@ -41,8 +41,12 @@ impl Splats<'_> {
     #[must_use]
     pub fn replicates(&self, index: usize, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
         let unit = 2f64.powi(self.film.exponent());
-        let light = means_by(&self.film.cells()[index], self.photons, None, rgb_from_xyz)?;
+        let light = self.sums(index).means(rgb_from_xyz)?;
         Some(light.map(|light| light.map(|x| x * unit)))
+    }
+
+    fn sums(&self, index: usize) -> Sums<'_> {
+        Sums { cells: &self.film.cells()[index], divisors: self.photons, weights: None }
     }
 }
 
@@ -76,16 +80,14 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
         .into_par_iter()
         .with_min_len(1024)
         .map(|index| {
-            let cells = &film.cells()[index];
-            let (counts, weights) = (counts(cells), film.layers.weights(index));
-            let halves = in_halves(cells);
-            let mut pixel = match halves {
-                true => mean_of_halves(cells, counts, weights, rgb_from_xyz),
-                false => mean_of(cells, counts, weights, rgb_from_xyz),
+            let sums = Sums::of(film, index);
+            let mut pixel = match in_halves(sums.cells) {
+                true => sums.mean_of_halves(rgb_from_xyz),
+                false => sums.mean(rgb_from_xyz),
             };
             if let Some(splats) = &splats {
                 // Two independent estimates of two parts of the light: means and variances add.
-                let light = mean_of(&splats.film.cells()[index], splats.photons, None, rgb_from_xyz);
+                let light = splats.sums(index).mean(rgb_from_xyz);
                 for c in 0..3 {
                     pixel.rgb[c] += light.rgb[c];
                     pixel.variance[c] += light.variance[c];
@@ -95,7 +97,7 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
             Resolved {
                 rgb: pixel.rgb.map(|x| (x * unit) as f32),
                 standard_error: pixel.variance.map(|v| (v.sqrt() * unit) as f32),
-                alpha: alpha(cells, weights) as f32,
+                alpha: alpha(sums.cells, sums.weights) as f32,
             }
         })
         .collect();
@@ -118,8 +120,8 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
 pub fn shared_errors(image: &Image, splats: &Splats, rgb_from_xyz: &[[f64; 3]; 3], span: f64) -> f64 {
     let unit = 2f64.powi(splats.film.exponent());
     let (mut all, mut own) = ([0.0; 3], [0.0; 3]);
-    for (i, cells) in splats.film.cells().iter().enumerate() {
-        let splatted = mean_of(cells, splats.photons, None, rgb_from_xyz).variance;
+    for i in 0..splats.film.cells().len() {
+        let splatted = splats.sums(i).mean(rgb_from_xyz).variance;
         for c in 0..3 {
             let error = f64::from(image.standard_error[c][i]);
             if error.is_finite() && splatted[c].is_finite() {
@@ -226,10 +228,7 @@ fn alpha(cells: &PixelCells, weights: Option<Weights>) -> f64 {
         let own = |r: usize| if counts[r] == 0 { 0.0 } else { cells[r].alpha_sum() / counts[r] as f64 };
         let mut means = std::array::from_fn(|r| [own(r)]);
         even(&mut means, counts, weights);
-        let [alpha] = match in_halves(cells) {
-            true => mean_of_two(&means, counts),
-            false => weighed(&means, counts),
-        };
+        let [alpha] = mean_of_replicates(&means, counts, in_halves(cells));
         return alpha;
     }
     match in_halves(cells) {
@@ -263,21 +262,21 @@ pub(super) fn even<const N: usize>(
     }
 }
 
-/// The mean of the samples of all replicates, given the `means` of each.
-fn weighed<const N: usize>(means: &[[f64; N]], counts: impl IntoIterator<Item = u64>) -> [f64; N] {
-    let (mut sums, mut total) = ([0.0; N], 0);
-    for (mean, n) in means.iter().zip(counts) {
-        total += n;
-        sums.iter_mut().zip(mean).for_each(|(sum, mean)| *sum += n as f64 * mean);
-    }
-    sums.map(|sum| sum / total.max(1) as f64)
-}
-
-/// The mean of the means of the halves.
-fn mean_of_two<const N: usize>(means: &[[f64; N]; REPLICATES], counts: [u64; REPLICATES]) -> [f64; N] {
-    let half = |of: Range<usize>| weighed(&means[of.clone()], counts[of].iter().copied());
-    let (a, b) = (half(0..HALF), half(HALF..REPLICATES));
-    std::array::from_fn(|c| 0.5 * (a[c] + b[c]))
+/// The mean of all samples, given the `means` of the replicates, or where `halves` weigh alike that of theirs.
+pub(super) fn mean_of_replicates<const N: usize>(
+    means: &[[f64; N]; REPLICATES],
+    counts: [u64; REPLICATES],
+    halves: bool,
+) -> [f64; N] {
+    let mean = |of: Range<usize>, channel: usize| {
+        let total: u64 = counts[of.clone()].iter().sum();
+        let sum: f64 = of.map(|r| counts[r] as f64 * means[r][channel]).sum();
+        sum / total.max(1) as f64
+    };
+    std::array::from_fn(|channel| match halves {
+        true => 0.5 * (mean(0..HALF, channel) + mean(HALF..REPLICATES, channel)),
+        false => mean(0..REPLICATES, channel),
+    })
 }
 
 fn samples(cells: &[Cell]) -> u64 {
@@ -303,64 +302,82 @@ pub(super) fn coverage_of_halves(cells: &PixelCells) -> f64 {
     (alpha(cells, None) / mean).clamp(a.min(b), a.max(b))
 }
 
-/// As [`mean_of`], where the halves weigh alike: how far one went on was for the other to say, so that it is no measure
-/// of how much it should count.
-fn mean_of_halves(
-    cells: &PixelCells,
-    counts: [u64; REPLICATES],
+/// The sums of a pixel and what becomes of them.
+struct Sums<'a> {
+    cells: &'a PixelCells,
+    /// What the sums of each replicate are divided by.
+    divisors: [u64; REPLICATES],
+    /// Where samples do not count for one each.
     weights: Option<Weights>,
-    rgb_from_xyz: &[[f64; 3]; 3],
-) -> PixelMean {
-    let Some(means) = means_by(cells, counts, weights, rgb_from_xyz) else {
-        return mean_of(cells, counts, weights, rgb_from_xyz);
-    };
-    let half = |of: Range<usize>| colours(&cells[of.clone()], counts[of].iter().sum(), rgb_from_xyz);
-    let rgb = if weights.is_some() {
-        mean_of_two(&means, counts)
-    } else {
-        let (a, b) = (half(0..HALF), half(HALF..REPLICATES));
-        [0, 1, 2].map(|c| 0.5 * (a[c] + b[c]))
-    };
-    let mut variance = [0.0; 3];
-    for own in means {
-        for c in 0..3 {
-            variance[c] += (own[c] - rgb[c]) * (own[c] - rgb[c]) / (REPLICATES * (REPLICATES - 1)) as f64;
-        }
-    }
-    PixelMean { rgb, variance }
 }
 
-/// Mean and variance of the mean of a pixel whose replicates are divided by `divisors`, and whose samples count by `weights` or
-/// each for one.
-fn mean_of(
-    cells: &PixelCells,
-    divisors: [u64; REPLICATES],
-    weights: Option<Weights>,
-    rgb_from_xyz: &[[f64; 3]; 3],
-) -> PixelMean {
-    let total: u64 = divisors.iter().sum();
-    let replicates = divisors.iter().filter(|&&n| n > 0).count();
-    if total == 0 {
-        return PixelMean { rgb: [0.0; 3], variance: [f64::NAN; 3] };
+impl Sums<'_> {
+    /// Those of the pixel of `film` at `index`.
+    fn of(film: &Film, index: usize) -> Sums<'_> {
+        let cells = &film.cells()[index];
+        Sums { cells, divisors: counts(cells), weights: film.layers.weights(index) }
     }
-    let own = |r: usize| if divisors[r] > 0 { colours(&cells[r..=r], divisors[r], rgb_from_xyz) } else { [0.0; 3] };
-    let mut means = std::array::from_fn(own);
-    let rgb = match weights {
-        Some(weights) => {
+
+    /// The mean of each replicate, zero where it has none.
+    fn means_or_zero(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> [[f64; 3]; REPLICATES] {
+        let Sums { cells, divisors, weights } = *self;
+        let own = |r: usize| if divisors[r] > 0 { colours(&cells[r..=r], divisors[r], rgb_from_xyz) } else { [0.0; 3] };
+        let mut means = std::array::from_fn(own);
+        if let Some(weights) = weights {
             even(&mut means, divisors, weights);
-            weighed(&means, divisors)
         }
-        None => colours(cells, total, rgb_from_xyz),
-    };
-    let mut variance = [0.0; 3];
-    for (own, &n) in means.iter().zip(&divisors) {
-        for c in 0..3 {
-            variance[c] += n as f64 * (own[c] - rgb[c]) * (own[c] - rgb[c]);
-        }
+        means
     }
-    let variance = variance
-        .map(|squares| if replicates < 2 { f64::NAN } else { squares / ((replicates - 1) as f64 * total as f64) });
-    PixelMean { rgb, variance }
+
+    /// The mean of each replicate; `None` where one has none.
+    fn means(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
+        (!self.divisors.contains(&0)).then(|| self.means_or_zero(rgb_from_xyz))
+    }
+
+    /// Mean and variance of the mean.
+    fn mean(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> PixelMean {
+        let Sums { cells, divisors, weights } = *self;
+        let total: u64 = divisors.iter().sum();
+        let replicates = divisors.iter().filter(|&&n| n > 0).count();
+        if total == 0 {
+            return PixelMean { rgb: [0.0; 3], variance: [f64::NAN; 3] };
+        }
+        let means = self.means_or_zero(rgb_from_xyz);
+        let rgb = match weights {
+            Some(_) => mean_of_replicates(&means, divisors, false),
+            None => colours(cells, total, rgb_from_xyz),
+        };
+        let mut variance = [0.0; 3];
+        for (own, &n) in means.iter().zip(&divisors) {
+            for c in 0..3 {
+                variance[c] += n as f64 * (own[c] - rgb[c]) * (own[c] - rgb[c]);
+            }
+        }
+        let variance = variance
+            .map(|squares| if replicates < 2 { f64::NAN } else { squares / ((replicates - 1) as f64 * total as f64) });
+        PixelMean { rgb, variance }
+    }
+
+    /// As [`Sums::mean`], where the halves weigh alike: how far one went on was for the other to say, so that it is no measure
+    /// of how much it should count.
+    fn mean_of_halves(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> PixelMean {
+        let Sums { cells, divisors, weights } = *self;
+        let Some(means) = self.means(rgb_from_xyz) else { return self.mean(rgb_from_xyz) };
+        let half = |of: Range<usize>| colours(&cells[of.clone()], divisors[of].iter().sum(), rgb_from_xyz);
+        let rgb = if weights.is_some() {
+            mean_of_replicates(&means, divisors, true)
+        } else {
+            let (a, b) = (half(0..HALF), half(HALF..REPLICATES));
+            [0, 1, 2].map(|c| 0.5 * (a[c] + b[c]))
+        };
+        let mut variance = [0.0; 3];
+        for own in means {
+            for c in 0..3 {
+                variance[c] += (own[c] - rgb[c]) * (own[c] - rgb[c]) / (REPLICATES * (REPLICATES - 1)) as f64;
+            }
+        }
+        PixelMean { rgb, variance }
+    }
 }
 
 /// The sum of `cells`, which is exact and rounded once, over `divisor`.
@@ -384,26 +401,7 @@ pub fn counts(cells: &PixelCells) -> [u64; REPLICATES] {
 /// The mean of each replicate of a pixel of `film`, in its units; `None` where one has no sample.
 #[must_use]
 pub fn replicate_means(film: &Film, index: usize, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
-    let cells = &film.cells()[index];
-    means_by(cells, counts(cells), film.layers.weights(index), rgb_from_xyz)
-}
-
-/// The mean of each replicate of a pixel, its sums over `divisors`, whose samples count by `weights` or each for one; `None` where
-/// one has none.
-fn means_by(
-    cells: &PixelCells,
-    divisors: [u64; REPLICATES],
-    weights: Option<Weights>,
-    rgb_from_xyz: &[[f64; 3]; 3],
-) -> Option<[[f64; 3]; REPLICATES]> {
-    if divisors.contains(&0) {
-        return None;
-    }
-    let mut means = std::array::from_fn(|r| colours(&cells[r..=r], divisors[r], rgb_from_xyz));
-    if let Some(weights) = weights {
-        even(&mut means, divisors, weights);
-    }
-    Some(means)
+    Sums::of(film, index).means(rgb_from_xyz)
 }
 
 /// The light of each replicate of a pixel of `film` and `splats`, in the scene's units; `None` where one has none.
