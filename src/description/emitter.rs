@@ -15,7 +15,7 @@ use super::transform::{TransformStep, check_view, is_similarity, parallel};
 pub struct EnvironmentLight {
     /// For messages; default none.
     pub name: Option<String>,
-    /// An image in latitude and longitude, linear (EXR or HDR) or sRGB (PNG or JPEG).
+    /// An image in latitude and longitude, linear (EXR, HDR or PFM) or sRGB (all others).
     pub file: FilePath,
     /// Factor; default 1.
     #[serde(default = "one")]

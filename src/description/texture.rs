@@ -39,7 +39,7 @@ fn one() -> f64 {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImageTexture {
-    /// PNG, JPEG, HDR or EXR.
+    /// PNG, JPEG, BMP, TGA, PNM, PFM, HDR or EXR.
     pub file: FilePath,
     /// What lies beyond the edges; default `repeat`.
     #[serde(default)]

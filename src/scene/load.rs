@@ -1,5 +1,7 @@
 //! Pictures and tables from files.
 
+mod pfm;
+
 use super::bands::Bands;
 use super::texture::{DataImage, Grid, ImageTexture, Numbers, Texel, Texels};
 use crate::error::{Error, Result};
@@ -8,6 +10,7 @@ use crate::spectrum::Carried;
 use crate::spectrum::colour::{self, ColourSpace};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
+use std::fmt::Display;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,6 +31,9 @@ pub struct Picture {
 /// The most bytes a decoded picture may take: 2 GiB.
 const LARGEST: u64 = 1 << 31;
 
+/// What is read.
+const KINDS: &str = "a PNG, JPEG, BMP, TGA, PNM, PFM, HDR or EXR picture";
+
 fn decode(path: &Path) -> Result<image::DynamicImage> {
     let mut bytes = crate::input::read(path).map_err(|e| Error::input(path, words(&e)))?;
     // Radiance pictures have either signature; the decoder knows one.
@@ -38,6 +44,10 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     if image::guess_format(&bytes).is_ok_and(|format| format == image::ImageFormat::Jpeg) && !jpeg_ends(&bytes) {
         return Err(Error::input(path, "expected a JPEG picture to its end, found one cut off: it is damaged"));
     }
+    let fault = |e: &dyn Display| Error::input(path, format!("expected {KINDS}: {e}"));
+    if pfm::is(&bytes) {
+        return pfm::decode(&bytes).map_err(|e| fault(&e));
+    }
     let mut reader = image::ImageReader::new(Cursor::new(bytes));
     if let Ok(format) = image::ImageFormat::from_path(path) {
         reader.set_format(format);
@@ -46,8 +56,7 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(LARGEST);
     reader.limits(limits);
-    let fault = |e| Error::input(path, format!("expected a PNG, JPEG, HDR or EXR picture: {e}"));
-    let decoder = reader.into_decoder().map_err(fault)?;
+    let decoder = reader.into_decoder().map_err(|e| fault(&e))?;
     let (width, height) = image::ImageDecoder::dimensions(&decoder);
     if width == 0 || height == 0 {
         return Err(Error::input(path, format!("expected a picture of one pixel or more, found {width} x {height}")));
@@ -58,7 +67,7 @@ fn decode(path: &Path) -> Result<image::DynamicImage> {
             format!("expected a picture of at most 2 GiB, found {width} x {height} pixels"),
         ));
     }
-    image::DynamicImage::from_decoder(decoder).map_err(fault)
+    image::DynamicImage::from_decoder(decoder).map_err(|e| fault(&e))
 }
 
 /// Whether a JPEG file has the marker of its end behind a scan, ITU-T T.81 annex B.
@@ -479,6 +488,32 @@ mod tests {
         }
     }
 
+    /// Three colours of eight bits in a row, under every name of a file that holds them as they are; and what is cut off is told.
+    #[test]
+    fn eight_bits_are_the_same_from_all_kinds_of_files() {
+        let dir = tempfile::tempdir().unwrap();
+        let colours = [[1, 2, 3], [250, 0, 128], [7, 255, 9]];
+        let image = image::RgbImage::from_fn(3, 1, |x, _| image::Rgb(colours[x as usize]));
+        for name in ["a.png", "a.bmp", "a.tga", "a.ppm"] {
+            let path = dir.path().join(name);
+            image.save(&path).unwrap();
+            let Decoded::Bytes { rgb, width: 3, height: 1, .. } = open(&path).unwrap() else { panic!("{name}") };
+            assert_eq!(rgb, colours.as_flattened(), "{name}");
+            let whole = std::fs::read(&path).unwrap();
+            for length in [whole.len() / 2, 20, 1] {
+                std::fs::write(&path, &whole[..length]).unwrap();
+                let error = open(&path).unwrap_err();
+                assert!(error.exit_code() == 3 && error.to_string().contains(KINDS), "{name}, {length}: {error}");
+            }
+        }
+        let mut map = b"PF\n1 1\n-1\n".to_vec();
+        map.extend([0.5_f32, 0.25, 2.0].map(f32::to_le_bytes).as_flattened());
+        std::fs::write(dir.path().join("a.pfm"), map).unwrap();
+        let path = dir.path().join("a.pfm");
+        let found = picture(&path, open(&path).unwrap()).unwrap();
+        assert_eq!(found.pixels, [[0.5, 0.25, 2.0]]);
+    }
+
     /// Cut off anywhere, also within its header or just before the marker of its end; what follows that does no harm.
     #[test]
     fn a_jpeg_that_is_cut_off_is_damaged() {
@@ -621,6 +656,6 @@ mod tests {
         let path = dir.path().join("earth.jpg");
         std::fs::write(&path, "not a picture").unwrap();
         let e = open(&path).unwrap_err();
-        assert!(e.exit_code() == 3 && e.to_string().contains("expected a PNG, JPEG, HDR or EXR picture"), "{e}");
+        assert!(e.exit_code() == 3 && e.to_string().contains(KINDS), "{e}");
     }
 }

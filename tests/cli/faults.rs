@@ -178,7 +178,7 @@ fn faults_with_words_of_others_begin_with_ours() {
         ),
         (
             "textures: {t: {image: {file: no_picture.png}}}",
-            "no_picture.png: expected a PNG, JPEG, HDR or EXR picture: ",
+            "no_picture.png: expected a PNG, JPEG, BMP, TGA, PNM, PFM, HDR or EXR picture: ",
             3,
         ),
         (
@@ -189,7 +189,7 @@ fn faults_with_words_of_others_begin_with_ours() {
         ("shapes: [{mesh: {file: odd.ply}}]", "odd.ply: ", 3),
         (
             "lights: [{environment: {file: no_picture.png}}]",
-            "no_picture.png: expected a PNG, JPEG, HDR or EXR picture: ",
+            "no_picture.png: expected a PNG, JPEG, BMP, TGA, PNM, PFM, HDR or EXR picture: ",
             3,
         ),
     ];

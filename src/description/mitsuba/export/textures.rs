@@ -225,7 +225,7 @@ impl<'a> Export<'a> {
 
 /// Whether the values of a picture depend on `raw`, and what they are with it the other way.
 fn stored_otherwise(image: &ImageTexture) -> Option<&'static str> {
-    match (ends_in(&image.file, "exr") || ends_in(&image.file, "hdr"), image.raw) {
+    match (["exr", "hdr", "pfm"].iter().any(|ending| ends_in(&image.file, ending)), image.raw) {
         (true, _) => None,
         (false, true) => Some("its colours by the curve of sRGB: Mitsuba takes raw ones for numbers alone"),
         (false, false) => Some("its numbers as they are stored: Mitsuba takes them from raw pictures alone"),
