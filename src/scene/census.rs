@@ -35,7 +35,9 @@ pub struct Census {
     pub backgrounds: usize,
     /// Media that rays can be in.
     pub media: usize,
-    /// Of those, media that scatter and whose extinction depends on wavelength.
+    /// Of those, media that are the same everywhere and scatter nothing.
+    pub clear_media: usize,
+    /// Of all, media that scatter and whose extinction depends on wavelength.
     pub chromatic_media: usize,
     /// Objects with a film.
     pub films: Vec<String>,
@@ -71,6 +73,7 @@ impl Census {
             delta_lights: self.delta_lights.max(other.delta_lights),
             backgrounds: self.backgrounds.max(other.backgrounds),
             media: self.media.max(other.media),
+            clear_media: self.clear_media.max(other.clear_media),
             chromatic_media: self.chromatic_media.max(other.chromatic_media),
             films: all(self.films, other.films),
             nested: all(self.nested, other.nested),
@@ -176,6 +179,7 @@ impl Census {
         };
         for (_, medium) in scene.media.iter().enumerate().filter(|(i, _)| used(*i)) {
             census.media += 1;
+            census.clear_media += usize::from(medium.is_clear());
             if medium.is_chromatic() {
                 census.chromatic_media += 1;
             }

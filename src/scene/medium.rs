@@ -158,6 +158,30 @@ impl Medium {
         Dimmed { through, passing: if scatters { through } else { Lanes::ONE } }
     }
 
+    /// Whether it is the same everywhere and scatters nothing.
+    #[must_use]
+    pub fn is_clear(&self) -> bool {
+        match &self.filling {
+            Filling::Even { scattering, .. } => scattering.is_black(),
+            Filling::EvenExtinction { scatters, .. } => !scatters,
+            Filling::Varying(_) => false,
+        }
+    }
+
+    /// What light keeps over `distance` in a medium that [is clear](Medium::is_clear): exp(−σ_a `distance`). None of another.
+    #[must_use]
+    pub fn clear(&self, distance: f64, nm: Lanes) -> Option<Lanes> {
+        if !self.is_clear() {
+            return None;
+        }
+        let extinction = match &self.filling {
+            Filling::Even { absorption, .. } => absorption.eval(nm),
+            Filling::EvenExtinction { extinction, .. } => extinction.eval(nm),
+            Filling::Varying(_) => return None,
+        };
+        Some(MediumLanes { extinction, scattering: Lanes::ZERO }.transmittance(distance))
+    }
+
     /// Whether light at some wavelengths does not come through an endless way in it.
     #[must_use]
     pub fn is_opaque_at_infinity(&self) -> bool {

@@ -319,9 +319,22 @@ impl EffectPlan {
         );
         let media = effect(
             "media",
-            path && census.media > 0,
-            count(census.media, "medium that light crosses", "media that light crosses"),
-            if path { "all space is empty" } else { "whitted does not simulate media" },
+            if path { census.media > 0 } else { census.clear_media > 0 },
+            match (path, census.media - census.clear_media) {
+                (true, _) => count(census.media, "medium that light crosses", "media that light crosses"),
+                (false, 0) => count(census.clear_media, "medium that dims light", "media that dim light"),
+                (false, left) => {
+                    let dim = count(census.clear_media, "medium that dims light", "media that dim light");
+                    format!(
+                        "{dim}; whitted leaves out {}",
+                        count(left, "that scatters or varies", "that scatter or vary")
+                    )
+                }
+            },
+            match path || census.media == 0 {
+                true => "all space is empty",
+                false => "whitted leaves out media that scatter or vary",
+            },
         );
         let nested = effect(
             "nested bodies",
@@ -352,7 +365,7 @@ impl EffectPlan {
             integrator,
             dispersion,
             chromatic,
-            media: media && path,
+            media,
             nested,
             depth_fog,
             packets: path && !census.dispersive.is_empty(),

@@ -4,7 +4,8 @@
 //!
 //! Lights with area shine from the middle of their surface; light from infinity is seen, and reaches
 //! surfaces through the ambient term only. Glass reflects and refracts by Fresnel's shares; where its
-//! index depends on the wavelength, each wavelength goes on alone after the first refraction.
+//! index depends on the wavelength, each wavelength goes on alone after the first refraction. Media that are the same
+//! everywhere and only absorb dim what crosses them (Beer and Lambert); others are left out.
 
 use super::Incoming;
 use super::path::seen_normal;
@@ -112,12 +113,16 @@ impl Tracer<'_> {
         let scene = self.scene;
         let mut ray = *ray;
         let mut arrived = Arrived { light: Lanes::ZERO, open: 1.0, first: None };
+        // What media on the way leave of the light.
+        let mut kept = Lanes::ONE;
         // What goes straight on does so here, and only mirrors and glass by recursion.
         for _ in 0..=MAX_BOUNDARIES {
-            let Some(hit) = scene.closest(&ray, reach) else {
+            let hit = scene.closest(&ray, reach);
+            kept *= self.clear(&inside, hit.map_or(f64::INFINITY, |hit| hit.t));
+            let Some(hit) = hit else {
                 let all = &scene.backgrounds;
                 let sky = all.iter().map(|&i| scene.lights[i as usize].background(ray.direction, self.nm));
-                arrived.light += sky.fold(Lanes::ZERO, |a, b| a + b) * arrived.open;
+                arrived.light += sky.fold(Lanes::ZERO, |a, b| a + b) * kept * arrived.open;
                 return arrived;
             };
             reach = f64::INFINITY;
@@ -139,8 +144,8 @@ impl Tracer<'_> {
                 let vertex = Vertex { scene, hit: &hit, surface: &surface, at: &hit.texture_point(&surface), wo };
                 let standing = Standing::new(seen_normal(&surface, wo), surface.tangent);
                 let at = Meeting { x: &vertex, standpoint };
-                let sent = self.scattered(&at, material, standing, weight * arrived.open, depth);
-                arrived.light += (emitted + sent.light) * arrived.open;
+                let sent = self.scattered(&at, material, standing, weight * kept * arrived.open, depth);
+                arrived.light += (emitted + sent.light) * kept * arrived.open;
                 let straight = sent.straight as f32;
                 if straight < 1.0 {
                     arrived.first.get_or_insert(surface.point);
@@ -282,17 +287,23 @@ impl Tracer<'_> {
         Some((a.wi, irradiance, a.distance, a.target))
     }
 
-    /// One where nothing stands between; the tint of transparent surfaces where the scene asks for it.
+    /// What light keeps over `distance` through the medium that it is in.
+    fn clear(&self, inside: &Inside, distance: f64) -> Lanes {
+        let medium = inside.medium.filter(|_| self.plan.media).map(|medium| &self.scene.media[medium as usize]);
+        medium.and_then(|medium| medium.clear(distance, self.nm)).unwrap_or(Lanes::ONE)
+    }
+
+    /// What media leave where nothing stands between; dimmed by transparent surfaces, too, where the scene asks for it.
     fn unshadowed(&self, ray: &Ray, mut inside: Inside, distance: f64, target: Option<Departure>) -> Lanes {
         let scene = self.scene;
         if !self.settings.transparent_shadows && !scene.has_boundaries {
-            return if scene.occluded(ray, distance, target) { Lanes::ZERO } else { Lanes::ONE };
+            return if scene.occluded(ray, distance, target) { Lanes::ZERO } else { self.clear(&inside, distance) };
         }
         let (mut ray, mut left, mut through) = (*ray, distance, Lanes::ONE);
         for _ in 0..=MAX_BOUNDARIES {
-            let Some(hit) = scene.closest(&ray, left).filter(|h| !scene.reaches(&ray, h, target)) else {
-                return through;
-            };
+            let hit = scene.closest(&ray, left).filter(|h| !scene.reaches(&ray, h, target));
+            through *= self.clear(&inside, hit.map_or(left, |hit| hit.t));
+            let Some(hit) = hit else { return through };
             let surface = scene.surface(&ray, &hit);
             let object = &scene.objects[hit.object as usize];
             let material = &scene.materials[object.material as usize];

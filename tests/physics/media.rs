@@ -47,6 +47,51 @@ fn tinted_glass_absorbs_between_its_reflections() {
     slab.estimate(&ray(v(0.1, 0.2, 5.0), v(0.1, 0.2, 0.0)), 8192).assert_is(expected, 5e-3);
 }
 
+/// The same of glass that absorbs by itself, by `path` and, as it draws nothing, exactly by `whitted`; also where the camera
+/// is in what absorbs, where light from infinity has none left, and of two media that `whitted` knows not.
+#[test]
+fn whitted_dims_what_crosses_a_medium_that_only_absorbs() {
+    let (r, t) = (0.04, (-0.8f64).exp());
+    let expected = r + (1.0 - r) * (1.0 - r) * t / (1.0 - r * t);
+    let whitted = "integrator: {whitted: {max_depth: 24}}\n";
+    let glass = "shapes:\n- cube: {size: 2, material: {dielectric: {ior: 1.5, absorption: {color: 0.6703200460356393, at: 1}}}}\n\
+                 lights: [{constant: {radiance: 1}}]\n";
+    let straight = ray(v(0.1, 0.2, 5.0), v(0.1, 0.2, 0.0));
+    bench(glass).estimate(&straight, 8192).assert_is(expected, 5e-3);
+    // A ray of less than 2^-16 of what reaches the eye is not followed: of the way out and of the way back, one each.
+    let dims_to = |text: &str, expected: f64, within: f64| {
+        for found in bench(&format!("{whitted}{text}")).lanes(&straight) {
+            assert_close(found, expected, within);
+        }
+    };
+    dims_to(glass, expected, 2.0 / 65_536.0 / expected);
+    let dims = |text: &str, expected: f64| dims_to(text, expected, 2e-6);
+    let board = |medium: &str| {
+        format!(
+            "media: {{m: {medium}}}\nmedium: m\nshapes:\n\
+             - rectangle: {{corner: [-2, -2, 0], edge_u: [4, 0, 0], edge_v: [0, 4, 0], emission: 1, material: {{diffuse: {{reflectance: 0}}}}}}\n"
+        )
+    };
+    dims(&board("{homogeneous: {absorption: 0.3}}"), (-1.5f64).exp());
+    dims(&board("{homogeneous: {absorption: 0.3, scattering: 0.1}}"), 1.0);
+    dims(
+        "media: {m: {homogeneous: {absorption: 0.3}}}\nmedium: m\nlights: [{constant: {radiance: 1}}]\nshapes: []\n",
+        0.0,
+    );
+    // A lamp two metres above a floor, through one metre of the medium; and from the middle of a medium without a wall.
+    let lamp = |shape: &str, first: &str| {
+        format!(
+            "{first}media: {{m: {{homogeneous: {{absorption: 0.3}}}}}}\nlights: [{{point: {{position: [0.1, 0.2, 2], intensity: 8}}}}]\n\
+             shapes:\n- plane: {{normal: [0, 0, 1]}}\n{shape}"
+        )
+    };
+    let floor = 0.5 * 2.0 / std::f64::consts::PI;
+    let slab = "- cube: {center: [0, 0, 1], size: 1, material: {boundary: {}}, inside: m}\n";
+    let crossed = (-0.3f64).exp();
+    dims(&lamp(slab, ""), floor * crossed * crossed);
+    dims(&lamp("", "medium: m\n"), floor * (-0.3 * 7.0f64).exp());
+}
+
 /// What only scatters keeps all light: in even light it is invisible, whatever the phase function. Grey,
 /// the mean of the lanes is 1; coloured, the luminance, since lanes stand in for each other there.
 #[test]
