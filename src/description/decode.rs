@@ -271,7 +271,10 @@ impl<'de> Deserializer<'de> for De<'_> {
             }
             _ if variants.contains(&"inline") => visitor
                 .visit_enum(Choice { kind: "inline", content: Some(self.node), key: None, de: self })
-                .map_err(|fault| fault.or_one_of(kinds_in_words(variants))),
+                .map_err(|fault| match fault.place.is_none_or(|place| self.node.stands_at(place)) {
+                    true => fault.or_one_of(kinds_in_words(variants)),
+                    false => fault,
+                }),
             Value::Map(entries) if entries.len() == 1 => {
                 let Entry { key, key_place, .. } = &entries[0];
                 Err(Fault::unknown(*key_place, key, kinds_in_words(variants)).under(Segment::Key(key.clone())))
@@ -446,6 +449,18 @@ mod tests {
         assert_eq!(
             faults("materials:\n  a: {boundary: {thick: 1}}"),
             "dir/s.yaml:3:18: materials.a.boundary.thick: expected no field, found \"thick\""
+        );
+    }
+
+    /// `none` and `file` may stand for the whole absorption, not for its colour.
+    #[test]
+    fn what_a_field_may_be_does_not_hold_what_stands_for_its_owner() {
+        let kinds = "a number, rgb, table, file, blackbody, illuminant, lines, scaled, zero_outside";
+        assert_eq!(
+            faults("materials:\n  a: {dielectric: {ior: 1.5, absorption: {color: [1, 2], at: 1}}}"),
+            format!(
+                "dir/s.yaml:3:50: materials.a.dielectric.absorption.color: expected one of {kinds}, found a list of 2"
+            )
         );
     }
 
