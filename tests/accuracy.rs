@@ -211,38 +211,28 @@ fn bands_know_their_errors() {
     }
 }
 
-/// Samples share their wavelengths where photons are merged, so that the colour of the whole picture errs together. Of 24 seeds
-/// no two neighbours differ by more than what they say of their means, as `abbe compare` asks; by independent pixels some did.
-/// What they say is (t/z)² of what their replicates scatter by, t of three degrees of freedom: in the mean of 72 degrees of
-/// freedom that is the variance over the seeds, of 23, in the colour of which it is most. An F of 72 and 23 is within 0.4 and
-/// 3.2 in 998 of 1000.
-#[test]
-fn pictures_of_merged_photons_say_how_much_their_means_vary() {
-    let yaml = "\
+/// A ball of glass whose photons are merged.
+const MERGED: &str = "\
 camera: {origin: [0, 1.6, 6], target: [0, 0.9, 0], fov_deg: 40}
 image: {width: 24, height: 20}
 render: {samples: 64, techniques: {merging: on}}
+output: {exr: {stderr: true}}
 shapes:
 - plane: {normal: [0, 1, 0]}
 - sphere: {center: [0, 1, 0], radius: 1, material: {dielectric: {ior: {glass: N-SF11}}}}
 - sphere: {center: [-3, 5, 4], radius: 1, emission: {blackbody: {kelvin: 5000, scale: 25}}}
 lights: [constant: {radiance: {illuminant: {name: D65, scale: 0.3}}}]
 ";
-    let bench = bench_with(yaml, &[]);
-    let sharing = Finish::of(&bench.prepared).sharing;
-    assert_eq!(sharing, Sharing::All);
-    let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
-    // Sums of blue, their variance as of independent pixels, and how many times that it is.
-    let pictures: Vec<[f64; 3]> = (0..24)
-        .map(|seed| {
-            let frame = frame_of(&bench, 1000 * seed);
-            let image = frame.resolve(&rgb_from_xyz);
-            let sum = image.rgb[2].iter().map(|&x| f64::from(x)).sum();
-            let own = image.standard_error[2].iter().map(|&e| f64::from(e) * f64::from(e)).sum();
-            [sum, own, frame.shared_errors(&image, &rgb_from_xyz, sharing)]
-        })
-        .collect();
-    let z = student_t_half_width(1.0 - GLOBAL_ALPHA / 3.0, f64::INFINITY);
+
+/// `pictures` are sums of a value over the pixels, their variances as of independent pixels, and how many times those they are, for
+/// the most of `values`. No two neighbours differ by more than that, as `abbe compare` asks.
+///
+/// What they say is (t/z)² of what their replicates scatter by, t of three degrees of freedom: in the mean of 72 degrees of
+/// freedom that is the variance over the 24 seeds, of 23, in the value of which it is most. An F of 72 and 23 is within 0.4 and
+/// 3.2 in 998 of 1000.
+fn assert_sums_vary_as_told(name: &str, pictures: &[[f64; 3]], values: f64) {
+    assert_eq!(pictures.len(), 24);
+    let z = student_t_half_width(1.0 - GLOBAL_ALPHA / values, f64::INFINITY);
     let differ = |shared: &dyn Fn(&[f64; 3]) -> f64| {
         let beyond = |pair: &&[[f64; 3]]| {
             let variance: f64 = pair.iter().map(|p| p[1] * shared(p)).sum();
@@ -250,10 +240,53 @@ lights: [constant: {radiance: {illuminant: {name: D65, scale: 0.3}}}]
         };
         pictures.windows(2).filter(beyond).count()
     };
-    assert_eq!(differ(&|p| p[2]), 0, "{pictures:?}");
-    let widened = (student_t_half_width(1.0 - GLOBAL_ALPHA / 3.0, 3.0) / z).powi(2);
+    assert_eq!(differ(&|p| p[2]), 0, "{name}: {pictures:?}");
+    let widened = (student_t_half_width(1.0 - GLOBAL_ALPHA / values, 3.0) / z).powi(2);
     let said = pictures.iter().map(|p| p[1] * p[2] / widened).sum::<f64>() / 24.0;
     let found = pictures.iter().map(|p| p[0]).collect::<Moments>().variance();
-    println!("{} differ if independent; variance {found:.3e}, said {said:.3e}", differ(&|_| 1.0));
-    assert!((0.4..3.2).contains(&(said / found)), "{said} for {found}");
+    println!("{name}: {} differ if independent; variance {found:.3e}, said {said:.3e}", differ(&|_| 1.0));
+    assert!((0.4..3.2).contains(&(said / found)), "{name}: {said} for {found}");
+}
+
+/// Samples share their wavelengths where photons are merged, so that the colour of the whole picture errs together: by
+/// independent pixels some of 24 seeds differed.
+#[test]
+fn pictures_of_merged_photons_say_how_much_their_means_vary() {
+    let bench = bench_with(MERGED, &[]);
+    let sharing = Finish::of(&bench.prepared).sharing;
+    assert_eq!(sharing, Sharing::All);
+    let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
+    let blue = |seed: u64| {
+        let frame = frame_of(&bench, 1000 * seed);
+        let image = frame.resolve(&rgb_from_xyz);
+        let sum = image.rgb[2].iter().map(|&x| f64::from(x)).sum();
+        let own = image.standard_error[2].iter().map(|&e| f64::from(e) * f64::from(e)).sum();
+        [sum, own, frame.shared_errors(&image, &rgb_from_xyz, sharing)]
+    };
+    let pictures: Vec<[f64; 3]> = (0..24).map(blue).collect();
+    assert_sums_vary_as_told("blue", &pictures, 3.0);
+}
+
+/// The same of each of two bands alone. Both together say what the one says of which it is more, at half the level.
+#[test]
+fn bands_of_merged_photons_say_how_much_their_means_vary() {
+    let bands = "height: 20, bands: [{name: blue, response: {table: [[420, 1], [500, 1]]}}, {name: red, response: {table: [[580, 1], [680, 1]]}}]";
+    let bench = bench_with(&MERGED.replace("height: 20", bands), &[]);
+    let frames: Vec<Frame> = (0..24).map(|seed| frame_of(&bench, 1000 * seed)).collect();
+    for (band, name) in ["blue", "red"].into_iter().enumerate() {
+        let of = |frame: &Frame| {
+            let sum = frame.layer(band).iter().map(|&x| f64::from(x)).sum();
+            let own = frame.layer_error(band).iter().map(|&e| f64::from(e) * f64::from(e)).sum();
+            [sum, own, frame.shared_errors_of_bands(band..band + 1, Sharing::All)]
+        };
+        let pictures: Vec<[f64; 3]> = frames.iter().map(of).collect();
+        assert_sums_vary_as_told(name, &pictures, 1.0);
+    }
+    let [blue, red] = [0, 1].map(|band| frames[0].shared_errors_of_bands(band..band + 1, Sharing::All));
+    let widened = |values: f64| {
+        let t = |dof| student_t_half_width(1.0 - GLOBAL_ALPHA / values, dof);
+        (t(3.0) / t(f64::INFINITY)).powi(2)
+    };
+    let both = frames[0].shared_errors_of_bands(0..2, Sharing::All);
+    assert!((both / (blue.max(red) * widened(2.0) / widened(1.0)) - 1.0).abs() < 1e-9, "{both}, {blue}, {red}");
 }

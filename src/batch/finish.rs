@@ -438,10 +438,10 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         description::FileLayout::Multipart => exr::Layout::Multipart,
     };
     file.attributes = attributes(finish, frame, report);
-    let shared = frame.shared_errors(image, &finish.rgb_from_xyz(), finish.sharing);
-    if shared > 1.0 {
-        file.attributes.push((exr::SHARED_ERRORS.to_owned(), Attribute::Text(format!("{shared:.3}"))));
-    }
+    file.attributes.extend(match finish.bands {
+        true => shared_errors_of_bands(finish, frame, 0..finish.spectral_channels().start),
+        false => shared_errors(frame.shared_errors(image, &finish.rgb_from_xyz(), finish.sharing)),
+    });
     if exr.aces_container && as_asked {
         file.attributes.push(("acesImageContainerFlag".to_owned(), Attribute::Int(1)));
     } else if exr.aces_container {
@@ -470,6 +470,17 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         report.notes.push(format!("{infinite} values are more than 32-bit floats hold: they are written as infinite"));
     }
     file
+}
+
+/// The attribute that tells how much more the sum of all pixels varies than that of independent ones; none where it is no more.
+fn shared_errors(shared: f64) -> Option<(String, Attribute)> {
+    (shared > 1.0).then(|| (exr::SHARED_ERRORS.to_owned(), Attribute::Text(format!("{shared:.3}"))))
+}
+
+/// The same of `channels`, which are bands; none where their errors are not told.
+fn shared_errors_of_bands(finish: &Finish, frame: &Frame, channels: Range<usize>) -> Option<(String, Attribute)> {
+    let told = finish.output.exr.stderr && finish.is_random();
+    told.then(|| frame.shared_errors_of_bands(channels, finish.sharing)).and_then(shared_errors)
 }
 
 /// The standard errors of the band that is channel `i`.
@@ -520,6 +531,7 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
     let mut attributes = attributes(finish, frame, report);
     let text = |name: &str, value: &str| (name.to_owned(), Attribute::Text(value.to_owned()));
     attributes.extend([text("spectralLayoutVersion", "1.0"), text("emissiveUnits", "W.m^-2.sr^-1")]);
+    attributes.extend(shared_errors_of_bands(finish, frame, channels.clone()));
     Some(ExrImage {
         frame: image.frame,
         window: image.window,

@@ -13,6 +13,7 @@ use crate::film::accumulate::{Film, InvalidCounts, REPLICATES};
 use crate::film::error::{self, ErrorEstimate, NoEstimate, Values};
 use crate::film::filter::FilterSampler;
 use crate::film::resolve::{self, Image};
+use crate::film::sharing;
 use crate::scene::Scene;
 use crate::spectrum::ColourSpace;
 use crate::transport::plan::EffectPlan;
@@ -137,16 +138,28 @@ impl Frame {
         resolve::resolve(&self.film, splats, rgb_from_xyz)
     }
 
-    /// How many times the variance of the sum of all pixels of `image` is that of independent ones, at the most; see
-    /// [`resolve::shared_errors`] and, for samples that share more than a filter, [`resolve::errors_shared_in_cells`].
+    /// How many times the variance of the sum of all pixels of `image` is that of independent ones, at the most.
     #[must_use]
     pub fn shared_errors(&self, image: &Image, rgb_from_xyz: &[[f64; 3]; 3], sharing: Sharing) -> f64 {
+        let errors = image.standard_error.each_ref().map(Vec::as_slice);
+        self.shared(Values::Colours(rgb_from_xyz, image), &errors, sharing)
+    }
+
+    /// The same of the further channels `channels`, bands that are summed by replicate.
+    #[must_use]
+    pub fn shared_errors_of_bands(&self, channels: Range<usize>, sharing: Sharing) -> f64 {
+        let errors: Vec<Vec<f32>> = channels.clone().map(|channel| self.layer_error(channel)).collect();
+        let errors: Vec<&[f32]> = errors.iter().map(Vec::as_slice).collect();
+        self.shared(Values::Bands(channels.start, channels.len()), &errors, sharing)
+    }
+
+    fn shared(&self, values: Values, errors: &[&[f32]], sharing: Sharing) -> f64 {
         let splats = self.splats.as_ref().map(SplatFilm::splats);
-        let in_cells = |cell| resolve::errors_shared_in_cells(image, &self.film, splats.as_ref(), rgb_from_xyz, cell);
+        let in_cells = |cell| sharing::in_cells(&self.film, splats, values, errors, cell);
         match sharing {
             Sharing::All => in_cells(None),
             Sharing::Near { span, cell, .. } => {
-                let by_filter = splats.map_or(1.0, |splats| resolve::shared_errors(image, &splats, rgb_from_xyz, span));
+                let by_filter = splats.map_or(1.0, |splats| sharing::by_filter(&splats, values, errors, span));
                 let by_paths = if cell > 1 { in_cells(Some(cell)) } else { 1.0 };
                 by_filter + by_paths - 1.0
             }
@@ -333,7 +346,7 @@ fn estimate(film: &Film, splats: Option<&SplatFilm>, gauge: &Gauge) -> Estimate 
     let image = resolve::resolve(film, photons, &space);
     let values = match gauge.bands {
         0 => Values::Colours(&space, &image),
-        bands => Values::Bands(bands),
+        bands => Values::Bands(0, bands),
     };
     let (overlap, cell) = match gauge.sharing {
         Sharing::Near { overlap, cell, .. } => (overlap, cell),

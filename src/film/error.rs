@@ -189,24 +189,24 @@ fn floor_of(values: impl Iterator<Item = f32>, count: usize) -> f64 {
 pub enum Values<'a> {
     /// Of its colours: the matrix that makes them of XYZ, and the picture in them. One f is of them all.
     Colours(&'a [[f64; 3]; 3], &'a Image),
-    /// Of so many bands of the spectrum, its first layers, summed by replicate. Each has an f of its own, as they have nothing
-    /// to do with each other's units; one without any light is left out.
-    Bands(usize),
+    /// Of bands of the spectrum, layers from this one on and so many, summed by replicate. Each has an f of its own, as they have
+    /// nothing to do with each other's units; one without any light is left out.
+    Bands(usize, usize),
 }
 
 /// A value of a pixel.
 #[derive(Clone, Copy)]
-struct Value {
+pub(super) struct Value {
     /// What the picture shows.
     mean: f64,
     /// And by each replicate.
-    replicates: [f64; REPLICATES],
+    pub replicates: [f64; REPLICATES],
     /// What was splatted of that, where it matters.
     splatted: Option<[f64; REPLICATES]>,
 }
 
 /// What is measured of a picture.
-struct Measured<'a> {
+pub(super) struct Measured<'a> {
     film: &'a Film,
     splats: Option<Splats<'a>>,
     values: Values<'a>,
@@ -219,11 +219,12 @@ struct Measured<'a> {
 }
 
 impl<'a> Measured<'a> {
-    fn new(film: &'a Film, splats: Option<Splats<'a>>, values: Values<'a>, apart: bool) -> Measured<'a> {
+    pub fn new(film: &'a Film, splats: Option<Splats<'a>>, values: Values<'a>, apart: bool) -> Measured<'a> {
         let (bands, floors) = match values {
             Values::Colours(_, image) => (Vec::new(), vec![floor(image); 3]),
-            Values::Bands(count) => {
-                let bands: Vec<Vec<f32>> = (0..count).map(|band| layer(film, splats.as_ref(), band)).collect();
+            Values::Bands(first, count) => {
+                let bands: Vec<Vec<f32>> =
+                    (first..first + count).map(|band| layer(film, splats.as_ref(), band)).collect();
                 let floors = bands.iter().map(|plane| floor_of(plane.iter().copied(), plane.len())).collect();
                 (bands, floors)
             }
@@ -232,7 +233,7 @@ impl<'a> Measured<'a> {
     }
 
     /// Puts the values of a pixel into `into`; false if a replicate has no sample.
-    fn read(&self, index: usize, into: &mut Vec<Value>) -> bool {
+    pub fn read(&self, index: usize, into: &mut Vec<Value>) -> bool {
         into.clear();
         let splats = self.splats.as_ref();
         match self.values {
@@ -245,8 +246,8 @@ impl<'a> Measured<'a> {
                     splatted: splatted.map(|light| light.map(|light| light[c])),
                 }));
             }
-            Values::Bands(_) => {
-                for (band, plane) in self.bands.iter().enumerate() {
+            Values::Bands(first, _) => {
+                for (band, plane) in (first..).zip(&self.bands) {
                     let Some(mut replicates) = self.film.layers.replicates(index, band, None) else { return false };
                     let mut splatted = None;
                     if let Some(splats) = splats {

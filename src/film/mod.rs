@@ -21,6 +21,7 @@ pub mod output;
 pub mod png;
 pub mod resolve;
 pub mod run;
+pub mod sharing;
 
 /// A rectangle of pixels: a crop, a tile, the data or the display window of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]

@@ -20,10 +20,7 @@
 
 use crate::film::Window;
 use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES, Sum};
-use crate::film::compare::GLOBAL_ALPHA;
-use crate::math::statistics::student_t_half_width;
 use rayon::prelude::*;
-use std::collections::HashMap;
 use std::ops::Range;
 
 /// Light that was splatted from photons: sums that are divided by the photons emitted, not by the
@@ -37,6 +34,12 @@ pub struct Splats<'a> {
 }
 
 impl Splats<'_> {
+    /// The variances of what was splatted, in the scene's units, pixel by pixel.
+    pub(super) fn variances(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> impl Iterator<Item = [f64; 3]> {
+        let unit = 2f64.powi(2 * self.film.exponent());
+        (0..self.film.cells().len()).map(move |i| self.sums(i).mean(rgb_from_xyz).variance.map(|v| v * unit))
+    }
+
     /// As [`replicate_light`], of what was splatted alone.
     #[must_use]
     pub fn replicates(&self, index: usize, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
@@ -111,92 +114,6 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
         alpha: resolved.iter().map(|pixel| pixel.alpha).collect(),
         standard_error: planes(|pixel| pixel.standard_error),
     }
-}
-
-/// How many times the variance of the sum of all pixels of an `image` in the colours of `rgb_from_xyz` is that of independent
-/// ones, in the colour where it is most: what is splatted falls into `span` pixels together
-/// ([`crate::film::filter::Filter::span`]).
-#[must_use]
-pub fn shared_errors(image: &Image, splats: &Splats, rgb_from_xyz: &[[f64; 3]; 3], span: f64) -> f64 {
-    let unit = 2f64.powi(splats.film.exponent());
-    let (mut all, mut own) = ([0.0; 3], [0.0; 3]);
-    for i in 0..splats.film.cells().len() {
-        let splatted = splats.sums(i).mean(rgb_from_xyz).variance;
-        for c in 0..3 {
-            let error = f64::from(image.standard_error[c][i]);
-            if error.is_finite() && splatted[c].is_finite() {
-                all[c] += error * error;
-                own[c] += splatted[c] * unit * unit;
-            }
-        }
-    }
-    let shared = |c: usize| if all[c] > 0.0 { 1.0 + (span - 1.0) * (own[c] / all[c]).min(1.0) } else { 1.0 };
-    (0..3).map(shared).fold(1.0, f64::max)
-}
-
-/// At the most so many times the variance of the sum of all pixels of an `image` is that of independent ones, in the colour where
-/// that is most, where pixels may share their errors with all in their cell of so many on a side, aligned to the frame, or with every
-/// other where there are no cells; 1 where replicates are empty.
-///
-/// What the sum of a cell varies by is told by the sums of its replicates, with three degrees of freedom, that of all by as many times
-/// (Σv)²/Σv², with v that of each. [`compare`](super::compare) takes what a file says for known and its scores for normal: so
-/// variances are multiplied by (t/z)², t and z the quantiles of Student and Gauss at its level, and what is beyond z standard
-/// errors is beyond t of those that were found.
-#[must_use]
-pub fn errors_shared_in_cells(
-    image: &Image,
-    film: &Film,
-    splats: Option<&Splats>,
-    rgb_from_xyz: &[[f64; 3]; 3],
-    cell: Option<u32>,
-) -> f64 {
-    /// Of a cell: sums by replicate, their samples, and the variances of its pixels.
-    #[derive(Clone, Copy, Default)]
-    struct Sums {
-        light: [[f64; 3]; REPLICATES],
-        samples: [f64; REPLICATES],
-        own: [f64; 3],
-    }
-    let place = |x: i32| cell.map_or(0, |cell| x.div_euclid(cell as i32));
-    let mut cells: HashMap<[i32; 2], Sums> = HashMap::new();
-    for (i, (counted, pixel)) in film.cells().iter().zip(film.window().iter()).enumerate() {
-        let error = image.standard_error.each_ref().map(|plane| f64::from(plane[i]));
-        let Some(light) =
-            replicate_light(film, splats, i, rgb_from_xyz).filter(|_| error.iter().all(|e| e.is_finite()))
-        else {
-            continue;
-        };
-        let sums = cells.entry(pixel.map(place)).or_default();
-        for (r, count) in counts(counted).into_iter().enumerate() {
-            sums.samples[r] += count as f64;
-            (0..3).for_each(|c| sums.light[r][c] += light[r][c]);
-        }
-        (0..3).for_each(|c| sums.own[c] += error[c] * error[c]);
-    }
-    // In an order that no hash decides, for the sake of the last bit.
-    let mut cells: Vec<([i32; 2], Sums)> = cells.into_iter().collect();
-    cells.sort_by_key(|(place, _)| *place);
-    let confidence = 1.0 - GLOBAL_ALPHA / 3.0;
-    let quantile = |dof| student_t_half_width(confidence, dof);
-    let bound = |c: usize| {
-        let variance = |Sums { light, samples, .. }: &Sums| {
-            let total: f64 = samples.iter().sum();
-            let mean = (0..REPLICATES).map(|r| samples[r] * light[r][c]).sum::<f64>() / total;
-            let squares: f64 = (0..REPLICATES).map(|r| samples[r] * (light[r][c] - mean).powi(2)).sum();
-            squares / ((REPLICATES - 1) as f64 * total)
-        };
-        let (mut all, mut squares, mut own) = (0.0, 0.0, 0.0);
-        for (_, sums) in &cells {
-            let variance = variance(sums);
-            all += variance;
-            squares += variance * variance;
-            own += sums.own[c];
-        }
-        let dof = (REPLICATES - 1) as f64 * (all * all / squares);
-        (quantile(dof) / quantile(f64::INFINITY)).powi(2) * all / own
-    };
-    // Without errors there is nothing to share: 0/0.
-    (0..3).map(bound).filter(|shared| shared.is_finite()).fold(1.0, f64::max)
 }
 
 /// A pixel of an [`Image`].

@@ -262,8 +262,8 @@ fn a_spectral_file_is_light_again() {
     }
 }
 
-/// Bands of the picture and of the spectral file have their standard errors beside them, as data; a picture without a wish for
-/// them has none.
+/// Bands of the picture and of the spectral file have their standard errors beside them, as data, and say how much of them pixels
+/// share; a picture without a wish for them has neither.
 #[test]
 fn bands_stand_beside_their_standard_errors() {
     let place = TempDir::new().unwrap();
@@ -272,7 +272,7 @@ fn bands_stand_beside_their_standard_errors() {
         let text = format!(
             "camera: {{origin: [0, 1, 5], target: [0, 1, 0], fov_deg: 40}}\n\
              image: {{width: 6, height: 4, bands: [{{name: red, response: 1}}, {{name: uv.a, response: 2}}]}}\n\
-             render: {{samples: 8}}\noutput: {{exr: {{{exr}}}, spectral: {{bands: 1}}}}\n\
+             render: {{samples: 8, techniques: {{reuse: on}}}}\noutput: {{exr: {{{exr}}}, spectral: {{bands: 1}}}}\n\
              shapes: [{{plane: {{normal: [0, 1, 0]}}}}, {{sphere: {{center: [0, 4, 0], radius: 1, emission: 5}}}}]\n"
         );
         common::write(&path("s.yaml"), text.as_bytes());
@@ -293,8 +293,11 @@ fn bands_stand_beside_their_standard_errors() {
         (plane(&picture, "uv.a").into(), plane(&picture, "stderr.uv.a").into())
     );
     assert!(plane(&spectral, bands[1]).iter().any(|e| *e > 0.0));
+    let shared = |part: &ExrPart| part.text("abbe/sharedErrors").map(|x| x.parse::<f64>().unwrap());
+    assert!([&picture, &spectral].iter().all(|part| shared(part).unwrap() > 1.0));
     let [picture, spectral] = parts("precision: float");
     assert_eq!((names(&picture).len(), names(&spectral).len()), (2, 4));
+    assert_eq!([&picture, &spectral].map(shared), [None, None]);
 }
 
 /// Radiance 1 at 400 nm to 4 at 700 nm is 750 in a band of response 1, whatever the sensitivity, and 1.5, 2.5 and 3.5 in the
