@@ -6,6 +6,9 @@
 use super::LARGEST;
 use image::DynamicImage;
 
+/// More bytes than any number has that is written with sense.
+const LONGEST: usize = 32;
+
 /// Whether a file begins as one.
 pub(super) fn is(bytes: &[u8]) -> bool {
     matches!(bytes, [b'P', b'F' | b'f', end, ..] if end.is_ascii_whitespace())
@@ -21,7 +24,9 @@ pub(super) fn decode(bytes: &[u8]) -> Result<DynamicImage, String> {
     let mut word = |what: &str| {
         let start = rest.iter().position(|b| !b.is_ascii_whitespace());
         let from = &rest[start.unwrap_or(rest.len())..];
-        let end = from.iter().position(u8::is_ascii_whitespace).ok_or(format!("expected {what}, found its end"))?;
+        let none = if from.len() > LONGEST { "a longer word" } else { "its end" };
+        let end = from.iter().take(LONGEST).position(u8::is_ascii_whitespace);
+        let end = end.ok_or_else(|| format!("expected {what}, found {none}"))?;
         // One byte lies between the last word and the values.
         rest = &from[end + 1..];
         std::str::from_utf8(&from[..end]).map_err(|_| format!("expected {what}, found other bytes"))
@@ -83,6 +88,7 @@ mod tests {
     fn what_is_no_map_is_told() {
         for (header, said) in [
             ("PF\n1 ", "expected a height, found its end"),
+            ("PF\n1234567890123456789012345678901234567890 1 -1\n", "expected a width, found a longer word"),
             ("PF\n0 1 -1\n", "expected a width from 1 up, found 0"),
             ("PF\n1 -1 -1\n", "expected a height from 1 up, found -1"),
             ("PF\n1 1 x\n", "expected a scale that is a number other than 0, found x"),
