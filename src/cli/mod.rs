@@ -61,7 +61,7 @@ enum Verb {
     #[command(after_help = "Example:\n  abbe export configs/scenes/flint.yaml -o flint.xml")]
     Export(ConvertArguments),
     /// Say whether two EXR files show the same picture, within their noise (exit 0 same, 1 different, 2 of different
-    /// size or channels, 3 missing or damaged)
+    /// size or channels or the answer could not be written, 3 missing or damaged)
     #[command(after_help = "Example:\n  abbe compare ours.exr theirs.exr --json figures.json")]
     Compare(CompareArguments),
     /// Say what is in a picture: size, colours, layers and their numbers, error, camera, scene
@@ -512,7 +512,7 @@ pub fn run() -> i32 {
             // Help and version go to the standard output and are no error.
             let code = if e.use_stderr() { 2 } else { 0 };
             note_loss(e.print());
-            return after_loss(code);
+            return after_loss(code, None);
         }
     };
     let threads = || use_threads(arguments.verb.threads());
@@ -528,10 +528,20 @@ pub fn run() -> i32 {
         Verb::Compare(a) => compare::run(a),
         Verb::Info(a) => info::run(a),
     });
-    after_loss(result.unwrap_or_else(|e| {
+    let code = result.unwrap_or_else(|e| {
         complain(&prefixed(&e));
-        e.exit_code()
-    }))
+        code_of(&e, Some(&arguments.verb))
+    });
+    after_loss(code, Some(&arguments.verb))
+}
+
+/// The exit code of a process whose command ends with an error. `compare` says by 1 that pictures differ: what it cannot write is none
+/// of that.
+fn code_of(e: &Error, verb: Option<&Verb>) -> i32 {
+    match (e.exit_code(), verb) {
+        (1, Some(Verb::Compare(_))) => 2,
+        (code, _) => code,
+    }
 }
 
 impl Verb {
@@ -606,11 +616,11 @@ fn note_loss(written: std::io::Result<()>) {
 }
 
 /// The exit code of a process that would end with `code` if all that it had to say was read.
-fn after_loss(code: i32) -> i32 {
+fn after_loss(code: i32, verb: Option<&Verb>) -> i32 {
     let Some(why) = LOST.get() else { return code };
     let lost = Error::output(Path::new("the standard output"), why);
     complain(&prefixed(&lost));
-    if code == 0 { lost.exit_code() } else { code }
+    if code == 0 { code_of(&lost, verb) } else { code }
 }
 
 /// Writes a line to the standard error, if anyone listens.
