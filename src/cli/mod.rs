@@ -535,8 +535,8 @@ pub fn run() -> i32 {
     after_loss(code, Some(&arguments.verb))
 }
 
-/// The exit code of a process whose command ends with an error. `compare` says by 1 that pictures differ: what it cannot write is none
-/// of that.
+/// The exit code of a process whose command ends with an error. `compare` says by 1 that pictures differ: that it cannot
+/// write, or has no threads, is none of that.
 fn code_of(e: &Error, verb: Option<&Verb>) -> i32 {
     match (e.exit_code(), verb) {
         (1, Some(Verb::Compare(_))) => 2,
