@@ -276,17 +276,19 @@ fn bands_of_merged_photons_say_how_much_their_means_vary() {
     for (band, name) in ["blue", "red"].into_iter().enumerate() {
         let of = |frame: &Frame| {
             let sum = frame.layer(band).iter().map(|&x| f64::from(x)).sum();
-            let own = frame.layer_error(band).iter().map(|&e| f64::from(e) * f64::from(e)).sum();
-            [sum, own, frame.shared_errors_of_bands(band..band + 1, Sharing::All)]
+            let errors = [frame.layer_error(band)];
+            let own = errors[0].iter().map(|&e| f64::from(e) * f64::from(e)).sum();
+            [sum, own, frame.shared_errors_of_bands(band, &errors, Sharing::All)]
         };
         let pictures: Vec<[f64; 3]> = frames.iter().map(of).collect();
         assert_sums_vary_as_told(name, &pictures, 1.0);
     }
-    let [blue, red] = [0, 1].map(|band| frames[0].shared_errors_of_bands(band..band + 1, Sharing::All));
+    let errors = [0, 1].map(|band| frames[0].layer_error(band));
+    let [blue, red] = [0, 1].map(|band| frames[0].shared_errors_of_bands(band, &errors[band..=band], Sharing::All));
     let widened = |values: f64| {
         let t = |dof| student_t_half_width(1.0 - GLOBAL_ALPHA / values, dof);
         (t(3.0) / t(f64::INFINITY)).powi(2)
     };
-    let both = frames[0].shared_errors_of_bands(0..2, Sharing::All);
+    let both = frames[0].shared_errors_of_bands(0, &errors, Sharing::All);
     assert!((both / (blue.max(red) * widened(2.0) / widened(1.0)) - 1.0).abs() < 1e-9, "{both}, {blue}, {red}");
 }

@@ -404,6 +404,12 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         description::Compression::Dwab => exr::Compression::Dwab(exr.dwa_level as f32),
     };
     let error = if exr.stderr { exr::StandardError::Write } else { exr::StandardError::Leave };
+    // Bands come first.
+    let mut errors = band_errors(finish, frame, 0..finish.spectral_channels().start);
+    let shared = match finish.bands {
+        true => frame.shared_errors_of_bands(0, &errors, finish.sharing),
+        false => frame.shared_errors(image, &finish.rgb_from_xyz(), finish.sharing),
+    };
     let layer = |(i, channel): (usize, &Channel)| {
         let own = LayerPlane {
             name: channel.name.clone(),
@@ -414,10 +420,9 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
                 Holds::Data | Holds::Once => exr::PlaneKind::Data,
             },
         };
-        let of_band = exr.stderr && channel.holds == Holds::Band;
-        let error = of_band.then(|| LayerPlane {
+        let error = errors.get_mut(i).map(|plane| LayerPlane {
             name: stderr_name(&channel.name),
-            plane: layer_error(finish, frame, i),
+            plane: std::mem::take(plane),
             kind: exr::PlaneKind::Data,
         });
         [Some(own), error].into_iter().flatten()
@@ -438,10 +443,7 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         description::FileLayout::Multipart => exr::Layout::Multipart,
     };
     file.attributes = attributes(finish, frame, report);
-    file.attributes.extend(match finish.bands {
-        true => shared_errors_of_bands(finish, frame, 0..finish.spectral_channels().start),
-        false => shared_errors(frame.shared_errors(image, &finish.rgb_from_xyz(), finish.sharing)),
-    });
+    file.attributes.extend(shared_errors(shared));
     if exr.aces_container && as_asked {
         file.attributes.push(("acesImageContainerFlag".to_owned(), Attribute::Int(1)));
     } else if exr.aces_container {
@@ -477,16 +479,12 @@ fn shared_errors(shared: f64) -> Option<(String, Attribute)> {
     (shared > 1.0).then(|| (exr::SHARED_ERRORS.to_owned(), Attribute::Text(format!("{shared:.3}"))))
 }
 
-/// The same of `channels`, which are bands; none where their errors are not told.
-fn shared_errors_of_bands(finish: &Finish, frame: &Frame, channels: Range<usize>) -> Option<(String, Attribute)> {
-    let told = finish.output.exr.stderr && finish.is_random();
-    told.then(|| frame.shared_errors_of_bands(channels, finish.sharing)).and_then(shared_errors)
-}
-
-/// The standard errors of the band that is channel `i`.
-fn layer_error(finish: &Finish, frame: &Frame, i: usize) -> Vec<f32> {
+/// The standard errors of the bands that are `channels`; none where they are not wanted.
+fn band_errors(finish: &Finish, frame: &Frame, channels: Range<usize>) -> Vec<Vec<f32>> {
     // As of colours: samples that are not random would be the same again.
-    if finish.is_random() { frame.layer_error(i) } else { vec![0.0; frame.film.window().pixels()] }
+    let none = || vec![0.0; frame.film.window().pixels()];
+    let error = |i: usize| if finish.is_random() { frame.layer_error(i) } else { none() };
+    if finish.output.exr.stderr { channels.map(error).collect() } else { Vec::new() }
 }
 
 /// The path of the spectral file beside the EXR at `path`: `name.spectral.exr`, and before the number of a frame.
@@ -523,15 +521,16 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
         return None;
     }
     let plane = |i: usize| (finish.layers[i].name.clone(), ChannelData::F32(frame.layer(i)));
-    let error = |i: usize| (stderr_name(&finish.layers[i].name), ChannelData::F32(layer_error(finish, frame, i)));
-    let errors: Vec<(String, ChannelData)> =
-        if finish.output.exr.stderr { channels.clone().map(error).collect() } else { Vec::new() };
     let preview = ["R", "G", "B"].iter().zip(&image.rgb);
     let preview = preview.map(|(name, plane)| ((*name).to_owned(), ChannelData::F32(plane.clone())));
     let mut attributes = attributes(finish, frame, report);
     let text = |name: &str, value: &str| (name.to_owned(), Attribute::Text(value.to_owned()));
     attributes.extend([text("spectralLayoutVersion", "1.0"), text("emissiveUnits", "W.m^-2.sr^-1")]);
-    attributes.extend(shared_errors_of_bands(finish, frame, channels.clone()));
+    let errors = band_errors(finish, frame, channels.clone());
+    attributes.extend(shared_errors(frame.shared_errors_of_bands(channels.start, &errors, finish.sharing)));
+    let name_of_error = |i: usize| stderr_name(&finish.layers[i].name);
+    let errors: Vec<(String, ChannelData)> =
+        channels.clone().map(name_of_error).zip(errors.into_iter().map(ChannelData::F32)).collect();
     Some(ExrImage {
         frame: image.frame,
         window: image.window,

@@ -145,17 +145,19 @@ impl Frame {
         self.shared(Values::Colours(rgb_from_xyz, image), &errors, sharing)
     }
 
-    /// The same of the further channels `channels`, bands that are summed by replicate.
+    /// The same of the further channels from `first` on, bands that are summed by replicate, whose standard errors are `errors`.
     #[must_use]
-    pub fn shared_errors_of_bands(&self, channels: Range<usize>, sharing: Sharing) -> f64 {
-        let errors: Vec<Vec<f32>> = channels.clone().map(|channel| self.layer_error(channel)).collect();
+    pub fn shared_errors_of_bands(&self, first: usize, errors: &[Vec<f32>], sharing: Sharing) -> f64 {
         let errors: Vec<&[f32]> = errors.iter().map(Vec::as_slice).collect();
-        self.shared(Values::Bands(channels.start, channels.len()), &errors, sharing)
+        self.shared(Values::Bands(first, errors.len()), &errors, sharing)
     }
 
     fn shared(&self, values: Values, errors: &[&[f32]], sharing: Sharing) -> f64 {
+        if errors.is_empty() {
+            return 1.0;
+        }
         let splats = self.splats.as_ref().map(SplatFilm::splats);
-        let in_cells = |cell| sharing::in_cells(&self.film, splats, values, errors, cell);
+        let in_cells = |cell| sharing::in_cells(&self.film, splats.as_ref(), values, errors, cell);
         match sharing {
             Sharing::All => in_cells(None),
             Sharing::Near { span, cell, .. } => {

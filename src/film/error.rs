@@ -39,7 +39,7 @@
 //! everywhere show that there is no noise only where they agree on light: a black pixel may be one whose light nobody has met.
 
 use super::accumulate::{Film, REPLICATES};
-use super::resolve::{Image, Splats, counts, layer, replicate_light};
+use super::resolve::{Image, Splats, counts, layer, replicate_light, replicates_of_layer};
 use crate::math::statistics::student_t_half_width;
 use rayon::prelude::*;
 use std::fmt;
@@ -196,17 +196,17 @@ pub enum Values<'a> {
 
 /// A value of a pixel.
 #[derive(Clone, Copy)]
-pub(super) struct Value {
+struct Value {
     /// What the picture shows.
     mean: f64,
     /// And by each replicate.
-    pub replicates: [f64; REPLICATES],
+    replicates: [f64; REPLICATES],
     /// What was splatted of that, where it matters.
     splatted: Option<[f64; REPLICATES]>,
 }
 
 /// What is measured of a picture.
-pub(super) struct Measured<'a> {
+struct Measured<'a> {
     film: &'a Film,
     splats: Option<Splats<'a>>,
     values: Values<'a>,
@@ -219,7 +219,7 @@ pub(super) struct Measured<'a> {
 }
 
 impl<'a> Measured<'a> {
-    pub fn new(film: &'a Film, splats: Option<Splats<'a>>, values: Values<'a>, apart: bool) -> Measured<'a> {
+    fn new(film: &'a Film, splats: Option<Splats<'a>>, values: Values<'a>, apart: bool) -> Measured<'a> {
         let (bands, floors) = match values {
             Values::Colours(_, image) => (Vec::new(), vec![floor(image); 3]),
             Values::Bands(first, count) => {
@@ -233,7 +233,7 @@ impl<'a> Measured<'a> {
     }
 
     /// Puts the values of a pixel into `into`; false if a replicate has no sample.
-    pub fn read(&self, index: usize, into: &mut Vec<Value>) -> bool {
+    fn read(&self, index: usize, into: &mut Vec<Value>) -> bool {
         into.clear();
         let splats = self.splats.as_ref();
         match self.values {
@@ -248,15 +248,8 @@ impl<'a> Measured<'a> {
             }
             Values::Bands(first, _) => {
                 for (band, plane) in (first..).zip(&self.bands) {
-                    let Some(mut replicates) = self.film.layers.replicates(index, band, None) else { return false };
-                    let mut splatted = None;
-                    if let Some(splats) = splats {
-                        let Some(light) = splats.film.layers.replicates(index, band, Some(splats.photons)) else {
-                            return false;
-                        };
-                        (0..REPLICATES).for_each(|r| replicates[r] += light[r]);
-                        splatted = Some(light).filter(|_| self.apart);
-                    }
+                    let Some(replicates) = replicates_of_layer(self.film, splats, index, band) else { return false };
+                    let splatted = splats.filter(|_| self.apart).and_then(|s| s.replicates_of_layer(index, band));
                     into.push(Value { mean: f64::from(plane[index]), replicates, splatted });
                 }
             }

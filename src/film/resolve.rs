@@ -40,6 +40,11 @@ impl Splats<'_> {
         (0..self.film.cells().len()).map(move |i| self.sums(i).mean(rgb_from_xyz).variance.map(|v| v * unit))
     }
 
+    /// As [`replicates_of_layer`], of what was splatted alone.
+    pub(super) fn replicates_of_layer(&self, index: usize, channel: usize) -> Option<[f64; REPLICATES]> {
+        self.film.layers.replicates(index, channel, Some(self.photons))
+    }
+
     /// As [`replicate_light`], of what was splatted alone.
     #[must_use]
     pub fn replicates(&self, index: usize, rgb_from_xyz: &[[f64; 3]; 3]) -> Option<[[f64; 3]; REPLICATES]> {
@@ -337,6 +342,21 @@ pub fn replicate_light(
         for (mean, light) in means.iter_mut().flatten().zip(light.iter().flatten()) {
             *mean += light;
         }
+    }
+    Some(means)
+}
+
+/// The same of further channel `channel`, where that is summed by replicate.
+pub(super) fn replicates_of_layer(
+    film: &Film,
+    splats: Option<&Splats>,
+    index: usize,
+    channel: usize,
+) -> Option<[f64; REPLICATES]> {
+    let mut means = film.layers.replicates(index, channel, None)?;
+    if let Some(splats) = splats {
+        let light = splats.replicates_of_layer(index, channel)?;
+        means.iter_mut().zip(light).for_each(|(mean, light)| *mean += light);
     }
     Some(means)
 }

@@ -2,8 +2,8 @@
 
 use super::accumulate::{Film, REPLICATES};
 use super::compare::GLOBAL_ALPHA;
-use super::error::{Measured, Values};
-use super::resolve::{Splats, counts};
+use super::error::Values;
+use super::resolve::{Splats, counts, replicate_light, replicates_of_layer};
 use crate::math::statistics::student_t_half_width;
 use std::collections::HashMap;
 
@@ -11,28 +11,30 @@ use std::collections::HashMap;
 /// together ([`Filter::span`](super::filter::Filter::span)).
 #[must_use]
 pub fn by_filter(splats: &Splats, values: Values, errors: &[&[f32]], span: f64) -> f64 {
-    let shared = |(errors, splatted): (&&[f32], &Vec<f64>)| {
-        let (mut all, mut own) = (0.0, 0.0);
-        for (error, splatted) in errors.iter().zip(splatted) {
-            let error = f64::from(*error);
-            if error.is_finite() && splatted.is_finite() {
-                all += error * error;
-                own += splatted;
+    // Variances, and what was splatted of them.
+    let mut sums = vec![[0.0; 2]; errors.len()];
+    let mut add = |value: usize, pixel: usize, splatted: f64| {
+        let error = f64::from(errors[value][pixel]);
+        if error.is_finite() && splatted.is_finite() {
+            sums[value][0] += error * error;
+            sums[value][1] += splatted;
+        }
+    };
+    match values {
+        Values::Colours(rgb_from_xyz, _) => {
+            for (pixel, variances) in splats.variances(rgb_from_xyz).enumerate() {
+                variances.into_iter().enumerate().for_each(|(c, variance)| add(c, pixel, variance));
             }
         }
-        if all > 0.0 { 1.0 + (span - 1.0) * (own / all).min(1.0) } else { 1.0 }
-    };
-    let splatted: Vec<Vec<f64>> = match values {
-        Values::Colours(rgb_from_xyz, _) => {
-            let variances: Vec<[f64; 3]> = splats.variances(rgb_from_xyz).collect();
-            (0..3).map(|c| variances.iter().map(|variance| variance[c]).collect()).collect()
-        }
         Values::Bands(first, count) => {
-            let of = |band| splats.film.layers.variances_of(band, Some(splats.photons)).collect();
-            (first..first + count).map(of).collect()
+            for value in 0..count {
+                let variances = splats.film.layers.variances_of(first + value, Some(splats.photons));
+                variances.enumerate().for_each(|(pixel, variance)| add(value, pixel, variance));
+            }
         }
-    };
-    errors.iter().zip(&splatted).map(shared).fold(1.0, f64::max)
+    }
+    let shared = |[all, own]: [f64; 2]| if all > 0.0 { 1.0 + (span - 1.0) * (own / all).min(1.0) } else { 1.0 };
+    sums.into_iter().map(shared).fold(1.0, f64::max)
 }
 
 /// At the most, for the value of `values` where it is most, of standard errors `errors` by pixel, where pixels may share them with all
@@ -43,7 +45,7 @@ pub fn by_filter(splats: &Splats, values: Values, errors: &[&[f32]], span: f64) 
 /// variances are multiplied by (t/z)², t and z the quantiles of Student and Gauss at its level, and what is beyond z standard
 /// errors is beyond t of those that were found.
 #[must_use]
-pub fn in_cells(film: &Film, splats: Option<Splats>, values: Values, errors: &[&[f32]], cell: Option<u32>) -> f64 {
+pub fn in_cells(film: &Film, splats: Option<&Splats>, values: Values, errors: &[&[f32]], cell: Option<u32>) -> f64 {
     /// Of a cell and a value: sums by replicate, and the variances of the pixels.
     #[derive(Clone, Copy, Default)]
     struct Sums {
@@ -51,11 +53,23 @@ pub fn in_cells(film: &Film, splats: Option<Splats>, values: Values, errors: &[&
         own: f64,
     }
     let place = |x: i32| cell.map_or(0, |cell| x.div_euclid(cell as i32));
-    let measured = Measured::new(film, splats, values, false);
+    let read = |pixel: usize, light: &mut Vec<[f64; REPLICATES]>| {
+        light.clear();
+        match values {
+            Values::Colours(rgb_from_xyz, _) => {
+                let replicates = replicate_light(film, splats, pixel, rgb_from_xyz);
+                light.extend(replicates.iter().flat_map(|all| (0..3).map(move |c| all.map(|colour| colour[c]))));
+            }
+            Values::Bands(first, count) => {
+                light.extend((first..first + count).map_while(|band| replicates_of_layer(film, splats, pixel, band)));
+            }
+        }
+        light.len() == errors.len()
+    };
     let mut cells: HashMap<[i32; 2], ([f64; REPLICATES], Vec<Sums>)> = HashMap::new();
     let mut light = Vec::new();
     for (i, (counted, pixel)) in film.cells().iter().zip(film.window().iter()).enumerate() {
-        if !measured.read(i, &mut light) || errors.iter().any(|plane| !plane[i].is_finite()) {
+        if !read(i, &mut light) || errors.iter().any(|plane| !plane[i].is_finite()) {
             continue;
         }
         let nothing = || ([0.0; REPLICATES], vec![Sums::default(); errors.len()]);
@@ -64,7 +78,7 @@ pub fn in_cells(film: &Film, splats: Option<Splats>, values: Values, errors: &[&
             *all += count as f64;
         }
         for ((sums, value), errors) in sums.iter_mut().zip(&light).zip(errors) {
-            (0..REPLICATES).for_each(|r| sums.light[r] += value.replicates[r]);
+            (0..REPLICATES).for_each(|r| sums.light[r] += value[r]);
             sums.own += f64::from(errors[i]) * f64::from(errors[i]);
         }
     }
