@@ -97,18 +97,29 @@ impl Medium {
     #[must_use]
     #[inline]
     pub fn set_out(&self, nm: Lanes, u: f64) -> Draft {
-        let lanes = match &self.filling {
-            Filling::Even { absorption, scattering } => even(absorption, scattering, nm),
+        match self.lanes(nm) {
+            Ok(lanes) => Draft { lanes, u, reach: lanes.reach(u) },
+            Err(_) => {
+                let lanes = MediumLanes { extinction: Lanes::ZERO, scattering: Lanes::ZERO };
+                Draft { lanes, u, reach: f64::INFINITY }
+            }
+        }
+    }
+
+    /// What decides about flights where extinction is the same everywhere, as if the albedo were so, too, 1 or 0; else what varies.
+    #[inline]
+    fn lanes(&self, nm: Lanes) -> Result<MediumLanes, &Varying> {
+        match &self.filling {
+            Filling::Even { absorption, scattering } => {
+                let scattering = scattering.eval(nm);
+                Ok(MediumLanes { extinction: absorption.eval(nm) + scattering, scattering })
+            }
             Filling::EvenExtinction { extinction, scatters, .. } => {
                 let extinction = extinction.eval(nm);
-                MediumLanes { extinction, scattering: if *scatters { extinction } else { Lanes::ZERO } }
+                Ok(MediumLanes { extinction, scattering: if *scatters { extinction } else { Lanes::ZERO } })
             }
-            Filling::Varying(_) => {
-                let lanes = MediumLanes { extinction: Lanes::ZERO, scattering: Lanes::ZERO };
-                return Draft { lanes, u, reach: f64::INFINITY };
-            }
-        };
-        Draft { lanes, u, reach: lanes.reach(u) }
+            Filling::Varying(varying) => Err(varying),
+        }
     }
 
     /// The flight of `draft` along `ray` toward a surface at `distance`, infinite where there is none within its reach;
@@ -140,22 +151,14 @@ impl Medium {
     #[must_use]
     #[inline]
     pub fn dim(&self, ray: &Ray, distance: f64, nm: Lanes, walk: impl FnOnce() -> Walk) -> Dimmed {
-        let (lanes, scatters) = match &self.filling {
-            Filling::Even { absorption, scattering } => {
-                let lanes = even(absorption, scattering, nm);
-                (lanes, lanes.scatters())
+        let (dimmed, scatters) = match self.lanes(nm) {
+            Ok(lanes) => {
+                let through = lanes.transmittance(distance);
+                (Dimmed { through, passing: through }, lanes.scatters())
             }
-            Filling::EvenExtinction { extinction, scatters, .. } => {
-                let extinction = extinction.eval(nm);
-                (MediumLanes { extinction, scattering: extinction }, *scatters)
-            }
-            Filling::Varying(varying) => {
-                let dimmed = varying.dim(ray, distance, nm, walk());
-                return if varying.scatters { dimmed } else { Dimmed { passing: Lanes::ONE, ..dimmed } };
-            }
+            Err(varying) => (varying.dim(ray, distance, nm, walk()), varying.scatters),
         };
-        let through = lanes.transmittance(distance);
-        Dimmed { through, passing: if scatters { through } else { Lanes::ONE } }
+        if scatters { dimmed } else { Dimmed { passing: Lanes::ONE, ..dimmed } }
     }
 
     /// Whether it is the same everywhere and scatters nothing.
@@ -171,15 +174,8 @@ impl Medium {
     /// What light keeps over `distance` in a medium that [is clear](Medium::is_clear): exp(−σ_a `distance`). None of another.
     #[must_use]
     pub fn clear(&self, distance: f64, nm: Lanes) -> Option<Lanes> {
-        if !self.is_clear() {
-            return None;
-        }
-        let extinction = match &self.filling {
-            Filling::Even { absorption, .. } => absorption.eval(nm),
-            Filling::EvenExtinction { extinction, .. } => extinction.eval(nm),
-            Filling::Varying(_) => return None,
-        };
-        Some(MediumLanes { extinction, scattering: Lanes::ZERO }.transmittance(distance))
+        let lanes = self.lanes(nm).ok().filter(|_| self.is_clear());
+        lanes.map(|lanes| lanes.transmittance(distance))
     }
 
     /// Whether light at some wavelengths does not come through an endless way in it.
@@ -204,11 +200,6 @@ impl Medium {
             Filling::Varying(varying) => varying.scatters && varying.extinction.is_chromatic(),
         }
     }
-}
-
-fn even(absorption: &Spectrum, scattering: &Spectrum, nm: Lanes) -> MediumLanes {
-    let scattering = scattering.eval(nm);
-    MediumLanes { extinction: absorption.eval(nm) + scattering, scattering }
 }
 
 /// Below this a shadow ray goes on by chance only, with a sixteenth of what it has left made one.

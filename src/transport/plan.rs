@@ -317,18 +317,16 @@ impl EffectPlan {
             count(census.backgrounds, "light from infinity", "lights from infinity"),
             "no light from infinity",
         );
+        let clear = count(census.clear_media, "medium that dims light", "media that dim light");
         let media = effect(
             "media",
             if path { census.media > 0 } else { census.clear_media > 0 },
             match (path, census.media - census.clear_media) {
                 (true, _) => count(census.media, "medium that light crosses", "media that light crosses"),
-                (false, 0) => count(census.clear_media, "medium that dims light", "media that dim light"),
+                (false, 0) => clear,
                 (false, left) => {
-                    let dim = count(census.clear_media, "medium that dims light", "media that dim light");
-                    format!(
-                        "{dim}; whitted leaves out {}",
-                        count(left, "that scatters or varies", "that scatter or vary")
-                    )
+                    let left = count(left, "that scatters or varies", "that scatter or vary");
+                    format!("{clear}; whitted leaves out {left}")
                 }
             },
             match path || census.media == 0 {
