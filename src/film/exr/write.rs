@@ -194,7 +194,11 @@ fn deflated_chunk(window: &Window, channels: &[Channel], rows: Range<usize>) -> 
 
 thread_local! {
     /// A thread's own, for a new one takes as long as a few rows.
-    static DEFLATE: RefCell<Compress> = RefCell::new(Compress::new(flate2::Compression::fast(), true));
+    static DEFLATE: RefCell<Compress> = RefCell::new(compressor());
+}
+
+fn compressor() -> Compress {
+    Compress::new(flate2::Compression::fast(), true)
 }
 
 /// The chunk of the rows from `y` on: `bytes` deflated. What does not shrink is stored as it is, `plain`, and known by
@@ -204,7 +208,12 @@ pub(super) fn pack(y: i32, bytes: &[u8], plain: Vec<u8>) -> Vec<u8> {
     // It fills the room that there is, and no more.
     let whole = DEFLATE.with_borrow_mut(|deflate| {
         deflate.reset();
-        matches!(deflate.compress_vec(bytes, &mut packed, FlushCompress::Finish), Ok(Status::StreamEnd))
+        let whole = matches!(deflate.compress_vec(bytes, &mut packed, FlushCompress::Finish), Ok(Status::StreamEnd));
+        // Left in the middle of a block it would not begin the next stream with one, reset or not (zlib-rs 0.6.8).
+        if !whole {
+            *deflate = compressor();
+        }
+        whole
     });
     let pixels = if whole && packed.len() < plain.len() { packed } else { plain };
     let mut chunk = Vec::with_capacity(8 + pixels.len());
@@ -492,6 +501,8 @@ mod tests {
     use super::super::tests::{image, rec709};
     use super::super::{Base, Precision, StandardError, beauty, read_exr};
     use super::*;
+    use crate::math::sampler::mix64;
+    use std::io::Read;
 
     /// 01:02:03:24, the second of its pair: no digit of the frames reaches the bit of dropped frames.
     #[test]
@@ -499,6 +510,22 @@ mod tests {
         let code = TimeCode { hours: 1, minutes: 2, seconds: 3, frames: 24, second: true };
         assert_eq!(time_bits(code), 0x0102_8324);
         assert_eq!(time_bits(TimeCode { second: false, frames: 29, ..code }), 0x0102_0329);
+    }
+
+    /// Noise does not shrink, and is left in the middle, where its room ends, a little or much more than the compressor holds itself.
+    /// What a thread packs next comes back as it was.
+    #[test]
+    fn what_follows_noise_is_packed_as_if_it_came_first() {
+        let noise = |bytes: u64| -> Vec<u8> { (0..bytes).map(|i| mix64(i) as u8).collect() };
+        let even: Vec<u8> = (0..8192).map(|i| (i / 64) as u8).collect();
+        for kibibytes in [4, 32, 63, 64, 65, 66, 72, 96, 128, 256, 1024] {
+            let noise = noise(kibibytes * 1024);
+            assert_eq!(pack(0, &noise, noise.clone())[8..], noise, "{kibibytes} KiB");
+            let packed = pack(0, &even, even.clone());
+            let mut found = Vec::new();
+            let inflated = flate2::read::ZlibDecoder::new(&packed[8..]).read_to_end(&mut found);
+            assert!(packed.len() < even.len() && inflated.is_ok() && found == even, "{kibibytes} KiB: {inflated:?}");
+        }
     }
 
     fn mixed(compression: Compression) -> ExrImage {
