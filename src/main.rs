@@ -8,5 +8,7 @@ mod memory;
 static ALLOCATOR: memory::LargePages = memory::LargePages;
 
 fn main() {
+    #[cfg(all(target_os = "linux", target_env = "gnu", target_pointer_width = "64"))]
+    memory::keep_large_blocks_apart();
     std::process::exit(abbe::cli::run());
 }

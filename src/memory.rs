@@ -2,7 +2,9 @@
 //!
 //! A page of 4 KiB costs an interrupt when it is first touched, some microseconds on a virtual machine, and a line of
 //! the table that translates addresses ever after. Blocks from half a large page on begin at one, and the kernel is
-//! asked to take such pages for them; it need not. Smaller blocks are left to the system's allocator.
+//! asked to take such pages for them; it need not. Smaller blocks are left to the system's allocator, which is kept
+//! from a habit: once a block with pages of its own is freed, it puts the next of that size between the small ones, and
+//! a heap that long batches leave in pieces grows without an end.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::ffi::{c_int, c_void};
@@ -15,12 +17,21 @@ const LARGE: usize = PAGE / 2;
 const ADVICE: c_int = 14;
 /// What `malloc` aligns to.
 const ALIGNED: usize = 16;
+/// `M_MMAP_THRESHOLD` of the C library, and the bytes from which blocks have pages of their own: those that it begins with.
+const OWN_PAGES: (c_int, c_int) = (-3, 128 << 10);
 
 unsafe extern "C" {
     fn posix_memalign(out: *mut *mut c_void, align: usize, size: usize) -> c_int;
     fn calloc(count: usize, size: usize) -> *mut c_void;
     fn free(block: *mut c_void);
     fn madvise(start: *mut c_void, length: usize, advice: c_int) -> c_int;
+    fn mallopt(parameter: c_int, value: c_int) -> c_int;
+}
+
+/// Keeps blocks that have pages of their own so, whatever was freed before: to be called once, at the start.
+pub fn keep_large_blocks_apart() {
+    // SAFETY: a number is set; a library that does not know it leaves all as it was.
+    unsafe { mallopt(OWN_PAGES.0, OWN_PAGES.1) };
 }
 
 /// The allocator.
