@@ -339,8 +339,7 @@ impl Row {
     fn reaches(&self, target: f64, more: f64) -> Option<f64> {
         let left = target * target - self.bias().unwrap_or(0.0).powi(2) - more * more;
         let samples = f64::from(self.samples);
-        // The slope is that from a quarter of the samples on: in the middle half of them.
-        let fit = Fit::with_slope(samples, self.noise[0], self.exponent(), 0.5 * samples);
+        let fit = Fit::with_slope(samples, self.noise[0], self.exponent());
         (left > 0.0).then(|| self.seconds * fit.samples_for(left.sqrt()) / samples)
     }
 

@@ -2,10 +2,8 @@
 //!
 //! Variance falls as samples^−b, with b between 1 (independent samples) and 2 or so (evenly spread ones), or below 1 where
 //! bright light is still turning up. The last passes, each of which doubles the samples, tell b, as far as their errors are
-//! known. What evenly spread samples make less of is soon gone and leaves what they do
-//! not: above 1 variance is taken for α/N + β/N² with the slope b. From it follow the samples that an error
-//! takes and, as a sample takes as long as those of the last pass, the time. Passes are cut short where the forecast says
-//! that the target lies before the next doubling.
+//! known. From it follow the samples that an error takes and, as a sample takes as long as those of the last pass, the time.
+//! Passes are cut short where the forecast says that the target lies before the next doubling.
 
 use super::frame::Milestone;
 use crate::error::{Error, Result};
@@ -149,29 +147,30 @@ fn seconds_a_sample(milestones: &[Milestone]) -> Option<f64> {
     (samples > 0 && seconds > 0.0).then(|| seconds / f64::from(samples))
 }
 
-/// How variance falls with samples: V = V₁ ((1 − s) q + s q²), q = (N₁/N)^p.
+/// How variance falls with samples: V = V₁ (N₁/N)^b.
 #[derive(Clone, Copy, Debug)]
 pub struct Fit {
     /// N₁, that of the last milestone.
     samples: f64,
     /// √V₁.
     error: f64,
-    /// s: nothing where p is below 1.
-    even: f64,
-    /// p, of 1 at most: below, bright light is so rare that more of it turns up with every sample.
-    power: f64,
+    /// b: below 1, bright light is so rare that more of it turns up with every sample.
+    slope: f64,
 }
 
 /// How far logarithms of variance lie off their line besides what their intervals say: 0.07 in 118 triples of doublings over the
 /// gallery; 0.2 foretells as well.
 const SCATTER: f64 = 0.1;
 
-/// Slope of independent samples, and how far off it slopes are, before any is seen: from 0 to 2 they are within two of these.
-const USUAL: (f64, f64) = (1.0, 0.5);
+/// What an error that cannot be believed adds to the variance of that logarithm: a few pixels carry it.
+const UNBELIEVED: f64 = 0.2;
+
+/// Slope of independent samples, and how far off it slopes are, before any is seen. See "What is foretold" in tools/bench/NOTES.md.
+const USUAL: (f64, f64) = (1.0, 0.35);
 
 impl Fit {
     /// Through the last milestone, with the slope in the middle of the last three that lie a doubling or so apart: by least
-    /// squares over logarithms, each weighed by its interval, and with what slopes are before any is seen, 1 ± ½. So what few
+    /// squares over logarithms, each weighed by its interval, and with what slopes are before any is seen. So what few
     /// pixels carry, of which the error is a guess, tells no slope, and one milestone alone has that of independent samples.
     #[must_use]
     pub fn of(milestones: &[Milestone]) -> Option<Fit> {
@@ -185,7 +184,8 @@ impl Fit {
         }
         let &(samples, last) = points.first()?;
         let logs = points.iter().map(|(samples, e)| {
-            let weight = 1.0 / (SCATTER * SCATTER + e.log_variance());
+            let guess = if e.valid { 0.0 } else { UNBELIEVED };
+            let weight = 1.0 / (SCATTER * SCATTER + e.log_variance() + guess);
             (weight, libm::log(*samples), 2.0 * libm::log(e.rel_rmse))
         });
         let (w, x, y) = logs.clone().fold((0.0, 0.0, 0.0), |(a, b, c), (w, x, y)| (a + w, b + w * x, c + w * y));
@@ -194,34 +194,25 @@ impl Fit {
             logs.fold((0.0, 0.0), |(a, b), (w, u, v)| (a + w * (u - x) * (v - y), b + w * (u - x) * (u - x)));
         let usual = 1.0 / (USUAL.1 * USUAL.1);
         let slope = (usual * USUAL.0 - xy) / (usual + xx);
-        Some(Fit::with_slope(samples, last.rel_rmse, slope, libm::exp(x)))
+        Some(Fit::with_slope(samples, last.rel_rmse, slope))
     }
 
-    /// Through `error` at `samples`, where variance falls at `middle` samples as samples^−slope, from 0 to 2.
+    /// Through `error` at `samples`, from where variance falls as samples^−slope, from 0 to 2.
     #[must_use]
-    pub fn with_slope(samples: f64, error: f64, slope: f64, middle: f64) -> Fit {
-        let slope = slope.clamp(0.0, 2.0);
-        // β / αN in the middle, and from it at the end.
-        let share = (slope - 1.0).max(0.0) / (2.0 - slope) * middle / samples;
-        let even = if share < f64::INFINITY { share / (1.0 + share) } else { 1.0 };
-        Fit { samples, error, even, power: slope.min(1.0) }
+    pub fn with_slope(samples: f64, error: f64, slope: f64) -> Fit {
+        Fit { samples, error, slope: slope.clamp(0.0, 2.0) }
     }
 
     /// Samples at which the error is `error`; infinite where it does not fall.
     #[must_use]
     pub fn samples_for(&self, error: f64) -> f64 {
-        // (1 − s) q + s q² = 1/v, without cancellation; an error of zero is there at once.
-        let v = (self.error / error).powi(2);
-        let rest = (1.0 - self.even) * v;
-        let grown = 0.5 * (rest + (rest * rest + 4.0 * self.even * v).sqrt());
-        self.samples * libm::pow(grown, 1.0 / self.power)
+        self.samples * libm::pow(self.error / error, 2.0 / self.slope)
     }
 
     /// The error at `samples`.
     #[must_use]
     pub fn error_at(&self, samples: f64) -> f64 {
-        let q = libm::pow(self.samples / samples, self.power);
-        self.error * (q * (1.0 - self.even + self.even * q)).sqrt()
+        self.error * libm::pow(self.samples / samples, 0.5 * self.slope)
     }
 }
 
@@ -380,34 +371,28 @@ mod tests {
         let all = milestones(&[4, 8, 16, 32, 64], 1.2);
         let quarter = Forecast::at_a_quarter(&all, &FREE, 64).unwrap();
         assert_eq!(quarter.made_at, 16);
-        // What falls as N⁻² is 0.2 KNOWN of the variance at 8, over the rest half as much at 16.
-        let share = 0.1 * KNOWN / (1.0 - 0.2 * KNOWN);
-        let expected = 16f64.powf(-1.2) * (1.0 / 4.0 + share / 16.0) / (1.0 + share);
-        assert!((quarter.error / expected.sqrt() - 1.0).abs() < 1e-5);
+        let expected = 16f64.powf(-0.6) * 4f64.powf(-0.5 * (1.0 + 0.2 * KNOWN));
+        assert!((quarter.error / expected - 1.0).abs() < 1e-12);
         assert!(Forecast::at_a_quarter(&all[..1], &FREE, 4).is_none());
     }
 
     /// How much of a slope's distance from the usual one counts that errors without scatter tell, at three doublings: their
-    /// weight is 2 ln² 2 / SCATTER², that of what is usual 4.
-    const KNOWN: f64 = 96.09 / 100.09;
+    /// weight is 2 ln² 2 / SCATTER², that of what is usual 1/0.35².
+    const KNOWN: f64 = 96.090_602_783_640_31 / (96.090_602_783_640_31 + 1.0 / (0.35 * 0.35));
 
-    /// Independent samples: error ∝ N^−½, so four times the samples. Evenly spread ones, N^−1 all but what is usual:
-    /// β/αN is 24 in the middle, 12 at the end, and α/N + β/N² is a quarter of that at 2.08 N. Light that still turns up, N^−¼:
-    /// a quarter of the variance at 4^(1/p).
+    /// Independent samples: error ∝ N^−½, so four times the samples. Evenly spread ones, N^−1 all but what is usual, half as many;
+    /// light that still turns up, N^−¼: nearly sixteen times.
     #[test]
     fn halving_costs_what_the_convergence_says() {
-        let factor = |m: &[Milestone]| {
-            let fit = Fit::of(m).unwrap();
+        let factor = |b: f64| {
+            let fit = Fit::of(&milestones(&[64, 128, 256], b)).unwrap();
             let samples = fit.samples_for(0.5 * fit.error_at(256.0));
             assert!((fit.error_at(samples) / fit.error_at(256.0) - 0.5).abs() < 1e-12);
             samples / 256.0
         };
-        let known = |b| milestones(&[64, 128, 256], b);
-        let even = KNOWN / (1.0 - KNOWN) * 0.5;
-        let a = 1.0 / (1.0 + even);
-        let expected = 2.0 * (a + (a * a + (1.0 - a)).sqrt());
-        for (b, expected) in [(1.0, 4.0), (2.0, expected), (0.5, 4f64.powf(1.0 / (1.0 - 0.5 * KNOWN)))] {
-            assert!((factor(&known(b)) / expected - 1.0).abs() < 1e-4, "{b}: {} {expected}", factor(&known(b)));
+        for b in [1.0, 2.0, 0.5] {
+            let expected = 4f64.powf(1.0 / (1.0 + (b - 1.0) * KNOWN));
+            assert!((factor(b) / expected - 1.0).abs() < 1e-9, "{b}: {} {expected}", factor(b));
         }
     }
 
@@ -424,7 +409,7 @@ mod tests {
     /// A picture whose light is still turning up after doubling upon doubling has no end in sight.
     #[test]
     fn an_error_that_does_not_fall_is_never_reached() {
-        let fit = Fit::with_slope(64.0, 0.5, 0.0, 32.0);
+        let fit = Fit::with_slope(64.0, 0.5, 0.0);
         assert_eq!((fit.error_at(1e6), fit.samples_for(0.25)), (0.5, f64::INFINITY));
         assert_eq!(fit.samples_for(0.5), 64.0);
     }
