@@ -112,29 +112,30 @@ impl Import<'_> {
         let intensity = self.spectrum(bag, "intensity", Role::Emission)?.unwrap_or_else(|| one(bag));
         fields.add("intensity", intensity);
         if let Some(texture) = bag.object("texture", &[Family::Texture])? {
-            rigid(bag, to_world)?;
             let name = self.declare_texture(texture)?;
             fields.add("texture", text(bag.place("texture"), name));
             // Their u grows along +x, to the left of who looks along the axis with +y up, and v along +y: with
-            // -y up, u grows to the right and v downward.
-            fields.add("up", numbers(place, &to_world.transform_vector3(-DVec3::Y).to_array()));
-            fields.add("v", text(place, "down"));
+            // -y up, u grows to the right and v downward. In a mirror u grows to the right with +y up.
+            let (up, v) = if is_mirror(to_world) { (DVec3::Y, "up") } else { (-DVec3::Y, "down") };
+            fields.add("up", numbers(place, &to_world.transform_vector3(up).to_array()));
+            fields.add("v", text(place, v));
         }
         Ok("spot")
     }
 
     fn projector(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<&'static str, Fault> {
         let to_world = bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
-        rigid(bag, to_world)?;
+        keeps_lengths(bag, to_world)?;
         let place = bag.place("to_world");
         fields.add("origin", numbers(place, &to_world.transform_point3(DVec3::ZERO).to_array()));
         fields.add("target", numbers(place, &to_world.transform_point3(DVec3::Z).to_array()));
-        fields.add("up", numbers(place, &to_world.transform_vector3(DVec3::Y).to_array()));
+        // v = 0 is the top of the picture. Upside down u grows to the other side, as in a mirror.
+        let (up, v) = if is_mirror(to_world) { (-DVec3::Y, "up") } else { (DVec3::Y, "down") };
+        fields.add("up", numbers(place, &to_world.transform_vector3(up).to_array()));
+        fields.add("v", text(bag.object.place, v));
         let (fov_deg, axis) = field_of_view(bag)?;
         fields.add("fov_deg", number(bag.place("fov"), fov_deg));
         fields.add("fov_axis", text(bag.place("fov_axis"), axis));
-        // v = 0 is the top of the picture.
-        fields.add("v", text(bag.object.place, "down"));
         let irradiance = self.spectrum_or_texture(bag, "irradiance", Role::Emission)?.unwrap_or_else(|| one(bag));
         fields.add("irradiance", irradiance);
         if let Some(scale) = bag.float("scale")? {
@@ -209,16 +210,22 @@ fn unscaled(bag: &Bag<'_>, length: f64) -> Result<(), Fault> {
     Err(bag.fault_of("to_world", message))
 }
 
-/// That a transform moves and turns what throws a picture.
-fn rigid(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
+/// That a transform only moves, turns and mirrors what throws a picture. Of one that scales Mitsuba lets the light of diffuse things grow with the scale,
+/// as of light from infinity.
+fn keeps_lengths(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
     let linear = DMat3::from_mat4(to_world);
     let gram = linear.transpose() * linear;
     // Numbers of six digits, as in shapes.
     let off = (gram - DMat3::IDENTITY).to_cols_array().into_iter().fold(0.0f64, |most, x| most.max(x.abs()));
-    if off <= 3e-6 && linear.determinant() > 0.0 {
+    if off <= 3e-6 {
         return Ok(());
     }
-    Err(bag.fault_of("to_world", "expected turns and moves, found a transform that scales, shears or mirrors"))
+    Err(bag.fault_of("to_world", "expected turns, moves and mirrors, found a transform that scales or shears"))
+}
+
+/// Whether what is on the left is on the right after it.
+fn is_mirror(to_world: DMat4) -> bool {
+    DMat3::from_mat4(to_world).determinant() < 0.0
 }
 
 /// What is not written shines like D65 of luminance 1.
@@ -248,6 +255,26 @@ mod tests {
         let Light::Projector(projector) = &scene.lights[1] else { panic!("a projector") };
         assert_eq!((projector.up, projector.v, projector.fov_deg), ([0.0, 1.0, 0.0], Growth::Down, 30.0));
         assert_eq!((projector.origin, projector.target), ([1.0, 2.0, 3.0], [1.0, 2.0, 4.0]));
+    }
+
+    /// What grows to the left with +y up grows to the right in a mirror, and with -y up; a scale leaves the directions of a spot.
+    #[test]
+    fn a_slide_in_a_mirror_has_its_left_on_the_right() {
+        let slide = |plugin: &str, texture: &str, transform: &str| {
+            format!(
+                "<emitter type=\"{plugin}\"><transform name=\"to_world\">{transform}</transform>\
+                     <texture type=\"bitmap\" name=\"{texture}\"><string name=\"filename\" value=\"a.png\"/></texture></emitter>"
+            )
+        };
+        let spot = slide("spot", "texture", "<scale x=\"-2\" y=\"2\" z=\"2\"/>");
+        let projector = slide("projector", "irradiance", "<scale y=\"-1\"/>");
+        let scene = good(&(spot + &projector));
+        let Light::Spot(spot) = &scene.lights[0] else { panic!("a spot") };
+        assert_eq!((spot.up, spot.v, spot.axis()), (Some([0.0, 2.0, 0.0]), Growth::Up, 2.0 * DVec3::Z));
+        let Light::Projector(projector) = &scene.lights[1] else { panic!("a projector") };
+        assert_eq!((projector.up, projector.v, projector.target), ([0.0, 1.0, 0.0], Growth::Up, [0.0, 0.0, 1.0]));
+        let told = fault(&slide("projector", "irradiance", "<scale value=\"2\"/>"), &[]);
+        assert!(told.ends_with("expected turns, moves and mirrors, found a transform that scales or shears"), "{told}");
     }
 
     /// Mitsuba throws an ellipse where a cone is scaled unevenly, and the same circle where evenly.
@@ -341,8 +368,5 @@ mod tests {
         assert_eq!(scene.shapes[1].emission_direction, Some(EmissionDirection::Normal));
         assert!(fault(&shape("point"), &[]).contains("expected an emitter that Abbe has (area, directionalarea)"));
         assert!(fault("<emitter type=\"area\"/>", &[]).contains("expected a <shape> around it, found it alone"));
-        let mirrored =
-            "<emitter type=\"projector\"><transform name=\"to_world\"><scale x=\"-1\"/></transform></emitter>";
-        assert!(fault(mirrored, &[]).contains("expected turns and moves"));
     }
 }
