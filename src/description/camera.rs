@@ -289,7 +289,7 @@ impl Default for Image {
     }
 }
 
-/// How samples become pixels. Lengths are in pixels.
+/// How samples become pixels. Lengths are in pixels, above 0 and at most 256.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Filter {
@@ -429,6 +429,14 @@ impl Camera {
 /// A length or none.
 const LENGTH: &str = "a number from 0 to 1e60";
 
+/// The widest filter, pixels: what pixels share of their noise is worked out for all pairs within it.
+const WIDEST: f64 = 256.0;
+
+fn check_width(at: At<'_>, width: f64, checker: &mut Checker<'_>) {
+    let expected = format!("a number above 0 and at most {WIDEST}");
+    checker.require(width > 0.0 && width <= WIDEST, at, &expected, width);
+}
+
 impl Image {
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         checker.whole_between(at.key("width"), self.width, 1, MAX_SIDE);
@@ -441,9 +449,9 @@ impl Image {
         let filter = at.key("filter");
         match self.filter {
             Filter::Box | Filter::Mitchell { .. } | Filter::CatmullRom => {}
-            Filter::Tent { radius } => checker.positive(filter.key("tent").key("radius"), radius),
-            Filter::Gaussian { stddev } => checker.positive(filter.key("gaussian").key("stddev"), stddev),
-            Filter::Lanczos { radius } => checker.positive(filter.key("lanczos").key("radius"), radius),
+            Filter::Tent { radius } => check_width(filter.key("tent").key("radius"), radius, checker),
+            Filter::Gaussian { stddev } => check_width(filter.key("gaussian").key("stddev"), stddev, checker),
+            Filter::Lanczos { radius } => check_width(filter.key("lanczos").key("radius"), radius, checker),
         }
         for (i, band) in self.bands.iter().enumerate() {
             let bands = at.key("bands");
@@ -625,12 +633,14 @@ mod tests {
     fn filters_have_a_width() {
         for (kind, field) in [("tent", "radius"), ("gaussian", "stddev"), ("lanczos", "radius")] {
             let column = 21 + kind.len() + field.len() + 2;
-            assert_eq!(
-                faults(&format!("image: {{filter: {{{kind}: {{{field}: 0}}}}}}")),
-                format!(
-                    "dir/s.yaml:2:{column}: image.filter.{kind}.{field}: expected a number greater than 0, found 0"
-                )
-            );
+            for width in ["0", "256.5", "1e20"] {
+                let expected = "expected a number above 0 and at most 256";
+                assert_eq!(
+                    faults(&format!("image: {{filter: {{{kind}: {{{field}: {width}}}}}}}")),
+                    format!("dir/s.yaml:2:{column}: image.filter.{kind}.{field}: {expected}, found {width}")
+                );
+            }
+            assert_eq!(faults(&format!("image: {{filter: {{{kind}: {{{field}: 256}}}}}}")), "none");
         }
     }
 }

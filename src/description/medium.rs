@@ -109,7 +109,7 @@ pub struct HeterogeneousMedium {
     pub extinction: SpectrumOrVolume,
     /// σₛ / σₜ, 0 to 1.
     pub albedo: SpectrumOrVolume,
-    /// Factor on the extinction; default 1.
+    /// Factor on the extinction; default 1. Their product makes at most 1e7 mean free paths across the volume.
     #[serde(default = "one")]
     pub scale: f64,
     /// Directions of scattered light; default `isotropic`.

@@ -214,6 +214,12 @@ impl Varying {
         Varying { extinction, scale: scale as f32, albedo, bounds, scatters }
     }
 
+    /// Mean free paths across it where it is densest: as many steps a ray may take that finds next to nothing on its way.
+    #[must_use]
+    pub fn thickness(&self) -> f64 {
+        f64::from(self.scale) * self.bounds.thickness()
+    }
+
     #[inline(never)]
     fn fly(&self, ray: &Ray, distance: f64, nm: Lanes, u: f64, mut walk: Walk) -> FreeFlight {
         if !self.scatters {

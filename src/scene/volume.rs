@@ -315,6 +315,12 @@ impl Bounds {
         bounds
     }
 
+    /// Mean free paths across the volume, if it were everywhere as dense as where it is densest.
+    #[must_use]
+    pub fn thickness(&self) -> f64 {
+        self.global * self.extent[0].distance(self.extent[1])
+    }
+
     /// Bounds of blocks of `edge` voxels a side.
     fn of(grid: &GridVolume, edge: usize) -> Bounds {
         let edge = edge.min(grid.size.into_iter().max().unwrap_or(1));

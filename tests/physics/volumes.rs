@@ -166,6 +166,23 @@ fn a_broken_grid_is_one_error() {
     assert!(fault.contains("extinction.volume: expected a volume of spectra, found one of raw numbers"), "{fault}");
 }
 
+/// A ray that has a step for each of 1e20 mean free paths in thin places has no end. The diagonal of the cube is √3.
+#[test]
+fn a_volume_too_thick_to_be_crossed_is_refused() {
+    let fault = |scale: &str| {
+        let scene = format!(
+            "{CAMERA}volumes: {{v: {{grid: {{file: v.vol}}}}}}\n\
+             media: {{m: {{heterogeneous: {{extinction: {{volume: v}}, albedo: 1, scale: {scale}}}}}}}\n"
+        );
+        try_bench(&scene, &[("v.vol", &vol([2, 1, 1], 1, &[1.0, 1e-3]))]).err()
+    };
+    assert_eq!(fault("5.7e6"), None);
+    assert_eq!(
+        fault("1e20").unwrap(),
+        "DIR/scene.yaml:4:41: media.m.heterogeneous.extinction: expected at most 1e7 mean free paths across the volume, found 1.7e20"
+    );
+}
+
 /// A texture of a volume is the volume where the surface cuts it: on the floor, 0.2 on one side, 0.8 on the other.
 #[test]
 fn a_volume_on_a_surface_is_cut_by_it() {

@@ -22,6 +22,9 @@ enum Use {
     Number,
 }
 
+/// Mean free paths across a volume from which on a ray through it is not followed: a step for each takes a second of them.
+const THICKEST: f64 = 1e7;
+
 impl Compiler<'_> {
     pub(super) fn volume(&mut self, at: &str, volume: &written::Volume) -> Result<Volume> {
         let world_from_local = DAffine3::from_mat4(volume.world_from_local());
@@ -114,8 +117,16 @@ impl Compiler<'_> {
             written::Medium::Heterogeneous(m) => {
                 let extinction = self.spectrum_or_volume(&at("extinction"), &m.extinction);
                 let albedo = self.albedo(&at("albedo"), &m.albedo);
+                let varying = Varying::new(extinction, m.scale, albedo);
+                let thickness = varying.thickness();
+                if thickness > THICKEST {
+                    let message = format!(
+                        "expected at most {THICKEST:e} mean free paths across the volume, found {thickness:.1e}"
+                    );
+                    self.fault(&at("extinction"), message);
+                }
                 Medium {
-                    filling: Filling::Varying(Box::new(Varying::new(extinction, m.scale, albedo))),
+                    filling: Filling::Varying(Box::new(varying)),
                     phase: self.phase(&at("phase"), &m.phase),
                     shadow_rays: m.shadow_rays,
                 }
