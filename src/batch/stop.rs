@@ -378,7 +378,10 @@ mod tests {
 
     /// How much of a slope's distance from the usual one counts that errors without scatter tell, at three doublings: their
     /// weight is 2 ln² 2 / SCATTER², that of what is usual 1/0.35².
-    const KNOWN: f64 = 96.090_602_783_640_31 / (96.090_602_783_640_31 + 1.0 / (0.35 * 0.35));
+    const KNOWN: f64 = {
+        let seen = 200.0 * std::f64::consts::LN_2 * std::f64::consts::LN_2;
+        seen / (seen + 1.0 / (0.35 * 0.35))
+    };
 
     /// Independent samples: error ∝ N^−½, so four times the samples. Evenly spread ones, N^−1 all but what is usual, half as many;
     /// light that still turns up, N^−¼: nearly sixteen times.
