@@ -10,6 +10,7 @@
 //! Source: "OpenEXR File Layout", openexr.com (technical documentation), and its list of standard attributes.
 
 pub mod header;
+mod pack;
 pub mod part;
 mod read;
 mod write;

@@ -25,7 +25,8 @@
 //! bits of BLAKE3 over the JSON and all packed rows: a part that was damaged is known by it. Files are read row by row.
 
 use super::Attribute;
-use super::write::{check_name, header_of, pack};
+use super::pack::pack;
+use super::write::{check_name, header_of};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::output::write_atomically;
