@@ -429,7 +429,7 @@ impl Camera {
 /// A length or none.
 const LENGTH: &str = "a number from 0 to 1e60";
 
-/// The widest filter, pixels: what pixels share of their noise is worked out for all pairs within it.
+/// The widest filter, pixels: light from the lamps themselves is dealt to all pixels within it.
 const WIDEST: f64 = 256.0;
 
 fn check_width(at: At<'_>, width: f64, checker: &mut Checker<'_>) {

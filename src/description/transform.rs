@@ -136,6 +136,11 @@ fn is_invertible(linear: DMat3) -> bool {
 /// to 2·3·5·10⁻⁷ s². Rounding of the arithmetic (10⁻¹⁵) drowns in that.
 const SIMILARITY_TOLERANCE: f64 = 3e-6;
 
+/// Whether what is on the left is on the right after it.
+pub(crate) fn is_mirror(transform: DMat4) -> bool {
+    DMat3::from_mat4(transform).determinant() < 0.0
+}
+
 /// Whether AᵀA = s² I, so that a ball stays a ball.
 pub(crate) fn is_similarity(linear: DMat3) -> bool {
     // Divided by the greatest entry, so that squares neither overflow nor vanish.

@@ -4,7 +4,7 @@ use glam::{DMat3, DMat4, DVec3};
 
 use super::super::fault::Fault;
 use super::super::node::Node;
-use super::super::transform::is_similarity;
+use super::super::transform::{is_mirror, is_similarity};
 use super::object::{Bag, Family};
 use super::parse::ABOUT_ONE;
 use super::sensors::field_of_view;
@@ -115,10 +115,8 @@ impl Import<'_> {
             let name = self.declare_texture(texture)?;
             fields.add("texture", text(bag.place("texture"), name));
             // Their u grows along +x, to the left of who looks along the axis with +y up, and v along +y: with
-            // -y up, u grows to the right and v downward. In a mirror u grows to the right with +y up.
-            let (up, v) = if is_mirror(to_world) { (DVec3::Y, "up") } else { (-DVec3::Y, "down") };
-            fields.add("up", numbers(place, &to_world.transform_vector3(up).to_array()));
-            fields.add("v", text(place, v));
+            // -y up, u grows to the right and v downward.
+            hang(bag, fields, to_world, -DVec3::Y);
         }
         Ok("spot")
     }
@@ -129,10 +127,8 @@ impl Import<'_> {
         let place = bag.place("to_world");
         fields.add("origin", numbers(place, &to_world.transform_point3(DVec3::ZERO).to_array()));
         fields.add("target", numbers(place, &to_world.transform_point3(DVec3::Z).to_array()));
-        // v = 0 is the top of the picture. Upside down u grows to the other side, as in a mirror.
-        let (up, v) = if is_mirror(to_world) { (-DVec3::Y, "up") } else { (DVec3::Y, "down") };
-        fields.add("up", numbers(place, &to_world.transform_vector3(up).to_array()));
-        fields.add("v", text(bag.object.place, v));
+        // v = 0 is the top of the picture.
+        hang(bag, fields, to_world, DVec3::Y);
         let (fov_deg, axis) = field_of_view(bag)?;
         fields.add("fov_deg", number(bag.place("fov"), fov_deg));
         fields.add("fov_axis", text(bag.place("fov_axis"), axis));
@@ -210,8 +206,8 @@ fn unscaled(bag: &Bag<'_>, length: f64) -> Result<(), Fault> {
     Err(bag.fault_of("to_world", message))
 }
 
-/// That a transform only moves, turns and mirrors what throws a picture. Of one that scales Mitsuba lets the light of diffuse things grow with the scale,
-/// as of light from infinity.
+/// That a transform only moves, turns and mirrors what throws a picture: Mitsuba lets light on what is diffuse grow with a
+/// scale, as that from infinity.
 fn keeps_lengths(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
     let linear = DMat3::from_mat4(to_world);
     let gram = linear.transpose() * linear;
@@ -223,9 +219,12 @@ fn keeps_lengths(bag: &Bag<'_>, to_world: DMat4) -> Result<(), Fault> {
     Err(bag.fault_of("to_world", "expected turns, moves and mirrors, found a transform that scales or shears"))
 }
 
-/// Whether what is on the left is on the right after it.
-fn is_mirror(to_world: DMat4) -> bool {
-    DMat3::from_mat4(to_world).determinant() < 0.0
+/// Enters where a picture has its top, along `up` and with v downward; in a mirror u grows to the other side, as it does upside down.
+fn hang(bag: &Bag<'_>, fields: &mut Fields, to_world: DMat4, up: DVec3) {
+    let place = bag.place("to_world");
+    let (up, v) = if is_mirror(to_world) { (-up, "up") } else { (up, "down") };
+    fields.add("up", numbers(place, &to_world.transform_vector3(up).to_array()));
+    fields.add("v", text(place, v));
 }
 
 /// What is not written shines like D65 of luminance 1.

@@ -3,9 +3,10 @@
 //! Shapes keep the texture coordinates that Mitsuba gives them; it is pictures that are turned over, for its
 //! v = 0 is their top.
 
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat4, DVec3};
 
 use super::super::fault::Fault;
+use super::super::transform::is_mirror;
 use super::object::{Bag, Family};
 use super::{Fields, Import, boolean, entry, list, matrix, named, number, numbers, text, whole};
 use crate::math::Frame;
@@ -71,7 +72,7 @@ impl Import<'_> {
     /// The form of a shape: its fields, but for the transform, and its kind.
     fn form(&mut self, bag: &Bag<'_>, to_world: DMat4, fields: &mut Fields) -> Result<&'static str, Fault> {
         let place = bag.object.place;
-        let mirrored = DMat3::from_mat4(to_world).determinant() < 0.0;
+        let mirrored = is_mirror(to_world);
         let mut turned = false;
         let kind = match bag.object.plugin.as_str() {
             "sphere" => {

@@ -9,7 +9,7 @@ use super::super::super::shape::{
     Caps, Cone, Cube, CurveBasis, Geometry, Layout, Normals, Plane, SdfNormals, Shape, Sphere, Winding,
 };
 use super::super::super::spectrum::SpectrumOrTexture;
-use super::super::super::transform::is_similarity;
+use super::super::super::transform::{is_mirror, is_similarity};
 use super::xml::numbers;
 use super::{Export, ends_in, joined};
 use crate::math::Frame;
@@ -179,7 +179,7 @@ impl Export<'_> {
 
     /// Material, light and media.
     fn surface(&mut self, field: &str, shape: &Shape) {
-        let mirrored = shape.world_from_object().determinant() < 0.0;
+        let mirrored = is_mirror(shape.world_from_object());
         // A sphere, disk or rectangle that is mirrored is turned inside out by Mitsuba.
         let flat = match &shape.geometry {
             Geometry::Sphere(_) | Geometry::Disk(_) | Geometry::Rectangle(_) => true,
@@ -223,7 +223,7 @@ impl Export<'_> {
     /// The scale of a cylinder that is mirrored, but looks like one that is not. As a lamp it sends too little light in Mitsuba.
     fn mirrored_tube(&self, shape: &Shape) -> Option<f64> {
         let world = shape.world_from_object();
-        let mirrored = matches!(shape.geometry, Geometry::Cylinder(_)) && world.determinant() < 0.0;
+        let mirrored = matches!(shape.geometry, Geometry::Cylinder(_)) && is_mirror(world);
         let linear = DMat3::from_mat4(world);
         (mirrored && !self.is_textured(shape) && is_similarity(linear)).then(|| linear.x_axis.length())
     }
