@@ -105,7 +105,7 @@ impl TryFrom<WrittenHomogeneous> for HomogeneousMedium {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeterogeneousMedium {
-    /// σₜ over `scale`, m⁻¹: a volume, outside whose box there is nothing.
+    /// σₜ over `scale`, m⁻¹: a volume. Outside of the box along the world's axes around its cube there is nothing.
     pub extinction: SpectrumOrVolume,
     /// σₛ / σₜ, 0 to 1.
     pub albedo: SpectrumOrVolume,

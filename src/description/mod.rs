@@ -142,7 +142,8 @@
 //!   haze: {constant: {value: 0.5, transform: [{scale: 2}]}}
 //!                                   # transform as of shapes, from the unit cube; default none
 //!   # plume: {grid: {file: plume.vol, filter: trilinear, wrap: clamp, raw: false, file_box: false}}
-//!                                   # and transform; all but file default; trilinear, nearest; wrap as of textures
+//!                                   # and transform; all but file default; trilinear, nearest; wrap as of textures, by which it
+//!                                   # goes on beyond its cube as far as the box along the world's axes around that
 //! materials:                        # ~ marks defaults
 //!   clay:
 //!     diffuse:
@@ -245,8 +246,8 @@
 //!     emission_direction: all       # ~ all: the same radiance all over the side of the normal; normal: all light
 //!                                   # along the normal, emission in W·m⁻²·nm⁻¹
 //!     sampling_weight: 1            # ~ how often light is looked for here, relative to its power; also of lights
-//!     inside: smoke                 # media on the two sides; ~ inside a closed shape nothing, outside what the
-//!                                   # camera is in; or vacuum, or both sides unchanged
+//!     inside: smoke                 # media on the two sides; ~ inside a closed shape that light can enter nothing,
+//!                                   # else and outside what the camera is in; or vacuum, or both sides unchanged
 //!     outside: smoke
 //!     transform:                    # applied in this order; ~ none
 //!     - translate: [1, 0, 0]

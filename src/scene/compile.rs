@@ -489,8 +489,8 @@ impl<'a> Compiler<'a> {
             (false, true) => Detail::Boundary,
             (false, false) => Detail::Geometry,
         };
-        // A closed body without a word about its inside is empty; an open one has the same
-        // medium on both sides; outside is what the camera is in.
+        // A closed body without a word about its inside is empty if light can enter it. An open one, and one that light cannot
+        // enter but may be in, as in a room, has the same medium on both sides; outside is what the camera is in.
         let closed = match &geometry {
             Geometry::Shape(shape) => shape.is_closed(),
             Geometry::Mesh(_) => true,
@@ -501,7 +501,8 @@ impl<'a> Compiler<'a> {
         if let Some(fault) = self.unfit_for_a_body(&self.materials[material as usize], &geometry, closed, shape) {
             self.fault(&format!("{at}.material"), fault);
         }
-        let enclosed = if closed { None } else { camera_medium };
+        let empty = closed && self.materials[material as usize].transmits();
+        let enclosed = if empty { None } else { camera_medium };
         let (behind, before) = if shape.flip_normals { (camera_medium, enclosed) } else { (enclosed, camera_medium) };
         let behind = self.absorbing(at, material, closed, &geometry, shape).or(behind);
         let unchanged = |side: &Option<String>| side.as_deref() == Some(written::UNCHANGED);

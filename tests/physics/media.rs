@@ -37,6 +37,28 @@ fn light_through_an_absorbing_slab_falls_exponentially_in_every_lane() {
     }
 }
 
+/// A mirrored room full of haze, with lamp and camera inside, has the same light by paths from either end, whichever way the normals
+/// of its walls point: what light cannot enter is no body of its own medium.
+#[test]
+fn light_within_a_room_is_in_what_the_camera_is_in() {
+    for flip in ["true", "false"] {
+        let room = |technique: &str| {
+            let bench = bench(&format!(
+                "media: {{haze: {{homogeneous: {{absorption: 0.5}}}}}}\nmedium: haze\n\
+                 render: {{samples: 256, techniques: {{light_tracing: {technique}}}}}\n\
+                 shapes:\n\
+                 - cube: {{size: 12, flip_normals: {flip}, material: {{mirror: {{reflectance: 0.8}}}}}}\n\
+                 - rectangle: {{corner: [-2, -2, -2], edge_u: [4, 0, 0], edge_v: [0, 4, 0]}}\n\
+                 - sphere: {{center: [0.3, 3.5, 0], radius: 0.4, {LAMP}}}\n"
+            ));
+            assert_eq!(bench.prepared.plan.caustics.is_some(), technique == "on");
+            bench.picture().mean()
+        };
+        let (on, off) = (room("on"), room("off"));
+        assert!((on.mean - off.mean).abs() < 4.0 * on.error.hypot(off.error), "{on:?} {off:?}");
+    }
+}
+
 /// A slab of tinted glass, seen straight: with R = 0.04 and t = e^(−2σ), the bounces between its faces sum
 /// to R + (1 − R)² t / (1 − R t) of the even light around it.
 #[test]
