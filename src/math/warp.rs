@@ -41,6 +41,13 @@ pub fn from_concentric_disk(p: DVec2) -> DVec2 {
     0.5 * square + 0.5
 }
 
+/// 1 − cos θ = 2 sin² θ/2 of any angle, without cancellation.
+#[must_use]
+pub fn one_minus_cos(angle: f64) -> f64 {
+    let sine = libm::sin(0.5 * angle);
+    2.0 * sine * sine
+}
+
 /// Directions about +z with density cos θ / π.
 #[must_use]
 pub fn cosine_hemisphere(u: DVec2) -> DVec3 {

@@ -4,7 +4,7 @@ use super::Scene;
 use super::bvh::Aabb;
 use super::light::Light;
 use crate::math::sampler::GOLDEN;
-use crate::math::warp::uniform_cone;
+use crate::math::warp::{one_minus_cos, uniform_cone};
 use crate::math::{Frame, Ray};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -99,10 +99,10 @@ impl Cone {
     fn of(light: &Light) -> Option<Cone> {
         let (position, axis, spread) = match light {
             Light::Point { position, .. } => (*position, DVec3::Z, 2.0),
-            Light::Spot { position, axis, cutoff, .. } => (*position, *axis, 1.0 - libm::cos(*cutoff)),
+            Light::Spot { position, axis, cutoff, .. } => (*position, *axis, one_minus_cos(*cutoff)),
             Light::Projector(projector) => {
                 let cone = projector.cone();
-                (cone.apex, cone.axis, 1.0 - libm::cos(cone.half_angle))
+                (cone.apex, cone.axis, one_minus_cos(cone.half_angle))
             }
             _ => return None,
         };

@@ -7,12 +7,12 @@ use super::shape::{Shape, TowardSample};
 use super::texture::{Texture, TexturePoint};
 use super::{Geometry, Hit, Object, SurfacePoint};
 use crate::math::frame::Frame;
-use crate::math::warp;
+use crate::math::warp::{self, one_minus_cos};
 use crate::math::{Departure, Ray};
 use crate::spectrum::observer::tristimulus;
 use crate::spectrum::{Lanes, Spectrum};
 use glam::{DMat3, DVec2, DVec3};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 /// A light.
@@ -119,10 +119,11 @@ pub fn free(distance: f64, target: Option<Departure>, point: DVec3, ray: &Ray) -
     }
 }
 
-/// How spot light falls off between beam and cutoff, as a factor in [0, 1].
+/// How spot light falls off between beam and cutoff, as a factor in [0, 1], in `direction` about `axis`, both unit. The angle is that
+/// of sine and cosine: a cosine alone has none below 1e-8.
 #[must_use]
-pub fn spot_falloff(cos: f64, beam: f64, cutoff: f64) -> f64 {
-    let angle = libm::acos(cos.clamp(-1.0, 1.0));
+pub fn spot_falloff(direction: DVec3, axis: DVec3, beam: f64, cutoff: f64) -> f64 {
+    let angle = libm::atan2(direction.cross(axis).length(), direction.dot(axis));
     if angle <= beam {
         1.0
     } else if angle >= cutoff {
@@ -318,7 +319,7 @@ impl Light {
                 })
             }
             Light::Spot { position, axis, beam, cutoff, intensity, slide } => {
-                let falloff = |wi: DVec3| spot_falloff(-wi.dot(*axis), *beam, *cutoff);
+                let falloff = |wi: DVec3| spot_falloff(-wi, *axis, *beam, *cutoff);
                 arriving_from_point(*position, from, falloff).map(|(wi, distance, factor)| {
                     let intensity = match slide {
                         Some(slide) => intensity.eval(nm) * slide.eval(wi, nm),
@@ -383,7 +384,7 @@ impl Light {
                     let all = slide.texture.representatives();
                     all.iter().map(Spectrum::luminance).sum::<f64>() / all.len() as f64
                 });
-                2.0 * PI * (1.0 - libm::cos(0.5 * (beam + cutoff))) * intensity.luminance() * slide
+                TAU * one_minus_cos(0.5 * (beam + cutoff)) * intensity.luminance() * slide
             }
             Light::Directional { irradiance, .. } => PI * radius * radius * irradiance.luminance(),
             Light::Constant { radiance } => 4.0 * PI * PI * radius * radius * radiance.luminance(),
@@ -461,10 +462,17 @@ mod tests {
 
     #[test]
     fn spots_are_full_in_the_beam_linear_to_the_cutoff_and_dark_beyond() {
-        let at = |deg: f64| spot_falloff(deg.to_radians().cos(), 15f64.to_radians(), 20f64.to_radians());
-        assert_eq!([at(0.0), at(14.9), at(20.1), at(180.0)], [1.0, 1.0, 0.0, 0.0]);
-        // Linear in the angle; acos near 17.5° is good to a few ulp of the cosine over its sine.
-        assert!((at(17.5) - 0.5).abs() < 1e-12);
+        // Down to angles of which the cosine is one.
+        for cutoff in [1.0, 20f64.to_radians(), 1e-5, 1e-9, 1e-15] {
+            let at = |share: f64| {
+                let angle = share * cutoff;
+                let direction = DVec3::new(libm::sin(angle), 0.0, libm::cos(angle));
+                spot_falloff(direction, DVec3::Z, 0.75 * cutoff, cutoff)
+            };
+            assert_eq!([at(0.0), at(0.74), at(1.01), at(1.0 / cutoff)], [1.0, 1.0, 0.0, 0.0]);
+            // Linear in the angle, whose sine along an axis is good to a few units of its last place.
+            assert!((at(0.875) - 0.5).abs() < 1e-12, "{cutoff}");
+        }
     }
 
     #[test]

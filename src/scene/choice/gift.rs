@@ -1,11 +1,12 @@
 //! What lights have to give to a point: as much as is known before one looks.
 
+use crate::math::warp::one_minus_cos;
 use crate::scene::bvh::Aabb;
 use crate::scene::light::Light;
 use crate::scene::shape::Shape;
 use crate::scene::{Geometry, Object};
 use glam::DVec3;
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 /// Where a light, or several, may be seen, and how strong.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +52,7 @@ impl Gift {
             }
             Light::Point { position, .. } => from_point(*position, power / (4.0 * PI), DVec3::Z, PI),
             Light::Spot { position, axis, beam, cutoff, .. } => {
-                let angle = 2.0 * PI * (1.0 - libm::cos(0.5 * (beam + cutoff)));
+                let angle = TAU * one_minus_cos(0.5 * (beam + cutoff));
                 from_point(*position, power / angle, *axis, *cutoff)
             }
             Light::Projector(projector) => {

@@ -189,13 +189,18 @@ impl Sphere {
             return toward_by_area(from, self.sample_area(u));
         };
         let local = uniform_cone(u, cap.one_minus_cos);
-        let direction = Frame::from_normal(cap.axis).to_world(local);
+        let frame = Frame::from_normal(cap.axis);
+        let direction = frame.to_world(local);
         // Near root of t² − 2 t d cos θ + (d² − r²) = 0 in the form without cancellation.
         let foot = cap.distance * local.z;
         let side = cap.distance * (local.x * local.x + local.y * local.y).sqrt();
         let half = ((self.radius - side) * (self.radius + side)).max(0.0).sqrt();
         let distance = cap.power / (foot + half);
-        let normal = (from + direction * distance - self.center).normalize_or(-cap.axis);
+        // From the middle to there, across the way and along it: without cancellation, however small the sphere.
+        let across = DVec2::new(local.x, local.y) * distance;
+        let sine = (local.x * local.x + local.y * local.y).sqrt();
+        let along = -(side * sine + half * local.z);
+        let normal = frame.to_world(DVec3::new(across.x, across.y, along)).normalize_or(-cap.axis);
         Some(TowardSample {
             direction,
             distance,
@@ -223,4 +228,32 @@ struct Cap {
     /// Power of the point: d² − r².
     power: f64,
     one_minus_cos: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+
+    /// Points that are seen lie on the side that is seen and in their direction, however small the sphere is beside its distance.
+    #[test]
+    fn what_is_seen_of_a_small_sphere_faces_who_sees_it() {
+        let center = DVec3::new(2e5, -3e5, 6e5);
+        for radius in [1e5, 1.0, 1e-6, 1e-11, 1e-15] {
+            let sphere = Sphere::new(center, radius, DMat3::IDENTITY).unwrap();
+            for k in 0..64 {
+                let u = DVec2::new((f64::from(k) + 0.5) / 64.0, (f64::from(k) * 0.618).fract());
+                let seen = sphere.sample_toward(DVec3::ZERO, u).unwrap();
+                // cos² at the surface is one less (d sin θ / r)², and sin² θ goes evenly to (r/d)² but for a part in (r/d)².
+                let cos = -seen.direction.dot(seen.normal);
+                assert!(cos > 0.0, "{radius}: {cos}");
+                let (d, sine) = (center.length(), seen.direction.cross(center / center.length()).length());
+                if radius > 1e-6 * d {
+                    assert!((cos * cos - (1.0 - (d * sine / radius).powi(2))).abs() < 1e-6, "{radius}: {cos}");
+                    assert!((seen.point - seen.direction * seen.distance).length() < 1e-9 * d, "{radius}");
+                }
+                assert!((seen.normal.length() - 1.0).abs() < 4.0 * f64::EPSILON);
+            }
+        }
+    }
 }
