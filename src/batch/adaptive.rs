@@ -15,13 +15,15 @@
 //! w = max(¼, λ√(v/c)).
 //!
 //! **Without the rest of the picture**, f, c and λ come from a pilot: one pixel of each quarter of each cell, with random
-//! numbers of its own. It is a pure function of scene and settings, so that parts of a picture agree. Costs are counted in
-//! rays, not in seconds.
+//! numbers of its own. Where samples count for several pixels, a pixel by itself does not show the noise that is left, and λ comes
+//! from whole cells, every sixteenth of them. The pilot is a pure function of scene and settings, so that parts of a picture agree.
+//! Costs are counted in rays, not in seconds.
 
 use super::frame::{FrameJob, light_unit};
 use super::part::Breaks;
+use super::unit::render_unit;
 use crate::film::Window;
-use crate::film::accumulate::{Film, Invalid, REPLICATES, SAMPLES_LIMIT};
+use crate::film::accumulate::{Film, Invalid, REPLICATES, SAMPLES_LIMIT, TileBuffer};
 use crate::film::resolve::replicate_means;
 use crate::math::sampler::mix64;
 use crate::spectrum::ColourSpace;
@@ -58,6 +60,10 @@ const STEPS: f64 = 16.0;
 
 /// What a sample costs besides its vertices, in rays: its own ray, its random numbers, the film.
 const OVERHEAD: u32 = 2;
+
+/// Of so many cells one is tried where that has to be done with all of its pixels, and so many in all if there are as many.
+const ONE_OF: usize = 16;
+const CELLS: usize = 64;
 
 /// Tells the pilot's numbers from the picture's.
 const STREAM: u64 = 0x6164_6170_7469_7665;
@@ -115,6 +121,18 @@ impl Grid {
 
     fn cells(&self) -> usize {
         self.columns * self.rows
+    }
+
+    /// What of a cell lies in the window.
+    fn pixels(&self, cell: usize) -> Window {
+        let [x, y] = self.corner(cell);
+        let cut = |start: i32, first: i32, size: u32| {
+            let end = (start + SIDE as i32).min(first.saturating_add_unsigned(size));
+            (start.max(first), (end - start.max(first)) as u32)
+        };
+        let ((x, width), (y, height)) =
+            (cut(x, self.window.x, self.window.width), cut(y, self.window.y, self.window.height));
+        Window { x, y, width, height }
     }
 
     /// The cell of a pixel of the window.
@@ -300,7 +318,8 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
     let all: f64 = tried.iter().map(|tried| tried.cost).sum();
     let cost = all / tried.iter().filter(|tried| !tried.pixels.is_empty()).count().max(1) as f64;
     // Slivers that the pilot has missed cost as much as others.
-    let costs = tried.iter().map(|tried| if tried.pixels.is_empty() { 1.0 } else { tried.cost / cost }).collect();
+    let costs: Vec<f64> =
+        tried.iter().map(|tried| if tried.pixels.is_empty() { 1.0 } else { tried.cost / cost }).collect();
     // With its neighbours a cell has about as many pixels here as it has by itself in the picture: a few would miss the
     // rare and bright, and all cells would be promised too much.
     let wish = |cell: usize| {
@@ -311,9 +330,51 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
         let variance = 0.5 * (variance(&pixels, 0, floor) + variance(&pixels, 1, floor));
         wish(variance, tried[cell].cost / cost)
     };
-    let wishes: Vec<f64> = (0..grid.cells()).filter(|cell| !tried[*cell].pixels.is_empty()).map(wish).collect();
+    let wishes: Vec<f64> = match job.plan.splatting {
+        false => (0..grid.cells()).filter(|cell| !tried[*cell].pixels.is_empty()).map(wish).collect(),
+        true => wishes_of_whole_cells(job, first, seed, (floor, &costs), pause)?,
+    };
     let least = LEAST.max(f64::from(first) / f64::from(job.samples));
     Some(Scale { floor, shares: scale(&wishes, least), costs })
+}
+
+/// The wishes of some cells whose pixels all have the `first` samples of the pilot, as [`decide`] will tell them; none if the render is
+/// to pause.
+fn wishes_of_whole_cells(
+    job: &FrameJob,
+    first: u32,
+    seed: u64,
+    (floor, costs): (f64, &[f64]),
+    pause: &dyn Breaks,
+) -> Option<Vec<f64>> {
+    let job = FrameJob { seed, ..*job };
+    let grid = Grid::of(job.window);
+    let layout = job.plan.layers.layout();
+    let one_of = (grid.cells() / CELLS).clamp(1, ONE_OF) as u64;
+    let chosen = |cell: &usize| mix64(seed ^ mix64(*cell as u64)).is_multiple_of(one_of);
+    let cells: Vec<usize> = (0..grid.cells()).filter(chosen).collect();
+    let of_cell = |cell: usize| -> Option<f64> {
+        if pause.wanted() {
+            return None;
+        }
+        let window = grid.pixels(cell);
+        let mut tile = TileBuffer::new(window);
+        tile.reset(window, layout);
+        render_unit(&job, 0..first, None, None, &mut tile);
+        let mut film = Film::new(job.scene.camera.resolution, window).ok()?.with_layers(layout);
+        film.merge_tile(&tile);
+        let pixels = means(&film, window.iter());
+        let variance = 0.5 * (variance(&pixels, 0, floor) + variance(&pixels, 1, floor));
+        Some(wish(variance, costs[cell]))
+    };
+    cells.into_par_iter().map(of_cell).collect()
+}
+
+/// The means of the replicates of those of `pixels` that lie in `film`.
+fn means(film: &Film, pixels: impl Iterator<Item = [i32; 2]>) -> Vec<[[f64; 3]; REPLICATES]> {
+    let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
+    let window = film.window();
+    pixels.filter_map(|pixel| replicate_means(film, window.index(pixel)?, &rgb_from_xyz)).collect()
 }
 
 /// Share of a cell up to a factor that all have in common.
@@ -324,22 +385,12 @@ fn wish(variance: f64, cost: f64) -> f64 {
 /// Shares out the samples of the picture among the cells of `film`, the rows of a part, whose pixels have `first` samples each.
 #[must_use]
 pub fn decide(job: &FrameJob, first: u32, film: &Film, scale: &Scale) -> Allocation {
-    let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
-    let window = film.window();
-    let grid = Grid::of(window);
+    let grid = Grid::of(film.window());
     // A part has all columns, and some rows.
     let offset = (grid.first[1] - Grid::of(job.window).first[1]) as usize * grid.columns;
     let of_cell = |cell: usize| -> [i16; HALVES] {
-        let [x, y] = grid.corner(cell);
         let cost = scale.costs[offset + cell];
-        let mut pixels = Vec::with_capacity((SIDE * SIDE) as usize);
-        for dy in 0..SIDE as i32 {
-            for dx in 0..SIDE as i32 {
-                if let Some(index) = window.index([x + dx, y + dy]) {
-                    pixels.extend(replicate_means(film, index, &rgb_from_xyz));
-                }
-            }
-        }
+        let pixels = means(film, grid.pixels(cell).iter());
         [1, 0].map(|other| {
             let share = (scale.shares * wish(variance(&pixels, other, scale.floor), cost)).clamp(LEAST, MOST);
             (libm::log2(share) * STEPS).round() as i16

@@ -162,7 +162,7 @@ fn row(s: &SceneReport) -> [String; 7] {
     let half = s.halving_seconds.map_or("-".into(), |t| format!("+{}", seconds(t)));
     [
         s.label(),
-        s.samples.to_string(),
+        s.adaptive.as_ref().map_or(s.samples.to_string(), |counts| format!("{:.1}", counts.mean)),
         seconds(s.seconds.rendering),
         format!("{:.2}", s.msamples_per_second),
         error,
