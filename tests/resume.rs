@@ -370,3 +370,32 @@ fn a_picture_of_several_parts_is_not_rendered_again() {
     std::fs::write(&file, &whole[..whole.len() - 40]).unwrap();
     assert!(!render() && render());
 }
+
+/// `timeout` signals the process, and then the group that it is in: two signals at once are one wish. One that comes later ends the
+/// process at once, whatever it writes.
+#[test]
+fn signals_that_come_together_are_one() {
+    let place = Place::of(&scene("off").replace("samples: 64", "samples: 1000000"));
+    for name in ["TERM", "INT"] {
+        let out = format!("{name}.exr");
+        let mut child = command(&place, &out, &["--checkpoint-interval", "1s"]).spawn().unwrap();
+        // It hears signals before it writes.
+        assert!(appears(&mut child, &place.path(&format!("{out}.checkpoint"))));
+        signal(&child, name);
+        signal(&child, name);
+        assert_eq!(child.wait().unwrap().code(), Some(75), "{name}");
+    }
+}
+
+/// Where nothing can be written any more, what is there is still there.
+#[test]
+fn a_finished_picture_needs_no_room_to_be_found() {
+    let place = Place::of(&scene("off").replace("samples: 64", "samples: 4"));
+    assert_eq!(run(&place, "o/a.exr", &[]).code, 0);
+    // As long as this stands there no checkpoint can be written.
+    std::fs::create_dir(place.path("o/a.exr.checkpoint")).unwrap();
+    let ran = run(&place, "o/a.exr", &[]);
+    assert!(ran.code == 1 && ran.err.contains("a.exr.checkpoint"), "{} {}", ran.code, ran.err);
+    assert_eq!(run(&place, "o/a.exr", &["--skip-existing"]).code, 0);
+    assert_eq!(place.json("o/report.json")["scenes"][0]["status"], "skipped");
+}

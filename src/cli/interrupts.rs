@@ -2,12 +2,17 @@
 
 use crate::error::Result;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Signals to stop that come within so short a time are one wish: `timeout` sends its own to the process and then to the group that
+/// the process is in.
+pub const ONE_WISH: Duration = Duration::from_secs(1);
 
 /// Flags that signals set.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupts {
-    /// SIGTERM or SIGINT came: keep what is done, and end. A second one ends the process at once.
+    /// SIGTERM or SIGINT came: keep what is done, and end. A second one, later than [`ONE_WISH`], ends the process at once.
     pub stop: Arc<AtomicBool>,
     /// SIGUSR1 came: write a picture of what is done.
     pub snapshot: Arc<AtomicBool>,
@@ -21,14 +26,24 @@ impl Interrupts {
     #[cfg(unix)]
     pub fn listen() -> Result<Interrupts> {
         use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
-        use signal_hook::flag;
+        let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGINT, SIGUSR1]).map_err(refused)?;
         let all = Interrupts::default();
-        for (signal, code) in [(SIGTERM, 143), (SIGINT, 130)] {
-            // In this order: the first signal finds the flag down, the second one up.
-            flag::register_conditional_shutdown(signal, code, all.stop.clone()).map_err(refused)?;
-            flag::register(signal, all.stop.clone()).map_err(refused)?;
-        }
-        flag::register(SIGUSR1, all.snapshot.clone()).map_err(refused)?;
+        let Interrupts { stop, snapshot } = all.clone();
+        let hear = move || {
+            let mut first: Option<Instant> = None;
+            for signal in signals.forever() {
+                match (signal, first) {
+                    (SIGUSR1, _) => snapshot.store(true, Ordering::Relaxed),
+                    (_, None) => {
+                        first = Some(Instant::now());
+                        stop.store(true, Ordering::Relaxed);
+                    }
+                    (_, Some(first)) if first.elapsed() < ONE_WISH => {}
+                    (_, Some(_)) => signal_hook::low_level::exit(128 + signal),
+                }
+            }
+        };
+        std::thread::Builder::new().name("signals".into()).spawn(hear).map_err(refused)?;
         Ok(all)
     }
 
