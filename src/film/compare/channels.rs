@@ -1,6 +1,6 @@
 //! Which channels of two files are held against each other.
 
-use super::noise::Pair;
+use super::noise::{Known, Pair};
 use super::{CompareOptions, Origin};
 use crate::film::Window;
 use crate::film::accumulate::REPLICATES;
@@ -39,8 +39,9 @@ pub(super) fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions
             }
         };
         let errors = [a, b].map(|file| floats(file, &stderr_name(&name)));
-        let (shared, dof) = ([shared(a), shared(b)], [degrees(a), degrees(b)]);
-        pairs.push(Pair::new(name, [samples_a, samples_b], errors, shared, dof, variance));
+        let known =
+            [a, b].map(|file| Known { shared: shared(file), dof: degrees(file), samples: said(file, "abbe/samples") });
+        pairs.push(Pair::new(name, [samples_a, samples_b], errors, known, window_a.width, variance));
     }
     Ok(pairs)
 }

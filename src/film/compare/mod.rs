@@ -406,6 +406,42 @@ pub(super) mod tests {
         file
     }
 
+    /// Four samples of light that one in twenty finds: where none did they agree, and yet are no nearer to the truth. Beside a picture of
+    /// many samples, which is right, that is noise; a tenth more light is not.
+    #[test]
+    fn few_samples_that_agree_by_chance_are_no_fault() {
+        let found = |seed: u64, samples: u32, gain: f64| {
+            let (mut values, mut errors) = (Vec::new(), Vec::new());
+            for i in 0..PIXELS {
+                let uniform =
+                    |k: u32| (mix64(mix64(seed) ^ mix64(i as u64) ^ u64::from(k)) >> 11) as f64 / 2f64.powi(53);
+                let sample =
+                    |k: u32| gain * (1.0 + 0.01 * uniform(k) + if uniform(k + 0x1000) < 0.05 { 4.0 } else { 0.0 });
+                let of = |r: u32| (0..samples / 4).map(|k| sample(4 * k + r)).sum::<f64>() / f64::from(samples / 4);
+                let replicates: Moments = (0..4).map(of).collect();
+                values.push(replicates.mean as f32);
+                errors.push(replicates.standard_error() as f32);
+            }
+            let mut file = file(vec![("Y".into(), values), ("stderr.Y".into(), errors)]);
+            file.parts[0].texts.push(("abbe/samples".into(), samples.to_string()));
+            file
+        };
+        let many = found(1, 1024, 1.0);
+        for seed in 2..6 {
+            let c = compare(&found(seed, 4, 1.0), &many, &CompareOptions::default());
+            assert_eq!(c.verdict, Verdict::Same, "{seed}: {}", c.reason);
+            let mut untold = found(seed, 4, 1.0);
+            untold.parts[0].texts.clear();
+            assert_eq!(compare(&untold, &many, &CompareOptions::default()).verdict, Verdict::Different, "{seed}");
+            let brighter = compare(&found(seed, 4, 1.1), &many, &CompareOptions::default());
+            assert_eq!(brighter.verdict, Verdict::Different, "{seed}");
+        }
+        // And a hundredth of the pixels that differ by half of their light.
+        let mut spots = found(7, 4, 1.0);
+        spots.parts[0].channels[0].1.iter_mut().step_by(97).for_each(|value| *value += 10.0);
+        assert_eq!(compare(&spots, &many, &CompareOptions::default()).verdict, Verdict::Different);
+    }
+
     /// Each run of equals is called different with probability 1e-3 (Bonferroni keeps it at that or below); of
     /// 20 runs none at these seeds, which happens with probability 0.98.
     #[test]

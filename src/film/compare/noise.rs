@@ -16,13 +16,31 @@ pub(super) struct Pair<'a> {
     pub a: Samples<'a>,
     pub b: Samples<'a>,
     pub noise: Noise<'a>,
-    /// How many times the variance of the sum of all pixels of A and of B is that of independent ones.
-    shared: [f64; 2],
-    /// Degrees of freedom of the standard errors of A and of B.
-    dof: [f64; 2],
+    /// What is known of A and of B.
+    known: [Known; 2],
+    /// Variances of A and of B about each pixel, where standard errors of single pixels are of few samples.
+    about: [Option<Vec<f64>>; 2],
     /// Whether the values of A and of B are half floats.
     half: [bool; 2],
 }
+
+/// What a file says of its noise besides standard errors.
+#[derive(Clone, Copy)]
+pub(super) struct Known {
+    /// How many times the variance of the sum of all pixels is that of independent ones.
+    pub shared: f64,
+    /// Degrees of freedom of the standard errors.
+    pub dof: f64,
+    /// Samples of a pixel, where that is said.
+    pub samples: Option<u32>,
+}
+
+/// Of fewer samples a pixel, four to a replicate, standard errors do not stand by themselves in the test of single pixels: where
+/// light is rare all replicates may lack it, and agree. They are held against those of the pixels around.
+const FEW: u32 = 16;
+
+/// How many pixels to each side are looked at for that.
+const AROUND: usize = 2;
 
 pub(super) enum Noise<'a> {
     /// Standard errors of A and B.
@@ -77,12 +95,15 @@ impl<'a> Pair<'a> {
         name: String,
         [a, b]: [Samples<'a>; 2],
         errors: [Option<&'a [f32]>; 2],
-        shared: [f64; 2],
-        dof: [f64; 2],
+        known: [Known; 2],
+        width: u32,
         variance: Option<(&'a [f32], u32)>,
     ) -> Pair<'a> {
         // Standard errors of which none is finite (one replicate) say nothing.
         let errors = errors.map(|plane| plane.filter(|errors| errors.iter().any(|e| e.is_finite())));
+        let is_few = |k: usize| variance.is_none() && known[k].samples.is_some_and(|samples| samples < FEW);
+        let about =
+            [0, 1].map(|k| errors[k].filter(|_| is_few(k)).map(|errors| variances_about(errors, width as usize)));
         let noise = match (variance, errors) {
             (Some((plane, samples)), _) => Noise::Sample(plane, f64::from(samples)),
             (None, [Some(a), Some(b)]) => Noise::Errors(a, b),
@@ -94,7 +115,7 @@ impl<'a> Pair<'a> {
             Samples::Integer(_) => false,
         };
         let half = [is_half(a), is_half(b)];
-        Pair { name, a, b, noise, shared, dof, half }
+        Pair { name, a, b, noise, known, about, half }
     }
 
     pub fn is_finite(&self, i: usize) -> bool {
@@ -123,7 +144,7 @@ impl<'a> Pair<'a> {
             .iter()
             .map(|&(samples, half)| if half { half_step(samples.at(i)) * half_step(samples.at(i)) / 12.0 } else { 0.0 })
             .sum();
-        let dof = self.dof;
+        let dof = self.known.map(|known| known.dof);
         let variance = match self.noise {
             Noise::Errors(a, b) => Variance { estimated: [square(a[i]), square(b[i])], dof, known: rounding },
             Noise::OneError(one) => Variance { estimated: [square(one[i]), 0.0], dof, known: rounding },
@@ -138,7 +159,15 @@ impl<'a> Pair<'a> {
 
     /// The difference of a pixel in standard errors, and their degrees of freedom.
     pub fn score(&self, i: usize) -> Option<(f64, f64)> {
-        let variance = self.variance(i)?;
+        let mut variance = self.variance(i)?;
+        // The one standard error that there is stands for A's.
+        let about = match self.noise {
+            Noise::OneError(_) => [self.about[0].as_ref().or(self.about[1].as_ref()), None],
+            _ => self.about.each_ref().map(Option::as_ref),
+        };
+        for (estimated, about) in variance.estimated.iter_mut().zip(about) {
+            *estimated = about.map_or(*estimated, |about| estimated.max(about[i]));
+        }
         Some((score(self.difference(i), variance.total()), variance.dof()))
     }
 
@@ -164,12 +193,12 @@ impl<'a> Pair<'a> {
             match self.variance(i) {
                 // Also where a pixel has no estimate though others have.
                 None => {
-                    let shared = self.shared[0].max(self.shared[1]);
+                    let shared = self.known[0].shared.max(self.known[1].shared);
                     variance += d * d * shared;
                     ratio_variance += (a - ratio * b) * (a - ratio * b) * shared;
                 }
                 Some(v) => {
-                    let v = Variance { estimated: [0, 1].map(|k| v.estimated[k] * self.shared[k]), ..v };
+                    let v = Variance { estimated: [0, 1].map(|k| v.estimated[k] * self.known[k].shared), ..v };
                     variance += v.total();
                     spread += v.spread();
                     // What is known without estimation belongs to A: a variance file, or rounding.
@@ -199,6 +228,22 @@ impl<'a> Pair<'a> {
             infinite_b: count(self.b, f64::is_infinite),
         }
     }
+}
+
+/// The mean of the squares of those `errors` that are finite in the square of pixels about each.
+fn variances_about(errors: &[f32], width: usize) -> Vec<f64> {
+    let height = errors.len() / width.max(1);
+    let near = |at: usize, end: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(end);
+    let about = |i: usize| {
+        let columns = near(i % width, width);
+        let all =
+            near(i / width, height).flat_map(|row| &errors[row * width + columns.start..row * width + columns.end]);
+        let (sum, count) = all
+            .filter(|e| e.is_finite())
+            .fold((0.0, 0.0), |(sum, count), e| (sum + f64::from(*e) * f64::from(*e), count + 1.0));
+        if count > 0.0 { sum / count } else { 0.0 }
+    };
+    (0..errors.len()).map(about).collect()
 }
 
 /// `difference` / √`variance`; no difference is no deviation even where there is no noise.
