@@ -192,15 +192,6 @@ fn render_and_write(
 ) -> Result<()> {
     let description = &prepared.description;
     let exr_path = output_path(prepared, overrides);
-    // A place that cannot be written to is told before the work, not after.
-    output::prepare_place(&exr_path)?;
-    output::prepare_place(&checkpoint::place(&exr_path))?;
-    if overrides.portion.is_all() {
-        output::prepare_place(&exr_path.with_extension("png"))?;
-        if description.output.spectral.is_some() {
-            output::prepare_place(&spectral_path(&exr_path))?;
-        }
-    }
     let filter = prepared.sampler()?;
     let job = prepared.job(&filter);
     let portion = &overrides.portion;
@@ -221,6 +212,15 @@ fn render_and_write(
         }
         report.files = vec![exr_path];
         return ended;
+    }
+    // A place that cannot be written to is told before the work, not after.
+    output::prepare_place(&exr_path)?;
+    output::prepare_place(&checkpoint::place(&exr_path))?;
+    if overrides.portion.is_all() {
+        output::prepare_place(&exr_path.with_extension("png"))?;
+        if description.output.spectral.is_some() {
+            output::prepare_place(&spectral_path(&exr_path))?;
+        }
     }
     let mut keeper = Keeper::new(&overrides.keep, stop, &exr_path, &identity, prepared.scene.watch.as_deref());
     let begun = keeper.begin(&job, share)?;

@@ -56,10 +56,19 @@ fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()
         let _ = std::fs::remove_file(&temporary);
         return Err(e);
     }
-    // The name has to reach the disk, too.
+    // The name has to reach the disk, too. The file is there already, so what a directory does not do by its nature is no fault.
     #[cfg(unix)]
-    File::open(directory_of(path))?.sync_all()?;
+    File::open(directory_of(path)).and_then(|directory| directory.sync_all()).or_else(unless_it_cannot_be)?;
     Ok(())
+}
+
+/// Passes over what a file system or the rights in it do not allow.
+#[cfg(unix)]
+fn unless_it_cannot_be(e: std::io::Error) -> std::io::Result<()> {
+    match e.kind() {
+        ErrorKind::PermissionDenied | ErrorKind::InvalidInput | ErrorKind::Unsupported => Ok(()),
+        _ => Err(e),
+    }
 }
 
 /// Gives `file` the owner and the permissions of what it is to replace, as far as that may be.
@@ -70,13 +79,12 @@ fn take_after(file: &File, path: &Path) -> std::io::Result<()> {
         use std::os::unix::fs::{MetadataExt, fchown};
         let new = file.metadata()?;
         if (new.uid(), new.gid()) != (old.uid(), old.gid()) {
-            match fchown(file, Some(old.uid()), Some(old.gid())) {
-                // Only root may give files away, and not to users that a container lacks.
-                Err(e) if !matches!(e.kind(), ErrorKind::PermissionDenied | ErrorKind::InvalidInput) => return Err(e),
-                _ => {}
-            }
+            // Only root may give files away, and not to users that a container lacks.
+            fchown(file, Some(old.uid()), Some(old.gid())).or_else(unless_it_cannot_be)?;
         }
+        file.set_permissions(old.permissions()).or_else(unless_it_cannot_be)
     }
+    #[cfg(not(unix))]
     file.set_permissions(old.permissions())
 }
 
