@@ -17,6 +17,7 @@
 
 mod table;
 
+use super::Window;
 use crate::error::{Error, Result};
 use glam::DVec2;
 use table::Table;
@@ -328,59 +329,52 @@ impl FilterSampler {
         }
     }
 
-    /// Deals light that falls on `place` (continuous, in pixels) to the pixels whose filters hold it. The shares add up to
-    /// one; those of a filter with gaps do so in the mean over places. Pixels at an edge that cuts the filter are given as
-    /// much more as it took from them.
-    pub fn deal(&self, place: DVec2, mut give: impl FnMut([i32; 2], f32)) {
+    /// Deals light that falls on `place` (continuous, in pixels) to the pixels of `window` whose filters hold it. The shares of all
+    /// pixels, in the window or not, add up to one; those of a filter with gaps do so in the mean over places. Pixels at an edge
+    /// that cuts the filter are given as much more as it took from them.
+    pub fn deal(&self, place: DVec2, window: &Window, mut give: impl FnMut([i32; 2], f32)) {
         if let Axis::Box = self.axis {
-            let pixel = place.floor();
-            give([pixel.x as i32, pixel.y as i32], 1.0);
-            return;
-        }
-        if self.leaves_gaps() {
-            let pixel = place.floor();
-            let [x, y] = (place - pixel - 0.5).to_array().map(|x| self.filter.eval(x) / self.axis.integral());
-            if x * y != 0.0 {
-                give([pixel.x as i32, pixel.y as i32], (x * y) as f32);
+            let pixel = [place.x.floor() as i32, place.y.floor() as i32];
+            if window.index(pixel).is_some() {
+                give(pixel, 1.0);
             }
             return;
         }
-        // Centres of pixels lie at halves.
-        let radius = self.radius();
-        let range = |x: f64| ((x - 0.5 - radius).ceil() as i32, (x - 0.5 + radius).floor() as i32);
-        let ((left, right), (upper, lower)) = (range(place.x), range(place.y));
-        let at = |x: f64, i: i32| self.filter.eval(x - 0.5 - f64::from(i));
-        let sum_x: f64 = (left..=right).map(|i| at(place.x, i)).sum();
-        let sum_y: f64 = (upper..=lower).map(|i| at(place.y, i)).sum();
-        let whole = sum_x * sum_y;
-        if whole == 0.0 {
-            return;
-        }
-        let Some([low, high]) = self.within else {
-            for j in upper..=lower {
-                let row = at(place.y, j) / whole;
-                for i in left..=right {
-                    give([i, j], (at(place.x, i) * row) as f32);
-                }
+        let [columns, rows] = [(0, window.x, window.width), (1, window.y, window.height)]
+            .map(|(axis, first, count)| self.shares(axis, place[axis], (first, first.saturating_add_unsigned(count))));
+        for &(y, of_row) in &rows {
+            for &(x, of_column) in &columns {
+                give([x, y], (of_column * of_row) as f32);
             }
-            return;
+        }
+    }
+
+    /// The same along an `axis`, x or y: pixels from the first of a window to the one after its last, and their shares, none of
+    /// which is zero.
+    fn shares(&self, axis: usize, place: f64, (first, end): (i32, i32)) -> Vec<(i32, f64)> {
+        let at = |i: i32| self.filter.eval(place - 0.5 - f64::from(i));
+        let (low, high, whole) = if self.leaves_gaps() {
+            let pixel = place.floor() as i32;
+            (pixel, pixel, self.axis.integral())
+        } else {
+            // Centres of pixels lie at halves.
+            let [low, high] = [(place - 0.5 - self.radius()).ceil(), (place - 0.5 + self.radius()).floor()];
+            let (low, high) = (low as i32, high as i32);
+            (low, high, (low..=high).map(at).sum())
         };
-        if place.cmplt(low).any() || place.cmpge(high).any() {
-            return;
-        }
         // The whole filter over what the edges leave of it.
-        let all = self.axis.between(-radius, radius).signed;
-        let more = |low: f64, high: f64, i: i32| {
-            let centre = f64::from(i) + 0.5;
-            let inside = (low..high).contains(&centre);
-            if inside { all / self.axis.between(low - centre, high - centre).signed } else { 0.0 }
-        };
-        for j in upper..=lower {
-            let row = at(place.y, j) * more(low.y, high.y, j) / whole;
-            for i in left..=right {
-                give([i, j], (at(place.x, i) * more(low.x, high.x, i) * row) as f32);
+        let all = self.axis.between(-self.radius(), self.radius()).signed;
+        let more = |i: i32| match self.within {
+            None => 1.0,
+            Some(corners) => {
+                let [from, to] = corners.map(|corner| corner[axis]);
+                let centre = f64::from(i) + 0.5;
+                let inside = (from..to).contains(&place) && (from..to).contains(&centre);
+                if inside { all / self.axis.between(from - centre, to - centre).signed } else { 0.0 }
             }
-        }
+        };
+        let held = low.max(first)..high.saturating_add(1).min(end);
+        held.map(|i| (i, at(i) * more(i) / whole)).filter(|(_, share)| *share != 0.0).collect()
     }
 
     /// The sample at `u` in [0, 1)² of the pixel about `centre`, in pixels, cut where the picture ends if light from beyond it
@@ -620,10 +614,8 @@ mod tests {
         for k in 0..steps * steps {
             let at = DVec2::new(f64::from(k % steps), f64::from(k / steps)) + 0.5;
             let place = low + 4.0 * at / f64::from(steps) - 1.0;
-            bell.deal(place, |pixel, share| {
-                if pixel == [-3, 2] {
-                    corner += f64::from(share) * (4.0 / f64::from(steps)).powi(2);
-                }
+            bell.deal(place, &Window { x: -3, y: 2, width: 1, height: 1 }, |_, share| {
+                corner += f64::from(share) * (4.0 / f64::from(steps)).powi(2);
             });
         }
         assert!((corner - 1.0).abs() < 4.0 * (-0.5 * std::f64::consts::PI.powi(2)).exp(), "{corner}");
@@ -642,7 +634,7 @@ mod tests {
             for i in 0..1000 {
                 for j in 0..1000 {
                     let place = DVec2::new(f64::from(i), f64::from(j)) / 1000.0 + 7.0005;
-                    sampler.deal(place, |_, share| sum += f64::from(share));
+                    sampler.deal(place, &Window::full(20, 20), |_, share| sum += f64::from(share));
                 }
             }
             assert!((sum / 1e6 - 1.0).abs() < 1e-4, "{filter:?}: {}", sum / 1e6);

@@ -205,11 +205,9 @@ impl Landed {
         let xyz = light.map(|x| x * unit);
         let mut numbers = Vec::new();
         plan.layers.append_traced(scene, wavelengths, splat.light, light, splat.group, &mut numbers);
-        filter.deal(splat.place, |pixel, share| {
-            if window.index(pixel).is_some() {
-                self.pixels.push((pixel, xyz.map(|x| x * share)));
-                self.numbers.extend(numbers.iter().map(|x| x * share));
-            }
+        filter.deal(splat.place, window, |pixel, share| {
+            self.pixels.push((pixel, xyz.map(|x| x * share)));
+            self.numbers.extend(numbers.iter().map(|x| x * share));
         });
     }
 

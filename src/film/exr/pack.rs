@@ -128,12 +128,13 @@ fn compressor() -> Compress {
 /// The chunk of the rows from `y` on: `bytes` deflated. What does not shrink is stored as it is, `plain`, and known by
 /// its length.
 pub(super) fn pack(y: i32, bytes: &[u8], plain: Vec<u8>) -> Vec<u8> {
-    let mut packed = Vec::with_capacity(plain.len());
-    // It fills the room that there is, and no more.
+    // It fills the room that there is, and no more: what zlib's `deflateBound` gives holds the whole of anything.
+    let length = bytes.len();
+    let mut packed = Vec::with_capacity(length + length.div_ceil(8) + length.div_ceil(64) + 11);
     let whole = DEFLATE.with_borrow_mut(|deflate| {
         deflate.reset();
         let whole = matches!(deflate.compress_vec(bytes, &mut packed, FlushCompress::Finish), Ok(Status::StreamEnd));
-        // Left in the middle of a block it would not begin the next stream with one, reset or not (zlib-rs 0.6.8).
+        // One that is left in the middle of a block does not begin the next stream with one, reset or not (zlib-rs 0.6.8).
         if !whole {
             *deflate = compressor();
         }
