@@ -442,7 +442,7 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         description::FileLayout::Single => exr::Layout::Single,
         description::FileLayout::Multipart => exr::Layout::Multipart,
     };
-    file.attributes = attributes(finish, frame, report);
+    file.attributes = attributes(finish, frame, report, report.error.as_ref());
     file.attributes.extend(shared_errors(shared));
     if exr.aces_container && as_asked {
         file.attributes.push(("acesImageContainerFlag".to_owned(), Attribute::Int(1)));
@@ -523,7 +523,8 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
     let plane = |i: usize| (finish.layers[i].name.clone(), ChannelData::F32(frame.layer(i)));
     let preview = ["R", "G", "B"].iter().zip(&image.rgb);
     let preview = preview.map(|(name, plane)| ((*name).to_owned(), ChannelData::F32(plane.clone())));
-    let mut attributes = attributes(finish, frame, report);
+    let error = frame.error_of_bands(channels.clone(), &finish.gauge());
+    let mut attributes = attributes(finish, frame, report, error.as_ref());
     let text = |name: &str, value: &str| (name.to_owned(), Attribute::Text(value.to_owned()));
     attributes.extend([text("spectralLayoutVersion", "1.0"), text("emissiveUnits", "W.m^-2.sr^-1")]);
     let errors = band_errors(finish, frame, channels.clone());

@@ -12,7 +12,7 @@ use crate::film::Window;
 use crate::film::accumulate::{Film, InvalidCounts, REPLICATES};
 use crate::film::error::{self, ErrorEstimate, NoEstimate, Values};
 use crate::film::filter::FilterSampler;
-use crate::film::resolve::{self, Image};
+use crate::film::resolve::{self, Image, Splats};
 use crate::film::sharing;
 use crate::scene::Scene;
 use crate::spectrum::ColourSpace;
@@ -136,6 +136,14 @@ impl Frame {
         }
         let splats = self.splats.as_ref().map(SplatFilm::splats);
         resolve::resolve(&self.film, splats, rgb_from_xyz)
+    }
+
+    /// The error of the further channels `bands`, which are bands that are summed by replicate, told as `gauge` tells that of the
+    /// picture.
+    #[must_use]
+    pub fn error_of_bands(&self, bands: Range<usize>, gauge: &Gauge) -> Option<ErrorEstimate> {
+        let splats = self.splats.as_ref().map(SplatFilm::splats);
+        told(&self.film, splats, Values::Bands(bands.start, bands.len()), gauge).0
     }
 
     /// How many times the variance of the sum of all pixels of `image` is that of independent ones, at the most.
@@ -350,14 +358,23 @@ fn estimate(film: &Film, splats: Option<&SplatFilm>, gauge: &Gauge) -> Estimate 
         0 => Values::Colours(&space, &image),
         bands => Values::Bands(0, bands),
     };
+    let (error, black) = told(film, photons, values, gauge);
+    Estimate { error, black, resolved: Some((space, image)) }
+}
+
+/// The error of `values`, where they tell one; it is known where nothing shines. And whether there is no light in them.
+fn told(film: &Film, splats: Option<Splats>, values: Values, gauge: &Gauge) -> (Option<ErrorEstimate>, bool) {
+    if !gauge.random {
+        return (None, false);
+    }
     let (overlap, cell) = match gauge.sharing {
         Sharing::Near { overlap, cell, .. } => (overlap, cell),
         Sharing::All => (1.0, 1),
     };
-    let found = error::relative_error(film, photons, values, overlap, cell);
+    let found = error::relative_error(film, splats, values, overlap, cell);
     let black = found == Err(NoEstimate::Black);
-    let error = if black && !gauge.lit { Some(ErrorEstimate::none(image.window.pixels() as u64)) } else { found.ok() };
-    Estimate { error, black, resolved: Some((space, image)) }
+    let error = if black && !gauge.lit { Some(ErrorEstimate::none(film.window().pixels() as u64)) } else { found.ok() };
+    (error, black)
 }
 
 /// An error where too many samples were invalid to trust the picture.

@@ -4,6 +4,7 @@ use super::finish::Finish;
 use super::frame::Frame;
 use super::report::SceneReport;
 use crate::description::{self, HeaderValue, Standard};
+use crate::film::error::ErrorEstimate;
 use crate::film::exr::{Attribute, TimeCode};
 use crate::spectrum::observer;
 
@@ -13,8 +14,13 @@ pub(super) const FAULT: &str = "abbe/fault";
 /// Of light at 555 nm, lm/W.
 const LUMENS_PER_WATT: f64 = 683.002;
 
-/// The header of a picture: what is needed to make it again, and how good it is.
-pub(super) fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -> Vec<(String, Attribute)> {
+/// The header of a file of a picture: what is needed to make it again, and how good it is, whose error is `error`.
+pub(super) fn attributes(
+    finish: &Finish,
+    frame: &Frame,
+    report: &SceneReport,
+    error: Option<&ErrorEstimate>,
+) -> Vec<(String, Attribute)> {
     let text = |s: &str| Attribute::Text(s.to_owned());
     let mut all = vec![
         ("software".to_owned(), text(concat!("Abbe ", env!("CARGO_PKG_VERSION")))),
@@ -72,7 +78,7 @@ pub(super) fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -
         let counts = format!("least {}, mean {:.1}, most {}", counts.least, counts.mean, counts.most);
         all.push(("abbe/adaptiveSamples".to_owned(), text(&counts)));
     }
-    if let Some(e) = &report.error {
+    if let Some(e) = error {
         all.push(("abbe/relativeError".to_owned(), Attribute::Double(e.rel_rmse)));
         let state = if e.valid { "valid" } else { "not converged, interval not valid" };
         all.push(("abbe/relativeErrorState".to_owned(), text(state)));
@@ -81,7 +87,7 @@ pub(super) fn attributes(finish: &Finish, frame: &Frame, report: &SceneReport) -
     if let Some(fault) = &report.fault {
         all.push((FAULT.to_owned(), text(fault)));
     }
-    if let Some(seconds) = report.halving_seconds {
+    if let Some(seconds) = report.halving_seconds.filter(|_| error.is_some()) {
         all.push(("abbe/secondsToHalveError".to_owned(), Attribute::Double(seconds)));
     }
     all
@@ -104,7 +110,7 @@ fn number(name: &str, value: f64) -> Attribute {
 fn rational_rate(rate: f64) -> [u32; 2] {
     let whole = (rate * 1.001).round();
     // 23.98 for 23.976…: digits are left out beyond the second.
-    let television = (whole / 1.001 - rate).abs() <= 0.005 && rate.fract() != 0.0 && whole % 6.0 == 0.0;
+    let television = whole > 0.0 && (whole / 1.001 - rate).abs() <= 0.005 && rate.fract() != 0.0 && whole % 6.0 == 0.0;
     if television {
         [whole as u32 * 1000, 1001]
     } else if rate.fract() == 0.0 {
@@ -143,9 +149,12 @@ mod tests {
     #[test]
     fn rates_of_television_are_over_1001() {
         let rates = [(24.0, [24, 1]), (23.976, [24_000, 1001]), (29.97, [30_000, 1001]), (59.94, [60_000, 1001])];
-        for (rate, rational) in
-            rates.into_iter().chain([(23.98, [24_000, 1001]), (12.5, [12_500, 1000]), (1e6, [1_000_000, 1])])
-        {
+        for (rate, rational) in rates.into_iter().chain([
+            (23.98, [24_000, 1001]),
+            (12.5, [12_500, 1000]),
+            (0.004, [4, 1000]),
+            (1e6, [1_000_000, 1]),
+        ]) {
             assert_eq!(rational_rate(rate), rational, "{rate}");
         }
     }

@@ -336,9 +336,8 @@ impl SceneReport {
             })
             .collect();
         if self.error.is_none() && finish.integrator == "path" {
-            self.notes.push(
-                "too few samples, light that they have hardly met, or black: the error cannot be estimated".into(),
-            );
+            let why = "a single pixel, too few samples, light that they have hardly met, or black";
+            self.notes.push(format!("{why}: the error cannot be estimated"));
         }
     }
 

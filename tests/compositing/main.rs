@@ -242,7 +242,10 @@ fn a_spectral_file_is_light_again() {
         let overrides = Overrides { output: Some(path("out.exr")), ..Overrides::default() };
         let report = batch::render_batch(&path(scene), &overrides, &(), &AtomicBool::new(false)).unwrap();
         assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
-        read_exr(&path("out.spectral.exr")).unwrap().parts.remove(0)
+        let part = read_exr(&path("out.spectral.exr")).unwrap().parts.remove(0);
+        // The sums of its bands are not kept by replicate, and the error of the colours is none of its own.
+        assert!(["State", "Interval95"].iter().all(|of| part.text(&format!("abbe/relativeError{of}")).is_none()));
+        part
     };
     let frame = FRAME.replace("float}", "float}, spectral: {bands: 3}").replace("samples: 16", "samples: 256");
     let means = |part: &ExrPart| -> Vec<f32> {
@@ -295,9 +298,13 @@ fn bands_stand_beside_their_standard_errors() {
     assert!(plane(&spectral, bands[1]).iter().any(|e| *e > 0.0));
     let shared = |part: &ExrPart| part.text("abbe/sharedErrors").map(|x| x.parse::<f64>().unwrap());
     assert!([&picture, &spectral].iter().all(|part| shared(part).unwrap() > 1.0));
+    // Each file has the error of its own bands: red and its double have that of all light, the mean over wavelengths another.
+    let own = |part: &ExrPart| part.text("abbe/relativeErrorState").is_some();
+    assert!(own(&picture) && own(&spectral));
     let [picture, spectral] = parts("precision: float");
     assert_eq!((names(&picture).len(), names(&spectral).len()), (2, 4));
     assert_eq!([&picture, &spectral].map(shared), [None, None]);
+    assert!(own(&picture) && own(&spectral));
 }
 
 /// Radiance 1 at 400 nm to 4 at 700 nm is 750 in a band of response 1, whatever the sensitivity, and 1.5, 2.5 and 3.5 in the
