@@ -184,15 +184,8 @@ impl SceneDescription {
         // Mattes, assets and groups of lamps go by name.
         let mattes = self.layers.iter().any(|layer| matches!(layer.content, LayerContent::Matte(_)));
         let named = mattes || !self.light_groups.is_empty() || !self.assets.is_empty();
-        let made = |i: usize| self.shapes[i].name.is_none().then(|| self.shapes[i].name_or_kind(i));
-        let made: HashMap<String, usize> = (0..self.shapes.len()).filter_map(|i| Some((made(i)?, i))).collect();
-        for (i, shape) in self.shapes.iter().enumerate().filter(|_| named) {
-            if let Some((name, other)) = shape.name.as_ref().and_then(|name| Some((name, made.get(name)?))) {
-                let shapes = At::ROOT.key("shapes");
-                let (shape, form) = (shapes.index(i), shape.geometry.kind());
-                let found = format!("{}, which shapes[{other}] has, since it has no other", quote(name));
-                checker.require(false, shape.key(form).key("name"), "a name of its own", found);
-            }
+        if named {
+            self.check_names_of_their_own(checker);
         }
         let shapes = |shining: bool| {
             let all = self.shapes.iter().enumerate().filter(move |(_, shape)| !shining || shape.emission.is_some());
@@ -215,6 +208,23 @@ impl SceneDescription {
                     checker.require(!taken.contains(&name.as_str()), at.index(i), "each name once", quote(name));
                     taken.push(name);
                 }
+            }
+        }
+    }
+
+    /// No shape and no lamp of a group is called as another is that has no name.
+    fn check_names_of_their_own(&self, checker: &mut Checker<'_>) {
+        let shape = |(i, shape): (usize, &Shape)| ("shapes", i, shape.geometry.kind(), shape.name.clone());
+        let light = |(i, light): (usize, &Light)| ("lights", i, light.kind(), light.name().map(str::to_owned));
+        let lights = self.lights.iter().enumerate().filter(|_| !self.light_groups.is_empty()).map(light);
+        let all: Vec<_> = self.shapes.iter().enumerate().map(shape).chain(lights).collect();
+        let unnamed = all.iter().filter(|(_, _, _, name)| name.is_none());
+        let made: HashMap<String, _> = unnamed.map(|(list, i, kind, _)| (format!("{kind}{i}"), (list, i))).collect();
+        for (list, i, kind, name) in &all {
+            if let Some((name, (other, j))) = name.as_ref().and_then(|name| Some((name, made.get(name)?))) {
+                let (list, found) = (At::ROOT.key(list), quote(name));
+                let found = format!("{found}, which {other}[{j}] has, since it has no other");
+                checker.require(false, list.index(*i).key(kind).key("name"), "a name of its own", found);
             }
         }
     }

@@ -327,6 +327,18 @@ fn a_missing_scene_file_and_a_missing_argument_are_told_apart() {
     assert_eq!(place.run(&["render", "s.yaml", "--set", "fog"]).code, 2);
 }
 
+/// A lamp without a name is called by its kind and number; a group would take it in with one that is given that name.
+#[test]
+fn no_lamp_is_called_as_one_without_a_name_is() {
+    let lamp = |name: &str| format!("- point: {{position: [0, 5, 0], intensity: 1{name}}}\n");
+    let lights = format!("lights:\n{}{}", lamp(", name: point1"), lamp(""));
+    let (found, code) = faults(&format!("{lights}light_groups: {{key: [point1]}}\n"));
+    let expected = "lights[0].point.name: expected a name of its own, found \"point1\", which lights[1] has, since it has no other";
+    assert!(code == 2 && found.len() == 1 && found[0].contains(expected), "{found:?}");
+    let apart = format!("{SMALL}{lights}light_groups: {{key: [point1]}}\n").replace("name: point1", "name: point0");
+    assert_eq!(Place::of(&apart).run(&["plan", "scene.yaml"]).code, 0);
+}
+
 /// What the file of a picture cannot hold is told before the render, as a fault of the description.
 #[test]
 fn channels_that_clash_are_refused_before_the_work() {
