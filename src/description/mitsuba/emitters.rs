@@ -107,7 +107,9 @@ impl Import<'_> {
             fields.add("cutoff_deg", number(bag.place("cutoff_angle"), cutoff));
         }
         if let Some(beam) = bag.float("beam_width")? {
-            fields.add("beam_deg", number(bag.place("beam_width"), beam));
+            // As in Mitsuba, where what is full within the beam ends at the cutoff.
+            let cutoff = bag.float("cutoff_angle")?.unwrap_or(20.0);
+            fields.add("beam_deg", number(bag.place("beam_width"), beam.min(cutoff)));
         }
         let intensity = self.spectrum(bag, "intensity", Role::Emission)?.unwrap_or_else(|| one(bag));
         fields.add("intensity", intensity);
@@ -286,6 +288,15 @@ mod tests {
         let scene = good(&spot(even));
         let Light::Spot(light) = &scene.lights[0] else { panic!("a spot") };
         assert_eq!(light.position, [7.0, 0.0, 0.0]);
+        // A beam that is wider than the light ends with it.
+        let float = |name: &str, value: u32| format!("<float name=\"{name}\" value=\"{value}\"/>");
+        let wide = |more: String| good(&spot("").replace("</emitter>", &format!("{more}</emitter>")));
+        for (scene, angle) in
+            [(wide(float("cutoff_angle", 12) + &float("beam_width", 30)), 12.0), (wide(float("beam_width", 30)), 20.0)]
+        {
+            let Light::Spot(light) = &scene.lights[0] else { panic!("a spot") };
+            assert_eq!((light.beam_deg, light.cutoff_deg), (angle, angle));
+        }
         for uneven in
             ["<scale x=\"3\"/>", "<scale z=\"2\"/>", "<matrix value=\"1 0.1 0 0 1 0 0 0 1\"/>", "<scale value=\"0\"/>"]
         {

@@ -37,6 +37,12 @@ impl Import<'_> {
                 let name = self.declare_volume(volume)?;
                 entry(bag.object.place, "volume", text(bag.place("volume"), name))
             }
+            plugin if SPECTRA.contains(&plugin) => {
+                let known = TEXTURES.join(", ");
+                return Err(
+                    bag.fault(format!("expected a texture that varies over a surface ({known}), found a spectrum"))
+                );
+            }
             _ => return Err(bag.unknown(TEXTURES.into_iter().chain(SPECTRA))),
         };
         bag.finish()?;
