@@ -35,8 +35,16 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
             }
         };
         let made = entry.scene(&overrides.set).and_then(|scene| {
-            let samples = scene.render.samples.clamp(FEWEST, MOST_SAMPLES);
-            let AccuracyArguments { pixels, rounds, error: target, time, truth, .. } = *arguments;
+            let wanted = scene.render.samples;
+            let samples = wanted.clamp(FEWEST, MOST_SAMPLES);
+            if samples != wanted {
+                super::complain(&format!("note: {}: {samples} samples a pixel in place of {wanted}", entry.name));
+            }
+            if scene.image.crop.is_some() {
+                super::complain(&format!("note: {}: of the whole frame, without its crop", entry.name));
+            }
+            let AccuracyArguments { pixels, rounds, error, time, truth, .. } = *arguments;
+            let target = error.or(scene.render.stop.error);
             let knobs = &arguments.knobs;
             let settings = Settings { pixels, samples, rounds, target, time, truth, knobs, beside };
             accuracy::sheet(&entry, &overrides, &settings, &told, &interrupts.stop)

@@ -249,7 +249,7 @@ struct AccuracyArguments {
         allow_negative_numbers = true
     )]
     pixels: u32,
-    /// About how long each scene may take, as 30s or 5m: its samples are cut to that, to 16 at the least
+    /// About how long each scene may take, as 30s or 5m: its samples, 16 to 256 a pixel, are cut to that
     #[arg(long, value_name = "TIME", value_parser = some_time, allow_hyphen_values = true)]
     time: Option<std::time::Duration>,
     /// The radiance that every pixel is known to have at all wavelengths, in place of a reference
@@ -267,7 +267,7 @@ struct AccuracyArguments {
         allow_negative_numbers = true
     )]
     rounds: u32,
-    /// The error that is wanted, as 0.01 or 1% [default: that of the scene as it is written]
+    /// The error that is wanted, as 0.01 or 1% [default: that of render.stop, else what the scene as it is written has]
     #[arg(long, value_name = "E", value_parser = relative_error, allow_hyphen_values = true)]
     error: Option<f64>,
     /// Threads; 0 takes as many as SLURM_CPUS_PER_TASK, CUE_THREADS or OMP_NUM_THREADS says (the first that is set), else
