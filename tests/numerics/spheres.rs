@@ -69,6 +69,32 @@ fn tiny_and_distant_lamps_light_by_the_inverse_square() {
         let body = camera([1.0, 1.0, 0.0], [0.0; 3], 0.01) + &lamp + &floor(1.0);
         cases.push(Case::new(format!("spot at {d:e}"), body, Answer::Every(0.5, 1e-5)).integrator(DIRECT));
     }
+    // As small beside their distance as the rounding of their coordinates and smaller.
+    for (r, d) in [(1e-12, 1e3), (1e-10, 1e6), (1e-11, 1e6)] {
+        let body = camera([1.0, 1.0, 0.0], [0.0; 3], 0.01)
+            + &sphere([0.0, d, 0.0], r, &shining((d / r).powi(2)))
+            + &floor(1.0);
+        cases.push(Case::new(format!("ball of {r:e} at {d:e}"), body, Answer::Every(0.5, 1e-5)).integrator(DIRECT));
+    }
+    // Narrow spots, seen where they are full, where they fall off from half of the cutoff on, and beyond. What the camera sees is
+    // 2 tan 0.1° of the radius of the spot, across which light falls evenly, from the middle of the pixels.
+    for cutoff in [1e-4_f64, 1e-6, 1e-7] {
+        let d = 1e6;
+        let radius = d * cutoff.to_radians();
+        for (share, expected) in [(0.3, 0.5), (0.75, 0.25), (0.95, 0.05), (1.1, 0.0)] {
+            let lamp = format!(
+                "<emitter type=\"spot\"><transform name=\"to_world\"><lookat origin=\"0, {d:?}, 0\" target=\"0, 0, 0\" up=\"0, 0, 1\"/></transform>\
+                 <float name=\"cutoff_angle\" value=\"{cutoff:?}\"/><float name=\"beam_width\" value=\"{:?}\"/>\
+                 <spectrum name=\"intensity\" value=\"{:?}\"/></emitter>",
+                0.5 * cutoff,
+                std::f64::consts::PI * d * d
+            );
+            let x = share * radius;
+            let body = camera([x, radius, 1e-3 * radius], [x, 0.0, 0.0], 0.2) + &lamp + &floor(4.0);
+            let name = format!("spot of {cutoff:e} degrees at {share}");
+            cases.push(Case::new(name, body, Answer::Mean(expected, 5e-4)).integrator(DIRECT));
+        }
+    }
     // The same at another scale and place.
     for s in [1e-8, 1e-6, 1e6] {
         let r = 1e-3 * s;
