@@ -344,7 +344,8 @@ class Draw:
 
     def hair(self) -> str:
         names = ("eumelanin", "pheomelanin")
-        dye = self.spectrum("sigma_a", 0.1, 2) if self.chance(0.3) else "".join(self.float(n, 0.05, 0.6) for n in names)
+        # Colours above 1 are cut there.
+        dye = self.spectrum("sigma_a", 0.1, 1) if self.chance(0.3) else "".join(self.float(n, 0.05, 0.6) for n in names)
         rough = self.float("longitudinal_roughness", 0.2, 0.8) + self.maybe(lambda: self.float("azimuthal_roughness", 0.2, 0.8))
         return dye + rough + self.maybe(lambda: self.float("scale_tilt", 0, 4)) + self.maybe(lambda: self.float("int_ior", 1.3, 1.7))
 
