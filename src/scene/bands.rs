@@ -4,6 +4,7 @@
 //! `S0.<nm>nm` is spectral radiance, `T.<nm>nm` reflectance or transmittance. Polarisation (S1 to S3) and fluorescence
 //! (`T.<nm>nm.<nm>nm`) are refused.
 
+use super::texture::spread;
 use crate::error::{Error, Result};
 use crate::film::exr::ExrPart;
 use crate::spectrum::{Lanes, Outside, Spectrum};
@@ -140,7 +141,6 @@ impl Bands {
     /// Some 16 spectra, for the choice of wavelengths.
     #[must_use]
     pub fn representatives(&self) -> Vec<Spectrum> {
-        let step = (self.len() / 16).max(1);
         let outside = match self.quantity {
             Quantity::Radiance => Outside::Zero,
             Quantity::Reflectance => Outside::Hold,
@@ -156,7 +156,7 @@ impl Bands {
             }
             Spectrum::from_samples(&samples, outside).ok()
         };
-        (0..self.len()).step_by(step).filter_map(spectrum).collect()
+        spread(self.len(), 16).filter_map(spectrum).collect()
     }
 
     /// The mean over the bands of each texel.

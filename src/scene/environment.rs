@@ -7,7 +7,7 @@ mod table;
 
 use super::bands::{self, Bands};
 use super::bvh::prefetch;
-use super::texture::Texel;
+use super::texture::{Texel, spread};
 use crate::math::elementary::atan2;
 use crate::math::sampler::Octet;
 use crate::math::trig::sin_cos_turn;
@@ -336,8 +336,7 @@ impl Environment {
         if let Some(bands) = &self.bands {
             return bands.representatives();
         }
-        let step = (self.texels.len() / 16).max(1);
-        let texels = self.texels.iter().step_by(step);
+        let texels = spread(self.texels.len(), 16).map(|i| &self.texels[i]);
         texels.map(|t| Spectrum::Sigmoid { c: t.coefficients, scale: t.scale }.times(&self.illuminant)).collect()
     }
 }

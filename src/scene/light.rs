@@ -371,19 +371,13 @@ impl Light {
     /// scene.
     #[must_use]
     pub fn power(&self, objects: &[Object], radius: f64) -> f64 {
-        let mean = |t: &Texture| {
-            let all = t.representatives();
-            all.iter().map(Spectrum::luminance).sum::<f64>() / all.len() as f64
-        };
+        let mean = Texture::mean_luminance;
         match self {
             Light::Area { object, radiance, .. } => PI * objects[*object as usize].geometry.area() * mean(radiance),
             Light::AlongNormal { object, exitance } => objects[*object as usize].geometry.area() * mean(exitance),
             Light::Point { intensity, .. } => 4.0 * PI * intensity.luminance(),
             Light::Spot { intensity, beam, cutoff, slide, .. } => {
-                let slide = slide.as_ref().map_or(1.0, |slide| {
-                    let all = slide.texture.representatives();
-                    all.iter().map(Spectrum::luminance).sum::<f64>() / all.len() as f64
-                });
+                let slide = slide.as_ref().map_or(1.0, |slide| mean(&slide.texture));
                 TAU * one_minus_cos(0.5 * (beam + cutoff)) * intensity.luminance() * slide
             }
             Light::Directional { irradiance, .. } => PI * radius * radius * irradiance.luminance(),

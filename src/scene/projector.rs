@@ -115,9 +115,7 @@ impl Projector {
     /// Luminous power, film units times m²: that which falls on the screen.
     #[must_use]
     pub fn power(&self) -> f64 {
-        let all = self.irradiance.representatives();
-        let mean = all.iter().map(Spectrum::luminance).sum::<f64>() / all.len() as f64;
-        4.0 * (self.half.x * self.half.y).abs() * PI * f64::from(self.scale) * mean
+        4.0 * (self.half.x * self.half.y).abs() * PI * f64::from(self.scale) * self.irradiance.mean_luminance()
     }
 
     /// Spectra of its light.

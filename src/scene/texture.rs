@@ -4,6 +4,7 @@ use super::SurfacePoint;
 use super::bands::Bands;
 use super::mesh::attribute::AttributeTexture;
 use super::volume::Volume;
+use crate::math::sampler::GOLDEN;
 use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use crate::spectrum::{Lanes, Spectrum, upsample};
 use glam::{DAffine2, DVec2, DVec3, Vec3};
@@ -203,6 +204,11 @@ impl Texels {
         }
     }
 
+    /// One of the greatest factor.
+    fn brightest(&self) -> Option<&Texel> {
+        self.colours.iter().max_by(|a, b| a.scale.total_cmp(&b.scale))
+    }
+
     fn len(&self) -> usize {
         self.numbers.as_ref().map_or(self.colours.len(), |numbers| numbers.len())
     }
@@ -221,7 +227,27 @@ pub struct ImageTexture {
     pub bands: Option<Bands>,
 }
 
+/// Places of a texture that tell its mean luminance.
+pub(super) const PLACES: usize = 256;
+
+/// Some `count` of the numbers below `len`, all where there are no more: spread by the golden ratio, so that they are in no one column of
+/// a picture, whatever its width.
+pub(super) fn spread(len: usize, count: usize) -> impl Iterator<Item = usize> {
+    let few = len <= count;
+    let place = move |i: usize| match few {
+        true => i,
+        false => (((i as f64 + 0.5) * GOLDEN).fract() * len as f64) as usize,
+    };
+    (0..count.min(len)).map(place)
+}
+
 impl ImageTexture {
+    /// What a texel shows.
+    fn spectrum(&self, texel: &Texel) -> Spectrum {
+        let own = Spectrum::Sigmoid { c: texel.coefficients, scale: texel.scale };
+        self.illuminant.as_ref().map_or(own.clone(), |illuminant| own.times(illuminant))
+    }
+
     /// The spectrum at `uv`. Spectra are mixed, not coefficients.
     #[must_use]
     pub fn eval(&self, uv: DVec2, nm: Lanes) -> Lanes {
@@ -416,8 +442,26 @@ impl Texture {
         !matches!(self, Texture::Uniform(_))
     }
 
-    /// Spectra that stand for the texture where one is needed (choice of wavelengths, of lights):
-    /// each spectrum of a checkerboard, and some 16 texels of a picture.
+    /// The mean luminance, as far as some 256 places tell it, for the choice of lights. What the brightest texel of a picture gives is in
+    /// it by itself, so that none is black that shines.
+    #[must_use]
+    pub fn mean_luminance(&self) -> f64 {
+        let mean = |all: Vec<Spectrum>| all.iter().map(Spectrum::luminance).sum::<f64>() / all.len().max(1) as f64;
+        match self {
+            Texture::Image(image) if image.bands.is_none() => {
+                let count = image.texels.len();
+                let brightest = image.texels.brightest().map_or(0.0, |texel| image.spectrum(texel).luminance());
+                let texels = spread(count, PLACES).map(|i| image.spectrum(image.texels.at(i)));
+                mean(texels.collect()).max(brightest / count.max(1) as f64)
+            }
+            Texture::Attribute(attribute) => attribute.mean_luminance(),
+            Texture::Checkerboard { a, b, .. } => 0.5 * (a.mean_luminance() + b.mean_luminance()),
+            _ => mean(self.representatives()),
+        }
+    }
+
+    /// Spectra that stand for the texture where one is needed (choice of wavelengths):
+    /// each spectrum of a checkerboard, and some 16 texels of a picture with its brightest.
     #[must_use]
     pub fn representatives(&self) -> Vec<Spectrum> {
         match self {
@@ -427,15 +471,8 @@ impl Texture {
                 bands.representatives().into_iter().map(lit).collect()
             }
             Texture::Image(image) => {
-                let step = (image.texels.len() / 16).max(1);
-                (0..image.texels.len())
-                    .step_by(step)
-                    .map(|i| {
-                        let t = image.texels.at(i);
-                        let s = Spectrum::Sigmoid { c: t.coefficients, scale: t.scale };
-                        image.illuminant.as_ref().map_or(s.clone(), |i| s.times(i))
-                    })
-                    .collect()
+                let texels = spread(image.texels.len(), 16).map(|i| image.texels.at(i)).chain(image.texels.brightest());
+                texels.map(|texel| image.spectrum(texel)).collect()
             }
             Texture::Volume(volume) => volume.representatives(),
             Texture::Attribute(attribute) => attribute.representatives(),
@@ -462,6 +499,28 @@ mod tests {
             illuminant: None,
             bands: None,
         }
+    }
+
+    /// A black frame says nothing of what is within; of a picture that is black but for a texel the mean is that of the texel.
+    #[test]
+    fn the_mean_of_a_picture_is_not_that_of_a_column() {
+        let grey = |v: f64| Texel { coefficients: upsample::coefficients([v as f32; 3]), scale: 1.0 };
+        let mean = |value: &dyn Fn(usize, usize) -> f64| {
+            let texels = (0..64 * 64).map(|i| grey(value(i % 64, i / 64))).collect();
+            Texture::Image(ImageTexture {
+                texels: Texels::each(texels),
+                grid: Grid::new(64, 64),
+                ..board(Wrap::Clamp, Interpolation::Nearest)
+            })
+            .mean_luminance()
+        };
+        let whole = mean(&|_, _| 0.5);
+        let is_within = |x: usize| (1..63).contains(&x);
+        let framed = mean(&|x, y| if is_within(x) && is_within(y) { 0.5 } else { 0.0 });
+        // Of 256 places spread evenly 4 √256 / 64 or so are off at each side.
+        assert!((framed / whole - (62.0 / 64.0_f64).powi(2)).abs() < 0.03, "{framed} of {whole}");
+        let dot = mean(&|x, y| if (x, y) == (11, 50) { 0.5 } else { 0.0 });
+        assert!((dot / whole * 4096.0 - 1.0).abs() < 0.3 || dot > whole / 4096.0, "{dot} of {whole}");
     }
 
     fn at(image: &ImageTexture, u: f64, v: f64) -> f64 {

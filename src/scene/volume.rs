@@ -8,7 +8,7 @@
 //! largest channel, times that scale. Between voxels the sigmoids and the scales are interpolated
 //! each on its own, then multiplied (the convention of Mitsuba 3).
 
-use super::texture::Wrap;
+use super::texture::{Wrap, spread};
 use crate::math::Ray;
 use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
@@ -189,14 +189,15 @@ impl GridVolume {
     /// Spectra that stand for the grid where one is needed: those of some 16 voxels.
     #[must_use]
     pub fn representatives(&self) -> Vec<Spectrum> {
-        let step = (self.size.iter().product::<usize>() / 16).max(1);
-        match &self.values {
-            Voxels::Grey(values) => values.iter().step_by(step).map(|v| Spectrum::constant(f64::from(*v))).collect(),
-            Voxels::Raw(values) => values.iter().step_by(step).map(|v| Spectrum::constant(f64::from(v[1]))).collect(),
+        let of = |i: usize| match &self.values {
+            Voxels::Grey(values) => Spectrum::constant(f64::from(values[i])),
+            Voxels::Raw(values) => Spectrum::constant(f64::from(values[i][1])),
             Voxels::Coloured(values) => {
-                values.iter().step_by(step).map(|&[a, b, c, scale]| Spectrum::Sigmoid { c: [a, b, c], scale }).collect()
+                let [a, b, c, scale] = values[i];
+                Spectrum::Sigmoid { c: [a, b, c], scale }
             }
-        }
+        };
+        spread(self.size.iter().product(), 16).map(of).collect()
     }
 }
 

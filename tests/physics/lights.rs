@@ -356,3 +356,32 @@ fn a_wall_in_the_plane_of_the_camera_hides_no_caustic() {
     }
     walled.picture().mean().assert_agrees(&free.picture().mean(), 0.01);
 }
+
+/// The film follows the brightness of the lamps. A black frame about the picture of one, and a picture that is black but for one texel, were
+/// taken for lamps without light: every sample was then beyond what the film holds.
+#[test]
+fn a_lamp_may_have_a_black_frame() {
+    let mut framed = image::GrayImage::from_pixel(64, 64, image::Luma([180]));
+    let mut dot = image::GrayImage::new(64, 64);
+    for i in 0..64 {
+        [(i, 0), (i, 63), (0, i), (63, i)].into_iter().for_each(|(x, y)| framed.put_pixel(x, y, image::Luma([0])));
+    }
+    dot.put_pixel(20, 40, image::Luma([180]));
+    // sRGB decoded.
+    let grey = ((180.0 / 255.0 + 0.055) / 1.055_f64).powf(2.4);
+    for (picture, share) in [(framed, (62.0 / 64.0_f64).powi(2)), (dot, 1.0 / 4096.0)] {
+        let mut png = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
+        let scene = "camera: {origin: [0, 0, 5], target: [0, 0, 0], orthographic_height: 1}\nimage: {width: 8, height: 8}\n\
+                     render: {samples: 1024}\ntextures: {t: {image: {file: t.png, filter: nearest, illuminant: E}}}\n\
+                     shapes: [rectangle: {corner: [-0.5, -0.5, 0], edge_u: [1, 0, 0], edge_v: [0, 1, 0], emission: {texture: t}}]\n";
+        let seen = bench_with(scene, &[("t.png", png.get_ref())]).grey().picture();
+        let mean = seen.mean();
+        assert_eq!(seen.invalid, 0);
+        assert!(
+            (mean.mean - share * grey).abs() < 4.5 * mean.error + 2e-3 * share * grey,
+            "{mean:?} for {}",
+            share * grey
+        );
+    }
+}

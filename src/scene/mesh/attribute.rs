@@ -9,7 +9,7 @@
 //! green blue` are the attribute `vertex_color` or `face_color`; whole numbers there count from 0 to the
 //! greatest of their type. An attribute has one number or three; other properties are passed over.
 
-use crate::scene::texture::TexturePoint;
+use crate::scene::texture::{PLACES, TexturePoint, spread};
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
 use glam::DVec3;
 use std::sync::Arc;
@@ -101,16 +101,33 @@ impl AttributeTexture {
         self.weighted(at).into_iter().map(|(i, w)| value(i) * w).sum::<DVec3>() * self.scale
     }
 
-    /// Some 16 of the spectra, for the choice of wavelengths.
+    /// Some 16 of the spectra and the brightest, for the choice of wavelengths.
     #[must_use]
     pub fn representatives(&self) -> Vec<Spectrum> {
-        let field = &self.field;
-        let step = (field.values.len() / 16).max(1);
+        spread(self.field.values.len(), 16).chain(self.brightest()).map(|i| self.spectrum(i)).collect()
+    }
+
+    /// The mean luminance of what stands in the file, as [`Texture::mean_luminance`](crate::scene::texture::Texture::mean_luminance).
+    #[must_use]
+    pub fn mean_luminance(&self) -> f64 {
+        let count = self.field.values.len();
+        let of = |i: usize| self.spectrum(i).luminance();
+        let brightest = self.brightest().map_or(0.0, of);
+        (spread(count, PLACES).map(of).sum::<f64>() / count.clamp(1, PLACES) as f64)
+            .max(brightest / count.max(1) as f64)
+    }
+
+    fn brightest(&self) -> Option<usize> {
+        let value = |i: &usize| self.field.values[*i].iter().sum::<f32>();
+        (0..self.field.values.len()).max_by(|a, b| value(a).total_cmp(&value(b)))
+    }
+
+    fn spectrum(&self, i: usize) -> Spectrum {
         let scale = self.scale as f32;
-        if field.sigmoids.is_empty() {
-            return field.values.iter().step_by(step).map(|v| Spectrum::Constant(v[0] * scale)).collect();
+        match self.field.sigmoids.get(i) {
+            Some(&c) => Spectrum::Sigmoid { c, scale },
+            None => Spectrum::Constant(self.field.values[i][0] * scale),
         }
-        field.sigmoids.iter().step_by(step).map(|&c| Spectrum::Sigmoid { c, scale }).collect()
     }
 }
 
