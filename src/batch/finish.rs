@@ -491,7 +491,8 @@ fn band_errors(finish: &Finish, frame: &Frame, channels: Range<usize>) -> Vec<Ve
 #[must_use]
 pub fn spectral_path(path: &Path) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let number = stem.rsplit_once('.').filter(|(_, n)| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    let is_number = |n: &str| n.strip_prefix('-').unwrap_or(n).bytes().all(|b| b.is_ascii_digit());
+    let number = stem.rsplit_once('.').filter(|(_, n)| n.ends_with(|c: char| c.is_ascii_digit()) && is_number(n));
     path.with_file_name(match number {
         Some((name, number)) => format!("{name}.spectral.{number}.exr"),
         None => format!("{stem}.spectral.exr"),
@@ -561,4 +562,22 @@ fn pixel_hash(image: &Image) -> String {
         hasher.update(&bytes);
     }
     hasher.finalize().to_hex()[..32].to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_frames_stay_at_the_end() {
+        for (path, expected) in [
+            ("o/a.exr", "o/a.spectral.exr"),
+            ("o/a.0001.exr", "o/a.spectral.0001.exr"),
+            ("o/a.-001.exr", "o/a.spectral.-001.exr"),
+            ("o/a.-.exr", "o/a.-.spectral.exr"),
+            ("o/a.1-1.exr", "o/a.1-1.spectral.exr"),
+        ] {
+            assert_eq!(spectral_path(Path::new(path)), Path::new(expected));
+        }
+    }
 }

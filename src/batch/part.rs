@@ -449,7 +449,7 @@ impl<'a> Part<'a> {
                 return false;
             }
             // Whole blocks of the sampler.
-            let step = (SAMPLES_OF_A_STEP / window.pixels().max(1)).next_multiple_of(32) as u32;
+            let step = (SAMPLES_OF_A_STEP / window.pixels().max(1)).next_multiple_of(32).max(32) as u32;
             let mut at = start;
             TILE.with_borrow_mut(|slot| {
                 let buffer = slot.get_or_insert_with(|| TileBuffer::new(window));
@@ -471,7 +471,8 @@ impl<'a> Part<'a> {
     /// How samples are shared out, where each pixel has the `first` ones; none if there was a pause.
     fn decide(&self, first: u32, pause: &dyn Breaks) -> Option<&Allocation> {
         if self.allocation.get().is_none() {
-            let scale = adaptive::pilot(self.job, first, pause)?;
+            // A pause in its midst would cost all that it has seen.
+            let scale = adaptive::pilot(self.job, first, &Ending(pause))?;
             let allocation = adaptive::decide(self.job, first, &lock(&self.film), &scale);
             // Nobody else decides meanwhile.
             let _ = self.allocation.set(allocation);

@@ -125,7 +125,7 @@ impl Stop {
             }
         }
         if let (Some(time), [first]) = (self.time, milestones)
-            && first.elapsed > time.mul_f64(1.0 + f64::from(u8::from(first.samples > 1)) * 0.5)
+            && first.elapsed.as_secs_f64() > time.as_secs_f64() * if first.samples > 1 { 1.5 } else { 1.0 }
         {
             return Err(Error::Render(format!(
                 "stop.time: {time:?} is too short for {} samples of each pixel, which took {:.1?}; they are written",
@@ -317,6 +317,13 @@ mod tests {
         assert!(stop(3600).check(&known).unwrap_err().to_string().contains("was not reached with 65536 samples"));
         stop(66).check(&known).unwrap();
         Stop { samples_wanted: true, ..stop(3600) }.check(&known).unwrap();
+    }
+
+    /// However far away a time is.
+    #[test]
+    fn a_time_may_be_as_long_as_there_is() {
+        let stop = Stop { time: Some(Duration::MAX), ..FREE };
+        stop.check(&milestones(&[4], 1.0)).unwrap();
     }
 
     const FREE: Stop = Stop { error: None, time: None, samples_wanted: true, floor: 0.0 };

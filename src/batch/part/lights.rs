@@ -12,6 +12,7 @@ use crate::transport::photons::{PhotonMap, Photons};
 use crate::transport::plan::Integrator;
 use glam::DVec2;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Mutex;
 
@@ -66,19 +67,21 @@ impl Part<'_> {
         let wanted = photons.is_some();
         let own = self.own_paths();
         let known = lock(&self.lights).clone();
+        let mut more: BTreeMap<u32, Vec<Range<u64>>> = BTreeMap::new();
+        for (paths, sample) in known.more.into_iter().filter(|(_, sample)| samples.contains(sample)) {
+            more.entry(sample).or_default().push(paths);
+        }
         let mut units: Vec<(u32, Range<u64>, bool)> = Vec::new();
         for sample in samples.clone() {
-            let there: Vec<Range<u64>> = if sample < known.below {
-                vec![own.clone()]
-            } else {
-                known.more.iter().filter(|(_, s)| *s == sample).map(|(paths, _)| paths.clone()).collect()
-            };
+            let there: Vec<Range<u64>> =
+                if sample < known.below { vec![own.clone()] } else { more.remove(&sample).unwrap_or_default() };
             let cuts = pieces(paths, &own, &there).into_iter().map(|(unit, add)| (sample, unit, add));
             units.extend(cuts.filter(|(_, _, add)| *add || wanted));
         }
-        let trace = |(sample, unit, add): (u32, Range<u64>, bool)| {
+        let trace = |(number, (sample, unit, add)): (usize, (u32, Range<u64>, bool))| {
             let mut left = Photons::default();
-            if pause.wanted() {
+            // One is followed however soon the pauses come.
+            if pause.ending() || number > 0 && pause.wanted() {
                 return (left, None);
             }
             let replicate = sample % REPLICATES as u32;
@@ -98,7 +101,7 @@ impl Part<'_> {
             (left, Some((unit, sample, add)))
         };
         // In the order of the paths, whoever follows them.
-        let followed: Vec<_> = units.into_par_iter().map(trace).collect();
+        let followed: Vec<_> = units.into_par_iter().enumerate().map(trace).collect();
         let whole = followed.iter().all(|(_, unit)| unit.is_some());
         let mut known = lock(&self.lights);
         if whole {
