@@ -12,9 +12,12 @@ pub fn run(arguments: &MergeArguments) -> Result<i32> {
         Inputs::of(merge::files(&arguments.parts)?).spare([file])?;
         prepare_place(file)?;
     }
-    let (report, written) = merge::merge(&arguments.parts, &arguments.output, arguments.report.as_deref())?;
+    let (mut report, written) = merge::merge(&arguments.parts, &arguments.output, arguments.report.as_deref())?;
     if let Some(file) = &arguments.report {
-        write_json(file, &report)?;
+        // What went wrong with the picture is told all the same.
+        if let Err(e) = write_json(file, &report) {
+            report.unwritten = Some(e);
+        }
     }
     if !arguments.quiet {
         super::say(&table(&report));

@@ -48,13 +48,16 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     if let Some(file) = &arguments.report {
         prepare_place(file)?;
     }
-    let report = batch::render_batch(&arguments.scene.file, &overrides, &teller, &interrupts.stop)?;
+    let mut report = batch::render_batch(&arguments.scene.file, &overrides, &teller, &interrupts.stop)?;
     teller.finish();
     if let Some(gone) = overrides.keep.viewer.as_ref().and_then(|viewer| viewer.close()) {
         super::complain(&format!("warning: {gone}"));
     }
     if let Some(file) = arguments.report.as_ref().filter(|_| report.misplaced.is_none()) {
-        write_json(file, &report)?;
+        // What went wrong in a scene is told all the same.
+        if let Err(e) = write_json(file, &report) {
+            report.unwritten = Some(e);
+        }
     }
     if !arguments.quiet && style != ProgressStyle::Json {
         super::say(&table(&report));

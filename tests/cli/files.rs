@@ -1,6 +1,6 @@
 //! What is left on the disk: whole files or none, also where none can be written.
 
-use super::{SMALL, batch};
+use super::{BALL, Place, SMALL, batch};
 use std::process::Command;
 
 /// A place that cannot be written to is told at once: the scene would take minutes.
@@ -269,4 +269,24 @@ fn merge_refuses_names_of_other_pictures_as_render_does() {
         assert_eq!((ran.err.as_str(), ran.code), (message, 2));
         assert!(!place.path("pic.png").exists());
     }
+}
+
+/// What keeps the report from being written does not hide what keeps a scene from being rendered, which is graver.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_report_that_cannot_be_written_hides_nothing() {
+    let place = Place::of("scenes: [none.yaml]\n");
+    let ran = place.run(&["render", "scene.yaml", "-q", "--report", "/dev/full"]);
+    assert_eq!(ran.code, 3, "{}", ran.err);
+    assert!(ran.err.contains("none.yaml") && ran.err.contains("/dev/full"), "{}", ran.err);
+}
+
+/// Tiles of more pixels than a thread takes samples of before it looks up: of such a one a step had no sample.
+#[test]
+fn tiles_may_be_large() {
+    let place = Place::of(&format!("{SMALL}{BALL}"));
+    let wide = ["image.width=8224", "image.height=257", "render.tile=257", "integrator=none", "render.samples=1"];
+    let set: Vec<&str> = wide.iter().flat_map(|setting| ["--set", setting]).collect();
+    let ran = place.run(&[&["render", "scene.yaml", "-q", "--threads", "1"], &set[..]].concat());
+    assert_eq!(ran.code, 0, "{}", ran.err);
 }
