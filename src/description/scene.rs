@@ -1,6 +1,6 @@
 //! A scene as it is written, and the way back from a field to its line.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -198,15 +198,17 @@ impl SceneDescription {
         for (field, kind, groups, known) in all {
             let most = usize::from(u8::MAX) - 1;
             checker.require(groups.len() <= most, At::ROOT.key(field), "at most 254 names", groups.len());
-            let mut taken: Vec<&str> = Vec::new();
+            let mut taken: HashSet<&str> = HashSet::new();
+            let there: HashSet<&str> = known.iter().map(String::as_str).collect();
             for (group, names) in groups {
                 let field = At::ROOT.key(field);
                 let at = field.key(group);
                 check_channel(group, false, at, checker);
                 for (i, name) in names.iter().enumerate() {
-                    checker.known(at.index(i), kind, name, &known);
-                    checker.require(!taken.contains(&name.as_str()), at.index(i), "each name once", quote(name));
-                    taken.push(name);
+                    if !there.contains(name.as_str()) {
+                        checker.known(at.index(i), kind, name, &known);
+                    }
+                    checker.require(taken.insert(name), at.index(i), "each name once", quote(name));
                 }
             }
         }
