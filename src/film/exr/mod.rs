@@ -176,27 +176,29 @@ impl ExrImage {
     /// by it.
     #[must_use]
     pub fn content_hash(&self) -> String {
-        let plane = |data: &ChannelData| -> Vec<f32> {
+        // One at a time: there may be hundreds of them.
+        let plane = |data: &ChannelData| -> Vec<u8> {
+            let bytes = |x: f32| x.to_bits().to_le_bytes();
             match data {
-                ChannelData::F16(samples) => samples.iter().map(|x| x.to_f32()).collect(),
-                ChannelData::F32(samples) => samples.clone(),
-                ChannelData::U32(samples) => samples.iter().map(|x| *x as f32).collect(),
+                ChannelData::F16(samples) => samples.iter().flat_map(|x| bytes(x.to_f32())).collect(),
+                ChannelData::F32(samples) => samples.iter().flat_map(|x| bytes(*x)).collect(),
+                ChannelData::U32(samples) => samples.iter().flat_map(|x| bytes(*x as f32)).collect(),
             }
         };
-        let planes: Vec<Vec<f32>> = self.channels.iter().map(|(_, data)| plane(data)).collect();
-        content_hash(self.channels.iter().zip(&planes).map(|((name, _), plane)| (name.as_str(), plane.as_slice())))
+        content_hash(self.channels.iter().map(|(name, data)| (name.as_str(), data)), plane)
     }
 }
 
-/// [`ExrImage::content_hash`] of samples as they are read.
-fn content_hash<'a>(channels: impl Iterator<Item = (&'a str, &'a [f32])>) -> String {
-    let mut channels: Vec<(&str, &[f32])> = channels.collect();
+/// [`ExrImage::content_hash`] of channels whose samples are those `bytes`.
+fn content_hash<'a, T: ?Sized + 'a>(
+    channels: impl Iterator<Item = (&'a str, &'a T)>,
+    bytes: impl Fn(&T) -> Vec<u8>,
+) -> String {
+    let mut channels: Vec<(&str, &T)> = channels.collect();
     channels.sort_by_key(|channel| channel.0);
     let mut hasher = blake3::Hasher::new();
     for (name, plane) in channels {
-        hasher.update(name.as_bytes()).update(&[0]);
-        let bytes: Vec<u8> = plane.iter().flat_map(|x| x.to_bits().to_le_bytes()).collect();
-        hasher.update(&bytes);
+        hasher.update(name.as_bytes()).update(&[0]).update(&bytes(plane));
     }
     hasher.finalize().to_hex()[..32].to_owned()
 }

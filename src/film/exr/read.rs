@@ -83,7 +83,8 @@ impl ExrFile {
     #[must_use]
     pub fn content_hash(&self) -> String {
         let channels = self.parts.iter().flat_map(|part| &part.channels);
-        content_hash(channels.map(|(name, plane)| (name.as_str(), plane.as_slice())))
+        let bytes = |plane: &[f32]| plane.iter().flat_map(|x| x.to_bits().to_le_bytes()).collect();
+        content_hash(channels.map(|(name, plane)| (name.as_str(), plane.as_slice())), bytes)
     }
 }
 
