@@ -204,9 +204,12 @@ impl Texels {
         }
     }
 
-    /// One of the greatest factor.
+    /// The one with the most light at eight wavelengths.
     fn brightest(&self) -> Option<&Texel> {
-        self.colours.iter().max_by(|a, b| a.scale.total_cmp(&b.scale))
+        let nm = Lanes::from([410.0, 450.0, 490.0, 530.0, 560.0, 590.0, 620.0, 660.0]);
+        let light = |texel: &Texel| texel.scale * upsample::eval_sigmoid(texel.coefficients, nm).reduce_add();
+        let all = self.colours.iter().map(|texel| (light(texel), texel));
+        all.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, texel)| texel)
     }
 
     fn len(&self) -> usize {

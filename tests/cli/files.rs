@@ -275,7 +275,7 @@ fn merge_refuses_names_of_other_pictures_as_render_does() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_report_that_cannot_be_written_hides_nothing() {
-    let place = Place::of("scenes: [none.yaml]\n");
+    let place = Place::of("scenes: [{file: none.yaml}]\n");
     let ran = place.run(&["render", "scene.yaml", "-q", "--report", "/dev/full"]);
     assert_eq!(ran.code, 3, "{}", ran.err);
     assert!(ran.err.contains("none.yaml") && ran.err.contains("/dev/full"), "{}", ran.err);
