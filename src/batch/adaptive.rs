@@ -353,6 +353,7 @@ fn wishes_of_whole_cells(
     let one_of = (grid.cells() / CELLS).clamp(1, ONE_OF) as u64;
     let chosen = |cell: &usize| mix64(seed ^ mix64(*cell as u64)).is_multiple_of(one_of);
     let cells: Vec<usize> = (0..grid.cells()).filter(chosen).collect();
+    let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
     let of_cell = |cell: usize| -> Option<f64> {
         if pause.wanted() {
             return None;
@@ -363,18 +364,17 @@ fn wishes_of_whole_cells(
         render_unit(&job, 0..first, None, None, &mut tile);
         let mut film = Film::new(job.scene.camera.resolution, window).ok()?.with_layers(layout);
         film.merge_tile(&tile);
-        let pixels = means(&film, window.iter());
+        let pixels = means(&film, window, &rgb_from_xyz);
         let variance = 0.5 * (variance(&pixels, 0, floor) + variance(&pixels, 1, floor));
         Some(wish(variance, costs[cell]))
     };
     cells.into_par_iter().map(of_cell).collect()
 }
 
-/// The means of the replicates of those of `pixels` that lie in `film`.
-fn means(film: &Film, pixels: impl Iterator<Item = [i32; 2]>) -> Vec<[[f64; 3]; REPLICATES]> {
-    let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
+/// The means of the replicates of the `pixels` of `film`, which holds them all.
+fn means(film: &Film, pixels: Window, rgb_from_xyz: &[[f64; 3]; 3]) -> Vec<[[f64; 3]; REPLICATES]> {
     let window = film.window();
-    pixels.filter_map(|pixel| replicate_means(film, window.index(pixel)?, &rgb_from_xyz)).collect()
+    pixels.iter().filter_map(|pixel| replicate_means(film, window.index(pixel)?, rgb_from_xyz)).collect()
 }
 
 /// Share of a cell up to a factor that all have in common.
@@ -385,12 +385,13 @@ fn wish(variance: f64, cost: f64) -> f64 {
 /// Shares out the samples of the picture among the cells of `film`, the rows of a part, whose pixels have `first` samples each.
 #[must_use]
 pub fn decide(job: &FrameJob, first: u32, film: &Film, scale: &Scale) -> Allocation {
+    let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
     let grid = Grid::of(film.window());
     // A part has all columns, and some rows.
     let offset = (grid.first[1] - Grid::of(job.window).first[1]) as usize * grid.columns;
     let of_cell = |cell: usize| -> [i16; HALVES] {
         let cost = scale.costs[offset + cell];
-        let pixels = means(film, grid.pixels(cell).iter());
+        let pixels = means(film, grid.pixels(cell), &rgb_from_xyz);
         [1, 0].map(|other| {
             let share = (scale.shares * wish(variance(&pixels, other, scale.floor), cost)).clamp(LEAST, MOST);
             (libm::log2(share) * STEPS).round() as i16

@@ -249,11 +249,18 @@ impl Report {
         if !output::directory_of(file).is_dir() {
             return;
         }
-        match output::write_json(file, self) {
-            Ok(()) => self.file = Some(file.to_path_buf()),
-            // The pictures are there; a report that cannot be written is a failure of its own.
-            Err(e) => self.unwritten = Some(e),
+        if self.copy_to(file) {
+            self.file = Some(file.to_path_buf());
         }
+    }
+
+    /// Writes it to a further place. Whether that went well: the pictures are there, and a report that cannot be written is a failure of
+    /// its own, which hides none of theirs.
+    pub fn copy_to(&mut self, file: &Path) -> bool {
+        let written = output::write_json(file, self);
+        let is_there = written.is_ok();
+        self.unwritten = written.err().or(self.unwritten.take());
+        is_there
     }
 }
 

@@ -4,7 +4,7 @@ use super::MergeArguments;
 use super::render::table;
 use crate::batch::merge;
 use crate::error::Result;
-use crate::film::output::{Inputs, prepare_place, write_json};
+use crate::film::output::{Inputs, prepare_place};
 
 /// Merges, and prints the table of the picture.
 pub fn run(arguments: &MergeArguments) -> Result<i32> {
@@ -14,10 +14,7 @@ pub fn run(arguments: &MergeArguments) -> Result<i32> {
     }
     let (mut report, written) = merge::merge(&arguments.parts, &arguments.output, arguments.report.as_deref())?;
     if let Some(file) = &arguments.report {
-        // What went wrong with the picture is told all the same.
-        if let Err(e) = write_json(file, &report) {
-            report.unwritten = Some(e);
-        }
+        report.copy_to(file);
     }
     if !arguments.quiet {
         super::say(&table(&report));

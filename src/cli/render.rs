@@ -8,7 +8,7 @@ use crate::batch;
 use crate::batch::report::{Report, SceneReport, Status};
 use crate::batch::tev::Viewer;
 use crate::error::Result;
-use crate::film::output::{prepare_place, write_json};
+use crate::film::output::prepare_place;
 use std::fmt::Write;
 use std::sync::Arc;
 
@@ -54,10 +54,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
         super::complain(&format!("warning: {gone}"));
     }
     if let Some(file) = arguments.report.as_ref().filter(|_| report.misplaced.is_none()) {
-        // What went wrong in a scene is told all the same.
-        if let Err(e) = write_json(file, &report) {
-            report.unwritten = Some(e);
-        }
+        report.copy_to(file);
     }
     if !arguments.quiet && style != ProgressStyle::Json {
         super::say(&table(&report));

@@ -231,7 +231,7 @@ pub struct ImageTexture {
 }
 
 /// Places of a texture that tell its mean luminance.
-pub(super) const PLACES: usize = 256;
+const PLACES: usize = 256;
 
 /// Some `count` of the numbers below `len`, all where there are no more: spread by the golden ratio, so that they are in no one column of
 /// a picture, whatever its width.
@@ -242,6 +242,12 @@ pub(super) fn spread(len: usize, count: usize) -> impl Iterator<Item = usize> {
         false => (((i as f64 + 0.5) * GOLDEN).fract() * len as f64) as usize,
     };
     (0..count.min(len)).map(place)
+}
+
+/// The mean luminance of `count` spectra, as far as [`PLACES`] of them tell it, and no less than what the `brightest` gives by itself.
+pub(super) fn mean_luminance(count: usize, brightest: Option<Spectrum>, at: impl Fn(usize) -> Spectrum) -> f64 {
+    let told = spread(count, PLACES).map(|i| at(i).luminance()).sum::<f64>() / count.clamp(1, PLACES) as f64;
+    told.max(brightest.map_or(0.0, |spectrum| spectrum.luminance()) / count.max(1) as f64)
 }
 
 impl ImageTexture {
@@ -449,17 +455,17 @@ impl Texture {
     /// it by itself, so that none is black that shines.
     #[must_use]
     pub fn mean_luminance(&self) -> f64 {
-        let mean = |all: Vec<Spectrum>| all.iter().map(Spectrum::luminance).sum::<f64>() / all.len().max(1) as f64;
         match self {
             Texture::Image(image) if image.bands.is_none() => {
-                let count = image.texels.len();
-                let brightest = image.texels.brightest().map_or(0.0, |texel| image.spectrum(texel).luminance());
-                let texels = spread(count, PLACES).map(|i| image.spectrum(image.texels.at(i)));
-                mean(texels.collect()).max(brightest / count.max(1) as f64)
+                let brightest = image.texels.brightest().map(|texel| image.spectrum(texel));
+                mean_luminance(image.texels.len(), brightest, |i| image.spectrum(image.texels.at(i)))
             }
             Texture::Attribute(attribute) => attribute.mean_luminance(),
             Texture::Checkerboard { a, b, .. } => 0.5 * (a.mean_luminance() + b.mean_luminance()),
-            _ => mean(self.representatives()),
+            _ => {
+                let all = self.representatives();
+                all.iter().map(Spectrum::luminance).sum::<f64>() / all.len().max(1) as f64
+            }
         }
     }
 

@@ -103,13 +103,13 @@ impl Import<'_> {
         let place = bag.place("to_world");
         fields.add("position", numbers(place, &to_world.transform_point3(DVec3::ZERO).to_array()));
         fields.add("direction", numbers(place, &to_world.transform_vector3(DVec3::Z).to_array()));
-        if let Some(cutoff) = bag.float("cutoff_angle")? {
+        let cutoff = bag.float("cutoff_angle")?;
+        if let Some(cutoff) = cutoff {
             fields.add("cutoff_deg", number(bag.place("cutoff_angle"), cutoff));
         }
         if let Some(beam) = bag.float("beam_width")? {
             // As in Mitsuba, where what is full within the beam ends at the cutoff.
-            let cutoff = bag.float("cutoff_angle")?.unwrap_or(20.0);
-            fields.add("beam_deg", number(bag.place("beam_width"), beam.min(cutoff)));
+            fields.add("beam_deg", number(bag.place("beam_width"), beam.min(cutoff.unwrap_or(20.0))));
         }
         let intensity = self.spectrum(bag, "intensity", Role::Emission)?.unwrap_or_else(|| one(bag));
         fields.add("intensity", intensity);

@@ -9,7 +9,7 @@
 //! green blue` are the attribute `vertex_color` or `face_color`; whole numbers there count from 0 to the
 //! greatest of their type. An attribute has one number or three; other properties are passed over.
 
-use crate::scene::texture::{PLACES, TexturePoint, spread};
+use crate::scene::texture::{TexturePoint, mean_luminance, spread};
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
 use glam::DVec3;
 use std::sync::Arc;
@@ -110,11 +110,8 @@ impl AttributeTexture {
     /// The mean luminance of what stands in the file, as [`Texture::mean_luminance`](crate::scene::texture::Texture::mean_luminance).
     #[must_use]
     pub fn mean_luminance(&self) -> f64 {
-        let count = self.field.values.len();
-        let of = |i: usize| self.spectrum(i).luminance();
-        let brightest = self.brightest().map_or(0.0, of);
-        (spread(count, PLACES).map(of).sum::<f64>() / count.clamp(1, PLACES) as f64)
-            .max(brightest / count.max(1) as f64)
+        let brightest = self.brightest().map(|i| self.spectrum(i));
+        mean_luminance(self.field.values.len(), brightest, |i| self.spectrum(i))
     }
 
     fn brightest(&self) -> Option<usize> {

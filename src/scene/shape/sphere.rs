@@ -193,12 +193,12 @@ impl Sphere {
         let direction = frame.to_world(local);
         // Near root of t² − 2 t d cos θ + (d² − r²) = 0 in the form without cancellation.
         let foot = cap.distance * local.z;
-        let side = cap.distance * (local.x * local.x + local.y * local.y).sqrt();
+        let sine = (local.x * local.x + local.y * local.y).sqrt();
+        let side = cap.distance * sine;
         let half = ((self.radius - side) * (self.radius + side)).max(0.0).sqrt();
         let distance = cap.power / (foot + half);
         // From the middle to there, across the way and along it: without cancellation, however small the sphere.
         let across = DVec2::new(local.x, local.y) * distance;
-        let sine = (local.x * local.x + local.y * local.y).sqrt();
         let along = -(side * sine + half * local.z);
         let normal = frame.to_world(DVec3::new(across.x, across.y, along)).normalize_or(-cap.axis);
         Some(TowardSample {
