@@ -180,7 +180,9 @@ fn of_yaml(root: &Node) -> std::result::Result<OpticalData, Fault> {
             if data.index.is_some() || tables.n.is_some() {
                 return Err(told(kind_node.place, &at("type"), "expected one formula or table of n, found a second"));
             }
-            let (index, note) = formula(number, kind_node, field("coefficients")?, field("wavelength_range")?, &at)?;
+            // Older editions of the database call it `range`.
+            let range = field("wavelength_range").or_else(|missing| entry.get("range").ok_or(missing))?;
+            let (index, note) = formula(number, kind_node, field("coefficients")?, range, &at)?;
             (data.index, data.note) = (Some(index), note);
             continue;
         }
@@ -399,6 +401,8 @@ mod tests {
         assert!(
             bad("    wavelength_range: 0.3 2.5\n", "").contains("DATA[0]: expected the field \"wavelength_range\"")
         );
+        let older = read("a.yml", &BK7.replace("wavelength_range", "range")).unwrap();
+        assert_eq!(older, read("a.yml", BK7).unwrap());
         assert_eq!(
             read("a.csv", "0.3,1.5\n").unwrap_err(),
             "a.csv: line 1, column 1: expected a heading wl,n or wl,k or wl,n,k, found \"0.3,1.5\""

@@ -138,25 +138,39 @@ impl Bands {
         [self.nm[0] - half(0), self.nm[n - 1] + half(n - 2)]
     }
 
-    /// Some 16 spectra, for the choice of wavelengths.
+    /// Some 16 of the spectra and the brightest, for the choice of wavelengths.
     #[must_use]
     pub fn representatives(&self) -> Vec<Spectrum> {
+        spread(self.len(), 16).chain(self.brightest()).map(|i| self.spectrum(i)).collect()
+    }
+
+    /// The texel with the most over all bands.
+    #[must_use]
+    pub fn brightest(&self) -> Option<usize> {
+        let sum = |i: &usize| self.texel(*i).iter().sum::<f32>();
+        (0..self.len()).max_by(|a, b| sum(a).total_cmp(&sum(b)))
+    }
+
+    /// The spectrum of the texel `i`, for choices; of one level where wavelengths are no table, as when f32 does not tell two apart.
+    ///
+    /// # Panics
+    /// If there is no such texel.
+    #[must_use]
+    pub fn spectrum(&self, i: usize) -> Spectrum {
+        let values = self.texel(i).iter().map(|x| f64::from(*x));
+        let mut samples: Vec<(f64, f64)> = self.nm.iter().map(|nm| f64::from(*nm)).zip(values).collect();
         let outside = match self.quantity {
-            Quantity::Radiance => Outside::Zero,
             Quantity::Reflectance => Outside::Hold,
-        };
-        let [low, high] = self.reach().map(f64::from);
-        let spectrum = |i: usize| {
-            let values = self.texel(i).iter().map(|x| f64::from(*x));
-            let mut samples: Vec<(f64, f64)> = self.nm.iter().map(|nm| f64::from(*nm)).zip(values).collect();
-            if outside == Outside::Zero {
+            Quantity::Radiance => {
+                let [low, high] = self.reach().map(f64::from);
                 let (first, last) = (samples[0].1, samples[samples.len() - 1].1);
                 samples.insert(0, (low, first));
                 samples.push((high, last));
+                Outside::Zero
             }
-            Spectrum::from_samples(&samples, outside).ok()
         };
-        spread(self.len(), 16).filter_map(spectrum).collect()
+        let mean = samples.iter().map(|(_, x)| x).sum::<f64>() / samples.len() as f64;
+        Spectrum::from_samples(&samples, outside).unwrap_or_else(|_| Spectrum::constant(mean))
     }
 
     /// The mean over the bands of each texel.

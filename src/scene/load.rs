@@ -128,7 +128,7 @@ pub struct Counted {
 pub fn open(path: &Path) -> Result<Decoded> {
     use image::ColorType::{L8, La8, Rgb8, Rgba8};
     if extension(path) == "exr" {
-        return exr::read_exr(path).map(Decoded::Exr);
+        return exr::read_exr(path).map(with_picture_first).map(Decoded::Exr);
     }
     let decoded = decode(path)?;
     if !matches!(decoded.color(), L8 | La8 | Rgb8 | Rgba8) {
@@ -136,6 +136,41 @@ pub fn open(path: &Path) -> Result<Decoded> {
     }
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
     Ok(Decoded::Bytes { rgb: decoded.into_rgb8().into_raw(), width, height, counted: None })
+}
+
+/// The names of colours, and those that some writers give them.
+const COLOURS: [[&str; 3]; 2] = [["R", "G", "B"], ["r", "g", "b"]];
+
+/// The file with the part first that has a picture. Where colours are in layers alone, they are those of the one layer that
+/// has red, green and blue, or among several those of Blender's `Combined`.
+fn with_picture_first(mut file: exr::ExrFile) -> exr::ExrFile {
+    let is_band = |(name, _): &(String, Vec<f32>)| name.starts_with("S0.") || name.starts_with("T.");
+    let has = |part: &exr::ExrPart, before: &str, names: [&str; 3]| {
+        names.iter().all(|name| part.channel(&format!("{before}{name}")).is_some())
+    };
+    let in_colour = |part: &exr::ExrPart| has(part, "", COLOURS[0]) || part.channels.iter().any(is_band);
+    let of = |is_one: &dyn Fn(&exr::ExrPart) -> bool| file.parts.iter().position(is_one);
+    let mut first = of(&in_colour).or_else(|| of(&|part| part.channel("Y").is_some()));
+    if first.is_none() {
+        let names =
+            file.parts.iter().enumerate().flat_map(|(i, part)| part.channels.iter().map(move |(name, _)| (i, name)));
+        let layers = names.flat_map(|(i, name)| COLOURS.map(|colours| (i, name.strip_suffix(colours[0]), colours)));
+        let whole = |(i, before, colours): (usize, Option<&str>, [&'static str; 3])| {
+            before.filter(|before| has(&file.parts[i], before, colours)).map(|before| (i, before.to_owned(), colours))
+        };
+        let layers: Vec<_> = layers.filter_map(whole).collect();
+        let combined = layers.iter().find(|(_, before, _)| before.ends_with("Combined."));
+        if let Some((i, before, colours)) = combined.or(layers.first().filter(|_| layers.len() == 1)) {
+            for (name, _) in &mut file.parts[*i].channels {
+                if let Some(k) = colours.iter().position(|colour| *name == format!("{before}{colour}")) {
+                    COLOURS[0][k].clone_into(name);
+                }
+            }
+            first = Some(*i);
+        }
+    }
+    file.parts[..first.map_or(0, |i| i + 1)].rotate_right(usize::from(first.is_some()));
+    file
 }
 
 fn extension(path: &Path) -> String {
@@ -267,7 +302,7 @@ fn exr_colours(path: &Path, file: &exr::ExrFile) -> Result<Vec<[f32; 3]>> {
     if let (Some(grey), true) = (part.channel("Y"), is_grey) {
         return Ok(grey.iter().map(|&y| [y; 3]).collect());
     }
-    let missing = ["R", "G", "B"].into_iter().find(|name| part.channel(name).is_none()).unwrap_or("R");
+    let missing = COLOURS[0].into_iter().find(|name| part.channel(name).is_none()).unwrap_or("R");
     Err(Error::input(path, format!("expected channels R, G, B, or X, Y, Z, or Y alone; found no {missing}")))
 }
 
@@ -415,27 +450,32 @@ pub fn data_image(path: &Path, decoded: Decoded, raw: bool) -> Result<(DataImage
 }
 
 /// Reads a curve: two columns, wavelength in nm and value, separated by commas, semicolons or
-/// blanks; what follows a `#` and a heading are passed over. In a `.spd` anything may follow the two columns, as in
-/// Mitsuba.
+/// blanks; what follows a `#` and a heading are passed over. In a `.spd` anything may follow two columns that are apart
+/// by blanks, as in Mitsuba.
 ///
 /// # Errors
 /// In words, with the line.
 pub fn samples(path: &Path) -> std::result::Result<Vec<(f64, f64)>, String> {
     let bytes = crate::input::read(path).map_err(|e| words(&e))?;
-    let text =
-        std::str::from_utf8(crate::input::without_mark(&bytes)).map_err(|_| "expected text, found other bytes")?;
     let has_comments = extension(path) == "spd";
+    let number = |word: &str| word.parse().ok().filter(|x: &f64| x.is_finite());
     let mut samples = Vec::new();
-    for (i, line) in text.lines().enumerate() {
-        let line = line.split('#').next().unwrap_or_default().trim();
+    for (i, line) in crate::input::without_mark(&bytes).split(|&b| b == b'\n').enumerate() {
+        let told = line.split(|&b| b == b'#').next().unwrap_or_default();
+        let told =
+            std::str::from_utf8(told).map_err(|_| format!("line {}: expected text, found other bytes", i + 1))?;
+        let line = told.trim();
         if line.is_empty() {
             continue;
         }
-        let fields: Vec<&str> =
-            line.split(|c: char| c == ',' || c == ';' || c.is_whitespace()).filter(|f| !f.is_empty()).collect();
-        let numbers: Vec<Option<f64>> = fields.iter().map(|f| f.parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        let fields = line.split(|c: char| c == ',' || c == ';' || c.is_whitespace()).filter(|f| !f.is_empty());
+        let numbers: Vec<Option<f64>> = fields.map(number).collect();
+        // A comma in the second word is that of a decimal fraction, and what comes after it is no comment.
+        let has_columns = || line.split_whitespace().take(2).all(|word| number(word).is_some());
         match numbers.as_slice() {
-            [Some(nm), Some(value), rest @ ..] if rest.is_empty() || has_comments => samples.push((*nm, *value)),
+            [Some(nm), Some(value), rest @ ..] if rest.is_empty() || has_comments && has_columns() => {
+                samples.push((*nm, *value));
+            }
             // A heading may stand before the first numbers; a wavelength that is none is not one.
             _ if samples.is_empty() && numbers.iter().take(2).all(Option::is_none) => {}
             _ => return Err(format!("line {}: expected a wavelength and a value, found \"{line}\"", i + 1)),
@@ -467,9 +507,49 @@ mod tests {
         assert_eq!(samples(&path).unwrap_err(), told);
         std::fs::write(dir.path().join("curve.spd"), wide).unwrap();
         assert_eq!(samples(&dir.path().join("curve.spd")).unwrap(), [(400.0, 0.1), (500.0, 0.2)]);
+        for commas in ["400 0,31", "400,0 0,31", "400 0,31 lit by day"] {
+            std::fs::write(dir.path().join("curve.spd"), commas).unwrap();
+            let told = format!("line 1: expected a wavelength and a value, found \"{commas}\"");
+            assert_eq!(samples(&dir.path().join("curve.spd")).unwrap_err(), told);
+        }
         std::fs::write(&path, "400 0.1\n500 zwei\n").unwrap();
         assert_eq!(samples(&path).unwrap_err(), "line 2: expected a wavelength and a value, found \"500 zwei\"");
+        std::fs::write(&path, b"# 20 \xb0C\n400 0.1\n500 0.2\n").unwrap();
+        assert_eq!(samples(&path).unwrap(), [(400.0, 0.1), (500.0, 0.2)]);
+        std::fs::write(&path, b"400 0.1\n500 0.2\xb0\n").unwrap();
+        assert_eq!(samples(&path).unwrap_err(), "line 2: expected text, found other bytes");
         assert_eq!(samples(&dir.path().join("none")).unwrap_err(), "expected a file, found none");
+    }
+
+    /// Parts of one pixel each: the value of red in what is taken for the picture, and whether there is one.
+    #[test]
+    fn the_picture_of_a_file_of_layers_is_found() {
+        let part = |channels: &[(&str, f32)]| exr::ExrPart {
+            name: None,
+            window: Window::full(1, 1),
+            channels: channels.iter().map(|(name, value)| ((*name).to_owned(), vec![*value])).collect(),
+            integers: Vec::new(),
+            texts: Vec::new(),
+        };
+        let red = |parts: Vec<exr::ExrPart>| {
+            let file = exr::ExrFile { display: Window::full(1, 1), chromaticities: None, parts };
+            let file = with_picture_first(file);
+            exr_colours(Path::new("a.exr"), &file).ok().map(|pixels| pixels[0][0])
+        };
+        let layer = |before: &str, value: f32| {
+            let names = ["R", "G", "B"].map(|c| format!("{before}{c}"));
+            part(&names.each_ref().map(|name| (name.as_str(), value)))
+        };
+        let depth = || part(&[("Z", 9.0)]);
+        assert_eq!(red(vec![layer("", 1.0), layer("", 2.0)]), Some(1.0));
+        assert_eq!(red(vec![depth(), layer("", 2.0)]), Some(2.0));
+        assert_eq!(red(vec![part(&[("Y", 3.0)]), layer("", 2.0)]), Some(2.0));
+        assert_eq!(red(vec![depth(), part(&[("Y", 3.0)])]), Some(3.0));
+        assert_eq!(red(vec![part(&[("b", 6.0), ("g", 5.0), ("r", 4.0)])]), Some(4.0));
+        assert_eq!(red(vec![depth(), layer("sky.", 2.0)]), Some(2.0));
+        assert_eq!(red(vec![layer("sky.", 2.0), layer("sun.", 3.0)]), None);
+        assert_eq!(red(vec![layer("V.DiffCol.", 2.0), depth(), layer("V.Combined.", 3.0)]), Some(3.0));
+        assert_eq!(red(vec![depth()]), None);
     }
 
     /// One of 2 x 1 pixels in four bytes each: 0.5 and, half as bright, 0.25, under both signatures.

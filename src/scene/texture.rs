@@ -253,7 +253,11 @@ pub(super) fn mean_luminance(count: usize, brightest: Option<Spectrum>, at: impl
 impl ImageTexture {
     /// What a texel shows.
     fn spectrum(&self, texel: &Texel) -> Spectrum {
-        let own = Spectrum::Sigmoid { c: texel.coefficients, scale: texel.scale };
+        self.lit(Spectrum::Sigmoid { c: texel.coefficients, scale: texel.scale })
+    }
+
+    /// What a spectrum of the picture is under its illuminant.
+    fn lit(&self, own: Spectrum) -> Spectrum {
         self.illuminant.as_ref().map_or(own.clone(), |illuminant| own.times(illuminant))
     }
 
@@ -456,30 +460,33 @@ impl Texture {
     #[must_use]
     pub fn mean_luminance(&self) -> f64 {
         match self {
-            Texture::Image(image) if image.bands.is_none() => {
-                let brightest = image.texels.brightest().map(|texel| image.spectrum(texel));
-                mean_luminance(image.texels.len(), brightest, |i| image.spectrum(image.texels.at(i)))
-            }
+            Texture::Uniform(spectrum) => spectrum.luminance(),
+            Texture::Image(image) => match &image.bands {
+                None => {
+                    let brightest = image.texels.brightest().map(|texel| image.spectrum(texel));
+                    mean_luminance(image.texels.len(), brightest, |i| image.spectrum(image.texels.at(i)))
+                }
+                Some(bands) => {
+                    let at = |i| image.lit(bands.spectrum(i));
+                    mean_luminance(bands.len(), bands.brightest().map(at), at)
+                }
+            },
+            Texture::Volume(volume) => volume.mean_luminance(),
             Texture::Attribute(attribute) => attribute.mean_luminance(),
             Texture::Checkerboard { a, b, .. } => 0.5 * (a.mean_luminance() + b.mean_luminance()),
-            _ => {
-                let all = self.representatives();
-                all.iter().map(Spectrum::luminance).sum::<f64>() / all.len().max(1) as f64
-            }
         }
     }
 
     /// Spectra that stand for the texture where one is needed (choice of wavelengths):
-    /// each spectrum of a checkerboard, and some 16 texels of a picture with its brightest.
+    /// each spectrum of a checkerboard, and some 16 texels of a picture or voxels of a volume with the brightest.
     #[must_use]
     pub fn representatives(&self) -> Vec<Spectrum> {
         match self {
             Texture::Uniform(spectrum) => vec![spectrum.clone()],
-            Texture::Image(ImageTexture { bands: Some(bands), illuminant, .. }) => {
-                let lit = |s: Spectrum| illuminant.as_ref().map_or(s.clone(), |i| s.times(i));
-                bands.representatives().into_iter().map(lit).collect()
-            }
             Texture::Image(image) => {
+                if let Some(bands) = &image.bands {
+                    return bands.representatives().into_iter().map(|spectrum| image.lit(spectrum)).collect();
+                }
                 let texels = spread(image.texels.len(), 16).map(|i| image.texels.at(i)).chain(image.texels.brightest());
                 texels.map(|texel| image.spectrum(texel)).collect()
             }
@@ -530,6 +537,30 @@ mod tests {
         assert!((framed / whole - (62.0 / 64.0_f64).powi(2)).abs() < 0.03, "{framed} of {whole}");
         let dot = mean(&|x, y| if (x, y) == (11, 50) { 0.5 } else { 0.0 });
         assert!((dot / whole * 4096.0 - 1.0).abs() < 0.3 || dot > whole / 4096.0, "{dot} of {whole}");
+    }
+
+    /// One of 4096 texels has all the light, in two bands: whichever it is, the mean is told no lower than that of even light.
+    #[test]
+    fn one_texel_of_measured_light_counts() {
+        let picture = |light: &dyn Fn(usize) -> f32| {
+            let plane: Vec<f32> = (0..4096).map(light).collect();
+            let part = crate::film::exr::ExrPart {
+                name: None,
+                window: crate::film::Window::full(64, 64),
+                channels: ["S0.500nm", "S0.600nm"].map(|band| (band.to_owned(), plane.clone())).into(),
+                integers: Vec::new(),
+                texts: Vec::new(),
+            };
+            let bands = Bands::of(std::path::Path::new("a.exr"), &part).unwrap();
+            assert!(bands.is_some());
+            Texture::Image(ImageTexture { bands, ..board(Wrap::Clamp, Interpolation::Nearest) })
+        };
+        let even = picture(&|_| 1.0).mean_luminance();
+        for lit in (0..4096).step_by(13) {
+            let dot = picture(&|i| if i == lit { 4096.0 } else { 0.0 });
+            assert!(dot.mean_luminance() > even * (1.0 - 1e-6), "{lit}");
+            assert!(dot.representatives().iter().any(|spectrum| spectrum.luminance() > 0.0), "{lit}");
+        }
     }
 
     fn at(image: &ImageTexture, u: f64, v: f64) -> f64 {

@@ -8,7 +8,7 @@
 //! largest channel, times that scale. Between voxels the sigmoids and the scales are interpolated
 //! each on its own, then multiplied (the convention of Mitsuba 3).
 
-use super::texture::{Wrap, spread};
+use super::texture::{Wrap, mean_luminance, spread};
 use crate::math::Ray;
 use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
@@ -186,18 +186,29 @@ impl GridVolume {
         }
     }
 
-    /// Spectra that stand for the grid where one is needed: those of some 16 voxels.
-    #[must_use]
-    pub fn representatives(&self) -> Vec<Spectrum> {
-        let of = |i: usize| match &self.values {
+    fn spectrum(&self, i: usize) -> Spectrum {
+        match &self.values {
             Voxels::Grey(values) => Spectrum::constant(f64::from(values[i])),
             Voxels::Raw(values) => Spectrum::constant(f64::from(values[i][1])),
             Voxels::Coloured(values) => {
                 let [a, b, c, scale] = values[i];
                 Spectrum::Sigmoid { c: [a, b, c], scale }
             }
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.size.iter().product()
+    }
+
+    /// The voxel with the most light, of coloured ones that of the largest scale.
+    fn brightest(&self) -> Option<usize> {
+        let light = |i: usize| match &self.values {
+            Voxels::Grey(values) => values[i],
+            Voxels::Raw(values) => values[i][1],
+            Voxels::Coloured(values) => values[i][3],
         };
-        spread(self.size.iter().product(), 16).map(of).collect()
+        (0..self.len()).max_by(|&a, &b| light(a).total_cmp(&light(b)))
     }
 }
 
@@ -246,12 +257,23 @@ impl Volume {
         }
     }
 
-    /// Spectra that stand for the volume where one is needed.
+    /// Spectra that stand for the volume where one is needed: those of some 16 voxels and of the brightest.
     #[must_use]
     pub fn representatives(&self) -> Vec<Spectrum> {
         match self {
             Volume::Constant { value, .. } => vec![value.clone()],
-            Volume::Grid(grid) => grid.representatives(),
+            Volume::Grid(grid) => spread(grid.len(), 16).chain(grid.brightest()).map(|i| grid.spectrum(i)).collect(),
+        }
+    }
+
+    /// The mean luminance, as that of a [`Texture`](super::texture::Texture::mean_luminance).
+    #[must_use]
+    pub fn mean_luminance(&self) -> f64 {
+        match self {
+            Volume::Constant { value, .. } => value.luminance(),
+            Volume::Grid(grid) => {
+                mean_luminance(grid.len(), grid.brightest().map(|i| grid.spectrum(i)), |i| grid.spectrum(i))
+            }
         }
     }
 

@@ -163,6 +163,7 @@ mod tests {
             ("f 1 2 -4\n", "line 4: expected a corner like 1, 1/2, 1//3 or 1/2/3, found \"-4\""),
             ("f 1/1 2/1 3/1\n", "line 4: face names texture coordinate 1, but the file has 0"),
             ("f 1 2\n", "line 4: expected a face of 3 or more corners, found 2"),
+            ("v 1.#INF 0 0\n", "line 4: expected a finite number, found \"1.#INF\""),
             ("f 1 2 x\n", "line 4: expected a corner like 1, 1/2, 1//3 or 1/2/3, found \"x\""),
             (
                 "f 1 2 99999999999999999999\n",

@@ -135,7 +135,7 @@ fn newline(text: &[u8]) -> usize {
     at + text[at..].iter().position(|&b| b == b'\n').unwrap_or(text.len() - at)
 }
 
-/// The words of a line, up to where a comment begins.
+/// The words of a line, up to one that begins with `#`.
 struct Words<'a> {
     rest: &'a [u8],
 }
@@ -152,7 +152,8 @@ impl<'a> Iterator for Words<'a> {
             self.rest = &[];
             return None;
         }
-        let end = rest.iter().position(|&b| b.is_ascii_whitespace() || b == b'#').unwrap_or(rest.len());
+        // A `#` within a word is no comment: Windows once wrote infinity as `1.#INF`.
+        let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
         self.rest = &rest[end..];
         Some(&rest[..end])
     }

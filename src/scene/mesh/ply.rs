@@ -123,7 +123,8 @@ fn header(bytes: &mut &[u8]) -> Result<Header, String> {
     let mut format = None;
     for number in 1.. {
         let end = bytes.iter().position(|&b| b == b'\n').ok_or("truncated: the header does not end")?;
-        let line = std::str::from_utf8(&bytes[..end]).map_err(|_| format!("line {number}: expected text"))?;
+        // Comments are in whatever encoding their writer had.
+        let line = String::from_utf8_lossy(&bytes[..end]);
         *bytes = &bytes[end + 1..];
         let words: Vec<&str> = line.split_whitespace().collect();
         let unknown = |word: &str| format!("line {number}: unknown type \"{word}\"");
