@@ -161,7 +161,7 @@ pub(super) fn prepare_scene(
     plan.techniques.extend(said);
     let shot = Shot { scene: &scene, plan: &plan, filter: &filter, seed, photons: None };
     if let Some(first) = first::decide(&shot, &census, &moments, planned, wishes) {
-        (plan.reuse, plan.shadow_rays) = (first.reuse, first.shadow_rays);
+        (plan.reuse, plan.shadow_rays, plan.asks_even_sky) = (first.reuse, first.shadow_rays, first.asks_even_sky);
         plan.techniques.extend(first.said);
     }
     if overrides.check_numerics && !moments.is_empty() {
@@ -246,6 +246,7 @@ fn wishes(description: &SceneDescription) -> Wishes {
         packets: wish(written.packets),
         merging: wish(written.merging),
         reuse: wish(written.reuse),
+        even_sky: wish(written.even_sky),
         shadow_rays: match written.shadow_rays {
             description::ShadowRays::Auto => None,
             description::ShadowRays::Number(count) => Some(count),

@@ -95,12 +95,13 @@
 //!   effects: auto                   # auto, all: the same picture
 //!   tile: 32                        # pixels
 //!   wavelengths: auto               # auto, visible, uniform
-//!   techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, splatting: auto, shadow_rays: auto, adaptive: auto}
+//!   techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, splatting: auto, shadow_rays: auto, even_sky: auto, adaptive: auto}
 //!                                   # auto, on, off: light of mirrors and glass traced from the lights, wavelengths that
 //!                                   # part followed together, photons collected where that light is seen in mirrors and
 //!                                   # through glass, indirect light shared by pixels near each other, samples that
 //!                                   # count for all pixels whose filters hold them; auto or 1 to 8 shadow rays from the
-//!                                   # first vertex of a path; more samples where the picture is noisier at the same mean
+//!                                   # first vertex of a path; shadow rays to `constant` lights, which rays that leave the
+//!                                   # scene meet anyway; more samples where the picture is noisier at the same mean
 //!                                   # (auto: off)
 //!   frames: ~                       # which, where values change over frames: 12, 1-100, 1-100x5, 1-10,20,30-40
 //!   seed_per_frame: true            # the frame is added to the seed, so that noise does not stand still

@@ -294,7 +294,8 @@ pub fn duration(text: &str) -> Option<Duration> {
     Duration::try_from_secs_f64(seconds * unit).ok()
 }
 
-/// `techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, splatting: auto, shadow_rays: auto, adaptive: auto}`
+/// `techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, splatting: auto, shadow_rays: auto, even_sky: auto,
+/// adaptive: auto}`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Techniques {
@@ -317,6 +318,9 @@ pub struct Techniques {
     /// How many shadow rays paths send from their first vertices; default as many as pay.
     #[serde(default)]
     pub shadow_rays: ShadowRays,
+    /// Whether shadow rays go to `constant` lights, too, which paths that leave the scene meet.
+    #[serde(default)]
+    pub even_sky: Technique,
     /// Whether pixels get more samples where the picture is noisier, at the same mean.
     #[serde(default)]
     pub adaptive: Technique,

@@ -12,9 +12,9 @@
 
 mod gift;
 
+use super::Object;
 use super::bvh::Aabb;
 use super::light::Light;
-use super::{Object, Scene};
 use crate::math::inverse_power_of_two;
 use gift::{Extent, Gift};
 use glam::{DVec3, Vec3};
@@ -402,20 +402,41 @@ impl Node {
     }
 }
 
-impl Scene {
+/// How one of the lights that are asked is chosen.
+#[derive(Clone, Debug)]
+pub struct Asked {
+    /// Without regard to the point: running sums of probabilities.
+    by_power: Vec<f64>,
+    /// At a point; `None` where all choose alike.
+    at_point: Option<Choice>,
+}
+
+impl Asked {
+    /// By the running sums `by_power` and, at a point, by `at_point`.
+    #[must_use]
+    pub fn new(by_power: Vec<f64>, at_point: Option<Choice>) -> Asked {
+        Asked { by_power, at_point }
+    }
+
+    /// Whether no light is ever asked.
+    #[must_use]
+    pub fn is_nobody(&self) -> bool {
+        self.by_power.last().is_none_or(|&all| all <= 0.0)
+    }
+
     /// Judges the lights from `point`. With `normal` light is wanted on that side of a surface only.
     #[must_use]
     #[inline(always)]
     pub fn asker(&self, point: DVec3, normal: Option<DVec3>) -> Asker {
-        Asker { point, normal, judged: self.choice.as_ref().and_then(|choice| choice.judge(point, normal)) }
+        Asker { point, normal, judged: self.at_point.as_ref().and_then(|choice| choice.judge(point, normal)) }
     }
 
     /// A light chosen by `u` in [0, 1) for `asker`, and the probability of that.
     #[must_use]
     #[inline(always)]
-    pub fn choose_light_for(&self, asker: &Asker, u: impl FnOnce() -> f64) -> Option<(usize, f64)> {
+    pub fn choose(&self, asker: &Asker, u: impl FnOnce() -> f64) -> Option<(usize, f64)> {
         // One alone needs no number.
-        if let [all] = self.light_cdf[..]
+        if let [all] = self.by_power[..]
             && all >= 1.0
         {
             return Some((0, all));
@@ -425,21 +446,27 @@ impl Scene {
 
     #[inline(never)]
     fn choose_among(&self, asker: &Asker, u: f64) -> Option<(usize, f64)> {
-        let (Some(choice), Some((asking, root))) = (&self.choice, &asker.judged) else { return self.choose_light(u) };
-        let mixed = |i: usize, there: f64| mixed(self.light_probability(i), there);
+        let (Some(choice), Some((asking, root))) = (&self.at_point, &asker.judged) else {
+            return chosen(&self.by_power, u);
+        };
+        let mixed = |i: usize, there: f64| mixed(share(&self.by_power, i), there);
         if u < BY_POWER {
-            let (i, _) = self.choose_light(u / BY_POWER)?;
+            let (i, _) = chosen(&self.by_power, u / BY_POWER)?;
             return Some((i, mixed(i, choice.probability(asking, root, i as u32))));
         }
         let (i, there) = choice.choose(asking, root, (u - BY_POWER) / (1.0 - BY_POWER))?;
         Some((i as usize, mixed(i as usize, there)))
     }
 
-    /// The probability of [`Scene::choose_light_for`] for light `i`, and what that `judged`: zero where it is not known.
+    /// The probability of [`Asked::choose`] for light `i`, and what that `judged`: zero where it is not known.
     #[must_use]
-    pub fn light_probability_at(&self, i: usize, point: DVec3, normal: Option<DVec3>, judged: f32) -> f64 {
-        let alone = self.light_probability(i);
-        let Some(choice) = &self.choice else { return alone };
+    pub fn probability(&self, i: usize, point: DVec3, normal: Option<DVec3>, judged: f32) -> f64 {
+        let alone = share(&self.by_power, i);
+        let Some(choice) = &self.at_point else { return alone };
+        // What has no share by power has no weight anywhere.
+        if alone <= 0.0 {
+            return 0.0;
+        }
         let asking = choice.asking(point, normal);
         let there = match choice.places[i] {
             Place::Distant(k) if judged > 0.0 => choice.share_of_distant(k, &asking, judged),
@@ -452,11 +479,26 @@ impl Scene {
     }
 }
 
+/// A light chosen by `u` in [0, 1) by running sums of probabilities, and its probability.
+#[must_use]
+pub fn chosen(sums: &[f64], u: f64) -> Option<(usize, f64)> {
+    let i = sums.partition_point(|&sum| sum <= u);
+    (i < sums.len()).then(|| (i, share(sums, i)))
+}
+
+/// The probability of [`chosen`] for light `i`.
+#[must_use]
+pub fn share(sums: &[f64], i: usize) -> f64 {
+    sums[i] - if i == 0 { 0.0 } else { sums[i - 1] }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::description::SceneDescription;
+    use crate::scene::Scene;
     use crate::scene::compile::compile;
+    use crate::scene::environment::Drawn;
     use crate::scene::shape::testing::Random;
 
     fn scene(lights: &str, shapes: &str) -> Scene {
@@ -508,23 +550,23 @@ mod tests {
         const N: u32 = 20_000;
         let mut random = Random::new(11);
         for scene in [all_kinds(), lamps_in_a_cube(40)] {
-            assert!(scene.choice.is_some());
+            assert!(scene.asked(true).at_point.is_some());
             for k in 0..20 {
                 let at = random.direction() * 6.0 * random.uniform();
                 let normal = (k % 2 == 0).then(|| random.direction());
                 let mut counts = vec![0u32; scene.lights.len()];
-                let asker = scene.asker(at, normal);
+                let asker = scene.asked(true).asker(at, normal);
                 for j in 0..N {
                     let u = (f64::from(j) + 0.5) / f64::from(N);
-                    let Some((i, p)) = scene.choose_light_for(&asker, || u) else { continue };
+                    let Some((i, p)) = scene.asked(true).choose(&asker, || u) else { continue };
                     for known in [asker.judged(), 0.0] {
-                        let said = scene.light_probability_at(i, at, normal, known);
+                        let said = scene.asked(true).probability(i, at, normal, known);
                         assert!((p / said - 1.0).abs() < 1e-12, "{p} {said}");
                     }
                     counts[i] += 1;
                 }
                 let probabilities: Vec<f64> =
-                    (0..scene.lights.len()).map(|i| scene.light_probability_at(i, at, normal, 0.0)).collect();
+                    (0..scene.lights.len()).map(|i| scene.asked(true).probability(i, at, normal, 0.0)).collect();
                 let none = 1.0 - f64::from(counts.iter().sum::<u32>()) / f64::from(N);
                 let ends = 16.0 / f64::from(N);
                 assert!((probabilities.iter().sum::<f64>() + none - 1.0).abs() < ends, "{probabilities:?} {none}");
@@ -541,7 +583,7 @@ mod tests {
     #[test]
     fn what_arrives_weighs_something() {
         let scene = all_kinds();
-        let choice = scene.choice.as_ref().unwrap();
+        let choice = scene.asked(true).at_point.as_ref().unwrap();
         let mut random = Random::new(5);
         let mut arrived = vec![0; scene.lights.len()];
         for _ in 0..20_000 {
@@ -550,7 +592,9 @@ mod tests {
             let (asking, nm) = (choice.asking(at, Some(normal)), crate::spectrum::Lanes::splat(550.0));
             for (i, light) in scene.lights.iter().enumerate() {
                 let u = glam::DVec2::new(random.uniform(), random.uniform());
-                let Some(found) = light.arriving(&scene.objects, at, Some(normal), u, nm) else { continue };
+                let Some(found) = light.arriving(&scene.objects, at, Some(normal), u, Drawn::Brighter, nm) else {
+                    continue;
+                };
                 // Further above the horizons than f32 is good to.
                 if found.wi.dot(normal) < 1e-3 || !found.radiance.simd_gt(crate::spectrum::Lanes::splat(1e-3)).all() {
                     continue;
@@ -567,7 +611,7 @@ mod tests {
     #[test]
     fn the_nearer_of_two_equal_lamps_is_chosen_by_the_square_of_the_distance() {
         let scene = scene(&(point(1.0, 3.0, 0.0, 1.0) + &point(-3.0, 3.0, 0.0, 1.0)), "");
-        let p = scene.light_probability_at(0, DVec3::new(0.0, 3.0, 0.0), None, 0.0);
+        let p = scene.asked(true).probability(0, DVec3::new(0.0, 3.0, 0.0), None, 0.0);
         assert!((p - (BY_POWER * 0.5 + (1.0 - BY_POWER) * 0.9)).abs() < 1e-6, "{p}");
     }
 
@@ -582,13 +626,13 @@ mod tests {
         for _ in 0..50 {
             let at = random.direction() * 8.0 * random.uniform();
             let nm = crate::spectrum::Lanes::splat(550.0);
-            let arriving = |light: &Light| light.arriving(&scene.objects, at, None, glam::DVec2::ZERO, nm);
+            let arriving = |light: &Light| light.arriving(&scene.objects, at, None, glam::DVec2::ZERO, Drawn::All, nm);
             let light: Vec<f64> =
                 scene.lights.iter().map(|l| arriving(l).map_or(0.0, |a| a.radiance.to_array()[0].into())).collect();
             let total: f64 = light.iter().sum();
             for (i, x) in light.iter().enumerate() {
                 let share = x / total;
-                here += share * share / scene.light_probability_at(i, at, None, 0.0) / 50.0;
+                here += share * share / scene.asked(true).probability(i, at, None, 0.0) / 50.0;
                 by_power += share * share / scene.light_probability(i) / 50.0;
             }
         }

@@ -22,7 +22,7 @@ mod surface;
 use super::apart::put_apart;
 use super::bvh::{Aabb, Bvh};
 use super::camera::Camera;
-use super::choice::Choice;
+use super::choice::{Asked, Choice};
 use super::few::Few;
 use super::instance::Group;
 use super::light::Light;
@@ -316,7 +316,14 @@ impl<'a> Compiler<'a> {
         let (center, radius) = extent(&boxes, &camera);
         let powers: Vec<f64> = lights.iter().map(|light| light.power(&objects, radius)).collect();
         let light_cdf = lights::light_cdf(&powers, &weights);
-        let choice = Choice::of(&lights, &powers, &weights, &objects, center, radius);
+        let asked = |weights: &[f64]| {
+            let by_power = lights::light_cdf(&powers, weights);
+            Asked::new(by_power, Choice::of(&lights, &powers, weights, &objects, center, radius))
+        };
+        let all_asked = asked(&weights);
+        let is_even = |light: &Light| matches!(light, Light::Constant { .. });
+        let uneven: Vec<f64> = lights.iter().zip(&weights).map(|(l, &w)| if is_even(l) { 0.0 } else { w }).collect();
+        let uneven_asked = (uneven != weights).then(|| asked(&uneven));
         let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
         let bands = self.bands();
         let wavelengths = self.shelf.carried.wavelengths().unwrap_or_else(|| match d.render.wavelengths {
@@ -358,7 +365,8 @@ impl<'a> Compiler<'a> {
             camera_inside: Inside::default(),
             lights,
             light_cdf,
-            choice,
+            all_asked,
+            uneven_asked,
             light_exponent: 0,
             has_media,
             backgrounds,

@@ -1,5 +1,6 @@
 //! Rays that leave the lights, for paths that begin there.
 
+use super::environment::Drawn;
 use super::light::{Light, spot_falloff};
 use super::texture::TexturePoint;
 use super::{Geometry, Object, Scene, SurfacePoint};
@@ -216,7 +217,7 @@ impl Scene {
                 Place::Infinity { direction: warp::uniform_sphere(u), irradiance }
             }
             Light::Environment(map) => {
-                let s = map.sample(u)?;
+                let s = map.sample(u, Drawn::All)?;
                 let irradiance = map.radiance_of(&s, nm) * (1.0 / s.pdf_solid_angle) as f32;
                 Place::Infinity { direction: -s.direction, irradiance }
             }

@@ -11,11 +11,11 @@ use super::texture::{Texel, spread};
 use crate::math::elementary::atan2;
 use crate::math::sampler::Octet;
 use crate::math::trig::sin_cos_turn;
-use crate::spectrum::luminance::REC709;
 use crate::spectrum::{Carried, Lanes, Spectrum, illuminant, upsample};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 use table::{Cell, PiecewiseConstant2d};
 
 /// Where the texels of an environment lie on the sphere.
@@ -41,14 +41,35 @@ pub struct Environment {
     world_from_map: DMat3,
     illuminant: Spectrum,
     mean_luminance: f64,
-    table: Table,
+    /// The mean over the sphere of what is brighter than the mean, by as much as it is.
+    brighter_luminance: f64,
+    brighter: Table,
+    /// Made when it is asked for.
+    all: OnceLock<Table>,
     /// Measured spectra in place of the texels' own, which then say how bright they are.
     bands: Option<Bands>,
 }
 
+/// Which directions are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drawn {
+    /// All from which light comes, by how much.
+    All,
+    /// Those from which more than the mean comes, by how much more: for who also finds light in a way of its own, which finds
+    /// what is even as well (Karlík et al. 2019, "MIS Compensation", with one sample of either). All where the map is even.
+    Brighter,
+}
+
+/// Directions by the factors of texels, as far as they are above a floor.
+#[derive(Clone, Debug)]
+struct Table {
+    floor: f64,
+    density: Density,
+}
+
 /// The density of directions over the unit square (longitude, colatitude).
 #[derive(Clone, Debug)]
-enum Table {
+enum Density {
     /// Constant in each texel.
     Constant(PiecewiseConstant2d),
     /// Bilinear between the factors of the texels as [`Mapping::Poles`] places them, so that a look-up of the light
@@ -104,9 +125,9 @@ impl Corners<'_> {
         (lower - upper).mul_add(y, upper)
     }
 
-    /// The factor, in f64: a density beside a bright texel depends on the last digits of the place.
-    fn scale(&self) -> f64 {
-        let [a, b, c, d] = self.texels.map(|t| f64::from(t.scale));
+    /// The factor above `floor`, texel by texel, in f64: a density beside a bright texel depends on the last digits of the place.
+    fn scale_above(&self, floor: f64) -> f64 {
+        let [a, b, c, d] = self.texels.map(|t| t.above(floor));
         let (upper, lower) = (a + (b - a) * self.x, c + (d - c) * self.x);
         // Rounding must not make light negative.
         (upper + (lower - upper) * self.y).max(0.0)
@@ -134,20 +155,38 @@ impl Environment {
             Mapping::Poles => PI * y as f64 / (height - 1) as f64,
         };
         let texels = upsampled(pixels, scale as f32, mapping, carried);
-        let table = match mapping {
-            Mapping::Texels => Table::Constant(neighbourhood(pixels, width, height)),
-            Mapping::Poles => bilinear(&texels, width, height),
-        };
         let illuminant = carried.light(illuminant::d65());
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for (y, row) in texels.chunks_exact(width).enumerate() {
-            let sin = libm::sin(row_angle(y));
-            // The factor is twice the largest channel; for choosing lights half of it will do.
-            sum += sin * row.iter().map(|t| 0.5 * f64::from(t.scale)).sum::<f64>();
-            weight += sin * width as f64;
+        // The mean over the sphere of factors above a floor.
+        let mean_above = |floor: f64| {
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for (y, row) in texels.chunks_exact(width).enumerate() {
+                let sin = libm::sin(row_angle(y));
+                sum += sin * row.iter().map(|texel| texel.above(floor)).sum::<f64>();
+                weight += sin * width as f64;
+            }
+            if weight > 0.0 { sum / weight } else { 0.0 }
+        };
+        let mean = mean_above(0.0);
+        // A map that is even but for the rounding of the mean of f32 has nothing above it.
+        let above = mean_above(mean);
+        let (floor, above) = if above > 1e-6 * mean { (mean, above) } else { (0.0, mean) };
+        let brighter = Table::of(&texels, width, mapping, floor);
+        // The factor is twice the largest channel; for choosing lights half of it will do.
+        let [mean_luminance, brighter_luminance] = [mean, above].map(|factor| 0.5 * factor * illuminant.luminance());
+        let all = OnceLock::new();
+        Environment {
+            texels,
+            width,
+            height,
+            mapping,
+            world_from_map,
+            illuminant,
+            mean_luminance,
+            brighter_luminance,
+            brighter,
+            all,
+            bands: None,
         }
-        let mean_luminance = if weight > 0.0 { sum / weight * illuminant.luminance() } else { 0.0 };
-        Environment { texels, width, height, mapping, world_from_map, illuminant, mean_luminance, table, bands: None }
     }
 
     /// A map of measured radiance, row 0 at the top, times `scale`.
@@ -224,24 +263,35 @@ impl Environment {
         }
         let value = match self.mapping {
             Mapping::Texels => corners.mix(|t| upsample::eval_sigmoid(t.coefficients, nm) * t.scale),
-            Mapping::Poles => corners.mix(|t| upsample::eval_sigmoid(t.coefficients, nm)) * corners.scale() as f32,
+            Mapping::Poles => {
+                corners.mix(|t| upsample::eval_sigmoid(t.coefficients, nm)) * corners.scale_above(0.0) as f32
+            }
         };
         value * self.illuminant.eval(nm)
     }
 
+    fn table(&self, drawn: Drawn) -> &Table {
+        match drawn {
+            Drawn::Brighter => &self.brighter,
+            Drawn::All if self.brighter.floor == 0.0 => &self.brighter,
+            Drawn::All => self.all.get_or_init(|| Table::of(&self.texels, self.width, self.mapping, 0.0)),
+        }
+    }
+
     /// A direction by brightness; `None` for a black map.
     #[must_use]
-    pub fn sample(&self, u: DVec2) -> Option<EnvironmentSample> {
-        let (at, pdf, left_edge) = match &self.table {
-            Table::Constant(table) => {
+    pub fn sample(&self, u: DVec2, drawn: Drawn) -> Option<EnvironmentSample> {
+        let table = self.table(drawn);
+        let (at, pdf, left_edge) = match &table.density {
+            Density::Constant(table) => {
                 let (at, pdf) = table.sample(u)?;
                 (at, pdf, 0.5)
             }
-            Table::Bilinear { cells, density } => {
+            Density::Bilinear { cells, density } => {
                 let cell = cells.sample_cell(u)?;
                 let first = cell.row * self.width;
                 let right = if cell.column + 1 == self.width { 0 } else { cell.column + 1 };
-                let scale = |i: usize| f64::from(self.texels[first + i].scale);
+                let scale = |i: usize| self.texels[first + i].above(table.floor);
                 let (a, b, c, d) =
                     (scale(cell.column), scale(right), scale(self.width + cell.column), scale(self.width + right));
                 // Down the cell by the sums of its rows, then across by the values at that height.
@@ -275,12 +325,12 @@ impl Environment {
         self.texels.len() >= 1 << 21
     }
 
-    /// Asks for the cache lines that [`Environment::sample`] and [`Environment::radiance_of`] read for `us`: three places
+    /// Asks for the cache lines that [`Environment::sample`] of what is brighter and [`Environment::radiance_of`] read for `us`: three places
     /// of the map, of which each tells the next. Those of several points are waited for together.
     pub fn foresee(&self, us: &[DVec2]) {
-        let table = match &self.table {
-            Table::Constant(table) => table,
-            Table::Bilinear { cells, .. } => cells,
+        let table = match &self.brighter.density {
+            Density::Constant(table) => table,
+            Density::Bilinear { cells, .. } => cells,
         };
         for Cell { row, column, within } in table.sample_cells::<{ Octet::SAMPLES }>(us).into_iter().flatten() {
             // The texels that the light is mixed of lie around the point; those of a cell of `Poles` to its right and below.
@@ -299,27 +349,30 @@ impl Environment {
 
     /// [`Environment::radiance`] and [`Environment::pdf`] at once.
     #[must_use]
-    pub fn radiance_and_pdf(&self, direction: DVec3, nm: Lanes) -> (Lanes, f64) {
+    pub fn radiance_and_pdf(&self, direction: DVec3, drawn: Drawn, nm: Lanes) -> (Lanes, f64) {
         let place = self.place(direction);
         let corners = self.corners(place.at);
-        (self.light(&corners, nm), self.density(&place, &corners))
+        (self.light(&corners, nm), self.density(&place, &corners, drawn))
     }
 
     /// Density of [`Environment::sample`] at `direction`, sr⁻¹.
     #[must_use]
-    pub fn pdf(&self, direction: DVec3) -> f64 {
+    pub fn pdf(&self, direction: DVec3, drawn: Drawn) -> f64 {
         let place = self.place(direction);
-        self.density(&place, &self.corners(place.at))
+        self.density(&place, &self.corners(place.at), drawn)
     }
 
-    fn density(&self, place: &Place, corners: &Corners) -> f64 {
+    fn density(&self, place: &Place, corners: &Corners, drawn: Drawn) -> f64 {
         if place.sin_theta <= 0.0 {
             return 0.0;
         }
-        let pdf = match &self.table {
-            Table::Constant(table) => table.pdf(place.at),
+        let Table { floor, density } = self.table(drawn);
+        let pdf = match density {
+            Density::Constant(table) => table.pdf(place.at),
             // The south pole itself belongs to the last row of cells.
-            Table::Bilinear { density, .. } => density[corners.row.min(density.len() - 1)] * corners.scale(),
+            Density::Bilinear { density, .. } => {
+                density[corners.row.min(density.len() - 1)] * corners.scale_above(*floor)
+            }
         };
         pdf / (2.0 * PI * PI * place.sin_theta)
     }
@@ -328,6 +381,12 @@ impl Environment {
     #[must_use]
     pub fn mean_luminance(&self) -> f64 {
         self.mean_luminance
+    }
+
+    /// The same of what is left above the mean, which is what [`Drawn::Brighter`] looks for.
+    #[must_use]
+    pub fn brighter_luminance(&self) -> f64 {
+        self.brighter_luminance
     }
 
     /// Some 16 spectra of the map, for the choice of wavelengths.
@@ -352,50 +411,68 @@ fn upsampled(pixels: &[[f32; 3]], scale: f32, mapping: Mapping, carried: Carried
     pixels.par_iter().with_min_len(1024).map(texel).collect()
 }
 
-/// The density that follows the luminance of each texel's neighbourhood (the largest of its 3 × 3,
-/// because bilinear look-ups spread a texel over its neighbours) times sin θ.
-fn neighbourhood(pixels: &[[f32; 3]], width: usize, height: usize) -> PiecewiseConstant2d {
-    let [r, g, b] = REC709;
-    let luminance: Vec<f64> =
-        pixels.iter().map(|p| (r * f64::from(p[0]) + g * f64::from(p[1]) + b * f64::from(p[2])).max(0.0)).collect();
-    let mut weights = vec![0.0; width * height];
-    for y in 0..height {
-        let sin = libm::sin(PI * (y as f64 + 0.5) / height as f64);
-        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
-        let column = |x: usize| rows.map(|row| luminance[row * width + x]).into_iter().fold(0.0f64, f64::max);
-        let (first, last) = (column(0), column(width - 1));
-        let (mut left, mut here) = (last, first);
-        for x in 0..width {
-            let right = if x + 1 < width { column(x + 1) } else { first };
-            weights[y * width + x] = left.max(here).max(right) * sin;
-            (left, here) = (here, right);
-        }
+impl Texel {
+    /// The factor above a floor.
+    fn above(&self, floor: f64) -> f64 {
+        (f64::from(self.scale) - floor).max(0.0)
     }
-    PiecewiseConstant2d::new(&weights, width, height)
 }
 
-/// The density that is bilinear between the factors of texels.
-fn bilinear(texels: &[Texel], width: usize, height: usize) -> Table {
-    let rows = height - 1;
-    let scale = |x: usize, y: usize| f64::from(texels[y * width + x].scale);
-    let mut weights = Vec::with_capacity(width * rows);
-    let mut density = Vec::with_capacity(rows);
-    for y in 0..rows {
-        // ∫ sin θ over the row of cells.
-        let (from, to) = (y as f64 / rows as f64, (y + 1) as f64 / rows as f64);
-        let sin = libm::cos(PI * from) - libm::cos(PI * to);
-        let pair = |x: usize| scale(x, y) + scale(x, y + 1);
-        weights.extend((0..width).map(|x| (pair(x) + pair(if x + 1 == width { 0 } else { x + 1 })) * sin));
-        density.push(sin);
+impl Table {
+    fn of(texels: &[Texel], width: usize, mapping: Mapping, floor: f64) -> Table {
+        let density = match mapping {
+            Mapping::Texels => Density::neighbourhood(texels, width, floor),
+            Mapping::Poles => Density::bilinear(texels, width, floor),
+        };
+        Table { floor, density }
     }
-    // A cell of weight w = Σ sin of a total W has the mean density (w / W) n m, and the factor there the mean Σ / 4.
-    let total: f64 = weights.iter().sum();
-    density.iter_mut().for_each(|sin| *sin *= 4.0 * weights.len() as f64 / total);
-    // Some maps are black: none of these is asked for.
-    if total == 0.0 {
-        density.fill(0.0);
+}
+
+impl Density {
+    /// That follows the factor of each texel's neighbourhood (the largest of its 3 × 3, because bilinear look-ups spread a
+    /// texel over its neighbours) times sin θ.
+    fn neighbourhood(texels: &[Texel], width: usize, floor: f64) -> Density {
+        let height = texels.len() / width;
+        let mut weights = vec![0.0; width * height];
+        for y in 0..height {
+            let sin = libm::sin(PI * (y as f64 + 0.5) / height as f64);
+            let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
+            let column =
+                |x: usize| rows.map(|row| texels[row * width + x].above(floor)).into_iter().fold(0.0f64, f64::max);
+            let (first, last) = (column(0), column(width - 1));
+            let (mut left, mut here) = (last, first);
+            for x in 0..width {
+                let right = if x + 1 < width { column(x + 1) } else { first };
+                weights[y * width + x] = left.max(here).max(right) * sin;
+                (left, here) = (here, right);
+            }
+        }
+        Density::Constant(PiecewiseConstant2d::new(&weights, width, height))
     }
-    Table::Bilinear { cells: PiecewiseConstant2d::new(&weights, width, rows), density }
+
+    /// That is bilinear between the factors of texels.
+    fn bilinear(texels: &[Texel], width: usize, floor: f64) -> Density {
+        let rows = texels.len() / width - 1;
+        let scale = |x: usize, y: usize| texels[y * width + x].above(floor);
+        let mut weights = Vec::with_capacity(width * rows);
+        let mut density = Vec::with_capacity(rows);
+        for y in 0..rows {
+            // ∫ sin θ over the row of cells.
+            let (from, to) = (y as f64 / rows as f64, (y + 1) as f64 / rows as f64);
+            let sin = libm::cos(PI * from) - libm::cos(PI * to);
+            let pair = |x: usize| scale(x, y) + scale(x, y + 1);
+            weights.extend((0..width).map(|x| (pair(x) + pair(if x + 1 == width { 0 } else { x + 1 })) * sin));
+            density.push(sin);
+        }
+        // A cell of weight w = Σ sin of a total W has the mean density (w / W) n m, and the factor there the mean Σ / 4.
+        let total: f64 = weights.iter().sum();
+        density.iter_mut().for_each(|sin| *sin *= 4.0 * weights.len() as f64 / total);
+        // Some maps are black: none of these is asked for.
+        if total == 0.0 {
+            density.fill(0.0);
+        }
+        Density::Bilinear { cells: PiecewiseConstant2d::new(&weights, width, rows), density }
+    }
 }
 
 /// A number in [0, 1] with a density that goes linearly from `a` to `b`, not both zero, by `u`.
@@ -420,6 +497,11 @@ mod tests {
         Environment::new(&pixels, [w, h], 1.0, mapping, DMat3::from_rotation_y(0.7), Carried::Spectra)
     }
 
+    fn ways() -> impl Iterator<Item = (Mapping, Drawn)> {
+        let drawn = [Drawn::All, Drawn::Brighter];
+        [Mapping::Texels, Mapping::Poles].into_iter().flat_map(move |mapping| drawn.map(|drawn| (mapping, drawn)))
+    }
+
     fn grid(n: u32) -> impl Iterator<Item = DVec2> {
         (0..n * n).map(move |i| DVec2::new(f64::from(i % n) + 0.5, f64::from(i / n) + 0.5) / f64::from(n))
     }
@@ -430,12 +512,12 @@ mod tests {
 
     #[test]
     fn density_of_sampled_directions_is_the_stated_one() {
-        for mapping in [Mapping::Texels, Mapping::Poles] {
+        for (mapping, drawn) in ways() {
             let map = bright_spot(mapping);
             for u in grid(64) {
-                let s = map.sample(u).unwrap();
+                let s = map.sample(u, drawn).unwrap();
                 assert!((s.direction.length() - 1.0).abs() < 1e-14);
-                let pdf = map.pdf(s.direction);
+                let pdf = map.pdf(s.direction, drawn);
                 // On the border of a cell rounding may pick the neighbour.
                 let border = mapping == Mapping::Texels && u.x * 64.0 % 4.0 < 1.0;
                 assert!((pdf / s.pdf_solid_angle - 1.0).abs() < 1e-9 || border, "{mapping:?} {u} {pdf} {s:?}");
@@ -447,9 +529,9 @@ mod tests {
     /// cell border is off by at most half a step of 1/512 in one dimension.
     #[test]
     fn density_integrates_to_one() {
-        for mapping in [Mapping::Texels, Mapping::Poles] {
+        for (mapping, drawn) in ways() {
             let map = bright_spot(mapping);
-            let mean = grid(512).map(|u| map.pdf(crate::math::warp::uniform_sphere(u))).sum::<f64>() / 262_144.0;
+            let mean = grid(512).map(|u| map.pdf(crate::math::warp::uniform_sphere(u), drawn)).sum::<f64>() / 262_144.0;
             assert!((mean * 4.0 * PI - 1.0).abs() < 5e-3, "{}", mean * 4.0 * PI);
         }
     }
@@ -460,7 +542,7 @@ mod tests {
     fn sampled_and_uniform_directions_find_the_same_light() {
         for mapping in [Mapping::Texels, Mapping::Poles] {
             let map = bright_spot(mapping);
-            let at = |u| map.sample(u).map_or(0.0, |s| green(&map, s.direction) / s.pdf_solid_angle);
+            let at = |u| map.sample(u, Drawn::All).map_or(0.0, |s| green(&map, s.direction) / s.pdf_solid_angle);
             let irrational = |i: u32| (DVec2::new(0.754_877_666, 0.569_840_291) * f64::from(i)).fract();
             let sampled = (0..65536).map(|i| at(irrational(i))).sum::<f64>() / 65536.0;
             let swept = grid(512).map(|u| green(&map, crate::math::warp::uniform_sphere(u))).sum::<f64>() / 262_144.0;
@@ -571,7 +653,7 @@ mod tests {
                 let pixels: Vec<[f32; 3]> = (0..w * h).map(|i| [if i == bright { 50.0 } else { 0.0 }; 3]).collect();
                 let map = Environment::new(&pixels, [w, h], 1.0, mapping, DMat3::IDENTITY, Carried::Spectra);
                 let shining = grid(128).map(crate::math::warp::uniform_sphere).filter(|d| green(&map, *d) > 0.0);
-                let densities: Vec<f64> = shining.map(|d| map.pdf(d)).collect();
+                let densities: Vec<f64> = shining.map(|d| map.pdf(d, Drawn::All)).collect();
                 assert!(densities.len() > 16 && densities.iter().all(|pdf| *pdf > 0.0), "{mapping:?} {bright}");
             }
         }
@@ -581,7 +663,10 @@ mod tests {
     fn a_black_map_is_never_sampled() {
         for mapping in [Mapping::Texels, Mapping::Poles] {
             let map = Environment::new(&[[0.0; 3]; 8], [4, 2], 1.0, mapping, DMat3::IDENTITY, Carried::Spectra);
-            assert!(map.sample(DVec2::splat(0.5)).is_none());
+            assert!(
+                map.sample(DVec2::splat(0.5), Drawn::All).is_none()
+                    && map.sample(DVec2::splat(0.5), Drawn::Brighter).is_none()
+            );
         }
     }
 }

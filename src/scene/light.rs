@@ -1,7 +1,7 @@
 //! What shines, and how a path finds it.
 
 use super::along_normal;
-use super::environment::Environment;
+use super::environment::{Drawn, Environment};
 use super::projector::Projector;
 use super::shape::{Shape, TowardSample};
 use super::texture::{Texture, TexturePoint};
@@ -211,23 +211,23 @@ impl Light {
 
     /// [`Light::background`] and [`Light::background_pdf`] at once.
     #[must_use]
-    pub fn background_and_pdf(&self, direction: DVec3, normal: Option<DVec3>, nm: Lanes) -> (Lanes, f64) {
+    pub fn background_and_pdf(&self, direction: DVec3, normal: Option<DVec3>, drawn: Drawn, nm: Lanes) -> (Lanes, f64) {
         match self {
-            Light::Environment(map) => map.radiance_and_pdf(direction, nm),
-            _ => (self.background(direction, nm), self.background_pdf(direction, normal)),
+            Light::Environment(map) => map.radiance_and_pdf(direction, drawn, nm),
+            _ => (self.background(direction, nm), self.background_pdf(direction, normal, drawn)),
         }
     }
 
     /// Density of [`Light::arriving`] toward the background along `direction`, sr⁻¹. `normal` is the
     /// shading normal that the sample was asked with.
     #[must_use]
-    pub fn background_pdf(&self, direction: DVec3, normal: Option<DVec3>) -> f64 {
+    pub fn background_pdf(&self, direction: DVec3, normal: Option<DVec3>, drawn: Drawn) -> f64 {
         match self {
             Light::Constant { .. } => match normal {
                 Some(n) => n.dot(direction).max(0.0) / PI,
                 None => 0.25 / PI,
             },
-            Light::Environment(map) => map.pdf(direction),
+            Light::Environment(map) => map.pdf(direction, drawn),
             _ => 0.0,
         }
     }
@@ -268,6 +268,7 @@ impl Light {
         from: DVec3,
         normal: Option<DVec3>,
         u: DVec2,
+        drawn: Drawn,
         nm: Lanes,
     ) -> Option<Arriving> {
         match self {
@@ -345,7 +346,7 @@ impl Light {
                     Some(n) => Frame::from_normal(n).to_world(warp::cosine_hemisphere(u)),
                     None => warp::uniform_sphere(u),
                 };
-                let density = self.background_pdf(wi, normal);
+                let density = self.background_pdf(wi, normal, drawn);
                 (density > 0.0).then(|| Arriving {
                     wi,
                     distance: f64::INFINITY,
@@ -355,7 +356,7 @@ impl Light {
                 })
             }
             Light::Environment(map) => {
-                let s = map.sample(u)?;
+                let s = map.sample(u, drawn)?;
                 Some(Arriving {
                     wi: s.direction,
                     distance: f64::INFINITY,
@@ -472,8 +473,12 @@ mod tests {
     #[test]
     fn point_light_falls_off_with_the_square_of_the_distance() {
         let light = Light::Point { position: DVec3::new(0.0, 3.0, 4.0), intensity: Spectrum::Constant(50.0) };
-        let a = light.arriving(&[], DVec3::ZERO, None, DVec2::ZERO, Lanes::splat(550.0)).unwrap();
+        let a = light.arriving(&[], DVec3::ZERO, None, DVec2::ZERO, Drawn::All, Lanes::splat(550.0)).unwrap();
         assert_eq!((a.distance, a.radiance.to_array()[0], a.density), (5.0, 2.0, None));
-        assert!(light.arriving(&[], DVec3::new(0.0, 3.0, 4.0), None, DVec2::ZERO, Lanes::splat(550.0)).is_none());
+        assert!(
+            light
+                .arriving(&[], DVec3::new(0.0, 3.0, 4.0), None, DVec2::ZERO, Drawn::All, Lanes::splat(550.0))
+                .is_none()
+        );
     }
 }

@@ -48,7 +48,7 @@ use crate::math::{Departure, Ray};
 use crate::spectrum::{Spectrum, WavelengthDistribution};
 use bvh::Bvh;
 use camera::Camera;
-use choice::Choice;
+use choice::{Asked, chosen, share};
 use curves::Curves;
 use few::Few;
 use glam::{DVec2, DVec3};
@@ -102,10 +102,12 @@ pub struct Scene {
     pub camera_inside: Inside,
     /// Lights.
     pub lights: Vec<Light>,
-    /// How lights are chosen: running sums of probabilities.
+    /// How lights are chosen that paths begin at: running sums of probabilities.
     pub light_cdf: Vec<f64>,
-    /// How a point of the scene chooses among them; `None` where all choose alike.
-    pub choice: Option<Choice>,
+    /// How a point of the scene chooses among those that it asks.
+    pub all_asked: Asked,
+    /// The same without light that is even over all directions, if there is any: what is scattered finds that, too.
+    pub uneven_asked: Option<Asked>,
     /// The film counts light over two to this power: `scene/brightness.rs` tells which.
     pub light_exponent: i32,
     /// Indices of lights from infinity.
@@ -531,8 +533,17 @@ impl Scene {
     /// A light chosen by `u` in [0, 1) and its probability.
     #[must_use]
     pub fn choose_light(&self, u: f64) -> Option<(usize, f64)> {
-        let i = self.light_cdf.partition_point(|&c| c <= u);
-        (i < self.lights.len()).then(|| (i, self.light_probability(i)))
+        chosen(&self.light_cdf, u)
+    }
+
+    /// How a point chooses among the lights that it asks, with light that is even over all directions or without.
+    #[must_use]
+    #[inline]
+    pub fn asked(&self, even_sky: bool) -> &Asked {
+        match &self.uneven_asked {
+            Some(uneven) if !even_sky => uneven,
+            _ => &self.all_asked,
+        }
     }
 
     /// Prepares for the samples that go with this one, when the first of them asks for the numbers by which they choose
@@ -553,7 +564,7 @@ impl Scene {
     /// The probability of [`Scene::choose_light`] for light `i`.
     #[must_use]
     pub fn light_probability(&self, i: usize) -> f64 {
-        self.light_cdf[i] - if i == 0 { 0.0 } else { self.light_cdf[i - 1] }
+        share(&self.light_cdf, i)
     }
 }
 

@@ -237,7 +237,7 @@ impl Tracer<'_> {
                 None => 1.0,
                 Some(p) => {
                     let total = crate::scene::Hit { t: p.distance + hit.t, ..hit };
-                    let q = scene.light_probability_at(light as usize, p.point, p.normal, path.judged)
+                    let q = self.asked().probability(light as usize, p.point, p.normal, path.judged)
                         * scene.lights[light as usize].area_pdf(
                             &scene.objects,
                             p.point,
@@ -363,7 +363,7 @@ impl Tracer<'_> {
         let wo = frame.to_local(at.wo);
         self.foresee(path);
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
-        if !bsdf.is_discrete() && self.settings.light_samples > 0 {
+        if !bsdf.is_discrete() && self.asks() {
             let toward = path.ray.direction.dot(surface.normal);
             let inside = path.inside;
             self.ask_lights::<CHROMATIC, MEDIA>(
@@ -453,7 +453,7 @@ impl Tracer<'_> {
             return false;
         }
         path.previous = match sample.chosen {
-            Chosen::Density(density) if self.settings.light_samples > 0 => Some(Previous {
+            Chosen::Density(density) if self.asks() => Some(Previous {
                 point: surface.point,
                 normal: at.sided,
                 rho: path.rho_sum::<CHROMATIC>() * f64::from(self.shadow_rays(path)),
@@ -573,7 +573,7 @@ impl Tracer<'_> {
         let wo = -path.ray.direction;
         self.foresee(path);
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
-        let next_event = self.settings.light_samples > 0 && medium.shadow_rays;
+        let next_event = self.asks() && medium.shadow_rays;
         if next_event {
             let inside = path.inside;
             let eval = |wi| {

@@ -50,6 +50,8 @@ pub struct Wishes {
     pub merging: Use,
     /// Paths that pixels share.
     pub reuse: Use,
+    /// Shadow rays to light that is even over all directions.
+    pub even_sky: Use,
     /// How many shadow rays first vertices send.
     pub shadow_rays: Option<u32>,
 }

@@ -183,6 +183,8 @@ pub struct EffectPlan {
     pub splatting: bool,
     /// Shadow rays from the first vertex of each path that looks for light, at most [`PARTS`](crate::math::sampler::PARTS).
     pub shadow_rays: u32,
+    /// Shadow rays go to light that is even over all directions, too, which what is scattered finds as well.
+    pub asks_even_sky: bool,
     /// Every glass is computed as if it were dispersive.
     pub all_dispersive: bool,
     /// Light of mirrors and glass that is traced from the lights.
@@ -370,6 +372,7 @@ impl EffectPlan {
             reuse: false,
             splatting: false,
             shadow_rays: 1,
+            asks_even_sky: true,
             all_dispersive: mode == EffectMode::All,
             caustics: None,
             adaptive: None,

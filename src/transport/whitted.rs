@@ -16,6 +16,7 @@ use crate::optics::bsdf::Pane;
 use crate::optics::dielectric::{RelativeIndex, refract};
 use crate::optics::fresnel::{self, Model};
 use crate::scene::compound::{Composition, Slopes, Standing, Vertex, share};
+use crate::scene::environment::Drawn;
 use crate::scene::light::{Light, free};
 use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Thickness, Tints, metal, relative_index};
 use crate::scene::shape::Shape;
@@ -279,7 +280,7 @@ impl Tracer<'_> {
             let target = Some(Departure::new(*object, 0));
             return Some((wi, radiance.eval(self.nm) * solid_angle as f32, distance, target));
         }
-        let a = light.arriving(&self.scene.objects, from, None, DVec2::splat(0.5), self.nm)?;
+        let a = light.arriving(&self.scene.objects, from, None, DVec2::splat(0.5), Drawn::All, self.nm)?;
         let irradiance = match a.density {
             None => a.radiance,
             Some(density) => a.radiance * (1.0 / density) as f32,

@@ -255,6 +255,7 @@ fn wavelengths_share_the_sampling_of_coloured_fog() {
     let noise = |scattering: &str| {
         let scene = bench(&format!(
             "media: {{m: {{homogeneous: {{scattering: {scattering}}}}}}}\nlights: [{{constant: {{radiance: 1}}}}]\n\
+             render: {{techniques: {{even_sky: on}}}}\n\
              shapes: [{{sphere: {{radius: 1, material: {{boundary: {{}}}}, inside: m}}}}]\n"
         ));
         let found = scene.luminance(&ray(v(0.3, 0.2, 5.0), v(0.3, 0.2, 0.0)), 4096);

@@ -55,6 +55,94 @@ fn several_shadow_rays_bring_the_light_of_one() {
     }
 }
 
+/// Things before a sky: chalk, coats, rough metal and glass, a mask, a pane, fog, a lamp and a point.
+fn under_a_sky(render: &str, path: &str, lights: &str, rest: &str) -> Bench {
+    let yaml = format!(
+        "camera: {{origin: [0, 0.6, 3], target: [0, 0, 0], fov_deg: 50}}\nimage: {{width: 20, height: 16}}\n\
+         integrator: {{path: {{max_depth: 4, {path}}}}}\nrender: {{{render}}}\n\
+         lights: [{lights}{{point: {{position: [1, 2, 1], intensity: 1}}}}]\n\
+         {rest}shapes:\n- plane: {{point: [0, -0.5, 0], normal: [0, 1, 0], material: {{diffuse: {{reflectance: 0.7}}}}}}\n\
+         - sphere: {{center: [-1, 0, 0], radius: 0.5, material: {{plastic: {{roughness: 0.1}}}}}}\n\
+         - sphere: {{center: [0, 0, 0], radius: 0.5, material: {{conductor: {{metal: gold, roughness: 0.3}}}}}}\n\
+         - sphere: {{center: [1, 0, 0], radius: 0.5, material: {{dielectric: {{ior: 1.5, roughness: 0.3}}}}}}\n\
+         - sphere: {{center: [-0.5, -0.2, 0.8], radius: 0.3, material: {{mask: {{opacity: 0.5, material: {{diffuse: {{}}}}}}}}}}\n\
+         - rectangle: {{corner: [0.1, -0.5, 1], edge_u: [0.8, 0, 0], edge_v: [0, 0.8, 0], material: {{thin_dielectric: {{ior: 1.5}}}}}}\n\
+         - sphere: {{center: [0, 1.2, -1], radius: 0.2, emission: 3}}\n"
+    );
+    bench_with(
+        &yaml,
+        &[("sky.png", &grey_png(16, 8, |x, y| if (x, y) == (5, 2) { 255 } else { (20 + x * 9 + y) as u8 }))],
+    )
+}
+
+const FOG: &str = "media: {fog: {homogeneous: {scattering: {rgb: [0.2, 0.5, 0.3]}, absorption: 0.1}}}\nmedium: fog\n";
+
+/// Light that is even over all directions is found by what scatters alone as it is with shadow rays.
+#[test]
+fn an_even_sky_is_as_bright_without_shadow_rays() {
+    for (name, samples, techniques, rest) in [
+        ("one ray", 16, "shadow_rays: 1, reuse: off", ""),
+        ("four rays", 16, "shadow_rays: 4, reuse: off", ""),
+        ("shared", 16, "shadow_rays: 1, reuse: on", ""),
+        ("fog", 128, "shadow_rays: 1, reuse: off", FOG),
+    ] {
+        let lit = |sky: &str| {
+            let render =
+                format!("samples: {samples}, techniques: {{even_sky: {sky}, {techniques}, light_tracing: off}}");
+            let bench = under_a_sky(&render, "", "{constant: {radiance: {rgb: [0.5, 0.7, 1]}}}, ", rest);
+            assert_eq!(bench.prepared.plan.asks_even_sky, sky == "on");
+            bench
+        };
+        let (asked, met) = (over_seeds(lit("on"), 0..24), over_seeds(lit("off"), 100..124));
+        assert_same_light(name, &asked, &met);
+    }
+}
+
+/// Shadow rays look for what is brighter than the mean of a sky where what scatters finds the rest, and for all of it where it does not.
+#[test]
+fn a_sky_is_as_bright_by_shadow_rays_alone() {
+    for (name, rest, samples) in [("clear", "", 16), ("fog", FOG, 256)] {
+        for mapping in ["texels", "mitsuba"] {
+            let lit = |path: &str| {
+                let sky = format!("{{environment: {{file: sky.png, mapping: {mapping}}}}}, ");
+                let render = format!("samples: {samples}, techniques: {{reuse: off, light_tracing: off}}");
+                under_a_sky(&render, path, &sky, rest)
+            };
+            let (both, alone) = (over_seeds(lit(""), 0..24), over_seeds(lit("scatter_samples: 0"), 100..124));
+            assert_same_light(&format!("{name}, {mapping}"), &both, &alone);
+        }
+    }
+}
+
+/// Among other lights under an open sky shadow rays to it do not pay; in a room with a small window they do.
+#[test]
+fn a_trial_leaves_an_even_sky_to_what_scatters_where_that_pays() {
+    let asks = |lights: &str, shapes: &str| {
+        let yaml = format!(
+            "camera: {{origin: [0, 0, 0.9], target: [0, -0.3, -1], fov_deg: 80}}\nimage: {{width: 64, height: 64}}\n\
+             render: {{samples: 256, techniques: {{light_tracing: off}}}}\nlights: [{{constant: {{radiance: 1}}}}{lights}]\n{shapes}"
+        );
+        bench_with(&yaml, &[]).prepared.plan.asks_even_sky
+    };
+    let open =
+        "shapes:\n- plane: {point: [0, -1, 0], normal: [0, 1, 0]}\n- cube: {center: [0, -0.8, -0.5], size: 0.4}\n";
+    assert!(!asks(", {point: {position: [0.5, 1, 0.5], intensity: 3}}", open));
+    // Walls of a box with a window of a fifth of its width in the ceiling.
+    let wall =
+        |corner: &str, u: &str, v: &str| format!("- rectangle: {{corner: {corner}, edge_u: {u}, edge_v: {v}}}\n");
+    let room = "shapes:\n".to_owned()
+        + &wall("[-1, -1, -1]", "[2, 0, 0]", "[0, 0, 2]")
+        + &wall("[-1, -1, -1]", "[2, 0, 0]", "[0, 2, 0]")
+        + &wall("[-1, -1, 1]", "[2, 0, 0]", "[0, 2, 0]")
+        + &wall("[-1, -1, -1]", "[0, 0, 2]", "[0, 2, 0]")
+        + &wall("[1, -1, -1]", "[0, 0, 2]", "[0, 2, 0]")
+        + &wall("[-1, 1, -1]", "[0.8, 0, 0]", "[0, 0, 2]")
+        + &wall("[0.2, 1, -1]", "[0.8, 0, 0]", "[0, 0, 2]")
+        + &wall("[-0.2, 1, -1]", "[0.4, 0, 0]", "[0, 0, 0.8]")
+        + &wall("[-0.2, 1, 0.2]", "[0.4, 0, 0]", "[0, 0, 0.8]");
+    assert!(asks("", &room));
+}
+
 /// L = 1 + ½ L everywhere in a room whose walls shine with 1 and reflect ½; and smoke that takes nothing away is as bright as the
 /// sky that it stands before.
 #[test]

@@ -6,6 +6,7 @@ use abbe::math::sampler::mix64;
 use abbe::math::statistics::Moments;
 use abbe::math::{Frame, Ray};
 use abbe::optics::bsdf::Bsdf;
+use abbe::scene::environment::Drawn;
 use abbe::scene::{Hit, SurfacePoint};
 use abbe::spectrum::Lanes;
 use glam::{DVec2, DVec3};
@@ -43,9 +44,8 @@ fn by_light(bench: &Bench, x: &Vertex, n: u64) -> Estimate {
         .map(|i| {
             let [a, b, _] = random(i);
             let nm = Lanes::splat(NM);
-            let Some(l) = scene.lights[0].arriving(&scene.objects, x.surface.point, None, DVec2::new(a, b), nm) else {
-                return 0.0;
-            };
+            let (from, u) = (x.surface.point, DVec2::new(a, b));
+            let Some(l) = scene.lights[0].arriving(&scene.objects, from, None, u, Drawn::All, nm) else { return 0.0 };
             let wi = x.frame.to_local(l.wi);
             let f = mean(x.bsdf.eval(x.wo, wi).f) * wi.z.abs();
             if f == 0.0 || scene.occluded(&scene.leave(&x.surface, &x.hit, l.wi), l.distance, l.target) {

@@ -163,6 +163,7 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
         ("merging", "merging", caustics.is_some_and(|c| c.merging.is_some()), about("merging")),
         ("path reuse", "reuse", chosen.plan.reuse, joined),
         ("splatting", "splatting", chosen.plan.splatting, dealt),
+        ("even sky", "even_sky", chosen.plan.asks_even_sky, about("shadow rays to the even sky")),
         ("adaptive", "adaptive", chosen.plan.adaptive.is_some(), shared),
     ] {
         if cause {
@@ -172,6 +173,7 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
     }
     if let Integrator::Path(settings) = &chosen.plan.integrator
         && first::single(&census, settings).is_none()
+        && !chosen.scene.asked(chosen.plan.asks_even_sky).is_nobody()
     {
         for count in first::counts().filter(|count| *count != chosen.plan.shadow_rays) {
             let count = count.to_string();

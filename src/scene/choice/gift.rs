@@ -64,7 +64,7 @@ impl Gift {
                 Gift::Distant { toward: Some(-*direction), surface: irradiance, point: irradiance }
             }
             Light::Constant { radiance } => Gift::everywhere(radiance.luminance()),
-            Light::Environment(map) => Gift::everywhere(map.mean_luminance()),
+            Light::Environment(map) => Gift::everywhere(map.brighter_luminance()),
         }
     }
 

@@ -5,7 +5,8 @@ use super::{Path, Tracer};
 use crate::math::sampler::{PARTS, Set, pairs};
 use crate::math::{Departure, Ray};
 use crate::scene::Inside;
-use crate::scene::choice::Asker;
+use crate::scene::choice::{Asked, Asker};
+use crate::scene::environment::Drawn;
 use crate::scene::light::free;
 use crate::spectrum::Lanes;
 use crate::transport::shadow::Shadow;
@@ -23,11 +24,11 @@ pub(super) fn power_heuristic(a: f64, b: f64) -> f64 {
 }
 
 /// What the vertices of paths that go together ask for.
-pub(super) type Questions = ArrayVec<Asked, { MOST * PARTS as usize }>;
+pub(super) type Questions = ArrayVec<Question, { MOST * PARTS as usize }>;
 
 /// Light that a vertex has asked for, and that arrives if nothing stands in the way.
 #[derive(Clone, Copy)]
-pub(super) struct Asked {
+pub(super) struct Question {
     pub(super) ray: Ray,
     pub(super) distance: f64,
     /// The face or triangle that the ray aims at.
@@ -82,13 +83,31 @@ impl Tracer<'_> {
             let (l, weight) = match &path.previous {
                 None => (light.background(path.ray.direction, self.nm), 1.0),
                 Some(p) => {
-                    let (l, pdf) = light.background_and_pdf(path.ray.direction, p.normal, self.nm);
-                    let q = self.scene.light_probability_at(i as usize, p.point, p.normal, path.judged) * pdf;
+                    let (l, pdf) = light.background_and_pdf(path.ray.direction, p.normal, self.drawn(), self.nm);
+                    let q = self.asked().probability(i as usize, p.point, p.normal, path.judged) * pdf;
                     (l, power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho))
                 }
             };
             self.meet_light::<CHROMATIC>(path, i, l, weight);
         }
+    }
+
+    /// How a vertex chooses among the lights that it asks.
+    #[inline(always)]
+    pub(super) fn asked(&self) -> &Asked {
+        self.scene.asked(self.plan.asks_even_sky)
+    }
+
+    /// Which directions of a sky shadow rays take: what is even is left to what scatters, if anything does.
+    #[inline(always)]
+    fn drawn(&self) -> Drawn {
+        if self.settings.scatter_samples > 0 { Drawn::Brighter } else { Drawn::All }
+    }
+
+    /// Whether vertices ask lights at all.
+    #[inline(always)]
+    pub(super) fn asks(&self) -> bool {
+        self.settings.light_samples > 0 && !self.asked().is_nobody()
     }
 
     /// Shadow rays from where the path is, if it looks for light there.
@@ -122,7 +141,7 @@ impl Tracer<'_> {
     ) {
         let count = self.shadow_rays(path);
         path.further += count - 1;
-        let asker = self.scene.asker(point, normal);
+        let asker = self.asked().asker(point, normal);
         path.judged = asker.judged();
         let parts = (count > 1).then(|| self.sampler.parts(Set::Shadows(path.vertices), count));
         for i in 0..count {
@@ -160,10 +179,12 @@ impl Tracer<'_> {
     ) {
         let scene = self.scene;
         let Asker { point, normal, .. } = *asker;
-        let Some((lamp, chance)) = scene.choose_light_for(asker, u_light) else { return };
+        let Some((lamp, chance)) = self.asked().choose(asker, u_light) else { return };
         // How often it is chosen.
         let probability = chance * f64::from(count);
-        let Some(light) = scene.lights[lamp].arriving(&scene.objects, point, normal, u, self.nm) else { return };
+        let Some(light) = scene.lights[lamp].arriving(&scene.objects, point, normal, u, self.drawn(), self.nm) else {
+            return;
+        };
         let (f, pdf) = eval(light.wi);
         if f.simd_eq(Lanes::ZERO).all() {
             return;
@@ -187,7 +208,7 @@ impl Tracer<'_> {
             && !scene.has_boundaries
         {
             let light_found = path.share_of::<CHROMATIC>(value, weight(None));
-            later.push(Asked { ray, distance, target: light.target, light: light_found, traced });
+            later.push(Question { ray, distance, target: light.target, light: light_found, traced });
             return;
         }
         let part;

@@ -3,7 +3,7 @@
 //!
 //! What a path does is `Tracer::meet`, as for one alone, with the same numbers in the same order: the bits are the same.
 
-use super::lights::{Asked, Questions};
+use super::lights::{Question, Questions};
 use super::reuse::Joint;
 use super::{Path, Step, Tracer, Walk};
 use crate::math::Ray;
@@ -120,7 +120,7 @@ fn trace<'a, const CHROMATIC: bool>(
 
         for (toward, asking) in asked.chunks(4).zip(asking.chunks(4)) {
             let count = toward.len();
-            let toward: [&Asked; 4] = std::array::from_fn(|lane| toward.get(lane).unwrap_or(&toward[0]));
+            let toward: [&Question; 4] = std::array::from_fn(|lane| toward.get(lane).unwrap_or(&toward[0]));
             let (distances, targets) = (toward.map(|to| to.distance), toward.map(|to| to.target));
             let hidden = scene.occluded_of_four(toward.map(|to| &to.ray), distances, targets, count);
             for (lane, (&i, to)) in asking.iter().zip(toward).take(count).enumerate() {

@@ -4,7 +4,7 @@ use super::STREAM;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::bvh::Aabb;
 use crate::scene::casters::Casters;
-use crate::scene::environment::Environment;
+use crate::scene::environment::{Drawn, Environment};
 use crate::scene::light::Light;
 use crate::scene::{Geometry, Scene};
 use crate::transport::caustics::{Caustics, Source, Target};
@@ -54,7 +54,7 @@ fn has_sun(map: &Environment) -> bool {
     const DRAWS: u32 = 4096;
     let sampler = |i| Sampler::new(STREAM, [0, 0], 0, i);
     let mut densities: Vec<f64> = (0..DRAWS)
-        .filter_map(|i| map.sample(pairs(sampler(i).set(Set::Camera)).0).map(|s| s.pdf_solid_angle))
+        .filter_map(|i| map.sample(pairs(sampler(i).set(Set::Camera)).0, Drawn::All).map(|s| s.pdf_solid_angle))
         .collect();
     densities.sort_by(|a, b| b.total_cmp(a));
     let mut angle = 0.0;

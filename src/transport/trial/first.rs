@@ -1,4 +1,5 @@
-//! What the first vertices of paths do: whether they share what paths find, and how many shadow rays they send.
+//! What the first vertices of paths do: whether they share what paths find, and how many shadow rays they send; and whether
+//! any vertex sends some to light that is even over all directions.
 
 use super::{MOST, STREAM, Tried, decided, judge, variance};
 use crate::film::accumulate::REPLICATES;
@@ -30,6 +31,8 @@ pub struct First {
     pub reuse: bool,
     /// How many shadow rays each sends.
     pub shadow_rays: u32,
+    /// Whether shadow rays go to light that is even over all directions.
+    pub asks_even_sky: bool,
     /// What to say of it.
     pub said: Vec<Effect>,
 }
@@ -53,7 +56,7 @@ pub fn counts() -> impl Iterator<Item = u32> {
 /// Why one shadow ray from a vertex is all that can be wanted; `None` where several may be.
 #[must_use]
 pub fn single(census: &Census, settings: &PathSettings) -> Option<&'static str> {
-    if settings.light_samples != 1 || settings.scatter_samples != 1 {
+    if several_ways(settings) {
         Some("samples have several paths, or look for light in one way only")
     } else if census.lights() == 0 {
         Some("there are no lights")
@@ -64,30 +67,42 @@ pub fn single(census: &Census, settings: &PathSettings) -> Option<&'static str> 
     }
 }
 
+fn several_ways(settings: &PathSettings) -> bool {
+    settings.light_samples != 1 || settings.scatter_samples != 1
+}
+
 /// What the first vertices of paths are to do; nothing but for paths from the camera.
 #[must_use]
 pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wishes: Wishes) -> Option<First> {
     let Shot { scene, plan, seed, .. } = *shot;
     let Integrator::Path(settings) = &plan.integrator else { return None };
-    let try_out = |reuse, shadow_rays| {
-        let plan = EffectPlan { reuse, shadow_rays, layers: LayerPlan::default(), ..plan.clone() };
+    let try_out = |asks_even_sky, reuse, shadow_rays| {
+        let layers = LayerPlan::default();
+        let plan = EffectPlan { reuse, shadow_rays, asks_even_sky, layers, ..plan.clone() };
         try_groups(&Shot { plan: &plan, seed: seed ^ STREAM, ..*shot }, samples)
     };
     let single = single(census, settings);
     let fixed = single.map_or(wishes.shadow_rays, |_| Some(1));
-    let way = |reuse| Way::find(fixed, reuse, |shadow_rays| try_out(reuse, shadow_rays));
+    let way = |sky: bool, reuse: bool| {
+        // Where the sky is the only light, nobody is asked.
+        let fixed = if scene.asked(sky).is_nobody() { Some(1) } else { fixed };
+        Way::find(fixed, reuse, |shadow_rays| try_out(sky, reuse, shadow_rays))
+    };
     let obstacle = reuse::obstacle(scene, census, plan, moments.len());
     let wish = obstacle.map_or_else(|| decided(wishes.reuse), |_| Some(false));
 
-    // What is settled needs no trial.
-    let settled = |reuse: bool| match fixed {
-        Some(shadow_rays) => Way { shadow_rays, cost: f64::NAN, ratio: f64::NAN, meets: true },
-        None => way(reuse),
-    };
-    let (reuse, why, way) = match wish {
-        Some(reuse) => (reuse, obstacle.unwrap_or("the scene says so").to_owned(), settled(reuse)),
-        None => {
-            let (alone, together) = (way(false), way(true));
+    // Whether to ask the even sky, where there is one and a choice.
+    let sky = scene.uneven_asked.is_some() && !several_ways(settings);
+    let sky_wish = if sky { decided(wishes.even_sky) } else { Some(true) };
+    let settled = obstacle.unwrap_or("the scene says so");
+    let best = |sky: bool| match (wish, fixed, sky_wish) {
+        // What is settled needs no trial.
+        (Some(reuse), Some(shadow_rays), Some(_)) => {
+            (reuse, settled.to_owned(), Way { shadow_rays, cost: f64::NAN, ratio: f64::NAN, meets: true })
+        }
+        (Some(reuse), ..) => (reuse, settled.to_owned(), way(sky, reuse)),
+        (None, ..) => {
+            let (alone, together) = (way(sky, false), way(sky, true));
             let (on, reason) = judge(together.cost / alone.cost, WORTH_IT);
             match together.meets {
                 true if on => (true, reason, together),
@@ -96,6 +111,20 @@ pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wis
             }
         }
     };
+    let (asks_even_sky, why_sky, (reuse, why, way)) = match sky_wish {
+        Some(asks) => (asks, "the scene says so".to_owned(), best(asks)),
+        None => {
+            let (asked, met) = (best(true), best(false));
+            // Such rays, too, have to be worth it.
+            let (leaves_out, reason) = judge(met.2.cost / asked.2.cost, 1.0 / WORTH_IT);
+            let reason = reason.replace("the trial expects", "without them the trial expects");
+            (!leaves_out, reason, if leaves_out { met } else { asked })
+        }
+    };
+    let mut said = Vec::new();
+    if sky {
+        said.push(Effect { name: "shadow rays to the even sky".into(), on: asks_even_sky, reason: why_sky });
+    }
     let count = way.shadow_rays;
     let rays = match count {
         1 => "several shadow rays from the first vertex".into(),
@@ -104,16 +133,12 @@ pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wis
     let of_rays = match (single, wishes.shadow_rays) {
         (Some(reason), _) => reason.into(),
         (None, Some(_)) => "the scene says so".into(),
+        (None, None) if scene.asked(asks_even_sky).is_nobody() => "no light is asked".into(),
         (None, None) => judge(way.ratio, WORTH_IT).1,
     };
-    Some(First {
-        reuse,
-        shadow_rays: count,
-        said: vec![
-            Effect { name: "paths shared by pixels".into(), on: reuse, reason: why },
-            Effect { name: rays, on: count > 1, reason: of_rays },
-        ],
-    })
+    said.push(Effect { name: "paths shared by pixels".into(), on: reuse, reason: why });
+    said.push(Effect { name: rays, on: count > 1, reason: of_rays });
+    Some(First { reuse, shadow_rays: count, asks_even_sky, said })
 }
 
 impl Way {
