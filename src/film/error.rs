@@ -27,7 +27,8 @@
 //!
 //! for any distribution of the samples: fourth cumulants enter both terms and their covariance alike, and cancel. The
 //! trace is that of single pixels, from S as for normal noise, A = tr(WS)² and B = (tr WS)², (A − B/3) · 9/10, which heavier
-//! tails make larger, so that the interval is rather too wide; and what neighbours share (one path from a light touches
+//! tails make larger; times the square of what the second order makes of the size of the pixel, since W is of the noisy
+//! mean: bright is noisy, and weighs little, so that S and W together tell too little. And what neighbours share (one path from a light touches
 //! several pixels, collected photons many): two differences of replicates that have nothing in common, u = x₁ − x₂ and
 //! v = x₃ − x₄, have E (uᵀWv)² = 4R² tr(WΣ)², so that (Σ uᵀWv)² − Σ (uᵀWv)² over the pixels of a block, in the mean over the
 //! three ways to pair four, is that of different pixels. Of light that is dealt to all pixels under a filter it is known what they
@@ -357,7 +358,7 @@ impl Sums {
         self.noisy += u64::from(values.iter().any(|v| v.replicates.iter().any(|x| *x != v.replicates[0])));
         self.black += u64::from(values.iter().all(|v| v.mean == 0.0));
         let channels = floors.iter().filter(|f| **f > 0.0).count() as f64;
-        let (mut error, mut further, mut crossed) = (0.0, 0.0, 0.0);
+        let (mut error, mut plain, mut further, mut crossed) = (0.0, 0.0, 0.0, 0.0);
         let mut shares = [0.0; REPLICATES];
         let mut pairs = [0.0; 3];
         let (mut own, mut splatted) = (Gram::default(), Gram::default());
@@ -383,6 +384,7 @@ impl Sums {
                 fourth += product * product / PAIRINGS.len() as f64 / 64.0;
             }
             further += (0.5 * second * fourth + first * third) / channels;
+            plain += variance * g / channels;
             error += (variance * g - 0.5 * second * fourth - first * third) / channels;
             crossed += self::crossed(x, floor) / channels;
             for (share, d) in shares.iter_mut().zip(deviations) {
@@ -407,7 +409,8 @@ impl Sums {
             *sum += pair;
             self.pair_squares += pair * pair;
         }
-        self.own += own.trace();
+        // W of the mean itself is as much larger or smaller as the size is that it makes.
+        self.own += if plain > 0.0 { own.trace() * (error.max(0.0) / plain).powi(2) } else { 0.0 };
         self.splatted += splatted.trace();
     }
 }
