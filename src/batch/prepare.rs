@@ -117,7 +117,7 @@ pub(super) fn prepare_scene(
             let hint = "whitted has no noise: its time and its error are given";
             return Err(Error::Config(format!("render.stop: {hint}")));
         }
-        Integrator::Whitted(w) => w.samples(),
+        Integrator::Whitted(w) => w.samples,
         Integrator::Path(_) | Integrator::Depth | Integrator::Light(_) | Integrator::Nothing => {
             description.render.most_samples()
         }
@@ -275,7 +275,8 @@ pub(super) fn integrator(description: &SceneDescription, written: &description::
         description::Integrator::Whitted(w) => Integrator::Whitted(WhittedSettings {
             max_depth: w.max_depth,
             grid: w.grid,
-            wavelengths: Spread::of_wavelengths(WhittedSettings::samples_of(w.grid)),
+            samples: w.samples(),
+            wavelengths: Spread::of_wavelengths(w.samples()),
             ambient: compile::ambient(description, &w.ambient)?,
             transparent_shadows: w.transparent_shadows,
         }),

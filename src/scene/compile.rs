@@ -40,7 +40,7 @@ use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene, TriangleMesh};
 use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
 use crate::math::Ray;
-use crate::spectrum::{Outside, Spectrum, WavelengthDistribution};
+use crate::spectrum::{LANES, Outside, RANDOM, Spectrum, WavelengthDistribution};
 use attributes::Surface;
 use glam::DVec3;
 use meshes::Meshes;
@@ -542,6 +542,14 @@ impl<'a> Compiler<'a> {
         objects: &[Object],
         bands: &[Band],
     ) -> WavelengthDistribution {
+        // Of `whitted` a pixel has a lattice of them, as many at least.
+        let points = match &self.description.integrator {
+            written::Integrator::Whitted(w) => {
+                let wavelengths = w.samples() as usize * LANES;
+                (1 << wavelengths.ilog2()).min(RANDOM)
+            }
+            _ => RANDOM,
+        };
         let mut emitters: Vec<(f64, Spectrum)> = Vec::new();
         for (light, power) in lights.iter().zip(powers) {
             let spectra = light.spectra();
@@ -571,7 +579,7 @@ impl<'a> Compiler<'a> {
                 }
             }
         }
-        WavelengthDistribution::for_scene(&emitters, &reflectances)
+        WavelengthDistribution::for_scene(&emitters, &reflectances, points)
     }
 }
 

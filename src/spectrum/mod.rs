@@ -30,7 +30,7 @@ pub use colour::ColourSpace;
 pub use index::RefractiveIndex;
 pub use spectra::Spectrum;
 pub use table::{Outside, Table};
-pub use wavelengths::{SampledWavelengths, WavelengthDistribution};
+pub use wavelengths::{RANDOM, SampledWavelengths, WavelengthDistribution};
 
 /// One number for each of the eight wavelengths of a path.
 #[cfg(not(feature = "four_lanes"))]

@@ -260,6 +260,19 @@ impl Spectrum {
         max
     }
 
+    /// Where the spectrum may jump, nm: the edges of lines, and where measured values begin and end.
+    pub(crate) fn jumps(&self) -> Vec<f64> {
+        match self {
+            Spectrum::Constant(_) | Spectrum::Sigmoid { .. } => Vec::new(),
+            Spectrum::Table(table) | Spectrum::SigmoidTable { table, .. } => {
+                let knots = table.knots();
+                let twice = knots.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
+                knots.first().into_iter().chain(knots.last()).copied().chain(twice).collect()
+            }
+            Spectrum::Product(factors) => factors.iter().flat_map(Spectrum::jumps).collect(),
+        }
+    }
+
     /// Where the spectrum is not smooth, nm.
     pub(crate) fn breakpoints(&self) -> Vec<f64> {
         match self {

@@ -33,13 +33,16 @@ pub struct SampledWavelengths {
 
 /// Intervals of P⁻¹: a power of two, a multiple of [`LANES`], so that all lanes sit at the same place of theirs.
 const KNOTS: usize = 2048;
+/// So many points of u stand for numbers drawn at random, to [`WavelengthDistribution::for_scene`].
+pub const RANDOM: usize = KNOTS;
 /// Intervals between one lane and the next.
 const ROWS: usize = KNOTS / LANES;
 
 /// The most by which the light of a wavelength may outweigh its interval: its density times the width of the interval over
 /// the mass of it.
 const UNEVEN: f64 = 4.0;
-/// The most pieces of the band: with whole numbers of intervals a piece is short of a quarter of its own at most.
+/// The most pieces of the band: with whole numbers of intervals a piece is short of a quarter of its own at most. Of fewer points half
+/// as many.
 const PIECES: usize = KNOTS / 4;
 
 /// An interval of u: where in nm it begins, how wide it is, and the last f32 in it.
@@ -169,20 +172,21 @@ impl WavelengthDistribution {
     /// For `vis`, `mix` and `em`, and for every emitter times 1 and times each reflectance, the
     /// standard deviation over u of the linear Rec.709 estimate of one path is computed on the
     /// lattice itself; the density with the least mean, weighted by emitter, is taken. At most the 64
-    /// strongest emitters and 64 reflectances, evenly spaced through the list, are looked at.
+    /// strongest emitters and 64 reflectances, evenly spaced through the list, are looked at. Of `points`, a power of two up to
+    /// [`RANDOM`], that are spread evenly over u each piece of the band, such as a line, has its share, one at least.
     #[must_use]
-    pub fn for_scene(emitters: &[(f64, Spectrum)], reflectances: &[Spectrum]) -> WavelengthDistribution {
+    pub fn for_scene<'a>(
+        emitters: &'a [(f64, Spectrum)],
+        reflectances: &[Spectrum],
+        points: usize,
+    ) -> WavelengthDistribution {
         const MOST: usize = 64;
-        let mut shares: Vec<(f64, &Spectrum, Density)> = Vec::new();
-        for (weight, spectrum) in emitters {
-            let density = Density::of_emission(spectrum);
-            if *weight > 0.0 && weight.is_finite() && density.total > 0.0 {
-                shares.push((*weight, spectrum, density));
-            }
-        }
+        let mut weighed: Vec<&(f64, Spectrum)> = emitters.iter().filter(|(w, _)| *w > 0.0 && w.is_finite()).collect();
         // A stable sort: equal weights stay in the order given.
-        shares.sort_by(|a, b| b.0.total_cmp(&a.0));
-        shares.truncate(MOST);
+        weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let share = |(weight, spectrum): &'a (f64, Spectrum)| (*weight, spectrum, Density::of_emission(spectrum));
+        let shares = weighed.into_iter().map(share).filter(|(_, _, density)| density.total > 0.0);
+        let shares: Vec<(f64, &Spectrum, Density)> = shares.take(MOST).collect();
         if shares.is_empty() {
             let mut distribution = WavelengthDistribution::visible();
             distribution.description.push_str("; no emitter to choose by");
@@ -193,22 +197,27 @@ impl WavelengthDistribution {
 
         let emission = Density::mixture(shares.iter().map(|(weight, _, density)| (*weight, density)));
         let visible = Density::visible();
+        // Points in a lattice would step over lines: each has its piece of the band. Numbers drawn at random meet them in the mean.
+        let jumps = |(_, spectrum, _): &(f64, &Spectrum, Density)| spectrum.jumps();
+        let of_lattice = shares.iter().filter(|_| points < RANDOM);
+        let jumps: Vec<f64> = of_lattice.flat_map(jumps).take(points / 2 - 1).collect();
         let candidates = [
             ("vis", visible.clone()),
             ("mix", Density::mixture([(0.5, &visible), (0.5, &emission)])),
             ("em", Density::mixture([(0.1, &visible), (0.9, &emission)])),
         ]
-        .map(|(name, density)| (name, density.distribution(String::new())));
+        .map(|(name, density)| (name, density.distribution_cut(String::new(), points, &jumps)));
         let noise = candidates.each_ref().map(|(_, distribution)| {
             let lattice = Lattice::of(distribution);
             let factors: Vec<Vec<Lanes>> = chosen.iter().map(|r| lattice.values(r)).collect();
             let (mut sum, mut weights) = (0.0, 0.0);
             for (weight, spectrum, _) in &shares {
                 let light = lattice.values(spectrum);
-                sum += weight * lattice.noise(&light, None);
+                // Light that the lattice does not see, as it steps over a narrow line, is seldom met by paths.
+                sum += weight * lattice.noise(&light, None).unwrap_or(f64::INFINITY);
                 weights += weight;
                 for factor in &factors {
-                    sum += weight * lattice.noise(&light, Some(factor));
+                    sum += weight * lattice.noise(&light, Some(factor)).unwrap_or(0.0);
                     weights += weight;
                 }
             }
@@ -217,7 +226,10 @@ impl WavelengthDistribution {
         let best = (1..3).fold(0, |best, i| if noise[i] < noise[best] { i } else { best });
         let what =
             ["by the eye", "half by the eye, half by the emitters", "a tenth by the eye, the rest by the emitters"];
-        let figure = |i: usize| format!("{} {:.2} %", candidates[i].0, 100.0 * noise[i]);
+        let figure = |i: usize| match noise[i].is_finite() {
+            true => format!("{} {:.2} %", candidates[i].0, 100.0 * noise[i]),
+            false => format!("{} steps over a line", candidates[i].0),
+        };
         let others: Vec<String> = (0..3).filter(|i| *i != best).map(figure).collect();
         let description = format!(
             "{}: {}; colour noise of a path {:.2} % ({})",
@@ -350,6 +362,11 @@ impl Density {
 
     /// The distribution with this density, but that each piece of the band has whole intervals.
     fn distribution(&self, description: String) -> WavelengthDistribution {
+        self.distribution_cut(description, RANDOM, &[])
+    }
+
+    /// The same with pieces that end at `jumps`, nm, each of them with whole numbers of `points`.
+    fn distribution_cut(&self, description: String, points: usize, jumps: &[f64]) -> WavelengthDistribution {
         let below: Vec<f64> = std::iter::once(0.0)
             .chain(self.mass.iter().scan(0.0, |sum, mass| {
                 *sum += mass;
@@ -357,10 +374,13 @@ impl Density {
             }))
             .collect();
         // Where pieces begin and end, as numbers of edges.
-        let mut cuts = vec![0, self.mass.len()];
+        let edge = |nm: &f64| self.edges.partition_point(|edge| edge < nm).min(self.mass.len());
+        let mut cuts: Vec<usize> = [0, self.mass.len()].into_iter().chain(jumps.iter().map(edge)).collect();
+        cuts.sort_unstable();
+        cuts.dedup();
         let intervals = loop {
-            let (intervals, uneven) = self.intervals(&below, &cuts);
-            if uneven.is_empty() || cuts.len() + uneven.len() > PIECES {
+            let (intervals, uneven) = self.intervals(&below, &cuts, points);
+            if uneven.is_empty() || cuts.len() + uneven.len() > PIECES.min(points / 2) {
                 break intervals;
             }
             cuts.extend(uneven);
@@ -371,9 +391,10 @@ impl Density {
 
     /// The intervals of the pieces between `cuts`, evenly by mass in each, and where to cut those that are uneven. `below` is
     /// the mass up to each edge.
-    fn intervals(&self, below: &[f64], cuts: &[usize]) -> (Vec<Interval>, Vec<usize>) {
+    fn intervals(&self, below: &[f64], cuts: &[usize], points: usize) -> (Vec<Interval>, Vec<usize>) {
         let shares = cuts.windows(2).map(|cut| (below[cut[1]] - below[cut[0]]) / self.total);
-        let counts = whole(&shares.map(|share| share * KNOTS as f64).collect::<Vec<f64>>(), KNOTS);
+        let counts = whole(&shares.map(|share| share * points as f64).collect::<Vec<f64>>(), points);
+        let counts = counts.into_iter().map(|count| count * (KNOTS / points));
         let (mut intervals, mut uneven) = (Vec::with_capacity(KNOTS), Vec::new());
         for (cut, count) in cuts.windows(2).zip(counts) {
             let (low, high) = (below[cut[0]], below[cut[1]]);
@@ -466,8 +487,8 @@ impl Lattice {
         self.samples.iter().map(|s| spectrum.eval(s.nm)).collect()
     }
 
-    /// Standard deviation of the estimate over its mean; 0 for black.
-    fn noise(&self, light: &[Lanes], reflectance: Option<&Vec<Lanes>>) -> f64 {
+    /// Standard deviation of the estimate over its mean; `None` for black.
+    fn noise(&self, light: &[Lanes], reflectance: Option<&Vec<Lanes>>) -> Option<f64> {
         let mut sum = [0.0; 3];
         let mut square = 0.0;
         for (i, weights) in self.weights.iter().enumerate() {
@@ -480,7 +501,7 @@ impl Lattice {
         }
         let n = self.weights.len() as f64;
         let mean: f64 = sum.iter().map(|s| (s / n) * (s / n)).sum();
-        if mean > 0.0 { ((square / n - mean).max(0.0) / mean).sqrt() } else { 0.0 }
+        (mean > 0.0).then(|| ((square / n - mean).max(0.0) / mean).sqrt())
     }
 }
 
@@ -500,8 +521,8 @@ mod tests {
         vec![
             WavelengthDistribution::uniform(),
             WavelengthDistribution::visible(),
-            WavelengthDistribution::for_scene(&[(1.0, d65())], &[]),
-            WavelengthDistribution::for_scene(&[(1.0, lines())], &[reflectance([0.6, 0.2, 0.1]).unwrap()]),
+            WavelengthDistribution::for_scene(&[(1.0, d65())], &[], RANDOM),
+            WavelengthDistribution::for_scene(&[(1.0, lines())], &[reflectance([0.6, 0.2, 0.1]).unwrap()], RANDOM),
         ]
     }
 
@@ -650,7 +671,49 @@ mod tests {
     /// deviation over u of the linear Rec.709 vector of `emitter` · `reflectance`, relative to its mean.
     fn colour_noise(of: &WavelengthDistribution, emitter: &Spectrum, reflectance: &Spectrum) -> f64 {
         let lattice = Lattice::of(of);
-        lattice.noise(&lattice.values(emitter), Some(&lattice.values(reflectance)))
+        lattice.noise(&lattice.values(emitter), Some(&lattice.values(reflectance))).unwrap()
+    }
+
+    /// The mean of `light` over a lattice of `points` as it is told, XYZ.
+    fn by_lattice(of: &WavelengthDistribution, light: &Spectrum, points: usize) -> [f64; 3] {
+        let sets = points / LANES;
+        let mut sum = [0.0; 3];
+        for s in 0..sets {
+            let wavelengths = of.sample((s as f64 + 0.5) / points as f64);
+            let own = xyz(light.eval(wavelengths.nm), &wavelengths);
+            sum = [0, 1, 2].map(|c| sum[c] + f64::from(own[c]) / sets as f64);
+        }
+        sum
+    }
+
+    /// A line of 1 nm beside a lamp that is ten thousand times as strong: of 32 points one is within it, wherever it lies.
+    /// Those of the lamp tell its colour to 1.5 % with what is left of them, and within the line ȳ is nearly straight.
+    #[test]
+    fn a_lattice_of_few_points_meets_every_line() {
+        for nm in [436.0, 450.0, 532.0, 546.1, 589.0, 611.0] {
+            let line = Spectrum::lines(&[(nm, 1.0, 1.0)]).unwrap();
+            let emitters = [(1e4, d65()), (1.0, line.clone())];
+            let distribution = WavelengthDistribution::for_scene(&emitters, &[], 32);
+            for (light, bound) in [(&line, 0.01), (&d65(), 0.015)] {
+                let (told, exact) = (by_lattice(&distribution, light, 32), tristimulus(light));
+                let off = (0..3).map(|c| (told[c] - exact[c]).powi(2)).sum::<f64>().sqrt();
+                let size = exact.iter().map(|x| x * x).sum::<f64>().sqrt();
+                assert!(off < bound * size, "{nm}: {told:?} {exact:?}");
+            }
+        }
+    }
+
+    /// Lines of a hundredth of a nanometre lie between the points of a lattice by the eye: paths meet them where the emitters choose.
+    #[test]
+    fn lines_that_a_lattice_steps_over_are_met() {
+        for nm in [436.0, 450.0, 532.0, 546.1, 589.0, 611.0] {
+            let line = Spectrum::lines(&[(nm, 1.0, 0.01)]).unwrap();
+            let distribution = WavelengthDistribution::for_scene(&[(1.0, line.clone())], &[], RANDOM);
+            assert!(!distribution.describe().starts_with("vis"), "{}", distribution.describe());
+            let noise = Lattice::of(&distribution);
+            let noise = noise.noise(&noise.values(&line), None).unwrap();
+            assert!(noise < 0.2, "{nm}: {noise}");
+        }
     }
 
     /// Sampling by the eye leaves 4 to 5 % for D65 on grey, and far more for lines; sampling by the emitter
@@ -661,8 +724,8 @@ mod tests {
         let visible = WavelengthDistribution::visible();
         let noise = colour_noise(&visible, &d65(), &grey);
         assert!((0.03..0.06).contains(&noise), "{noise}");
-        let day = WavelengthDistribution::for_scene(&[(1.0, d65())], &[]);
-        let night = WavelengthDistribution::for_scene(&[(1.0, lines())], &[]);
+        let day = WavelengthDistribution::for_scene(&[(1.0, d65())], &[], RANDOM);
+        let night = WavelengthDistribution::for_scene(&[(1.0, lines())], &[], RANDOM);
         assert!(night.describe().starts_with("em:"), "{}", night.describe());
         assert!(
             colour_noise(&night, &lines(), &grey) < 0.2 * colour_noise(&visible, &lines(), &grey),
@@ -672,7 +735,7 @@ mod tests {
         assert!(colour_noise(&day, &d65(), &grey) <= noise * 1.000_001, "{}", day.describe());
         println!("{} | {}", day.describe(), night.describe());
         // The scale of a spectrum does not count, and nothing depends on chance.
-        let again = WavelengthDistribution::for_scene(&[(1.0, lines().scaled(1e6))], &[]);
+        let again = WavelengthDistribution::for_scene(&[(1.0, lines().scaled(1e6))], &[], RANDOM);
         assert_eq!(again.describe(), night.describe());
         assert_eq!(again.sample(0.3), night.sample(0.3));
     }
@@ -680,7 +743,7 @@ mod tests {
     #[test]
     fn without_light_the_eye_decides() {
         for emitters in [vec![], vec![(1.0, Spectrum::constant(0.0))], vec![(0.0, d65())]] {
-            let d = WavelengthDistribution::for_scene(&emitters, &[]);
+            let d = WavelengthDistribution::for_scene(&emitters, &[], RANDOM);
             assert!(d.describe().starts_with("vis") && d.describe().contains("no emitter"), "{}", d.describe());
         }
     }

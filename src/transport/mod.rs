@@ -487,9 +487,7 @@ impl Samples {
 /// its number behind a hole.
 fn deciding(shot: &Shot, sampler: &Sampler, at: Address, crossing: u32, left: Option<f64>) -> f64 {
     match &shot.plan.integrator {
-        Integrator::Whitted(settings) => {
-            left.unwrap_or_else(|| Spread::new(settings.samples(), GOLDEN).at(at.in_turn()))
-        }
+        Integrator::Whitted(settings) => left.unwrap_or_else(|| Spread::new(settings.samples, GOLDEN).at(at.in_turn())),
         _ => sampler.set(Set::Extra(crossing << 16))[2],
     }
 }

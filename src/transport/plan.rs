@@ -112,6 +112,8 @@ pub struct WhittedSettings {
     pub max_depth: u32,
     /// Points of a pixel along each side.
     pub grid: u32,
+    /// Samples of a pixel: it is traced anew where the points are fewer.
+    pub samples: u32,
     /// How the wavelengths of a pixel's samples are spread.
     pub wavelengths: Spread,
     /// Radiance that surfaces get from everywhere, times their reflectance.
@@ -119,22 +121,6 @@ pub struct WhittedSettings {
     /// True where transparent objects let light through in a straight line, dimmed and tinted by
     /// their surfaces, instead of casting a full shadow.
     pub transparent_shadows: bool,
-}
-
-impl WhittedSettings {
-    /// Samples of a pixel: one a point of the grid, and at least four, because the wavelengths of
-    /// fewer would not do. The 32 of four sets integrate a colour to 0.5 %, the 8 of one set only to
-    /// 10 %; with one point it is traced four times.
-    #[must_use]
-    pub fn samples(&self) -> u32 {
-        WhittedSettings::samples_of(self.grid)
-    }
-
-    /// The same of a `grid`.
-    #[must_use]
-    pub fn samples_of(grid: u32) -> u32 {
-        (grid * grid).max(4)
-    }
 }
 
 /// Whether effects that the scene lacks are left out.

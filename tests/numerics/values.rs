@@ -8,7 +8,7 @@ use abbe::math::statistics::Moments;
 use abbe::optics::microfacet::{Distribution, Microfacets};
 use abbe::optics::phase::Phase;
 use abbe::scene::FogFalloff;
-use abbe::spectrum::{ColourSpace, Spectrum, WavelengthDistribution, observer, upsample};
+use abbe::spectrum::{ColourSpace, RANDOM, Spectrum, WavelengthDistribution, observer, upsample};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 
@@ -121,7 +121,7 @@ fn wavelengths_stay_in_the_band_and_have_weights() {
     let line = |nm: f64| Spectrum::lines(&[(nm, 1.0, 1.0)]).unwrap();
     let mut all = vec![WavelengthDistribution::uniform(), WavelengthDistribution::visible()];
     for nm in [361.0, 555.0, 829.0] {
-        all.push(WavelengthDistribution::for_scene(&[(1.0, line(nm))], &[]));
+        all.push(WavelengthDistribution::for_scene(&[(1.0, line(nm))], &[], RANDOM));
         all.push(WavelengthDistribution::for_bands(&[&line(nm)], &[]));
     }
     for distribution in all {
