@@ -9,7 +9,7 @@ use super::bands::{self, Bands};
 use super::bvh::prefetch;
 use super::texture::{Texel, spread};
 use crate::math::elementary::atan2;
-use crate::math::sampler::Octet;
+use crate::math::sampler::{GOLDEN, Octet};
 use crate::math::trig::sin_cos_turn;
 use crate::spectrum::{Carried, Lanes, Spectrum, illuminant, upsample};
 use glam::{DMat3, DVec2, DVec3};
@@ -387,6 +387,27 @@ impl Environment {
     #[must_use]
     pub fn brighter_luminance(&self) -> f64 {
         self.brighter_luminance
+    }
+
+    /// Some of its spectra and what each gives to the mean of all directions: of 1024 directions drawn by brightness.
+    #[must_use]
+    pub fn shares(&self) -> Vec<(f64, Spectrum)> {
+        const DRAWS: usize = 1024;
+        let place = |i: usize| DVec2::new((i as f64 + 0.5) / DRAWS as f64, ((i as f64 + 0.5) * GOLDEN).fract());
+        let draws = (0..DRAWS).filter_map(|i| self.sample(place(i), Drawn::All));
+        let share = |sample: EnvironmentSample| {
+            let corners = self.corners(sample.at);
+            let nearest = usize::from(corners.x > 0.5) + 2 * usize::from(corners.y > 0.5);
+            let spectrum = match &self.bands {
+                Some(bands) => bands.spectrum(corners.numbers[nearest].min(bands.len() - 1)),
+                None => {
+                    let Texel { coefficients: c, scale } = *corners.texels[nearest];
+                    Spectrum::Sigmoid { c, scale }.times(&self.illuminant)
+                }
+            };
+            (1.0 / (4.0 * PI * sample.pdf_solid_angle * DRAWS as f64), spectrum)
+        };
+        draws.map(share).collect()
     }
 
     /// Some 16 spectra of the map, for the choice of wavelengths.

@@ -139,9 +139,9 @@ pub fn chromaticity(lights: &[Light], objects: &[Object], radius: f64) -> Option
     let mut sum = [0.0; 3];
     for light in lights {
         let mut xyz = [0.0; 3];
-        for spectrum in light.spectra() {
+        for (weight, spectrum) in light.shares() {
             let own = tristimulus(&spectrum);
-            xyz = [0, 1, 2].map(|c| xyz[c] + own[c]);
+            xyz = [0, 1, 2].map(|c| xyz[c] + weight * own[c]);
         }
         let power = light.power(objects, radius);
         if xyz[1] > 0.0 && power > 0.0 {
@@ -402,6 +402,22 @@ impl Light {
             | Light::Constant { radiance: s } => vec![s.clone()],
             Light::Environment(map) => map.representatives(),
             Light::Projector(projector) => projector.spectra(),
+        }
+    }
+
+    /// Spectra of its light, each with what it gives to the mean of all.
+    fn shares(&self) -> Vec<(f64, Spectrum)> {
+        match self {
+            Light::Area { radiance: t, .. } | Light::AlongNormal { exitance: t, .. } => t.shares(),
+            Light::Spot { intensity, slide: Some(slide), .. } => {
+                slide.texture.shares().into_iter().map(|(share, s)| (share, s.times(intensity))).collect()
+            }
+            Light::Point { intensity: s, .. }
+            | Light::Spot { intensity: s, .. }
+            | Light::Directional { irradiance: s, .. }
+            | Light::Constant { radiance: s } => vec![(1.0, s.clone())],
+            Light::Environment(map) => map.shares(),
+            Light::Projector(projector) => projector.shares(),
         }
     }
 }

@@ -118,6 +118,12 @@ impl Projector {
         4.0 * (self.half.x * self.half.y).abs() * PI * f64::from(self.scale) * self.irradiance.mean_luminance()
     }
 
+    /// Spectra of its light and their shares.
+    #[must_use]
+    pub fn shares(&self) -> Vec<(f64, Spectrum)> {
+        self.irradiance.shares()
+    }
+
     /// Spectra of its light.
     #[must_use]
     pub fn spectra(&self) -> Vec<Spectrum> {

@@ -477,6 +477,28 @@ impl Texture {
         }
     }
 
+    /// Some of its spectra and their shares of it, so that the mean of all is told: texels of a picture, voxels or values of a file.
+    #[must_use]
+    pub fn shares(&self) -> Vec<(f64, Spectrum)> {
+        const SOME: usize = 1024;
+        let even = |count: usize, at: &dyn Fn(usize) -> Spectrum| -> Vec<(f64, Spectrum)> {
+            let share = 1.0 / count.clamp(1, SOME) as f64;
+            spread(count, SOME).map(|i| (share, at(i))).collect()
+        };
+        match self {
+            Texture::Uniform(spectrum) => vec![(1.0, spectrum.clone())],
+            Texture::Image(image) => match &image.bands {
+                Some(bands) => even(bands.len(), &|i| image.lit(bands.spectrum(i))),
+                None => even(image.texels.len(), &|i| image.spectrum(image.texels.at(i))),
+            },
+            Texture::Volume(volume) => volume.shares(even),
+            Texture::Attribute(attribute) => attribute.shares(even),
+            Texture::Checkerboard { a, b, .. } => {
+                a.shares().into_iter().chain(b.shares()).map(|(share, spectrum)| (0.5 * share, spectrum)).collect()
+            }
+        }
+    }
+
     /// Spectra that stand for the texture where one is needed (choice of wavelengths):
     /// each spectrum of a checkerboard, and some 16 texels of a picture or voxels of a volume with the brightest.
     #[must_use]

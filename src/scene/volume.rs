@@ -277,6 +277,18 @@ impl Volume {
         }
     }
 
+    /// Its spectra and their shares, of a grid as `even` tells those of so many.
+    #[must_use]
+    pub fn shares(
+        &self,
+        even: impl Fn(usize, &dyn Fn(usize) -> Spectrum) -> Vec<(f64, Spectrum)>,
+    ) -> Vec<(f64, Spectrum)> {
+        match self {
+            Volume::Constant { value, .. } => vec![(1.0, value.clone())],
+            Volume::Grid(grid) => even(grid.len(), &|i| grid.spectrum(i)),
+        }
+    }
+
     fn local_from_world(&self) -> DAffine3 {
         match self {
             Volume::Constant { local_from_world, .. } => *local_from_world,
@@ -348,7 +360,12 @@ impl Bounds {
     fn of(grid: &GridVolume, edge: usize) -> Bounds {
         let edge = edge.min(grid.size.into_iter().max().unwrap_or(1));
         let blocks = grid.size.map(|n| n.div_ceil(edge));
-        let factors: Vec<(f32, f32)> = (0..grid.size.iter().product()).map(|i| grid.bound(i)).collect();
+        // Those of colours are worked out once; others are read as they are, which takes no memory.
+        let worked_out: Vec<(f32, f32)> = match &grid.values {
+            Voxels::Coloured(_) => (0..grid.len()).map(|i| grid.bound(i)).collect(),
+            Voxels::Grey(_) | Voxels::Raw(_) => Vec::new(),
+        };
+        let bound = |i: usize| worked_out.get(i).copied().unwrap_or_else(|| grid.bound(i));
         // A look-up at place x mixes voxels ⌊x − ½⌋ and the next; rounding may carry a point over a face
         // of its block, so one voxel on either side counts.
         let around = |axis: usize, block: usize| -> Vec<usize> {
@@ -370,7 +387,7 @@ impl Bounds {
                     for &k in z {
                         for &j in y {
                             for &i in x {
-                                let (v, f) = factors[grid.index([i, j, k])];
+                                let (v, f) = bound(grid.index([i, j, k]));
                                 (value, factor) = (value.max(v), factor.max(f));
                             }
                         }
@@ -383,7 +400,7 @@ impl Bounds {
             }
         }
         let n = grid.size.map(|n| n as f64);
-        let largest = |pick: fn(&(f32, f32)) -> f32| factors.iter().map(pick).fold(0.0f32, f32::max);
+        let largest = |pick: fn((f32, f32)) -> f32| (0..grid.len()).map(|i| pick(bound(i))).fold(0.0f32, f32::max);
         Bounds {
             place_from_world: DAffine3::from_scale(DVec3::from(n)) * grid.local_from_world,
             blocks,

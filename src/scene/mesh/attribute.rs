@@ -114,6 +114,15 @@ impl AttributeTexture {
         mean_luminance(self.field.values.len(), brightest, |i| self.spectrum(i))
     }
 
+    /// Its spectra and their shares, as `even` tells those of so many.
+    #[must_use]
+    pub fn shares(
+        &self,
+        even: impl Fn(usize, &dyn Fn(usize) -> Spectrum) -> Vec<(f64, Spectrum)>,
+    ) -> Vec<(f64, Spectrum)> {
+        even(self.field.values.len(), &|i| self.spectrum(i))
+    }
+
     fn brightest(&self) -> Option<usize> {
         let value = |i: &usize| self.field.values[*i].iter().sum::<f32>();
         (0..self.field.values.len()).max_by(|a, b| value(a).total_cmp(&value(b)))
