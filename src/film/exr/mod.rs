@@ -23,6 +23,7 @@ use crate::film::Window;
 use crate::film::resolve::Image;
 use crate::spectrum::ColourSpace;
 use half::f16;
+use std::collections::BTreeMap;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -354,7 +355,7 @@ pub struct Beauty {
 ///
 /// Half holds 11 significant bits between 2⁻¹⁴ and 65504. A picture with a finite value that would round to infinity,
 /// or so dim that the step of subnormal halves (2⁻²⁴) exceeds half's own relative precision at the mean
-/// (mean of |value| below 2⁻¹⁴), is written as float instead, and the note says so. Nothing is clamped.
+/// (mean of |value| below 2⁻¹⁴), is written as float instead, and so is a layer of light by itself; the note says so. Nothing is clamped.
 ///
 /// DWA packs halves, also of floats, and keeps no infinity: a picture that half cannot hold, or that is not finite, is
 /// packed as ZIPS instead, which loses nothing.
@@ -369,12 +370,25 @@ pub fn beauty(
     compression: Compression,
 ) -> Beauty {
     let colours: Vec<(&str, &Vec<f32>)> = base.colours().iter().map(|&(name, i)| (name, &image.rgb[i])).collect();
-    let light = layers.iter().filter(|layer| layer.kind != PlaneKind::Data).map(|layer| &layer.plane);
     let in_colours = base != Base::Nothing || layers.iter().any(|layer| layer.kind == PlaneKind::Colour);
-    let planes: Vec<&Vec<f32>> = colours.iter().map(|(_, plane)| *plane).chain(light).collect();
+    // The picture and each layer of light by itself: a dim one may lie beside a bright one.
+    let of_colours: Vec<&Vec<f32>> = colours.iter().map(|(_, plane)| *plane).collect();
+    let mut of_layers: BTreeMap<&str, Vec<&Vec<f32>>> = BTreeMap::new();
+    for layer in layers.iter().filter(|layer| layer.kind != PlaneKind::Data) {
+        of_layers.entry(group(&layer.name)).or_default().push(&layer.plane);
+    }
     let (narrow, lossy) = (precision == Precision::Half, compression.loses());
-    let beyond_half = if narrow || lossy { half_loses(&planes) } else { None };
-    let wide = !narrow || beyond_half.is_some();
+    let lost = |planes: &[&Vec<f32>]| if narrow || lossy { half_loses(planes) } else { None };
+    let colours_lost = lost(&of_colours);
+    let wide = !narrow || colours_lost.is_some();
+    let layers_lost: Vec<(String, String)> =
+        of_layers.iter().filter_map(|(name, planes)| Some(((*name).to_owned(), lost(planes)?))).collect();
+    let told = |(name, why): &(String, String)| format!("layer {name}: {why}");
+    let beyond_half = colours_lost.or_else(|| {
+        let told: Vec<String> = layers_lost.iter().map(told).collect();
+        (!told.is_empty()).then(|| told.join("; "))
+    });
+    let planes: Vec<&Vec<f32>> = of_colours.iter().chain(of_layers.values().flatten()).copied().collect();
     let beyond_dwa = if lossy { beyond_half.clone().or_else(|| not_finite(&planes)) } else { None };
     let compression = if beyond_dwa.is_some() { Compression::Zips } else { compression };
     let note = match (beyond_half.filter(|_| narrow), beyond_dwa) {
@@ -383,7 +397,7 @@ pub fn beauty(
         (None, Some(why)) => Some(format!("{why}: packed as ZIPS in place of DWA")),
         (None, None) => None,
     };
-    let data = |plane: &[f32]| {
+    let data = |plane: &[f32], wide: bool| {
         if wide {
             ChannelData::F32(plane.to_vec())
         } else {
@@ -391,9 +405,9 @@ pub fn beauty(
         }
     };
     let mut channels: Vec<(String, ChannelData)> =
-        colours.iter().map(|&(name, plane)| (name.to_string(), data(plane))).collect();
+        colours.iter().map(|&(name, plane)| (name.to_string(), data(plane, wide))).collect();
     if base.has_alpha() {
-        channels.push(("A".to_string(), data(&image.alpha)));
+        channels.push(("A".to_string(), data(&image.alpha, wide)));
     }
     let mut data_channels = BTreeSet::new();
     if error == StandardError::Write {
@@ -405,7 +419,9 @@ pub fn beauty(
     }
     for layer in layers {
         let samples = match layer.kind {
-            PlaneKind::Colour | PlaneKind::Band => data(&layer.plane),
+            PlaneKind::Colour | PlaneKind::Band => {
+                data(&layer.plane, wide || layers_lost.iter().any(|(name, _)| name == group(&layer.name)))
+            }
             PlaneKind::Data => ChannelData::F32(layer.plane),
         };
         if layer.kind != PlaneKind::Colour {
@@ -424,6 +440,11 @@ pub fn beauty(
         layout: Layout::Single,
     };
     Beauty { exr, note }
+}
+
+/// The layer of a channel: its name up to the last point.
+fn group(name: &str) -> &str {
+    name.rsplit_once('.').map_or(name, |(layer, _)| layer)
 }
 
 /// Why 16-bit floats cannot hold the planes, if they cannot.
