@@ -19,8 +19,9 @@ use super::node::{Entry, Node, Place, Sources, Value, did_you_mean, quote};
 use super::path::Segment;
 use crate::error::Error;
 
-/// The maps of a scene whose keys are names, of which a number may be one.
-const NAMES: [&str; 5] = ["materials", "textures", "volumes", "media", "groups"];
+/// The maps whose keys are names, of which a number may be one.
+const NAMES: [&str; 8] =
+    ["materials", "textures", "volumes", "media", "groups", "assets", "light_groups", "attributes"];
 const INTERPOLATION: &str = "interpolation";
 const KEYS: &str = "keys";
 const FILE: &str = "file";
@@ -113,7 +114,7 @@ fn table(path: &Path, sources: &mut Sources) -> Result<Vec<Node>, String> {
     let bytes = read_bytes(path).map_err(|error| format!("cannot be read: {error}"))?;
     let text = str::from_utf8(crate::input::without_mark(&bytes)).map_err(|_| "expected text in UTF-8".to_owned())?;
     let source = sources.add_file(path);
-    let mut rows = Vec::new();
+    let (mut rows, mut has_names) = (Vec::new(), false);
     for (line, text) in (1..).zip(text.lines()) {
         let fields: Vec<&str> = text.split(',').map(str::trim).collect();
         if fields[0].starts_with('#') || fields == [""] {
@@ -131,7 +132,9 @@ fn table(path: &Path, sources: &mut Sources) -> Result<Vec<Node>, String> {
                 numbers.push(value);
                 rows.push(Node::new(place, Value::List(numbers)));
             }
-            None if rows.is_empty() && fields.iter().all(|field| field.parse::<f64>().is_err()) => {}
+            None if rows.is_empty() && !has_names && fields.iter().all(|field| field.parse::<f64>().is_err()) => {
+                has_names = true;
+            }
             _ => {
                 let found = quote(text.trim());
                 let at = fields.iter().find(|field| !field.parse().is_ok_and(f64::is_finite)).unwrap_or(&fields[0]);
@@ -296,7 +299,7 @@ fn check(node: &Node) -> Result<(), Fault> {
             .iter()
             .enumerate()
             .try_for_each(|(i, item)| check(item).map_err(|fault| fault.under(Segment::Index(i)))),
-        _ if number(node).is_some() => Ok(()),
+        _ if number(node).is_some_and(f64::is_finite) => Ok(()),
         _ => Err(Fault::expected(node, "a number or a list of numbers, which can change over frames")),
     }
 }
@@ -393,6 +396,20 @@ mod tests {
         assert_eq!(x("{-10: 4, -5: 5, 5: 0}", 0.0), 2.5);
         assert_eq!(x("{keys: [[0, 1], [0.5, 2]]}", 0.25), 1.5);
         assert_eq!(x("{7: 3}", 1.0), 3.0);
+    }
+
+    /// What is no number at any key is told at every frame, and names are no frames where names stand.
+    #[test]
+    fn keys_hold_finite_numbers_and_names_are_none() {
+        for value in ["{1: .nan, 4: .nan}", "{1: 2, 4: .inf}"] {
+            let told = at(&format!("x: {value}"), 1.0).unwrap_err();
+            assert!(told.contains("expected a number or a list of numbers"), "{told}");
+        }
+        for names in ["assets: {keys: [s], 1: [t]}", "light_groups: {1: [p]}", "attributes: {keys: 3}"] {
+            let root = at(names, 1.0).unwrap();
+            let (_, unchanged) = (root.found(), at(names, 9.0).unwrap());
+            assert_eq!(format!("{root:?}"), format!("{unchanged:?}"));
+        }
     }
 
     #[test]
@@ -527,6 +544,8 @@ mod tests {
         let named = "it is named at DIR/s.yaml:4:45";
         assert_eq!(says("1, 2, 3, 4\n2, a\n"), format!("DIR/p.csv: line 2, column 4: {line} \"2, a\"; {named}"));
         assert_eq!(says("1\n"), format!("DIR/p.csv: line 1, column 1: {line} \"1\"; {named}"));
+        // One line of names may stand first; further ones are rows with other separators.
+        assert_eq!(says("1;2\n2;3\n3, 4\n"), format!("DIR/p.csv: line 2, column 1: {line} \"2;3\"; {named}"));
         let empty = "expected lines of a frame and one number or more, with commas, found none";
         assert_eq!(says("# frame, x, y, z\n"), format!("DIR/p.csv: {empty}; {named}"));
         assert_eq!(
