@@ -295,8 +295,14 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
     let end = curve[curve.len() - 1];
     let cost = |tally: &Tally| {
         let Figure { value, error } = tally.noise_squared();
-        // Of the least of a few times nobody knows the error: half of how far they lie apart.
-        let time = 0.5 * (tally.most_seconds() / tally.seconds() - 1.0);
+        // Of the least of a few times nobody knows the error: half of how far they lie apart, of two the whole, and of one
+        // that is not known.
+        let apart = tally.most_seconds() / tally.seconds() - 1.0;
+        let time = match tally.rounds() {
+            0 | 1 => f64::INFINITY,
+            2 => apart,
+            _ => 0.5 * apart,
+        };
         (value * tally.seconds(), (error / value).hypot(time))
     };
     let ((own, own_error), (cost, error)) = (cost(chosen), cost(tally));

@@ -162,6 +162,12 @@ impl Tally {
         [value.sqrt(), value.sqrt() / stretch, value.sqrt() * stretch]
     }
 
+    /// How many rounds there are.
+    #[must_use]
+    pub fn rounds(&self) -> usize {
+        self.passes.len()
+    }
+
     /// Seconds of a render, the least of the rounds.
     #[must_use]
     pub fn seconds(&self) -> f64 {

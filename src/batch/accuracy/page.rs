@@ -173,8 +173,10 @@ pub fn cells(row: &Row) -> [String; 10] {
         row.bias().map_or(format!("<{}", per_cent(row.bias_bound())), per_cent),
         light.join(" "),
         match row.efficiency {
-            Figure { value, error } if value.is_finite() => format!("{value:.2} ± {error:.2}"),
-            _ => "no noise".to_owned(),
+            Figure { value, .. } if !value.is_finite() => "no noise".to_owned(),
+            // Of a single round nobody knows how far times lie apart.
+            Figure { value, error } if !error.is_finite() => format!("{value:.2} ± ?"),
+            Figure { value, error } => format!("{value:.2} ± {error:.2}"),
         },
         row.to_target.map_or("never".into(), |t| format!("{t:.2}")),
     ]
