@@ -326,7 +326,7 @@ impl LayerSums {
     /// NaN where fewer than two replicates have samples, and where sums are not kept by replicate.
     pub fn variances_of(&self, channel: usize, divisors: Option<[u64; REPLICATES]>) -> impl Iterator<Item = f64> {
         self.sets_of(channel).enumerate().map(move |(index, sets)| {
-            let alike = divisors.is_none() && halves(&sets).is_some();
+            let alike = divisors.is_none() && are_halves(&sets);
             let evened = self.evened(index, &sets);
             let own = sets.enumerate().map(|(r, (sum, n))| match evened {
                 Some((means, counts)) => (means[r][0], counts[r]),
@@ -353,9 +353,14 @@ fn total(sets: impl Iterator<Item = (Sum, u32)>) -> (f64, u64) {
 
 /// The sums of the halves of the replicates and their samples, where one half went on for longer than the other.
 fn halves(sets: &(impl Iterator<Item = (Sum, u32)> + Clone)) -> Option<[(f64, u64); 2]> {
-    let (first, second) = (total(sets.clone().take(HALF)), total(sets.clone().skip(HALF)));
-    let both = first.1 > 0 && second.1 > 0;
-    (both && first.1.abs_diff(second.1) > HALF as u64).then_some([first, second])
+    are_halves(sets).then(|| [total(sets.clone().take(HALF)), total(sets.clone().skip(HALF))])
+}
+
+/// Whether there are [`halves`], which the numbers of samples tell.
+fn are_halves(sets: &(impl Iterator<Item = (Sum, u32)> + Clone)) -> bool {
+    let count = |sets: &mut dyn Iterator<Item = (Sum, u32)>| sets.map(|(_, n)| u64::from(n)).sum::<u64>();
+    let [first, second] = [count(&mut sets.clone().take(HALF)), count(&mut sets.clone().skip(HALF))];
+    first > 0 && second > 0 && first.abs_diff(second) > HALF as u64
 }
 
 /// Σᵣ nᵣ (mᵣ − m)² / ((R − 1) Σ nᵣ), given mᵣ and nᵣ.
