@@ -86,6 +86,12 @@ fn a_batch_tells_a_target_out_of_reach_from_a_failure() {
         "{said}"
     );
     assert!(!said.contains("failed") && place.path("a.exr").exists() && place.path("scene.exr").exists());
+    // Both have a row, and their files and pictures count.
+    let (_, table) = abbe(&place, "render batch.yaml -o .");
+    assert!(table.lines().any(|line| line.starts_with("a ")), "{table}");
+    assert!(table.contains("4 files in"), "{table}");
+    let page = std::fs::read_to_string(place.path("contact-sheet.html")).unwrap();
+    assert!(page.contains("a.exr") && page.contains("scene.exr"));
 }
 
 /// A frame before its fade-in: where no light has power the picture is black for sure, whole or in parts.

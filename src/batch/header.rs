@@ -35,6 +35,7 @@ pub(super) fn attributes(
         ("abbe/effects".to_owned(), text(&report.effects_in_force().join(", "))),
         ("abbe/renderSeconds".to_owned(), Attribute::Double(frame.elapsed.as_secs_f64())),
         ("abbe/invalidSamples".to_owned(), text(&frame.invalid().total().to_string())),
+        ("abbe/invalidByCause".to_owned(), text(&frame.invalid().causes().map(|n| n.to_string()).join(" "))),
     ];
     for (name, matrix) in [("worldToCamera", finish.world_to_camera), ("worldToNDC", finish.world_to_ndc)] {
         all.extend(matrix.map(|matrix| (name.to_owned(), Attribute::Matrix4(matrix))));

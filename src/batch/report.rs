@@ -357,6 +357,12 @@ impl SceneReport {
         self.seconds.rendering = header.number("abbe/renderSeconds").unwrap_or(0.0);
         self.pixel_hash = header.text("abbe/pixelHash").unwrap_or_default().to_owned();
         self.halving_seconds = header.number("abbe/secondsToHalveError");
+        let causes: Vec<u64> = header
+            .text("abbe/invalidByCause")
+            .map_or_else(Vec::new, |text| text.split(' ').filter_map(|n| n.parse().ok()).collect());
+        if let [nan, infinite, negative, overflow] = causes[..] {
+            self.invalid = InvalidCounts { nan, infinite, negative, overflow };
+        }
         let interval = header.text("abbe/relativeErrorInterval95").unwrap_or_default();
         let ends: Vec<f64> = interval.split(' ').filter_map(|end| end.parse().ok()).collect();
         if let (Some(rel_rmse), [low, high]) = (header.number("abbe/relativeError"), ends.as_slice()) {

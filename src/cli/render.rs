@@ -173,7 +173,8 @@ fn row(s: &SceneReport) -> [String; 7] {
 
 /// The table at the end: what was rendered, what it cost, how good it is, where it is.
 pub fn table(report: &Report) -> String {
-    let done: Vec<&SceneReport> = report.scenes.iter().filter(|s| matches!(s.status, Status::Done)).collect();
+    let is_written = |s: &&SceneReport| matches!(s.status, Status::Done) || s.is_written_with_a_fault();
+    let done: Vec<&SceneReport> = report.scenes.iter().filter(is_written).collect();
     let mut out = String::new();
     if done.is_empty() {
         return out;
@@ -191,7 +192,7 @@ pub fn table(report: &Report) -> String {
             let metered = if png.metered { ", metered" } else { "" };
             let white =
                 png.white.map_or(String::new(), |[x, y]| format!("; light of x {x:.4}, y {y:.4} is shown white"));
-            let _ = writeln!(out, "PNG: {}: exposure {:+} stops{metered}{white}", s.name, png.exposure_stops);
+            let _ = writeln!(out, "PNG: {}: exposure {:+} stops{metered}{white}", s.label(), png.exposure_stops);
         }
     }
     for s in &done {

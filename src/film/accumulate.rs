@@ -102,6 +102,12 @@ impl InvalidCounts {
         }
     }
 
+    /// Those that are no numbers, infinite, negative and too large, in this order.
+    #[must_use]
+    pub fn causes(&self) -> [u64; 4] {
+        [self.nan, self.infinite, self.negative, self.overflow]
+    }
+
     /// All causes together.
     #[must_use]
     pub fn total(&self) -> u64 {

@@ -53,12 +53,16 @@ fn invalid_samples_are_counted_and_end_with_code_4() {
     assert!(ran.err.contains("64 of 64 samples were invalid") && ran.err.contains("64 NaN"), "{}", ran.err);
     assert!(file.parts[0].channels.iter().all(|(_, c)| c.iter().all(|x| x.is_finite())));
     assert_eq!(file.parts[0].text("abbe/invalidSamples"), Some("64"));
+    assert_eq!(file.parts[0].text("abbe/invalidByCause"), Some("64 0 0 0"));
     // So it is when the picture is found there, which nothing changes.
     let written = std::fs::metadata(place.path("hot/good.exr")).unwrap().modified().unwrap();
     for keep in ["--resume", "--skip-existing"] {
         let set = "lights[0].constant.radiance=3e38";
         let again = place.run(&["render", "scenes/good.yaml", "-q", "-o", "hot", "--set", set, keep]);
         assert_eq!((again.code, again.err.lines().last()), (4, ran.err.lines().last()), "{keep}");
+        let report: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(place.path("hot/report.json")).unwrap()).unwrap();
+        assert_eq!(report["scenes"][0]["invalid"]["nan"], 64, "{keep}");
         assert_eq!(std::fs::metadata(place.path("hot/good.exr")).unwrap().modified().unwrap(), written, "{keep}");
     }
     // What f32 holds the film holds.

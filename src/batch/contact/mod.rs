@@ -52,9 +52,8 @@ impl Contact {
     /// Takes up the picture of `report`, the `scene`-th of the batch, if it is there.
     pub fn add(&mut self, scene: usize, report: &mut SceneReport) {
         let error_map = report.error_map.take();
-        let Some(exr) = report.files.first().filter(|_| !matches!(report.status, Status::Failed { .. })) else {
-            return;
-        };
+        let is_there = !matches!(report.status, Status::Failed { .. }) || report.is_written_with_a_fault();
+        let Some(exr) = report.files.first().filter(|_| is_there) else { return };
         let png = exr.with_extension("png");
         // A picture that someone has taken away meanwhile is not on the sheet.
         let Some(thumbnail) = thumbnail(&png, self.side) else { return };

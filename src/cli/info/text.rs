@@ -98,12 +98,13 @@ fn window(window: Window, frame: Window) -> String {
 }
 
 /// Attributes that have a line of their own, or that say nothing to a person.
-const TOLD: [&str; 39] = [
+const TOLD: [&str; 40] = [
     "abbe/adaptiveSamples",
     "abbe/contentHash",
     "abbe/effects",
     "abbe/frame",
     "abbe/integrator",
+    "abbe/invalidByCause",
     "abbe/invalidSamples",
     "abbe/part",
     "abbe/partHash",
