@@ -4,6 +4,7 @@ mod common;
 
 use abbe::batch::{self, Overrides};
 use abbe::description;
+use abbe::scene::mesh;
 use common::Bench;
 use std::path::{Path, PathBuf};
 
@@ -26,7 +27,8 @@ fn prepared(file: &Path, directory: &Path, again: bool) -> (batch::Prepared, des
     let overrides = small();
     let entry = batch::entries(file, &overrides).unwrap_or_else(|error| panic!("{error}")).remove(0);
     let xml = directory.join("scene.xml");
-    let exported = description::export(&entry.scene(&overrides.set).unwrap_or_else(|error| panic!("{error}")), &xml);
+    let scene = entry.scene(&overrides.set).unwrap_or_else(|error| panic!("{error}"));
+    let exported = description::export(&scene, &xml, &mesh::normals_of);
     if !again {
         return (batch::prepare(&entry, &overrides).unwrap_or_else(|error| panic!("{error}")), exported);
     }
@@ -243,7 +245,7 @@ fn bands_are_exported() {
             entry.scene(&none.set).unwrap_or_else(|error| panic!("{error}"))
         };
         let ours = scene_of(&yaml);
-        let exported = description::export(&ours, &directory.path().join("s.xml"));
+        let exported = description::export(&ours, &directory.path().join("s.xml"), &mesh::normals_of);
         let xml = directory.path().join("s.xml");
         std::fs::write(&xml, &exported.xml).unwrap();
         let theirs = scene_of(&xml);
@@ -450,6 +452,22 @@ fn pictures_on_planes_stay_where_they_are() {
     }
 }
 
+/// A tetrahedron whose corners are counterclockwise from outside, with normals of this length, or none.
+fn tetrahedron(length: &str) -> String {
+    let mut text = String::new();
+    for [x, y, z] in [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]] {
+        text.push_str(&format!("v {} {} {}\n", 0.5 * x, 0.5 * y, 0.5 * z));
+        if let Ok(length) = length.parse::<f64>() {
+            text.push_str(&format!("vn {} {} {}\n", length * x, length * y, length * z));
+        }
+    }
+    for [a, b, c] in [[1, 2, 3], [1, 4, 2], [1, 3, 4], [2, 4, 3]] {
+        let corner = |i: i32| if length.is_empty() { i.to_string() } else { format!("{i}//{i}") };
+        text.push_str(&format!("f {} {} {}\n", corner(a), corner(b), corner(c)));
+    }
+    text
+}
+
 /// The losses of a scene of a floor under an even sky, `head` and `shape`, and its text for Mitsuba; read back it is the same.
 fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
     let directory = tempfile::tempdir().unwrap();
@@ -458,6 +476,9 @@ fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
         ("red.csv", "400,0.1\n550,0.1\n600,0.7\n700,0.8\n"),
         ("inky.csv", "wl,n,k\n0.3,1.5,1e-7\n0.9,1.5,2e-7\n"),
         ("hair.txt", "-0.4 0.2 0 0.1\n0 0.6 0 0.1\n0.3 0.7 0 0.1\n0.6 0.2 0 0.1\n"),
+        ("outward.obj", &tetrahedron("1")),
+        ("inward.obj", &tetrahedron("-1")),
+        ("bare.obj", &tetrahedron("")),
     ] {
         common::write(&directory.path().join(name), bytes.as_bytes());
     }
@@ -489,6 +510,51 @@ fn bodies_in_the_fog_of_the_camera_keep_it_around_them() {
         for side in [format!("name=\"interior\" id=\"{interior}\""), format!("name=\"exterior\" id=\"{exterior}\"")] {
             assert!(xml.contains(&side), "{more}: {side} in {xml}");
         }
+    }
+}
+
+/// For Mitsuba the outside of a mesh is where the normals of its file point, if it has any, else where its corners are
+/// counterclockwise in the world.
+#[test]
+fn the_outside_of_a_mesh_is_turned_round_only_where_mitsuba_has_it_on_the_other_side() {
+    for (file, how, plain, mirrored) in [
+        ("outward.obj", "normals: file", false, false),
+        ("outward.obj", "normals: vertex", false, false),
+        ("outward.obj", "normals: vertex, winding: world", false, false),
+        ("outward.obj", "normals: face", false, true),
+        ("outward.obj", "normals: smooth, winding: world", false, true),
+        ("inward.obj", "normals: vertex", true, true),
+        ("inward.obj", "normals: face", false, true),
+        ("inward.obj", "normals: smooth, winding: world", true, false),
+        ("bare.obj", "normals: vertex", false, true),
+        ("bare.obj", "normals: vertex, winding: world", false, false),
+    ] {
+        for (x, flipped) in [(1, plain), (-1, mirrored)] {
+            let place = format!("transform: [scale: [{x}, 1, 1]]");
+            let (_, xml) = exported_with("", &format!("mesh: {{file: {file}, {how}, {place}, emission: 1}}"));
+            assert_eq!(xml.contains("name=\"flip_normals\""), flipped, "{file}, {how}, {place}: {xml}");
+        }
+    }
+}
+
+/// What is inside a mesh Mitsuba tells by the order of its corners, whatever its normals say: where that is turned by a mirror, it
+/// gets the media the other way round.
+#[test]
+fn media_stay_inside_of_mirrored_meshes() {
+    let ink = "media: {ink: {homogeneous: {absorption: 0.7}}}\n";
+    for (file, normals, x, side) in [
+        ("outward.obj", "vertex", 1, "interior"),
+        ("outward.obj", "vertex", -1, "exterior"),
+        ("bare.obj", "vertex", -1, "interior"),
+        ("inward.obj", "vertex", 1, "exterior"),
+        ("inward.obj", "vertex", -1, "interior"),
+    ] {
+        let mesh = format!(
+            "mesh: {{file: {file}, normals: {normals}, transform: [scale: [{x}, 1, 1]], material: {{boundary: {{}}}}, inside: ink}}"
+        );
+        let (told, xml) = exported_with(ink, &mesh);
+        assert_eq!(told, [""; 0]);
+        assert!(xml.contains(&format!("<ref name=\"{side}\" id=\"ink\"/>")), "{mesh}: {xml}");
     }
 }
 

@@ -5,6 +5,7 @@ use crate::batch;
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::output::{Inputs, directory_of, is_stream, write_atomically};
+use crate::scene::mesh;
 use std::path::Path;
 
 /// Prints the scene as YAML, or writes it.
@@ -22,7 +23,7 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
     let scene = read(arguments)?;
     let output = arguments.output.as_deref();
     let file = output.filter(|path| !is_stream(path));
-    let exported = description::export(&scene, file.unwrap_or(Path::new("")));
+    let exported = description::export(&scene, file.unwrap_or(Path::new("")), &mesh::normals_of);
     match file {
         Some(path) => {
             for (name, bytes) in &exported.files {

@@ -25,12 +25,14 @@ pub use load::{Sources, load};
 pub use tree::{MAX_TRIANGLES, MeshHit, MeshTree};
 pub use triangle::{TriangleHit, TriangleRay};
 
+use crate::description::MeshNormals;
 use crate::math::{Frame, warp};
 use crate::scene::bvh::Aabb;
 use crate::scene::shape::SurfacePoint;
 use attribute::{Attribute, Element};
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use std::collections::HashMap;
+use std::path::Path;
 use triangle::area_vector;
 
 /// Where shading normals come from.
@@ -130,6 +132,17 @@ impl MeshSource {
             (b - a).cross(c - a).dot(n[0] + n[1] + n[2])
         };
         self.triangles.iter().map(agreement).sum::<f64>() < 0.0
+    }
+}
+
+/// Where the normals of mesh `index` of a file point; none of a file that cannot be read.
+#[must_use]
+pub fn normals_of(path: &Path, index: u32) -> MeshNormals {
+    match load(path, index) {
+        Ok(source) if source.normals.is_empty() => MeshNormals::Missing,
+        Ok(source) if source.is_wound_against_its_normals() => MeshNormals::Inward,
+        Ok(_) => MeshNormals::Outward,
+        Err(_) => MeshNormals::Missing,
     }
 }
 

@@ -26,7 +26,8 @@ mod textures;
 mod volumes;
 mod xml;
 
-use std::collections::BTreeSet;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::super::camera::{Band, Camera, Clip, Filter, FovAxis, Image, Lens, Pose, Projection};
@@ -60,9 +61,20 @@ pub struct Exported {
     pub files: Vec<(String, Vec<u8>)>,
 }
 
-/// Writes `scene` for the file `path`.
+/// Where the normals of a mesh file point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeshNormals {
+    /// It has none.
+    Missing,
+    /// To the side from which its corners are counterclockwise, over most of the area.
+    Outward,
+    /// To the other.
+    Inward,
+}
+
+/// Writes `scene` for the file `path`. `normals` reads mesh `index` of a file.
 #[must_use]
-pub fn export(scene: &SceneDescription, path: &Path) -> Exported {
+pub fn export(scene: &SceneDescription, path: &Path, normals: &dyn Fn(&Path, u32) -> MeshNormals) -> Exported {
     let nothing = Node::new(Default::default(), Value::Null);
     let no_sources = Sources::default();
     let (root, sources) = scene.tree().unwrap_or((&nothing, &no_sources));
@@ -71,7 +83,12 @@ pub fn export(scene: &SceneDescription, path: &Path) -> Exported {
     let (losses, files) = (Vec::new(), Vec::new());
     let (ids, mentioned) = (BTreeSet::new(), BTreeSet::new());
     let xml = Xml::default();
-    let mut export = Export { scene, root, sources, directory, stem, ids, mentioned, xml, losses, files };
+    // Each file is read once.
+    let known = RefCell::new(BTreeMap::new());
+    let normals = &|file: &Path, index: u32| {
+        *known.borrow_mut().entry((file.to_owned(), index)).or_insert_with(|| normals(file, index))
+    };
+    let mut export = Export { scene, root, sources, normals, directory, stem, ids, mentioned, xml, losses, files };
     export.scene();
     export.missing_light();
     let Export { xml, mut losses, files, .. } = export;
@@ -84,6 +101,7 @@ struct Export<'a> {
     scene: &'a SceneDescription,
     root: &'a Node,
     sources: &'a Sources,
+    normals: &'a dyn Fn(&Path, u32) -> MeshNormals,
     directory: &'a Path,
     /// Before the names of files that are written beside the scene.
     stem: String,

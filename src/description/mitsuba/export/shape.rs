@@ -6,12 +6,12 @@ use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
 
 use super::super::super::medium::{UNCHANGED, VACUUM};
 use super::super::super::shape::{
-    Caps, Cone, Cube, CurveBasis, Geometry, Layout, Normals, Plane, SdfNormals, Shape, Sphere, Winding,
+    Caps, Cone, Cube, CurveBasis, Geometry, Layout, Mesh, Normals, Plane, SdfNormals, Shape, Sphere, Winding,
 };
 use super::super::super::spectrum::SpectrumOrTexture;
 use super::super::super::transform::{is_mirror, is_similarity};
 use super::xml::numbers;
-use super::{Export, ends_in, joined};
+use super::{Export, MeshNormals, ends_in, joined};
 use crate::math::Frame;
 use crate::math::trig::sin_cos_turn;
 
@@ -38,10 +38,10 @@ impl Export<'_> {
     pub(super) fn shape(&mut self, list: &str, i: usize, shape: &Shape) {
         let why = self.shape_shortfall(shape);
         let mirrored_tube = self.mirrored_tube(shape);
+        let restated = self.is_restated(shape);
         match &why {
             Some(why) => self.instead("shape", &format!("{list}[{i}]"), why.as_str()),
-            // Other directions would be drawn on it.
-            None if mirrored_tube.is_some() => self.restate("shape", &format!("{list}[{i}]")),
+            None if restated => self.restate("shape", &format!("{list}[{i}]")),
             None => {}
         }
         let kind = shape.geometry.kind();
@@ -168,7 +168,7 @@ impl Export<'_> {
         };
         match (why, layout) {
             (Some(_), _) => self.end(),
-            (None, _) if mirrored_tube.is_some() => self.end(),
+            (None, _) if restated => self.end(),
             // No picture lies on it, but the same random numbers shall mean the same directions.
             (None, Some(Layout::YUp)) => {
                 self.xml.instruction(&format!("set {field}.layout: y_up"));
@@ -180,27 +180,58 @@ impl Export<'_> {
     /// Material, light and media.
     fn surface(&mut self, field: &str, shape: &Shape) {
         let mirrored = is_mirror(shape.world_from_object());
-        // A sphere, disk or rectangle that is mirrored is turned inside out by Mitsuba.
-        let flat = match &shape.geometry {
-            Geometry::Sphere(_) | Geometry::Disk(_) | Geometry::Rectangle(_) => true,
-            // So is a mesh; one that keeps its outside is turned back.
-            Geometry::Mesh(mesh) => mesh.winding == Winding::Object,
+        let turned = match &shape.geometry {
+            // One that is mirrored is turned inside out by Mitsuba.
+            Geometry::Sphere(_) | Geometry::Disk(_) | Geometry::Rectangle(_) => mirrored,
+            Geometry::Mesh(mesh) => self.is_turned(mesh, mirrored),
             _ => false,
         };
-        if shape.flip_normals != (mirrored && flat) && can_be_flipped(&shape.geometry) {
+        if shape.flip_normals != turned && can_be_flipped(&shape.geometry) {
             self.xml.value("boolean", "flip_normals", true);
         }
         self.material_ref(&format!("{field}.material"), &shape.material);
         if let Some(emission) = &shape.emission {
             self.area(shape, emission);
         }
-        for (key, medium) in
-            ["interior", "exterior"].into_iter().zip(self.sides(shape).map(|side| side.map(str::to_owned)))
-        {
+        let keys = if self.has_crossed_media(shape) { ["exterior", "interior"] } else { ["interior", "exterior"] };
+        for (key, medium) in keys.into_iter().zip(self.sides(shape).map(|side| side.map(str::to_owned))) {
             if let Some(medium) = medium.filter(|medium| ![VACUUM, UNCHANGED].contains(&medium.as_str())) {
                 let id = self.id(&medium, "medium");
                 self.xml.leaf("ref", &[("name", key), ("id", &id)]);
             }
+        }
+    }
+
+    /// Whether Mitsuba has the outside of a mesh on the side from which its corners are clockwise in the world. It goes by the
+    /// normals of the file, which a mirror leaves on their side while it turns the order of the corners round.
+    fn is_against_its_corners(&self, mesh: &Mesh, mirrored: bool) -> bool {
+        mesh.normals != Normals::Face
+            && match (self.normals)(&mesh.file, mesh.index) {
+                MeshNormals::Missing => false,
+                MeshNormals::Outward => mirrored,
+                MeshNormals::Inward => !mirrored,
+            }
+    }
+
+    /// Whether Mitsuba has the outside of a mesh where its inside is.
+    fn is_turned(&self, mesh: &Mesh, mirrored: bool) -> bool {
+        match (mesh.winding, mesh.normals) {
+            (Winding::World, Normals::File | Normals::Vertex | Normals::Face) => false,
+            // Ours are not those of the file.
+            (Winding::World, Normals::Smooth) => self.is_against_its_corners(mesh, mirrored),
+            (Winding::Object, _) => mirrored != self.is_against_its_corners(mesh, mirrored),
+        }
+    }
+
+    /// Whether Mitsuba would have the media of a mesh on the wrong sides: it tells those by the order of the corners, and the
+    /// outside of a surface by the normals.
+    fn has_crossed_media(&self, shape: &Shape) -> bool {
+        let sides = self.sides(shape);
+        match &shape.geometry {
+            Geometry::Mesh(mesh) if sides[0] != sides[1] && self.transmits(&shape.material) => {
+                self.is_against_its_corners(mesh, is_mirror(shape.world_from_object()))
+            }
+            _ => false,
         }
     }
 
@@ -226,6 +257,15 @@ impl Export<'_> {
         let mirrored = matches!(shape.geometry, Geometry::Cylinder(_)) && is_mirror(world);
         let linear = DMat3::from_mat4(world);
         (mirrored && !self.is_textured(shape) && is_similarity(linear)).then(|| linear.x_axis.length())
+    }
+
+    /// Whether a shape stands in the file as it was written, too. Of what Mitsuba can express those do that would be read as
+    /// others: a tube and a mesh on which other directions would be drawn, and media that are crossed.
+    fn is_restated(&self, shape: &Shape) -> bool {
+        let mirrored = is_mirror(shape.world_from_object());
+        let turned = matches!(&shape.geometry, Geometry::Mesh(mesh) if self.is_turned(mesh, mirrored));
+        let tube = self.mirrored_tube(shape).is_some();
+        self.shape_shortfall(shape).is_some() || turned || tube || self.has_crossed_media(shape)
     }
 
     /// A mesh in a file of its own.
