@@ -567,6 +567,7 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
     let textures = "textures: {earth: {image: {file: EARTH}}, data: {image: {file: EARTH, raw: true}}, \
                     board: {checkerboard: {a: {texture: earth}, b: 0.3}}}\n";
     let grey = card("diffuse: {}");
+    const BALL: &str = "sphere: {center: [0, 0.5, 0], radius: 0.5, material: {boundary: {}}, inside: m}";
     let cases: &[(&str, &str, &[&str], &[&str])] = &[
         (
             "",
@@ -643,6 +644,24 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
             &card("diffuse: {}").replace("material: {diffuse: {}}", "emission: {texture: board}"),
             &["shapes[1]: the picture as the spectra of its colours, without its illuminant"],
             &[],
+        ),
+        (
+            "media: {m: {homogeneous: {absorption: {rgb: [2, 1, 0.5]}}}}\n",
+            BALL,
+            &["media.m: its coefficients at every fifth nanometre"],
+            &["name=\"sigma_t\" value=\"360:", "name=\"albedo\" value=\"0\""],
+        ),
+        (
+            "media: {m: {homogeneous: {absorption: {scaled: {by: 2, of: {rgb: [1, 0.5, 0.25]}}}}}}\n",
+            BALL,
+            &["media.m: its coefficients at every fifth nanometre"],
+            &["name=\"sigma_t\" value=\"360:", "name=\"albedo\" value=\"0\""],
+        ),
+        (
+            "media: {m: {homogeneous: {extinction: {rgb: [2, 1, 0.5]}, albedo: {scaled: {by: 0.5, of: {rgb: [1, 0.5, 0.25]}}}}}}\n",
+            BALL,
+            &["media.m: its colour at every fifth nanometre"],
+            &["name=\"sigma_t\" value=\"360:", "name=\"albedo\" value=\"360:"],
         ),
         (
             "lights: [{constant: {radiance: {scaled: {by: 2, of: {scaled: {by: 0.3, of: {illuminant: D65}}}}}}}]\n",

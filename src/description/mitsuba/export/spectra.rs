@@ -48,9 +48,17 @@ impl Export<'_> {
         if !constants.iter().all(|constant| Export::can_say(constant)) {
             return Some(grey.to_owned());
         }
-        let sampled = constants.iter().any(|constant| colour_beyond(constant, 1.0).is_some());
+        let sampled = constants.iter().any(|constant| colour_beyond(constant, Role::OpticalConstant, 1.0).is_some());
         sampled
             .then(|| "its colour at every fifth nanometre: Mitsuba has none above 1 there, and no multiples".to_owned())
+    }
+
+    /// What Mitsuba gets in place of a coefficient that it has no words for.
+    pub(super) fn coefficient_shortfall(coefficient: &Spectrum) -> Option<&'static str> {
+        if !Export::can_say(coefficient) {
+            return Some("grey in place of a spectrum");
+        }
+        colour_beyond(coefficient, Role::Coefficient, 1.0).map(|_| "its colour at every fifth nanometre")
     }
 
     /// A `<spectrum>` or `<rgb>`; what Mitsuba cannot say is grey of one half.
@@ -59,9 +67,7 @@ impl Export<'_> {
     }
 
     fn scaled_spectrum(&mut self, name: &str, spectrum: &Spectrum, role: Role, by: f64) {
-        if role == Role::OpticalConstant
-            && let Some(curve) = colour_beyond(spectrum, by)
-        {
+        if let Some(curve) = colour_beyond(spectrum, role, by) {
             return self.curve(name, &curve, 1.0);
         }
         match spectrum {
@@ -114,9 +120,13 @@ impl Export<'_> {
         self.samples(name, |nm| at(curve, nm) * by);
     }
 
-    /// What a function is at every fifth nanometre.
+    /// What a function is at every fifth nanometre; Mitsuba refuses a table of zeros.
     pub(super) fn samples(&mut self, name: &str, value: impl Fn(f64) -> f64) {
-        let pairs: Vec<String> = (360..=830u32).step_by(5).map(|nm| format!("{nm}:{}", value(f64::from(nm)))).collect();
+        let pairs: Vec<(u32, f64)> = (360..=830).step_by(5).map(|nm| (nm, value(f64::from(nm)))).collect();
+        if pairs.iter().all(|(_, value)| *value == 0.0) {
+            return self.xml.value("spectrum", name, 0);
+        }
+        let pairs: Vec<String> = pairs.iter().map(|(nm, value)| format!("{nm}:{value}")).collect();
         self.xml.value("spectrum", name, pairs.join(", "));
     }
 
@@ -171,15 +181,25 @@ fn unscaled(spectrum: &Spectrum) -> (f64, &Spectrum) {
     }
 }
 
-/// The curve of a colour times `by`, unless it is a reflectance as it stands.
-fn colour_beyond(spectrum: &Spectrum, by: f64) -> Option<Curve> {
+/// The curve of a colour times `by`, unless it is a reflectance as it stands, or light.
+fn colour_beyond(spectrum: &Spectrum, role: Role, by: f64) -> Option<Curve> {
     match spectrum {
         Spectrum::Rgb(rgb) if by != 1.0 || rgb.iter().any(|channel| *channel > 1.0) => {
-            upsample::optical_constant(*rgb).ok().map(|curve| curve.scaled(by))
+            let curve = match role {
+                Role::Coefficient => upsample::unbounded(*rgb),
+                Role::OpticalConstant => upsample::optical_constant(*rgb),
+                Role::Reflectance | Role::Emission => return None,
+            };
+            curve.ok().map(|curve| curve.scaled(by))
         }
-        Spectrum::Scaled(scaled) => colour_beyond(&scaled.of, by * scaled.by),
+        Spectrum::Scaled(scaled) => colour_beyond(&scaled.of, role, by * scaled.by),
         _ => None,
     }
+}
+
+/// Whether it is a colour, or a multiple of one.
+pub(super) fn is_colour(spectrum: &Spectrum) -> bool {
+    matches!(unscaled(spectrum).1, Spectrum::Rgb(_))
 }
 
 /// Whether Mitsuba has words for it as the response of a band, whose wavelengths have to end.

@@ -35,7 +35,7 @@ impl<'a> Export<'a> {
                 .then_some("one way to go on beyond the edges for u and v"),
             Texture::Checkerboard(board) => (!(Export::can_say_either(&board.a) && Export::can_say_either(&board.b)))
                 .then_some("grey squares in place of a spectrum"),
-            Texture::Volume(volume) => (!self.can_say_volume(volume)).then_some("grey in place of a spectrum"),
+            Texture::Volume(volume) => self.volume_shortfall(volume),
             Texture::MeshAttribute(_) => None,
         };
         if let Some(why) = why {

@@ -6,9 +6,9 @@ use super::super::super::medium::{Coefficients, Medium, Phase};
 use super::super::super::spectrum::Spectrum;
 use super::super::super::texture::Wrap;
 use super::super::super::volume::{NumberOrVolume, SpectrumOrVolume, Volume, VolumeFilter};
-use super::Export;
-use super::spectra::{Role, curve_of};
+use super::spectra::{Role, curve_of, is_colour};
 use super::xml::numbers;
+use super::{Export, joined};
 
 impl Export<'_> {
     /// A medium of the scene's list.
@@ -56,7 +56,7 @@ impl Export<'_> {
                 self.xml.value("spectrum", "sigma_t", a + s);
                 self.xml.value("spectrum", "albedo", if a + s > 0.0 { s / (a + s) } else { 0.0 });
             }
-            (absorption, Spectrum::Number(0.0)) => {
+            (absorption, Spectrum::Number(0.0)) if !is_colour(absorption) => {
                 self.spectrum("sigma_t", absorption, Role::Coefficient);
                 self.xml.value("spectrum", "albedo", 0.0);
             }
@@ -139,43 +139,39 @@ impl Export<'_> {
     }
 
     fn medium_shortfall(&self, medium: &Medium) -> Option<String> {
-        let spectra = |all: &[&SpectrumOrVolume]| {
-            let good = all.iter().all(|s| match s {
-                SpectrumOrVolume::Spectrum(s) => can_say(s),
-                SpectrumOrVolume::Volume(name) => self.can_say_volume(name),
-            });
-            (!good).then(|| "grey in place of a spectrum".to_owned())
+        let either = |value: &SpectrumOrVolume| match value {
+            SpectrumOrVolume::Spectrum(spectrum) => Export::coefficient_shortfall(spectrum),
+            SpectrumOrVolume::Volume(name) => self.volume_shortfall(name),
+        };
+        let both = |extinction: Option<&'static str>, albedo: &SpectrumOrVolume| {
+            let albedo = either(albedo).filter(|why| extinction != Some(why));
+            joined([extinction, albedo].map(|why| why.map(str::to_owned)))
         };
         match medium {
             Medium::Homogeneous(m) => match &m.coefficients {
                 Coefficients::Parts { absorption: Spectrum::Number(_), scattering: Spectrum::Number(_) } => None,
-                Coefficients::Parts { absorption, scattering: Spectrum::Number(0.0) } if can_say(absorption) => None,
+                // A colour within 1 is not the reflectance that Mitsuba takes it for.
+                Coefficients::Parts { absorption, scattering: Spectrum::Number(0.0) }
+                    if Export::can_say(absorption) && !is_colour(absorption) =>
+                {
+                    None
+                }
                 Coefficients::Parts { absorption, scattering } => {
                     let known = curve_of(absorption).is_some() && curve_of(scattering).is_some();
                     let instead = if known { "its coefficients at every fifth nanometre" } else { "a grey medium" };
                     Some(instead.to_owned())
                 }
-                Coefficients::Sum { extinction, albedo, .. } => {
-                    spectra(&[albedo]).or((!can_say(extinction)).then(|| "grey in place of a spectrum".to_owned()))
-                }
+                Coefficients::Sum { extinction, albedo, .. } => both(Export::coefficient_shortfall(extinction), albedo),
             },
-            Medium::Heterogeneous(m) => spectra(&[&m.extinction, &m.albedo]),
+            Medium::Heterogeneous(m) => both(either(&m.extinction), &m.albedo),
         }
     }
 
-    /// Whether Mitsuba has words for a volume.
-    pub(super) fn can_say_volume(&self, name: &str) -> bool {
+    /// What Mitsuba gets in place of a volume that it has no words for.
+    pub(super) fn volume_shortfall(&self, name: &str) -> Option<&'static str> {
         match self.scene.volumes.get(name) {
-            Some(Volume::Constant(constant)) => can_say(&constant.value),
-            Some(Volume::Grid(_)) | None => true,
+            Some(Volume::Constant(constant)) => Export::coefficient_shortfall(&constant.value),
+            Some(Volume::Grid(_)) | None => None,
         }
-    }
-}
-
-/// Whether Mitsuba has words for a coefficient: none for colours beyond one.
-fn can_say(spectrum: &Spectrum) -> bool {
-    match spectrum {
-        Spectrum::Rgb(rgb) => rgb.iter().all(|x| *x <= 1.0),
-        other => Export::can_say(other),
     }
 }
