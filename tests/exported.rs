@@ -664,6 +664,24 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
             &["name=\"sigma_t\" value=\"360:", "name=\"albedo\" value=\"360:"],
         ),
         (
+            "",
+            &card("diffuse: {reflectance: {scaled: {by: 0.5, of: {rgb: [0.9, 0.2, 0.8]}}}}"),
+            &["shapes[1].rectangle.material: its colour at every fifth nanometre: Mitsuba has no multiples of one"],
+            &["name=\"reflectance\" value=\"360:"],
+        ),
+        (
+            "",
+            &card("mirror: {reflectance: {scaled: {by: 0.5, of: {rgb: [0.9, 0.2, 0.8]}}}}"),
+            &["shapes[1].rectangle.material: its colour at every fifth nanometre: Mitsuba has no multiples of one"],
+            &["name=\"specular_reflectance\" value=\"360:"],
+        ),
+        (
+            "textures: {squares: {checkerboard: {a: {scaled: {by: 0.5, of: {rgb: [0.9, 0.2, 0.8]}}}, b: 0.3}}}\n",
+            &card("diffuse: {reflectance: {texture: squares}}"),
+            &["textures.squares: its colour at every fifth nanometre: Mitsuba has no multiples of one"],
+            &["name=\"color0\" value=\"360:"],
+        ),
+        (
             "lights: [{constant: {radiance: {scaled: {by: 2, of: {scaled: {by: 0.3, of: {illuminant: D65}}}}}}}]\n",
             &grey,
             &[],

@@ -224,7 +224,7 @@ impl Export<'_> {
     /// What Mitsuba gets in place of such a material, where it cannot express it.
     pub(super) fn compound_shortfall(&self, material: &Material) -> Option<String> {
         let colour =
-            |s: &SpectrumOrTexture| (!Export::can_say_either(s)).then(|| "grey in place of a spectrum".to_owned());
+            |s: &SpectrumOrTexture| Export::either_shortfall(&[s], "grey in place of a spectrum").map(str::to_owned);
         let tinted = |luminance: Luminance, tints: [&NumberOrTexture; 2]| {
             let bright = luminance == Luminance::Colour && tints.iter().any(|tint| **tint != ZERO);
             bright.then(|| "tints over the luminance that Mitsuba takes, about 2.6 times as bright".to_owned())

@@ -53,6 +53,24 @@ impl Export<'_> {
             .then(|| "its colour at every fifth nanometre: Mitsuba has none above 1 there, and no multiples".to_owned())
     }
 
+    /// What Mitsuba gets in place of shares of light that it has no words for: `grey`, or of a multiple of a colour its curve.
+    pub(super) fn reflectance_shortfall(shares: &[&Spectrum], grey: &'static str) -> Option<&'static str> {
+        if !shares.iter().all(|share| Export::can_say(share)) {
+            return Some(grey);
+        }
+        let sampled = shares.iter().any(|share| colour_beyond(share, Role::Reflectance, 1.0).is_some());
+        sampled.then_some("its colour at every fifth nanometre: Mitsuba has no multiples of one")
+    }
+
+    /// The same where textures may stand, which tell what they lack by themselves.
+    pub(super) fn either_shortfall(shares: &[&SpectrumOrTexture], grey: &'static str) -> Option<&'static str> {
+        let spectra = shares.iter().filter_map(|share| match share {
+            SpectrumOrTexture::Spectrum(spectrum) => Some(spectrum),
+            SpectrumOrTexture::Texture(_) => None,
+        });
+        Export::reflectance_shortfall(&spectra.collect::<Vec<_>>(), grey)
+    }
+
     /// What Mitsuba gets in place of a coefficient that it has no words for.
     pub(super) fn coefficient_shortfall(coefficient: &Spectrum) -> Option<&'static str> {
         if !Export::can_say(coefficient) {
@@ -161,13 +179,6 @@ impl Export<'_> {
             SpectrumOrTexture::Texture(texture) => self.colours_of(name, texture),
         }
     }
-
-    pub(super) fn can_say_either(value: &SpectrumOrTexture) -> bool {
-        match value {
-            SpectrumOrTexture::Spectrum(spectrum) => Export::can_say(spectrum),
-            SpectrumOrTexture::Texture(_) => true,
-        }
-    }
 }
 
 /// A spectrum without the factors before it, and their product.
@@ -181,14 +192,16 @@ fn unscaled(spectrum: &Spectrum) -> (f64, &Spectrum) {
     }
 }
 
-/// The curve of a colour times `by`, unless it is a reflectance as it stands, or light.
+/// The curve of a colour times `by`, unless it is a reflectance as it stands, or light: half of the reflectance of a colour is
+/// not that of half the colour.
 fn colour_beyond(spectrum: &Spectrum, role: Role, by: f64) -> Option<Curve> {
     match spectrum {
         Spectrum::Rgb(rgb) if by != 1.0 || rgb.iter().any(|channel| *channel > 1.0) => {
             let curve = match role {
+                Role::Reflectance => upsample::reflectance(*rgb),
                 Role::Coefficient => upsample::unbounded(*rgb),
                 Role::OpticalConstant => upsample::optical_constant(*rgb),
-                Role::Reflectance | Role::Emission => return None,
+                Role::Emission => return None,
             };
             curve.ok().map(|curve| curve.scaled(by))
         }

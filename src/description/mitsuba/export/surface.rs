@@ -209,10 +209,8 @@ impl Export<'_> {
 /// The same for materials that are not made of others.
 fn plain_shortfall(material: &Material) -> Option<String> {
     let highlight = |given: bool| given.then(|| "no highlight: those belong to the Whitted ray tracer".to_owned());
-    let spectra = |all: &[&SpectrumOrTexture]| {
-        let good = all.iter().all(|spectrum| Export::can_say_either(spectrum));
-        (!good).then(|| "grey in place of a spectrum".to_owned())
-    };
+    let spectra =
+        |all: &[&SpectrumOrTexture]| Export::either_shortfall(all, "grey in place of a spectrum").map(str::to_owned);
     let schlick = |fresnel: Fresnel| {
         (fresnel == Fresnel::Schlick).then(|| "Fresnel's equations in place of Schlick's approximation".to_owned())
     };
@@ -220,8 +218,8 @@ fn plain_shortfall(material: &Material) -> Option<String> {
     match material {
         Material::Diffuse(m) => joined([highlight(m.highlight.is_some()), spectra(&[&m.reflectance])]),
         Material::Mirror(m) => {
-            let grey = (!Export::can_say(&m.reflectance)).then(|| "a grey mirror".into());
-            joined([highlight(m.highlight.is_some()), grey])
+            let grey = Export::reflectance_shortfall(&[&m.reflectance], "a grey mirror");
+            joined([highlight(m.highlight.is_some()), grey.map(str::to_owned)])
         }
         Material::Conductor(m) => {
             let index = match &m.index {

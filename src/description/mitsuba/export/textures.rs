@@ -33,8 +33,9 @@ impl<'a> Export<'a> {
         let why = match texture {
             Texture::Image(image) => (image.wrap_v.is_some_and(|wrap| wrap != image.wrap))
                 .then_some("one way to go on beyond the edges for u and v"),
-            Texture::Checkerboard(board) => (!(Export::can_say_either(&board.a) && Export::can_say_either(&board.b)))
-                .then_some("grey squares in place of a spectrum"),
+            Texture::Checkerboard(board) => {
+                Export::either_shortfall(&[&board.a, &board.b], "grey squares in place of a spectrum")
+            }
             Texture::Volume(volume) => self.volume_shortfall(volume),
             Texture::MeshAttribute(_) => None,
         };
