@@ -558,6 +558,35 @@ fn media_stay_inside_of_mirrored_meshes() {
     }
 }
 
+/// A slide hangs upside down for Mitsuba and is written again; what that cannot say is told of the light, too, whose own words
+/// bring it back.
+#[test]
+fn slides_keep_what_mitsuba_cannot_say() {
+    let edges = "one way to go on beyond the edges for u and v";
+    let grey = "grey squares in place of a spectrum";
+    for (texture, light, told) in [
+        (
+            "image: {file: EARTH, wrap_v: clamp, scale: [1.5, 2.5]}",
+            "spot: {position: [0, 3, 0], target: [0, 0, 0], up: [0, 0, -1], cutoff_deg: 30, intensity: 10, texture: slide}",
+            vec![format!("textures.slide: {edges}"), format!("lights[0]: {edges}")],
+        ),
+        (
+            "checkerboard: {a: {file: red.csv}, b: 0.2}",
+            "projector: {origin: [0, 3, 0], target: [0, 0, 0], up: [0, 0, -1], fov_deg: 40, irradiance: {texture: slide}}",
+            vec![format!("textures.slide: {grey}"), format!("lights[0]: {grey}")],
+        ),
+        (
+            "checkerboard: {a: {file: red.csv}, b: 0.2}",
+            "projector: {origin: [0, 3, 0], target: [0, 0, 0], up: [0, 0, -1], fov_deg: 40, v: down, irradiance: {texture: slide}}",
+            vec![format!("textures.slide: {grey}")],
+        ),
+    ] {
+        let head = format!("textures: {{slide: {{{texture}}}}}\nlights: [{light}]\n");
+        let (losses, xml) = exported_with(&head, "sphere: {radius: 0.3}");
+        assert_eq!(losses, told, "{xml}");
+    }
+}
+
 /// A file that Mitsuba refuses, or another picture without a word, is none: what it has no words for is told, all of it.
 #[test]
 fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {

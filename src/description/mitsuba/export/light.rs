@@ -26,14 +26,14 @@ impl Export<'_> {
         let why = match light {
             Light::Point(l) => Export::light_shortfall(&l.intensity),
             Light::Spot(l) => {
-                let slide = l.texture.as_ref().and_then(|texture| self.pictures_shortfall(texture));
-                joined([Export::light_shortfall(&l.intensity), slide.map(str::to_owned)])
+                let slide = l.texture.as_ref().and_then(|texture| self.pictures_shortfall(texture, stands(l.v)));
+                joined([Export::light_shortfall(&l.intensity), slide])
             }
             Light::Directional(l) => Export::light_shortfall(&l.irradiance),
             Light::Constant(l) => Export::light_shortfall(&l.radiance),
             Light::Environment(l) => (l.mapping != EnvironmentMapping::Mitsuba)
                 .then(|| "the same image on Mitsuba's grid, shifted by half a row toward the poles".to_owned()),
-            Light::Projector(l) => self.shining_shortfall(&l.irradiance),
+            Light::Projector(l) => self.shining_shortfall(&l.irradiance, stands(l.v)),
         };
         if let Some(why) = &why {
             self.instead("emitter", &format!("lights[{i}]"), why.as_str());
@@ -169,7 +169,7 @@ impl Export<'_> {
     }
 
     /// What Mitsuba gets in place of what shines, where it cannot express it.
-    pub(super) fn shining_shortfall(&self, value: &SpectrumOrTexture) -> Option<String> {
+    pub(super) fn shining_shortfall(&self, value: &SpectrumOrTexture, stands: Stands) -> Option<String> {
         let texture = match value {
             SpectrumOrTexture::Spectrum(spectrum) => return Export::light_shortfall(spectrum),
             SpectrumOrTexture::Texture(texture) => texture,
@@ -179,7 +179,7 @@ impl Export<'_> {
             None => self.shines_by_squares(texture),
         };
         joined([
-            self.pictures_shortfall(texture).map(str::to_owned),
+            self.pictures_shortfall(texture, stands),
             lost.then(|| "the picture as the spectra of its colours, without its illuminant".to_owned()),
         ])
     }

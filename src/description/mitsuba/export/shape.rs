@@ -10,6 +10,7 @@ use super::super::super::shape::{
 };
 use super::super::super::spectrum::SpectrumOrTexture;
 use super::super::super::transform::{is_mirror, is_similarity};
+use super::textures::Stands;
 use super::xml::numbers;
 use super::{Export, MeshNormals, ends_in, joined};
 use crate::math::Frame;
@@ -300,7 +301,7 @@ impl Export<'_> {
     fn shape_shortfall(&self, shape: &Shape) -> Option<String> {
         let said = |text: &str| Some(text.to_owned());
         let textured = self.is_textured(shape);
-        let grey = shape.emission.as_ref().and_then(|emission| self.shining_shortfall(emission));
+        let grey = shape.emission.as_ref().and_then(|emission| self.shining_shortfall(emission, Stands::Upright));
         let own = match &shape.geometry {
             Geometry::Rectangle(_) => None,
             Geometry::Plane(_) => said("a square of 5 km: Mitsuba has no plane without end"),

@@ -10,7 +10,7 @@ use super::super::super::spectrum::{Spectrum, SpectrumOrTexture};
 use super::super::super::texture::{Checkerboard, ImageTexture, Texture, TextureFilter, Wrap};
 use super::spectra::Role;
 use super::xml::numbers;
-use super::{Export, ends_in};
+use super::{Export, ends_in, joined};
 
 /// What a texture is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,15 +30,7 @@ impl<'a> Export<'a> {
     /// A texture of the scene's list.
     pub(super) fn texture(&mut self, name: &str, texture: &Texture) {
         let id = self.id(name, "texture");
-        let why = match texture {
-            Texture::Image(image) => (image.wrap_v.is_some_and(|wrap| wrap != image.wrap))
-                .then_some("one way to go on beyond the edges for u and v"),
-            Texture::Checkerboard(board) => {
-                Export::either_shortfall(&[&board.a, &board.b], "grey squares in place of a spectrum")
-            }
-            Texture::Volume(volume) => self.volume_shortfall(volume),
-            Texture::MeshAttribute(_) => None,
-        };
+        let why = self.texture_shortfall(texture);
         if let Some(why) = why {
             self.instead("texture", &super::field(&["textures", name]), why);
         }
@@ -49,6 +41,19 @@ impl<'a> Export<'a> {
             let written = self.root.get("textures").and_then(|all| all.get(name)?.get("image")?.get("illuminant"));
             let yaml = written.map_or("D65".to_owned(), |node| self.yaml(node));
             self.xml.instruction(&format!("set {}: {yaml}", super::field(&["textures", name, "image", "illuminant"])));
+        }
+    }
+
+    /// What Mitsuba gets in place of a texture that it cannot express.
+    fn texture_shortfall(&self, texture: &Texture) -> Option<&'static str> {
+        match texture {
+            Texture::Image(image) => (image.wrap_v.is_some_and(|wrap| wrap != image.wrap))
+                .then_some("one way to go on beyond the edges for u and v"),
+            Texture::Checkerboard(board) => {
+                Export::either_shortfall(&[&board.a, &board.b], "grey squares in place of a spectrum")
+            }
+            Texture::Volume(volume) => self.volume_shortfall(volume),
+            Texture::MeshAttribute(_) => None,
         }
     }
 
@@ -184,11 +189,16 @@ impl<'a> Export<'a> {
         }
     }
 
-    /// What Mitsuba gets in place of the pictures that shine, in `texture` or in its squares.
-    pub(super) fn pictures_shortfall(&self, texture: &str) -> Option<&'static str> {
-        let inner = self.scene.textures.get(texture)?.inner();
-        let own = self.refused(texture, Asked::Colours).and_then(stored_otherwise);
-        own.or_else(|| inner.into_iter().find_map(|texture| self.pictures_shortfall(texture)))
+    /// What Mitsuba gets in place of the pictures that shine, in `texture` or in its squares. What is not referred to, but written
+    /// again, lacks what the texture lacks.
+    pub(super) fn pictures_shortfall(&self, texture: &str, stands: Stands) -> Option<String> {
+        let written = self.scene.textures.get(texture)?;
+        let refused = self.refused(texture, Asked::Colours);
+        let again = refused.is_some() || stands == Stands::OnItsHead;
+        let own = again.then(|| self.texture_shortfall(written)).flatten();
+        let own = joined([own, refused.and_then(stored_otherwise)].map(|why| why.map(str::to_owned)));
+        let mut inner = written.inner().into_iter();
+        own.or_else(|| inner.find_map(|texture| self.pictures_shortfall(texture, stands)))
     }
 
     /// Whether Mitsuba finds slopes and normals in it.
