@@ -119,7 +119,7 @@ impl Start<'_> {
             }
             (Place::Point(position), Light::Spot { axis, beam, cutoff, intensity, slide, .. }) => {
                 let falloff = spot_falloff(direction, *axis, *beam, *cutoff);
-                let slide = || slide.as_ref().map_or(Lanes::ONE, |slide| slide.eval(-direction, self.nm));
+                let slide = || slide.as_ref().map_or(Lanes::ONE, |slide| slide.eval(-direction, *position, self.nm));
                 (falloff > 0.0)
                     .then(|| (Ray::new(*position, direction), intensity.eval(self.nm) * slide() * falloff as f32))
             }

@@ -86,11 +86,12 @@ pub struct Slide {
 }
 
 impl Slide {
-    /// The value in the direction `wi` toward the light.
-    pub(super) fn eval(&self, wi: DVec3, nm: Lanes) -> Lanes {
+    /// The value in the direction `wi` toward the light, which is at `position`: what varies in space has one value there, as in
+    /// Mitsuba.
+    pub(super) fn eval(&self, wi: DVec3, position: DVec3, nm: Lanes) -> Lanes {
         let d = self.axes.transpose() * -wi;
         let uv = 0.5 + 0.5 * d.truncate() / (d.z * self.half);
-        self.texture.eval(&TexturePoint { uv, ..TexturePoint::default() }, nm)
+        self.texture.eval(&TexturePoint { uv, point: position, ..TexturePoint::default() }, nm)
     }
 }
 
@@ -323,7 +324,7 @@ impl Light {
                 let falloff = |wi: DVec3| spot_falloff(-wi, *axis, *beam, *cutoff);
                 arriving_from_point(*position, from, falloff).map(|(wi, distance, factor)| {
                     let intensity = match slide {
-                        Some(slide) => intensity.eval(nm) * slide.eval(wi, nm),
+                        Some(slide) => intensity.eval(nm) * slide.eval(wi, *position, nm),
                         None => intensity.eval(nm),
                     };
                     Arriving { wi, distance, radiance: intensity * factor, density: None, target: None }
@@ -470,6 +471,9 @@ fn arriving_from_point(position: DVec3, from: DVec3, falloff: impl FnOnce(DVec3)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::texture::Wrap;
+    use crate::scene::volume::{Between, GridVolume, Volume, Voxels};
+    use glam::DAffine3;
 
     #[test]
     fn spots_are_full_in_the_beam_linear_to_the_cutoff_and_dark_beyond() {
@@ -483,6 +487,37 @@ mod tests {
             assert_eq!([at(0.0), at(0.74), at(1.01), at(1.0 / cutoff)], [1.0, 1.0, 0.0, 0.0]);
             // Linear in the angle, whose sine along an axis is good to a few units of its last place.
             assert!((at(0.875) - 0.5).abs() < 1e-12, "{cutoff}");
+        }
+    }
+
+    /// A slide of a volume shows what that is where the spot stands, as in Mitsuba 3.9.1: seen from there it is even.
+    #[test]
+    fn a_slide_of_a_volume_has_the_value_at_the_spot() {
+        // One voxel to the left of x = 1, the other to the right.
+        let volume = Volume::Grid(Arc::new(GridVolume {
+            size: [2, 1, 1],
+            values: Voxels::Grey(vec![0.25, 0.75]),
+            between: Between::Nearest,
+            wrap: Wrap::Clamp,
+            local_from_world: DAffine3::from_scale(DVec3::splat(0.5)),
+        }));
+        for (x, value) in [(0.5, 0.25), (1.5, 0.75)] {
+            let position = DVec3::new(x, 0.0, 0.0);
+            let slide = Slide { texture: Texture::Volume(volume.clone()), axes: DMat3::IDENTITY, half: DVec2::ONE };
+            let spot = Light::Spot {
+                position,
+                axis: DVec3::Z,
+                beam: 0.8,
+                cutoff: 0.9,
+                intensity: Spectrum::Constant(1.0),
+                slide: Some(Box::new(slide)),
+            };
+            for from in [DVec3::new(x - 0.6, 0.0, 1.0), DVec3::new(x + 0.6, 0.0, 1.0)] {
+                let light = spot.arriving(&[], from, None, DVec2::ZERO, Drawn::All, Lanes::splat(550.0)).unwrap();
+                let intensity = f64::from(light.radiance.to_array()[0]) * light.distance * light.distance;
+                // Three roundings to f32.
+                assert!((intensity / value - 1.0).abs() < 3.0 * f64::from(f32::EPSILON), "{from}: {intensity}");
+            }
         }
     }
 
