@@ -711,6 +711,12 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
             &["name=\"color0\" value=\"360:"],
         ),
         (
+            "textures: {photo: {image: {file: EARTH}}}\n",
+            "sphere: {center: [0, 1, 0], radius: 0.5, emission: {texture: photo}}",
+            &["shapes[1]: the same shape with Mitsuba's texture coordinates"],
+            &["set textures.photo.image.illuminant: D65"],
+        ),
+        (
             "lights: [{constant: {radiance: {scaled: {by: 2, of: {scaled: {by: 0.3, of: {illuminant: D65}}}}}}}]\n",
             &grey,
             &[],

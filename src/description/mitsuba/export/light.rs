@@ -188,9 +188,27 @@ impl Export<'_> {
     pub(super) fn loses_illuminant(&self, picture: &str) -> bool {
         match self.illuminant_of(picture) {
             Some(Lit::Otherwise) => true,
-            Some(Lit::Daylight(_)) => self.scene.textures.values().any(|texture| texture.inner().contains(&picture)),
+            Some(Lit::Daylight(_)) => {
+                let in_squares = self.scene.textures.values().any(|texture| texture.inner().contains(&picture));
+                in_squares || self.shines_as_written(picture)
+            }
             Some(Lit::AsItIs) | None => false,
         }
+    }
+
+    /// Whether a shape or a projector that shines by a picture stands in the file as it was written: it names the picture itself
+    /// then, not the one that Mitsuba has within D65.
+    fn shines_as_written(&self, picture: &str) -> bool {
+        let shapes = self.scene.shapes.iter().chain(self.scene.groups.values().flatten());
+        let mut lamps =
+            shapes.filter(|shape| shape.emission.as_ref().and_then(SpectrumOrTexture::name) == Some(picture));
+        let thrown = |light: &Light| match light {
+            Light::Projector(l) => {
+                l.irradiance.name() == Some(picture) && self.shining_shortfall(&l.irradiance, stands(l.v)).is_some()
+            }
+            _ => false,
+        };
+        lamps.any(|shape| self.is_restated(shape)) || self.scene.lights.iter().any(thrown)
     }
 
     /// Whether a checkerboard has pictures in it that something multiplies where they shine.

@@ -262,7 +262,7 @@ impl Export<'_> {
 
     /// Whether a shape stands in the file as it was written, too. Of what Mitsuba can express those do that would be read as
     /// others: a tube and a mesh on which other directions would be drawn, and media that are crossed.
-    fn is_restated(&self, shape: &Shape) -> bool {
+    pub(super) fn is_restated(&self, shape: &Shape) -> bool {
         let mirrored = is_mirror(shape.world_from_object());
         let turned = matches!(&shape.geometry, Geometry::Mesh(mesh) if self.is_turned(mesh, mirrored));
         let tube = self.mirrored_tube(shape).is_some();
