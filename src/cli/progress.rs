@@ -93,6 +93,8 @@ fn words(p: &Progress) -> String {
         }
         (Some(e), Some(f)) => format!("{rate}, error {}, about {} in {left}", per_cent(e.rel_rmse), per_cent(f.error)),
         (Some(e), None) => format!("{rate}, error {}, {left} left", per_cent(e.rel_rmse)),
+        // The first of a large frame waited for its memory: what it took says nothing of the others.
+        (None, _) if p.done < p.total / 100 => rate,
         (None, _) => format!("{rate}, {left} left"),
     }
 }
@@ -221,6 +223,7 @@ mod tests {
         let elapsed = Duration::from_secs(10);
         let p = Progress { done: 300_000, total: 1_200_000, elapsed, error: None, forecast: None, target: None };
         assert_eq!(words(&p), "0.03 Msamples/s, 30.0 s left");
+        assert_eq!(words(&Progress { done: 3000, ..p.clone() }), "0.00 Msamples/s");
         let error = Some(ErrorEstimate { rel_rmse: 0.018, low: 0.017, high: 0.019, pixels: 100, valid: true });
         let forecast = Some(Forecast { made_at: 8, samples: 40.0, seconds: 52.0, error: 0.01 });
         let known = Progress { error, forecast, ..p };

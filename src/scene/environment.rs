@@ -167,9 +167,9 @@ impl Environment {
             if weight > 0.0 { sum / weight } else { 0.0 }
         };
         let mean = mean_above(0.0);
-        // A map that is even but for the rounding of the mean of f32 has nothing above it.
+        // A map that is even to the rounding of its texels has nothing above.
         let above = mean_above(mean);
-        let (floor, above) = if above > 1e-6 * mean { (mean, above) } else { (0.0, mean) };
+        let (floor, above) = if above > f64::from(f32::EPSILON) * mean { (mean, above) } else { (0.0, mean) };
         let brighter = Table::of(&texels, width, mapping, floor);
         // The factor is twice the largest channel; for choosing lights half of it will do.
         let [mean_luminance, brighter_luminance] = [mean, above].map(|factor| 0.5 * factor * illuminant.luminance());
@@ -677,6 +677,17 @@ mod tests {
                 let densities: Vec<f64> = shining.map(|d| map.pdf(d, Drawn::All)).collect();
                 assert!(densities.len() > 16 && densities.iter().all(|pdf| *pdf > 0.0), "{mapping:?} {bright}");
             }
+        }
+    }
+
+    #[test]
+    fn an_even_map_is_drawn_as_a_whole() {
+        for mapping in [Mapping::Texels, Mapping::Poles] {
+            let map = Environment::new(&[[0.3; 3]; 128], [16, 8], 1.0, mapping, DMat3::IDENTITY, Carried::Spectra);
+            assert_eq!(map.brighter_luminance(), map.mean_luminance());
+            let direction = DVec3::new(0.3, 0.4, 0.5).normalize();
+            assert_eq!(map.pdf(direction, Drawn::Brighter), map.pdf(direction, Drawn::All));
+            assert!(map.sample(DVec2::splat(0.3), Drawn::Brighter).is_some());
         }
     }
 
