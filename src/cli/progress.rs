@@ -223,7 +223,7 @@ mod tests {
         let elapsed = Duration::from_secs(10);
         let p = Progress { done: 300_000, total: 1_200_000, elapsed, error: None, forecast: None, target: None };
         assert_eq!(words(&p), "0.03 Msamples/s, 30.0 s left");
-        assert_eq!(words(&Progress { done: 3000, ..p.clone() }), "0.00 Msamples/s");
+        assert_eq!(words(&Progress { done: 3000, ..p }), "0.00 Msamples/s");
         let error = Some(ErrorEstimate { rel_rmse: 0.018, low: 0.017, high: 0.019, pixels: 100, valid: true });
         let forecast = Some(Forecast { made_at: 8, samples: 40.0, seconds: 52.0, error: 0.01 });
         let known = Progress { error, forecast, ..p };
