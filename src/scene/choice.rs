@@ -424,6 +424,19 @@ impl Asked {
         self.by_power.last().is_none_or(|&all| all <= 0.0)
     }
 
+    /// A light chosen by `u` in [0, 1) without regard to the point, and the probability of that.
+    #[must_use]
+    pub fn chosen_by_power(&self, u: f64) -> Option<(usize, f64)> {
+        let i = self.by_power.partition_point(|&sum| sum <= u);
+        (i < self.by_power.len()).then(|| (i, self.share_of_power(i)))
+    }
+
+    /// The probability of [`Asked::chosen_by_power`] for light `i`.
+    #[must_use]
+    pub fn share_of_power(&self, i: usize) -> f64 {
+        self.by_power[i] - if i == 0 { 0.0 } else { self.by_power[i - 1] }
+    }
+
     /// Judges the lights from `point`. With `normal` light is wanted on that side of a surface only.
     #[must_use]
     #[inline(always)]
@@ -447,11 +460,11 @@ impl Asked {
     #[inline(never)]
     fn choose_among(&self, asker: &Asker, u: f64) -> Option<(usize, f64)> {
         let (Some(choice), Some((asking, root))) = (&self.at_point, &asker.judged) else {
-            return chosen(&self.by_power, u);
+            return self.chosen_by_power(u);
         };
-        let mixed = |i: usize, there: f64| mixed(share(&self.by_power, i), there);
+        let mixed = |i: usize, there: f64| mixed(self.share_of_power(i), there);
         if u < BY_POWER {
-            let (i, _) = chosen(&self.by_power, u / BY_POWER)?;
+            let (i, _) = self.chosen_by_power(u / BY_POWER)?;
             return Some((i, mixed(i, choice.probability(asking, root, i as u32))));
         }
         let (i, there) = choice.choose(asking, root, (u - BY_POWER) / (1.0 - BY_POWER))?;
@@ -461,7 +474,7 @@ impl Asked {
     /// The probability of [`Asked::choose`] for light `i`, and what that `judged`: zero where it is not known.
     #[must_use]
     pub fn probability(&self, i: usize, point: DVec3, normal: Option<DVec3>, judged: f32) -> f64 {
-        let alone = share(&self.by_power, i);
+        let alone = self.share_of_power(i);
         let Some(choice) = &self.at_point else { return alone };
         // What has no share by power has no weight anywhere.
         if alone <= 0.0 {
@@ -477,19 +490,6 @@ impl Asked {
         };
         mixed(alone, there)
     }
-}
-
-/// A light chosen by `u` in [0, 1) by running sums of probabilities, and its probability.
-#[must_use]
-pub fn chosen(sums: &[f64], u: f64) -> Option<(usize, f64)> {
-    let i = sums.partition_point(|&sum| sum <= u);
-    (i < sums.len()).then(|| (i, share(sums, i)))
-}
-
-/// The probability of [`chosen`] for light `i`.
-#[must_use]
-pub fn share(sums: &[f64], i: usize) -> f64 {
-    sums[i] - if i == 0 { 0.0 } else { sums[i - 1] }
 }
 
 #[cfg(test)]

@@ -315,7 +315,6 @@ impl<'a> Compiler<'a> {
         media.append(&mut self.absorbing);
         let (center, radius) = extent(&boxes, &camera);
         let powers: Vec<f64> = lights.iter().map(|light| light.power(&objects, radius)).collect();
-        let light_cdf = lights::light_cdf(&powers, &weights);
         let asked = |weights: &[f64]| {
             let by_power = lights::light_cdf(&powers, weights);
             Asked::new(by_power, Choice::of(&lights, &powers, weights, &objects, center, radius))
@@ -364,7 +363,6 @@ impl<'a> Compiler<'a> {
             nested,
             camera_inside: Inside::default(),
             lights,
-            light_cdf,
             all_asked,
             uneven_asked,
             light_exponent: 0,

@@ -48,7 +48,7 @@ use crate::math::{Departure, Ray};
 use crate::spectrum::{Spectrum, WavelengthDistribution};
 use bvh::Bvh;
 use camera::Camera;
-use choice::{Asked, chosen, share};
+use choice::Asked;
 use curves::Curves;
 use few::Few;
 use glam::{DVec2, DVec3};
@@ -102,9 +102,7 @@ pub struct Scene {
     pub camera_inside: Inside,
     /// Lights.
     pub lights: Vec<Light>,
-    /// How lights are chosen that paths begin at: running sums of probabilities.
-    pub light_cdf: Vec<f64>,
-    /// How a point of the scene chooses among those that it asks.
+    /// How a point of the scene chooses among those that it asks; and by power alone those are chosen that paths begin at.
     pub all_asked: Asked,
     /// The same without light that is even over all directions, if there is any: what is scattered finds that, too.
     pub uneven_asked: Option<Asked>,
@@ -533,7 +531,7 @@ impl Scene {
     /// A light chosen by `u` in [0, 1) and its probability.
     #[must_use]
     pub fn choose_light(&self, u: f64) -> Option<(usize, f64)> {
-        chosen(&self.light_cdf, u)
+        self.all_asked.chosen_by_power(u)
     }
 
     /// How a point chooses among the lights that it asks, with light that is even over all directions or without.
@@ -564,7 +562,7 @@ impl Scene {
     /// The probability of [`Scene::choose_light`] for light `i`.
     #[must_use]
     pub fn light_probability(&self, i: usize) -> f64 {
-        share(&self.light_cdf, i)
+        self.all_asked.share_of_power(i)
     }
 }
 
