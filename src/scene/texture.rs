@@ -250,6 +250,13 @@ pub(super) fn mean_luminance(count: usize, brightest: Option<Spectrum>, at: impl
     told.max(brightest.map_or(0.0, |spectrum| spectrum.luminance()) / count.max(1) as f64)
 }
 
+/// Some 1024 of `count` spectra, each with an even share of their mean.
+pub(super) fn even_shares(count: usize, at: impl Fn(usize) -> Spectrum) -> Vec<(f64, Spectrum)> {
+    const SOME: usize = 1024;
+    let share = 1.0 / count.clamp(1, SOME) as f64;
+    spread(count, SOME).map(|i| (share, at(i))).collect()
+}
+
 impl ImageTexture {
     /// What a texel shows.
     fn spectrum(&self, texel: &Texel) -> Spectrum {
@@ -480,19 +487,14 @@ impl Texture {
     /// Some of its spectra and their shares of it, so that the mean of all is told: texels of a picture, voxels or values of a file.
     #[must_use]
     pub fn shares(&self) -> Vec<(f64, Spectrum)> {
-        const SOME: usize = 1024;
-        let even = |count: usize, at: &dyn Fn(usize) -> Spectrum| -> Vec<(f64, Spectrum)> {
-            let share = 1.0 / count.clamp(1, SOME) as f64;
-            spread(count, SOME).map(|i| (share, at(i))).collect()
-        };
         match self {
             Texture::Uniform(spectrum) => vec![(1.0, spectrum.clone())],
             Texture::Image(image) => match &image.bands {
-                Some(bands) => even(bands.len(), &|i| image.lit(bands.spectrum(i))),
-                None => even(image.texels.len(), &|i| image.spectrum(image.texels.at(i))),
+                Some(bands) => even_shares(bands.len(), |i| image.lit(bands.spectrum(i))),
+                None => even_shares(image.texels.len(), |i| image.spectrum(image.texels.at(i))),
             },
-            Texture::Volume(volume) => volume.shares(even),
-            Texture::Attribute(attribute) => attribute.shares(even),
+            Texture::Volume(volume) => volume.shares(),
+            Texture::Attribute(attribute) => attribute.shares(),
             Texture::Checkerboard { a, b, .. } => {
                 a.shares().into_iter().chain(b.shares()).map(|(share, spectrum)| (0.5 * share, spectrum)).collect()
             }

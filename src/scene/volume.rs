@@ -8,7 +8,7 @@
 //! largest channel, times that scale. Between voxels the sigmoids and the scales are interpolated
 //! each on its own, then multiplied (the convention of Mitsuba 3).
 
-use super::texture::{Wrap, mean_luminance, spread};
+use super::texture::{Wrap, even_shares, mean_luminance, spread};
 use crate::math::Ray;
 use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
@@ -277,15 +277,12 @@ impl Volume {
         }
     }
 
-    /// Its spectra and their shares, of a grid as `even` tells those of so many.
+    /// Some of its spectra and their shares, as those of a [`Texture`](super::texture::Texture::shares).
     #[must_use]
-    pub fn shares(
-        &self,
-        even: impl Fn(usize, &dyn Fn(usize) -> Spectrum) -> Vec<(f64, Spectrum)>,
-    ) -> Vec<(f64, Spectrum)> {
+    pub fn shares(&self) -> Vec<(f64, Spectrum)> {
         match self {
             Volume::Constant { value, .. } => vec![(1.0, value.clone())],
-            Volume::Grid(grid) => even(grid.len(), &|i| grid.spectrum(i)),
+            Volume::Grid(grid) => even_shares(grid.len(), |i| grid.spectrum(i)),
         }
     }
 

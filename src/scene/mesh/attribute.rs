@@ -9,7 +9,7 @@
 //! green blue` are the attribute `vertex_color` or `face_color`; whole numbers there count from 0 to the
 //! greatest of their type. An attribute has one number or three; other properties are passed over.
 
-use crate::scene::texture::{TexturePoint, mean_luminance, spread};
+use crate::scene::texture::{TexturePoint, even_shares, mean_luminance, spread};
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
 use glam::DVec3;
 use std::sync::Arc;
@@ -114,13 +114,10 @@ impl AttributeTexture {
         mean_luminance(self.field.values.len(), brightest, |i| self.spectrum(i))
     }
 
-    /// Its spectra and their shares, as `even` tells those of so many.
+    /// Some of its spectra and their shares, as [`Texture::shares`](crate::scene::texture::Texture::shares).
     #[must_use]
-    pub fn shares(
-        &self,
-        even: impl Fn(usize, &dyn Fn(usize) -> Spectrum) -> Vec<(f64, Spectrum)>,
-    ) -> Vec<(f64, Spectrum)> {
-        even(self.field.values.len(), &|i| self.spectrum(i))
+    pub fn shares(&self) -> Vec<(f64, Spectrum)> {
+        even_shares(self.field.values.len(), |i| self.spectrum(i))
     }
 
     fn brightest(&self) -> Option<usize> {
