@@ -111,7 +111,7 @@ impl InvalidCounts {
     /// All causes together.
     #[must_use]
     pub fn total(&self) -> u64 {
-        self.nan + self.infinite + self.negative + self.overflow
+        self.causes().iter().sum()
     }
 }
 

@@ -28,8 +28,8 @@
 //! for any distribution of the samples: fourth cumulants enter both terms and their covariance alike, and cancel. The
 //! trace is that of single pixels, from S as for normal noise, A = tr(WS)² and B = (tr WS)², (A − B/3) · 9/10, which heavier
 //! tails make larger; times the square of what the second order makes of the size of the pixel, since W is of the noisy
-//! mean: bright is noisy, and weighs little, so that S and W together tell too little. And what neighbours share (one path from a light touches
-//! several pixels, collected photons many): two differences of replicates that have nothing in common, u = x₁ − x₂ and
+//! mean: bright is noisy, and weighs little, so that S and W together tell too little. And what neighbours share (one path
+//! from a light touches several pixels, collected photons many): two differences of replicates that have nothing in common, u = x₁ − x₂ and
 //! v = x₃ − x₄, have E (uᵀWv)² = 4R² tr(WΣ)², so that (Σ uᵀWv)² − Σ (uᵀWv)² over the pixels of a block, in the mean over the
 //! three ways to pair four, is that of different pixels. Of light that is dealt to all pixels under a filter it is known what they
 //! share, and pairs of them may lie in two blocks: it is that at the least. The next order of the size, about four times the square of

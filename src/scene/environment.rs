@@ -325,8 +325,8 @@ impl Environment {
         self.texels.len() >= 1 << 21
     }
 
-    /// Asks for the cache lines that [`Environment::sample`] of what is brighter and [`Environment::radiance_of`] read for `us`: three places
-    /// of the map, of which each tells the next. Those of several points are waited for together.
+    /// Asks for the cache lines that [`Environment::sample`] of what is brighter and [`Environment::radiance_of`] read for
+    /// `us`: three places of the map, of which each tells the next. Those of several points are waited for together.
     pub fn foresee(&self, us: &[DVec2]) {
         let table = match &self.brighter.density {
             Density::Constant(table) => table,

@@ -169,7 +169,9 @@ fn with_picture_first(mut file: exr::ExrFile) -> exr::ExrFile {
             first = Some(*i);
         }
     }
-    file.parts[..first.map_or(0, |i| i + 1)].rotate_right(usize::from(first.is_some()));
+    if let Some(first) = first {
+        file.parts[..=first].rotate_right(1);
+    }
     file
 }
 

@@ -23,8 +23,7 @@ use crate::film::Window;
 use crate::film::resolve::Image;
 use crate::spectrum::ColourSpace;
 use half::f16;
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// How pixels are packed; without loss but for DWA.
@@ -355,7 +354,8 @@ pub struct Beauty {
 ///
 /// Half holds 11 significant bits between 2⁻¹⁴ and 65504. A picture with a finite value that would round to infinity,
 /// or so dim that the step of subnormal halves (2⁻²⁴) exceeds half's own relative precision at the mean
-/// (mean of |value| below 2⁻¹⁴), is written as float instead, and so is a layer of light by itself; the note says so. Nothing is clamped.
+/// (mean of |value| below 2⁻¹⁴), is written as float instead, and so is a layer of light by itself; the note says so.
+/// Nothing is clamped.
 ///
 /// DWA packs halves, also of floats, and keeps no infinity: a picture that half cannot hold, or that is not finite, is
 /// packed as ZIPS instead, which loses nothing.

@@ -116,8 +116,9 @@ pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wis
         None => {
             let (asked, met) = (best(true), best(false));
             // Such rays, too, have to be worth it.
-            let (leaves_out, reason) = judge(met.2.cost / asked.2.cost, 1.0 / WORTH_IT);
-            let reason = reason.replace("the trial expects", "without them the trial expects");
+            let ratio = met.2.cost / asked.2.cost;
+            let (leaves_out, reason) = judge(ratio, 1.0 / WORTH_IT);
+            let reason = if ratio.is_nan() { reason } else { format!("without them {reason}") };
             (!leaves_out, reason, if leaves_out { met } else { asked })
         }
     };

@@ -39,10 +39,10 @@ impl Export<'_> {
     pub(super) fn shape(&mut self, list: &str, i: usize, shape: &Shape) {
         let why = self.shape_shortfall(shape);
         let mirrored_tube = self.mirrored_tube(shape);
-        let restated = self.is_restated(shape);
+        let reads_otherwise = self.reads_otherwise(shape);
         match &why {
             Some(why) => self.instead("shape", &format!("{list}[{i}]"), why.as_str()),
-            None if restated => self.restate("shape", &format!("{list}[{i}]")),
+            None if reads_otherwise => self.restate("shape", &format!("{list}[{i}]")),
             None => {}
         }
         let kind = shape.geometry.kind();
@@ -169,7 +169,7 @@ impl Export<'_> {
         };
         match (why, layout) {
             (Some(_), _) => self.end(),
-            (None, _) if restated => self.end(),
+            (None, _) if reads_otherwise => self.end(),
             // No picture lies on it, but the same random numbers shall mean the same directions.
             (None, Some(Layout::YUp)) => {
                 self.xml.instruction(&format!("set {field}.layout: y_up"));
@@ -260,13 +260,18 @@ impl Export<'_> {
         (mirrored && !self.is_textured(shape) && is_similarity(linear)).then(|| linear.x_axis.length())
     }
 
-    /// Whether a shape stands in the file as it was written, too. Of what Mitsuba can express those do that would be read as
-    /// others: a tube and a mesh on which other directions would be drawn, and media that are crossed.
+    /// Whether a shape stands in the file as it was written, too.
     pub(super) fn is_restated(&self, shape: &Shape) -> bool {
+        self.shape_shortfall(shape).is_some() || self.reads_otherwise(shape)
+    }
+
+    /// Whether a shape that Mitsuba can express would be read as another: a tube and a mesh on which other directions would be
+    /// drawn, and media that are crossed.
+    fn reads_otherwise(&self, shape: &Shape) -> bool {
         let mirrored = is_mirror(shape.world_from_object());
         let turned = matches!(&shape.geometry, Geometry::Mesh(mesh) if self.is_turned(mesh, mirrored));
         let tube = self.mirrored_tube(shape).is_some();
-        self.shape_shortfall(shape).is_some() || turned || tube || self.has_crossed_media(shape)
+        turned || tube || self.has_crossed_media(shape)
     }
 
     /// A mesh in a file of its own.
