@@ -1,8 +1,9 @@
-//! Light from all around: an image on the sphere at infinity, sampled by its luminance.
+//! Light from all around: an image on the sphere at infinity, sampled by its brightness.
 //!
 //! Equirectangular. In the frame of the map +y is up; columns to the right turn from −z toward +x.
 //! Two conventions say where the texels lie, see [`Mapping`].
 
+mod density;
 mod table;
 
 use super::bands::{self, Bands};
@@ -12,11 +13,12 @@ use crate::math::elementary::atan2;
 use crate::math::sampler::{GOLDEN, Octet};
 use crate::math::trig::sin_cos_turn;
 use crate::spectrum::{Carried, Lanes, Spectrum, illuminant, upsample};
+use density::{Density, Table, linear};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
-use table::{Cell, PiecewiseConstant2d};
+use table::Cell;
 
 /// Where the texels of an environment lie on the sphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,28 +60,6 @@ pub enum Drawn {
     /// Those from which more than the mean comes, by how much more: for who also finds light in a way of its own, which finds
     /// what is even as well (Karlík et al. 2019, "MIS Compensation", with one sample of either). All where the map is even.
     Brighter,
-}
-
-/// Directions by the factors of texels, as far as they are above a floor.
-#[derive(Clone, Debug)]
-struct Table {
-    floor: f64,
-    density: Density,
-}
-
-/// The density of directions over the unit square (longitude, colatitude).
-#[derive(Clone, Debug)]
-enum Density {
-    /// Constant in each texel.
-    Constant(PiecewiseConstant2d),
-    /// Bilinear between the factors of the texels as [`Mapping::Poles`] places them, so that a look-up of the light
-    /// gives its density too, times the mean of sin θ in each row of cells. Cell (x, y) lies between columns x and
-    /// x + 1, and rows y and y + 1, of texels.
-    Bilinear {
-        cells: PiecewiseConstant2d,
-        /// For each row of cells, the density over the factor.
-        density: Vec<f64>,
-    },
 }
 
 /// A direction toward the environment.
@@ -430,77 +410,6 @@ fn upsampled(pixels: &[[f32; 3]], scale: f32, mapping: Mapping, carried: Carried
         Texel { coefficients: if black { upsample::coefficients([0.0; 3]) } else { coefficients }, scale: s * scale }
     };
     pixels.par_iter().with_min_len(1024).map(texel).collect()
-}
-
-impl Texel {
-    /// The factor above a floor.
-    fn above(&self, floor: f64) -> f64 {
-        (f64::from(self.scale) - floor).max(0.0)
-    }
-}
-
-impl Table {
-    fn of(texels: &[Texel], width: usize, mapping: Mapping, floor: f64) -> Table {
-        let density = match mapping {
-            Mapping::Texels => Density::neighbourhood(texels, width, floor),
-            Mapping::Poles => Density::bilinear(texels, width, floor),
-        };
-        Table { floor, density }
-    }
-}
-
-impl Density {
-    /// That follows the factor of each texel's neighbourhood (the largest of its 3 × 3, because bilinear look-ups spread a
-    /// texel over its neighbours) times sin θ.
-    fn neighbourhood(texels: &[Texel], width: usize, floor: f64) -> Density {
-        let height = texels.len() / width;
-        let mut weights = vec![0.0; width * height];
-        for y in 0..height {
-            let sin = libm::sin(PI * (y as f64 + 0.5) / height as f64);
-            let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
-            let column =
-                |x: usize| rows.map(|row| texels[row * width + x].above(floor)).into_iter().fold(0.0f64, f64::max);
-            let (first, last) = (column(0), column(width - 1));
-            let (mut left, mut here) = (last, first);
-            for x in 0..width {
-                let right = if x + 1 < width { column(x + 1) } else { first };
-                weights[y * width + x] = left.max(here).max(right) * sin;
-                (left, here) = (here, right);
-            }
-        }
-        Density::Constant(PiecewiseConstant2d::new(&weights, width, height))
-    }
-
-    /// That is bilinear between the factors of texels.
-    fn bilinear(texels: &[Texel], width: usize, floor: f64) -> Density {
-        let rows = texels.len() / width - 1;
-        let scale = |x: usize, y: usize| texels[y * width + x].above(floor);
-        let mut weights = Vec::with_capacity(width * rows);
-        let mut density = Vec::with_capacity(rows);
-        for y in 0..rows {
-            // ∫ sin θ over the row of cells.
-            let (from, to) = (y as f64 / rows as f64, (y + 1) as f64 / rows as f64);
-            let sin = libm::cos(PI * from) - libm::cos(PI * to);
-            let pair = |x: usize| scale(x, y) + scale(x, y + 1);
-            weights.extend((0..width).map(|x| (pair(x) + pair(if x + 1 == width { 0 } else { x + 1 })) * sin));
-            density.push(sin);
-        }
-        // A cell of weight w = Σ sin of a total W has the mean density (w / W) n m, and the factor there the mean Σ / 4.
-        let total: f64 = weights.iter().sum();
-        density.iter_mut().for_each(|sin| *sin *= 4.0 * weights.len() as f64 / total);
-        // Some maps are black: none of these is asked for.
-        if total == 0.0 {
-            density.fill(0.0);
-        }
-        Density::Bilinear { cells: PiecewiseConstant2d::new(&weights, width, rows), density }
-    }
-}
-
-/// A number in [0, 1] with a density that goes linearly from `a` to `b`, not both zero, by `u`.
-fn linear(a: f64, b: f64, u: f64) -> f64 {
-    // The root of a x + (b − a) x² / 2 = u (a + b) / 2, free of cancellation.
-    let root = (a * a + u * (b * b - a * a)).max(0.0).sqrt();
-    (u * (a + b) / (a + root)).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]
