@@ -1,6 +1,9 @@
 //! A scene that is written for Mitsuba and read back is the same scene: it gives the same picture.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod sides;
+mod words;
 
 use abbe::batch::{self, Overrides};
 use abbe::description;
@@ -452,22 +455,6 @@ fn pictures_on_planes_stay_where_they_are() {
     }
 }
 
-/// A tetrahedron whose corners are counterclockwise from outside, with normals of this length, or none.
-fn tetrahedron(length: &str) -> String {
-    let mut text = String::new();
-    for [x, y, z] in [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]] {
-        text.push_str(&format!("v {} {} {}\n", 0.5 * x, 0.5 * y, 0.5 * z));
-        if let Ok(length) = length.parse::<f64>() {
-            text.push_str(&format!("vn {} {} {}\n", length * x, length * y, length * z));
-        }
-    }
-    for [a, b, c] in [[1, 2, 3], [1, 4, 2], [1, 3, 4], [2, 4, 3]] {
-        let corner = |i: i32| if length.is_empty() { i.to_string() } else { format!("{i}//{i}") };
-        text.push_str(&format!("f {} {} {}\n", corner(a), corner(b), corner(c)));
-    }
-    text
-}
-
 /// The losses of a scene of a floor under an even sky, `head` and `shape`, and its text for Mitsuba; read back it is the same.
 fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
     let directory = tempfile::tempdir().unwrap();
@@ -476,9 +463,9 @@ fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
         ("red.csv", "400,0.1\n550,0.1\n600,0.7\n700,0.8\n"),
         ("inky.csv", "wl,n,k\n0.3,1.5,1e-7\n0.9,1.5,2e-7\n"),
         ("hair.txt", "-0.4 0.2 0 0.1\n0 0.6 0 0.1\n0.3 0.7 0 0.1\n0.6 0.2 0 0.1\n"),
-        ("outward.obj", &tetrahedron("1")),
-        ("inward.obj", &tetrahedron("-1")),
-        ("bare.obj", &tetrahedron("")),
+        ("outward.obj", &sides::tetrahedron("1")),
+        ("inward.obj", &sides::tetrahedron("-1")),
+        ("bare.obj", &sides::tetrahedron("")),
     ] {
         common::write(&directory.path().join(name), bytes.as_bytes());
     }
@@ -494,246 +481,4 @@ fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
     let (_, exported) = prepared(&yaml, directory.path(), false);
     same_picture(&yaml);
     (exported.losses.into_iter().map(|loss| format!("{}: {}", loss.field, loss.instead)).collect(), exported.xml)
-}
-
-/// Outside a body whose outside is not written is what the camera is in; for Mitsuba it would be empty.
-#[test]
-fn bodies_in_the_fog_of_the_camera_keep_it_around_them() {
-    let fog = "media: {fog: {homogeneous: {absorption: 0.4}}, ink: {homogeneous: {absorption: 0.1}}}\nmedium: fog\n\
-               lights: [point: {position: [0, 3, 2], intensity: 5}]\n";
-    for (more, interior, exterior) in
-        [("inside: ink", "ink", "fog"), ("outside: ink, flip_normals: true", "fog", "ink")]
-    {
-        let ball = format!("sphere: {{center: [0, 0.5, 0], radius: 0.5, material: {{boundary: {{}}}}, {more}}}");
-        let (told, xml) = exported_with(fog, &ball);
-        assert_eq!(told, [""; 0], "{more}");
-        for side in [format!("name=\"interior\" id=\"{interior}\""), format!("name=\"exterior\" id=\"{exterior}\"")] {
-            assert!(xml.contains(&side), "{more}: {side} in {xml}");
-        }
-    }
-}
-
-/// For Mitsuba the outside of a mesh is where the normals of its file point, if it has any, else where its corners are
-/// counterclockwise in the world.
-#[test]
-fn the_outside_of_a_mesh_is_turned_round_only_where_mitsuba_has_it_on_the_other_side() {
-    for (file, how, plain, mirrored) in [
-        ("outward.obj", "normals: file", false, false),
-        ("outward.obj", "normals: vertex", false, false),
-        ("outward.obj", "normals: vertex, winding: world", false, false),
-        ("outward.obj", "normals: face", false, true),
-        ("outward.obj", "normals: smooth, winding: world", false, true),
-        ("inward.obj", "normals: vertex", true, true),
-        ("inward.obj", "normals: face", false, true),
-        ("inward.obj", "normals: smooth, winding: world", true, false),
-        ("bare.obj", "normals: vertex", false, true),
-        ("bare.obj", "normals: vertex, winding: world", false, false),
-    ] {
-        for (x, flipped) in [(1, plain), (-1, mirrored)] {
-            let place = format!("transform: [scale: [{x}, 1, 1]]");
-            let (_, xml) = exported_with("", &format!("mesh: {{file: {file}, {how}, {place}, emission: 1}}"));
-            assert_eq!(xml.contains("name=\"flip_normals\""), flipped, "{file}, {how}, {place}: {xml}");
-        }
-    }
-}
-
-/// What is inside a mesh Mitsuba tells by the order of its corners, whatever its normals say: where that is turned by a mirror, it
-/// gets the media the other way round.
-#[test]
-fn media_stay_inside_of_mirrored_meshes() {
-    let ink = "media: {ink: {homogeneous: {absorption: 0.7}}}\n";
-    for (file, normals, x, side) in [
-        ("outward.obj", "vertex", 1, "interior"),
-        ("outward.obj", "vertex", -1, "exterior"),
-        ("bare.obj", "vertex", -1, "interior"),
-        ("inward.obj", "vertex", 1, "exterior"),
-        ("inward.obj", "vertex", -1, "interior"),
-    ] {
-        let mesh = format!(
-            "mesh: {{file: {file}, normals: {normals}, transform: [scale: [{x}, 1, 1]], material: {{boundary: {{}}}}, inside: ink}}"
-        );
-        let (told, xml) = exported_with(ink, &mesh);
-        assert_eq!(told, [""; 0]);
-        assert!(xml.contains(&format!("<ref name=\"{side}\" id=\"ink\"/>")), "{mesh}: {xml}");
-    }
-}
-
-/// A slide hangs upside down for Mitsuba and is written again; what that cannot say is told of the light, too, whose own words
-/// bring it back.
-#[test]
-fn slides_keep_what_mitsuba_cannot_say() {
-    let edges = "one way to go on beyond the edges for u and v";
-    let grey = "grey squares in place of a spectrum";
-    for (texture, light, told) in [
-        (
-            "image: {file: EARTH, wrap_v: clamp, scale: [1.5, 2.5]}",
-            "spot: {position: [0, 3, 0], target: [0, 0, 0], up: [0, 0, -1], cutoff_deg: 30, intensity: 10, texture: slide}",
-            vec![format!("textures.slide: {edges}"), format!("lights[0]: {edges}")],
-        ),
-        (
-            "checkerboard: {a: {file: red.csv}, b: 0.2}",
-            "projector: {origin: [0, 3, 0], target: [0, 0, 0], up: [0, 0, -1], fov_deg: 40, irradiance: {texture: slide}}",
-            vec![format!("textures.slide: {grey}"), format!("lights[0]: {grey}")],
-        ),
-        (
-            "checkerboard: {a: {file: red.csv}, b: 0.2}",
-            "projector: {origin: [0, 3, 0], target: [0, 0, 0], up: [0, 0, -1], fov_deg: 40, v: down, irradiance: {texture: slide}}",
-            vec![format!("textures.slide: {grey}")],
-        ),
-    ] {
-        let head = format!("textures: {{slide: {{{texture}}}}}\nlights: [{light}]\n");
-        let (losses, xml) = exported_with(&head, "sphere: {radius: 0.3}");
-        assert_eq!(losses, told, "{xml}");
-    }
-}
-
-/// A file that Mitsuba refuses, or another picture without a word, is none: what it has no words for is told, all of it.
-#[test]
-fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
-    let card = |material: &str| {
-        format!("rectangle: {{corner: [-1, 0, 0], edge_u: [2, 0, 0], edge_v: [0, 1, 0], material: {{{material}}}}}")
-    };
-    let textures = "textures: {earth: {image: {file: EARTH}}, data: {image: {file: EARTH, raw: true}}, \
-                    board: {checkerboard: {a: {texture: earth}, b: 0.3}}}\n";
-    let grey = card("diffuse: {}");
-    const BALL: &str = "sphere: {center: [0, 0.5, 0], radius: 0.5, material: {boundary: {}}, inside: m}";
-    let cases: &[(&str, &str, &[&str], &[&str])] = &[
-        (
-            "",
-            "curves: {file: hair.txt, basis: bspline, flip_normals: true}",
-            &["shapes[1]: the same shape with its normals outward: Mitsuba's has no others"],
-            &[],
-        ),
-        (
-            "image: {filter: {lanczos: {radius: 2.5}}}\n",
-            &grey,
-            &["image.filter: 3 lobes: Mitsuba's are whole"],
-            &["<integer name=\"lobes\" value=\"3\"/>"],
-        ),
-        (
-            "image: {filter: {mitchell: {b: 0.9, c: 0.05}}, sensitivity: 3}\n",
-            &grey,
-            &["image.sensitivity: a film of sensitivity 1"],
-            &["<float name=\"B\" value=\"0.9\"/>", "<float name=\"C\" value=\"0.05\"/>"],
-        ),
-        (
-            "camera: {origin: [0, 1, 4], target: [0, 0.5, 0], orthographic_height: 3, principal_point: [0.2, -0.1], \
-             lens: {radius: 0.2, focus_distance: 4}}\n",
-            &grey,
-            &[
-                "camera.lens: none: Mitsuba's orthographic camera has no lens",
-                "camera.principal_point: the middle of the picture: Mitsuba has another for a pinhole with a perspective alone",
-            ],
-            &[],
-        ),
-        (
-            "",
-            // 1.5 + 4000 / 587.5618² = 1.51159.
-            &card("plastic: {roughness: 0.3, ior: {cauchy: [1.5, 0.004]}, reflectance: {file: red.csv}}"),
-            &[
-                "shapes[1].rectangle.material: the index at 587.5618 nm, 1.5116 over 1.0000: Mitsuba has no dispersion; \
-               grey in place of a spectrum; the coat's mean over 64 cosines, which makes the base darker by up to 2 %",
-            ],
-            &[],
-        ),
-        (
-            "",
-            "sphere: {radius: 0.5, material: {dielectric: {ior: {file: inky.csv}}}}",
-            &["shapes[1].sphere.material: the index at 587.5618 nm, 1.5000 over 1.0000: Mitsuba has no dispersion; \
-               no absorption inside, which Mitsuba has in media only"],
-            &[],
-        ),
-        (
-            "",
-            // 0.5 (1 - cos(pi/256)) = 3.765e-5.
-            "cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 0.5, emission: {lines: [{nm: 589, power: 1}]}}",
-            &["shapes[1]: a mesh of 256 sides, at most 3.76e-5 m inside: Mitsuba has no cone; a grey light"],
-            &[],
-        ),
-        (
-            textures,
-            &card("mask: {opacity: {texture: earth}, material: {diffuse: {}}}"),
-            &["textures.earth: its numbers as they are stored: Mitsuba takes them from raw pictures alone"],
-            &["<boolean name=\"raw\" value=\"true\"/>"],
-        ),
-        (
-            textures,
-            &card("diffuse: {reflectance: {texture: data}}"),
-            &["textures.data: its colours by the curve of sRGB: Mitsuba takes raw ones for numbers alone"],
-            &[],
-        ),
-        (
-            textures,
-            &card("bump: {height: {texture: board}, material: {diffuse: {}}}"),
-            &["shapes[1].rectangle.material: what it covers: Mitsuba has no slopes but of pictures"],
-            &["<bsdf type=\"mask\">"],
-        ),
-        (
-            textures,
-            &card("diffuse: {}").replace("material: {diffuse: {}}", "emission: {texture: board}"),
-            &["shapes[1]: the picture as the spectra of its colours, without its illuminant"],
-            &[],
-        ),
-        (
-            "media: {m: {homogeneous: {absorption: {rgb: [2, 1, 0.5]}}}}\n",
-            BALL,
-            &["media.m: its coefficients at every fifth nanometre"],
-            &["name=\"sigma_t\" value=\"360:", "name=\"albedo\" value=\"0\""],
-        ),
-        (
-            "media: {m: {homogeneous: {absorption: {scaled: {by: 2, of: {rgb: [1, 0.5, 0.25]}}}}}}\n",
-            BALL,
-            &["media.m: its coefficients at every fifth nanometre"],
-            &["name=\"sigma_t\" value=\"360:", "name=\"albedo\" value=\"0\""],
-        ),
-        (
-            "media: {m: {homogeneous: {extinction: {rgb: [2, 1, 0.5]}, albedo: {scaled: {by: 0.5, of: {rgb: [1, 0.5, 0.25]}}}}}}\n",
-            BALL,
-            &["media.m: its colour at every fifth nanometre"],
-            &["name=\"sigma_t\" value=\"360:", "name=\"albedo\" value=\"360:"],
-        ),
-        (
-            "",
-            &card("diffuse: {reflectance: {scaled: {by: 0.5, of: {rgb: [0.9, 0.2, 0.8]}}}}"),
-            &["shapes[1].rectangle.material: its colour at every fifth nanometre: Mitsuba has no multiples of one"],
-            &["name=\"reflectance\" value=\"360:"],
-        ),
-        (
-            "",
-            &card("mirror: {reflectance: {scaled: {by: 0.5, of: {rgb: [0.9, 0.2, 0.8]}}}}"),
-            &["shapes[1].rectangle.material: its colour at every fifth nanometre: Mitsuba has no multiples of one"],
-            &["name=\"specular_reflectance\" value=\"360:"],
-        ),
-        (
-            "textures: {squares: {checkerboard: {a: {scaled: {by: 0.5, of: {rgb: [0.9, 0.2, 0.8]}}}, b: 0.3}}}\n",
-            &card("diffuse: {reflectance: {texture: squares}}"),
-            &["textures.squares: its colour at every fifth nanometre: Mitsuba has no multiples of one"],
-            &["name=\"color0\" value=\"360:"],
-        ),
-        (
-            "textures: {photo: {image: {file: EARTH}}}\n",
-            "sphere: {center: [0, 1, 0], radius: 0.5, emission: {texture: photo}}",
-            &["shapes[1]: the same shape with Mitsuba's texture coordinates"],
-            &["set textures.photo.image.illuminant: D65"],
-        ),
-        (
-            "lights: [{constant: {radiance: {scaled: {by: 2, of: {scaled: {by: 0.3, of: {illuminant: D65}}}}}}}]\n",
-            &grey,
-            &[],
-            &[],
-        ),
-        (
-            "",
-            "cylinder: {base: [0, 0.5, 0], top: [0, 1, 0], radius: 0.2, caps: none, emission: 1, transform: [scale: [-2, 2, 2]]}",
-            &[],
-            &["<float name=\"radius\" value=\"0.4\"/>"],
-        ),
-    ];
-    for (head, shape, losses, said) in cases {
-        let (told, xml) = exported_with(head, shape);
-        assert_eq!(told, *losses, "{head}{shape}");
-        assert!(said.iter().all(|part| xml.contains(part)), "{head}{shape}: {said:?} in {xml}");
-        let for_mitsuba = xml.split("<?abbe").map(|part| part.split_once("?>").map_or(part, |(_, after)| after));
-        assert!(for_mitsuba.into_iter().all(|part| !part.contains("flip_normals")), "{xml}");
-    }
 }

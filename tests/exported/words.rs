@@ -1,0 +1,183 @@
+//! What Mitsuba has no words for is told, and comes back.
+
+use super::exported_with;
+
+/// A slide hangs upside down for Mitsuba and is written again; what that cannot say is told of the light, too, whose own words
+/// bring it back.
+#[test]
+fn slides_keep_what_mitsuba_cannot_say() {
+    let edges = "one way to go on beyond the edges for u and v";
+    let grey = "grey squares in place of a spectrum";
+    for (texture, light, told) in [
+        (
+            "image: {file: EARTH, wrap_v: clamp, scale: [1.5, 2.5]}",
+            "spot: {position: [0, 3, 0], target: [0, 0, 0], up: [0, 0, -1], cutoff_deg: 30, intensity: 10, texture: slide}",
+            vec![format!("textures.slide: {edges}"), format!("lights[0]: {edges}")],
+        ),
+        (
+            "checkerboard: {a: {file: red.csv}, b: 0.2}",
+            "projector: {origin: [0, 3, 0], target: [0, 0, 0], up: [0, 0, -1], fov_deg: 40, irradiance: {texture: slide}}",
+            vec![format!("textures.slide: {grey}"), format!("lights[0]: {grey}")],
+        ),
+        (
+            "checkerboard: {a: {file: red.csv}, b: 0.2}",
+            "projector: {origin: [0, 3, 0], target: [0, 0, 0], up: [0, 0, -1], fov_deg: 40, v: down, irradiance: {texture: slide}}",
+            vec![format!("textures.slide: {grey}")],
+        ),
+    ] {
+        let head = format!("textures: {{slide: {{{texture}}}}}\nlights: [{light}]\n");
+        let (losses, xml) = exported_with(&head, "sphere: {radius: 0.3}");
+        assert_eq!(losses, told, "{xml}");
+    }
+}
+
+/// A file that Mitsuba refuses, or another picture without a word, is none: what it has no words for is told, all of it.
+#[test]
+fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
+    let card = |material: &str| {
+        format!("rectangle: {{corner: [-1, 0, 0], edge_u: [2, 0, 0], edge_v: [0, 1, 0], material: {{{material}}}}}")
+    };
+    let textures = "textures: {earth: {image: {file: EARTH}}, data: {image: {file: EARTH, raw: true}}, \
+                    board: {checkerboard: {a: {texture: earth}, b: 0.3}}}\n";
+    let grey = card("diffuse: {}");
+    const BALL: &str = "sphere: {center: [0, 0.5, 0], radius: 0.5, material: {boundary: {}}, inside: m}";
+    let cases: &[(&str, &str, &[&str], &[&str])] = &[
+        (
+            "",
+            "curves: {file: hair.txt, basis: bspline, flip_normals: true}",
+            &["shapes[1]: the same shape with its normals outward: Mitsuba's has no others"],
+            &[],
+        ),
+        (
+            "image: {filter: {lanczos: {radius: 2.5}}}\n",
+            &grey,
+            &["image.filter: 3 lobes: Mitsuba's are whole"],
+            &["<integer name=\"lobes\" value=\"3\"/>"],
+        ),
+        (
+            "image: {filter: {mitchell: {b: 0.9, c: 0.05}}, sensitivity: 3}\n",
+            &grey,
+            &["image.sensitivity: a film of sensitivity 1"],
+            &["<float name=\"B\" value=\"0.9\"/>", "<float name=\"C\" value=\"0.05\"/>"],
+        ),
+        (
+            "camera: {origin: [0, 1, 4], target: [0, 0.5, 0], orthographic_height: 3, principal_point: [0.2, -0.1], \
+             lens: {radius: 0.2, focus_distance: 4}}\n",
+            &grey,
+            &[
+                "camera.lens: none: Mitsuba's orthographic camera has no lens",
+                "camera.principal_point: the middle of the picture: Mitsuba has another for a pinhole with a perspective alone",
+            ],
+            &[],
+        ),
+        (
+            "",
+            // 1.5 + 4000 / 587.5618² = 1.51159.
+            &card("plastic: {roughness: 0.3, ior: {cauchy: [1.5, 0.004]}, reflectance: {file: red.csv}}"),
+            &[
+                "shapes[1].rectangle.material: the index at 587.5618 nm, 1.5116 over 1.0000: Mitsuba has no dispersion; \
+               grey in place of a spectrum; the coat's mean over 64 cosines, which makes the base darker by up to 2 %",
+            ],
+            &[],
+        ),
+        (
+            "",
+            "sphere: {radius: 0.5, material: {dielectric: {ior: {file: inky.csv}}}}",
+            &["shapes[1].sphere.material: the index at 587.5618 nm, 1.5000 over 1.0000: Mitsuba has no dispersion; \
+               no absorption inside, which Mitsuba has in media only"],
+            &[],
+        ),
+        (
+            "",
+            // 0.5 (1 - cos(pi/256)) = 3.765e-5.
+            "cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 0.5, emission: {lines: [{nm: 589, power: 1}]}}",
+            &["shapes[1]: a mesh of 256 sides, at most 3.76e-5 m inside: Mitsuba has no cone; a grey light"],
+            &[],
+        ),
+        (
+            textures,
+            &card("mask: {opacity: {texture: earth}, material: {diffuse: {}}}"),
+            &["textures.earth: its numbers as they are stored: Mitsuba takes them from raw pictures alone"],
+            &["<boolean name=\"raw\" value=\"true\"/>"],
+        ),
+        (
+            textures,
+            &card("diffuse: {reflectance: {texture: data}}"),
+            &["textures.data: its colours by the curve of sRGB: Mitsuba takes raw ones for numbers alone"],
+            &[],
+        ),
+        (
+            textures,
+            &card("bump: {height: {texture: board}, material: {diffuse: {}}}"),
+            &["shapes[1].rectangle.material: what it covers: Mitsuba has no slopes but of pictures"],
+            &["<bsdf type=\"mask\">"],
+        ),
+        (
+            textures,
+            &card("diffuse: {}").replace("material: {diffuse: {}}", "emission: {texture: board}"),
+            &["shapes[1]: the picture as the spectra of its colours, without its illuminant"],
+            &[],
+        ),
+        (
+            "media: {m: {homogeneous: {absorption: {rgb: [2, 1, 0.5]}}}}\n",
+            BALL,
+            &["media.m: its coefficients at every fifth nanometre"],
+            &["name=\"sigma_t\" value=\"360:", "name=\"albedo\" value=\"0\""],
+        ),
+        (
+            "media: {m: {homogeneous: {absorption: {scaled: {by: 2, of: {rgb: [1, 0.5, 0.25]}}}}}}\n",
+            BALL,
+            &["media.m: its coefficients at every fifth nanometre"],
+            &["name=\"sigma_t\" value=\"360:", "name=\"albedo\" value=\"0\""],
+        ),
+        (
+            "media: {m: {homogeneous: {extinction: {rgb: [2, 1, 0.5]}, albedo: {scaled: {by: 0.5, of: {rgb: [1, 0.5, 0.25]}}}}}}\n",
+            BALL,
+            &["media.m: its colour at every fifth nanometre"],
+            &["name=\"sigma_t\" value=\"360:", "name=\"albedo\" value=\"360:"],
+        ),
+        (
+            "",
+            &card("diffuse: {reflectance: {scaled: {by: 0.5, of: {rgb: [0.9, 0.2, 0.8]}}}}"),
+            &["shapes[1].rectangle.material: its colour at every fifth nanometre: Mitsuba has no multiples of one"],
+            &["name=\"reflectance\" value=\"360:"],
+        ),
+        (
+            "",
+            &card("mirror: {reflectance: {scaled: {by: 0.5, of: {rgb: [0.9, 0.2, 0.8]}}}}"),
+            &["shapes[1].rectangle.material: its colour at every fifth nanometre: Mitsuba has no multiples of one"],
+            &["name=\"specular_reflectance\" value=\"360:"],
+        ),
+        (
+            "textures: {squares: {checkerboard: {a: {scaled: {by: 0.5, of: {rgb: [0.9, 0.2, 0.8]}}}, b: 0.3}}}\n",
+            &card("diffuse: {reflectance: {texture: squares}}"),
+            &["textures.squares: its colour at every fifth nanometre: Mitsuba has no multiples of one"],
+            &["name=\"color0\" value=\"360:"],
+        ),
+        (
+            "textures: {photo: {image: {file: EARTH}}}\n",
+            "sphere: {center: [0, 1, 0], radius: 0.5, emission: {texture: photo}}",
+            &["shapes[1]: the same shape with Mitsuba's texture coordinates"],
+            &["set textures.photo.image.illuminant: D65"],
+        ),
+        (
+            "lights: [{constant: {radiance: {scaled: {by: 2, of: {scaled: {by: 0.3, of: {illuminant: D65}}}}}}}]\n",
+            &grey,
+            &[],
+            &[],
+        ),
+        (
+            "",
+            "cylinder: {base: [0, 0.5, 0], top: [0, 1, 0], radius: 0.2, caps: none, emission: 1, transform: [scale: [-2, 2, 2]]}",
+            &[],
+            &["<float name=\"radius\" value=\"0.4\"/>"],
+        ),
+    ];
+    for (head, shape, losses, said) in cases {
+        let (told, xml) = exported_with(head, shape);
+        assert_eq!(told, *losses, "{head}{shape}");
+        assert!(said.iter().all(|part| xml.contains(part)), "{head}{shape}: {said:?} in {xml}");
+        let for_mitsuba = xml.split("<?abbe").map(|part| part.split_once("?>").map_or(part, |(_, after)| after));
+        assert!(for_mitsuba.into_iter().all(|part| !part.contains("flip_normals")), "{xml}");
+    }
+}
