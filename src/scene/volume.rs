@@ -355,14 +355,21 @@ impl Bounds {
 
     /// Bounds of blocks of `edge` voxels a side.
     fn of(grid: &GridVolume, edge: usize) -> Bounds {
+        match &grid.values {
+            Voxels::Grey(values) => Bounds::by(grid, edge, |i| (values[i], 1.0)),
+            Voxels::Raw(_) => Bounds::by(grid, edge, |i| grid.bound(i)),
+            // Each is asked for several times, and worked out once.
+            Voxels::Coloured(_) => {
+                let bounds: Vec<(f32, f32)> = (0..grid.len()).map(|i| grid.bound(i)).collect();
+                Bounds::by(grid, edge, |i| bounds[i])
+            }
+        }
+    }
+
+    /// The same where a voxel has the bound that `bound` tells, as [`GridVolume::bound`].
+    fn by(grid: &GridVolume, edge: usize, bound: impl Fn(usize) -> (f32, f32)) -> Bounds {
         let edge = edge.min(grid.size.into_iter().max().unwrap_or(1));
         let blocks = grid.size.map(|n| n.div_ceil(edge));
-        // Those of colours are worked out once; others are read as they are, which takes no memory.
-        let worked_out: Vec<(f32, f32)> = match &grid.values {
-            Voxels::Coloured(_) => (0..grid.len()).map(|i| grid.bound(i)).collect(),
-            Voxels::Grey(_) | Voxels::Raw(_) => Vec::new(),
-        };
-        let bound = |i: usize| worked_out.get(i).copied().unwrap_or_else(|| grid.bound(i));
         // A look-up at place x mixes voxels ⌊x − ½⌋ and the next; rounding may carry a point over a face
         // of its block, so one voxel on either side counts.
         let around = |axis: usize, block: usize| -> Vec<usize> {
