@@ -23,7 +23,6 @@ use crate::scene::camera::{Camera, Projection};
 use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Channel, Holds};
 use crate::transport::plan::{Effect, EffectPlan, Integrator};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -485,7 +484,7 @@ fn band_errors(finish: &Finish, frame: &Frame, channels: Range<usize>) -> Vec<Ve
     // As of colours: samples that are not random would be the same again.
     let none = || vec![0.0; frame.film.window().pixels()];
     let error = |i: usize| if finish.is_random() { frame.layer_error(i) } else { none() };
-    if finish.output.exr.stderr { channels.into_par_iter().map(error).collect() } else { Vec::new() }
+    if finish.output.exr.stderr { channels.map(error).collect() } else { Vec::new() }
 }
 
 /// The path of the spectral file beside the EXR at `path`: `name.spectral.exr`, and before the number of a frame.

@@ -179,7 +179,7 @@ impl Frame {
     /// The further channel `channel` where its values stand once, not samples.
     #[must_use]
     pub fn layer_once(&self, channel: usize) -> Vec<f32> {
-        self.film.layers.sums_of(channel).map(|x| x as f32).collect()
+        self.film.layers.sums_of(channel).into_iter().map(|x| x as f32).collect()
     }
 
     /// The further channel `channel`, its mean over samples; bands and light by its ways come first.
@@ -191,7 +191,7 @@ impl Frame {
     /// The standard errors of [`Frame::layer`], where sums are kept by replicate; else NaN.
     #[must_use]
     pub fn layer_error(&self, channel: usize) -> Vec<f32> {
-        let mut variances: Vec<f64> = self.film.layers.variances_of(channel, None).collect();
+        let mut variances: Vec<f64> = self.film.layers.variances_of(channel, None);
         if let Some(splats) = self.splats.as_ref().filter(|s| channel < s.film.layers.channels()) {
             // Two independent estimates of two parts of the light: variances add.
             let light = splats.film.layers.variances_of(channel, Some(splats.paths));

@@ -11,6 +11,7 @@ use super::accumulate::{ALPHA_QUANTUM, Invalid, InvalidCounts, REPLICATES, SAMPL
 use super::mattes::Mattes;
 use super::resolve::{HALF, even, mean_of_replicates};
 use super::run::LayerRun;
+use rayon::prelude::*;
 
 /// How many sums a pixel has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -257,9 +258,10 @@ impl LayerSums {
     }
 
     /// The sums of one channel, pixel by pixel: of each set, and how many samples are in it.
-    fn sets_of(&self, channel: usize) -> impl Iterator<Item = impl Iterator<Item = (Sum, u32)> + Clone> {
+    fn sets_of(&self, channel: usize) -> impl IndexedParallelIterator<Item = impl Iterator<Item = (Sum, u32)> + Clone> {
         let Layout { channels, kept } = self.layout;
-        let pixels = self.sums.chunks_exact((channels * kept.sets()).max(1)).zip(self.counts.chunks_exact(kept.sets()));
+        let sums = self.sums.par_chunks_exact((channels * kept.sets()).max(1));
+        let pixels = sums.zip(self.counts.par_chunks_exact(kept.sets())).with_min_len(1024);
         pixels.map(move |(sums, counts)| {
             let own = sums.iter().skip(channel).step_by(channels.max(1)).copied();
             own.zip(counts.iter().copied())
@@ -283,8 +285,9 @@ impl LayerSums {
     }
 
     /// The sums of one channel, pixel by pixel.
-    pub fn sums_of(&self, channel: usize) -> impl Iterator<Item = f64> {
-        self.sets_of(channel).map(|sets| total(sets).0)
+    #[must_use]
+    pub fn sums_of(&self, channel: usize) -> Vec<f64> {
+        self.sets_of(channel).map(|sets| total(sets).0).collect()
     }
 
     /// The means of one channel, pixel by pixel, as [`resolve`](super::resolve) has them; 0 where there is no sample.
@@ -324,8 +327,9 @@ impl LayerSums {
     /// is not how many samples they have.
     ///
     /// NaN where fewer than two replicates have samples, and where sums are not kept by replicate.
-    pub fn variances_of(&self, channel: usize, divisors: Option<[u64; REPLICATES]>) -> impl Iterator<Item = f64> {
-        self.sets_of(channel).enumerate().map(move |(index, sets)| {
+    #[must_use]
+    pub fn variances_of(&self, channel: usize, divisors: Option<[u64; REPLICATES]>) -> Vec<f64> {
+        let variances = self.sets_of(channel).enumerate().map(|(index, sets)| {
             let alike = divisors.is_none() && are_halves(&sets);
             let evened = self.evened(index, &sets);
             let own = sets.enumerate().map(|(r, (sum, n))| match evened {
@@ -338,7 +342,8 @@ impl LayerSums {
             // Where the halves weigh alike, so do their replicates, which take turns.
             let weight = |n: u64| if alike { 1.0 } else { n as f64 };
             variance_of_mean(own.filter(|(_, n)| *n > 0).map(|(mean, n)| (mean, weight(n))))
-        })
+        });
+        variances.collect()
     }
 }
 
@@ -426,9 +431,9 @@ mod tests {
             sums.add(1, replicate, 1.0, &[7.0, x]);
         }
         assert_eq!((sums.plane(0), sums.plane(1)), (vec![0.0, 7.0], vec![0.0, 2.0]));
-        let variances: Vec<f64> = sums.variances_of(1, None).collect();
+        let variances = sums.variances_of(1, None);
         assert!(variances[0].is_nan() && variances[1] == 0.5, "{variances:?}");
-        let variances: Vec<f64> = sums.variances_of(1, Some([4; 4])).collect();
+        let variances = sums.variances_of(1, Some([4; 4]));
         assert!(variances[0] == 0.0 && (variances[1] - 5.0 / 48.0).abs() < 1e-15, "{variances:?}");
         // Halves that had 2 and 8 samples weigh alike: (1 + 2)/2, and with means 0, 2, 1 and 3 of the replicates
         // (9/4 + 1/4 + 1/4 + 9/4)/(4·3) = 5/12.
@@ -436,10 +441,10 @@ mod tests {
         for (replicate, count, x) in [(0, 1, 0.0), (1, 1, 2.0), (2, 4, 1.0), (3, 4, 3.0)] {
             (0..count).for_each(|_| sums.add(0, replicate, 1.0, &[x]));
         }
-        let variance = sums.variances_of(0, None).next().unwrap();
+        let variance = sums.variances_of(0, None)[0];
         assert!(sums.plane(0) == [1.5] && (variance - 5.0 / 12.0).abs() < 1e-15, "{variance}");
         let together = LayerSums::new(Layout { channels: 1, kept: Kept::Together }, 1);
-        assert!(together.variances_of(0, None).all(f64::is_nan));
+        assert!(together.variances_of(0, None).into_iter().all(f64::is_nan));
     }
 
     #[test]

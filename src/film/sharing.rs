@@ -29,7 +29,7 @@ pub fn by_filter(splats: &Splats, values: Values, errors: &[&[f32]], span: f64) 
         Values::Bands(first, count) => {
             for value in 0..count {
                 let variances = splats.film.layers.variances_of(first + value, Some(splats.photons));
-                variances.enumerate().for_each(|(pixel, variance)| add(value, pixel, variance));
+                variances.into_iter().enumerate().for_each(|(pixel, variance)| add(value, pixel, variance));
             }
         }
     }
