@@ -175,7 +175,8 @@ pub fn render_scene(
     stop: &AtomicBool,
 ) -> (SceneReport, Result<()>) {
     let mut report = SceneReport::new(&prepared.scene.name, prepared.description.frame);
-    report.describe(&Finish::of(prepared), loading);
+    report.describe(&Finish::of(prepared), loading.saturating_sub(prepared.trials));
+    report.seconds.trials = prepared.trials.as_secs_f64();
     let result = render_and_write(prepared, overrides, watcher, stop, &mut report);
     if let Err(e) = &result {
         report.fail(e);

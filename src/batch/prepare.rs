@@ -25,7 +25,7 @@ use crate::transport::{Shot, Spread};
 use glam::DVec2;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What may be written is what a film holds.
 const _: () = assert!(description::SAMPLES_LIMIT == SAMPLES_LIMIT * REPLICATES as u32);
@@ -53,6 +53,8 @@ pub struct Prepared {
     pub source: PathBuf,
     /// The scene one frame later, where the picture says how things move.
     pub next: Option<Box<Scene>>,
+    /// Wall time that pilot and trials took to choose techniques.
+    pub trials: Duration,
 }
 
 impl Prepared {
@@ -139,6 +141,7 @@ pub(super) fn prepare_scene(
     plan.layers = layers::plan(&description, &scene, planned)?;
     let filter = sampler(&description)?;
     let (seed, wishes) = (description.render.seed, wishes(&description));
+    let choosing = Instant::now();
     if let Some((packets, said)) = trial::packets(&scene, &plan, &filter, seed, planned, wishes.packets) {
         plan.packets = packets;
         plan.techniques.push(said);
@@ -164,6 +167,7 @@ pub(super) fn prepare_scene(
         (plan.reuse, plan.shadow_rays, plan.asks_even_sky) = (first.reuse, first.shadow_rays, first.asks_even_sky);
         plan.techniques.extend(first.said);
     }
+    let trials = choosing.elapsed();
     if overrides.check_numerics && !moments.is_empty() {
         let expected = "--check-numerics: expected a scene in which nothing moves, or --set camera.shutter=null";
         return Err(Error::Config(format!("{expected}, found motion blur")));
@@ -195,7 +199,7 @@ pub(super) fn prepare_scene(
         }
     };
     let source = entry.path.clone();
-    let prepared = Prepared { description, scene, moments, plan, samples, planned, stop, hash, source, next };
+    let prepared = Prepared { description, scene, moments, plan, samples, planned, stop, hash, source, next, trials };
     check_files(&prepared)?;
     Ok(prepared)
 }

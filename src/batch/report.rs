@@ -67,6 +67,8 @@ pub enum Status {
 pub struct Seconds {
     /// Reading and compiling the scene.
     pub loading: f64,
+    /// Trials before the render, which choose techniques.
+    pub trials: f64,
     /// Rendering.
     pub rendering: f64,
     /// Writing files.
@@ -304,7 +306,7 @@ impl SceneReport {
         names::label(&self.name, self.frame)
     }
 
-    /// Notes what is to be rendered.
+    /// Notes what is to be rendered, and the time it took to read.
     pub fn describe(&mut self, finish: &Finish, loading: Duration) {
         self.notes.extend(finish.notes.iter().cloned());
         self.integrator.clone_from(&finish.integrator);
