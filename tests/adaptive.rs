@@ -218,17 +218,17 @@ fn the_mean_of_adaptive_renders_is_that_of_uniform_ones() {
     );
 }
 
-/// Where samples count for several pixels less noise is left than a pixel by itself shows. What is shared out is what was asked for all
+/// Where samples count for several pixels, or paths are shared, less noise is left than a pixel by itself shows. What is shared out is what was asked for all
 /// the same, to the fifth that a pilot of 64 cells with shares of 1/4 to 2 is uncertain by (one standard deviation 0.6 / √64), twice, and
 /// the roundings to powers of two.
 #[test]
 fn dealt_samples_are_as_many_as_were_asked_for() {
-    for filter in ["{gaussian: {stddev: 0.8}}", "{tent: {radius: 2}}"] {
+    for (filter, reuse) in [("{gaussian: {stddev: 0.8}}", "off"), ("{tent: {radius: 2}}", "off"), ("box", "on")] {
         let film = bench_with(
             &format!(
                 "camera: {{origin: [0, 1.6, 6], target: [0, 0.9, 0], fov_deg: 40}}\n\
                  image: {{width: 64, height: 64, filter: {filter}}}\n\
-                 render: {{samples: 64, techniques: {{adaptive: on, shadow_rays: 1}}}}\n\
+                 render: {{samples: 64, techniques: {{adaptive: on, shadow_rays: 1, reuse: {reuse}}}}}\n\
                  shapes:\n\
                  - plane: {{normal: [0, 1, 0]}}\n\
                  - sphere: {{center: [0, 1, 0], radius: 0.8, material: {{plastic: {{reflectance: 0.4, roughness: 0.2}}}}}}\n\
@@ -240,6 +240,7 @@ fn dealt_samples_are_as_many_as_were_asked_for() {
         .film();
         let all: u64 = film.cells().iter().flatten().map(|cell| u64::from(cell.count)).sum();
         let mean = all as f64 / film.cells().len() as f64;
-        assert!((mean / 64.0 - 1.0).abs() < 0.2, "{filter}: {mean}");
+        println!("{filter}, {reuse}: {mean}");
+        assert!((mean / 64.0 - 1.0).abs() < 0.2, "{filter}, {reuse}: {mean}");
     }
 }

@@ -15,8 +15,8 @@
 //! w = max(¼, λ√(v/c)).
 //!
 //! **Without the rest of the picture**, f, c and λ come from a pilot: one pixel of each quarter of each cell, with random
-//! numbers of its own. Where samples count for several pixels, a pixel by itself does not show the noise that is left, and λ comes
-//! from whole cells, every sixteenth of them. The pilot is a pure function of scene and settings, so that parts of a picture agree.
+//! numbers of its own. Where samples count for several pixels or paths are shared, a pixel by itself does not show the noise that is left, and
+//! λ comes from whole cells, every sixteenth of them. The pilot is a pure function of scene and settings, so that parts of a picture agree.
 //! Costs are counted in rays, not in seconds.
 
 use super::frame::{FrameJob, light_unit};
@@ -330,7 +330,7 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
         let variance = 0.5 * (variance(&pixels, 0, floor) + variance(&pixels, 1, floor));
         wish(variance, tried[cell].cost / cost)
     };
-    let wishes: Vec<f64> = match job.plan.splatting {
+    let wishes: Vec<f64> = match job.plan.splatting || job.plan.reuse {
         false => (0..grid.cells()).filter(|cell| !tried[*cell].pixels.is_empty()).map(wish).collect(),
         true => wishes_of_whole_cells(job, first, seed, (floor, &costs), pause)?,
     };

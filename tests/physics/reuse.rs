@@ -132,6 +132,21 @@ fn pixels_that_share_paths_have_the_light_of_those_that_do_not() {
     }
 }
 
+/// Cells that have samples by their noise share paths all the same: those of a cell have the same number.
+#[test]
+fn noisy_cells_share_more_paths() {
+    let walls = room("material: {diffuse: {reflectance: 0.7}}");
+    let things = walls + "- sphere: {center: [-0.4, -0.6, -0.3], radius: 0.4, material: {mirror: {}}}\n";
+    let [apart, shared_out] = [("off", 0), ("on, adaptive: on", 100)].map(|(reuse, first)| {
+        let bench = lit(reuse, &things, "");
+        let plan = &bench.prepared.plan;
+        assert_eq!((plan.reuse, plan.adaptive.is_some()), (reuse != "off", reuse != "off"), "{reuse}");
+        over_seeds(bench, first..first + 24)
+    });
+    let ratio = assert_same_light("samples by noise", &apart, &shared_out);
+    assert!(ratio < 0.9, "{ratio}");
+}
+
 /// L = 1 + ½ L everywhere in a room whose walls shine with 1 and reflect ½, and in the inside of a cube.
 #[test]
 fn a_furnace_of_shared_paths_is_as_bright_as_it_has_to_be() {

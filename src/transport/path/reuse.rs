@@ -56,9 +56,6 @@ pub fn obstacle(scene: &Scene, census: &Census, plan: &EffectPlan, moments: usiz
         Some("some surfaces let light straight through")
     } else if moments > 0 {
         Some("things move while the shutter is open")
-    } else if plan.adaptive.is_some() {
-        // Its own pilot asks pixels one by one.
-        Some("samples are shared out by noise")
     } else if settings.light_samples != 1 || settings.scatter_samples != 1 {
         Some("samples have several paths, or look for light in one way only")
     } else if settings.roulette_depth <= 2 {
