@@ -76,9 +76,9 @@ pub struct Milestone {
     pub elapsed: Duration,
     /// The estimate, where replicates give one.
     pub error: Option<ErrorEstimate>,
-    /// Whether no light was met at all.
+    /// Why they give none, where samples are random.
     #[serde(default)]
-    pub black: bool,
+    pub unknown: Option<NoEstimate>,
 }
 
 /// A rendered picture.
@@ -117,8 +117,8 @@ impl Frame {
     /// The frame of `samples` of each pixel that were added up elsewhere in `elapsed`, whose error `gauge` tells.
     #[must_use]
     pub fn of(film: Film, splats: Option<SplatFilm>, samples: u32, elapsed: Duration, gauge: &Gauge) -> Frame {
-        let Estimate { error, black, resolved } = estimate(&film, splats.as_ref(), gauge);
-        let milestones = vec![Milestone { samples, elapsed, error, black }];
+        let Estimate { error, unknown, resolved } = estimate(&film, splats.as_ref(), gauge);
+        let milestones = vec![Milestone { samples, elapsed, error, unknown }];
         Frame { film, splats, elapsed, milestones, resolved }
     }
 
@@ -143,7 +143,8 @@ impl Frame {
     #[must_use]
     pub fn error_of_bands(&self, bands: Range<usize>, gauge: &Gauge) -> Option<ErrorEstimate> {
         let splats = self.splats.as_ref().map(SplatFilm::splats);
-        told(&self.film, splats, Values::Bands(bands.start, bands.len()), gauge).0
+        let values = Values::Bands(bands.start, bands.len());
+        if gauge.random { told(&self.film, splats, values, gauge).ok() } else { None }
     }
 
     /// How many times the variance of the sum of all pixels of `image` is that of independent ones, at the most.
@@ -322,12 +323,12 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
         while !part.add(pass.clone(), breaks, &finished) {
             breaks.take(part, &begun.milestones, before + start.elapsed())?;
         }
-        let Estimate { error, black, resolved } = match whole {
+        let Estimate { error, unknown, resolved } = match whole {
             true => part.look(|film, splats| estimate(film, splats, &job.gauge)),
             false => Estimate::default(),
         };
         begun.resolved = resolved;
-        begun.milestones.push(Milestone { samples: pass.end, elapsed: before + start.elapsed(), error, black });
+        begun.milestones.push(Milestone { samples: pass.end, elapsed: before + start.elapsed(), error, unknown });
     }
     begun.elapsed = before + start.elapsed();
     Ok(begun)
@@ -341,8 +342,8 @@ type Resolved = ([[f64; 3]; 3], Image);
 struct Estimate {
     /// Its error, where they tell one; it is known where nothing shines.
     error: Option<ErrorEstimate>,
-    /// Whether there is no light in it.
-    black: bool,
+    /// Why they tell none.
+    unknown: Option<NoEstimate>,
     /// The picture.
     resolved: Option<Resolved>,
 }
@@ -358,23 +359,28 @@ fn estimate(film: &Film, splats: Option<&SplatFilm>, gauge: &Gauge) -> Estimate 
         0 => Values::Colours(&space, &image),
         bands => Values::Bands(0, bands),
     };
-    let (error, black) = told(film, photons, values, gauge);
-    Estimate { error, black, resolved: Some((space, image)) }
+    let (error, unknown) = match told(film, photons, values, gauge) {
+        Ok(error) => (Some(error), None),
+        Err(why) => (None, Some(why)),
+    };
+    Estimate { error, unknown, resolved: Some((space, image)) }
 }
 
-/// The error of `values`, where they tell one; it is known where nothing shines. And whether there is no light in them.
-fn told(film: &Film, splats: Option<Splats>, values: Values, gauge: &Gauge) -> (Option<ErrorEstimate>, bool) {
-    if !gauge.random {
-        return (None, false);
-    }
+/// The error of `values`, where replicates tell one; it is known where nothing shines.
+fn told(
+    film: &Film,
+    splats: Option<Splats>,
+    values: Values,
+    gauge: &Gauge,
+) -> std::result::Result<ErrorEstimate, NoEstimate> {
     let (overlap, cell) = match gauge.sharing {
         Sharing::Near { overlap, cell, .. } => (overlap, cell),
         Sharing::All => (1.0, 1),
     };
-    let found = error::relative_error(film, splats, values, overlap, cell);
-    let black = found == Err(NoEstimate::Black);
-    let error = if black && !gauge.lit { Some(ErrorEstimate::none(film.window().pixels() as u64)) } else { found.ok() };
-    (error, black)
+    match error::relative_error(film, splats, values, overlap, cell) {
+        Err(NoEstimate::Black) if !gauge.lit => Ok(ErrorEstimate::none(film.window().pixels() as u64)),
+        found => found,
+    }
 }
 
 /// An error where too many samples were invalid to trust the picture.

@@ -344,9 +344,8 @@ impl SceneReport {
                 Some(ConvergencePoint { samples: m.samples, seconds, relative_error: e.rel_rmse, valid: e.valid })
             })
             .collect();
-        if self.error.is_none() && finish.integrator == "path" {
-            let why = "a single pixel, too few samples, light that they have hardly met, or black";
-            self.notes.push(format!("{why}: the error cannot be estimated"));
+        if let Some(why) = frame.milestones.last().and_then(|m| m.unknown) {
+            self.notes.push(format!("the error cannot be estimated: {why}"));
         }
     }
 

@@ -8,7 +8,7 @@
 use super::frame::Milestone;
 use crate::error::{Error, Result};
 use crate::film::accumulate::REPLICATES;
-use crate::film::error::ErrorEstimate;
+use crate::film::error::{ErrorEstimate, NoEstimate};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -63,7 +63,7 @@ impl Stop {
         let error = self.target().is_some_and(|target| below(last, target) && (believed || twice(target)));
         // Where nothing but the error would end it.
         let alone = self.error.is_some() && self.time.is_none() && !self.samples_wanted;
-        let hopeless = alone && last.black && last.samples >= BLACK_UNTIL;
+        let hopeless = alone && last.unknown == Some(NoEstimate::Black) && last.samples >= BLACK_UNTIL;
         error || hopeless || self.time.is_some_and(|time| last.elapsed >= time)
     }
 
@@ -105,12 +105,15 @@ impl Stop {
         if let Some(asked) = self.error {
             let found = match last.error {
                 Some(e) => format!("the picture is written with an error of {:.3e}", e.rel_rmse),
-                None if last.black => "the picture is written, and black".to_owned(),
-                None => "the picture is written, its error is unknown".to_owned(),
+                None => match last.unknown {
+                    Some(NoEstimate::Black) => "the picture is written, and black".to_owned(),
+                    Some(why) => format!("the picture is written, its error is unknown: {why}"),
+                    None => "the picture is written, its error is unknown".to_owned(),
+                },
             };
             if asked < self.floor && last.error.is_some_and(|e| e.rel_rmse <= self.floor) {
                 return Err(Error::Render(format!(
-                    "stop.error: {asked:e} is below {:.1e}, what rounding to the precision of the file makes; {found}; \
+                    "stop.error: {asked:.3e} is below {:.1e}, what rounding to the precision of the file makes; {found}; \
                      output.exr.precision: float holds more",
                     self.floor
                 )));
@@ -119,7 +122,7 @@ impl Stop {
             let in_time = self.time.is_none_or(|time| last.elapsed < time.mul_f64(0.5));
             if last.error.is_none_or(|e| e.rel_rmse > asked) && !self.samples_wanted && in_time {
                 return Err(Error::Render(format!(
-                    "stop.error: {asked:e} was not reached with {} samples a pixel; {found}",
+                    "stop.error: {asked:.3e} was not reached with {} samples a pixel; {found}",
                     last.samples
                 )));
             }
@@ -268,7 +271,7 @@ mod tests {
         let of = |&n: &u32| {
             let rel_rmse = f64::from(n).powf(-0.5 * b);
             let error = ErrorEstimate { rel_rmse, low: rel_rmse, high: rel_rmse, pixels: 100, valid: true };
-            Milestone { samples: n, elapsed: Duration::from_millis(n.into()), error: Some(error), black: false }
+            Milestone { samples: n, elapsed: Duration::from_millis(n.into()), error: Some(error), unknown: None }
         };
         samples.iter().map(of).collect()
     }
@@ -292,7 +295,7 @@ mod tests {
     fn a_picture_that_stays_black_is_given_up() {
         let stop = Stop { error: Some(0.1), samples_wanted: false, ..FREE };
         let mut known = milestones(&[64, 128, 256], 1.0);
-        known.iter_mut().for_each(|m| (m.error, m.black) = (None, true));
+        known.iter_mut().for_each(|m| (m.error, m.unknown) = (None, Some(NoEstimate::Black)));
         assert!(stop.reached(&known) && !stop.reached(&known[..2]));
         assert!(
             stop.check(&known)

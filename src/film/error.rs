@@ -112,7 +112,7 @@ const WIDEST: f64 = 100.0;
 const BLOCKS: usize = 64;
 
 /// Why there is no error estimate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum NoEstimate {
     /// No pixel has samples in all replicates.
     FewReplicates,

@@ -1,6 +1,8 @@
 """Meshes and skies that scenes of tools/bench name, made where they are missing; they are the same each time.
 
-PLY is binary, little-endian, with positions and triangles alone.
+    target/venv/bin/python tools/bench/made.py
+
+writes them to target/bench/made, where scenes/plain looks for them (tools/test makes target/venv). PLY is binary, little-endian, with positions and triangles alone.
 """
 import math
 import pathlib
@@ -88,3 +90,7 @@ def ensure(folder):
         if not (folder / name).is_file():
             make(folder / name)
     return folder
+
+
+if __name__ == "__main__":
+    ensure(pathlib.Path(__file__).resolve().parents[2] / "target" / "bench" / "made")
