@@ -63,19 +63,21 @@ fn a_disk_that_fills_leaves_no_half_part_and_all_parts_when_they_are_merged() {
     assert!(pixels(&place.path("merged/scene.exr")) == pixels(&place.path("whole/scene.exr")));
 }
 
-/// A checkpoint for which there is no room is a note; the picture is made all the same, if it fits.
+/// A checkpoint for which there is no room is a note, at once and in the end; the picture is made all the same, if it fits.
 #[test]
 fn a_checkpoint_for_which_there_is_no_room_costs_nothing() {
     let place = Place::of(SCENE);
     let small = ["render", "scene.yaml", "-q", "-o", "out", "--checkpoint-interval", "0.001s", "--spp", "256"];
-    let ran = cramped(
-        &place,
-        &[&small[..], &["--set", "image.width=40", "--set", "image.height=20", "--set", "output.exr.precision=half"]]
-            .concat(),
-    );
+    let size = ["--set", "image.width=40", "--set", "image.height=20", "--set", "output.exr.precision=half"];
+    let ran = cramped(&place, &[&small[..], &size].concat());
     assert_eq!(ran.code, 0, "{}", ran.err);
-    assert!(ran.err.starts_with("note: scene: no checkpoint: out/scene.exr.checkpoint: cannot write: "), "{}", ran.err);
+    let note = "note: scene: no checkpoint: out/scene.exr.checkpoint: cannot write: ";
+    assert!(ran.err.starts_with(note) && ran.err.matches(note).count() == 2, "{}", ran.err);
     assert_eq!(place.names("out"), ["report.json", "scene.exr", "scene.png"]);
+    let ran = cramped(&place, &[&small[..], &size, &["--progress", "json"]].concat());
+    let said: Vec<&str> = ran.out.lines().filter(|line| line.contains("no checkpoint")).collect();
+    let is = |line: &str, event: &str| line.contains(&format!("\"event\":\"{event}\""));
+    assert!(said.len() == 2 && is(said[0], "note") && is(said[1], "done"), "{}", ran.out);
 }
 
 #[test]

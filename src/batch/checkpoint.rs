@@ -5,6 +5,7 @@
 //! not asked. Work pauses between two units, so that it is exact: what is resumed gives the same bits. The same pauses show
 //! the picture to a viewer ([`super::tev`]).
 
+use super::Watcher;
 use super::develop;
 use super::finish::{Finish, spectral_path};
 use super::frame::{Begun, FrameJob, Milestone, lock};
@@ -63,6 +64,7 @@ pub struct Keeper<'a> {
     path: &'a Path,
     identity: &'a Identity,
     watch: Option<&'a Watch>,
+    watcher: &'a dyn Watcher,
     /// Of the run that is resumed.
     counted: Option<Counts>,
     next: Mutex<Option<Instant>>,
@@ -81,6 +83,7 @@ impl<'a> Keeper<'a> {
         path: &'a Path,
         identity: &'a Identity,
         watch: Option<&'a Watch>,
+        watcher: &'a dyn Watcher,
     ) -> Keeper<'a> {
         let next = Mutex::new(keep.every.and_then(|every| Instant::now().checked_add(every)));
         Keeper {
@@ -89,6 +92,7 @@ impl<'a> Keeper<'a> {
             path,
             identity,
             watch,
+            watcher,
             counted: None,
             next,
             next_look: Mutex::new(Instant::now()),
@@ -165,6 +169,15 @@ impl<'a> Keeper<'a> {
         png::write_png(&snapshot_place(self.path), &image, &finish.png_settings(&image))
     }
 
+    /// What is not worth losing the render for: told at once, and in the report. The same trouble twice in a row is told once.
+    fn note(&self, note: String) {
+        let mut notes = lock(&self.notes);
+        if notes.last() != Some(&note) {
+            self.watcher.warns(&note);
+            notes.push(note);
+        }
+    }
+
     fn is_due(&self) -> bool {
         self.keep.every.is_some() && lock(&self.next).is_some_and(|next| Instant::now() >= next)
     }
@@ -195,11 +208,10 @@ impl Breaks for Keeper<'_> {
                 format!("stopped at {per_cent:.1} %, kept in {}; --resume goes on from there", file.display());
             return Err(Error::Stopped(message));
         }
-        // Neither is worth losing the render for.
         if self.keep.snapshot.swap(false, Ordering::Relaxed)
             && let Err(e) = self.snapshot(part)
         {
-            lock(&self.notes).push(format!("no snapshot: {e}"));
+            self.note(format!("no snapshot: {e}"));
         }
         if let Some(viewer) = self.looking_on() {
             let start = Instant::now();
@@ -211,11 +223,7 @@ impl Breaks for Keeper<'_> {
         if self.is_due() {
             let start = Instant::now();
             if let Err(e) = self.write(part, milestones, elapsed) {
-                let note = format!("no checkpoint: {e}");
-                let mut notes = lock(&self.notes);
-                if notes.last() != Some(&note) {
-                    notes.push(note);
-                }
+                self.note(format!("no checkpoint: {e}"));
             }
             // At most a fifth of the time goes into checkpoints.
             let pause = self.keep.every.map(|every| every.max(4 * start.elapsed()));
@@ -357,7 +365,7 @@ mod tests {
         part_file::write(&place(&path), &identity, &before, &[], time, Some(counts)).unwrap();
 
         let (keep, stop) = (Keep { resume: true, ..Keep::default() }, AtomicBool::new(false));
-        let mut keeper = Keeper::new(&keep, &stop, &path, &identity, None);
+        let mut keeper = Keeper::new(&keep, &stop, &path, &identity, None, &());
         let begun = keeper.begin(&job, share).unwrap();
         assert_eq!((begun.elapsed, keeper.numerics()), (time, Some(counts)));
         let frame = go_on(begun, &|_| {}, &keeper).unwrap().finish();

@@ -89,6 +89,8 @@ pub trait Watcher: Sync {
     fn scene_begins(&self, turn: Turn, name: &str);
     /// Samples were done.
     fn progress(&self, progress: Progress);
+    /// Something went wrong that does not end the render: its report will say so, but somebody may mend it before.
+    fn warns(&self, _message: &str) {}
     /// A picture ended.
     fn scene_ends(&self, report: &SceneReport);
 }
@@ -223,7 +225,7 @@ fn render_and_write(
             output::prepare_place(&spectral_path(&exr_path))?;
         }
     }
-    let mut keeper = Keeper::new(&overrides.keep, stop, &exr_path, &identity, prepared.scene.watch.as_deref());
+    let mut keeper = Keeper::new(&overrides.keep, stop, &exr_path, &identity, prepared.scene.watch.as_deref(), watcher);
     let begun = keeper.begin(&job, share)?;
     let begun = go_on(begun, &|p| watcher.progress(p), &keeper)?;
     if !portion.is_all() {

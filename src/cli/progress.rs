@@ -162,6 +162,17 @@ impl Watcher for Teller {
         }
     }
 
+    fn warns(&self, message: &str) {
+        let scene = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner).scene.clone();
+        let note = format!("note: {scene}: {message}");
+        match &self.style {
+            // Where the bars are not drawn it says nothing.
+            Style::Bars { all, .. } => drop(all.println(note)),
+            Style::Json => line(&json!({"event": "note", "scene": scene, "message": message})),
+            Style::Plain | Style::OpenJd | Style::Quiet => complain(&note),
+        }
+    }
+
     fn scene_ends(&self, report: &SceneReport) {
         match &self.style {
             Style::Bars { batch, .. } => batch.inc(1),

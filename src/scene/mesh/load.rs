@@ -241,6 +241,36 @@ mod tests {
         assert!(message.contains("attribute vertex_heat of number 0 is NaN"), "{message}");
     }
 
+    /// Two triangles of a quad with coordinates at their corners, which agree at vertex 0 alone: vertex 2 becomes two, with all that
+    /// it has. A face may have none.
+    #[test]
+    fn ply_corners_may_have_coordinates_of_their_own() {
+        let head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+            property float heat_0\nelement face 2\nproperty list uchar int vertex_index\nproperty list uchar float texcoord\n\
+            end_header\n0 0 0 1.5\n1 0 0 2\n1 1 0 3\n0 1 0 4\n";
+        let of = |faces: &str| format!("{head}{faces}");
+        let faces = "3 0 1 2 6 0.5 0 1 0 1 1\n3 0 2 3 6 0.5 0 0.25 0.75 0 1\n";
+        let mesh = read("a.ply", of(faces).as_bytes()).unwrap();
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 4, 3]]);
+        assert_eq!(mesh.positions[4], mesh.positions[2]);
+        assert_eq!(mesh.uvs, [[0.5, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.25, 0.75]].map(DVec2::from_array));
+        assert_eq!(mesh.attributes[0].values, [1.5, 2.0, 3.0, 4.0, 3.0]);
+        let mesh = read("a.ply", of("3 0 1 2 6 0.5 0 1 0 1 1\n3 0 2 3 0\n").as_bytes()).unwrap();
+        assert_eq!(
+            (mesh.triangles[1], mesh.uvs[4], mesh.uvs[5], mesh.uvs[3]),
+            ([4, 5, 3], DVec2::ZERO, DVec2::ZERO, DVec2::ZERO)
+        );
+        let says = |faces: &str| fault("a.ply", of(faces).as_bytes());
+        let message = says("3 0 1 2 4 0.5 0 1 0\n3 0 2 3 0\n");
+        assert!(
+            message.contains("face 0: expected u and v of each corner, found 3 corners and 4 numbers"),
+            "{message}"
+        );
+        let message = says("3 0 1 2 6 0.5 0 1 0 1 nan\n3 0 2 3 0\n");
+        assert!(message.contains("face 0: texcoord: expected finite numbers, found NaN"), "{message}");
+        assert!(says("3 0 1 9 6 0.5 0 1 0 1 1\n3 0 2 3 0\n").contains("names vertex 9"));
+    }
+
     #[test]
     fn every_truncation_of_a_ply_is_an_error() {
         for format in ["ascii", "binary_little_endian", "binary_big_endian"] {

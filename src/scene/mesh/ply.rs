@@ -2,12 +2,13 @@
 //! File Format").
 //!
 //! Other elements are passed over. Properties beyond position, normal and texture coordinates become
-//! attributes, see [`super::attribute`].
+//! attributes, see [`super::attribute`]. Faces may have a list `texcoord`, u and v of each corner, as MeshLab writes it.
 
 use super::MeshSource;
 use super::attribute::{Attribute, Channel, Column, Element, named_columns};
 use super::polygon::unfold;
 use glam::{DVec2, DVec3};
+use std::collections::HashMap;
 
 /// The type of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -191,17 +192,17 @@ impl Payload<'_> {
         }
     }
 
-    /// Reads the numbers of one row: those of properties that are no lists to `scalars`, in order, and the
-    /// list `chosen` to `list`.
-    fn row(
+    /// Reads the numbers of one row: those of properties that are no lists to `scalars`, in order, and each list of `chosen` to
+    /// that of `lists` in its place.
+    fn row<const N: usize>(
         &mut self,
         properties: &[Property],
-        chosen: Option<usize>,
         scalars: &mut Vec<f64>,
-        list: &mut Vec<f64>,
+        chosen: [Option<usize>; N],
+        lists: &mut [Vec<f64>; N],
     ) -> Result<(), String> {
         scalars.clear();
-        list.clear();
+        lists.iter_mut().for_each(Vec::clear);
         for (i, property) in properties.iter().enumerate() {
             let Some(count) = property.list else {
                 scalars.push(self.next(property.kind)?);
@@ -211,10 +212,11 @@ impl Payload<'_> {
             if !(0.0..=f64::from(u32::MAX)).contains(&count) || count.fract() != 0.0 {
                 return Err(format!("expected the length of a list, found {count}"));
             }
+            let list = chosen.iter().position(|chosen| *chosen == Some(i));
             for _ in 0..count as u64 {
                 let x = self.next(property.kind)?;
-                if Some(i) == chosen {
-                    list.push(x);
+                if let Some(list) = list {
+                    lists[list].push(x);
                 }
             }
         }
@@ -239,6 +241,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
     let mut out = MeshSource::default();
     // Triangles of faces of more than three corners: where these are is known when all is read.
     let mut fans = Vec::new();
+    // Of the corners of triangles, where faces have coordinates.
+    let mut corner_uvs: Vec<[DVec2; 3]> = Vec::new();
     for (name, count, properties) in &header.elements {
         // Every row takes at least a byte: a count beyond that is a fault, not a long wait.
         if *count > total {
@@ -248,7 +252,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
         // Scalars of a row come without the lists.
         let scalar_names: Vec<&str> = properties.iter().filter(|p| p.list.is_none()).map(|p| p.name.as_str()).collect();
         let column = |name: &str| scalar_names.iter().position(|n| *n == name);
-        let (mut scalars, mut list) = (Vec::new(), Vec::new());
+        let mut scalars = Vec::new();
         match name.as_str() {
             "vertex" => {
                 let all = |names: [&str; 3]| Some([column(names[0])?, column(names[1])?, column(names[2])?]);
@@ -261,7 +265,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
                 free.iter_mut().for_each(|c| c.taken |= uv_names.is_some_and(|names| names.contains(&c.name.as_str())));
                 let mut attributes = named_columns(Element::Vertex, &free);
                 for i in 0..*count {
-                    payload.row(properties, None, &mut scalars, &mut list).map_err(|e| row_fault(i, e))?;
+                    payload.row(properties, &mut scalars, [], &mut []).map_err(|e| row_fault(i, e))?;
                     let vector = |at: [usize; 3]| DVec3::from(at.map(|k| scalars[k]));
                     out.positions.push(vector(position));
                     out.normals.extend(normal.map(vector));
@@ -271,16 +275,26 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
                 out.attributes.extend(attributes.into_iter().map(|(attribute, _)| attribute));
             }
             "face" => {
-                let chosen = ["vertex_index", "vertex_indices"]
-                    .into_iter()
-                    .find_map(|n| properties.iter().position(|p| p.list.is_some() && p.name == n))
-                    .ok_or("expected faces with vertex_index or vertex_indices")?;
+                let list = |name: &str| properties.iter().position(|p| p.list.is_some() && p.name == name);
+                let corners = list("vertex_index").or_else(|| list("vertex_indices"));
+                let corners = corners.ok_or("expected faces with vertex_index or vertex_indices")?;
+                let (chosen, mut lists) = ([Some(corners), list("texcoord")], [Vec::new(), Vec::new()]);
                 let mut attributes = named_columns(Element::Face, &columns(properties, |_| false));
                 for i in 0..*count {
-                    payload.row(properties, Some(chosen), &mut scalars, &mut list).map_err(|e| row_fault(i, e))?;
+                    payload.row(properties, &mut scalars, chosen, &mut lists).map_err(|e| row_fault(i, e))?;
+                    let [list, uvs] = &lists;
                     if list.len() < 3 {
                         return Err(format!("face {i}: expected 3 or more vertices, found {}", list.len()));
                     }
+                    // A face may have none.
+                    if ![0, 2 * list.len()].contains(&uvs.len()) {
+                        let found = format!("{} corners and {} numbers of texcoord", list.len(), uvs.len());
+                        return Err(format!("face {i}: expected u and v of each corner, found {found}"));
+                    }
+                    if let Some(x) = uvs.iter().find(|x| !x.is_finite()) {
+                        return Err(format!("face {i}: texcoord: expected finite numbers, found {x}"));
+                    }
+                    let uv = |k: usize| uvs.get(2 * k..2 * k + 2).map_or(DVec2::ZERO, DVec2::from_slice);
                     // An index that is none becomes one that no file has vertices for: casts saturate.
                     let corner = |k: usize| if list[k] < 0.0 { u32::MAX } else { list[k] as u32 };
                     if list.len() > 3 {
@@ -288,6 +302,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
                     }
                     for k in 2..list.len() {
                         out.triangles.push([corner(0), corner(k - 1), corner(k)]);
+                        if chosen[1].is_some() {
+                            corner_uvs.push([uv(0), uv(k - 1), uv(k)]);
+                        }
                         attributes.iter_mut().for_each(|(attribute, from)| push(attribute, from, &scalars));
                     }
                 }
@@ -295,13 +312,50 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
             }
             _ => {
                 for i in 0..*count {
-                    payload.row(properties, None, &mut scalars, &mut list).map_err(|e| row_fault(i, e))?;
+                    payload.row(properties, &mut scalars, [], &mut []).map_err(|e| row_fault(i, e))?;
                 }
             }
         }
     }
+    part_at_seams(&mut out, &corner_uvs);
     fans.into_iter().for_each(|fan| unfold(&out.positions, &mut out.triangles[fan]));
     Ok(out)
+}
+
+/// Gives the corners of all triangles the coordinates `uvs`; nothing where there are none. A vertex whose corners have several becomes as
+/// many vertices, at the same place.
+fn part_at_seams(mesh: &mut MeshSource, uvs: &[[DVec2; 3]]) {
+    if uvs.is_empty() {
+        return;
+    }
+    let there = mesh.positions.len();
+    mesh.uvs = vec![DVec2::NAN; there];
+    let mut further: HashMap<(u32, [u64; 2]), u32> = HashMap::new();
+    for (triangle, uvs) in mesh.triangles.iter_mut().zip(uvs) {
+        for (vertex, &uv) in triangle.iter_mut().zip(uvs) {
+            let from = *vertex as usize;
+            // What is not there is a fault that is told later.
+            if from >= there || mesh.uvs[from] == uv {
+                continue;
+            }
+            if mesh.uvs[from].is_nan() {
+                mesh.uvs[from] = uv;
+                continue;
+            }
+            *vertex = *further.entry((*vertex, [uv.x, uv.y].map(f64::to_bits))).or_insert_with(|| {
+                mesh.positions.push(mesh.positions[from]);
+                mesh.uvs.push(uv);
+                mesh.normals.extend(mesh.normals.get(from).copied());
+                for attribute in mesh.attributes.iter_mut().filter(|a| a.element == Element::Vertex) {
+                    let value = from * attribute.channels..(from + 1) * attribute.channels;
+                    attribute.values.extend_from_within(value);
+                }
+                mesh.positions.len() as u32 - 1
+            });
+        }
+    }
+    // No face has the others.
+    mesh.uvs.iter_mut().filter(|uv| uv.is_nan()).for_each(|uv| *uv = DVec2::ZERO);
 }
 
 /// The properties of an element that are no lists.
