@@ -67,9 +67,9 @@ fn a_disk_that_fills_leaves_no_half_part_and_all_parts_when_they_are_merged() {
 #[test]
 fn a_checkpoint_for_which_there_is_no_room_costs_nothing() {
     let place = Place::of(SCENE);
-    let small = ["render", "scene.yaml", "-q", "-o", "out", "--checkpoint-interval", "0.001s", "--spp", "256"];
+    let small = ["render", "scene.yaml", "-o", "out", "--checkpoint-interval", "0.001s", "--spp", "256"];
     let size = ["--set", "image.width=40", "--set", "image.height=20", "--set", "output.exr.precision=half"];
-    let ran = cramped(&place, &[&small[..], &size].concat());
+    let ran = cramped(&place, &[&small[..], &size, &["-q"]].concat());
     assert_eq!(ran.code, 0, "{}", ran.err);
     let note = "note: scene: no checkpoint: out/scene.exr.checkpoint: cannot write: ";
     assert!(ran.err.starts_with(note) && ran.err.matches(note).count() == 2, "{}", ran.err);

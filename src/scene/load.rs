@@ -8,7 +8,7 @@ pub use curve::samples;
 use super::bands::Bands;
 use super::texture::{DataImage, Grid, ImageTexture, Numbers, Texel, Texels};
 use crate::error::{Error, Result};
-use crate::film::{Window, exr};
+use crate::film::{Window, exr, png};
 use crate::spectrum::Carried;
 use crate::spectrum::colour::{self, ColourSpace};
 use rayon::prelude::*;
@@ -243,6 +243,13 @@ pub fn cut_out(path: &Path, file: &exr::ExrFile) -> Option<String> {
         let path = path.display();
         format!("{path} holds {window} of a frame of {width}x{height}; that part is taken for the whole picture")
     })
+}
+
+/// What a person should know of a PNG file whose colours are said to be others than those that they are taken for.
+#[must_use]
+pub fn other_colours(path: &Path) -> Option<String> {
+    let said = png::inspect::other_colours(path)?;
+    Some(format!("{} says that its colours are {said}; they are taken for sRGB", path.display()))
 }
 
 /// A picture of light from the file `path`: EXR by its chromaticities, HDR as it is, 8- and 16-bit files decoded from sRGB.

@@ -290,3 +290,23 @@ fn tiles_may_be_large() {
     let ran = place.run(&[&["render", "scene.yaml", "-q", "--threads", "1"], &set[..]].concat());
     assert_eq!(ran.code, 0, "{}", ran.err);
 }
+
+/// Pictures whose file says that their colours are others than those that they are taken for are told; numbers are not colours.
+#[test]
+fn pictures_in_other_colours_are_told() {
+    let place = Place::with(&[("a.yaml", &format!("{SMALL}{BALL}"))]);
+    assert_eq!(place.run(&["render", "a.yaml", "-q", "-o", "p3.exr", "--set", "output.png.space=display_p3"]).code, 0);
+    let told = "textures.t.image.file: p3.png says that its colours are Display P3 (cICP); they are taken for sRGB";
+    let said = |raw: &str| {
+        let texture = format!("textures={{t: {{image: {{file: p3.png, raw: {raw}}}}}}}");
+        let material = "materials={m: {diffuse: {reflectance: {texture: t}}}}";
+        let shapes = "shapes=[{sphere: {radius: 1, material: m}}]";
+        let ran = place
+            .run(&["render", "a.yaml", "-q", "-o", "b.exr", "--set", &texture, "--set", material, "--set", shapes]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        ran.err
+    };
+    let (colours, numbers) = (said("false"), said("true"));
+    assert!(colours.starts_with("note: a: ") && colours.contains(told), "{colours}");
+    assert!(!numbers.contains("taken for"), "{numbers}");
+}

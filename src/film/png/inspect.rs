@@ -3,6 +3,7 @@
 use super::tags;
 use crate::error::{Error, Result};
 use serde::Serialize;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 /// The head of a file.
@@ -59,11 +60,9 @@ fn chunks(bytes: &[u8], damaged: &mut Option<String>) -> Option<PngFacts> {
             *damaged = Some(latin1(name));
             return None;
         }
-        let mut says = |own: i32, text: String| {
-            if own > rank {
-                (rank, facts.colours) = (own, text);
-            }
-        };
+        if let Some((own, text)) = meaning(name, content).filter(|(own, _)| *own > rank) {
+            (rank, facts.colours) = (own, text);
+        }
         match name {
             b"IHDR" => {
                 let word = |i: usize| Some(u32::from_be_bytes(content.get(i..i + 4)?.try_into().ok()?));
@@ -78,38 +77,74 @@ fn chunks(bytes: &[u8], damaged: &mut Option<String>) -> Option<PngFacts> {
                     _ => return None,
                 };
             }
-            b"cICP" => says(
-                4,
-                match content {
-                    [12, 13, 0, 1] => "Display P3 (cICP)".into(),
-                    [1, 13, 0, 1] => "sRGB (cICP)".into(),
-                    [9, 16, 0, 1] => "Rec. 2100 PQ (cICP)".into(),
-                    [9, 18, 0, 1] => "Rec. 2100 HLG (cICP)".into(),
-                    other => format!("code points {other:?} of H.273 (cICP)"),
-                },
-            ),
-            b"iCCP" => {
-                let end = content.iter().position(|b| *b == 0)?;
-                says(3, format!("{} (ICC profile)", latin1(&content[..end])));
-            }
-            b"sRGB" => says(2, "sRGB".into()),
-            b"gAMA" => {
-                let gamma = u32::from_be_bytes(content.try_into().ok()?);
-                says(1, format!("gamma {}", 1e5 / f64::from(gamma.max(1))));
-            }
             b"tEXt" => {
                 let end = content.iter().position(|b| *b == 0)?;
                 facts.texts.push((latin1(&content[..end]), latin1(&content[end + 1..])));
             }
             b"IEND" => {
                 if rank == 0 {
-                    facts.colours = "not said, so sRGB".into();
+                    facts.colours = format!("not said, so {SRGB}");
                 }
                 return Some(facts);
             }
             _ => {}
         }
     }
+}
+
+/// What a chunk says of the numbers of the file, and its rank among those that do.
+fn meaning(name: &[u8], content: &[u8]) -> Option<(i32, String)> {
+    Some(match name {
+        b"cICP" => (
+            4,
+            match content {
+                [12, 13, 0, 1] => "Display P3 (cICP)".into(),
+                [1, 13, 0, 1] => format!("{SRGB} (cICP)"),
+                [9, 16, 0, 1] => "Rec. 2100 PQ (cICP)".into(),
+                [9, 18, 0, 1] => "Rec. 2100 HLG (cICP)".into(),
+                other => format!("code points {other:?} of H.273 (cICP)"),
+            },
+        ),
+        b"iCCP" => {
+            let end = content.iter().position(|b| *b == 0)?;
+            (3, format!("{} (ICC profile)", latin1(&content[..end])))
+        }
+        b"sRGB" => (2, SRGB.into()),
+        b"gAMA" => {
+            let gamma = u32::from_be_bytes(content.try_into().ok()?);
+            // What writers state beside sRGB, for readers that know nothing better.
+            let like = if gamma == 45_455 { ", as of sRGB" } else { "" };
+            (1, format!("gamma {}{like}", 1e5 / f64::from(gamma.max(1))))
+        }
+        _ => return None,
+    })
+}
+
+/// The colours that pictures have that do not say which.
+const SRGB: &str = "sRGB";
+
+/// What the PNG file at `path` says of its colours, where that is not sRGB; nothing of other files.
+#[must_use]
+pub fn other_colours(path: &Path) -> Option<String> {
+    let mut file = BufReader::new(crate::input::open(path).ok()?);
+    let mut signature = [0; 8];
+    file.read_exact(&mut signature).ok().filter(|()| signature == *b"\x89PNG\r\n\x1a\n")?;
+    let mut best: Option<(i32, String)> = None;
+    loop {
+        let (mut length, mut name) = ([0; 4], [0; 4]);
+        file.read_exact(&mut length).and_then(|()| file.read_exact(&mut name)).ok()?;
+        // All that is said of them stands before them.
+        if name == *b"IDAT" {
+            break;
+        }
+        let mut content = Vec::new();
+        let length = u64::from(u32::from_be_bytes(length));
+        (&mut file).take(length).read_to_end(&mut content).ok().filter(|read| *read as u64 == length)?;
+        file.read_exact(&mut [0; 4]).ok()?;
+        let own = meaning(&name, &content);
+        best = own.into_iter().chain(best).max_by_key(|(rank, _)| *rank);
+    }
+    best.map(|(_, text)| text).filter(|text| !text.contains(SRGB))
 }
 
 fn latin1(bytes: &[u8]) -> String {
@@ -149,5 +184,40 @@ mod tests {
             let message = format!("the PNG file is damaged: the checksum of the chunk {told} is wrong");
             assert!(inspect(&path).unwrap_err().to_string().ends_with(&message), "{told}");
         }
+    }
+    /// The chunk that counts most is heard, and only where it says something else than what is taken for granted.
+    #[test]
+    fn colours_that_are_not_srgb_are_told() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let plain = {
+            let mut bytes = Vec::new();
+            let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
+            image::ImageEncoder::write_image(encoder, &[9; 3], 1, 1, image::ExtendedColorType::Rgb8).unwrap();
+            bytes
+        };
+        // Behind the signature and the head, 25 bytes with length, name and checksum.
+        let with = |chunks: &[(&[u8; 4], &[u8])]| {
+            let chunk = |(name, content): &(&[u8; 4], &[u8])| {
+                let length = u32::try_from(content.len()).unwrap().to_be_bytes();
+                [&length[..], &name[..], content, &tags::crc(*name, content).to_be_bytes()].concat()
+            };
+            let chunks: Vec<u8> = chunks.iter().flat_map(chunk).collect();
+            std::fs::write(&path, [&plain[..33], &chunks, &plain[33..]].concat()).unwrap();
+            assert!(inspect(&path).is_ok());
+            other_colours(&path)
+        };
+        let gamma = |gamma: u32| gamma.to_be_bytes();
+        let (linear, usual) = (gamma(100_000), gamma(45_455));
+        assert_eq!(with(&[]), None);
+        assert_eq!(with(&[(b"gAMA", &linear)]).unwrap(), "gamma 1");
+        assert_eq!(with(&[(b"gAMA", &usual)]), None);
+        assert_eq!(with(&[(b"sRGB", &[0]), (b"gAMA", &linear)]), None);
+        assert_eq!(with(&[(b"cICP", &[12, 13, 0, 1]), (b"sRGB", &[0])]).unwrap(), "Display P3 (cICP)");
+        assert_eq!(with(&[(b"iCCP", b"Adobe RGB (1998)\0\0")]).unwrap(), "Adobe RGB (1998) (ICC profile)");
+        assert_eq!(with(&[(b"iCCP", b"GIMP built-in sRGB\0\0")]), None);
+        std::fs::write(&path, &plain[..40]).unwrap();
+        assert_eq!(other_colours(&path), None);
+        assert_eq!(other_colours(&dir.path().join("none.png")), None);
     }
 }

@@ -132,7 +132,8 @@ impl<'a> Compiler<'a> {
                     Ok((Arc::new(map), note))
                 });
                 let (map, note) = map.map_err(|e| self.asked(&format!("{at}.file"), e))?;
-                note.iter().for_each(|note| self.note(&format!("{at}.file"), note));
+                let colours = load::other_colours(&l.file);
+                note.iter().chain(&colours).for_each(|note| self.note(&format!("{at}.file"), note));
                 Light::Environment(map)
             }
             written::Light::Projector(l) => return Ok(self.projector(at, l)),
