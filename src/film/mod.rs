@@ -15,6 +15,7 @@ pub mod exr;
 pub mod facts;
 pub mod filter;
 pub mod heat;
+pub mod icc;
 pub mod layers;
 pub mod mattes;
 pub mod output;

@@ -8,7 +8,7 @@ pub use curve::samples;
 use super::bands::Bands;
 use super::texture::{DataImage, Grid, ImageTexture, Numbers, Texel, Texels};
 use crate::error::{Error, Result};
-use crate::film::{Window, exr, png};
+use crate::film::{Window, exr, icc, png};
 use crate::spectrum::Carried;
 use crate::spectrum::colour::{self, ColourSpace};
 use rayon::prelude::*;
@@ -245,10 +245,13 @@ pub fn cut_out(path: &Path, file: &exr::ExrFile) -> Option<String> {
     })
 }
 
-/// What a person should know of a PNG file whose colours are said to be others than those that they are taken for.
+/// What a person should know of a PNG or JPEG file that says that its colours are others than those that they are taken for.
 #[must_use]
 pub fn other_colours(path: &Path) -> Option<String> {
-    let said = png::inspect::other_colours(path)?;
+    let said = match extension(path).as_str() {
+        "jpg" | "jpeg" => format!("{} (ICC profile)", icc::name_of(path).filter(|name| !name.contains("sRGB"))?),
+        _ => png::inspect::other_colours(path)?,
+    };
     Some(format!("{} says that its colours are {said}; they are taken for sRGB", path.display()))
 }
 

@@ -2,6 +2,7 @@
 
 use super::tags;
 use crate::error::{Error, Result};
+use crate::film::icc;
 use serde::Serialize;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -107,7 +108,7 @@ fn meaning(name: &[u8], content: &[u8]) -> Option<(i32, String)> {
         ),
         b"iCCP" => {
             let end = content.iter().position(|b| *b == 0)?;
-            (3, format!("{} (ICC profile)", latin1(&content[..end])))
+            (ICC, format!("{} (ICC profile)", latin1(&content[..end])))
         }
         b"sRGB" => (2, SRGB.into()),
         b"gAMA" => {
@@ -119,6 +120,9 @@ fn meaning(name: &[u8], content: &[u8]) -> Option<(i32, String)> {
         _ => return None,
     })
 }
+
+/// The rank of a profile.
+const ICC: i32 = 3;
 
 /// The colours that pictures have that do not say which.
 const SRGB: &str = "sRGB";
@@ -144,7 +148,12 @@ pub fn other_colours(path: &Path) -> Option<String> {
         let own = meaning(&name, &content);
         best = own.into_iter().chain(best).max_by_key(|(rank, _)| *rank);
     }
-    best.map(|(_, text)| text).filter(|text| !text.contains(SRGB))
+    let text = match best? {
+        // What writers call the chunk says little.
+        (ICC, chunk) => icc::name_of(path).map_or(chunk, |name| format!("{name} (ICC profile)")),
+        (_, text) => text,
+    };
+    Some(text).filter(|text| !text.contains(SRGB))
 }
 
 fn latin1(bytes: &[u8]) -> String {

@@ -1,0 +1,67 @@
+//! The names of ICC profiles of pictures (ICC.1:2022, section 9.2.41; of version 2 in ICC.1:2001-04, section 6.5.17).
+
+use image::ImageReader;
+use std::io::BufReader;
+use std::path::Path;
+
+/// What the profile of the picture at `path` is called, where it has one that has a name.
+#[must_use]
+pub fn name_of(path: &Path) -> Option<String> {
+    let file = BufReader::new(crate::input::open(path).ok()?);
+    let decoder = ImageReader::new(file).with_guessed_format().ok()?.into_decoder();
+    name(&image::ImageDecoder::icc_profile(&mut decoder.ok()?).ok()??)
+}
+
+/// What a profile is called: its tag `desc`.
+fn name(profile: &[u8]) -> Option<String> {
+    let word = |bytes: &[u8], at: usize| -> Option<usize> {
+        Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize)
+    };
+    let within = |bytes: &[u8], start: usize, length: usize| -> Option<Vec<u8>> {
+        Some(bytes.get(start..start.checked_add(length)?)?.to_vec())
+    };
+    // Behind the head the number of tags, and of each its name, place and length.
+    let tags = profile.get(132..)?.chunks_exact(12).take(word(profile, 128)?);
+    let tag = tags.into_iter().find(|tag| tag.starts_with(b"desc"))?;
+    let text = within(profile, word(tag, 4)?, word(tag, 8)?)?;
+    let name = match text.get(..4)? {
+        // One string of ASCII, with a zero at its end.
+        b"desc" => String::from_utf8_lossy(&within(&text, 12, word(&text, 8)?)?).into_owned(),
+        // Strings of UTF-16 by language: the first.
+        b"mluc" => {
+            let letters = within(&text, word(&text, 24)?, word(&text, 20)?)?;
+            let letters: Vec<u16> = letters.as_chunks().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
+            String::from_utf16_lossy(&letters)
+        }
+        _ => return None,
+    };
+    let name: String = name.chars().filter(|c| !c.is_control()).collect();
+    Some(name.trim().to_owned()).filter(|name| !name.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A profile with a tag before that of its name.
+    fn profile(text: &[u8]) -> Vec<u8> {
+        let word = |n: usize| u32::try_from(n).unwrap().to_be_bytes();
+        let tags = [&word(2)[..], b"cprt", &word(0), &word(4), b"desc", &word(156), &word(text.len())].concat();
+        [&[0; 128][..], &tags, text].concat()
+    }
+
+    #[test]
+    fn profiles_have_names_in_two_forms() {
+        let ascii = [b"desc\0\0\0\0\0\0\0\x08", &b"Adobe 1\0"[..], &[0; 9]].concat();
+        assert_eq!(name(&profile(&ascii)).unwrap(), "Adobe 1");
+        let letters: Vec<u8> = "LG HDR".encode_utf16().flat_map(u16::to_be_bytes).collect();
+        let head = [0, 0, 0, 1, 0, 0, 0, 12, b'e', b'n', b'U', b'S', 0, 0, 0, 12, 0, 0, 0, 28];
+        let unicode = [b"mluc\0\0\0\0", &head[..], &letters].concat();
+        assert_eq!(name(&profile(&unicode)).unwrap(), "LG HDR");
+        // However it is cut off there is a name or none.
+        for whole in [profile(&ascii), profile(&unicode)] {
+            (0..whole.len()).for_each(|end| drop(name(&whole[..end])));
+        }
+        assert_eq!(name(&profile(b"none")), None);
+    }
+}
