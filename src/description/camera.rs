@@ -8,7 +8,7 @@ use super::fault::Checker;
 use super::material::given_fields;
 use super::path::At;
 use super::spectrum::{Role, Spectrum, Vec3, one, yes};
-use super::transform::{TransformStep, check_view, is_similarity, parallel};
+use super::transform::{TransformStep, check_view, is_similarity_but_for, parallel};
 use crate::error::in_short;
 use crate::math::LENGTHS;
 
@@ -390,7 +390,8 @@ impl Pose {
                 TransformStep::Matrix(rows).check(at, checker);
                 let linear = DMat3::from_mat4(TransformStep::Matrix(rows).matrix());
                 if let (Projection::Perspective { .. }, true) = (projection, checker.count() == before) {
-                    let rigid = is_similarity(linear) && (linear.determinant().abs() - 1.0).abs() < RIGID_TOLERANCE;
+                    let similar = is_similarity_but_for(linear, RIGHT_ANGLE_TOLERANCE);
+                    let rigid = similar && (linear.determinant().abs() - 1.0).abs() < RIGID_TOLERANCE;
                     let found = "a matrix that scales or shears";
                     checker.require(rigid, at, "moves, turns and mirrors for a perspective", found);
                 }
@@ -398,6 +399,10 @@ impl Pose {
         }
     }
 }
+
+/// What products of the axes of a rigid motion, written with four significant digits, may be off by: entries are by up to 5·10⁻⁵, and
+/// a product is a sum of three of two such each.
+const RIGHT_ANGLE_TOLERANCE: f64 = 3e-4;
 
 /// What the volume of a rigid motion, written with four significant digits, may be off by.
 const RIGID_TOLERANCE: f64 = 3e-3;

@@ -143,6 +143,11 @@ pub(crate) fn is_mirror(transform: DMat4) -> bool {
 
 /// Whether AᵀA = s² I, so that a ball stays a ball.
 pub(crate) fn is_similarity(linear: DMat3) -> bool {
+    is_similarity_but_for(linear, SIMILARITY_TOLERANCE)
+}
+
+/// The same to a departure of `tolerance`, relative to the squared scale.
+pub(crate) fn is_similarity_but_for(linear: DMat3, tolerance: f64) -> bool {
     // Divided by the greatest entry, so that squares neither overflow nor vanish.
     let greatest = [linear.x_axis, linear.y_axis, linear.z_axis]
         .into_iter()
@@ -151,9 +156,7 @@ pub(crate) fn is_similarity(linear: DMat3) -> bool {
     let gram = unit.transpose() * unit;
     let squared = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;
     let off = gram - DMat3::from_diagonal(DVec3::splat(squared));
-    [off.x_axis, off.y_axis, off.z_axis]
-        .into_iter()
-        .all(|axis| axis.abs().max_element() <= SIMILARITY_TOLERANCE * squared)
+    [off.x_axis, off.y_axis, off.z_axis].into_iter().all(|axis| axis.abs().max_element() <= tolerance * squared)
 }
 
 /// The steps of a transform as one matrix: the first step acts first.

@@ -83,7 +83,8 @@ pub(crate) fn read(path: &Path, defines: &[(String, String)], sources: &mut Sour
     let document = parse::read(path, defines, sources)?;
     let sees_media = integrators::sees_media(&document).map_err(|fault| fault.into_error(sources))?;
     let import = Import { sees_media, ..Import::new(&document) };
-    let root = import.scene().map_err(|fault| fault.into_error(sources))?;
+    let (root, notes) = import.scene().map_err(|fault| fault.into_error(sources))?;
+    notes.into_iter().for_each(|(place, message)| sources.note(place, message));
     if !sees_media && let Some(medium) = document.objects.iter().find(|object| object.family == Family::Medium) {
         let message = "medium: it is passed over, with all others: the scene's integrator sees none, volpath does";
         sources.note(medium.place, message.to_owned());
@@ -117,6 +118,8 @@ struct Import<'a> {
     taken: HashSet<String>,
     /// Whether the integrator sees media.
     sees_media: bool,
+    /// What a person should know, and of which place.
+    notes: Vec<(Place, String)>,
 }
 
 impl<'a> Import<'a> {
@@ -138,6 +141,7 @@ impl<'a> Import<'a> {
             shining: HashSet::new(),
             taken,
             sees_media: true,
+            notes: Vec::new(),
         }
     }
 
@@ -145,7 +149,7 @@ impl<'a> Import<'a> {
         Bag::new(self.document, index)
     }
 
-    fn scene(mut self) -> std::result::Result<Node, Fault> {
+    fn scene(mut self) -> std::result::Result<(Node, Vec<(Place, String)>), Fault> {
         let root = self.bag(0);
         let place = root.object.place;
         let integrator = match root.only(Family::Integrator)? {
@@ -217,7 +221,7 @@ impl<'a> Import<'a> {
         for setting in &self.document.settings {
             setting.apply(&mut root)?;
         }
-        Ok(root)
+        Ok((root, self.notes))
     }
 
     /// A name for an object in one of the maps: its id, or one made from its place.
@@ -417,6 +421,32 @@ mod tests {
             panic!("{:?}", scene.shapes[0].material)
         };
         assert_eq!(glass.ior, super::super::Index::Number(1.7));
+    }
+
+    /// Of veach-bidir: numbers of six digits whose axes are off from right angles by 2e-5.
+    #[test]
+    fn a_camera_may_be_turned_by_rounded_numbers() {
+        let camera = |first: &str| {
+            format!(
+                "<sensor type=\"perspective\"><transform name=\"to_world\"><matrix value=\"{first} -0.00467005 -0.999977 16.2155 \
+                 0 0.999989 -0.00467011 4.05167 0.999987 -2.34659e-005 -0.00502464 0.0114864 0 0 0 1\"/></transform></sensor>"
+            )
+        };
+        good(&camera("-0.00500708"));
+        let sheared = fault(&camera("-0.00700708"), &[]);
+        assert!(
+            sheared
+                .ends_with("expected moves, turns and mirrors for a perspective, found a matrix that scales or shears")
+        );
+    }
+
+    /// An element that nobody knows is told as that, whatever is in it.
+    #[test]
+    fn an_unknown_element_is_one_fault() {
+        let told = fault("<camera type=\"perspective\"><float name=\"fov\" value=\"40\"/></camera>", &[]);
+        assert!(told.starts_with("s.xml:3:1: expected an element of a scene, found <camera>; known: "), "{told}");
+        let told = fault("<float name=\"fov\" value=\"40\"><float name=\"a\" value=\"1\"/></float>", &[]);
+        assert!(told.contains("expected nothing inside <float>, found <float>"), "{told}");
     }
 
     #[test]

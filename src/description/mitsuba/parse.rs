@@ -273,6 +273,7 @@ impl Parser<'_> {
             return self.set(parent, name, element.place, Value::Object(index));
         }
         if tag != "transform"
+            && PROPERTY_TAGS.contains(&tag)
             && let Some(inner) = element.children.first()
         {
             let message = format!("expected nothing inside <{tag}>, found <{}>", inner.tag);

@@ -67,7 +67,7 @@ impl Import<'_> {
         match value {
             Value::Float(value) => Ok(Some(grey(place, *value, role))),
             Value::Integer(value) => Ok(Some(grey(place, *value as f64, role))),
-            Value::Rgb(rgb) => Ok(Some(colour(place, *rgb, role))),
+            Value::Rgb(rgb) => Ok(Some(colour(place, self.coefficients(place, name, *rgb), role))),
             Value::Spectrum(SpectrumValue::Uniform(value)) => Ok(Some(number(place, *value))),
             Value::Spectrum(SpectrumValue::Table(pairs)) => Ok(Some(table(place, pairs))),
             Value::Spectrum(SpectrumValue::File(path)) => Ok(Some(file(place, path))),
@@ -85,6 +85,24 @@ impl Import<'_> {
                 Err(bag.fault_of(name, format!("expected a spectrum, a colour or a float, found {found}")))
             }
         }
+    }
+
+    /// The colour `rgb` of `name`. Of metals and of what hair absorbs such numbers are told where Mitsuba makes others of them.
+    fn coefficients(&mut self, place: Place, name: &str, rgb: [f64; 3]) -> [f64; 3] {
+        if !["eta", "k", "sigma_a"].contains(&name) {
+            return rgb;
+        }
+        let below = name != "sigma_a" && rgb.iter().any(|x| *x < 0.0);
+        if below {
+            self.notes.push((place, format!("{name}: numbers below 0 of {rgb:?} are taken for 0, as in Mitsuba")));
+        }
+        if rgb.iter().any(|x| *x > 1.0) {
+            self.notes.push((
+                place,
+                format!("{name}: numbers above 1 of {rgb:?} are what they say; Mitsuba takes 1 for them"),
+            ));
+        }
+        if below { rgb.map(|x| x.max(0.0)) } else { rgb }
     }
 
     /// The spectrum or `{texture: name}` of a property.
@@ -398,6 +416,26 @@ mod tests {
         assert_eq!(radiance(&srgb("0.5")), Spectrum::Number(0.5));
         let above = fault(&format!("<emitter type=\"constant\">{}</emitter>", srgb("2, 1, 1")), &[]);
         assert!(above.contains("texture \"srgb\": color: red channel: expected"), "{above}");
+    }
+
+    /// Bitterli's living-room-2 has a metal of such an index.
+    #[test]
+    fn colours_of_metals_that_mitsuba_alters_are_told() {
+        let metal = |eta: &str, k: &str| {
+            good(&format!(
+                "<shape type=\"sphere\"><bsdf type=\"conductor\"><rgb name=\"eta\" value=\"{eta}\"/>\n\
+                 <rgb name=\"k\" value=\"{k}\"/></bsdf></shape>"
+            ))
+        };
+        let scene = metal("-0.25, 0.5, 4", "-0.5, 0.5, 1");
+        let notes = scene.locator.notes();
+        let told = [
+            "s.xml:3:46: eta: numbers below 0 of [-0.25, 0.5, 4.0] are taken for 0, as in Mitsuba",
+            "s.xml:3:46: eta: numbers above 1 of [-0.25, 0.5, 4.0] are what they say; Mitsuba takes 1 for them",
+            "s.xml:4:1: k: numbers below 0 of [-0.5, 0.5, 1.0] are taken for 0, as in Mitsuba",
+        ];
+        assert!(notes.len() == 3 && notes.iter().zip(told).all(|(note, told)| note.ends_with(told)), "{notes:?}");
+        assert_eq!(metal("0.2, 0.5, 1", "0, 0.5, 1").locator.notes(), [""; 0]);
     }
 
     /// Of 500 to 600 nm at 4000 K, Mitsuba 3.9.1 shows 1193 3314 -306; of the whole body 4903 3204 1850.
