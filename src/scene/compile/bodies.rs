@@ -6,7 +6,7 @@ use crate::scene::apart::Contact;
 use crate::scene::bvh::Aabb;
 use crate::scene::material::Material;
 use crate::scene::shape::Shape;
-use crate::scene::{Geometry, Scene};
+use crate::scene::{Geometry, Object, Scene};
 
 /// Pairs that are told.
 const TOLD: usize = 8;
@@ -55,6 +55,22 @@ impl Compiler<'_> {
             let note = "more bodies that light goes into are not looked at for faces that they share; leave gaps there";
             scene.notes.push(format!("{passed_over} {note}"));
         }
+    }
+
+    /// Notes which closed meshes that light goes into have normals that point inwards, unless somebody wants that.
+    pub(super) fn note_inside_out(&self, scene: &mut Scene) {
+        let told = |(i, object): (usize, &Object)| {
+            let Geometry::Mesh(mesh) = &object.geometry else { return None };
+            let material = &self.materials[object.material as usize];
+            let bounds = material.refracts() || material.transmits() && object.inside != object.outside;
+            let shape = self.description.shapes.get(i)?;
+            let note = "it is closed, and its normals point inwards: its inside, with what light is in there, is all that is around it; \
+                        flip_normals: true turns it";
+            let found = bounds && !object.flipped && mesh.mesh.is_inside_out();
+            found.then(|| self.description.fault(&format!("shapes[{i}].{}", shape.geometry.kind()), note))
+        };
+        let notes: Vec<String> = scene.objects.iter().enumerate().filter_map(told).collect();
+        scene.notes.extend(notes);
     }
 
     /// Puts the eye and lamps beside the surfaces that they lie on, and says so.

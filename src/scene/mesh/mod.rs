@@ -252,6 +252,19 @@ impl Mesh {
         Aabb::from_points(self.positions.iter().map(|p| DVec3::from(p.map(f64::from)) + self.origin))
     }
 
+    /// Whether it is closed and its normals point into it: the area vectors of a closed surface add up to zero, to their rounding,
+    /// and the volume that it bounds, a sum over its triangles and any point, is negative.
+    #[must_use]
+    pub fn is_inside_out(&self) -> bool {
+        let (mut sum, mut all, mut volume) = (DVec3::ZERO, 0.0, 0.0);
+        for i in 0..self.triangles.len() as u32 {
+            let corners = self.vertices(i);
+            let area = area_vector(corners);
+            (sum, all, volume) = (sum + area, all + area.length(), volume + area.dot(corners[0]));
+        }
+        volume < 0.0 && sum.length() <= 1e-9 * all
+    }
+
     /// The area of triangle `i`, m². Zero exactly for triangles that are never hit.
     #[must_use]
     pub fn area(&self, i: u32) -> f64 {
