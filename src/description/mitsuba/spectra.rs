@@ -430,8 +430,8 @@ mod tests {
         let scene = metal("-0.25, 0.5, 4", "-0.5, 0.5, 1");
         let notes = scene.locator.notes();
         let told = [
-            "s.xml:3:46: eta: numbers below 0 of [-0.25, 0.5, 4.0] are taken for 0, as in Mitsuba",
-            "s.xml:3:46: eta: numbers above 1 of [-0.25, 0.5, 4.0] are what they say; Mitsuba takes 1 for them",
+            "s.xml:3:45: eta: numbers below 0 of [-0.25, 0.5, 4.0] are taken for 0, as in Mitsuba",
+            "s.xml:3:45: eta: numbers above 1 of [-0.25, 0.5, 4.0] are what they say; Mitsuba takes 1 for them",
             "s.xml:4:1: k: numbers below 0 of [-0.5, 0.5, 1.0] are taken for 0, as in Mitsuba",
         ];
         assert!(notes.len() == 3 && notes.iter().zip(told).all(|(note, told)| note.ends_with(told)), "{notes:?}");
