@@ -426,18 +426,23 @@ mod tests {
     /// Of veach-bidir: numbers of six digits whose axes are off from right angles by 2e-5.
     #[test]
     fn a_camera_may_be_turned_by_rounded_numbers() {
-        let camera = |first: &str| {
-            format!(
-                "<sensor type=\"perspective\"><transform name=\"to_world\"><matrix value=\"{first} -0.00467005 -0.999977 16.2155 \
-                 0 0.999989 -0.00467011 4.05167 0.999987 -2.34659e-005 -0.00502464 0.0114864 0 0 0 1\"/></transform></sensor>"
-            )
+        let with = |first: &str| {
+            let text = format!(
+                "<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/>\
+                 <transform name=\"to_world\"><matrix value=\"{first} -0.00467005 -0.999977 16.2155 \
+                 0 0.999989 -0.00467011 4.05167 0.999987 -2.34659e-005 -0.00502464 0.0114864 0 0 0 1\"/></transform></sensor></scene>"
+            );
+            let directory = tempfile::tempdir().unwrap();
+            let path = directory.path().join("s.xml");
+            std::fs::write(&path, text).unwrap();
+            let mut sources = Sources::default();
+            let root = read(&path, &[], &mut sources)?;
+            SceneDescription::of_tree(root, &path, sources)
         };
-        good(&camera("-0.00500708"));
-        let sheared = fault(&camera("-0.00700708"), &[]);
-        assert!(
-            sheared
-                .ends_with("expected moves, turns and mirrors for a perspective, found a matrix that scales or shears")
-        );
+        with("-0.00500708").unwrap();
+        let sheared = with("-0.00700708").unwrap_err().to_string();
+        let told = "camera.to_world: expected moves, turns and mirrors for a perspective, found a matrix that scales or shears";
+        assert!(sheared.ends_with(told), "{sheared}");
     }
 
     /// An element that nobody knows is told as that, whatever is in it.

@@ -61,7 +61,7 @@ impl Compiler<'_> {
     pub(super) fn note_inside_out(&self, scene: &mut Scene) {
         let told = |(i, object): (usize, &Object)| {
             let Geometry::Mesh(mesh) = &object.geometry else { return None };
-            let material = &self.materials[object.material as usize];
+            let material = &scene.materials[object.material as usize];
             let bounds = material.refracts() || material.transmits() && object.inside != object.outside;
             let shape = self.description.shapes.get(i)?;
             let note = "it is closed, and its normals point inwards: its inside, with what light is in there, is all that is around it; \
