@@ -4,12 +4,13 @@ use image::ImageReader;
 use std::io::BufReader;
 use std::path::Path;
 
-/// What the profile of the picture at `path` is called, where it has one that has a name.
+/// What the picture at `path` says of its colours by a profile, where it has one that has a name.
 #[must_use]
-pub fn name_of(path: &Path) -> Option<String> {
+pub fn colours(path: &Path) -> Option<String> {
     let file = BufReader::new(crate::input::open(path).ok()?);
     let decoder = ImageReader::new(file).with_guessed_format().ok()?.into_decoder();
-    name(&image::ImageDecoder::icc_profile(&mut decoder.ok()?).ok()??)
+    let name = name(&image::ImageDecoder::icc_profile(&mut decoder.ok()?).ok()??)?;
+    Some(format!("{name} (ICC profile)"))
 }
 
 /// What a profile is called: its tag `desc`.

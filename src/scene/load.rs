@@ -246,12 +246,11 @@ pub fn cut_out(path: &Path, file: &exr::ExrFile) -> Option<String> {
 }
 
 /// What a person should know of a PNG or JPEG file that says that its colours are others than those that they are taken for.
-#[must_use]
-pub fn other_colours(path: &Path) -> Option<String> {
+fn other_colours(path: &Path) -> Option<String> {
     let said = match extension(path).as_str() {
-        "jpg" | "jpeg" => format!("{} (ICC profile)", icc::name_of(path).filter(|name| !name.contains("sRGB"))?),
-        _ => png::inspect::other_colours(path)?,
-    };
+        "jpg" | "jpeg" => icc::colours(path).filter(|colours| !png::inspect::are_srgb(colours)),
+        _ => png::inspect::other_colours(path),
+    }?;
     Some(format!("{} says that its colours are {said}; they are taken for sRGB", path.display()))
 }
 
@@ -260,7 +259,7 @@ pub fn other_colours(path: &Path) -> Option<String> {
 /// # Errors
 /// [`Error::Input`] where a pixel is not finite.
 pub fn picture(path: &Path, decoded: Decoded) -> Result<Picture> {
-    let mut notes = Vec::new();
+    let mut notes = Vec::from_iter(other_colours(path));
     let picture = match decoded {
         Decoded::Exr(file) => {
             notes.extend(cut_out(path, &file));
@@ -366,11 +365,12 @@ pub fn image_texture(
         let none = make(Texels::each(Vec::new()), width as usize, height as usize);
         return Ok((ImageTexture { bands: Some(bands), ..none }, cut_out(path, file)));
     }
+    let colours = || if raw { None } else { other_colours(path) };
     match decoded {
         Decoded::Bytes { rgb, width, height, counted } => {
             let level = if raw { std::array::from_fn(|x| x as f32 / 255.0) } else { colour::srgb8_table() };
             let texels = upsampled_bytes(counted.unwrap_or_else(|| count(&rgb)), &level, carried);
-            Ok((make(texels, width, height), None))
+            Ok((make(texels, width, height), colours()))
         }
         Decoded::Other(decoded) if !is_linear(&decoded) => {
             let (width, height) = (decoded.width() as usize, decoded.height() as usize);
@@ -381,7 +381,7 @@ pub fn image_texture(
             let rgb = decoded.into_rgb16();
             let texel = |p: &[u16]| colour_texel([level(p[0]), level(p[1]), level(p[2])], carried);
             let texels = rgb.as_raw().par_chunks_exact(3).map(texel).collect();
-            Ok((make(Texels::each(texels), width, height), None))
+            Ok((make(Texels::each(texels), width, height), colours()))
         }
         decoded => {
             let picture = picture(path, decoded)?;

@@ -92,17 +92,15 @@ impl Import<'_> {
         if !["eta", "k", "sigma_a"].contains(&name) {
             return rgb;
         }
-        let below = name != "sigma_a" && rgb.iter().any(|x| *x < 0.0);
-        if below {
+        let taken = if name == "sigma_a" { rgb } else { rgb.map(|x| x.max(0.0)) };
+        if taken != rgb {
             self.notes.push((place, format!("{name}: numbers below 0 of {rgb:?} are taken for 0, as in Mitsuba")));
         }
         if rgb.iter().any(|x| *x > 1.0) {
-            self.notes.push((
-                place,
-                format!("{name}: numbers above 1 of {rgb:?} are what they say; Mitsuba takes 1 for them"),
-            ));
+            let note = format!("{name}: numbers above 1 of {rgb:?} are what they say; Mitsuba takes 1 for them");
+            self.notes.push((place, note));
         }
-        if below { rgb.map(|x| x.max(0.0)) } else { rgb }
+        taken
     }
 
     /// The spectrum or `{texture: name}` of a property.

@@ -150,10 +150,16 @@ pub fn other_colours(path: &Path) -> Option<String> {
     }
     let text = match best? {
         // What writers call the chunk says little.
-        (ICC, chunk) => icc::name_of(path).map_or(chunk, |name| format!("{name} (ICC profile)")),
+        (ICC, chunk) => icc::colours(path).unwrap_or(chunk),
         (_, text) => text,
     };
-    Some(text).filter(|text| !text.contains(SRGB))
+    Some(text).filter(|text| !are_srgb(text))
+}
+
+/// Whether colours of which a file says `said` are what pictures have that say nothing.
+#[must_use]
+pub fn are_srgb(said: &str) -> bool {
+    said.contains(SRGB)
 }
 
 fn latin1(bytes: &[u8]) -> String {

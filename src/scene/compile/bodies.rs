@@ -64,7 +64,7 @@ impl Compiler<'_> {
             let material = &scene.materials[object.material as usize];
             let bounds = material.refracts() || material.transmits() && object.inside != object.outside;
             let shape = self.description.shapes.get(i)?;
-            let note = "it is closed, and its normals point inwards: its inside, with what light is in there, is all that is around it; \
+            let note = "it is closed, and its normals point inwards: its inside, and what is in there, is all that is around it; \
                         flip_normals: true turns it";
             let found = bounds && !object.flipped && mesh.mesh.is_inside_out();
             found.then(|| self.description.fault(&format!("shapes[{i}].{}", shape.geometry.kind()), note))

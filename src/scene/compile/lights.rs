@@ -132,8 +132,7 @@ impl<'a> Compiler<'a> {
                     Ok((Arc::new(map), note))
                 });
                 let (map, note) = map.map_err(|e| self.asked(&format!("{at}.file"), e))?;
-                let colours = load::other_colours(&l.file);
-                note.iter().chain(&colours).for_each(|note| self.note(&format!("{at}.file"), note));
+                note.iter().for_each(|note| self.note(&format!("{at}.file"), note));
                 Light::Environment(map)
             }
             written::Light::Projector(l) => return Ok(self.projector(at, l)),

@@ -176,8 +176,7 @@ impl<'a> Compiler<'a> {
                 });
                 let file = format!("{at}.image.file");
                 let (mut loaded, note) = loaded.map_err(|e| self.asked(&file, e))?;
-                let colours = if image.raw { None } else { load::other_colours(&image.file) };
-                note.iter().chain(&colours).for_each(|note| self.note(&file, note));
+                note.iter().for_each(|note| self.note(&file, note));
                 loaded.grid = self.grid(at, image, loaded.grid.width, loaded.grid.height);
                 Texture::Image(loaded)
             }
