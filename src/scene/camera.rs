@@ -33,12 +33,13 @@ struct View {
     /// right, a pixel down.
     right: DVec3,
     down: DVec3,
-    /// The axis in the world, as long as the matrix makes it; that length; and the axis of unit length.
+    /// The axis in the world, as long as the matrix makes it, and of unit length.
     axis: DVec3,
-    axis_length: f64,
     unit_axis: DVec3,
     /// Where the axis meets the near clipping plane.
     near: DVec3,
+    /// The clipping planes in units of the camera, which a matrix may make as long as the axis.
+    clip: [f64; 2],
     /// World to camera space.
     camera_from_world: DAffine3,
 }
@@ -127,14 +128,16 @@ impl Camera {
         let (Projection::Perspective { half_width } | Projection::Orthographic { half_width }) = projection;
         let side = 2.0 * half_width / size.x;
         let m = world_from_camera.matrix3;
+        let axis_length = m.z_axis.length();
+        let local_clip = clip.map(|distance| distance / axis_length);
         let view = View {
             middle: (DVec2::splat(0.5) + principal_point) * size,
             right: m.x_axis * side,
             down: m.y_axis * -side,
             axis: m.z_axis,
-            axis_length: m.z_axis.length(),
             unit_axis: m.z_axis.normalize(),
-            near: world_from_camera.translation + m.z_axis * clip[0],
+            near: world_from_camera.translation + m.z_axis * local_clip[0],
+            clip: local_clip,
             camera_from_world: world_from_camera.inverse(),
         };
         let lens = lens.filter(|lens| lens.radius > 0.0);
@@ -182,7 +185,7 @@ impl Camera {
         let (origin, direction) = match (self.lens, self.projection) {
             (Some(l), _) => self.through_lens(l, place, warp::concentric_disk(lens()) * l.radius),
             (None, Projection::Perspective { .. }) => {
-                (view.near + across * self.clip[0], (view.axis + across).normalize())
+                (view.near + across * view.clip[0], (view.axis + across).normalize())
             }
             (None, Projection::Orthographic { .. }) => (view.near + across, view.unit_axis),
         };
@@ -203,7 +206,7 @@ impl Camera {
         let focus = origin + direction * lens.focus_distance;
         origin += on_lens.extend(0.0);
         let direction = focus - origin;
-        origin += direction * (self.clip[0] / direction.z);
+        origin += direction * (self.view.clip[0] / direction.z);
         let to_world = self.world_from_camera;
         (to_world.transform_point3(origin), to_world.transform_vector3(direction).normalize())
     }
@@ -215,7 +218,7 @@ impl Camera {
         if self.clip[1] == f64::INFINITY {
             return f64::INFINITY;
         }
-        (self.clip[1] - self.clip[0]) * self.view.axis_length / ray.direction.dot(self.view.axis)
+        (self.clip[1] - self.clip[0]) / ray.direction.dot(self.view.unit_axis)
     }
 
     /// How light from `point` enters the camera through the point `lens` of the unit square of its lens; `None` where
@@ -228,7 +231,7 @@ impl Camera {
     pub fn entry(&self, point: DVec3, lens: impl FnOnce() -> DVec2) -> Option<Entry> {
         let w = f64::from(self.resolution[0]);
         let local = self.view.camera_from_world.transform_point3(point);
-        if !(local.z > 0.0 && local.z >= self.clip[0] && local.z <= self.clip[1]) {
+        if !(local.z > 0.0 && local.z >= self.view.clip[0] && local.z <= self.view.clip[1]) {
             return None;
         }
         let (aperture, focus) = match self.lens {
@@ -259,7 +262,7 @@ impl Camera {
         let pixel = self.on_picture(plane / half_width);
         // Rays begin at the near clipping plane.
         let start = origin.extend(0.0);
-        let begin = start + (local - start) * (self.clip[0] / local.z);
+        let begin = start + (local - start) * (self.view.clip[0] / local.z);
         let offset = self.world_from_camera.transform_point3(begin) - point;
         let whole = self.world_from_camera.transform_point3(start) - point;
         let wi = whole.try_normalize()?;

@@ -179,7 +179,7 @@ pub(super) fn first_covering(
             return Some(Covering { hit, surface, normal });
         }
         ray = scene.leave(&surface, &hit, ray.direction);
-        reach = f64::INFINITY;
+        reach -= hit.t;
     }
     None
 }

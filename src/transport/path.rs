@@ -106,11 +106,11 @@ impl Tracer<'_> {
         }
     }
 
-    /// Follows a path to its end, first no farther than `reach`. Its first vertices may be noted in a `joint`.
+    /// Follows a path to its end, no farther than `seen` until it scatters. Its first vertices may be noted in a `joint`.
     fn follow<const CHROMATIC: bool, const MEDIA: bool>(
         &self,
         path: &mut Path,
-        mut reach: f64,
+        mut seen: f64,
         mut joint: Option<&mut Joint>,
     ) -> Walk {
         let scene = self.scene;
@@ -118,6 +118,7 @@ impl Tracer<'_> {
         let mut ahead = Ahead::UNKNOWN;
 
         loop {
+            let mut reach = seen;
             // The flight through a medium is drawn first: beyond its reach no surface matters.
             let flying = if MEDIA { path.inside.medium } else { None }.map(|medium| {
                 let medium = &scene.media[medium as usize];
@@ -134,7 +135,6 @@ impl Tracer<'_> {
                 true => scene.next(&mut ahead, &path.ray, reach),
                 false => scene.closest(&path.ray, reach),
             };
-            reach = f64::INFINITY;
             let distance = hit.map_or(f64::INFINITY, |h| h.t);
 
             // The medium between here and the next surface may scatter the path first.
@@ -156,14 +156,18 @@ impl Tracer<'_> {
                         break;
                     }
                     walk.crossings = 0;
+                    seen = f64::INFINITY;
                     continue;
                 }
             }
 
             match self.meet::<CHROMATIC, MEDIA>(path, &mut walk, hit, None, joint.as_deref_mut()) {
                 Step::Ended => break,
-                Step::Straight(distance) => ahead.go_on(distance),
-                Step::Scattered => {}
+                Step::Straight(distance) => {
+                    seen -= distance;
+                    ahead.go_on(distance);
+                }
+                Step::Scattered => seen = f64::INFINITY,
             }
         }
         walk

@@ -109,7 +109,7 @@ struct Seen<'a> {
 
 impl Tracer<'_> {
     /// What arrives along `ray` from no farther than `reach`, for the lanes in which `weight`, the share that reaches the eye,
-    /// is not zero. As in `path`, the bound is on what is met first.
+    /// is not zero.
     fn trace(&self, ray: &Ray, mut inside: Inside, weight: Lanes, depth: u32, mut reach: f64) -> Arrived {
         let scene = self.scene;
         let mut ray = *ray;
@@ -126,7 +126,7 @@ impl Tracer<'_> {
                 arrived.light += sky.fold(Lanes::ZERO, |a, b| a + b) * kept * arrived.open;
                 return arrived;
             };
-            reach = f64::INFINITY;
+            reach -= hit.t;
             let surface = scene.surface(&ray, &hit);
             let object = &scene.objects[hit.object as usize];
             let material = &scene.materials[object.material as usize];

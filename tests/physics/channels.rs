@@ -555,8 +555,11 @@ fn hidden_lights_shine_and_are_not_seen() {
 /// open, and what the camera sees is the inside.
 #[test]
 fn the_camera_sees_between_its_clipping_planes_only() {
-    let see = |integrator: &str, clip: &str| {
-        let camera = PARALLEL.replace("height: 2", &format!("height: 0.01, clip: {{{clip}}}"));
+    // The same camera with another unit, which the planes do not follow.
+    const LARGE: &str =
+        "camera: {to_world: [[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, -2, 5], [0, 0, 0, 1]], orthographic_height: 2}\n";
+    let see = |camera: &str, integrator: &str, clip: &str| {
+        let camera = camera.replace("height: 2", &format!("height: 0.005, clip: {{{clip}}}"));
         let frame = render(&format!(
             "{camera}image: {{width: 1, height: 1}}\nrender: {{samples: 4}}\nintegrator: {integrator}\n\
              lights: [{{constant: {{radiance: 1}}}}]\nlayers: [{{name: d, surface: depth}}]\n\
@@ -565,11 +568,13 @@ fn the_camera_sees_between_its_clipping_planes_only() {
         let Image { rgb, alpha, .. } = frame.resolve(&ColourSpace::Xyz.matrix_from_xyz());
         (f64::from(frame.layer(0)[0]), rgb[1][0], alpha[0])
     };
-    for integrator in ["path", "{whitted: {}}"] {
+    for (camera, integrator) in
+        [(PARALLEL, "path"), (PARALLEL, "{whitted: {}}"), (LARGE, "path"), (LARGE, "{whitted: {}}")]
+    {
         // Half the picture is 5 mm wide: the sphere is at most 2.5e-5 m off there.
         for (clip, expected) in [("near: 0", 4.0), ("near: 3.5", 0.5), ("near: 4.5", 1.5), ("near: 4.5, far: 5.5", 0.0)]
         {
-            let (depth, light, alpha) = see(integrator, clip);
+            let (depth, light, alpha) = see(camera, integrator, clip);
             assert!((depth - expected).abs() < 3e-5, "{integrator} {clip}: {depth}");
             // The sphere is black, and the sky behind it is not.
             assert_eq!(
@@ -577,6 +582,34 @@ fn the_camera_sees_between_its_clipping_planes_only() {
                 if expected > 0.0 { (false, 1.0) } else { (true, 0.0) },
                 "{integrator} {clip}"
             );
+        }
+    }
+}
+
+/// What a camera looks at through something open is no nearer: a floor, 8 m away behind a mask without a covering, seen by paths from
+/// either end; and through a camera that a matrix makes larger.
+#[test]
+fn the_far_clipping_plane_stays_where_it_is_behind_what_is_open() {
+    let light = |camera: &str, integrator: &str, far: f64| {
+        let frame = render(&format!(
+            "camera: {{{camera}, clip: {{far: {far}}}}}\nimage: {{width: 8, height: 8}}\nrender: {{samples: 16}}\n\
+             integrator: {integrator}\nmaterials: {{white: {{diffuse: {{}}}}, hole: {{mask: {{opacity: 0, material: white}}}}}}\n\
+             shapes:\n- rectangle: {{corner: [-20, -20, -3], edge_u: [40, 0, 0], edge_v: [0, 40, 0], material: white}}\n\
+             - rectangle: {{corner: [-20, -20, 2], edge_u: [40, 0, 0], edge_v: [0, 40, 0], material: hole}}\n\
+             lights: [{{point: {{position: [0, 0, 0], intensity: 10}}}}]\n"
+        ));
+        let Image { rgb, alpha, .. } = frame.resolve(&ColourSpace::Xyz.matrix_from_xyz());
+        let seen = alpha.iter().filter(|alpha| **alpha > 0.0).count();
+        (rgb[1].iter().sum::<f32>() / rgb[1].len() as f32, seen)
+    };
+    let scaled = "to_world: [[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, -2, 5], [0, 0, 0, 1]], orthographic_height: 2";
+    for camera in ["origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 30", scaled] {
+        let expected = light(camera, "path", 9.0);
+        assert!(expected.0 > 0.05, "{camera}: {expected:?}");
+        for integrator in ["path", "{whitted: {}}", "light_tracer"] {
+            assert_eq!(light(camera, integrator, 6.0), (0.0, 0), "{camera} {integrator}");
+            let found = light(camera, integrator, 9.0).0;
+            assert!((found / expected.0 - 1.0).abs() < 0.2, "{camera} {integrator}: {found} for {expected:?}");
         }
     }
 }

@@ -34,9 +34,14 @@ impl Import<'_> {
         if near <= 0.0 {
             return Err(bag.fault_of("near_clip", format!("expected a number above 0, found {near}")));
         }
+        // Their parallel rays begin as much farther away as `to_world` makes the camera larger, and see as far from there.
+        let begin = match plugin {
+            "orthographic" => near * to_world.z_axis.truncate().length(),
+            _ => near,
+        };
         let mut clip = Fields::new(place);
-        clip.add("near", number(bag.place("near_clip"), near));
-        clip.add("far", number(bag.place("far_clip"), far));
+        clip.add("near", number(bag.place("near_clip"), begin));
+        clip.add("far", number(bag.place("far_clip"), far + (begin - near)));
         camera.add("clip", clip.map());
         let focus_distance = bag.float("focus_distance")?;
         if plugin == "perspective" {

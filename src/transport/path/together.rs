@@ -81,7 +81,7 @@ fn trace<'a, const CHROMATIC: bool>(
     let mut asked = Questions::new();
     // Whose they are.
     let mut asking = [0; MOST * PARTS as usize];
-    // The camera does not see beyond its clipping plane.
+    // The camera does not see beyond its clipping plane, whatever it looks through.
     let mut reach = [f64::INFINITY; MOST];
     for (i, path) in paths.iter_mut().enumerate() {
         let ray = wanted(i).ray;
@@ -98,7 +98,6 @@ fn trace<'a, const CHROMATIC: bool>(
             let rays = from_lanes(group, |i| &paths[i].ray);
             scene.closest_of_four(rays, from_lanes(group, |i| reach[i]), group.len(), hits);
         }
-        reach = [f64::INFINITY; MOST];
 
         // Each its own way: it scatters, and asks a light.
         let going = left;
@@ -112,10 +111,13 @@ fn trace<'a, const CHROMATIC: bool>(
             let known = asked.len();
             let step = tracer.meet::<CHROMATIC, false>(path, walk, hits[k], Some(&mut asked), joint);
             asking[known..asked.len()].fill(i);
-            if !matches!(step, Step::Ended) {
-                on[left] = i;
-                left += 1;
-            }
+            reach[i] = match step {
+                Step::Ended => continue,
+                Step::Straight(distance) => reach[i] - distance,
+                Step::Scattered => f64::INFINITY,
+            };
+            on[left] = i;
+            left += 1;
         }
 
         for (toward, asking) in asked.chunks(4).zip(asking.chunks(4)) {

@@ -30,6 +30,8 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use glam::DVec3;
+
 use super::super::camera::{Band, Camera, Clip, Filter, FovAxis, Image, Lens, Pose, Projection};
 use super::super::light::Light;
 use super::super::node::{Node, Sources, Value};
@@ -445,8 +447,16 @@ impl<'a> Export<'a> {
             // Theirs always ends somewhere.
             self.xml.instruction("set camera.clip: {near: 0}");
         }
-        self.xml.value("float", "near_clip", if clip.near > 0.0 { clip.near } else { 1e-4 });
-        self.xml.value("float", "far_clip", clip.far.min(1e8));
+        // As an import has it.
+        let scale = match (pose, projection) {
+            (Pose::ToWorld(rows), Projection::Orthographic { .. }) => {
+                DVec3::from_array([0, 1, 2].map(|i| rows[i][2])).length()
+            }
+            _ => 1.0,
+        };
+        let begin = clip.near / scale;
+        self.xml.value("float", "near_clip", if begin > 0.0 { begin } else { 1e-4 });
+        self.xml.value("float", "far_clip", (clip.far - (clip.near - begin)).min(1e8));
         if let (Some(lens), "thinlens") = (lens, plugin) {
             self.xml.value("float", "aperture_radius", lens.radius);
             self.xml.value("float", "focus_distance", lens.focus_distance);
