@@ -281,13 +281,15 @@ impl Choice {
 }
 
 /// Sorts a group of two or more along an axis; where it is best cut in two, so that the sum of intensity times size is
-/// least.
+/// least, and of several such cuts the one that leaves the larger half smallest: lamps in one place make no list.
 fn parting(group: &mut [(u32, Extent)]) -> usize {
     let cost = |bounds: &Aabb, intensity: f64| (bounds.max - bounds.min).length_squared() * intensity;
     let by = |axis: usize| {
         move |a: &(u32, Extent), b: &(u32, Extent)| a.1.center[axis].total_cmp(&b.1.center[axis]).then(a.0.cmp(&b.0))
     };
     let mut best = (f64::INFINITY, 0, group.len() / 2);
+    let all_of = group.len();
+    let uneven = |at: usize| (2 * at).abs_diff(all_of);
     for axis in 0..3 {
         group.sort_unstable_by(by(axis));
         let sweep = |order: &mut dyn Iterator<Item = &(u32, Extent)>| -> Vec<f64> {
@@ -303,7 +305,7 @@ fn parting(group: &mut [(u32, Extent)]) -> usize {
         let right = sweep(&mut group.iter().rev());
         for at in 1..group.len() {
             let all = left[at - 1] + right[group.len() - at - 1];
-            if all < best.0 {
+            if all < best.0 || all == best.0 && uneven(at) < uneven(best.2) {
                 best = (all, axis, at);
             }
         }
