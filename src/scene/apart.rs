@@ -163,7 +163,7 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
         let least = one.touched.iter().map(|(_, n)| -n.dot(inward)).filter(|d| *d > 0.1).fold(f64::INFINITY, f64::min);
         let done = match &mut objects[one.body].geometry {
             Geometry::Shape(shape) => shape.inset(by).map(|smaller| *shape = smaller),
-            Geometry::Mesh(mesh) if mesh.mesh.is_closed() && least.is_finite() => {
+            Geometry::Mesh(mesh) if mesh.mesh.may_be_closed() && least.is_finite() => {
                 mesh.shift(inward * (by / least));
                 Some(())
             }
@@ -199,7 +199,7 @@ fn has_points(geometry: &Geometry) -> bool {
 fn is_closed(geometry: &Geometry) -> bool {
     match geometry {
         Geometry::Shape(shape) => shape.is_closed(),
-        Geometry::Mesh(mesh) => mesh.mesh.is_closed(),
+        Geometry::Mesh(mesh) => mesh.mesh.may_be_closed(),
         Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
     }
 }

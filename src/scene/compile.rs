@@ -388,7 +388,7 @@ impl<'a> Compiler<'a> {
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         self.note_contacts(&mut scene, &contacts, passed_over);
         self.note_overlaps(&mut scene);
-        self.note_inside_out(&mut scene);
+        self.note_meshes(&mut scene);
         self.note_lost_light(&mut scene, &light_names);
         scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);
         Ok(scene)

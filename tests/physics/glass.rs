@@ -220,24 +220,22 @@ fn indices_below_one_and_far_above_are_accepted() {
 
 /// A tetrahedron with the origin at a corner: (0, 0, 0), x, y and z.
 #[test]
-fn meshes_that_are_inside_out_are_told() {
+fn meshes_that_are_open_or_inside_out_are_told() {
     let outward = [[1, 3, 2], [1, 2, 4], [1, 4, 3], [2, 3, 4]];
     let obj = |faces: &[[u32; 3]]| {
         let faces: String = faces.iter().map(|[a, b, c]| format!("f {a} {b} {c}\n")).collect();
         format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n{faces}")
     };
     let inward = outward.map(|[a, b, c]| [a, c, b]);
-    let told = |faces: &[[u32; 3]], more: &str| {
+    let said = |faces: &[[u32; 3]], more: &str, what: &str| {
         let yaml = format!(
             "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 4, height: 4}}\n\
              media: {{mist: {{homogeneous: {{extinction: 1, albedo: 0.5}}}}}}\nshapes:\n- mesh: {{file: t.obj, {more}}}\n"
         );
         let notes = bench_with(&yaml, &[("t.obj", obj(faces).as_bytes())]).prepared.scene.notes.clone();
-        notes
-            .iter()
-            .filter(|note| note.contains("5:9: shapes[0].mesh: it is closed, and its normals point inwards"))
-            .count()
+        notes.iter().filter(|note| note.contains(&format!("5:9: shapes[0].mesh: {what}"))).count()
     };
+    let told = |faces: &[[u32; 3]], more: &str| said(faces, more, "it is closed, and its normals point inwards");
     let glass = "material: {dielectric: {ior: 1.5}}";
     assert_eq!((told(&inward, glass), told(&outward, glass)), (1, 0));
     assert_eq!(told(&inward, "material: {boundary: {}}, inside: mist"), 1);
@@ -248,6 +246,17 @@ fn meshes_that_are_inside_out_are_told() {
     ] {
         assert_eq!(told(&inward, more), 0, "{more}");
     }
-    // Open, so that it has no inside.
+    // Open, so that it has no inside; and one triangle that is wound the other way.
     assert_eq!(told(&inward[..3], glass), 0);
+    for (faces, more, edges, times) in [
+        (&outward[..3], glass, 3, 1),
+        (&inward[..3], glass, 3, 1),
+        (&[[1, 2, 3], [1, 2, 4], [1, 4, 3], [2, 3, 4]][..], glass, 6, 1),
+        (&outward[..3], "material: {boundary: {}}, inside: mist", 3, 1),
+        (&outward[..3], "material: {diffuse: {}}", 3, 0),
+        (&outward[..], glass, 0, 0),
+    ] {
+        let what = format!("{edges} of its edges have no second triangle, wound the same way, on their other side");
+        assert_eq!(said(faces, more, &what), times, "{faces:?} {more}");
+    }
 }

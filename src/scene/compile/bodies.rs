@@ -57,17 +57,24 @@ impl Compiler<'_> {
         }
     }
 
-    /// Notes which closed meshes that light goes into have normals that point inwards, unless somebody wants that.
-    pub(super) fn note_inside_out(&self, scene: &mut Scene) {
+    /// Notes which meshes that light goes into are open, or have normals that point inwards, unless somebody wants that.
+    pub(super) fn note_meshes(&self, scene: &mut Scene) {
         let told = |(i, object): (usize, &Object)| {
             let Geometry::Mesh(mesh) = &object.geometry else { return None };
             let material = &scene.materials[object.material as usize];
             let bounds = material.refracts() || material.transmits() && object.inside != object.outside;
-            let shape = self.description.shapes.get(i)?;
-            let note = "it is closed, and its normals point inwards: its inside, and what is in there, is all that is around it; \
-                        flip_normals: true turns it";
-            let found = bounds && !object.flipped && mesh.mesh.is_inside_out();
-            found.then(|| self.description.fault(&format!("shapes[{i}].{}", shape.geometry.kind()), note))
+            let shape = self.description.shapes.get(i).filter(|_| bounds)?;
+            let note = match mesh.mesh.open_edges() {
+                0 if object.flipped || !mesh.mesh.is_inside_out() => return None,
+                0 => "it is closed, and its normals point inwards: its inside, and what is in there, is all that is around it; \
+                      flip_normals: true turns it"
+                    .to_owned(),
+                open => format!(
+                    "{open} of its edges have no second triangle, wound the same way, on their other side: light that goes in where it \
+                     is open, or out, is taken to be where it was"
+                ),
+            };
+            Some(self.description.fault(&format!("shapes[{i}].{}", shape.geometry.kind()), &note))
         };
         let notes: Vec<String> = scene.objects.iter().enumerate().filter_map(told).collect();
         scene.notes.extend(notes);

@@ -220,10 +220,10 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// Whether it encloses a volume: the areas of a closed mesh add up to nothing, as vectors. Corners are rounded to f32, 2⁻²⁴,
-    /// and so are areas.
+    /// Whether it may enclose a volume, with edges that do not meet or not: the areas of what is closed add up to nothing, as vectors.
+    /// Corners are rounded to f32, 2⁻²⁴, and so are areas.
     #[must_use]
-    pub fn is_closed(&self) -> bool {
+    pub fn may_be_closed(&self) -> bool {
         let areas = (0..self.triangles.len() as u32).map(|i| self.area_vector(i));
         let (sum, all) = areas.fold((DVec3::ZERO, 0.0), |(sum, all), area| (sum + area, all + area.length()));
         sum.length() <= 1e-6 * all
@@ -252,17 +252,43 @@ impl Mesh {
         Aabb::from_points(self.positions.iter().map(|p| DVec3::from(p.map(f64::from)) + self.origin))
     }
 
-    /// Whether it is closed and its normals point into it: the area vectors of a closed surface add up to zero, to their rounding,
-    /// and the volume that it bounds, a sum over its triangles and any point, is negative.
+    /// How many edges have no second triangle, wound the same way, on their other side: none of a closed mesh. Corners in one place
+    /// are one.
+    #[must_use]
+    pub fn open_edges(&self) -> usize {
+        let places = places(self);
+        let edges = |turned: bool| {
+            let around = self.triangles.iter().flat_map(|triangle| {
+                let [a, b, c] = triangle.map(|v| places[v as usize]);
+                [[a, b], [b, c], [c, a]]
+            });
+            let mut all: Vec<_> = around.filter(|[a, b]| a != b).collect();
+            if turned {
+                all.iter_mut().for_each(|edge| edge.reverse());
+            }
+            all.sort_unstable();
+            all
+        };
+        let (there, mut back) = (edges(false), edges(true).into_iter().peekable());
+        let alone = |edge: &&[usize; 2]| {
+            while back.next_if(|other| other < *edge).is_some() {}
+            back.next_if_eq(*edge).is_none()
+        };
+        there.iter().filter(alone).count()
+    }
+
+    /// Whether the volume that a closed mesh bounds, a sum over its triangles and any point, is negative beyond its rounding: its
+    /// normals point into it.
     #[must_use]
     pub fn is_inside_out(&self) -> bool {
-        let (mut sum, mut all, mut volume) = (DVec3::ZERO, 0.0, 0.0);
+        let (mut volume, mut all) = (0.0, 0.0);
         for i in 0..self.triangles.len() as u32 {
             let corners = self.vertices(i);
             let area = area_vector(corners);
-            (sum, all, volume) = (sum + area, all + area.length(), volume + area.dot(corners[0]));
+            (volume, all) = (volume + area.dot(corners[0]), all + area.length() * corners[0].length());
         }
-        volume < 0.0 && sum.length() <= 1e-9 * all
+        // A sum of n terms, each of them wrong by a few roundings.
+        volume < -(self.triangles.len() as f64 + 8.0) * f64::EPSILON * all
     }
 
     /// The area of triangle `i`, m². Zero exactly for triangles that are never hit.

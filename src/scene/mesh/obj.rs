@@ -6,6 +6,7 @@
 use super::MeshSource;
 use super::polygon::unfold;
 use glam::{DVec2, DVec3};
+use std::collections::HashMap;
 
 /// Position, texture coordinate and normal of a corner of a face, counted from 1; 0 where there is none.
 type Corner = [u32; 3];
@@ -77,8 +78,11 @@ fn weld(positions: &[DVec3], uvs: &[DVec2], normals: &[DVec3], faces: &Faces) ->
     let counts = [positions.len(), uvs.len(), normals.len()];
     let has = |k: usize| faces.corners.iter().any(|c| c[k] != 0);
     let (has_uvs, has_normals) = (has(1), has(2));
-    // The vertices at a position form a chain: the first of each, and after each vertex the next.
+    // The vertices at a position form a chain: the first of each, and after each vertex the next. As a rule they are few; what
+    // exceeds the longest chain is looked up.
     const END: u32 = u32::MAX;
+    const LONGEST: usize = 16;
+    let mut crowd: HashMap<Corner, u32> = HashMap::new();
     let mut first = vec![END; positions.len()];
     let mut next: Vec<u32> = Vec::new();
     let mut of_vertex: Vec<Corner> = Vec::new();
@@ -93,13 +97,21 @@ fn weld(positions: &[DVec3], uvs: &[DVec2], normals: &[DVec3], faces: &Faces) ->
                 }
             }
             let place = c[0] as usize - 1;
-            let mut vertex = first[place];
+            let (mut vertex, mut passed) = (first[place], 0);
             while vertex != END && of_vertex[vertex as usize] != c {
-                vertex = next[vertex as usize];
+                (vertex, passed) = (next[vertex as usize], passed + 1);
+            }
+            if passed == LONGEST {
+                vertex = crowd.get(&c).copied().unwrap_or(END);
             }
             if vertex == END {
                 vertex = u32::try_from(of_vertex.len()).ok().filter(|&v| v != END).ok_or("more than 2^32 vertices")?;
-                next.push(std::mem::replace(&mut first[place], vertex));
+                if passed < LONGEST {
+                    next.push(std::mem::replace(&mut first[place], vertex));
+                } else {
+                    next.push(END);
+                    crowd.insert(c, vertex);
+                }
                 of_vertex.push(c);
                 out.positions.push(positions[place]);
                 if has_uvs {
@@ -283,6 +295,25 @@ mod tests {
             assert!(short_decimal(word.as_bytes()).is_none_or(|x| long == Some(x)), "{word}");
         }
         assert_eq!(short_decimal(b"-0").map(f64::to_bits), Some((-0.0f64).to_bits()));
+    }
+
+    /// A corner that two hundred triangles have, each with a texture coordinate of its own, which the next shares.
+    #[test]
+    fn a_corner_of_many_faces_is_a_vertex_for_each_that_differs() {
+        let n = 200;
+        let mut text = String::from("v 0 0 0\n");
+        (0..=n).for_each(|i| text += &format!("v 1 {i} 0\nvt {i} 0.5\n"));
+        for i in 0..n {
+            let (a, b) = (i / 2 + 1, i + 2);
+            text += &format!("f 1/{a} {b}/{b} {}/{}\n", b + 1, (b + 1).min(n + 1));
+        }
+        let mesh = read(text.as_bytes()).unwrap();
+        let middles = mesh.positions.iter().filter(|p| **p == DVec3::ZERO).count();
+        assert_eq!((mesh.triangles.len(), middles), (n, n / 2));
+        for (i, triangle) in mesh.triangles.iter().enumerate() {
+            let middle = triangle[0] as usize;
+            assert_eq!((mesh.positions[middle], mesh.uvs[middle]), (DVec3::ZERO, DVec2::new((i / 2) as f64, 0.5)));
+        }
     }
 
     #[test]

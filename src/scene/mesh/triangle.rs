@@ -7,6 +7,7 @@
 //! fallback to double precision at zero becomes needless.
 
 use crate::math::Ray;
+use crate::scene::shape::exact::{cross, difference_of_products};
 use crate::scene::shape::plain;
 use glam::DVec3;
 
@@ -108,22 +109,9 @@ impl TriangleRay {
     }
 }
 
-/// a b − c d with a relative error below 2⁻⁵², hence with the exact sign.
-#[inline(always)]
-pub(super) fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
-    let cd = c * d;
-    let error = (-c).mul_add(d, cd);
-    a.mul_add(b, -cd) + error
-}
-
 /// The normal times twice the area; zero exactly where the corners lie on a line.
 pub(super) fn area_vector([a, b, c]: [DVec3; 3]) -> DVec3 {
-    let (e, f) = (b - a, c - a);
-    DVec3::new(
-        difference_of_products(e.y, f.z, e.z, f.y),
-        difference_of_products(e.z, f.x, e.x, f.z),
-        difference_of_products(e.x, f.y, e.y, f.x),
-    )
+    cross(b - a, c - a)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use glam::DVec3;
 ///
 /// Kahan's algorithm; bound by Jeannerod, Louvet and Muller 2013, "Further Analysis of Kahan's
 /// Algorithm for the Accurate Computation of 2 × 2 Determinants".
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     let cd = c * d;
