@@ -9,28 +9,47 @@ use std::path::Path;
 pub fn colours(path: &Path) -> Option<String> {
     let file = BufReader::new(crate::input::open(path).ok()?);
     let decoder = ImageReader::new(file).with_guessed_format().ok()?.into_decoder();
-    let name = name(&image::ImageDecoder::icc_profile(&mut decoder.ok()?).ok()??)?;
-    Some(format!("{name} (ICC profile)"))
+    let profile = image::ImageDecoder::icc_profile(&mut decoder.ok()?).ok()??;
+    let linear = if is_linear(&profile) { ", linear" } else { "" };
+    Some(format!("{}{linear} (ICC profile)", name(&profile)?))
+}
+
+/// What profiles of values in proportion to light say of themselves, in small letters.
+pub const LINEAR: &str = "linear";
+
+/// Whether values of red are in proportion to its light: the tag `rTRC`.
+fn is_linear(profile: &[u8]) -> bool {
+    let Some(curve) = tag(profile, b"rTRC") else { return false };
+    // No values of a table, the exponent 1 as a number of 8 bits and a fraction of 8, or as one of 16 and 16.
+    let ends = |start: &[u8]| curve.starts_with(start);
+    ends(b"curv\0\0\0\0\0\0\0\0") || ends(b"curv\0\0\0\0\0\0\0\x01\x01\0") || ends(b"para\0\0\0\0\0\0\0\0\0\x01\0\0")
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<usize> {
+    Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize)
+}
+
+fn within(bytes: &[u8], start: usize, length: usize) -> Option<&[u8]> {
+    bytes.get(start..start.checked_add(length)?)
+}
+
+/// What the tag of this name holds.
+fn tag<'a>(profile: &'a [u8], name: &[u8; 4]) -> Option<&'a [u8]> {
+    // Behind the head the number of tags, and of each its name, place and length.
+    let mut tags = profile.get(132..)?.chunks_exact(12).take(word(profile, 128)?);
+    let tag = tags.find(|tag| tag.starts_with(name))?;
+    within(profile, word(tag, 4)?, word(tag, 8)?)
 }
 
 /// What a profile is called: its tag `desc`.
 fn name(profile: &[u8]) -> Option<String> {
-    let word = |bytes: &[u8], at: usize| -> Option<usize> {
-        Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize)
-    };
-    let within = |bytes: &[u8], start: usize, length: usize| -> Option<Vec<u8>> {
-        Some(bytes.get(start..start.checked_add(length)?)?.to_vec())
-    };
-    // Behind the head the number of tags, and of each its name, place and length.
-    let tags = profile.get(132..)?.chunks_exact(12).take(word(profile, 128)?);
-    let tag = tags.into_iter().find(|tag| tag.starts_with(b"desc"))?;
-    let text = within(profile, word(tag, 4)?, word(tag, 8)?)?;
+    let text = tag(profile, b"desc")?;
     let name = match text.get(..4)? {
         // One string of ASCII, with a zero at its end.
-        b"desc" => String::from_utf8_lossy(&within(&text, 12, word(&text, 8)?)?).into_owned(),
+        b"desc" => String::from_utf8_lossy(within(text, 12, word(text, 8)?)?).into_owned(),
         // Strings of UTF-16 by language: the first.
         b"mluc" => {
-            let letters = within(&text, word(&text, 24)?, word(&text, 20)?)?;
+            let letters = within(text, word(text, 24)?, word(text, 20)?)?;
             let letters: Vec<u16> = letters.as_chunks().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
             String::from_utf16_lossy(&letters)
         }
@@ -64,5 +83,22 @@ mod tests {
             (0..whole.len()).for_each(|end| drop(name(&whole[..end])));
         }
         assert_eq!(name(&profile(b"none")), None);
+    }
+
+    #[test]
+    fn linear_profiles_are_told_by_their_curve() {
+        let with = |curve: &[u8]| {
+            let word = |n: usize| u32::try_from(n).unwrap().to_be_bytes();
+            [&[0; 128][..], &word(1), b"rTRC", &word(144), &word(curve.len()), curve].concat()
+        };
+        let linear = |curve: &[u8]| is_linear(&with(curve));
+        assert!(linear(b"curv\0\0\0\0\0\0\0\0"));
+        assert!(linear(b"curv\0\0\0\0\0\0\0\x01\x01\0"));
+        assert!(linear(b"para\0\0\0\0\0\0\0\0\0\x01\0\0"));
+        // The exponents 2.2 and 2.4, a table, and none.
+        assert!(!linear(b"curv\0\0\0\0\0\0\0\x01\x02\x33"));
+        assert!(!linear(b"para\0\0\0\0\0\x03\0\0\0\x02\x66\x66"));
+        assert!(!linear(b"curv\0\0\0\0\0\0\x04\0\0\0"));
+        assert!(!is_linear(&[0; 200]));
     }
 }

@@ -294,7 +294,8 @@ fn round(x: f64) -> String {
     if x >= 1.0 { format!("{x:.0}") } else { format!("{x:.3}").trim_end_matches('0').to_owned() }
 }
 
-fn escaped(text: &str) -> String {
+/// Text in HTML, also within quotes.
+pub(in crate::batch) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

@@ -154,7 +154,10 @@ fn write_text(out: &mut Small, at: [usize; 2], width: usize, text: &str, grey: u
 /// The PNG at `path`, each pixel of the thumbnail the mean light of a block; `None` where there is none that can be read.
 fn thumbnail(path: &Path, side: usize) -> Option<Small> {
     let facts = inspect::inspect(path).ok()?;
-    let image = image::open(path).ok()?.into_rgb8();
+    let mut reader = image::ImageReader::open(path).ok()?;
+    // It is whole, whatever its size.
+    reader.no_limits();
+    let image = reader.decode().ok()?.into_rgb8();
     let (width, height) = (image.width() as usize, image.height() as usize);
     let wide = facts.colours.starts_with("Display P3");
     Some(average(width, height, image.as_raw(), side, wide))

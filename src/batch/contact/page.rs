@@ -1,7 +1,7 @@
 //! The page of a contact sheet: one file of HTML that opens from disk.
 
 use super::{Card, EMBEDDED, encode, link};
-use crate::batch::accuracy::page::base64;
+use crate::batch::accuracy::page::{base64, escaped};
 use crate::batch::report::{Report, SceneReport, Status};
 use crate::film::heat::Small;
 use crate::transport::plan::Effect;
@@ -79,11 +79,6 @@ fn time(s: f64) -> String {
     }
 }
 
-/// Text in HTML, also within quotes.
-fn html(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
 fn plural(n: usize, what: &str) -> String {
     if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
 }
@@ -100,9 +95,9 @@ pub(super) fn write(out: &mut dyn Write, cards: &[Card], dir: &Path, report: &Re
         match field {
             "title" => {
                 let title = report.source.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-                out.write_all(html(&title).as_bytes())?;
+                out.write_all(escaped(&title).as_bytes())?;
             }
-            "about" => out.write_all(html(&about(cards, report)).as_bytes())?,
+            "about" => out.write_all(escaped(&about(cards, report)).as_bytes())?,
             "summary" => out.write_all(summary(cards, report).as_bytes())?,
             "faults" => out.write_all(faults(report).as_bytes())?,
             "switch" if maps => {
@@ -114,7 +109,7 @@ pub(super) fn write(out: &mut dyn Write, cards: &[Card], dir: &Path, report: &Re
             )?,
             "options" => {
                 for (i, card) in cards.iter().enumerate() {
-                    write!(out, "<option value=\"{i}\">{}</option>", html(&scene(card).label()))?;
+                    write!(out, "<option value=\"{i}\">{}</option>", escaped(&scene(card).label()))?;
                 }
             }
             "rows" => {
@@ -152,7 +147,9 @@ fn about(cards: &[Card], report: &Report) -> String {
 /// A list of what failed, if anything did.
 fn faults(report: &Report) -> String {
     let fault = |scene: &SceneReport| match &scene.status {
-        Status::Failed { message, .. } => Some(format!("<li><b>{}</b> {}</li>\n", html(&scene.label()), html(message))),
+        Status::Failed { message, .. } => {
+            Some(format!("<li><b>{}</b> {}</li>\n", escaped(&scene.label()), escaped(message)))
+        }
         Status::Done | Status::Skipped => None,
     };
     let faults: String = report.scenes.iter().filter_map(fault).collect();
@@ -175,9 +172,9 @@ fn summary(cards: &[Card], report: &Report) -> String {
         sentences.push(format!(
             "Errors go from {} (<b>{}</b>) to {} (<b>{}</b>).",
             share(best.1),
-            html(best.0),
+            escaped(best.0),
             share(worst.1),
-            html(worst.0)
+            escaped(worst.0)
         ));
     }
     let halving: f64 = all.iter().filter_map(|(_, f)| f.halving_seconds).sum();
@@ -188,7 +185,7 @@ fn summary(cards: &[Card], report: &Report) -> String {
                 "To halve every error would take {} more, {} of it for <b>{}</b>.",
                 time(halving),
                 time(seconds),
-                html(name)
+                escaped(name)
             ));
         }
     }
@@ -211,8 +208,8 @@ fn data(small: &Small) -> String {
 
 fn figure(i: usize, card: &Card, scene: &SceneReport, dir: &Path, embed: bool) -> String {
     let figures = Figures::of(scene);
-    let name = html(&scene.label());
-    let full = html(&link(dir, &card.png));
+    let name = escaped(&scene.label());
+    let full = escaped(&link(dir, &card.png));
     let source = if embed { data(&card.thumbnail) } else { full.clone() };
     let map = match &card.error_map {
         Some(map) => format!(" data-map=\"{}\"", data(map)),
@@ -220,7 +217,7 @@ fn figure(i: usize, card: &Card, scene: &SceneReport, dir: &Path, embed: bool) -
     };
     let [width, height] = scene.resolution;
     let half = figures.halving_seconds.map_or(String::new(), |s| format!(", half of it in {} more", time(s)));
-    let chip = |e: &Effect| format!("<li title=\"{}\">{}</li>", html(&e.reason), html(&e.name));
+    let chip = |e: &Effect| format!("<li title=\"{}\">{}</li>", escaped(&e.reason), escaped(&e.name));
     let chips: String = scene.effects.iter().filter(|e| e.on).map(chip).collect();
     let developed = scene
         .png
@@ -232,10 +229,10 @@ fn figure(i: usize, card: &Card, scene: &SceneReport, dir: &Path, embed: bool) -
         .chain(scene.techniques.iter())
         .map(|e| {
             let state = if e.on { "on" } else { "off" };
-            format!("<tr class=\"{state}\"><td>{}<td>{state}<td>{}", html(&e.name), html(&e.reason))
+            format!("<tr class=\"{state}\"><td>{}<td>{state}<td>{}", escaped(&e.name), escaped(&e.reason))
         })
         .collect();
-    let notes: String = scene.notes.iter().map(|note| format!("<p class=\"note\">{}</p>", html(note))).collect();
+    let notes: String = scene.notes.iter().map(|note| format!("<p class=\"note\">{}</p>", escaped(note))).collect();
     format!(
         "<figure id=\"f{i}\"><a href=\"{full}\"><img loading=\"lazy\" alt=\"{name}\" src=\"{source}\" data-full=\"{full}\"{map}></a>\
          <figcaption><h3>{name}</h3><p>{width} × {height} · {} samples · {}</p>\
@@ -246,8 +243,8 @@ fn figure(i: usize, card: &Card, scene: &SceneReport, dir: &Path, embed: bool) -
         figures.samples,
         time(figures.seconds),
         figures.class(scene),
-        html(&figures.error(scene)),
-        html(&link(dir, &card.exr)),
+        escaped(&figures.error(scene)),
+        escaped(&link(dir, &card.exr)),
         if scene.notes.is_empty() { String::new() } else { format!(", {}", plural(scene.notes.len(), "note")) },
     )
 }
@@ -259,12 +256,12 @@ fn row(i: usize, scene: &SceneReport) -> String {
     let pixels = f64::from(width) * f64::from(height);
     let cell = |value: f64, text: &str| format!("<td data-v=\"{value}\">{text}");
     let on: Vec<&str> = scene.effects_in_force();
-    let mut out = format!("<tr><td data-v=\"{i}\"><a href=\"#f{i}\">{}</a>", html(&scene.label()));
+    let mut out = format!("<tr><td data-v=\"{i}\"><a href=\"#f{i}\">{}</a>", escaped(&scene.label()));
     out += &cell(pixels, &format!("{width} × {height}"));
     out += &cell(f64::from(figures.samples), &figures.samples.to_string());
     out += &cell(figures.seconds, &time(figures.seconds));
-    out += &cell(figures.error.map_or(-1.0, |e| e[0]), &html(&figures.error(scene)));
+    out += &cell(figures.error.map_or(-1.0, |e| e[0]), &escaped(&figures.error(scene)));
     let half = figures.halving_seconds;
     out += &cell(half.unwrap_or(-1.0), &half.map_or("-".to_owned(), |s| format!("+{}", time(s))));
-    out + &format!("<td>{}\n", html(&on.join(", ")))
+    out + &format!("<td>{}\n", escaped(&on.join(", ")))
 }

@@ -4,7 +4,7 @@ use super::tags;
 use crate::error::{Error, Result};
 use crate::film::icc;
 use serde::Serialize;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 
 /// The head of a file.
@@ -37,10 +37,15 @@ pub fn inspect(path: &Path) -> Result<PngFacts> {
         return Err(Error::input(path, format!("the PNG file is damaged: the checksum of the chunk {chunk} is wrong")));
     }
     let facts = facts.ok_or_else(|| Error::input(path, "not a whole PNG file: its chunks break off"))?;
-    // All pixels are there and their checksums hold.
-    image::load_from_memory_with_format(&bytes, image::ImageFormat::Png)
-        .map_err(|e| Error::input(path, format!("the PNG file is damaged: {e}")))?;
+    rows(&bytes).map_err(|e| Error::input(path, format!("the PNG file is damaged: {e}")))?;
     Ok(facts)
+}
+
+/// Reads all pixels, whose checksums hold then, row by row: a picture may be large.
+fn rows(bytes: &[u8]) -> std::result::Result<(), png::DecodingError> {
+    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info()?;
+    while reader.next_row()?.is_some() {}
+    reader.finish()
 }
 
 /// What chunks say, up to the first that is `damaged`, whose name is left there; readers of pixels pass over those of text and
@@ -156,10 +161,10 @@ pub fn other_colours(path: &Path) -> Option<String> {
     Some(text).filter(|text| !are_srgb(text))
 }
 
-/// Whether colours of which a file says `said` are what pictures have that say nothing.
+/// Whether colours of which a file says `said` are what pictures have that say nothing. Linear ones with its primaries are not.
 #[must_use]
 pub fn are_srgb(said: &str) -> bool {
-    said.contains(SRGB)
+    said.contains(SRGB) && !said.to_ascii_lowercase().contains(icc::LINEAR)
 }
 
 fn latin1(bytes: &[u8]) -> String {
