@@ -354,6 +354,15 @@ fn same_cell(uv: &DAffine2, at: &TexturePoint) -> bool {
 }
 
 impl Scalar {
+    /// As [`Texture::leaves`].
+    #[must_use]
+    pub fn leaves(&self) -> usize {
+        match self {
+            Scalar::Checkerboard { a, b, .. } => a.leaves() + b.leaves(),
+            _ => 1,
+        }
+    }
+
     /// The number at a point; of three their mean by luminance (Rec. 709).
     #[must_use]
     #[inline]
@@ -481,6 +490,15 @@ impl Texture {
             Texture::Volume(volume) => volume.mean_luminance(),
             Texture::Attribute(attribute) => attribute.mean_luminance(),
             Texture::Checkerboard { a, b, .. } => 0.5 * (a.mean_luminance() + b.mean_luminance()),
+        }
+    }
+
+    /// Colours, pictures and other textures in it, each as often as it is mentioned.
+    #[must_use]
+    pub fn leaves(&self) -> usize {
+        match self {
+            Texture::Checkerboard { a, b, .. } => a.leaves() + b.leaves(),
+            _ => 1,
         }
     }
 

@@ -184,11 +184,12 @@ impl<'a> Compiler<'a> {
                 self.attribute(at, attribute).map_or_else(Texture::one, |a| Texture::Attribute(a.into()))
             }
             written::Texture::Volume(name) => Texture::Volume(self.volume_texture(&format!("{at}.volume"), name)),
-            written::Texture::Checkerboard(board) => Texture::Checkerboard {
-                a: Box::new(self.cell(&format!("{at}.checkerboard.a"), &board.a)),
-                b: Box::new(self.cell(&format!("{at}.checkerboard.b"), &board.b)),
-                uv: self.board_map(at, board),
-            },
+            written::Texture::Checkerboard(board) => {
+                let [a, b] = [("a", &board.a), ("b", &board.b)]
+                    .map(|(key, colour)| Box::new(self.cell(&format!("{at}.checkerboard.{key}"), colour)));
+                let uv = self.board_map(at, board);
+                self.bounded(at, Texture::Checkerboard { a, b, uv }, Texture::leaves).unwrap_or_else(Texture::one)
+            }
         })
     }
 
@@ -222,9 +223,23 @@ impl<'a> Compiler<'a> {
                         written::SpectrumOrTexture::Texture(name) => self.named_numbers(&format!("{at}.texture"), name),
                     })
                 };
-                Scalar::Checkerboard { a: cell("a", &board.a), b: cell("b", &board.b), uv: self.board_map(at, board) }
+                let [a, b] = [cell("a", &board.a), cell("b", &board.b)];
+                let uv = self.board_map(at, board);
+                self.bounded(at, Scalar::Checkerboard { a, b, uv }, Scalar::leaves).unwrap_or(Scalar::Uniform(0.5))
             }
         })
+    }
+
+    /// A texture that holds others, each as often as it is mentioned, where they are not too many.
+    fn bounded<T>(&mut self, at: &str, texture: T, leaves: impl Fn(&T) -> usize) -> Option<T> {
+        if leaves(&texture) <= MOST_PARTS {
+            return Some(texture);
+        }
+        self.fault(
+            at,
+            format!("expected at most {MOST_PARTS} colours and textures in boards within boards, found more"),
+        );
+        None
     }
 
     /// The lattice of the picture `image` of the texture `at`.
