@@ -157,6 +157,8 @@ fn a_frame_is_exported_as_it_stands() {
     let exported = |arguments: &[&str]| {
         let ran = place.run(&[&["export"], arguments].concat());
         assert_eq!(ran.code, 0, "{}", ran.err);
+        let several = "note: a.yaml: frame 4 of 6 is written; --frames N picks another";
+        assert_eq!(ran.err.contains(several), arguments.contains(&"4-9"), "{}", ran.err);
         let text = ran.out;
         // One scene writes `render` first, the other last.
         let (render, rest) = text.lines().partition::<Vec<&str>, _>(|line| line.contains("<?abbe set"));

@@ -55,6 +55,11 @@ fn read(arguments: &ConvertArguments) -> Result<SceneDescription> {
             if let Some(output) = &arguments.output {
                 Inputs::of(animation.files().iter().chain([file])).spare([output])?;
             }
+            if let [first, _, ..] = animation.frames() {
+                let count = animation.frames().len();
+                let message = format!("frame {first} of {count} is written; --frames N picks another");
+                super::complain(&format!("note: {}: {message}", file.display()));
+            }
             let scene = animation.into_first()?;
             for note in scene.locator.notes() {
                 super::complain(&format!("note: {note}"));

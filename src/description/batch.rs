@@ -11,7 +11,7 @@ use super::animation::Animation;
 use super::decode::decode;
 use super::edit::{self, Setting};
 use super::fault::{Checker, Fault};
-use super::mitsuba;
+use super::mitsuba::{self, Define};
 use super::node::{Entry, Node, Place, Sources, Value, quote};
 use super::output::Output;
 use super::path::{At, Segment};
@@ -98,8 +98,8 @@ pub struct BatchEntry {
     /// The batch's `output` and `render`, laid over the scene's.
     layers: Arc<[(&'static str, Node)]>,
     settings: Vec<Setting>,
-    /// Parameters of a Mitsuba scene, by name.
-    defines: Vec<(String, String)>,
+    /// Parameters of a Mitsuba scene.
+    defines: Vec<Define>,
     /// What the places of the above refer to.
     sources: Arc<Sources>,
 }
@@ -154,22 +154,22 @@ struct WrittenEntry {
     #[serde(rename = "set")]
     _set: Option<BTreeMap<String, IgnoredAny>>,
     #[serde(default)]
-    define: BTreeMap<String, Define>,
+    define: BTreeMap<String, Parameter>,
 }
 
 /// The value of a parameter, as it would stand in XML.
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum Define {
+enum Parameter {
     Number(f64),
     Name(String),
 }
 
-impl Define {
+impl Parameter {
     fn text(self) -> String {
         match self {
-            Define::Number(value) => value.to_string(),
-            Define::Name(text) => text,
+            Parameter::Number(value) => value.to_string(),
+            Parameter::Name(text) => text,
         }
     }
 }
@@ -215,6 +215,10 @@ impl Batch {
                 }
             }
             let xml = mitsuba::is_xml(&entry.file);
+            let define = |(name, value): (String, Parameter)| {
+                let place = node.get("define").and_then(|map| map.get(&name)).map(|value| value.place);
+                Define { name, value: value.text(), place }
+            };
             checker.require(
                 xml || entry.define.is_empty(),
                 at.key("define"),
@@ -223,7 +227,7 @@ impl Batch {
             );
             entries.push(BatchEntry {
                 name,
-                defines: entry.define.into_iter().map(|(name, value)| (name, value.text())).collect(),
+                defines: entry.define.into_iter().map(define).collect(),
                 path: entry.file.0,
                 place: node.get("file").map(|file| file.place),
                 layers: Arc::clone(&layers),
@@ -278,8 +282,9 @@ impl BatchEntry {
                 "-D {name}={value}: expected a Mitsuba scene (.xml), found {path}; --set changes fields of YAML"
             )));
         }
-        self.defines.retain(|(name, _)| !defines.iter().any(|(other, _)| other == name));
-        self.defines.extend(defines.iter().cloned());
+        self.defines.retain(|define| !defines.iter().any(|(name, _)| *name == define.name));
+        let given = |(name, value): &(String, String)| Define { name: name.clone(), value: value.clone(), place: None };
+        self.defines.extend(defines.iter().map(given));
         Ok(())
     }
 
@@ -508,13 +513,30 @@ mod tests {
     }
 
     #[test]
+    fn a_parameter_that_no_scene_has_is_told_where_it_stands() {
+        let scene = "<scene version=\"3.0.0\"><default name=\"res\" value=\"8\"/><integrator type=\"path\">\
+                     <integer name=\"max_depth\" value=\"$res\"/></integrator></scene>";
+        let batch = "scenes:\n- file: s.xml\n  define: {res: 4, rez: 5}\n";
+        with(&[("s.xml", scene), ("batch.yaml", batch)], |directory| {
+            let document = load(&directory.join("batch.yaml")).unwrap();
+            let error = document.check(&[]).unwrap_err();
+            assert_eq!(
+                in_words(&error, directory),
+                "DIR/batch.yaml:3:25: define.rez: expected a parameter that DIR/s.xml uses, found none named \"rez\"; \
+                 did you mean \"res\"?"
+            );
+        });
+    }
+
+    #[test]
     fn the_reference_batch_is_a_batch() {
         with(&[("batch.yaml", &super::super::testing::reference("batch"))], |directory| {
             let document = load(&directory.join("batch.yaml")).unwrap();
             assert_eq!(document.entries().len(), 3);
             assert_eq!(document.entries()[1].settings.len(), 4);
-            let defines = [("integrator", "path"), ("res", "64")].map(|(name, value)| (name.into(), value.into()));
-            assert_eq!(document.entries()[2].defines, defines);
+            let defines = document.entries()[2].defines.iter();
+            let defines: Vec<_> = defines.map(|define| (define.name.as_str(), define.value.as_str())).collect();
+            assert_eq!(defines, [("integrator", "path"), ("res", "64")]);
         });
     }
 }

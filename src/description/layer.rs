@@ -7,7 +7,7 @@ use super::fault::Checker;
 use super::material::given_fields;
 use super::node::{did_you_mean, quote};
 use super::path::At;
-use super::settings::Integrator;
+use super::settings::{DepthIntegrator, Integrator, NoIntegrator, PathIntegrator};
 
 /// `diffuse`, `{name: nn, surface: shading_normal}`, `{name: key, ways: [diffuse, glossy], light_group: key}` or
 /// `{name: direct, light: {path: {max_depth: 2}}, form: xyz}`
@@ -188,13 +188,32 @@ enum WrittenLayer {
 struct WrittenFields {
     name: String,
     surface: Option<Quantity>,
-    light: Option<Integrator>,
+    light: Option<CameraIntegrator>,
     form: Option<LightForm>,
     ways: Option<Vec<LightWay>>,
     light_group: Option<String>,
     #[serde(default)]
     squares: bool,
     squares_name: Option<String>,
+}
+
+/// The integrators that start at the camera, and so see what the picture does.
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum CameraIntegrator {
+    Path(PathIntegrator),
+    Depth(DepthIntegrator),
+    None(NoIntegrator),
+}
+
+impl From<CameraIntegrator> for Integrator {
+    fn from(written: CameraIntegrator) -> Integrator {
+        match written {
+            CameraIntegrator::Path(path) => Integrator::Path(path),
+            CameraIntegrator::Depth(depth) => Integrator::Depth(depth),
+            CameraIntegrator::None(none) => Integrator::None(none),
+        }
+    }
 }
 
 /// Layers that a name says all of, with the names of their channels.
@@ -254,7 +273,9 @@ impl TryFrom<WrittenLayer> for Layer {
             (Some(quantity), None, None, None, None) => LayerContent::Surface(quantity),
             (None, None, None, Some(ways), group) => LayerContent::Ways { ways, group },
             (None, None, None, None, Some(group)) => LayerContent::Ways { ways: EVERY.to_vec(), group: Some(group) },
-            (None, of, form, None, None) => LayerContent::Light { of, form: form.unwrap_or_default() },
+            (None, of, form, None, None) => {
+                LayerContent::Light { of: of.map(Integrator::from), form: form.unwrap_or_default() }
+            }
             _ => {
                 let found = given_fields(&given);
                 return Err(format!(
@@ -316,10 +337,7 @@ impl Layer {
             checker.require(!ways.is_empty(), at.key("ways"), "one way or more", "none");
         }
         if let LayerContent::Light { of: Some(integrator), .. } = &self.content {
-            let at = at.key("light");
-            let by_camera = matches!(integrator, Integrator::Path(_) | Integrator::Depth(_) | Integrator::None(_));
-            checker.require(by_camera, at, "path, depth or none", "another integrator");
-            integrator.check(at, checker);
+            integrator.check(at.key("light"), checker);
         }
     }
 }
@@ -398,9 +416,12 @@ mod tests {
     #[test]
     fn layers_have_names_of_their_own_and_camera_rays() {
         assert_eq!(
-            faults("layers:\n- {name: a, surface: depth}\n- {name: a, light: whitted}\n"),
-            "dir/s.yaml:4:10: layers[1].name: expected a name of its own, found \"a\" again\n\
-             dir/s.yaml:4:20: layers[1].light: expected path, depth or none, found another integrator"
+            faults("layers:\n- {name: a, surface: depth}\n- {name: a, light: path}\n"),
+            "dir/s.yaml:4:10: layers[1].name: expected a name of its own, found \"a\" again"
+        );
+        assert_eq!(
+            faults("layers:\n- {name: a, light: whitted}\n"),
+            "dir/s.yaml:3:20: layers[0].light: expected one of path, depth, none, found \"whitted\""
         );
     }
 }

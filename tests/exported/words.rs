@@ -81,6 +81,29 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
             &[],
         ),
         (
+            "volumes: {v: {constant: {value: 0.3}}}\ntextures: {t: {volume: v}, b: {checkerboard: {a: {texture: t}, b: 0.3}}}\n",
+            &card("plastic: {reflectance: {texture: b}, tint: {texture: t}}"),
+            &[
+                "shapes[1].rectangle.material: a base of 0.5 and no tint: Mitsuba's plastics want the mean of a texture, which it \
+               does not have of volumes and of attributes of meshes",
+            ],
+            &["<float name=\"diffuse_reflectance\" value=\"0.5\"/>"],
+        ),
+        (
+            "",
+            "sphere: {radius: 0.5, material: {dielectric: {roughness: 0.2, ior: 1.5, exterior_ior: 1.5}}}",
+            &[
+                "shapes[1].sphere.material: an index a millionth above that around it: Mitsuba wants those of what is rough to differ",
+            ],
+            &["<float name=\"int_ior\" value=\"1.500001"],
+        ),
+        (
+            "",
+            "sphere: {radius: 0.5, material: {dielectric: {ior: 1.5, exterior_ior: 1.5}}}",
+            &[],
+            &["<float name=\"int_ior\" value=\"1.5\"/>"],
+        ),
+        (
             "",
             "sphere: {radius: 0.5, material: {dielectric: {ior: {file: inky.csv}}}}",
             &["shapes[1].sphere.material: the index at 587.5618 nm, 1.5000 over 1.0000: Mitsuba has no dispersion; \

@@ -3,7 +3,7 @@
 use glam::{DMat3, DMat4, DVec3};
 
 use super::super::fault::Fault;
-use super::super::node::Node;
+use super::super::node::{Node, quote};
 use super::super::transform::{is_mirror, is_similarity};
 use super::object::{Bag, Family};
 use super::parse::ABOUT_ONE;
@@ -58,6 +58,11 @@ impl Import<'_> {
         match bag.object.plugin.as_str() {
             "area" => {}
             "directionalarea" => fields.add("emission_direction", text(bag.object.place, "normal")),
+            plugin if EMITTERS.contains(&plugin) => {
+                let message =
+                    format!("expected an emitter that a shape can be (area, directionalarea), found {}", quote(plugin));
+                return Err(Fault::at_place(bag.object.plugin_place, message));
+            }
             _ => return Err(bag.unknown(SHINING)),
         }
         weight(&bag, fields)?;
@@ -376,7 +381,12 @@ mod tests {
         let scene = good(&(shape("area") + &shape("directionalarea")));
         assert_eq!(scene.shapes[0].emission_direction, None);
         assert_eq!(scene.shapes[1].emission_direction, Some(EmissionDirection::Normal));
-        assert!(fault(&shape("point"), &[]).contains("expected an emitter that Abbe has (area, directionalarea)"));
+        let told = fault(&shape("point"), &[]);
+        assert!(
+            told.ends_with("expected an emitter that a shape can be (area, directionalarea), found \"point\""),
+            "{told}"
+        );
+        assert!(fault(&shape("aera"), &[]).contains("expected an emitter that Abbe has (area, directionalarea)"));
         assert!(fault("<emitter type=\"area\"/>", &[]).contains("expected a <shape> around it, found it alone"));
     }
 }

@@ -45,6 +45,7 @@ use super::medium::{UNCHANGED, VACUUM};
 use super::node::{Entry, Node, Place, Sources, Value};
 use crate::error::Result;
 use object::{Bag, Document, Family, Object};
+pub(crate) use parse::Define;
 
 /// Ratio of the integral of ȳ, by which our film divides, to the constant of Mitsuba's film.
 const FILM: f64 = 106.856_914_916_767 / 106.750_259_399_414_06;
@@ -74,12 +75,12 @@ pub(crate) fn is_xml(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xml"))
 }
 
-/// Reads a scene as a tree of the grammar. `defines` are the `-D name=value`.
+/// Reads a scene as a tree of the grammar, with values for its parameters.
 ///
 /// # Errors
 /// [`Error::Config`](crate::error::Error::Config) with the first fault;
 /// [`Error::Input`](crate::error::Error::Input) for a file that cannot be read.
-pub(crate) fn read(path: &Path, defines: &[(String, String)], sources: &mut Sources) -> Result<Node> {
+pub(crate) fn read(path: &Path, defines: &[Define], sources: &mut Sources) -> Result<Node> {
     let document = parse::read(path, defines, sources)?;
     let sees_media = integrators::sees_media(&document).map_err(|fault| fault.into_error(sources))?;
     let import = Import { sees_media, ..Import::new(&document) };
@@ -348,7 +349,8 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("s.xml");
         std::fs::write(&path, format!("{HEAD}{text}\n</scene>\n")).unwrap();
-        let defines: Vec<(String, String)> = defines.iter().map(|(n, v)| ((*n).to_owned(), (*v).to_owned())).collect();
+        let define = |(n, v): &(&str, &str)| Define { name: (*n).to_owned(), value: (*v).to_owned(), place: None };
+        let defines: Vec<Define> = defines.iter().map(define).collect();
         let mut sources = Sources::default();
         let root = read(&path, &defines, &mut sources)?;
         SceneDescription::of_tree(root, &path, sources)
@@ -514,6 +516,14 @@ mod tests {
     #[test]
     fn sensors_after_the_first_are_noted() {
         assert_eq!(good("<shape type=\"sphere\"/>").locator.notes(), [""; 0]);
+        let turned = "<shape type=\"cube\"><transform name=\"to_world\"><rotate AXIS angle=\"9\"/></transform></shape>";
+        assert_eq!(good(&turned.replace("AXIS", "x=\"0.6\" y=\"0.8\"")).locator.notes(), [""; 0]);
+        let notes = good(&turned.replace("AXIS", "x=\"1\" y=\"1\"")).locator.notes();
+        assert!(
+            notes.len() == 1
+                && notes[0].contains("s.xml:3:47: expected an axis of length 1 in <rotate>, found one of 1.4142"),
+            "{notes:?}"
+        );
         let notes = good("<sensor type=\"perspective\"/>\n<sensor type=\"perspective\"/>").locator.notes();
         let told: Vec<&str> = notes.iter().map(|note| &note[note.find("s.xml").unwrap()..]).collect();
         assert!(
@@ -636,5 +646,39 @@ mod tests {
             text.push_str(&format!("<bsdf type=\"twosided\" id=\"b{i}\"><ref id=\"b{}\"/></bsdf>", i - 1));
         }
         assert!(fault(&text, &[]).ends_with("expected at most 64 objects within one another, found more"));
+    }
+
+    /// Each doubles the one before.
+    #[test]
+    fn parameters_do_not_multiply_without_end() {
+        let bomb: String =
+            (1..60).map(|i| format!("<default name=\"a{i}\" value=\"$a{j}$a{j}\"/>\n", j = i - 1)).collect();
+        let told = fault(&format!("<default name=\"a0\" value=\"xy\"/>\n{bomb}"), &[]);
+        let expected = ": expected parameters of at most 67108864 bytes in all their places, found more";
+        assert!(told.starts_with("s.xml:2") && told.ends_with(expected), "{told}");
+    }
+
+    #[test]
+    fn a_path_in_an_included_file_is_for_that_file_alone() {
+        let directory = tempfile::tempdir().unwrap();
+        let at = |name: &str| directory.path().join(name);
+        std::fs::create_dir_all(at("sub")).unwrap();
+        let shape = "<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape>";
+        for name in ["a.obj", "sub/a.obj"] {
+            std::fs::write(at(name), "").unwrap();
+        }
+        let scene = |inner: &str| format!("<scene version=\"3.0.0\">{inner}</scene>");
+        std::fs::write(at("sub/in.xml"), scene(&format!("<path value=\".\"/>{shape}"))).unwrap();
+        std::fs::write(at("s.xml"), scene(&format!("<include filename=\"sub/in.xml\"/>{shape}"))).unwrap();
+        let document = parse::read(&at("s.xml"), &[], &mut Sources::default()).unwrap();
+        let found: Vec<String> = document
+            .objects
+            .iter()
+            .filter(|object| object.plugin == "obj")
+            .map(|object| document.find("a.obj", object.source))
+            .collect();
+        let place = |name: &str| at(name).canonicalize().unwrap();
+        let found: Vec<_> = found.iter().map(|path| Path::new(path).canonicalize().unwrap()).collect();
+        assert_eq!(found, [place("sub/a.obj"), place("a.obj")]);
     }
 }

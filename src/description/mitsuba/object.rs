@@ -144,6 +144,8 @@ pub(crate) struct Document {
     pub(crate) settings: Vec<Setting>,
     /// Directories in which files are looked for, in order.
     pub(crate) search: Vec<std::path::PathBuf>,
+    /// The same with the <path> of each file that is read.
+    pub(crate) searches: std::collections::HashMap<u32, Vec<std::path::PathBuf>>,
     /// Directory of each file that was read, by source.
     pub(crate) directories: std::collections::HashMap<u32, std::path::PathBuf>,
 }
@@ -407,7 +409,8 @@ impl Document {
     /// As [`Document::find`], where there is such a file.
     pub(crate) fn look_for(&self, name: &str, source: u32) -> Option<String> {
         let own = self.directories.get(&source);
-        let found = self.search.iter().chain(own).map(|directory| directory.join(name)).find(|path| path.exists());
+        let search = self.searches.get(&source).unwrap_or(&self.search);
+        let found = search.iter().chain(own).map(|directory| directory.join(name)).find(|path| path.exists());
         found.map(|path| path.to_string_lossy().into_owned())
     }
 

@@ -5,6 +5,7 @@ mod text;
 mod transform;
 mod values;
 
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -16,6 +17,7 @@ pub(super) use self::transform::ABOUT_ONE;
 use super::super::edit::{Setting, read_bytes};
 use super::super::fault::Fault;
 use super::super::node::{Node, Place, Sources, Value as NodeValue, did_you_mean, quote};
+use super::super::path::Segment;
 use super::super::yaml::{self, MAX_NODES};
 use super::object::{Document, Family, Object, Property, Value};
 use super::xml::{self, Attribute, Element};
@@ -24,14 +26,39 @@ use crate::error::{Error, Result};
 /// The deepest nesting of includes, as in Mitsuba.
 const MAX_INCLUDES: usize = 15;
 
-/// Reads a scene with `defines`, the `-D name=value` of the command line.
+/// A value for a parameter of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Define {
+    /// Of the parameter.
+    pub name: String,
+    /// As it would stand in XML.
+    pub value: String,
+    /// Where a batch gives it; none of `-D name=value` on the command line.
+    pub place: Option<Place>,
+}
+
+impl Define {
+    /// A fault of it.
+    fn fault(&self, message: &str, sources: &Sources) -> Error {
+        match self.place {
+            Some(place) => {
+                let path = [Segment::Key("define".into()), Segment::Key(self.name.clone())];
+                Fault::at_place(place, message).under_path(&path).into_error(sources)
+            }
+            None => Error::Config(format!("-D {}={}: {message}", self.name, self.value)),
+        }
+    }
+}
+
+/// Reads a scene with `defines`.
 ///
 /// # Errors
 /// [`Error::Config`] with the first fault; [`Error::Input`] for a file that cannot be read.
-pub(crate) fn read(path: &Path, defines: &[(String, String)], sources: &mut Sources) -> Result<Document> {
+pub(crate) fn read(path: &Path, defines: &[Define], sources: &mut Sources) -> Result<Document> {
     let mut parser = Parser {
         sources,
         budget: MAX_NODES,
+        filled: Cell::new(0),
         parameters: Vec::new(),
         document: Document::default(),
         names: HashMap::new(),
@@ -39,11 +66,13 @@ pub(crate) fn read(path: &Path, defines: &[(String, String)], sources: &mut Sour
         reading: Vec::new(),
         unreadable: None,
     };
-    for (name, value) in defines {
+    for define in defines {
+        let Define { name, value, .. } = define;
         if parser.parameters.iter().any(|parameter| parameter.name == *name) {
-            return Err(Error::Config(format!("-D {name}={value}: expected each name once, found {name:?} again")));
+            let message = format!("expected each name once, found {} again", quote(name));
+            return Err(define.fault(&message, parser.sources));
         }
-        parser.parameters.push(Parameter { name: name.clone(), value: value.clone(), defined: true, used: false });
+        parser.parameters.push(Parameter { name: name.clone(), value: value.clone(), used: false });
     }
     let home = path.parent().unwrap_or(Path::new("")).to_path_buf();
     parser.document.search = vec![home, PathBuf::new()];
@@ -52,16 +81,17 @@ pub(crate) fn read(path: &Path, defines: &[(String, String)], sources: &mut Sour
         return Err(error);
     }
     outcome.map_err(|fault| fault.into_error(parser.sources))?;
-    if let Some(unused) = parser.parameters.iter().find(|parameter| parameter.defined && !parameter.used) {
-        let known: Vec<&str> = parser.parameters.iter().filter(|p| !p.defined).map(|p| p.name.as_str()).collect();
-        let hint = did_you_mean(&unused.name, known.iter().copied());
-        return Err(Error::Config(format!(
-            "-D {}={}: expected a parameter that {} uses, found none named {}{hint}",
-            unused.name,
-            unused.value,
+    // Those of the definitions are the first.
+    if let Some((unused, _)) = defines.iter().zip(&parser.parameters).find(|(_, parameter)| !parameter.used) {
+        let own = parser.parameters.iter().skip(defines.len());
+        let known = own.chain(parser.parameters.iter().filter(|parameter| parameter.used));
+        let hint = did_you_mean(&unused.name, known.map(|parameter| parameter.name.as_str()));
+        let message = format!(
+            "expected a parameter that {} uses, found none named {}{hint}",
             path.display(),
             quote(&unused.name)
-        )));
+        );
+        return Err(unused.fault(&message, parser.sources));
     }
     Ok(parser.document)
 }
@@ -70,8 +100,6 @@ pub(crate) fn read(path: &Path, defines: &[(String, String)], sources: &mut Sour
 struct Parameter {
     name: String,
     value: String,
-    /// On the command line rather than by `<default>`.
-    defined: bool,
     used: bool,
 }
 
@@ -86,6 +114,8 @@ struct Reference {
 struct Parser<'a> {
     sources: &'a mut Sources,
     budget: usize,
+    /// Bytes of parameters that were filled in.
+    filled: Cell<usize>,
     parameters: Vec<Parameter>,
     document: Document,
     /// Where each named property of each object is written.
@@ -143,6 +173,7 @@ impl Parser<'_> {
         let in_file = InFile { source, old: major_version(version)? < 2 };
 
         self.reading.push(canonical);
+        let around = self.document.search.clone();
         let result = match parent {
             None if root.tag != "scene" => {
                 let found = quote(&root.tag);
@@ -165,6 +196,9 @@ impl Parser<'_> {
             }
         };
         self.reading.pop();
+        // Its <path> is no other file's.
+        let own = std::mem::replace(&mut self.document.search, around);
+        self.document.searches.insert(source, own);
         result
     }
 
@@ -365,7 +399,7 @@ impl Parser<'_> {
                 }
                 let value = self.text(attribute(element, "value")?)?;
                 if !self.parameters.iter().any(|parameter| parameter.name == name) {
-                    self.parameters.push(Parameter { name, value, defined: false, used: false });
+                    self.parameters.push(Parameter { name, value, used: false });
                 }
                 return Ok(());
             }

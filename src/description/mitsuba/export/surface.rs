@@ -15,13 +15,94 @@ use crate::spectrum::{self, Outside, RefractiveIndex, catalogue};
 /// The wavelength at which a dispersive index is taken where there can be only one: the d line, nm.
 const D_LINE_NM: f64 = 587.5618;
 
+/// The ratio of two indices which Mitsuba tells apart: eight steps of its 32-bit floats. Such a surface reflects 2.5e-13.
+const APART: f64 = 1.0 + 1e-6;
+
 /// Names and values of an element's attributes.
 pub(super) type Attributes = [(&'static str, String)];
 
 impl Export<'_> {
     /// What Mitsuba gets in place of a material that it cannot express.
     fn shortfall(&self, material: &Material) -> Option<String> {
-        plain_shortfall(material).or_else(|| self.compound_shortfall(material))
+        self.plain_shortfall(material).or_else(|| self.compound_shortfall(material))
+    }
+
+    /// The same for materials that are not made of others.
+    fn plain_shortfall(&self, material: &Material) -> Option<String> {
+        let highlight = |given: bool| given.then(|| "no highlight: those belong to the Whitted ray tracer".to_owned());
+        let spectra = |all: &[&SpectrumOrTexture]| {
+            Export::either_shortfall(all, "grey in place of a spectrum").map(str::to_owned)
+        };
+        let schlick = |fresnel: Fresnel| {
+            (fresnel == Fresnel::Schlick).then(|| "Fresnel's equations in place of Schlick's approximation".to_owned())
+        };
+        let barely = |rough: bool, inside: &Index, outside: &Index| {
+            (rough && alike(inside, outside)).then(|| {
+                "an index a millionth above that around it: Mitsuba wants those of what is rough to differ".to_owned()
+            })
+        };
+        let film = |given: bool| given.then(|| "no interference: Mitsuba has no thin films".to_owned());
+        match material {
+            Material::Diffuse(m) => joined([highlight(m.highlight.is_some()), spectra(&[&m.reflectance])]),
+            Material::Mirror(m) => {
+                let grey = Export::reflectance_shortfall(&[&m.reflectance], "a grey mirror");
+                joined([highlight(m.highlight.is_some()), grey.map(str::to_owned)])
+            }
+            Material::Conductor(m) => {
+                let index = match &m.index {
+                    ConductorIndex::Metal(_) | ConductorIndex::File(_) => {
+                        Some("its index at every fifth nanometre".to_owned())
+                    }
+                    ConductorIndex::Written { eta, k } => {
+                        Export::constant_shortfall(&[eta, k], "grey indices in place of spectra")
+                    }
+                };
+                let film = film(m.film.is_some());
+                joined([highlight(m.highlight.is_some()), schlick(m.fresnel), film, index, spectra(&[&m.tint])])
+            }
+            Material::Dielectric(m) => {
+                let said = |given: bool, what: &str| given.then(|| what.to_owned());
+                joined([
+                    highlight(m.highlight.is_some()),
+                    schlick(m.fresnel),
+                    film(m.film.is_some()),
+                    dispersive(&m.ior, &m.exterior_ior),
+                    said(absorbs(m), "no absorption inside, which Mitsuba has in media only"),
+                    said(m.priority.is_some(), "no priority: in Mitsuba bodies that overlap are wrong"),
+                    barely(m.roughness != Roughness::Number(0.0), &m.ior, &m.exterior_ior),
+                    spectra(&[&m.reflection_tint, &m.transmission_tint]),
+                ])
+            }
+            Material::ThinDielectric(m) => joined([
+                film(m.thickness_nm.is_some()),
+                dispersive(&m.ior, &m.exterior_ior),
+                spectra(&[&m.reflection_tint, &m.transmission_tint]),
+            ]),
+            Material::Plastic(m) => {
+                let few = m.roughness > 0.0 && m.diffuse_mean == DiffuseMean::Integral;
+                joined([
+                    highlight(m.highlight.is_some()),
+                    dispersive(&m.ior, &m.exterior_ior),
+                    spectra(&[&m.reflectance, &m.tint]),
+                    barely(m.roughness > 0.0, &m.ior, &m.exterior_ior),
+                    self.meanless(m),
+                    few.then(|| "the coat's mean over 64 cosines, which makes the base darker by up to 2 %".to_owned()),
+                ])
+            }
+            _ => None,
+        }
+    }
+
+    /// What a plastic has in place of textures of which Mitsuba does not know the mean.
+    fn meanless(&self, m: &Plastic) -> Option<String> {
+        let instead = match (self.lacks_mean(&m.reflectance), self.lacks_mean(&m.tint)) {
+            (true, true) => "a base of 0.5 and no tint",
+            (true, false) => "a base of 0.5",
+            (false, true) => "no tint",
+            (false, false) => return None,
+        };
+        let why = "Mitsuba's plastics want the mean of a texture, which it does not have of volumes and of attributes of meshes";
+        Some(format!("{instead}: {why}"))
     }
 
     /// A material of the scene's list.
@@ -149,30 +230,36 @@ impl Export<'_> {
 
     fn dielectric(&mut self, m: &Dielectric, attributes: &Attributes) {
         self.open_owned("bsdf", attributes);
-        self.indices(&m.ior, &m.exterior_ior);
+        self.indices(&m.ior, &m.exterior_ior, m.roughness != Roughness::Number(0.0));
         self.tints(&m.reflection_tint, &m.transmission_tint);
         self.roughness(&m.roughness, m.distribution);
     }
 
     fn thin(&mut self, m: &ThinDielectric, attributes: &Attributes) {
         self.open_owned("bsdf", attributes);
-        self.indices(&m.ior, &m.exterior_ior);
+        self.indices(&m.ior, &m.exterior_ior, false);
         self.tints(&m.reflection_tint, &m.transmission_tint);
     }
 
     fn plastic(&mut self, m: &Plastic, attributes: &Attributes) {
         self.open_owned("bsdf", attributes);
-        self.spectrum_or_texture("diffuse_reflectance", &m.reflectance, Role::Reflectance);
-        self.tint("specular_reflectance", &m.tint);
-        self.indices(&m.ior, &m.exterior_ior);
+        match self.lacks_mean(&m.reflectance) {
+            true => self.xml.value("float", "diffuse_reflectance", 0.5),
+            false => self.spectrum_or_texture("diffuse_reflectance", &m.reflectance, Role::Reflectance),
+        }
+        if !self.lacks_mean(&m.tint) {
+            self.tint("specular_reflectance", &m.tint);
+        }
+        self.indices(&m.ior, &m.exterior_ior, m.roughness > 0.0);
         self.xml.value("boolean", "nonlinear", m.nonlinear);
         if m.roughness > 0.0 {
             self.roughness(&Roughness::Number(m.roughness), m.distribution);
         }
     }
 
-    fn indices(&mut self, inside: &Index, outside: &Index) {
-        self.xml.value("float", "int_ior", at_d(inside));
+    fn indices(&mut self, inside: &Index, outside: &Index, rough: bool) {
+        let apart = if rough && alike(inside, outside) { APART } else { 1.0 };
+        self.xml.value("float", "int_ior", at_d(inside) * apart);
         self.xml.value("float", "ext_ior", at_d(outside));
     }
 
@@ -206,63 +293,6 @@ impl Export<'_> {
     }
 }
 
-/// The same for materials that are not made of others.
-fn plain_shortfall(material: &Material) -> Option<String> {
-    let highlight = |given: bool| given.then(|| "no highlight: those belong to the Whitted ray tracer".to_owned());
-    let spectra =
-        |all: &[&SpectrumOrTexture]| Export::either_shortfall(all, "grey in place of a spectrum").map(str::to_owned);
-    let schlick = |fresnel: Fresnel| {
-        (fresnel == Fresnel::Schlick).then(|| "Fresnel's equations in place of Schlick's approximation".to_owned())
-    };
-    let film = |given: bool| given.then(|| "no interference: Mitsuba has no thin films".to_owned());
-    match material {
-        Material::Diffuse(m) => joined([highlight(m.highlight.is_some()), spectra(&[&m.reflectance])]),
-        Material::Mirror(m) => {
-            let grey = Export::reflectance_shortfall(&[&m.reflectance], "a grey mirror");
-            joined([highlight(m.highlight.is_some()), grey.map(str::to_owned)])
-        }
-        Material::Conductor(m) => {
-            let index = match &m.index {
-                ConductorIndex::Metal(_) | ConductorIndex::File(_) => {
-                    Some("its index at every fifth nanometre".to_owned())
-                }
-                ConductorIndex::Written { eta, k } => {
-                    Export::constant_shortfall(&[eta, k], "grey indices in place of spectra")
-                }
-            };
-            let film = film(m.film.is_some());
-            joined([highlight(m.highlight.is_some()), schlick(m.fresnel), film, index, spectra(&[&m.tint])])
-        }
-        Material::Dielectric(m) => {
-            let said = |given: bool, what: &str| given.then(|| what.to_owned());
-            joined([
-                highlight(m.highlight.is_some()),
-                schlick(m.fresnel),
-                film(m.film.is_some()),
-                dispersive(&m.ior, &m.exterior_ior),
-                said(absorbs(m), "no absorption inside, which Mitsuba has in media only"),
-                said(m.priority.is_some(), "no priority: in Mitsuba bodies that overlap are wrong"),
-                spectra(&[&m.reflection_tint, &m.transmission_tint]),
-            ])
-        }
-        Material::ThinDielectric(m) => joined([
-            film(m.thickness_nm.is_some()),
-            dispersive(&m.ior, &m.exterior_ior),
-            spectra(&[&m.reflection_tint, &m.transmission_tint]),
-        ]),
-        Material::Plastic(m) => {
-            let few = m.roughness > 0.0 && m.diffuse_mean == DiffuseMean::Integral;
-            joined([
-                highlight(m.highlight.is_some()),
-                dispersive(&m.ior, &m.exterior_ior),
-                spectra(&[&m.reflectance, &m.tint]),
-                few.then(|| "the coat's mean over 64 cosines, which makes the base darker by up to 2 %".to_owned()),
-            ])
-        }
-        _ => None,
-    }
-}
-
 /// Whether the back of a material is like its front.
 fn both_sides(material: &Material) -> bool {
     match material {
@@ -284,6 +314,11 @@ fn dispersive(inside: &Index, outside: &Index) -> Option<String> {
     (!constant(inside) || !constant(outside)).then(|| {
         format!("the index at {D_LINE_NM} nm, {:.4} over {:.4}: Mitsuba has no dispersion", at_d(inside), at_d(outside))
     })
+}
+
+/// Whether both are one index to Mitsuba.
+fn alike(inside: &Index, outside: &Index) -> bool {
+    at_d(inside) as f32 == at_d(outside) as f32
 }
 
 /// Whether a body takes light away inside: by what is written, else by the file of its index.

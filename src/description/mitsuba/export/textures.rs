@@ -206,6 +206,19 @@ impl<'a> Export<'a> {
         matches!(self.scene.textures.get(texture), None | Some(Texture::Image(_)))
     }
 
+    /// Whether Mitsuba refuses to take the mean of it.
+    pub(super) fn lacks_mean(&self, colour: &SpectrumOrTexture) -> bool {
+        colour.name().is_some_and(|name| self.has_no_mean(name))
+    }
+
+    fn has_no_mean(&self, texture: &str) -> bool {
+        match self.scene.textures.get(texture) {
+            Some(Texture::Volume(_) | Texture::MeshAttribute(_)) => true,
+            Some(written) => written.inner().into_iter().any(|inner| self.has_no_mean(inner)),
+            None => false,
+        }
+    }
+
     /// Whether what it shows depends on how u and v run.
     pub(super) fn texture_follows_uv(&self, name: &str) -> bool {
         match self.scene.textures.get(name) {

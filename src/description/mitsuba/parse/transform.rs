@@ -14,11 +14,11 @@ pub(in crate::description::mitsuba) const ABOUT_ONE: f64 = 1e-3;
 /// Mitsuba's turn: Rodrigues' formula with the axis as it is written. Where that is not of length one it stretches too,
 /// and files that were made by looking at the picture mean what they showed. What was rounded is taken for a unit vector.
 fn turn(axis: DVec3, deg: f64) -> DMat4 {
-    let length = axis.length();
     let turned = rotation(axis, deg);
-    if (length - 1.0).abs() <= ABOUT_ONE {
+    if is_unit(axis) {
         return turned;
     }
+    let length = axis.length();
     // R = cos θ + sin θ [a]× + (1 − cos θ) a aᵀ of the unit vector a; of l a the second term has l, the third l².
     let along = axis / length;
     let outer = DMat3::from_cols(along * along.x, along * along.y, along * along.z);
@@ -27,6 +27,10 @@ fn turn(axis: DVec3, deg: f64) -> DMat4 {
     let skew = (turned - turned.transpose()) * 0.5;
     let stretched = DMat3::from_diagonal(DVec3::splat(cos)) + skew * length + outer * ((1.0 - cos) * length * length);
     DMat4::from_mat3(stretched)
+}
+
+fn is_unit(axis: DVec3) -> bool {
+    (axis.length() - 1.0).abs() <= ABOUT_ONE
 }
 
 impl Parser<'_> {
@@ -49,6 +53,14 @@ impl Parser<'_> {
                     let axis = DVec3::from(self.vector(step, 0.0)?);
                     if axis == DVec3::ZERO {
                         return Err(at("expected an axis other than 0, 0, 0 in <rotate>".to_owned()));
+                    }
+                    if !is_unit(axis) {
+                        let what = "as in Mitsuba, it stretches besides turning, and shapes but meshes may look otherwise than there";
+                        let message = format!(
+                            "expected an axis of length 1 in <rotate>, found one of {:.4}: {what}",
+                            axis.length()
+                        );
+                        self.sources.note(step.place, message);
                     }
                     turn(axis, self.number(attribute(step, "angle")?)?)
                 }

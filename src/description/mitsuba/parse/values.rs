@@ -7,6 +7,9 @@ use super::super::xml::{Attribute, Element};
 use super::text::{number, spectrum_value, tokens};
 use super::{InFile, Parameter, Parser, check_attributes};
 
+/// The most bytes that are filled in, so that parameters cannot multiply each other without end: 64 MiB.
+const MOST_FILLED: usize = 1 << 26;
+
 impl Parser<'_> {
     /// The value of an attribute with its parameters filled in.
     pub(super) fn text(&mut self, attribute: &Attribute) -> std::result::Result<String, Fault> {
@@ -46,6 +49,12 @@ impl Parser<'_> {
                 return Err(Fault::at_place(attribute.place, message));
             };
             text.push_str(&parameter.value);
+            self.filled.set(self.filled.get() + parameter.value.len());
+            if self.filled.get() > MOST_FILLED {
+                let message =
+                    format!("expected parameters of at most {MOST_FILLED} bytes in all their places, found more");
+                return Err(Fault::at_place(attribute.place, message));
+            }
             used.push(index);
             rest = &after[parameter.name.len()..];
         }
