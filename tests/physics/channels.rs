@@ -555,11 +555,8 @@ fn hidden_lights_shine_and_are_not_seen() {
 /// open, and what the camera sees is the inside.
 #[test]
 fn the_camera_sees_between_its_clipping_planes_only() {
-    // The same camera with another unit, which the planes do not follow.
-    const LARGE: &str =
-        "camera: {to_world: [[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, -2, 5], [0, 0, 0, 1]], orthographic_height: 2}\n";
-    let see = |camera: &str, integrator: &str, clip: &str| {
-        let camera = camera.replace("height: 2", &format!("height: 0.005, clip: {{{clip}}}"));
+    let see = |pose: &str, integrator: &str, clip: &str| {
+        let camera = format!("camera: {{{pose}, clip: {{{clip}}}}}\n");
         let frame = render(&format!(
             "{camera}image: {{width: 1, height: 1}}\nrender: {{samples: 4}}\nintegrator: {integrator}\n\
              lights: [{{constant: {{radiance: 1}}}}]\nlayers: [{{name: d, surface: depth}}]\n\
@@ -568,13 +565,15 @@ fn the_camera_sees_between_its_clipping_planes_only() {
         let Image { rgb, alpha, .. } = frame.resolve(&ColourSpace::Xyz.matrix_from_xyz());
         (f64::from(frame.layer(0)[0]), rgb[1][0], alpha[0])
     };
-    for (camera, integrator) in
-        [(PARALLEL, "path"), (PARALLEL, "{whitted: {}}"), (LARGE, "path"), (LARGE, "{whitted: {}}")]
-    {
+    const PLAIN: &str = "origin: [0, 0, 5], target: [0, 0, 0], orthographic_height: 0.01";
+    // The same camera with another unit, which the planes do not follow.
+    const LARGE: &str =
+        "to_world: [[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, -2, 5], [0, 0, 0, 1]], orthographic_height: 0.005";
+    for (pose, integrator) in [(PLAIN, "path"), (PLAIN, "{whitted: {}}"), (LARGE, "path"), (LARGE, "{whitted: {}}")] {
         // Half the picture is 5 mm wide: the sphere is at most 2.5e-5 m off there.
         for (clip, expected) in [("near: 0", 4.0), ("near: 3.5", 0.5), ("near: 4.5", 1.5), ("near: 4.5, far: 5.5", 0.0)]
         {
-            let (depth, light, alpha) = see(camera, integrator, clip);
+            let (depth, light, alpha) = see(pose, integrator, clip);
             assert!((depth - expected).abs() < 3e-5, "{integrator} {clip}: {depth}");
             // The sphere is black, and the sky behind it is not.
             assert_eq!(

@@ -257,24 +257,25 @@ impl Mesh {
     #[must_use]
     pub fn open_edges(&self) -> usize {
         let places = places(self);
-        let edges = |turned: bool| {
-            let around = self.triangles.iter().flat_map(|triangle| {
-                let [a, b, c] = triangle.map(|v| places[v as usize]);
-                [[a, b], [b, c], [c, a]]
-            });
-            let mut all: Vec<_> = around.filter(|[a, b]| a != b).collect();
-            if turned {
-                all.iter_mut().for_each(|edge| edge.reverse());
+        // Those that run to a place of a higher number, and those that run back.
+        let mut edges = [Vec::new(), Vec::new()];
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|v| places[v as usize] as u64);
+            for (from, to) in [(a, b), (b, c), (c, a)].into_iter().filter(|(from, to)| from != to) {
+                edges[usize::from(to < from)].push(from.min(to) << 32 | from.max(to));
             }
-            all.sort_unstable();
-            all
+        }
+        edges.iter_mut().for_each(|edges| edges.sort_unstable());
+        let without_partner = |edges: &[u64], others: &[u64]| {
+            let mut others = others.iter().peekable();
+            let alone = |edge: &&u64| {
+                while others.next_if(|other| other < edge).is_some() {}
+                others.next_if_eq(edge).is_none()
+            };
+            edges.iter().filter(alone).count()
         };
-        let (there, mut back) = (edges(false), edges(true).into_iter().peekable());
-        let alone = |edge: &&[usize; 2]| {
-            while back.next_if(|other| other < *edge).is_some() {}
-            back.next_if_eq(*edge).is_none()
-        };
-        there.iter().filter(alone).count()
+        let [there, back] = &edges;
+        without_partner(there, back) + without_partner(back, there)
     }
 
     /// Whether the volume that a closed mesh bounds, a sum over its triangles and any point, is negative beyond its rounding: its
