@@ -1,0 +1,152 @@
+//! Numbers that vary over a surface: roughness, weights, heights, normals.
+
+use super::{Grid, Interpolation, TexturePoint, same_cell};
+use crate::scene::mesh::attribute::AttributeTexture;
+use crate::scene::volume::Volume;
+use crate::spectrum::luminance::REC709_OF_MITSUBA;
+use glam::{DAffine2, DVec2, DVec3, Vec3};
+use std::sync::Arc;
+
+/// A number at every point of a surface, or three: data such as roughness, weight, height, normal.
+#[derive(Clone, Debug)]
+pub enum Scalar {
+    /// The same everywhere.
+    Uniform(f64),
+    /// A picture of numbers.
+    Image(DataImage),
+    /// As in [`Texture`].
+    Checkerboard {
+        /// Where the cells' parities agree.
+        a: Box<Scalar>,
+        /// Where they differ.
+        b: Box<Scalar>,
+        /// From u, v to periods.
+        uv: DAffine2,
+    },
+    /// What fills space, where the surface cuts it.
+    Volume(Volume),
+    /// Numbers of the mesh itself.
+    Attribute(Box<AttributeTexture>),
+}
+
+/// Three numbers a texel, row by row; all three are the same in a picture of one channel.
+#[derive(Clone, Debug)]
+pub enum Numbers {
+    /// As they are.
+    Floats(Arc<Vec<[f32; 3]>>),
+    /// Bytes, and what each stands for.
+    Bytes {
+        /// Three a texel.
+        bytes: Arc<Vec<u8>>,
+        /// By byte.
+        level: Box<[f32; 256]>,
+    },
+}
+
+impl Numbers {
+    /// The numbers of the texel at `index`.
+    #[must_use]
+    #[inline]
+    pub fn at(&self, index: usize) -> [f32; 3] {
+        match self {
+            Numbers::Floats(texels) => texels[index],
+            Numbers::Bytes { bytes, level } => {
+                let texel = &bytes[3 * index..3 * index + 3];
+                [0, 1, 2].map(|k| level[usize::from(texel[k])])
+            }
+        }
+    }
+}
+
+/// A picture whose texels are numbers.
+#[derive(Clone, Debug)]
+pub struct DataImage {
+    /// What they are.
+    pub texels: Numbers,
+    /// Where they lie.
+    pub grid: Grid,
+}
+
+impl Scalar {
+    /// As [`Texture::leaves`].
+    #[must_use]
+    pub fn leaves(&self) -> usize {
+        match self {
+            Scalar::Checkerboard { a, b, .. } => a.leaves() + b.leaves(),
+            _ => 1,
+        }
+    }
+
+    /// The number at a point; of three their mean by luminance (Rec. 709).
+    #[must_use]
+    #[inline]
+    pub fn eval(&self, at: &TexturePoint) -> f64 {
+        match self {
+            Scalar::Uniform(x) => *x,
+            // Most boards are of two numbers.
+            Scalar::Checkerboard { a, b, uv } => match &**(if same_cell(uv, at) { a } else { b }) {
+                Scalar::Uniform(x) => *x,
+                varying => varying.eval_varying(at),
+            },
+            _ => self.eval_varying(at),
+        }
+    }
+
+    #[inline(never)]
+    fn eval_varying(&self, at: &TexturePoint) -> f64 {
+        match self {
+            Scalar::Uniform(x) => *x,
+            Scalar::Image(image) => f64::from(image.grid.value(at.uv, |i| luminance(image.texels.at(i)))),
+            Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).eval(at),
+            Scalar::Volume(volume) => volume.scalar(at.point),
+            Scalar::Attribute(attribute) => f64::from(luminance(attribute.triple(at).as_vec3().to_array())),
+        }
+    }
+
+    /// The three numbers at a point.
+    #[must_use]
+    pub fn triple(&self, at: &TexturePoint) -> DVec3 {
+        match self {
+            Scalar::Uniform(x) => DVec3::splat(*x),
+            Scalar::Image(image) => image.grid.value(at.uv, |i| Vec3::from(image.texels.at(i))).as_dvec3(),
+            Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).triple(at),
+            Scalar::Volume(volume) => DVec3::splat(volume.scalar(at.point)),
+            Scalar::Attribute(attribute) => attribute.triple(at),
+        }
+    }
+
+    /// Its derivatives by u and v at a point; zero across the steps between cells and texels.
+    #[must_use]
+    pub fn gradient(&self, at: &TexturePoint) -> DVec2 {
+        match self {
+            // A volume knows nothing of u and v.
+            Scalar::Uniform(_) | Scalar::Volume(_) | Scalar::Attribute(_) => DVec2::ZERO,
+            Scalar::Image(DataImage { grid, .. }) if grid.interpolation == Interpolation::Nearest => DVec2::ZERO,
+            Scalar::Image(image) => {
+                let grid = &image.grid;
+                let (corner, w) = grid.corner(at.uv);
+                let [h00, h10, h01, h11] = grid.four(corner).map(|i| f64::from(luminance(image.texels.at(i))));
+                // Of the bilinear form, by columns and by rows; rows count downward.
+                let by_x = (h10 - h00) * (1.0 - w.y) + (h11 - h01) * w.y;
+                let by_y = (h01 - h00) * (1.0 - w.x) + (h11 - h10) * w.x;
+                let picture = DVec2::new(by_x * grid.width as f64, -by_y * grid.height as f64);
+                grid.uv.matrix2.transpose() * picture
+            }
+            Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).gradient(at),
+        }
+    }
+
+    /// True for anything but one number.
+    #[must_use]
+    pub fn varies(&self) -> bool {
+        !matches!(self, Scalar::Uniform(_))
+    }
+}
+
+fn luminance(rgb: [f32; 3]) -> f32 {
+    if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
+        return rgb[0];
+    }
+    let [r, g, b] = REC709_OF_MITSUBA.map(|weight| weight as f32);
+    r * rgb[0] + g * rgb[1] + b * rgb[2]
+}
