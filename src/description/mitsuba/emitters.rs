@@ -59,8 +59,8 @@ impl Import<'_> {
             "area" => {}
             "directionalarea" => fields.add("emission_direction", text(bag.object.place, "normal")),
             plugin if EMITTERS.contains(&plugin) => {
-                let message =
-                    format!("expected an emitter that a shape can be (area, directionalarea), found {}", quote(plugin));
+                let known = SHINING.join(", ");
+                let message = format!("expected an emitter that a shape can be ({known}), found {}", quote(plugin));
                 return Err(Fault::at_place(bag.object.plugin_place, message));
             }
             _ => return Err(bag.unknown(SHINING)),

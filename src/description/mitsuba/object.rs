@@ -142,9 +142,7 @@ pub(crate) struct Document {
     pub(crate) ids: std::collections::HashMap<String, usize>,
     /// Fields of the grammar that are set past everything else, in the order of the text.
     pub(crate) settings: Vec<Setting>,
-    /// Directories in which files are looked for, in order.
-    pub(crate) search: Vec<std::path::PathBuf>,
-    /// The same with the <path> of each file that is read.
+    /// Directories in which what a file names is looked for, in order, by source.
     pub(crate) searches: std::collections::HashMap<u32, Vec<std::path::PathBuf>>,
     /// Directory of each file that was read, by source.
     pub(crate) directories: std::collections::HashMap<u32, std::path::PathBuf>,
@@ -409,8 +407,8 @@ impl Document {
     /// As [`Document::find`], where there is such a file.
     pub(crate) fn look_for(&self, name: &str, source: u32) -> Option<String> {
         let own = self.directories.get(&source);
-        let search = self.searches.get(&source).unwrap_or(&self.search);
-        let found = search.iter().chain(own).map(|directory| directory.join(name)).find(|path| path.exists());
+        let search = self.searches.get(&source).into_iter().flatten();
+        let found = search.chain(own).map(|directory| directory.join(name)).find(|path| path.exists());
         found.map(|path| path.to_string_lossy().into_owned())
     }
 

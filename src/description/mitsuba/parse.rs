@@ -59,6 +59,7 @@ pub(crate) fn read(path: &Path, defines: &[Define], sources: &mut Sources) -> Re
         sources,
         budget: MAX_NODES,
         filled: Cell::new(0),
+        search: vec![path.parent().unwrap_or(Path::new("")).to_path_buf(), PathBuf::new()],
         parameters: Vec::new(),
         document: Document::default(),
         names: HashMap::new(),
@@ -74,8 +75,6 @@ pub(crate) fn read(path: &Path, defines: &[Define], sources: &mut Sources) -> Re
         }
         parser.parameters.push(Parameter { name: name.clone(), value: value.clone(), used: false });
     }
-    let home = path.parent().unwrap_or(Path::new("")).to_path_buf();
-    parser.document.search = vec![home, PathBuf::new()];
     let outcome = parser.file(path, None, None).and_then(|()| parser.resolve());
     if let Some(error) = parser.unreadable.take() {
         return Err(error);
@@ -116,6 +115,8 @@ struct Parser<'a> {
     budget: usize,
     /// Bytes of parameters that were filled in.
     filled: Cell<usize>,
+    /// Directories in which what the file that is being read names is looked for, in order.
+    search: Vec<PathBuf>,
     parameters: Vec<Parameter>,
     document: Document,
     /// Where each named property of each object is written.
@@ -173,7 +174,7 @@ impl Parser<'_> {
         let in_file = InFile { source, old: major_version(version)? < 2 };
 
         self.reading.push(canonical);
-        let around = self.document.search.clone();
+        let around = self.search.clone();
         let result = match parent {
             None if root.tag != "scene" => {
                 let found = quote(&root.tag);
@@ -197,7 +198,7 @@ impl Parser<'_> {
         };
         self.reading.pop();
         // Its <path> is no other file's.
-        let own = std::mem::replace(&mut self.document.search, around);
+        let own = std::mem::replace(&mut self.search, around);
         self.document.searches.insert(source, own);
         result
     }
@@ -424,7 +425,7 @@ impl Parser<'_> {
                     let message = format!("expected a directory, found none at {}", path.display());
                     return Err(Fault::at_place(written.place, message));
                 }
-                self.document.search.insert(0, path);
+                self.search.insert(0, path);
                 return Ok(());
             }
             "translate" | "rotate" | "scale" | "lookat" | "matrix" => {
@@ -473,7 +474,7 @@ impl Parser<'_> {
         if first.exists() {
             return first;
         }
-        let found = self.document.search.iter().map(|directory| directory.join(name)).find(|path| path.exists());
+        let found = self.search.iter().map(|directory| directory.join(name)).find(|path| path.exists());
         found.unwrap_or(first)
     }
 

@@ -69,7 +69,7 @@ impl Export<'_> {
                     dispersive(&m.ior, &m.exterior_ior),
                     said(absorbs(m), "no absorption inside, which Mitsuba has in media only"),
                     said(m.priority.is_some(), "no priority: in Mitsuba bodies that overlap are wrong"),
-                    barely(m.roughness != Roughness::Number(0.0), &m.ior, &m.exterior_ior),
+                    barely(is_rough(&m.roughness), &m.ior, &m.exterior_ior),
                     spectra(&[&m.reflection_tint, &m.transmission_tint]),
                 ])
             }
@@ -230,7 +230,7 @@ impl Export<'_> {
 
     fn dielectric(&mut self, m: &Dielectric, attributes: &Attributes) {
         self.open_owned("bsdf", attributes);
-        self.indices(&m.ior, &m.exterior_ior, m.roughness != Roughness::Number(0.0));
+        self.indices(&m.ior, &m.exterior_ior, is_rough(&m.roughness));
         self.tints(&m.reflection_tint, &m.transmission_tint);
         self.roughness(&m.roughness, m.distribution);
     }
@@ -306,7 +306,11 @@ fn both_sides(material: &Material) -> bool {
 }
 
 fn plugin(smooth: &'static str, rough: &'static str, roughness: &Roughness) -> &'static str {
-    if *roughness == Roughness::Number(0.0) { smooth } else { rough }
+    if is_rough(roughness) { rough } else { smooth }
+}
+
+fn is_rough(roughness: &Roughness) -> bool {
+    *roughness != Roughness::Number(0.0)
 }
 
 fn dispersive(inside: &Index, outside: &Index) -> Option<String> {
