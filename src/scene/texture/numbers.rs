@@ -14,7 +14,7 @@ pub enum Scalar {
     Uniform(f64),
     /// A picture of numbers.
     Image(DataImage),
-    /// As in [`Texture`].
+    /// As in [`super::Texture`].
     Checkerboard {
         /// Where the cells' parities agree.
         a: Box<Scalar>,
@@ -68,7 +68,7 @@ pub struct DataImage {
 }
 
 impl Scalar {
-    /// As [`Texture::leaves`].
+    /// As [`super::Texture::leaves`].
     #[must_use]
     pub fn leaves(&self) -> usize {
         match self {
