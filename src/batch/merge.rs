@@ -58,8 +58,10 @@ pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Re
     let out = opened.iter().find_map(|(_, part)| Some(picture(out, &part.as_ref().ok()?.header.finish)));
     let out = out.unwrap_or_default();
     // What an earlier merge has written among its parts is none.
-    let earlier = out.canonicalize().ok();
-    let is_earlier = |path: &PathBuf| earlier.is_some() && path.canonicalize().ok() == earlier && !paths.contains(path);
+    let earlier: Vec<PathBuf> =
+        finish::places(&out).into_iter().filter_map(|place| place.canonicalize().ok()).collect();
+    let is_earlier =
+        |path: &PathBuf| path.canonicalize().is_ok_and(|path| earlier.contains(&path)) && !paths.contains(path);
     opened.retain(|(path, part)| part.is_ok() || !is_earlier(path));
     let parts: Vec<Written> = opened.into_iter().map(|(_, part)| part).collect::<Result<_>>()?;
     let Some(first) = parts.first() else {

@@ -202,7 +202,7 @@ fn check_cut(scene: &SceneDescription, cut: Cut, adaptive: bool) -> std::result:
         return Err(format!("--tiles {}: expected at most {rows}, the rows{cells} of the picture", cut.tiles));
     }
     let samples = match &scene.integrator {
-        description::Integrator::Whitted(whitted) => whitted.grid.saturating_mul(whitted.grid),
+        description::Integrator::Whitted(whitted) => whitted.samples(),
         _ => scene.render.most_samples(),
     };
     if cut.ranges > samples {

@@ -101,12 +101,20 @@ fn render(job: &Job) -> String {
         command += " ";
         command += &word(argument);
     }
-    let parts = if job.cut.parts() {
-        "what+=(--tile \"$tile\" --samples \"$samples\")\n\
-         place=\"$pictures/parts/$scene\"\n\
-         [ \"$frames\" = - ] || place=\"$place/{frame}\"\n"
-    } else {
-        "place=\"$pictures\"\n"
+    // Where samples are shared out by noise a picture has no ranges of them, not even one.
+    let part = match (job.cut.tiles > 1, job.cut.ranges > 1) {
+        (true, true) => "--tile \"$tile\" --samples \"$samples\"",
+        (true, false) => "--tile \"$tile\"",
+        (false, true) => "--samples \"$samples\"",
+        (false, false) => "",
+    };
+    let parts = match part {
+        "" => "place=\"$pictures\"\n".to_owned(),
+        part => format!(
+            "what+=({part})\n\
+             place=\"$pictures/parts/$scene\"\n\
+             [ \"$frames\" = - ] || place=\"$place/{{frame}}\"\n"
+        ),
     };
     head(job, "render", &directives)
         + &format!(
@@ -192,6 +200,9 @@ mod tests {
             let done = std::process::Command::new("bash").args(["-n", "-c", &file.text]).output().unwrap();
             assert!(done.status.success(), "{}: {}", file.name, String::from_utf8_lossy(&done.stderr));
         }
+        // Ranges of samples are named where there are several: adaptive sampling knows none.
+        let tiles = render(&job(Cut { tiles: 2, ranges: 1, frames: 1 }));
+        assert!(tiles.contains("what+=(--tile \"$tile\")\n") && !tiles.contains("--samples"), "{tiles}");
         // A name may begin like an option.
         assert!(render(&job(Cut { tiles: 1, ranges: 1, frames: 1 })).contains(" --scene=\"$scene\" "));
         assert_eq!(word("it's"), "'it'\\''s'");
