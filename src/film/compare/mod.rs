@@ -522,6 +522,26 @@ pub(super) mod tests {
         assert_eq!(bad.pixel_test.unwrap().pixels_rejected, 40);
     }
 
+    /// Errors of one picture alone, whose pixels err alike: a mean of 25 times the variance has five times the deviation, which the
+    /// file says of itself, whichever of the two it is.
+    #[test]
+    fn what_the_one_noisy_picture_says_of_its_errors_holds_in_either_order() {
+        let mut noisy = render(3, 1.0, 0.3, 1.0);
+        let reference = without_errors(render(4, 1.0, 0.003, 1.0));
+        let alone = compare(&noisy, &reference, &CompareOptions::default()).channels[0].global_z;
+        noisy.parts[0].texts.push(("abbe/sharedErrors".into(), "25".into()));
+        noisy.parts[0].texts.push(("abbe/samples".into(), "4".into()));
+        let one = compare(&noisy, &reference, &CompareOptions::default());
+        let other = compare(&reference, &noisy, &CompareOptions::default());
+        assert_eq!(one.noise, Some(NoiseSource::OneStandardError));
+        assert!((one.channels[0].global_z - alone / 5.0).abs() < 1e-9, "{} {alone}", one.channels[0].global_z);
+        for (a, b) in one.channels.iter().zip(&other.channels) {
+            assert!((a.global_z + b.global_z).abs() < 1e-9, "{}: {} {}", a.name, a.global_z, b.global_z);
+            assert_eq!(a.global_dof, b.global_dof);
+        }
+        assert_eq!(one.pixel_test.map(|test| test.accepted), other.pixel_test.map(|test| test.accepted));
+    }
+
     #[test]
     fn a_picture_is_the_same_as_itself_and_as_its_half() {
         let a = render(5, 1.0, 0.3, 1.0);

@@ -43,10 +43,8 @@ const FEW: u32 = 16;
 const AROUND: usize = 2;
 
 pub(super) enum Noise<'a> {
-    /// Standard errors of A and B.
-    Errors(&'a [f32], &'a [f32]),
-    /// Standard errors of one of them.
-    OneError(&'a [f32]),
+    /// Standard errors of A and B, or of one of them: the other is then held to be without noise.
+    Errors([Option<&'a [f32]>; 2]),
     /// Variance of a sample of A, and the samples a pixel.
     Sample(&'a [f32], f64),
     Unknown,
@@ -55,8 +53,8 @@ pub(super) enum Noise<'a> {
 impl Noise<'_> {
     pub fn source(&self) -> NoiseSource {
         match self {
-            Noise::Errors(..) => NoiseSource::StandardErrors,
-            Noise::OneError(_) => NoiseSource::OneStandardError,
+            Noise::Errors([Some(_), Some(_)]) => NoiseSource::StandardErrors,
+            Noise::Errors(_) => NoiseSource::OneStandardError,
             Noise::Sample(..) => NoiseSource::SampleVariance,
             Noise::Unknown => NoiseSource::Differences,
         }
@@ -106,9 +104,8 @@ impl<'a> Pair<'a> {
             [0, 1].map(|k| errors[k].filter(|_| is_few(k)).map(|errors| variances_about(errors, width as usize)));
         let noise = match (variance, errors) {
             (Some((plane, samples)), _) => Noise::Sample(plane, f64::from(samples)),
-            (None, [Some(a), Some(b)]) => Noise::Errors(a, b),
-            (None, [Some(one), None] | [None, Some(one)]) => Noise::OneError(one),
             (None, [None, None]) => Noise::Unknown,
+            (None, errors) => Noise::Errors(errors),
         };
         let is_half = |samples| match samples {
             Samples::Float(values) => values.iter().all(|&v| v.is_nan() || f16::from_f32(v).to_f32() == v),
@@ -146,8 +143,10 @@ impl<'a> Pair<'a> {
             .sum();
         let dof = self.known.map(|known| known.dof);
         let variance = match self.noise {
-            Noise::Errors(a, b) => Variance { estimated: [square(a[i]), square(b[i])], dof, known: rounding },
-            Noise::OneError(one) => Variance { estimated: [square(one[i]), 0.0], dof, known: rounding },
+            Noise::Errors(errors) => {
+                let estimated = errors.map(|plane| plane.map_or(0.0, |errors| square(errors[i])));
+                Variance { estimated, dof, known: rounding }
+            }
             Noise::Sample(plane, samples) => {
                 let per_sample = f64::from(plane[i]).max(VARIANCE_FLOOR);
                 Variance { estimated: [0.0; 2], dof, known: per_sample / samples }
@@ -160,13 +159,8 @@ impl<'a> Pair<'a> {
     /// The difference of a pixel in standard errors, and their degrees of freedom.
     pub fn score(&self, i: usize) -> Option<(f64, f64)> {
         let mut variance = self.variance(i)?;
-        // The one standard error that there is stands for A's.
-        let about = match self.noise {
-            Noise::OneError(_) => [self.about[0].as_ref().or(self.about[1].as_ref()), None],
-            _ => self.about.each_ref().map(Option::as_ref),
-        };
-        for (estimated, about) in variance.estimated.iter_mut().zip(about) {
-            *estimated = about.map_or(*estimated, |about| estimated.max(about[i]));
+        for (estimated, about) in variance.estimated.iter_mut().zip(&self.about) {
+            *estimated = about.as_ref().map_or(*estimated, |about| estimated.max(about[i]));
         }
         Some((score(self.difference(i), variance.total()), variance.dof()))
     }
