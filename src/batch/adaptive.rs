@@ -58,8 +58,8 @@ const MOST: f64 = 64.0;
 /// Shares are powers of 2 to a whole number of these.
 const STEPS: f64 = 16.0;
 
-/// What a sample costs besides its vertices, in rays: its own ray, its random numbers, the film.
-const OVERHEAD: u32 = 2;
+/// What a sample costs besides its rays, in rays: its random numbers, the film.
+const OVERHEAD: f64 = 1.0;
 
 /// Of so many cells one is tried where that has to be done with all of its pixels, and so many in all if there are as many.
 const ONE_OF: usize = 16;
@@ -283,7 +283,7 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
         }
         let [x, y] = grid.corner(cell);
         let mut tried = Tried::default();
-        let mut rays = 0;
+        let mut rays = 0.0;
         for quarter in 0..4u32 {
             // Which pixel of a quarter is a matter of chance, lest a pattern of the picture agree with it.
             let draw = mix64(seed ^ mix64((cell as u64) << 2 | u64::from(quarter)));
@@ -295,8 +295,8 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
             let mut means = [[0.0; 3]; REPLICATES];
             for (replicate, mean) in means.iter_mut().enumerate() {
                 for index in 0..each {
-                    let (sample, events) = transport::sample(&shot, place.map(|x| x as u32), replicate as u32, index);
-                    rays += u64::from(OVERHEAD + 2 * events);
+                    let (sample, work) = transport::sample(&shot, place.map(|x| x as u32), replicate as u32, index);
+                    rays += OVERHEAD + work.rays;
                     if Invalid::of(sample.radiance).is_none() {
                         let rgb = ColourSpace::Rec709.from_xyz(sample.xyz.map(|x| x * unit * sample.weight));
                         for (sum, x) in mean.iter_mut().zip(rgb) {
@@ -307,7 +307,7 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
             }
             tried.pixels.push(means);
         }
-        tried.cost = rays as f64 / (tried.pixels.len() as f64 * f64::from(first)).max(1.0);
+        tried.cost = rays / (tried.pixels.len() as f64 * f64::from(first)).max(1.0);
         Some(tried)
     };
     let tried: Option<Vec<Tried>> = (0..grid.cells()).into_par_iter().map(of_cell).collect();

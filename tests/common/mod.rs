@@ -250,10 +250,10 @@ impl Bench {
 
     /// How many events the path of that sample had.
     pub fn events(&self, pixel: [u32; 2], index: u32) -> u32 {
-        self.traced(pixel, index).1
+        self.traced(pixel, index).1.events
     }
 
-    fn traced(&self, pixel: [u32; 2], index: u32) -> (transport::PixelSample, u32) {
+    fn traced(&self, pixel: [u32; 2], index: u32) -> (transport::PixelSample, transport::Work) {
         let Prepared { scene, plan, .. } = &self.prepared;
         let filter = self.prepared.sampler().unwrap();
         let replicates = REPLICATES as u32;

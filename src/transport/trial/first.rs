@@ -23,6 +23,10 @@ const GROUPS: (f64, f64) = (9.0, 256.0);
 const WORTH_IT: f64 = 0.9;
 /// How many shadow rays are tried beside one. What others cost and gain follows.
 const PROBED: u32 = 4;
+/// The share of the variance that further shadow rays are believed to take away at the most. The trial tells it to ± 0.25, and where
+/// rare bright paths make a part of the noise it sees none of them. Over 42 scenes and ten seeds what it chooses takes 1.05 times
+/// the time to an error that the best number would, in place of 1.09 where all is believed.
+const BELIEVED: f64 = 0.7;
 
 /// What first vertices do.
 #[derive(Clone, Debug)]
@@ -159,10 +163,10 @@ impl Way {
         let several = try_out(PROBED);
         // V = a + b n^-1.5 and C = c + d (n − 1) of n rays, over those of one ray: what evenly spread rays find at the edge of a
         // shadow varies so.
-        let fall = |n: u32| 1.0 - f64::from(n).powf(-1.5);
-        let b = (1.0 - variance(&several) / variance_of_one) / fall(PROBED);
+        let fall = |n: u32| 1.0 - 1.0 / (f64::from(n) * f64::from(n).sqrt());
+        let b = ((1.0 - variance(&several) / variance_of_one) / fall(PROBED)).min(BELIEVED);
         let d = (several.rays / one.rays - 1.0) / f64::from(PROBED - 1);
-        let ratio = |n: u32| (1.0 - b.min(1.0) * fall(n)) * (1.0 + d * f64::from(n - 1));
+        let ratio = |n: u32| (1.0 - b * fall(n)) * (1.0 + d * f64::from(n - 1));
         let best = counts().skip(1).min_by(|a, b| ratio(*a).total_cmp(&ratio(*b))).unwrap_or(1);
         let least = ratio(best);
         match judge(least, WORTH_IT).0 {
