@@ -312,7 +312,8 @@ pub fn write(
     report: &mut SceneReport,
 ) -> Result<()> {
     let (counted, dropped) = frame.film.samples();
-    let sound = frame::check_invalid(&frame.invalid(), counted + dropped).and(target);
+    let paths: u64 = frame.splats.iter().flat_map(|splats| splats.paths).sum();
+    let sound = frame::check_invalid(&frame.invalid(), counted + dropped + paths).and(target);
     report.fault = sound.as_ref().err().map(ToString::to_string);
     let mut image = frame.resolve(&finish.rgb_from_xyz());
     if !finish.is_random() {

@@ -383,7 +383,7 @@ fn told(
     }
 }
 
-/// An error where too many samples were invalid to trust the picture.
+/// An error where too many of the `samples`, among which paths from the lights are counted, were invalid to trust the picture.
 ///
 /// # Errors
 /// [`Error::Render`] with the counts by cause.

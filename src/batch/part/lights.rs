@@ -2,7 +2,7 @@
 
 use super::{Breaks, Part};
 use crate::batch::frame::{FrameJob, light_unit, lock};
-use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES};
+use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT};
 use crate::film::resolve::Splats;
 use crate::spectrum::SampledWavelengths;
 use crate::transport;
@@ -35,6 +35,8 @@ impl SplatFilm {
 
 /// Paths of one work unit from the lights: some milliseconds, so that threads end together where a sample has few.
 pub(super) const PATHS_OF_A_UNIT: u64 = 1 << 10;
+/// Shares of pixels that are gathered, some MB of them, before they are added to the picture: a wide filter deals light to thousands.
+const AT_ONCE: usize = 1 << 16;
 
 /// Which paths of the share have been added.
 #[derive(Clone, Debug, Default)]
@@ -94,9 +96,14 @@ impl Part<'_> {
                         landed.add(self.job, wavelengths, &splat);
                     }
                 });
+                if landed.pixels.len() >= AT_ONCE {
+                    landed.move_to(&mut lock(splats), replicate);
+                }
             }
             if add {
-                landed.add_to(&mut lock(splats), replicate, unit.end - unit.start);
+                let mut splats = lock(splats);
+                landed.move_to(&mut splats, replicate);
+                splats.paths[replicate as usize] += unit.end - unit.start;
             }
             (left, Some((unit, sample, add)))
         };
@@ -183,7 +190,7 @@ pub(super) fn paths_of_a_sample(job: &FrameJob, light_paths: &LightPaths) -> u64
     light_paths.caustics.map_or(width * height, |c| c.paths(width * height))
 }
 
-/// What the paths of one unit left on the picture.
+/// What paths of one unit left on the picture since it was last added there.
 #[derive(Default)]
 struct Landed {
     pixels: Vec<([i32; 2], [f32; 3])>,
@@ -206,6 +213,11 @@ impl Landed {
         let unit = light_unit(scene);
         let light = splat.xyz(wavelengths);
         let xyz = light.map(|x| x * unit);
+        // Told once, however many pixels it is dealt to.
+        if xyz.iter().any(|x| x.abs() >= SAMPLE_LIMIT) {
+            self.invalid.record(Invalid::Overflow);
+            return;
+        }
         let mut numbers = Vec::new();
         plan.layers.append_traced(scene, wavelengths, splat.light, light, splat.group, &mut numbers);
         filter.deal(splat.place, window, |pixel, share| {
@@ -214,9 +226,9 @@ impl Landed {
         });
     }
 
-    fn add_to(&self, splats: &mut SplatFilm, replicate: u32, paths: u64) {
-        splats.paths[replicate as usize] += paths;
-        splats.film.invalid += self.invalid;
+    /// Adds all to `splats`, and is empty.
+    fn move_to(&mut self, splats: &mut SplatFilm, replicate: u32) {
+        splats.film.invalid += std::mem::take(&mut self.invalid);
         let channels = splats.film.layers.channels();
         let window = splats.film.window();
         for (i, &(pixel, xyz)) in self.pixels.iter().enumerate() {
@@ -225,6 +237,8 @@ impl Landed {
                 splats.film.layers.add(index, replicate as usize, 1.0, &self.numbers[i * channels..(i + 1) * channels]);
             }
         }
+        self.pixels.clear();
+        self.numbers.clear();
     }
 }
 
