@@ -3,7 +3,7 @@
 //! An *effect* is something that is simulated (dispersion, a medium, a texture). A scene that lacks
 //! it does not pay for it, and leaving it out never changes a bit: `effects: all` turns everything
 //! on and is the proof. A *technique* is how an effect is computed; it changes noise and time,
-//! never the mean.
+//! never the mean, but for merging, which blurs, less with every sample.
 
 use super::Spread;
 use super::caustics::Caustics;
@@ -149,8 +149,6 @@ pub struct Effect {
 pub struct EffectPlan {
     /// Which light transport.
     pub integrator: Integrator,
-    /// Indices that depend on wavelength.
-    pub dispersion: bool,
     /// Sampling decisions that depend on wavelength: densities are kept for each lane.
     pub chromatic: bool,
     /// Media.
@@ -240,7 +238,6 @@ impl EffectPlan {
     #[must_use]
     pub fn of(census: &Census, integrator: Integrator, mode: EffectMode) -> EffectPlan {
         let path = !matches!(integrator, Integrator::Whitted(_));
-        let from_camera = !matches!(integrator, Integrator::Light(_));
         let mut effects: Vec<Effect> = Vec::new();
         // An effect of the scene: on if the scene has it, or if everything is forced on.
         let mut effect = |name: &'static str, present: bool, here: String, absent: &str| {
@@ -257,7 +254,7 @@ impl EffectPlan {
 
         let bent = census.dispersive.iter().chain(&census.rough_dispersive);
         let dispersive: Vec<String> = bent.chain(&census.coloured_coats).cloned().collect();
-        let dispersion = effect(
+        effect(
             "dispersion",
             !dispersive.is_empty(),
             format!("index depends on wavelength: {}", some_of(&dispersive)),
@@ -335,21 +332,23 @@ impl EffectPlan {
             "the lens has a radius".into(),
             if path { "the camera is a pinhole" } else { "whitted uses a pinhole" },
         );
-        effect(
-            "indirect light",
-            path,
-            "path follows light over every surface".into(),
-            "whitted knows light of mirrors and glass only, and an ambient term",
-        );
+        let (follows, absent) = match &integrator {
+            Integrator::Path(_) => ("path follows light over every surface", None),
+            Integrator::Light(_) => ("light_tracer follows light over every surface", None),
+            Integrator::Whitted(_) => ("", Some("whitted knows light of mirrors and glass only, and an ambient term")),
+            Integrator::Depth => ("", Some("depth looks for no light")),
+            Integrator::Nothing => ("", Some("none looks for no light")),
+        };
+        effect("indirect light", absent.is_none(), follows.into(), absent.unwrap_or_default());
         // Not an effect but a consequence; forced on with the effects that call for it.
         let bends = !(census.dispersive.is_empty() && census.rough_dispersive.is_empty());
         let chromatic = bends || census.chromatic_media > 0 || mode == EffectMode::All;
-        let techniques = if path && from_camera { path_techniques(census, chromatic) } else { Vec::new() };
+        let techniques =
+            if matches!(integrator, Integrator::Path(_)) { path_techniques(census, chromatic) } else { Vec::new() };
         let shows_light = matches!(integrator, Integrator::Path(_) | Integrator::Light(_));
         EffectPlan {
             lit: census.lights() > 0 || census.fog || !shows_light,
             integrator,
-            dispersion,
             chromatic,
             media,
             nested,
