@@ -3,7 +3,7 @@
 use crate::description::{self, LayerContent, MaterialRef, SceneDescription, Shape};
 use crate::film::cryptomatte::Matte;
 use crate::scene::Scene;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// The mattes that are asked for, with the names of what the scene's objects are part of.
 pub(super) fn mattes(description: &SceneDescription, scene: &Scene) -> Vec<Matte> {
@@ -18,20 +18,26 @@ pub(super) fn mattes(description: &SceneDescription, scene: &Scene) -> Vec<Matte
             description::Matte::Object => scene.objects.iter().map(|object| object.name.clone()).collect(),
             description::Matte::Material => scene.material_names.clone(),
             description::Matte::Asset => {
+                let assets = assets(description);
                 let shapes = description.shapes.iter().map(Some).chain(std::iter::repeat(None));
                 let objects = scene.objects.iter().zip(shapes);
-                objects.map(|(object, shape)| asset(description, &object.name, shape).0.to_owned()).collect()
+                objects.map(|(object, shape)| asset(&assets, &object.name, shape).0.to_owned()).collect()
             }
         },
     };
     wanted.map(matte).collect()
 }
 
-/// What the object `name` is part of, and what that is: an asset, else the group that its `shape` copies, else itself.
-fn asset<'a>(description: &'a SceneDescription, name: &'a str, shape: Option<&'a Shape>) -> (&'a str, &'static str) {
-    let named = description.assets.iter().find(|(_, shapes)| shapes.iter().any(|shape| shape == name));
-    match (named, shape.and_then(|shape| shape.geometry.group())) {
-        (Some((asset, _)), _) => (asset, "an asset"),
+/// The asset of each shape that is named as part of one.
+fn assets(description: &SceneDescription) -> HashMap<&str, &str> {
+    let named = description.assets.iter();
+    named.flat_map(|(asset, shapes)| shapes.iter().map(move |shape| (shape.as_str(), asset.as_str()))).collect()
+}
+
+/// What the object `name` is part of, and what that is: one of the `assets`, else the group that its `shape` copies, else itself.
+fn asset<'a>(assets: &HashMap<&str, &'a str>, name: &'a str, shape: Option<&'a Shape>) -> (&'a str, &'static str) {
+    match (assets.get(name), shape.and_then(|shape| shape.geometry.group())) {
+        (Some(asset), _) => (asset, "an asset"),
         (None, Some(group)) => (group, "a group"),
         (None, None) => (name, "a shape"),
     }
@@ -64,8 +70,9 @@ pub(super) fn shared_names(description: &SceneDescription) -> Vec<String> {
                 }
             }
             description::Matte::Asset => {
+                let assets = assets(description);
                 for (shape, name) in named() {
-                    let (asset, what) = asset(description, &name, Some(shape));
+                    let (asset, what) = asset(&assets, &name, Some(shape));
                     means(asset, what);
                 }
             }
