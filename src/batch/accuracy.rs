@@ -303,7 +303,7 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
             2 => apart,
             _ => 0.5 * apart,
         };
-        (value * tally.seconds(), (error / value).hypot(time))
+        (value * tally.seconds(), libm::hypot(error / value, time))
     };
     let ((own, own_error), (cost, error)) = (cost(chosen), cost(tally));
     let mut row = Row {
@@ -317,7 +317,7 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
         bias_squared: tally.bias_squared(reference),
         light: tally.light(reference),
         efficiency: match own / cost {
-            value if value.is_finite() => Figure { value, error: value * own_error.hypot(error) },
+            value if value.is_finite() => Figure { value, error: value * libm::hypot(own_error, error) },
             // Without noise: nothing to weigh.
             _ => Figure { value: f64::INFINITY, error: 0.0 },
         },
@@ -367,7 +367,7 @@ impl Row {
     #[must_use]
     fn finds_as(&self, other: &Row) -> bool {
         let near = |a: &Figure, b: &Figure, least: f64| {
-            (a.value - b.value).abs() <= (SIGNIFICANT * a.error.hypot(b.error)).max(least)
+            (a.value - b.value).abs() <= (SIGNIFICANT * libm::hypot(a.error, b.error)).max(least)
         };
         near(&self.bias_squared, &other.bias_squared, ROUNDING.max(2.0 * SHIFT * other.bias_squared.value))
             && self.light.iter().zip(&other.light).all(|(a, b)| near(a, b, SHIFT))

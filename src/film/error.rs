@@ -332,7 +332,7 @@ pub fn relative_error(
     let trace = all.own + shared.max((overlap - 1.0) * all.splatted).max(0.0);
     let share = if all.error == 0.0 { 0.0 } else { all.further / all.error };
     let next = NEXT_ORDER * share * share * all.error;
-    let half = student_t_half_width(0.95, EFFECTIVE_PIXELS) * (8.0 / 3.0 * trace).sqrt().hypot(next) / n;
+    let half = student_t_half_width(0.95, EFFECTIVE_PIXELS) * libm::hypot((8.0 / 3.0 * trace).sqrt(), next) / n;
     // Of a sum of squares: symmetric in its logarithm, for few squares make it more skewed than a normal number.
     let stretch = if rel_mse > 0.0 { libm::exp((0.5 * half / rel_mse).min(WIDEST)) } else { 1.0 };
     let effective = if all.squares > 0.0 { all.error * all.error / all.squares } else { n };

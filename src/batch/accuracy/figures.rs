@@ -226,7 +226,7 @@ impl Tally {
             let [own, truth] = [self.light.as_slice(), &truth].map(|all| all.iter().map(|m| m[c]).collect::<Moments>());
             let value = own.mean / truth.mean;
             let relative = |m: &Moments| wide(m) / m.mean;
-            Figure { value, error: value * relative(&own).hypot(relative(&truth)) }
+            Figure { value, error: value * libm::hypot(relative(&own), relative(&truth)) }
         })
     }
 }

@@ -257,7 +257,7 @@ pub(super) fn field_of_view(bag: &Bag<'_>) -> Result<(f64, &'static str), Fault>
                 let message = format!("expected millimetres such as \"50mm\", found {}", quote(written));
                 bag.fault_of("focal_length", message)
             })?;
-            let diagonal = FILM_35_MM[0].hypot(FILM_35_MM[1]);
+            let diagonal = libm::hypot(FILM_35_MM[0], FILM_35_MM[1]);
             Ok((2.0 * libm::atan(0.5 * diagonal / millimetres).to_degrees(), "diagonal"))
         }
     }
