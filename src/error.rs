@@ -78,6 +78,14 @@ impl Error {
         Error::Input { path: path.to_path_buf(), message: one_line(message.into()) }
     }
 
+    /// An [`Error::Input`] of a file that could not be opened or read, and why.
+    pub fn unread(path: &Path, why: &std::io::Error) -> Error {
+        match why.kind() {
+            std::io::ErrorKind::NotFound => Error::input(path, "there is no such file"),
+            _ => Error::input(path, why.to_string()),
+        }
+    }
+
     /// An [`Error::Output`] about `path`.
     pub fn output(path: &Path, message: impl ToString) -> Error {
         Error::Output { path: path.to_path_buf(), message: message.to_string() }

@@ -10,7 +10,7 @@
 //!  scene/                        compiled, immutable, Send + Sync; what rays meet
 //!  optics/  film/  description/  light at one point | samples to files | what a person wrote
 //!  spectrum/                     wavelengths, spectra, observer, refractive indices
-//!  math/  error.rs  input.rs     frames, rays, warps, statistics | the one error enum | files that are read
+//!  math/  error.rs  input.rs     rays, frames, warps, random numbers, statistics | the one error enum | files that are read
 //! ```
 pub mod batch;
 pub mod cli;

@@ -133,7 +133,7 @@ pub struct SceneReport {
     pub frame: Option<i32>,
     /// How it ended; what is said of one that was there already, its header says.
     pub status: Status,
-    /// `path` or `whitted`.
+    /// As the scene names it: `path`, `whitted`, `light_tracer`, `depth` or `none`.
     pub integrator: String,
     /// Width and height in pixels.
     pub resolution: [u32; 2],

@@ -4,7 +4,7 @@
 //! A layer is a number a sample. Numbers are added exactly, as in [`accumulate`](super::accumulate), in one sum a
 //! pixel and channel and one count a pixel; a picture without layers has neither. Where standard errors are wanted or
 //! samples are shared out by noise, a pixel has a sum and a count for each replicate. What cannot be added is left out of
-//! all layers of its pixel and counted by cause; colour does not hear of it.
+//! its own channel and counted by cause; colour does not hear of it.
 
 use super::Window;
 use super::accumulate::{ALPHA_QUANTUM, Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum};

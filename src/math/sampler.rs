@@ -23,7 +23,8 @@ pub enum Set {
     Scatter(u32),
     /// At vertex `.0`: choice of light, choice of lobe, Russian roulette, free flight.
     Choice(u32),
-    /// At vertex `.0`: further numbers of the medium or of a light with volume.
+    /// At vertex `.0`, and there at each surface that the path has gone straight through (in the upper half of `.0`): free flight
+    /// beyond it, whether it goes straight on, which part of a compound it meets; one spare.
     Extra(u32),
     /// At vertex `.0`, where it sends several shadow rays: light point u, v, choice of light; one spare.
     Shadows(u32),
@@ -498,7 +499,8 @@ mod tests {
                 sets.iter().flat_map(|set| sampler.set(*set)).map(|x| x - 0.5).collect()
             })
             .collect();
-        for a in 0..20 {
+        assert_eq!(samples[0].len(), 24);
+        for a in 0..24 {
             for b in 0..a {
                 let r = samples.iter().map(|x| x[a] * x[b]).sum::<f64>() * 12.0 / f64::from(n);
                 assert!(r.abs() < 4.5 / f64::from(n).sqrt(), "{b} and {a}: {r}");

@@ -18,7 +18,7 @@ use crate::film::filter::FilterSampler;
 use crate::scene::Scene;
 use crate::scene::casters::{self, Casters};
 use crate::scene::light::Light;
-use crate::transport::layers::Source as Channel;
+use crate::transport::layers;
 use aims::is_small;
 use camera::from_camera;
 use glam::DVec2;
@@ -157,7 +157,7 @@ pub fn decide(
             return left_off("lamps are hidden up to the first pane only");
         }
     }
-    if plan.layers.layers.iter().any(|layer| matches!(layer.source, Channel::Light(..))) {
+    if plan.layers.layers.iter().any(|layer| matches!(layer.source, layers::Source::Light(..))) {
         return left_off("layers of light are measured path by path from the camera");
     }
     let wanted = |light: &Light| settings.delta_caustics || light.may_be_met();

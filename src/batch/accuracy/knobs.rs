@@ -136,8 +136,11 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
     all.push(Trial { way: Way::Independent, ..trial("sampler", "independent", &[]) });
     for value in [1, 5, 1000] {
         if value != path.roulette_depth {
-            let text = if value == 1000 { "from 1000".to_owned() } else { format!("from {value}") };
-            all.push(trial("roulette", &text, &[("integrator.path.roulette_depth", &value.to_string())]));
+            all.push(trial(
+                "roulette",
+                &format!("from {value}"),
+                &[("integrator.path.roulette_depth", &value.to_string())],
+            ));
         }
     }
     for count in [1, 4, 16] {
@@ -171,10 +174,7 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
             all.push(trial(knob, value, &[(&format!("render.techniques.{key}"), value)]));
         }
     }
-    if let Integrator::Path(settings) = &chosen.plan.integrator
-        && first::single(&census, settings).is_none()
-        && !chosen.scene.asked(chosen.plan.asks_even_sky).is_nobody()
-    {
+    if first::single(&census, path).is_none() && !chosen.scene.asked(chosen.plan.asks_even_sky).is_nobody() {
         for count in first::counts().filter(|count| *count != chosen.plan.shadow_rays) {
             let count = count.to_string();
             all.push(trial("shadow rays", &count, &[("render.techniques.shadow_rays", &count)]));

@@ -166,10 +166,7 @@ impl Header {
 /// # Errors
 /// [`Error::Input`] for a file that is missing, is no OpenEXR file, or whose header is cut off or broken.
 pub fn read_headers(path: &Path) -> Result<Headers> {
-    let file = crate::input::open(path).map_err(|e| {
-        let missing = e.kind() == std::io::ErrorKind::NotFound;
-        Error::input(path, if missing { "there is no such file".to_string() } else { e.to_string() })
-    })?;
+    let file = crate::input::open(path).map_err(|e| Error::unread(path, &e))?;
     let mut reader = Reader { source: BufReader::new(file).take(LIMIT) };
     headers(&mut reader).map_err(|message| Error::input(path, message))
 }

@@ -1,4 +1,4 @@
-//! OpenEXR files: one part of named channels, written atomically with reproducible bytes; any flat
+//! OpenEXR files of named channels, in one part or a part a layer, written atomically with reproducible bytes; any flat
 //! file read back.
 //!
 //! Conventions: channels R, G, B, A in upper case, premultiplied; the display window is the frame and the data window

@@ -211,10 +211,7 @@ impl PartFile {
     /// [`Error::Input`] if it is missing or no part.
     pub fn open(path: &Path) -> Result<PartFile> {
         let fail = |message: &str| Error::input(path, message);
-        let file = crate::input::open(path).map_err(|e| {
-            let missing = e.kind() == std::io::ErrorKind::NotFound;
-            Error::input(path, if missing { "there is no such file".to_string() } else { e.to_string() })
-        })?;
+        let file = crate::input::open(path).map_err(|e| Error::unread(path, &e))?;
         let mut reader = Counted { inner: BufReader::new(file), count: 0 };
         let mut start = [0u8; 8];
         let damaged = |e: std::io::Error| match e.kind() {
@@ -460,7 +457,7 @@ mod tests {
         assert!(ones.iter().all(|x| *x == 4_294_967_296.0));
     }
 
-    /// Each byte changed in turn, and each length: an error of input, never other numbers.
+    /// Bytes changed and files cut short, all over the file: an error of input, never other numbers.
     #[test]
     fn a_damaged_part_is_refused() {
         let dir = tempfile::tempdir().unwrap();

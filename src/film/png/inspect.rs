@@ -27,10 +27,7 @@ pub struct PngFacts {
 /// # Errors
 /// [`Error::Input`] for a file that is missing, no PNG file, or damaged.
 pub fn inspect(path: &Path) -> Result<PngFacts> {
-    let bytes = std::fs::read(path).map_err(|e| {
-        let missing = e.kind() == std::io::ErrorKind::NotFound;
-        Error::input(path, if missing { "there is no such file".to_string() } else { e.to_string() })
-    })?;
+    let bytes = crate::input::read(path).map_err(|e| Error::unread(path, &e))?;
     let mut damaged = None;
     let facts = chunks(&bytes, &mut damaged);
     if let Some(chunk) = damaged {
