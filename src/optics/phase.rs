@@ -96,7 +96,8 @@ impl Phase {
             Phase::HenyeyGreenstein(g) => {
                 // 1 + g² − 2 g cos as a sum of nonnegative terms, (1 − |g|)² + 2|g| (1 − cos of the angle
                 // from the peak): it must not cancel for |g| near one.
-                let from_peak = 1.0 - cos * g.signum();
+                // A cosine beyond one by rounding is one.
+                let from_peak = (1.0 - cos * g.signum()).max(0.0);
                 let d = (1.0 - g.abs()).mul_add(1.0 - g.abs(), 2.0 * g.abs() * from_peak);
                 (1.0 - g) * (1.0 + g) / (4.0 * PI * d * d.sqrt())
             }
@@ -210,6 +211,21 @@ mod tests {
                 let mean = (0..steps).map(|j| p(cos(j))).sum::<f64>() / f64::from(steps);
                 let expected = mean * 2.0 * PI * 2.0 / cells as f64 * f64::from(n);
                 assert!((f64::from(count) - expected).abs() < 2.1, "{phase:?} cell {cell}: {count} {expected}");
+            }
+        }
+    }
+
+    /// Straight on, where the product of a direction with itself is rounded to either side of one, the peak is
+    /// (1 − g²) / (4π (1 − |g|)³), and no more than rounding below it.
+    #[test]
+    fn the_narrowest_peaks_are_finite_along_any_direction() {
+        for g in [0.999_999_99f64, -0.999_999_999, 1.0 - f64::EPSILON] {
+            let phase = Phase::HenyeyGreenstein(g);
+            let peak = (1.0 - g) * (1.0 + g) / (4.0 * PI * (1.0 - g.abs()).powi(3));
+            for i in 0..1000 {
+                let wi = warp::uniform_sphere(DVec2::new((f64::from(i) + 0.5) / 1000.0, f64::from(i) * 0.618 % 1.0));
+                let found = phase.eval(wi * -g.signum(), wi);
+                assert!(found > 0.0 && found <= peak * (1.0 + 1e-12), "{g}: {found} of {peak}");
             }
         }
     }
