@@ -216,7 +216,8 @@
 //!   leaf: {mask: {opacity: 0.5, material: clay}} # ~ a number or {texture: name}; a material is a name, or a kind
 //!                                                # written in place
 //!   worn: {blend: {weight: 0.5, first: clay, second: ring}}          # ~ of the second
-//!   card: {two_sided: {front: clay, back: lacquer}}                  # ~ back is the front's; no glass
+//!   card: {two_sided: {front: clay, back: lacquer}}                  # ~ back is the front's; no glass, and beside
+//!                                                # a back of its own nothing thin or of hair, which scatters light through
 //!   waves: {bump: {height: {texture: earth}, scale: 1, material: clay}}
 //!                                                # ~ scale; metres along the normal
 //!   scales: {normal_map: {normals: {texture: earth}, material: clay}}

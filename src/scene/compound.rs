@@ -14,7 +14,7 @@
 //! Lecocq and Stachowiak 2019 ("A Microfacet-Based Shadowing Function to Solve the Bump Terminator Problem"), with
 //! α² = tan²θ/8 of the turned normal, at most 1.
 
-use super::material::{Material, Straight};
+use super::material::{Kind, Material, Straight};
 use super::texture::{Scalar, TexturePoint};
 use super::{Hit, Scene, SurfacePoint};
 use crate::math::Frame;
@@ -58,7 +58,7 @@ pub enum Composition {
         /// Where it is 1.
         second: Arc<Material>,
     },
-    /// A material for each side; the back is the front's mirror image.
+    /// A material for each side, neither of which has sides in it ([`one_side`]); the back is the front's mirror image.
     TwoSided {
         /// On the side of the normal.
         front: Arc<Material>,
@@ -359,6 +359,28 @@ impl Compound {
             Composition::Relief { .. } => true,
         }
     }
+}
+
+/// `material` as it is on one side of another: of what has two sides of its own the front is there, and the back never seen.
+#[must_use]
+pub fn one_side(material: &Arc<Material>) -> Arc<Material> {
+    let Some(compound) = material.compound().filter(|_| has_sides(material)) else { return material.clone() };
+    let composition = match &compound.composition {
+        Composition::TwoSided { front, .. } => return one_side(front),
+        Composition::Mask { opacity, inner } => Composition::Mask { opacity: opacity.clone(), inner: one_side(inner) },
+        Composition::Blend { weight, first, second } => {
+            Composition::Blend { weight: weight.clone(), first: one_side(first), second: one_side(second) }
+        }
+        Composition::Relief { relief, inner } => Composition::Relief { relief: relief.clone(), inner: one_side(inner) },
+    };
+    Arc::new(Material { kind: Kind::Compound(Box::new(Compound::new(composition))), ..(**material).clone() })
+}
+
+fn has_sides(material: &Material) -> bool {
+    material.compound().is_some_and(|compound| {
+        matches!(compound.composition, Composition::TwoSided { .. })
+            || compound.composition.inner().into_iter().any(has_sides)
+    })
 }
 
 /// A share from 0 to 1.

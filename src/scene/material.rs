@@ -377,6 +377,16 @@ impl Material {
         }
     }
 
+    /// Whether light that falls on one side is scattered from the other, without bending.
+    #[must_use]
+    pub fn scatters_through(&self) -> bool {
+        match &self.kind {
+            Kind::PrincipledThin(_) | Kind::Hair { .. } => true,
+            Kind::Compound(compound) => compound.composition.inner().iter().any(|m| m.scatters_through()),
+            _ => false,
+        }
+    }
+
     /// What goes straight through at `surface` in `direction`; `None` where nothing can.
     #[must_use]
     #[inline]

@@ -407,7 +407,9 @@ impl<'a> Walk<'a, '_> {
             if !bsdf.is_discrete() && !in_part && (!sharp || beam.unfound) {
                 self.connect(&beam, &bsdf, &at, &view, u_lens);
                 if !sharp {
-                    self.leave_photon(&Beam { power: beam.power * view.shadowing, ..beam }, &surface);
+                    if part.is_none() {
+                        self.leave_photon(&beam, &surface);
+                    }
                     beam.unfound = false;
                 }
                 if !self.goes_on(&mut beam) {
@@ -491,18 +493,18 @@ impl<'a> Walk<'a, '_> {
     /// Sends the beam on from a surface that is seen as `view` from where it goes; false where it ends.
     fn cross(&self, beam: &mut Beam, sample: &BsdfSample, at: &Place, view: &View, roulette: f64) -> bool {
         let went = view.frame.to_world(sample.wi);
-        let side = went.dot(at.surface.normal) * at.came.dot(at.surface.normal);
-        if (side > 0.0) == sample.transmitted || side == 0.0 {
-            return false;
-        }
         // Power, not radiance: no 1/η² on crossing, and the cosines of the true normal for those of the other.
         let normal = at.surface.normal;
         let cosines = [view.frame.n, normal].map(|normal| at.came.dot(normal));
+        let side = went.dot(normal) * cosines[1];
+        if view.facing(cosines[1]) * cosines[0] <= 0.0 || side == 0.0 {
+            return false;
+        }
         let adjoint = sample.eta2 * adjoint(cosines[0], sample.wi.z, cosines[1], went.dot(normal));
         beam.power *= sample.weight * (view.shadowing * adjoint as f32);
         beam.rho *= sample.ratio;
         let scene = self.paths.scene;
-        if sample.transmitted {
+        if side < 0.0 {
             let object = &scene.objects[at.hit.object as usize];
             let beyond = scene.beyond(object, at.surface, went, beam.inside());
             (beam.medium, beam.bodies) = (Some(beyond.medium), beyond.bodies);
@@ -601,6 +603,11 @@ impl<'a> Walk<'a, '_> {
             let (shown, part) = match &material.kind {
                 _ if hidden => (None, None),
                 Kind::Compound(compound) => {
+                    // Whoever collects photons chooses one of its materials; they lie there for all of them.
+                    let sharp = self.paths.caustics.is_some_and(|caustics| caustics.is_sharp(hit.object));
+                    if beam.vertex > 0 && !sharp {
+                        self.leave_photon(beam, &surface);
+                    }
                     let (at, wo) = (&hit.texture_point(&surface), -direction);
                     let x = crate::scene::compound::Vertex { scene, hit: &hit, surface: &surface, at, wo };
                     let u = self.sampler.set(set)[2];

@@ -452,10 +452,12 @@ impl Tracer<'_> {
     ) -> bool {
         let Leaving { hit, surface, object, .. } = *at;
         let wi = at.frame.to_world(sample.wi);
-        let side = wi.dot(surface.normal) * at.wo.dot(surface.normal);
-        if (side > 0.0) == sample.transmitted || side == 0.0 {
+        // As light that is asked for: neither side is the other's.
+        let geometric = wi.dot(surface.normal) * if at.flip { -1.0 } else { 1.0 };
+        if geometric * sample.wi.z <= 0.0 {
             return false;
         }
+        let crosses = wi.dot(surface.normal) * at.wo.dot(surface.normal) < 0.0;
         path.previous = match sample.chosen {
             Chosen::Density(density) if self.asks() => Some(Previous {
                 point: surface.point,
@@ -467,7 +469,7 @@ impl Tracer<'_> {
             Chosen::Density(_) | Chosen::Discrete => None,
         };
         if let Some(ledger) = self.ledger {
-            let first = || if sample.transmitted { First::Transmitted } else { First::Reflected(diffuse()) };
+            let first = || if crosses { First::Transmitted } else { First::Reflected(diffuse()) };
             ledger.leave(path.vertices, first, sample.chosen == Chosen::Discrete);
         }
         path.mirrored |= path.sharp && path.vertices == 0;
@@ -484,7 +486,7 @@ impl Tracer<'_> {
             path.rho *= sample.ratio;
         }
         path.eta2 *= sample.eta2;
-        if MEDIA && sample.transmitted {
+        if MEDIA && crosses {
             path.inside = self.scene.beyond(object, surface, wi, path.inside);
         } else if let Some(crossing) = at.crossing {
             path.inside.bodies = crossing.here;

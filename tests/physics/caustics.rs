@@ -428,6 +428,44 @@ fn merged_photons_count_for_the_length_of_a_path() {
     assert_eq!(light(3).0, 0.0);
 }
 
+/// A spot shines up at a mirror that throws its light onto a floor at 60°, which the camera sees in another. What is left of the light
+/// that a white floor sends back is the opacity of a mask, the share of a blend with black, and of slopes of tan θ = 2 across the
+/// way of the light what shadows leave: α² = tan²θ/8 = 1/2 and G₁ = 2/(1 + √(1 + α² tan² 60°)) = 0.775. The beam is 4° wide, over
+/// which G₁ runs from 0.75 to 0.80.
+#[test]
+fn merged_light_is_that_of_each_material_once() {
+    // (0, 2, 1)/√5 as a colour, v across.
+    let tilted = [&b"P6\n1 1\n255\n"[..], &[128, 242, 185]].concat();
+    let light = |material: &str| {
+        let text = format!(
+            "camera: {{origin: [2, 1.5, 0], target: [4, 1, 0], fov_deg: 10}}\nimage: {{width: 24, height: 24}}\n\
+             render: {{samples: 64, techniques: {{light_tracing: on, merging: on}}}}\n\
+             textures: {{tilted: {{image: {{file: tilted.ppm, raw: true}}}}}}\nshapes:\n\
+             - rectangle: {{corner: [-3, 0, 3], edge_u: [6, 0, 0], edge_v: [0, 0, -6], material: {material}}}\n\
+             - rectangle: {{corner: [-7.794, 3.5, -1], edge_u: [1.732, 1, 0], edge_v: [0, 0, 2], material: {{mirror: {{}}}}}}\n\
+             - rectangle: {{corner: [4, 0.5, -1], edge_u: [0, 0, 2], edge_v: [0, 1, 0], material: {{mirror: {{}}}}}}\n\
+             lights: [{{spot: {{position: [-6.928, 1, 0], target: [-6.928, 4, 0], cutoff_deg: 2, intensity: 9}}}}]\n"
+        );
+        let bench = bench_with(&text, &[("tilted.ppm", &tilted)]);
+        assert!(bench.prepared.plan.caustics.as_ref().is_some_and(|c| c.merging.is_some()), "{material}");
+        part(&render(&bench), 1, |_, _| true)
+    };
+    let relief = |shadowing| {
+        format!("{{normal_map: {{normals: {{texture: tilted}}, shadowing: {shadowing}, material: {{diffuse: {{}}}}}}}}")
+    };
+    let black = "{blend: {weight: 0.3, first: {diffuse: {reflectance: 0}}, second: {diffuse: {}}}}";
+    for (whole, left, expected) in [
+        ("{diffuse: {}}", "{mask: {opacity: 0.3, material: {diffuse: {}}}}", 0.3),
+        ("{diffuse: {}}", black, 0.3),
+        (&*relief(false), &*relief(true), 0.775),
+    ] {
+        let ((a, ea), (b, eb)) = (light(whole), light(left));
+        let ratio = b / a;
+        let error = ratio * (ea / a).hypot(eb / b);
+        assert!((ratio - expected).abs() < 0.01 + 4.0 * error && error < 0.03, "{left}: {ratio} ± {error}");
+    }
+}
+
 /// Half of a pixel is the least radius of a filter without gaps; below it light from the lights would be little but noise.
 #[test]
 fn light_is_traced_for_filters_without_gaps() {

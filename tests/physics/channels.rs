@@ -164,6 +164,48 @@ shapes:
     }
 }
 
+/// Rough glass under a relief that does not turn toward its viewer, seen from behind its normal, and two sides within two sides, the
+/// inner of which lets light through on its front alone: by lamps that are asked, by scattering and from the lamps.
+#[test]
+fn sides_are_the_same_to_all_techniques() {
+    const LEANING: &str = "\
+camera: {origin: [-4, 1.2, 0], target: [0, 0, 0], fov_deg: 20}
+image: {width: 16, height: 16}
+render: {samples: 256, techniques: {light_tracing: off}}
+integrator: {INTEGRATOR: {max_depth: 2, SAMPLES}}
+textures: {lean: {image: {file: lean.ppm, raw: true}}}
+shapes:
+- rectangle: {corner: [-2, 0, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4], material: {normal_map: {normals: {texture: lean},
+    shadowing: false, turn: false, material: {dielectric: {ior: 1.5, roughness: 0.4}}}}}
+- sphere: {center: [2, 3, 2], radius: 1, emission: 5}
+- sphere: {center: [-1, -3, -1], radius: 1, emission: 5}
+";
+    const SHEET: &str = "\
+camera: {origin: [0, 0.5, 3], target: [0, 0, 0], fov_deg: 30}
+image: {width: 16, height: 16}
+render: {samples: 256, techniques: {light_tracing: off}}
+integrator: {INTEGRATOR: {max_depth: 2, SAMPLES}}
+shapes:
+- rectangle: {corner: [-2, 0, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4], material: {diffuse: {reflectance: 0.8}}}
+- rectangle: {corner: [-9, 1, 9], edge_u: [18, 0, 0], edge_v: [0, 0, -18], material: {two_sided: {front: {diffuse: {}},
+    back: {two_sided: {front: {mask: {opacity: 0.1, material: {diffuse: {}}}}, back: {diffuse: {}}}}}}}
+- sphere: {center: [0, 3, 0], radius: 1, emission: 5}
+";
+    // (0.89, 0, 0.45) as a colour: it leans away from the camera.
+    let lean = [&b"P6\n1 1\n255\n"[..], &[242, 128, 185]].concat();
+    for (what, scene) in [("leaning", LEANING), ("sheet", SHEET)] {
+        let by = |integrator: &str, samples: &str| {
+            let scene = scene.replace("INTEGRATOR", integrator).replace(", SAMPLES", samples);
+            render_with(&bench_with(&scene, &[("lean.ppm", &lean)]), Filter::Box, 32)
+        };
+        let path = by("path", "");
+        assert!(luminance(&path).0 > 0.01, "{what}");
+        assert_agree(&format!("{what}, scattering"), &path, &by("path", ", light_samples: 0"));
+        assert_agree(&format!("{what}, lamps"), &path, &by("path", ", scatter_samples: 0"));
+        assert_agree(&format!("{what}, from the lamps"), &path, &by("light_tracer", ""));
+    }
+}
+
 /// Segments that end at the boundary of nothing count for neither or for both.
 #[test]
 fn crossings_count_from_both_ends() {

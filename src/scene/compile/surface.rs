@@ -8,7 +8,7 @@ use crate::math::LENGTHS;
 use crate::optics::fresnel::Model;
 use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::optics::plastic::DiffuseMean;
-use crate::scene::compound::{Composition, Compound, MOST_PARTS, MOST_RELIEFS, Relief, ReliefForm};
+use crate::scene::compound::{Composition, Compound, MOST_PARTS, MOST_RELIEFS, Relief, ReliefForm, one_side};
 use crate::scene::material::{Coat, Highlight, HighlightModel, Kind, Material, Roughness, TexturedRoughness, Tints};
 use crate::scene::texture::{Grid, ImageTexture, Interpolation, Scalar, Texture, Wrap};
 use crate::scene::{bands, load};
@@ -414,7 +414,16 @@ impl<'a> Compiler<'a> {
                         let expected = "expected a material that bends no light, found one that does";
                         self.fault(&at(name), format!("{expected}: neither side would be its inside"));
                     }
-                    material
+                    // Light from behind would meet another material than it comes out of.
+                    if m.back.as_ref().is_some_and(|back| *back != m.front) && material.scatters_through() {
+                        let expected =
+                            "expected a material that scatters no light to its other side, found one that does";
+                        self.fault(
+                            &at(name),
+                            format!("{expected}: it has to be the front of both sides, without `back`"),
+                        );
+                    }
+                    one_side(&material)
                 };
                 let front = side("front", &m.front);
                 let back = m.back.as_ref().map_or_else(|| front.clone(), |back| side("back", back));

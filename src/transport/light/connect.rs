@@ -27,7 +27,7 @@ impl Walk<'_, '_> {
         let view = if at.is_plain() { *view } else { at.seen_from(entry.direction) };
         let [local, to_camera] = [at.came, entry.direction].map(|direction| view.frame.to_local(direction));
         let (came, went) = (at.came.dot(at.surface.normal), entry.direction.dot(at.surface.normal));
-        if came * local.z * went * to_camera.z <= 0.0 {
+        if view.facing(came) * local.z <= 0.0 || went == 0.0 {
             return;
         }
         // The viewer is at the camera: f as radiance has it.

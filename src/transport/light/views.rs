@@ -34,6 +34,16 @@ pub(super) struct View {
     /// The share of the light that slopes do not stop.
     pub shadowing: f32,
     way: Way,
+    /// Whether the frame is turned against the normal.
+    flipped: bool,
+}
+
+impl View {
+    /// A cosine at the true normal as it is at that on the side of the frame. Light counts whose cosine in the frame has the
+    /// same sign.
+    pub fn facing(&self, cosine: f64) -> f64 {
+        if self.flipped { -cosine } else { cosine }
+    }
 }
 
 /// By which normal a surface is seen, and with which reliefs turned, a bit each.
@@ -92,16 +102,20 @@ impl Place<'_> {
             return self.resolved(&leaf, normal);
         }
         let frame = Frame::from_normal_and_tangent(self.on_lit_side(normal), surface.tangent);
-        View { frame, shadowing: 1.0, way: (normal, 0) }
+        View { frame, shadowing: 1.0, way: (normal, 0), flipped: self.is_turned() }
     }
 
     fn resolved(&self, leaf: &Leaf, normal: DVec3) -> View {
         let shadowing = leaf.slopes.shadowing(self.came) as f32;
-        View { frame: leaf.frame, shadowing, way: (normal, leaf.turned) }
+        View { frame: leaf.frame, shadowing, way: (normal, leaf.turned), flipped: leaf.flipped }
     }
 
     /// A normal, turned to the light where the material is the same from both sides.
     fn on_lit_side(&self, normal: DVec3) -> DVec3 {
-        if self.two_sided && self.came.dot(self.surface.normal) < 0.0 { -normal } else { normal }
+        if self.is_turned() { -normal } else { normal }
+    }
+
+    fn is_turned(&self) -> bool {
+        self.two_sided && self.came.dot(self.surface.normal) < 0.0
     }
 }
