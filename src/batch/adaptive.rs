@@ -24,6 +24,7 @@ use super::part::Breaks;
 use super::unit::render_unit;
 use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, REPLICATES, SAMPLES_LIMIT, TileBuffer};
+use crate::film::error::floor_about;
 use crate::film::resolve::replicate_means;
 use crate::math::sampler::mix64;
 use crate::spectrum::ColourSpace;
@@ -314,7 +315,7 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
     let tried = tried?;
     let values = || tried.iter().flat_map(|tried| &tried.pixels).flatten().flatten();
     let mean = values().sum::<f64>() / values().count().max(1) as f64;
-    let floor = 0.01 * mean * mean;
+    let floor = floor_about(mean);
     let all: f64 = tried.iter().map(|tried| tried.cost).sum();
     let cost = all / tried.iter().filter(|tried| !tried.pixels.is_empty()).count().max(1) as f64;
     // Slivers that the pilot has missed cost as much as others.

@@ -148,7 +148,7 @@ fn fixed_point<const FRACTION: i32>(x: f32) -> i128 {
 }
 
 /// Why `x` cannot be a sample of magnitude below `limit`.
-fn check(x: f32, limit: f32) -> std::result::Result<(), Invalid> {
+pub(super) fn check(x: f32, limit: f32) -> std::result::Result<(), Invalid> {
     // NaN fails the comparison too.
     if x.abs() < limit {
         Ok(())

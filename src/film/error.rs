@@ -181,7 +181,12 @@ pub fn floor(image: &Image) -> f64 {
 
 /// f of `count` values.
 fn floor_of(values: impl Iterator<Item = f32>, count: usize) -> f64 {
-    let mean = values.map(f64::from).sum::<f64>() / count.max(1) as f64;
+    floor_about(values.map(f64::from).sum::<f64>() / count.max(1) as f64)
+}
+
+/// f where the mean of all values is `mean`.
+#[must_use]
+pub fn floor_about(mean: f64) -> f64 {
     0.01 * mean * mean
 }
 

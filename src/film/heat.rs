@@ -1,5 +1,6 @@
 //! The error of each pixel as a small picture: dark where light is known well, bright where it is not.
 
+use crate::film::error::floor_about;
 use crate::film::resolve::Image;
 
 /// Relative standard errors at the ends of the scale, which is logarithmic.
@@ -50,7 +51,7 @@ pub fn error_map(image: &Image, luminance: [f64; 3], side: usize) -> Option<Smal
                 for x in column * step..((column + 1) * step).min(width) {
                     let i = y * width + x;
                     let (value, error) = (weigh(&image.rgb, i), weigh(&image.standard_error, i));
-                    let relative = error * error / (value * value + 0.01 * mean * mean);
+                    let relative = error * error / (value * value + floor_about(mean));
                     // Black without error is known.
                     let relative = if error == 0.0 { 0.0 } else { relative };
                     if relative.is_finite() {

@@ -7,7 +7,7 @@
 //! its own channel and counted by cause; colour does not hear of it.
 
 use super::Window;
-use super::accumulate::{ALPHA_QUANTUM, Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum};
+use super::accumulate::{ALPHA_QUANTUM, Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum, check};
 use super::mattes::Mattes;
 use super::resolve::{HALF, even, mean_of_replicates};
 use super::run::LayerRun;
@@ -380,15 +380,7 @@ fn variance_of_mean(replicates: impl Iterator<Item = (f64, f64)> + Clone) -> f64
 /// Why `x` cannot be added, if it cannot.
 #[must_use]
 pub fn fault(x: f32) -> Option<Invalid> {
-    if x.abs() < SAMPLE_LIMIT {
-        None
-    } else if x.is_nan() {
-        Some(Invalid::Nan)
-    } else if x.is_infinite() {
-        Some(Invalid::Infinite)
-    } else {
-        Some(Invalid::Overflow)
-    }
+    check(x, SAMPLE_LIMIT).err()
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use super::caustics::Caustics;
 use super::light::{Bounds, LightPaths};
 use super::plan::{Effect, EffectPlan, Integrator, PathSettings};
 use crate::film::accumulate::REPLICATES;
+use crate::film::error::floor_about;
 use crate::film::filter::FilterSampler;
 use crate::scene::Scene;
 use crate::scene::casters::{self, Casters};
@@ -215,7 +216,7 @@ impl Trial<'_> {
 /// The weight of a squared error in each block: relative to its mean, in the dark to a tenth of that of the picture.
 fn relative(means: &[f64]) -> Vec<f64> {
     let mean = means.iter().sum::<f64>() / means.len() as f64;
-    means.iter().map(|m| if mean > 0.0 { 1.0 / (m * m + 0.01 * mean * mean) } else { 1.0 }).collect()
+    means.iter().map(|m| if mean > 0.0 { 1.0 / (m * m + floor_about(mean)) } else { 1.0 }).collect()
 }
 
 /// The mean of values with weights.

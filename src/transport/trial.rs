@@ -10,6 +10,7 @@ pub mod first;
 use super::plan::{Effect, EffectPlan, Integrator};
 use super::{Incoming, Shot};
 use crate::film::accumulate::REPLICATES;
+use crate::film::error::floor_about;
 use crate::film::filter::FilterSampler;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::scene::Scene;
@@ -126,7 +127,7 @@ fn cost_of_error(tried: &Tried) -> f64 {
 fn variance(tried: &Tried) -> f64 {
     let values = || tried.colours.iter().flatten().flatten();
     let mean = values().sum::<f64>() / values().count() as f64;
-    let floor = 0.01 * mean * mean;
+    let floor = floor_about(mean);
     let mut squares: Vec<f64> = tried
         .colours
         .iter()
