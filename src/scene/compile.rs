@@ -557,7 +557,9 @@ impl<'a> Compiler<'a> {
         }
         if !bands.is_empty() {
             let responses: Vec<&Spectrum> = bands.iter().map(|b| &b.response).collect();
-            return WavelengthDistribution::for_bands(&responses, &emitters);
+            // In the place of colours, bands leave them a tenth, for the preview; beside a picture of colours, half.
+            let colours = if self.description.image.bands.is_empty() { 0.5 } else { 0.1 };
+            return WavelengthDistribution::for_bands(&responses, &emitters, colours, points);
         }
         let mut reflectances = Vec::new();
         for object in objects {

@@ -162,32 +162,19 @@ impl WavelengthDistribution {
     /// strongest emitters and 64 reflectances, evenly spaced through the list, are looked at. Of `points`, a power of two up to
     /// [`RANDOM`], that are spread evenly over u each piece of the band, such as a line, has its share, one at least.
     #[must_use]
-    pub fn for_scene<'a>(
-        emitters: &'a [(f64, Spectrum)],
-        reflectances: &[Spectrum],
-        points: usize,
-    ) -> WavelengthDistribution {
-        const MOST: usize = 64;
-        let mut weighed: Vec<&(f64, Spectrum)> = emitters.iter().filter(|(w, _)| *w > 0.0 && w.is_finite()).collect();
-        // A stable sort: equal weights stay in the order given.
-        weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let share = |(weight, spectrum): &'a (f64, Spectrum)| (*weight, spectrum, Density::of_emission(spectrum));
-        let shares = weighed.into_iter().map(share).filter(|(_, _, density)| density.total > 0.0);
-        let shares: Vec<(f64, &Spectrum, Density)> = shares.take(MOST).collect();
-        if shares.is_empty() {
+    pub fn for_scene(emitters: &[(f64, Spectrum)], reflectances: &[Spectrum], points: usize) -> WavelengthDistribution {
+        let shares = Shares::of(emitters);
+        if shares.0.is_empty() {
             let mut distribution = WavelengthDistribution::visible();
             distribution.description.push_str("; no emitter to choose by");
             return distribution;
         }
-        let step = reflectances.len().div_ceil(MOST).max(1);
+        let step = reflectances.len().div_ceil(Shares::MOST).max(1);
         let chosen: Vec<&Spectrum> = reflectances.iter().step_by(step).filter(|r| !r.is_constant()).collect();
 
-        let emission = Density::mixture(shares.iter().map(|(weight, _, density)| (*weight, density)));
+        let emission = shares.emission();
         let visible = Density::visible();
-        // Points in a lattice would step over lines: each has its piece of the band. Numbers drawn at random meet them in the mean.
-        let jumps = |(_, spectrum, _): &(f64, &Spectrum, Density)| spectrum.jumps();
-        let of_lattice = shares.iter().filter(|_| points < RANDOM);
-        let jumps: Vec<f64> = of_lattice.flat_map(jumps).take(points / 2 - 1).collect();
+        let jumps = shares.jumps(points);
         let candidates = [
             ("vis", visible.clone()),
             ("mix", Density::mixture([(0.5, &visible), (0.5, &emission)])),
@@ -198,7 +185,7 @@ impl WavelengthDistribution {
             let lattice = Lattice::of(distribution);
             let factors: Vec<Vec<Lanes>> = chosen.iter().map(|r| lattice.values(r)).collect();
             let (mut sum, mut weights) = (0.0, 0.0);
-            for (weight, spectrum, _) in &shares {
+            for (weight, spectrum, _) in &shares.0 {
                 let light = lattice.values(spectrum);
                 // Light that the lattice does not see, as it steps over a narrow line, is seldom met by paths.
                 sum += weight * lattice.noise(&light, None).unwrap_or(f64::INFINITY);
@@ -228,14 +215,21 @@ impl WavelengthDistribution {
         WavelengthDistribution { description, ..candidates[best].1.clone() }
     }
 
-    /// For a picture of bands, with these emitters and the shares of the light they stand for: nine parts in twenty by
-    /// the sum of the responses, as many by that sum times the emission, and a tenth by the eye, for the colours of the
-    /// preview.
+    /// For bands of the spectrum, with these emitters and the shares of the light they stand for. The share `colours` of the
+    /// samples is for the colours that are rendered as well: half of it by the eye, half by the emitters as the eye sees them.
+    /// What is left goes by the sum of the responses and by that sum times the emission, half by each. Of `points` as in
+    /// [`WavelengthDistribution::for_scene`].
     ///
-    /// Every band of a sum of bands of equal area gets at least its share of nine twentieths of the samples, however
-    /// dim it is; where all of the light comes in lines, half of them lie on lines.
+    /// Every band of a sum of bands of equal area gets at least its share of what goes by the responses, however
+    /// dim it is; where all of the light comes in lines that the bands see, half of the samples lie on lines.
     #[must_use]
-    pub fn for_bands(responses: &[&Spectrum], emitters: &[(f64, Spectrum)]) -> WavelengthDistribution {
+    pub fn for_bands(
+        responses: &[&Spectrum],
+        emitters: &[(f64, Spectrum)],
+        colours: f64,
+        points: usize,
+    ) -> WavelengthDistribution {
+        let shares = Shares::of(emitters);
         let mut breakpoints: Vec<f64> = responses.iter().flat_map(|r| r.breakpoints()).collect();
         breakpoints.extend(emitters.iter().flat_map(|(_, e)| e.breakpoints()));
         // Each by its own largest value: units of radiance do not count.
@@ -246,11 +240,17 @@ impl WavelengthDistribution {
         let by_response = Density::new(&breakpoints, sensitivity);
         let by_both = Density::new(&breakpoints, |nm| sensitivity(nm) * light(nm));
         let visible = Density::visible();
-        let mut parts = vec![(0.45, &by_response), (0.1, &visible)];
-        parts.push((0.45, if by_both.total > 0.0 { &by_both } else { &by_response }));
-        Density::mixture(parts).distribution(
-            "bands: 45 % by the responses, 45 % by the responses and the emitters, 10 % by the eye".into(),
-        )
+        let emission = if shares.0.is_empty() { visible.clone() } else { shares.emission() };
+        let by_both = if by_both.total > 0.0 { &by_both } else { &by_response };
+        let (of_bands, of_colours) = (0.5 * (1.0 - colours), 0.5 * colours);
+        let parts = [(of_bands, &by_response), (of_bands, by_both), (of_colours, &visible), (of_colours, &emission)];
+        let description = format!(
+            "bands: {0:.1} % by the responses, {0:.1} % by the responses and the emitters, {1:.1} % by the eye, \
+             {1:.1} % by the emitters",
+            100.0 * of_bands,
+            100.0 * of_colours
+        );
+        Density::mixture(parts).distribution_cut(description, points, &shares.jumps(points))
     }
 
     /// `count` wavelengths a path with these intervals, [`KNOTS`] of them.
@@ -289,6 +289,35 @@ impl WavelengthDistribution {
     #[must_use]
     pub fn describe(&self) -> &str {
         &self.description
+    }
+}
+
+/// The strongest emitters, with the share of the light each stands for and its density.
+struct Shares<'a>(Vec<(f64, &'a Spectrum, Density)>);
+
+impl<'a> Shares<'a> {
+    /// So many emitters are looked at.
+    const MOST: usize = 64;
+
+    fn of(emitters: &'a [(f64, Spectrum)]) -> Shares<'a> {
+        let mut weighed: Vec<&(f64, Spectrum)> = emitters.iter().filter(|(w, _)| *w > 0.0 && w.is_finite()).collect();
+        // A stable sort: equal weights stay in the order given.
+        weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let share = |(weight, spectrum): &'a (f64, Spectrum)| (*weight, spectrum, Density::of_emission(spectrum));
+        let shares = weighed.into_iter().map(share).filter(|(_, _, density)| density.total > 0.0);
+        Shares(shares.take(Shares::MOST).collect())
+    }
+
+    /// What all of them send out, as the eye sees it.
+    fn emission(&self) -> Density {
+        Density::mixture(self.0.iter().map(|(weight, _, density)| (*weight, density)))
+    }
+
+    /// Where they jump, nm. Points in a lattice would step over lines: each has its piece of the band. Numbers drawn at random
+    /// meet them in the mean.
+    fn jumps(&self, points: usize) -> Vec<f64> {
+        let of_lattice = self.0.iter().filter(|_| points < RANDOM);
+        of_lattice.flat_map(|(_, spectrum, _)| spectrum.jumps()).take(points / 2 - 1).collect()
     }
 }
 
@@ -537,6 +566,25 @@ mod tests {
                 assert!(off < bound * size, "{nm}: {told:?} {exact:?}");
             }
         }
+    }
+
+    /// Bands from 400 to 500 nm beside a picture of colours, and sodium's two lines far from them: of 32 points some are on each
+    /// line, and the colour is Σ power · x̄, ȳ, z̄ at the lines, which are straight over 0.1 nm to 1e-5, over ∫ ȳ.
+    #[test]
+    fn bands_beside_a_picture_leave_its_colours() {
+        let edges = [400.0, 425.0, 450.0, 475.0, 500.0];
+        let band = |e: &[f64]| Spectrum::from_samples(&[(e[0], 0.04), (e[1], 0.04)], crate::spectrum::Outside::Zero);
+        let bands: Vec<Spectrum> = edges.windows(2).map(|e| band(e).unwrap()).collect();
+        let lines = [(589.0, 100.0), (589.6, 50.0)];
+        let sodium = Spectrum::lines(&lines.map(|(nm, power)| (nm, power, 0.1))).unwrap();
+        let emitters = [(1.0, sodium.clone())];
+        let distribution = WavelengthDistribution::for_bands(&bands.iter().collect::<Vec<_>>(), &emitters, 0.5, 32);
+        let told = by_lattice(&distribution, &sodium, 32);
+        let exact =
+            [0, 1, 2].map(|c| lines.iter().map(|(nm, power)| power * matching(*nm)[c]).sum::<f64>() / Y_INTEGRAL);
+        // π Y of the same light, as irradiance on white: 1.0763 (power times ȳ over ∫ ȳ).
+        assert!((exact[1] - 1.0763).abs() < 1e-4, "{exact:?}");
+        assert!((0..3).all(|c| (told[c] - exact[c]).abs() < 1e-3 * exact[1]), "{told:?} {exact:?}");
     }
 
     /// Lines of a hundredth of a nanometre lie between the points of a lattice by the eye: paths meet them where the emitters choose.

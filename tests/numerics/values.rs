@@ -122,7 +122,7 @@ fn wavelengths_stay_in_the_band_and_have_weights() {
     let mut all = vec![WavelengthDistribution::uniform(), WavelengthDistribution::visible()];
     for nm in [361.0, 555.0, 829.0] {
         all.push(WavelengthDistribution::for_scene(&[(1.0, line(nm))], &[], RANDOM));
-        all.push(WavelengthDistribution::for_bands(&[&line(nm)], &[]));
+        all.push(WavelengthDistribution::for_bands(&[&line(nm)], &[], 0.1, RANDOM));
     }
     for distribution in all {
         for u in [0.0, f64::MIN_POSITIVE, 2f64.powi(-32), 0.5, 1.0 - 2f64.powi(-32), 1.0f64.next_down()] {
