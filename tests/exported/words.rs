@@ -189,6 +189,19 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
             &[],
             &[],
         ),
+        // A table of zeros has "no probability mass" there.
+        (
+            "lights: [{constant: {radiance: {scaled: {by: 0, of: {illuminant: D65}}}}}]\n",
+            &card("diffuse: {reflectance: {table: [[400, 0], [700, 0]]}}"),
+            &[],
+            &["<spectrum name=\"radiance\" value=\"0\"/>", "<spectrum name=\"reflectance\" value=\"0\"/>"],
+        ),
+        (
+            "lights: [{constant: {radiance: {scaled: {by: 0, of: {table: [[400, 1], [700, 2]]}}}}}]\n",
+            &grey,
+            &[],
+            &["<spectrum name=\"radiance\" value=\"0\"/>"],
+        ),
         (
             "",
             "cylinder: {base: [0, 0.5, 0], top: [0, 1, 0], radius: 0.2, caps: none, emission: 1, transform: [scale: [-2, 2, 2]]}",

@@ -106,6 +106,7 @@ impl Export<'_> {
                 }
                 _ => self.xml.value("spectrum", name, 0.5 * by),
             },
+            Spectrum::Illuminant(illuminant) if illuminant.scale * by == 0.0 => self.xml.value("spectrum", name, 0),
             Spectrum::Illuminant(illuminant) if illuminant.name.eq_ignore_ascii_case("D65") => {
                 self.xml.open("spectrum", &[("type", "d65"), ("name", name)]);
                 self.xml.value("float", "scale", illuminant.scale * by / DAYLIGHT);
@@ -157,8 +158,11 @@ impl Export<'_> {
         }
     }
 
-    /// Mitsuba's tables are zero beyond their ends, so what is held is written to the ends of the band.
+    /// Mitsuba's tables are zero beyond their ends, so what is held is written to the ends of the band. It refuses one of zeros.
     fn table(&mut self, name: &str, pairs: &[[f64; 2]], by: f64, ends: Ends) {
+        if pairs.iter().all(|[_, value]| value * by == 0.0) {
+            return self.xml.value("spectrum", name, 0);
+        }
         let mut all = pairs.to_vec();
         if let (Ends::Held, Some(&first), Some(&last)) = (ends, pairs.first(), pairs.last()) {
             if first[0] > BAND_NM[0] {
