@@ -285,7 +285,8 @@ pub(crate) fn check(output: &Output, at: At<'_>, checker: &mut Checker<'_>) {
         checker.whole_between(at.key("bands"), spectral.bands, 1, 512);
         let inside = spectral.from_nm >= 360.0 && spectral.to_nm <= 830.0 && spectral.from_nm < spectral.to_nm;
         let found = format_args!("{} to {}", in_short(spectral.from_nm), in_short(spectral.to_nm));
-        checker.require(inside, at.key("to_nm"), "a range within 360 to 830 nm", found);
+        let at_fault = at.key(if spectral.from_nm < 360.0 { "from_nm" } else { "to_nm" });
+        checker.require(inside, at_fault, "a range within 360 to 830 nm", found);
     }
 }
 
@@ -307,11 +308,11 @@ mod tests {
         assert_eq!(
             faults("output: {spectral: {bands: 0, from_nm: 300}}"),
             "dir/s.yaml:2:28: output.spectral.bands: expected a whole number from 1 to 512, found 0\n\
-             dir/s.yaml:2:20: output.spectral.to_nm: expected a range within 360 to 830 nm, found 300 to 700"
-                .split('\n')
-                .rev()
-                .collect::<Vec<_>>()
-                .join("\n")
+             dir/s.yaml:2:40: output.spectral.from_nm: expected a range within 360 to 830 nm, found 300 to 700"
+        );
+        assert_eq!(
+            faults("output: {spectral: {bands: 4, to_nm: 900}}"),
+            "dir/s.yaml:2:38: output.spectral.to_nm: expected a range within 360 to 830 nm, found 400 to 900"
         );
     }
 
