@@ -138,15 +138,25 @@ impl Compiler<'_> {
         }
         if let Some(spectral) = &self.description.output.spectral {
             for [from, to] in spectral.edges() {
-                // The mean over the band; the name has its middle, with a comma.
-                let height = 1.0 / (to - from);
-                let response = Spectrum::from_samples(&[(from, height), (to, height)], Outside::Zero);
+                // The mean over the band, from the ends as wavelengths meet them; the name has its middle, with a comma.
+                let [first, next] = [from, to].map(not_below);
+                let height = 1.0 / (f64::from(next) - f64::from(first));
+                // The end of a band is the beginning of the next, and counts there alone.
+                let last = if to < BAND_NM[1] { next.next_down() } else { next };
+                let samples = [first, last].map(|nm| (f64::from(nm), height));
+                let response = Spectrum::from_samples(&samples, Outside::Zero);
                 let name = format!("S0.{:.6}nm", 0.5 * (from + to)).replace('.', ",").replacen(',', ".", 1);
                 all.extend(response.map(|response| Band { name, response }));
             }
         }
         all
     }
+}
+
+/// The smallest f32 that is not below `nm`.
+fn not_below(nm: f64) -> f32 {
+    let nearest = nm as f32;
+    if f64::from(nearest) < nm { nearest.next_up() } else { nearest }
 }
 
 /// A spectrum from samples (nm, value), some of which count in a picture.
@@ -182,6 +192,34 @@ fn beyond_the_band(response: &written::Spectrum) -> Option<[f64; 2]> {
 mod tests {
     use crate::description::SceneDescription;
     use crate::scene::compile::compile;
+    use crate::spectrum::Lanes;
+
+    /// Of bands side by side each wavelength counts in one, with its share of the band: the sum over a band's wavelengths, one
+    /// f32 apart, is 1 to the rounding of each. The last that is rendered counts, too.
+    #[test]
+    fn a_wavelength_is_in_one_band() {
+        let bands = |range: &str| {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\noutput: {{spectral: {{{range}}}}}\n"
+            );
+            let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
+            compile(&description, "s").unwrap().bands
+        };
+        let ten = bands("bands: 10, from_nm: 500.003, to_nm: 500.103");
+        let step = 500f32.next_up() - 500.0;
+        let mut sums = [0.0; 10];
+        let mut nm = 500f32;
+        while nm < 500.2 {
+            let values: Vec<f32> = ten.iter().map(|band| band.response.eval(Lanes::splat(nm)).to_array()[0]).collect();
+            let inside = (500.003..500.103).contains(&f64::from(nm));
+            assert_eq!(values.iter().filter(|value| **value > 0.0).count(), usize::from(inside), "{nm}: {values:?}");
+            (0..10).for_each(|i| sums[i] += f64::from(values[i] * step));
+            nm = nm.next_up();
+        }
+        assert!(sums.iter().all(|sum| (sum - 1.0).abs() < 1e-6), "{sums:?}");
+        let last = &bands("bands: 2, from_nm: 820, to_nm: 830")[1].response;
+        assert_eq!([825.0, 830.0].map(|nm| last.eval(Lanes::splat(nm)).to_array()[0]), [0.2; 2]);
+    }
 
     /// Reflectances and albedos in per cent, as they stand, scaled to what they are, and beyond.
     #[test]
