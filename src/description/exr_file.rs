@@ -59,6 +59,9 @@ fn to_nm() -> f64 {
     700.0
 }
 
+/// The narrowest band of a spectral file, nm, as of spectral lines: wavelengths are rounded to some 6e-5 nm.
+const LEAST_BAND_NM: f64 = 0.01;
+
 /// What DWA compression is allowed to lose, by default: 45 is what its makers call visually lossless.
 pub(crate) const DWA_LEVEL: f64 = 45.0;
 
@@ -287,6 +290,10 @@ pub(crate) fn check(output: &Output, at: At<'_>, checker: &mut Checker<'_>) {
         let found = format_args!("{} to {}", in_short(spectral.from_nm), in_short(spectral.to_nm));
         let at_fault = at.key(if spectral.from_nm < 360.0 { "from_nm" } else { "to_nm" });
         checker.require(inside, at_fault, "a range within 360 to 830 nm", found);
+        let width = (spectral.to_nm - spectral.from_nm) / f64::from(spectral.bands.max(1));
+        // What the ends are rounded by is no fault.
+        let wide = !inside || width > LEAST_BAND_NM - 1e-9;
+        checker.require(wide, at, "bands at least 0.01 nm wide", format_args!("{} nm", in_short(width)));
     }
 }
 
@@ -314,6 +321,14 @@ mod tests {
             faults("output: {spectral: {bands: 4, to_nm: 900}}"),
             "dir/s.yaml:2:38: output.spectral.to_nm: expected a range within 360 to 830 nm, found 400 to 900"
         );
+    }
+
+    /// 512 of 10⁻⁷ nm have fewer names than bands: (400.0000001 - 400) / 512 = 1.953e-10, to the rounding of 400.0000001.
+    #[test]
+    fn bands_are_wider_than_wavelengths_are_rounded() {
+        let told = faults("output: {spectral: {bands: 512, from_nm: 400, to_nm: 400.0000001}}");
+        assert!(told.starts_with("dir/s.yaml:2:20: output.spectral: expected bands at least 0.01 nm wide, found 1.95"));
+        scene("output: {spectral: {bands: 10, from_nm: 500.1, to_nm: 500.2}}");
     }
 
     #[test]

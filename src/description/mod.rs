@@ -117,7 +117,8 @@
 //!                                   # {owner: us, timeCode: "01:00:00:00"} (of frame 0): standard ones of OpenEXR by
 //!                                   # their types, other numbers int where they are whole and fit, else double
 //!   spectral: ~                     # or {bands: 31, from_nm: 400, to_nm: 700}: a further file, NAME.spectral.exr, of mean
-//!                                   # radiance in bands (layout 1.0 of Fichet, Pacanowski and Wilkie); ~ from 400 to 700
+//!                                   # radiance in bands (layout 1.0 of Fichet, Pacanowski and Wilkie); ~ from 400 to 700;
+//!                                   # 0.01 nm wide at the least
 //!   png:
 //!     exposure: 0                   # stops, or auto: the log-average luminance of the picture, without its darkest 20 and
 //!                                   # brightest 2 %, is shown as 0.18; the report and the PNG say how many stops that are
