@@ -260,6 +260,18 @@ impl Spectrum {
         max
     }
 
+    /// Whether f32 holds every value.
+    pub(crate) fn is_finite(&self) -> bool {
+        let parts = match self {
+            Spectrum::Constant(value) => value.is_finite(),
+            Spectrum::Sigmoid { scale, .. } => scale.is_finite(),
+            Spectrum::Table(table) => table.is_finite(),
+            Spectrum::SigmoidTable { scale, table, .. } => scale.is_finite() && table.is_finite(),
+            Spectrum::Product(factors) => factors.iter().all(Spectrum::is_finite),
+        };
+        parts && self.max() <= f64::from(f32::MAX)
+    }
+
     /// Where the spectrum may jump, nm: the edges of lines, and where measured values begin and end.
     pub(crate) fn jumps(&self) -> Vec<f64> {
         match self {

@@ -208,6 +208,14 @@ impl Table {
         }
     }
 
+    /// Whether f32 holds all values and slopes.
+    pub(crate) fn is_finite(&self) -> bool {
+        match &self.knots {
+            Knots::Uniform { entries, .. } => entries.iter().flatten().all(|x| x.is_finite()),
+            Knots::Irregular { entries, .. } => measured(entries).iter().flatten().all(|x| x.is_finite()),
+        }
+    }
+
     /// First and last knot, nm.
     #[must_use]
     pub fn range(&self) -> [f64; 2] {

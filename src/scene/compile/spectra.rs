@@ -40,6 +40,17 @@ impl Compiler<'_> {
         outside: Outside,
         role: Role,
     ) -> Spectrum {
+        let spectrum = self.any_spectrum(at, s, outside, role);
+        // Scales, and widths of lines, may make more of numbers that are in range.
+        if matches!(role, Role::Light) && !spectrum.is_finite() {
+            self.fault(at, "expected light up to 3.4e38, found more");
+            return Spectrum::Constant(0.0);
+        }
+        spectrum
+    }
+
+    /// What is written, though f32 may not hold it.
+    fn any_spectrum(&mut self, at: &str, s: &written::Spectrum, outside: Outside, role: Role) -> Spectrum {
         let black = Spectrum::Constant(0.0);
         match s {
             written::Spectrum::Number(x) => Spectrum::constant(*x),
@@ -219,6 +230,33 @@ mod tests {
         assert!(sums.iter().all(|sum| (sum - 1.0).abs() < 1e-6), "{sums:?}");
         let last = &bands("bands: 2, from_nm: 820, to_nm: 830")[1].response;
         assert_eq!([825.0, 830.0].map(|nm| last.eval(Lanes::splat(nm)).to_array()[0]), [0.2; 2]);
+    }
+
+    /// 10³⁷ over 0.01 nm is 10³⁹ a nanometre; F11 of luminance 1 is 5.6 at 545 nm; and twice 2·10³⁸ is 4·10³⁸. A thousandth of
+    /// each is light.
+    #[test]
+    fn light_that_no_float_holds_is_refused() {
+        let told = |radiance: &str| {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nlights: [{{constant: {{radiance: {radiance}}}}}]\n"
+            );
+            let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
+            compile(&description, "s").err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        for (much, less) in [
+            (
+                "{lines: [{nm: 550, power: 1.0e37, width_nm: 0.01}]}",
+                "{lines: [{nm: 550, power: 1.0e34, width_nm: 0.01}]}",
+            ),
+            ("{illuminant: {name: F11, scale: 1.0e38}}", "{illuminant: {name: F11, scale: 1.0e35}}"),
+            (
+                "{scaled: {by: 2, of: {illuminant: {name: E, scale: 2.0e38}}}}",
+                "{scaled: {by: 2, of: {illuminant: {name: E, scale: 2.0e35}}}}",
+            ),
+        ] {
+            let expected = "s.yaml:2:32: lights[0].constant.radiance: expected light up to 3.4e38, found more";
+            assert_eq!((told(much).as_str(), told(less).as_str()), (expected, ""));
+        }
     }
 
     /// Reflectances and albedos in per cent, as they stand, scaled to what they are, and beyond.
