@@ -53,6 +53,9 @@ impl Spectrum {
         Table::new(samples, outside).map(|table| Spectrum::Table(Arc::new(table)))
     }
 
+    /// The narrowest line, nm.
+    pub(crate) const LEAST_WIDTH_NM: f64 = 0.01;
+
     /// Spectral lines (nm, power, width in nm): each a box about its wavelength that holds its
     /// power, so that the height is power / width. Lines may overlap.
     ///
@@ -73,7 +76,7 @@ impl Spectrum {
                     in_short(power)
                 ));
             }
-            if !(width.is_finite() && width >= 0.01) {
+            if !(width.is_finite() && width >= Spectrum::LEAST_WIDTH_NM) {
                 return Err(format!(
                     "line {i} at {} nm: expected a width of 0.01 nm or more, found {}",
                     in_short(nm),

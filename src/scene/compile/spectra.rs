@@ -79,12 +79,23 @@ impl Compiler<'_> {
                 } else {
                     illuminant::blackbody(b.kelvin)
                 };
-                self.or(at, spectrum, black).scaled(b.scale)
+                self.or(&format!("{at}.blackbody.kelvin"), spectrum, black).scaled(b.scale)
             }
-            written::Spectrum::Illuminant(i) => self.or(at, illuminant::illuminant(&i.name), black).scaled(i.scale),
+            written::Spectrum::Illuminant(i) => {
+                self.or(&format!("{at}.illuminant"), illuminant::illuminant(&i.name), black).scaled(i.scale)
+            }
             written::Spectrum::Lines(lines) => {
                 let lines: Vec<(f64, f64, f64)> = lines.iter().map(|l| (l.nm, l.power, l.width_nm)).collect();
-                self.or(at, Spectrum::lines(&lines), black)
+                let faults = self.faults.len();
+                for (i, line) in lines.iter().enumerate() {
+                    if let Err(message) = Spectrum::lines(&[*line]) {
+                        // The field says which line it is.
+                        let expected = message.split_once(": ").map_or(&*message, |(_, expected)| expected);
+                        let field = if line.2 < Spectrum::LEAST_WIDTH_NM { "width_nm" } else { "nm" };
+                        self.fault(&format!("{at}.lines[{i}].{field}"), expected);
+                    }
+                }
+                if self.faults.len() > faults { black } else { self.or(at, Spectrum::lines(&lines), black) }
             }
             written::Spectrum::ZeroOutside(s) => {
                 self.written_spectrum(&format!("{at}.zero_outside"), s, Outside::Zero, role)
@@ -230,6 +241,31 @@ mod tests {
         assert!(sums.iter().all(|sum| (sum - 1.0).abs() < 1e-6), "{sums:?}");
         let last = &bands("bands: 2, from_nm: 820, to_nm: 830")[1].response;
         assert_eq!([825.0, 830.0].map(|nm| last.eval(Lanes::splat(nm)).to_array()[0]), [0.2; 2]);
+    }
+
+    /// What only the spectrum itself finds out is told at the field that says it.
+    #[test]
+    fn faults_of_spectra_name_their_field() {
+        for (radiance, told) in [
+            ("{blackbody: {kelvin: 10}}", "53: R.blackbody.kelvin: expected a temperature of 50 to 1e12 K, found 10"),
+            ("{illuminant: D66}", "45: R.illuminant: unknown illuminant \"D66\""),
+            (
+                "{lines: [{nm: 500, width_nm: 0.001}]}",
+                "61: R.lines[0].width_nm: expected a width of 0.01 nm or more, found 0.001",
+            ),
+            (
+                "{lines: [{nm: 500}, {nm: 300}]}",
+                "57: R.lines[1].nm: expected a line within 360 to 830 nm, found 300 nm of width 1",
+            ),
+        ] {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nlights: [{{constant: {{radiance: {radiance}}}}}]\n"
+            );
+            let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
+            let found = compile(&description, "s").err().unwrap().to_string();
+            let expected = format!("s.yaml:2:{}", told.replace("R.", "lights[0].constant.radiance."));
+            assert!(found.starts_with(&expected), "{found}");
+        }
     }
 
     /// 10³⁷ over 0.01 nm is 10³⁹ a nanometre; F11 of luminance 1 is 5.6 at 545 nm; and twice 2·10³⁸ is 4·10³⁸. A thousandth of
