@@ -388,13 +388,28 @@ impl Pose {
                 let at = at.key("to_world");
                 let before = checker.count();
                 TransformStep::Matrix(rows).check(at, checker);
-                let linear = DMat3::from_mat4(TransformStep::Matrix(rows).matrix());
-                if let (Projection::Perspective { .. }, true) = (projection, checker.count() == before) {
-                    let similar = is_similarity_but_for(linear, RIGHT_ANGLE_TOLERANCE);
-                    let rigid = similar && (linear.determinant().abs() - 1.0).abs() < RIGID_TOLERANCE;
-                    let found = "a matrix that scales or shears";
-                    checker.require(rigid, at, "moves, turns and mirrors for a perspective", found);
+                if checker.count() != before {
+                    return;
                 }
+                let matrix = TransformStep::Matrix(rows).matrix();
+                let linear = DMat3::from_mat4(matrix);
+                match projection {
+                    Projection::Perspective { .. } => {
+                        let similar = is_similarity_but_for(linear, RIGHT_ANGLE_TOLERANCE);
+                        let rigid = similar && (linear.determinant().abs() - 1.0).abs() < RIGID_TOLERANCE;
+                        let found = "a matrix that scales or shears";
+                        checker.require(rigid, at, "moves, turns and mirrors for a perspective", found);
+                    }
+                    Projection::Orthographic { .. } => {
+                        let lengths =
+                            [linear.x_axis, linear.y_axis, linear.z_axis].map(|axis| axis.abs().max_element());
+                        if let Some(length) = lengths.into_iter().find(|length| !LENGTHS.contains(length)) {
+                            checker.require(false, at, "axes of length from 1e-60 to 1e60", in_short(length));
+                        }
+                    }
+                }
+                let place = matrix.w_axis.truncate().abs().max_element();
+                checker.require(place <= *LENGTHS.end(), at, "a place up to 1e60", in_short(place));
             }
         }
     }
@@ -415,13 +430,16 @@ impl Camera {
                 let within = fov_deg > 0.0 && fov_deg < 180.0;
                 checker.require(within, at.key("fov_deg"), "an angle between 0 and 180 degrees", fov_deg);
             }
-            Projection::Orthographic { height } => checker.positive(at.key("orthographic_height"), height),
+            Projection::Orthographic { height } => check_length(at.key("orthographic_height"), height, checker),
         }
         if let Some(lens) = self.lens {
             let at = at.key("lens");
             checker.require((0.0..=*LENGTHS.end()).contains(&lens.radius), at.key("radius"), LENGTH, lens.radius);
-            checker.positive(at.key("focus_distance"), lens.focus_distance);
+            check_length(at.key("focus_distance"), lens.focus_distance, checker);
         }
+        let aside = self.principal_point.into_iter().all(|share| share.abs() <= FARTHEST_ASIDE);
+        let found = format_args!("{:?}", self.principal_point);
+        checker.require(aside, at.key("principal_point"), "two numbers from -1e6 to 1e6", found);
         if let Some(shutter) = &self.shutter {
             shutter.check(at.key("shutter"), checker);
         }
@@ -429,6 +447,17 @@ impl Camera {
         checker.require((0.0..=*LENGTHS.end()).contains(&self.clip.near), clip.key("near"), LENGTH, self.clip.near);
         checker.require(self.clip.far > self.clip.near, clip.key("far"), "more than near", self.clip.far);
     }
+}
+
+/// How far the line of sight may meet the picture from its middle, in widths and heights: the largest picture
+/// has its pixels to 10⁻⁵ of themselves there.
+const FARTHEST_ASIDE: f64 = 1e6;
+
+/// A length of what is looked through.
+fn check_length(at: At<'_>, length: f64, checker: &mut Checker<'_>) {
+    checker.positive(at, length);
+    // What is not greater than 0 has been told.
+    checker.require(length <= 0.0 || LENGTHS.contains(&length), at, "a number from 1e-60 to 1e60", length);
 }
 
 /// A length or none.
@@ -555,6 +584,39 @@ mod tests {
             "dir/s.yaml:1:75: camera.lens.radius: expected a number from 0 to 1e60, found -1\n\
              dir/s.yaml:1:95: camera.lens.focus_distance: expected a number greater than 0, found 0"
         );
+    }
+
+    /// Squares of rays overflowed beyond 1e154, and vanished below 1e-154: the picture was of the sky alone.
+    #[test]
+    fn lengths_of_a_camera_have_squares() {
+        let eye = "origin: [0, 0, 5], target: [0, 0, 0]";
+        let rows = |z: &str| {
+            format!("to_world: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, {z}, 0], [0, 0, 0, 1]], orthographic_height: 1")
+        };
+        for (fields, told) in [
+            (
+                format!("{eye}, fov_deg: 9, lens: {{radius: 1, focus_distance: 1.0e155}}"),
+                "lens.focus_distance: expected a number from 1e-60 to 1e60, found 1e155",
+            ),
+            (
+                format!("{eye}, fov_deg: 9, principal_point: [1.0e160, 0]"),
+                "principal_point: expected two numbers from -1e6 to 1e6, found [1e160, 0.0]",
+            ),
+            (
+                format!("{eye}, orthographic_height: 1.0e308"),
+                "orthographic_height: expected a number from 1e-60 to 1e60, found 1e308",
+            ),
+            (rows("1.0e-170"), "to_world: expected axes of length from 1e-60 to 1e60, found 1e-170"),
+            (rows("1.0e200"), "to_world: expected axes of length from 1e-60 to 1e60, found 1e200"),
+            (
+                rows("1").replace("[1, 0, 0, 0]", "[1, 0, 0, 1.0e200]"),
+                "to_world: expected a place up to 1e60, found 1e200",
+            ),
+        ] {
+            let found = camera(&fields);
+            assert!(found.ends_with(&format!(": camera.{told}")), "{found}");
+        }
+        assert_eq!(camera(&rows("1.0e-60")), "none");
     }
 
     #[test]
