@@ -51,9 +51,11 @@ impl Scene {
     pub(super) fn put_beside(&mut self, boxes: &[Aabb]) -> Vec<(Option<usize>, u32)> {
         let mut moved = Vec::new();
         let eye = self.camera.eye();
+        let copied = self.objects[boxes.len()..].iter().any(|object| matches!(object.geometry, Geometry::Mesh(_)));
         let rounded = self.objects.iter().zip(boxes).filter_map(|(object, b)| match object.geometry {
-            Geometry::Mesh(_) | Geometry::Instance(_) => Some((b.max - b.min).max_element()),
-            Geometry::Shape(_) | Geometry::Sdf(_) | Geometry::Curves(_) => None,
+            Geometry::Mesh(_) => Some((b.max - b.min).max_element()),
+            Geometry::Instance(_) if copied => Some((b.max - b.min).max_element()),
+            Geometry::Instance(_) | Geometry::Shape(_) | Geometry::Sdf(_) | Geometry::Curves(_) => None,
         });
         let extent = rounded.filter(|extent| extent.is_finite()).fold(0.0, f64::max);
         // A mesh that is not moved to the origin has coordinates of at most 4.5 times its size.
@@ -156,11 +158,14 @@ impl Scene {
                     let Some(hit) = self.closest(&ray, left) else { break };
                     let surface = self.surface(&ray, &hit);
                     let scale = surface.scale.max(size);
-                    let away = (surface.point - point).dot(surface.normal).abs();
+                    let away = surface.point - point;
                     let known = |other: &Lain| {
                         other.hit.object == hit.object && other.surface.normal.dot(surface.normal).abs() > 1.0 - 1e-9
                     };
-                    if away <= (NEAR * scale).max(self.rounding(&hit)) && !found.iter().any(known) {
+                    // Some axis meets it within √3 of how far its plane is away; what is farther has another plane by the point.
+                    let tolerance = (NEAR * scale).max(self.rounding(&hit, surface.normal));
+                    let through = away.dot(surface.normal).abs() <= tolerance && away.length() <= 2.0 * tolerance;
+                    if through && !found.iter().any(known) {
                         found.push(Lain { hit, surface, scale });
                     }
                     ray = self.leave(&surface, &hit, direction);
@@ -170,13 +175,13 @@ impl Scene {
         found
     }
 
-    /// How far corners of what was met may lie off where they are written.
-    fn rounding(&self, hit: &Hit) -> f64 {
+    /// How far corners of what was met may lie off where they are written, along the normal there.
+    fn rounding(&self, hit: &Hit, normal: DVec3) -> f64 {
         let Geometry::Mesh(mesh) = &self.objects[hit.object as usize].geometry else { return 0.0 };
         let corners = mesh.mesh.vertices(hit.part).map(|corner| corner.abs().max_element());
         let stretch = self.instance_map(hit).map_or(1.0, |map| {
             let m = map.world_from_object().matrix3;
-            m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length())
+            [m.x_axis, m.y_axis, m.z_axis].map(|axis| axis.dot(normal).abs()).iter().sum()
         });
         NEAR_MESH * stretch * corners.into_iter().fold(0.0, f64::max)
     }
@@ -261,6 +266,27 @@ mod tests {
             let scene = compile(&description, "s").unwrap();
             let above = scene.lights[0].position().unwrap().y - f64::from(y as f32);
             assert!(above > 0.0 && above < 1e-8, "{y}: {above}");
+        }
+    }
+
+    /// A ball of 1 m that is stretched to 10¹⁰ m along x measures as much, but at z = 6 the eye is 5 m off it. The floor of a
+    /// mesh, half a metre below the eye, has corners that are told to 1.2 km along x alone.
+    #[test]
+    fn what_is_stretched_is_not_nearer() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(
+            directory.path().join("strip.obj"),
+            "v -1 0.5 -9\nv -1 0.5 9\nv 1 0.5 9\nv 1 0.5 -9\nf 1 2 3 4\n",
+        )
+        .unwrap();
+        for child in ["sphere: {radius: 1}", "mesh: {file: strip.obj}}, {sphere: {radius: 1}"] {
+            let text = format!(
+                "camera: {{origin: [0, 1, 6], target: [0, 0.5, 0], fov_deg: 40}}\ngroups: {{g: [{{{child}}}]}}\n\
+                 shapes:\n- plane: {{normal: [0, 1, 0]}}\n- instance: {{group: g, transform: [{{scale: [1.0e10, 1, 1]}}]}}\n"
+            );
+            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
+            let scene = compile(&description, "s").unwrap();
+            assert_eq!((scene.camera.eye().y, scene.notes.len()), (1.0, 0), "{child}: {:?}", scene.notes);
         }
     }
 
