@@ -1,7 +1,7 @@
 //! How texture coordinates run over a surface.
 
 use super::shape::exact::difference_of_products;
-use super::shape::{Detail, SurfacePoint};
+use super::shape::{Detail, Shape, SurfacePoint};
 use super::{Geometry, Hit, Scene};
 use crate::math::Ray;
 use glam::{DMat2, DVec2, DVec3};
@@ -64,7 +64,8 @@ impl Scene {
             Geometry::Shape(shape) => {
                 let size = shape.bounds().map_or(surface.scale, |(low, high)| (high - low).max_element());
                 let uv = |p: DVec3| shape.surface(p, hit.part as u8).uv;
-                differences(point, axes, size, shape.is_closed(), uv)
+                // Those of a plane are lengths.
+                differences(point, axes, size, !matches!(shape, Shape::Plane(_)), uv)
             }
             // No texture coordinates.
             Geometry::Sdf(_) => DMat2::ZERO,
@@ -102,8 +103,7 @@ fn differences(point: DVec3, axes: [DVec3; 2], size: f64, angles: bool, uv: impl
     let [s, t] = axes.map(|axis| {
         let step = size.max(f64::MIN_POSITIVE) / 8192.0 / axis.length();
         let d = uv(point + axis * step) - uv(point - axis * step);
-        let wrapped = DVec2::new(nearest_turn(d.x), nearest_turn(d.y));
-        let d = if angles || d.abs().max_element() > 0.5 { wrapped } else { d };
+        let d = if angles { DVec2::new(nearest_turn(d.x), nearest_turn(d.y)) } else { d };
         d / (2.0 * step)
     });
     DMat2::from_cols(s, t)
@@ -112,4 +112,29 @@ fn differences(point: DVec3, axes: [DVec3; 2], size: f64, angles: bool, uv: impl
 /// `d` less the nearest whole number.
 fn nearest_turn(d: f64) -> f64 {
     d - d.round()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::description::SceneDescription;
+    use crate::math::Ray;
+    use crate::scene::compile::compile;
+    use glam::DVec3;
+
+    /// u and v of a plane are metres, however far from the origin: ∂p/∂u and ∂p/∂v are unit vectors that stand on each other, to
+    /// the rounding of u, 2⁻⁵³ of some coordinate over 2⁻¹² of it.
+    #[test]
+    fn texture_coordinates_of_a_plane_run_alike_everywhere() {
+        let text =
+            "camera: {origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}\nshapes: [plane: {normal: [0, 1, 0]}]\n";
+        let description = SceneDescription::parse(text, std::path::Path::new("s.yaml")).unwrap();
+        let scene = compile(&description, "s").unwrap();
+        for x in [1.0, 1500.0, 3000.0, -9000.0, 1e7] {
+            let ray = Ray::new(DVec3::new(x, 1.0, 0.3 * x), DVec3::NEG_Y);
+            let hit = scene.closest(&ray, f64::INFINITY).unwrap();
+            let [du, dv] = scene.uv_gradient(&hit, &scene.surface_with_texture(&ray, &hit)).partials();
+            let off = [du.length() - 1.0, dv.length() - 1.0, du.dot(dv)];
+            assert!(off.into_iter().all(|off| off.abs() < 1e-11), "{x}: {du} {dv}");
+        }
+    }
 }
