@@ -463,6 +463,9 @@ fn check_length(at: At<'_>, length: f64, checker: &mut Checker<'_>) {
 /// A length or none.
 const LENGTH: &str = "a number from 0 to 1e60";
 
+/// Mitchell and Netravali look at b and c from 0 to 1, and at 3/2 and -1/4; far beyond, lobes cancel each other.
+const MOST_MITCHELL: f64 = 2.0;
+
 /// The widest filter, pixels: light from the lamps themselves is dealt to all pixels within it.
 const WIDEST: f64 = 256.0;
 
@@ -482,7 +485,13 @@ impl Image {
         checker.require((least..=most).contains(&self.sensitivity), at.key("sensitivity"), &expected, found);
         let filter = at.key("filter");
         match self.filter {
-            Filter::Box | Filter::Mitchell { .. } | Filter::CatmullRom => {}
+            Filter::Box | Filter::CatmullRom => {}
+            Filter::Mitchell { b, c } => {
+                for (key, number) in [("b", b), ("c", c)] {
+                    let holds = number.abs() <= MOST_MITCHELL;
+                    checker.require(holds, filter.key("mitchell").key(key), "a number from -2 to 2", number);
+                }
+            }
             Filter::Tent { radius } => check_width(filter.key("tent").key("radius"), radius, checker),
             Filter::Gaussian { stddev } => check_width(filter.key("gaussian").key("stddev"), stddev, checker),
             Filter::Lanczos { radius } => check_width(filter.key("lanczos").key("radius"), radius, checker),
@@ -694,6 +703,16 @@ mod tests {
             let told = faults(&format!("image: {{sensitivity: {sensitivity}}}"));
             assert!(told.ends_with(&format!("{expected} {found}")), "{told}");
         }
+    }
+
+    #[test]
+    fn a_cubic_has_lobes_that_leave_something() {
+        assert_eq!(
+            faults("image: {filter: {mitchell: {b: 30, c: -2.5}}}"),
+            "dir/s.yaml:2:32: image.filter.mitchell.b: expected a number from -2 to 2, found 30\n\
+             dir/s.yaml:2:39: image.filter.mitchell.c: expected a number from -2 to 2, found -2.5"
+        );
+        assert_eq!(faults("image: {filter: {mitchell: {b: 1.5, c: -0.25}}}"), "none");
     }
 
     #[test]

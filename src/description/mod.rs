@@ -37,7 +37,7 @@
 //!   height: 600                     # default
 //!   filter: box                     # default; or one of
 //!                                   #   {tent: {radius: 1}}, {gaussian: {stddev: 0.5}}, mitchell (b and c
-//!                                   #   default 1/3), catmull_rom, {lanczos: {radius: 3}}
+//!                                   #   default 1/3, -2 to 2), catmull_rom, {lanczos: {radius: 3}}
 //!   crop: {x: 0, y: 0, width: 10, height: 10}   # default all; x and y default 0
 //!   overscan: 0                     # default; pixels that are rendered beyond each edge of the frame, without a crop
 //!   sample_border: true             # default; false: the filter is cut where the picture ends, and takes no light from beyond
@@ -189,10 +189,10 @@
 //!       spec_trans: 0                            # ~ light enters; the back is then another side
 //!       specular: 0.5                            # ~ reflectance 0.08 specular; or eta: 1.5, the index
 //!       spec_tint: 0                             # ~ reflection takes the hue of the base
-//!       sheen: 0.2                               # ~ 0 and up
+//!       sheen: 0.2                               # ~ 0 to 10
 //!       sheen_tint: 0                            # ~
 //!       flatness: 0                              # ~ diffusion looks like subsurface scattering
-//!       clearcoat: 0.5                           # ~ 0 and up
+//!       clearcoat: 0.5                           # ~ 0 to 10
 //!       clearcoat_gloss: 0                       # ~
 //!       luminance: colour                        # ~ what the base is divided by for a tint: its luminance; or
 //!                                                # mitsuba, as its spectral modes estimate it (0.38 of white)

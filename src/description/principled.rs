@@ -26,13 +26,13 @@ pub struct Principled {
     pub contrast: Contrast,
     /// Share of the dielectric reflection that is tinted, 0 to 1; default 0.
     pub spec_tint: NumberOrTexture,
-    /// Default 0.
+    /// 0 to 10; default 0.
     pub sheen: NumberOrTexture,
     /// Share of it that is tinted, 0 to 1; default 0.
     pub sheen_tint: NumberOrTexture,
     /// From diffuse to the shape of subsurface scattering, 0 to 1; default 0.
     pub flatness: NumberOrTexture,
-    /// Default 0.
+    /// 0 to 10; default 0.
     pub clearcoat: NumberOrTexture,
     /// 0 to 1; default 0.
     pub clearcoat_gloss: NumberOrTexture,
@@ -66,6 +66,9 @@ pub enum Luminance {
 
 /// Factors from the least to the most on how often a lobe is sampled: beyond, the others would in effect not be.
 const RATES: [f64; 2] = [1e-6, 1e6];
+
+/// The strongest sheen and clearcoat, which add to the light that comes back; as they are meant, they go up to 1.
+const MOST_STRENGTH: f64 = 10.0;
 
 /// Factors on how often the lobes of a [`Principled`] are sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -177,7 +180,7 @@ pub struct PrincipledThin {
     /// Share of the reflection that is tinted, 0 to 1; default 0.
     #[serde(default = "zero")]
     pub spec_tint: NumberOrTexture,
-    /// Default 0.
+    /// 0 to 10; default 0.
     #[serde(default = "zero")]
     pub sheen: NumberOrTexture,
     /// Share of it that is tinted, 0 to 1; default 0.
@@ -249,7 +252,7 @@ impl Principled {
             }
         }
         for (key, strength) in [("sheen", &self.sheen), ("clearcoat", &self.clearcoat)] {
-            strength.check(f64::INFINITY, at.key(key), checker);
+            strength.check(MOST_STRENGTH, at.key(key), checker);
         }
         match self.contrast {
             Contrast::Eta(eta) => checker.index(at.key("eta"), eta),
@@ -274,7 +277,7 @@ impl PrincipledThin {
             ("spec_trans", &self.spec_trans, 1.0),
             ("diff_trans", &self.diff_trans, 2.0),
             ("spec_tint", &self.spec_tint, 1.0),
-            ("sheen", &self.sheen, f64::INFINITY),
+            ("sheen", &self.sheen, MOST_STRENGTH),
             ("sheen_tint", &self.sheen_tint, 1.0),
             ("flatness", &self.flatness, 1.0),
         ];
@@ -352,6 +355,11 @@ mod tests {
             (
                 "{eta: 0}",
                 "dir/s.yaml:3:25: materials.m.principled.eta: expected an index of refraction, a number from 1e-6 to 1e6, found 0",
+            ),
+            (
+                "{sheen: 1.0e38, clearcoat: 1.0e30}",
+                "dir/s.yaml:3:27: materials.m.principled.sheen: expected a number from 0 to 10, found 1e38\n\
+                 dir/s.yaml:3:46: materials.m.principled.clearcoat: expected a number from 0 to 10, found 1e30",
             ),
             (
                 "{metallic: 2}",

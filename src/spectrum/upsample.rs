@@ -97,7 +97,10 @@ pub fn reflectance(rgb: [f64; 3]) -> Result<Spectrum, String> {
     if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
         return Ok(Spectrum::constant(rgb[0]));
     }
-    Ok(Spectrum::Sigmoid { c: fit::solve(rgb).map(|x| x as f32), scale: 1.0 })
+    let c = fit::solve(rgb);
+    // What is darker than f32 can tell is as dark as it can tell, of the same hue.
+    let beyond = (fit::largest(c) / f64::from(END)).max(1.0);
+    Ok(Spectrum::Sigmoid { c: c.map(|x| (x / beyond) as f32), scale: 1.0 })
 }
 
 /// The emission that has the linear Rec.709 colour `rgb`: for (1, 1, 1), D65 of luminance 1.
@@ -211,6 +214,16 @@ mod tests {
         assert_eq!(values(optical_constant([0.2, 0.3, 1.0])), values(reflectance([0.2, 0.3, 1.0])));
         assert_eq!(values(optical_constant([0.2, 0.3, 1.5])), values(unbounded([0.2, 0.3, 1.5])));
         assert!(optical_constant([-0.1, 0.3, 0.5]).is_err());
+    }
+
+    /// A reflectance of 10⁻³⁰⁰ has coefficients of some 10¹⁵⁰, beyond f32: it is as good as black, if not how far.
+    #[test]
+    fn colours_that_are_all_but_black_are_numbers() {
+        for rgb in [[1e-300, 0.0, 0.0], [0.0, 1e-100, 1e-101], [5e-324, 0.0, 0.0]] {
+            let spectrum = reflectance(rgb).unwrap();
+            let lanes = spectrum.eval(Lanes::new([360.0, 420.0, 480.0, 540.0, 595.0, 660.0, 720.0, 830.0]));
+            assert!(lanes.to_array().iter().all(|x| (0.0..1e-20).contains(x)), "{rgb:?}: {lanes:?} of {spectrum:?}");
+        }
     }
 
     /// A deterministic spread of colours: inside, on faces, on edges, dark and near white.
