@@ -149,7 +149,7 @@ mod tests {
             ("ior: 0.9", "3:19: materials.m.hair.ior: expected an index above that outside, found 0.9"),
             (
                 "ior: -1",
-                "3:19: materials.m.hair.ior: expected an index of refraction, a number from 1e-6 to 1e6, found -1",
+                "3:19: materials.m.hair.ior: expected an index of refraction, a number from 0.1 to 10, found -1",
             ),
             ("roughness_along: 0", "3:31: materials.m.hair.roughness_along: expected a number from 0.01 to 1, found 0"),
         ] {

@@ -557,12 +557,12 @@ mod tests {
         );
         assert_eq!(
             a("thin_dielectric: {ior: 1, exterior_ior: 0}"),
-            "dir/s.yaml:3:47: materials.a.thin_dielectric.exterior_ior: expected an index of refraction, a number from 1e-6 to 1e6, found 0"
+            "dir/s.yaml:3:47: materials.a.thin_dielectric.exterior_ior: expected an index of refraction, a number from 0.1 to 10, found 0"
         );
         assert_eq!(
             a("plastic: {reflectance: 2, ior: 0, roughness: -1}"),
             "dir/s.yaml:3:30: materials.a.plastic.reflectance: expected a number from 0 to 1, found 2\n\
-             dir/s.yaml:3:38: materials.a.plastic.ior: expected an index of refraction, a number from 1e-6 to 1e6, found 0\n\
+             dir/s.yaml:3:38: materials.a.plastic.ior: expected an index of refraction, a number from 0.1 to 10, found 0\n\
              dir/s.yaml:3:52: materials.a.plastic.roughness: expected a roughness, a number from 0 to 10, found -1"
         );
     }

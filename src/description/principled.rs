@@ -354,7 +354,7 @@ mod tests {
             ),
             (
                 "{eta: 0}",
-                "dir/s.yaml:3:25: materials.m.principled.eta: expected an index of refraction, a number from 1e-6 to 1e6, found 0",
+                "dir/s.yaml:3:25: materials.m.principled.eta: expected an index of refraction, a number from 0.1 to 10, found 0",
             ),
             (
                 "{sheen: 1.0e38, clearcoat: 1.0e30}",

@@ -11,6 +11,7 @@ use super::decode::{FILE_PATH, whole};
 use super::fault::Checker;
 use super::path::At;
 use crate::error::in_short;
+use crate::spectrum::index::INDICES;
 
 /// Three numbers: a position or a vector, metres; or a colour.
 pub type Vec3 = [f64; 3];
@@ -263,12 +264,12 @@ pub(crate) enum Role {
     Emission,
     /// 0 or more, and nothing that emits: σ.
     Coefficient,
-    /// η and k: from 0 to [`MOST_INDEX`], and nothing that emits.
+    /// η and k: from 0 to [`MOST_CONSTANT`], and nothing that emits.
     OpticalConstant,
 }
 
-/// The largest index of refraction; its inverse is the smallest. Fresnel's equations take fourth powers of it.
-const MOST_INDEX: f64 = 1e6;
+/// The largest optical constant of a metal. Fresnel's equations take fourth powers of it.
+const MOST_CONSTANT: f64 = 1e6;
 
 /// What a lane of light can hold.
 const MOST_LIGHT: f64 = f32::MAX as f64;
@@ -286,7 +287,7 @@ impl Spectrum {
                 Role::Reflectance => ((0.0..=1.0).contains(&(value * by)), "a number from 0 to 1"),
                 Role::Emission | Role::Coefficient if value * by > MOST_LIGHT => (false, "a number from 0 to 3.4e38"),
                 Role::Emission | Role::Coefficient => (value * by >= 0.0, "a number of 0 or more"),
-                Role::OpticalConstant => ((0.0..=MOST_INDEX).contains(&(value * by)), "a number from 0 to 1e6"),
+                Role::OpticalConstant => ((0.0..=MOST_CONSTANT).contains(&(value * by)), "a number from 0 to 1e6"),
             };
             checker.require(holds, at, expected, format_args!("{}{times}", in_short(value)));
         };
@@ -405,8 +406,8 @@ impl Index {
 impl Checker<'_> {
     /// `found` is an index of refraction.
     pub(crate) fn index(&mut self, at: At<'_>, found: f64) {
-        let holds = (1.0 / MOST_INDEX..=MOST_INDEX).contains(&found);
-        self.require(holds, at, "an index of refraction, a number from 1e-6 to 1e6", found);
+        let holds = INDICES.contains(&found);
+        self.require(holds, at, "an index of refraction, a number from 0.1 to 10", found);
     }
 }
 
@@ -550,11 +551,13 @@ mod tests {
 
     #[test]
     fn an_index_is_positive() {
-        let expected = "expected an index of refraction, a number from 1e-6 to 1e6";
-        for n in ["0", "-1.5", "1e300"] {
+        let expected = "expected an index of refraction, a number from 0.1 to 10";
+        for n in ["0", "-1.5", "15", "0.05", "1e300"] {
             assert_eq!(index(n), format!("dir/s.yaml:4:23: {GLASS}: {expected}, found {n}"));
         }
-        assert_eq!(index("0.9"), "none");
+        for n in ["0.1", "0.9", "10"] {
+            assert_eq!(index(n), "none");
+        }
         assert_eq!(
             index("{abbe: {nd: 0, vd: 0}}"),
             format!(

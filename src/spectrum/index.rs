@@ -15,6 +15,10 @@ pub const LINE_F: f64 = 486.1327;
 /// Hydrogen C, nm.
 pub const LINE_C: f64 = 656.2725;
 
+/// Indices that can be used: far beyond any transparent material, so that what leaves them is a misplaced digit or a wavelength
+/// unit.
+pub const INDICES: std::ops::RangeInclusive<f64> = 0.1..=10.0;
+
 /// A real refractive index as a function of wavelength λ (in µm in the formulas).
 #[derive(Clone, Debug, PartialEq)]
 pub enum RefractiveIndex {
@@ -188,9 +192,8 @@ impl RefractiveIndex {
     /// Whether the index can be used over the whole band.
     ///
     /// # Errors
-    /// In words: a resonance within 360 to 830 nm, an index that is not a finite number between 0.1 and 10
-    /// somewhere in it, or a table that does not cover it or is not in order. The bounds are far beyond
-    /// any transparent material; what leaves them is a misplaced digit or a wavelength unit.
+    /// In words: a resonance within 360 to 830 nm, an index that is not a finite number within [`INDICES`]
+    /// somewhere in it, or a table that does not cover it or is not in order.
     pub fn check_band(&self) -> Result<(), String> {
         if let RefractiveIndex::Table { samples } = self {
             if let Some(i) = (1..samples.len()).find(|i| samples[*i][0] <= samples[i - 1][0]) {
@@ -218,7 +221,7 @@ impl RefractiveIndex {
         for i in 0..=4700 {
             let nm = BAND_NM[0] + 0.1 * f64::from(i);
             let n = self.at(nm);
-            if !(0.1..=10.0).contains(&n) {
+            if !INDICES.contains(&n) {
                 let found = if n.is_nan() { "a negative square".to_string() } else { in_short(n) };
                 return Err(format!("expected an index of 0.1 to 10 over 360 to 830 nm, found {found} at {nm:.1} nm"));
             }
