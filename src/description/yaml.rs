@@ -290,7 +290,7 @@ impl Builder {
 }
 
 /// What a node and all inside it count toward [`MAX_NODES`].
-fn weight(node: &Node) -> usize {
+pub(crate) fn weight(node: &Node) -> usize {
     match &node.value {
         Value::Text(text) => 1 + text.len() / TEXT_PER_NODE,
         Value::List(items) => 1 + items.iter().map(weight).sum::<usize>(),

@@ -1,5 +1,7 @@
 //! Materials that are made of others, and numbers that may follow a texture.
 
+use std::collections::HashSet;
+
 use super::super::fault::Fault;
 use super::super::node::Node;
 use super::bsdfs::Sides;
@@ -97,7 +99,7 @@ impl Import<'_> {
         let allowed = bag.boolean("allow_transmission")?.unwrap_or(false);
         let inner = bag.objects(Family::Bsdf);
         bag.finish()?;
-        if !allowed && let Some(open) = inner.iter().find_map(|index| self.lets_through(*index)) {
+        if !allowed && let Some(open) = inner.iter().find_map(|index| self.lets_through(*index, &mut HashSet::new())) {
             super::bsdfs::transparent(&self.bag(open), Sides::Both)?;
         }
         match inner[..] {
@@ -118,13 +120,16 @@ impl Import<'_> {
         }
     }
 
-    /// A part of a material that lets light through, whatever its numbers.
-    fn lets_through(&self, index: usize) -> Option<usize> {
+    /// A part of a material that lets light through, whatever its numbers. Materials that were `seen` do not.
+    fn lets_through(&self, index: usize, seen: &mut HashSet<usize>) -> Option<usize> {
+        if !seen.insert(index) {
+            return None;
+        }
         let bag = self.bag(index);
         match bag.object.plugin.as_str() {
             "dielectric" | "dispersivedielectric" | "thindielectric" | "roughdielectric" => Some(index),
             "null" | "mask" | "principledthin" | "hair" => Some(index),
-            _ => bag.objects(Family::Bsdf).into_iter().find_map(|inner| self.lets_through(inner)),
+            _ => bag.objects(Family::Bsdf).into_iter().find_map(|inner| self.lets_through(inner, seen)),
         }
     }
 

@@ -1,5 +1,7 @@
 //! Integrators: the fields `integrator` and `layers`.
 
+use std::collections::HashSet;
+
 use super::super::fault::Fault;
 use super::super::node::{Node, Place, quote};
 use super::object::{Bag, Document, Family, Object, Value};
@@ -32,7 +34,11 @@ pub(super) fn sees_media(document: &Document) -> Result<bool, Fault> {
     let objects = Bag::new(document, 0).objects(Family::Integrator);
     let mut known: Option<(usize, bool)> = None;
     let mut open = objects;
+    let mut seen = HashSet::new();
     while let Some(index) = open.pop() {
+        if !seen.insert(index) {
+            continue;
+        }
         let bag = Bag::new(document, index);
         let sees = match bag.object.plugin.as_str() {
             _ if bag.written().is_some() => true,
@@ -160,7 +166,10 @@ impl Import<'_> {
         let mut all = Vec::new();
         for index in inside {
             let place = self.bag(index).object.place;
-            all.push((name_of(bag.object, index), place, self.translated(index)?));
+            let translated = self.translated(index)?;
+            // It is a layer; those within it have counted themselves.
+            self.again(index, &translated.integrator)?;
+            all.push((name_of(bag.object, index), place, translated));
         }
         Ok(all)
     }

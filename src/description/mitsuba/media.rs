@@ -101,6 +101,7 @@ impl Import<'_> {
             _ => return Err(bag.unknown(PHASES)),
         };
         bag.finish()?;
+        self.again(index, &node)?;
         Ok(node)
     }
 

@@ -43,6 +43,7 @@ use super::edit::Setting;
 use super::fault::Fault;
 use super::medium::{UNCHANGED, VACUUM};
 use super::node::{Entry, Node, Place, Sources, Value};
+use super::yaml::{MAX_NODES, weight};
 use crate::error::Result;
 use object::{Bag, Document, Family, Object};
 pub(crate) use parse::Define;
@@ -119,6 +120,10 @@ struct Import<'a> {
     taken: HashSet<String>,
     /// Whether the integrator sees media.
     sees_media: bool,
+    /// Objects that stand in place of a reference already.
+    in_place: HashSet<usize>,
+    /// How many more nodes references may write out again.
+    left: usize,
     /// What a person should know, and of which place.
     notes: Vec<(Place, String)>,
 }
@@ -142,6 +147,8 @@ impl<'a> Import<'a> {
             shining: HashSet::new(),
             taken,
             sees_media: true,
+            in_place: HashSet::new(),
+            left: MAX_NODES,
             notes: Vec::new(),
         }
     }
@@ -223,6 +230,18 @@ impl<'a> Import<'a> {
             setting.apply(&mut root)?;
         }
         Ok((root, self.notes))
+    }
+
+    /// Counts `node`, as which an object stands in place of a reference, from the second time on. References that each
+    /// name another one twice double at every step.
+    fn again(&mut self, index: usize, node: &Node) -> std::result::Result<(), Fault> {
+        if self.in_place.insert(index) {
+            return Ok(());
+        }
+        let message = || format!("expected at most {MAX_NODES} values that references write out again, found more");
+        let left = self.left.checked_sub(weight(node));
+        self.left = left.ok_or_else(|| Fault::at_place(self.document.objects[index].place, message()))?;
+        Ok(())
     }
 
     /// A name for an object in one of the maps: its id, or one made from its place.
@@ -646,6 +665,37 @@ mod tests {
             text.push_str(&format!("<bsdf type=\"twosided\" id=\"b{i}\"><ref id=\"b{}\"/></bsdf>", i - 1));
         }
         assert!(fault(&text, &[]).ends_with("expected at most 64 objects within one another, found more"));
+    }
+
+    /// Each of 60 names the one before twice: 2⁶⁰ objects, were they all written out, or as many looks.
+    #[test]
+    fn references_do_not_multiply_without_end() {
+        let chain = |first: &str, next: &dyn Fn(usize, String) -> String| {
+            let twice = |i: usize| format!("<ref id=\"o{i}\"/>").repeat(2);
+            (1..=60).fold(first.to_owned(), |text, i| text + &next(i, twice(i - 1)) + "\n")
+        };
+        let expected = "expected at most 4000000 values that references write out again, found more";
+        let phases = chain("<phase type=\"isotropic\" id=\"o0\"/>", &|i, twice| {
+            format!("<phase type=\"blendphase\" id=\"o{i}\"><float name=\"weight\" value=\"0.5\"/>{twice}</phase>")
+        });
+        let merges = chain("<shape type=\"sphere\" id=\"o0\"/>", &|i, twice| {
+            format!("<shape type=\"merge\" id=\"o{i}\">{twice}</shape>")
+        });
+        let layers = chain("<integrator type=\"path\" id=\"o0\"/>", &|i, twice| {
+            format!(
+                "<integrator type=\"aov\" id=\"o{i}\"><string name=\"aovs\" value=\"\"/>{twice}</integrator>"
+            )
+        });
+        // Of a scene's integrators there is one.
+        let layers = format!("<integrator type=\"moment\">{layers}<ref id=\"o60\"/></integrator>");
+        for text in [phases, merges, layers] {
+            assert!(fault(&text, &[]).ends_with(expected), "{}", fault(&text, &[]));
+        }
+        let materials = chain("<bsdf type=\"diffuse\" id=\"o0\"/>", &|i, twice| {
+            format!("<bsdf type=\"blendbsdf\" id=\"o{i}\"><float name=\"weight\" value=\"0.5\"/>{twice}</bsdf>")
+        });
+        let both = format!("{materials}<bsdf type=\"twosided\"><ref id=\"o60\"/></bsdf>");
+        assert_eq!(fault(&both, &[]), "none");
     }
 
     /// Each doubles the one before.

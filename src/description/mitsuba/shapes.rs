@@ -45,6 +45,7 @@ impl Import<'_> {
                 for child in bag.objects(Family::Shape) {
                     self.shape(child)?;
                 }
+                self.again(index, &Fields::new(bag.object.place).kind("merge"))?;
                 return bag.finish();
             }
             "shapegroup" => return self.group(index).map(|_| ()),
@@ -65,7 +66,9 @@ impl Import<'_> {
             self.surface(&bag, &mut fields)?;
         }
         bag.finish()?;
-        self.shapes.push(fields.kind(kind));
+        let node = fields.kind(kind);
+        self.again(index, &node)?;
+        self.shapes.push(node);
         Ok(())
     }
 

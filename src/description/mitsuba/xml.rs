@@ -4,7 +4,8 @@
 //! borrow from the text, so that the offset of each name and value is known. Nesting is limited
 //! here, before anything deep is built. Instructions `<?abbe …?>` become elements of their own: what
 //! [`export`](super::export) says past Mitsuba. A document type is refused, and with it every entity but
-//! the five of XML and character references: there is nothing to expand without end.
+//! the five of XML and character references: nothing here grows as it is read. What references write out more than
+//! once is counted where that happens, by [`Import::again`](super::Import::again).
 
 use quick_xml::Reader;
 use quick_xml::escape::unescape;
