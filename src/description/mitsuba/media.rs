@@ -3,7 +3,6 @@
 use super::super::fault::Fault;
 use super::super::medium::{UNCHANGED, VACUUM};
 use super::super::node::Node;
-use super::integrators::has_media;
 use super::object::{Bag, Family, Value};
 use super::parse;
 use super::spectra::Role;
@@ -61,7 +60,7 @@ impl Import<'_> {
     /// The media on the two sides of a shape. A side that a shape does not name is empty if it names the other; a
     /// shape that names none leaves a ray in what it is in.
     pub(crate) fn sides(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<(), Fault> {
-        if !has_media(self.document) {
+        if !self.has_media {
             return Ok(());
         }
         let sides = [("inside", "interior"), ("outside", "exterior")];
@@ -158,6 +157,14 @@ mod tests {
             })
             .collect();
         assert_eq!(inside, [1.0, 2.0, 3.0]);
+    }
+
+    /// Each of 100,000 looked among all of them for a medium: 41 s where the rest takes one.
+    #[test]
+    fn many_shapes_without_media_take_no_quadratic_time() {
+        let begin = std::time::Instant::now();
+        assert_eq!(good(&"<shape type=\"sphere\"/>".repeat(100_000)).shapes.len(), 100_000);
+        assert!(begin.elapsed() < std::time::Duration::from_secs(20));
     }
 
     /// A volume that is the same everywhere is a spectrum, wherever it is; one that varies is no even extinction.

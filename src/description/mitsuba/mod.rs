@@ -118,6 +118,8 @@ struct Import<'a> {
     shining: HashSet<usize>,
     /// Names that no other object may be given.
     taken: HashSet<String>,
+    /// Whether there are media.
+    has_media: bool,
     /// Whether the integrator sees media.
     sees_media: bool,
     /// Objects that stand in place of a reference already.
@@ -146,6 +148,7 @@ impl<'a> Import<'a> {
             for_numbers: HashMap::new(),
             shining: HashSet::new(),
             taken,
+            has_media: integrators::has_media(document),
             sees_media: true,
             in_place: HashSet::new(),
             left: MAX_NODES,
