@@ -41,7 +41,7 @@ use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
 use crate::math::Ray;
 use crate::spectrum::{LANES, Outside, RANDOM, Spectrum, WavelengthDistribution};
-use attributes::Surface;
+use attributes::{AtHand, Surface};
 use glam::DVec3;
 use meshes::Meshes;
 use spectra::Role;
@@ -64,6 +64,8 @@ struct Compiler<'a> {
     shelf: Shelf,
     /// What textures lie on.
     surface: Surface,
+    /// What was made for it.
+    at_hand: AtHand<'a>,
     /// Whether a texture has asked for that.
     asks_for_surface: bool,
     /// Materials that are others on each surface.
@@ -161,6 +163,7 @@ impl<'a> Compiler<'a> {
             pictures: Pictures::default(),
             shelf: Shelf::default(),
             surface: Surface::Unknown,
+            at_hand: AtHand::default(),
             asks_for_surface: false,
             on_surface: BTreeSet::new(),
             textures: HashMap::new(),
@@ -267,7 +270,7 @@ impl<'a> Compiler<'a> {
                 objects.push(object);
             }
         }
-        self.surface = Surface::Unknown;
+        self.lie_on(Surface::Unknown);
         for (i, light) in d.lights.iter().enumerate() {
             let at = format!("lights[{i}].{}", light.kind());
             let weight = light.sampling_weight();
@@ -448,7 +451,7 @@ impl<'a> Compiler<'a> {
         index: u32,
         lights: &mut Vec<Light>,
     ) -> Result<Option<Object>> {
-        self.surface = Surface::Shape;
+        self.lie_on(Surface::Shape);
         let Some(geometry) = self.geometry(at, shape)? else { return Ok(None) };
         if let Some(group) = shape.geometry.group() {
             let (detail, material) = (Detail::Geometry, self.groups[group].1);

@@ -1,12 +1,15 @@
 //! Textures that are attributes of the mesh they lie on.
 //!
 //! Such a texture, and with it a material that holds one, is another one on each mesh: neither is kept by
-//! name, and the material is compiled anew for each shape that has it.
+//! name for longer than its mesh, and the material is compiled anew for each shape that has it.
 
 use super::Compiler;
 use crate::description as written;
+use crate::scene::material::Material;
 use crate::scene::mesh::attribute::AttributeTexture;
 use crate::scene::mesh::{Mesh, MeshSource};
+use crate::scene::texture::{Scalar, Texture};
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// The surface that a material is compiled for.
@@ -17,6 +20,14 @@ pub(super) enum Surface {
     Shape,
     /// A mesh.
     Mesh(OfMesh),
+}
+
+/// What is another on each surface, by name, as it is on the one at hand.
+#[derive(Default)]
+pub(super) struct AtHand<'a> {
+    pub(super) textures: HashMap<&'a str, Texture>,
+    pub(super) numbers: HashMap<&'a str, Scalar>,
+    pub(super) materials: HashMap<&'a str, Arc<Material>>,
 }
 
 /// The attributes of a mesh, and its triangles as they lie in the world.
@@ -34,6 +45,22 @@ impl OfMesh {
 }
 
 impl<'a> Compiler<'a> {
+    /// From here on textures lie on `surface`.
+    pub(super) fn lie_on(&mut self, surface: Surface) {
+        self.surface = surface;
+        self.at_hand = AtHand::default();
+    }
+
+    /// What is known of the surface at hand; who uses it asks for that.
+    pub(super) fn kept<T: Clone>(
+        &mut self,
+        of: impl for<'b> FnOnce(&'b AtHand<'a>) -> Option<&'b T>,
+    ) -> Option<T> {
+        let known = of(&self.at_hand).cloned();
+        self.asks_for_surface |= known.is_some();
+        known
+    }
+
     /// What `make` makes, and whether it asked for the surface.
     pub(super) fn asking<T>(&mut self, make: impl FnOnce(&mut Self) -> T) -> (T, bool) {
         let before = std::mem::take(&mut self.asks_for_surface);
@@ -72,5 +99,47 @@ impl<'a> Compiler<'a> {
         };
         self.fault(&format!("{at}.mesh_attribute.name"), message);
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile;
+
+    /// What `text` says is wrong on a mesh of one triangle that is `m`, with a colour of three numbers and a number at each vertex.
+    fn fault(text: &str) -> String {
+        let directory = tempfile::tempdir().unwrap();
+        let numbers: String = ["x", "y", "z", "red", "green", "blue", "wear_0"]
+            .map(|name| format!("property float {name}\n"))
+            .concat();
+        let vertices = "0 0 0 0.5 0.5 0.5 1.5\n1 0 0 0.5 0.5 0.5 0\n0 1 0 0.5 0.5 0.5 0\n";
+        let face = "element face 1\nproperty list uchar int vertex_indices\n";
+        let ply = format!("ply\nformat ascii 1.0\nelement vertex 3\n{numbers}{face}end_header\n{vertices}3 0 1 2\n");
+        std::fs::write(directory.path().join("t.ply"), ply).unwrap();
+        let head = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes: [{mesh: {file: t.ply, material: m}}]\n";
+        let description = SceneDescription::parse(&format!("{head}{text}"), &directory.path().join("s.yaml")).unwrap();
+        compile(&description, "s").err().map(|error| error.to_string()).unwrap_or_default()
+    }
+
+    /// Each of 60 holds the one before twice: 2⁶⁰ looks, if none were kept. 2¹² colours are as many as there may be, and 2¹²
+    /// materials with the 2¹² - 1 blends over them twice as many as that.
+    #[test]
+    fn what_holds_an_attribute_twice_at_each_level_is_made_once_a_mesh() {
+        let boards: String = (1..60)
+            .map(|i| format!("  t{i}: {{checkerboard: {{a: {{texture: t{j}}}, b: {{texture: t{j}}}}}}}\n", j = i - 1))
+            .collect();
+        let attribute = "textures:\n  t0: {mesh_attribute: {name: vertex_color}}\n";
+        let diffuse = |texture: &str| format!("diffuse: {{reflectance: {{texture: {texture}}}}}");
+        let told = fault(&format!("{attribute}{boards}materials: {{m: {{{}}}}}\n", diffuse("t59")));
+        assert!(told.contains("t13: expected at most 4096 colours and textures in boards within boards"), "{told}");
+        assert!(!told.contains("t12:"), "{told}");
+        let blends: String = (1..60)
+            .map(|i| format!("  m{i}: {{blend: {{weight: 0.5, first: m{j}, second: m{j}}}}}\n", j = i - 1))
+            .collect();
+        let first = format!("materials:\n  m0: {{{}}}\n{blends}  m: {{blend: {{weight: 0.5, first: m59, second: m59}}}}\n", diffuse("t0"));
+        let told = fault(&format!("{attribute}{first}"));
+        assert!(told.contains("m12.blend: expected at most 4096 layers and materials"), "{told}");
+        assert!(!told.contains("m11"), "{told}");
     }
 }

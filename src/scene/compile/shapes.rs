@@ -78,7 +78,7 @@ impl Compiler<'_> {
                     .meshes
                     .take(at, &source, mesh, &DAffine3::from_mat4(m))
                     .map_err(|message| self.asked(&place, Error::input(&mesh.file, message)))?;
-                self.surface = Surface::Mesh(OfMesh::new(source, &made.mesh));
+                self.lie_on(Surface::Mesh(OfMesh::new(source, &made.mesh)));
                 return Ok(Some(Geometry::Mesh(Box::new(made))));
             }
             written::Geometry::Instance(instance) => {

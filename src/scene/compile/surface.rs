@@ -110,6 +110,9 @@ impl<'a> Compiler<'a> {
         if let Some(known) = self.textures.get(name) {
             return known.clone();
         }
+        if let Some(known) = self.kept(|at_hand| at_hand.textures.get(name)) {
+            return known;
+        }
         let (made, asked) = self.asking(|c| {
             c.within(at, "texture", name, |c| {
                 let texture = &c.description.textures[name];
@@ -124,9 +127,8 @@ impl<'a> Compiler<'a> {
             }
             None => Texture::one(),
         };
-        if !asked {
-            self.textures.insert(name, texture.clone());
-        }
+        let kept = if asked { &mut self.at_hand.textures } else { &mut self.textures };
+        kept.insert(name, texture.clone());
         texture
     }
 
@@ -134,6 +136,9 @@ impl<'a> Compiler<'a> {
     pub(super) fn named_numbers(&mut self, at: &str, name: &'a str) -> Scalar {
         if let Some(known) = self.numbers.get(name) {
             return known.clone();
+        }
+        if let Some(known) = self.kept(|at_hand| at_hand.numbers.get(name)) {
+            return known;
         }
         let (made, asked) = self.asking(|c| {
             c.within(at, "texture", name, |c| {
@@ -149,9 +154,8 @@ impl<'a> Compiler<'a> {
             }
             None => Scalar::Uniform(0.5),
         };
-        if !asked {
-            self.numbers.insert(name, numbers.clone());
-        }
+        let kept = if asked { &mut self.at_hand.numbers } else { &mut self.numbers };
+        kept.insert(name, numbers.clone());
         numbers
     }
 
@@ -282,6 +286,9 @@ impl<'a> Compiler<'a> {
         if let Some(known) = self.named.get(name) {
             return known.clone();
         }
+        if let Some(known) = self.kept(|at_hand| at_hand.materials.get(name)) {
+            return known;
+        }
         let at = format!("materials.{name}");
         let (made, asked) = self.asking(|c| {
             c.within(&at, "material", name, |c| {
@@ -290,9 +297,8 @@ impl<'a> Compiler<'a> {
             })
         });
         let material = Arc::new(made.unwrap_or(Material { kind: Kind::Boundary, two_sided: false, highlight: None }));
-        if !asked {
-            self.named.insert(name, material.clone());
-        }
+        let kept = if asked { &mut self.at_hand.materials } else { &mut self.named };
+        kept.insert(name, material.clone());
         material
     }
 
