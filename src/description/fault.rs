@@ -346,9 +346,8 @@ impl<'a> Checker<'a> {
     }
 
     /// `name` is among `names` of things of this kind.
-    pub(crate) fn known(&mut self, at: At<'_>, kind: &str, name: &str, names: &[String]) {
-        let names = names.iter().map(String::as_str).collect();
-        if let Some(hint) = unknown(name, &names, self.untold) {
+    pub(crate) fn known(&mut self, at: At<'_>, kind: &str, name: &str, names: &BTreeSet<&str>) {
+        if let Some(hint) = unknown(name, names, self.untold) {
             self.fault(at, format!("unknown {kind} {}{hint}", quote(name)));
         }
     }
