@@ -18,6 +18,8 @@ const HAS_COLOURS: u32 = 0x8;
 const DOUBLE: u32 = 0x2000;
 /// A zlib stream gives at most 1032 bytes for each of its own (RFC 1951: 258 bytes by a code of two bits).
 const MOST_INFLATED: u64 = 1032;
+/// Of the name of a mesh, in bytes; it is read one by one.
+const LONGEST_NAME: usize = 1 << 16;
 
 /// Reads mesh number `index`, counted from 0.
 pub(super) fn read(bytes: &[u8], index: u32) -> Result<MeshSource, String> {
@@ -30,7 +32,13 @@ pub(super) fn read(bytes: &[u8], index: u32) -> Result<MeshSource, String> {
     let flags = u32::from_le_bytes(stream.array()?);
     if version == 4 {
         // The name of the mesh.
-        while stream.array::<1>()? != [0] {}
+        let mut length = 0;
+        while stream.array::<1>()? != [0] {
+            length += 1;
+            if length > LONGEST_NAME {
+                return Err(format!("expected a name of at most {LONGEST_NAME} bytes that ends with a zero, found more"));
+            }
+        }
     }
     let vertices = u64::from_le_bytes(stream.array()?);
     let triangles = u64::from_le_bytes(stream.array()?);
@@ -202,6 +210,23 @@ mod tests {
                 assert_eq!(read(&bytes, 3).unwrap_err(), "expected a mesh from 0 to 2, found 3");
             }
         }
+    }
+
+    /// After it come no vertices and no triangles.
+    #[test]
+    fn a_name_has_an_end() {
+        let named = |length: usize| {
+            let mut body = 0u32.to_le_bytes().to_vec();
+            body.resize(4 + length, b'a');
+            body.push(0);
+            body.extend([0; 16]);
+            let mut zlib = ZlibEncoder::new(Vec::new(), Compression::fast());
+            zlib.write_all(&body).unwrap();
+            [&MAGIC.to_le_bytes()[..], &4u16.to_le_bytes(), &zlib.finish().unwrap()].concat()
+        };
+        assert!(read(&named(65_536), 0).is_ok());
+        let expected = "expected a name of at most 65536 bytes that ends with a zero, found more";
+        assert_eq!(read(&named(65_537), 0).unwrap_err(), expected);
     }
 
     #[test]
