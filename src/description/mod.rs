@@ -364,7 +364,7 @@
 //! `zero_outside`. `blackbody`, `illuminant` and `lines` are emissions only. An illuminant, and a black body unless
 //! `normalised` is false, is scaled to luminance 1, which is that of the number 1; then comes its `scale`. A black body that is
 //! not normalised has its radiance by Planck's law, W·m⁻²·sr⁻¹·nm⁻¹. Where a texture is allowed it is written
-//! `{texture: name}`; a picture with numbers above 1 is light and no reflectance.
+//! `{texture: name}`; a picture, a volume or an attribute with numbers above 1 is light and no reflectance.
 //!
 //! # Refractive indices
 //! ```yaml

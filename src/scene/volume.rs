@@ -186,6 +186,18 @@ impl GridVolume {
         }
     }
 
+    /// The greatest number in its file.
+    #[must_use]
+    pub fn greatest(&self) -> f32 {
+        let greatest = |i: usize| match &self.values {
+            Voxels::Grey(values) => values[i],
+            Voxels::Raw(values) => values[i].into_iter().fold(0.0, f32::max),
+            // The scale is twice the largest channel.
+            Voxels::Coloured(values) => 0.5 * values[i][3],
+        };
+        (0..self.len()).map(greatest).fold(0.0, f32::max)
+    }
+
     fn spectrum(&self, i: usize) -> Spectrum {
         match &self.values {
             Voxels::Grey(values) => Spectrum::constant(f64::from(values[i])),

@@ -106,8 +106,10 @@ impl<'a> Compiler<'a> {
 mod tests {
     use crate::description::SceneDescription;
     use crate::scene::compile::compile;
+    use crate::scene::grid::testing::vol;
 
-    /// What `text` says is wrong on a mesh of one triangle that is `m`, with a colour of three numbers and a number at each vertex.
+    /// What `text` says is wrong on a mesh of one triangle that is `m`. At its vertices stand grey of 0.5 as a colour, and numbers up
+    /// to 1.5; volumes of one voxel are white and twice as bright.
     fn fault(text: &str) -> String {
         let directory = tempfile::tempdir().unwrap();
         let numbers: String = ["x", "y", "z", "red", "green", "blue", "wear_0"]
@@ -117,6 +119,9 @@ mod tests {
         let face = "element face 1\nproperty list uchar int vertex_indices\n";
         let ply = format!("ply\nformat ascii 1.0\nelement vertex 3\n{numbers}{face}end_header\n{vertices}3 0 1 2\n");
         std::fs::write(directory.path().join("t.ply"), ply).unwrap();
+        for (file, values) in [("one.vol", &[1.0][..]), ("two.vol", &[2.0]), ("white.vol", &[1.0; 3]), ("red.vol", &[2.0, 1.0, 0.0])] {
+            std::fs::write(directory.path().join(file), vol([1; 3], values.len() as i32, values)).unwrap();
+        }
         let head = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes: [{mesh: {file: t.ply, material: m}}]\n";
         let description = SceneDescription::parse(&format!("{head}{text}"), &directory.path().join("s.yaml")).unwrap();
         compile(&description, "s").err().map(|error| error.to_string()).unwrap_or_default()
@@ -141,5 +146,41 @@ mod tests {
         let told = fault(&format!("{attribute}{first}"));
         assert!(told.contains("m12.blend: expected at most 4096 layers and materials"), "{told}");
         assert!(!told.contains("m11"), "{told}");
+    }
+
+    /// Numbers of other uses are not bounded.
+    #[test]
+    fn what_a_file_has_above_one_is_no_reflectance_and_no_albedo() {
+        let reflects = |texture: &str| {
+            let material = "materials: {m: {diffuse: {reflectance: {texture: t}}}}\n";
+            fault(&format!("textures: {{t: {texture}}}\n{material}"))
+        };
+        let attribute =
+            |name: &str, scale: f64| reflects(&format!("{{mesh_attribute: {{name: {name}, scale: {scale}}}}}"));
+        assert_eq!([attribute("vertex_color", 2.0), attribute("vertex_wear", 0.5)], ["", ""]);
+        let told = attribute("vertex_color", 4.0);
+        assert!(told.contains("reflectances from 0 to 1 in the attribute vertex_color times 4, found 2"), "{told}");
+        let told = attribute("vertex_wear", 1.0);
+        assert!(told.contains("reflectances from 0 to 1 in the attribute vertex_wear, found 1.5"), "{told}");
+        let rough = "materials: {m: {conductor: {metal: gold, roughness: {texture: t}}}}\n";
+        assert_eq!(fault(&format!("textures: {{t: {{mesh_attribute: {{name: vertex_wear}}}}}}\n{rough}")), "");
+
+        let scatters = |file: &str| {
+            let medium = "media: {smoke: {homogeneous: {extinction: 1, albedo: {volume: v}}}}\n";
+            fault(&format!("volumes: {{v: {{grid: {{file: {file}}}}}}}\n{medium}materials: {{m: {{diffuse: {{}}}}}}\n"))
+        };
+        let paints = |file: &str| {
+            let material = "materials: {m: {diffuse: {reflectance: {texture: t}}}}\n";
+            fault(&format!("volumes: {{v: {{grid: {{file: {file}}}}}}}\ntextures: {{t: {{volume: v}}}}\n{material}"))
+        };
+        for file in ["one.vol", "white.vol"] {
+            assert_eq!([scatters(file), paints(file)], ["", ""]);
+        }
+        for file in ["two.vol", "red.vol"] {
+            for told in [scatters(file), paints(file)] {
+                let parts = [file, "expected values from 0 to 1 for a share of light, found 2", "named at"];
+                assert!(parts.iter().all(|part| told.contains(part)), "{told}");
+            }
+        }
     }
 }

@@ -3,7 +3,7 @@
 use super::Compiler;
 use super::spectra::Role;
 use crate::description as written;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_short};
 use crate::optics::phase::{Phase, PhaseTable};
 use crate::scene::grid::Grid;
 use crate::scene::medium::{Filling, Medium, PhaseBlend, PhaseFunction, Varying};
@@ -88,10 +88,36 @@ impl Compiler<'_> {
 
     fn albedo(&mut self, at: &str, s: &written::SpectrumOrVolume) -> Volume {
         let albedo = self.spectrum_or_volume(at, s);
-        if let (written::SpectrumOrVolume::Spectrum(written), Volume::Constant { value, .. }) = (s, &albedo) {
-            self.check_file_of_shares(at, written, value);
+        match (s, &albedo) {
+            (written::SpectrumOrVolume::Spectrum(written), Volume::Constant { value, .. }) => {
+                self.check_file_of_shares(at, written, value);
+            }
+            (written::SpectrumOrVolume::Volume(name), volume) => {
+                self.check_shares(&format!("{at}.volume"), volume, name);
+            }
+            _ => {}
         }
         albedo
+    }
+
+    /// Refuses a file of more than all light in the volume `name`, which the field `at` takes for shares of it.
+    pub(super) fn check_shares(&mut self, at: &str, volume: &Volume, name: &str) {
+        let description = self.description;
+        match (&description.volumes[name], volume) {
+            (written::Volume::Constant(written), Volume::Constant { value, .. }) => {
+                self.check_file_of_shares(at, &written.value, value);
+            }
+            (written::Volume::Grid(written), Volume::Grid(grid)) => {
+                let found = grid.greatest();
+                if found > 1.0 {
+                    let found = in_short(f64::from(found));
+                    let message = format!("expected values from 0 to 1 for a share of light, found {found}");
+                    let error = self.asked(at, Error::input(&written.file, message));
+                    self.unread.get_or_insert(error);
+                }
+            }
+            _ => {}
+        }
     }
 
     pub(super) fn medium(&mut self, at: &str, medium: &written::Medium) -> Medium {

@@ -3,7 +3,7 @@
 use super::Compiler;
 use super::spectra::Role;
 use crate::description as written;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_short};
 use crate::math::LENGTHS;
 use crate::optics::fresnel::Model;
 use crate::optics::microfacet::{Distribution, Microfacets};
@@ -36,7 +36,7 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    /// Refuses light in the texture `name`, which the field `at` takes for reflectances.
+    /// Refuses more than all light in the texture `name`, which the field `at` takes for reflectances.
     fn check_reflects(&mut self, at: &str, texture: &Texture, name: &str) {
         let description = self.description;
         match (&description.textures[name], texture) {
@@ -61,6 +61,16 @@ impl<'a> Compiler<'a> {
                     if let Some(name) = written.name() {
                         self.check_reflects(at, texture, name);
                     }
+                }
+            }
+            (written::Texture::Volume(volume), Texture::Volume(found)) => self.check_shares(at, found, volume),
+            (written::Texture::MeshAttribute(written), Texture::Attribute(attribute)) => {
+                if let Some(found) = attribute.no_share() {
+                    let written::MeshAttribute { name, scale } = written;
+                    let times = if *scale == 1.0 { String::new() } else { format!(" times {}", in_short(*scale)) };
+                    let found = in_short(f64::from(found));
+                    let expected = format!("expected reflectances from 0 to 1 in the attribute {name}{times}");
+                    self.fault(at, format!("{expected}, found {found}"));
                 }
             }
             _ => {}

@@ -101,6 +101,13 @@ impl AttributeTexture {
         self.weighted(at).into_iter().map(|(i, w)| value(i) * w).sum::<DVec3>() * self.scale
     }
 
+    /// The first number that, by its scale, is below 0 or above 1.
+    #[must_use]
+    pub fn no_share(&self) -> Option<f32> {
+        let mut scaled = self.field.values.iter().flatten().map(|&x| (f64::from(x) * self.scale) as f32);
+        scaled.find(|x| !(0.0..=1.0).contains(x))
+    }
+
     /// Some 16 of the spectra and the brightest, for the choice of wavelengths.
     #[must_use]
     pub fn representatives(&self) -> Vec<Spectrum> {
