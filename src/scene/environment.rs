@@ -235,7 +235,6 @@ impl Environment {
 
     fn light(&self, corners: &Corners, nm: Lanes) -> Lanes {
         if let Some(bands) = &self.bands {
-            // A single row stands for both poles.
             // Rows beyond those of the file are its last.
             let texel =
                 |i: usize| bands.eval(if i < bands.len() { i } else { bands.len() - self.width + i % self.width }, nm);

@@ -66,7 +66,7 @@ pub(crate) struct Object {
     pub(crate) id: Option<String>,
     /// Of the element.
     pub(crate) place: Place,
-    /// Directory of the file in which it stands: the last place where its files are looked for.
+    /// Number of the file in which it stands, whose directory is the last place where its files are looked for.
     pub(crate) source: u32,
     /// In the order of the text; names are distinct but for the empty one.
     pub(crate) properties: Vec<Property>,
@@ -398,8 +398,8 @@ impl Document {
         self.ids.get(id).is_some_and(|index| self.objects[*index].family == family)
     }
 
-    /// Where the file `name` is: absolute, else in the first directory of the search that has it,
-    /// else in that of the file that mentions it.
+    /// Where the file `name` is: absolute, else in the first directory of the search that has it, or that of the
+    /// file that mentions it, else in that of the scene's file, where it is then missed.
     pub(crate) fn find(&self, name: &str, source: u32) -> String {
         self.look_for(name, source).unwrap_or_else(|| self.home().join(name).to_string_lossy().into_owned())
     }
