@@ -374,8 +374,8 @@ fn told(
     gauge: &Gauge,
 ) -> std::result::Result<ErrorEstimate, NoEstimate> {
     let (overlap, cell) = match gauge.sharing {
-        Sharing::Near { overlap, cell, .. } => (overlap, cell),
-        Sharing::All => (1.0, 1),
+        Sharing::Near { overlap, cell, .. } => (overlap, Some(cell)),
+        Sharing::All => (1.0, None),
     };
     match error::relative_error(film, splats, values, overlap, cell) {
         Err(NoEstimate::Black) if !gauge.lit => Ok(ErrorEstimate::none(film.window().pixels() as u64)),
