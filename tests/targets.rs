@@ -259,6 +259,19 @@ fn shipped_scenes_of_known_light_have_it() {
     }
 }
 
+/// Beside layers of light nothing can be traced from the lamps: there is no such knob, and all others have their rows.
+#[test]
+fn a_scene_with_layers_of_light_has_a_sheet() {
+    let glass = "- sphere: {center: [1, 0.5, 1], radius: 0.4, material: {dielectric: {ior: 1.5}}}\n";
+    let lamp = "lights:\n- point: {position: [2, 4, 3], intensity: 30}\n";
+    let place = Place::of(&format!("{SCENE}{glass}{lamp}layers:\n- {{name: d, light: depth}}\n"));
+    let (code, said) = abbe(&place, "accuracy scene.yaml -o sheet --rounds 1 --pixels 64");
+    assert_eq!(code, 0, "{said}");
+    let sheet = &place.json("sheet/accuracy.json")[0];
+    let knobs: Vec<&str> = sheet["rows"].as_array().unwrap().iter().map(|row| row["knob"].as_str().unwrap()).collect();
+    assert!(knobs.contains(&"effects") && !knobs.contains(&"light tracing"), "{knobs:?}");
+}
+
 /// This very program beside itself finds the same picture. What is no build or no knob is told.
 #[test]
 fn another_build_has_a_row_of_its_own() {

@@ -2,6 +2,7 @@
 
 use super::super::{Prepared, adaptive, motion, splatting};
 use super::Settings;
+use crate::description::LayerContent;
 use crate::error::{Error, Result};
 use crate::film::accumulate::REPLICATES;
 use crate::spectrum::Carried;
@@ -160,8 +161,10 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
     let census = motion::census(&chosen.scene, &chosen.moments);
     let joined = reuse::obstacle(&chosen.scene, &census, &chosen.plan, chosen.moments.len()).is_none();
     let dealt = chosen.sampler().is_ok_and(|filter| splatting::choose(Use::On, &chosen.plan, &filter).0);
+    // Layers of light are measured from the camera alone: beside them it is refused.
+    let measured = chosen.description.layers.iter().any(|layer| matches!(layer.content, LayerContent::Light { .. }));
     for (knob, key, on, cause) in [
-        ("light tracing", "light_tracing", caustics.is_some(), about("light tracing")),
+        ("light tracing", "light_tracing", caustics.is_some(), about("light tracing") && !measured),
         ("packets", "packets", chosen.plan.packets || caustics.is_some(), about("packets")),
         ("merging", "merging", caustics.is_some_and(|c| c.merging.is_some()), about("merging")),
         ("path reuse", "reuse", chosen.plan.reuse, joined),
