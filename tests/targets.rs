@@ -62,6 +62,29 @@ fn targets_end_a_render_whichever_comes_first() {
     assert_eq!(samples("--set render.stop.samples=20"), 20);
 }
 
+/// A time or an error for all scenes is none for those by `whitted`; one of their own is refused.
+#[test]
+fn targets_of_a_batch_pass_over_scenes_without_noise() {
+    let place = Place::of(SCENE);
+    let batch = |render: &str, own: &str| {
+        let whitted = format!("{{file: scene.yaml, name: w, set: {{integrator: whitted{own}}}}}");
+        std::fs::write(place.path("batch.yaml"), format!("{render}scenes: [{{file: scene.yaml}}, {whitted}]\n"))
+            .unwrap();
+    };
+    batch("", "");
+    let (code, said) = abbe(&place, "render batch.yaml -q -o . --error 20%");
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("note: w: whitted has no noise") && place.path("w.exr").exists(), "{said}");
+    assert!(!said.contains("note: scene: whitted"), "{said}");
+    batch("render: {stop: {error: 0.2}}\n", "");
+    assert_eq!(abbe(&place, "render batch.yaml -q -o .").0, 0);
+    batch("", ", render.stop.error: 0.2");
+    let (code, said) = abbe(&place, "render batch.yaml -q -o .");
+    assert!(code == 2 && said.contains("whitted has no noise: its time"), "{code} {said}");
+    batch("", "");
+    assert_eq!(abbe(&place, "render batch.yaml -q -o . --error 20% --scene w").0, 2);
+}
+
 #[test]
 fn a_target_out_of_reach_is_told_and_the_picture_is_there() {
     let place = Place::of(SCENE);

@@ -219,7 +219,7 @@ fn check_files(prepared: &Prepared) -> Result<()> {
 }
 
 /// What ends the render besides samples.
-fn stop(description: &SceneDescription) -> Stop {
+pub(super) fn stop(description: &SceneDescription) -> Stop {
     let written = &description.render.stop;
     let floor = match description.output.exr.precision {
         description::Precision::Half => stop::rounding(11),

@@ -270,6 +270,12 @@ impl BatchEntry {
         self.place.map(|place| self.sources.describe(place))
     }
 
+    /// Whether the batch gives all of its scenes a `render.stop`.
+    #[must_use]
+    pub fn batch_has_stop(&self) -> bool {
+        self.layers.iter().any(|(key, node)| *key == "render" && node.get("stop").is_some())
+    }
+
     /// Gives values to parameters of the scene, the `-D NAME=VALUE` of the command line; they win over those of a
     /// batch.
     ///
