@@ -62,6 +62,26 @@ fn targets_end_a_render_whichever_comes_first() {
     assert_eq!(samples("--set render.stop.samples=20"), 20);
 }
 
+/// Samples of the command line bound what the file gives as its targets; a number of samples there is as good as one outside.
+#[test]
+fn samples_of_the_command_line_bound_the_stop_of_the_file() {
+    for stop in ["{samples: 32}", "{error: 1e-5}", "{error: 1e-5, samples: 32}"] {
+        let place = Place::of(&SCENE.replace("samples: 16", &format!("samples: 16, stop: {stop}")));
+        let (code, said) = abbe(&place, "render scene.yaml -q -o a.exr --spp 8");
+        assert_eq!(code, 0, "{stop}: {said}");
+        assert_eq!(place.json("report.json")["scenes"][0]["samples"], 8, "{stop}");
+    }
+    let place = Place::of(SCENE);
+    let hash = |arguments: &str| {
+        assert_eq!(abbe(&place, &format!("render scene.yaml -q -o a.exr {arguments}")).0, 0);
+        place.json("report.json")["scenes"][0]["scene_hash"].clone()
+    };
+    let eight = hash("--spp 8");
+    assert_eq!(eight, hash("--set render.samples=8"));
+    assert_eq!(eight, hash("--set render.stop.samples=8"));
+    assert_ne!(eight, hash("--spp 12"));
+}
+
 /// A time or an error for all scenes is none for those by `whitted`; one of their own is refused.
 #[test]
 fn targets_of_a_batch_pass_over_scenes_without_noise() {

@@ -356,6 +356,11 @@ pub(super) fn hash_text(description: &SceneDescription) -> String {
     content.frame = None;
     content.motion = None;
     content.render.frames_per_second = None;
+    // A stop at a number of samples is that number.
+    if !stop(description).is_open() {
+        content.render.samples = content.render.most_samples();
+        content.render.stop = description::Stop::default();
+    }
     format!("{content:?}")
 }
 
