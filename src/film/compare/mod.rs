@@ -8,7 +8,8 @@
 //!   their paths. Sees a bias of 1 % that the next test misses.
 //! - **per pixel**: the test of Mitsuba 3 (`src/render/tests/test_renders.py`): each pixel at a level that the Šidák
 //!   correction derives from [`PIXEL_ALPHA`], passed by [`ACCEPT_FRACTION`] of all. Sees local faults. Variances of fewer than
-//!   16 samples are no less here than the mean of those of the 5 × 5 pixels around.
+//!   16 samples are no less here than the mean of those of the 5 × 5 pixels around. In small pictures that share is less than one
+//!   value: as many pixels may fail there as do by chance, and one.
 //!
 //! The noise is known from `stderr.*` channels (standard errors of the means, from four replicates: three degrees of
 //! freedom a pixel, or one less than the samples), from a file of variances per sample (as Mitsuba's references come
@@ -144,6 +145,8 @@ pub struct PixelTest {
     pub accepted: f64,
     /// Pixels in which a value fails.
     pub pixels_rejected: usize,
+    /// Pixels that may, whatever their share: more do by chance in one comparison of equals in a thousand.
+    pub pixels_allowed: usize,
     /// Mean of the scores: near 0 if nothing is biased.
     pub score_mean: f64,
     /// Standard deviation of the scores: 1 for normal ones; with 3 + 3 degrees of freedom about √(6/4) = 1.2.
@@ -238,7 +241,7 @@ fn judge(c: &Comparison, count: usize, options: &CompareOptions) -> (Verdict, St
         return (Verdict::Different, reason);
     }
     match &c.pixel_test {
-        Some(test) if test.accepted < ACCEPT_FRACTION => {
+        Some(test) if test.accepted < ACCEPT_FRACTION && test.pixels_rejected > test.pixels_allowed => {
             let share = 100.0 * test.accepted;
             (Verdict::Different, format!("only {share:.2} % of the pixel values agree within their noise"))
         }
@@ -304,11 +307,12 @@ impl Comparison {
             line(format!("global p, all channels   {:.3e} (different below {GLOBAL_ALPHA:.0e})", self.global_p));
             if let Some(test) = &self.pixel_test {
                 line(format!(
-                    "pixel values that agree  {:.3} % (different below {} %), {} pixels rejected at {:.1e}",
+                    "pixel values that agree  {:.3} % (different below {} %), {} pixels rejected at {:.1e} (different above {})",
                     100.0 * test.accepted,
                     100.0 * ACCEPT_FRACTION,
                     test.pixels_rejected,
-                    test.alpha
+                    test.alpha,
+                    test.pixels_allowed
                 ));
                 let (mean, deviation) = (test.score_mean, test.score_deviation);
                 line(format!("pixel scores             mean {mean:.3}, deviation {deviation:.3}"));
@@ -571,6 +575,32 @@ pub(super) mod tests {
         half.parts[0].channels[0].1[77] *= 1.25;
         let c = compare(&half, &exact, &CompareOptions::default());
         assert_eq!(c.verdict, Verdict::Different, "{}", c.table());
+    }
+
+    /// 8 x 8 pixels that are ten standard errors off, or not at all: a pixel is rejected in three comparisons of equals in a hundred, two in one
+    /// of two thousand, by Student's tails; of the sum of all pixels ten are little more than one standard error.
+    #[test]
+    fn a_single_pixel_makes_no_small_picture_different() {
+        let flat = |changes: &[(usize, usize, f32)]| {
+            let window = Window::full(8, 8);
+            let mut file = file(Vec::new());
+            (file.display, file.parts[0].window) = (window, window);
+            for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
+                let mut plane = vec![1.0; window.pixels()];
+                changes.iter().filter(|change| change.0 == c).for_each(|(_, i, by)| plane[*i] += by);
+                file.parts[0].channels.push((name.to_string(), plane));
+                file.parts[0].channels.push((format!("stderr.{name}"), vec![0.1; window.pixels()]));
+            }
+            file
+        };
+        let with = |changes: &[(usize, usize, f32)]| compare(&flat(changes), &flat(&[]), &CompareOptions::default());
+        let one = with(&[(0, 5, 1.4), (1, 5, 1.4)]);
+        assert_eq!(one.verdict, Verdict::Same, "{}", one.table());
+        let two = with(&[(0, 5, 1.4), (0, 6, -1.4)]);
+        assert_eq!(two.verdict, Verdict::Different, "{}", two.table());
+        assert!(two.reason.contains("of the pixel values agree"), "{}", two.reason);
+        let tests = [one, two].map(|c| c.pixel_test.unwrap());
+        assert_eq!(tests.map(|test| (test.pixels_rejected, test.pixels_allowed)), [(1, 1), (2, 1)]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! What the noise of two pictures explains.
 
-use super::{ChannelFigures, NoiseSource, PIXEL_ALPHA, PixelTest, VARIANCE_FLOOR, kept};
+use super::{ChannelFigures, GLOBAL_ALPHA, NoiseSource, PIXEL_ALPHA, PixelTest, VARIANCE_FLOOR, kept};
 use crate::film::exr::Samples;
 use crate::math::statistics::{Moments, normal_two_sided_p, sidak, student_t_two_sided_p};
 use crate::spectrum::luminance::REC709_OF_MITSUBA;
@@ -284,9 +284,29 @@ pub(super) fn pixel_test(pairs: &[Pair], finite: &[bool]) -> Option<PixelTest> {
         alpha,
         accepted: accepted as f64 / tested as f64,
         pixels_rejected: rejected,
+        // One is no pattern: the tails of four replicates are longer than Student's.
+        pixels_allowed: by_chance(pixels, alpha * pairs.len() as f64).max(1),
         score_mean: scores.mean,
         score_deviation: scores.variance().sqrt(),
     })
+}
+
+/// How many of `count` things that come with probability `p` are exceeded with a probability of [`GLOBAL_ALPHA`] at the most.
+fn by_chance(count: usize, p: f64) -> usize {
+    if p >= 1.0 {
+        return count;
+    }
+    let n = count as f64;
+    // Of the binomial distribution, from nothing on.
+    let mut exactly = libm::exp(n * libm::log1p(-p));
+    let mut more = 1.0 - exactly;
+    let mut k = 0;
+    while more > GLOBAL_ALPHA && k < count {
+        exactly *= (n - k as f64) / (k + 1) as f64 * p / (1.0 - p);
+        more -= exactly;
+        k += 1;
+    }
+    k
 }
 
 /// The scores of Mitsuba's test at a pixel, if there are R, G, B and a variance file.
@@ -316,6 +336,14 @@ mod tests {
             let (v, next) = (f16::from_bits(bits).to_f64(), f16::from_bits(bits + 1).to_f64());
             assert_eq!(half_step(v), next - v, "{v}");
         }
+    }
+
+    /// Of 64 things of ½ more than 44 come in 7.8e-4 of all cases, more than 43 in 1.8e-3; of a Poisson number of mean 0.3 more than 3 in 2.7e-4, more than
+    /// 2 in 3.6e-3.
+    #[test]
+    fn what_comes_by_chance_is_the_quantile_of_the_binomial() {
+        assert_eq!((by_chance(64, 0.5), by_chance(1_000_000, 3e-7)), (44, 3));
+        assert_eq!((by_chance(64, 0.0), by_chance(5, 1.5), by_chance(0, 0.5)), (0, 5, 0));
     }
 
     /// Welch: equal variances give ν₁ + ν₂ = 6, one vanishing gives 3, known variance adds certainty.
