@@ -15,6 +15,7 @@
 
 use super::desk::{self, Outcome, Pass};
 use super::{Figure, Point};
+use crate::batch::adaptive::SIDE;
 use crate::film::Window;
 use crate::film::accumulate::REPLICATES;
 use crate::film::error::{self, PAIRINGS};
@@ -24,6 +25,9 @@ use crate::spectrum::{ColourSpace, Spectrum, observer};
 
 /// Blocks along the longer side.
 const BLOCKS: u32 = 8;
+
+/// Blocks are whole cells, in which paths and dealt samples are shared, where that leaves as many.
+const FEWEST_BLOCKS: u32 = 16;
 
 /// What stands out by less is taken for chance: of forty settings one in ten scenes or so stands out by chance.
 pub const SIGNIFICANT: f64 = 3.0;
@@ -92,11 +96,19 @@ impl Reference {
 
     /// The block of each pixel, and how many there are.
     fn blocks(&self) -> (impl Fn(usize) -> usize, usize) {
-        let Window { width, height, .. } = self.window;
-        let side = width.max(height).div_ceil(BLOCKS).max(1);
-        let columns = width.div_ceil(side);
-        let block = move |i: usize| (i as u32 / width / side * columns + i as u32 % width / side) as usize;
-        (block, (columns * height.div_ceil(side)) as usize)
+        let Window { x, y, width, height } = self.window;
+        // Cells are aligned to the frame.
+        let before = |side: u32| [x, y].map(|at| at.rem_euclid(side as i32) as u32);
+        let of_side = |side: u32| [(before(side)[0] + width).div_ceil(side), (before(side)[1] + height).div_ceil(side)];
+        let fine = width.max(height).div_ceil(BLOCKS).max(1);
+        let whole = fine.next_multiple_of(SIDE);
+        let side = if of_side(whole).iter().product::<u32>() >= FEWEST_BLOCKS { whole } else { fine };
+        let ([left, above], [columns, rows]) = (before(side), of_side(side));
+        let block = move |i: usize| {
+            let (column, row) = ((left + i as u32 % width) / side, (above + i as u32 / width) / side);
+            (row * columns + column) as usize
+        };
+        (block, (columns * rows) as usize)
     }
 
     /// noise² of each block.
@@ -127,8 +139,9 @@ impl Tally {
         };
     }
 
-    /// noise² of one picture after `pass`. Of a single round the blocks tell the error, which is then too large by how
-    /// they differ.
+    /// noise² of one picture after `pass`. Blocks may share what they find where photons are merged: the error is that by how the
+    /// whole differs between rounds if that is more. Of a single round the blocks tell it, which is then too large by how they
+    /// differ.
     fn noise_after(&self, pass: usize) -> Figure {
         let all: Vec<&[f64]> = self.passes.iter().map(|round| round[pass].noise.as_slice()).collect();
         let rounds = all.len() as f64;
@@ -136,7 +149,9 @@ impl Tally {
         let blocks = all[0].len();
         let variance = if all.len() > 1 {
             let of = |block: usize| all.iter().map(|round| round[block]).collect::<Moments>();
-            (0..blocks).map(|block| of(block).variance()).sum::<f64>() / rounds
+            let apart = (0..blocks).map(|block| of(block).variance()).sum::<f64>();
+            let together = all.iter().map(|round| round.iter().sum::<f64>()).collect::<Moments>().variance();
+            apart.max(together) / rounds
         } else {
             all[0].iter().copied().collect::<Moments>().variance() * blocks as f64
         };
@@ -324,6 +339,42 @@ mod tests {
         let found: Moments = (0..100).map(|s| of(s, &block).value).collect();
         let expected = 0.04 / 1.01 / 64.0;
         assert!((found.mean - expected).abs() < 4.0 * found.standard_error() + 0.1 * expected, "{found:?} {expected}");
+    }
+
+    /// Two rounds of which one has twice the noise in all four blocks, 4 and 8 in all: their mean varies by 8/2, by blocks alone by 4 · ½/2.
+    #[test]
+    fn what_blocks_share_counts_for_the_error_of_the_noise() {
+        let round = |noise: f64| vec![Pass { samples: 4, seconds: 1.0, noise: vec![noise; 4] }];
+        let tally = Tally { passes: vec![round(1.0), round(2.0)], ..Tally::default() };
+        let Figure { value, error } = tally.noise_squared();
+        assert_eq!((value, error), (6.0, 2.0));
+    }
+
+    #[test]
+    fn no_cell_lies_in_two_blocks_where_blocks_are_many() {
+        let of = |window: Window| {
+            let pixels = window.pixels();
+            let plane = || vec![1.0; pixels];
+            let image = Image {
+                window,
+                rgb: [plane(), plane(), plane()],
+                standard_error: [plane(), plane(), plane()],
+                ..flat(1.0)
+            };
+            Reference::new(&image, vec![None; pixels])
+        };
+        for window in [Window::full(48, 48), Window { x: -4, y: -3, width: 56, height: 54 }] {
+            let reference = of(window);
+            let (block, count) = reference.blocks();
+            assert!(count >= 16, "{count}");
+            let mut cells = std::collections::BTreeMap::new();
+            for (i, [x, y]) in window.iter().enumerate() {
+                assert!(block(i) < count);
+                assert_eq!(*cells.entry([x.div_euclid(8), y.div_euclid(8)]).or_insert(block(i)), block(i));
+            }
+        }
+        // 3 x 3 cells: too few to tell how they differ.
+        assert_eq!(of(Window::full(24, 24)).blocks().1, 64);
     }
 
     #[test]
