@@ -119,9 +119,15 @@ fn own_names(file: &ExrFile) -> Vec<String> {
     let groups = [&["R", "G", "B"][..], &["X", "Y", "Z"], &["Y"]];
     match groups.into_iter().find(|group| group.iter().all(|name| all.contains(name))) {
         Some(group) => owned(group),
-        None => {
-            all.into_iter().filter(|name| *name != "A" && !name.starts_with("stderr.")).map(str::to_owned).collect()
-        }
+        None => all.into_iter().filter(|name| *name != "A" && !is_of_samples(name)).map(str::to_owned).collect(),
+    }
+}
+
+/// Whether a channel tells of the samples of a picture, or names what is seen, and is no mean that two pictures have in common.
+fn is_of_samples(name: &str) -> bool {
+    match name.split_once('.') {
+        Some((layer, _)) => matches!(layer, "stderr" | "variance" | "numerics") || layer.starts_with("Crypto"),
+        None => name == "sampleCount",
     }
 }
 
@@ -232,6 +238,20 @@ mod tests {
         assert!(c.verdict == Verdict::Same && c.identical);
         let told = "not compared             A, Z, normal.*\n";
         assert!(c.table().contains(told), "{}", c.table());
+    }
+
+    /// With 16 and with 64 samples a pixel, of which variances are as many times apart; IDs are no light.
+    #[test]
+    fn what_tells_of_samples_is_not_compared_as_a_band() {
+        let bands = |samples: f32| {
+            let light = |name: &str| (name.to_string(), vec![1.0; PIXELS]);
+            let layers = ["stderr.a", "variance.a", "sampleCount", "CryptoObject00.R"];
+            let layers = layers.map(|name| (name.to_string(), vec![samples; PIXELS]));
+            file([light("a"), light("b.T")].into_iter().chain(layers).collect())
+        };
+        let c = compare(&bands(16.0), &bands(64.0), &CompareOptions::default());
+        assert_eq!(c.channels.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["a", "b.T"]);
+        assert_eq!(c.verdict, Verdict::Same, "{}", c.table());
     }
 
     #[test]

@@ -181,8 +181,8 @@ pub struct Comparison {
 /// Compares two files; `b` is the reference.
 ///
 /// Compared are the spectral bands (`S0.…nm`, `T.…nm`) of a file that has any, else R, G, B, else X, Y, Z, else Y, else all
-/// channels without alpha and `stderr.*`; in whichever parts they are that have the window of the first. These must be the
-/// same in both files.
+/// channels without alpha and what tells of samples, such as `stderr.*`; in whichever parts they are that have the window of the
+/// first. These must be the same in both files.
 #[must_use]
 pub fn compare(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Comparison {
     let pairs = match pairs(a, b, options) {
