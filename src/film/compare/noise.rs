@@ -20,8 +20,8 @@ pub(super) struct Pair<'a> {
     known: [Known; 2],
     /// Variances of A and of B about each pixel, where standard errors of single pixels are of few samples.
     about: [Option<Vec<f64>>; 2],
-    /// Whether the values of A and of B are half floats.
-    half: [bool; 2],
+    /// Whether the values of A and of B are half floats; one that is not is rounded to them where the other is.
+    half: bool,
 }
 
 /// What a file says of its noise besides standard errors.
@@ -111,7 +111,7 @@ impl<'a> Pair<'a> {
             Samples::Float(values) => values.iter().all(|&v| v.is_nan() || f16::from_f32(v).to_f32() == v),
             Samples::Integer(_) => false,
         };
-        let half = [is_half(a), is_half(b)];
+        let half = is_half(a) || is_half(b);
         Pair { name, a, b, noise, known, about, half }
     }
 
@@ -123,8 +123,15 @@ impl<'a> Pair<'a> {
         self.a.iter().zip(self.b.iter()).all(|(x, y)| x.to_bits() == y.to_bits())
     }
 
+    /// A and B at a pixel. Rounded alike: where one value stands in many pixels so does what its rounding makes, which would
+    /// add up as no noise does.
+    fn values(&self, i: usize) -> [f64; 2] {
+        [self.a.at(i), self.b.at(i)].map(|v| if self.half { to_half(v) } else { v })
+    }
+
     fn difference(&self, i: usize) -> f64 {
-        self.a.at(i) - self.b.at(i)
+        let [a, b] = self.values(i);
+        a - b
     }
 
     /// Whether a pixel lacks the standard error by which others are judged: too few replicates.
@@ -137,10 +144,10 @@ impl<'a> Pair<'a> {
         let square = |e: f32| f64::from(e) * f64::from(e);
         // A half float of exponent e was rounded to a multiple of 2^(e − 10): a uniform error of variance step²/12.
         // If both pictures were rounded alike and agree, there is no difference to explain.
-        let rounding: f64 = [(self.a, self.half[0]), (self.b, self.half[1])]
-            .iter()
-            .map(|&(samples, half)| if half { half_step(samples.at(i)) * half_step(samples.at(i)) / 12.0 } else { 0.0 })
-            .sum();
+        let rounding: f64 = match self.half {
+            true => self.values(i).map(|v| half_step(v) * half_step(v) / 12.0).iter().sum(),
+            false => 0.0,
+        };
         let dof = self.known.map(|known| known.dof);
         let variance = match self.noise {
             Noise::Errors(errors) => {
@@ -176,13 +183,15 @@ impl<'a> Pair<'a> {
         // Of the difference: sum, variance, and Σv²/ν; of A − ratio·B: variance.
         let (mut difference, mut variance, mut spread, mut ratio_variance) = (0.0, 0.0, 0.0, 0.0);
         for i in (0..finite.len()).filter(|&i| finite[i]) {
-            let (a, b, d) = (self.a.at(i), self.b.at(i), self.difference(i));
+            let (a, b) = (self.a.at(i), self.b.at(i));
+            let d = a - b;
             if d != 0.0 {
                 squares += d * d;
                 relative += d * d / (b * b + floor);
                 symmetric += d.abs() / (a.abs() + b.abs() + 0.01 * reference_mean.abs());
                 largest = largest.max(d.abs());
             }
+            let d = self.difference(i);
             difference += d;
             match self.variance(i) {
                 // Also where a pixel has no estimate though others have.
@@ -243,6 +252,14 @@ fn variances_about(errors: &[f32], width: usize) -> Vec<f64> {
 /// `difference` / √`variance`; no difference is no deviation even where there is no noise.
 fn score(difference: f64, variance: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference / variance.sqrt() }
+}
+
+/// `v` as the half float that is next to it; itself where it is too large for any.
+fn to_half(v: f64) -> f64 {
+    match f16::from_f64(v) {
+        half if half.is_finite() => half.to_f64(),
+        _ => v,
+    }
 }
 
 /// The distance of half floats at `v`: 2^(e − 10), 2⁻²⁴ for subnormals.
