@@ -315,6 +315,22 @@ fn a_scene_with_layers_of_light_has_a_sheet() {
     assert!(knobs.contains(&"effects") && !knobs.contains(&"light tracing"), "{knobs:?}");
 }
 
+/// Of a scene with frames both render the one that the sheet is of, with the same random numbers.
+#[test]
+fn another_build_renders_the_frame_of_the_sheet() {
+    let place = Place::of(&SCENE.replace("samples: 16", "samples: 16, frames: 4-6"));
+    let program = env!("CARGO_BIN_EXE_abbe");
+    let arguments = "accuracy scene.yaml -o sheet --rounds 1 --pixels 64 --knob roulette";
+    let (code, said) = abbe(&place, &format!("{arguments} --beside {program}"));
+    assert_eq!(code, 0, "{said}");
+    let rows = &place.json("sheet/accuracy.json")[0]["rows"];
+    let build = rows.as_array().unwrap().last().unwrap();
+    assert_eq!(build["knob"], "build");
+    for key in ["samples", "light", "noise", "bias_squared"] {
+        assert_eq!(build[key], rows[0][key], "{key}");
+    }
+}
+
 /// This very program beside itself finds the same picture. What is no build or no knob is told.
 #[test]
 fn another_build_has_a_row_of_its_own() {

@@ -221,8 +221,10 @@ pub fn sheet(
             let seed = seed.wrapping_add(u64::from(round));
             let outcome = match settings.beside.filter(|_| trial.way == Way::Beside) {
                 Some(build) => {
-                    let seed = ("render.seed".to_owned(), seed.to_string());
-                    match build.render(&entry.name, &desk.overrides, &[seed], Some(&reference)) {
+                    let mut set = vec![("render.seed".to_owned(), seed.to_string())];
+                    // Of frames the first, as here.
+                    set.extend(chosen.description.frame.map(|n| ("render.frames".to_owned(), format!("\"{n}\""))));
+                    match build.render(&entry.name, &desk.overrides, &set, Some(&reference)) {
                         Ok(outcome) => outcome,
                         // It costs its own row, and not those that are done.
                         Err(e) => {
