@@ -11,7 +11,8 @@ use std::path::Path;
 /// Figures of a picture.
 #[derive(Clone, Copy)]
 pub(super) struct Figures {
-    samples: u32,
+    /// Of a pixel, in the mean.
+    samples: f64,
     seconds: f64,
     /// The error and the ends of its interval.
     error: Option<[f64; 3]>,
@@ -23,7 +24,7 @@ impl Figures {
     pub(super) fn of(scene: &SceneReport) -> Figures {
         let valid = scene.error.is_some_and(|e| e.valid);
         Figures {
-            samples: scene.samples,
+            samples: scene.adaptive.as_ref().map_or(scene.samples.into(), |counts| (10.0 * counts.mean).round() / 10.0),
             seconds: scene.seconds.rendering,
             error: scene.error.map(|e| [e.rel_rmse, e.low, e.high]),
             valid,
@@ -258,10 +259,26 @@ fn row(i: usize, scene: &SceneReport) -> String {
     let on: Vec<&str> = scene.effects_in_force();
     let mut out = format!("<tr><td data-v=\"{i}\"><a href=\"#f{i}\">{}</a>", escaped(&scene.label()));
     out += &cell(pixels, &format!("{width} × {height}"));
-    out += &cell(f64::from(figures.samples), &figures.samples.to_string());
+    out += &cell(figures.samples, &figures.samples.to_string());
     out += &cell(figures.seconds, &time(figures.seconds));
     out += &cell(figures.error.map_or(-1.0, |e| e[0]), &escaped(&figures.error(scene)));
     let half = figures.halving_seconds;
     out += &cell(half.unwrap_or(-1.0), &half.map_or("-".to_owned(), |s| format!("+{}", time(s))));
     out + &format!("<td>{}\n", escaped(&on.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::batch::report::SampleCounts;
+
+    #[test]
+    fn samples_that_are_shared_out_stand_by_their_mean() {
+        let mut report = SceneReport::new("a", None);
+        report.samples = 64;
+        assert!(Figures::of(&report).short().starts_with("64 spp"));
+        report.adaptive = Some(SampleCounts { least: 16, mean: 37.46, most: 256 });
+        assert!(Figures::of(&report).short().starts_with("37.5 spp"));
+        assert!(row(0, &report).contains("<td data-v=\"37.5\">37.5"));
+    }
 }
