@@ -474,6 +474,7 @@ pub use optical_data::{OpticalData, optical_data};
 pub use output::{
     Channels, Colour, Compression, Exposure, Exr, Output, Png, PngDither, PngSpace, Precision, Tonemap, WhiteBalance,
 };
+pub(crate) use path::field;
 pub use path_map::PathMap;
 pub use principled::{Contrast, Luminance, Principled, PrincipledThin, Sampling, ThinSampling};
 pub use print::yaml;

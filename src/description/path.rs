@@ -26,6 +26,12 @@ pub(crate) fn display<'a>(segments: impl IntoIterator<Item = &'a Segment>) -> St
     text
 }
 
+/// The path of a field within maps.
+pub(crate) fn field(keys: &[&str]) -> String {
+    let keys: Vec<Segment> = keys.iter().map(|key| Segment::Key((*key).to_owned())).collect();
+    display(&keys)
+}
+
 fn push_key(text: &mut String, key: &str) {
     if !text.is_empty() {
         text.push('.');

@@ -242,7 +242,7 @@ impl<'a> Compiler<'a> {
         let mut media = Vec::new();
         for (name, medium) in &d.media {
             self.medium_ids.insert(name, media.len() as u32);
-            let at = format!("media.{name}");
+            let at = written::field(&["media", name]);
             media.push(self.medium(&at, medium));
         }
         let camera_medium = d.medium.as_ref().map(|name| self.medium_ids[name.as_str()]);
@@ -400,7 +400,7 @@ impl<'a> Compiler<'a> {
     fn volumes_and_materials(&mut self) -> Result<()> {
         let d = self.description;
         for (name, volume) in &d.volumes {
-            let compiled = self.volume(&format!("volumes.{name}"), volume)?;
+            let compiled = self.volume(&written::field(&["volumes", name]), volume)?;
             self.volumes.insert(name, compiled);
         }
         for name in d.materials.keys() {
@@ -424,10 +424,11 @@ impl<'a> Compiler<'a> {
         for (group, shapes) in d.groups.iter().filter(|(name, _)| copied.contains(name.as_str())) {
             let first = (d.shapes.len() + children.len()) as u32;
             let start = children.len();
+            let list = written::field(&["groups", group]);
             for (i, shape) in shapes.iter().enumerate() {
                 let kind = shape.geometry.kind();
                 let name = shape.name.clone().unwrap_or_else(|| format!("{group}.{kind}{i}"));
-                let at = format!("groups.{group}[{i}].{kind}");
+                let at = format!("{list}[{i}].{kind}");
                 // No child shines, by the checks of the description.
                 if let Some(child) = self.object(&at, name, shape, camera_medium, first, &mut Vec::new())? {
                     materials.push(shape.material_name(&child.name));

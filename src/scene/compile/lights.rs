@@ -40,7 +40,7 @@ impl<'a> Compiler<'a> {
                 let carried = self.shelf.carried;
                 let daylight = || carried.light(illuminant::d65());
                 let lit = written.illuminant.clone().map_or_else(daylight, |i| {
-                    let at = format!("textures.{name}.image.illuminant");
+                    let at = written::field(&["textures", name, "image", "illuminant"]);
                     self.light_spectrum(&at, &written::Spectrum::Illuminant(i))
                 });
                 image.illuminant = (!lit.is_constant() || lit.max() != 1.0).then_some(lit);

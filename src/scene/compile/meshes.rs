@@ -24,7 +24,8 @@ fn wanted(description: &SceneDescription) -> Vec<(String, &written::Shape, &writ
     let alone = description.shapes.iter().enumerate().map(|(i, shape)| (format!("shapes[{i}]"), shape));
     let grouped =
         description.groups.iter().filter(|(name, _)| copied.contains(name.as_str())).flat_map(|(name, shapes)| {
-            shapes.iter().enumerate().map(move |(i, shape)| (format!("groups.{name}[{i}]"), shape))
+            let list = written::field(&["groups", name]);
+            shapes.iter().enumerate().map(move |(i, shape)| (format!("{list}[{i}]"), shape))
         });
     alone
         .chain(grouped)

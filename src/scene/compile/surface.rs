@@ -126,7 +126,7 @@ impl<'a> Compiler<'a> {
         let (made, asked) = self.asking(|c| {
             c.within(at, "texture", name, |c| {
                 let texture = &c.description.textures[name];
-                c.texture(&format!("textures.{name}"), texture)
+                c.texture(&written::field(&["textures", name]), texture)
             })
         });
         let texture = match made {
@@ -153,7 +153,7 @@ impl<'a> Compiler<'a> {
         let (made, asked) = self.asking(|c| {
             c.within(at, "texture", name, |c| {
                 let texture = &c.description.textures[name];
-                c.numbers(&format!("textures.{name}"), texture)
+                c.numbers(&written::field(&["textures", name]), texture)
             })
         });
         let numbers = match made {
@@ -174,7 +174,7 @@ impl<'a> Compiler<'a> {
         let description = self.description;
         for name in description.textures.keys() {
             if !self.textures.contains_key(name.as_str()) && !self.numbers.contains_key(name.as_str()) {
-                self.named_texture(&format!("textures.{name}"), name);
+                self.named_texture(&written::field(&["textures", name]), name);
             }
         }
     }
@@ -299,7 +299,7 @@ impl<'a> Compiler<'a> {
         if let Some(known) = self.kept(|at_hand| at_hand.materials.get(name)) {
             return known;
         }
-        let at = format!("materials.{name}");
+        let at = written::field(&["materials", name]);
         let (made, asked) = self.asking(|c| {
             c.within(&at, "material", name, |c| {
                 let material = &c.description.materials[name];
@@ -559,4 +559,22 @@ fn family(distribution: written::Distribution) -> Distribution {
 
 fn facets(alpha: f64, distribution: written::Distribution) -> Option<Microfacets> {
     (alpha >= SMOOTHEST).then_some(Microfacets::isotropic(family(distribution), alpha))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile;
+    use std::path::Path;
+
+    /// Blender numbers what has no name of its own: a fault of `Material.001` was told at the line of `Material`.
+    #[test]
+    fn faults_of_names_with_a_dot_are_told_where_they_stand() {
+        let text = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nmaterials:\n  Material: {diffuse: {}}\n  \
+                    Material.001:\n    dielectric: {ior: {glass: none}}\n";
+        let description = SceneDescription::parse(text, Path::new("s.yaml")).unwrap();
+        let told = compile(&description, "s").unwrap_err().to_string();
+        let expected = "s.yaml:5:23: materials.\"Material.001\".dielectric.ior: unknown glass \"none\"";
+        assert!(told.starts_with(expected), "{told}");
+    }
 }

@@ -35,7 +35,7 @@ use glam::DVec3;
 use super::super::camera::{Band, Camera, Clip, Filter, FovAxis, Image, Lens, Pose, Projection};
 use super::super::light::Light;
 use super::super::node::{Node, Sources, Value};
-use super::super::path::{self, Segment};
+use super::super::path::{self, field};
 use super::super::print::{Printer, relative};
 use super::super::scene::SceneDescription;
 use super::super::settings::{Coverage, Integrator, Technique};
@@ -129,12 +129,6 @@ fn joined(said: impl IntoIterator<Item = Option<String>>) -> Option<String> {
 /// Whether a file has this extension.
 fn ends_in(file: &Path, extension: &str) -> bool {
     file.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
-}
-
-/// The path of a field.
-fn field(keys: &[&str]) -> String {
-    let keys: Vec<Segment> = keys.iter().map(|key| Segment::Key((*key).to_owned())).collect();
-    path::display(&keys)
 }
 
 impl<'a> Export<'a> {
