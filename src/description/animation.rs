@@ -81,9 +81,11 @@ impl Animation {
     /// # Errors
     /// [`Error::Config`](crate::error::Error::Config) for what is no output.
     pub fn output(&self) -> Result<Output> {
-        let Some(mut node) = self.root.get("output").cloned() else { return Ok(Output::default()) };
-        let evaluated = self.frames.first().map_or(Ok(()), |frame| keyed::evaluate(&mut node, f64::from(*frame)));
-        evaluated.and_then(|()| decode(&node, &self.sources)).map_err(|fault| fault.into_error(&self.sources))
+        let Value::Map(entries) = &self.root.value else { return Ok(Output::default()) };
+        let Some(entry) = entries.iter().find(|entry| entry.key == "output") else { return Ok(Output::default()) };
+        let first = self.frames.first();
+        let node = first.map_or_else(|| Ok(entry.node.clone()), |frame| keyed::section(entry, f64::from(*frame)));
+        node.and_then(|node| decode(&node, &self.sources)).map_err(|fault| fault.into_error(&self.sources))
     }
 
     /// The scene at one of its frames, or the scene that has none.

@@ -16,12 +16,12 @@ use std::path::Path;
 use super::edit::read_bytes;
 use super::fault::Fault;
 use super::node::{Entry, Node, Place, Sources, Value, did_you_mean, quote};
-use super::path::Segment;
+use super::path::{self, At, Segment};
 use crate::error::Error;
 
 /// The maps whose keys are names, of which a number may be one.
 const NAMES: [&str; 8] =
-    ["materials", "textures", "volumes", "media", "groups", "assets", "light_groups", "attributes"];
+    ["materials", "textures", "volumes", "media", "groups", "assets", "light_groups", "output.exr.attributes"];
 const INTERPOLATION: &str = "interpolation";
 const KEYS: &str = "keys";
 const FILE: &str = "file";
@@ -55,21 +55,21 @@ pub(crate) fn is_keyed(node: &Node) -> bool {
 fn each(root: &mut Node, change: &mut dyn FnMut(&mut Node) -> Result<(), Fault>) -> Result<(), Fault> {
     fn within(
         node: &mut Node,
-        names: bool,
+        at: At<'_>,
         change: &mut dyn FnMut(&mut Node) -> Result<(), Fault>,
     ) -> Result<(), Fault> {
-        if !names && is_keyed(node) {
+        if is_keyed(node) && !NAMES.contains(&path::display(&at.segments()).as_str()) {
             return change(node);
         }
         match &mut node.value {
             Value::List(items) => {
                 for (i, item) in items.iter_mut().enumerate() {
-                    within(item, false, change).map_err(|fault| fault.under(Segment::Index(i)))?;
+                    within(item, at.index(i), change).map_err(|fault| fault.under(Segment::Index(i)))?;
                 }
             }
             Value::Map(entries) => {
                 for Entry { key, node, .. } in entries {
-                    within(node, false, change).map_err(|fault| fault.under(Segment::Key(key.clone())))?;
+                    within(node, at.key(key), change).map_err(|fault| fault.under(Segment::Key(key.clone())))?;
                 }
             }
             _ => {}
@@ -78,8 +78,7 @@ fn each(root: &mut Node, change: &mut dyn FnMut(&mut Node) -> Result<(), Fault>)
     }
     let Value::Map(entries) = &mut root.value else { return Ok(()) };
     for Entry { key, node, .. } in entries {
-        let names = NAMES.contains(&key.as_str());
-        within(node, names, change).map_err(|fault| fault.under(Segment::Key(key.clone())))?;
+        within(node, At::ROOT.key(key), change).map_err(|fault| fault.under(Segment::Key(key.clone())))?;
     }
     Ok(())
 }
@@ -173,14 +172,23 @@ pub(crate) fn evaluate_within(root: &mut Node, frame: f64, time: f64) -> Result<
     const STILL: [&str; 5] = ["image", "integrator", "layers", "render", "output"];
     let Value::Map(entries) = &mut root.value else { return Ok(()) };
     for entry in entries.iter_mut().filter(|entry| STILL.contains(&entry.key.as_str())) {
-        // As a tree of its own, with the path of its faults.
-        let mut alone = Node::new(entry.node.place, Value::Map(vec![entry.clone()]));
-        evaluate(&mut alone, frame)?;
-        if let Value::Map(mut alone) = alone.value {
-            entry.node = alone.remove(0).node;
-        }
+        entry.node = section(entry, frame)?;
     }
     evaluate(root, time)
+}
+
+/// A section of a scene at `frame`.
+///
+/// # Errors
+/// As [`evaluate`].
+pub(crate) fn section(entry: &Entry, frame: f64) -> Result<Node, Fault> {
+    // As a tree of its own, with the path of its names and faults.
+    let mut alone = Node::new(entry.node.place, Value::Map(vec![entry.clone()]));
+    evaluate(&mut alone, frame)?;
+    match alone.value {
+        Value::Map(mut alone) => Ok(alone.remove(0).node),
+        _ => Ok(alone),
+    }
 }
 
 /// The value at `frame` of one keyed node.
@@ -405,9 +413,28 @@ mod tests {
             let told = at(&format!("x: {value}"), 1.0).unwrap_err();
             assert!(told.contains("expected a number or a list of numbers"), "{told}");
         }
-        for names in ["assets: {keys: [s], 1: [t]}", "light_groups: {1: [p]}", "attributes: {keys: 3}"] {
+        for names in [
+            "assets: {keys: [s], 1: [t]}",
+            "light_groups: {1: [p]}",
+            "output: {exr: {attributes: {\"2024\": a, keys: 3}}}",
+        ] {
             let [one, other] = [1.0, 9.0].map(|frame| format!("{:?}", at(names, frame).unwrap()));
             assert_eq!(one, other);
+        }
+    }
+
+    /// "expected render.frames or --frames", and with those another fault.
+    #[test]
+    fn attributes_of_files_are_names_and_no_frames() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("s.yaml");
+        for frames in ["", "render: {frames: 1-3}\n"] {
+            let text = format!("{CAMERA}{frames}output: {{exr: {{attributes: {{\"2024\": a, keys: kim}}}}}}\n");
+            std::fs::write(&file, text).unwrap();
+            let animation = load(&file).unwrap().entries()[0].animation(&[]).unwrap();
+            for output in [animation.output().unwrap(), animation.into_first().unwrap().output] {
+                assert_eq!(output.exr.attributes.keys().collect::<Vec<_>>(), ["2024", "keys"]);
+            }
         }
     }
 
