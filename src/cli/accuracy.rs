@@ -80,7 +80,7 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
         return Ok(code);
     }
     let title = arguments.scene.file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let command = std::env::args().skip(1).fold("abbe".to_owned(), |all, word| all + " " + &word);
+    let command = std::env::args_os().skip(1).fold("abbe".to_owned(), |all, word| all + " " + &word.to_string_lossy());
     write_atomically(&files[0], page(&title, &command, &sheets, &without).as_bytes())?;
     write_json(&files[1], &sheets)?;
     write_atomically(&files[2], csv(&sheets).as_bytes())?;

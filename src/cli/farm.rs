@@ -25,6 +25,10 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
         ..Job::of(&arguments.scene.file, &overrides, cut)?
     };
     check_pictures(arguments, &job)?;
+    let read = if arguments.format == FarmFormat::Openjd { &job.files[..] } else { &[] };
+    for path in [&job.source, &job.pictures, &bundle].into_iter().chain(read) {
+        in_words(path)?;
+    }
     let files = match arguments.format {
         FarmFormat::Openjd => openjd::files(&job)?,
         FarmFormat::Slurm => slurm::files(&job),
@@ -92,6 +96,12 @@ fn check_pictures(arguments: &FarmArguments, job: &Job) -> Result<()> {
     }
 }
 
+/// A path as the files of a bundle, which are text, say it.
+fn in_words(path: &Path) -> Result<&str> {
+    let fault = || Error::Config(format!("{}: expected a path in UTF-8, found other bytes", path.display()));
+    path.to_str().ok_or_else(fault)
+}
+
 /// A word as a person may paste it into a shell, in quotes where it needs them.
 fn shell(text: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/._-+:,@%=".contains(c);
@@ -107,7 +117,7 @@ fn further(arguments: &FarmArguments, overrides: &Overrides) -> Result<Vec<Strin
     if !scene.set.is_empty() {
         let from = scene.set_from.as_deref().unwrap_or(Path::new("."));
         let from = std::path::absolute(from).map_err(|e| Error::input(from, e.to_string()))?;
-        all.extend(["--set-from".to_owned(), from.display().to_string()]);
+        all.extend(["--set-from".to_owned(), in_words(&from)?.to_owned()]);
     }
     let numbers = [("--spp", scene.spp.map(u64::from)), ("--seed", scene.seed)];
     all.extend(numbers.into_iter().filter_map(|(name, value)| Some([name.to_owned(), value?.to_string()])).flatten());

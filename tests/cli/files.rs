@@ -257,6 +257,32 @@ fn a_scene_whose_name_is_no_text_has_a_report() {
     assert!(source.contains("bad\u{fffd}.yaml"), "{source}");
 }
 
+/// The command stands on the page, at whose end it was a panic after all of the work. A job is text, in which such a path was
+/// another one.
+#[cfg(target_os = "linux")]
+#[test]
+fn arguments_that_are_no_text_are_shown_or_refused() {
+    use std::os::unix::ffi::OsStrExt;
+    let place = batch();
+    let name = std::ffi::OsStr::from_bytes(b"bad\xff.yaml");
+    std::fs::copy(place.path("scenes/good.yaml"), place.path(".").join(name)).unwrap();
+    let run = |words: &str| {
+        let words: Vec<&str> = words.split(' ').collect();
+        let ran = place.command(&words[..1]).arg(name).args(&words[1..]).output().unwrap();
+        (String::from_utf8(ran.stderr).unwrap(), ran.status.code())
+    };
+    let (said, code) = run("accuracy -q -o sheet --set integrator=whitted");
+    assert_eq!(code, Some(0), "{said}");
+    let page = std::fs::read_to_string(place.path("sheet/accuracy.html")).unwrap();
+    assert!(page.contains("abbe accuracy bad\u{fffd}.yaml -q -o sheet"), "{page}");
+    for format in ["slurm", "openjd"] {
+        let (said, code) = run(&format!("farm -q -o job --format {format}"));
+        assert!(said.ends_with("bad\u{fffd}.yaml: expected a path in UTF-8, found other bytes\n"), "{said}");
+        assert_eq!((said.lines().count(), code), (1, Some(2)), "{said}");
+        assert_eq!(place.names("job"), Vec::<String>::new());
+    }
+}
+
 /// It made a directory of that name.
 #[test]
 fn merge_refuses_names_of_other_pictures_as_render_does() {
