@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Prints the scene as YAML, or writes it.
 pub fn import(arguments: &ConvertArguments) -> Result<i32> {
-    let scene = read(arguments)?;
+    let (scene, _) = read(arguments)?;
     // Beside a stream lies nothing.
     let file = arguments.output.as_deref().filter(|path| !is_stream(path));
     let directory = file.map_or(Path::new(""), directory_of);
@@ -20,14 +20,16 @@ pub fn import(arguments: &ConvertArguments) -> Result<i32> {
 
 /// Prints the scene as Mitsuba's XML, or writes it, and says what Mitsuba cannot express.
 pub fn export(arguments: &ConvertArguments) -> Result<i32> {
-    let scene = read(arguments)?;
+    let (scene, read) = read(arguments)?;
     let output = arguments.output.as_deref();
     let file = output.filter(|path| !is_stream(path));
     let exported = description::export(&scene, file.unwrap_or(Path::new("")), &mesh::normals_of);
     match file {
         Some(path) => {
+            let beside = |name: &String| directory_of(path).join(name);
+            read.spare(exported.files.iter().map(|(name, _)| beside(name)))?;
             for (name, bytes) in &exported.files {
-                write_atomically(&directory_of(path).join(name), bytes)?;
+                write_atomically(&beside(name), bytes)?;
             }
         }
         None if !exported.files.is_empty() => {
@@ -45,16 +47,16 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
     Ok(0)
 }
 
-/// The one scene that is asked for, of other files than the one that is to be written. Its notes are told.
-fn read(arguments: &ConvertArguments) -> Result<SceneDescription> {
+/// The one scene that is asked for, of other files than the one that is to be written, and those files. Its notes are told.
+fn read(arguments: &ConvertArguments) -> Result<(SceneDescription, Inputs)> {
     let file = &arguments.scene.file;
     let overrides = arguments.scene.overrides(None)?;
     match &batch::entries(file, &overrides)?[..] {
         [entry] => {
             let animation = entry.animation(&overrides.set)?;
-            if let Some(output) = &arguments.output {
-                Inputs::of(animation.files().iter().chain([file])).spare([output])?;
-            }
+            let mut read = Inputs::of(animation.files().iter().chain([file]));
+            read.add(animation.named_files());
+            read.spare(&arguments.output)?;
             if let [first, _, ..] = animation.frames() {
                 let count = animation.frames().len();
                 let message = format!("frame {first} of {count} is written; --frames N picks another");
@@ -64,7 +66,7 @@ fn read(arguments: &ConvertArguments) -> Result<SceneDescription> {
             for note in scene.locator.notes() {
                 super::complain(&format!("note: {note}"));
             }
-            Ok(scene)
+            Ok((scene, read))
         }
         entries => Err(Error::Config(format!(
             "{}: expected one scene, found {}; --scene NAME picks one",

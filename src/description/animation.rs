@@ -102,6 +102,28 @@ impl Animation {
         self.sources.files()
     }
 
+    /// The files that it names besides: pictures, meshes, spectra.
+    #[must_use]
+    pub fn named_files(&self) -> Vec<PathBuf> {
+        fn within(node: &Node, sources: &Sources, found: &mut Vec<PathBuf>) {
+            match &node.value {
+                Value::List(items) => items.iter().for_each(|item| within(item, sources, found)),
+                Value::Map(entries) => {
+                    for Entry { key, node, .. } in entries {
+                        match &node.value {
+                            Value::Text(file) if key == "file" => found.push(sources.file(node.place, file)),
+                            _ => within(node, sources, found),
+                        }
+                    }
+                }
+                _ => {}
+            }
+        }
+        let mut found = Vec::new();
+        within(&self.root, &self.sources, &mut found);
+        found
+    }
+
     /// All pictures in order, each with its frame.
     pub fn into_scenes(self) -> impl Iterator<Item = (Option<i32>, Result<SceneDescription>)> {
         let mut frames = self.frames.clone().into_iter();

@@ -145,11 +145,20 @@ fn no_output_takes_the_place_of_what_is_read() {
     assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "parts", "--tile", "0/2"]).code, 0);
     assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "parts", "--tile", "1/2"]).code, 0);
     let part = &format!("parts/{}", place.names("parts").into_iter().find(|name| name.ends_with(".exr")).unwrap());
+    let mesh = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    std::fs::write(place.path("c.shape0.ply"), mesh).unwrap();
+    let shapes = "shapes: [{mesh: {file: c.shape0.ply}}, {cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 1}}]\n";
+    std::fs::write(place.path("cone.yaml"), format!("{SMALL}{shapes}")).unwrap();
+    assert_eq!(place.run(&["export", "cone.yaml", "-o", "d.xml"]).code, 0);
     let deep = "scenes/../scenes/good.yaml";
     let exr = "./out/sky.exr";
     for (arguments, file, before) in [
         (vec!["export", "scenes/good.yaml", "-o", deep], deep, ""),
         (vec!["import", "me.xml", "-o", "me.xml"], "me.xml", ""),
+        (vec!["import", "d.xml", "-o", "c.shape0.ply"], "c.shape0.ply", ""),
+        (vec!["export", "cone.yaml", "-o", "c.shape0.ply"], "c.shape0.ply", ""),
+        (vec!["export", "cone.yaml", "-o", "c.xml"], "./c.shape0.ply", ""),
         (vec!["render", "sky.yaml", "-q", "-o", "out"], "out/sky.exr", "sky: "),
         (vec!["render", "sky.yaml", "-q", "-o", "pictures", "--report", exr], exr, ""),
         (vec!["render", "sky.yaml", "-q", "--report", "sky.yaml"], "sky.yaml", ""),
