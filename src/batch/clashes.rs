@@ -1,6 +1,6 @@
 //! No two pictures of a job go to one file, and no report: what would be written twice is told before anything is rendered.
 
-use super::{Overrides, about_place, checkpoint, finish, names, place, spectral_path};
+use super::{Overrides, about_files, about_place, checkpoint, finish, names, place, spectral_path};
 use crate::description::{Animation, BatchEntry};
 use crate::error::{Error, Result};
 use crate::film::output::{self, Inputs};
@@ -178,6 +178,31 @@ fn clashes(
 fn sheet_place(pictures: &Pictures, overrides: &Overrides) -> PathBuf {
     let directory = about_place(&pictures.directory, !pictures.frames.is_empty(), overrides);
     directory.join(names::about(overrides, "contact-sheet", "exr"))
+}
+
+/// Refuses a batch whose report or contact sheet would take the place of a file that it reads. Of one scene that is found when
+/// it is compiled, before anything is rendered.
+///
+/// # Errors
+/// [`Error::Config`] with the place.
+pub(super) fn check_about(entries: &[BatchEntry], overrides: &Overrides) -> Result<()> {
+    if entries.len() < 2 {
+        return Ok(());
+    }
+    let Some(first) = entries.iter().find_map(|entry| Pictures::of(entry, overrides)) else { return Ok(()) };
+    let files = about_files(&about_place(&first.directory, !first.frames.is_empty(), overrides), overrides);
+    if !files.iter().any(|file| file.is_file()) {
+        return Ok(());
+    }
+    let looked = |entry: &BatchEntry| -> Option<(Vec<PathBuf>, Pictures)> {
+        let animation = entry.animation(&overrides.set).ok()?;
+        let read = [animation.files(), animation.named_files()].concat();
+        Some((read, Pictures::seen(&animation, overrides)?))
+    };
+    let found: Vec<(Vec<PathBuf>, Pictures)> = entries.par_iter().filter_map(looked).collect();
+    let sheet = found.iter().any(|(_, pictures)| pictures.sheet);
+    let files = if sheet { &files[..] } else { &files[..1] };
+    found.iter().try_for_each(|(read, _)| Inputs::of(read).spare(files))
 }
 
 /// Refuses a report in the place of a picture, of what is written beside it, or of a file from which scenes are read.

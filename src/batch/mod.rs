@@ -164,6 +164,12 @@ fn about_place(directory: &Path, frames: bool, overrides: &Overrides) -> PathBuf
     pictures.ancestors().find(plain).unwrap_or(Path::new("")).to_path_buf()
 }
 
+/// The report, and the picture and the page of the contact sheet, in `directory`.
+fn about_files(directory: &Path, overrides: &Overrides) -> [PathBuf; 3] {
+    [("report", "json"), ("contact-sheet", "png"), ("contact-sheet", "html")]
+        .map(|(stem, ending)| directory.join(names::about(overrides, stem, ending)))
+}
+
 /// Renders a prepared scene and writes its pictures.
 ///
 /// # Errors
@@ -269,6 +275,7 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
     let mut read = Inputs::of(entries.iter().map(|entry| &*entry.path).chain([path]));
     read.spare(&overrides.report)?;
     clashes::check_report(&entries, overrides)?;
+    clashes::check_about(&entries, overrides)?;
     'batch: for (i, entry) in entries.iter().enumerate() {
         let mut loading = Instant::now();
         let animation = entry.animation(&overrides.set);
@@ -302,7 +309,16 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                 // Nobody comes after the last one.
                 shelf = Shelf::default();
             }
-            let prepared = prepared.and_then(|p| checks::places(&p, overrides, &mut read).map(|()| p));
+            let several = entries.len() > 1 || frames > 1;
+            let prepared = prepared.and_then(|p| {
+                checks::places(&p, overrides, &mut read)?;
+                let Prepared { description, .. } = &p;
+                let dir = || about_place(&description.output.dir, description.frame.is_some(), overrides);
+                let about = about_files(&report_dir.clone().unwrap_or_else(dir), overrides);
+                let sheet = several && description.output.contact_sheet && overrides.portion.is_all();
+                read.spare(if sheet { &about[..] } else { &about[..1] })?;
+                Ok(p)
+            });
             if scenes.is_empty() {
                 read.spare(&overrides.report)?;
             }
@@ -312,7 +328,6 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                     let dir = || about_place(&description.output.dir, description.frame.is_some(), overrides);
                     report_dir.get_or_insert_with(dir);
                     let mut report = render_scene(&prepared, overrides, loading.elapsed(), watcher, stop).0;
-                    let several = entries.len() > 1 || frames > 1;
                     if several && prepared.description.output.contact_sheet && overrides.portion.is_all() {
                         contact.add(scenes.len(), &mut report);
                     }
@@ -339,12 +354,15 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
     // What only a later scene reads.
     report.misplaced = read.spare(&overrides.report).err();
     if let Some(dir) = report_dir {
-        let sheet = ["png", "html"].map(|ending| dir.join(names::about(overrides, "contact-sheet", ending)));
-        match contact.write(&sheet, &report) {
+        let [file, sheet @ ..] = about_files(&dir, overrides);
+        match contact.write(&sheet, &read, &report) {
             Ok(page) => report.contact_sheet = page,
             Err(e) => report.unwritten = Some(e),
         }
-        report.write(&dir.join(names::about(overrides, "report", "json")));
+        match read.spare([&file]) {
+            Ok(()) => report.write(&file),
+            Err(e) => report.unwritten = Some(e),
+        }
     }
     Ok(report)
 }

@@ -8,7 +8,7 @@ use crate::batch::accuracy::beside::Beside;
 use crate::batch::accuracy::page::{HEADINGS, cells, held_against, page};
 use crate::batch::accuracy::{self, FEWEST, Settings, Sheet};
 use crate::error::{Error, Result};
-use crate::film::output::{prepare_place, write_atomically, write_json};
+use crate::film::output::{Inputs, prepare_place, write_atomically, write_json};
 use std::fmt::Write;
 
 /// Samples of a pixel of a small copy, at most: what a scene asks for beyond takes long and says the same.
@@ -26,9 +26,17 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
     for file in &files {
         prepare_place(file)?;
     }
+    let entries = batch::entries(&arguments.scene.file, &overrides)?;
+    let mut read = Inputs::of([&arguments.scene.file]);
+    // What cannot be read is told in its turn.
+    for animation in entries.iter().filter_map(|entry| entry.animation(&overrides.set).ok()) {
+        read.add(animation.files());
+        read.add(animation.named_files());
+    }
+    read.spare(&files)?;
     let (mut sheets, mut without) = (Vec::new(), Vec::new());
     let mut codes = Vec::new();
-    for entry in batch::entries(&arguments.scene.file, &overrides)? {
+    for entry in entries {
         let told = |what: &str, done: usize, total: usize| {
             if !arguments.quiet {
                 super::complain(&format!("{}: {done}/{total} {what}", entry.name));

@@ -230,6 +230,45 @@ fn a_report_in_the_place_of_what_a_later_scene_reads_costs_no_picture() {
     assert!(["good.exr", "lit.exr", "report.json"].iter().all(|name| place.path("o").join(name).is_file()));
 }
 
+/// The report and the contact sheet lie in the directory of the pictures, under names of their own.
+#[test]
+fn neither_report_nor_contact_sheet_nor_sheet_of_accuracy_is_written_over_what_is_read() {
+    let place = batch();
+    assert_eq!(place.run(&["render", "scenes/good.yaml", "-q", "-o", "sky.exr"]).code, 0);
+    let json = r#"{"camera": {"origin": [0, 0, 5], "target": [0, 0, 0], "fov_deg": 40}, "image": {"width": 4, "height": 4},
+        "render": {"samples": 4}, "lights": [{"constant": {"radiance": 1}}]}"#;
+    std::fs::create_dir(place.path("in")).unwrap();
+    for name in ["in/report.json", "in/report.x.json", "in/accuracy.json"] {
+        std::fs::write(place.path(name), json).unwrap();
+    }
+    std::fs::copy(place.path("sky.png"), place.path("in/contact-sheet.png")).unwrap();
+    let textured =
+        "textures: {t: {image: {file: contact-sheet.png}}}\nmaterials: {m: {diffuse: {reflectance: {texture: t}}}}\n";
+    std::fs::write(place.path("in/textured.yaml"), format!("{SMALL}{BALL}{textured}")).unwrap();
+    let two = |name: &str| format!("scenes: [{{file: ../scenes/good.yaml}}, {{file: {name}}}]\n");
+    std::fs::write(place.path("in/one.yaml"), two("report.json")).unwrap();
+    std::fs::write(place.path("in/two.yaml"), two("textured.yaml")).unwrap();
+    std::fs::write(place.path("in/x.yaml"), "scenes: [{file: report.x.json, name: x}]\n").unwrap();
+    let before = place.names("in");
+    for (arguments, file, label) in [
+        ("render in/report.json -o in", "in/report.json", "report: "),
+        ("render in/one.yaml -o in", "in/report.json", ""),
+        ("render in/x.yaml -o in --scene x", "in/report.x.json", "x: "),
+        ("render in/two.yaml -o in", "in/contact-sheet.png", ""),
+        ("render in/textured.yaml -o in --frames 1-2", "in/contact-sheet.png", "textured.0001: "),
+        ("accuracy in/accuracy.json -o in", "in/accuracy.json", ""),
+    ] {
+        let bytes = std::fs::read(place.path(file)).unwrap();
+        let ran = place.run(&[&arguments.split(' ').collect::<Vec<_>>()[..], &["-q"]].concat());
+        let words = format!("error: {label}{file}: expected a place to write to, found a file that is read");
+        assert_eq!((ran.err.lines().next(), ran.code), (Some(&*words), 2), "{arguments}");
+        assert!(std::fs::read(place.path(file)).unwrap() == bytes, "{arguments}");
+        assert_eq!(place.names("in"), before, "{arguments}");
+    }
+    // One picture has no contact sheet.
+    assert_eq!(place.run(&["render", "in/textured.yaml", "-q", "-o", "in"]).code, 0);
+}
+
 /// The decoder divided by its width. The other scene of the batch is rendered.
 #[test]
 fn a_picture_without_pixels_is_refused() {

@@ -10,7 +10,7 @@ mod page;
 use super::report::{Report, SceneReport, Status};
 use crate::error::{Error, Result};
 use crate::film::heat::{Small, blocks};
-use crate::film::output::{directory_of, write_atomically, write_pieces};
+use crate::film::output::{Inputs, directory_of, write_atomically, write_pieces};
 use crate::film::png::inspect;
 use crate::spectrum::ColourSpace;
 use crate::spectrum::colour::{srgb_encode, srgb8_table};
@@ -73,14 +73,16 @@ impl Contact {
         }
     }
 
-    /// Writes the picture and the page of these names, where there are two pictures or more; gives the page.
+    /// Writes the picture and the page of these names, where there are two pictures or more; gives the page. None of what was
+    /// `read` is overwritten.
     ///
     /// # Errors
-    /// [`Error::Output`].
-    pub fn write(&self, [png, html]: &[PathBuf; 2], report: &Report) -> Result<Option<PathBuf>> {
+    /// [`Error::Output`]; [`Error::Config`] for a file that was read.
+    pub fn write(&self, [png, html]: &[PathBuf; 2], read: &Inputs, report: &Report) -> Result<Option<PathBuf>> {
         if self.cards.len() < 2 {
             return Ok(None);
         }
+        read.spare([png, html])?;
         let sheet = encode(&self.sheet(report)).map_err(|e| Error::output(png, e))?;
         write_atomically(png, &sheet)?;
         write_pieces(html, |out| page::write(out, &self.cards, directory_of(html), report))?;
@@ -253,7 +255,7 @@ mod tests {
         }
         let report = Report::new(Path::new("batch.yaml"), scenes, std::time::Duration::from_secs(1));
         let names = ["png", "html"].map(|ending| dir.path().join("sheet").with_extension(ending));
-        let page = contact.write(&names, &report).unwrap().unwrap();
+        let page = contact.write(&names, &Inputs::default(), &report).unwrap().unwrap();
         assert_eq!(contact.side, 64);
         assert!(contact.cards.iter().all(|card| card.thumbnail.width <= 64));
         let sheet = image::open(page.with_extension("png")).unwrap();
