@@ -38,11 +38,14 @@ impl Pictures {
         })
     }
 
-    /// The EXR files of a frame. What lies beside them has their names, with other endings.
+    /// The EXR files of a frame, and its snapshot as if it were one. What lies beside them has their names, with other endings.
     fn files(&self, name: &str, frame: Option<i32>, overrides: &Overrides) -> impl Iterator<Item = PathBuf> + use<> {
         let file = place(&self.directory, name, frame, overrides);
         let spectral = self.spectral.then(|| spectral_path(&file));
-        std::iter::once(file).chain(spectral)
+        // Parts are no PNGs, whose place it could take.
+        let snapshot = || checkpoint::snapshot_place(&file).with_extension("exr");
+        let snapshot = overrides.portion.is_all().then(snapshot);
+        std::iter::once(file).chain(spectral).chain(snapshot)
     }
 
     fn frames(&self) -> impl Iterator<Item = Option<i32>> {
@@ -50,6 +53,9 @@ impl Pictures {
         none.into_iter().chain(self.frames.iter().map(|frame| Some(*frame)))
     }
 }
+
+/// How the names of snapshots end, without `.png`.
+const SNAPSHOT: &str = ".snapshot";
 
 /// What is the same of the names of all frames of a scene.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -68,9 +74,11 @@ impl Key {
         match self {
             Key::BeforeNumber => {
                 let stem = path.file_stem().map(OsStr::to_string_lossy).unwrap_or_default();
+                // The number of a frame stands before it.
+                let stem = stem.strip_suffix(SNAPSHOT).unwrap_or(&stem);
                 let numbered = stem.rsplit_once('.').filter(|(_, number)| number.chars().all(digits));
                 path.parent().hash(&mut hasher);
-                (numbered.map_or(&*stem, |(before, _)| before), numbered.is_some()).hash(&mut hasher);
+                (numbered.map_or(stem, |(before, _)| before), numbered.is_some()).hash(&mut hasher);
             }
             Key::Letters => path.to_string_lossy().replace(digits, "").hash(&mut hasher),
         }
@@ -165,6 +173,8 @@ fn clashes(
                     clashes.entry((i, i)).or_insert(clash);
                 }
                 if let Some((other, at)) = first.insert(file.clone(), (i, frame)).filter(|(other, _)| *other != i) {
+                    let is_snapshot = file.file_stem().is_some_and(|stem| stem.to_string_lossy().ends_with(SNAPSHOT));
+                    let file = if is_snapshot { file.with_extension("png") } else { file };
                     let (file, one, two) = (file.display(), who(other, at), who(i, frame));
                     clashes.entry((other, i)).or_insert_with(|| format!("{file} would be that of {one} and of {two}"));
                 }
