@@ -5,7 +5,7 @@ use crate::batch;
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::output::{Inputs, directory_of, is_stream, write_atomically};
-use crate::scene::mesh;
+use crate::scene::{mesh, sdf};
 use std::path::Path;
 
 /// Prints the scene as YAML, or writes it.
@@ -23,7 +23,8 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
     let (scene, read) = read(arguments)?;
     let output = arguments.output.as_deref();
     let file = output.filter(|path| !is_stream(path));
-    let exported = description::export(&scene, file.unwrap_or(Path::new("")), &mesh::normals_of);
+    let path = file.unwrap_or(Path::new(""));
+    let exported = description::export(&scene, path, &mesh::normals_of, &sdf::is_closed);
     match file {
         Some(path) => {
             let beside = |name: &String| directory_of(path).join(name);

@@ -1,6 +1,6 @@
 //! Outside stays outside, and media stay where they are.
 
-use super::exported_with;
+use super::{common, exported_with};
 
 /// A tetrahedron whose corners are counterclockwise from outside, with normals of this length, or none.
 pub(super) fn tetrahedron(length: &str) -> String {
@@ -32,6 +32,27 @@ fn bodies_in_the_fog_of_the_camera_keep_it_around_them() {
         for side in [format!("name=\"interior\" id=\"{interior}\""), format!("name=\"exterior\" id=\"{exterior}\"")] {
             assert!(xml.contains(&side), "{more}: {side} in {xml}");
         }
+    }
+}
+
+/// What reaches the sides of its grid bounds nothing: it has the same medium on both sides. Of the ball of radius 0.4 in the unit
+/// cube one of 0.6 does so.
+#[test]
+fn an_open_grid_of_distances_keeps_the_fog_of_the_camera_on_both_sides() {
+    let directory = tempfile::tempdir().unwrap();
+    let fog = "media: {fog: {homogeneous: {absorption: 0.4}}}\nmedium: fog\n";
+    for (name, grown, open) in [("closed.vol", 0.0, false), ("open.vol", 0.2, true)] {
+        let mut bytes = common::ball_of_distances();
+        for number in bytes[48..].chunks_exact_mut(4) {
+            let distance = f32::from_le_bytes([number[0], number[1], number[2], number[3]]) - grown;
+            number.copy_from_slice(&distance.to_le_bytes());
+        }
+        let file = directory.path().join(name);
+        common::write(&file, &bytes);
+        let grid = format!("sdf_grid: {{file: {}, material: {{boundary: {{}}}}}}", file.display());
+        let (_, xml) = exported_with(fog, &grid);
+        assert!(xml.contains("name=\"exterior\" id=\"fog\""), "{name}: {xml}");
+        assert_eq!(xml.contains("name=\"interior\" id=\"fog\""), open, "{name}: {xml}");
     }
 }
 

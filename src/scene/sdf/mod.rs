@@ -30,6 +30,7 @@ use super::shape::SurfacePoint;
 use crate::math::{Frame, Ray};
 use cubic::Cubic;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
+use std::path::Path;
 
 /// Where the shading normals of a grid come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,6 +120,13 @@ impl Cell {
             self.kxyz * d.x * d.y * d.z,
         ])
     }
+}
+
+/// Whether the grid in a file bounds a solid; one that cannot be read does.
+#[must_use]
+pub fn is_closed(file: &Path) -> bool {
+    let grid = Grid::load(file).ok().and_then(|g| SdfGrid::new(&g, &DAffine3::IDENTITY, SdfNormals::Analytic).ok());
+    grid.is_none_or(|grid| grid.is_closed())
 }
 
 impl SdfGrid {

@@ -74,9 +74,15 @@ pub enum MeshNormals {
     Inward,
 }
 
-/// Writes `scene` for the file `path`. `normals` reads mesh `index` of a file.
+/// Writes `scene` for the file `path`. `normals` reads mesh `index` of a file, `closed` tells whether the grid of one bounds a
+/// solid.
 #[must_use]
-pub fn export(scene: &SceneDescription, path: &Path, normals: &dyn Fn(&Path, u32) -> MeshNormals) -> Exported {
+pub fn export(
+    scene: &SceneDescription,
+    path: &Path,
+    normals: &dyn Fn(&Path, u32) -> MeshNormals,
+    closed: &dyn Fn(&Path) -> bool,
+) -> Exported {
     let nothing = Node::new(Default::default(), Value::Null);
     let no_sources = Sources::default();
     let (root, sources) = scene.tree().unwrap_or((&nothing, &no_sources));
@@ -90,7 +96,10 @@ pub fn export(scene: &SceneDescription, path: &Path, normals: &dyn Fn(&Path, u32
     let normals = &|file: &Path, index: u32| {
         *known.borrow_mut().entry((file.to_owned(), index)).or_insert_with(|| normals(file, index))
     };
-    let mut export = Export { scene, root, sources, normals, directory, stem, ids, mentioned, xml, losses, files };
+    let known = RefCell::new(BTreeMap::new());
+    let closed = &|file: &Path| *known.borrow_mut().entry(file.to_owned()).or_insert_with(|| closed(file));
+    let mut export =
+        Export { scene, root, sources, normals, closed, directory, stem, ids, mentioned, xml, losses, files };
     export.scene();
     export.missing_light();
     let Export { xml, mut losses, files, .. } = export;
@@ -104,6 +113,7 @@ struct Export<'a> {
     root: &'a Node,
     sources: &'a Sources,
     normals: &'a dyn Fn(&Path, u32) -> MeshNormals,
+    closed: &'a dyn Fn(&Path) -> bool,
     directory: &'a Path,
     /// Before the names of files that are written beside the scene.
     stem: String,

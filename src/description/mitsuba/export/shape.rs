@@ -241,7 +241,8 @@ impl Export<'_> {
     fn sides<'s>(&'s self, shape: &'s Shape) -> [Option<&'s str>; 2] {
         let around = self.scene.medium.as_deref().filter(|_| self.transmits(&shape.material));
         let closed = match &shape.geometry {
-            Geometry::Sphere(_) | Geometry::Cube(_) | Geometry::Mesh(_) | Geometry::SdfGrid(_) => true,
+            Geometry::Sphere(_) | Geometry::Cube(_) | Geometry::Mesh(_) => true,
+            Geometry::SdfGrid(grid) => around.is_none() || (self.closed)(&grid.file),
             Geometry::Cylinder(cylinder) => cylinder.caps == Caps::Both,
             Geometry::Cone(cone) => cone.cap,
             Geometry::Disk(_) | Geometry::Plane(_) | Geometry::Rectangle(_) => false,
