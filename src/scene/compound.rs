@@ -33,9 +33,6 @@ pub struct Compound {
     pub reliefs: usize,
 }
 
-/// The most layers and materials in a material: it bounds the time of a look-up.
-pub const MOST_PARTS: usize = 4096;
-
 /// The most reliefs over each other.
 pub const MOST_RELIEFS: usize = 4;
 

@@ -2,13 +2,13 @@
 
 use super::Compiler;
 use super::spectra::Role;
-use crate::description as written;
+use crate::description::{self as written, DEEPEST, MOST_PARTS};
 use crate::error::{Error, Result, in_short};
 use crate::math::LENGTHS;
 use crate::optics::fresnel::Model;
 use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::optics::plastic::DiffuseMean;
-use crate::scene::compound::{Composition, Compound, MOST_PARTS, MOST_RELIEFS, Relief, ReliefForm, one_side};
+use crate::scene::compound::{Composition, Compound, MOST_RELIEFS, Relief, ReliefForm, one_side};
 use crate::scene::material::{Coat, Highlight, HighlightModel, Kind, Material, Roughness, TexturedRoughness, Tints};
 use crate::scene::texture::{Grid, ImageTexture, Interpolation, Scalar, Texture, Wrap};
 use crate::scene::{bands, load};
@@ -19,9 +19,6 @@ use std::sync::Arc;
 /// Roughness below which a surface is computed as smooth: the lobe is then narrower than f32 can
 /// tell directions apart (2⁻²⁴ · 16), and D(m) leaves the range of f32.
 const SMOOTHEST: f64 = 1e-6;
-
-/// The most materials or textures that hold each other.
-const DEEPEST: usize = 64;
 
 impl<'a> Compiler<'a> {
     pub(super) fn reflectance_texture(&mut self, at: &str, s: &'a written::SpectrumOrTexture) -> Texture {

@@ -34,6 +34,7 @@ use glam::DVec3;
 
 use super::super::camera::{Band, Camera, Clip, Filter, FovAxis, Image, Lens, Pose, Projection};
 use super::super::light::Light;
+use super::super::nesting;
 use super::super::node::{Node, Sources, Value};
 use super::super::path::{self, field};
 use super::super::print::{Printer, relative};
@@ -42,6 +43,8 @@ use super::super::settings::{Coverage, Integrator, Technique};
 use super::{DAYLIGHT, FILM};
 use spectra::can_be_band;
 use xml::Xml;
+
+use crate::error::Result;
 
 /// Something that Mitsuba cannot express.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,13 +79,16 @@ pub enum MeshNormals {
 
 /// Writes `scene` for the file `path`. `normals` reads mesh `index` of a file, `closed` tells whether the grid of one bounds a
 /// solid.
-#[must_use]
+///
+/// # Errors
+/// [`Error::Config`](crate::error::Error::Config) for materials and textures that hold themselves, or too much.
 pub fn export(
     scene: &SceneDescription,
     path: &Path,
     normals: &dyn Fn(&Path, u32) -> MeshNormals,
     closed: &dyn Fn(&Path) -> bool,
-) -> Exported {
+) -> Result<Exported> {
+    nesting::check(scene)?;
     let nothing = Node::new(Default::default(), Value::Null);
     let no_sources = Sources::default();
     let (root, sources) = scene.tree().unwrap_or((&nothing, &no_sources));
@@ -105,7 +111,7 @@ pub fn export(
     let Export { xml, mut losses, files, .. } = export;
     let mut told = BTreeSet::new();
     losses.retain(|loss| told.insert((loss.field.clone(), loss.instead.clone())));
-    Exported { xml: xml.finish(), losses, files }
+    Ok(Exported { xml: xml.finish(), losses, files })
 }
 
 struct Export<'a> {
