@@ -38,6 +38,9 @@ pub struct TextureRef {
     pub texture: String,
 }
 
+/// The least α of Mitsuba 3, whose numbers are raised to it, and of textures, whose texels of zero are not smooth.
+pub const LEAST_ALPHA: f64 = 1e-4;
+
 /// Microfacet roughness α, in all directions or along ∂p/∂u and across.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]

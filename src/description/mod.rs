@@ -457,7 +457,9 @@ pub use camera::{
     Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection, Shutter, ShutterTimes,
 };
 pub use coating::{Film, TexturedThickness, Thickness};
-pub use compound::{Blend, Brushed, Bump, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided};
+pub use compound::{
+    Blend, Brushed, Bump, LEAST_ALPHA, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided,
+};
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, Growth, ProjectorLight};
 pub use exr_file::{FileLayout, HeaderValue, HeaderValues, SpectralFile, Standard, counted_rate, standard, time_code};
 pub use frames::{Frames, frames, frames_in_short};

@@ -4,6 +4,7 @@ use super::SurfacePoint;
 use super::compound::{Composition, Compound};
 use super::principled::{Solid, Thin};
 use super::texture::{Scalar, Texture, TexturePoint};
+use crate::description::LEAST_ALPHA;
 use crate::optics::bsdf::{Bsdf, Metal, Pane};
 use crate::optics::dielectric::{Dielectric, RelativeIndex, RoughDielectric, Tint};
 use crate::optics::fresnel::Model;
@@ -250,9 +251,6 @@ pub struct TexturedRoughness {
     /// α across; the same as along where there is none.
     pub v: Option<Scalar>,
 }
-
-/// The least α that a texture gives, by Mitsuba 3's convention: a texel of zero is not smooth.
-const LEAST_ALPHA: f64 = 1e-4;
 
 impl Roughness {
     fn at(&self, at: &TexturePoint) -> Microfacets {

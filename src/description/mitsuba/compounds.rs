@@ -2,15 +2,13 @@
 
 use std::collections::HashSet;
 
+use super::super::LEAST_ALPHA;
 use super::super::fault::Fault;
 use super::super::node::Node;
 use super::bsdfs::Sides;
 use super::object::{Bag, Family, SpectrumValue, Value};
 use super::spectra::Role;
 use super::{Fields, Import, boolean, entry, number, text};
-
-/// The least roughness: Mitsuba takes what is less for this.
-const LEAST_ALPHA: f64 = 1e-4;
 
 /// Whether two nodes are the same number.
 fn same(a: &Node, b: &Node) -> bool {

@@ -685,9 +685,7 @@ mod tests {
             format!("<shape type=\"merge\" id=\"o{i}\">{twice}</shape>")
         });
         let layers = chain("<integrator type=\"path\" id=\"o0\"/>", &|i, twice| {
-            format!(
-                "<integrator type=\"aov\" id=\"o{i}\"><string name=\"aovs\" value=\"\"/>{twice}</integrator>"
-            )
+            format!("<integrator type=\"aov\" id=\"o{i}\"><string name=\"aovs\" value=\"\"/>{twice}</integrator>")
         });
         // Of a scene's integrators there is one.
         let layers = format!("<integrator type=\"moment\">{layers}<ref id=\"o60\"/></integrator>");

@@ -36,6 +36,7 @@ impl Import<'_> {
     pub(crate) fn shape(&mut self, index: usize) -> Result<(), Fault> {
         let bag = self.bag(index);
         if let Some(node) = bag.written() {
+            self.again(index, &node)?;
             self.shapes.push(node);
             return Ok(());
         }

@@ -52,10 +52,7 @@ impl<'a> Compiler<'a> {
     }
 
     /// What is known of the surface at hand; who uses it asks for that.
-    pub(super) fn kept<T: Clone>(
-        &mut self,
-        of: impl for<'b> FnOnce(&'b AtHand<'a>) -> Option<&'b T>,
-    ) -> Option<T> {
+    pub(super) fn kept<T: Clone>(&mut self, of: impl for<'b> FnOnce(&'b AtHand<'a>) -> Option<&'b T>) -> Option<T> {
         let known = of(&self.at_hand).cloned();
         self.asks_for_surface |= known.is_some();
         known
@@ -112,14 +109,15 @@ mod tests {
     /// to 1.5; volumes of one voxel are white and twice as bright.
     fn fault(text: &str) -> String {
         let directory = tempfile::tempdir().unwrap();
-        let numbers: String = ["x", "y", "z", "red", "green", "blue", "wear_0"]
-            .map(|name| format!("property float {name}\n"))
-            .concat();
+        let numbers: String =
+            ["x", "y", "z", "red", "green", "blue", "wear_0"].map(|name| format!("property float {name}\n")).concat();
         let vertices = "0 0 0 0.5 0.5 0.5 1.5\n1 0 0 0.5 0.5 0.5 0\n0 1 0 0.5 0.5 0.5 0\n";
         let face = "element face 1\nproperty list uchar int vertex_indices\n";
         let ply = format!("ply\nformat ascii 1.0\nelement vertex 3\n{numbers}{face}end_header\n{vertices}3 0 1 2\n");
         std::fs::write(directory.path().join("t.ply"), ply).unwrap();
-        for (file, values) in [("one.vol", &[1.0][..]), ("two.vol", &[2.0]), ("white.vol", &[1.0; 3]), ("red.vol", &[2.0, 1.0, 0.0])] {
+        for (file, values) in
+            [("one.vol", &[1.0][..]), ("two.vol", &[2.0]), ("white.vol", &[1.0; 3]), ("red.vol", &[2.0, 1.0, 0.0])]
+        {
             std::fs::write(directory.path().join(file), vol([1; 3], values.len() as i32, values)).unwrap();
         }
         let head = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes: [{mesh: {file: t.ply, material: m}}]\n";
@@ -142,7 +140,10 @@ mod tests {
         let blends: String = (1..60)
             .map(|i| format!("  m{i}: {{blend: {{weight: 0.5, first: m{j}, second: m{j}}}}}\n", j = i - 1))
             .collect();
-        let first = format!("materials:\n  m0: {{{}}}\n{blends}  m: {{blend: {{weight: 0.5, first: m59, second: m59}}}}\n", diffuse("t0"));
+        let first = format!(
+            "materials:\n  m0: {{{}}}\n{blends}  m: {{blend: {{weight: 0.5, first: m59, second: m59}}}}\n",
+            diffuse("t0")
+        );
         let told = fault(&format!("{attribute}{first}"));
         assert!(told.contains("m12.blend: expected at most 4096 layers and materials"), "{told}");
         assert!(!told.contains("m11"), "{told}");

@@ -268,8 +268,7 @@ mod tests {
         }
     }
 
-    /// 10³⁷ over 0.01 nm is 10³⁹ a nanometre; F11 of luminance 1 is 5.6 at 545 nm; and twice 2·10³⁸ is 4·10³⁸. A thousandth of
-    /// each is light.
+    /// 10³⁷ over 0.01 nm is 10³⁹ a nanometre; F11 of luminance 1 is 5.6 at 545 nm. A thousandth of each is light.
     #[test]
     fn light_that_no_float_holds_is_refused() {
         let told = |radiance: &str| {
@@ -285,10 +284,6 @@ mod tests {
                 "{lines: [{nm: 550, power: 1.0e34, width_nm: 0.01}]}",
             ),
             ("{illuminant: {name: F11, scale: 1.0e38}}", "{illuminant: {name: F11, scale: 1.0e35}}"),
-            (
-                "{scaled: {by: 2, of: {illuminant: {name: E, scale: 2.0e38}}}}",
-                "{scaled: {by: 2, of: {illuminant: {name: E, scale: 2.0e35}}}}",
-            ),
         ] {
             let expected = "s.yaml:2:32: lights[0].constant.radiance: expected light up to 3.4e38, found more";
             assert_eq!((told(much).as_str(), told(less).as_str()), (expected, ""));

@@ -36,7 +36,9 @@ pub(super) fn read(bytes: &[u8], index: u32) -> Result<MeshSource, String> {
         while stream.array::<1>()? != [0] {
             length += 1;
             if length > LONGEST_NAME {
-                return Err(format!("expected a name of at most {LONGEST_NAME} bytes that ends with a zero, found more"));
+                return Err(format!(
+                    "expected a name of at most {LONGEST_NAME} bytes that ends with a zero, found more"
+                ));
             }
         }
     }
