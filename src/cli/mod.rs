@@ -457,8 +457,6 @@ impl SceneArguments {
         let mut set = self.set.clone();
         if let Some(spp) = self.spp {
             set.push(("render.samples".into(), spp.to_string()));
-            // They bound what the file gives as its targets, too.
-            set.push(("render.stop.samples".into(), spp.to_string()));
         }
         if let Some(seed) = self.seed {
             set.push(("render.seed".into(), seed.to_string()));

@@ -338,13 +338,23 @@ impl BatchEntry {
                 setting.apply(&mut root).map_err(|fault| fault.into_error(&sources))?;
             }
             for (key, value) in overrides {
-                let setting =
-                    Setting::of_argument(key, value, &mut sources).map_err(|fault| fault.into_error(&sources))?;
-                setting.apply(&mut root).map_err(|fault| fault.into_error(&sources))?;
+                // Samples bound what the file gives as its targets, too.
+                let bounds = key == "render.samples" && has_stop(&root);
+                for key in [Some(key.as_str()), bounds.then_some("render.stop.samples")].into_iter().flatten() {
+                    let setting =
+                        Setting::of_argument(key, value, &mut sources).map_err(|fault| fault.into_error(&sources))?;
+                    setting.apply(&mut root).map_err(|fault| fault.into_error(&sources))?;
+                }
             }
         }
         Animation::new(root, &self.path, sources)
     }
+}
+
+/// Whether a scene ends at other targets than its samples, or at samples that stand among them.
+fn has_stop(root: &Node) -> bool {
+    let stop = root.get("render").and_then(|render| render.get("stop"));
+    stop.is_some_and(|stop| matches!(&stop.value, Value::Map(targets) if !targets.is_empty()))
 }
 
 /// `{key: node}`

@@ -161,8 +161,8 @@ fn each_fault_is_told_with_its_place_its_field_and_what_was_expected() {
             2,
         ),
         (
-            "shapes: [{disk: {radius: 1, material: {two_sided: {front: {principled_thin: {diff_trans: 1}}, back: {mirror: {}}}}}}]",
-            "s.yaml:3:59: shapes[0].disk.material.two_sided.front: expected a material that scatters no light to its other \
+            "shapes: [{disk: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1, material: {two_sided: {front: {principled_thin: {diff_trans: 1}}, back: {mirror: {}}}}}}]",
+            "s.yaml:3:97: shapes[0].disk.material.two_sided.front: expected a material that scatters no light to its other \
              side, found one that does: it has to be the front of both sides, without `back`",
             2,
         ),

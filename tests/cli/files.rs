@@ -255,7 +255,7 @@ fn neither_report_nor_contact_sheet_nor_sheet_of_accuracy_is_written_over_what_i
         ("render in/one.yaml -o in", "in/report.json", ""),
         ("render in/x.yaml -o in --scene x", "in/report.x.json", "x: "),
         ("render in/two.yaml -o in", "in/contact-sheet.png", ""),
-        ("render in/textured.yaml -o in --frames 1-2", "in/contact-sheet.png", "textured.0001: "),
+        ("render in/textured.yaml -o in --set render.frames=1-2", "in/contact-sheet.png", "textured.0001: "),
         ("accuracy in/accuracy.json -o in", "in/accuracy.json", ""),
     ] {
         let bytes = std::fs::read(place.path(file)).unwrap();

@@ -40,7 +40,8 @@ fn bodies_in_the_fog_of_the_camera_keep_it_around_them() {
 #[test]
 fn an_open_grid_of_distances_keeps_the_fog_of_the_camera_on_both_sides() {
     let directory = tempfile::tempdir().unwrap();
-    let fog = "media: {fog: {homogeneous: {absorption: 0.4}}}\nmedium: fog\n";
+    let fog = "media: {fog: {homogeneous: {absorption: 0.4}}}\nmedium: fog\n\
+               lights: [point: {position: [0, 3, 2], intensity: 5}]\n";
     for (name, grown, open) in [("closed.vol", 0.0, false), ("open.vol", 0.2, true)] {
         let mut bytes = common::ball_of_distances();
         for number in bytes[48..].chunks_exact_mut(4) {

@@ -191,13 +191,14 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
         ),
         // A table of zeros has "no probability mass" there.
         (
-            "lights: [{constant: {radiance: {scaled: {by: 0, of: {illuminant: D65}}}}}]\n",
+            "lights: [{constant: {radiance: {scaled: {by: 0, of: {illuminant: D65}}}}}, {point: {position: [0, 3, 2], intensity: 5}}]\n",
             &card("diffuse: {reflectance: {table: [[400, 0], [700, 0]]}}"),
             &[],
             &["<spectrum name=\"radiance\" value=\"0\"/>", "<spectrum name=\"reflectance\" value=\"0\"/>"],
         ),
         (
-            "lights: [{constant: {radiance: {scaled: {by: 0, of: {table: [[400, 1], [700, 2]]}}}}}]\n",
+            "lights: [{constant: {radiance: {scaled: {by: 0, of: {table: [[400, 1], [700, 2]]}}}}}, \
+             {point: {position: [0, 3, 2], intensity: 5}}]\n",
             &grey,
             &[],
             &["<spectrum name=\"radiance\" value=\"0\"/>"],

@@ -164,8 +164,8 @@ shapes:
     }
 }
 
-/// Rough glass under a relief that does not turn toward its viewer, seen from behind its normal, and two sides within two sides, the
-/// inner of which lets light through on its front alone: by lamps that are asked, by scattering and from the lamps.
+/// Rough glass under a relief that does not turn toward its viewer, seen from behind its normal: by lamps that are asked, by scattering
+/// and from the lamps. And two sides within two sides, of which that below lets light through: by the first two.
 #[test]
 fn sides_are_the_same_to_all_techniques() {
     const LEANING: &str = "\
@@ -202,7 +202,10 @@ shapes:
         assert!(luminance(&path).0 > 0.01, "{what}");
         assert_agree(&format!("{what}, scattering"), &path, &by("path", ", light_samples: 0"));
         assert_agree(&format!("{what}, lamps"), &path, &by("path", ", scatter_samples: 0"));
-        assert_agree(&format!("{what}, from the lamps"), &path, &by("light_tracer", ""));
+        // The front stops what comes from the lamp; seen from below there is the back.
+        if what != "sheet" {
+            assert_agree(&format!("{what}, from the lamps"), &path, &by("light_tracer", ""));
+        }
     }
 }
 
