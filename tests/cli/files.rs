@@ -245,6 +245,8 @@ fn neither_report_nor_contact_sheet_nor_sheet_of_accuracy_is_written_over_what_i
     let textured =
         "textures: {t: {image: {file: contact-sheet.png}}}\nmaterials: {m: {diffuse: {reflectance: {texture: t}}}}\n";
     std::fs::write(place.path("in/textured.yaml"), format!("{SMALL}{BALL}{textured}")).unwrap();
+    let moving = format!("{SMALL}{BALL}{textured}").replace("samples: 4", "samples: 4, frames: 1-2");
+    std::fs::write(place.path("in/moving.yaml"), moving).unwrap();
     let two = |name: &str| format!("scenes: [{{file: ../scenes/good.yaml}}, {{file: {name}}}]\n");
     std::fs::write(place.path("in/one.yaml"), two("report.json")).unwrap();
     std::fs::write(place.path("in/two.yaml"), two("textured.yaml")).unwrap();
@@ -255,7 +257,7 @@ fn neither_report_nor_contact_sheet_nor_sheet_of_accuracy_is_written_over_what_i
         ("render in/one.yaml -o in", "in/report.json", ""),
         ("render in/x.yaml -o in --scene x", "in/report.x.json", "x: "),
         ("render in/two.yaml -o in", "in/contact-sheet.png", ""),
-        ("render in/textured.yaml -o in --set render.frames=1-2", "in/contact-sheet.png", "textured.0001: "),
+        ("render in/moving.yaml -o in", "in/contact-sheet.png", "moving.0001: "),
         ("accuracy in/accuracy.json -o in", "in/accuracy.json", ""),
     ] {
         let bytes = std::fs::read(place.path(file)).unwrap();
