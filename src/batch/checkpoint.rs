@@ -50,10 +50,13 @@ pub fn place(path: &Path) -> PathBuf {
     name.into()
 }
 
+/// How the names of snapshots end, without `.png`.
+pub(super) const SNAPSHOT: &str = ".snapshot";
+
 /// The PNG of what is done of the file at `path`.
 #[must_use]
 pub fn snapshot_place(path: &Path) -> PathBuf {
-    path.with_extension("snapshot.png")
+    path.with_extension(format!("{}.png", &SNAPSHOT[1..]))
 }
 
 /// Keeps one render.

@@ -54,9 +54,6 @@ impl Pictures {
     }
 }
 
-/// How the names of snapshots end, without `.png`.
-const SNAPSHOT: &str = ".snapshot";
-
 /// What is the same of the names of all frames of a scene.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Key {
@@ -75,7 +72,7 @@ impl Key {
             Key::BeforeNumber => {
                 let stem = path.file_stem().map(OsStr::to_string_lossy).unwrap_or_default();
                 // The number of a frame stands before it.
-                let stem = stem.strip_suffix(SNAPSHOT).unwrap_or(&stem);
+                let stem = stem.strip_suffix(checkpoint::SNAPSHOT).unwrap_or(&stem);
                 let numbered = stem.rsplit_once('.').filter(|(_, number)| number.chars().all(digits));
                 path.parent().hash(&mut hasher);
                 (numbered.map_or(stem, |(before, _)| before), numbered.is_some()).hash(&mut hasher);
@@ -173,7 +170,8 @@ fn clashes(
                     clashes.entry((i, i)).or_insert(clash);
                 }
                 if let Some((other, at)) = first.insert(file.clone(), (i, frame)).filter(|(other, _)| *other != i) {
-                    let is_snapshot = file.file_stem().is_some_and(|stem| stem.to_string_lossy().ends_with(SNAPSHOT));
+                    let stem = file.file_stem().map(OsStr::to_string_lossy).unwrap_or_default();
+                    let is_snapshot = stem.ends_with(checkpoint::SNAPSHOT);
                     let file = if is_snapshot { file.with_extension("png") } else { file };
                     let (file, one, two) = (file.display(), who(other, at), who(i, frame));
                     clashes.entry((other, i)).or_insert_with(|| format!("{file} would be that of {one} and of {two}"));

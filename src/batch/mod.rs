@@ -314,21 +314,20 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                 checks::places(&p, overrides, &mut read)?;
                 let Prepared { description, .. } = &p;
                 let dir = || about_place(&description.output.dir, description.frame.is_some(), overrides);
-                let about = about_files(&report_dir.clone().unwrap_or_else(dir), overrides);
+                let dir = report_dir.clone().unwrap_or_else(dir);
                 let sheet = several && description.output.contact_sheet && overrides.portion.is_all();
+                let about = about_files(&dir, overrides);
                 read.spare(if sheet { &about[..] } else { &about[..1] })?;
-                Ok(p)
+                Ok((p, dir, sheet))
             });
             if scenes.is_empty() {
                 read.spare(&overrides.report)?;
             }
             let mut report = match prepared {
-                Ok(prepared) => {
-                    let Prepared { description, .. } = &prepared;
-                    let dir = || about_place(&description.output.dir, description.frame.is_some(), overrides);
-                    report_dir.get_or_insert_with(dir);
+                Ok((prepared, dir, sheet)) => {
+                    report_dir.get_or_insert(dir);
                     let mut report = render_scene(&prepared, overrides, loading.elapsed(), watcher, stop).0;
-                    if several && prepared.description.output.contact_sheet && overrides.portion.is_all() {
+                    if sheet {
                         contact.add(scenes.len(), &mut report);
                     }
                     report

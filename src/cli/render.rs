@@ -27,9 +27,6 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     if let Some(time) = arguments.time {
         scene.set.push(("render.stop.time".into(), time.as_secs_f64().to_string()));
     }
-    if let (Some(spp), true) = (arguments.scene.spp, arguments.error.is_some() || arguments.time.is_some()) {
-        scene.set.push(("render.stop.samples".into(), spp.to_string()));
-    }
     let overrides = batch::Overrides {
         report: arguments.report.clone(),
         check_numerics: arguments.check_numerics,

@@ -337,14 +337,18 @@ impl BatchEntry {
             for setting in &self.settings {
                 setting.apply(&mut root).map_err(|fault| fault.into_error(&sources))?;
             }
+            let mut set = |root: &mut Node, key: &str, value: &str| {
+                let setting = Setting::of_argument(key, value, &mut sources);
+                setting.and_then(|setting| setting.apply(root)).map_err(|fault| fault.into_error(&sources))
+            };
             for (key, value) in overrides {
-                // Samples bound what the file gives as its targets, too.
-                let bounds = key == "render.samples" && has_stop(&root);
-                for key in [Some(key.as_str()), bounds.then_some("render.stop.samples")].into_iter().flatten() {
-                    let setting =
-                        Setting::of_argument(key, value, &mut sources).map_err(|fault| fault.into_error(&sources))?;
-                    setting.apply(&mut root).map_err(|fault| fault.into_error(&sources))?;
-                }
+                set(&mut root, key, value)?;
+            }
+            // Samples that are said last bound other targets, too.
+            let samples = ["render.samples", "render.stop", "render.stop.samples"];
+            match overrides.iter().rev().find(|(key, _)| samples.contains(&key.as_str())) {
+                Some((key, value)) if key == samples[0] && has_stop(&root) => set(&mut root, samples[2], value)?,
+                _ => {}
             }
         }
         Animation::new(root, &self.path, sources)

@@ -101,20 +101,17 @@ fn render(job: &Job) -> String {
         command += " ";
         command += &word(argument);
     }
+    let mut parts = String::new();
+    if job.cut.tiles > 1 {
+        parts += "what+=(--tile \"$tile\")\n";
+    }
     // Where samples are shared out by noise a picture has no ranges of them, not even one.
-    let part = match (job.cut.tiles > 1, job.cut.ranges > 1) {
-        (true, true) => "--tile \"$tile\" --samples \"$samples\"",
-        (true, false) => "--tile \"$tile\"",
-        (false, true) => "--samples \"$samples\"",
-        (false, false) => "",
-    };
-    let parts = match part {
-        "" => "place=\"$pictures\"\n".to_owned(),
-        part => format!(
-            "what+=({part})\n\
-             place=\"$pictures/parts/$scene\"\n\
-             [ \"$frames\" = - ] || place=\"$place/{{frame}}\"\n"
-        ),
+    if job.cut.ranges > 1 {
+        parts += "what+=(--samples \"$samples\")\n";
+    }
+    parts += match job.cut.parts() {
+        true => "place=\"$pictures/parts/$scene\"\n[ \"$frames\" = - ] || place=\"$place/{frame}\"\n",
+        false => "place=\"$pictures\"\n",
     };
     head(job, "render", &directives)
         + &format!(

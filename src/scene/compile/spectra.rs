@@ -213,20 +213,22 @@ fn beyond_the_band(response: &written::Spectrum) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use crate::description::SceneDescription;
+    use crate::error::Result;
+    use crate::scene::Scene;
     use crate::scene::compile::compile;
     use crate::spectrum::Lanes;
+
+    /// A scene with a camera, on its first line, and `line`.
+    fn compiled(line: &str) -> Result<Scene> {
+        let text = format!("camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\n{line}\n");
+        compile(&SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap(), "s")
+    }
 
     /// Of bands side by side each wavelength counts in one, with its share of the band: the sum over a band's wavelengths, one
     /// f32 apart, is 1 to the rounding of each. The last that is rendered counts, too.
     #[test]
     fn a_wavelength_is_in_one_band() {
-        let bands = |range: &str| {
-            let text = format!(
-                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\noutput: {{spectral: {{{range}}}}}\n"
-            );
-            let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-            compile(&description, "s").unwrap().bands
-        };
+        let bands = |range: &str| compiled(&format!("output: {{spectral: {{{range}}}}}")).unwrap().bands;
         let ten = bands("bands: 10, from_nm: 500.003, to_nm: 500.103");
         let step = 500f32.next_up() - 500.0;
         let mut sums = [0.0; 10];
@@ -258,11 +260,8 @@ mod tests {
                 "57: R.lines[1].nm: expected a line within 360 to 830 nm, found 300 nm of width 1",
             ),
         ] {
-            let text = format!(
-                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nlights: [{{constant: {{radiance: {radiance}}}}}]\n"
-            );
-            let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-            let found = compile(&description, "s").err().unwrap().to_string();
+            let found =
+                compiled(&format!("lights: [{{constant: {{radiance: {radiance}}}}}]")).err().unwrap().to_string();
             let expected = format!("s.yaml:2:{}", told.replace("R.", "lights[0].constant.radiance."));
             assert!(found.starts_with(&expected), "{found}");
         }
@@ -272,11 +271,8 @@ mod tests {
     #[test]
     fn light_that_no_float_holds_is_refused() {
         let told = |radiance: &str| {
-            let text = format!(
-                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nlights: [{{constant: {{radiance: {radiance}}}}}]\n"
-            );
-            let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-            compile(&description, "s").err().map(|error| error.to_string()).unwrap_or_default()
+            let scene = compiled(&format!("lights: [{{constant: {{radiance: {radiance}}}}}]"));
+            scene.err().map(|error| error.to_string()).unwrap_or_default()
         };
         for (much, less) in [
             (
