@@ -72,6 +72,8 @@ fn samples_of_the_command_line_bound_the_stop_of_the_file() {
         assert_eq!(place.json("report.json")["scenes"][0]["samples"], 8, "{stop}");
     }
     let place = Place::of(SCENE);
+    let (code, said) = abbe(&place, "render scene.yaml -q -o a.exr --error 1% --set render.samples=0");
+    assert_eq!((code, said.matches("expected").count()), (2, 1), "{said}");
     let hash = |arguments: &str| {
         assert_eq!(abbe(&place, &format!("render scene.yaml -q -o a.exr {arguments}")).0, 0);
         place.json("report.json")["scenes"][0]["scene_hash"].clone()

@@ -17,7 +17,7 @@ use super::output::Output;
 use super::path::{At, Segment};
 use super::path_map::PathMap;
 use super::scene::SceneDescription;
-use super::settings::Render;
+use super::settings::{Render, SAMPLES_LIMIT};
 use super::spectrum::FilePath;
 use crate::error::{Error, Result};
 
@@ -344,10 +344,13 @@ impl BatchEntry {
             for (key, value) in overrides {
                 set(&mut root, key, value)?;
             }
-            // Samples that are said last bound other targets, too.
+            // Samples that are said last bound other targets, too; what is no number of them is told once.
+            let holds = |value: &str| value.trim().parse().is_ok_and(|n: u32| (1..=SAMPLES_LIMIT).contains(&n));
             let samples = ["render.samples", "render.stop", "render.stop.samples"];
             match overrides.iter().rev().find(|(key, _)| samples.contains(&key.as_str())) {
-                Some((key, value)) if key == samples[0] && has_stop(&root) => set(&mut root, samples[2], value)?,
+                Some((key, value)) if key == samples[0] && has_stop(&root) && holds(value) => {
+                    set(&mut root, samples[2], value)?
+                }
                 _ => {}
             }
         }
