@@ -2,8 +2,7 @@
 
 A scene is a function of its number. It has a ground, one to three bodies, one or two lights, a camera and an integrator,
 each with parameters, textures and transforms that are drawn. What the two renderers are known to mean otherwise (the
-README says why) is left out here, beside the word "known".
-"""
+(docs/mitsuba.md says why) is left out here, beside the word "known".
 
 import random
 import re
