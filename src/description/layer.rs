@@ -2,8 +2,8 @@
 
 use serde::Deserialize;
 
-use super::camera::check_channel;
 use super::fault::Checker;
+use super::image::check_channel;
 use super::material::given_fields;
 use super::node::{did_you_mean, quote};
 use super::path::At;

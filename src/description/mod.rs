@@ -427,6 +427,7 @@ mod exr_file;
 mod fault;
 mod frames;
 mod hair;
+mod image;
 mod keyed;
 mod layer;
 mod light;
@@ -453,9 +454,7 @@ mod yaml;
 pub use absorption::{Absorption, ColorAt};
 pub use animation::{Animation, Motion};
 pub use batch::{Batch, BatchEntry, Document, load, load_mapped};
-pub use camera::{
-    Band, Camera, Clip, Crop, Filter, FovAxis, Image, Lens, MAX_SIDE, Pose, Projection, Shutter, ShutterTimes,
-};
+pub use camera::{Camera, Clip, FovAxis, Lens, Pose, Projection, Shutter, ShutterTimes};
 pub use coating::{Film, TexturedThickness, Thickness};
 pub use compound::{
     Blend, Brushed, Bump, LEAST_ALPHA, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided,
@@ -464,6 +463,7 @@ pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, Growt
 pub use exr_file::{FileLayout, HeaderValue, HeaderValues, SpectralFile, Standard, counted_rate, standard, time_code};
 pub use frames::{Frames, frames, frames_in_short};
 pub use hair::{Hair, HairColour};
+pub use image::{Band, Crop, Filter, Image, MAX_SIDE};
 pub use layer::{Data, Layer, LayerContent, LightForm, LightWay, Matte, Quantity};
 pub use light::{Aim, ConstantLight, DirectionalLight, Falloff, Fog, FogLaw, Light, PointLight, SpotLight};
 pub use material::{

@@ -7,11 +7,12 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use super::animation::{Animation, Motion};
-use super::camera::{Camera, Image, check_channel};
+use super::camera::Camera;
 use super::decode::decode;
 use super::edit;
 use super::exr_file;
 use super::fault::{Checker, Fault};
+use super::image::{Image, check_channel};
 use super::layer::{Layer, LayerContent};
 use super::light::{Fog, Light};
 use super::material::Material;

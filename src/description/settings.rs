@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use serde::Deserialize;
 
-use super::camera::MAX_SIDE;
 use super::decode::{whole, whole_or_none};
 use super::fault::Checker;
 use super::frames::Frames;
+use super::image::MAX_SIDE;
 use super::light::nothing;
 use super::path::At;
 use super::spectrum::{Role, Spectrum};

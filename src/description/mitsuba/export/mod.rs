@@ -32,7 +32,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::super::camera::{Band, Camera, Clip, Filter, FovAxis, Image, Lens, Pose, Projection};
+use super::super::camera::{Camera, Clip, FovAxis, Lens, Pose, Projection};
+use super::super::image::{Band, Filter, Image};
 use super::super::light::Light;
 use super::super::nesting;
 use super::super::node::{Node, Sources, Value};
