@@ -90,6 +90,23 @@ struct Compiler<'a> {
     materials: Vec<Material>,
 }
 
+/// The lamps that shine, one after the other, and the names of those that do not.
+#[derive(Default)]
+struct Lamps {
+    lights: Vec<Light>,
+    /// How often each is asked, times what its power says.
+    weights: Vec<f64>,
+    names: Vec<String>,
+    dark: Vec<String>,
+}
+
+/// What rays look for things in.
+struct Search {
+    bvh: Bvh,
+    few: Option<Few>,
+    together: Option<Together>,
+}
+
 /// The spectrum of the ambient light of `whitted`.
 ///
 /// # Errors
@@ -223,6 +240,99 @@ impl<'a> Compiler<'a> {
 
     fn scene(&mut self, name: &str) -> Result<Scene> {
         let d = self.description;
+        self.read()?;
+        let mut media = self.media();
+        let camera_medium = d.medium.as_ref().map(|name| self.medium_ids[name.as_str()]);
+        // Children of groups come after everything that stands in the scene itself.
+        let (children, names_of_children) = self.groups(camera_medium)?;
+        let mut lamps = Lamps::default();
+        let (mut objects, mut material_names) = self.objects(camera_medium, &mut lamps)?;
+        self.lights(&mut lamps)?;
+        self.unused_textures();
+        let camera = self.camera();
+        if !self.faults.is_empty() || self.unread.is_some() {
+            // What is wrong is told by `finish`.
+            return Err(Error::Config(String::new()));
+        }
+
+        let mut boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
+        let (contacts, passed_over) = put_apart(&mut objects, &mut boxes, &self.materials);
+        let Search { bvh, few, together } = self.search(&mut objects, &boxes);
+        objects.extend(children);
+        material_names.extend(names_of_children);
+        let nested = Nested::of(&mut objects, boxes.len(), |object| {
+            self.materials[object.material as usize].body().ok().flatten()
+        });
+        media.append(&mut self.absorbing);
+
+        let (center, radius) = extent(&boxes, &camera);
+        let Lamps { lights, weights, names: light_names, dark } = lamps;
+        let powers: Vec<f64> = lights.iter().map(|light| light.power(&objects, radius)).collect();
+        let asked = |weights: &[f64]| {
+            let by_power = lights::light_cdf(&powers, weights);
+            Asked::new(by_power, Choice::of(&lights, &powers, weights, &objects, center, radius))
+        };
+        let all_asked = asked(&weights);
+        let is_even = |light: &Light| matches!(light, Light::Constant { .. });
+        let uneven: Vec<f64> = lights.iter().zip(&weights).map(|(l, &w)| if is_even(l) { 0.0 } else { w }).collect();
+        let uneven_asked = (uneven != weights).then(|| asked(&uneven));
+        let is_large = |light: &Light| matches!(light, Light::Environment(map) if map.is_large());
+        let bands = self.bands();
+        let wavelengths = self.shelf.carried.wavelengths().unwrap_or_else(|| match d.render.wavelengths {
+            written::Wavelengths::Auto => self.wavelengths(&lights, &powers, &objects, &bands),
+            written::Wavelengths::Visible => WavelengthDistribution::visible(),
+            written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
+        });
+        let lets_through = |o: &Object| o.body != 0 || self.materials[o.material as usize].lets_through();
+        let mut scene = Scene {
+            name: name.to_owned(),
+            camera,
+            has_boundaries: objects.iter().any(lets_through),
+            has_media: camera_medium.is_some() || objects.iter().any(|o| o.inside.is_some() || o.outside.is_some()),
+            objects,
+            material_names,
+            standing: boxes.len(),
+            bvh,
+            few,
+            together,
+            fog: self.depth_fog(),
+            materials: std::mem::take(&mut self.materials),
+            media,
+            camera_medium,
+            nested,
+            camera_inside: Inside::default(),
+            shines_on_rays: lights.iter().any(Light::may_be_met),
+            large_sky: lights.iter().position(is_large).map(|i| i as u32),
+            backgrounds: (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect(),
+            lights,
+            all_asked,
+            uneven_asked,
+            light_exponent: 0,
+            has_sky: d.lights.iter().any(|l| matches!(l, written::Light::Constant(_) | written::Light::Environment(_))),
+            dark,
+            light_groups: lights::groups(d, &light_names),
+            wavelengths,
+            bands,
+            center,
+            radius,
+            files: std::mem::take(&mut self.files),
+            notes: self.told_notes(),
+            watch: None,
+        };
+        self.note_beside(&mut scene, &boxes, &light_names);
+        scene.light_exponent = scene.film_exponent(&powers, &boxes);
+        let eye = Ray::new(scene.camera.eye(), DVec3::Z);
+        self.note_contacts(&mut scene, &contacts, passed_over);
+        self.note_overlaps(&mut scene);
+        self.note_meshes(&mut scene);
+        self.note_lost_light(&mut scene, &light_names);
+        scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);
+        Ok(scene)
+    }
+
+    /// Reads what takes long, meshes beside all else, and makes what is used by name.
+    fn read(&mut self) -> Result<()> {
+        let d = self.description;
         let known = Meshes::known(d, &mut self.shelf);
         let (meshes, made) = rayon::join(
             || Meshes::of(d, known),
@@ -239,62 +349,65 @@ impl<'a> Compiler<'a> {
         made?;
         meshes.keep(&mut self.shelf);
         self.meshes = meshes;
+        Ok(())
+    }
+
+    /// The media that have names.
+    fn media(&mut self) -> Vec<Medium> {
         let mut media = Vec::new();
-        for (name, medium) in &d.media {
+        for (name, medium) in &self.description.media {
             self.medium_ids.insert(name, media.len() as u32);
             let at = written::field(&["media", name]);
             media.push(self.medium(&at, medium));
         }
-        let camera_medium = d.medium.as_ref().map(|name| self.medium_ids[name.as_str()]);
+        media
+    }
 
-        let mut objects: Vec<Object> = Vec::new();
-        let mut lights: Vec<Light> = Vec::new();
-        let mut weights: Vec<f64> = Vec::new();
-        let mut light_names: Vec<String> = Vec::new();
-        let mut dark: Vec<String> = Vec::new();
-        // Children of groups come after everything that stands in the scene itself.
-        let (children, names_of_children) = self.groups(camera_medium)?;
-        let mut material_names: Vec<String> = Vec::new();
-        for (i, shape) in d.shapes.iter().enumerate() {
+    /// What stands in the scene itself, and the names of its materials. Shapes that shine join the lamps.
+    fn objects(&mut self, camera_medium: Option<u32>, lamps: &mut Lamps) -> Result<(Vec<Object>, Vec<String>)> {
+        let (mut objects, mut material_names) = (Vec::new(), Vec::new());
+        for (i, shape) in self.description.shapes.iter().enumerate() {
             let at = format!("shapes[{i}].{}", shape.geometry.kind());
             let name = shape.name_or_kind(i);
             let index = objects.len() as u32;
-            if let Some(object) = self.object(&at, name, shape, camera_medium, index, &mut lights)? {
+            if let Some(object) = self.object(&at, name, shape, camera_medium, index, &mut lamps.lights)? {
                 if object.light.is_some() {
-                    light_names.push(object.name.clone());
-                    weights.push(shape.sampling_weight.unwrap_or(1.0));
+                    lamps.names.push(object.name.clone());
+                    lamps.weights.push(shape.sampling_weight.unwrap_or(1.0));
                 } else if object.is_lamp {
-                    dark.push(object.name.clone());
+                    lamps.dark.push(object.name.clone());
                 }
                 material_names.push(shape.material_name(&object.name));
                 objects.push(object);
             }
         }
         self.lie_on(Surface::Unknown);
-        for (i, light) in d.lights.iter().enumerate() {
+        Ok((objects, material_names))
+    }
+
+    /// The lights that are no shapes, behind those that are.
+    fn lights(&mut self, lamps: &mut Lamps) -> Result<()> {
+        for (i, light) in self.description.lights.iter().enumerate() {
             let at = format!("lights[{i}].{}", light.kind());
             let weight = light.sampling_weight();
             let made = self.skies.remove(&i).unwrap_or_else(|| self.light(&at, light));
             let name = light.name_or_kind(i);
             match made? {
-                Some(light) if light.is_dark() => dark.push(name),
+                Some(light) if light.is_dark() => lamps.dark.push(name),
                 Some(light) => {
-                    lights.push(light);
-                    light_names.push(name);
-                    weights.push(weight);
+                    lamps.lights.push(light);
+                    lamps.names.push(name);
+                    lamps.weights.push(weight);
                 }
                 None => {}
             }
         }
-        self.unused_textures();
-        let camera = self.camera();
-        if !self.faults.is_empty() || self.unread.is_some() {
-            // What is wrong is told by `finish`.
-            return Err(Error::Config(String::new()));
-        }
+        Ok(())
+    }
 
-        let mut boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
-        let (contacts, passed_over) = put_apart(&mut objects, &mut boxes, &self.materials);
+    /// How rays find what stands in the scene itself: few things side by side, meshes that belong together in one tree, the
+    /// rest in another.
+    fn search(&self, objects: &mut [Object], boxes: &[Aabb]) -> Search {
         let all: Vec<u32> = (0..objects.len() as u32).collect();
         // The box of one small mesh among few things is met side by side with theirs.
         let mut meshes = objects.iter().filter_map(|object| match &object.geometry {
@@ -305,35 +418,17 @@ impl<'a> Compiler<'a> {
         // Boundaries are better found together.
         let is_small = |mesh: &TriangleMesh| mesh.tree.as_ref().is_some_and(MeshTree::is_small);
         let one = one.filter(|(mesh, material)| is_small(mesh) && !material.lets_through());
-        let few = one.and_then(|_| Few::of(&objects, &all, &boxes));
-        let together = if few.is_none() { Together::take(&mut objects, &boxes) } else { None };
+        let few = one.and_then(|_| Few::of(objects, &all, boxes));
+        let together = if few.is_none() { Together::take(objects, boxes) } else { None };
         let alone: Vec<u32> = all.into_iter().filter(|&i| !together.as_ref().is_some_and(|t| t.holds(i))).collect();
         let bvh = Bvh::build(&alone.iter().map(|&i| boxes[i as usize]).collect::<Vec<Aabb>>()).named(&alone);
-        let few = few.or_else(|| Few::of(&objects, &alone, &boxes));
-        objects.extend(children);
-        material_names.extend(names_of_children);
-        let nested = Nested::of(&mut objects, boxes.len(), |object| {
-            self.materials[object.material as usize].body().ok().flatten()
-        });
-        media.append(&mut self.absorbing);
-        let (center, radius) = extent(&boxes, &camera);
-        let powers: Vec<f64> = lights.iter().map(|light| light.power(&objects, radius)).collect();
-        let asked = |weights: &[f64]| {
-            let by_power = lights::light_cdf(&powers, weights);
-            Asked::new(by_power, Choice::of(&lights, &powers, weights, &objects, center, radius))
-        };
-        let all_asked = asked(&weights);
-        let is_even = |light: &Light| matches!(light, Light::Constant { .. });
-        let uneven: Vec<f64> = lights.iter().zip(&weights).map(|(l, &w)| if is_even(l) { 0.0 } else { w }).collect();
-        let uneven_asked = (uneven != weights).then(|| asked(&uneven));
-        let backgrounds = (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect();
-        let bands = self.bands();
-        let wavelengths = self.shelf.carried.wavelengths().unwrap_or_else(|| match d.render.wavelengths {
-            written::Wavelengths::Auto => self.wavelengths(&lights, &powers, &objects, &bands),
-            written::Wavelengths::Visible => WavelengthDistribution::visible(),
-            written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
-        });
-        let fog = d.fog.as_ref().map(|fog| DepthFog {
+        let few = few.or_else(|| Few::of(objects, &alone, boxes));
+        Search { bvh, few, together }
+    }
+
+    fn depth_fog(&mut self) -> Option<DepthFog> {
+        let fog = self.description.fog.as_ref()?;
+        Some(DepthFog {
             colour: self.spectrum("fog.colour", &fog.colour, Outside::Zero, Role::Light),
             falloff: match fog.law {
                 written::FogLaw::Linear { start, end } => FogFalloff::Linear { start, end },
@@ -344,57 +439,7 @@ impl<'a> Compiler<'a> {
                     FogFalloff::ExponentialSquared { density }
                 }
             },
-        });
-        let shines_on_rays = lights.iter().any(Light::may_be_met);
-        let is_large = |light: &Light| matches!(light, Light::Environment(map) if map.is_large());
-        let large_sky = lights.iter().position(is_large).map(|i| i as u32);
-        let lets_through = |o: &Object| o.body != 0 || self.materials[o.material as usize].lets_through();
-        let has_boundaries = objects.iter().any(lets_through);
-        let has_media = camera_medium.is_some() || objects.iter().any(|o| o.inside.is_some() || o.outside.is_some());
-        let mut scene = Scene {
-            name: name.to_owned(),
-            camera,
-            objects,
-            material_names,
-            standing: boxes.len(),
-            bvh,
-            few,
-            together,
-            materials: std::mem::take(&mut self.materials),
-            media,
-            camera_medium,
-            nested,
-            camera_inside: Inside::default(),
-            lights,
-            all_asked,
-            uneven_asked,
-            light_exponent: 0,
-            has_media,
-            backgrounds,
-            has_sky: d.lights.iter().any(|l| matches!(l, written::Light::Constant(_) | written::Light::Environment(_))),
-            dark,
-            light_groups: lights::groups(d, &light_names),
-            fog,
-            wavelengths,
-            bands,
-            center,
-            radius,
-            has_boundaries,
-            shines_on_rays,
-            large_sky,
-            files: std::mem::take(&mut self.files),
-            notes: self.told_notes(),
-            watch: None,
-        };
-        self.note_beside(&mut scene, &boxes, &light_names);
-        scene.light_exponent = scene.film_exponent(&powers, &boxes);
-        let eye = Ray::new(scene.camera.eye(), DVec3::Z);
-        self.note_contacts(&mut scene, &contacts, passed_over);
-        self.note_overlaps(&mut scene);
-        self.note_meshes(&mut scene);
-        self.note_lost_light(&mut scene, &light_names);
-        scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);
-        Ok(scene)
+        })
     }
 
     fn volumes_and_materials(&mut self) -> Result<()> {
