@@ -1,41 +1,46 @@
 //! Materials and textures that hold others by name: none holds itself, and none holds too much.
-//!
-//! What is rendered is checked as it is made, by the same rules. Here is the check for what only reads a description.
 
 use std::collections::HashMap;
 
+use super::fault::Checker;
 use super::material::{Material, MaterialRef};
-use super::path::field;
+use super::path::At;
 use super::scene::SceneDescription;
+use super::shape::Shape;
 use super::texture::Texture;
-use crate::error::{Error, Result};
 
 /// The most layers and materials in a material, and colours and textures in boards within boards, each as often as it is
 /// mentioned: it bounds the time of a look-up.
-pub(crate) const MOST_PARTS: usize = 4096;
+const MOST_PARTS: usize = 4096;
 
 /// The most materials or textures that hold each other.
-pub(crate) const DEEPEST: usize = 64;
+const DEEPEST: usize = 64;
 
 /// Refuses materials and textures that hold themselves, or too much.
-///
-/// # Errors
-/// [`Error::Config`] with each of them.
-pub(crate) fn check(scene: &SceneDescription) -> Result<()> {
-    let material = |name: &str| scene.materials.get(name).map_or((0, Vec::new()), in_material);
-    let texture = |name: &str| scene.textures.get(name).map_or((0, Vec::new()), in_texture);
-    let parts = "layers and materials";
-    let mut materials = Nesting::new(scene, ["materials", "material", parts], &material);
-    for name in scene.materials.keys() {
-        materials.parts(name);
+pub(crate) fn check(scene: &SceneDescription, checker: &mut Checker<'_>) {
+    let held = |name: &str| scene.materials.get(name).map_or((0, Vec::new()), in_material);
+    let mut materials = Nesting::new(["material", "layers and materials"], &held);
+    for (name, material) in &scene.materials {
+        let at = At::ROOT.key("materials");
+        let at = at.key(name);
+        materials.named(at, at.key(material.kind()), name, checker);
     }
-    let parts = "colours and textures in boards within boards";
-    let mut textures = Nesting::new(scene, ["textures", "texture", parts], &texture);
+    for (i, shape) in scene.shapes.iter().enumerate() {
+        let at = At::ROOT.key("shapes");
+        materials.of_shape(at.index(i), shape, checker);
+    }
+    for (name, shapes) in &scene.groups {
+        for (i, shape) in shapes.iter().enumerate() {
+            let at = At::ROOT.key("groups");
+            materials.of_shape(at.key(name).index(i), shape, checker);
+        }
+    }
+    let held = |name: &str| scene.textures.get(name).map_or((0, Vec::new()), in_texture);
+    let mut textures = Nesting::new(["texture", "colours and textures in boards within boards"], &held);
     for name in scene.textures.keys() {
-        textures.parts(name);
+        let at = At::ROOT.key("textures");
+        textures.named(at.key(name), at.key(name), name, checker);
     }
-    let faults = [materials.faults, textures.faults].concat();
-    if faults.is_empty() { Ok(()) } else { Err(Error::Config(faults.join("\n"))) }
 }
 
 /// How many parts are a material's own, and the names of the others.
@@ -60,71 +65,92 @@ fn in_texture(texture: &Texture) -> (usize, Vec<&str>) {
     (colours - names.len(), names)
 }
 
+/// What is wrong with a name.
+#[derive(Clone, Copy)]
+enum Wrong {
+    HoldsItself,
+    TooDeep,
+    TooMuch,
+}
+
 /// Names of one kind that are looked at.
 struct Nesting<'a, 'f> {
-    scene: &'a SceneDescription,
-    /// The section, what one is called, and what its parts are.
-    words: [&'static str; 3],
+    /// What one is called, and what its parts are.
+    words: [&'static str; 2],
     /// How many parts are one's own, and which it holds.
     held: &'f dyn Fn(&str) -> (usize, Vec<&'a str>),
-    known: HashMap<&'a str, usize>,
+    /// How many parts each has. One that is wrong counts as one: what holds it is not wrong for that.
+    known: HashMap<&'a str, (usize, Option<Wrong>)>,
     /// From the outermost.
     open: Vec<&'a str>,
-    faults: Vec<String>,
 }
 
 impl<'a, 'f> Nesting<'a, 'f> {
-    fn new(
-        scene: &'a SceneDescription,
-        words: [&'static str; 3],
-        held: &'f dyn Fn(&str) -> (usize, Vec<&'a str>),
-    ) -> Nesting<'a, 'f> {
-        Nesting { scene, words, held, known: HashMap::new(), open: Vec::new(), faults: Vec::new() }
+    fn new(words: [&'static str; 2], held: &'f dyn Fn(&str) -> (usize, Vec<&'a str>)) -> Nesting<'a, 'f> {
+        Nesting { words, held, known: HashMap::new(), open: Vec::new() }
     }
 
-    fn fault(&mut self, name: &str, message: &str) {
-        let fault = self.scene.fault(&field(&[self.words[0], name]), message);
-        if !self.faults.contains(&fault) {
-            self.faults.push(fault);
+    /// The thing `name`, which stands at `at`, its parts at `inner`.
+    fn named(&mut self, at: At<'_>, inner: At<'_>, name: &'a str, checker: &mut Checker<'_>) {
+        self.parts(name);
+        let [word, parts] = self.words;
+        match self.known.get(name).and_then(|known| known.1) {
+            None => {}
+            Some(Wrong::HoldsItself) => {
+                checker.fault(at, format!("expected a {word} that does not hold itself, found \"{name}\""));
+            }
+            Some(Wrong::TooDeep) => {
+                checker.fault(at, format!("expected at most {DEEPEST} {word}s that hold each other, found more"));
+            }
+            Some(Wrong::TooMuch) => {
+                checker.fault(inner, format!("expected at most {MOST_PARTS} {parts}, found more"));
+            }
         }
     }
 
-    /// How many parts `name` has. One with a fault counts as one.
+    /// How many parts `name` has.
     fn parts(&mut self, name: &'a str) -> usize {
-        if let Some(parts) = self.known.get(name) {
-            return *parts;
+        if let Some(&(parts, _)) = self.known.get(name) {
+            return parts;
         }
-        let [_, kind, what] = self.words;
-        if self.open.contains(&name) {
-            self.fault(name, &format!("expected a {kind} that does not hold itself, found \"{name}\""));
-            return 1;
-        }
-        if self.open.len() == DEEPEST {
-            self.fault(name, &format!("expected at most {DEEPEST} {kind}s that hold each other, found more"));
+        let wrong = if self.open.contains(&name) {
+            Some(Wrong::HoldsItself)
+        } else if self.open.len() == DEEPEST {
+            Some(Wrong::TooDeep)
+        } else {
+            None
+        };
+        if wrong.is_some() {
+            self.known.insert(name, (1, wrong));
             return 1;
         }
         self.open.push(name);
-        let (own, inner) = (self.held)(name);
-        let mut parts = inner.into_iter().fold(own, |sum, inner| sum.saturating_add(self.parts(inner)));
+        let parts = self.sum((self.held)(name));
         self.open.pop();
-        if parts > MOST_PARTS {
-            self.fault(name, &format!("expected at most {MOST_PARTS} {what}, found more"));
-            parts = 1;
+        let known = if parts > MOST_PARTS { (1, Some(Wrong::TooMuch)) } else { (parts, None) };
+        self.known.entry(name).or_insert(known).0
+    }
+
+    /// How many parts there are of which so many stand by themselves.
+    fn sum(&mut self, (own, inner): (usize, Vec<&'a str>)) -> usize {
+        inner.into_iter().fold(own, |sum, inner| sum.saturating_add(self.parts(inner)))
+    }
+
+    /// The material that stands in `shape`, if one does.
+    fn of_shape(&mut self, at: At<'_>, shape: &'a Shape, checker: &mut Checker<'_>) {
+        if let MaterialRef::Inline(material) = &shape.material
+            && self.sum(in_material(material)) > MOST_PARTS
+        {
+            let [_, parts] = self.words;
+            let message = format!("expected at most {MOST_PARTS} {parts}, found more");
+            checker.fault(at.key(shape.geometry.kind()).key("material"), message);
         }
-        self.known.insert(name, parts);
-        parts
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::scene;
-    use super::*;
-
-    /// What is said of the scene of these lines, from line 2.
-    fn told(text: &str) -> String {
-        check(&scene(text)).err().map(|error| error.to_string()).unwrap_or_default()
-    }
+    use super::super::testing::faults as told;
 
     /// The blend k has one part more than twice those of the one before: 2^(k + 2) - 1, within 4096 up to the tenth. The board k has
     /// twice the colours: 2^(k + 1), within 4096 up to the eleventh.
@@ -147,10 +173,10 @@ mod tests {
                 "materials:\n  paint: {diffuse: {}}\n  b00: {blend: {weight: 0.5, first: paint, second: paint}}\n";
             first.to_owned() + &(1..=last).map(next).collect::<String>()
         };
-        assert_eq!(told(&blends(10)), "");
+        assert_eq!(told(&blends(10)), "none");
         let message = told(&blends(11));
         assert!(
-            message.ends_with(": materials.b11: expected at most 4096 layers and materials, found more"),
+            message.ends_with(": materials.b11.blend: expected at most 4096 layers and materials, found more"),
             "{message}"
         );
         let boards = |last: usize| {
@@ -160,7 +186,7 @@ mod tests {
             let first = "textures:\n  t00: {checkerboard: {a: 0.1, b: 0.5}}\n";
             first.to_owned() + &(1..=last).map(next).collect::<String>()
         };
-        assert_eq!(told(&boards(11)), "");
+        assert_eq!(told(&boards(11)), "none");
         assert!(told(&boards(12)).contains(": textures.t12: expected at most 4096 colours and textures"));
     }
 }

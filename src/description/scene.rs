@@ -17,6 +17,7 @@ use super::layer::{Layer, LayerContent};
 use super::light::{Fog, Light};
 use super::material::Material;
 use super::medium::{Medium, UNCHANGED, VACUUM};
+use super::nesting;
 use super::node::{Node, Sources, Value, quote};
 use super::output::Output;
 use super::path::{self, At};
@@ -316,6 +317,7 @@ impl SceneDescription {
             let role = if reflects { Role::Reflectance } else { Role::Coefficient };
             volume.check(role, at.key("volumes").key(name), &mut checker);
         }
+        nesting::check(self, &mut checker);
         checker.finish(sources)
     }
 }

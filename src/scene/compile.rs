@@ -76,8 +76,6 @@ struct Compiler<'a> {
     /// Environments, by where they stand among the lights, until they are asked for.
     skies: HashMap<usize, Result<Option<Light>>>,
     numbers: HashMap<&'a str, Scalar>,
-    /// Textures and materials that are being made, from the outermost: what holds itself shows here.
-    making: Vec<(&'static str, &'a str)>,
     named: HashMap<&'a str, Arc<Material>>,
     material_ids: HashMap<&'a str, u32>,
     medium_ids: HashMap<&'a str, u32>,
@@ -187,7 +185,6 @@ impl<'a> Compiler<'a> {
             volumes: HashMap::new(),
             skies: HashMap::new(),
             numbers: HashMap::new(),
-            making: Vec::new(),
             named: HashMap::new(),
             material_ids: HashMap::new(),
             medium_ids: HashMap::new(),

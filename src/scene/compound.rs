@@ -27,8 +27,6 @@ use std::sync::Arc;
 pub struct Compound {
     /// How.
     pub composition: Composition,
-    /// Layers and materials in it, each as often as it is mentioned.
-    pub size: usize,
     /// Most reliefs over each other.
     pub reliefs: usize,
 }
@@ -265,10 +263,9 @@ impl Compound {
     #[must_use]
     pub fn new(composition: Composition) -> Compound {
         let inner = composition.inner();
-        let size = inner.iter().map(|m| m.compound().map_or(1, |l| l.size)).fold(1, usize::saturating_add);
         let reliefs = inner.iter().map(|m| m.compound().map_or(0, |l| l.reliefs)).max().unwrap_or(0);
         let reliefs = reliefs + usize::from(matches!(composition, Composition::Relief { .. }));
-        Compound { composition, size, reliefs }
+        Compound { composition, reliefs }
     }
 
     /// The material that one path meets, chosen by `u` in [0, 1); `None` where it goes straight on. `normal` is the

@@ -352,15 +352,6 @@ impl Texture {
         }
     }
 
-    /// Colours, pictures and other textures in it, each as often as it is mentioned.
-    #[must_use]
-    pub fn leaves(&self) -> usize {
-        match self {
-            Texture::Checkerboard { a, b, .. } => a.leaves() + b.leaves(),
-            _ => 1,
-        }
-    }
-
     /// Some of its spectra and their shares of it, so that the mean of all is told: texels of a picture, voxels or values of a file.
     #[must_use]
     pub fn shares(&self) -> Vec<(f64, Spectrum)> {

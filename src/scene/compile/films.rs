@@ -28,7 +28,7 @@ impl<'a> Compiler<'a> {
             written::Thickness::Number(nm) => (Thickness::Uniform(*nm), *nm),
             written::Thickness::Textured(textured) => {
                 let (from, to) = (textured.from, textured.to);
-                let numbers = self.named_numbers(&format!("{at}.texture"), &textured.texture);
+                let numbers = self.named_numbers(&textured.texture);
                 (Thickness::Textured { numbers, from, to }, from.max(to))
             }
         };

@@ -20,7 +20,7 @@ impl<'a> Compiler<'a> {
     pub(super) fn emission_texture(&mut self, at: &str, s: &'a written::SpectrumOrTexture) -> Texture {
         match s {
             written::SpectrumOrTexture::Texture(name) => {
-                let mut texture = self.named_texture(&format!("{at}.texture"), name);
+                let mut texture = self.named_texture(name);
                 self.light_up(&mut texture, name);
                 texture
             }
@@ -154,7 +154,7 @@ impl<'a> Compiler<'a> {
                     self.fault(&format!("{at}.up"), "expected a direction that is not along the axis");
                     return None;
                 };
-                let texture = self.named_texture(&format!("{at}.texture"), name);
+                let texture = self.named_texture(name);
                 let half = libm::tan(cutoff) * DVec2::new(1.0, growth(l.v));
                 Some(Box::new(Slide { texture, axes: world_from_spot.matrix3, half }))
             }

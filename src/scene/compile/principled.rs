@@ -9,10 +9,10 @@ use crate::scene::texture::{Scalar, Texture};
 impl<'a> Compiler<'a> {
     pub(super) fn principled(&mut self, place: &str, m: &'a written::Principled) -> Solid {
         let base = self.reflectance_texture(&format!("{place}.base_color"), &m.base_color);
-        let mut number = |key: &str, s: &'a written::NumberOrTexture| self.scalar(&format!("{place}.{key}"), s);
-        let transmission = m.spec_trans.as_ref().map(|s| number("spec_trans", s));
-        let specular_tint = number("spec_tint", &m.spec_tint);
-        let sheen_tint = number("sheen_tint", &m.sheen_tint);
+        let mut number = |s: &'a written::NumberOrTexture| self.scalar(s);
+        let transmission = m.spec_trans.as_ref().map(|s| number(s));
+        let specular_tint = number(&m.spec_tint);
+        let sheen_tint = number(&m.sheen_tint);
         Solid {
             luminance: luminance(m.luminance, &base, [&specular_tint, &sheen_tint]),
             base,
@@ -20,16 +20,16 @@ impl<'a> Compiler<'a> {
                 written::Contrast::Eta(eta) => index_of_eta(eta, transmission.is_some()),
                 written::Contrast::Specular(specular) => index_of_specular(specular, transmission.is_some()),
             },
-            roughness: number("roughness", &m.roughness),
-            anisotropic: number("anisotropic", &m.anisotropic),
-            metallic: number("metallic", &m.metallic),
+            roughness: number(&m.roughness),
+            anisotropic: number(&m.anisotropic),
+            metallic: number(&m.metallic),
             transmission,
             specular_tint,
-            sheen: number("sheen", &m.sheen),
+            sheen: number(&m.sheen),
             sheen_tint,
-            flatness: number("flatness", &m.flatness),
-            clearcoat: number("clearcoat", &m.clearcoat),
-            clearcoat_gloss: number("clearcoat_gloss", &m.clearcoat_gloss),
+            flatness: number(&m.flatness),
+            clearcoat: number(&m.clearcoat),
+            clearcoat_gloss: number(&m.clearcoat_gloss),
             rates: Rates {
                 specular: m.sampling.specular as f32,
                 clearcoat: m.sampling.clearcoat as f32,
@@ -40,21 +40,21 @@ impl<'a> Compiler<'a> {
 
     pub(super) fn principled_thin(&mut self, place: &str, m: &'a written::PrincipledThin) -> Thin {
         let base = self.reflectance_texture(&format!("{place}.base_color"), &m.base_color);
-        let mut number = |key: &str, s: &'a written::NumberOrTexture| self.scalar(&format!("{place}.{key}"), s);
-        let specular_tint = number("spec_tint", &m.spec_tint);
-        let sheen_tint = number("sheen_tint", &m.sheen_tint);
+        let mut number = |s: &'a written::NumberOrTexture| self.scalar(s);
+        let specular_tint = number(&m.spec_tint);
+        let sheen_tint = number(&m.sheen_tint);
         Thin {
             luminance: luminance(m.luminance, &base, [&specular_tint, &sheen_tint]),
             base,
-            eta: number("eta", &m.eta),
-            roughness: number("roughness", &m.roughness),
-            anisotropic: number("anisotropic", &m.anisotropic),
-            transmission: number("spec_trans", &m.spec_trans),
-            diffuse_transmission: number("diff_trans", &m.diff_trans),
+            eta: number(&m.eta),
+            roughness: number(&m.roughness),
+            anisotropic: number(&m.anisotropic),
+            transmission: number(&m.spec_trans),
+            diffuse_transmission: number(&m.diff_trans),
             specular_tint,
-            sheen: number("sheen", &m.sheen),
+            sheen: number(&m.sheen),
             sheen_tint,
-            flatness: number("flatness", &m.flatness),
+            flatness: number(&m.flatness),
             rates: ThinRates {
                 reflection: m.sampling.reflection as f32,
                 transmission: m.sampling.transmission as f32,

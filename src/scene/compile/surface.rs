@@ -2,7 +2,7 @@
 
 use super::Compiler;
 use super::spectra::Role;
-use crate::description::{self as written, DEEPEST, MOST_PARTS};
+use crate::description as written;
 use crate::error::{Error, Result, in_short};
 use crate::math::LENGTHS;
 use crate::optics::fresnel::Model;
@@ -25,7 +25,7 @@ impl<'a> Compiler<'a> {
         match s {
             written::SpectrumOrTexture::Texture(name) => {
                 let at = format!("{at}.texture");
-                let texture = self.named_texture(&at, name);
+                let texture = self.named_texture(name);
                 self.check_reflects(&at, &texture, name);
                 texture
             }
@@ -77,43 +77,21 @@ impl<'a> Compiler<'a> {
     /// A cell of a checkerboard, which may reflect or shine.
     fn cell(&mut self, at: &str, s: &'a written::SpectrumOrTexture) -> Texture {
         match s {
-            written::SpectrumOrTexture::Texture(name) => self.named_texture(&format!("{at}.texture"), name),
+            written::SpectrumOrTexture::Texture(name) => self.named_texture(name),
             written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.reflectance(at, s)),
         }
     }
 
     /// A number, or a texture of numbers.
-    pub(super) fn scalar(&mut self, at: &str, s: &'a written::NumberOrTexture) -> Scalar {
+    pub(super) fn scalar(&mut self, s: &'a written::NumberOrTexture) -> Scalar {
         match s {
             written::NumberOrTexture::Number(x) => Scalar::Uniform(*x),
-            written::NumberOrTexture::Texture(name) => self.named_numbers(&format!("{at}.texture"), name),
+            written::NumberOrTexture::Texture(name) => self.named_numbers(name),
         }
-    }
-
-    /// Runs `make` for the thing `name` of the kind `kind`, unless that is being made already.
-    fn within<T>(
-        &mut self,
-        at: &str,
-        kind: &'static str,
-        name: &'a str,
-        make: impl FnOnce(&mut Self) -> T,
-    ) -> Option<T> {
-        if self.making.contains(&(kind, name)) {
-            self.fault(at, format!("expected a {kind} that does not hold itself, found \"{name}\""));
-            return None;
-        }
-        if self.making.len() == DEEPEST {
-            self.fault(at, format!("expected at most {DEEPEST} {kind}s that hold each other, found more"));
-            return None;
-        }
-        self.making.push((kind, name));
-        let made = make(self);
-        self.making.pop();
-        Some(made)
     }
 
     /// The texture `name` as spectra.
-    pub(super) fn named_texture(&mut self, at: &str, name: &'a str) -> Texture {
+    pub(super) fn named_texture(&mut self, name: &'a str) -> Texture {
         if let Some(known) = self.textures.get(name) {
             return known.clone();
         }
@@ -121,26 +99,20 @@ impl<'a> Compiler<'a> {
             return known;
         }
         let (made, asked) = self.asking(|c| {
-            c.within(at, "texture", name, |c| {
-                let texture = &c.description.textures[name];
-                c.texture(&written::field(&["textures", name]), texture)
-            })
+            let texture = &c.description.textures[name];
+            c.texture(&written::field(&["textures", name]), texture)
         });
-        let texture = match made {
-            Some(Ok(texture)) => texture,
-            Some(Err(error)) => {
-                self.unread.get_or_insert(error);
-                Texture::one()
-            }
-            None => Texture::one(),
-        };
+        let texture = made.unwrap_or_else(|error| {
+            self.unread.get_or_insert(error);
+            Texture::one()
+        });
         let kept = if asked { &mut self.at_hand.textures } else { &mut self.textures };
         kept.insert(name, texture.clone());
         texture
     }
 
     /// The texture `name` as numbers.
-    pub(super) fn named_numbers(&mut self, at: &str, name: &'a str) -> Scalar {
+    pub(super) fn named_numbers(&mut self, name: &'a str) -> Scalar {
         if let Some(known) = self.numbers.get(name) {
             return known.clone();
         }
@@ -148,19 +120,13 @@ impl<'a> Compiler<'a> {
             return known;
         }
         let (made, asked) = self.asking(|c| {
-            c.within(at, "texture", name, |c| {
-                let texture = &c.description.textures[name];
-                c.numbers(&written::field(&["textures", name]), texture)
-            })
+            let texture = &c.description.textures[name];
+            c.numbers(&written::field(&["textures", name]), texture)
         });
-        let numbers = match made {
-            Some(Ok(numbers)) => numbers,
-            Some(Err(error)) => {
-                self.unread.get_or_insert(error);
-                Scalar::Uniform(0.5)
-            }
-            None => Scalar::Uniform(0.5),
-        };
+        let numbers = made.unwrap_or_else(|error| {
+            self.unread.get_or_insert(error);
+            Scalar::Uniform(0.5)
+        });
         let kept = if asked { &mut self.at_hand.numbers } else { &mut self.numbers };
         kept.insert(name, numbers.clone());
         numbers
@@ -171,7 +137,7 @@ impl<'a> Compiler<'a> {
         let description = self.description;
         for name in description.textures.keys() {
             if !self.textures.contains_key(name.as_str()) && !self.numbers.contains_key(name.as_str()) {
-                self.named_texture(&written::field(&["textures", name]), name);
+                self.named_texture(name);
             }
         }
     }
@@ -199,7 +165,7 @@ impl<'a> Compiler<'a> {
                 let [a, b] = [("a", &board.a), ("b", &board.b)]
                     .map(|(key, colour)| Box::new(self.cell(&format!("{at}.checkerboard.{key}"), colour)));
                 let uv = self.board_map(at, board);
-                self.bounded(at, Texture::Checkerboard { a, b, uv }, Texture::leaves).unwrap_or_else(Texture::one)
+                Texture::Checkerboard { a, b, uv }
             }
         })
     }
@@ -231,26 +197,14 @@ impl<'a> Compiler<'a> {
                             self.fault(&at, "expected a number in a texture that is used as numbers, found a spectrum");
                             Scalar::Uniform(0.5)
                         }
-                        written::SpectrumOrTexture::Texture(name) => self.named_numbers(&format!("{at}.texture"), name),
+                        written::SpectrumOrTexture::Texture(name) => self.named_numbers(name),
                     })
                 };
                 let [a, b] = [cell("a", &board.a), cell("b", &board.b)];
                 let uv = self.board_map(at, board);
-                self.bounded(at, Scalar::Checkerboard { a, b, uv }, Scalar::leaves).unwrap_or(Scalar::Uniform(0.5))
+                Scalar::Checkerboard { a, b, uv }
             }
         })
-    }
-
-    /// A texture that holds others, each as often as it is mentioned, where they are not too many.
-    fn bounded<T>(&mut self, at: &str, texture: T, leaves: impl Fn(&T) -> usize) -> Option<T> {
-        if leaves(&texture) <= MOST_PARTS {
-            return Some(texture);
-        }
-        self.fault(
-            at,
-            format!("expected at most {MOST_PARTS} colours and textures in boards within boards, found more"),
-        );
-        None
     }
 
     /// The lattice of the picture `image` of the texture `at`.
@@ -297,13 +251,8 @@ impl<'a> Compiler<'a> {
             return known;
         }
         let at = written::field(&["materials", name]);
-        let (made, asked) = self.asking(|c| {
-            c.within(&at, "material", name, |c| {
-                let material = &c.description.materials[name];
-                c.material(&at, material)
-            })
-        });
-        let material = Arc::new(made.unwrap_or(Material { kind: Kind::Boundary, two_sided: false, highlight: None }));
+        let (material, asked) = self.asking(|c| c.material(&at, &c.description.materials[name]));
+        let material = Arc::new(material);
         let kept = if asked { &mut self.at_hand.materials } else { &mut self.named };
         kept.insert(name, material.clone());
         material
@@ -344,14 +293,14 @@ impl<'a> Compiler<'a> {
                 };
                 let [eta, k] = self.shelf.carried.metal(metal);
                 let tint = self.reflectance_texture(&at("tint"), &m.tint);
-                let facets = self.roughness(&at("roughness"), &m.roughness, m.distribution);
+                let facets = self.roughness(&m.roughness, m.distribution);
                 let film = self.film(&at("film"), m.film.as_ref());
                 (Kind::Conductor { eta, k, tint, fresnel: model(m.fresnel), facets, film }, m.two_sided, m.highlight)
             }
             written::Material::Dielectric(m) => {
                 let interior = self.index(&at("ior"), &m.ior);
                 let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
-                let facets = self.roughness(&at("roughness"), &m.roughness, m.distribution);
+                let facets = self.roughness(&m.roughness, m.distribution);
                 let tints = self.tints(&place, &m.reflection_tint, &m.transmission_tint);
                 let film = self.film(&at("film"), m.film.as_ref());
                 let absorption = self.absorption(&place, m).map(Box::new);
@@ -409,12 +358,12 @@ impl<'a> Compiler<'a> {
             }
             written::Material::Boundary(_) => plain(Kind::Boundary),
             written::Material::Mask(m) => {
-                let opacity = self.scalar(&at("opacity"), &m.opacity);
+                let opacity = self.scalar(&m.opacity);
                 let inner = self.inner(&at("material"), &m.material);
                 plain(self.compound(&place, Composition::Mask { opacity, inner }))
             }
             written::Material::Blend(m) => {
-                let weight = self.scalar(&at("weight"), &m.weight);
+                let weight = self.scalar(&m.weight);
                 let first = self.inner(&at("first"), &m.first);
                 let second = self.inner(&at("second"), &m.second);
                 plain(self.compound(&place, Composition::Blend { weight, first, second }))
@@ -443,14 +392,14 @@ impl<'a> Compiler<'a> {
                 plain(self.compound(&place, Composition::TwoSided { front, back }))
             }
             written::Material::Bump(m) => {
-                let heights = self.named_numbers(&at("height.texture"), &m.height.texture);
+                let heights = self.named_numbers(&m.height.texture);
                 let form = ReliefForm::Heights { heights, scale: m.scale };
                 let relief = Relief { form, turn: m.turn, shadowing: m.shadowing };
                 let inner = self.inner(&at("material"), &m.material);
                 plain(self.compound(&place, Composition::Relief { relief, inner }))
             }
             written::Material::NormalMap(m) => {
-                let normals = self.named_numbers(&at("normals.texture"), &m.normals.texture);
+                let normals = self.named_numbers(&m.normals.texture);
                 let relief = Relief { form: ReliefForm::Normals(normals), turn: m.turn, shadowing: m.shadowing };
                 let inner = self.inner(&at("material"), &m.material);
                 plain(self.compound(&place, Composition::Relief { relief, inner }))
@@ -469,10 +418,6 @@ impl<'a> Compiler<'a> {
 
     fn compound(&mut self, at: &str, composition: Composition) -> Kind {
         let compound = Compound::new(composition);
-        if compound.size > MOST_PARTS {
-            self.fault(at, format!("expected at most {MOST_PARTS} layers and materials, found more"));
-            return Kind::Boundary;
-        }
         if compound.reliefs > MOST_RELIEFS {
             self.fault(at, format!("expected at most {MOST_RELIEFS} reliefs over each other, found more"));
             return Kind::Boundary;
@@ -482,16 +427,15 @@ impl<'a> Compiler<'a> {
 
     fn roughness(
         &mut self,
-        at: &str,
         roughness: &'a written::Roughness,
         distribution: written::Distribution,
     ) -> Option<Roughness> {
         let (u, v) = match roughness {
             written::Roughness::Number(alpha) => return facets(*alpha, distribution).map(Roughness::Uniform),
-            written::Roughness::Texture(name) => (self.named_numbers(&format!("{at}.texture"), name), None),
+            written::Roughness::Texture(name) => (self.named_numbers(name), None),
             written::Roughness::Brushed(brushed) => {
-                let u = self.scalar(&format!("{at}.u"), &brushed.u);
-                (u, Some(self.scalar(&format!("{at}.v"), &brushed.v)))
+                let u = self.scalar(&brushed.u);
+                (u, Some(self.scalar(&brushed.v)))
             }
         };
         let distribution = family(distribution);

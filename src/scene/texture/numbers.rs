@@ -68,15 +68,6 @@ pub struct DataImage {
 }
 
 impl Scalar {
-    /// As [`super::Texture::leaves`].
-    #[must_use]
-    pub fn leaves(&self) -> usize {
-        match self {
-            Scalar::Checkerboard { a, b, .. } => a.leaves() + b.leaves(),
-            _ => 1,
-        }
-    }
-
     /// The number at a point; of three their mean by luminance (Rec. 709).
     #[must_use]
     #[inline]

@@ -35,7 +35,6 @@ use glam::DVec3;
 use super::super::camera::{Camera, Clip, FovAxis, Lens, Pose, Projection};
 use super::super::image::{Band, Filter, Image};
 use super::super::light::Light;
-use super::super::nesting;
 use super::super::node::{Node, Sources, Value};
 use super::super::path::{self, field};
 use super::super::print::{Printer, relative};
@@ -80,16 +79,12 @@ pub enum MeshNormals {
 
 /// Writes `scene` for the file `path`. `normals` reads mesh `index` of a file, `closed` tells whether the grid of one bounds a
 /// solid.
-///
-/// # Errors
-/// [`Error::Config`](crate::error::Error::Config) for materials and textures that hold themselves, or too much.
 pub fn export(
     scene: &SceneDescription,
     path: &Path,
     normals: &dyn Fn(&Path, u32) -> MeshNormals,
     closed: &dyn Fn(&Path) -> bool,
 ) -> Result<Exported> {
-    nesting::check(scene)?;
     let nothing = Node::new(Default::default(), Value::Null);
     let no_sources = Sources::default();
     let (root, sources) = scene.tree().unwrap_or((&nothing, &no_sources));
