@@ -84,7 +84,11 @@ pub struct ConvergencePoint {
     pub seconds: f64,
     /// Relative RMSE.
     pub relative_error: f64,
-    /// Whether its interval could be believed.
+    /// Ends of its 95 % interval.
+    pub low: f64,
+    /// See `low`.
+    pub high: f64,
+    /// Whether that could be believed.
     pub valid: bool,
 }
 
@@ -340,8 +344,14 @@ impl SceneReport {
             .iter()
             .filter_map(|m| {
                 let e = m.error.as_ref()?;
-                let seconds = m.elapsed.as_secs_f64();
-                Some(ConvergencePoint { samples: m.samples, seconds, relative_error: e.rel_rmse, valid: e.valid })
+                Some(ConvergencePoint {
+                    samples: m.samples,
+                    seconds: m.elapsed.as_secs_f64(),
+                    relative_error: e.rel_rmse,
+                    low: e.low,
+                    high: e.high,
+                    valid: e.valid,
+                })
             })
             .collect();
         if let Some(why) = frame.milestones.last().and_then(|m| m.unknown) {

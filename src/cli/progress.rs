@@ -1,7 +1,7 @@
 //! How a render tells of its progress: bars, lines, JSON, nothing.
 
 use super::ProgressStyle;
-use super::render::seconds;
+use super::render::{per_cent, per_cent_between, seconds, seconds_between};
 use super::{complain, say};
 use crate::batch::frame::Progress;
 use crate::batch::report::{SceneReport, Status};
@@ -85,13 +85,16 @@ fn words(p: &Progress) -> String {
         None => (p.total - p.done) as f64 / rate,
     };
     let left = seconds(left);
-    let per_cent = |x: f64| format!("{:.2} %", x * 100.0);
     let rate = format!("{:.2} Msamples/s", rate * 1e-6);
     match (&p.error, &p.forecast) {
         (Some(e), Some(f)) if p.target.is_some_and(|target| f.error <= target * 1.000_001) => {
-            format!("{rate}, error {}, {} in about {left}", per_cent(e.rel_rmse), per_cent(f.error))
+            let between = seconds_between(f.seconds_between.map(|end| (end - elapsed).max(0.0)));
+            format!("{rate}, error {}, {} in about {left}{between}", per_cent(e.rel_rmse), per_cent(f.error))
         }
-        (Some(e), Some(f)) => format!("{rate}, error {}, about {} in {left}", per_cent(e.rel_rmse), per_cent(f.error)),
+        (Some(e), Some(f)) => {
+            let between = per_cent_between(f.error_between);
+            format!("{rate}, error {}, about {} ({between}) in {left}", per_cent(e.rel_rmse), per_cent(f.error))
+        }
         (Some(e), None) => format!("{rate}, error {}, {left} left", per_cent(e.rel_rmse)),
         // The first of a large frame waited for its memory: what it took says nothing of the others.
         (None, _) if p.done < p.total / 100 => rate,
@@ -236,10 +239,20 @@ mod tests {
         assert_eq!(words(&p), "0.03 Msamples/s, 30.0 s left");
         assert_eq!(words(&Progress { done: 3000, ..p }), "0.00 Msamples/s");
         let error = Some(ErrorEstimate { rel_rmse: 0.018, low: 0.017, high: 0.019, pixels: 100, valid: true });
-        let forecast = Some(Forecast { made_at: 8, samples: 40.0, seconds: 52.0, error: 0.01 });
-        let known = Progress { error, forecast, ..p };
-        assert_eq!(words(&known), "0.03 Msamples/s, error 1.80 %, about 1.00 % in 42.0 s");
+        let forecast = Forecast {
+            made_at: 8,
+            samples: 40.0,
+            seconds: 52.0,
+            error: 0.01,
+            error_between: [0.009, 0.011],
+            seconds_between: [52.0; 2],
+        };
+        let known = Progress { error, forecast: Some(forecast), ..p };
+        assert_eq!(words(&known), "0.03 Msamples/s, error 1.80 %, about 1.00 % (0.90-1.10 %) in 42.0 s");
         let aimed = Progress { target: Some(0.01), ..known };
         assert_eq!(words(&aimed), "0.03 Msamples/s, error 1.80 %, 1.00 % in about 42.0 s");
+        let forecast = Some(Forecast { seconds_between: [40.0, 72.0], ..forecast });
+        let aimed = Progress { forecast, ..aimed };
+        assert_eq!(words(&aimed), "0.03 Msamples/s, error 1.80 %, 1.00 % in about 42.0 s (30.0 s to 62.0 s)");
     }
 }

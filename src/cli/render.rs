@@ -134,6 +134,17 @@ pub fn per_cent(x: f64) -> String {
     if x < 0.1 { format!("{:.2} %", x * 100.0) } else { format!("{:.1} %", x * 100.0) }
 }
 
+/// Two shares, with the sign once.
+pub fn per_cent_between([low, high]: [f64; 2]) -> String {
+    format!("{}-{}", per_cent(low).replace(" %", ""), per_cent(high))
+}
+
+/// Two times; nothing where they read alike.
+pub fn seconds_between([low, high]: [f64; 2]) -> String {
+    let [low, high] = [seconds(low), seconds(high)];
+    if low == high { String::new() } else { format!(" ({low} to {high})") }
+}
+
 /// A number, and its share of `all`.
 fn with_share(part: u64, all: u64) -> String {
     let share = part as f64 / all.max(1) as f64;
@@ -150,7 +161,7 @@ const HEADINGS: [&str; 7] = ["scene", "samples", "time", "Msamples/s", "error (9
 fn row(s: &SceneReport) -> [String; 7] {
     let error = match (&s.error, s.integrator.as_str()) {
         (Some(e), _) => {
-            let interval = format!("{}-{}", per_cent(e.low).replace(" %", ""), per_cent(e.high));
+            let interval = per_cent_between([e.low, e.high]);
             format!("{} ({})", per_cent(e.rel_rmse), if e.valid { &interval } else { "not converged" })
         }
         (None, "whitted") => "no noise".into(),
@@ -208,14 +219,16 @@ pub fn table(report: &Report) -> String {
     let foretold = done.iter().filter_map(|s| Some((s, s.forecast?, s.error?)));
     for (i, (s, f, e)) in foretold.enumerate() {
         if i == 0 {
-            let _ = writeln!(out, "\nforetold at a quarter of the samples, and how it came:");
+            let _ = writeln!(out, "\nforetold at a quarter of the samples (95 %), and how it came:");
         }
         let _ = writeln!(
             out,
-            "  {}: {} and {} at {:.0} samples; {} and {} at {}",
+            "  {}: {}{} and {} ({}) at {:.0} samples; {} and {} at {}",
             s.label(),
             seconds(f.seconds),
+            seconds_between(f.seconds_between),
             per_cent(f.error),
+            per_cent_between(f.error_between),
             f.samples,
             seconds(s.seconds.rendering),
             per_cent(e.rel_rmse),
