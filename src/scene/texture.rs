@@ -9,7 +9,7 @@ use super::bands::Bands;
 use super::mesh::attribute::AttributeTexture;
 use super::volume::Volume;
 use crate::math::sampler::GOLDEN;
-use crate::spectrum::{Lanes, Spectrum, upsample};
+use crate::spectrum::{LANES, Lanes, Spectrum, upsample};
 use glam::{DAffine2, DVec2, DVec3};
 use std::ops::{Add, Mul};
 use std::sync::Arc;
@@ -207,9 +207,10 @@ impl Texels {
         }
     }
 
-    /// The one with the most light at eight wavelengths.
+    /// The one with the most light at eight wavelengths (at four in the build of four lanes).
     fn brightest(&self) -> Option<&Texel> {
-        let nm = Lanes::from([410.0, 450.0, 490.0, 530.0, 560.0, 590.0, 620.0, 660.0]);
+        const NM: [f32; 8] = [410.0, 450.0, 490.0, 530.0, 560.0, 590.0, 620.0, 660.0];
+        let nm = Lanes::new(std::array::from_fn(|lane| NM[lane * NM.len() / LANES]));
         let light = |texel: &Texel| texel.scale * upsample::eval_sigmoid(texel.coefficients, nm).reduce_add();
         let all = self.colours.iter().map(|texel| (light(texel), texel));
         all.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, texel)| texel)
