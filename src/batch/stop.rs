@@ -284,12 +284,19 @@ impl Forecast {
         let samples = within(stop.target().map_or(most, |target| fit.samples_for(target)));
         let samples_between = stop.target().map_or([most; 2], |target| fit.samples_between(target)).map(within);
         let seconds = |samples: f64| elapsed + (samples - now) * rate;
+        let error = fit.error_at(samples);
+        let error_between = match stop.target() {
+            None => fit.error_between(samples),
+            // What ends the render is reached, or all else ends before.
+            Some(_) if samples_between[1] < most => [error; 2],
+            Some(_) => [error, fit.error_between(most)[1].max(error)],
+        };
         Some(Forecast {
             made_at: last.samples,
             samples,
             seconds: seconds(samples),
-            error: fit.error_at(samples),
-            error_between: fit.error_between(samples),
+            error,
+            error_between,
             seconds_between: samples_between.map(seconds),
         })
     }
@@ -421,6 +428,10 @@ mod tests {
         let stop = Stop { error: Some(0.01), ..FREE };
         let f = Forecast::of(&milestones(&[16, 32, 64], 1.0), &stop, 1 << 16).unwrap();
         assert!((f.samples - 1e4).abs() < 1e-6 && (f.seconds - 10.0).abs() < 1e-9 && (f.error - 0.01).abs() < 1e-12);
+        // A target that is reached is what comes; where samples end before, more than it may come.
+        assert_eq!(f.error_between, [f.error; 2]);
+        let short = Forecast::of(&milestones(&[16, 32, 64], 1.0), &stop, 10_000).unwrap();
+        assert!(short.error_between[0] == short.error && short.error_between[1] > 0.011, "{short:?}");
         let all = milestones(&[4, 8, 16, 32, 64], 1.2);
         let quarter = Forecast::at_a_quarter(&all, &FREE, 64).unwrap();
         assert_eq!(quarter.made_at, 16);

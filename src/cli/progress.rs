@@ -93,7 +93,7 @@ fn words(p: &Progress) -> String {
         }
         (Some(e), Some(f)) => {
             let between = per_cent_between(f.error_between);
-            format!("{rate}, error {}, about {} ({between}) in {left}", per_cent(e.rel_rmse), per_cent(f.error))
+            format!("{rate}, error {}, about {}{between} in {left}", per_cent(e.rel_rmse), per_cent(f.error))
         }
         (Some(e), None) => format!("{rate}, error {}, {left} left", per_cent(e.rel_rmse)),
         // The first of a large frame waited for its memory: what it took says nothing of the others.
@@ -254,5 +254,8 @@ mod tests {
         let forecast = Some(Forecast { seconds_between: [40.0, 72.0], ..forecast });
         let aimed = Progress { forecast, ..aimed };
         assert_eq!(words(&aimed), "0.03 Msamples/s, error 1.80 %, 1.00 % in about 42.0 s (30.0 s to 62.0 s)");
+        let forecast = Some(Forecast { seconds_between: [10.0, 72.0], ..forecast.unwrap() });
+        let aimed = Progress { forecast, ..aimed };
+        assert_eq!(words(&aimed), "0.03 Msamples/s, error 1.80 %, 1.00 % in about 42.0 s (up to 62.0 s)");
     }
 }

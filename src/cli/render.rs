@@ -135,14 +135,24 @@ pub fn per_cent(x: f64) -> String {
 }
 
 /// Two shares, with the sign once.
-pub fn per_cent_between([low, high]: [f64; 2]) -> String {
+fn per_cent_interval([low, high]: [f64; 2]) -> String {
     format!("{}-{}", per_cent(low).replace(" %", ""), per_cent(high))
 }
 
-/// Two times; nothing where they read alike.
+/// Two shares in brackets; nothing where they read alike.
+pub fn per_cent_between(between: [f64; 2]) -> String {
+    let [low, high] = between.map(per_cent);
+    if low == high { String::new() } else { format!(" ({})", per_cent_interval(between)) }
+}
+
+/// Two times in brackets; nothing where they read alike.
 pub fn seconds_between([low, high]: [f64; 2]) -> String {
-    let [low, high] = [seconds(low), seconds(high)];
-    if low == high { String::new() } else { format!(" ({low} to {high})") }
+    let ends = [seconds(low), seconds(high)];
+    match ends {
+        [a, b] if a == b => String::new(),
+        [_, end] if low <= 0.0 => format!(" (up to {end})"),
+        [a, b] => format!(" ({a} to {b})"),
+    }
 }
 
 /// A number, and its share of `all`.
@@ -161,7 +171,7 @@ const HEADINGS: [&str; 7] = ["scene", "samples", "time", "Msamples/s", "error (9
 fn row(s: &SceneReport) -> [String; 7] {
     let error = match (&s.error, s.integrator.as_str()) {
         (Some(e), _) => {
-            let interval = per_cent_between([e.low, e.high]);
+            let interval = per_cent_interval([e.low, e.high]);
             format!("{} ({})", per_cent(e.rel_rmse), if e.valid { &interval } else { "not converged" })
         }
         (None, "whitted") => "no noise".into(),
@@ -223,7 +233,7 @@ pub fn table(report: &Report) -> String {
         }
         let _ = writeln!(
             out,
-            "  {}: {}{} and {} ({}) at {:.0} samples; {} and {} at {}",
+            "  {}: {}{} and {}{} at {:.0} samples; {} and {} at {}",
             s.label(),
             seconds(f.seconds),
             seconds_between(f.seconds_between),
