@@ -171,6 +171,8 @@ pub(super) fn first_covering(
                 let mut number = u(crossing, left);
                 let leaf = compound.choose(&vertex, seen_normal(&surface, wo), Turns::Seen, &mut number);
                 left = Some(number);
+                // A part of it may only bound a medium.
+                let leaf = leaf.filter(|leaf| !matches!(leaf.material.kind, Kind::Boundary));
                 leaf.map(|leaf| if leaf.flipped { -leaf.frame.n } else { leaf.frame.n })
             }
             _ => Some(surface.shading_normal),

@@ -217,17 +217,26 @@ fn mattes_add_up_to_alpha_where_samples_are_shared_out() {
     }
 }
 
-/// A mask lets a third through: the matte of what is before covers two thirds, as alpha of a picture without a background.
+/// A mask lets a third through: the matte of what is before covers two thirds, as alpha of a picture without a background. So does
+/// a blend of which a third only bounds media, be it glass of the index around it.
 #[test]
 fn holes_of_a_mask_are_holes_of_its_matte() {
-    let text = "lights: [{constant: {radiance: 1}}]\nlayers: [crypto_object]\nshapes:\n\
-                - plane: {name: veil, normal: [0, 0, 1], material: {mask: {opacity: 0.6667, material: {diffuse: {}}}}}\n";
-    let part = render(&format!("{FRAME}{text}"));
-    let (coverage, alpha) = (plane(&part, "CryptoObject00.G"), plane(&part, "A"));
-    assert!(coverage.iter().zip(alpha).all(|(c, a)| (c - a).abs() <= f32::EPSILON), "{coverage:?} {alpha:?}");
-    let mean = coverage.iter().sum::<f32>() / coverage.len() as f32;
-    // 384 pixels of 16 samples: four standard errors of a share of 2/3 are 4·√(2/9/6144).
-    assert!((mean - 0.6667).abs() < 4.0 * (2.0f32 / 9.0 / 6144.0).sqrt(), "{mean}");
+    for material in [
+        "mask: {opacity: 0.6667, material: {diffuse: {}}}",
+        "blend: {weight: 0.6667, first: {boundary: {}}, second: {diffuse: {}}}",
+        "blend: {weight: 0.3333, first: {diffuse: {}}, second: {dielectric: {ior: 1}}}",
+    ] {
+        let part = render(&format!(
+            "{FRAME}lights: [{{constant: {{radiance: 1}}}}]\nlayers: [crypto_object]\nshapes:\n\
+             - plane: {{name: veil, normal: [0, 0, 1], material: {{{material}}}}}\n"
+        ));
+        let (coverage, alpha) = (plane(&part, "CryptoObject00.G"), plane(&part, "A"));
+        let alike = coverage.iter().zip(alpha).all(|(c, a)| (c - a).abs() <= f32::EPSILON);
+        assert!(alike, "{material}: {coverage:?} {alpha:?}");
+        let mean = coverage.iter().sum::<f32>() / coverage.len() as f32;
+        // 384 pixels of 16 samples: four standard errors of a share of 2/3 are 4·√(2/9/6144).
+        assert!((mean - 0.6667).abs() < 4.0 * (2.0f32 / 9.0 / 6144.0).sqrt(), "{material}: {mean}");
+    }
 }
 
 /// A spectral file that was rendered is a sky again. The first falls from 2 at 400 nm to 1 at 700 nm; its bands of 100 nm

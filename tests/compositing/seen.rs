@@ -107,8 +107,8 @@ fn depth_is_in_metres_whatever_the_scale_of_the_camera() {
 }
 
 /// Normal and albedo are those of what the camera sees: through the box of a medium, through a lamp that is hidden, through the
-/// holes of a card, in which a pixel is a mean; with the relief of a material that is within another. In daylight grey is
-/// grey, whatever the sensitivity of the film.
+/// holes of a card, be they a mask's or parts of a blend, in which a pixel is a mean; with the relief of a material that is within
+/// another. In daylight grey is grey, whatever the sensitivity of the film.
 #[test]
 fn normal_and_albedo_are_of_what_is_seen() {
     let scene = |front: &str| {
@@ -123,8 +123,10 @@ fn normal_and_albedo_are_of_what_is_seen() {
     let lamp = "- rectangle: {corner: [-5, -5, 3], edge_u: [10, 0, 0], edge_v: [0, 10, 0], emission: 1}\n";
     let card = "- rectangle: {corner: [-5, -5, 3], edge_u: [10, 0, 0], edge_v: [0, 10, 0], material: {mask: {opacity: 0.25, \
                 material: {diffuse: {reflectance: 0.9}}}}}\n";
+    let blend = "- rectangle: {corner: [-5, -5, 3], edge_u: [10, 0, 0], edge_v: [0, 10, 0], material: {blend: {weight: 0.25, \
+                 first: {boundary: {}}, second: {diffuse: {reflectance: 0.9}}}}}\n";
     let haze = "- cube: {center: [0, 0, 3], size: 2, inside: haze, material: {boundary: {}}}\n";
-    for (front, share) in [("", 0.0), (haze, 0.0), (lamp, 0.0), (card, 0.25)] {
+    for (front, share) in [("", 0.0), (haze, 0.0), (lamp, 0.0), (card, 0.25), (blend, 0.25)] {
         let part = scene(front);
         let mean = |name: &str| f64::from(plane(&part, name).iter().sum::<f32>()) / 64.0;
         // 1024 evenly spread samples decide on the card: a pixel is off by few of them, the mean of 64 pixels by less than one.
