@@ -149,7 +149,8 @@ pub(super) struct Covering {
 }
 
 /// The first surface that a camera ray meets and that is really there: no hole of a mask, which `u` decides at the
-/// crossing of that number, told what is left of the number before, no boundary of a medium alone, no hidden lamp.
+/// crossing of that number, told what is left of the number before, no boundary of a medium alone, no hidden lamp, no surface of
+/// a body where a stronger one has the place.
 pub(super) fn first_covering(
     scene: &Scene,
     plan: &EffectPlan,
@@ -158,12 +159,15 @@ pub(super) fn first_covering(
 ) -> Option<Covering> {
     let hides = matches!(&plan.integrator, Integrator::Path(settings) if settings.hide_emitters);
     let (mut ray, mut reach, mut left) = (*ray, scene.camera.reach(ray), None);
+    let mut inside = scene.camera_inside;
     for crossing in 0..=MAX_BOUNDARIES {
         let hit = scene.closest(&ray, reach)?;
         let surface = scene.surface_with_texture(&ray, &hit);
         let object = &scene.objects[hit.object as usize];
+        let is_hidden_lamp = hides && object.is_lamp;
+        let of_body = scene.crossing(object, &surface, ray.direction, &inside.bodies);
         let normal = match &scene.materials[object.material as usize].kind {
-            _ if hides && object.is_lamp => None,
+            _ if is_hidden_lamp || of_body.is_some_and(|of_body| !of_body.shows) => None,
             Kind::Boundary => None,
             Kind::Compound(compound) => {
                 let (wo, at) = (-ray.direction, &hit.texture_point(&surface));
@@ -179,6 +183,9 @@ pub(super) fn first_covering(
         };
         if let Some(normal) = normal {
             return Some(Covering { hit, surface, normal });
+        }
+        if !is_hidden_lamp {
+            inside = scene.beyond(object, &surface, ray.direction, inside);
         }
         ray = scene.leave(&surface, &hit, ray.direction);
         reach -= hit.t;

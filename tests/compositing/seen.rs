@@ -338,6 +338,26 @@ fn cards_behind_cards_cover_their_share_in_whitted() {
     }
 }
 
+/// Seen from within a body that has the place, the ball of a weaker one is not there, nor is one of its own kind: what is seen is the
+/// wall around, 3 m away.
+#[test]
+fn what_has_not_the_place_is_not_seen_from_within() {
+    for integrator in ["path", "{whitted: {}}"] {
+        for other in ["ior: 1.33, priority: 1", "ior: 1.5, priority: 2"] {
+            let part = render(&format!(
+                "camera: {{origin: [0, 0, 0], target: [0, 0, -1], fov_deg: 10}}\nimage: {{width: 4, height: 4}}\n\
+                 integrator: {integrator}\nrender: {{samples: 4}}\nlayers: [Z, crypto_object]\n\
+                 lights: [{{constant: {{radiance: 1}}}}]\nshapes:\n\
+                 - sphere: {{name: ball, center: [0, 0, -2], radius: 0.5, material: {{dielectric: {{{other}}}}}}}\n\
+                 - sphere: {{name: around, radius: 3, material: {{dielectric: {{ior: 1.5, priority: 2}}}}}}\n"
+            ));
+            assert!(coverage(&part, "around").iter().all(|share| *share == 1.0), "{integrator}: {other}");
+            // The middle of a corner's pixel is 3/4 √2 tan 5° = tan 5.3° beside that of the picture: 3 cos 5.3° = 2.987.
+            assert!(plane(&part, "Z").iter().all(|z| (2.986..3.0).contains(z)), "{integrator}: {other}");
+        }
+    }
+}
+
 /// A name that a material and a shape have, or an asset and a shape, is that of one matte.
 #[test]
 fn names_of_two_things_in_one_matte_are_told() {
