@@ -98,9 +98,10 @@ pub struct Shot<'a> {
 }
 
 impl<'a> Shot<'a> {
-    /// Depth fog, where there is some.
-    fn fog(&self) -> Option<&'a DepthFog> {
-        depth_fog(self.scene, self.plan)
+    /// Depth fog before what `integrator` shows, where there is some: a distance is no light, nor is nothing.
+    fn fog(&self, integrator: &Integrator) -> Option<&'a DepthFog> {
+        let shows_light = !matches!(integrator, Integrator::Depth | Integrator::Nothing);
+        depth_fog(self.scene, self.plan).filter(|_| shows_light)
     }
 }
 
@@ -316,7 +317,8 @@ impl Begun {
             // What came before belongs to no sample.
             let _ = watch::take();
         }
-        let light = self.light(shot, sampler, &shot.plan.integrator, shot.fog(), ledger);
+        let integrator = &shot.plan.integrator;
+        let light = self.light(shot, sampler, integrator, shot.fog(integrator), ledger);
         if watched {
             self.counted = watch::take();
         }
@@ -361,7 +363,7 @@ impl Begun {
             (counted, weight),
             ledger,
             |integrator| {
-                let light = self.light(shot, sampler, integrator, None, None);
+                let light = self.light(shot, sampler, integrator, shot.fog(integrator), None);
                 let xyz = observer::xyz(light.radiance, &wavelengths);
                 layers::Seen { radiance: light.radiance, xyz, alpha: light.alpha }
             },
@@ -384,7 +386,8 @@ pub fn sample(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Pixe
     let sampler = Sampler::new(shot.seed, pixel, replicate, index);
     let mut begun = Begun::blank();
     begun.begin(shot, Address { pixel, replicate, index }, &sampler);
-    let light = begun.light(shot, &sampler, &shot.plan.integrator, shot.fog(), None);
+    let integrator = &shot.plan.integrator;
+    let light = begun.light(shot, &sampler, integrator, shot.fog(integrator), None);
     begun.see(&light);
     begun.finish();
     (begun.sample, Work { events: begun.events, rays: begun.rays(shot.scene) })
@@ -555,7 +558,7 @@ fn follow_together(begun: &mut [Begun], shot: &Shot, settings: &PathSettings, oc
     let mut light = [Incoming::NONE; Octet::SAMPLES];
     path::together::radiance(shot, settings, begun.len(), wanted(begun, octet), |i, found| light[i] = found);
     for (begun, mut light) in begun.iter_mut().zip(light) {
-        veil(shot.fog(), &mut light, begun.sample.wavelengths.nm, None);
+        veil(shot.fog(&shot.plan.integrator), &mut light, begun.sample.wavelengths.nm, None);
         begun.see(&light);
     }
 }
@@ -575,7 +578,7 @@ fn follow_shared(begun: &mut [Begun], shot: &Shot, settings: &PathSettings, octe
     let give = |i: usize, found| light[i] = found;
     let pairs = path::reuse::radiance(shot, settings, ledgers, begun.len(), wanted(begun, octet), give);
     for (i, (begun, mut light)) in begun.iter_mut().zip(light).enumerate() {
-        veil(shot.fog(), &mut light, shared.nm, ledgers.get(i));
+        veil(shot.fog(&shot.plan.integrator), &mut light, shared.nm, ledgers.get(i));
         begun.see(&light);
         begun.counted = Counts::default();
     }

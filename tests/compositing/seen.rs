@@ -239,6 +239,27 @@ fn depth_fog_is_light_of_no_lamp() {
     }
 }
 
+/// A layer of light by another integrator is what the picture would be by that. A floor of 0.5 under a sky of 0.2, 6 m away in fog
+/// of 0.3 that takes 1 - e^-0.6 = 0.4512 there: 0.1 · 0.5488 + 0.3 · 0.4512 = 0.1902. The distance stays 6, and nothing black. Light
+/// is as noisy as its wavelengths: far less than a hundredth in 4096 samples.
+#[test]
+fn light_by_any_integrator_is_behind_depth_fog_and_distances_are_not() {
+    let lit = 0.1 * (-0.6f64).exp() + 0.3 * (1.0 - (-0.6f64).exp());
+    for (integrator, expected) in [("path", lit), ("{path: {max_depth: 9}}", lit), ("depth", 6.0), ("none", 0.0)] {
+        let part = render(&format!(
+            "camera: {{origin: [0, 0, 6], target: [0, 0, 0], orthographic_height: 4}}\nimage: {{width: 4, height: 4}}\n\
+             render: {{samples: 256}}\noutput: {{exr: {{precision: float, channels: xyz}}}}\nintegrator: {integrator}\n\
+             fog: {{colour: 0.3, density: 0.1}}\nlights: [{{constant: {{radiance: 0.2}}}}]\n\
+             shapes: [{{plane: {{normal: [0, 0, 1]}}}}]\nlayers:\n- {{name: deep, light: {{path: {{max_depth: 60}}}}, form: xyz}}\n\
+             - {{name: far, light: depth, form: xyz}}\n- {{name: nothing, light: none, form: xyz}}\n"
+        ));
+        for (name, expected) in [("Y", expected), ("deep.Y", lit), ("far.Y", 6.0), ("nothing.Y", 0.0)] {
+            let mean = f64::from(plane(&part, name).iter().sum::<f32>()) / 16.0;
+            assert!((mean - expected).abs() <= 0.01 * expected, "{integrator}: {name} {mean}, not {expected}");
+        }
+    }
+}
+
 /// Nearly smooth glass throws a caustic, whether paths from the lights or from the camera find it: what is not caustic has the
 /// same mean, 0.0084, with both. It has little noise: 1 % at 256 samples of 384 pixels is ten standard errors.
 #[test]
