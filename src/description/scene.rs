@@ -197,9 +197,10 @@ impl SceneDescription {
             shapes(true).chain(self.lights.iter().enumerate().map(|(i, light)| light.name_or_kind(i))).collect();
         let shapes: Vec<String> = shapes(false).collect();
         let all = [("light_groups", "lamp", &self.light_groups, lamps), ("assets", "shape", &self.assets, shapes)];
+        // Light is parted by numbers of eight bits; mattes go by names.
+        let (most, groups) = (usize::from(u8::MAX) - 1, self.light_groups.len());
+        checker.require(groups <= most, At::ROOT.key("light_groups"), "at most 254 names", groups);
         for (field, kind, groups, known) in all {
-            let most = usize::from(u8::MAX) - 1;
-            checker.require(groups.len() <= most, At::ROOT.key(field), "at most 254 names", groups.len());
             let mut taken: HashSet<&str> = HashSet::new();
             let known: BTreeSet<&str> = known.iter().map(String::as_str).collect();
             for (group, names) in groups {
@@ -514,6 +515,16 @@ mod tests {
              dir/s.yaml:4:9: medium: unknown medium \"fogg\"; the scene defines none\n\
              dir/s.yaml:6:33: materials.flint.mirror.reflectance: expected a number from 0 to 1, found 2"
         );
+    }
+
+    /// A production has hundreds.
+    #[test]
+    fn only_groups_of_lamps_are_at_most_254() {
+        let shapes: String = (0..300).map(|i| format!("- sphere: {{radius: 1, name: s{i}, emission: 1}}\n")).collect();
+        let groups: Vec<String> = (0..300).map(|i| format!("g{i}: [s{i}]")).collect();
+        let told = |field: &str| faults(&format!("shapes:\n{shapes}{field}: {{{}}}\n", groups.join(", ")));
+        assert_eq!(told("assets"), "none");
+        assert_eq!(told("light_groups"), "dir/s.yaml:303:15: light_groups: expected at most 254 names, found 300");
     }
 
     #[test]
