@@ -189,6 +189,12 @@ impl Environment {
         Ok(Environment { bands: Some(bands.scaled(scale as f32)), ..map })
     }
 
+    /// The direction in which `other`, turned otherwise, shows what this map shows in `direction`.
+    #[must_use]
+    pub fn carried(&self, other: &Environment, direction: DVec3) -> DVec3 {
+        other.world_from_map * (self.world_from_map.transpose() * direction)
+    }
+
     fn place(&self, direction: DVec3) -> Place {
         let d = self.world_from_map.transpose() * direction;
         let turns = atan2(d.x, -d.z) / (2.0 * PI);

@@ -7,6 +7,7 @@ use super::plan::{EffectPlan, Integrator};
 use super::shadow::MAX_BOUNDARIES;
 use crate::math::Ray;
 use crate::scene::compound::{Turns, Vertex};
+use crate::scene::light::Light;
 use crate::scene::material::Kind;
 use crate::scene::{Geometry, Hit, Scene, SurfacePoint};
 use glam::{DAffine3, DVec2, DVec3};
@@ -84,12 +85,23 @@ fn motion(scene: &Scene, next: &Scene, place: DVec2, ray: &Ray, met: Option<&Cov
             let point = moved(scene, next, hit, surface.point);
             next.camera.entry(point, || DVec2::splat(0.5)).map(|entry| entry.pixel)
         }
-        // What is infinitely far keeps its direction.
-        None => next.camera.vanishing_point(ray.direction),
+        None => next.camera.vanishing_point(turned(scene, next, ray.direction)),
     };
     let Some(there) = there else { return [0.0; 2] };
     let shift = there - place;
     [shift.x as f32, -shift.y as f32]
+}
+
+/// Where what is infinitely far in `direction` is seen in the scene `next`: there still, or of the first picture of a sky in the
+/// same place of it.
+fn turned(scene: &Scene, next: &Scene, direction: DVec3) -> DVec3 {
+    let skies = scene.backgrounds.iter().zip(&next.backgrounds);
+    let mut maps =
+        skies.filter_map(|(&here, &there)| match (&scene.lights[here as usize], &next.lights[there as usize]) {
+            (Light::Environment(here), Light::Environment(there)) => Some((here, there)),
+            _ => None,
+        });
+    maps.next().map_or(direction, |(here, there)| here.carried(there, direction))
 }
 
 /// Where the point that was hit is in the scene `next`: at the same place of the same triangle, or of the same form. What

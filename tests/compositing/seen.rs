@@ -57,6 +57,29 @@ fn the_sky_moves_with_the_camera_alone() {
     }
 }
 
+/// The picture of a sky that turns by 5° about y, by which +x turns toward -z: what is seen at tan a beside the middle is at
+/// tan(a - 5°) a frame later, whatever its height. Where an even sky shines, too, the picture is what moves.
+#[test]
+fn a_sky_that_turns_moves() {
+    let mut sky = b"PF\n2 1\n-1.0\n".to_vec();
+    sky.extend([1f32, 1.0, 1.0, 2.0, 1.0, 1.0].iter().flat_map(|x| x.to_le_bytes()));
+    for even in ["", "constant: {radiance: 1}}, {"] {
+        let part = first_of_two(
+            &format!(
+                "camera: {{origin: [0, 0, 0], target: [0, 0, -1], fov_deg: 40}}\n\
+                 lights: [{{{even}environment: {{file: sky.pfm, rotate_deg: {{1: 0, 2: 5}}}}}}]\n"
+            ),
+            &[("sky.pfm", sky.clone())],
+        );
+        for (i, found) in plane(&part, "motion.X").iter().enumerate() {
+            let place = ((i % 64) as f64 + 0.5 - 32.0) / SCALE;
+            let expected = SCALE * ((place.atan() - 5f64.to_radians()).tan() - place);
+            // f32 of some pixels.
+            assert!((f64::from(*found) - expected).abs() < 1e-5, "{even}: {found}, not {expected}, at {i}");
+        }
+    }
+}
+
 /// Curves and grids of distances that turn by 10° about the line of sight and are moved: each point they show is carried
 /// along. P is written in 32 bits, 2⁻²⁴ of some metres, which are seen at 30 pixels a metre.
 #[test]
