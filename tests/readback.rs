@@ -170,6 +170,13 @@ fn the_camera_in_the_header_is_the_camera() {
     let middle = apply(&to_ndc, [0.0, 0.5, 0.0, 1.0]);
     assert_close(middle[0] / middle[3], 0.5, 1e-6);
     assert_close(middle[1] / middle[3], 0.5, 1e-6);
+    // The frame in the plane at distance one: what is at its left edge there is at 0 of the picture.
+    let exr::math::Vec2(x, y) = own.screen_window_center;
+    assert_eq!([x, y], [0.0; 2]);
+    let half = f64::from(own.screen_window_width) / 2.0;
+    let world = [0.7, -0.4, 1.2, 1.0];
+    let (seen, place) = (apply(&to_camera, world), apply(&to_ndc, world));
+    assert_close(place[0] / place[3], 0.5 + seen[0] / seen[2] / (2.0 * half), 1e-5);
 }
 
 /// Where half cannot hold a value, the file is 32 bits wide and the report says so; nothing is clamped.

@@ -68,6 +68,8 @@ pub struct Finish {
     pub world_to_camera: Option<[f32; 16]>,
     /// And to the frame.
     pub world_to_ndc: Option<[f32; 16]>,
+    /// Middle and width of the frame before a camera that sees from a point.
+    pub screen_window: Option<[f32; 3]>,
     /// Files, colours and tone curve.
     pub output: Output,
     /// The chromaticity that is shown white.
@@ -185,6 +187,7 @@ impl Finish {
             notes: scene.notes.iter().cloned().chain(note).chain(mattes::shared_names(description)).collect(),
             world_to_camera: finite(scene.camera.camera_from_world()),
             world_to_ndc: finite(scene.camera.ndc_from_world()),
+            screen_window: scene.camera.screen_window(),
             white,
             output,
             sensitivity: description.image.sensitivity,

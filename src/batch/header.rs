@@ -40,6 +40,10 @@ pub(super) fn attributes(
     for (name, matrix) in [("worldToCamera", finish.world_to_camera), ("worldToNDC", finish.world_to_ndc)] {
         all.extend(matrix.map(|matrix| (name.to_owned(), Attribute::Matrix4(matrix))));
     }
+    if let Some([x, y, width]) = finish.screen_window {
+        all.push(("screenWindowCenter".to_owned(), Attribute::Vec2([x, y])));
+        all.push(("screenWindowWidth".to_owned(), Attribute::Float(width)));
+    }
     if let Some(number) = finish.frame_number {
         all.push(("abbe/frame".to_owned(), Attribute::Int(number)));
         all.push(("imageCounter".to_owned(), Attribute::Int(number)));

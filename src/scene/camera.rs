@@ -320,6 +320,17 @@ impl Camera {
         (ndc_from_camera * DMat4::from(self.view.camera_from_world)).to_cols_array().map(|x| x as f32)
     }
 
+    /// The frame in the plane at distance one before the camera, in its space: x and y of the middle, and the width. `None` where
+    /// it sees along parallel lines.
+    #[must_use]
+    pub fn screen_window(&self) -> Option<[f32; 3]> {
+        let Projection::Perspective { half_width } = self.projection else { return None };
+        let width = 2.0 * half_width;
+        let height = width * f64::from(self.resolution[1]) / f64::from(self.resolution[0]);
+        let middle = self.principal_point * DVec2::new(-width, height);
+        Some([middle.x, middle.y, width].map(|x| x as f32))
+    }
+
     /// Distance of `point` along the axis, metres, whatever the scale of the camera's own coordinates.
     #[must_use]
     pub fn depth(&self, point: DVec3) -> f64 {
@@ -391,6 +402,24 @@ mod tests {
         let ndc = DVec2::new(row(0), row(1)) / row(3);
         // Sixteen f32 roundings of numbers of size one.
         assert!((ndc - DVec2::new(0.15, 0.8)).length() < 16.0 * f64::from(f32::EPSILON), "{ndc}");
+    }
+
+    /// 90° across 200 pixels is a window of width 2; where the axis is 20 pixels right of the middle and 10 below it, the middle is 0.2 to
+    /// the left of the axis and 0.1 above. The ray through a corner meets that of the window.
+    #[test]
+    fn the_screen_window_is_what_the_rays_pass() {
+        let Camera { world_from_camera, projection, resolution, .. } = camera(None);
+        let place = DVec2::new(0.1, 0.1);
+        let camera = Camera::new(world_from_camera, projection, resolution, None, [0.0, f64::INFINITY], place);
+        let [x, y, width] = camera.screen_window().unwrap();
+        assert_eq!([x, y, width], [-0.2, 0.1, 2.0]);
+        let corner = camera.ray(DVec2::ZERO, || unreachable!()).direction;
+        // The camera looks along −z; the window is half as high as wide.
+        let [right, up] = [corner.x, corner.y].map(|x| x / -corner.z);
+        assert!((right - f64::from(x - 0.5 * width)).abs() < 1e-6 && (up - f64::from(y + 0.25 * width)).abs() < 1e-6);
+        let parallel = Projection::Orthographic { half_width: 1.0 };
+        let parallel = Camera::new(world_from_camera, parallel, resolution, None, [0.0, f64::INFINITY], place);
+        assert!(parallel.screen_window().is_none());
     }
 
     #[test]

@@ -204,9 +204,9 @@ fn header_bytes(image: &ExrImage, part: &Part, chunks: Option<usize>) -> std::re
     if let Compression::Dwaa(level) | Compression::Dwab(level) = compression {
         structure.push(("dwaCompressionLevel", "float", level.to_le_bytes().to_vec()));
     }
-    // A manifest stands beside its channels, all else in the first part.
+    // A manifest stands beside its channels, what every header has to say in all parts, all else in the first.
     let here = |name: &str| match (name.strip_prefix(cryptomatte::PREFIX), &part.name) {
-        (None, _) | (_, None) => part.first,
+        (None, _) | (_, None) => part.first || name.starts_with("screenWindow"),
         (Some(rest), Some(layer)) => rest.starts_with(&cryptomatte::key(layer)),
     };
     let further: Vec<&(String, Attribute)> = image.attributes.iter().filter(|(name, _)| here(name)).collect();
@@ -250,9 +250,15 @@ fn header(
         ("displayWindow", "box2i", window_bytes(Window::full(frame[0], frame[1]))),
         ("lineOrder", "lineOrder", vec![0]),
         ("pixelAspectRatio", "float", 1f32.to_le_bytes().to_vec()),
-        ("screenWindowCenter", "v2f", vec![0; 8]),
-        ("screenWindowWidth", "float", 1f32.to_le_bytes().to_vec()),
     ];
+    // What the format asks for where nobody says how the picture was projected.
+    for (name, kind, value) in
+        [("screenWindowCenter", "v2f", vec![0; 8]), ("screenWindowWidth", "float", floats([1.0]))]
+    {
+        if further.iter().all(|(other, _)| other != name) {
+            attributes.push((name, kind, value));
+        }
+    }
     attributes.extend(structure);
     match colour {
         Some(ColourEncoding { primaries, interop_id }) => {
