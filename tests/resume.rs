@@ -371,6 +371,27 @@ fn a_picture_of_several_parts_is_not_rendered_again() {
     assert!(!render() && render());
 }
 
+/// DWA changes numbers as it packs them: what was written is what is read. Damage still shows.
+#[test]
+fn a_picture_that_is_packed_with_loss_is_not_rendered_again() {
+    let scene = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nimage: {width: 40, height: 40}\n\
+                 render: {samples: 4}\noutput: {exr: {compression: dwaa, layout: multipart}}\nlayers: [normal, direct]\n\
+                 shapes: [{sphere: {radius: 1}}]\nlights: [{point: {position: [2, 3, 4], intensity: 9}}]\n";
+    let place = Place::of(scene);
+    let render = || {
+        let ran = place.run(&["render", "scene.yaml", "-o", "out", "--skip-existing", "--progress", "plain"]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        ran.out.contains("1 of 1 were there already")
+    };
+    assert!(!render() && render());
+    let said = place.run(&["info", "out/scene.exr"]).out;
+    assert!(said.contains("as they were written"), "{said}");
+    let file = place.path("out/scene.exr");
+    let whole = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &whole[..whole.len() - 40]).unwrap();
+    assert!(!render() && render());
+}
+
 /// `timeout` signals the process, and then the group that it is in: two signals at once are one wish. One that comes later ends the
 /// process at once, whatever it writes.
 #[test]

@@ -9,7 +9,7 @@ use super::prepare::{Prepared, colour_space, filter, window};
 use super::report::{Developed, SceneReport};
 use super::{contact, develop, layers, mattes};
 use crate::description::{self, LayerContent, Output, SceneDescription, Shutter};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::PixelCells;
 use crate::film::cryptomatte::Matte;
@@ -305,8 +305,8 @@ pub fn integrator(integrator: &Integrator) -> &'static str {
 /// whether that is as good as was asked for.
 ///
 /// # Errors
-/// [`Error::Output`](crate::error::Error::Output) where a file cannot be written, [`Error::Render`](crate::error::Error::Render)
-/// for invalid samples, or `target`; the files are then written all the same.
+/// [`Error::Output`] where a file cannot be written, [`Error::Render`] for invalid samples, or `target`; the files are then
+/// written all the same.
 pub fn write(
     finish: &Finish,
     frame: &Frame,
@@ -551,7 +551,7 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
 
 /// Writes a file that says what its channels add up to, so that damage shows.
 fn write_sealed(path: &Path, file: &mut ExrImage) -> Result<()> {
-    let hash = Attribute::Text(file.content_hash());
+    let hash = Attribute::Text(file.content_hash().map_err(|message| Error::output(path, message))?);
     file.attributes.push(("abbe/contentHash".to_owned(), hash));
     exr::write_exr(path, file)
 }

@@ -174,8 +174,14 @@ impl ExrImage {
 
     /// 128 bits of BLAKE3 over the channels as [`read_exr`] gives them, in the order of their names: what was damaged is known
     /// by it.
-    #[must_use]
-    pub fn content_hash(&self) -> String {
+    ///
+    /// # Errors
+    /// What in the picture cannot be written.
+    pub fn content_hash(&self) -> std::result::Result<String, String> {
+        if self.compression.loses() {
+            // What packing leaves is not what it was given.
+            return Ok(read::decode(&encode_exr(self)?)?.content_hash());
+        }
         // One at a time: there may be hundreds of them.
         let plane = |data: &ChannelData| -> Vec<u8> {
             let bytes = |x: f32| x.to_bits().to_le_bytes();
@@ -185,7 +191,7 @@ impl ExrImage {
                 ChannelData::U32(samples) => samples.iter().flat_map(|x| bytes(*x as f32)).collect(),
             }
         };
-        content_hash(self.channels.iter().map(|(name, data)| (name.as_str(), data)), plane)
+        Ok(content_hash(self.channels.iter().map(|(name, data)| (name.as_str(), data)), plane))
     }
 }
 

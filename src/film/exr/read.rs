@@ -127,14 +127,30 @@ pub fn read_exr(path: &Path) -> Result<ExrFile> {
     let meta = MetaData::read_from_buffered(&mut reader, false).map_err(fail)?;
     check_size(path, &meta)?;
     std::io::Seek::rewind(&mut reader).map_err(|e| Error::input(path, e.to_string()))?;
+    let file = parts_of(reader).map_err(fail)?;
+    if file.parts.is_empty() {
+        return Err(Error::input(path, "the file has no part with pixels"));
+    }
+    Ok(file)
+}
+
+/// What [`read_exr`] will read of the `bytes` of a file.
+///
+/// # Errors
+/// Why they are none.
+pub(super) fn decode(bytes: &[u8]) -> std::result::Result<ExrFile, String> {
+    parts_of(std::io::Cursor::new(bytes)).map_err(words)
+}
+
+/// All parts, the largest level of each.
+fn parts_of(reader: impl std::io::Read + std::io::Seek) -> ::exr::error::Result<ExrFile> {
     let image = read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
         .all_layers()
         .all_attributes()
-        .from_buffered(reader)
-        .map_err(fail)?;
+        .from_buffered(reader)?;
 
     let shared = &image.attributes;
     let mut parts = Vec::new();
@@ -175,9 +191,6 @@ pub fn read_exr(path: &Path) -> Result<ExrFile> {
         let mut texts: Vec<(String, String)> = known.chain(custom).collect();
         texts.sort();
         parts.push(ExrPart { name: own.layer_name.as_ref().map(text), window, channels, integers, texts });
-    }
-    if parts.is_empty() {
-        return Err(Error::input(path, "the file has no part with pixels"));
     }
     let chromaticities = shared.chromaticities.map(|c| [c.red, c.green, c.blue, c.white].map(|p| [p.x(), p.y()]));
     Ok(ExrFile { display: window(shared.display_window), chromaticities, parts })
