@@ -8,7 +8,7 @@
 use super::Watcher;
 use super::develop;
 use super::finish::{Finish, spectral_path};
-use super::frame::{Begun, FrameJob, Milestone, lock};
+use super::frame::{self, Begun, FrameJob, Milestone, lock};
 use super::header::FAULT;
 use super::merge::sum;
 use super::names;
@@ -122,9 +122,7 @@ impl<'a> Keeper<'a> {
         written.add_to(&mut film, splats.as_mut())?;
         let header = &written.header;
         let part = Part::resume(job, share, &header.claims, header.allocation(), film, splats)?;
-        let (done, total) = part.progress();
-        let per_cent = 100.0 * done as f64 / total.max(1) as f64;
-        lock(&self.notes).push(format!("resumed at {per_cent:.1} %"));
+        lock(&self.notes).push(format!("resumed at {:.1} %", per_cent(&part, &header.milestones)));
         self.counted = header.numerics;
         let elapsed = Duration::try_from_secs_f64(header.seconds).unwrap_or_default();
         Ok(Begun::from(part, header.milestones.clone(), elapsed))
@@ -186,6 +184,12 @@ impl<'a> Keeper<'a> {
     }
 }
 
+/// How much is done of what `part` will be, as far as `milestones` foretell that.
+fn per_cent(part: &Part, milestones: &[Milestone]) -> f64 {
+    let (done, total) = (part.progress().0, frame::samples_in_all(part, milestones));
+    100.0 * done as f64 / total.max(done).max(1) as f64
+}
+
 impl Breaks for Keeper<'_> {
     fn wanted(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
@@ -204,11 +208,12 @@ impl Breaks for Keeper<'_> {
                 return self.stop.take(part, milestones, elapsed);
             }
             self.write(part, milestones, elapsed)?;
-            let (done, total) = part.progress();
-            let per_cent = 100.0 * done as f64 / total.max(1) as f64;
             let file = place(self.path);
-            let message =
-                format!("stopped at {per_cent:.1} %, kept in {}; --resume goes on from there", file.display());
+            let message = format!(
+                "stopped at {:.1} %, kept in {}; --resume goes on from there",
+                per_cent(part, milestones),
+                file.display()
+            );
             return Err(Error::Stopped(message));
         }
         if self.keep.snapshot.swap(false, Ordering::Relaxed)
@@ -333,13 +338,41 @@ pub fn ended(keep: &Keep, path: &Path, identity: &Identity, share: Option<&Share
 mod tests {
     use super::*;
     use crate::batch::frame::go_on;
+    use crate::batch::part::Claims;
     use crate::batch::{Overrides, entries, prepare};
+    use crate::film::error::ErrorEstimate;
     use crate::film::filter::{Filter, FilterSampler};
 
     const SCENE: &str = "camera: {origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}\n\
         image: {width: 4, height: 4}\nrender: {samples: 4, techniques: {light_tracing: on}}\nshapes:\n\
         - plane: {normal: [0, 1, 0]}\n- sphere: {center: [0, 1, 0], radius: 1, material: {dielectric: {ior: 1.5}}}\n\
         - sphere: {center: [1, 3, 1], radius: 0.2, emission: 20}\n";
+
+    /// 512 samples with an error of √(1/512), which falls as √(1/N), are half of the 1024 that bring it to 1/32, and not a 128th of
+    /// the most there may be.
+    #[test]
+    fn what_is_done_of_a_render_to_an_error_is_a_share_of_what_that_takes() {
+        let dir = tempfile::tempdir().unwrap();
+        let yaml = dir.path().join("scene.yaml");
+        std::fs::write(&yaml, SCENE).unwrap();
+        let overrides =
+            Overrides { set: vec![("render.stop".into(), "{error: 0.03125}".into())], ..Overrides::default() };
+        let prepared = prepare(&entries(&yaml, &overrides).unwrap()[0], &overrides).unwrap();
+        let filter = FilterSampler::new(Filter::Box).unwrap();
+        let job = prepared.job(&filter);
+        let share = Share::all(job.samples);
+        let empty = Part::new(&job, share.clone()).unwrap();
+        let claims = Claims { camera: vec![(job.window, 0..512)], ..empty.claims() };
+        let (film, splats) = empty.finish();
+        let part = Part::resume(&job, share, &claims, None, film, splats).unwrap();
+        let milestone = |samples: u32| {
+            let rel_rmse = f64::from(samples).powf(-0.5);
+            let error = ErrorEstimate { rel_rmse, low: rel_rmse, high: rel_rmse, pixels: 16, valid: true };
+            Milestone { samples, elapsed: Duration::from_millis(samples.into()), error: Some(error), unknown: None }
+        };
+        let found = per_cent(&part, &[128, 256, 512].map(milestone));
+        assert!((found - 50.0).abs() < 0.01, "{found}");
+    }
 
     /// A run of 90 seconds that dropped samples of four kinds, and did no others, is gone on with: the seconds and what was
     /// counted are there at the end, as scenes like this drop none.

@@ -291,13 +291,11 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
     let before = begun.elapsed;
     let start = Instant::now();
     let part = &begun.part;
-    let (done, total) = part.progress();
-    let done = AtomicU64::new(done);
+    let done = AtomicU64::new(part.progress().0);
     let job = part.job();
     let whole = part.share().is_all(job.samples);
 
     let Range { start: first, end: most } = part.share().samples;
-    let pixels = job.window.pixels() as f64;
     loop {
         let milestones = &begun.milestones;
         let at = milestones.last().map_or(first, |m| m.samples);
@@ -310,10 +308,7 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
         let pass = at..end.max(part.reached());
         let latest = milestones.last().and_then(|m| m.error);
         let forecast = Forecast::of(milestones, &job.stop, most).filter(|_| whole);
-        let total = match forecast {
-            Some(forecast) if job.stop.is_open() => (forecast.samples * pixels) as u64,
-            _ => total,
-        };
+        let total = samples_in_all(part, milestones);
         let finished = |unit| {
             let done = done.fetch_add(unit, Ordering::Relaxed) + unit;
             let total = total.max(done);
@@ -332,6 +327,16 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
     }
     begun.elapsed = before + start.elapsed();
     Ok(begun)
+}
+
+/// Samples of pixels that `part` will have at its end, as far as `milestones` foretell that.
+#[must_use]
+pub fn samples_in_all(part: &Part, milestones: &[Milestone]) -> u64 {
+    let job = part.job();
+    match job.stop.is_open() {
+        true => (job.stop.foreseen(milestones, part.share().samples.end) * job.window.pixels() as f64) as u64,
+        false => part.progress().1,
+    }
 }
 
 /// A picture and the matrix from XYZ to its colours.

@@ -91,6 +91,17 @@ impl Stop {
         Some(end.min(most))
     }
 
+    /// Samples of a pixel at the end, of at most `most`, as far as `milestones` foretell it: where no error is known, the time is.
+    #[must_use]
+    pub fn foreseen(&self, milestones: &[Milestone], most: u32) -> f64 {
+        if let Some(forecast) = Forecast::of(milestones, self, most) {
+            return forecast.samples;
+        }
+        let now = milestones.last().map_or(0, |m| m.samples);
+        let in_time = self.samples_left(milestones).map(|left| f64::from(now) + left);
+        f64::from(most).min(in_time.unwrap_or(f64::INFINITY))
+    }
+
     /// How many more samples the time leaves room for after `milestones`; none where there is no such bound.
     fn samples_left(&self, milestones: &[Milestone]) -> Option<f64> {
         let left = self.time?.saturating_sub(milestones.last()?.elapsed);
@@ -370,6 +381,19 @@ mod tests {
         assert!(stop(3600).check(&known).unwrap_err().to_string().contains("was not reached with 65536 samples"));
         stop(66).check(&known).unwrap();
         Stop { samples_wanted: true, ..stop(3600) }.check(&known).unwrap();
+    }
+
+    /// Eight samples of a millisecond each, whose error nobody knows: 12 ms more have room for twelve. With no time, or more of it,
+    /// as many as there may be.
+    #[test]
+    fn a_time_foretells_samples_where_no_error_is_known() {
+        let mut known = milestones(&[4, 8], 1.0);
+        known.iter_mut().for_each(|m| (m.error, m.unknown) = (None, Some(NoEstimate::Black)));
+        let foreseen = |stop: Stop, most| (stop.foreseen(&known, most) * 1e6).round() * 1e-6;
+        let time = |millis| Stop { time: Some(Duration::from_millis(millis)), ..FREE };
+        assert_eq!((foreseen(time(20), 65_536), foreseen(time(20), 16)), (20.0, 16.0));
+        assert_eq!((foreseen(time(100_000), 65_536), foreseen(FREE, 65_536)), (65_536.0, 65_536.0));
+        assert_eq!(time(20).foreseen(&[], 65_536), 65_536.0);
     }
 
     /// However far away a time is.
