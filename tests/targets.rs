@@ -100,11 +100,19 @@ fn targets_of_a_batch_pass_over_scenes_without_noise() {
     assert!(!said.contains("note: scene: whitted"), "{said}");
     batch("render: {stop: {error: 0.2}}\n", "");
     assert_eq!(abbe(&place, "render batch.yaml -q -o .").0, 0);
+    // So are those of a task, which has one scene, and what is planned.
+    let (code, said) = abbe(&place, "render batch.yaml -q -o . --scene w");
+    assert!(code == 0 && said.contains("note: w: whitted has no noise"), "{code} {said}");
+    assert_eq!(abbe(&place, "plan batch.yaml").0, 0);
+    assert_eq!(abbe(&place, "farm batch.yaml -q --format slurm -o job --scene w --tiles 2").0, 0);
     batch("", ", render.stop.error: 0.2");
     let (code, said) = abbe(&place, "render batch.yaml -q -o .");
     assert!(code == 2 && said.contains("whitted has no noise: its time"), "{code} {said}");
     batch("", "");
     assert_eq!(abbe(&place, "render batch.yaml -q -o . --error 20% --scene w").0, 2);
+    // Each task would end so.
+    let (code, said) = abbe(&place, "farm batch.yaml -q --format slurm -o other --set render.stop.error=0.2");
+    assert!(code == 2 && said.contains("w: render.stop: whitted has no noise"), "{code} {said}");
 }
 
 #[test]

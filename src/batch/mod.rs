@@ -38,7 +38,7 @@ use finish::{Finish, spectral_path};
 use frame::{Progress, go_on};
 use part_file::Identity;
 pub use portion::{Portion, Samples};
-use prepare::prepare_scene;
+use prepare::prepare_one_of;
 pub use prepare::{Prepared, prepare, window};
 use report::{Report, SceneReport, Status};
 use std::path::{Path, PathBuf};
@@ -296,15 +296,7 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                 break 'batch;
             }
             watcher.scene_begins(Turn { scene: [i, entries.len()], frame: [n, frames] }, &label);
-            let prepared = description.and_then(|mut description| {
-                let spared = entries.len() > 1 && spare_whitted(&mut description, entry, overrides);
-                let mut prepared = prepare_scene(entry, description, overrides, &mut shelf, |_| {})?;
-                if spared {
-                    let note = "whitted has no noise: the time or error that is given to all has no say";
-                    prepared.scene.notes.push(note.into());
-                }
-                Ok(prepared)
-            });
+            let prepared = description.and_then(|d| prepare_one_of(entry, d, overrides, &mut shelf));
             if i + 1 == entries.len() && n + 1 == frames {
                 // Nobody comes after the last one.
                 shelf = Shelf::default();
@@ -364,19 +356,6 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
         }
     }
     Ok(report)
-}
-
-/// Takes away the targets of a picture by `whitted`, which knows none, where they are not its own but those of all scenes. Whether
-/// there were any.
-fn spare_whitted(description: &mut SceneDescription, entry: &BatchEntry, overrides: &Overrides) -> bool {
-    let is_target = |key: &str| ["render.stop", "render.stop.error", "render.stop.time"].contains(&key);
-    let of_all = entry.batch_has_stop() || overrides.set.iter().any(|(key, _)| is_target(key));
-    let whitted = matches!(description.integrator, description::Integrator::Whitted(_));
-    let spared = of_all && whitted && prepare::stop(description).is_open();
-    if spared {
-        description.render.stop = description::Stop::default();
-    }
-    spared
 }
 
 impl Report {

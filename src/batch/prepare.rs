@@ -98,7 +98,47 @@ impl Prepared {
 /// # Errors
 /// [`Error::Config`] and [`Error::Input`], as [`compile::compile`].
 pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
-    prepare_scene(entry, entry.scene(&overrides.set)?, overrides, &mut Shelf::default(), |_| {})
+    prepare_one_of(entry, entry.scene(&overrides.set)?, overrides, &mut Shelf::default())
+}
+
+/// [`prepare_scene`] of one of the pictures of a batch. What is asked of all of them asks nothing of those by `whitted`.
+pub(super) fn prepare_one_of(
+    entry: &BatchEntry,
+    mut description: SceneDescription,
+    overrides: &Overrides,
+    shelf: &mut Shelf,
+) -> Result<Prepared> {
+    let spared = spare_whitted(&mut description, entry, overrides);
+    let mut prepared = prepare_scene(entry, description, overrides, shelf, |_| {})?;
+    if spared {
+        let note = "whitted has no noise: the time or error that is given to all has no say";
+        prepared.scene.notes.push(note.into());
+    }
+    Ok(prepared)
+}
+
+/// Takes away the targets of a picture by `whitted`, which knows none, where they are not its own but those of all scenes: of the
+/// batch, or of the command line if that asks for more than this scene. Whether there were any.
+pub(super) fn spare_whitted(description: &mut SceneDescription, entry: &BatchEntry, overrides: &Overrides) -> bool {
+    let is_target = |key: &str| ["render.stop", "render.stop.error", "render.stop.time"].contains(&key);
+    let of_all = match overrides.set.iter().any(|(key, _)| is_target(key)) {
+        true => entry.place().is_some() && overrides.scenes.len() != 1,
+        false => entry.batch_has_stop(),
+    };
+    let spared = of_all && check_stop(description).is_err();
+    if spared {
+        description.render.stop = description::Stop::default();
+    }
+    spared
+}
+
+/// Refuses a time or an error for a picture by `whitted`.
+pub(super) fn check_stop(description: &SceneDescription) -> Result<()> {
+    let whitted = matches!(description.integrator, description::Integrator::Whitted(_));
+    match whitted && stop(description).is_open() {
+        true => Err(Error::Config("render.stop: whitted has no noise: its time and its error are given".into())),
+        false => Ok(()),
+    }
 }
 
 /// Compiles a scene that has been read, with what the scene before has read (see [`compile::compile_with`]), has `alter`
@@ -114,11 +154,8 @@ pub(super) fn prepare_scene(
     alter(&mut scene);
     let integrator = integrator(&description, &description.integrator)?;
     let stop = stop(&description);
+    check_stop(&description)?;
     let samples = match &integrator {
-        Integrator::Whitted(_) if stop.is_open() => {
-            let hint = "whitted has no noise: its time and its error are given";
-            return Err(Error::Config(format!("render.stop: {hint}")));
-        }
         Integrator::Whitted(w) => w.samples,
         Integrator::Path(_) | Integrator::Depth | Integrator::Light(_) | Integrator::Nothing => {
             description.render.most_samples()
@@ -219,7 +256,7 @@ fn check_files(prepared: &Prepared) -> Result<()> {
 }
 
 /// What ends the render besides samples.
-pub(super) fn stop(description: &SceneDescription) -> Stop {
+fn stop(description: &SceneDescription) -> Stop {
     let written = &description.render.stop;
     let floor = match description.output.exr.precision {
         description::Precision::Half => stop::rounding(11),

@@ -10,6 +10,7 @@ pub mod slurm;
 
 use super::adaptive::SIDE;
 use super::part::bands;
+use super::prepare::{check_stop, spare_whitted};
 use super::{Overrides, checks, clashes, ends_in, entries, names, prepare, window};
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
@@ -103,17 +104,24 @@ impl Job {
         // A task knows only its own scenes, and all go to one directory.
         clashes::check(&entries, &Overrides { output: Some("pictures".into()), ..overrides.clone() })?;
         for entry in entries {
+            // A task has this scene alone.
+            let alone = Overrides { scenes: vec![entry.name.clone()], ..overrides.clone() };
+            let as_its_task_has_it = |mut description: SceneDescription| -> Result<SceneDescription> {
+                spare_whitted(&mut description, &entry, &alone);
+                check_stop(&description).map_err(|e| Error::Config(format!("{}: {e}", entry.name)))?;
+                Ok(description)
+            };
             let mut look = || -> Result<Vec<i32>> {
                 let animation = entry.animation(&overrides.set)?;
                 let frames = animation.frames().to_vec();
                 files.extend(animation.files());
-                let description = animation.scene(frames.first().copied())?;
+                let description = as_its_task_has_it(animation.scene(frames.first().copied())?)?;
                 files.extend(compile::compile_with(&description, &entry.name, &mut shelf)?.files);
                 if cut.parts() {
                     let adaptive = description.render.techniques.adaptive == description::Technique::On
                         && prepare(&entry, overrides)?.plan.adaptive.is_some();
                     for (frame, description) in animation.into_scenes() {
-                        check_cut(&description?, cut, adaptive).map_err(|message| {
+                        check_cut(&as_its_task_has_it(description?)?, cut, adaptive).map_err(|message| {
                             Error::Config(format!("{}: {message}", names::label(&entry.name, frame)))
                         })?;
                     }
