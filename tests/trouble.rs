@@ -225,6 +225,21 @@ fn a_job_for_a_farm_whose_names_are_patterns_is_refused() {
     assert_eq!(framed("here#", &["--pictures", "out", "-o", "/tmp"]), plain(&here, "#"));
 }
 
+/// A scene that no batch names has the name of its file, of which a tab made two columns of the table of tasks, and an end of a
+/// line two tasks.
+#[cfg(unix)]
+#[test]
+fn a_job_for_a_farm_whose_names_are_no_columns_is_refused() {
+    let place = Place::with(&[("a\tb.yaml", SCENE), ("a\nb.yaml", SCENE)]);
+    for (file, told) in [("a\tb.yaml", "\"a\\tb\""), ("a\nb.yaml", "\"a\\nb\"")] {
+        for format in ["slurm", "openjd"] {
+            let ran = place.run(&["farm", file, "-q", "--format", format, "-o", "job"]);
+            let expected = format!("error: {told}: expected a name without control characters, found one\n");
+            assert_eq!((ran.code, ran.err, place.names("job").len()), (2, expected, 0));
+        }
+    }
+}
+
 /// A task runs in the directory of the job, or of a session. Its texture lies where the command line and a file of rules
 /// say, from the directory in which the job was made.
 #[test]

@@ -126,6 +126,13 @@ impl Job {
                         })?;
                     }
                 }
+                // A line of a table is a task, and a column a name.
+                if entry.name.contains(char::is_control) {
+                    return Err(Error::Config(format!(
+                        "{:?}: expected a name without control characters, found one",
+                        entry.name
+                    )));
+                }
                 if entry.name.contains("{{") {
                     return Err(Error::Config(format!("{}: expected a name without {{{{, found one", entry.name)));
                 }

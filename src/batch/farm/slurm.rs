@@ -31,7 +31,8 @@ pub fn files(job: &Job) -> Vec<BundleFile> {
     all
 }
 
-/// The lines of tasks: scene, frames, tile, samples; and of pictures: scene, frame. Names of scenes have no tabs.
+/// The lines of tasks: scene, frames, tile, samples; and of pictures: scene, frame. Names of scenes have neither tabs nor ends of
+/// lines.
 fn tables(job: &Job) -> (String, String) {
     let (mut tasks, mut pictures) = (String::new(), String::new());
     for group in &job.groups {
