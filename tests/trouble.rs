@@ -295,7 +295,12 @@ fn samples_may_be_cut_into_even_ranges() {
     let common = ["render", "scene.yaml", "-q", "--spp", "7"];
     for i in 0..3 {
         let samples = format!("{i}/3");
-        assert_eq!(place.run(&[&common[..], &["-o", "parts", "--samples", &samples]].concat()).code, 0);
+        // Two, two and three of seven; of a part that is there already, too.
+        for further in [&[][..], &["--resume"]] {
+            let ran = place.run(&[&common[..], &["-o", "parts", "--samples", &samples], further].concat());
+            let scene = &place.json(&format!("parts/report.samples{i}of3.json"))["scenes"][0];
+            assert_eq!((ran.code, scene["samples"].as_u64()), (0, Some([2, 2, 3][i])), "{}", ran.err);
+        }
     }
     assert!(place.path("parts/scene.samples0of3.exr").is_file());
     assert_eq!(place.run(&["merge", "parts", "-q", "-o", "merged"]).code, 0);

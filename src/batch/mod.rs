@@ -213,6 +213,9 @@ fn render_and_write(
     let share = portion.share(job.window, job.samples, finish.rows())?;
     checks::memory(description, share.rows(job.window), part::Part::bytes(&job, &share), overrides.memory_limit)?;
     let part = (!portion.is_all()).then_some(&share);
+    if part.is_some() {
+        report.samples = share.samples.end - share.samples.start;
+    }
     if let Some(ended) = checkpoint::ended(&overrides.keep, &exr_path, &identity, part) {
         checkpoint::remove_left_over(&exr_path, &identity)?;
         report.status = Status::Skipped;
