@@ -5,7 +5,7 @@ use crate::description::{Animation, BatchEntry};
 use crate::error::{Error, Result};
 use crate::film::output::{self, Inputs};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ffi::OsStr;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
@@ -89,8 +89,10 @@ struct Look {
     told: bool,
     /// By [`Key::BeforeNumber`] and by [`Key::Letters`], of the files of a frame.
     keys: [Vec<u64>; 2],
-    /// Where the contact sheet would lie.
-    sheet: Option<PathBuf>,
+    /// Where the contact sheet would lie if its first picture were that of the batch.
+    sheet: PathBuf,
+    /// Whether its pictures are on the sheet.
+    on_sheet: bool,
 }
 
 impl Look {
@@ -106,8 +108,8 @@ impl Look {
         let told = pictures.frames.is_empty() || probe[0] == probe[1];
         let first = pictures.frames.first().copied();
         let keys = [Key::BeforeNumber, Key::Letters].map(|key| keys_of(key, first));
-        let sheet = pictures.sheet.then(|| sheet_place(&pictures, overrides));
-        Some(Look { told, keys, sheet })
+        let sheet = sheet_place(&pictures, overrides);
+        Some(Look { told, keys, sheet, on_sheet: pictures.sheet })
     }
 }
 
@@ -125,11 +127,13 @@ pub(super) fn check(entries: &[BatchEntry], overrides: &Overrides) -> Result<()>
     let looks: Vec<Option<Look>> = entries.par_iter().map(|entry| Look::at(entry, overrides)).collect();
     let which = usize::from(!looks.iter().flatten().all(|look| look.told));
     let key = [Key::BeforeNumber, Key::Letters][which];
-    // The sheet lies beside the first picture.
-    let sheet = looks.iter().flatten().find_map(|look| look.sheet.as_deref());
+    // The sheet lies beside the first picture that can be begun, on the sheet or not: those before it may fail.
+    let looked = || looks.iter().flatten();
+    let any = looked().any(|look| look.on_sheet);
+    let sheets: BTreeSet<&Path> = looked().filter(|_| any).map(|look| &*look.sheet).collect();
 
     let mut met: HashMap<u64, u32> = HashMap::new();
-    sheet.iter().for_each(|sheet| *met.entry(key.of(sheet)).or_default() += 1);
+    sheets.iter().for_each(|sheet| *met.entry(key.of(sheet)).or_default() += 1);
     for look in looks.iter().flatten() {
         look.keys[which].iter().collect::<HashSet<_>>().into_iter().for_each(|key| *met.entry(*key).or_default() += 1);
     }
@@ -141,16 +145,16 @@ pub(super) fn check(entries: &[BatchEntry], overrides: &Overrides) -> Result<()>
         let name = &entries[*i].name;
         format!("{place}scene \"{name}\": expected each file once, {clash}; give one of them another name")
     };
-    let lines: Vec<String> = clashes(entries, suspects, sheet, overrides).iter().map(line).collect();
+    let lines: Vec<String> = clashes(entries, suspects, &sheets, overrides).iter().map(line).collect();
     if lines.is_empty() { Ok(()) } else { Err(Error::Config(lines.join("\n"))) }
 }
 
 /// For each two of `suspects`, by number, the first file that both would write; twice the same number for one that would
-/// write `sheet`.
+/// write one of the `sheets`.
 fn clashes(
     entries: &[BatchEntry],
     suspects: impl Iterator<Item = usize>,
-    sheet: Option<&Path>,
+    sheets: &BTreeSet<&Path>,
     overrides: &Overrides,
 ) -> BTreeMap<(usize, usize), String> {
     let who = |i: usize, frame: Option<i32>| {
@@ -164,9 +168,10 @@ fn clashes(
         let Some(pictures) = Pictures::of(entry, overrides) else { continue };
         for frame in pictures.frames() {
             for file in pictures.files(&entry.name, frame, overrides) {
-                if sheet == Some(&*file) {
+                if sheets.contains(&*file) {
                     let file = file.with_extension("png");
-                    let clash = format!("{} is the contact sheet of the batch", file.display());
+                    let is = if sheets.len() == 1 { "is" } else { "may be" };
+                    let clash = format!("{} {is} the contact sheet of the batch", file.display());
                     clashes.entry((i, i)).or_insert(clash);
                 }
                 if let Some((other, at)) = first.insert(file.clone(), (i, frame)).filter(|(other, _)| *other != i) {
@@ -232,11 +237,12 @@ pub(super) fn check_report(entries: &[BatchEntry], overrides: &Overrides) -> Res
             spare(report, &file, overrides.portion.is_all(), &names::label(&entry.name, frame))?;
         }
     }
-    // The sheet lies beside the first picture.
-    let sheet = found.clone().find(|(_, pictures)| pictures.sheet);
-    let sheet = sheet.map(|(_, pictures)| sheet_place(pictures, overrides));
+    // The sheet lies beside the first picture that can be begun.
+    let any = found.clone().any(|(_, pictures)| pictures.sheet);
+    let sheets = found.clone().filter(|_| any).map(|(_, pictures)| sheet_place(pictures, overrides));
+    let sheets: BTreeSet<PathBuf> = sheets.collect();
     let several = found.map(|(_, pictures)| pictures.frames().count()).sum::<usize>() > 1;
-    let mut files = sheet.iter().flat_map(|sheet| ["png", "html"].map(|ending| sheet.with_extension(ending)));
+    let mut files = sheets.iter().flat_map(|sheet| ["png", "html"].map(|ending| sheet.with_extension(ending)));
     match several && files.any(|file| is_place_of(report, &file)) {
         true => Err(taken(report, "the contact sheet")),
         false => Ok(()),

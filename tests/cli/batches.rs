@@ -141,7 +141,7 @@ fn what_is_said_of_a_batch_lies_above_the_directories_of_its_scenes() {
 fn two_pictures_of_one_file_are_refused_before_the_work() {
     let entry = |name: &str, set: &str| format!("- {{file: s.yaml, name: {name}, set: {{{set}}}}}\n");
     let bands = "output.spectral: {bands: 3}";
-    let cases: [([String; 2], &[&str], &str); 5] = [
+    let cases: [([String; 2], &[&str], &str); 6] = [
         (
             [entry("x.0001", ""), entry("x", "render.frames: 1-2")],
             &["-o", "out"],
@@ -161,6 +161,12 @@ fn two_pictures_of_one_file_are_refused_before_the_work() {
             [entry("y", ""), entry("contact-sheet", "")],
             &["-o", "out"],
             "out/contact-sheet.png is the contact sheet of the batch",
+        ),
+        // Where `y` cannot be rendered the sheet lies beside the other.
+        (
+            [entry("y", "output.dir: q"), entry("contact-sheet", "output.dir: out")],
+            &[],
+            "out/contact-sheet.png may be the contact sheet of the batch",
         ),
         (
             [entry("a", ""), entry("a1", "")],
