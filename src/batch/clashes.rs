@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ffi::OsStr;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// The pictures of a scene, as far as they decide about names.
 struct Pictures {
@@ -31,7 +31,8 @@ impl Pictures {
     fn seen(animation: &Animation, overrides: &Overrides) -> Option<Pictures> {
         let output = animation.output().ok()?;
         Some(Pictures {
-            directory: output.dir,
+            // `./out` is `out`.
+            directory: output.dir.components().filter(|piece| *piece != Component::CurDir).collect(),
             frames: animation.frames().to_vec(),
             spectral: output.spectral.is_some() && overrides.portion.is_all(),
             sheet: output.contact_sheet && overrides.portion.is_all(),

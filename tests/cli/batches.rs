@@ -141,7 +141,7 @@ fn what_is_said_of_a_batch_lies_above_the_directories_of_its_scenes() {
 fn two_pictures_of_one_file_are_refused_before_the_work() {
     let entry = |name: &str, set: &str| format!("- {{file: s.yaml, name: {name}, set: {{{set}}}}}\n");
     let bands = "output.spectral: {bands: 3}";
-    let cases: [([String; 2], &[&str], &str); 6] = [
+    let cases: [([String; 2], &[&str], &str); 7] = [
         (
             [entry("x.0001", ""), entry("x", "render.frames: 1-2")],
             &["-o", "out"],
@@ -150,6 +150,11 @@ fn two_pictures_of_one_file_are_refused_before_the_work() {
         (
             [entry("x.spectral", ""), entry("x", bands)],
             &["-o", "out"],
+            "out/x.spectral.exr would be that of scene \"x.spectral\" and of scene \"x\"",
+        ),
+        (
+            [entry("x.spectral", "output.dir: out"), entry("x", "output: {dir: ./out, spectral: {bands: 3}}")],
+            &[],
             "out/x.spectral.exr would be that of scene \"x.spectral\" and of scene \"x\"",
         ),
         (
