@@ -187,6 +187,29 @@ fn a_job_for_a_farm_has_a_place_for_each_picture() {
     }
 }
 
+/// Frame 11 of `a` and frame 1 of `a1` are one file or two, and so are the bands of `x` and the picture `x.spectral`.
+#[test]
+fn a_job_for_a_farm_is_held_to_the_names_that_its_tasks_will_write() {
+    let batch = |one: &str, two: &str| {
+        format!(
+            "output: {{spectral: {{bands: 3}}}}\nscenes: [{{file: scene.yaml, name: {one}}}, {{file: scene.yaml, name: {two}}}]\n"
+        )
+    };
+    let place =
+        Place::with(&[("scene.yaml", SCENE), ("a.yaml", &batch("a", "a1")), ("x.yaml", &batch("x", "x.spectral"))]);
+    for verb in [&["farm", "--format", "slurm", "-o", "job", "--pictures"][..], &["render", "--spp", "4", "-o"]] {
+        for (batch, frames, pictures, clash) in [
+            ("a.yaml", &["--frames", "1,11"][..], "{scene}{frame}.exr", "a11.exr would be that of frame 11"),
+            ("x.yaml", &[], "out", "out/x.spectral.exr would be that of scene \"x\""),
+            ("x.yaml", &[], "{scene}/p.exr", ""),
+        ] {
+            let ran = place.run(&[verb, &[pictures, batch, "-q"], frames].concat());
+            let expected = if clash.is_empty() { 0 } else { 2 };
+            assert!(ran.code == expected && ran.err.contains(clash), "{verb:?} {pictures}: {}", ran.err);
+        }
+    }
+}
+
 /// A task takes what it is told with `-o` for a pattern; the merge, that looks for parts, takes it as it stands.
 #[test]
 fn a_job_for_a_farm_whose_names_are_patterns_is_refused() {

@@ -11,7 +11,7 @@ use std::path::Path;
 pub fn run(arguments: &FarmArguments) -> Result<i32> {
     let cut =
         Cut { tiles: arguments.tiles, ranges: arguments.sample_ranges, frames: arguments.frames_per_task as usize };
-    let overrides = arguments.scene.overrides(None)?;
+    let overrides = arguments.scene.overrides(arguments.pictures.clone())?;
     let bundle = std::path::absolute(&arguments.output).map_err(|e| Error::output(&arguments.output, e))?;
     let pictures = match &arguments.pictures {
         Some(pictures) => std::path::absolute(pictures).map_err(|e| Error::output(pictures, e))?,

@@ -101,8 +101,10 @@ impl Job {
         let mut shelf = Shelf::default();
         let mut faults: Vec<Error> = Vec::new();
         let entries = entries(source, overrides)?;
-        // A task knows only its own scenes, and all go to one directory.
-        clashes::check(&entries, &Overrides { output: Some("pictures".into()), ..overrides.clone() })?;
+        // A task knows only its own scenes, and where they go.
+        let place = overrides.output.clone().unwrap_or("pictures".into());
+        checks::output_place("--pictures", Some(&place), entries.len())?;
+        clashes::check(&entries, &Overrides { output: Some(place), ..overrides.clone() })?;
         for entry in entries {
             // A task has this scene alone.
             let alone = Overrides { scenes: vec![entry.name.clone()], ..overrides.clone() };
