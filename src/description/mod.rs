@@ -136,7 +136,8 @@
 //!   earth: {image: {file: earth.jpg, wrap: repeat, filter: bilinear, scale: [1, 1], offset: [0, 0], raw: false}}
 //!                                   # repeat, mirror, clamp, and wrap_v where it differs; bilinear, nearest; all but
 //!                                   # file default; uv: [[a, b, c], [d, e, f]] maps u, v before scale and offset;
-//!                                   # illuminant: {name: D65, scale: 1} multiplies its colours where it shines
+//!                                   # illuminant: {name: D65, scale: 1} multiplies its colours where it shines (~ this,
+//!                                   # of measured radiance none)
 //!   marble: {volume: haze}          # a volume where it is cut by the surface
 //!   rust: {mesh_attribute: {name: vertex_color, scale: 1}}   # numbers of the .ply file of the mesh; ~ scale
 //!   floor: {checkerboard: {a: 0.1, b: {rgb: [0.9, 0.8, 0.7]}, scale: [12, 12]}}   # scale default [1, 1]

@@ -33,8 +33,9 @@ impl<'a> Compiler<'a> {
         let description = self.description;
         match (&description.textures[name], texture) {
             (written::Texture::Image(written), Texture::Image(image)) => {
-                // Light that was measured is as it is.
-                if image.bands.as_ref().is_some_and(|bands| bands.quantity == bands::Quantity::Radiance) {
+                // Light that was measured is as it is, unless something else is written.
+                let measured = image.bands.as_ref().is_some_and(|bands| bands.quantity == bands::Quantity::Radiance);
+                if measured && written.illuminant.is_none() {
                     return;
                 }
                 let carried = self.shelf.carried;
@@ -229,8 +230,13 @@ pub(super) fn light_cdf(powers: &[f64], weights: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spectrum::Spectrum;
+    use crate::description::SceneDescription;
+    use crate::film::{Window, exr};
+    use crate::scene::compile::compile;
+    use crate::scene::texture::TexturePoint;
+    use crate::spectrum::{Lanes, Spectrum};
     use glam::DVec3;
+    use std::collections::BTreeSet;
 
     fn point(intensity: f32) -> Light {
         Light::Point { position: DVec3::ZERO, intensity: Spectrum::Constant(intensity) }
@@ -245,5 +251,34 @@ mod tests {
         assert_eq!(light_cdf(&powers, &[1.0, 0.0]), [1.0, 1.0]);
         assert_eq!(light_cdf(&powers, &[0.0, 2.0]), [0.0, 1.0]);
         assert_eq!(light_cdf(&powers, &[0.0, 0.0]), [0.0, 0.0]);
+    }
+
+    /// Radiance of 3 at 400 and 500 nm, as it was measured and behind an even illuminant of 2.
+    #[test]
+    fn measured_light_has_the_illuminant_that_is_written() {
+        let directory = tempfile::tempdir().unwrap();
+        let sky = exr::ExrImage {
+            frame: [1, 1],
+            window: Window::full(1, 1),
+            channels: ["S0.400nm", "S0.500nm"].map(|name| (name.to_owned(), exr::ChannelData::F32(vec![3.0]))).into(),
+            colour: None,
+            attributes: Vec::new(),
+            data: BTreeSet::new(),
+            compression: exr::Compression::Zip,
+            layout: exr::Layout::Single,
+        };
+        exr::write_exr(&directory.path().join("light.exr"), &sky).unwrap();
+        for (written, expected) in [("", 3.0), (", illuminant: {name: E, scale: 2}", 6.0)] {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\n\
+                 textures: {{t: {{image: {{file: light.exr{written}}}}}}}\n\
+                 shapes: [sphere: {{radius: 1, emission: {{texture: t}}}}]\n"
+            );
+            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
+            let scene = compile(&description, "s").unwrap();
+            let Light::Area { radiance, .. } = &scene.lights[0] else { panic!("a shape that shines") };
+            let found = radiance.eval(&TexturePoint::default(), Lanes::splat(450.0)).to_array()[0];
+            assert!((found - expected).abs() < 1e-6, "{found} for {expected}");
+        }
     }
 }
