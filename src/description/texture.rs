@@ -4,7 +4,8 @@ use serde::Deserialize;
 
 use super::fault::Checker;
 use super::path::At;
-use super::spectrum::{FilePath, Illuminant, Role, SpectrumOrTexture};
+use super::spectrum::{FilePath, Illuminant, Role, Spectrum, SpectrumOrTexture};
+use crate::spectrum::illuminant;
 
 /// A pattern over the surface parameters (u, v).
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -62,7 +63,7 @@ pub struct ImageTexture {
     /// Whether the values are data, not sRGB colour; default false.
     #[serde(default)]
     pub raw: bool,
-    /// What multiplies the colours where the image shines; default D65 of luminance 1.
+    /// What multiplies the colours where the image shines; default D65 of luminance 1, of measured radiance none.
     pub illuminant: Option<Illuminant>,
 }
 
@@ -129,7 +130,15 @@ impl Texture {
                     checker.reflecting_volumes.insert(name);
                 }
             }
-            Texture::Image(_) => {}
+            Texture::Image(image) => {
+                if let Some(lit) = &image.illuminant {
+                    // Also where the picture does not shine, or shines as it was measured.
+                    Spectrum::Illuminant(lit.clone()).check(Role::Emission, at.key("image"), checker);
+                    if let Err(message) = illuminant::illuminant(&lit.name) {
+                        checker.fault(at.key("image").key("illuminant"), message);
+                    }
+                }
+            }
             Texture::MeshAttribute(attribute) => {
                 let name = attribute.name.as_str();
                 let named = name.starts_with("vertex_") || name.starts_with("face_");
@@ -159,6 +168,24 @@ mod tests {
         assert_eq!(
             faults(&format!("{board}{emitting}{reflecting}")),
             "dir/s.yaml:3:25: textures.a.checkerboard.a: expected a number from 0 to 1, found 2"
+        );
+    }
+
+    /// Nothing has to shine by the picture for its illuminant to be told.
+    #[test]
+    fn the_illuminant_of_a_picture_is_a_light() {
+        let told = |illuminant: &str| {
+            faults(&format!("textures:\n  a: {{image: {{file: a.png, illuminant: {illuminant}}}}}\n"))
+        };
+        assert_eq!([told("F11"), told("{name: d50, scale: 3}")], ["none", "none"]);
+        assert_eq!(
+            told("{name: D65, scale: -2}"),
+            "dir/s.yaml:3:59: textures.a.image.illuminant.scale: expected a number of 0 or more, found -2"
+        );
+        assert!(
+            told("{name: D66}").starts_with("dir/s.yaml:3:40: textures.a.image.illuminant: unknown illuminant \"D66\""),
+            "{}",
+            told("{name: D66}")
         );
     }
 }
