@@ -233,15 +233,16 @@ impl Tally {
         Figure { value, error: (apart.max(together) / 3.0 / 24.0).sqrt() }
     }
 
-    /// Red, green and blue over those of the reference.
+    /// Red, green and blue over those of the reference. Of colours outside of Rec. 709 one is below zero: there a ratio above one is of
+    /// less light, so that it is taken as far to the other side of one.
     #[must_use]
     pub fn light(&self, reference: &Reference) -> [Figure; 3] {
         let truth = means(&reference.replicates);
         std::array::from_fn(|c| {
             let [own, truth] = [self.light.as_slice(), &truth].map(|all| all.iter().map(|m| m[c]).collect::<Moments>());
-            let value = own.mean / truth.mean;
-            let relative = |m: &Moments| wide(m) / m.mean;
-            Figure { value, error: value * libm::hypot(relative(&own), relative(&truth)) }
+            let ratio = own.mean / truth.mean;
+            let value = if truth.mean < 0.0 { 2.0 - ratio } else { ratio };
+            Figure { value, error: libm::hypot(wide(&own), ratio * wide(&truth)) / truth.mean.abs() }
         })
     }
 }
@@ -382,5 +383,15 @@ mod tests {
         let reference = Reference::new(&flat(1.0), outcome(1, |_| 1.0, 0.05).replicates);
         let [red, ..] = tally(&reference, 2, 5, |_| 1.5, 0.2).light(&reference);
         assert!((red.value - 1.5).abs() < 4.0 * red.error && red.error < 0.02, "{red:?}");
+    }
+
+    /// -1/2 is half as much again above -1 as -3/2 is below it.
+    #[test]
+    fn more_than_what_is_below_zero_is_above_one() {
+        let reference = Reference::new(&flat(1.0), outcome(1, |_| -1.0, 0.05).replicates);
+        for (own, expected) in [(-0.5, 1.5), (-1.5, 0.5), (0.0, 2.0)] {
+            let [.., blue] = tally(&reference, 2, 5, |_| own, 0.2).light(&reference);
+            assert!((blue.value - expected).abs() < 4.0 * blue.error && (0.0..0.02).contains(&blue.error), "{blue:?}");
+        }
     }
 }
