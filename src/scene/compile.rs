@@ -280,6 +280,7 @@ impl<'a> Compiler<'a> {
             written::Wavelengths::Visible => WavelengthDistribution::visible(),
             written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
         });
+        self.note_few_wavelengths(&wavelengths, &bands);
         let lets_through = |o: &Object| o.body != 0 || self.materials[o.material as usize].lets_through();
         let mut scene = Scene {
             name: name.to_owned(),

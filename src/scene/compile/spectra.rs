@@ -5,7 +5,10 @@ use super::Compiler;
 use super::indices::nanometres;
 use crate::description as written;
 use crate::error::{Error, in_short};
-use crate::spectrum::{BAND_NM, Outside, Spectrum, illuminant, upsample};
+use crate::spectrum::observer::quadrature;
+use crate::spectrum::{
+    BAND_NM, LANES, Outside, SampledWavelengths, Spectrum, WavelengthDistribution, illuminant, upsample,
+};
 
 /// What a spectrum stands for, which decides how a colour becomes one.
 #[derive(Clone, Copy)]
@@ -173,7 +176,35 @@ impl Compiler<'_> {
         }
         all
     }
+
+    /// Tells how far off `bands` are in even light where `whitted` has too few of `wavelengths` for them.
+    pub(super) fn note_few_wavelengths(&mut self, wavelengths: &WavelengthDistribution, bands: &[Band]) {
+        let written::Integrator::Whitted(w) = &self.description.integrator else { return };
+        // The lattice of a pixel: sets that begin evenly spread over the distance from lane to lane.
+        let sets = w.samples();
+        let begin = |set: u32| (f64::from(set) + 0.5) / f64::from(sets) / LANES as f64;
+        let drawn: Vec<SampledWavelengths> = (0..sets).map(|set| wavelengths.sample(begin(set))).collect();
+        let off = |Band { response, .. }: &Band| {
+            let found = drawn.iter().map(|w| f64::from((response.eval(w.nm) * w.inv_pdf).reduce_add())).sum::<f64>();
+            let exact: f64 =
+                quadrature(&response.breakpoints()).iter().map(|(nm, width)| response.at(*nm) * width).sum();
+            (found / (drawn.len() * LANES) as f64 / exact - 1.0).abs()
+        };
+        let worst = bands.iter().map(off).fold(0.0, f64::max);
+        if worst > WORST_BAND {
+            let message = format!(
+                "{} wavelengths a pixel are few for {} bands: even light is off by up to {:.0} % in them; a larger grid has more",
+                drawn.len() * LANES,
+                bands.len(),
+                100.0 * worst
+            );
+            self.note("integrator.whitted", &message);
+        }
+    }
 }
+
+/// How far off a band may be by the wavelengths of `whitted` without a word.
+const WORST_BAND: f64 = 0.1;
 
 /// The smallest f32 that is not below `nm`.
 fn not_below(nm: f64) -> f32 {
@@ -243,6 +274,23 @@ mod tests {
         assert!(sums.iter().all(|sum| (sum - 1.0).abs() < 1e-6), "{sums:?}");
         let last = &bands("bands: 2, from_nm: 820, to_nm: 830")[1].response;
         assert_eq!([825.0, 830.0].map(|nm| last.eval(Lanes::splat(nm)).to_array()[0]), [0.2; 2]);
+    }
+
+    /// Of 31 bands some have none of 32 wavelengths, and are black. Of 512 each has 8, as half of them go by the bands, and 3 by the
+    /// eye: one more or less is less than a tenth. Two broad bands have enough of 32, and a path draws its own.
+    #[test]
+    fn bands_that_have_few_wavelengths_are_told() {
+        let notes = |integrator: &str, bands: u32| {
+            let light = "lights: [constant: {radiance: 1}]";
+            let written = format!("integrator: {integrator}\noutput: {{spectral: {{bands: {bands}}}}}\n{light}");
+            compiled(&written).unwrap().notes
+        };
+        let told = notes("whitted", 31);
+        let parts = ["s.yaml:2", "32 wavelengths a pixel are few for 31 bands", "off by up to 100 %"];
+        assert!(told.len() == 1 && parts.iter().all(|part| told[0].contains(part)), "{told:?}");
+        for (integrator, bands) in [("{whitted: {grid: 8}}", 31), ("whitted", 2), ("path", 31)] {
+            assert_eq!(notes(integrator, bands), [""; 0], "{integrator} {bands}");
+        }
     }
 
     /// What only the spectrum itself finds out is told at the field that says it.
