@@ -80,11 +80,10 @@ impl Projector {
         }
         let distance = offset.length();
         let factor = PI * distance / (local.z * local.z * local.z);
-        let at = TexturePoint { uv, point: from, ..TexturePoint::default() };
         Some(Arriving {
             wi: -offset / distance,
             distance,
-            radiance: self.irradiance.eval(&at, nm) * (self.scale * factor as f32),
+            radiance: self.thrown(uv, nm) * (self.scale * factor as f32),
             density: None,
             target: None,
         })
@@ -98,9 +97,14 @@ impl Projector {
     pub fn emit(&self, u: DVec2, nm: Lanes) -> (Ray, Lanes) {
         let place = (2.0 * u - 1.0) * self.half;
         let direction = (self.axes * place.extend(1.0)).normalize();
-        let at = TexturePoint { uv: u, point: self.position + direction, ..TexturePoint::default() };
         let factor = PI * 4.0 * (self.half.x * self.half.y).abs();
-        (Ray::new(self.position, direction), self.irradiance.eval(&at, nm) * (self.scale * factor as f32))
+        (Ray::new(self.position, direction), self.thrown(u, nm) * (self.scale * factor as f32))
+    }
+
+    /// What the picture is at `uv`. What varies in space has one value, that where the projector stands, so that light met from
+    /// its two ends is the same.
+    fn thrown(&self, uv: DVec2, nm: Lanes) -> Lanes {
+        self.irradiance.eval(&TexturePoint { uv, point: self.position, ..TexturePoint::default() }, nm)
     }
 
     /// The cone that holds its light.
@@ -135,7 +139,10 @@ impl Projector {
 mod tests {
     use super::*;
     use crate::scene::camera::Camera;
+    use crate::scene::texture::Wrap;
+    use crate::scene::volume::{Between, GridVolume, Volume, Voxels};
     use glam::DAffine2;
+    use std::sync::Arc;
 
     /// Black to the left, 1 on the right half.
     fn slide() -> Texture {
@@ -203,5 +210,22 @@ mod tests {
             let mean = (0..64).map(power).sum::<f64>() / 64.0;
             assert!((mean / (3.0 * PI * 0.5 * 8.0) - 1.0).abs() < 1e-6, "{half} {mean}");
         }
+    }
+    /// A volume that is 1 where the projector stands and 5 beyond x = 2: where its light falls, and where its rays lead,
+    /// the picture is 1 all the same. On its axis at distance 2 there arrives π · 3 / 4; its rays carry π · 3 · 8 m².
+    #[test]
+    fn a_volume_has_the_value_at_the_projector() {
+        let (between, wrap) = (Between::Nearest, Wrap::Clamp);
+        let local_from_world = DAffine3::from_scale(DVec3::splat(0.25));
+        let values = Voxels::Grey(vec![1.0, 5.0]);
+        let grid = GridVolume { size: [2, 1, 1], values, local_from_world, between, wrap };
+        let place = Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(9.0, 2.0, 3.0), DVec3::Y).unwrap();
+        let slide = Texture::Volume(Volume::Grid(Arc::new(grid)));
+        let projector = Projector::new(place, DVec2::new(2.0, 1.0), slide, 3.0);
+        let nm = Lanes::splat(550.0);
+        let lit = projector.arriving(DVec3::new(3.0, 2.0, 3.0), nm).unwrap().radiance.to_array()[0];
+        assert!((f64::from(lit) / (3.0 * PI / 4.0) - 1.0).abs() < 1e-6, "{lit}");
+        let sent = projector.emit(DVec2::new(0.7, 0.2), nm).1.to_array()[0];
+        assert!((f64::from(sent) / (3.0 * PI * 8.0) - 1.0).abs() < 1e-6, "{sent}");
     }
 }
