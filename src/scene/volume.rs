@@ -12,7 +12,7 @@ use super::texture::{Wrap, even_shares, mean_luminance, spread};
 use crate::math::Ray;
 use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -130,11 +130,23 @@ impl GridVolume {
         mix(along_y(n.near[2]), along_y(n.far[2]), n.share[2])
     }
 
+    /// f(voxel) at `point`, between voxels as they are mixed.
+    fn value<T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>>(
+        &self,
+        point: DVec3,
+        f: impl Fn(usize) -> T,
+    ) -> T {
+        let place = self.place(point);
+        match self.between {
+            Between::Nearest => f(self.nearest(place)),
+            Between::Trilinear => self.blend(&self.neighbours(place), f),
+        }
+    }
+
     /// One number at `point`: the value, or the luminance of three.
     #[must_use]
     pub fn scalar(&self, point: DVec3) -> f64 {
-        let place = self.place(point);
-        let number = |i: usize| match &self.values {
+        f64::from(self.value(point, |i| match &self.values {
             Voxels::Grey(values) => values[i],
             Voxels::Raw(values) => {
                 let [r, g, b] = values[i];
@@ -143,11 +155,16 @@ impl GridVolume {
             }
             // Never asked for: compiling refuses a coloured grid where a number is wanted.
             Voxels::Coloured(values) => values[i][3],
-        };
-        f64::from(match self.between {
-            Between::Nearest => number(self.nearest(place)),
-            Between::Trilinear => self.blend(&self.neighbours(place), number),
-        })
+        }))
+    }
+
+    /// The three numbers at `point`, equal for a grid of one.
+    #[must_use]
+    pub fn triple(&self, point: DVec3) -> DVec3 {
+        match &self.values {
+            Voxels::Raw(values) => self.value(point, |i| Vec3::from(values[i])).as_dvec3(),
+            _ => DVec3::splat(self.scalar(point)),
+        }
     }
 
     /// The spectrum at `point`.
@@ -242,6 +259,15 @@ impl Volume {
             Volume::Constant { value: Spectrum::Constant(value), .. } => f64::from(*value),
             Volume::Constant { value, .. } => (360..=830).map(|nm| value.at(f64::from(nm))).sum::<f64>() / 471.0,
             Volume::Grid(grid) => grid.scalar(point),
+        }
+    }
+
+    /// The three numbers at `point`.
+    #[must_use]
+    pub fn triple(&self, point: DVec3) -> DVec3 {
+        match self {
+            Volume::Constant { .. } => DVec3::splat(self.scalar(point)),
+            Volume::Grid(grid) => grid.triple(point),
         }
     }
 

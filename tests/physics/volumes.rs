@@ -199,6 +199,24 @@ fn a_volume_on_a_surface_is_cut_by_it() {
     }
 }
 
+/// Normals may be the three numbers of a volume. Those of (0.8, 0.5, 0.9) are (0.6, 0, 0.8): light from straight above, of
+/// irradiance π, comes back from a floor of ½ as ½ · 0.8, whichever way u runs.
+#[test]
+fn normals_of_a_volume_are_its_three_numbers() {
+    for filter in ["nearest", "trilinear"] {
+        let scene = bench_with(
+            &format!(
+                "{CAMERA}volumes: {{v: {{grid: {{file: v.vol, raw: true, filter: {filter}}}}}}}\ntextures: {{t: {{volume: v}}}}\n\
+                 lights: [{{directional: {{direction: [0, -1, 0], irradiance: 3.141592653589793}}}}]\n\
+                 shapes: [{{plane: {{normal: [0, 1, 0], material: {{normal_map: {{normals: {{texture: t}}, shadowing: false, \
+                 material: {{diffuse: {{reflectance: 0.5}}}}}}}}}}}}]\n"
+            ),
+            &[("v.vol", &vol([1, 1, 1], 3, &[0.8, 0.5, 0.9]))],
+        );
+        scene.estimate(&ray(v(0.5, 3.0, 0.5), v(0.5, 0.0, 0.5)), 64).assert_is(0.4, 1e-6);
+    }
+}
+
 /// A lamp over a floor behind a pane, F = ½ as without it, times what the pane lets through on the way of each
 /// direction: less than without. What shadow rays and scattering find together is what a path without shadow rays
 /// finds.

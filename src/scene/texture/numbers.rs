@@ -101,7 +101,7 @@ impl Scalar {
             Scalar::Uniform(x) => DVec3::splat(*x),
             Scalar::Image(image) => image.grid.value(at.uv, |i| Vec3::from(image.texels.at(i))).as_dvec3(),
             Scalar::Checkerboard { a, b, uv } => (if same_cell(uv, at) { a } else { b }).triple(at),
-            Scalar::Volume(volume) => DVec3::splat(volume.scalar(at.point)),
+            Scalar::Volume(volume) => volume.triple(at.point),
             Scalar::Attribute(attribute) => attribute.triple(at),
         }
     }
