@@ -8,7 +8,7 @@ use super::super::transform::{is_mirror, is_similarity};
 use super::object::{Bag, Family};
 use super::parse::ABOUT_ONE;
 use super::sensors::field_of_view;
-use super::spectra::Role;
+use super::spectra::{Role, not_negative};
 use super::{DAYLIGHT, Fields, Import, entry, list, matrix, named, number, numbers, text};
 
 const EMITTERS: [&str; 6] = ["point", "constant", "envmap", "spot", "directional", "projector"];
@@ -170,6 +170,7 @@ fn envmap(bag: &Bag<'_>, fields: &mut Fields) -> Result<&'static str, Fault> {
     let file = bag.required("filename", bag.file("filename"))?;
     fields.add("file", text(bag.place("filename"), file));
     let scale = bag.float("scale")?.unwrap_or(1.0);
+    not_negative(bag, "scale", &[scale])?;
     fields.add("scale", number(bag.place("scale"), scale * DAYLIGHT));
     // How it is sampled.
     bag.boolean("mis_compensation")?;

@@ -65,9 +65,14 @@ impl Import<'_> {
     ) -> Result<Option<Node>, Fault> {
         let place = bag.place(name);
         match value {
-            Value::Float(value) => Ok(Some(grey(place, *value, role))),
-            Value::Integer(value) => Ok(Some(grey(place, *value as f64, role))),
-            Value::Rgb(rgb) => Ok(Some(colour(place, self.coefficients(place, name, *rgb), role))),
+            Value::Float(value) => grey(bag, name, *value, role).map(Some),
+            Value::Integer(value) => grey(bag, name, *value as f64, role).map(Some),
+            Value::Rgb(rgb) => {
+                if role == Role::Emission {
+                    not_negative(bag, name, rgb)?;
+                }
+                Ok(Some(colour(place, self.coefficients(place, name, *rgb), role)))
+            }
             Value::Spectrum(SpectrumValue::Uniform(value)) => Ok(Some(number(place, *value))),
             Value::Spectrum(SpectrumValue::Table(pairs)) => Ok(Some(table(place, pairs))),
             Value::Spectrum(SpectrumValue::File(path)) => Ok(Some(file(place, path))),
@@ -138,6 +143,7 @@ impl Import<'_> {
         let Some(nested) = bag.only(Family::Texture)? else { return Ok(None) };
         let place = bag.object.place;
         let scale = bag.float("scale")?.unwrap_or(1.0);
+        not_negative(&bag, "scale", &[scale])?;
         bag.finish()?;
         let plain = self.declare_texture(nested)?;
         let mut picture = self.textures.iter().find(|entry| entry.key == plain).map(|entry| entry.node.clone());
@@ -180,6 +186,7 @@ impl Import<'_> {
             }
             "d65" => {
                 let scale = bag.float("scale")?.unwrap_or(1.0);
+                not_negative(&bag, "scale", &[scale])?;
                 let colour = match bag.value("color") {
                     None => None,
                     Some(Value::Rgb(rgb)) => Some(*rgb),
@@ -188,6 +195,7 @@ impl Import<'_> {
                         return Err(bag.fault_of("color", format!("expected an rgb colour, found {found}")));
                     }
                 };
+                not_negative(&bag, "color", &colour.unwrap_or_default())?;
                 match colour {
                     None => d65(place, scale),
                     Some(rgb) => self::colour(place, rgb.map(|x| x * scale), Role::Emission),
@@ -343,10 +351,19 @@ fn floats(bag: &Bag<'_>, name: &'static str) -> Result<Vec<f64>, Fault> {
     parse::tokens(text).map(|token| parse::number(token, bag.place(name))).collect()
 }
 
-fn grey(place: Place, value: f64, role: Role) -> Node {
+fn grey(bag: &Bag<'_>, name: &str, value: f64, role: Role) -> Result<Node, Fault> {
+    let place = bag.place(name);
     match role {
-        Role::Emission => d65(place, value),
-        Role::Reflectance | Role::Coefficient => number(place, value),
+        Role::Emission => not_negative(bag, name, &[value]).map(|()| d65(place, value)),
+        Role::Reflectance | Role::Coefficient => Ok(number(place, value)),
+    }
+}
+
+/// That numbers which are multiplied before the grammar has them are 0 or more: a fault there would name others than the file.
+pub(crate) fn not_negative(bag: &Bag<'_>, name: &str, numbers: &[f64]) -> Result<(), Fault> {
+    match numbers.iter().find(|x| **x < 0.0) {
+        Some(x) => Err(bag.fault_of(name, format!("expected a number of 0 or more, found {x}"))),
+        None => Ok(()),
     }
 }
 
@@ -414,6 +431,22 @@ mod tests {
         assert_eq!(radiance(&srgb("0.5")), Spectrum::Number(0.5));
         let above = fault(&format!("<emitter type=\"constant\">{}</emitter>", srgb("2, 1, 1")), &[]);
         assert!(above.contains("texture \"srgb\": color: red channel: expected"), "{above}");
+    }
+
+    /// They are multiplied by D65's luminance on Mitsuba's film before the grammar has them.
+    #[test]
+    fn negative_lights_are_told_as_they_are_written() {
+        let sky = |radiance: &str| fault(&format!("<emitter type=\"constant\">{radiance}</emitter>"), &[]);
+        let told = [
+            sky("<float name=\"radiance\" value=\"-1\"/>"),
+            sky("<rgb name=\"radiance\" value=\"2, -1, 3\"/>"),
+            sky("<spectrum type=\"d65\" name=\"radiance\"><float name=\"scale\" value=\"-1\"/></spectrum>"),
+            sky("<spectrum type=\"d65\" name=\"radiance\"><rgb name=\"color\" value=\"-1, 0, 0\"/></spectrum>"),
+            fault("<emitter type=\"envmap\"><string name=\"filename\" value=\"a.exr\"/><float name=\"scale\" value=\"-1\"/></emitter>", &[]),
+        ];
+        for told in told {
+            assert!(told.ends_with("expected a number of 0 or more, found -1"), "{told}");
+        }
     }
 
     /// Bitterli's living-room-2 has a metal of such an index.
