@@ -196,9 +196,14 @@ impl Import<'_> {
                     }
                 };
                 not_negative(&bag, "color", &colour.unwrap_or_default())?;
-                match colour {
-                    None => d65(place, scale),
-                    Some(rgb) => self::colour(place, rgb.map(|x| x * scale), Role::Emission),
+                match (colour.map(|rgb| rgb.map(|x| x * scale)), role) {
+                    (None, _) => d65(place, scale),
+                    (Some(rgb), Role::Emission) => self::colour(place, rgb, role),
+                    // Colours of a surface and of the squares of a checkerboard have no D65 in them.
+                    (Some(rgb), Role::Reflectance | Role::Coefficient) => match upsample::emission(rgb) {
+                        Ok(curve) => sampled(place, BAND_NM, &curve.scaled(DAYLIGHT)),
+                        Err(message) => return Err(bag.fault_of("color", message)),
+                    },
                 }
             }
             "srgb" => {
@@ -407,9 +412,9 @@ fn table(place: Place, pairs: &[[f64; 2]]) -> Node {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::{Light, Spectrum};
+    use super::super::super::{Light, Spectrum, SpectrumOrTexture, Texture};
     use super::super::tests::{fault, good};
-    use crate::spectrum::{illuminant, upsample};
+    use crate::spectrum::{ColourSpace, Outside, Spectrum as Curve, colour, illuminant, observer, upsample};
 
     /// The radiance of a constant emitter.
     fn radiance(spectrum: &str) -> Spectrum {
@@ -433,6 +438,37 @@ mod tests {
         assert!(above.contains("texture \"srgb\": color: red channel: expected"), "{above}");
     }
 
+    /// D65 of a colour is the light of that colour in a square of a checkerboard, too: Mitsuba 3.9.1 shows a lamp of the two of
+    /// these as their mean. Surfaces that reflect it have its curve, whose largest value at a scale of 2 is above 1.
+    #[test]
+    fn daylight_of_a_colour_has_d65_in_it_wherever_it_stands() {
+        let lit = |name: &str, rgb: &str, scale: f64| {
+            format!(
+                "<spectrum type=\"d65\" name=\"{name}\"><float name=\"scale\" value=\"{scale}\"/>\
+                 <rgb name=\"color\" value=\"{rgb}\"/></spectrum>"
+            )
+        };
+        let board = lit("color0", "0.9, 0.2, 0.4", 1.0) + &lit("color1", "2, 2, 2", 1.0);
+        let scene = good(&format!("<texture type=\"checkerboard\" id=\"board\">{board}</texture>"));
+        let Texture::Checkerboard(board) = &scene.textures["board"] else { panic!("a checkerboard") };
+        for (square, rgb) in [(&board.a, [0.9, 0.2, 0.4]), (&board.b, [2.0; 3])] {
+            let SpectrumOrTexture::Spectrum(Spectrum::Table(table)) = square else { panic!("a table: {square:?}") };
+            let pairs: Vec<(f64, f64)> = table.iter().map(|[nm, x]| (*nm, *x)).collect();
+            let xyz = observer::tristimulus(&Curve::from_samples(&pairs, Outside::Zero).unwrap());
+            let shown = colour::times(ColourSpace::Rec709.matrix_from_xyz(), xyz).map(|x| x / super::DAYLIGHT);
+            // Straight lines of 1 nm leave the curve by less.
+            assert!((0..3).all(|c| (shown[c] - rgb[c]).abs() < 1e-3), "{shown:?}, expected {rgb:?}");
+        }
+        let white =
+            |scale| format!("<bsdf type=\"diffuse\" id=\"m\">{}</bsdf>", lit("reflectance", "0.5, 0.5, 0.5", scale));
+        assert_eq!(fault(&white(1.0), &[]), "none");
+        assert!(
+            fault(&white(2.0), &[]).contains("expected a number from 0 to 1, found 1."),
+            "{}",
+            fault(&white(2.0), &[])
+        );
+    }
+
     /// They are multiplied by D65's luminance on Mitsuba's film before the grammar has them.
     #[test]
     fn negative_lights_are_told_as_they_are_written() {
@@ -442,7 +478,10 @@ mod tests {
             sky("<rgb name=\"radiance\" value=\"2, -1, 3\"/>"),
             sky("<spectrum type=\"d65\" name=\"radiance\"><float name=\"scale\" value=\"-1\"/></spectrum>"),
             sky("<spectrum type=\"d65\" name=\"radiance\"><rgb name=\"color\" value=\"-1, 0, 0\"/></spectrum>"),
-            fault("<emitter type=\"envmap\"><string name=\"filename\" value=\"a.exr\"/><float name=\"scale\" value=\"-1\"/></emitter>", &[]),
+            fault(
+                "<emitter type=\"envmap\"><string name=\"filename\" value=\"a.exr\"/><float name=\"scale\" value=\"-1\"/></emitter>",
+                &[],
+            ),
         ];
         for told in told {
             assert!(told.ends_with("expected a number of 0 or more, found -1"), "{told}");
