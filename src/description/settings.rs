@@ -62,7 +62,7 @@ pub struct PathIntegrator {
     #[serde(default = "one", deserialize_with = "whole::<_, 0, MAX_SPLIT>")]
     pub scatter_samples: u32,
     /// Whether going straight through a thin pane or the boundary of a medium ends a segment for `max_depth`, so that lamps behind
-    /// it are seen in spite of `hide_emitters`; default false.
+    /// it are seen in spite of `hide_emitters`, and light from infinity where the `first_hit` is coverage; default false.
     #[serde(default)]
     pub count_crossings: bool,
     /// Whether mirrors, glass and the coats of plastics throw the light of point, spot, projector and directional lights, too, which

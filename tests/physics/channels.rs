@@ -596,6 +596,24 @@ fn hidden_lights_shine_and_are_not_seen() {
     assert!((mean - 1.0 - 3.0 * solid_angle).abs() < 4.0 * error && error < 0.01 * mean, "{mean} ± {error}");
 }
 
+/// A boundary before a hidden sky: where the first hit covers, there is alpha, and so is the light that comes through; where it covers
+/// nothing, nothing is seen. Beside it there is neither.
+#[test]
+fn a_hidden_sky_is_seen_where_what_is_before_it_covers() {
+    for (coverage, x, expected) in
+        [("first_hit", 0, (1.0, 1.0)), ("scattering", 0, (0.0, 0.0)), ("first_hit", 9, (0.0, 0.0))]
+    {
+        let scene = format!(
+            "{PARALLEL}image: {{width: 1, height: 1}}\nlights: [{{constant: {{radiance: 1}}}}]\n\
+             integrator: {{path: {{max_depth: 2, count_crossings: true, hide_emitters: true, coverage: {coverage}}}}}\nshapes:\n\
+             - rectangle: {{corner: [{}, -2, 0], edge_u: [4, 0, 0], edge_v: [0, 4, 0], material: {{boundary: {{}}}}}}\n",
+            x - 2
+        );
+        let sample = bench_with(&scene, &[]).sample([0, 0], 0);
+        assert_eq!((sample.radiance.to_array()[0], sample.alpha), expected, "{coverage} {x}");
+    }
+}
+
 /// Between clipping planes at 4 and 6 m from a camera at 5 m there is the unit sphere's middle part: the near cap is
 /// open, and what the camera sees is the inside.
 #[test]

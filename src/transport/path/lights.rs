@@ -9,6 +9,7 @@ use crate::scene::choice::{Asked, Asker};
 use crate::scene::environment::Drawn;
 use crate::scene::light::free;
 use crate::spectrum::Lanes;
+use crate::transport::plan::Coverage;
 use crate::transport::shadow::Shadow;
 use crate::transport::ways::{First, Found};
 use arrayvec::ArrayVec;
@@ -75,7 +76,11 @@ impl Tracer<'_> {
 
     /// Light from infinity along a ray that met nothing.
     pub(super) fn add_background<const CHROMATIC: bool>(&self, path: &mut Path) {
-        if !self.meets_lights(path) || self.settings.hide_emitters && path.vertices == 0 {
+        // What the path went straight through covers what is behind, and shows it, where the first hit does.
+        let covered =
+            self.settings.coverage == Coverage::FirstHit && self.settings.count_crossings && path.crossings > 0;
+        let is_seen = path.vertices == 0 && !covered;
+        if !self.meets_lights(path) || self.settings.hide_emitters && is_seen {
             return;
         }
         for &i in &self.scene.backgrounds {
