@@ -7,8 +7,10 @@ mod words;
 
 use abbe::batch::{self, Overrides};
 use abbe::description;
+use abbe::math::Ray;
 use abbe::scene::{mesh, sdf};
 use common::Bench;
+use glam::DVec3;
 use std::path::{Path, PathBuf};
 
 /// A small picture of few samples, the same for both.
@@ -204,6 +206,27 @@ lights:
     assert_eq!(exported.losses, []);
     assert!(!exported.xml.contains("instead"), "{}", exported.xml);
     same_picture(&yaml);
+}
+
+/// Where u begins is seen by layers alone where nothing has a picture on it; the seam comes back with the world's transform.
+#[test]
+fn the_seam_of_a_cylinder_comes_back() {
+    let tube = "cylinder: {base: [0, 0, 0], top: [0.3, 1, 0.4], radius: 0.4, caps: none";
+    for more in
+        ["", ", seam: [0, 0, 1]", ", seam: [1, 0, 2], transform: [{scale: 1.5}, {rotate: {axis: [1, 2, 3], deg: 40}}]"]
+    {
+        let directory = tempfile::tempdir().unwrap();
+        let yaml = directory.path().join("s.yaml");
+        let camera = "camera: {origin: [0, 0.5, 5], target: [0, 0.5, 0]}";
+        common::write(&yaml, format!("{camera}\nintegrator: none\nshapes: [{{{tube}{more}}}}}]\n").as_bytes());
+        let ray = Ray::new(DVec3::new(0.1, 0.4, 5.0), DVec3::NEG_Z);
+        let [ours, theirs] = [false, true].map(|again| {
+            let (prepared, _) = prepared(&yaml, directory.path(), again);
+            let hit = prepared.scene.closest(&ray, f64::INFINITY).unwrap();
+            prepared.scene.surface(&ray, &hit).uv
+        });
+        assert!((ours - theirs).length() < 1e-12, "{more}: {ours} {theirs}");
+    }
 }
 
 /// Each loss names its field, and its reason names what Mitsuba lacks.

@@ -167,6 +167,10 @@ impl Export<'_> {
             Geometry::Cube(cube) => Some(cube.layout),
             _ => None,
         };
+        let seam = match &shape.geometry {
+            Geometry::Cylinder(cylinder) => cylinder.seam.map(|seam| world.transform_vector3(seam.into())),
+            _ => None,
+        };
         match (why, layout) {
             (Some(_), _) => self.end(),
             (None, _) if reads_otherwise => self.end(),
@@ -174,7 +178,12 @@ impl Export<'_> {
             (None, Some(Layout::YUp)) => {
                 self.xml.instruction(&format!("set {field}.layout: y_up"));
             }
-            (None, _) => {}
+            (None, _) => {
+                // Nor does a picture follow it, but layers of coordinates do. It is read back where the world has it.
+                if let Some(seam) = seam {
+                    self.xml.instruction(&format!("set {field}.seam: [{}]", numbers(&seam.to_array())));
+                }
+            }
         }
     }
 
