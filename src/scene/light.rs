@@ -154,17 +154,19 @@ pub fn chromaticity(lights: &[Light], objects: &[Object], radius: f64) -> Option
 }
 
 impl Light {
-    /// Whether it sends out nothing: it costs nothing then. Of pictures that is not asked.
+    /// Whether it sends out nothing: it costs nothing then.
     #[must_use]
     pub fn is_dark(&self) -> bool {
         match self {
-            Light::Area { radiance: Texture::Uniform(light), .. }
-            | Light::AlongNormal { exitance: Texture::Uniform(light), .. }
-            | Light::Point { intensity: light, .. }
-            | Light::Spot { intensity: light, .. }
+            Light::Area { radiance: light, .. } | Light::AlongNormal { exitance: light, .. } => light.is_black(),
+            Light::Spot { intensity, slide, .. } => {
+                intensity.is_black() || slide.as_ref().is_some_and(|slide| slide.texture.is_black())
+            }
+            Light::Point { intensity: light, .. }
             | Light::Directional { irradiance: light, .. }
             | Light::Constant { radiance: light } => light.is_black(),
-            Light::Area { .. } | Light::AlongNormal { .. } | Light::Environment(_) | Light::Projector(_) => false,
+            Light::Environment(map) => map.mean_luminance() == 0.0,
+            Light::Projector(projector) => projector.is_dark(),
         }
     }
 

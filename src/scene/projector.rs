@@ -116,6 +116,12 @@ impl Projector {
         Cone { apex: self.position, axis: self.axes.z_axis, half_angle: libm::atan(half.length()), solid_angle }
     }
 
+    /// Whether it sends out nothing.
+    #[must_use]
+    pub fn is_dark(&self) -> bool {
+        self.scale == 0.0 || self.irradiance.is_black()
+    }
+
     /// Luminous power, film units times m²: that which falls on the screen.
     #[must_use]
     pub fn power(&self) -> f64 {

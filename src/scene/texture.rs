@@ -353,6 +353,18 @@ impl Texture {
         }
     }
 
+    /// Whether it is nothing everywhere. Of pictures that is not asked: a black texel, too, has the 2.5e-37 by which sigmoids miss 0.
+    #[must_use]
+    pub fn is_black(&self) -> bool {
+        match self {
+            Texture::Uniform(spectrum) => spectrum.is_black(),
+            Texture::Checkerboard { a, b, .. } => a.is_black() && b.is_black(),
+            // The brightest voxel or value counts by itself there.
+            Texture::Volume(_) | Texture::Attribute(_) => self.mean_luminance() == 0.0,
+            Texture::Image(_) => false,
+        }
+    }
+
     /// Some of its spectra and their shares of it, so that the mean of all is told: texels of a picture, voxels or values of a file.
     #[must_use]
     pub fn shares(&self) -> Vec<(f64, Spectrum)> {

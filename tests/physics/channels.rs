@@ -303,6 +303,7 @@ fn light_goes_straight_through_256_surfaces_at_the_most() {
 /// Lamps without power change no pixel, but what is said of lamps holds of them: `hide_emitters` hides one, and a sky covers.
 #[test]
 fn lights_without_power_are_left_out() {
+    let day = [&b"PF\n2 1\n-1\n"[..], &1f32.to_le_bytes().repeat(6)].concat();
     let bench = |integrator: &str, emission: &str, dark: &str| {
         let scene = format!(
             "{PARALLEL}image: {{width: 1, height: 1}}\nintegrator: {integrator}\nshapes:\n\
@@ -310,11 +311,16 @@ fn lights_without_power_are_left_out() {
              - sphere: {{name: lamp, center: [3, 0, 3], radius: 1, material: {{diffuse: {{}}}}{emission}}}\n\
              lights:\n- point: {{name: bulb, position: [0, 3, 3], intensity: 3}}\n{dark}"
         );
-        bench_with(&scene, &[])
+        bench_with(&scene, &[("day.pfm", &day)])
     };
     let dark = "- constant: {radiance: {table: [[360, 0], [830, 0]]}}\n- directional: {direction: [0, 0, -1], irradiance: 0}\n\
                 - point: {name: out, position: [1, 2, 3], intensity: 0}\n\
                 - spot: {position: [1, 2, 3], target: [0, 0, 0], cutoff_deg: 30, intensity: 0}\n\
+                - spot: {position: [1, 2, 3], target: [0, 0, 0], texture: black, intensity: 1}\n\
+                - projector: {name: slide, origin: [1, 2, 3], target: [0, 0, 0], fov_deg: 30, scale: 0}\n\
+                - projector: {name: board, origin: [1, 2, 3], target: [0, 0, 0], fov_deg: 30, irradiance: {texture: black}}\n\
+                - environment: {name: night, file: day.pfm, scale: 0}\n\
+                textures: {black: {checkerboard: {a: 0, b: 0}}}\n\
                 light_groups: {a: [out], b: [bulb]}\n";
     for integrator in ["path", "{whitted: {}}", "light_tracer"] {
         let [with, without] =
@@ -324,7 +330,8 @@ fn lights_without_power_are_left_out() {
             assert_eq!((a.radiance, a.alpha), (b.radiance, b.alpha), "{integrator}");
         }
         assert_eq!((with.prepared.scene.lights.len(), &with.prepared.scene.light_groups.of[..]), (1, &[2][..]));
-        assert_eq!(with.prepared.scene.dark, ["lamp", "constant1", "directional2", "out", "spot4"].map(str::to_owned));
+        let dark = ["lamp", "constant1", "directional2", "out", "spot4", "spot5", "slide", "board", "night"];
+        assert_eq!(with.prepared.scene.dark, dark.map(str::to_owned));
     }
     let front =
         ", emission: 0}\n- rectangle: {corner: [-9, -9, 2], edge_u: [18, 0, 0], edge_v: [0, 18, 0], emission: 0";
