@@ -293,8 +293,12 @@ impl EffectPlan {
         effect(
             "lights without extent",
             census.delta_lights > 0,
-            count(census.delta_lights, "point, spot or directional light", "point, spot or directional lights"),
-            "no point, spot or directional light",
+            count(
+                census.delta_lights,
+                "point, spot, projector or directional light",
+                "point, spot, projector or directional lights",
+            ),
+            "no point, spot, projector or directional light",
         );
         effect(
             "environment",
