@@ -43,10 +43,12 @@ fn frame_of(text: &str) -> Option<f64> {
     text.parse().ok().filter(|frame: &f64| number && frame.is_finite())
 }
 
-/// Whether a node is keyed, or meant to be.
+/// Whether a node is keyed, or meant to be. A number without value is no frame, but most likely behind a decimal comma: in
+/// `{radius: 0,5}` it is a field that nobody knows.
 pub(crate) fn is_keyed(node: &Node) -> bool {
+    let is_frame = |entry: &Entry| frame_of(&entry.key).is_some() && !matches!(entry.node.value, Value::Null);
     match &node.value {
-        Value::Map(entries) => entries.iter().any(|entry| entry.key == KEYS || frame_of(&entry.key).is_some()),
+        Value::Map(entries) => entries.iter().any(|entry| entry.key == KEYS || is_frame(entry)),
         _ => false,
     }
 }
@@ -592,6 +594,19 @@ mod tests {
             scene(&[("s.yaml", &text)]).unwrap_err(),
             "DIR/s.yaml:3:20: shapes[0].sphere.radius: expected render.frames or --frames, since this changes over frames, found none"
         );
+    }
+
+    /// The comma of `0,5` begins a field of its own, at the 5.
+    #[test]
+    fn a_decimal_comma_is_a_field_too_many_and_no_frame() {
+        for frames in ["", "render: {frames: 1}"] {
+            let text = format!("{CAMERA}{frames}\nshapes:\n- sphere: {{radius: 0,5}}\n");
+            let told = scene(&[("s.yaml", &text)]).unwrap_err();
+            assert!(
+                told.starts_with("DIR/s.yaml:4:22: shapes[0].sphere.5: expected one of center, radius, "),
+                "{told}"
+            );
+        }
     }
 
     #[test]
