@@ -281,12 +281,19 @@ impl<'de> Deserializer<'de> for De<'_> {
             }
             Value::Text(text) => Err(Fault::unknown(self.node.place, text, kinds_in_words(variants))),
             Value::Map(entries) if entries.iter().any(|entry| named(&entry.key).is_some()) => {
-                // The usual slip: fields that stand beside their kind, not under it.
                 let keys = enumerate(entries.iter().map(|entry| entry.key.as_str()));
-                let kind = entries.iter().find_map(|entry| named(&entry.key)).unwrap_or_default();
-                let message =
-                    format!("expected one key, the kind, found {keys}; fields of {kind} are indented under it");
-                Err(Fault::at_place(self.node.place, message))
+                let mut message = format!("expected one key, the kind, found {keys}");
+                let kinds: Vec<&Entry> = entries.iter().filter(|entry| named(&entry.key).is_some()).collect();
+                // The usual slip: fields that stand beside their kind, not under it. Another kind is no field, and a kind that
+                // holds a list or a text has none.
+                if let [kind] = kinds[..]
+                    && matches!(kind.node.value, Value::Null | Value::Map(_))
+                {
+                    message += &format!("; fields of {} are indented under it", kind.key);
+                }
+                // What is too many, perhaps by a setting.
+                let more = entries.iter().find(|entry| entry.key != kinds[0].key);
+                Err(Fault::at_place(more.map_or(self.node.place, |entry| entry.key_place), message))
             }
             _ => Err(Fault::none_of(self.node, kinds_in_words(variants))),
         }
@@ -592,8 +599,32 @@ mod tests {
     fn fields_beside_their_kind_are_pointed_out() {
         assert_eq!(
             faults("shapes:\n- sphere: {radius: 1}\n  material: red"),
-            "dir/s.yaml:3:3: shapes[0]: expected one key, the kind, found sphere, material; \
+            "dir/s.yaml:4:3: shapes[0]: expected one key, the kind, found sphere, material; \
              fields of sphere are indented under it"
+        );
+        // No fields: another kind, and what stands beside a list or a text.
+        let sphere = |field: &str| faults(&format!("shapes:\n- sphere: {{radius: 1, {field}}}"));
+        assert_eq!(
+            sphere("transform: [{translate: [0, 1, 0], scale: 2}]"),
+            "dir/s.yaml:3:58: shapes[0].sphere.transform[0]: expected one key, the kind, found translate, scale"
+        );
+        assert_eq!(
+            sphere("emission: {rgb: [1, 1, 1], by: 5}"),
+            "dir/s.yaml:3:50: shapes[0].sphere.emission: expected one key, the kind, found rgb, by"
+        );
+    }
+
+    /// The file has one kind, to which `--set` adds.
+    #[test]
+    fn a_field_that_a_setting_puts_beside_a_kind_is_told_at_the_setting() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("s.yaml");
+        std::fs::write(&file, format!("{}shapes:\n- sphere: {{radius: 1}}\n", super::super::testing::CAMERA)).unwrap();
+        let set = [("shapes[0].radius".to_owned(), "2".to_owned())];
+        assert_eq!(
+            load(&file).unwrap().entries()[0].scene(&set).unwrap_err().to_string(),
+            "--set shapes[0].radius=2: shapes[0]: expected one key, the kind, found sphere, radius; fields of sphere are \
+             indented under it"
         );
     }
 
