@@ -449,6 +449,11 @@ impl Geometry {
                 );
                 if let Some(seam) = cylinder.seam {
                     checker.direction(at.key("seam"), seam);
+                    let along = [0, 1, 2].map(|i| cylinder.top[i] - cylinder.base[i]);
+                    if seam != [0.0; 3] && apart && parallel(seam, along) {
+                        let expected = "a direction that is not along the axis";
+                        checker.require(false, at.key("seam"), expected, "one along it");
+                    }
                 }
             }
             Geometry::Cone(cone) => {
@@ -496,6 +501,10 @@ mod tests {
             (
                 "cylinder: {base: [0, 1, 0], top: [0, 1, 0], radius: 1}",
                 "3:36: shapes[0].cylinder.top: expected a point other than the base, found [0.0, 1.0, 0.0]",
+            ),
+            (
+                "cylinder: {base: [0, 0, 0], top: [0, 1, 0], radius: 1, seam: [0, -2, 0]}",
+                "3:64: shapes[0].cylinder.seam: expected a direction that is not along the axis, found one along it",
             ),
             (
                 "cone: {base: [0, 0, 0], apex: [0, 0, 0], radius: 1}",
