@@ -8,7 +8,7 @@ use std::fmt;
 use serde::de::{Expected, Unexpected};
 
 use super::material::Material;
-use super::node::{Node, Place, Sources, did_you_mean, enumerate, quote};
+use super::node::{Node, Place, Sources, Value, did_you_mean, enumerate, quote};
 use super::path::{self, At, Segment};
 use crate::error::{Error, in_short, one_line};
 
@@ -267,6 +267,11 @@ impl<'a> Checker<'a> {
     /// What is written in the field `at`, in words.
     pub(crate) fn written(&self, at: At<'_>) -> String {
         self.root.find(&at.segments()).map_or_else(|| "nothing".to_owned(), Node::found)
+    }
+
+    /// Whether the field `at` is written; one without value is not.
+    pub(crate) fn is_written(&self, at: At<'_>) -> bool {
+        self.root.find(&at.segments()).is_some_and(|node| !matches!(node.value, Value::Null))
     }
 
     /// Faults so far.

@@ -343,18 +343,14 @@ impl Shape {
         let at = at.key(self.geometry.kind());
         self.geometry.check(at, checker);
         if let Geometry::Instance(_) = self.geometry {
-            let written = [
-                ("material", self.material != MaterialRef::default()),
-                ("emission", self.emission.is_some()),
-                ("inside", self.inside.is_some()),
-                ("outside", self.outside.is_some()),
-                ("flip_normals", self.flip_normals),
-            ];
-            for (key, _) in written.into_iter().filter(|(_, is_written)| *is_written) {
-                checker.fault(
-                    at.key(key),
-                    "expected no such field of an instance: the shapes of its group have their own",
-                );
+            // A material that is the default, too, would be one that nobody sees.
+            for key in ["material", "emission", "inside", "outside", "flip_normals"] {
+                if checker.is_written(at.key(key)) {
+                    checker.fault(
+                        at.key(key),
+                        "expected no such field of an instance: the shapes of its group have their own",
+                    );
+                }
             }
         }
         self.material.check(at.key("material"), checker);

@@ -188,6 +188,11 @@ fn faults_of_groups_are_told() {
             "groups: {tree: [{sphere: {radius: 1}}]}\nshapes:\n- instance: {group: tree, emission: 3}\n",
             "s.yaml:4:37: shapes[0].instance.emission: expected no such field of an instance: the shapes of its group have their own",
         ),
+        // Also where it says what a shape has without it.
+        (
+            "groups: {tree: [{sphere: {radius: 1}}]}\nshapes:\n- instance: {group: tree, material: {diffuse: {}}, inside: }\n",
+            "s.yaml:4:37: shapes[0].instance.material: expected no such field of an instance: the shapes of its group have their own",
+        ),
     ];
     for (text, expected) in cases {
         assert_eq!(fault(text), expected);
