@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::input;
 
 /// The maps that an included file may hold.
-const SHARED: [&str; 4] = ["materials", "textures", "volumes", "media"];
+pub(super) const SHARED: [&str; 4] = ["materials", "textures", "volumes", "media"];
 const INCLUDE: &str = "include";
 
 /// Reads a file to a tree.

@@ -16,7 +16,7 @@
 //!
 //! ```yaml
 //! # scene
-//! include: []                       # files that hold materials, textures, media; each is read once
+//! include: []                       # files that hold materials, textures, volumes, media; each is read once
 //! camera:
 //!   origin: [0, 3.2, 12]
 //!   target: [0, 1.1, 0]
@@ -182,7 +182,8 @@
 //!                                                # diffuse_mean: integral (~), nodes: how a rough coat's diffuse
 //!                                                # reflectance from inside is taken, nodes as in Mitsuba 3
 //!   paint:
-//!     principled:                                # Burley's, as in Mitsuba 3; numbers are 0 to 1, or {texture: name}
+//!     principled:                                # Burley's, as in Mitsuba 3; numbers are 0 to 1, or {texture: name},
+//!                                                # which specular, eta and sampling do not take
 //!       base_color: {rgb: [0.8, 0.3, 0.1]}       # spectrum or texture; ~ 0.5
 //!       roughness: 0.4                           # ~ 0.5; α is its square
 //!       anisotropic: 0                           # ~ highlights longer along ∂p/∂u
@@ -190,10 +191,10 @@
 //!       spec_trans: 0                            # ~ light enters; the back is then another side
 //!       specular: 0.5                            # ~ reflectance 0.08 specular; or eta: 1.5, the index
 //!       spec_tint: 0                             # ~ reflection takes the hue of the base
-//!       sheen: 0.2                               # ~ 0 to 10
+//!       sheen: 0.2                               # ~ 0; up to 10
 //!       sheen_tint: 0                            # ~
 //!       flatness: 0                              # ~ diffusion looks like subsurface scattering
-//!       clearcoat: 0.5                           # ~ 0 to 10
+//!       clearcoat: 0.5                           # ~ 0; up to 10
 //!       clearcoat_gloss: 0                       # ~
 //!       luminance: colour                        # ~ what the base is divided by for a tint: its luminance; or
 //!                                                # mitsuba, as its spectral modes estimate it (0.38 of white)
@@ -552,6 +553,13 @@ mod tests {
         assert_eq!(scene.output, bare.output);
         assert_eq!(scene.integrator, bare.integrator);
         assert_eq!(Image { crop: None, ..scene.image }, bare.image);
+    }
+
+    #[test]
+    fn the_page_names_what_an_included_file_may_hold() {
+        let page = reference("scene");
+        let include = page.lines().find(|line| line.starts_with("include: ")).unwrap();
+        assert!(edit::SHARED.iter().all(|kind| include.contains(kind)), "{include}");
     }
 
     #[test]
