@@ -6,7 +6,7 @@ use super::plain::Plain;
 use super::span::{Exit, Faces, Span};
 use super::{
     AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose, largest,
-    turns,
+    turns, turns_rate,
 };
 use crate::math::warp::concentric_disk;
 use crate::math::{Frame, Ray};
@@ -168,6 +168,19 @@ impl Cone {
     /// The point on that generator a fraction `f` of the way from apex to base.
     fn side_point(&self, outward: DVec3, f: f64) -> DVec3 {
         self.apex + (outward * self.radius - self.frame.n * self.height) * f
+    }
+
+    /// As [`super::Shape::uv_rates`].
+    pub(super) fn uv_rates(&self, point: DVec3, face: u8, direction: DVec3) -> DVec2 {
+        let d = self.frame.to_local(direction);
+        if face != WALL {
+            return DVec2::new(d.x, -d.y * self.turn) * (0.5 / self.radius);
+        }
+        let local = self.frame.to_local(point - self.apex);
+        let outward = (local.x * d.x + local.y * d.y) / (local.x * local.x + local.y * local.y).sqrt();
+        // Of the foot of the perpendicular on the generator, which v counts from the base.
+        let down = (outward * self.radius - d.z * self.height) / (self.slant * self.slant);
+        DVec2::new(self.turn * turns_rate(local.x, local.y, d.x, d.y), -down)
     }
 
     pub(super) fn surface(&self, point: DVec3, face: u8, detail: Detail) -> SurfacePoint {

@@ -202,6 +202,13 @@ impl Cube {
         (t < t_max).then(|| ShapeHit { t, face: Cube::face(exit, last, d) ^ 1 })
     }
 
+    /// As [`super::Shape::uv_rates`].
+    pub(super) fn uv_rates(&self, face: u8, direction: DVec3) -> DVec2 {
+        let d = self.coordinates(direction).to_array();
+        let Picture { right, up } = &self.pictures[usize::from(face) % 6];
+        0.5 * DVec2::new(right.1 * d[right.0], up.1 * d[up.0])
+    }
+
     pub(super) fn surface(&self, point: DVec3, face: u8) -> SurfacePoint {
         let [x, y, z, _] = self.coordinates(point - self.center).to_array();
         let axis = usize::from(face / 2) % 3;

@@ -5,7 +5,7 @@ use super::plain::Plain;
 use super::span::{Exit, Faces, Span};
 use super::{
     AreaSample, BELOW_ONE, Detail, ShapeHit, SurfacePoint, check_direction, check_length, check_point, choose,
-    in_words, largest, turns,
+    in_words, largest, turns, turns_rate,
 };
 use crate::math::trig::sin_cos_turn;
 use crate::math::warp::concentric_disk;
@@ -170,6 +170,17 @@ impl Cylinder {
     /// Point, normal and the rest at a place on the wall; `outward` is the unit radial vector.
     fn wall_point(&self, outward: DVec3, height: f64) -> DVec3 {
         self.base + (self.frame.n * height + outward * self.radius)
+    }
+
+    /// As [`super::Shape::uv_rates`].
+    pub(super) fn uv_rates(&self, point: DVec3, face: u8, direction: DVec3) -> DVec2 {
+        let d = self.frame.to_local(direction);
+        if face != WALL {
+            let side = if face == BASE { -1.0 } else { 1.0 };
+            return DVec2::new(d.x, d.y * side * self.turn) * (0.5 / self.radius);
+        }
+        let local = self.frame.to_local(point - self.base);
+        DVec2::new(self.turn * turns_rate(local.x, local.y, d.x, d.y), d.z / self.length)
     }
 
     pub(super) fn surface(&self, point: DVec3, face: u8, detail: Detail) -> SurfacePoint {

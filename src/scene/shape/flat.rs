@@ -4,7 +4,7 @@ use super::exact::{along, dot};
 use super::plain::Plain;
 use super::{
     AreaSample, Detail, ShapeHit, SurfacePoint, TowardSample, check_direction, check_length, check_point, in_words,
-    largest, toward_by_area, turns,
+    largest, toward_by_area, turns, turns_rate,
 };
 use crate::math::warp::concentric_disk;
 use crate::math::{Frame, Ray};
@@ -65,6 +65,11 @@ impl Plane {
 
     pub(super) fn plain(&self) -> Plain {
         Plain::Plane { point: self.point.as_vec3(), normal: self.frame.n.as_vec3() }
+    }
+
+    /// As [`super::Shape::uv_rates`].
+    pub(super) fn uv_rates(&self, direction: DVec3) -> DVec2 {
+        self.frame.to_local(direction).truncate()
     }
 
     pub(super) fn surface(&self, point: DVec3) -> SurfacePoint {
@@ -171,8 +176,13 @@ impl Patch {
 
     #[inline]
     fn coordinates(&self, point: DVec3) -> DVec2 {
-        let p = point - self.origin;
-        DVec2::new(dot(p, self.to_a), dot(p, self.to_b))
+        self.rates(point - self.origin)
+    }
+
+    /// How fast the coordinates change along `direction`.
+    #[inline]
+    fn rates(&self, direction: DVec3) -> DVec2 {
+        DVec2::new(dot(direction, self.to_a), dot(direction, self.to_b))
     }
 
     /// The vector of coordinates `at`.
@@ -232,6 +242,12 @@ impl Disk {
 
     pub(super) fn plain(&self) -> Plain {
         self.0.plain(true)
+    }
+
+    /// As [`super::Shape::uv_rates`].
+    pub(super) fn uv_rates(&self, point: DVec3, direction: DVec3) -> DVec2 {
+        let (at, d) = (self.0.coordinates(point), self.0.rates(direction));
+        DVec2::new(at.dot(d) / at.length(), turns_rate(at.x, at.y, d.x, d.y))
     }
 
     pub(super) fn surface(&self, point: DVec3, detail: Detail) -> SurfacePoint {
@@ -294,6 +310,11 @@ impl Rectangle {
 
     pub(super) fn plain(&self) -> Plain {
         self.0.plain(false)
+    }
+
+    /// As [`super::Shape::uv_rates`].
+    pub(super) fn uv_rates(&self, direction: DVec3) -> DVec2 {
+        self.0.rates(direction)
     }
 
     #[inline]

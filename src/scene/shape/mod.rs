@@ -242,6 +242,21 @@ impl Shape {
         }
     }
 
+    /// How fast u and v change at `point` of `face` along a `direction` in the surface, times its length. No numbers where u has no
+    /// direction: at a pole, the middle of a disk, the apex of a cone.
+    #[must_use]
+    pub fn uv_rates(&self, point: DVec3, face: u8, direction: DVec3) -> DVec2 {
+        match self {
+            Shape::Sphere(s) => s.uv_rates(point, direction),
+            Shape::Plane(s) => s.uv_rates(direction),
+            Shape::Disk(s) => s.uv_rates(point, direction),
+            Shape::Rectangle(s) => s.uv_rates(direction),
+            Shape::Cube(s) => s.uv_rates(face, direction),
+            Shape::Cylinder(s) => s.uv_rates(point, face, direction),
+            Shape::Cone(s) => s.uv_rates(point, face, direction),
+        }
+    }
+
     /// Least and greatest corner of a box that holds every point that [`Shape::surface`] gives;
     /// `None` for a plane.
     #[must_use]
@@ -375,6 +390,11 @@ pub(super) fn turns(x: f64, y: f64) -> f64 {
     let t = libm::atan2(y, x) / std::f64::consts::TAU;
     // −1e-30 + 1 rounds to one.
     (if t < 0.0 { t + 1.0 } else { t }).clamp(0.0, BELOW_ONE)
+}
+
+/// How fast [`turns`] change at (x, y) along (dx, dy).
+pub(super) fn turns_rate(x: f64, y: f64, dx: f64, dy: f64) -> f64 {
+    (x * dy - y * dx) / ((x * x + y * y) * std::f64::consts::TAU)
 }
 
 /// A density by area as one by solid angle, pdf · d² / |cos|; 0 where that has no finite value (edge-on).

@@ -16,7 +16,7 @@ use super::exact::{cross, dot};
 use super::plain::Plain;
 use super::{
     AreaSample, BELOW_ONE, Detail, Layout, ShapeHit, SurfacePoint, TowardSample, check_length, check_point, largest,
-    solid_angle_density, toward_by_area,
+    solid_angle_density, toward_by_area, turns_rate,
 };
 use crate::math::warp::{uniform_cone, uniform_sphere};
 use crate::math::{Frame, Ray};
@@ -113,6 +113,17 @@ impl Sphere {
     /// Largest number that goes into a point of the surface.
     fn scale(&self) -> f64 {
         largest(self.center).max(self.radius)
+    }
+
+    /// As [`super::Shape::uv_rates`].
+    pub(super) fn uv_rates(&self, point: DVec3, direction: DVec3) -> DVec2 {
+        let to_object = self.world_from_object.transpose();
+        let n = to_object * (point - self.center).normalize_or(DVec3::Y);
+        let d = to_object * direction / self.radius;
+        // Of the latitude: y and its cosine turn into each other.
+        let across = (n.x * n.x + n.z * n.z).sqrt();
+        let latitude = (d.y * across - n.y * (n.x * d.x + n.z * d.z) / across) / PI;
+        DVec2::new(turns_rate(n.z, n.x, d.z, d.x), if self.from_north { -latitude } else { latitude })
     }
 
     pub(super) fn surface(&self, point: DVec3, detail: Detail) -> SurfacePoint {
