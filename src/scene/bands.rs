@@ -10,7 +10,7 @@ use crate::film::exr::ExrPart;
 use crate::spectrum::{Lanes, Outside, Spectrum};
 use rayon::prelude::*;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// What the numbers of a spectral file are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +30,8 @@ pub struct Bands {
     nm: Vec<f32>,
     /// For each texel a number for each band.
     values: Arc<Vec<f32>>,
+    /// The texel with the most over all bands, once that is asked for.
+    brightest: Arc<OnceLock<Option<usize>>>,
 }
 
 impl Bands {
@@ -80,14 +82,14 @@ impl Bands {
         let texels = part.window.pixels();
         let of_texel = |i: usize| found.iter().map(move |(_, _, plane)| plane[i]).collect::<Vec<f32>>();
         let values: Vec<f32> = (0..texels).into_par_iter().with_min_len(1024).flat_map_iter(of_texel).collect();
-        Ok(Some(Bands { quantity, nm, values: Arc::new(values) }))
+        Ok(Some(Bands { quantity, nm, values: Arc::new(values), brightest: Arc::default() }))
     }
 
     /// The same spectra times `factor`.
     #[must_use]
     pub fn scaled(self, factor: f32) -> Bands {
         let values = self.values.par_iter().map(|x| x * factor).collect();
-        Bands { values: Arc::new(values), ..self }
+        Bands { values: Arc::new(values), brightest: Arc::default(), ..self }
     }
 
     /// How many texels.
@@ -147,8 +149,10 @@ impl Bands {
     /// The texel with the most over all bands.
     #[must_use]
     pub fn brightest(&self) -> Option<usize> {
-        let sum = |i: &usize| self.texel(*i).iter().sum::<f32>();
-        (0..self.len()).max_by(|a, b| sum(a).total_cmp(&sum(b)))
+        *self.brightest.get_or_init(|| {
+            let sum = |i: &usize| self.texel(*i).iter().sum::<f32>();
+            (0..self.len()).max_by(|a, b| sum(a).total_cmp(&sum(b)))
+        })
     }
 
     /// The spectrum of the texel `i`, for choices; of one level where wavelengths are no table, as when f32 does not tell two apart.

@@ -502,6 +502,7 @@ mod tests {
             between: Between::Nearest,
             wrap: Wrap::Clamp,
             local_from_world: DAffine3::from_scale(DVec3::splat(0.5)),
+            brightest: std::sync::OnceLock::new(),
         }));
         for (x, value) in [(0.5, 0.25), (1.5, 0.75)] {
             let position = DVec3::new(x, 0.0, 0.0);

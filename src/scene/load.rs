@@ -422,7 +422,7 @@ fn count(pixels: &[u8]) -> Counted {
 fn upsampled_bytes(counted: Counted, level: &[f32; 256], carried: Carried) -> Texels {
     let texel = |c: &[u8; 3]| colour_texel(c.map(|x| level[usize::from(x)]), carried);
     let colours = counted.colours.par_iter().with_min_len(256).map(texel).collect();
-    Texels { colours: Arc::new(colours), numbers: Some(Arc::new(counted.numbers)), greatest: 1.0 }
+    Texels::numbered(colours, counted.numbers)
 }
 
 /// A picture of numbers from the file `path`: EXR and HDR as they are, 8- and 16-bit files from 0 to 1, decoded from

@@ -372,7 +372,7 @@ mod tests {
     use crate::spectrum::Carried;
     use glam::DAffine3;
     use std::f64::consts::PI;
-    use std::sync::Arc;
+    use std::sync::{Arc, OnceLock};
 
     /// A density along x by its values at `values.len()` even steps, constant in y and z, in the unit cube.
     fn along_x(values: &[f32]) -> Volume {
@@ -382,6 +382,7 @@ mod tests {
             local_from_world: DAffine3::IDENTITY,
             between: Between::Trilinear,
             wrap: Wrap::Clamp,
+            brightest: OnceLock::new(),
         }))
     }
 
@@ -469,6 +470,7 @@ mod tests {
             local_from_world: DAffine3::IDENTITY,
             between: Between::Trilinear,
             wrap: Wrap::Clamp,
+            brightest: OnceLock::new(),
         }));
         let medium = along(Varying::new(volume.clone(), 2.0, grey(1.0)));
         assert!(medium.is_chromatic());

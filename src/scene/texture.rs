@@ -12,7 +12,7 @@ use crate::math::sampler::GOLDEN;
 use crate::spectrum::{LANES, Lanes, Spectrum, upsample};
 use glam::{DAffine2, DVec2, DVec3};
 use std::ops::{Add, Mul};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A point of a surface, as textures see it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -187,6 +187,8 @@ pub struct Texels {
     pub numbers: Option<Arc<Vec<u32>>>,
     /// The greatest factor of any: above one they are light, and no reflectances.
     pub greatest: f32,
+    /// Which colour has the most light, once that is asked for: all that the picture lies on asks for it.
+    brightest: Arc<OnceLock<Option<usize>>>,
 }
 
 impl Texels {
@@ -194,7 +196,14 @@ impl Texels {
     #[must_use]
     pub fn each(texels: Vec<Texel>) -> Texels {
         let greatest = texels.iter().fold(1.0, |greatest: f32, texel| greatest.max(texel.scale));
-        Texels { colours: Arc::new(texels), numbers: None, greatest }
+        Texels { colours: Arc::new(texels), numbers: None, greatest, brightest: Arc::default() }
+    }
+
+    /// Texels of these colours, none of which is above one, by their numbers.
+    #[must_use]
+    pub fn numbered(colours: Vec<Texel>, numbers: Vec<u32>) -> Texels {
+        let numbers = Some(Arc::new(numbers));
+        Texels { colours: Arc::new(colours), numbers, greatest: 1.0, brightest: Arc::default() }
     }
 
     /// The texel at `index`.
@@ -209,11 +218,14 @@ impl Texels {
 
     /// The one with the most light at eight wavelengths (at four in the build of four lanes).
     fn brightest(&self) -> Option<&Texel> {
-        const NM: [f32; 8] = [410.0, 450.0, 490.0, 530.0, 560.0, 590.0, 620.0, 660.0];
-        let nm = Lanes::new(std::array::from_fn(|lane| NM[lane * NM.len() / LANES]));
-        let light = |texel: &Texel| texel.scale * upsample::eval_sigmoid(texel.coefficients, nm).reduce_add();
-        let all = self.colours.iter().map(|texel| (light(texel), texel));
-        all.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, texel)| texel)
+        let found = self.brightest.get_or_init(|| {
+            const NM: [f32; 8] = [410.0, 450.0, 490.0, 530.0, 560.0, 590.0, 620.0, 660.0];
+            let nm = Lanes::new(std::array::from_fn(|lane| NM[lane * NM.len() / LANES]));
+            let light = |texel: &Texel| texel.scale * upsample::eval_sigmoid(texel.coefficients, nm).reduce_add();
+            let all = self.colours.iter().map(light).enumerate();
+            all.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+        });
+        found.map(|i| &self.colours[i])
     }
 
     fn len(&self) -> usize {
@@ -445,6 +457,15 @@ mod tests {
         // Its own share of the picture, or where one of the places is on it, theirs.
         let is_share = |texels: f64| (dot / whole * texels - 1.0).abs() < 1e-6;
         assert!(is_share(4096.0) || is_share(256.0), "{dot} of {whole}");
+    }
+
+    /// What lies on a thing is a copy of the picture: what one has found all others know. Of two that are as bright it is the last.
+    #[test]
+    fn the_brightest_texel_is_looked_for_once() {
+        let picture = board(Wrap::Clamp, Interpolation::Nearest);
+        let copy = picture.clone();
+        assert!(Texture::Image(picture).mean_luminance() > 0.0);
+        assert_eq!(copy.texels.brightest.get(), Some(&Some(2)));
     }
 
     /// One of 4096 texels has all the light, in two bands: whichever it is, the mean is told no lower than that of even light.

@@ -14,7 +14,7 @@ use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A spectrum at every point of space.
 #[derive(Clone, Debug)]
@@ -53,6 +53,8 @@ pub struct GridVolume {
     pub between: Between,
     /// Beyond the cube.
     pub wrap: Wrap,
+    /// The voxel with the most light, once that is asked for.
+    pub brightest: OnceLock<Option<usize>>,
 }
 
 /// The numbers of a grid.
@@ -237,7 +239,7 @@ impl GridVolume {
             Voxels::Raw(values) => values[i][1],
             Voxels::Coloured(values) => values[i][3],
         };
-        (0..self.len()).max_by(|&a, &b| light(a).total_cmp(&light(b)))
+        *self.brightest.get_or_init(|| (0..self.len()).max_by(|&a, &b| light(a).total_cmp(&light(b))))
     }
 }
 
@@ -606,7 +608,7 @@ mod tests {
 
     fn grid(size: [usize; 3], values: Voxels) -> GridVolume {
         let (local_from_world, between, wrap) = (DAffine3::IDENTITY, Between::Trilinear, Wrap::Clamp);
-        GridVolume { size, values, local_from_world, between, wrap }
+        GridVolume { size, values, local_from_world, between, wrap, brightest: OnceLock::new() }
     }
 
     /// A deterministic spread of numbers in [0, 1).

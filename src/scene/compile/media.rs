@@ -13,7 +13,7 @@ use crate::scene::{Geometry, Object, Scene};
 use crate::spectrum::{Carried, Outside, Spectrum};
 use glam::{DAffine3, DVec3};
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// What a volume is asked for.
 #[derive(Clone, Copy, PartialEq)]
@@ -255,5 +255,6 @@ fn grid_volume(written: &written::GridVolume, world_from_local: DAffine3, carrie
             written::Wrap::Mirror => Wrap::Mirror,
             written::Wrap::Clamp => Wrap::Clamp,
         },
+        brightest: OnceLock::new(),
     })
 }
