@@ -4,6 +4,7 @@ use super::bvh::Aabb;
 use super::material::{Kind, Material, Roughness};
 use super::{Geometry, Object, Scene};
 use glam::DVec3;
+use std::collections::{HashMap, HashSet};
 
 /// A ball around something that focuses light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,12 +162,13 @@ impl Casters {
         let material = |i: usize| &scene.materials[scene.objects[i].material as usize];
         let sharp = |i: usize| is_wanted(material(i));
         let mut casters = Casters::none(scene);
+        // Groups are looked through once, however many copies they have, but for those that reach out of the range of numbers.
+        let (mut groups, mut seen) = (HashMap::new(), HashSet::new());
         for (i, object) in scene.objects.iter().enumerate() {
             let (casts, children) = match &object.geometry {
                 Geometry::Instance(instance) => {
-                    let first = instance.group.first as usize;
-                    let members = first..first + instance.group.bvh.order().len();
-                    (members.clone().any(sharp), members)
+                    let members = instance.group.members();
+                    (*groups.entry(members.start).or_insert_with(|| members.clone().any(sharp)), members)
                 }
                 _ => (sharp(i), i..i + 1),
             };
@@ -176,7 +178,8 @@ impl Casters {
             }
             let bounds = moments.iter().fold(object.bounds(), |all, moment| all.union(&moment.objects[i].bounds()));
             let ball = Ball::around(&bounds);
-            for child in children {
+            let unseen = seen.insert((children.start, ball.is_none()));
+            for child in children.filter(|_| unseen) {
                 casters.casts[child] = sharp(child);
                 casters.unending[child] = sharp(child) && ball.is_none();
                 let parts = |scene: &Scene| is_dispersive(&scene.materials[scene.objects[child].material as usize]);
@@ -252,6 +255,25 @@ mod tests {
             let held = |b: &Ball| (b.center - one.center).length() + one.radius <= b.radius * (1.0 + 1e-12);
             assert!(few.iter().any(held), "{one:?}");
         }
+    }
+
+    /// Thousands of copies of a group of thousands: a look through the group for each of them, three times over, would take minutes.
+    #[test]
+    fn many_copies_of_a_large_group_take_no_quadratic_time() {
+        const MANY: usize = 20_000;
+        let begin = std::time::Instant::now();
+        let mut text = "camera: {origin: [0, 3, 9], target: [0, 0, 0], fov_deg: 40}\n\
+            materials: {silver: {mirror: {}}}\ngroups:\n  many:\n"
+            .to_owned();
+        (0..MANY)
+            .for_each(|i| text += &format!("  - sphere: {{center: [{i}, 0, 0], radius: 0.1, material: silver}}\n"));
+        text += "shapes:\n";
+        (0..MANY).for_each(|i| text += &format!("- instance: {{group: many, transform: [translate: [0, {i}, 0]]}}\n"));
+        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
+        let casters = Casters::of(&compile(&description, "s").unwrap(), &[]);
+        assert_eq!(casters.casts.iter().filter(|casts| **casts).count(), MANY);
+        assert_eq!(casters.names.len(), MANY);
+        assert!(begin.elapsed() < std::time::Duration::from_secs(20));
     }
 
     /// Triangles of several meshes are in a tree of their own, beside that of the other objects.

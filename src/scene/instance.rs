@@ -22,6 +22,7 @@ use crate::error::in_short;
 use crate::math::dd::{Dd, Dd3};
 use crate::math::{Departure, Ray};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Objects that are placed together: a run of `Scene::objects`.
@@ -31,6 +32,14 @@ pub struct Group {
     pub first: u32,
     /// Over the objects of the run, in their own space.
     pub bvh: Bvh,
+}
+
+impl Group {
+    /// Indices of its objects.
+    #[must_use]
+    pub fn members(&self) -> Range<usize> {
+        self.first as usize..self.first as usize + self.bvh.order().len()
+    }
 }
 
 /// A copy of a group.

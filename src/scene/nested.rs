@@ -16,6 +16,7 @@ use crate::math::Ray;
 use crate::scene::shape::{Detail, Shape};
 use crate::spectrum::RefractiveIndex;
 use glam::DVec3;
+use std::collections::HashMap;
 
 /// Bodies that a path is in at one time; of more the weakest are forgotten.
 const MOST: usize = 8;
@@ -121,24 +122,25 @@ impl Nested {
         let found = objects.iter().zip(0u32..).filter_map(|(o, i)| of(o).map(|(p, index, shows)| (p, i, index, shows)));
         let mut all: Vec<(i32, u32, RefractiveIndex, bool)> = found.collect();
         all.sort_by_key(|(priority, object, ..)| (*priority, std::cmp::Reverse(*object)));
-        let mut kinds = vec![RefractiveIndex::Constant(1.0)];
+        // By all their numbers.
+        let in_text = |index: &RefractiveIndex| format!("{index:?}");
+        let mut kinds = HashMap::from([(in_text(&RefractiveIndex::Constant(1.0)), 0)]);
         let mut nested = Nested::default();
         for ((priority, object, index, shows), rank) in all.into_iter().zip(1..) {
             let kind = (!shows).then(|| {
-                let known = kinds.iter().position(|kind| *kind == index);
-                known.unwrap_or_else(|| {
-                    kinds.push(index.clone());
-                    kinds.len() - 1
-                }) as u32
+                let next = kinds.len() as u32;
+                *kinds.entry(in_text(&index)).or_insert(next)
             });
             let owner = &mut objects[object as usize];
             owner.body = rank;
             nested.bodies.push(Body { object, priority, index, medium: owner.inside, kind });
         }
-        let holds = |object: &Object| match &object.geometry {
+        // Groups are looked through once, however many copies they have.
+        let mut groups: HashMap<u32, bool> = HashMap::new();
+        let mut holds = |object: &Object| match &object.geometry {
             Geometry::Instance(instance) => {
-                let first = instance.group.first as usize;
-                objects[first..first + instance.group.bvh.order().len()].iter().any(|child| child.body != 0)
+                let any = || objects[instance.group.members()].iter().any(|child| child.body != 0);
+                *groups.entry(instance.group.first).or_insert_with(any)
             }
             _ => object.body != 0,
         };
@@ -231,10 +233,8 @@ impl Scene {
                 continue;
             };
             let (local, _) = instance.map.enter(&ray);
-            for child in instance.group.first..instance.group.first + instance.group.bvh.order().len() as u32 {
-                if self.objects[child as usize].body != 0 {
-                    add(child, self.depth(child, &local));
-                }
+            for child in instance.group.members().filter(|child| self.objects[*child].body != 0) {
+                add(child as u32, self.depth(child as u32, &local));
             }
         }
         bodies

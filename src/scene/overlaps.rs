@@ -13,6 +13,7 @@ use crate::math::Ray;
 use crate::math::warp;
 use crate::scene::shape::Shape;
 use glam::{DVec2, DVec3};
+use std::collections::HashMap;
 
 /// Rays for a pair of bodies.
 const RAYS: u32 = 64;
@@ -84,15 +85,15 @@ impl Scene {
         };
         let is_body = |object: &&Object| closed(object) && refracts(object);
         let standing = self.objects[..self.standing].iter().zip(0u32..);
+        // Groups are looked through once, however many copies they have.
+        let mut groups: HashMap<u32, Option<&Object>> = HashMap::new();
         let bodies = standing.filter_map(|(object, i)| {
             let inner = match &object.geometry {
-                Geometry::Instance(instance) => {
-                    let first = instance.group.first as usize;
-                    let children = &self.objects[first..first + instance.group.bvh.order().len()];
-                    let mut all = children.iter().filter(is_body);
+                Geometry::Instance(instance) => *groups.entry(instance.group.first).or_insert_with(|| {
+                    let mut all = self.objects[instance.group.members()].iter().filter(is_body);
                     // Of several bodies in one group the surfaces are not told apart here.
                     all.next().filter(|_| all.next().is_none())
-                }
+                }),
                 _ => Some(object).filter(is_body),
             }?;
             Some(Body { object: i, bounds: object.bounds(), ranked: inner.body != 0 })
