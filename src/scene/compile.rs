@@ -54,6 +54,8 @@ struct Compiler<'a> {
     faults: Vec<String>,
     /// What a person should know.
     notes: Vec<(String, String)>,
+    /// The same, to look them up.
+    noted: HashSet<(String, String)>,
     /// The first curve that could not be read.
     unread: Option<Error>,
     files: Vec<PathBuf>,
@@ -172,6 +174,7 @@ impl<'a> Compiler<'a> {
             description,
             faults: Vec::new(),
             notes: Vec::new(),
+            noted: HashSet::new(),
             unread: None,
             files: Vec::new(),
             meshes: Meshes::default(),

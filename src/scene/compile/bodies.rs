@@ -7,6 +7,7 @@ use crate::scene::bvh::Aabb;
 use crate::scene::material::Material;
 use crate::scene::shape::Shape;
 use crate::scene::{Geometry, Object, Scene};
+use std::collections::HashMap;
 
 /// Pairs that are told.
 const TOLD: usize = 8;
@@ -82,10 +83,16 @@ impl Compiler<'_> {
 
     /// Puts the eye and lamps beside the surfaces that they lie on, and says so.
     pub(super) fn note_beside(&self, scene: &mut Scene, boxes: &[Aabb], light_names: &[String]) {
-        for (light, object) in scene.put_beside(boxes) {
+        let moved = scene.put_beside(boxes);
+        if moved.is_empty() {
+            return;
+        }
+        // Of those with one name the first.
+        let lamps = self.description.lights.iter().enumerate().rev();
+        let lamps: HashMap<String, _> = lamps.map(|(k, lamp)| (lamp.name_or_kind(k), (k, lamp))).collect();
+        for (light, object) in moved {
             let on = &scene.objects[object as usize].name;
-            let lamps = self.description.lights.iter().enumerate();
-            let lamp = |i: usize| lamps.clone().find(|(k, lamp)| lamp.name_or_kind(*k) == light_names[i]);
+            let lamp = |i: usize| lamps.get(&light_names[i]);
             let (at, note) = match light.and_then(lamp) {
                 None => ("camera".to_owned(), format!("stands on {on}: it sees from the side to which it looks")),
                 Some((k, lamp)) => (

@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::scene::camera::{self, Camera};
 use crate::spectrum::illuminant;
 use glam::DVec2;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 impl<'a> Compiler<'a> {
@@ -195,8 +196,11 @@ fn growth(v: written::Growth) -> f64 {
 
 /// The groups that the lights of these names are in.
 pub(super) fn groups(d: &written::SceneDescription, lights: &[String]) -> LightGroups {
-    let of =
-        |light: &String| d.light_groups.values().position(|names| names.contains(light)).map_or(0, |i| i as u8 + 1);
+    let mut numbers: HashMap<&str, u8> = HashMap::new();
+    for (names, number) in d.light_groups.values().zip(1..) {
+        numbers.extend(names.iter().map(|name| (name.as_str(), number)));
+    }
+    let of = |light: &String| numbers.get(light.as_str()).copied().unwrap_or(0);
     LightGroups { names: d.light_groups.keys().cloned().collect(), of: lights.iter().map(of).collect() }
 }
 
@@ -280,5 +284,21 @@ mod tests {
             let found = radiance.eval(&TexturePoint::default(), Lanes::splat(450.0)).to_array()[0];
             assert!((found - expected).abs() < 1e-6, "{found} for {expected}");
         }
+    }
+
+    /// Many lamps in two groups, and one in none: sought name by name they would take a minute.
+    #[test]
+    fn many_lamps_in_groups_take_no_quadratic_time() {
+        const MANY: usize = 200_000;
+        let begin = std::time::Instant::now();
+        let text = "camera: {origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}\n";
+        let mut scene = SceneDescription::parse(text, std::path::Path::new("s.yaml")).unwrap();
+        let lamps: Vec<String> = (0..MANY).map(|i| format!("lamp{i:07}")).collect();
+        scene.light_groups.insert("fill".into(), vec![lamps[1].clone()]);
+        scene.light_groups.insert("key".into(), lamps[2..].to_vec());
+        let groups = groups(&scene, &lamps);
+        assert_eq!((&groups.names[..], &groups.of[..3]), (&["fill".to_owned(), "key".to_owned()][..], &[0, 1, 2][..]));
+        assert!(groups.of[2..].iter().all(|group| *group == 2));
+        assert!(begin.elapsed() < std::time::Duration::from_secs(20));
     }
 }
