@@ -36,7 +36,7 @@ use super::super::camera::{Camera, Clip, FovAxis, Lens, Pose, Projection};
 use super::super::image::{Band, Filter, Image};
 use super::super::light::Light;
 use super::super::node::{Node, Sources, Value};
-use super::super::path::{self, field};
+use super::super::path::{self, Segment, field};
 use super::super::print::{Printer, relative};
 use super::super::scene::SceneDescription;
 use super::super::settings::{Coverage, Integrator, Technique};
@@ -181,7 +181,7 @@ impl<'a> Export<'a> {
         // Volumes stand where they are used, but what is written as it was knows them by name.
         let volumes = self.scene.volumes.keys().filter(|name| self.mentioned.contains(*name));
         for name in volumes.collect::<Vec<_>>() {
-            if let Some(node) = self.root.get("volumes").and_then(|volumes| volumes.get(name)) {
+            if let Some(node) = self.named("volumes", name) {
                 let yaml = self.yaml(node);
                 self.xml.instruction(&format!("set {}: {yaml}", field(&["volumes", name])));
             }
@@ -235,13 +235,18 @@ impl<'a> Export<'a> {
                     if let Some((name, _)) = self.scene.materials.get_key_value(text)
                         && used.insert(name.as_str())
                     {
-                        open.extend(self.root.get("materials").and_then(|materials| materials.get(name)));
+                        open.extend(self.named("materials", name));
                     }
                 }
                 _ => {}
             }
         }
         used
+    }
+
+    /// What is written under a name of a section.
+    fn named(&self, section: &str, name: &str) -> Option<&'a Node> {
+        self.scene.node(&[section, name].map(|key| Segment::Key(key.to_owned())))
     }
 
     /// An id for something of a kind that has this name.
@@ -269,7 +274,7 @@ impl<'a> Export<'a> {
 
     /// Begins what says a field in another way, which reading it back shall not take; `end` closes it.
     fn restate(&mut self, tag: &str, field: &str) {
-        let node = path::parse(field).ok().and_then(|path| self.root.find(&path));
+        let node = path::parse(field).ok().and_then(|path| self.scene.node(&path));
         if let Some(node) = node {
             self.mention(node);
         }

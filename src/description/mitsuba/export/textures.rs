@@ -38,7 +38,7 @@ impl<'a> Export<'a> {
         if why.is_some() {
             self.end();
         } else if self.loses_illuminant(name) {
-            let written = self.root.get("textures").and_then(|all| all.get(name)?.get("image")?.get("illuminant"));
+            let written = self.named("textures", name).and_then(|node| node.get("image")?.get("illuminant"));
             let yaml = written.map_or("D65".to_owned(), |node| self.yaml(node));
             self.xml.instruction(&format!("set {}: {yaml}", super::field(&["textures", name, "image", "illuminant"])));
         }
