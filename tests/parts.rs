@@ -299,6 +299,30 @@ fn parts_that_do_not_make_up_one_picture_are_refused() {
     assert!(e.contains(&format!("expected a part by {version}")) && e.contains("found one by Abbe 9"), "{e}");
 }
 
+/// Of the numbers of a header one is changed to what no part has: tiles, samples, rows, seconds. There is no tile of none.
+#[test]
+fn a_header_that_makes_no_sense_is_told_by_info_as_by_merge() {
+    let place = Place::of(&format!("{FRAME}{}", scenes()[0].1));
+    let whole = std::fs::read(render(&place, "a.exr", part([0, 2], [0, 8]), &[])).unwrap();
+    for (from, to) in [
+        ("\"tile\":[0,2]", "\"tile\":[0,0]"),
+        ("\"tile\":[0,2]", "\"tile\":[2,2]"),
+        ("\"samples\":[0,9]", "\"samples\":[9,9]"),
+        ("\"width\":20,\"height\":14", "\"width\":20,\"height\": 0"),
+    ] {
+        let at = whole.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
+        let mut bytes = whole.clone();
+        bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
+        std::fs::write(place.path("bad.exr"), bytes).unwrap();
+        for verb in [&["info", "bad.exr"][..], &["merge", "bad.exr", "-o", "out"]] {
+            let ran = place.run(verb);
+            let told =
+                ran.err.starts_with("error: bad.exr: ") && ran.err.contains("damaged") && ran.err.lines().count() == 1;
+            assert!(ran.code == 3 && told, "{verb:?} of {to}: {} {}", ran.code, ran.err);
+        }
+    }
+}
+
 /// Settings of files are one field of a header, longer than a message.
 #[test]
 fn where_parts_of_other_settings_differ_is_told() {

@@ -299,6 +299,37 @@ impl Header {
         Share { tile: self.tile[0], tiles: self.tile[1], samples, rows: self.finish.rows() }
     }
 
+    /// Whether what it says holds together; the rest of it makes no sense otherwise.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let share = self.share();
+        let Range { start, end } = share.samples;
+        let window = self.finish.window;
+        let inside = |claim: &(Window, Range<u32>)| {
+            let (tile, samples) = claim;
+            share.rows(window).contains(tile) && samples.start == start && samples.end >= start && samples.end <= end
+        };
+        let followed = |claim: &(Range<u64>, Range<u32>)| {
+            let (paths, samples) = claim;
+            paths.start <= paths.end
+                && self.paths.is_some_and(|all| paths.end <= all)
+                && start <= samples.start
+                && samples.start <= samples.end
+                && samples.end <= end
+        };
+        window.pixels() > 0
+            && window.pixels() <= 1 << 30
+            && window.x.unsigned_abs().max(window.y.unsigned_abs()) <= 1 << 30
+            && share.tile < share.tiles
+            && start < end
+            && end <= self.finish.samples
+            && self.paths.is_some() == self.splat_paths.is_some()
+            && self.seconds >= 0.0
+            && self.claims.camera.iter().all(inside)
+            && self.claims.lights.iter().all(followed)
+            && self.shares_agree()
+    }
+
     /// How samples are shared out, where that is decided.
     #[must_use]
     pub fn allocation(&self) -> Option<Allocation> {
@@ -457,34 +488,7 @@ fn open_if(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<Written> {
         return Err(Error::input(path, message));
     }
     let header: Header = serde_json::from_str(&file.json).map_err(|e| damaged(&e))?;
-    let share = header.share();
-    let Range { start, end } = share.samples;
-    let window = header.finish.window;
-    let inside = |claim: &(Window, Range<u32>)| {
-        let (tile, samples) = claim;
-        share.rows(window).contains(tile) && samples.start == start && samples.end >= start && samples.end <= end
-    };
-    let followed = |claim: &(Range<u64>, Range<u32>)| {
-        let (paths, samples) = claim;
-        paths.start <= paths.end
-            && header.paths.is_some_and(|all| paths.end <= all)
-            && start <= samples.start
-            && samples.start <= samples.end
-            && samples.end <= end
-    };
-    let sound = window.pixels() > 0
-        && window.pixels() <= 1 << 30
-        && window.x.unsigned_abs().max(window.y.unsigned_abs()) <= 1 << 30
-        && share.tile < share.tiles
-        && start < end
-        && end <= header.finish.samples
-        && header.window() == file.window
-        && header.paths.is_some() == header.splat_paths.is_some()
-        && header.seconds >= 0.0
-        && header.claims.camera.iter().all(inside)
-        && header.claims.lights.iter().all(followed)
-        && header.shares_agree();
-    if !sound {
+    if !(header.is_sound() && header.window() == file.window) {
         return Err(damaged(&"it does not hold together"));
     }
     Ok(Written { path: path.to_path_buf(), header, file })

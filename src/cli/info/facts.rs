@@ -165,8 +165,11 @@ pub fn of(path: &Path) -> Result<ExrFacts> {
 }
 
 fn part(path: &Path, json: &str) -> Result<PartOfPicture> {
-    let header: PartHeader = serde_json::from_str(json)
-        .map_err(|e| Error::input(path, format!("a part of another version of Abbe, or damaged: {e}")))?;
+    let unsound = |e: &str| Error::input(path, format!("a part of another version of Abbe, or damaged: {e}"));
+    let header: PartHeader = serde_json::from_str(json).map_err(|e| unsound(&e.to_string()))?;
+    if !header.is_sound() {
+        return Err(unsound("its header does not hold together"));
+    }
     let share = header.share();
     let all = share.rows(header.finish.window).pixels() as f64 * share.samples.len() as f64;
     let done: f64 = header.claims.camera.iter().map(|(w, samples)| w.pixels() as f64 * samples.len() as f64).sum();
