@@ -97,6 +97,11 @@ fn rules_for_paths_that_cannot_be_read_are_an_input_error() {
             .starts_with("error: rules.json: expected rules as of pathmapping-1.0, found")
     );
     assert!(says(&["--path-map", "x"], 2).contains("expected FROM=TO, two directories, found \"x\""));
+    // Nobody writes to the one, and the other has no end.
+    assert!(Command::new("mkfifo").arg(place.path("fifo")).status().unwrap().success());
+    let fifo = says(&["--path-map-file", "fifo"], 3);
+    assert_eq!(fifo, "error: fifo: cannot be read: expected a regular file, found a FIFO\n");
+    assert!(says(&["--path-map-file", "/dev/zero"], 3).starts_with("error: /dev/zero: expected rules as of"));
 }
 
 #[test]

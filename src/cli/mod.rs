@@ -451,7 +451,8 @@ impl SceneArguments {
             paths.add(rule).map_err(Error::Config)?;
         }
         if let Some(file) = &self.path_map_file {
-            let rules = std::fs::read(file).map_err(|e| Error::input(file, format!("cannot be read: {e}")))?;
+            let rules = crate::description::named_bytes(file);
+            let rules = rules.map_err(|e| Error::input(file, format!("cannot be read: {e}")))?;
             paths.add_rules(&rules).map_err(|message| Error::input(file, message))?;
         }
         let mut set = self.set.clone();

@@ -34,12 +34,16 @@ pub(crate) fn read_file(path: &Path, sources: &mut Sources) -> Result<Node> {
 /// # Errors
 /// As there.
 pub(crate) fn read_named(path: &Path, sources: &mut Sources) -> Result<Node> {
-    if !["/dev", "/proc"].iter().any(|system| path.starts_with(system)) {
-        return read_file(path, sources);
-    }
-    let bytes = File::open(path).and_then(read_most);
-    let bytes = bytes.map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
+    let bytes = named_bytes(path).map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
     read_bytes_as(&bytes, path, sources)
+}
+
+/// The bytes of a file that the command line names, at most one more than may be read.
+pub(crate) fn named_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+    match ["/dev", "/proc"].iter().any(|system| path.starts_with(system)) {
+        true => File::open(path).and_then(read_most),
+        false => read_bytes(path),
+    }
 }
 
 /// Reads the bytes of a file to a tree.

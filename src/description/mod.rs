@@ -461,6 +461,7 @@ pub use coating::{Film, TexturedThickness, Thickness};
 pub use compound::{
     Blend, Brushed, Bump, LEAST_ALPHA, Mask, NormalMap, NumberOrTexture, Roughness, TextureRef, TwoSided,
 };
+pub(crate) use edit::named_bytes;
 pub use emitter::{EmissionDirection, EnvironmentLight, EnvironmentMapping, Growth, ProjectorLight};
 pub use exr_file::{FileLayout, HeaderValue, HeaderValues, SpectralFile, Standard, counted_rate, standard, time_code};
 pub use frames::{Frames, frames, frames_in_short};
