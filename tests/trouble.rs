@@ -148,6 +148,10 @@ fn a_job_for_a_farm_is_refused_where_its_tasks_would_be() {
     assert_eq!((ran.code, place.names("job").len()), (2, 0), "{}", ran.err);
     let expected = "expected an argument without {{, which Open Job Description takes for a variable, found one";
     assert_eq!(ran.err, format!("error: output.exr.attributes={{owner: \"a{{{{b}}}}\"}}: {expected}\n"));
+    // A line of the table of tasks is a task, and a tab ends its scene.
+    std::fs::write(place.path("a\tb\n.yaml"), SCENE).unwrap();
+    let message = says(&["a\tb\n.yaml"]);
+    assert_eq!(message, "error: \"a\\tb\\n\": expected a name without control characters, found one\n");
     // All that is wrong is told at once.
     let message = says(&["batch.yaml"]);
     assert!(message.contains("keyed.yaml:7:15: fog.colour: expected render.frames or --frames"), "{message}");
