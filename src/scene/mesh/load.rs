@@ -301,6 +301,18 @@ mod tests {
         }
     }
 
+    /// Twenty thousand elements of a million rows each, as many as the file has bytes: 2·10¹⁰ rows of nothing.
+    #[test]
+    fn ply_rows_without_properties_take_no_time() {
+        let nothing = "element nothing 1000000\n".repeat(20_000);
+        let padding = "comment padding\n".repeat(40_000);
+        let text = String::from_utf8(quad("ascii")).unwrap();
+        let text = text.replacen("element vertex", &format!("{nothing}{padding}element vertex"), 1);
+        let start = std::time::Instant::now();
+        assert_eq!(read("a.ply", text.as_bytes()).unwrap(), read("a.ply", &quad("ascii")).unwrap());
+        assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+    }
+
     #[test]
     fn missing_files_and_other_formats_are_told() {
         let missing = load(Path::new("no/such.obj"), 0).unwrap_err();

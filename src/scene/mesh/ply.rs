@@ -244,7 +244,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
     // Of the corners of triangles, where faces have coordinates.
     let mut corner_uvs: Vec<[DVec2; 3]> = Vec::new();
     for (name, count, properties) in &header.elements {
-        // Every row takes at least a byte: a count beyond that is a fault, not a long wait.
+        // Every row with properties takes at least a byte: a count beyond that is a fault, not a long wait.
         if *count > total {
             return Err(format!("truncated: expected {count} of element {name} in {total} bytes"));
         }
@@ -310,6 +310,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
                 }
                 out.attributes.extend(attributes.into_iter().map(|(attribute, _)| attribute));
             }
+            // Of rows that hold nothing there may be any number, in each of any number of elements.
+            _ if properties.is_empty() => {}
             _ => {
                 for i in 0..*count {
                     payload.row(properties, &mut scalars, [], &mut []).map_err(|e| row_fault(i, e))?;
