@@ -106,7 +106,7 @@ impl<'a> Keeper<'a> {
     /// The render from where a checkpoint left it, if one is to be resumed and there, else from the beginning.
     ///
     /// # Errors
-    /// [`Error::Input`] for a checkpoint that is damaged or of something else; [`Error::Render`] if the memory cannot be had.
+    /// [`Error::Input`] for a checkpoint that is damaged or of something else; [`Error::Memory`] if the memory cannot be had.
     pub fn begin<'j>(&mut self, job: &'j FrameJob<'j>, share: Share) -> Result<Begun<'j>> {
         let file = place(self.path);
         if !(self.keep.resume && file.exists()) {

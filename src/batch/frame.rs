@@ -277,7 +277,7 @@ impl<'a> Begun<'a> {
 /// then, from any thread; `breaks` may end the render between two units.
 ///
 /// # Errors
-/// [`Error::Render`] if the memory cannot be had, or what `breaks` says.
+/// [`Error::Memory`] if the memory cannot be had, or what `breaks` says.
 pub fn render(job: &FrameJob, watch: &(dyn Fn(Progress) + Sync), breaks: &dyn Breaks) -> Result<Frame> {
     Ok(go_on(Begun::new(job, Share::all(job.samples))?, watch, breaks)?.finish())
 }

@@ -49,7 +49,7 @@ pub fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 /// # Errors
 /// [`Error::Input`] if a part is missing, damaged or of another picture, or if they do not make up the picture exactly
 /// once; [`Error::Config`] for a place that is that of a part or not one for pictures, and where a further `report` would take
-/// the picture's; [`Error::Output`]; [`Error::Render`] as the render itself.
+/// the picture's; [`Error::Output`]; [`Error::Memory`] if there is too little; [`Error::Render`] as the render itself.
 pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Report, Result<()>)> {
     checks::output_place("-o", Some(out), 1)?;
     let start = Instant::now();

@@ -202,7 +202,7 @@ struct Tile {
 /// is the whole picture, bit for bit.
 ///
 /// # Errors
-/// [`Error::Render`] if the memory cannot be had.
+/// [`Error::Memory`] if the memory cannot be had.
 pub fn render_part(job: &FrameJob, samples: Range<u32>) -> Result<(Film, Option<SplatFilm>)> {
     let part = Part::new(job, Share::all(job.samples))?;
     part.add(samples, &AtomicBool::new(false), &|_| {});
@@ -241,7 +241,7 @@ impl<'a> Part<'a> {
     /// Nothing yet of `share`.
     ///
     /// # Errors
-    /// [`Error::Render`] if the memory cannot be had.
+    /// [`Error::Memory`] if the memory cannot be had.
     pub fn new(job: &'a FrameJob<'a>, share: Share) -> Result<Part<'a>> {
         let layers = job.plan.layers.layout();
         let exponent = job.scene.light_exponent;

@@ -498,7 +498,7 @@ impl Written {
     /// Empty sums of the size of `window` for parts like this.
     ///
     /// # Errors
-    /// [`Error::Render`] if the memory cannot be had.
+    /// [`Error::Memory`] if the memory cannot be had.
     pub fn empty(&self, window: Window) -> Result<(Film, Option<SplatFilm>)> {
         let Header { finish, exponent, .. } = &self.header;
         let film = |window, layers| {

@@ -363,7 +363,7 @@ impl Film {
     /// An empty film for the pixels of `window` in a frame of `frame` pixels (width, height).
     ///
     /// # Errors
-    /// [`Error::Config`] if the window is empty, [`Error::Render`] if the memory cannot be had.
+    /// [`Error::Config`] if the window is empty, [`Error::Memory`] if the memory cannot be had.
     pub fn new(frame: [u32; 2], window: Window) -> Result<Film> {
         if window.pixels() == 0 {
             return Err(Error::Config(format!("film: the window {window} holds no pixel")));
@@ -371,7 +371,7 @@ impl Film {
         let mut cells = Vec::new();
         if cells.try_reserve_exact(window.pixels()).is_err() {
             let megabytes = Film::bytes(window, Layout::default()) / 1_000_000;
-            return Err(Error::Render(format!("film: {window} needs {megabytes} MB, more than there is")));
+            return Err(Error::Memory(format!("film: {window} needs {megabytes} MB, more than there is")));
         }
         cells.resize(window.pixels(), PixelCells::default());
         let (invalid, layers) = (InvalidCounts::default(), LayerSums::default());
@@ -499,6 +499,14 @@ mod tests {
     use super::*;
     use crate::math::sampler::mix64;
     use proptest::prelude::*;
+
+    /// 2⁵⁵ pixels of 256 bytes are more than a process can address. Nothing is written then, as 4 would say.
+    #[test]
+    fn a_film_for_which_there_is_no_memory_ends_with_33() {
+        let window = Window { x: 0, y: 0, width: 1 << 28, height: 1 << 27 };
+        let refused = Film::new([1 << 28, 1 << 27], window).unwrap_err();
+        assert_eq!(refused.exit_code(), 33, "{refused}");
+    }
 
     /// Every power of two and its neighbours over the whole range: the fixed-point number is within half a unit of x,
     /// and equal where the last mantissa bit is a whole unit, |x| ≥ 2⁻⁴⁰.
