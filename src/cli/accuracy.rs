@@ -71,7 +71,9 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
             }
             Ok(Err(why)) => without.push((entry.name.clone(), why)),
             Err(e) => {
-                super::complain(&format!("error: {}: {e}", entry.name));
+                for line in e.to_string().lines() {
+                    super::complain(&format!("error: {}: {line}", entry.name));
+                }
                 codes.push(e.exit_code());
                 if interrupts.stop.load(std::sync::atomic::Ordering::Relaxed) {
                     break;

@@ -35,6 +35,24 @@ fn plan_and_render_end_alike_where_several_things_are_wrong() {
     }
 }
 
+/// Programs that read what is said look for the word at the beginning of a line.
+#[test]
+fn each_fault_is_a_line_of_its_own_by_every_verb() {
+    let place = Place::with(&[(
+        "s.yaml",
+        "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes: [sphere: {radius: -1}, sphere: {radius: -2}]\n",
+    )]);
+    let message = |i: usize, column: usize| {
+        let radius = -1 - i as i32;
+        format!("s.yaml:2:{column}: shapes[{i}].sphere.radius: expected a number greater than 0, found {radius}")
+    };
+    for (verb, before) in [(&["plan"][..], ""), (&["render", "-q"], "s: "), (&["accuracy", "-q", "-o", "acc"], "s: ")] {
+        let ran = place.run(&[verb, &["s.yaml"]].concat());
+        let lines = [message(0, 27), message(1, 49)].map(|message| format!("error: {before}{message}\n"));
+        assert_eq!((ran.code, ran.err), (2, lines.concat()), "{verb:?}");
+    }
+}
+
 #[test]
 fn the_report_tells_what_was_made_and_what_it_cost() {
     let place = batch();
