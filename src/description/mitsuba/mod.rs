@@ -516,6 +516,26 @@ mod tests {
         );
     }
 
+    #[test]
+    fn a_film_without_pixels_is_told_at_its_side() {
+        let told = |width: u32, height: u32| {
+            let film =
+                format!("<integer name=\"width\" value=\"{width}\"/>\n<integer name=\"height\" value=\"{height}\"/>");
+            let directory = tempfile::tempdir().unwrap();
+            let path = directory.path().join("s.xml");
+            let head = HEAD.replace("</sensor>", "<film type=\"hdrfilm\">");
+            std::fs::write(&path, format!("{head}{film}</film></sensor></scene>")).unwrap();
+            let mut sources = Sources::default();
+            let root = read(&path, &[], &mut sources).unwrap();
+            SceneDescription::of_tree(root, &path, sources).unwrap_err().to_string()
+        };
+        let expected = "expected a whole number from 1 to 65536, found";
+        for (told, ending) in [(told(0, 8), "s.xml:3:1: image.width: "), (told(8, 65537), "s.xml:4:1: image.height: ")]
+        {
+            assert!(told.contains(&format!("{ending}{expected}")), "{told}");
+        }
+    }
+
     /// Mitsuba 3.9.1 lowers the letters of some words and not of others.
     #[test]
     fn words_may_be_in_capitals_where_they_may_for_mitsuba() {

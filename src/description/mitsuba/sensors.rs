@@ -103,6 +103,7 @@ impl Import<'_> {
         let mut exr = Fields::new(place);
         let (mut filter, mut precision, mut channels) = (None, "half", "rgb");
         let [mut width, mut height] = [768, 576];
+        let mut sides = [place; 2];
         let mut sample_border = boolean(place, false);
         if let Some(index) = index {
             let bag = self.bag(index);
@@ -110,6 +111,7 @@ impl Import<'_> {
                 return Err(bag.unknown(FILMS));
             }
             [width, height] = size(&bag)?;
+            sides = ["width", "height"].map(|side| bag.place(side));
             if ["crop_width", "crop_height", "crop_offset_x", "crop_offset_y"].iter().any(|key| bag.has(key)) {
                 let mut crop = Fields::new(bag.object.place);
                 let fields = [
@@ -146,8 +148,8 @@ impl Import<'_> {
             }
             bag.finish()?;
         }
-        image.add("width", whole(place, width));
-        image.add("height", whole(place, height));
+        image.add("width", whole(sides[0], width));
+        image.add("height", whole(sides[1], height));
         image.add("sample_border", sample_border);
         image.add("sensitivity", number(place, FILM));
         image.add("filter", filter.unwrap_or_else(|| text(place, "gaussian")));
