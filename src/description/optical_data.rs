@@ -20,6 +20,9 @@ const MUST_COVER: [f64; 2] = [405.0, 700.0];
 /// How far below zero k may be, which is then taken as zero: by as much as clear glass absorbs, σ = 0.25 m⁻¹.
 const MOST_NOISE: f64 = 1e-8;
 
+/// No material has a k near to this; by a greater one σ = 4πk/λ or what lies between two rows may be none that a number holds.
+const MOST_K: f64 = 1e6;
+
 /// What a file says of a material.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OpticalData {
@@ -122,6 +125,10 @@ impl Tables {
                     &field,
                     &format!("expected k of 0 or more, found {} at {nm} nm", in_short(*k)),
                 ));
+            }
+            if let Some([nm, k]) = samples.iter().find(|s| s[1] > MOST_K) {
+                let found = format!("expected k of at most {MOST_K}, found {} at {nm} nm", in_short(*k));
+                return Err(told(place, &field, &found));
             }
             // The same rules as for an index, but for its size.
             let lifted = samples.iter().map(|s| [s[0], 1.0]).collect();
@@ -397,6 +404,7 @@ mod tests {
             bad("2.500 8", "0.700 8").contains("DATA[1].data: k: expected a table of 360 to 830 nm, found 300 to 700")
         );
         assert!(bad("8.1300E-06", "-8e-6").contains("expected k of 0 or more, found -8e-6 at 2500 nm"));
+        assert!(bad("8.1300E-06", "1e308").contains("expected k of at most 1000000, found 1e308 at 2500 nm"));
         assert!(bad("DATA:", "DATUM:").contains("found no DATA"));
         assert!(
             bad("    wavelength_range: 0.3 2.5\n", "").contains("DATA[0]: expected the field \"wavelength_range\"")

@@ -3,6 +3,7 @@
 use super::Compiler;
 use super::spectra::Role;
 use crate::description::{self as written, OpticalData};
+use crate::error::in_short;
 use crate::optics::phase::Phase;
 use crate::scene::Geometry;
 use crate::scene::medium::{Filling, Medium, PhaseFunction};
@@ -87,7 +88,7 @@ impl<'a> Compiler<'a> {
         };
         let opaque = nanometres().find(|&nm| data.k_at(nm) > MOST_K || index.at(nm) < 1.0);
         if let Some(nm) = opaque {
-            let (n, k) = (index.at(nm), data.k_at(nm));
+            let [n, k] = [index.at(nm), data.k_at(nm)].map(in_short);
             let found = if data.k.is_some() { format!("{n} + {k}i") } else { format!("{n} without k") };
             let message = format!(
                 "expected something clear, with n of 1 or more and k up to {MOST_K}, found {found} at {nm} nm; metals \
