@@ -264,7 +264,13 @@ pub fn prepare_place(file: &Path) -> Result<()> {
     if directory.exists() && !directory.is_dir() {
         return Err(Error::output(file, format!("{} is not a directory", directory.display())));
     }
-    std::fs::create_dir_all(directory).map_err(fail)?;
+    std::fs::create_dir_all(directory).map_err(|e| match e.kind() {
+        // What is there is no directory, nor anything else: the end of a link.
+        ErrorKind::AlreadyExists => {
+            Error::output(file, format!("{} leads through a symbolic link to nowhere", directory.display()))
+        }
+        _ => fail(e),
+    })?;
     // A temporary name is shorter than one that is too long.
     if let Err(e) = std::fs::symlink_metadata(&end)
         && e.kind() == ErrorKind::InvalidFilename
@@ -358,6 +364,19 @@ mod tests {
         assert!(e.contains(&format!("the directory {} does not exist", missing.display())), "{e}");
         let e = write_atomically(dir.path(), b"").unwrap_err().to_string();
         assert!(e.ends_with("it is a directory"), "{e}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_directory_that_is_a_link_to_nowhere_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let link = dir.path().join("shots");
+        std::os::unix::fs::symlink(dir.path().join("unmounted/shots"), &link).unwrap();
+        for directory in [link.clone(), link.join("a")] {
+            let e = prepare_place(&directory.join("a.exr")).unwrap_err();
+            let said = format!("{} leads through a symbolic link to nowhere", directory.display());
+            assert!(e.exit_code() == 1 && e.to_string().ends_with(&said), "{e}");
+        }
     }
 
     /// What a dead process left goes, but nothing of a live one, of one elsewhere that may live, or of people.
