@@ -5,6 +5,7 @@ use super::header::{Header, read_headers};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::spectrum::ColourSpace;
+use ::exr::compression::Compression;
 use ::exr::image::FlatSamples;
 use ::exr::meta::MetaData;
 use ::exr::meta::attribute::{AttributeValue, IntegerBounds, Text};
@@ -125,7 +126,8 @@ pub fn read_exr(path: &Path) -> Result<ExrFile> {
     let file = std::fs::File::open(path).map_err(|e| Error::input(path, e.to_string()))?;
     let mut reader = std::io::BufReader::new(file);
     let meta = MetaData::read_from_buffered(&mut reader, false).map_err(fail)?;
-    check_size(path, &meta)?;
+    let length = reader.get_ref().metadata().map_err(|e| Error::input(path, e.to_string()))?.len();
+    check_size(path, &meta, length)?;
     std::io::Seek::rewind(&mut reader).map_err(|e| Error::input(path, e.to_string()))?;
     let file = parts_of(reader).map_err(fail)?;
     if file.parts.is_empty() {
@@ -206,16 +208,47 @@ fn text(text: &Text) -> String {
     String::from_utf8_lossy(text.as_slice()).into_owned()
 }
 
-fn check_size(path: &Path, meta: &MetaData) -> Result<()> {
-    let mut samples = 0u64;
+/// Refuses a file of `length` bytes whose header announces more samples than can be held, or than it can have: memory is taken
+/// for all that is announced, before it is read.
+fn check_size(path: &Path, meta: &MetaData, length: u64) -> Result<()> {
+    let (mut samples, mut packed) = (0u64, 0u64);
     for header in &meta.headers {
         let pixels = (header.layer_size.width() as u64).saturating_mul(header.layer_size.height() as u64);
-        samples = samples.saturating_add(pixels.saturating_mul(header.channels.list.len() as u64));
+        let channels = &header.channels.list;
+        samples = samples.saturating_add(pixels.saturating_mul(channels.len() as u64));
+        let bytes: u64 = channels.iter().map(|channel| channel.sample_type.bytes_per_sample() as u64).sum();
+        packed = packed.saturating_add(pixels.saturating_mul(bytes).div_ceil(most_unpacked(header.compression)));
     }
-    if samples > SAMPLES_LIMIT {
-        return Err(Error::input(path, format!("the header announces {samples} samples, more than can be held")));
+    let fail =
+        |than: String| Err(Error::input(path, format!("the header announces {samples} samples, more than {than}")));
+    match () {
+        () if samples > SAMPLES_LIMIT => fail("can be held".into()),
+        () if packed > length => fail(format!("a file of {length} bytes can have")),
+        () => Ok(()),
     }
-    Ok(())
+}
+
+/// How many bytes of samples a byte of a file gives at the most.
+fn most_unpacked(compression: Compression) -> u64 {
+    /// 258 bytes by a code of two bits (RFC 1951).
+    const DEFLATED: u64 = 1032;
+    /// 128 bytes by two.
+    const RUNS: u64 = 64;
+    match compression {
+        Compression::Uncompressed => 1,
+        Compression::RLE => RUNS,
+        Compression::ZIP1 | Compression::ZIP16 => DEFLATED,
+        // Three bytes for the four of a float.
+        Compression::PXR24 => DEFLATED.div_ceil(3) * 4,
+        // 256 numbers of two bytes by two codes of a bit and a count of eight.
+        Compression::PIZ => 410,
+        // 16 numbers of two bytes by three bytes, where they are the same.
+        Compression::B44 | Compression::B44A => 11,
+        // 64 floats by two numbers of two bytes, or runs, which are then deflated.
+        Compression::DWAA(_) | Compression::DWAB(_) => RUNS * DEFLATED,
+        // Refused before.
+        Compression::HTJ2K32 | Compression::HTJ2K256 => u64::MAX,
+    }
 }
 
 fn words(e: ::exr::error::Error) -> String {
@@ -268,7 +301,8 @@ mod tests {
         }
     }
 
-    /// A data window of 2²⁹ × 2²⁹ pixels in a file of a few hundred bytes.
+    /// Data windows in a file of a few hundred bytes: of 2²⁹ × 2²⁹ pixels, and of 2²⁶ × 1, whose half a gigabyte may be held, and
+    /// would need a thousandth of that in the file.
     #[test]
     fn a_header_that_announces_too_much_is_refused() {
         let beauty = beauty(
@@ -280,13 +314,46 @@ mod tests {
             StandardError::Leave,
             Compression::Zips,
         );
-        let mut bytes = encode_exr(&beauty.exr).unwrap();
+        let whole = encode_exr(&beauty.exr).unwrap();
         let name = b"dataWindow\0box2i\0";
-        let at = bytes.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4 + 8;
-        for place in [at, at + 4] {
-            bytes[place..place + 4].copy_from_slice(&(1i32 << 29).to_le_bytes());
+        let at = whole.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4 + 8;
+        let found = format!("more than a file of {} bytes can have", whole.len());
+        for (right, bottom, told) in [(1 << 29, 1 << 29, "more than can be held"), ((1 << 26) - 1, 2, &found)] {
+            let mut bytes = whole.clone();
+            bytes[at..at + 4].copy_from_slice(&i32::to_le_bytes(right));
+            bytes[at + 4..at + 8].copy_from_slice(&i32::to_le_bytes(bottom));
+            let (_dir, path) = file(&bytes);
+            let message = read_exr(&path).unwrap_err().to_string();
+            assert!(message.contains(told), "{message}");
         }
-        let (_dir, path) = file(&bytes);
-        assert!(read_exr(&path).unwrap_err().to_string().contains("more than can be held"));
+    }
+
+    /// Zeros, packed as tightly as they can be.
+    #[test]
+    fn what_packs_well_is_read() {
+        use super::super::{ChannelData, ExrImage, Layout};
+        let samples = 4096 * 256;
+        for compression in [
+            Compression::None,
+            Compression::Zips,
+            Compression::Zip,
+            Compression::Piz,
+            Compression::Dwaa(45.0),
+            Compression::Dwab(45.0),
+        ] {
+            let image = ExrImage {
+                frame: [4096, 256],
+                window: Window::full(4096, 256),
+                channels: ["B", "G", "R"].map(|name| (name.to_owned(), ChannelData::F32(vec![0.0; samples]))).into(),
+                colour: None,
+                attributes: Vec::new(),
+                data: std::collections::BTreeSet::new(),
+                compression,
+                layout: Layout::Single,
+            };
+            let (_dir, path) = file(&encode_exr(&image).unwrap());
+            let read = read_exr(&path).unwrap();
+            assert!(read.parts[0].channels.iter().all(|(_, found)| *found == vec![0.0; samples]), "{compression:?}");
+        }
     }
 }
