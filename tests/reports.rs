@@ -346,6 +346,25 @@ fn transparent_shadows_are_dark_or_light_as_asked() {
             "disk: {center: [0, 1, 0], normal: [0, 1, 0], radius: 1, material: {thin_dielectric: {ior: 1.5}}}",
             0.96 / 1.04,
         ),
+        (
+            "cube: {center: [0, 1, 0], size: 1, material: {dielectric: {ior: 1.5, transmission_tint: 0.5}}}",
+            0.96 * 0.96 * 0.25,
+        ),
+        (
+            "disk: {center: [0, 1, 0], normal: [0, 1, 0], radius: 1, \
+             material: {thin_dielectric: {ior: 1.5, transmission_tint: 0.5}}}",
+            0.5 * 0.96 / 1.04,
+        ),
+        // Half of it is a wall, whatever it is made of: the other half does as it does by itself.
+        (
+            "disk: {center: [0, 1, 0], normal: [0, 1, 0], radius: 1, \
+             material: {blend: {weight: 0.5, first: {diffuse: {}}, second: {thin_dielectric: {ior: 1.5}}}}}",
+            0.5 * 0.96 / 1.04,
+        ),
+        (
+            "cube: {center: [0, 1, 0], size: 1, material: {mask: {opacity: 1, material: {dielectric: {ior: 1.5}}}}}",
+            0.96 * 0.96,
+        ),
         ("cube: {center: [0, 1, 0], size: 1, material: {diffuse: {}}}", 0.0),
     ];
     for (body, share) in bodies {

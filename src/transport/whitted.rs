@@ -18,7 +18,7 @@ use crate::optics::fresnel::{self, Model};
 use crate::scene::compound::{Composition, Slopes, Standing, Vertex, share};
 use crate::scene::environment::Drawn;
 use crate::scene::light::{Light, free};
-use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Thickness, Tints, metal, relative_index};
+use crate::scene::material::{Highlight, HighlightModel, Kind, Material, Tints, metal, relative_index};
 use crate::scene::shape::Shape;
 use crate::scene::texture::Texture;
 use crate::scene::{Geometry, Inside, Object, Scene};
@@ -310,44 +310,68 @@ impl Tracer<'_> {
             let material = &scene.materials[object.material as usize];
             let crossing = scene.crossing(object, &surface, ray.direction, &inside.bodies);
             inside = scene.beyond(object, &surface, ray.direction, inside);
-            let cos = ray.direction.dot(surface.normal);
-            match &material.kind {
-                Kind::Boundary => {}
-                _ if crossing.is_some_and(|crossing| !crossing.shows) => {}
-                Kind::Dielectric { interior, exterior, fresnel: model, film, .. }
-                    if self.settings.transparent_shadows =>
-                {
-                    let exterior = crossing.and_then(|crossing| crossing.around).unwrap_or(exterior);
-                    let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive);
-                    through *= match film {
-                        None => index.lanes(|eta| {
-                            let eta = if cos < 0.0 { eta } else { 1.0 / eta };
-                            fresnel::dielectric(*model, cos.abs(), eta).transmitted
-                        }),
-                        Some(film) => {
-                            let film = film.at(&hit.texture_point(&surface), self.nm, exterior);
-                            let reflected = film.over_dielectric(cos.abs(), index.each(), cos < 0.0);
-                            Lanes::new(reflected.map(|r| (1.0 - r) as f32))
-                        }
-                    };
+            if crossing.is_none_or(|crossing| crossing.shows) {
+                let around = crossing.and_then(|crossing| crossing.around);
+                let wo = -ray.direction;
+                let x = Vertex { scene, hit: &hit, surface: &surface, at: &hit.texture_point(&surface), wo };
+                through *= self.passing(material, &x, around);
+                if !through.simd_gt(Lanes::ZERO).any() {
+                    return Lanes::ZERO;
                 }
-                Kind::Compound(compound) => {
-                    let at = hit.texture_point(&surface);
-                    let Some(s) = compound.straight(&surface, ray.direction, &at, self.nm) else { return Lanes::ZERO };
-                    through *= s.weight * s.share as f32;
-                }
-                Kind::Thin { interior, exterior, thickness, .. } if self.settings.transparent_shadows => {
-                    let waves = |t: &Thickness| t.waves(&hit.texture_point(&surface), self.nm, exterior);
-                    let waves = thickness.as_deref().map(waves);
-                    let pane = Pane::new(cos.abs(), &relative_index(interior, exterior, self.nm, false), waves);
-                    through *= pane.transmitted * pane.share as f32;
-                }
-                _ => return Lanes::ZERO,
             }
             ray = scene.leave(&surface, &hit, ray.direction);
             left -= hit.t;
         }
         Lanes::ZERO
+    }
+
+    /// What goes straight on through a material toward a light, `around` being the index outside where it is not the material's:
+    /// of one that is made of others the sum of what they let through. Glass and panes do where the scene asks for it.
+    fn passing(&self, material: &Material, x: &Vertex, around: Option<&RefractiveIndex>) -> Lanes {
+        let &Vertex { surface, at, wo, .. } = x;
+        let part = |share: f64, inner: &Material| match share {
+            0.0 => Lanes::ZERO,
+            _ => self.passing(inner, x, around) * share as f32,
+        };
+        let cos = wo.dot(surface.normal);
+        match &material.kind {
+            Kind::Boundary => Lanes::ONE,
+            Kind::Compound(compound) => match &compound.composition {
+                Composition::Mask { opacity, inner } => {
+                    let opacity = share(opacity, at);
+                    part(opacity, inner) + Lanes::splat((1.0 - opacity) as f32)
+                }
+                Composition::Blend { weight, first, second } => {
+                    let weight = share(weight, at);
+                    part(1.0 - weight, first) + part(weight, second)
+                }
+                Composition::TwoSided { front, back } => part(1.0, if cos < 0.0 { back } else { front }),
+                Composition::Relief { inner, .. } => part(1.0, inner),
+            },
+            Kind::Dielectric { interior, exterior, fresnel: model, tints, film, .. }
+                if self.settings.transparent_shadows =>
+            {
+                let exterior = around.unwrap_or(exterior);
+                let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive);
+                let transmitted = match film {
+                    None => index.lanes(|eta| {
+                        let eta = if cos > 0.0 { eta } else { 1.0 / eta };
+                        fresnel::dielectric(*model, cos.abs(), eta).transmitted
+                    }),
+                    Some(film) => {
+                        let reflected =
+                            film.at(at, self.nm, exterior).over_dielectric(cos.abs(), index.each(), cos > 0.0);
+                        Lanes::new(reflected.map(|r| (1.0 - r) as f32))
+                    }
+                };
+                transmitted * Tints::at(tints.as_deref(), at, self.nm).transmitted
+            }
+            Kind::Thin { .. } if self.settings.transparent_shadows => {
+                let straight = material.straight(surface, -wo, || *at, self.nm);
+                straight.map_or(Lanes::ZERO, |straight| straight.weight * straight.share as f32)
+            }
+            _ => Lanes::ZERO,
+        }
     }
 
     /// Light from mirrors and through glass.
