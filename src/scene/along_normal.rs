@@ -1,7 +1,7 @@
 //! Surfaces whose points each send their light along the normal, as a collimated lamp does.
 //!
 //! Light reaches a point from where a normal of the surface passes through it. Every shape is convex, so
-//! from outside that is the nearest point, if any. The beam that leaves a small area spreads with the
+//! from outside that is the nearest point, if any; within a cube that shines inward there is one on each face. The beam that leaves a small area spreads with the
 //! curvature of the surface: at a distance h its area has grown by (1 + h κ₁)(1 + h κ₂), and the
 //! irradiance across it has shrunk by that.
 
@@ -11,6 +11,7 @@ use super::shape::Shape;
 use super::texture::{Texture, TexturePoint};
 use crate::math::{Departure, Ray};
 use crate::spectrum::Lanes;
+use arrayvec::ArrayVec;
 use glam::{DVec2, DVec3};
 
 /// The most faces of a shape.
@@ -20,8 +21,8 @@ const FACES: u8 = 6;
 /// points of a surface are good to some eight roundings each, and light that leaves a point does not come back to it.
 const NEAREST: f64 = 32.0 * f64::EPSILON;
 
-/// Light at `from`; `facing` is −1 where the surface shines against its own normal, else 1. A mesh is asked
-/// at one triangle, which `u` chooses by area.
+/// Light at `from`; `facing` is −1 where the surface shines against its own normal, else 1. Of several faces that shine there
+/// `u` chooses one. A mesh is asked at one triangle, which `u` chooses by area.
 #[must_use]
 pub fn arriving(
     geometry: &Geometry,
@@ -34,13 +35,14 @@ pub fn arriving(
 ) -> Option<Arriving> {
     match geometry {
         Geometry::Shape(shape) => {
-            let foot = foot(shape, facing, from)?;
+            let feet = feet(shape, facing, from);
+            let foot = feet.get((u.x * feet.len() as f64) as usize)?;
             let surface = shape.surface(foot.point, foot.face);
             let at = TexturePoint::new(&surface, u32::from(foot.face), [0.0; 2]);
             Some(Arriving {
                 wi: foot.direction,
                 distance: foot.distance,
-                radiance: exitance.eval(&at, nm) * foot.spread as f32,
+                radiance: exitance.eval(&at, nm) * (foot.spread * feet.len() as f64) as f32,
                 density: None,
                 target: Some(Departure::new(object, u32::from(foot.face))),
             })
@@ -84,8 +86,8 @@ struct Foot {
     spread: f64,
 }
 
-fn foot(shape: &Shape, facing: f64, from: DVec3) -> Option<Foot> {
-    (0..FACES).find_map(|face| {
+fn feet(shape: &Shape, facing: f64, from: DVec3) -> ArrayVec<Foot, { FACES as usize }> {
+    let foot = |face| {
         let normal = shape.surface_with(from, face, super::shape::Detail::Geometry).normal * facing;
         let hit = shape.intersect(&Ray::new(from, -normal), f64::INFINITY, None).filter(|hit| hit.face == face)?;
         let surface = shape.surface_with(from - normal * hit.t, face, super::shape::Detail::Geometry);
@@ -99,7 +101,8 @@ fn foot(shape: &Shape, facing: f64, from: DVec3) -> Option<Foot> {
         let [k1, k2] = shape.curvatures(surface.point, face);
         let spread = 1.0 / (hit.t.mul_add(k1 * facing, 1.0) * hit.t.mul_add(k2 * facing, 1.0));
         Some(Foot { direction: -outward, distance: hit.t, point: surface.point, face, spread })
-    })
+    };
+    (0..FACES).filter_map(foot).collect()
 }
 
 #[cfg(test)]
@@ -188,6 +191,26 @@ mod tests {
                 assert!(found.is_none(), "{shape:?} {} {found:?}", sample.point);
             }
         }
+    }
+
+    /// Within a cube turned inside out each face lights a point by its exitance, from its own side: over u each of the six is asked
+    /// as often, for six times that.
+    #[test]
+    fn each_face_of_a_cube_turned_inside_out_lights_its_inside() {
+        let cube = Cube::new(DVec3::ZERO, [DVec3::X, DVec3::Y, DVec3::Z]).unwrap();
+        let geometry = Geometry::Shape(Shape::Cube(cube));
+        let from = DVec3::new(0.1, -0.2, 0.3);
+        let mut sides: Vec<DVec3> = Vec::new();
+        for i in 0..6 {
+            let u = DVec2::new((f64::from(i) + 0.5) / 6.0, 0.5);
+            let light = arriving(&geometry, -1.0, 0, &Texture::one(), from, u, Lanes::splat(550.0)).expect("light");
+            assert_eq!(light.radiance.to_array()[0], 6.0);
+            // The wall is at 1 along an axis.
+            assert!((light.distance - (1.0 - from.dot(light.wi))).abs() < 1e-14, "{} {}", light.wi, light.distance);
+            sides.push(light.wi);
+        }
+        assert_eq!(sides.iter().sum::<DVec3>(), DVec3::ZERO);
+        assert!((0..6).all(|i| (0..i).all(|j| sides[i].dot(sides[j]) < 0.5)), "{sides:?}");
     }
 
     /// Two triangles of areas 1 and 3: the mean over u of what one of them gives is the exitance.
