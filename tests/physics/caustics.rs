@@ -281,6 +281,15 @@ fn a_sun_in_an_environment_is_traced_and_an_even_sky_is_not() {
     assert!(!tracing && reason == "no light is small or has a sun", "{reason}");
 }
 
+/// No path begins at a lamp that is never looked for: what glass throws of its light stays with paths from the camera, which meet
+/// it by chance.
+#[test]
+fn light_of_a_lamp_of_no_weight_is_not_left_to_paths_from_it() {
+    let light = "- sphere: {center: [-1.5, 2, 1], radius: 0.2, emission: 30, sampling_weight: 0}\n";
+    let (tracing, _, reason) = techniques(&Case { what: "no weight", light, ..AREA }.bench("on", "auto", 64));
+    assert!(!tracing && reason == "no light is small or has a sun", "{reason}");
+}
+
 /// Where panes count for the length of a path, as in scenes read from Mitsuba's XML, paths from the lights cannot tell what
 /// they may still meet. Without a pane there is nothing to count: the picture is the same, traced or not.
 #[test]
