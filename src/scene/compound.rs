@@ -344,6 +344,21 @@ impl Compound {
         }
     }
 
+    /// See [`Material::open`].
+    #[must_use]
+    pub fn open(&self, surface: &SurfacePoint, direction: DVec3, at: &TexturePoint) -> f64 {
+        let inner = |material: &Material| material.open(surface, direction, at);
+        let mixed = |first: f64, second: f64, weight: f64| first * (1.0 - weight) + second * weight;
+        match &self.composition {
+            Composition::Mask { opacity, inner: material } => mixed(1.0, inner(material), share(opacity, at)),
+            Composition::Blend { weight, first, second } => mixed(inner(first), inner(second), share(weight, at)),
+            Composition::TwoSided { front, back } => {
+                inner(if direction.dot(surface.normal) > 0.0 { back } else { front })
+            }
+            Composition::Relief { inner: material, .. } => inner(material),
+        }
+    }
+
     /// True where the layer itself varies over the surface.
     #[must_use]
     pub fn varies(&self) -> bool {

@@ -410,6 +410,16 @@ impl Material {
         }
     }
 
+    /// The share of paths in `direction` that meet nothing at `surface`: it is a hole there, or only bounds a medium.
+    #[must_use]
+    pub fn open(&self, surface: &SurfacePoint, direction: DVec3, at: &TexturePoint) -> f64 {
+        match &self.kind {
+            Kind::Boundary => 1.0,
+            Kind::Compound(compound) => compound.open(surface, direction, at),
+            _ => 0.0,
+        }
+    }
+
     /// The scattering function at a point for the wavelengths `nm`. `all_dispersive` treats every
     /// glass as if its index depended on wavelength (`effects: all`).
     #[must_use]

@@ -151,6 +151,7 @@ impl Tracer<'_> {
                 if let Some(t) = flight.scattered_at {
                     let point = path.ray.at(t);
                     // A medium counts as coverage: what is behind it is dimmed.
+                    walk.cover();
                     walk.show(|| scene.camera.depth(point));
                     if !self.scatter_in_medium::<CHROMATIC, MEDIA>(path, point, medium) {
                         break;
@@ -231,6 +232,9 @@ impl Tracer<'_> {
             Coverage::Scattering => straight.is_none(),
             Coverage::FirstHit => true,
         } {
+            walk.cover();
+        }
+        if !boundary {
             walk.show(|| scene.camera.depth(surface.point));
         }
 
@@ -288,7 +292,7 @@ impl Tracer<'_> {
             return Step::Straight(hit.t);
         }
         // A pane that mirrors.
-        walk.show(|| scene.camera.depth(surface.point));
+        walk.cover();
         if self.is_last(path) {
             return Step::Ended;
         }

@@ -92,3 +92,33 @@ fn each_path_of_a_sample_is_behind_its_own_fog() {
         bench_with(&scene, &[]).grey().picture().mean().assert_is(0.5 * (-0.2f64).exp(), 0.02);
     }
 }
+
+/// A pane, whole or half of it a hole, one metre from the eye, and a white wall at five, lit through the pane. What comes through
+/// the pane, T = (1 − r)/(1 + r) with r = 0.04 of it, is faded as the pane is, what comes through the hole as the wall is: whichever
+/// paths bring it, and whatever counts as coverage. With s = h + (1 − h) T in all, E = π and ρ = 1 that is
+/// s (h e^(−0.3 · 5) + (1 − h) T e^(−0.3)).
+#[test]
+fn what_comes_through_a_pane_is_behind_the_fog_before_the_pane() {
+    let through = 0.96 / 1.04;
+    let pane = "thin_dielectric: {ior: 1.5}";
+    for (hole, material) in [(0.0, pane.to_owned()), (0.5, format!("mask: {{opacity: 0.5, material: {{{pane}}}}}"))] {
+        let all = hole + (1.0 - hole) * through;
+        let expected = all * (hole * (-1.5f64).exp() + (1.0 - hole) * through * (-0.3f64).exp());
+        for integrator in [
+            "path: {max_depth: 2}",
+            "path: {max_depth: 2, coverage: scattering}",
+            "path: {max_depth: 2, coverage: first_hit}",
+            "light_tracer: {max_depth: 2}",
+        ] {
+            let scene = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 20}}\nimage: {{width: 8, height: 8}}\n\
+                 render: {{samples: 1024}}\nintegrator: {{{integrator}}}\nfog: {{colour: 0, density: 0.3}}\n\
+                 lights: [{{directional: {{direction: [0, 0, -1], irradiance: 3.14159265}}}}]\nshapes:\n\
+                 - rectangle: {{corner: [-1, -1, 0], edge_u: [2, 0, 0], edge_v: [0, 2, 0], \
+                   material: {{diffuse: {{reflectance: 1}}}}}}\n\
+                 - rectangle: {{corner: [-1, -1, 4], edge_u: [2, 0, 0], edge_v: [0, 2, 0], material: {{{material}}}}}\n"
+            );
+            bench_with(&scene, &[]).grey().picture().mean().assert_is(expected, 0.02);
+        }
+    }
+}

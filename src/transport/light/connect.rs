@@ -59,7 +59,8 @@ impl Walk<'_, '_> {
     fn send(&mut self, beam: &Beam, point: DVec3, ray: &Ray, inside: Inside, entry: &Entry, light: Lanes) {
         let Some(through) = self.open(ray, entry.distance, inside, beam) else { return };
         let share = LANES as f32 / beam.rho.reduce_add();
-        let light = beam.only(beam.power * light * through * share) * self.clear(point);
+        let clear = self.clear_through(point, ray, entry.distance, inside, beam.nm);
+        let light = beam.only(beam.power * light * through * share * clear);
         (self.splat)(self.wavelengths, Splat { place: entry.pixel, light, alone: beam.alone, group: self.group });
     }
 
@@ -67,6 +68,38 @@ impl Walk<'_, '_> {
     pub(super) fn clear(&self, point: DVec3) -> f32 {
         depth_fog(self.paths.scene, self.paths.plan)
             .map_or(1.0, |fog| 1.0 - fog.falloff.amount(self.paths.scene.camera.depth(point)) as f32)
+    }
+
+    /// What depth fog leaves of light from a point that comes straight on to the camera at `distance` along `ray`: it is faded as the
+    /// first thing is that the camera sees there. What goes through the holes of a material made of others passes that by.
+    pub(super) fn clear_through(&self, point: DVec3, ray: &Ray, distance: f64, mut inside: Inside, nm: Lanes) -> Lanes {
+        let LightPaths { scene, plan, .. } = *self.paths;
+        let mut clear = Lanes::splat(self.clear(point));
+        if depth_fog(scene, plan).is_none() || !scene.has_boundaries {
+            return clear;
+        }
+        let (mut ray, mut left) = (*ray, distance);
+        for _ in 0..=MAX_BOUNDARIES {
+            let Some(hit) = scene.closest(&ray, left) else { break };
+            let surface = scene.surface(&ray, &hit);
+            let object = &scene.objects[hit.object as usize];
+            let crossing = scene.crossing(object, &surface, ray.direction, &inside.bodies);
+            if crossing.is_none_or(|crossing| crossing.shows) && !(object.is_lamp && self.hides_lamps()) {
+                let material = &scene.materials[object.material as usize];
+                let at = hit.texture_point(&surface);
+                let open = material.open(&surface, ray.direction, &at) as f32;
+                let straight = material.straight(&surface, ray.direction, || at, nm);
+                let all = straight.map_or(Lanes::ZERO, |s| s.weight * s.share as f32);
+                // Nothing comes through where all is zero.
+                let seen =
+                    (Lanes::ONE - Lanes::splat(open) / all.max(Lanes::splat(f32::MIN_POSITIVE))).max(Lanes::ZERO);
+                clear += (Lanes::splat(self.clear(surface.point)) - clear) * seen;
+            }
+            inside = scene.beyond(object, &surface, ray.direction, inside);
+            ray = scene.leave(&surface, &hit, ray.direction);
+            left -= hit.t;
+        }
+        clear
     }
 
     /// The share of light that comes straight on to the camera at `distance`; `None` where something opaque stands

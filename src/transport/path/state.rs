@@ -66,7 +66,7 @@ pub(super) struct Path {
 pub(super) struct Walk {
     pub(super) alpha: f32,
     pub(super) depth: f64,
-    /// Whether it has met nothing that counts as coverage.
+    /// Whether it has met nothing yet that is to be seen.
     pub(super) first: bool,
     /// Boundaries crossed since the last vertex. They have numbers of their own, so that every vertex of the path keeps
     /// the same ones whether or not boundaries lie on the way.
@@ -82,12 +82,18 @@ impl Walk {
         Walk { alpha: if covered { 1.0 } else { 0.0 }, ..Walk::NEW }
     }
 
-    /// Something that covers what is behind it, `depth` away.
+    /// Something to be seen, `depth` away: depth fog is that of the first, whatever counts as coverage.
     #[inline]
     pub(super) fn show(&mut self, depth: impl FnOnce() -> f64) {
         if self.first {
-            *self = Walk { alpha: 1.0, depth: depth(), first: false, ..*self };
+            *self = Walk { depth: depth(), first: false, ..*self };
         }
+    }
+
+    /// Something that covers what is behind it.
+    #[inline]
+    pub(super) fn cover(&mut self) {
+        self.alpha = 1.0;
     }
 }
 
