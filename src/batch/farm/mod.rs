@@ -138,11 +138,6 @@ impl Job {
                 if entry.name.contains("{{") {
                     return Err(Error::Config(format!("{}: expected a name without {{{{, found one", entry.name)));
                 }
-                // In the table of tasks they end a name; a batch has none.
-                if entry.name.contains(char::is_control) {
-                    let message = format!("{:?}: expected a name without control characters, found one", entry.name);
-                    return Err(Error::Config(message));
-                }
                 if cut.parts() && frames.is_empty() && ends_in(Path::new(&entry.name), &["exr"]) {
                     return Err(Error::Config(format!(
                         "{}: expected a name that does not end in .exr, for the directory of its parts",
