@@ -112,7 +112,7 @@ fn what_comes_through_a_pane_is_behind_the_fog_before_the_pane() {
         ] {
             let scene = format!(
                 "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 20}}\nimage: {{width: 8, height: 8}}\n\
-                 render: {{samples: 1024}}\nintegrator: {{{integrator}}}\nfog: {{colour: 0, density: 0.3}}\n\
+                 render: {{samples: 4096}}\nintegrator: {{{integrator}}}\nfog: {{colour: 0, density: 0.3}}\n\
                  lights: [{{directional: {{direction: [0, 0, -1], irradiance: 3.14159265}}}}]\nshapes:\n\
                  - rectangle: {{corner: [-1, -1, 0], edge_u: [2, 0, 0], edge_v: [0, 2, 0], \
                    material: {{diffuse: {{reflectance: 1}}}}}}\n\
