@@ -29,6 +29,8 @@ pub struct Compound {
     pub composition: Composition,
     /// Most reliefs over each other.
     pub reliefs: usize,
+    /// Whether its back is made of something else than its front, which may have other holes.
+    pub sided: bool,
 }
 
 /// The most reliefs over each other.
@@ -265,7 +267,11 @@ impl Compound {
         let inner = composition.inner();
         let reliefs = inner.iter().map(|m| m.compound().map_or(0, |l| l.reliefs)).max().unwrap_or(0);
         let reliefs = reliefs + usize::from(matches!(composition, Composition::Relief { .. }));
-        Compound { composition, reliefs }
+        let sided = match &composition {
+            Composition::TwoSided { front, back } => !Arc::ptr_eq(front, back),
+            _ => inner.iter().any(|m| m.compound().is_some_and(|l| l.sided)),
+        };
+        Compound { composition, reliefs, sided }
     }
 
     /// The material that one path meets, chosen by `u` in [0, 1); `None` where it goes straight on. `normal` is the

@@ -611,7 +611,24 @@ impl<'a> Walk<'a, '_> {
                     let (at, wo) = (&hit.texture_point(&surface), -direction);
                     let x = crate::scene::compound::Vertex { scene, hit: &hit, surface: &surface, at, wo };
                     let u = self.sampler.set(set)[2];
-                    let leaf = compound.resolve(&x, seen_normal(&surface, wo), u);
+                    let mut leaf = compound.resolve(&x, seen_normal(&surface, wo), u);
+                    // What goes straight on is seen from behind, where the holes may be others.
+                    if compound.sided && self.lamp.is_some() {
+                        let behind = crate::scene::compound::Vertex { wo: direction, ..x };
+                        let open = compound.resolve(&behind, seen_normal(&surface, direction), u).is_none();
+                        match (&leaf, open) {
+                            (None, false) => return None,
+                            (Some(_), true) => {
+                                // Of the two ways one is followed.
+                                let place = CHOSEN + 1 + beam.vertex.wrapping_add(crossings << 16);
+                                beam.power *= 2.0;
+                                if self.sampler.set(Set::Extra(place))[0] < 0.5 {
+                                    leaf = None;
+                                }
+                            }
+                            _ => {}
+                        }
+                    }
                     (leaf.as_ref().map(|leaf| leaf.material), leaf.map(|leaf| (leaf, &**compound, u)))
                 }
                 _ => (Some(material), None),

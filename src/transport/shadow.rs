@@ -33,13 +33,15 @@ pub(super) struct Shadow<'a> {
     pub target: Option<Departure>,
     /// Whether lamps are not there.
     pub past_lamps: bool,
+    /// Whether it leads to who sees, and not from there: materials with two sides are as they are seen.
+    pub to_viewer: bool,
 }
 
 impl Shadow<'_> {
     /// Transmittance along `ray` to `distance`, and for each lane the probability that a path would have come through
     /// without scattering; `None` where something opaque stands between.
     pub fn cast<const MEDIA: bool>(self, ray: &Ray, distance: f64) -> Option<(Lanes, Lanes)> {
-        let Shadow { scene, sampler, nm, vertex, mut inside, panes, target, past_lamps } = self;
+        let Shadow { scene, sampler, nm, vertex, mut inside, panes, target, past_lamps, .. } = self;
         let dim = |medium: Option<u32>, ray: &Ray, distance: f64, crossings: u32| match medium {
             Some(m) if MEDIA => {
                 // Shadow rays walk by numbers of their own.
@@ -114,7 +116,8 @@ impl Shadow<'_> {
         let straight = if crossing.is_some_and(|c| !c.shows) {
             Straight::OPEN
         } else {
-            material.straight(&surface, ray.direction, || hit.texture_point(&surface), self.nm)?
+            let direction = if self.to_viewer { -ray.direction } else { ray.direction };
+            material.straight(&surface, direction, || hit.texture_point(&surface), self.nm)?
         };
         *inside = scene.beyond(object, &surface, ray.direction, *inside);
         Some((straight, surface))

@@ -385,3 +385,25 @@ fn a_lamp_may_have_a_black_frame() {
         );
     }
 }
+
+/// A card over a floor, black, with other holes on its two sides: 0.8 of it as seen from above, 0.1 from below. To a floor that is lit
+/// through it, and seen below it, it is what it is from there, so that with E = π and ρ = 1 there is light of 0.1. Where the floor is
+/// lit aslant, below the card, it is seen from above through the holes that are there: 0.8 cos 45°.
+#[test]
+fn holes_of_a_card_are_those_of_the_side_that_is_seen() {
+    let card = "material: {two_sided: {front: {mask: {opacity: 0.2, material: {diffuse: {reflectance: 0}}}}, \
+        back: {mask: {opacity: 0.9, material: {diffuse: {reflectance: 0}}}}}}";
+    for (eye, fov, light, expected) in [(0.5, 20.0, "[0, -1, 0]", 0.1), (1.5, 6.7, "[1, -1, 0]", 0.8 * 0.5f64.sqrt())] {
+        for integrator in ["path: {max_depth: 2}", "light_tracer: {max_depth: 2}"] {
+            let scene = format!(
+                "camera: {{origin: [0, {eye}, 0], target: [0, 0, 0], up: [0, 0, 1], fov_deg: {fov}}}\n\
+                 image: {{width: 8, height: 8}}\nrender: {{samples: 16384}}\nintegrator: {{{integrator}}}\n\
+                 lights: [{{directional: {{direction: {light}, irradiance: 3.14159265}}}}]\nshapes:\n\
+                 - rectangle: {{corner: [-0.1, 0, 0.1], edge_u: [0.2, 0, 0], edge_v: [0, 0, -0.2], \
+                   material: {{diffuse: {{reflectance: 1}}}}}}\n\
+                 - rectangle: {{corner: [-0.25, 1, 0.25], edge_u: [0.5, 0, 0], edge_v: [0, 0, -0.5], {card}}}\n"
+            );
+            bench_with(&scene, &[]).grey().picture().mean().assert_is(expected, 0.05);
+        }
+    }
+}

@@ -87,8 +87,8 @@ impl Walk<'_, '_> {
             if crossing.is_none_or(|crossing| crossing.shows) && !(object.is_lamp && self.hides_lamps()) {
                 let material = &scene.materials[object.material as usize];
                 let at = hit.texture_point(&surface);
-                let open = material.open(&surface, ray.direction, &at) as f32;
-                let straight = material.straight(&surface, ray.direction, || at, nm);
+                let open = material.open(&surface, -ray.direction, &at) as f32;
+                let straight = material.straight(&surface, -ray.direction, || at, nm);
                 let all = straight.map_or(Lanes::ZERO, |s| s.weight * s.share as f32);
                 // Nothing comes through where all is zero.
                 let seen =
@@ -113,7 +113,7 @@ impl Walk<'_, '_> {
             _ => MAX_BOUNDARIES,
         };
         let past_lamps = self.hides_lamps();
-        let shadow = Shadow { scene, sampler, nm, vertex, inside, panes, target: None, past_lamps };
+        let shadow = Shadow { scene, sampler, nm, vertex, inside, panes, target: None, past_lamps, to_viewer: true };
         let tracked = plan.media || plan.nested;
         let came = if tracked { shadow.cast::<true>(ray, distance) } else { shadow.cast::<false>(ray, distance) };
         came.map(|(through, _)| through)

@@ -232,6 +232,7 @@ impl Tracer<'_> {
             panes: self.panes(path),
             target: light.target,
             past_lamps: false,
+            to_viewer: false,
         };
         let Some((through, passing)) = shadow.cast::<MEDIA>(&ray, distance) else { return };
         let weight = weight(Some(passing));
