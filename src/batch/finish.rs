@@ -187,7 +187,7 @@ impl Finish {
             notes: scene.notes.iter().cloned().chain(note).chain(mattes::shared_names(description)).collect(),
             world_to_camera: finite(scene.camera.camera_from_world()),
             world_to_ndc: finite(scene.camera.ndc_from_world()),
-            screen_window: scene.camera.screen_window(),
+            screen_window: scene.camera.screen_window().and_then(finite),
             white,
             output,
             sensitivity: description.image.sensitivity,
@@ -284,9 +284,9 @@ pub fn base(output: &description::Output, bands: bool) -> exr::Base {
     }
 }
 
-/// A matrix all whose numbers f32 can hold: JSON has no others.
-fn finite(matrix: [f32; 16]) -> Option<[f32; 16]> {
-    Some(matrix).filter(|matrix| matrix.iter().all(|x| x.is_finite()))
+/// Numbers all of which f32 can hold: JSON has no others.
+fn finite<const N: usize>(numbers: [f32; N]) -> Option<[f32; N]> {
+    Some(numbers).filter(|numbers| numbers.iter().all(|x| x.is_finite()))
 }
 
 /// The name of an integrator.

@@ -217,7 +217,7 @@ fn the_seam_of_a_cylinder_comes_back() {
     {
         let directory = tempfile::tempdir().unwrap();
         let yaml = directory.path().join("s.yaml");
-        let camera = "camera: {origin: [0, 0.5, 5], target: [0, 0.5, 0]}";
+        let camera = "camera: {origin: [0, 0.5, 5], target: [0, 0.5, 0], fov_deg: 40}";
         common::write(&yaml, format!("{camera}\nintegrator: none\nshapes: [{{{tube}{more}}}}}]\n").as_bytes());
         let ray = Ray::new(DVec3::new(0.1, 0.4, 5.0), DVec3::NEG_Z);
         let [ours, theirs] = [false, true].map(|again| {
