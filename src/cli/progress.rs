@@ -251,11 +251,11 @@ mod tests {
         assert_eq!(words(&known), "0.03 Msamples/s, error 1.80 %, about 1.00 % (0.90-1.10 %) in 42.0 s");
         let aimed = Progress { target: Some(0.01), ..known };
         assert_eq!(words(&aimed), "0.03 Msamples/s, error 1.80 %, 1.00 % in about 42.0 s");
-        let forecast = Some(Forecast { seconds_between: [40.0, 72.0], ..forecast });
-        let aimed = Progress { forecast, ..aimed };
+        let forecast = Forecast { seconds_between: [40.0, 72.0], ..forecast };
+        let aimed = Progress { forecast: Some(forecast), ..aimed };
         assert_eq!(words(&aimed), "0.03 Msamples/s, error 1.80 %, 1.00 % in about 42.0 s (30.0 s to 62.0 s)");
-        let forecast = Some(Forecast { seconds_between: [10.0, 72.0], ..forecast.unwrap() });
-        let aimed = Progress { forecast, ..aimed };
+        let forecast = Forecast { seconds_between: [10.0, 72.0], ..forecast };
+        let aimed = Progress { forecast: Some(forecast), ..aimed };
         assert_eq!(words(&aimed), "0.03 Msamples/s, error 1.80 %, 1.00 % in about 42.0 s (up to 62.0 s)");
     }
 }

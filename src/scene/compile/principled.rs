@@ -10,7 +10,7 @@ impl<'a> Compiler<'a> {
     pub(super) fn principled(&mut self, place: &str, m: &'a written::Principled) -> Solid {
         let base = self.reflectance_texture(&format!("{place}.base_color"), &m.base_color);
         let mut number = |s: &'a written::NumberOrTexture| self.scalar(s);
-        let transmission = m.spec_trans.as_ref().map(|s| number(s));
+        let transmission = m.spec_trans.as_ref().map(&mut number);
         let specular_tint = number(&m.spec_tint);
         let sheen_tint = number(&m.sheen_tint);
         Solid {
