@@ -1,8 +1,9 @@
 """Scenes drawn at random from most of Mitsuba's plugins, for what no scene of one feature shows: how they go together.
 
 A scene is a function of its number. It has a ground, one to three bodies, one or two lights, a camera and an integrator,
-each with parameters, textures and transforms that are drawn. What the two renderers are known to mean otherwise (the
+each with parameters, textures and transforms that are drawn. What the two renderers are known to mean otherwise
 (docs/mitsuba.md says why) is left out here, beside the word "known".
+"""
 
 import random
 import re
