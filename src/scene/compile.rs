@@ -75,8 +75,6 @@ struct Compiler<'a> {
     /// Textures as spectra and as numbers, once they are asked for.
     textures: HashMap<&'a str, Texture>,
     volumes: HashMap<&'a str, Volume>,
-    /// Those of colours that are asked for shares of light.
-    shares: HashMap<String, Volume>,
     /// Environments, by where they stand among the lights, until they are asked for.
     skies: HashMap<usize, Result<Option<Light>>>,
     numbers: HashMap<&'a str, Scalar>,
@@ -188,7 +186,6 @@ impl<'a> Compiler<'a> {
             on_surface: BTreeSet::new(),
             textures: HashMap::new(),
             volumes: HashMap::new(),
-            shares: HashMap::new(),
             skies: HashMap::new(),
             numbers: HashMap::new(),
             named: HashMap::new(),

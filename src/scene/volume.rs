@@ -5,8 +5,7 @@
 //! about the cube in the world, where a medium made of it ends (the convention of Mitsuba 3).
 //!
 //! Colours become spectra voxel by voxel: a sigmoid (`spectrum::upsample`) of the colour over twice its
-//! largest channel, times that scale; for shares of light, such as albedos and reflectances, the sigmoid of the colour itself, which
-//! no wavelength takes beyond one, as the other may. Between voxels the sigmoids and the scales are interpolated
+//! largest channel, times that scale. Between voxels the sigmoids and the scales are interpolated
 //! each on its own, then multiplied (the convention of Mitsuba 3).
 
 use super::texture::{Wrap, even_shares, mean_luminance, spread};
@@ -78,16 +77,6 @@ impl Voxels {
             // Black is a spectrum of zero, not one of grey times zero: its neighbours are mixed with it.
             let [a, b, c] = carried.coefficients(if scale > 0.0 { rgb.map(|v| v / scale) } else { [0.0; 3] });
             [a, b, c, scale]
-        };
-        Voxels::Coloured(colours.par_iter().map(voxel).collect())
-    }
-
-    /// Colours within [0, 1] as spectra of shares of light, which are within that, too.
-    #[must_use]
-    pub fn shares(colours: &[[f32; 3]], carried: Carried) -> Voxels {
-        let voxel = |&rgb: &[f32; 3]| {
-            let [a, b, c] = carried.coefficients(rgb);
-            [a, b, c, 1.0]
         };
         Voxels::Coloured(colours.par_iter().map(voxel).collect())
     }

@@ -217,45 +217,6 @@ fn normals_of_a_volume_are_its_three_numbers() {
     }
 }
 
-/// A red of a grid, (0.9, 0.05, 0.05), is a share of light: paint of it reflects no wavelength by more than one, nor do boards of it,
-/// and by that of the colour itself, as where the colour is written as such. A ball of smoke with this albedo is nowhere brighter
-/// than the even sky about it, at 1, which it would be with none absorbed.
-#[test]
-fn colours_of_a_grid_give_back_no_more_light_than_comes() {
-    let red = vol([1, 1, 1], 3, &[0.9, 0.05, 0.05]);
-    let paint = |reflectance: &str| {
-        let scene = format!(
-            "{CAMERA}volumes: {{v: {{grid: {{file: v.vol}}}}}}\n\
-             textures: {{t: {{volume: v}}, b: {{checkerboard: {{a: {{texture: t}}, b: {{texture: t}}}}}}}}\n\
-             integrator: {{whitted: {{ambient: 1}}}}\nshapes:\n\
-             - plane: {{normal: [0, 0, 1], material: {{diffuse: {{reflectance: {reflectance}}}}}}}\n"
-        );
-        bench_with(&scene, &[("v.vol", &red)]).lanes(&ray(v(0.5, 0.5, 3.0), v(0.5, 0.5, 0.0)))
-    };
-    let written = paint("{rgb: [0.9, 0.05, 0.05]}");
-    for texture in ["{texture: t}", "{texture: b}"] {
-        for (found, expected) in paint(texture).into_iter().zip(written) {
-            // The fast coefficients of voxels are within 2e-4 of their colour, the exact ones solve it: at its ends a spectrum may
-            // differ by more.
-            assert!(found <= 1.0 && (found - expected).abs() < 2e-2, "{texture}: {found}, written {expected}");
-        }
-    }
-    let smoke = format!(
-        "{CAMERA}volumes: {{v: {{grid: {{file: v.vol}}}}}}\n\
-         media: {{m: {{homogeneous: {{extinction: 4, albedo: {{volume: v}}}}}}}}\n\
-         lights: [{{constant: {{radiance: 1}}}}]\n\
-         shapes: [{{sphere: {{radius: 1, material: {{boundary: {{}}}}, inside: m}}}}]\n"
-    );
-    let smoke = bench_with(&smoke, &[("v.vol", &red)]);
-    let through = ray(v(0.1, 0.2, 5.0), v(0.1, 0.2, 0.0));
-    // Of 4096 paths of at most 1, or little more by a light sample, the mean is good to a few hundredths.
-    let deep = smoke.estimate_of(&through, 4096, |light, wavelengths| {
-        let lanes = wavelengths.nm.to_array().into_iter().zip(light.radiance.to_array());
-        lanes.filter(|(nm, _)| *nm > 640.0).map(|(_, light)| f64::from(light)).fold(0.0, f64::max)
-    });
-    assert!(deep.mean > 0.3 && deep.mean < 1.05, "{}", deep.mean);
-}
-
 /// A lamp over a floor behind a pane, F = ½ as without it, times what the pane lets through on the way of each
 /// direction: less than without. What shadow rays and scattering find together is what a path without shadow rays
 /// finds.

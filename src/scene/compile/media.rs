@@ -35,7 +35,7 @@ impl Compiler<'_> {
             }),
             written::Volume::Grid(grid) => {
                 self.files.push(grid.file.to_path_buf());
-                let loaded = grid_volume(grid, world_from_local, Voxels::upsampled, self.shelf.carried);
+                let loaded = grid_volume(grid, world_from_local, self.shelf.carried);
                 Ok(Volume::Grid(Arc::new(loaded.map_err(|e| self.asked(&format!("{at}.grid.file"), e))?)))
             }
         }
@@ -97,35 +97,7 @@ impl Compiler<'_> {
             }
             _ => {}
         }
-        match s {
-            written::SpectrumOrVolume::Spectrum(_) => albedo,
-            written::SpectrumOrVolume::Volume(name) => self.of_shares(&format!("{at}.volume"), albedo, name),
-        }
-    }
-
-    /// The `volume` of this `name`, which the field `at` takes for shares of light: of colours another, whose spectra are within 1.
-    pub(super) fn of_shares(&mut self, at: &str, volume: Volume, name: &str) -> Volume {
-        let description = self.description;
-        let (Volume::Grid(grid), written::Volume::Grid(written)) = (&volume, &description.volumes[name]) else {
-            return volume;
-        };
-        if !matches!(grid.values, Voxels::Coloured(_)) || grid.greatest() > 1.0 {
-            return volume;
-        }
-        if let Some(known) = self.shares.get(name) {
-            return known.clone();
-        }
-        let world_from_local = DAffine3::from_mat4(description.volumes[name].world_from_local());
-        let shares = match grid_volume(written, world_from_local, Voxels::shares, self.shelf.carried) {
-            Ok(grid) => Volume::Grid(Arc::new(grid)),
-            Err(error) => {
-                let error = self.asked(at, error);
-                self.unread.get_or_insert(error);
-                volume
-            }
-        };
-        self.shares.insert(name.to_owned(), shares.clone());
-        shares
+        albedo
     }
 
     /// Refuses a file of more than all light in the volume `name`, which the field `at` takes for shares of it.
@@ -240,17 +212,12 @@ impl Compiler<'_> {
     }
 }
 
-/// Reads the grid of a volume, of whose colours `spectra` makes spectra.
+/// Reads the grid of a volume.
 ///
 /// # Errors
 /// [`Error::Input`] where the file is missing or broken, holds numbers below zero, or has neither one channel
 /// nor three.
-fn grid_volume(
-    written: &written::GridVolume,
-    world_from_local: DAffine3,
-    spectra: impl Fn(&[[f32; 3]], Carried) -> Voxels,
-    carried: Carried,
-) -> Result<GridVolume> {
+fn grid_volume(written: &written::GridVolume, world_from_local: DAffine3, carried: Carried) -> Result<GridVolume> {
     let path: &Path = &written.file;
     let grid = Grid::load(path)?;
     if let Some(i) = grid.values.iter().position(|v| *v < 0.0) {
@@ -261,7 +228,7 @@ fn grid_volume(
     let values = match (grid.channels, written.raw) {
         (1, _) => Voxels::Grey(grid.values),
         (3, true) => Voxels::Raw(triples()),
-        (3, false) => spectra(&triples(), carried),
+        (3, false) => Voxels::upsampled(&triples(), carried),
         (n, _) => return Err(Error::input(path, format!("expected 1 channel or 3, found {n}"))),
     };
     let mut local_from_world = world_from_local.inverse();

@@ -27,7 +27,7 @@ impl<'a> Compiler<'a> {
                 let at = format!("{at}.texture");
                 let texture = self.named_texture(name);
                 self.check_reflects(&at, &texture, name);
-                self.reflecting(&at, texture, name)
+                texture
             }
             written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.reflectance(at, s)),
         }
@@ -71,24 +71,6 @@ impl<'a> Compiler<'a> {
                 }
             }
             _ => {}
-        }
-    }
-
-    /// The `texture` of this `name`, which the field `at` takes for reflectances: spectra of volumes in it are within 1.
-    fn reflecting(&mut self, at: &str, texture: Texture, name: &str) -> Texture {
-        let description = self.description;
-        match (&description.textures[name], texture) {
-            (written::Texture::Volume(volume), Texture::Volume(found)) => {
-                Texture::Volume(self.of_shares(at, found, volume))
-            }
-            (written::Texture::Checkerboard(board), Texture::Checkerboard { a, b, uv }) => {
-                let [a, b] = [(&board.a, a), (&board.b, b)].map(|(written, cell)| match written.name() {
-                    Some(name) => Box::new(self.reflecting(at, *cell, name)),
-                    None => cell,
-                });
-                Texture::Checkerboard { a, b, uv }
-            }
-            (_, texture) => texture,
         }
     }
 
