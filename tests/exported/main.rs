@@ -33,7 +33,7 @@ fn prepared(file: &Path, directory: &Path, again: bool) -> (batch::Prepared, des
     let entry = batch::entries(file, &overrides).unwrap_or_else(|error| panic!("{error}")).remove(0);
     let xml = directory.join("scene.xml");
     let scene = entry.scene(&overrides.set).unwrap_or_else(|error| panic!("{error}"));
-    let exported = description::export(&scene, &xml, &mesh::normals_of, &sdf::is_closed).unwrap();
+    let exported = description::export(&scene, &xml, &mesh::normals_of, &sdf::is_closed);
     if !again {
         return (batch::prepare(&entry, &overrides).unwrap_or_else(|error| panic!("{error}")), exported);
     }
@@ -272,7 +272,7 @@ fn bands_are_exported() {
         };
         let ours = scene_of(&yaml);
         let xml = directory.path().join("s.xml");
-        let exported = description::export(&ours, &xml, &mesh::normals_of, &sdf::is_closed).unwrap();
+        let exported = description::export(&ours, &xml, &mesh::normals_of, &sdf::is_closed);
         std::fs::write(&xml, &exported.xml).unwrap();
         let theirs = scene_of(&xml);
         (ours.image.bands, theirs.image.bands, exported)

@@ -44,8 +44,6 @@ use super::{DAYLIGHT, FILM};
 use spectra::can_be_band;
 use xml::Xml;
 
-use crate::error::Result;
-
 /// Something that Mitsuba cannot express.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loss {
@@ -84,7 +82,7 @@ pub fn export(
     path: &Path,
     normals: &dyn Fn(&Path, u32) -> MeshNormals,
     closed: &dyn Fn(&Path) -> bool,
-) -> Result<Exported> {
+) -> Exported {
     let nothing = Node::new(Default::default(), Value::Null);
     let no_sources = Sources::default();
     let (root, sources) = scene.tree().unwrap_or((&nothing, &no_sources));
@@ -107,7 +105,7 @@ pub fn export(
     let Export { xml, mut losses, files, .. } = export;
     let mut told = BTreeSet::new();
     losses.retain(|loss| told.insert((loss.field.clone(), loss.instead.clone())));
-    Ok(Exported { xml: xml.finish(), losses, files })
+    Exported { xml: xml.finish(), losses, files }
 }
 
 struct Export<'a> {
