@@ -327,6 +327,13 @@ fn usr1_writes_a_picture_of_what_is_done_and_the_render_goes_on() {
     assert_eq!(child.wait().unwrap().code(), Some(75));
 }
 
+/// Renders the scene of `place` where its picture is not there yet; whether it was.
+fn was_there(place: &Place) -> bool {
+    let ran = place.run(&["render", "scene.yaml", "-o", "out", "--skip-existing", "--progress", "plain"]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    ran.out.contains("1 of 1 were there already")
+}
+
 /// Missing, cut off, or a copy of the picture: then the render is made again.
 #[test]
 fn a_file_of_bands_that_does_not_hold_is_made_again() {
@@ -334,11 +341,7 @@ fn a_file_of_bands_that_does_not_hold_is_made_again() {
                  render: {samples: 4}\noutput: {spectral: {bands: 4}}\nshapes: [{sphere: {radius: 1}}]\n\
                  lights: [{constant: {radiance: 1}}]\n";
     let place = Place::of(scene);
-    let render = || {
-        let ran = place.run(&["render", "scene.yaml", "-o", "out", "--skip-existing", "--progress", "plain"]);
-        assert_eq!(ran.code, 0, "{}", ran.err);
-        ran.out.contains("1 of 1 were there already")
-    };
+    let render = || was_there(&place);
     let (main, bands) = (place.path("out/scene.exr"), place.path("out/scene.spectral.exr"));
     assert!(!render() && render());
     std::fs::remove_file(&bands).unwrap();
@@ -359,11 +362,7 @@ fn a_picture_of_several_parts_is_not_rendered_again() {
                  render: {samples: 4}\noutput: {exr: {layout: multipart}}\nlayers: [normal, crypto_object]\n\
                  shapes: [{sphere: {radius: 1}}]\nlights: [{constant: {radiance: 1}}]\n";
     let place = Place::of(scene);
-    let render = || {
-        let ran = place.run(&["render", "scene.yaml", "-o", "out", "--skip-existing", "--progress", "plain"]);
-        assert_eq!(ran.code, 0, "{}", ran.err);
-        ran.out.contains("1 of 1 were there already")
-    };
+    let render = || was_there(&place);
     assert!(!render() && render());
     let file = place.path("out/scene.exr");
     let whole = std::fs::read(&file).unwrap();
@@ -378,11 +377,7 @@ fn a_picture_that_is_packed_with_loss_is_not_rendered_again() {
                  render: {samples: 4}\noutput: {exr: {compression: dwaa, layout: multipart}}\nlayers: [normal, direct]\n\
                  shapes: [{sphere: {radius: 1}}]\nlights: [{point: {position: [2, 3, 4], intensity: 9}}]\n";
     let place = Place::of(scene);
-    let render = || {
-        let ran = place.run(&["render", "scene.yaml", "-o", "out", "--skip-existing", "--progress", "plain"]);
-        assert_eq!(ran.code, 0, "{}", ran.err);
-        ran.out.contains("1 of 1 were there already")
-    };
+    let render = || was_there(&place);
     assert!(!render() && render());
     let said = place.run(&["info", "out/scene.exr"]).out;
     assert!(said.contains("as they were written"), "{said}");

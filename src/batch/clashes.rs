@@ -128,10 +128,7 @@ pub(super) fn check(entries: &[BatchEntry], overrides: &Overrides) -> Result<()>
     let looks: Vec<Option<Look>> = entries.par_iter().map(|entry| Look::at(entry, overrides)).collect();
     let which = usize::from(!looks.iter().flatten().all(|look| look.told));
     let key = [Key::BeforeNumber, Key::Letters][which];
-    // The sheet lies beside the first picture that can be begun, on the sheet or not: those before it may fail.
-    let looked = || looks.iter().flatten();
-    let any = looked().any(|look| look.on_sheet);
-    let sheets: BTreeSet<&Path> = looked().filter(|_| any).map(|look| &*look.sheet).collect();
+    let sheets = sheets(looks.iter().flatten().map(|look| (look.on_sheet, &*look.sheet)));
 
     let mut met: HashMap<u64, u32> = HashMap::new();
     sheets.iter().for_each(|sheet| *met.entry(key.of(sheet)).or_default() += 1);
@@ -148,6 +145,13 @@ pub(super) fn check(entries: &[BatchEntry], overrides: &Overrides) -> Result<()>
     };
     let lines: Vec<String> = clashes(entries, suspects, &sheets, overrides).iter().map(line).collect();
     if lines.is_empty() { Ok(()) } else { Err(Error::Config(lines.join("\n"))) }
+}
+
+/// Where the contact sheet may lie, of the scenes' pictures whether they are on it and where it lies if they come first: beside the
+/// first picture that can be begun, on the sheet or not, since those before it may fail. Nowhere if none is on it.
+fn sheets<P: Ord>(scenes: impl Iterator<Item = (bool, P)>) -> BTreeSet<P> {
+    let (on_sheet, places): (Vec<bool>, BTreeSet<P>) = scenes.unzip();
+    if on_sheet.contains(&true) { places } else { BTreeSet::new() }
 }
 
 /// For each two of `suspects`, by number, the first file that both would write; twice the same number for one that would
@@ -238,10 +242,7 @@ pub(super) fn check_report(entries: &[BatchEntry], overrides: &Overrides) -> Res
             spare(report, &file, overrides.portion.is_all(), &names::label(&entry.name, frame))?;
         }
     }
-    // The sheet lies beside the first picture that can be begun.
-    let any = found.clone().any(|(_, pictures)| pictures.sheet);
-    let sheets = found.clone().filter(|_| any).map(|(_, pictures)| sheet_place(pictures, overrides));
-    let sheets: BTreeSet<PathBuf> = sheets.collect();
+    let sheets = sheets(found.clone().map(|(_, pictures)| (pictures.sheet, sheet_place(pictures, overrides))));
     let several = found.map(|(_, pictures)| pictures.frames().count()).sum::<usize>() > 1;
     let mut files = sheets.iter().flat_map(|sheet| ["png", "html"].map(|ending| sheet.with_extension(ending)));
     match several && files.any(|file| is_place_of(report, &file)) {

@@ -94,12 +94,14 @@ impl Stop {
     /// Samples of a pixel at the end, of at most `most`, as far as `milestones` foretell it: where no error is known, the time is.
     #[must_use]
     pub fn foreseen(&self, milestones: &[Milestone], most: u32) -> f64 {
-        if let Some(forecast) = Forecast::of(milestones, self, most) {
-            return forecast.samples;
-        }
+        Forecast::of(milestones, self, most).map_or_else(|| self.in_time(milestones, most), |forecast| forecast.samples)
+    }
+
+    /// Samples of a pixel for which there is time in all, at most `most`.
+    fn in_time(&self, milestones: &[Milestone], most: u32) -> f64 {
         let now = milestones.last().map_or(0, |m| m.samples);
-        let in_time = self.samples_left(milestones).map(|left| f64::from(now) + left);
-        f64::from(most).min(in_time.unwrap_or(f64::INFINITY))
+        let in_time = self.samples_left(milestones).map_or(f64::INFINITY, |left| f64::from(now) + left);
+        f64::from(most).min(in_time)
     }
 
     /// How many more samples the time leaves room for after `milestones`; none where there is no such bound.
@@ -254,17 +256,13 @@ impl Fit {
     }
 
     /// Between what the samples lie at which the error is `error`, 95 times of 100: where that is at either end of what the error
-    /// there lies between.
-    fn samples_between(&self, error: f64) -> [f64; 2] {
+    /// there lies between, or at some number beyond `most`.
+    fn samples_between(&self, error: f64, most: f64) -> [f64; 2] {
         [0, 1].map(|end| {
             let reached = |samples: f64| self.error_between(samples)[end] <= error;
             let (mut low, mut high) = (self.samples, self.samples);
-            while !reached(high) {
+            while high < most && !reached(high) {
                 (low, high) = (high, 2.0 * high);
-                // An end that does not fall is not reached.
-                if !high.is_finite() {
-                    return high;
-                }
             }
             for _ in 0..30 {
                 let middle = 0.5 * (low + high);
@@ -307,10 +305,10 @@ impl Forecast {
         let now = f64::from(last.samples);
         let elapsed = last.elapsed.as_secs_f64();
         // What ends the render besides the error.
-        let most = f64::from(most).min(stop.samples_left(milestones).map_or(f64::INFINITY, |left| now + left));
+        let most = stop.in_time(milestones, most);
         let within = |samples: f64| samples.max(now).min(most);
         let samples = within(stop.target().map_or(most, |target| fit.samples_for(target)));
-        let samples_between = stop.target().map_or([most; 2], |target| fit.samples_between(target)).map(within);
+        let samples_between = stop.target().map_or([most; 2], |target| fit.samples_between(target, most)).map(within);
         let seconds = |samples: f64| elapsed + (samples - now) * rate;
         let error = fit.error_at(samples);
         let error_between = match stop.target() {
@@ -342,7 +340,7 @@ impl Forecast {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::sampler::mix64;
+    use crate::math::sampler::uniform;
 
     /// After `samples`, a millisecond each, an error of √(1/N^b).
     fn milestones(samples: &[u32], b: f64) -> Vec<Milestone> {
@@ -508,11 +506,6 @@ mod tests {
             let share = held as f64 / DRAWS as f64;
             assert!((share - 0.95).abs() < 4.0 * (0.95 * 0.05 / DRAWS as f64).sqrt(), "{share}");
         }
-    }
-
-    /// Between 0 and 1.
-    fn uniform(seed: u64, i: u64) -> f64 {
-        (mix64(seed ^ mix64(i)) as f64 + 0.5) * 2f64.powi(-64)
     }
 
     /// How much of a slope's distance from the usual one counts that errors without scatter tell, at three doublings: their

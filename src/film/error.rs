@@ -470,15 +470,10 @@ mod tests {
     use crate::film::Window;
     use crate::film::accumulate::TileBuffer;
     use crate::film::resolve::resolve;
-    use crate::math::sampler::mix64;
+    use crate::math::sampler::uniform;
     use crate::math::statistics::Moments;
 
     const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-
-    /// Uniform on [0, 1).
-    fn uniform(seed: u64, i: u64) -> f64 {
-        (mix64(seed ^ mix64(i)) >> 11) as f64 / 9_007_199_254_740_992.0
-    }
 
     /// A film of `side` × `side` pixels whose samples are what `sample` makes of a pixel's number and a uniform number, the
     /// same in all channels; `count` of them in each replicate.

@@ -388,15 +388,10 @@ pub fn replicates(
 mod tests {
     use super::*;
     use crate::film::accumulate::TileBuffer;
-    use crate::math::sampler::mix64;
+    use crate::math::sampler::uniform;
     use crate::math::statistics::Moments;
 
     const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-
-    /// Uniform on [0, 1).
-    fn uniform(seed: u64, i: u64) -> f64 {
-        (mix64(seed ^ mix64(i)) >> 11) as f64 / 9_007_199_254_740_992.0
-    }
 
     /// A film whose samples are mean·(1 + a·U), U uniform on [−1, 1], with `counts` samples a replicate.
     fn noisy(seed: u64, side: u32, mean: f64, a: f64, counts: [u64; 4]) -> Film {

@@ -313,6 +313,12 @@ pub fn mix64(x: u64) -> u64 {
     x ^ x >> 31
 }
 
+/// Number `i` of a sequence, uniform on [0, 1).
+#[cfg(test)]
+pub(crate) fn uniform(seed: u64, i: u64) -> f64 {
+    (mix64(seed ^ mix64(i)) >> 11) as f64 / 9_007_199_254_740_992.0
+}
+
 /// Nested uniform (Owen) scramble of a bit-reversed number by the hash of Laine and Karras 2011,
 /// with the constants of Burley 2020, section 3.
 #[inline(always)]

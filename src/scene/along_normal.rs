@@ -1,9 +1,9 @@
 //! Surfaces whose points each send their light along the normal, as a collimated lamp does.
 //!
 //! Light reaches a point from where a normal of the surface passes through it. Every shape is convex, so
-//! from outside that is the nearest point, if any; within a cube that shines inward there is one on each face. The beam that leaves a small area spreads with the
-//! curvature of the surface: at a distance h its area has grown by (1 + h κ₁)(1 + h κ₂), and the
-//! irradiance across it has shrunk by that.
+//! from outside that is the nearest point, if any; within a cube that shines inward there is one on each
+//! face. The beam that leaves a small area spreads with the curvature of the surface: at a distance h its
+//! area has grown by (1 + h κ₁)(1 + h κ₂), and the irradiance across it has shrunk by that.
 
 use super::Geometry;
 use super::light::Arriving;

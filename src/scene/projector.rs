@@ -217,6 +217,7 @@ mod tests {
             assert!((mean / (3.0 * PI * 0.5 * 8.0) - 1.0).abs() < 1e-6, "{half} {mean}");
         }
     }
+
     /// A volume that is 1 where the projector stands and 5 beyond x = 2: where its light falls, and where its rays lead,
     /// the picture is 1 all the same. On its axis at distance 2 there arrives π · 3 / 4; its rays carry π · 3 · 8 m².
     #[test]

@@ -10,8 +10,7 @@ use crate::film::accumulate::{Invalid, SAMPLE_LIMIT};
 use crate::film::layers::{Kept, Layout};
 use crate::math::{Frame, Ray};
 use crate::scene::compound::{Composition, Vertex, share};
-use crate::scene::material::{Kind, Material};
-use crate::scene::texture::Scalar;
+use crate::scene::material::Material;
 use crate::scene::watch::Counts;
 use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, Spectrum, illuminant, observer};
@@ -536,25 +535,6 @@ impl First {
         self.albedo_of(material, plan, nm, ray)
     }
 
-    /// The share of a material that covers what is behind it.
-    fn covers(&self, material: &Material, ray: &Ray) -> f64 {
-        let Some(compound) = material.compound() else {
-            return if matches!(material.kind, Kind::Boundary) { 0.0 } else { 1.0 };
-        };
-        let share = |of: &Scalar| share(of, &self.hit.texture_point(&self.surface));
-        match &compound.composition {
-            Composition::Mask { opacity, inner } => share(opacity) * self.covers(inner, ray),
-            Composition::Blend { weight, first, second } => {
-                let w = share(weight);
-                (1.0 - w) * self.covers(first, ray) + w * self.covers(second, ray)
-            }
-            Composition::TwoSided { front, back } => {
-                self.covers(if ray.direction.dot(self.surface.normal) > 0.0 { back } else { front }, ray)
-            }
-            Composition::Relief { inner, .. } => self.covers(inner, ray),
-        }
-    }
-
     fn albedo_of(&self, material: &Material, plan: &EffectPlan, nm: Lanes, ray: &Ray) -> Lanes {
         let surface = &self.surface;
         if let Some(compound) = material.compound() {
@@ -564,10 +544,12 @@ impl First {
                     inner(material)
                 }
                 Composition::Blend { weight, first, second } => {
-                    let mut w = share(weight, &self.hit.texture_point(surface));
+                    let at = self.hit.texture_point(surface);
+                    let mut w = share(weight, &at);
                     // What is seen is no hole: each part counts by how much of it covers.
                     if self.normal.is_some() {
-                        let [first, second] = [(1.0 - w) * self.covers(first, ray), w * self.covers(second, ray)];
+                        let covers = |part: &Material| 1.0 - part.open(surface, ray.direction, &at);
+                        let [first, second] = [(1.0 - w) * covers(first), w * covers(second)];
                         w = if first + second > 0.0 { second / (first + second) } else { w };
                     }
                     let w = w as f32;

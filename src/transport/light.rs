@@ -24,7 +24,7 @@ use super::{moment_at, scene_at};
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::optics::bsdf::{Bsdf, BsdfSample, Chosen};
-use crate::scene::compound::{Compound, Leaf, below};
+use crate::scene::compound::{Compound, Leaf, Vertex, below};
 use crate::scene::light::Light;
 use crate::scene::material::Kind;
 use crate::scene::nested::{Bodies, Crossing as Meeting};
@@ -609,12 +609,12 @@ impl<'a> Walk<'a, '_> {
                         self.leave_photon(beam, &surface);
                     }
                     let (at, wo) = (&hit.texture_point(&surface), -direction);
-                    let x = crate::scene::compound::Vertex { scene, hit: &hit, surface: &surface, at, wo };
+                    let x = Vertex { scene, hit: &hit, surface: &surface, at, wo };
                     let u = self.sampler.set(set)[2];
                     let mut leaf = compound.resolve(&x, seen_normal(&surface, wo), u);
                     // What goes straight on is seen from behind, where the holes may be others.
                     if compound.sided && self.lamp.is_some() {
-                        let behind = crate::scene::compound::Vertex { wo: direction, ..x };
+                        let behind = Vertex { wo: direction, ..x };
                         let open = compound.resolve(&behind, seen_normal(&surface, direction), u).is_none();
                         match (&leaf, open) {
                             (None, false) => return None,

@@ -9,10 +9,9 @@ use crate::scene::texture::{Scalar, Texture};
 impl<'a> Compiler<'a> {
     pub(super) fn principled(&mut self, place: &str, m: &'a written::Principled) -> Solid {
         let base = self.reflectance_texture(&format!("{place}.base_color"), &m.base_color);
-        let mut number = |s: &'a written::NumberOrTexture| self.scalar(s);
-        let transmission = m.spec_trans.as_ref().map(&mut number);
-        let specular_tint = number(&m.spec_tint);
-        let sheen_tint = number(&m.sheen_tint);
+        let transmission = m.spec_trans.as_ref().map(|s| self.scalar(s));
+        let specular_tint = self.scalar(&m.spec_tint);
+        let sheen_tint = self.scalar(&m.sheen_tint);
         Solid {
             luminance: luminance(m.luminance, &base, [&specular_tint, &sheen_tint]),
             base,
@@ -20,16 +19,16 @@ impl<'a> Compiler<'a> {
                 written::Contrast::Eta(eta) => index_of_eta(eta, transmission.is_some()),
                 written::Contrast::Specular(specular) => index_of_specular(specular, transmission.is_some()),
             },
-            roughness: number(&m.roughness),
-            anisotropic: number(&m.anisotropic),
-            metallic: number(&m.metallic),
+            roughness: self.scalar(&m.roughness),
+            anisotropic: self.scalar(&m.anisotropic),
+            metallic: self.scalar(&m.metallic),
             transmission,
             specular_tint,
-            sheen: number(&m.sheen),
+            sheen: self.scalar(&m.sheen),
             sheen_tint,
-            flatness: number(&m.flatness),
-            clearcoat: number(&m.clearcoat),
-            clearcoat_gloss: number(&m.clearcoat_gloss),
+            flatness: self.scalar(&m.flatness),
+            clearcoat: self.scalar(&m.clearcoat),
+            clearcoat_gloss: self.scalar(&m.clearcoat_gloss),
             rates: Rates {
                 specular: m.sampling.specular as f32,
                 clearcoat: m.sampling.clearcoat as f32,
@@ -40,21 +39,20 @@ impl<'a> Compiler<'a> {
 
     pub(super) fn principled_thin(&mut self, place: &str, m: &'a written::PrincipledThin) -> Thin {
         let base = self.reflectance_texture(&format!("{place}.base_color"), &m.base_color);
-        let mut number = |s: &'a written::NumberOrTexture| self.scalar(s);
-        let specular_tint = number(&m.spec_tint);
-        let sheen_tint = number(&m.sheen_tint);
+        let specular_tint = self.scalar(&m.spec_tint);
+        let sheen_tint = self.scalar(&m.sheen_tint);
         Thin {
             luminance: luminance(m.luminance, &base, [&specular_tint, &sheen_tint]),
             base,
-            eta: number(&m.eta),
-            roughness: number(&m.roughness),
-            anisotropic: number(&m.anisotropic),
-            transmission: number(&m.spec_trans),
-            diffuse_transmission: number(&m.diff_trans),
+            eta: self.scalar(&m.eta),
+            roughness: self.scalar(&m.roughness),
+            anisotropic: self.scalar(&m.anisotropic),
+            transmission: self.scalar(&m.spec_trans),
+            diffuse_transmission: self.scalar(&m.diff_trans),
             specular_tint,
-            sheen: number(&m.sheen),
+            sheen: self.scalar(&m.sheen),
             sheen_tint,
-            flatness: number(&m.flatness),
+            flatness: self.scalar(&m.flatness),
             rates: ThinRates {
                 reflection: m.sampling.reflection as f32,
                 transmission: m.sampling.transmission as f32,
