@@ -314,10 +314,35 @@ impl Parser<'_> {
             let message = format!("expected nothing inside <{tag}>, found <{}>", inner.tag);
             return Err(Fault::at_place(inner.place, message));
         }
-        let value = match tag {
+        match tag {
+            "ref" => self.reference(element, parent, in_file),
+            "alias" => self.alias(element),
+            "default" => self.default(element),
+            "include" => {
+                check_attributes(element, &["filename"], &["name"])?;
+                let file = self.text(attribute(element, "filename")?)?;
+                let path = self.find_from(&file, in_file.source);
+                self.file(&path, Some(parent), Some(element))
+            }
+            "path" => self.search_path(element, parent, in_file),
+            "translate" | "rotate" | "scale" | "lookat" | "matrix" => {
+                let message = format!("expected <{tag}> inside <transform>, found it outside");
+                Err(Fault::at_place(element.place, message))
+            }
+            _ => {
+                let value = self.value(element, in_file)?;
+                let name = self.name_of(element, in_file)?;
+                self.set(parent, name, element.place, value)
+            }
+        }
+    }
+
+    /// The value of a parameter that is no object.
+    fn value(&mut self, element: &Element, in_file: InFile) -> std::result::Result<Value, Fault> {
+        match element.tag.as_str() {
             "float" => {
                 check_attributes(element, &["name", "value"], &[])?;
-                Value::Float(self.number(attribute(element, "value")?)?)
+                Ok(Value::Float(self.number(attribute(element, "value")?)?))
             }
             "integer" => {
                 check_attributes(element, &["name", "value"], &[])?;
@@ -325,125 +350,115 @@ impl Parser<'_> {
                 let text = self.text(written)?;
                 // Mitsuba's have no plus.
                 let whole = text.trim().parse().ok().filter(|_| !text.trim().starts_with('+'));
-                Value::Integer(whole.ok_or_else(|| {
+                let whole = whole.ok_or_else(|| {
                     Fault::at_place(written.place, format!("expected a whole number, found {}", quote(&text)))
-                })?)
+                })?;
+                Ok(Value::Integer(whole))
             }
             "boolean" => {
                 check_attributes(element, &["name", "value"], &[])?;
                 let written = attribute(element, "value")?;
                 let text = self.text(written)?;
                 match text.to_ascii_lowercase().as_str() {
-                    "true" => Value::Boolean(true),
-                    "false" => Value::Boolean(false),
+                    "true" => Ok(Value::Boolean(true)),
+                    "false" => Ok(Value::Boolean(false)),
                     _ => {
                         let message = format!("expected true or false, found {}", quote(&text));
-                        return Err(Fault::at_place(written.place, message));
+                        Err(Fault::at_place(written.place, message))
                     }
                 }
             }
             "string" => {
                 check_attributes(element, &["name", "value"], &[])?;
-                Value::Text(self.text(attribute(element, "value")?)?)
+                Ok(Value::Text(self.text(attribute(element, "value")?)?))
             }
             "point" | "vector" => {
                 check_attributes(element, &["name"], &["value", "x", "y", "z"])?;
                 if element.attribute("value").is_none() {
                     check_attributes(element, &["name", "x", "y", "z"], &[])?;
                 }
-                Value::Vector(self.vector(element, 0.0)?)
+                Ok(Value::Vector(self.vector(element, 0.0)?))
             }
             "rgb" => {
                 check_attributes(element, &["name", "value"], &[])?;
                 let written = attribute(element, "value")?;
                 match self.numbers(written)?[..] {
-                    [grey] => Value::Rgb([grey; 3]),
-                    [r, g, b] => Value::Rgb([r, g, b]),
+                    [grey] => Ok(Value::Rgb([grey; 3])),
+                    [r, g, b] => Ok(Value::Rgb([r, g, b])),
                     ref other => {
                         let message = format!("expected 1 or 3 numbers, found {}", other.len());
-                        return Err(Fault::at_place(written.place, message));
+                        Err(Fault::at_place(written.place, message))
                     }
                 }
             }
-            "spectrum" => self.spectrum(element, in_file)?,
+            "spectrum" => self.spectrum(element, in_file),
             "transform" => {
                 check_attributes(element, &["name"], &[])?;
-                Value::Transform(self.transform(element)?)
+                Ok(Value::Transform(self.transform(element)?))
             }
-            "ref" => {
-                check_attributes(element, &["id"], &["name"])?;
-                let name = self.name_of(element, in_file)?;
-                let id = self.text(attribute(element, "id")?)?;
-                // The index is filled in by `resolve`.
-                self.set(parent, name, element.place, Value::Object(usize::MAX))?;
-                let property = self.document.objects[parent].properties.len() - 1;
-                self.references.push(Reference { object: parent, property, id, place: element.place });
-                return Ok(());
-            }
-            "alias" => {
-                check_attributes(element, &["id", "as"], &[])?;
-                let id = self.text(attribute(element, "id")?)?;
-                let Some(&index) = self.document.ids.get(&id) else {
-                    let hint = did_you_mean(&id, self.document.ids.keys().map(String::as_str));
-                    let message = format!("expected the id of an object above, found {}{hint}", quote(&id));
-                    return Err(Fault::at_place(element.place, message));
-                };
-                let new = self.text(attribute(element, "as")?)?;
-                return self.name(&new, index, element.place);
-            }
-            "default" => {
-                check_attributes(element, &["name", "value"], &[])?;
-                let written = attribute(element, "name")?;
-                let name = self.text(written)?;
-                if name.is_empty() {
-                    return Err(Fault::at_place(written.place, "expected a name, found empty text"));
-                }
-                let value = self.text(attribute(element, "value")?)?;
-                if !self.parameters.iter().any(|parameter| parameter.name == name) {
-                    self.parameters.push(Parameter { name, value, used: false });
-                }
-                return Ok(());
-            }
-            "include" => {
-                check_attributes(element, &["filename"], &["name"])?;
-                let file = self.text(attribute(element, "filename")?)?;
-                let path = self.find_from(&file, in_file.source);
-                return self.file(&path, Some(parent), Some(element));
-            }
-            "path" => {
-                check_attributes(element, &["value"], &[])?;
-                if self.document.objects[parent].family != Family::Scene {
-                    return Err(Fault::at_place(
-                        element.place,
-                        "expected <path> directly inside <scene>, found it deeper",
-                    ));
-                }
-                let written = attribute(element, "value")?;
-                let text = self.text(written)?;
-                let path = self.find_from(&text, in_file.source);
-                if !path.is_dir() {
-                    let message = format!("expected a directory, found none at {}", path.display());
-                    return Err(Fault::at_place(written.place, message));
-                }
-                self.search.insert(0, path);
-                return Ok(());
-            }
-            "translate" | "rotate" | "scale" | "lookat" | "matrix" => {
-                let message = format!("expected <{tag}> inside <transform>, found it outside");
-                return Err(Fault::at_place(element.place, message));
-            }
-            _ => {
+            tag => {
                 let known = Family::TAGS.iter().map(|(tag, _)| *tag).chain(PROPERTY_TAGS);
                 let mut hint = did_you_mean(tag, known.clone());
                 if hint.is_empty() {
                     hint = format!("; known: {}", known.collect::<Vec<_>>().join(", "));
                 }
                 let message = format!("expected an element of a scene, found <{tag}>{hint}");
-                return Err(Fault::at_place(element.place, message));
+                Err(Fault::at_place(element.place, message))
             }
-        };
+        }
+    }
+
+    fn reference(&mut self, element: &Element, parent: usize, in_file: InFile) -> std::result::Result<(), Fault> {
+        check_attributes(element, &["id"], &["name"])?;
         let name = self.name_of(element, in_file)?;
-        self.set(parent, name, element.place, value)
+        let id = self.text(attribute(element, "id")?)?;
+        // The index is filled in by `resolve`.
+        self.set(parent, name, element.place, Value::Object(usize::MAX))?;
+        let property = self.document.objects[parent].properties.len() - 1;
+        self.references.push(Reference { object: parent, property, id, place: element.place });
+        Ok(())
+    }
+
+    fn alias(&mut self, element: &Element) -> std::result::Result<(), Fault> {
+        check_attributes(element, &["id", "as"], &[])?;
+        let id = self.text(attribute(element, "id")?)?;
+        let Some(&index) = self.document.ids.get(&id) else {
+            let hint = did_you_mean(&id, self.document.ids.keys().map(String::as_str));
+            let message = format!("expected the id of an object above, found {}{hint}", quote(&id));
+            return Err(Fault::at_place(element.place, message));
+        };
+        let new = self.text(attribute(element, "as")?)?;
+        self.name(&new, index, element.place)
+    }
+
+    fn default(&mut self, element: &Element) -> std::result::Result<(), Fault> {
+        check_attributes(element, &["name", "value"], &[])?;
+        let written = attribute(element, "name")?;
+        let name = self.text(written)?;
+        if name.is_empty() {
+            return Err(Fault::at_place(written.place, "expected a name, found empty text"));
+        }
+        let value = self.text(attribute(element, "value")?)?;
+        if !self.parameters.iter().any(|parameter| parameter.name == name) {
+            self.parameters.push(Parameter { name, value, used: false });
+        }
+        Ok(())
+    }
+
+    fn search_path(&mut self, element: &Element, parent: usize, in_file: InFile) -> std::result::Result<(), Fault> {
+        check_attributes(element, &["value"], &[])?;
+        if self.document.objects[parent].family != Family::Scene {
+            return Err(Fault::at_place(element.place, "expected <path> directly inside <scene>, found it deeper"));
+        }
+        let written = attribute(element, "value")?;
+        let text = self.text(written)?;
+        let path = self.find_from(&text, in_file.source);
+        if !path.is_dir() {
+            let message = format!("expected a directory, found none at {}", path.display());
+            return Err(Fault::at_place(written.place, message));
+        }
+        self.search.insert(0, path);
+        Ok(())
     }
 
     fn name_of(&self, element: &Element, in_file: InFile) -> std::result::Result<String, Fault> {

@@ -279,54 +279,11 @@ impl<'a> Compiler<'a> {
             written::Material::Mirror(m) => {
                 (Kind::Mirror { reflectance: self.reflectance(&at("reflectance"), &m.reflectance) }, true, m.highlight)
             }
-            written::Material::Conductor(m) => {
-                let metal = match &m.index {
-                    written::ConductorIndex::Metal(name) => {
-                        let none = (Spectrum::Constant(1.0), Spectrum::Constant(0.0));
-                        self.or(&at("metal"), catalogue::metal(name), none).into()
-                    }
-                    written::ConductorIndex::File(file) => self.metal_file(&at("file"), file).into(),
-                    written::ConductorIndex::Written { eta, k } => [
-                        self.written_spectrum(&at("eta"), eta, Outside::Hold, Role::OpticalConstant),
-                        self.written_spectrum(&at("k"), k, Outside::Hold, Role::OpticalConstant),
-                    ],
-                };
-                let [eta, k] = self.shelf.carried.metal(metal);
-                let tint = self.reflectance_texture(&at("tint"), &m.tint);
-                let facets = self.roughness(&m.roughness, m.distribution);
-                let film = self.film(&at("film"), m.film.as_ref());
-                (Kind::Conductor { eta, k, tint, fresnel: model(m.fresnel), facets, film }, m.two_sided, m.highlight)
-            }
-            written::Material::Dielectric(m) => {
-                let interior = self.index(&at("ior"), &m.ior);
-                let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
-                let facets = self.roughness(&m.roughness, m.distribution);
-                let tints = self.tints(&place, &m.reflection_tint, &m.transmission_tint);
-                let film = self.film(&at("film"), m.film.as_ref());
-                let absorption = self.absorption(&place, m).map(Box::new);
-                if facets.is_some() && m.fresnel == written::Fresnel::Schlick {
-                    self.fault(&at("fresnel"), "expected exact on rough glass, found schlick");
-                }
-                // Without a difference of index there is no interface, however rough: light goes on, and
-                // casts no shadow.
-                match (&interior, &exterior) {
-                    (RefractiveIndex::Constant(a), RefractiveIndex::Constant(b))
-                        if a == b
-                            && tints.is_none()
-                            && m.priority.is_none()
-                            && film.is_none()
-                            && absorption.is_none() =>
-                    {
-                        plain(Kind::Boundary)
-                    }
-                    _ => {
-                        let (fresnel, priority) = (model(m.fresnel), m.priority);
-                        let kind =
-                            Kind::Dielectric { interior, exterior, fresnel, facets, tints, priority, film, absorption };
-                        (kind, false, m.highlight)
-                    }
-                }
-            }
+            written::Material::Conductor(m) => (self.conductor(&place, m), m.two_sided, m.highlight),
+            written::Material::Dielectric(m) => match self.dielectric(&place, m) {
+                Kind::Boundary => plain(Kind::Boundary),
+                kind => (kind, false, m.highlight),
+            },
             written::Material::ThinDielectric(m) => {
                 let interior = self.index(&at("ior"), &m.ior);
                 let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
@@ -335,20 +292,7 @@ impl<'a> Compiler<'a> {
                 let thickness = thickness.map(|t| Box::new(self.thickness(&at("thickness_nm"), t, &interior)));
                 plain(Kind::Thin { interior, exterior, tints, thickness })
             }
-            written::Material::Plastic(m) => {
-                let reflectance = self.reflectance_texture(&at("reflectance"), &m.reflectance);
-                let tint = self.reflectance_texture(&at("tint"), &m.tint);
-                let interior = self.index(&at("ior"), &m.ior);
-                let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
-                let facets = facets(m.roughness, m.distribution);
-                let tint = (!is_one(&tint)).then(|| Box::new(tint));
-                let mean = match m.diffuse_mean {
-                    written::DiffuseMean::Integral => DiffuseMean::Integral,
-                    written::DiffuseMean::Nodes => DiffuseMean::Nodes,
-                };
-                let coat = Box::new(Coat::new(interior, exterior, facets, mean));
-                (Kind::Plastic { reflectance, coat, nonlinear: m.nonlinear, tint }, m.two_sided, m.highlight)
-            }
+            written::Material::Plastic(m) => (self.plastic(&place, m), m.two_sided, m.highlight),
             written::Material::Hair(m) => plain(self.hair(&place, m)),
             written::Material::Principled(m) => {
                 (Kind::Principled(Box::new(self.principled(&place, m))), m.two_sided, None)
@@ -368,29 +312,7 @@ impl<'a> Compiler<'a> {
                 let second = self.inner(&at("second"), &m.second);
                 plain(self.compound(&place, Composition::Blend { weight, first, second }))
             }
-            written::Material::TwoSided(m) => {
-                let mut side = |name: &str, side: &'a written::MaterialRef| {
-                    let material = self.inner(&at(name), side);
-                    // The back is the front's mirror image: light would enter from either side, and never leave.
-                    if material.refracts() {
-                        let expected = "expected a material that bends no light, found one that does";
-                        self.fault(&at(name), format!("{expected}: neither side would be its inside"));
-                    }
-                    // Light from behind would meet another material than it comes out of.
-                    if m.back.as_ref().is_some_and(|back| *back != m.front) && material.scatters_through() {
-                        let expected =
-                            "expected a material that scatters no light to its other side, found one that does";
-                        self.fault(
-                            &at(name),
-                            format!("{expected}: it has to be the front of both sides, without `back`"),
-                        );
-                    }
-                    one_side(&material)
-                };
-                let front = side("front", &m.front);
-                let back = m.back.as_ref().map_or_else(|| front.clone(), |back| side("back", back));
-                plain(self.compound(&place, Composition::TwoSided { front, back }))
-            }
+            written::Material::TwoSided(m) => plain(self.sides(&place, m)),
             written::Material::Bump(m) => {
                 let heights = self.named_numbers(&m.height.texture);
                 let form = ReliefForm::Heights { heights, scale: m.scale };
@@ -414,6 +336,87 @@ impl<'a> Compiler<'a> {
             },
         });
         Material { kind, two_sided, highlight }
+    }
+
+    fn conductor(&mut self, place: &str, m: &'a written::Conductor) -> Kind {
+        let at = |field: &str| format!("{place}.{field}");
+        let metal = match &m.index {
+            written::ConductorIndex::Metal(name) => {
+                let none = (Spectrum::Constant(1.0), Spectrum::Constant(0.0));
+                self.or(&at("metal"), catalogue::metal(name), none).into()
+            }
+            written::ConductorIndex::File(file) => self.metal_file(&at("file"), file).into(),
+            written::ConductorIndex::Written { eta, k } => [
+                self.written_spectrum(&at("eta"), eta, Outside::Hold, Role::OpticalConstant),
+                self.written_spectrum(&at("k"), k, Outside::Hold, Role::OpticalConstant),
+            ],
+        };
+        let [eta, k] = self.shelf.carried.metal(metal);
+        let tint = self.reflectance_texture(&at("tint"), &m.tint);
+        let facets = self.roughness(&m.roughness, m.distribution);
+        let film = self.film(&at("film"), m.film.as_ref());
+        Kind::Conductor { eta, k, tint, fresnel: model(m.fresnel), facets, film }
+    }
+
+    fn dielectric(&mut self, place: &str, m: &'a written::Dielectric) -> Kind {
+        let at = |field: &str| format!("{place}.{field}");
+        let interior = self.index(&at("ior"), &m.ior);
+        let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
+        let facets = self.roughness(&m.roughness, m.distribution);
+        let tints = self.tints(place, &m.reflection_tint, &m.transmission_tint);
+        let film = self.film(&at("film"), m.film.as_ref());
+        let absorption = self.absorption(place, m).map(Box::new);
+        if facets.is_some() && m.fresnel == written::Fresnel::Schlick {
+            self.fault(&at("fresnel"), "expected exact on rough glass, found schlick");
+        }
+        // Without a difference of index there is no interface, however rough: light goes on, and
+        // casts no shadow.
+        let is_clear = tints.is_none() && m.priority.is_none() && film.is_none() && absorption.is_none();
+        if let (RefractiveIndex::Constant(a), RefractiveIndex::Constant(b)) = (&interior, &exterior)
+            && a == b
+            && is_clear
+        {
+            return Kind::Boundary;
+        }
+        let (fresnel, priority) = (model(m.fresnel), m.priority);
+        Kind::Dielectric { interior, exterior, fresnel, facets, tints, priority, film, absorption }
+    }
+
+    fn plastic(&mut self, place: &str, m: &'a written::Plastic) -> Kind {
+        let at = |field: &str| format!("{place}.{field}");
+        let reflectance = self.reflectance_texture(&at("reflectance"), &m.reflectance);
+        let tint = self.reflectance_texture(&at("tint"), &m.tint);
+        let interior = self.index(&at("ior"), &m.ior);
+        let exterior = self.index(&at("exterior_ior"), &m.exterior_ior);
+        let facets = facets(m.roughness, m.distribution);
+        let tint = (!is_one(&tint)).then(|| Box::new(tint));
+        let mean = match m.diffuse_mean {
+            written::DiffuseMean::Integral => DiffuseMean::Integral,
+            written::DiffuseMean::Nodes => DiffuseMean::Nodes,
+        };
+        let coat = Box::new(Coat::new(interior, exterior, facets, mean));
+        Kind::Plastic { reflectance, coat, nonlinear: m.nonlinear, tint }
+    }
+
+    fn sides(&mut self, place: &str, m: &'a written::TwoSided) -> Kind {
+        let at = |field: &str| format!("{place}.{field}");
+        let mut side = |name: &str, side: &'a written::MaterialRef| {
+            let material = self.inner(&at(name), side);
+            // The back is the front's mirror image: light would enter from either side, and never leave.
+            if material.refracts() {
+                let expected = "expected a material that bends no light, found one that does";
+                self.fault(&at(name), format!("{expected}: neither side would be its inside"));
+            }
+            // Light from behind would meet another material than it comes out of.
+            if m.back.as_ref().is_some_and(|back| *back != m.front) && material.scatters_through() {
+                let expected = "expected a material that scatters no light to its other side, found one that does";
+                self.fault(&at(name), format!("{expected}: it has to be the front of both sides, without `back`"));
+            }
+            one_side(&material)
+        };
+        let front = side("front", &m.front);
+        let back = m.back.as_ref().map_or_else(|| front.clone(), |back| side("back", back));
+        self.compound(place, Composition::TwoSided { front, back })
     }
 
     fn compound(&mut self, at: &str, composition: Composition) -> Kind {
