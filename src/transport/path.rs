@@ -240,23 +240,7 @@ impl Tracer<'_> {
 
         // Light that the surface itself sends out.
         if let Some(light) = object.light.filter(|_| self.meets_lights(path)) {
-            let emitted = scene.lights[light as usize].emitted(&surface, &hit, wo_world, self.nm);
-            let weight = match &path.previous {
-                None => 1.0,
-                Some(p) => {
-                    let total = crate::scene::Hit { t: p.distance + hit.t, ..hit };
-                    let q = self.asked().probability(light as usize, p.point, p.normal, path.judged)
-                        * scene.lights[light as usize].area_pdf(
-                            &scene.objects,
-                            p.point,
-                            path.ray.direction,
-                            &total,
-                            surface.normal,
-                        );
-                    power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho)
-                }
-            };
-            self.meet_light::<CHROMATIC>(path, light, emitted, weight);
+            self.meet_lamp::<CHROMATIC>(path, light, &hit, &surface);
         }
 
         // What goes straight on has no vertex there: a lamp behind is also found from the vertex before.
@@ -264,32 +248,15 @@ impl Tracer<'_> {
             && (boundary
                 || self.sampler.set(Set::Extra(path.vertices.wrapping_add(walk.crossings << 16)))[1] < straight.share)
         {
-            if self.settings.count_crossings && self.is_last(path) {
-                return Step::Ended;
-            }
-            walk.crossings += 1;
-            path.crossings += 1;
-            if walk.crossings > MAX_BOUNDARIES {
-                return Step::Ended;
-            }
-            path.beta *= straight.weight;
-            if let Some(p) = &mut path.previous {
-                p.density *= match compound {
-                    None => straight.share,
-                    Some(all) => {
-                        let at = || hit.texture_point(&surface);
-                        all.straight(&surface, path.ray.direction, at, self.nm).map_or(1.0, |s| s.share)
-                    }
-                };
-            }
-            if MEDIA {
-                path.inside = scene.beyond(object, &surface, path.ray.direction, path.inside);
-            }
-            if let Some(p) = &mut path.previous {
-                p.distance += hit.t;
-            }
-            path.ray = scene.leave(&surface, &hit, path.ray.direction);
-            return Step::Straight(hit.t);
+            let share = || match compound {
+                None => straight.share,
+                Some(all) => {
+                    let at = || hit.texture_point(&surface);
+                    all.straight(&surface, path.ray.direction, at, self.nm).map_or(1.0, |s| s.share)
+                }
+            };
+            let through = Straight { share: path.previous.as_ref().map_or(1.0, |_| share()), ..*straight };
+            return self.go_straight::<MEDIA>(path, walk, &hit, &surface, &through);
         }
         // A pane that mirrors.
         walk.cover();
@@ -355,6 +322,54 @@ impl Tracer<'_> {
         }
         walk.crossings = 0;
         Step::Scattered
+    }
+
+    /// The light of a lamp that the path meets.
+    #[inline(always)]
+    fn meet_lamp<const CHROMATIC: bool>(&self, path: &mut Path, index: u32, hit: &Hit, surface: &SurfacePoint) {
+        let light = &self.scene.lights[index as usize];
+        let emitted = light.emitted(surface, hit, -path.ray.direction, self.nm);
+        let weight = match &path.previous {
+            None => 1.0,
+            Some(p) => {
+                let total = Hit { t: p.distance + hit.t, ..*hit };
+                let density = light.area_pdf(&self.scene.objects, p.point, path.ray.direction, &total, surface.normal);
+                let q = self.asked().probability(index as usize, p.point, p.normal, path.judged) * density;
+                power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho)
+            }
+        };
+        self.meet_light::<CHROMATIC>(path, index, emitted, weight);
+    }
+
+    /// On through a surface as if it were not there; `through` has the chance of that and its factor.
+    #[inline(always)]
+    fn go_straight<const MEDIA: bool>(
+        &self,
+        path: &mut Path,
+        walk: &mut Walk,
+        hit: &Hit,
+        surface: &SurfacePoint,
+        through: &Straight,
+    ) -> Step {
+        if self.settings.count_crossings && self.is_last(path) {
+            return Step::Ended;
+        }
+        walk.crossings += 1;
+        path.crossings += 1;
+        if walk.crossings > MAX_BOUNDARIES {
+            return Step::Ended;
+        }
+        path.beta *= through.weight;
+        if let Some(p) = &mut path.previous {
+            p.density *= through.share;
+            p.distance += hit.t;
+        }
+        if MEDIA {
+            let object = &self.scene.objects[hit.object as usize];
+            path.inside = self.scene.beyond(object, surface, path.ray.direction, path.inside);
+        }
+        path.ray = self.scene.leave(surface, hit, path.ray.direction);
+        Step::Straight(hit.t)
     }
 
     /// Asks a light and sends the path on; false where it ends.
