@@ -203,6 +203,7 @@ pub(super) fn prepare_scene(
     if let Some(first) = first::decide(&shot, &census, &moments, planned, wishes) {
         (plan.reuse, plan.shadow_rays, plan.asks_even_sky) = (first.reuse, first.shadow_rays, first.asks_even_sky);
         plan.techniques.extend(first.said);
+        plan.equiangular = first.equiangular;
     }
     let trials = choosing.elapsed();
     if overrides.check_numerics && !moments.is_empty() {
@@ -288,6 +289,7 @@ fn wishes(description: &SceneDescription) -> Wishes {
         merging: wish(written.merging),
         reuse: wish(written.reuse),
         even_sky: wish(written.even_sky),
+        equiangular: wish(written.equiangular),
         shadow_rays: match written.shadow_rays {
             description::ShadowRays::Auto => None,
             description::ShadowRays::Number(count) => Some(count),

@@ -305,7 +305,7 @@ pub fn duration(text: &str) -> Option<Duration> {
 }
 
 /// `techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, splatting: auto, shadow_rays: auto, even_sky: auto,
-/// adaptive: auto}`
+/// equiangular: auto, adaptive: auto}`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Techniques {
@@ -331,6 +331,9 @@ pub struct Techniques {
     /// Whether shadow rays go to `constant` lights, too, which paths that leave the scene meet.
     #[serde(default)]
     pub even_sky: Technique,
+    /// Whether light of lamps without extent is looked for along the ways of paths through media, too.
+    #[serde(default)]
+    pub equiangular: Technique,
     /// Whether pixels get more samples where the picture is noisier, at the same mean.
     #[serde(default)]
     pub adaptive: Technique,

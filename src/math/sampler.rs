@@ -28,6 +28,8 @@ pub enum Set {
     Extra(u32),
     /// At vertex `.0`, where it sends several shadow rays: light point u, v, choice of light; one spare.
     Shadows(u32),
+    /// On the way to vertex `.0`, by surfaces as [`Set::Extra`]: choice of light, distance, light point u, v.
+    Along(u32),
 }
 
 impl Set {
@@ -41,6 +43,7 @@ impl Set {
             Set::Extra(vertex) => 4 + 3 * vertex,
             // Where choices are of vertices that no path has.
             Set::Shadows(vertex) => Set::Choice(FAR + vertex).index(),
+            Set::Along(vertex) => Set::Extra(FAR + vertex).index(),
         }
     }
 }
@@ -448,7 +451,9 @@ mod tests {
     /// and pairs (0, 1) do so in every elementary box: the net property survives both scrambles.
     #[test]
     fn every_set_is_stratified_in_each_dimension_and_in_two() {
-        for set in [Set::Camera, Set::Lens, Set::Scatter(0), Set::Choice(7), Set::Extra(40), Set::Shadows(0)] {
+        for set in
+            [Set::Camera, Set::Lens, Set::Scatter(0), Set::Choice(7), Set::Extra(40), Set::Shadows(0), Set::Along(3)]
+        {
             let n = 256;
             let points: Vec<_> = (0..n).map(|i| Sampler::new(5, [17, 9], 2, i).set(set)).collect();
             for d in 0..4 {

@@ -23,6 +23,7 @@ use super::apart::put_apart;
 use super::bvh::{Aabb, Bvh};
 use super::camera::Camera;
 use super::choice::{Asked, Choice};
+use super::equiangular;
 use super::few::Few;
 use super::instance::Group;
 use super::light::Light;
@@ -305,6 +306,7 @@ impl<'a> Compiler<'a> {
             shines_on_rays: lights.iter().any(Light::may_be_met),
             large_sky: lights.iter().position(is_large).map(|i| i as u32),
             backgrounds: (0..lights.len() as u32).filter(|&i| lights[i as usize].is_environment()).collect(),
+            near_lamps: equiangular::lamps(&lights, |i| all_asked.share_of_power(i)),
             lights,
             all_asked,
             uneven_asked,

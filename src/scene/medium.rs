@@ -161,6 +161,49 @@ impl Medium {
         if scatters { dimmed } else { Dimmed { passing: Lanes::ONE, ..dimmed } }
     }
 
+    /// Whether it scatters light.
+    #[must_use]
+    pub fn scatters(&self) -> bool {
+        match &self.filling {
+            Filling::Even { scattering, .. } => !scattering.is_black(),
+            Filling::EvenExtinction { scatters, .. } => *scatters,
+            Filling::Varying(varying) => varying.scatters,
+        }
+    }
+
+    /// Where along `ray`, which meets a surface at `distance`, it may be; empty where the second is not greater.
+    #[must_use]
+    pub fn span(&self, ray: &Ray, distance: f64) -> (f64, f64) {
+        match &self.filling {
+            Filling::Varying(varying) => varying.bounds.span(ray, distance),
+            Filling::Even { .. } | Filling::EvenExtinction { .. } => (0.0, distance),
+        }
+    }
+
+    /// σ_s at `t` metres along `ray`, and about the density with which a flight ends there whose lanes lead by `rho`, 1/m:
+    /// that itself where extinction is the same everywhere, and what it is where little lies before, elsewhere.
+    #[must_use]
+    pub fn scattering_at(&self, ray: &Ray, t: f64, nm: Lanes, rho: Lanes) -> (Lanes, f64) {
+        let point = ray.at(t);
+        let (scattering, extinction) = match &self.filling {
+            Filling::Even { absorption, scattering } => {
+                let scattering = scattering.eval(nm);
+                let extinction = absorption.eval(nm) + scattering;
+                (scattering, extinction * (MediumLanes { extinction, scattering }).transmittance(t))
+            }
+            Filling::EvenExtinction { extinction, albedo, .. } => {
+                let extinction = extinction.eval(nm);
+                let lanes = MediumLanes { extinction, scattering: extinction };
+                (extinction * albedo.eval(point, nm), extinction * lanes.transmittance(t))
+            }
+            Filling::Varying(varying) => {
+                let extinction = varying.extinction.eval(point, nm) * varying.scale;
+                (extinction * varying.albedo.eval(point, nm), extinction)
+            }
+        };
+        (scattering, f64::from((rho * extinction).reduce_add() / rho.reduce_add()))
+    }
+
     /// Whether it is the same everywhere and scatters nothing.
     #[must_use]
     pub fn is_clear(&self) -> bool {

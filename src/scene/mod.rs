@@ -21,6 +21,7 @@ pub mod compound;
 pub mod curves;
 pub mod emission;
 pub mod environment;
+pub mod equiangular;
 pub mod few;
 pub mod grid;
 pub mod instance;
@@ -106,6 +107,8 @@ pub struct Scene {
     pub all_asked: Asked,
     /// The same without light that is even over all directions, if there is any: what is scattered finds that, too.
     pub uneven_asked: Option<Asked>,
+    /// Lamps without extent, toward which distances in media may be drawn; none where they are many.
+    pub near_lamps: Vec<equiangular::Lamp>,
     /// The film counts light over two to this power: `scene/brightness.rs` tells which.
     pub light_exponent: i32,
     /// Indices of lights from infinity.

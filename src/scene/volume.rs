@@ -455,10 +455,16 @@ impl Bounds {
         }
     }
 
+    /// Where along the first `t_max` metres of `ray` the volume is; empty where the second is not greater.
+    #[must_use]
+    pub fn span(&self, ray: &Ray, t_max: f64) -> (f64, f64) {
+        slab(ray.origin, ray.direction, self.extent, [0.0, t_max])
+    }
+
     /// The stretches of `ray` up to `t_max` inside the volume, each with its bound.
     #[must_use]
     pub fn march(&self, ray: &Ray, t_max: f64) -> March<'_> {
-        let (enter, leave) = slab(ray.origin, ray.direction, self.extent, [0.0, t_max]);
+        let (enter, leave) = self.span(ray, t_max);
         let origin = self.place_from_world.transform_point3(ray.origin);
         let direction = self.place_from_world.transform_vector3(ray.direction);
         let (inside, outside) = slab(origin, direction, [DVec3::ZERO, DVec3::from(self.size)], [enter, leave]);

@@ -10,6 +10,7 @@
 //! are the densities of the two techniques, each already summed over the lanes that could lead;
 //! they are combined by the power heuristic (Veach 1997, eq. 9.13).
 
+mod along;
 mod lights;
 mod parting;
 pub mod reuse;
@@ -31,6 +32,7 @@ use crate::scene::material::{Kind, Material, Straight};
 use crate::scene::medium::Medium;
 use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths};
+use along::Along;
 use glam::DVec3;
 use lights::{Questions, power_heuristic};
 use reuse::Joint;
@@ -128,8 +130,11 @@ impl Tracer<'_> {
                     _ => self.sampler.set(set)[0],
                 };
                 let draft = medium.set_out(self.nm, u);
-                reach = reach.min(draft.reach);
-                (medium, set, draft)
+                let looks_along = self.looks_along(path, medium);
+                if !looks_along {
+                    reach = reach.min(draft.reach);
+                }
+                (medium, set, draft, looks_along)
             });
             let hit = match MEDIA && scene.has_boundaries {
                 true => scene.next(&mut ahead, &path.ray, reach),
@@ -138,8 +143,12 @@ impl Tracer<'_> {
             let distance = hit.map_or(f64::INFINITY, |h| h.t);
 
             // The medium between here and the next surface may scatter the path first.
-            if MEDIA && let Some((medium, set, draft)) = &flying {
+            if MEDIA && let Some((medium, set, draft, looks_along)) = &flying {
                 let (medium, set) = (*medium, *set);
+                let along = looks_along.then(|| self.along(path, medium, distance));
+                if let Some(along) = &along {
+                    self.ask_along::<CHROMATIC, MEDIA>(path, along, walk.crossings);
+                }
                 let flight = medium.arrive(draft, &path.ray, distance, self.nm, || self.sampler.walk(set));
                 path.beta *= flight.weight;
                 if CHROMATIC {
@@ -153,7 +162,12 @@ impl Tracer<'_> {
                     // A medium counts as coverage: what is behind it is dimmed.
                     walk.cover();
                     walk.show(|| scene.camera.depth(point));
-                    if !self.scatter_in_medium::<CHROMATIC, MEDIA>(path, point, medium) {
+                    if !self.scatter_in_medium::<CHROMATIC, MEDIA>(
+                        path,
+                        point,
+                        medium,
+                        along.as_ref().map(|along| (along, t)),
+                    ) {
                         break;
                     }
                     walk.crossings = 0;
@@ -395,6 +409,7 @@ impl Tracer<'_> {
                 u_light,
                 || at.choice.draw(0),
                 |wi| at.eval(bsdf, wo, wi),
+                |_| 1.0,
                 |wi| match wi.dot(surface.normal) * toward > 0.0 {
                     true => First::Transmitted,
                     false => First::Reflected(bsdf.diffuse_share(wo, frame.to_local(wi))),
@@ -586,6 +601,7 @@ impl Tracer<'_> {
         path: &mut Path,
         point: DVec3,
         medium: &Medium,
+        along: Option<(&Along, f64)>,
     ) -> bool {
         if self.is_last(path) {
             return false;
@@ -605,12 +621,14 @@ impl Tracer<'_> {
                 let p = Lanes::splat(medium.phase.eval(point, wo, wi) as f32);
                 (p, p)
             };
+            let share = |lamp| along.map_or(1.0, |(along, t)| self.share_of_flight(along, t, lamp));
             self.ask_lights::<CHROMATIC, MEDIA>(
                 path,
                 (point, None),
                 u_light,
                 || choice[0],
                 eval,
+                share,
                 |_| First::Media,
                 |_| inside,
                 |wi| Ray::new(point, wi),

@@ -9,6 +9,7 @@ mod common;
 mod caustics;
 mod channels;
 mod dispersion;
+mod equiangular;
 mod films;
 mod fog;
 mod furnace;

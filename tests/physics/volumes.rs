@@ -5,7 +5,7 @@ use super::common::{Bench, CAMERA, Estimate, assert_close, bench, bench_with, ra
 use std::f64::consts::PI;
 
 /// The bytes of a grid over the unit cube.
-fn vol(size: [i32; 3], channels: i32, values: &[f32]) -> Vec<u8> {
+pub fn vol(size: [i32; 3], channels: i32, values: &[f32]) -> Vec<u8> {
     let mut bytes = b"VOL\x03".to_vec();
     for n in [1, size[0], size[1], size[2], channels] {
         bytes.extend(n.to_le_bytes());
@@ -17,7 +17,7 @@ fn vol(size: [i32; 3], channels: i32, values: &[f32]) -> Vec<u8> {
 }
 
 /// Some 500 numbers between 0 and 2, without order.
-fn noise() -> Vec<f32> {
+pub fn noise() -> Vec<f32> {
     (0..512u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / f32::powi(2.0, 23)).collect()
 }
 

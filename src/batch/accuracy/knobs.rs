@@ -170,6 +170,12 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
         ("path reuse", "reuse", chosen.plan.reuse, joined),
         ("splatting", "splatting", chosen.plan.splatting, dealt),
         ("even sky", "even_sky", chosen.plan.asks_even_sky, about("shadow rays to the even sky")),
+        (
+            "equiangular",
+            "equiangular",
+            chosen.plan.equiangular,
+            about("equiangular") && !chosen.scene.near_lamps.is_empty(),
+        ),
         ("adaptive", "adaptive", chosen.plan.adaptive.is_some(), shared),
     ] {
         if cause {

@@ -105,7 +105,7 @@ impl Tracer<'_> {
 
     /// Which directions of a sky shadow rays take: what is even is left to what scatters, if anything does.
     #[inline(always)]
-    fn drawn(&self) -> Drawn {
+    pub(super) fn drawn(&self) -> Drawn {
         if self.settings.scatter_samples > 0 { Drawn::Brighter } else { Drawn::All }
     }
 
@@ -129,7 +129,8 @@ impl Tracer<'_> {
 
     /// Next-event estimation: as many times as the path sends shadow rays from here light from one point of one light, at a point
     /// with the normal of the side that is asked for. `u` and `u_light` are the numbers of a single time; `eval` tells f · |cos| and
-    /// densities toward a direction, `first` what scatters light from there.
+    /// densities toward a direction, `share` what part of a lamp's light is left to this, `first` what
+    /// scatters light from a direction.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the state of a vertex, split by borrow")]
     pub(super) fn ask_lights<const CHROMATIC: bool, const MEDIA: bool>(
@@ -139,6 +140,7 @@ impl Tracer<'_> {
         u: DVec2,
         u_light: impl Fn() -> f64,
         eval: impl Fn(DVec3) -> (Lanes, Lanes),
+        share: impl Fn(u32) -> f64,
         first: impl Fn(DVec3) -> First,
         inside: impl Fn(DVec3) -> Inside,
         leave: impl Fn(DVec3) -> Ray,
@@ -158,6 +160,7 @@ impl Tracer<'_> {
                 part.map_or(u, |u| pairs(u).0),
                 || part.map_or_else(&u_light, |u| u[2]),
                 &eval,
+                &share,
                 &first,
                 &inside,
                 &leave,
@@ -177,6 +180,7 @@ impl Tracer<'_> {
         u: DVec2,
         u_light: impl FnOnce() -> f64,
         eval: impl Fn(DVec3) -> (Lanes, Lanes),
+        share: impl Fn(u32) -> f64,
         first: impl Fn(DVec3) -> First,
         inside: impl Fn(DVec3) -> Inside,
         leave: impl FnOnce(DVec3) -> Ray,
@@ -200,7 +204,7 @@ impl Tracer<'_> {
         let value = f * light.radiance;
         let led = if CHROMATIC { path.rho * pdf } else { pdf };
         let weight = |passing: Option<Lanes>| match light.density {
-            None => 1.0 / probability,
+            None => share(lamp as u32) / probability,
             Some(density) => {
                 let q = density * probability;
                 // B: what scattering, led by any lane, would have found this light with.
@@ -240,12 +244,18 @@ impl Tracer<'_> {
             path.leave_out::<CHROMATIC>(value * through, weight);
             return;
         }
-        let share = path.share_of::<CHROMATIC>(value * through, weight);
+        let found = path.share_of::<CHROMATIC>(value * through, weight);
+        self.enter(path, found, lamp, || first(light.wi));
+    }
+
+    /// Adds `share` of the light of a lamp that the vertex which the path is at scatters, by `first` if it is the first.
+    #[inline(always)]
+    pub(super) fn enter(&self, path: &mut Path, share: Lanes, lamp: usize, first: impl FnOnce() -> First) {
         path.radiance += share;
         if let Some(ledger) = self.ledger {
             let found = self.found(path, share, lamp as u32);
             match path.vertices {
-                0 => ledger.scattered_by(first(light.wi), found, 1),
+                0 => ledger.scattered_by(first(), found, 1),
                 vertex if ledger.is_caustic_from_here(vertex) => ledger.caustic(found),
                 vertices => ledger.scattered(found, vertices + 1),
             }

@@ -6,10 +6,12 @@ use crate::film::accumulate::REPLICATES;
 use crate::math::sampler::{PARTS, Sampler, Set, pairs};
 use crate::scene::Scene;
 use crate::scene::census::Census;
+use crate::scene::equiangular;
+use crate::scene::medium::Medium;
 use crate::spectrum::ColourSpace;
 use crate::transport::layers::LayerPlan;
 use crate::transport::path::reuse;
-use crate::transport::pilot::Wishes;
+use crate::transport::pilot::{Use, Wishes};
 use crate::transport::plan::{Effect, EffectPlan, Integrator, PathSettings};
 use crate::transport::{Samples, Shot, place_in};
 use rayon::prelude::*;
@@ -28,6 +30,10 @@ const PROBED: u32 = 4;
 /// the time to an error that the best number would, in place of 1.09 where all is believed.
 const BELIEVED: f64 = 0.7;
 
+/// Up to what ratio of times to an error distances in media are drawn toward lamps. What they save first is light of flights that end
+/// near a lamp, rare and bright, of which a trial sees next to none: it expects about 1.25 times what comes (`tools/bench/NOTES.md`).
+const NEAR_LAMPS: f64 = 1.1;
+
 /// What first vertices do.
 #[derive(Clone, Debug)]
 pub struct First {
@@ -37,6 +43,8 @@ pub struct First {
     pub shadow_rays: u32,
     /// Whether shadow rays go to light that is even over all directions.
     pub asks_even_sky: bool,
+    /// Whether distances in media are drawn toward lamps without extent, too.
+    pub equiangular: bool,
     /// What to say of it.
     pub said: Vec<Effect>,
 }
@@ -143,7 +151,34 @@ pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wis
     };
     said.push(Effect { name: "paths shared by pixels".into(), on: reuse, reason: why });
     said.push(Effect { name: rays, on: count > 1, reason: of_rays });
-    Some(First { reuse, shadow_rays: count, asks_even_sky, said })
+    let equiangular = along(scene, wishes.equiangular, |equiangular| {
+        let layers = LayerPlan::default();
+        let plan = EffectPlan { reuse, shadow_rays: count, asks_even_sky, equiangular, layers, ..plan.clone() };
+        let tried = try_groups(&Shot { plan: &plan, seed: seed ^ STREAM, ..*shot }, samples);
+        variance(&tried) * tried.rays
+    });
+    let equiangular = equiangular.is_some_and(|effect| {
+        said.push(effect.clone());
+        effect.on
+    });
+    Some(First { reuse, shadow_rays: count, asks_even_sky, equiangular, said })
+}
+
+/// Whether distances in media are drawn toward lamps without extent; nothing where there are no such lamps or media. `cost` is
+/// variance times cost with it and without.
+fn along(scene: &Scene, wish: Use, cost: impl Fn(bool) -> f64) -> Option<Effect> {
+    let looks = |medium: &Medium| medium.scatters() && medium.shadow_rays;
+    let lamps = scene.lights.iter().filter(|light| light.position().is_some()).count();
+    if lamps == 0 || !scene.media.iter().any(looks) {
+        return None;
+    }
+    let (on, reason) = match decided(wish) {
+        _ if lamps > equiangular::MOST => (false, format!("more than {} lamps have no extent", equiangular::MOST)),
+        _ if scene.near_lamps.is_empty() => (false, "no lamp without extent is asked".into()),
+        Some(on) => (on, "the scene says so".into()),
+        None => judge(cost(true) / cost(false), NEAR_LAMPS),
+    };
+    Some(Effect { name: "equiangular sampling".into(), on, reason })
 }
 
 impl Way {

@@ -1,0 +1,108 @@
+//! Distances in media that are drawn toward lamps change the noise, never the mean.
+
+use super::common::{Bench, bench_with, grey_png, ray, v};
+use super::reuse::{assert_layers_add_up, assert_same_light, over_seeds};
+use super::volumes::{noise, vol};
+use std::f64::consts::PI;
+
+/// A ray that passes a lamp of intensity I at distance h, the nearer the brighter, in fog that is told by its scattering once:
+/// L = I σ_s / 4π ∫ e^(−σ_t (t + r)) / r² dt, with r² = h² + (t − 5)², to a black wall 10 m away. So near the lamp as here nearly
+/// every flight ends where it finds little: without such distances 2¹³ of them tell nothing.
+#[test]
+fn light_beside_a_lamp_in_fog_is_its_integral() {
+    let (scattering, absorption, intensity) = (0.02f64, 0.01, 3.0);
+    let fog = bench_with(
+        &format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 10}}\nintegrator: {{path: {{max_depth: 2}}}}\n\
+             render: {{samples: 16, techniques: {{equiangular: on}}}}\n\
+             media: {{fog: {{homogeneous: {{scattering: {scattering}, absorption: {absorption}}}}}}}\nmedium: fog\n\
+             lights: [{{point: {{position: [0, 0, 0], intensity: {intensity}}}}}]\n\
+             shapes: [{{plane: {{point: [0, 0, -5], normal: [0, 0, 1], material: {{diffuse: {{reflectance: 0}}}}}}}}]\n"
+        ),
+        &[],
+    );
+    assert!(fog.prepared.plan.equiangular);
+    for h in [1.0f64, 1e-2, 1e-5] {
+        // t − 5 = h tan θ, so that dt / r² = dθ / h: 10⁵ midpoints of a smooth integrand.
+        let (n, end) = (100_000, (5.0 / h).atan());
+        let sum: f64 = (0..n)
+            .map(|i| {
+                let theta = end * ((f64::from(i) + 0.5) * 2.0 / f64::from(n) - 1.0);
+                let (t, r) = (5.0 + h * theta.tan(), h / theta.cos());
+                (-(scattering + absorption) * (t + r)).exp() * 2.0 * end / (f64::from(n) * h)
+            })
+            .sum();
+        let expected = intensity * scattering / (4.0 * PI) * sum;
+        fog.estimate(&ray(v(h, 0.0, 5.0), v(h, 0.0, 0.0)), 8192).assert_is(expected, 2e-3);
+    }
+}
+
+/// Smoke, a ball and a floor in the light of lamps that stand away from the smoke: near them, flights alone are too noisy to compare.
+fn lit(equiangular: &str, medium: &str, lights: &str, shapes: &str, layers: &str) -> Bench {
+    let yaml = format!(
+        "camera: {{origin: [0, 0.2, 4], target: [0, 0, 0], fov_deg: 20}}\nimage: {{width: 20, height: 16}}\n\
+         integrator: {{path: {{max_depth: 4}}}}\nrender: {{samples: 32, techniques: {{equiangular: {equiangular}, light_tracing: off}}}}\n\
+         volumes: {{v: {{grid: {{file: v.vol, transform: [{{scale: 2}}, {{translate: [-1, -1, -1]}}]}}}}}}\n\
+         media: {{m: {medium}}}\nlights: [{lights}]\n{layers}\
+         shapes:\n- plane: {{point: [0, -1.2, 0], normal: [0, 1, 0], material: {{diffuse: {{reflectance: 0.6}}}}}}\n\
+         - cube: {{size: 2, material: {{boundary: {{}}}}, inside: m}}\n{shapes}"
+    );
+    let slide = grey_png(4, 4, |x, y| if (x + y) % 2 == 0 { 255 } else { 60 });
+    bench_with(&yaml, &[("v.vol", &vol([8, 8, 8], 1, &noise())), ("slide.png", &slide)])
+}
+
+const THIN: &str = "{homogeneous: {scattering: 0.1, absorption: 0.05, phase: {hg: 0.3}}}";
+const COLOURED: &str = "{homogeneous: {scattering: {rgb: [0.2, 0.6, 0.3]}, absorption: 0.1}}";
+const GRID: &str = "{heterogeneous: {extinction: {volume: v}, albedo: 0.8, scale: 0.5, phase: {hg: 0.5}}}";
+const POINT: &str = "{point: {position: [0.4, 1.8, 0.3], intensity: 3}}";
+const SPOT: &str = "{spot: {position: [-2, 1.5, 0.5], target: [0, 0, 0], cutoff_deg: 20, beam_deg: 15, intensity: 9}}";
+const PROJECTOR: &str =
+    "{projector: {origin: [2.2, 0.5, 0.6], target: [0, 0, 0], fov_deg: 30, irradiance: {texture: slide}, scale: 20}}";
+
+#[test]
+fn light_is_the_same_by_distances_toward_lamps() {
+    let ball = "- sphere: {center: [0.2, -0.3, 0.1], radius: 0.4, material: {diffuse: {reflectance: 0.7}}}\n";
+    let open = "- sphere: {center: [0.2, -0.3, 0.1], radius: 0.4, material: {mask: {opacity: 0.5, material: {diffuse: {}}}}}\n\
+                - rectangle: {corner: [-0.9, -0.9, 0.8], edge_u: [1, 0, 0], edge_v: [0, 1, 0], material: {thin_dielectric: {ior: 1.5}}}\n\
+                - rectangle: {corner: [-0.9, -0.9, -0.8], edge_u: [1.8, 0, 0], edge_v: [0, 1.8, 0], material: {mirror: {}}}\n";
+    let textures = "textures: {slide: {image: {file: slide.png}}}\n";
+    let all = [POINT, SPOT, PROJECTOR].join(", ") + ", {constant: {radiance: 0.05}}";
+    for (name, medium, lights, shapes, most) in [
+        ("thin smoke and a point", THIN, POINT, ball, 0.8),
+        ("coloured smoke and a spot", COLOURED, SPOT, ball, 0.9),
+        ("a grid, a point and a spot", GRID, &[POINT, SPOT].join(", "), ball, 0.9),
+        ("a pane, a mask and a mirror", COLOURED, &[POINT, SPOT].join(", "), open, 1.0),
+        ("all kinds and a sky", GRID, &all, ball, 1.0),
+    ] {
+        let by_flights = over_seeds(lit("off", medium, lights, shapes, textures), 0..24);
+        let bench = lit("on", medium, lights, shapes, textures);
+        assert!(bench.prepared.plan.equiangular, "{name}");
+        let both = over_seeds(bench, 100..124);
+        let ratio = assert_same_light(name, &by_flights, &both);
+        assert!(ratio < most, "{name}: {ratio}");
+    }
+}
+
+#[test]
+fn layers_add_up_with_distances_toward_lamps() {
+    let textures = "textures: {slide: {image: {file: slide.png}}}\n";
+    let plain = lit("on", GRID, &[POINT, SPOT].join(", "), "", textures);
+    let layers = format!("{textures}layers: [emission, direct, indirect, caustic]\n");
+    assert_layers_add_up(&plain, &lit("on", GRID, &[POINT, SPOT].join(", "), "", &layers));
+}
+
+/// A spot's beam in thin smoke is what they are for. In thick smoke flights end before the beam, of nine lamps none is looked at
+/// along the way, and where none has a place there is nothing to decide.
+#[test]
+fn a_trial_draws_distances_toward_lamps_where_that_pays() {
+    let decided = |scattering: f64, lights: &str| {
+        let fog = format!("{{homogeneous: {{scattering: {scattering}}}}}");
+        let bench = lit("auto", &fog, lights, "", "textures: {slide: {image: {file: slide.png}}}\n");
+        let said = bench.prepared.plan.techniques.iter().any(|t| t.name == "equiangular sampling");
+        (said, bench.prepared.plan.equiangular)
+    };
+    assert_eq!(decided(0.05, SPOT), (true, true));
+    assert_eq!(decided(40.0, POINT), (true, false));
+    assert_eq!(decided(0.05, &[POINT; 9].join(", ")), (true, false));
+    assert_eq!(decided(0.05, "{directional: {direction: [0, -1, 0], irradiance: 1}}"), (false, false));
+}
