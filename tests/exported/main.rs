@@ -420,8 +420,8 @@ fn lamps_keep_their_names_and_pictures_their_alpha() {
     same_picture(&yaml);
 }
 
-/// A picture on a plane repeats by the metre along the tangent for Mitsuba, too, which reads none of our instructions; a plane that
-/// is mirrored keeps its front. What else has no texture coordinates there, or others, is told.
+/// A picture on a plane repeats by the metre along the tangent for Mitsuba, too, which reads none of our instructions, and turns with
+/// it; a plane that is mirrored keeps its front. What else has no texture coordinates there, or others, is told.
 #[test]
 fn pictures_on_planes_stay_where_they_are() {
     let directory = tempfile::tempdir().unwrap();
@@ -438,6 +438,7 @@ fn pictures_on_planes_stay_where_they_are() {
     let planes = [
         "- plane: {point: [0, -0.2, 0], normal: [0, 2, 0], tangent: [3, 0, 1], material: tiles}\n",
         "- plane: {point: [0, -0.2, 0], normal: [0, 1, 0], tangent: [3, 0, 1], material: one, transform: [scale: [-0.7, 1, 0.5]]}\n",
+        "- plane: {point: [0, -0.2, 0], normal: [0, 1, 0], material: tiles, transform: [rotate: {axis: [0, 1, 0], deg: 30}]}\n",
         "- plane: {point: [0, -0.2, 0], normal: [0, 1, 0], material: {two_sided: {front: {diffuse: {}}, back: {diffuse: {reflectance: 0}}}}, transform: [scale: [-1, 1, 1]]}\n",
     ];
     for plane in planes {

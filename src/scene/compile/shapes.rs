@@ -23,8 +23,9 @@ impl Compiler<'_> {
                 made.map(|sphere| Shape::Sphere(sphere.with_layout(layout(s.layout))))
             }
             written::Geometry::Plane(p) => {
-                let tangent = p.tangent.map_or(DVec3::ZERO, vector);
-                Plane::new(point(p.point), normal_transform(m, vec3(p.normal)), tangent).map(Shape::Plane)
+                let normal = vec3(p.normal);
+                let tangent = carried(m, normal, p.tangent.map(vec3)).unwrap_or_default();
+                Plane::new(point(p.point), normal_transform(m, normal), tangent).map(Shape::Plane)
             }
             written::Geometry::Disk(d) => {
                 let frame = match vec3(d.normal).try_normalize() {
@@ -109,12 +110,17 @@ fn layout(layout: written::Layout) -> Layout {
     }
 }
 
-/// Where u = 0 about the axis `along` once it is transformed, and whether u then runs the other way: textures move with what
-/// they are on. `None` where neither a transform nor `written` moves it.
+/// Where u = 0 about the axis `along` once it is transformed, and whether u then runs the other way. `None` where neither a
+/// transform nor `written` moves it.
 fn seam(m: DMat4, along: DVec3, written: Option<DVec3>) -> Option<(DVec3, bool)> {
-    let carried = || along.try_normalize().filter(|_| m != DMat4::IDENTITY).map(|axis| Frame::from_normal(axis).s);
-    let direction = written.or_else(carried)?;
-    Some((m.transform_vector3(direction), DMat3::from_mat4(m).determinant() < 0.0))
+    Some((carried(m, along, written)?, DMat3::from_mat4(m).determinant() < 0.0))
+}
+
+/// The direction across `axis` by which texture coordinates are counted, `written` or chosen, once it is transformed: textures
+/// move with what they are on. `None` where neither a transform nor `written` moves it.
+fn carried(m: DMat4, axis: DVec3, written: Option<DVec3>) -> Option<DVec3> {
+    let chosen = || axis.try_normalize().filter(|_| m != DMat4::IDENTITY).map(|axis| Frame::from_normal(axis).s);
+    written.or_else(chosen).map(|direction| m.transform_vector3(direction))
 }
 
 fn normal_transform(m: DMat4, n: DVec3) -> DVec3 {
@@ -127,7 +133,7 @@ mod tests {
     use crate::scene::Geometry;
     use crate::scene::compile::compile;
     use crate::scene::shape::testing::Random;
-    use glam::{DMat3, DVec3};
+    use glam::{DMat3, DVec2, DVec3};
     use std::path::Path;
 
     /// Texture coordinates belong to the thing, however it is turned, resized and mirrored; to a rounding of the largest
@@ -175,6 +181,29 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    /// u and v of a plane are metres along two directions in it, which turn with it, also where its normal stays: a turn moves the
+    /// texture coordinates of 0.1 m, 0.3 m along with the point.
+    #[test]
+    fn the_texture_of_a_plane_turns_with_it() {
+        for plane in ["normal: [0.2, 1, 0.3]", "normal: [0.1, 0.7, 0.9]", "normal: [0, 0, 1], tangent: [1, 2, 0]"] {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n- plane: {{{plane}}}\n\
+                 - plane: {{{plane}, transform: [{{rotate: {{axis: [0.2, 1, 0.3], deg: 75}}}}]}}\n"
+            );
+            let description = SceneDescription::parse(&text, Path::new("s.yaml")).unwrap();
+            let scene = compile(&description, "s").unwrap();
+            let [Geometry::Shape(plain), Geometry::Shape(turned)] = [0, 1].map(|i| &scene.objects[i].geometry) else {
+                panic!("two shapes");
+            };
+            let at = plain.surface(DVec3::ZERO, 0);
+            let point = 0.1 * at.tangent + 0.3 * at.normal.cross(at.tangent);
+            let (a, b) = (plain.surface(point, 0), turned.surface(rotation(75.0) * point, 0));
+            assert!((a.uv - DVec2::new(0.1, 0.3)).abs().max_element() < 1e-14, "{plane}: {}", a.uv);
+            assert!((a.uv - b.uv).abs().max_element() < 1e-14, "{plane}: {} {}", a.uv, b.uv);
+            assert!((rotation(75.0) * a.tangent).dot(b.tangent) > 1.0 - 1e-14, "{plane}");
         }
     }
 

@@ -429,8 +429,10 @@ fn cone_mesh(cone: &Cone) -> String {
 fn standing(plane: &Plane, world: DMat4) -> DAffine3 {
     let linear = DMat3::from_mat4(world);
     let normal = (linear.inverse().transpose() * DVec3::from(plane.normal)).normalize_or_zero();
-    let tangent = plane.tangent.map_or(DVec3::ZERO, |tangent| linear * DVec3::from(tangent));
-    let Frame { s, t, n } = Frame::from_normal_and_tangent(normal, tangent);
+    // One that is chosen turns with the plane, too.
+    let chosen = || Frame::from_normal(DVec3::from(plane.normal).normalize_or_zero()).s;
+    let tangent = plane.tangent.map_or_else(chosen, DVec3::from);
+    let Frame { s, t, n } = Frame::from_normal_and_tangent(normal, linear * tangent);
     DAffine3::from_cols(s, t, n, world.transform_point3(plane.point.into()))
 }
 
