@@ -176,6 +176,11 @@ pub(super) fn prepare_scene(
     let mut plan = EffectPlan::of(&census, integrator, mode);
     plan.effects.extend(blur.said);
     plan.layers = layers::plan(&description, &scene, planned)?;
+    if matches!(plan.integrator, Integrator::Depth) {
+        // Distances are no brighter where the lamps are.
+        scene.light_exponent = 0;
+        moments.iter_mut().for_each(|moment| moment.light_exponent = 0);
+    }
     let filter = sampler(&description)?;
     let (seed, wishes) = (description.render.seed, wishes(&description));
     let choosing = Instant::now();

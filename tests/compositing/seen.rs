@@ -283,6 +283,20 @@ fn light_by_any_integrator_is_behind_depth_fog_and_distances_are_not() {
     }
 }
 
+/// A floor 6 m away is as far in the darkest and in the brightest light. Wavelengths are told to a hundredth in 4096 samples.
+#[test]
+fn distances_are_the_same_in_any_light() {
+    for sky in [1e-30, 1.0, 1e30] {
+        let part = render(&format!(
+            "camera: {{origin: [0, 0, 6], target: [0, 0, 0], orthographic_height: 4}}\nimage: {{width: 4, height: 4}}\n\
+             render: {{samples: 256}}\noutput: {{exr: {{precision: float, channels: xyz}}}}\nintegrator: depth\n\
+             lights: [{{constant: {{radiance: {sky:e}}}}}]\nshapes: [{{plane: {{normal: [0, 0, 1]}}}}]\n"
+        ));
+        let mean = f64::from(plane(&part, "Y").iter().sum::<f32>()) / 16.0;
+        assert!((mean / 6.0 - 1.0).abs() <= 0.01, "{sky:e}: {mean}");
+    }
+}
+
 /// Nearly smooth glass throws a caustic, whether paths from the lights or from the camera find it: what is not caustic has the
 /// same mean, 0.0084, with both. It has little noise: 1 % at 256 samples of 384 pixels is ten standard errors.
 #[test]
