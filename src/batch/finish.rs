@@ -417,7 +417,7 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
     let layer = |(i, channel): (usize, &Channel)| {
         let own = LayerPlane {
             name: channel.name.clone(),
-            plane: if channel.holds == Holds::Once { frame.layer_once(i) } else { frame.layer(i) },
+            plane: if channel.holds == Holds::Once { frame.layer_once(i) } else { whole(frame.layer(i), channel) },
             kind: match channel.holds {
                 Holds::Light => exr::PlaneKind::Colour,
                 Holds::Band => exr::PlaneKind::Band,
@@ -426,7 +426,7 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         };
         let error = errors.get_mut(i).map(|plane| LayerPlane {
             name: stderr_name(&channel.name),
-            plane: std::mem::take(plane),
+            plane: whole(std::mem::take(plane), channel),
             kind: exr::PlaneKind::Data,
         });
         [Some(own), error].into_iter().flatten()
@@ -483,7 +483,14 @@ fn shared_errors(shared: f64) -> Option<(String, Attribute)> {
     (shared > 1.0).then(|| (exr::SHARED_ERRORS.to_owned(), Attribute::Text(format!("{shared:.3}"))))
 }
 
-/// The standard errors of the bands that are `channels`; none where they are not wanted.
+/// The numbers of `channel`, or their standard errors, of which `plane` is as the sums count them.
+fn whole(mut plane: Vec<f32>, channel: &Channel) -> Vec<f32> {
+    let unit = 2f64.powi(channel.exponent);
+    plane.iter_mut().for_each(|x| *x = (f64::from(*x) * unit) as f32);
+    plane
+}
+
+/// The standard errors of the bands that are `channels`, as their sums count them; none where they are not wanted.
 fn band_errors(finish: &Finish, frame: &Frame, channels: Range<usize>) -> Vec<Vec<f32>> {
     // As of colours: samples that are not random would be the same again.
     let none = || vec![0.0; frame.film.window().pixels()];
@@ -525,7 +532,7 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
     if channels.is_empty() {
         return None;
     }
-    let plane = |i: usize| (finish.layers[i].name.clone(), ChannelData::F32(frame.layer(i)));
+    let plane = |i: usize| (finish.layers[i].name.clone(), ChannelData::F32(whole(frame.layer(i), &finish.layers[i])));
     let preview = ["R", "G", "B"].iter().zip(&image.rgb);
     let preview = preview.map(|(name, plane)| ((*name).to_owned(), ChannelData::F32(plane.clone())));
     let error = frame.error_of_bands(channels.clone(), &finish.gauge());
@@ -534,9 +541,9 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
     attributes.extend([text("spectralLayoutVersion", "1.0"), text("emissiveUnits", "W.m^-2.sr^-1")]);
     let errors = band_errors(finish, frame, channels.clone());
     attributes.extend(shared_errors(frame.shared_errors_of_bands(channels.start, &errors, finish.sharing)));
-    let name_of_error = |i: usize| stderr_name(&finish.layers[i].name);
+    let own = finish.layers[channels.clone()].iter().zip(errors);
     let errors: Vec<(String, ChannelData)> =
-        channels.clone().map(name_of_error).zip(errors.into_iter().map(ChannelData::F32)).collect();
+        own.map(|(channel, plane)| (stderr_name(&channel.name), ChannelData::F32(whole(plane, channel)))).collect();
     Some(ExrImage {
         frame: image.frame,
         window: image.window,

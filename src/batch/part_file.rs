@@ -3,10 +3,11 @@
 //! [`crate::film::exr::part`] says how sums become channels. Their names: `camera0.X` is the sum of X in replicate 0, in
 //! units of 2⁻⁶⁴ of light over 2^`exponent`; `camera0.A` that of coverage, in 2⁻³⁴; `camera0.n` counts its samples,
 //! `camera0.dropped` those that were dropped; `lights0.X` … are the same of paths from the lights. `cameraLayers.3` is
-//! the sum of the fourth further channel, `cameraLayers.n` its samples, or `cameraLayers0.3` and `cameraLayers0.n` those of
-//! replicate 0 where standard errors of layers are wanted; `cameraMattes.0` is the number of what covers the
-//! pixel, times 2³², and how many samples met it, `cameraMattes.1` of the next. A value is the sum over replicates over the count
-//! over replicates; of paths from the lights over `splat_paths` instead.
+//! the sum of the fourth further channel, in units of 2⁻⁶⁴ over 2 to the power that `finish.layers` has for it,
+//! `cameraLayers.n` its samples, or `cameraLayers0.3` and `cameraLayers0.n` those of replicate 0 where standard errors of layers
+//! are wanted; `cameraMattes.0` is the number of what covers the pixel, times 2³², and how many samples met it,
+//! `cameraMattes.1` of the next. A value is the sum over replicates over the count over replicates; of paths from the lights
+//! over `splat_paths` instead.
 //!
 //! The same file, with what is done so far in `claims`, is a checkpoint.
 

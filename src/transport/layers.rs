@@ -138,6 +138,10 @@ pub struct LayerPlan {
     pub in_xyz: bool,
     /// Factor on light, as on the picture's own.
     pub sensitivity: f64,
+    /// Light is counted over two to this power, as the film counts it: sums hold so much only.
+    pub exponent: i32,
+    /// Whether the picture's own integrator gives distances, which are no light.
+    pub distances: bool,
     /// How far apart samples of a pixel stand, in pixels: 1/√n.
     pub sample_distance: f64,
     /// Whether it is noted who covers the pixels.
@@ -158,6 +162,8 @@ impl Default for LayerPlan {
             white: illuminant::d65(),
             in_xyz: false,
             sensitivity: 1.0,
+            exponent: 0,
+            distances: false,
             sample_distance: 1.0,
             mattes: false,
             sharp: Vec::new(),
@@ -173,6 +179,13 @@ pub struct Channel {
     pub name: String,
     /// What it holds.
     pub holds: Holds,
+    /// Its sums are of the numbers over two to this power.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub exponent: i32,
+}
+
+fn is_zero(exponent: &i32) -> bool {
+    *exponent == 0
 }
 
 /// What kind of number a channel holds.
@@ -220,6 +233,21 @@ impl LayerPlan {
         Layout { channels, kept: self.kept }
     }
 
+    /// Two to which power the numbers of `source` are counted over.
+    fn exponent_of(&self, source: &Source) -> i32 {
+        match source {
+            Source::Light(None, _) | Source::Band(_) if self.distances => 0,
+            Source::Light(Some(i), _) if matches!(self.integrators[*i], Integrator::Depth) => 0,
+            Source::Light(..) | Source::Band(_) | Source::Ways(..) => self.exponent,
+            Source::Surface(_) | Source::Seen(_) | Source::Numerics | Source::Middle(_) => 0,
+        }
+    }
+
+    /// What the numbers of `source` are multiplied by on their way to the sums.
+    fn unit_of(&self, source: &Source) -> f32 {
+        one_over_two_to(self.exponent_of(source))
+    }
+
     /// Light in the terms of the picture.
     fn as_the_picture(&self, xyz: [f32; 3]) -> [f32; 3] {
         if self.in_xyz { xyz } else { rgb(&self.rgb_from_xyz, xyz) }
@@ -236,11 +264,12 @@ impl LayerPlan {
         numbers: &mut Vec<f32>,
     ) {
         for layer in &self.layers {
+            let unit = self.unit_of(&layer.source);
             match layer.source {
-                Source::Band(i) => numbers.push(in_band(scene, i, wavelengths, light)),
+                Source::Band(i) => numbers.push(in_band(scene, i, wavelengths, light) * unit),
                 Source::Ways(ways, of) => {
                     let counts = ways.holds(Way::Caustic) && of.is_none_or(|of| of == group);
-                    let light = xyz.map(|x| x * self.sensitivity as f32);
+                    let light = xyz.map(|x| x * unit * self.sensitivity as f32);
                     numbers.extend(if counts { self.as_the_picture(light) } else { [0.0; 3] });
                 }
                 Source::Surface(_) | Source::Seen(_) | Source::Light(..) | Source::Numerics | Source::Middle(_) => {}
@@ -257,27 +286,30 @@ impl LayerPlan {
                 [Some((&layer.name, false)), layer.squares.as_ref().map(|name| (name, true))].into_iter().flatten()
             {
                 let unless_squared = |holds| if squared { Holds::Data } else { holds };
+                let exponent = self.exponent_of(&layer.source);
+                let exponent = if squared { 2 * (exponent + lowered(exponent)) } else { exponent };
                 match layer.source {
                     Source::Surface(quantity) | Source::Seen(quantity) => {
-                        let names = quantity.components().iter().map(|c| format!("{name}.{c}"));
                         let colour = quantity == Quantity::Albedo;
                         let holds = unless_squared(if colour { Holds::Light } else { Holds::Data });
-                        all.extend(names.map(|name| Channel { name, holds }));
+                        all.extend(channels(name, quantity.components(), holds, exponent));
                     }
                     Source::Light(_, form) => {
                         let components: &[&str] = match form {
                             Form::Rgba => &["R", "G", "B", "A"],
                             Form::Xyz => &["X", "Y", "Z"],
                         };
-                        all.extend(channels(name, components, unless_squared(Holds::Light)));
+                        all.extend(channels(name, components, unless_squared(Holds::Light), exponent));
                     }
-                    Source::Band(_) => all.push(Channel { name: name.clone(), holds: Holds::Band }),
-                    Source::Numerics => all.extend(channels(name, &NUMERICS, Holds::Data)),
+                    Source::Band(_) => all.push(Channel { name: name.clone(), holds: Holds::Band, exponent }),
+                    Source::Numerics => all.extend(channels(name, &NUMERICS, Holds::Data, exponent)),
                     Source::Ways(..) => {
                         let components = if self.in_xyz { ["X", "Y", "Z"] } else { ["R", "G", "B"] };
-                        all.extend(channels(name, &components, Holds::Light));
+                        all.extend(channels(name, &components, Holds::Light, exponent));
                     }
-                    Source::Middle(middle) => all.extend(channels(name, middle.components(), Holds::Once)),
+                    Source::Middle(middle) => {
+                        all.extend(channels(name, middle.components(), Holds::Once, exponent));
+                    }
                 }
             }
         }
@@ -285,11 +317,23 @@ impl LayerPlan {
     }
 }
 
-/// Channels of the layer `name`; a component without a name is the layer itself.
-fn channels(name: &str, components: &[&str], holds: Holds) -> impl Iterator<Item = Channel> {
+/// By how many more powers of two numbers that are counted over two to the power `exponent` are divided before they are squared: where
+/// light is bright, sums hold the squares of all numbers that they hold, (2³⁸ / 2²⁰)² = 2³⁶.
+fn lowered(exponent: i32) -> i32 {
+    if exponent > 0 { 20 } else { 0 }
+}
+
+/// A power of two, within what f32 holds.
+fn one_over_two_to(exponent: i32) -> f32 {
+    f32::from_bits(((127 - exponent) as u32) << 23)
+}
+
+/// Channels of the layer `name`, whose light is counted over two to the power `exponent`; coverage is no light. A component
+/// without a name is the layer itself.
+fn channels(name: &str, components: &[&str], holds: Holds, exponent: i32) -> impl Iterator<Item = Channel> {
     components.iter().map(move |c| {
         let name = if c.is_empty() { name.to_owned() } else { format!("{name}.{c}") };
-        Channel { name, holds }
+        Channel { name, holds, exponent: if *c == "A" { 0 } else { exponent } }
     })
 }
 
@@ -388,39 +432,42 @@ impl Values {
         let mut surface = surface.iter();
         let sensitivity = layers.sensitivity as f32;
         for layer in &layers.layers {
-            let squares = layer.squares.is_some();
+            let unit = layers.unit_of(&layer.source);
+            let squares = layer.squares.is_some().then(|| one_over_two_to(lowered(layers.exponent_of(&layer.source))));
             match layer.source {
                 Source::Surface(quantity) | Source::Seen(quantity) => {
                     let count = quantity.components().len();
                     let start = numbers.len();
                     numbers.extend(surface.by_ref().take(count));
-                    if squares {
+                    if squares.is_some() {
                         numbers.extend_from_within(start..);
                         numbers[start + count..].iter_mut().for_each(|x| *x *= *x);
                     }
                 }
                 Source::Light(of, form) => {
                     let seen = of.map_or(own, |i| others[i]);
-                    let xyz = seen.xyz.map(|x| x * sensitivity);
+                    let xyz = seen.xyz.map(|x| x * unit * sensitivity);
                     match form {
-                        Form::Xyz => put(numbers, xyz, squares),
+                        Form::Xyz => put(numbers, xyz, squares.map(|factor| [factor; 3])),
                         Form::Rgba => {
                             let [r, g, b] = rgb(&layers.rgb_from_xyz, xyz);
-                            put(numbers, [r, g, b, seen.alpha], squares);
+                            put(numbers, [r, g, b, seen.alpha], squares.map(|factor| [factor, factor, factor, 1.0]));
                         }
                     }
                 }
                 Source::Band(i) => {
-                    put(numbers, [in_band(scene, i, wavelengths, own.radiance)], squares);
+                    put(numbers, [in_band(scene, i, wavelengths, own.radiance) * unit], squares.map(|factor| [factor]));
                 }
                 Source::Ways(ways, group) => {
                     let light = ledger.map_or(Lanes::ZERO, |ledger| ledger.light(ways, group));
-                    let xyz = observer::xyz(light, wavelengths).map(|x| x * sensitivity);
+                    let xyz = observer::xyz(light, wavelengths).map(|x| x * unit * sensitivity);
                     numbers.extend(layers.as_the_picture(xyz));
                 }
                 // These stand in the pixel once.
                 Source::Middle(middle) => numbers.extend(middle.components().iter().map(|_| 0.0)),
-                Source::Numerics => put(numbers, own.numerics(counted.0, counted.1), squares),
+                Source::Numerics => {
+                    put(numbers, own.numerics(counted.0, counted.1), squares.map(|factor| [factor; NUMERICS.len()]));
+                }
             }
         }
     }
@@ -432,12 +479,13 @@ fn in_band(scene: &Scene, band: usize, wavelengths: &SampledWavelengths, light: 
     counted.reduce_add() / LANES as f32
 }
 
-/// Appends `values`, and their squares if they are wanted.
+/// Appends `values`, and the squares of so many times each if they are wanted.
 #[inline]
-fn put<const N: usize>(numbers: &mut Vec<f32>, values: [f32; N], squares: bool) {
+fn put<const N: usize>(numbers: &mut Vec<f32>, values: [f32; N], squares: Option<[f32; N]>) {
     numbers.extend_from_slice(&values);
-    if squares {
-        numbers.extend_from_slice(&values.map(|x| x * x));
+    if let Some(factors) = squares {
+        let lowered = values.iter().zip(factors).map(|(x, factor)| x * factor);
+        numbers.extend(lowered.map(|x| x * x));
     }
 }
 

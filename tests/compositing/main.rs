@@ -57,6 +57,11 @@ fn light_by_its_ways_and_by_its_lamps_adds_up_to_the_picture() {
         let techniques = format!("samples: 16, techniques: {{light_tracing: {light}, merging: {merging}}}");
         FRAME.replace("samples: 16", &techniques)
     };
+    let lamps = |power: i32| {
+        ["radiance: 0.2", "intensity: 3", "emission: 20"]
+            .into_iter()
+            .fold(STAGE.to_owned(), |stage, lamp| stage.replace(lamp, &format!("{lamp}e{power}")))
+    };
     let adaptive = FRAME.replace("samples: 16", "samples: 64, techniques: {adaptive: on, merging: off}");
     let adaptive = adaptive.replace("width: 24, height: 16", "width: 64, height: 48");
     let scenes = [
@@ -75,6 +80,9 @@ fn light_by_its_ways_and_by_its_lamps_adds_up_to_the_picture() {
         // Some cells of 8 × 8 pixels have more samples in one half of the replicates than in the other.
         ("samples shared out", adaptive.clone() + STAGE),
         ("rays", FRAME.to_owned() + "integrator: {path: {light_samples: 2, scatter_samples: 2}}\n" + STAGE),
+        // As dark and as bright as sums that count by the number alone do not hold.
+        ("darkness", frame("on", "off") + &lamps(-26)),
+        ("glare", frame("on", "off") + &lamps(25)),
     ];
     let families: [&[&str]; 3] = [
         &["emission", "caustic", "direct", "indirect"],
