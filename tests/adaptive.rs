@@ -106,6 +106,21 @@ fn parts_by_rows_of_cells_are_the_picture_bit_for_bit() {
     assert!(message.contains("--samples 0-31: expected --tile i/n or render.techniques.adaptive: off"), "{message}");
 }
 
+/// The pilot goes over the whole picture for each part. Its paths are none of the picture, and were counted once for each.
+#[test]
+fn parts_count_what_robust_arithmetic_was_needed_for_as_one_render_does() {
+    let place = Place::of(&scene("seed: 3"));
+    let counts = |portion: Portion| {
+        let output = Some(place.path("out"));
+        let overrides = Overrides { output, portion, check_numerics: true, ..Overrides::default() };
+        let stop = AtomicBool::new(false);
+        let report = batch::render_batch(&place.path("scene.yaml"), &overrides, &(), &stop).unwrap();
+        report.scenes[0].numerics.unwrap()
+    };
+    let parts = (0..3).map(|i| counts(Portion { tile: Some([i, 3]), samples: None }));
+    assert_eq!(merge::sum(parts), Some(counts(Portion::default())));
+}
+
 /// Stops the render after so many units of work.
 struct StopAfter<'a>(AtomicU64, &'a AtomicBool);
 

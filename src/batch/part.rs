@@ -472,7 +472,9 @@ impl<'a> Part<'a> {
     fn decide(&self, first: u32, pause: &dyn Breaks) -> Option<&Allocation> {
         if self.allocation.get().is_none() {
             // A pause in its midst would cost all that it has seen.
-            let scale = adaptive::pilot(self.job, first, &Ending(pause))?;
+            let pilot = || adaptive::pilot(self.job, first, &Ending(pause));
+            // Its paths are no part of the picture, and each part of one has them.
+            let scale = self.job.scene.watch.as_ref().map_or_else(pilot, |watch| watch.aside(pilot))?;
             let allocation = adaptive::decide(self.job, first, &lock(&self.film), &scale);
             // Nobody else decides meanwhile.
             let _ = self.allocation.set(allocation);

@@ -64,6 +64,18 @@ impl Watch {
         }
     }
 
+    /// Does `work` and counts nothing of it. Nothing else is traced meanwhile.
+    pub fn aside<T>(&self, work: impl FnOnce() -> T) -> T {
+        let Counts { surfaces, robust, rays, self_hits } = self.counts();
+        let done = work();
+        for (sum, before) in
+            [(&self.surfaces, surfaces), (&self.robust, robust), (&self.rays, rays), (&self.self_hits, self_hits)]
+        {
+            sum.store(before, Ordering::Relaxed);
+        }
+        done
+    }
+
     /// A surface was met.
     #[cold]
     #[inline(never)]
