@@ -289,6 +289,9 @@ struct Found {
 /// [`picture_ended`] of one of its EXR files.
 fn exr_holds(path: &Path, finish: &Finish, holds: Holds) -> Option<Found> {
     let file = exr::read_exr(path).ok()?;
+    if !exr::rows_are_apart(path).is_ok_and(|apart| apart) {
+        return None;
+    }
     // What is said of the whole file stands in its first part.
     let part = &file.parts[0];
     let found = part.text("spectralLayoutVersion").map_or(Holds::Colours, |_| Holds::Bands);

@@ -15,7 +15,7 @@ pub mod part;
 mod read;
 mod write;
 
-pub use read::{ExrFile, ExrPart, Samples, read_exr};
+pub use read::{ExrFile, ExrPart, Samples, read_exr, rows_are_apart};
 pub use write::{encode_exr, write_exr};
 
 use crate::error::Result;
