@@ -141,13 +141,6 @@ fn a_job_for_a_farm_is_refused_where_its_tasks_would_be() {
         says(&["scene.yaml", "--tiles", "9", "--frames", "1-4", "--set", "image.height={1: 60, 4: 6}"]),
         "error: scene.0004: --tiles 9: expected at most 6, the rows of the picture\n"
     );
-    // What a template of Open Job Description would take for a variable of its own.
-    let owner = ["--format", "openjd", "--set", "output.exr.attributes={owner: \"a{{b}}\"}"];
-    let openjd = [&["farm", "scene.yaml", "-o", "job"], &owner[..]].concat();
-    let ran = place.run(&openjd);
-    assert_eq!((ran.code, place.names("job").len()), (2, 0), "{}", ran.err);
-    let expected = "expected an argument without {{, which Open Job Description takes for a variable, found one";
-    assert_eq!(ran.err, format!("error: output.exr.attributes={{owner: \"a{{{{b}}}}\"}}: {expected}\n"));
     // All that is wrong is told at once.
     let message = says(&["batch.yaml"]);
     assert!(message.contains("keyed.yaml:7:15: fog.colour: expected render.frames or --frames"), "{message}");

@@ -60,6 +60,15 @@ def test_pictures_that_are_not_cut_need_no_second_step(binary, farm, tmp_path):
     assert {Path(p).name for p in assets["inputs"]["filenames"]} == {"batch.yaml", "moving.yaml", "still one.yaml"}
 
 
+def test_arguments_may_have_maps_in_maps(binary, farm, tmp_path):
+    batch = write_batch(tmp_path, "1", samples=4, still=False)
+    told = ["--set", 'output.exr={precision: float, attributes: {owner: "a{{b"}}']
+    run(binary, "render", batch, "-q", "-o", tmp_path / "one", *told)
+    job = farm(batch, *told)
+    start(job, "Render")
+    assert_same(job / "pictures", tmp_path / "one")
+
+
 def test_a_part_that_is_missing_fails_the_merge(farm, tmp_path):
     job = farm(write_batch(tmp_path, "1", samples=4, still=False), "--tiles", 2)
     start(job, "Render")

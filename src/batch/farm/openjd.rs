@@ -64,26 +64,34 @@ fn faults(job: &Job) -> Vec<String> {
     let [source, pictures] = [&job.source, &job.pictures].map(|path| path.display().to_string());
     let values = [("the path of the batch", &source), ("--pictures", &pictures), ("--program", &job.program)];
     faults.extend(values.into_iter().filter_map(|(what, text)| letters(what, text)));
+    faults.extend(braced(job).filter_map(|(_, argument)| letters(argument, argument)));
     for group in &job.groups {
         let what = || format!("{}: render.frames, written in short", group.scenes[0]);
         faults.extend(letters(&what(), &frames_of(group)));
     }
-    let fixed = parameters(job).lines().count();
+    let (parameters, braced) = (parameters(job).lines().count(), braced(job).count());
     let framed = job.groups.iter().filter(|group| !group.frames.is_empty()).count();
-    if fixed + framed > MOST_PARAMETERS {
+    if parameters + framed > MOST_PARAMETERS {
+        let and = if braced > 0 { format!(" beside {braced} arguments with {{{{ or }}}}") } else { String::new() };
         faults.push(format!(
-            "render.frames: expected at most {} different sets of frames in one job, as many as Open Job Description has \
-             parameters for, found {framed}; --scene makes a job of some scenes",
-            MOST_PARAMETERS - fixed
+            "render.frames: expected at most {} different sets of frames in one job{and}, as many as Open Job Description \
+             has parameters for, found {framed}; --scene makes a job of some scenes",
+            MOST_PARAMETERS.saturating_sub(parameters)
         ));
     }
-    let bound = job.arguments.iter().filter(|argument| argument.contains("{{"));
-    faults.extend(bound.map(|argument| {
-        format!(
-            "{argument}: expected an argument without {{{{, which Open Job Description takes for a variable, found one"
-        )
+    // Names with {{ are refused for every engine.
+    let closed = job.groups.iter().flat_map(|group| &group.scenes).filter(|name| name.contains("}}"));
+    faults.extend(closed.map(|name| {
+        format!("{name}: expected a name without }}}}, which ends a variable of Open Job Description, found one")
     }));
     faults
+}
+
+/// The arguments, with their numbers, that would be taken for variables or their ends where they stand in a template: nested maps
+/// of `--set`. They are the values of parameters.
+fn braced(job: &Job) -> impl Iterator<Item = (usize, &str)> {
+    let is_braced = |argument: &str| argument.contains("{{") || argument.contains("}}");
+    job.arguments.iter().map(String::as_str).enumerate().filter(move |(_, argument)| is_braced(argument))
 }
 
 /// The frames of a group in order, for its ranges may not overlap.
@@ -151,6 +159,13 @@ fn parameters(job: &Job) -> String {
             job.cut.frames
         );
     }
+    for (i, argument) in braced(job) {
+        let _ = writeln!(
+            out,
+            "- {{name: Argument{i}, type: STRING, default: {}, userInterface: {{control: HIDDEN}}}}",
+            quoted(argument)
+        );
+    }
     out
 }
 
@@ -209,7 +224,11 @@ fn render(job: &Job, group: &Group, mark: &str, out: &mut String) {
     arguments.extend(["-o", place, "--threads", "{{Param.Threads}}", "--resume", "--progress", "openjd"]);
     arguments.extend(["--path-map-file", "{{Session.PathMappingRulesFile}}"]);
     arguments.extend(NO_SHEET);
-    arguments.extend(job.arguments.iter().map(String::as_str));
+    let mut further = job.arguments.clone();
+    for (i, _) in braced(job) {
+        further[i] = format!("{{{{Param.Argument{i}}}}}");
+    }
+    arguments.extend(further.iter().map(String::as_str));
     action(&arguments, out);
 }
 
@@ -281,8 +300,27 @@ mod tests {
         assert!(of(sets(44)).is_ok());
         assert!(says(sets(45)).starts_with("render.frames: expected at most 44 different sets of frames in one job"));
 
-        let told = Job { arguments: vec!["--set".into(), "a={b: c{{d}}}".into()], ..one.clone() };
-        let says = files(&told).unwrap_err().to_string();
-        assert!(says.starts_with("a={b: c{{d}}}: expected an argument without {{, which"), "{says}");
+        let told = |names: Group| Job { groups: vec![names], ..one.clone() };
+        let closed = Group { scenes: vec!["a}}".into()], frames: vec![] };
+        let expected = "a}}: expected a name without }}, which ends a variable of Open Job Description, found one";
+        assert_eq!(files(&told(closed)).unwrap_err().to_string(), expected);
+    }
+    /// `openjd check` refused a template with `}}` in an argument, "Missing opening braces", and so refused a map in a map.
+    #[test]
+    fn arguments_with_braces_are_the_values_of_parameters() {
+        let arguments = ["--set", "a={b: {c: d}}", "--set", "e={f: g}", "--set", "h=\"{{i\""].map(String::from);
+        let job = Job { arguments: arguments.into(), ..job(Cut { tiles: 2, ranges: 1, frames: 1 }) };
+        let text = template(&job);
+        let told = "\"--set\", \"{{Param.Argument1}}\", \"--set\", \"e={f: g}\", \"--set\", \"{{Param.Argument5}}\"]\n";
+        assert_eq!(text.matches(told).count(), 2, "{text}");
+        for (i, value) in [(1, "\"a={b: {c: d}}\""), (5, "\"h=\\\"{{i\\\"\"")] {
+            let line = format!(
+                "- {{name: Argument{i}, type: STRING, default: {value}, userInterface: {{control: HIDDEN}}}}\n"
+            );
+            assert_eq!(text.matches(&line).count(), 1, "{text}");
+        }
+        assert!(files(&job).is_ok());
+        let long = Job { arguments: vec![format!("{{{{{}", "x".repeat(1023))], ..job };
+        assert!(files(&long).unwrap_err().to_string().ends_with("as Open Job Description allows, found 1025"));
     }
 }
