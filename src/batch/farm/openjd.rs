@@ -142,7 +142,8 @@ fn template(job: &Job) -> String {
 
 /// The parameters of a job besides its frames, one a line.
 fn parameters(job: &Job) -> String {
-    let name = quoted(&job.name.chars().take(100).collect::<String>());
+    // Names of jobs have no control characters.
+    let name = quoted(&job.name.chars().filter(|c| !c.is_control()).take(100).collect::<String>());
     let threads = job.threads;
     let program = quoted(&job.program);
     let mut out = format!(
@@ -322,5 +323,12 @@ mod tests {
         assert!(files(&job).is_ok());
         let long = Job { arguments: vec![format!("{{{{{}", "x".repeat(1023))], ..job };
         assert!(files(&long).unwrap_err().to_string().ends_with("as Open Job Description allows, found 1025"));
+    }
+
+    /// `openjd run` refused a job whose name had the end of a line of the name of its file.
+    #[test]
+    fn the_name_of_a_job_has_no_control_characters() {
+        let job = Job { name: "a\nb\u{7f}".into(), ..job(Cut { tiles: 1, ranges: 1, frames: 1 }) };
+        assert!(template(&job).contains("- {name: JobName, type: STRING, default: \"ab\"}\n"));
     }
 }
