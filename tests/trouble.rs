@@ -302,13 +302,51 @@ fn tasks_of_a_farm_find_files_where_the_job_was_told_they_are() {
     }
 }
 
-/// Runs the first task of a job of Slurm, without Slurm.
-fn task(place: &Place, job: &str) -> Ran {
+/// A task runs elsewhere: it looked for `./abbe` in the directory of the job, or of its session.
+#[test]
+fn tasks_of_a_farm_find_the_program_that_the_job_was_told() {
+    let place = Place::of(SCENE);
+    std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_abbe"), place.path("abbe")).unwrap();
+    let here = place.directory.path().canonicalize().unwrap();
+    let farm = |format: &str, program: &str| {
+        let made = place.run(&[
+            "farm",
+            "scene.yaml",
+            "-q",
+            "--format",
+            format,
+            "-o",
+            "job",
+            "--program",
+            program,
+            "--spp",
+            "1",
+        ]);
+        assert_eq!((made.code, made.err.as_str()), (0, ""));
+    };
+    farm("slurm", "./abbe");
+    let ran = Ran::of(first_task(&place, "job").output().unwrap());
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert!(place.path("job/pictures/scene.exr").is_file());
+    let own = format!("{:?}", here.join("abbe").display().to_string());
+    for (program, expected) in [("./abbe", own.as_str()), ("abbe", "\"abbe\"")] {
+        farm("openjd", program);
+        let template = std::fs::read_to_string(place.path("job/template.yaml")).unwrap();
+        assert!(template.contains(&format!("{{name: Abbe, type: STRING, default: {expected},")), "{template}");
+    }
+}
+
+/// The first task of a job of Slurm, without Slurm.
+fn first_task(place: &Place, job: &str) -> Command {
     let run = "srun() { while [ \"${1#--}\" != \"$1\" ]; do shift; done; \"$@\"; }; . ./render.sbatch";
     let mut command = Command::new("bash");
-    command.current_dir(place.path(job)).args(["-c", run]);
-    command.env("ABBE", env!("CARGO_BIN_EXE_abbe")).env("SLURM_ARRAY_TASK_ID", "0");
-    Ran::of(command.output().unwrap())
+    command.current_dir(place.path(job)).args(["-c", run]).env("SLURM_ARRAY_TASK_ID", "0");
+    command
+}
+
+/// Runs the first task of a job of Slurm by this program.
+fn task(place: &Place, job: &str) -> Ran {
+    Ran::of(first_task(place, job).env("ABBE", env!("CARGO_BIN_EXE_abbe")).output().unwrap())
 }
 
 /// Even ranges cover all samples once, however many there are.

@@ -19,7 +19,7 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
     };
     let job = Job {
         pictures,
-        program: arguments.program.clone(),
+        program: program(&arguments.program)?,
         arguments: further(arguments, &overrides)?,
         threads: arguments.threads,
         ..Job::of(&arguments.scene.file, &overrides, cut)?
@@ -94,6 +94,15 @@ fn check_pictures(arguments: &FarmArguments, job: &Job) -> Result<()> {
         Some((mark, here)) => refuse("the working directory", &here, &mark),
         None => Ok(()),
     }
+}
+
+/// The program as a task, which runs in another directory, finds it. A name alone is looked for on the path of each machine.
+fn program(written: &str) -> Result<String> {
+    if !written.contains(std::path::is_separator) {
+        return Ok(written.to_owned());
+    }
+    let path = std::path::absolute(written).map_err(|e| Error::input(Path::new(written), e.to_string()))?;
+    Ok(in_words(&path)?.to_owned())
 }
 
 /// A path as the files of a bundle, which are text, say it.
