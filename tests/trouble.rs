@@ -336,6 +336,23 @@ fn tasks_of_a_farm_find_the_program_that_the_job_was_told() {
     }
 }
 
+/// By 4 a task that was stopped twenty times said that its picture is written.
+#[test]
+fn a_task_that_is_given_up_says_so_by_a_code_of_no_picture() {
+    let place = Place::of(SCENE);
+    assert_eq!(place.run(&["farm", "scene.yaml", "-q", "--format", "slurm", "-o", "job"]).code, 0);
+    let ends = |restarts: &str| {
+        let mut command = Command::new("bash");
+        // It cannot be put into the queue again here, either.
+        command.args(["-c", "srun() { return 75; }; scontrol() { false; }; . ./render.sbatch"]);
+        command.env("SLURM_ARRAY_TASK_ID", "0").env("SLURM_JOB_ID", "1").env("SLURM_RESTART_COUNT", restarts);
+        Ran::of(command.current_dir(place.path("job")).output().unwrap())
+    };
+    let given_up = ends("20");
+    assert_eq!((given_up.code, given_up.err.as_str()), (1, "given up after 20 restarts\n"));
+    assert_eq!(ends("19").code, 75);
+}
+
 /// The first task of a job of Slurm, without Slurm.
 fn first_task(place: &Place, job: &str) -> Command {
     let run = "srun() { while [ \"${1#--}\" != \"$1\" ]; do shift; done; \"$@\"; }; . ./render.sbatch";

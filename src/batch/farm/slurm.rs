@@ -13,6 +13,10 @@ use std::fmt::Write;
 /// How often a task begins again before it is given up.
 const RESTARTS: u32 = 20;
 
+/// How a task that is given up ends: as one that could not write its picture. Not with 75, which `RequeueExit` may name, nor with 4,
+/// which says that the picture is there.
+const GIVEN_UP: i32 = 1;
+
 /// The files of the bundle.
 #[must_use]
 pub fn files(job: &Job) -> Vec<BundleFile> {
@@ -132,7 +136,7 @@ fn render(job: &Job) -> String {
              if [[ $code == 75 || $code == 137 ]]; then\n    \
                  if ((restarts >= {RESTARTS})); then\n        \
                      echo \"given up after $restarts restarts\" >&2\n        \
-                     exit 4\n    \
+                     exit {GIVEN_UP}\n    \
                  fi\n    \
                  # It ends this script, too.\n    \
                  scontrol requeue \"$SLURM_JOB_ID\" && sleep 60\n\
