@@ -17,6 +17,9 @@ const RESTARTS: u32 = 20;
 /// which says that the picture is there.
 const GIVEN_UP: i32 = 1;
 
+/// The most bytes of a job's name, with which the names of its logs begin: file systems take 255.
+const LONGEST: usize = 100;
+
 /// The files of the bundle.
 #[must_use]
 pub fn files(job: &Job) -> Vec<BundleFile> {
@@ -67,7 +70,8 @@ pub fn word(text: &str) -> String {
 
 /// The head of both scripts.
 fn head(job: &Job, name: &str, directives: &str) -> String {
-    let job_name: String = job.name.chars().filter(|c| c.is_alphanumeric() || "-_.".contains(*c)).collect();
+    let mut job_name: String = job.name.chars().filter(|c| c.is_alphanumeric() || "-_.".contains(*c)).collect();
+    job_name.truncate(job_name.floor_char_boundary(LONGEST));
     format!(
         "#!/bin/bash\n\
          #SBATCH --job-name={name}-{job_name}\n\
@@ -225,6 +229,16 @@ mod tests {
             };
             assert_eq!(said(&[]), format!("{path}|{path}"));
             assert_eq!(said(&[("ABBE", "/a b"), ("ABBE_PICTURES", "/c'}")]), "/a b|/c'}");
+        }
+    }
+
+    /// A log is called `NAME_JOB_TASK.log`, with numbers of ten digits at the most: 26 bytes besides the name.
+    #[test]
+    fn the_names_of_logs_are_names_of_files() {
+        let long = Job { name: "é".repeat(125), ..job(Cut { tiles: 2, ranges: 1, frames: 1 }) };
+        for script in [render(&long), merge(&long)] {
+            let name = script.lines().find_map(|line| line.strip_prefix("#SBATCH --job-name=")).unwrap();
+            assert!(name.len() + 26 <= 255 && name.ends_with("ééé"), "{name}");
         }
     }
 }
