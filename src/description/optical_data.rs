@@ -167,12 +167,17 @@ fn numbers(node: &Node, field: &str) -> std::result::Result<Vec<f64>, Fault> {
     found.split_whitespace().map(parse).collect()
 }
 
+/// What the types of formulas begin with.
+const FORMULA: &str = "formula ";
+
 fn of_yaml(root: &Node) -> std::result::Result<OpticalData, Fault> {
     let expected = "DATA: expected a list of formulas and tables";
     let Some(list) = root.get("DATA") else { return Err(told(root.place, "", &format!("{expected}, found no DATA"))) };
     let Value::List(entries) = &list.value else {
         return Err(told(list.place, "", &format!("{expected}, found {}", list.found())));
     };
+    let kind_of = |entry: &Node| entry.get("type").and_then(text).unwrap_or_default();
+    let has_formula = entries.iter().any(|entry| kind_of(entry).starts_with(FORMULA));
     let (mut data, mut tables) = (OpticalData::default(), Tables::default());
     for (i, entry) in entries.iter().enumerate() {
         let at = |field: &str| format!("DATA[{i}].{field}");
@@ -183,7 +188,7 @@ fn of_yaml(root: &Node) -> std::result::Result<OpticalData, Fault> {
         };
         let kind_node = field("type")?;
         let kind = text(kind_node).unwrap_or_default();
-        if let Some(number) = kind.strip_prefix("formula ") {
+        if let Some(number) = kind.strip_prefix(FORMULA) {
             if data.index.is_some() || tables.n.is_some() {
                 return Err(told(kind_node.place, &at("type"), "expected one formula or table of n, found a second"));
             }
@@ -207,7 +212,7 @@ fn of_yaml(root: &Node) -> std::result::Result<OpticalData, Fault> {
         let rows = rows(&text(rows_node).unwrap_or_default(), wanted);
         let rows = rows.map_err(|fault| told(rows_node.place, &at("data"), &fault))?;
         // A formula of n beside a table of both: the table's k counts.
-        let columns = if columns == Columns::Nk && data.index.is_some() { Columns::K } else { columns };
+        let columns = if columns == Columns::Nk && has_formula { Columns::K } else { columns };
         let rows: Vec<Vec<f64>> = match (columns, wanted) {
             (Columns::K, 3) => rows.into_iter().map(|row| vec![row[0], row[2]]).collect(),
             _ => rows,
@@ -347,6 +352,19 @@ mod tests {
     fn a_last_line_needs_no_end_and_noise_about_zero_is_none() {
         let data = read("a.yml", "DATA:\n- type: tabulated k\n  data: |\n    0.3 -8e-10\n    0.9 1e-9").unwrap();
         assert_eq!(data.k, Some(vec![[300.0, 0.0], [900.0, 1e-9]]));
+    }
+
+    /// A formula has the index and a table beside it the absorption, whichever is written first.
+    #[test]
+    fn a_table_of_both_beside_a_formula_gives_k() {
+        let table = "- type: tabulated nk\n  data: |\n    0.3 0.2 3\n    0.6 0.4 5\n    0.9 0.6 9";
+        let formula = &BK7[BK7.find("- type: formula").unwrap()..BK7.find("- type: tabulated k").unwrap()];
+        let (formula, table) = (formula.trim_end(), table.replace('\n', "\n  "));
+        let both = [format!("DATA:\n  {formula}\n  {table}\n"), format!("DATA:\n  {table}\n  {formula}\n")];
+        let [after, before] = both.map(|yaml| read("g.yml", &yaml).unwrap());
+        assert_eq!(after, before);
+        assert_eq!(after.index, read("b.yml", BK7).unwrap().index);
+        assert_eq!(after.k, Some(vec![[300.0, 3.0], [600.0, 5.0], [900.0, 9.0]]));
     }
 
     #[test]
