@@ -289,6 +289,7 @@ impl<'a> Compiler<'a> {
         let mut scene = Scene {
             name: name.to_owned(),
             camera,
+            has_planes: boxes.iter().any(|bounds| !bounds.is_finite()),
             has_boundaries: objects.iter().any(lets_through),
             has_media: camera_medium.is_some() || objects.iter().any(|o| o.inside.is_some() || o.outside.is_some()),
             objects,

@@ -234,6 +234,24 @@ impl Scene {
     fn arriving_ray(&self, direction: DVec3, u: DVec2) -> Ray {
         let frame = Frame::from_normal(direction);
         let disk = warp::concentric_disk(u) * self.radius;
-        Ray::new(self.center + frame.s * disk.x + frame.t * disk.y - direction * self.radius, direction)
+        self.from_infinity(self.center + frame.s * disk.x + frame.t * disk.y, direction, self.radius)
+    }
+
+    /// Light from infinity that comes to `to` in `direction`, from as far before it as everything that has an end lies
+    /// within, `back`.
+    ///
+    /// Planes may stand farther out, and may let light through: it begins behind all that it has to cross. Twice the way
+    /// to one is behind it, however that is rounded.
+    #[must_use]
+    pub fn from_infinity(&self, to: DVec3, direction: DVec3, mut back: f64) -> Ray {
+        while self.has_planes {
+            let out = Ray::new(to - direction * back, -direction);
+            let Some(farther) = self.closest(&out, f64::INFINITY).map(|hit| 2.0 * (back + hit.t)) else { break };
+            if !farther.is_finite() {
+                break;
+            }
+            back = farther;
+        }
+        Ray::new(to - direction * back, direction)
     }
 }

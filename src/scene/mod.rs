@@ -129,6 +129,8 @@ pub struct Scene {
     pub center: DVec3,
     /// Its radius, metres.
     pub radius: f64,
+    /// True where something that stands in the scene has no end.
+    pub has_planes: bool,
     /// True where light may go straight through some object: the boundary of a medium, a pane, a body within another.
     pub has_boundaries: bool,
     /// True where a ray can meet light by chance: some light has an extent.

@@ -47,8 +47,6 @@ pub struct Caustics {
     pub parts: bool,
     /// The first radius within which photons are collected where mirrors and glass are seen, metres.
     pub merging: Option<f64>,
-    /// Whether something that stands in the scene has no end.
-    pub endless: bool,
 }
 
 /// A light and what it is aimed at.
@@ -219,12 +217,7 @@ impl Caustics {
             Freedom::Place(direction) => {
                 // From outside everything that has an end.
                 let back = (ball.center - scene.center).length() + scene.radius + ball.radius;
-                let ray = Ray::new(x - direction * back, direction);
-                // What has no end may stand farther out.
-                if self.endless && scene.occluded(&Ray::new(ray.origin, -direction), f64::INFINITY, None) {
-                    return None;
-                }
-                (ray, start.irradiance())
+                (scene.from_infinity(x, direction, back), start.irradiance())
             }
             Freedom::None(..) => return None,
         };

@@ -518,6 +518,22 @@ fn light_that_nothing_else_finds_is_traced_for_every_seed() {
     }
 }
 
+/// A sun over a black sheet that is open to a quarter throws through a ball of glass what a quarter of that sun does, be the
+/// sheet a plane that stands farther out than all that has an end.
+#[test]
+fn light_that_glass_throws_comes_through_planes_that_stand_far_out() {
+    let sun = "lights: [directional: {direction: [0.3, -1, -0.2], irradiance: 1}]\n";
+    let sheet = "- plane: {point: [0, 50, 0], normal: [0, -1, 0], \
+                 material: {mask: {opacity: 0.75, material: {diffuse: {reflectance: 0}}}}}\n\
+                 lights: [directional: {direction: [0.3, -1, -0.2], irradiance: 4}]\n";
+    let [a, b] = [sheet, sun].map(|light| {
+        let bench = Case { light, ..AREA }.bench("on", "auto", 256);
+        assert!(techniques(&bench).0, "{light}");
+        render(&bench)
+    });
+    assert_agree("sheet", &a, &b);
+}
+
 /// Light without extent, which no path from the camera finds behind glass, against the tracer of all paths from the
 /// lights, where the ball is out of the picture: a path through a mirror next to the camera is not its part.
 #[test]

@@ -96,6 +96,32 @@ fn paths_from_the_lights_and_from_the_camera_agree() {
     }
 }
 
+/// A square that faces the camera in an even sky of radiance 1, of which a plane, farther out than everything else, hides
+/// half: all directions with x < 0. Of what comes from there it lets a share s through. The irradiance is π (1 + s) / 2, and
+/// back comes ρ (1 + s) / 2.
+#[test]
+fn light_from_infinity_comes_through_planes_that_stand_far_out() {
+    let materials = [
+        ("{diffuse: {reflectance: 0}}", 0.0),
+        ("{mask: {opacity: 0.75, material: {diffuse: {reflectance: 0}}}}", 0.25),
+        ("{boundary: {}}", 1.0),
+    ];
+    for (material, share) in materials {
+        for integrator in ["path", "light_tracer"] {
+            let frame = render(&format!(
+                "{PARALLEL}image: {{width: 4, height: 4}}\nrender: {{samples: 16384}}\n\
+                 integrator: {{{integrator}: {{max_depth: 2}}}}\nlights: [{{constant: {{radiance: 1}}}}]\nshapes:\n\
+                 - plane: {{point: [-3, 0, 0], normal: [1, 0, 0], material: {material}}}\n\
+                 - rectangle: {{corner: [-1.2, -1.2, 0], edge_u: [2.4, 0, 0], edge_v: [0, 2.4, 0]}}\n"
+            ));
+            let ((mean, error), expected) = (luminance(&frame), 0.5 * (1.0 + share) / 2.0);
+            // Of six one in 2600 is beyond four of these errors.
+            let z = (mean - expected) / error;
+            assert!(z.abs() < 4.0 && error < 0.02 * expected, "{integrator} {material}: {mean} ± {error}, z = {z:.1}");
+        }
+    }
+}
+
 /// A camera is in a ball of mist with nothing around it. Lamps outside shine away from it: nothing scatters their light.
 #[test]
 fn light_that_meets_nothing_is_not_in_what_the_camera_is_in() {

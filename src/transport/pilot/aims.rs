@@ -106,8 +106,6 @@ impl Caustics {
         }
         let total: f64 = sources.iter().map(|s| s.probability).sum();
         sources.iter_mut().for_each(|s| s.probability /= total);
-        let stands = &scene.objects[..scene.standing];
-        let endless = stands.iter().any(|o| !o.bounds().is_finite());
         let sums = Caustics::sums(&sources);
         Caustics {
             casts,
@@ -119,7 +117,6 @@ impl Caustics {
             ratio: 1.0,
             packets,
             parts: casters.parts || in_part.parts,
-            endless,
             merging: None,
         }
     }
