@@ -18,7 +18,7 @@ fn ortho(x: &str, shutter: &str) -> String {
 
 /// Renders a scene, and gives the luminance of its pixels, with the report.
 fn render(scene: &str, further: &[&str]) -> (Vec<f64>, Value) {
-    let place = Place::of(scene);
+    let place = Place::with(&[("scene.yaml", scene), ("sky.pgm", "P2 2 1 255\n0 255\n")]);
     let ran = place.run(&[&["render", "scene.yaml", "-q", "-o", "out.exr", "--report", "r.json"], further].concat());
     assert_eq!(ran.code, 0, "{}\n{scene}", ran.err);
     let channels = pixels(&place.path("out.exr"));
@@ -118,6 +118,23 @@ fn moments_are_as_many_as_pixels_that_are_travelled() {
     }
 }
 
+/// What has no end is passed as well. A camera of parallel rays goes 4 m along a wall while the shutter is open, at ten
+/// pixels a metre. One whose picture is 64 pixels and 1° wide turns toward a place 1 m before it, which goes from t/2 to t to
+/// the right: at the tangent of half a degree over 32 pixels t/2 is 40 of them, and more than the picture is wide.
+#[test]
+fn moments_are_as_many_as_pixels_of_planes_and_skies_that_are_passed() {
+    let wall = ortho("{3: 0, 4: 8}", "1") + "image: {width: 160, height: 40}\nshapes: [{plane: {normal: [0, 0, 1]}}]\n";
+    let t = 2.0 * 40.0 * 0.5f64.to_radians().tan() / 32.0;
+    let sky = format!(
+        "camera: {{origin: [0, 0, 0], target: {{3: [0, 0, -1], 4: [{t}, 0, -1]}}, fov_deg: 1, shutter: 1}}\n\
+         image: {{width: 64, height: 8}}\nlights: [environment: {{file: sky.pgm}}]\n"
+    );
+    for scene in [wall, sky] {
+        let (_, report) = render(&(scene + &FRAME.replacen("image: {width: 16, height: 4}\n", "", 1)), &["--spp", "1"]);
+        assert!(effect(&report).ends_with("40 moments: what moves travels 40 pixels"), "{}", effect(&report));
+    }
+}
+
 /// A point lamp, a ball of glass and a floor, with whatever else.
 fn caustic(eye: &str, lamp: &str, ball: &str, further: &str) -> String {
     format!(
@@ -134,7 +151,7 @@ fn caustic(eye: &str, lamp: &str, ball: &str, further: &str) -> String {
 
 /// The mean luminance of a picture, its standard error from those of the pixels, and the report.
 fn mean(scene: &str, further: &[&str]) -> (f64, f64, Value) {
-    let place = Place::of(scene);
+    let place = Place::with(&[("scene.yaml", scene), ("sky.pgm", "P2 2 1 255\n0 255\n")]);
     let ran = place.run(&[&["render", "scene.yaml", "-q", "-o", "out.exr", "--report", "r.json"], further].concat());
     assert_eq!(ran.code, 0, "{}\n{scene}", ran.err);
     let channels = pixels(&place.path("out.exr"));

@@ -13,6 +13,7 @@ use crate::scene::bvh::Aabb;
 use crate::scene::census::Census;
 use crate::scene::compile;
 use crate::scene::shelf::Shelf;
+use crate::transport::middle;
 use crate::transport::plan::{Effect, Integrator};
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
@@ -22,6 +23,8 @@ const LEAST: u32 = 16;
 const MOST: u32 = 64;
 /// Triangles of all moments, each of which has its own: 130 bytes each.
 const TRIANGLES: usize = 16_000_000;
+/// Places along each side of the picture at which planes and skies are looked at.
+const PLACES: u32 = 5;
 
 /// The scene while the shutter is open.
 #[derive(Debug, Default)]
@@ -89,12 +92,12 @@ pub fn census(still: &Scene, moments: &[Scene]) -> Census {
     moments.iter().map(Census::of).fold(Census::of(still), Census::join)
 }
 
-/// The longest way of the corner of a box between two moments, pixels. What has no end or is behind the camera does not
-/// count, nor what is there at one of them only.
+/// The longest way between two moments, pixels, of the corner of a box, and of what has no end at places that are spread over
+/// the picture. What is behind the camera does not count, nor what is there at one of them only.
 fn travelled(open: &Scene, close: &Scene) -> f64 {
+    let size = DVec2::from(open.camera.resolution.map(f64::from));
     let places = |scene: &Scene, bounds: &Aabb| -> Vec<Option<DVec2>> {
         let ndc_from_world = DMat4::from_cols_array(&scene.camera.ndc_from_world().map(f64::from));
-        let size = DVec2::from(scene.camera.resolution.map(f64::from));
         let corner = |i: u32| {
             let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
             let at = ndc_from_world * DVec4::from((DVec3::new(pick(0), pick(1), pick(2)), 1.0));
@@ -103,11 +106,13 @@ fn travelled(open: &Scene, close: &Scene) -> f64 {
         (0..8).map(corner).collect()
     };
     // No further than across the picture: beyond it nobody looks.
-    let across = DVec2::from(open.camera.resolution.map(f64::from)).length();
+    let across = size.length();
     let pairs = open.objects.iter().zip(&close.objects);
     let ways = pairs.flat_map(|(a, b)| {
         let (from, to) = (places(open, &a.bounds()), places(close, &b.bounds()));
         from.into_iter().zip(to).filter_map(|(from, to)| Some((to? - from?).length())).collect::<Vec<_>>()
     });
-    ways.fold(0.0, f64::max).min(across)
+    let spread = |i: u32| (DVec2::new(f64::from(i % PLACES), f64::from(i / PLACES)) + 0.5) / f64::from(PLACES);
+    let endless = (0..PLACES * PLACES).filter_map(|i| middle::passes(open, close, spread(i) * size));
+    ways.chain(endless).fold(0.0, f64::max).min(across)
 }

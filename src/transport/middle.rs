@@ -92,6 +92,29 @@ fn motion(scene: &Scene, next: &Scene, place: DVec2, ray: &Ray, met: Option<&Cov
     [shift.x as f32, -shift.y as f32]
 }
 
+/// How far what has no end, a plane or a picture of the sky, moves at `place` until the scene is `next`, pixels; `None` where
+/// something else is seen.
+///
+/// What leaves the camera's view counts as well: its way is told beside the ray through the same place.
+#[must_use]
+pub fn passes(scene: &Scene, next: &Scene, place: DVec2) -> Option<f64> {
+    let through = |scene: &Scene, place| scene.camera.ray(place, || DVec2::splat(0.5));
+    let (ray, beside, after) = (through(scene, place), through(scene, place + DVec2::X), through(next, place));
+    let (way, pixel) = match scene.closest(&ray, scene.camera.reach(&ray)) {
+        Some(hit) if !scene.objects[hit.instance.unwrap_or(hit.object) as usize].bounds().is_finite() => {
+            let point = scene.surface(&ray, &hit).point;
+            let apart = moved(scene, next, &hit, point) - after.origin;
+            (apart.reject_from(after.direction), beside.at(hit.t) - ray.at(hit.t))
+        }
+        None if scene.backgrounds.iter().any(|&i| matches!(scene.lights[i as usize], Light::Environment(_))) => {
+            (turned(scene, next, ray.direction) - after.direction, beside.direction - ray.direction)
+        }
+        _ => return None,
+    };
+    let pixels = way.length() / pixel.length();
+    pixels.is_finite().then_some(pixels)
+}
+
 /// Where what is infinitely far in `direction` is seen in the scene `next`: there still, or of the first picture of a sky in the
 /// same place of it.
 fn turned(scene: &Scene, next: &Scene, direction: DVec3) -> DVec3 {
