@@ -25,10 +25,10 @@ const MOST: i32 = 20;
 
 impl Scene {
     /// The power of two by which a film divides the light of the scene, [`crate::film::accumulate::Film::exponent`]: 0 where
-    /// the brightest of what its lights, of [`Light::power`] `powers`, and its fog show lies between 2⁻²⁴ and 2²⁰. A darker
+    /// the brightest of what its lights, of [`Light::power`] `powers`, its fog and the `ambient` light of `whitted` show lies between 2⁻²⁴ and 2²⁰. A darker
     /// scene is raised to one, with 2³⁸ left above; a brighter one lowered to 2²⁰, so that all of 2⁻⁶⁰ of the brightest or
     /// more keeps its mantissa. `boxes` are those of the objects.
-    pub(super) fn film_exponent(&self, powers: &[f64], boxes: &[Aabb]) -> i32 {
+    pub(super) fn film_exponent(&self, powers: &[f64], ambient: Option<f64>, boxes: &[Aabb]) -> i32 {
         let lamps = || self.lights.iter().zip(powers.iter().copied());
         let shown = lamps().filter_map(|(light, power)| match light {
             Light::Area { object, .. } | Light::AlongNormal { object, .. } => {
@@ -48,7 +48,7 @@ impl Scene {
         cones.sort_by(|a, b| b.1.total_cmp(&a.1));
         let lit = cones.iter().take(ASKED).map(|(cone, power)| self.lit(cone, *power));
         let fog = self.fog.as_ref().map(|fog| fog.colour.luminance());
-        let brightness = shown.chain(lit).chain(fog);
+        let brightness = shown.chain(lit).chain(fog).chain(ambient);
         let brightest = brightness.filter(|b| b.is_finite()).fold(0.0, f64::max);
         if brightest < f64::MIN_POSITIVE {
             return 0;
@@ -166,5 +166,12 @@ mod tests {
         };
         assert!((29..=31).contains(&fog(2f64.powi(50))), "{}", fog(2f64.powi(50)));
         assert!((-51..=-49).contains(&fog(2f64.powi(-50))), "{}", fog(2f64.powi(-50)));
+        // And so does the ambient light of `whitted`, beside a lamp of 2⁻⁵⁰ as well.
+        let ambient = |ambient: f64| {
+            let lamp = format!("point: {{position: [0, 1, 0], intensity: {:e}}}", 2f64.powi(-50));
+            exponent(&format!("integrator: {{whitted: {{ambient: {ambient:e}}}}}\nlights: [{lamp}]\n"))
+        };
+        assert!((29..=31).contains(&ambient(2f64.powi(50))), "{}", ambient(2f64.powi(50)));
+        assert_eq!(ambient(0.5), 0);
     }
 }

@@ -285,6 +285,12 @@ impl<'a> Compiler<'a> {
             written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
         });
         self.note_few_wavelengths(&wavelengths, &bands);
+        let ambient = match &d.integrator {
+            written::Integrator::Whitted(whitted) => {
+                Some(self.light_spectrum("integrator.whitted.ambient", &whitted.ambient).luminance())
+            }
+            _ => None,
+        };
         let lets_through = |o: &Object| o.body != 0 || self.materials[o.material as usize].lets_through();
         let mut scene = Scene {
             name: name.to_owned(),
@@ -324,7 +330,7 @@ impl<'a> Compiler<'a> {
             watch: None,
         };
         self.note_beside(&mut scene, &boxes, &light_names);
-        scene.light_exponent = scene.film_exponent(&powers, &boxes);
+        scene.light_exponent = scene.film_exponent(&powers, ambient, &boxes);
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         self.note_contacts(&mut scene, &contacts, passed_over);
         self.note_overlaps(&mut scene);
