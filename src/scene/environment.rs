@@ -130,9 +130,17 @@ impl Environment {
         let last = &pixels[pixels.len() - width..];
         let padded = (missing > 0).then(|| [pixels, &last.repeat(missing)].concat());
         let (pixels, height) = (padded.as_deref().unwrap_or(pixels), height + missing);
-        let row_angle = |y: usize| match mapping {
-            Mapping::Texels => PI * (y as f64 + 0.5) / height as f64,
-            Mapping::Poles => PI * y as f64 / (height - 1) as f64,
+        // The share of a row in the sphere, up to a factor. Between the poles it is the sine; a row that is a pole has half a
+        // hat: of hats as wide as a step δ, ∫ hat sin dθ is 2 (1 − cos δ) sin θ / δ, at a pole 1 − sin δ / δ.
+        let share = |y: usize| match mapping {
+            Mapping::Texels => libm::sin(PI * (y as f64 + 0.5) / height as f64),
+            Mapping::Poles => {
+                let step = PI / (height - 1) as f64;
+                match y == 0 || y == height - 1 {
+                    true => 0.5 * (step - libm::sin(step)) / (1.0 - libm::cos(step)),
+                    false => libm::sin(step * y as f64),
+                }
+            }
         };
         let texels = upsampled(pixels, scale as f32, mapping, carried);
         let illuminant = carried.light(illuminant::d65());
@@ -140,9 +148,9 @@ impl Environment {
         let mean_above = |floor: f64| {
             let (mut sum, mut weight) = (0.0, 0.0);
             for (y, row) in texels.chunks_exact(width).enumerate() {
-                let sin = libm::sin(row_angle(y));
-                sum += sin * row.iter().map(|texel| texel.above(floor)).sum::<f64>();
-                weight += sin * width as f64;
+                let share = share(y);
+                sum += share * row.iter().map(|texel| texel.above(floor)).sum::<f64>();
+                weight += share * width as f64;
             }
             if weight > 0.0 { sum / weight } else { 0.0 }
         };
@@ -525,6 +533,21 @@ mod tests {
         for (direction, expected) in cases {
             // Greys are flat spectra: f32 sigmoids and D65's f32 table.
             assert!((find(direction) / expected - 1.0).abs() < 1e-5, "{direction} {} {expected}", find(direction));
+        }
+    }
+
+    /// A map that is black but for a pole of three rows, whose light falls to nothing at the equator: of an even one it has
+    /// ∫₀^{π/2} (1 − 2θ/π) sin θ dθ / 2 = (1 − 2/π) / 2.
+    #[test]
+    fn a_map_whose_poles_alone_shine_is_no_dark_one() {
+        let mean = |rows: [f32; 3]| {
+            let pixels: Vec<_> = rows.iter().flat_map(|g| [[*g; 3]; 4]).collect();
+            Environment::new(&pixels, [4, 3], 1.0, Mapping::Poles, DMat3::IDENTITY, Carried::Spectra).mean_luminance()
+        };
+        for rows in [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]] {
+            let (share, expected) = (mean(rows) / mean([1.0; 3]), 0.5 * (1.0 - 2.0 / PI));
+            // Greys are sigmoids in f32.
+            assert!((share / expected - 1.0).abs() < 1e-5, "{rows:?}: {share} {expected}");
         }
     }
 
