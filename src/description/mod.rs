@@ -56,7 +56,8 @@
 //!                                   #              transparent_shadows: false}},
 //!                                   #   depth: the distance to the first surface, m; none: black
 //!                                   # max_depth of a path counts segments: 1 emission, 2 direct light;
-//!                                   # hide_emitters: lights that the camera sees itself are left out;
+//!                                   # hide_emitters: lights that the camera sees itself are left out, with the shapes that
+//!                                   # shine; by light_tracer their light alone, as by Mitsuba's ptracer;
 //!                                   # light_samples, scatter_samples: each sample follows as many whole paths as the
 //!                                   # greater says; 0: without shadow rays, or without light met by scattering
 //!                                   # coverage: what alpha counts: surfaces and media, not holes and boundaries; or what
@@ -341,7 +342,8 @@
 //!
 //! With a `shutter` of the camera all that changes while it is open is blurred, cameras, shapes, lights and materials alike:
 //! each sample sees the scene at one of a number of evenly spaced moments. `image`, `integrator`, `layers`, `render` and
-//! `output` stay as at the frame. Where photons are merged all pixels of a sample see the same moment.
+//! `output` stay as at the frame. Where photons are merged all pixels of a sample see the same moment. `whitted` and
+//! `light_tracer` draw no times and show the frame itself, which `abbe plan` says.
 //!
 //! Which frames are rendered says `render.frames`, of the scene or of the batch, or `--frames`; a scene that changes and says
 //! nothing of frames is refused. Frame 12 is the very picture of a scene in which the values at 12 are written, with the
