@@ -266,7 +266,7 @@ impl<'a> Compiler<'a> {
         });
         media.append(&mut self.absorbing);
 
-        let (center, radius) = extent(&boxes, &camera);
+        let (center, radius) = extent(&objects, &boxes, &camera);
         let Lamps { lights, weights, names: light_names, dark } = lamps;
         let powers: Vec<f64> = lights.iter().map(|light| light.power(&objects, radius)).collect();
         let asked = |weights: &[f64]| {
@@ -660,10 +660,15 @@ impl Object {
     }
 }
 
-/// Centre and radius of all that has an end; about the camera where nothing has.
-fn extent(boxes: &[Aabb], camera: &Camera) -> (DVec3, f64) {
-    let finite = boxes.iter().filter(|b| b.min.is_finite() && b.max.is_finite());
-    match finite.copied().reduce(|a, b| a.union(&b)) {
+/// Centre and radius of all that has an end, in `boxes` of what stands in the scene or beside what has none in a copied group;
+/// about the camera where nothing has.
+fn extent(objects: &[Object], boxes: &[Aabb], camera: &Camera) -> (DVec3, f64) {
+    let copied = objects.iter().zip(boxes).filter(|(_, bounds)| !bounds.is_finite()).flat_map(|(object, _)| {
+        let Geometry::Instance(instance) = &object.geometry else { return Vec::new() };
+        instance.group.members().map(|child| instance.map.bounds(&objects[child].bounds())).collect()
+    });
+    let finite = boxes.iter().copied().chain(copied).filter(Aabb::is_finite);
+    match finite.reduce(|a, b| a.union(&b)) {
         Some(b) => (b.min * 0.5 + b.max * 0.5, 0.5 * (b.max - b.min).length()),
         None => (camera.world_from_camera.translation, 1.0),
     }

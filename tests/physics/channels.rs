@@ -122,6 +122,22 @@ fn light_from_infinity_comes_through_planes_that_stand_far_out() {
     }
 }
 
+/// A square in a group with a plane behind it, which hides none of the even sky before it: ρ.
+#[test]
+fn what_is_copied_with_a_plane_has_light_from_infinity() {
+    for integrator in ["path", "light_tracer"] {
+        let frame = render(&format!(
+            "{PARALLEL}image: {{width: 4, height: 4}}\nrender: {{samples: 16384}}\n\
+             integrator: {{{integrator}: {{max_depth: 2}}}}\nlights: [{{constant: {{radiance: 1}}}}]\n\
+             groups: {{both: [{{plane: {{point: [0, 0, -2], normal: [0, 0, 1]}}}}, \
+             {{rectangle: {{corner: [-1.2, -1.2, 0], edge_u: [2.4, 0, 0], edge_v: [0, 2.4, 0]}}}}]}}\n\
+             shapes: [{{instance: {{group: both}}}}]\n"
+        ));
+        let (mean, error) = luminance(&frame);
+        assert!((mean - 0.5).abs() < 4.0 * error && error < 0.01, "{integrator}: {mean} ± {error}");
+    }
+}
+
 /// A camera is in a ball of mist with nothing around it. Lamps outside shine away from it: nothing scatters their light.
 #[test]
 fn light_that_meets_nothing_is_not_in_what_the_camera_is_in() {
