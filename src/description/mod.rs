@@ -254,7 +254,8 @@
 //!                                   # along the normal, emission in W·m⁻²·nm⁻¹
 //!     sampling_weight: 1            # ~ how often light is looked for here, relative to its power; also of lights
 //!     inside: smoke                 # media on the two sides; ~ inside a closed shape that light can enter nothing,
-//!                                   # else and outside what the camera is in; or vacuum, or both sides unchanged
+//!                                   # else and outside what the camera is in; or vacuum, or both sides unchanged, as
+//!                                   # they are of what light cannot enter where neither is written
 //!     outside: smoke
 //!     transform:                    # applied in this order; ~ none
 //!     - translate: [1, 0, 0]

@@ -292,11 +292,13 @@ impl<'a> Compiler<'a> {
             _ => None,
         };
         let lets_through = |o: &Object| o.body != 0 || self.materials[o.material as usize].lets_through();
+        let parts_media = |o: &Object| !o.keeps_medium && [o.inside, o.outside] != [camera_medium; 2];
         let mut scene = Scene {
             name: name.to_owned(),
             camera,
             has_planes: boxes.iter().any(|bounds| !bounds.is_finite()),
             has_boundaries: objects.iter().any(lets_through),
+            parts_media: objects.iter().any(parts_media),
             has_media: camera_medium.is_some() || objects.iter().any(|o| o.inside.is_some() || o.outside.is_some()),
             objects,
             material_names,
@@ -567,7 +569,8 @@ impl<'a> Compiler<'a> {
         if let Some(fault) = self.unfit_for_a_body(&self.materials[material as usize], &geometry, closed, shape) {
             self.fault(&format!("{at}.material"), fault);
         }
-        let empty = closed && self.materials[material as usize].transmits();
+        let transmits = self.materials[material as usize].transmits();
+        let empty = closed && transmits;
         let enclosed = if empty { None } else { camera_medium };
         let (behind, before) = if shape.flip_normals { (camera_medium, enclosed) } else { (enclosed, camera_medium) };
         let behind = self.absorbing(at, material, closed, &geometry, shape).or(behind);
@@ -577,6 +580,8 @@ impl<'a> Compiler<'a> {
             Some(written::VACUUM | written::UNCHANGED) => None,
             Some(name) => Some(self.medium_ids[name]),
         };
+        // What light never crosses may stand in any medium: it tells of none unless that is written.
+        let silent = !transmits && shape.inside.is_none() && shape.outside.is_none();
         Ok(Some(Object {
             name,
             geometry,
@@ -585,7 +590,7 @@ impl<'a> Compiler<'a> {
             detail,
             inside: medium(&shape.inside, behind),
             outside: medium(&shape.outside, before),
-            keeps_medium: unchanged(&shape.inside) && unchanged(&shape.outside),
+            keeps_medium: unchanged(&shape.inside) && unchanged(&shape.outside) || silent,
             flipped: shape.flip_normals,
             is_lamp,
             body: 0,

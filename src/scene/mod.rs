@@ -95,6 +95,8 @@ pub struct Scene {
     pub media: Vec<Medium>,
     /// Whether any of them fills a part of space.
     pub has_media: bool,
+    /// Whether some surface has on one side what the camera is not in.
+    pub parts_media: bool,
     /// What is where no body is.
     pub camera_medium: Option<u32>,
     /// Bodies with a priority.
@@ -189,7 +191,7 @@ pub struct Object {
     pub inside: Option<u32>,
     /// Medium on the side of the normal.
     pub outside: Option<u32>,
-    /// True where a path that crosses stays in the medium that it was in, whatever the two above say.
+    /// True where the two above say nothing: a path that crosses stays in the medium that it was in.
     pub keeps_medium: bool,
     /// Whether its normals point to the other side than the form's own.
     pub flipped: bool,

@@ -284,6 +284,9 @@ impl Scene {
         if let Some(lamp) = lamp.filter(|lamp| !lamp.keeps_medium) {
             return lamp.outside;
         }
+        if !self.parts_media {
+            return self.camera_medium;
+        }
         let way = self.camera.eye() - origin.origin;
         let (mut distance, mut ray) = (way.length(), Ray { direction: way.normalize_or(DVec3::Z), ..*origin });
         for _ in 0..MOST_SURFACES {

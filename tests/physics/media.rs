@@ -234,6 +234,27 @@ fn light_to_a_floor_is_dimmed_on_every_stretch_of_its_way() {
     assert_close(scene.look(v(1.8, 2.4, 0.0), DVec3::ZERO), expected, 2e-6);
 }
 
+/// What stands in smoke need not say so where light never crosses it: on the way from a lamp to a floor light is dimmed by what fills
+/// the cube around both, whether it is followed from the camera, which comes through the face of the cube, or from the lamp.
+#[test]
+fn what_stands_in_a_body_of_smoke_is_lit_through_it() {
+    let lit = |integrator: &str, samples: u32, sides: &str| {
+        bench(&format!(
+            "render: {{samples: {samples}}}\nintegrator: {{{integrator}: {{max_depth: 2}}}}\n\
+                 media: {{smoke: {{homogeneous: {{absorption: 0.7}}}}}}\nshapes:\n\
+                 - cube: {{size: 3, material: {{boundary: {{}}}}, inside: smoke}}\n\
+                 - rectangle: {{corner: [-1, -1, 1], edge_u: [2, 0, 0], edge_v: [0, 0.5, -2]{sides}}}\n\
+                 - disk: {{center: [0, 1.2, 0], normal: [0, -1, 0], radius: 0.4, {LAMP}{sides}}}\n"
+        ))
+        .grey()
+        .picture()
+        .mean()
+    };
+    let written = lit("path", 4096, ", inside: smoke, outside: smoke");
+    lit("path", 4096, "").assert_agrees(&written, 1e-2);
+    lit("light_tracer", 16384, "").assert_agrees(&written, 1e-2);
+}
+
 /// A sheet of nothing between a lamp and a floor changes neither what is found from the lamp nor what is found
 /// from the floor: F = ½ for a disc of radius 1 at height 1.
 #[test]
