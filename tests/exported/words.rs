@@ -203,6 +203,14 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
             &[],
             &["<spectrum name=\"radiance\" value=\"0\"/>"],
         ),
+        // So has a black colour.
+        (
+            "lights: [{constant: {radiance: {rgb: [0, 0, 0]}}}, \
+             {point: {position: [0, 3, 2], intensity: {scaled: {by: 0, of: {rgb: [1, 0.5, 0.2]}}}}}]\n",
+            "sphere: {center: [0, 1, 0], radius: 0.5, emission: 1}",
+            &[],
+            &["<spectrum name=\"radiance\" value=\"0\"/>", "<spectrum name=\"intensity\" value=\"0\"/>"],
+        ),
         (
             "",
             "cylinder: {base: [0, 0.5, 0], top: [0, 1, 0], radius: 0.2, caps: none, emission: 1, transform: [scale: [-2, 2, 2]]}",

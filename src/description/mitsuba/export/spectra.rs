@@ -90,6 +90,10 @@ impl Export<'_> {
         }
         match spectrum {
             Spectrum::Number(value) => self.xml.value("spectrum", name, value * by),
+            // Mitsuba refuses a black `<rgb>` as light.
+            Spectrum::Rgb(rgb) if role == Role::Emission && rgb.iter().all(|c| c * by == 0.0) => {
+                self.xml.value("spectrum", name, 0);
+            }
             Spectrum::Rgb(rgb) => {
                 let light = if role == Role::Emission { 1.0 / DAYLIGHT } else { 1.0 };
                 self.xml.value("rgb", name, numbers(&rgb.map(|c| c * by * light)));
