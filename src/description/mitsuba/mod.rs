@@ -556,6 +556,19 @@ mod tests {
     }
 
     #[test]
+    fn how_a_picture_is_kept_makes_no_difference() {
+        let texture = |id: &str, format: &str| {
+            let file = "<string name=\"filename\" value=\"a.png\"/>";
+            format!("<texture type=\"bitmap\" id=\"{id}\">{file}{format}</texture>")
+        };
+        for format in ["auto", "variant", "float16", "fp16", "uint8"] {
+            let format = format!("<string name=\"format\" value=\"{format}\"/>");
+            let scene = good(&(texture("kept", &format) + &texture("plain", "")));
+            assert_eq!(scene.textures["kept"], scene.textures["plain"], "{format}");
+        }
+    }
+
+    #[test]
     fn sensors_after_the_first_are_noted() {
         assert_eq!(good("<shape type=\"sphere\"/>").locator.notes(), [""; 0]);
         let turned = "<shape type=\"cube\"><transform name=\"to_world\"><rotate AXIS angle=\"9\"/></transform></shape>";

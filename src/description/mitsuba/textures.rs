@@ -110,8 +110,8 @@ fn bitmap(bag: &Bag<'_>) -> Result<Node, Fault> {
     if let Some(raw) = bag.boolean("raw")? {
         fields.add("raw", boolean(bag.place("raw"), raw));
     }
-    // How it is kept in memory.
-    bag.choice("format", &["auto", "variant", "fp16", "float16"])?;
+    // How it is kept in memory. Eight bits are for their RGB variants alone.
+    bag.choice("format", &["auto", "variant", "fp16", "float16", "uint8"])?;
     bag.boolean("accel")?;
     // Theirs begins at the upper left corner of the file, ours at the lower left.
     let [u, v] = to_uv(bag)?.unwrap_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
