@@ -569,6 +569,19 @@ mod tests {
     }
 
     #[test]
+    fn what_has_no_name_is_told_by_what_it_is() {
+        let ball = |part: &str| fault(&format!("<shape type=\"sphere\">{part}</shape>"), &[]);
+        assert_eq!(
+            ball("<float name=\"\" value=\"1\"/>"),
+            "s.xml:3:22: shape \"sphere\": expected a name, found a float without one"
+        );
+        assert_eq!(
+            ball("<sampler type=\"independent\"/>"),
+            "s.xml:3:22: shape \"sphere\": expected no sampler \"independent\""
+        );
+    }
+
+    #[test]
     fn sensors_after_the_first_are_noted() {
         assert_eq!(good("<shape type=\"sphere\"/>").locator.notes(), [""; 0]);
         let turned = "<shape type=\"cube\"><transform name=\"to_world\"><rotate AXIS angle=\"9\"/></transform></shape>";

@@ -368,7 +368,11 @@ impl<'a> Bag<'a> {
         let Some((property, _)) = unused else { return Ok(()) };
         let found = property.value.kind(self.document);
         if property.name.is_empty() {
-            return Err(self.fault_at(property.place, format!("expected no {}", found.trim_start_matches("the "))));
+            let message = match property.value {
+                Value::Object(_) => format!("expected no {}", found.trim_start_matches("the ")),
+                _ => format!("expected a name, found {found} without one"),
+            };
+            return Err(self.fault_at(property.place, message));
         }
         let mut known = self.asked.borrow().clone();
         known.sort_unstable();
