@@ -417,6 +417,13 @@ mod tests {
             fault("<shape type=\"sphere\"><float name=\"radius\" value=\"$rad\"/></shape>", &[]),
             "s.xml:3:50: expected a parameter with a <default> or -D rad=…, found $rad without either"
         );
+        // A name comes straight after the dollar.
+        for (value, found) in [("${rad}", "${rad}"), ("1$ 2", "$ 2"), ("12$", "$")] {
+            assert_eq!(
+                fault(&format!("<shape type=\"sphere\"><float name=\"radius\" value=\"{value}\"/></shape>"), &[]),
+                format!("s.xml:3:50: expected the name of a parameter after $, found \"{found}\"; \\$ is a dollar")
+            );
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What attributes hold once parameters are filled in: text, numbers, vectors, spectra.
 
 use super::super::super::fault::Fault;
-use super::super::super::node::did_you_mean;
+use super::super::super::node::{did_you_mean, quote};
 use super::super::object::{SpectrumValue, Value};
 use super::super::xml::{Attribute, Element};
 use super::text::{number, spectrum_value, tokens};
@@ -43,6 +43,11 @@ impl Parser<'_> {
             let Some((index, parameter)) = longest else {
                 let end = after.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(after.len());
                 let name = &after[..end];
+                if name.is_empty() {
+                    let found = quote(&format!("${after}"));
+                    let message = format!("expected the name of a parameter after $, found {found}; \\$ is a dollar");
+                    return Err(Fault::at_place(attribute.place, message));
+                }
                 let hint = did_you_mean(name, self.parameters.iter().map(|parameter| parameter.name.as_str()));
                 let message =
                     format!("expected a parameter with a <default> or -D {name}=…, found ${name} without either{hint}");
