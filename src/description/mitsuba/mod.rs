@@ -513,9 +513,13 @@ mod tests {
         );
         assert_eq!(
             fault("<group/>", &[]),
-            "s.xml:3:1: expected an element of a scene, found <group>; known: scene, integrator, sensor, film, rfilter, \
+            "s.xml:3:1: expected an element of a scene, found <group>; known: integrator, sensor, film, rfilter, \
              sampler, shape, bsdf, emitter, medium, phase, texture, volume, float, integer, boolean, string, point, vector, \
              rgb, spectrum, transform, ref, alias, default, include, path"
+        );
+        assert_eq!(
+            fault("<scene type=\"scene\"><shape type=\"cube\"/></scene>", &[]),
+            "s.xml:3:1: expected <scene> around all others, found it inside"
         );
         assert_eq!(
             fault("<shape typ=\"sphere\"/>", &[]),

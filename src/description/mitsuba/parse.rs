@@ -396,8 +396,10 @@ impl Parser<'_> {
                 check_attributes(element, &["name"], &[])?;
                 Ok(Value::Transform(self.transform(element)?))
             }
+            "scene" => Err(Fault::at_place(element.place, "expected <scene> around all others, found it inside")),
             tag => {
-                let known = Family::TAGS.iter().map(|(tag, _)| *tag).chain(PROPERTY_TAGS);
+                let inside = Family::TAGS.iter().filter(|(_, family)| *family != Family::Scene);
+                let known = inside.map(|(tag, _)| *tag).chain(PROPERTY_TAGS);
                 let mut hint = did_you_mean(tag, known.clone());
                 if hint.is_empty() {
                     hint = format!("; known: {}", known.collect::<Vec<_>>().join(", "));
