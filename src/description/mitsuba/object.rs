@@ -410,9 +410,14 @@ impl Document {
 
     /// As [`Document::find`], where there is such a file.
     pub(crate) fn look_for(&self, name: &str, source: u32) -> Option<String> {
-        let own = self.directories.get(&source);
-        let search = self.searches.get(&source).into_iter().flatten();
-        let found = search.chain(own).map(|directory| directory.join(name)).find(|path| path.exists());
+        // Mitsuba opens files when all is read, and by then knows the <path>s of the scene's file alone. What it does not find so
+        // may be where the file that names it has its own.
+        let root = self.objects.first().map_or(source, |root| root.source);
+        let searches = [root, source].into_iter().filter_map(|source| self.searches.get(&source)).flatten();
+        let found = searches
+            .chain(self.directories.get(&source))
+            .map(|directory| directory.join(name))
+            .find(|path| path.exists());
         found.map(|path| path.to_string_lossy().into_owned())
     }
 

@@ -175,6 +175,10 @@ impl Parser<'_> {
 
         self.reading.push(canonical);
         let around = self.search.clone();
+        // What it names is looked for beside the file that includes it first.
+        if let Some(outer) = include.and_then(|include| self.document.directories.get(&include.place.source)) {
+            self.search.insert(0, outer.clone());
+        }
         let result = match parent {
             None if root.tag != "scene" => {
                 let found = quote(&root.tag);
@@ -491,8 +495,12 @@ impl Parser<'_> {
         if first.exists() {
             return first;
         }
-        let found = self.search.iter().map(|directory| directory.join(name)).find(|path| path.exists());
-        found.unwrap_or(first)
+        self.searched(name).unwrap_or(first)
+    }
+
+    /// What the directories that are known so far hold by this name.
+    fn searched(&self, name: &str) -> Option<PathBuf> {
+        self.search.iter().map(|directory| directory.join(name)).find(|path| path.exists())
     }
 
     /// What was spelt otherwise before version 2, beside camelCase.

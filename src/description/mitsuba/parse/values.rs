@@ -117,6 +117,9 @@ impl Parser<'_> {
             }
         };
         let name = self.text(value)?;
-        Ok(Value::Spectrum(SpectrumValue::File(self.document.find(&name, in_file.source))))
+        // Mitsuba reads it at once, so a <path> further on is not for it.
+        let found = self.searched(&name).map(|path| path.to_string_lossy().into_owned());
+        let file = found.unwrap_or_else(|| self.document.find(&name, in_file.source));
+        Ok(Value::Spectrum(SpectrumValue::File(file)))
     }
 }
