@@ -70,13 +70,32 @@ struct Probe {
 /// What a body is to do.
 struct Withdrawal {
     body: usize,
-    /// What it touches, and its own normal there; of one thing once for each of its faces.
+    /// What it touches, and its own normal there; of a mesh, which moves by its normals, once for each of its faces.
     touched: Vec<(u32, DVec3)>,
+    /// Where each thing stands in `touched`: of a ball each point has a normal of its own, too many to go through.
+    known: HashMap<u32, Vec<usize>>,
     scale: f64,
     /// Whether something that it touches has no priority, so that it has to be left.
     leaves: bool,
     /// Its place among those that touch each other, from the largest.
     rank: usize,
+}
+
+impl Withdrawal {
+    fn new(body: usize) -> Withdrawal {
+        Withdrawal { body, touched: Vec::new(), known: HashMap::new(), scale: 0.0, leaves: false, rank: 0 }
+    }
+
+    /// It touches `other` where its own normal is `normal`.
+    fn touches(&mut self, other: u32, normal: DVec3, is_mesh: bool) {
+        let Withdrawal { touched, known, .. } = self;
+        let known = known.entry(other).or_default();
+        let same = |&k: &usize| touched[k].1.dot(normal) > 1.0 - 1e-9;
+        if known.is_empty() || is_mesh && !known.iter().any(same) {
+            known.push(touched.len());
+            touched.push((other, normal));
+        }
+    }
 }
 
 /// Puts bodies apart that share faces, and says which, and how many more bodies were not looked at; `boxes` are the objects'.
@@ -99,13 +118,10 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
 
     let mut found: BTreeMap<usize, Withdrawal> = BTreeMap::new();
     let mut withdraw = |body: usize, other: usize, normal: DVec3, scale: f64, leaves: bool| {
-        let none = || Withdrawal { body, touched: Vec::new(), scale: 0.0, leaves: false, rank: 0 };
-        let one = found.entry(body).or_insert_with(none);
+        let one = found.entry(body).or_insert_with(|| Withdrawal::new(body));
         one.scale = one.scale.max(scale);
         one.leaves |= leaves;
-        if !one.touched.iter().any(|(known, n)| *known == other as u32 && n.dot(normal) > 1.0 - 1e-9) {
-            one.touched.push((other as u32, normal));
-        }
+        one.touches(other as u32, normal, is_mesh(&objects[body].geometry));
     };
     let mut points_of_guests = POINTS;
     for &body in &bodies {
@@ -170,15 +186,14 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
             Geometry::Mesh(_) | Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => None,
         };
         boxes[one.body] = objects[one.body].bounds();
-        let is_mesh = matches!(objects[one.body].geometry, Geometry::Mesh(_));
-        let mut told = Vec::new();
+        let is_mesh = is_mesh(&objects[one.body].geometry);
+        let mut told = HashSet::new();
         for (other, normal) in one.touched {
             let left = !is_mesh || -normal.dot(inward) > 0.1;
             // Of bodies with priorities one may have had to leave something else.
             let parted = ranked[one.body] && ranked[other as usize] && (one.leaves || leaving.contains(&other));
             let by = done.map(|()| by).filter(|_| left && !parted);
-            if !told.contains(&(other, by.is_some())) {
-                told.push((other, by.is_some()));
+            if told.insert((other, by.is_some())) {
                 contacts.push(Contact { body: one.body as u32, other, by, parted });
             }
         }
@@ -193,6 +208,10 @@ fn has_points(geometry: &Geometry) -> bool {
         Geometry::Mesh(_) => true,
         Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
     }
+}
+
+fn is_mesh(geometry: &Geometry) -> bool {
+    matches!(geometry, Geometry::Mesh(_))
 }
 
 /// Whether it has an inside.
@@ -288,6 +307,21 @@ mod tests {
     }
 
     const TABLE: &str = "- rectangle: {corner: [-2, 0, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4]}\n";
+
+    /// All points of a ball in another of its size touch it, each with a normal of its own, and so do those of a third. A ball
+    /// is made smaller, whatever they are; a mesh moves by those of its faces, one for each of the six of a cube.
+    #[test]
+    fn a_body_knows_no_more_of_what_it_touches_than_it_withdraws_by() {
+        let normals =
+            |i: usize| warp::uniform_sphere(DVec2::new((i as f64 + 0.5) / 999.0, (i as f64 * GOLDEN).fract()));
+        let mut ball = Withdrawal::new(0);
+        (0..999).for_each(|i| ball.touches(1 + i as u32 % 2, normals(i), false));
+        assert_eq!(ball.touched.iter().map(|(other, _)| *other).collect::<Vec<_>>(), [1, 2]);
+        let mut cube = Withdrawal::new(0);
+        let faces = [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z];
+        (0..999).for_each(|i| cube.touches(1 + i as u32 % 2, faces[i / 2 % 6], true));
+        assert_eq!(cube.touched.len(), 12);
+    }
 
     /// Which of two bodies withdraws, and to which side, for whatever they are, and the table first or last.
     #[test]
