@@ -208,6 +208,11 @@ impl Table {
         }
     }
 
+    /// Wavelength and value of each knot.
+    pub(crate) fn samples(&self) -> Vec<(f64, f64)> {
+        self.knots().into_iter().zip(self.values().into_iter().map(f64::from)).collect()
+    }
+
     /// Whether f32 holds all values and slopes.
     pub(crate) fn is_finite(&self) -> bool {
         match &self.knots {

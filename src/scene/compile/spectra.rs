@@ -2,7 +2,6 @@
 
 use super::super::{Band, load};
 use super::Compiler;
-use super::indices::nanometres;
 use crate::description as written;
 use crate::error::{Error, in_short};
 use crate::spectrum::observer::quadrature;
@@ -120,8 +119,14 @@ impl Compiler<'_> {
                 _ => return,
             }
         };
-        if let Some(nm) = nanometres().find(|&nm| spectrum.at(nm) > 1.0) {
-            let found = in_short(spectrum.at(nm));
+        // Straight between its samples, it is greatest at one of them or at an end of the band.
+        let samples = if let Spectrum::Table(table) = spectrum { table.samples() } else { Vec::new() };
+        let within = samples.into_iter().filter(|(nm, _)| (BAND_NM[0]..=BAND_NM[1]).contains(nm));
+        let mut looked_at = within.chain(BAND_NM.map(|nm| (nm, spectrum.at(nm))));
+        if let Some((nm, found)) = looked_at.find(|(_, value)| *value > 1.0) {
+            // Digits beyond those of f32 are not the file's.
+            let digits = |x: f64| in_short((x as f32).to_string().parse().unwrap_or(x));
+            let (nm, found) = (digits(nm), digits(found));
             let times = if by == 1.0 { String::new() } else { format!(" times {}", in_short(by)) };
             let message = format!(
                 "expected values{times} from 0 to 1 for a share of light (not per cent), found {found} at {nm} nm"
@@ -334,6 +339,31 @@ mod tests {
         }
     }
 
+    /// The files say so between two whole nanometres, on either side of a jump, and beyond the band alone, where the line to
+    /// the next sample is at (7 − 0.5) · 130/200 + 0.5 = 4.725 as the band ends. That nothing is too bright beyond the band
+    /// alone is no fault: 1.2 at 900 nm is at 0.955 there.
+    #[test]
+    fn more_than_all_light_is_found_at_any_sample_of_a_file() {
+        let directory = tempfile::tempdir().unwrap();
+        let fault = |samples: &str| {
+            std::fs::write(directory.path().join("paint.csv"), samples.replace(' ', "\n")).unwrap();
+            let text = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes:\n\
+                        - sphere: {radius: 1, material: {diffuse: {reflectance: {file: paint.csv}}}}\n";
+            let description = SceneDescription::parse(text, &directory.path().join("s.yaml")).unwrap();
+            compile(&description, "s").err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        for (samples, found) in [
+            ("400,0.5 450.4,0.5 450.5,3 450.6,0.5 700,0.5", "found 3 at 450.5 nm"),
+            ("400,0.5 450.5,1.5 450.5,0.5 700,0.5", "found 1.5 at 450.5 nm"),
+            ("400,0.5 450.5,0.5 450.5,1.5 450.7,0.5 700,0.5", "found 1.5 at 450.5 nm"),
+            ("400,0.5 700,0.5 900,7", "found 4.725 at 830 nm"),
+        ] {
+            assert!(fault(samples).contains(found), "{samples}: {}", fault(samples));
+        }
+        assert_eq!(fault("400,0.5 700,0.5 900,1.2"), "");
+        assert_eq!(fault("400,1 450.5,1 700,1"), "");
+    }
+
     /// Reflectances and albedos in per cent, as they stand, scaled to what they are, and beyond.
     #[test]
     fn a_file_of_more_than_all_light_is_no_reflectance() {
@@ -351,7 +381,7 @@ mod tests {
         let scaled = "{scaled: {by: 0.01, of: {file: paint.csv}}}";
         assert_eq!(fault(scaled, scaled), "");
         for told in [fault("{file: paint.csv}", "0.5"), fault("0.5", "{file: paint.csv}")] {
-            let parts = ["paint.csv: expected values from 0 to 1", "found 50 at 360 nm", "named at"];
+            let parts = ["paint.csv: expected values from 0 to 1", "found 50 at 400 nm", "named at"];
             assert!(parts.iter().all(|part| told.contains(part)), "{told}");
         }
         let told = fault("{scaled: {by: 0.02, of: {zero_outside: {file: paint.csv}}}}", "0.5");
