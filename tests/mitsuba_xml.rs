@@ -326,6 +326,23 @@ fn includes_do_not_multiply_without_end() {
     assert!(begin.elapsed() < Duration::from_secs(20));
 }
 
+/// A file of 1 MiB, which is included four times by one that is included four times, and so on: 4⁸ MiB are 64 GiB.
+#[test]
+fn what_is_included_again_and_again_is_counted_each_time() {
+    let directory = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
+    write("s.xml", &GOOD.replace("</scene>", "<include filename=\"0.xml\"/></scene>"));
+    for i in 0..8 {
+        let often = format!("<include filename=\"{}.xml\"/>", i + 1).repeat(4);
+        write(&format!("{i}.xml"), &format!("<scene version=\"3.0.0\">{often}</scene>"));
+    }
+    write("8.xml", &format!("<scene version=\"3.0.0\"><!--{}--></scene>", "x".repeat(1 << 20)));
+    let (code, message) = outcome(&abbe(directory.path(), &["plan", "s.xml"]));
+    assert_eq!(code, 2, "{message}");
+    assert!(message.starts_with("error: 7.xml:1:"), "{message}");
+    assert!(message.ends_with(": expected at most 256 MiB of text in all files, found more\n"), "{message}");
+}
+
 #[test]
 fn bombs_are_one_error_and_no_wait() {
     let begin = Instant::now();

@@ -416,8 +416,8 @@
 //! # Faults
 //! Each is one line, `file:line:column: field: expected …, found …; did you mean "…"?`. Text that
 //! cannot be read, or does not follow the grammar, stops at the first fault; numbers out of range
-//! and unknown names are told all at once. Limits: 64 MiB of text, 64 levels, 4 million values
-//! with aliases written out.
+//! and unknown names are told all at once. Limits: 64 MiB of text (256 in all files of a Mitsuba scene, each as often as it is
+//! included), 64 levels, 4 million values with aliases written out.
 
 mod absorption;
 mod animation;

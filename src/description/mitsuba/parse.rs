@@ -25,6 +25,10 @@ use crate::error::{Error, Result};
 
 /// The deepest nesting of includes, as in Mitsuba.
 const MAX_INCLUDES: usize = 15;
+/// The most text of all files, each as often as it is included.
+const MAX_TEXT: usize = 4 * yaml::MAX_BYTES;
+/// What a file counts for at the least: to open it takes as long as to read so much.
+const LEAST_TEXT: usize = 4096;
 
 /// A value for a parameter of a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,6 +62,7 @@ pub(crate) fn read(path: &Path, defines: &[Define], sources: &mut Sources) -> Re
     let mut parser = Parser {
         sources,
         budget: MAX_NODES,
+        read: 0,
         filled: Cell::new(0),
         search: vec![path.parent().unwrap_or(Path::new("")).to_path_buf(), PathBuf::new()],
         parameters: Vec::new(),
@@ -113,6 +118,8 @@ struct Reference {
 struct Parser<'a> {
     sources: &'a mut Sources,
     budget: usize,
+    /// Bytes of the files that were read.
+    read: usize,
     /// Bytes of parameters that were filled in.
     filled: Cell<usize>,
     /// Directories in which what the file that is being read names is looked for, in order.
@@ -165,6 +172,11 @@ impl Parser<'_> {
                 return Err(Fault::at_place(here, "cannot be read"));
             }
         };
+        self.read += bytes.len().max(LEAST_TEXT);
+        if self.read > MAX_TEXT {
+            let message = format!("expected at most {} MiB of text in all files, found more", MAX_TEXT >> 20);
+            return Err(Fault::at_place(here, message));
+        }
         let source = self.sources.add_resolved_file(path);
         self.document.directories.insert(source, path.parent().unwrap_or(Path::new("")).to_path_buf());
         let root = xml::read(&bytes, source, &mut self.budget)?;
