@@ -99,6 +99,11 @@ fn files_that_cannot_be_used_are_told_with_both_places() {
         told("{dielectric: {ior: 1.5, absorption: {color: 0.5, at: 0}}}", "")
             .contains("absorption.at: expected a number greater than 0")
     );
+    // ln 2 over 10⁻³⁹ m is more than f32 holds.
+    assert!(
+        told("{dielectric: {ior: 1.5, absorption: {color: 0.5, at: 1.0e-39}}}", "")
+            .contains("absorption.at: expected a length over which no more than 3.4e38 m⁻¹ is absorbed, found 1e-39")
+    );
     assert!(
         told(clear, &nk(1.3, 1e-8))
             .contains("expected a closed shape or a plane for a material that absorbs, found an open disk")

@@ -136,7 +136,7 @@ impl<'a> Compiler<'a> {
             (Some(written::Absorption::None), _) => None,
             (Some(written::Absorption::File(path)), _) => by_k(self, &at("absorption.file"), path, true),
             (Some(written::Absorption::Color(c)), _) => {
-                let at = at("absorption.color");
+                let [at, length] = [at("absorption.color"), at("absorption.at")];
                 let color = self.written_spectrum(&at, &c.color, Outside::Hold, Role::Reflectance);
                 self.check_file_of_shares(&at, &c.color, &color);
                 if let Some(nm) = nanometres().find(|&nm| color.at(nm) <= 0.0) {
@@ -149,7 +149,12 @@ impl<'a> Compiler<'a> {
                 let color = self.shelf.carried.reflectance(color);
                 let sigma = |nm: f64| (nm, -libm::log(color.at(nm).max(DARKEST)).min(0.0) / c.at);
                 let made = Spectrum::from_samples(&nanometres().map(sigma).collect::<Vec<_>>(), Outside::Hold);
-                Some(self.or(&at, made, Spectrum::Constant(0.0)))
+                // The darkest colour absorbs 88 over its length: what f32 does not hold comes of that.
+                let made = made.map_err(|_| {
+                    let found = in_short(c.at);
+                    format!("expected a length over which no more than 3.4e38 m⁻¹ is absorbed, found {found}")
+                });
+                Some(self.or(&length, made, Spectrum::Constant(0.0)))
             }
             (None, written::Index::File(path)) => by_k(self, &at("ior.file"), path, false),
             (None, _) => None,
