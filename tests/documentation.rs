@@ -76,6 +76,21 @@ fn links_lead_to_files_and_headings_that_are_there() {
 
 /// Names of four words or more in backticks are those of tests.
 #[test]
+fn exit_codes_are_the_same_on_both_pages() {
+    let table = |page: &str| -> Vec<String> {
+        let text = fs::read_to_string(page).unwrap();
+        text.lines()
+            .skip_while(|line| !line.starts_with("| exit code"))
+            .take_while(|l| !l.is_empty())
+            .map(Into::into)
+            .collect()
+    };
+    let table_of_readme = table("README.md");
+    assert!(table_of_readme.len() > 8, "{table_of_readme:?}");
+    assert_eq!(table_of_readme, table("docs/farm.md"));
+}
+
+#[test]
 fn tests_that_pages_name_are_there() {
     let sources = ["src", "tests", "tools"].iter().flat_map(|folder| files(Path::new(folder)));
     let sources = sources.filter(|file| file.extension().is_some_and(|e| e == "rs" || e == "py"));

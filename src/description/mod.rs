@@ -356,7 +356,7 @@
 //! - 0.5                             # the same at every wavelength
 //! - {rgb: [0.8, 0.1, 0.1]}          # linear Rec. 709
 //! - {table: [[400, 0.1], [700, 0.9]]}                     # nm and value; nm increases
-//! - {file: paint.csv}               # the same, two columns
+//! - {file: paint.csv}               # the same, two columns; a wavelength may stand there twice: a jump
 //! - {blackbody: {kelvin: 5000, scale: 1, normalised: true}}            # defaults but kelvin
 //! - {illuminant: D65}               # a CIE illuminant
 //! - {illuminant: {name: D65, scale: 3}}
@@ -412,6 +412,30 @@
 //! # Mitsuba scenes
 //! A file whose name ends in `.xml` is a scene of Mitsuba 3 and is translated into this grammar: `mitsuba`. All that
 //! follows, `--set` too, is the same.
+//!
+//! # Bounds
+//! Of fields whose bounds do not stand beside them above; `a` is any name. Roughness, thickness and sampling have theirs in every
+//! material. Coordinates and lengths reach 1e60, light 3.4e38; a black body has 50 to 1e12 K, a line a width of 0.01 nm or more.
+//! ```yaml
+//! # bounds
+//! camera.shutter.moments: [2, 256]
+//! image.filter.tent.radius: [0, 256]                    # and stddev, and that of lanczos; pixels, above 0
+//! image.overscan: [0, 16384]
+//! integrator.path.light_samples: [0, 65536]             # and scatter_samples
+//! integrator.whitted.max_depth: [1, 256]
+//! integrator.whitted.grid: [1, 1024]
+//! render.samples: [1, 134217728]                        # and of stop
+//! render.tile: [1, 65536]
+//! render.frames_per_second: [0.001, 1.0e6]
+//! output.spectral.bands: [1, 512]
+//! output.png.exposure: [-64, 64]
+//! output.png.white_balance: [1000, 40000]               # K
+//! materials.a.conductor.eta: [0, 1.0e6]                 # and k
+//! materials.a.conductor.roughness: [0, 10]
+//! materials.a.conductor.film.thickness_nm: [0, 1.0e9]
+//! materials.a.principled.sampling.specular: [1.0e-6, 1.0e6]      # of others 0, too
+//! materials.a.hair.tilt_deg: [-10, 10]
+//! ```
 //!
 //! # Faults
 //! Each is one line, `file:line:column: field: expected …, found …; did you mean "…"?`. Text that
@@ -590,6 +614,41 @@ mod tests {
         for line in reference("indices").lines().skip(1) {
             let index = line.strip_prefix("- ").unwrap();
             scene(&format!("materials:\n  glass:\n    dielectric:\n      ior: {index}\n"));
+        }
+    }
+
+    /// The ends of each are taken, and what is one beyond them is refused; a radius of 0 is, too.
+    #[test]
+    fn the_bounds_of_the_page_are_those_of_its_fields() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("s.yaml");
+        let fault = |field: &str, number: f64| {
+            let kind = field.split('.').nth(2).unwrap_or("");
+            let material = match (kind, field.ends_with(".eta")) {
+                ("conductor", true) => "{conductor: {eta: 1, k: 1}}",
+                ("conductor", false) => "{conductor: {metal: gold, film: {ior: 2, thickness_nm: 1}}}",
+                ("principled", _) => "{principled: {}}",
+                _ => "{hair: {}}",
+            };
+            let camera = testing::CAMERA.replace("fov_deg", "shutter: {open: -0.25, close: 0.25}, fov_deg");
+            std::fs::write(
+                &file,
+                format!("{camera}output: {{spectral: {{bands: 3}}}}\nmaterials: {{a: {material}}}\n"),
+            )
+            .unwrap();
+            let set = [(field.to_owned(), number.to_string())];
+            load(&file).unwrap().entries()[0].scene(&set).err().map(|error| error.to_string())
+        };
+        for line in reference("bounds").lines().skip(1) {
+            let (field, range) = line.split('#').next().unwrap().trim().split_once(": ").unwrap();
+            let ends: Vec<f64> =
+                range.trim_matches(['[', ']']).split(", ").map(|number| number.parse().unwrap()).collect();
+            for number in [ends[0], ends[1]].into_iter().filter(|number| *number > 0.0 || !field.ends_with("radius")) {
+                assert_eq!(fault(field, number), None, "{line}: {number}");
+            }
+            for number in [ends[0] - 1.0, ends[1] + 1.0] {
+                assert!(fault(field, number).is_some(), "{line}: {number}");
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Rays, frames, warps, statistics: numbers without light.
 //!
-//! Geometry is f64 throughout (DESIGN: positions, directions, distances, densities);
+//! Geometry is f64 throughout (positions, directions, distances, densities);
 //! colour is f32. Vectors are [`glam::DVec3`]; transforms read right to left
 //! (`world_from_object`).
 
