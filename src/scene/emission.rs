@@ -244,13 +244,14 @@ impl Scene {
     /// to one is behind it, however that is rounded.
     #[must_use]
     pub fn from_infinity(&self, to: DVec3, direction: DVec3, mut back: f64) -> Ray {
-        while self.has_planes {
+        let farther = |back: f64| {
             let out = Ray::new(to - direction * back, -direction);
-            let Some(farther) = self.closest(&out, f64::INFINITY).map(|hit| 2.0 * (back + hit.t)) else { break };
-            if !farther.is_finite() {
-                break;
+            self.closest(&out, f64::INFINITY).map(|hit| 2.0 * (back + hit.t)).filter(|far| far.is_finite())
+        };
+        if self.has_planes {
+            while let Some(far) = farther(back) {
+                back = far;
             }
-            back = farther;
         }
         Ray::new(to - direction * back, direction)
     }
