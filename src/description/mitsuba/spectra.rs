@@ -197,8 +197,12 @@ impl Import<'_> {
                 };
                 not_negative(&bag, "color", &colour.unwrap_or_default())?;
                 match (colour.map(|rgb| rgb.map(|x| x * scale)), role) {
-                    (None, _) => d65(place, scale),
+                    (None, Role::Emission) => d65(place, scale),
                     (Some(rgb), Role::Emission) => self::colour(place, rgb, role),
+                    // What is no light has no kind of its own for it.
+                    (None, Role::Reflectance | Role::Coefficient) => {
+                        sampled(place, BAND_NM, &illuminant::d65().scaled(scale * DAYLIGHT))
+                    }
                     // Colours of a surface and of the squares of a checkerboard have no D65 in them.
                     (Some(rgb), Role::Reflectance | Role::Coefficient) => match upsample::emission(rgb) {
                         Ok(curve) => sampled(place, BAND_NM, &curve.scaled(DAYLIGHT)),
@@ -259,7 +263,7 @@ impl Import<'_> {
                     let message = format!("expected more than wavelength_min, {least}, found {most}");
                     return Err(bag.fault_of("wavelength_max", message));
                 }
-                if least <= BAND_NM[0] && most >= BAND_NM[1] {
+                if role == Role::Emission && least <= BAND_NM[0] && most >= BAND_NM[1] {
                     let mut fields = Fields::new(place);
                     fields.add("kelvin", number(place, kelvin));
                     fields.add("normalised", super::boolean(place, false));
@@ -412,7 +416,7 @@ fn table(place: Place, pairs: &[[f64; 2]]) -> Node {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::{Light, Spectrum, SpectrumOrTexture, Texture};
+    use super::super::super::{Light, Material, Spectrum, SpectrumOrTexture, Texture};
     use super::super::tests::{fault, good};
     use crate::spectrum::{ColourSpace, Outside, Spectrum as Curve, colour, illuminant, observer, upsample};
 
@@ -467,6 +471,40 @@ mod tests {
             "{}",
             fault(&white(2.0), &[])
         );
+    }
+
+    /// D65's table is 100 at 560 nm, which Mitsuba divides by 98.9974; a black body is Planck's radiance there, whatever it stands for.
+    #[test]
+    fn what_shines_may_say_what_a_surface_reflects() {
+        let d65 = "<spectrum type=\"d65\" name=\"NAME\"><float name=\"scale\" value=\"0.5\"/></spectrum>";
+        let body = "<spectrum type=\"blackbody\" name=\"NAME\"><float name=\"temperature\" value=\"1100\"/></spectrum>";
+        let at_560 = |reflectance: &SpectrumOrTexture| match reflectance {
+            SpectrumOrTexture::Spectrum(Spectrum::Table(table)) => {
+                assert_eq!((table[0][0], table[200][0], table.len()), (360.0, 560.0, 471));
+                table[200][1]
+            }
+            other => panic!("a table: {other:?}"),
+        };
+        for (spectrum, expected) in [(d65, 0.5 * 100.0 / 98.997_417_5), (body, illuminant::planck(560.0, 1100.0))] {
+            let named = |name: &str| spectrum.replace("NAME", name);
+            let scene = good(&format!(
+                "<bsdf type=\"diffuse\" id=\"m\">{}</bsdf><bsdf type=\"conductor\" id=\"c\"><texture type=\"checkerboard\" \
+                 name=\"specular_reflectance\" id=\"board\">{}</texture></bsdf>",
+                named("reflectance"),
+                named("color0")
+            ));
+            let Material::Diffuse(diffuse) = &scene.materials["m"] else { panic!("diffuse") };
+            let Texture::Checkerboard(board) = &scene.textures["board"] else { panic!("a checkerboard") };
+            for found in [at_560(&diffuse.reflectance), at_560(&board.a)] {
+                assert!((found / expected - 1.0).abs() < 1e-4, "{found}, expected {expected}");
+            }
+        }
+        let above = fault(
+            &format!("<bsdf type=\"diffuse\" id=\"m\">{}</bsdf>", d65.replace("0.5", "2"))
+                .replace("NAME", "reflectance"),
+            &[],
+        );
+        assert!(above.contains("expected a number from 0 to 1, found "), "{above}");
     }
 
     /// They are multiplied by D65's luminance on Mitsuba's film before the grammar has them.
