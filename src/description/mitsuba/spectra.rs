@@ -1,5 +1,7 @@
 //! Spectra and refractive indices.
 
+use std::collections::HashSet;
+
 use super::super::fault::Fault;
 use super::super::node::{Node, Place, did_you_mean, quote};
 use super::object::{Bag, Family, SpectrumValue, Value};
@@ -110,6 +112,35 @@ impl Import<'_> {
 
     /// The spectrum or `{texture: name}` of a property.
     pub(crate) fn spectrum_or_texture(
+        &mut self,
+        bag: &Bag<'_>,
+        name: &'static str,
+        role: Role,
+    ) -> Result<Option<Node>, Fault> {
+        // The illuminant of a picture is for where it shines: on a surface it would be lost, and its scale with it.
+        if role == Role::Reflectance
+            && let Some(Value::Object(index)) = bag.value(name)
+            && self.is_lit(*index, &mut HashSet::new())
+        {
+            let message =
+                "expected a texture without D65, found a \"d65\" with a picture inside, which is for what shines";
+            return Err(bag.fault_of(name, message));
+        }
+        self.spectrum_or_cell(bag, name, role)
+    }
+
+    /// Whether a texture is D65 times a picture, or has such squares. Textures that were `seen` are not.
+    fn is_lit(&self, index: usize, seen: &mut HashSet<usize>) -> bool {
+        if !seen.insert(index) {
+            return false;
+        }
+        let bag = self.bag(index);
+        let inner = bag.objects(Family::Texture);
+        (bag.object.plugin == "d65" && !inner.is_empty()) || inner.into_iter().any(|inner| self.is_lit(inner, seen))
+    }
+
+    /// The same of a square of a checkerboard, which may shine or reflect.
+    pub(crate) fn spectrum_or_cell(
         &mut self,
         bag: &Bag<'_>,
         name: &'static str,
@@ -505,6 +536,25 @@ mod tests {
             &[],
         );
         assert!(above.contains("expected a number from 0 to 1, found "), "{above}");
+    }
+
+    /// Mitsuba 3.9.1 shows what reflects by such a picture by D65 times its colours, times the scale.
+    #[test]
+    fn a_picture_in_d65_is_for_what_shines() {
+        let lit = |name: &str| {
+            format!(
+                "<texture type=\"d65\" name=\"{name}\"><float name=\"scale\" value=\"0.5\"/><texture type=\"bitmap\" name=\"t\">\
+                 <string name=\"filename\" value=\"a.png\"/></texture></texture>"
+            )
+        };
+        let board = |name: &str| format!("<texture type=\"checkerboard\" name=\"{name}\">{}</texture>", lit("color0"));
+        let ball = |inside: String| fault(&format!("<shape type=\"sphere\">{inside}</shape>"), &[]);
+        let reflects = |texture: String| ball(format!("<bsdf type=\"diffuse\">{texture}</bsdf>"));
+        let shines = |texture: String| ball(format!("<emitter type=\"area\">{texture}</emitter>"));
+        for told in [reflects(lit("reflectance")), reflects(board("reflectance"))] {
+            assert!(told.contains("bsdf \"diffuse\": reflectance: expected a texture without D65, found"), "{told}");
+        }
+        assert_eq!([shines(lit("radiance")), shines(board("radiance"))], ["none", "none"]);
     }
 
     /// They are multiplied by D65's luminance on Mitsuba's film before the grammar has them.

@@ -76,7 +76,7 @@ impl Import<'_> {
         let keys = if used == Use::Spectra { ["a", "b"] } else { ["b", "a"] };
         for (ours, theirs, default) in [(keys[0], "color0", 0.4), (keys[1], "color1", 0.2)] {
             let colour = match used {
-                Use::Spectra => self.spectrum_or_texture(bag, theirs, Role::Reflectance)?,
+                Use::Spectra => self.spectrum_or_cell(bag, theirs, Role::Reflectance)?,
                 Use::Numbers => self.number_or_texture(bag, theirs)?,
             };
             fields.add(ours, colour.unwrap_or_else(|| number(place, default)));
