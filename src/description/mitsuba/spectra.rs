@@ -7,7 +7,7 @@ use super::super::node::{Node, Place, did_you_mean, quote};
 use super::object::{Bag, Family, SpectrumValue, Value};
 use super::parse;
 use super::{DAYLIGHT, Fields, Import, entry, list, number, numbers, text};
-use crate::spectrum::{BAND_NM, Lanes, Spectrum as Curve, illuminant, upsample};
+use crate::spectrum::{BAND_NM, Lanes, Outside, Spectrum as Curve, illuminant, upsample};
 
 /// What a spectrum stands for, which decides what a colour or a bare number means.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -136,7 +136,9 @@ impl Import<'_> {
         }
         let bag = self.bag(index);
         let inner = bag.objects(Family::Texture);
-        (bag.object.plugin == "d65" && !inner.is_empty()) || inner.into_iter().any(|inner| self.is_lit(inner, seen))
+        let varies = |index: &usize| !SPECTRA.contains(&self.document.objects[*index].plugin.as_str());
+        (bag.object.plugin == "d65" && inner.iter().any(varies))
+            || inner.into_iter().any(|inner| self.is_lit(inner, seen))
     }
 
     /// The same of a square of a checkerboard, which may shine or reflect.
@@ -165,31 +167,30 @@ impl Import<'_> {
         self.spectrum(bag, name, role)
     }
 
-    /// The picture within a `d65`, under a name of its own, as light of D65; `None` where there is none.
+    /// The picture or checkerboard within a `d65`, under a name of its own, as light of D65; `None` where there is none.
     fn lit_texture(&mut self, index: usize) -> Result<Option<String>, Fault> {
         if let Some(name) = self.names.get(&index) {
             return Ok(Some(name.clone()));
         }
         let bag = self.bag(index);
-        let Some(nested) = bag.only(Family::Texture)? else { return Ok(None) };
+        let nested = bag.only(Family::Texture)?;
+        let is_spectrum = |index: &usize| SPECTRA.contains(&bag.document.objects[*index].plugin.as_str());
+        let Some(nested) = nested.filter(|index| !is_spectrum(index)) else { return Ok(None) };
         let place = bag.object.place;
         let scale = bag.float("scale")?.unwrap_or(1.0);
         not_negative(&bag, "scale", &[scale])?;
         bag.finish()?;
         let plain = self.declare_texture(nested)?;
-        let mut picture = self.textures.iter().find(|entry| entry.key == plain).map(|entry| entry.node.clone());
-        let illuminant = picture.as_mut().and_then(|node| node.get_mut("image")).and_then(|n| n.get_mut("illuminant"));
-        let Some(illuminant) = illuminant else {
-            return Err(bag.fault("expected a bitmap inside, found another texture"));
+        let lit =
+            self.textures.iter().find(|entry| entry.key == plain).and_then(|entry| match entry.node.get("image") {
+                Some(_) => picture_in_daylight(place, entry.node.clone(), scale),
+                None => board_in_daylight(place, entry.node.clone(), scale),
+            });
+        let Some(lit) = lit else {
+            return Err(bag.fault("expected a bitmap or a checkerboard of two spectra inside, found another texture"));
         };
-        let mut fields = Fields::new(place);
-        fields.add("name", text(place, "D65"));
-        fields.add("scale", number(place, scale * DAYLIGHT));
-        *illuminant = fields.map();
         let name = self.name_for(index);
-        if let Some(picture) = picture {
-            self.textures.push(self.entry(index, &name, picture));
-        }
+        self.textures.push(self.entry(index, &name, lit));
         Ok(Some(name))
     }
 
@@ -227,6 +228,19 @@ impl Import<'_> {
                     }
                 };
                 not_negative(&bag, "color", &colour.unwrap_or_default())?;
+                if let Some(inner) = bag.only(Family::Texture)? {
+                    if colour.is_some() {
+                        return Err(bag.fault("expected either color or a spectrum inside, found both"));
+                    }
+                    bag.finish()?;
+                    let Some(inner) = self.spectrum_plugin(inner, Role::Coefficient)? else {
+                        return Err(bag.fault("expected a spectrum inside, found a texture"));
+                    };
+                    let Some(lit) = in_daylight(place, &inner, scale) else {
+                        return Err(bag.fault("expected a spectrum that is no file inside, found one of a file"));
+                    };
+                    return Ok(Some(lit));
+                }
                 match (colour.map(|rgb| rgb.map(|x| x * scale)), role) {
                     (None, Role::Emission) => d65(place, scale),
                     (Some(rgb), Role::Emission) => self::colour(place, rgb, role),
@@ -385,6 +399,61 @@ fn sampled(place: Place, ends: [f64; 2], curve: &Curve) -> Node {
     table(place, &pairs)
 }
 
+/// D65 of luminance `scale` times a number, a colour of a surface or a table; `None` of anything else.
+fn in_daylight(place: Place, of: &Node, scale: f64) -> Option<Node> {
+    let daylight = illuminant::d65().scaled(scale * DAYLIGHT);
+    if let super::Value::Float(by) = of.value {
+        return Some(sampled(place, BAND_NM, &daylight.scaled(by)));
+    }
+    let (knots, curve) = if let Some(rgb) = of.get("rgb") {
+        (BAND_NM.to_vec(), upsample::reflectance(floats_of(rgb)?.try_into().ok()?).ok()?)
+    } else {
+        let super::Value::List(rows) = &of.get("zero_outside").unwrap_or(of).get("table")?.value else { return None };
+        let rows: Option<Vec<[f64; 2]>> = rows.iter().map(|row| floats_of(row)?.try_into().ok()).collect();
+        let samples: Vec<(f64, f64)> = rows?.into_iter().map(|[nm, value]| (nm, value)).collect();
+        let curve = Curve::from_samples(&samples, Outside::Zero).ok()?;
+        (samples.into_iter().map(|(nm, _)| nm).collect(), curve)
+    };
+    // Each whole wavelength, and where a table has its own; zero outside.
+    let [from, to] = [knots.first()?.max(BAND_NM[0]), knots.last()?.min(BAND_NM[1])];
+    let whole = (BAND_NM[0] as i32..=BAND_NM[1] as i32).map(f64::from);
+    let mut all: Vec<f64> = whole.chain(knots).filter(|nm| (from..=to).contains(nm)).collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    if all.len() < 2 {
+        return Some(number(place, 0.0));
+    }
+    Some(table(place, &all.into_iter().map(|nm| [nm, at(&curve, nm) * at(&daylight, nm)]).collect::<Vec<_>>()))
+}
+
+/// A picture as light of D65 of luminance `scale`.
+fn picture_in_daylight(place: Place, mut picture: Node, scale: f64) -> Option<Node> {
+    let mut fields = Fields::new(place);
+    fields.add("name", text(place, "D65"));
+    fields.add("scale", number(place, scale * DAYLIGHT));
+    *picture.get_mut("image")?.get_mut("illuminant")? = fields.map();
+    Some(picture)
+}
+
+/// The same of a checkerboard; `None` where a square is a texture or a file.
+fn board_in_daylight(place: Place, mut board: Node, scale: f64) -> Option<Node> {
+    for key in ["a", "b"] {
+        let square = board.get_mut("checkerboard")?.get_mut(key)?;
+        *square = in_daylight(place, square, scale)?;
+    }
+    Some(board)
+}
+
+/// The numbers of a list of them.
+fn floats_of(list: &Node) -> Option<Vec<f64>> {
+    let super::Value::List(items) = &list.value else { return None };
+    let float = |item: &Node| match item.value {
+        super::Value::Float(x) => Some(x),
+        _ => None,
+    };
+    items.iter().map(float).collect()
+}
+
 /// The numbers of a string such as `"1, 2, 3"`.
 fn floats(bag: &Bag<'_>, name: &'static str) -> Result<Vec<f64>, Fault> {
     let text = bag.required(name, bag.text(name))?;
@@ -536,6 +605,55 @@ mod tests {
             &[],
         );
         assert!(above.contains("expected a number from 0 to 1, found "), "{above}");
+    }
+
+    /// Of 560 nm D65 has 100 / 98.9974 there; half of what stands at 500 and at 620 nm is what stands at 560.
+    #[test]
+    fn daylight_multiplies_the_spectrum_or_the_squares_inside() {
+        let lit = |inside: &str| {
+            let scale = "<float name=\"scale\" value=\"3\"/>";
+            good(&format!(
+                "<shape type=\"sphere\"><emitter type=\"area\"><texture type=\"d65\" name=\"radiance\" id=\"lit\">{scale}{inside}</texture>\
+                 </emitter></shape>"
+            ))
+        };
+        let at_560 = |spectrum: &Spectrum| {
+            let mut table = match spectrum {
+                Spectrum::Table(table) => table.as_slice(),
+                Spectrum::ZeroOutside(inner) => match &**inner {
+                    Spectrum::Table(table) => {
+                        assert_eq!((table[0][0], table[120][0], table.len()), (500.0, 620.0, 121));
+                        table.as_slice()
+                    }
+                    other => panic!("a table: {other:?}"),
+                },
+                other => panic!("a table: {other:?}"),
+            }
+            .iter();
+            table.find(|[nm, _]| *nm == 560.0).unwrap()[1] / (3.0 * 100.0 / 98.997_417_5)
+        };
+        let near =
+            |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-4, "{found}, expected {expected}");
+        let irregular = |name: &str| {
+            format!(
+                "<spectrum type=\"irregular\" name=\"{name}\"><string name=\"wavelengths\" value=\"500, 620\"/>\
+                 <string name=\"values\" value=\"0.2, 0.6\"/></spectrum>"
+            )
+        };
+        let uniform = "<spectrum type=\"uniform\" name=\"a\"><float name=\"value\" value=\"0.7\"/></spectrum>";
+        for (inside, expected) in [(irregular("a").as_str(), 0.4), (uniform, 0.7)] {
+            let scene = lit(inside);
+            let Some(SpectrumOrTexture::Spectrum(radiance)) = &scene.shapes[0].emission else { panic!("a spectrum") };
+            near(at_560(radiance), expected);
+        }
+        let squares = irregular("color0") + "<rgb name=\"color1\" value=\"0.9, 0.2, 0.4\"/>";
+        let scene = lit(&format!("<texture type=\"checkerboard\" name=\"a\">{squares}</texture>"));
+        let Texture::Checkerboard(board) = &scene.textures["lit"] else { panic!("a checkerboard") };
+        let [SpectrumOrTexture::Spectrum(a), SpectrumOrTexture::Spectrum(b)] = [&board.a, &board.b] else {
+            panic!("spectra: {board:?}")
+        };
+        near(at_560(a), 0.4);
+        near(at_560(b), super::at(&upsample::reflectance([0.9, 0.2, 0.4]).unwrap(), 560.0));
     }
 
     /// Mitsuba 3.9.1 shows what reflects by such a picture by D65 times its colours, times the scale.
