@@ -49,6 +49,18 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
             &[],
         ),
         (
+            "textures: {lamp: {checkerboard: {a: {illuminant: A}, b: {scaled: {by: 2, of: {blackbody: {kelvin: 3000}}}}}}}\n",
+            &grey,
+            &["textures.lamp: its spectra at every fifth nanometre"],
+            &["<spectrum name=\"color0\" value=\"360:", "<spectrum name=\"color1\" value=\"360:"],
+        ),
+        (
+            "textures: {lamp: {checkerboard: {a: {illuminant: A}, b: {file: red.csv}}}}\n",
+            &grey,
+            &["textures.lamp: grey squares in place of a spectrum"],
+            &["<spectrum name=\"color0\" value=\"360:", "<spectrum name=\"color1\" value=\"0.5\"/>"],
+        ),
+        (
             "image: {filter: {lanczos: {radius: 2.5}}}\n",
             &grey,
             &["image.filter: 3 lobes: Mitsuba's are whole"],

@@ -55,8 +55,11 @@ impl Export<'_> {
 
     /// What Mitsuba gets in place of shares of light that it has no words for: `grey`, or of a multiple of a colour its curve.
     pub(super) fn reflectance_shortfall(shares: &[&Spectrum], grey: &'static str) -> Option<&'static str> {
-        if !shares.iter().all(|share| Export::can_say(share)) {
-            return Some(grey);
+        let unsaid: Vec<&Spectrum> = shares.iter().copied().filter(|share| !Export::can_say(share)).collect();
+        if !unsaid.is_empty() {
+            // The squares of a checkerboard may be light.
+            let curves = unsaid.iter().all(|share| sampled(unscaled(share).1).is_some());
+            return Some(if curves { "its spectra at every fifth nanometre" } else { grey });
         }
         let sampled = shares.iter().any(|share| colour_beyond(share, Role::Reflectance, 1.0).is_some());
         sampled.then_some("its colour at every fifth nanometre: Mitsuba has no multiples of one")
