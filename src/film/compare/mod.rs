@@ -14,8 +14,8 @@
 //! The noise is known from `stderr.*` channels (standard errors of the means, from four replicates: three degrees of
 //! freedom a pixel, or one less than the samples), from a file of variances per sample (as Mitsuba's references come
 //! with), or else from the differences themselves: where both pictures are right, E(Σd²) = Σvar(d), so Σd/√Σd² is a
-//! standard score. That form tests the mean only, and has the say where single pixels lack a standard error. A picture in
-//! half floats carries the variance of its rounding besides.
+//! standard score. That form tests the mean only, and has the say where single pixels lack a standard error, or all of a
+//! picture do, which has one sample of each. A picture in half floats carries the variance of its rounding besides.
 //!
 //! Both tests want pixels that are independent: a box filter, or filters by importance sampling. Light that is dealt to all
 //! pixels which a filter covers is not; a file says by how much more the sum of its pixels varies ([`crate::film::exr::SHARED_ERRORS`]).
@@ -544,6 +544,27 @@ pub(super) mod tests {
             assert_eq!(a.global_dof, b.global_dof);
         }
         assert_eq!(one.pixel_test.map(|test| test.accepted), other.pixel_test.map(|test| test.accepted));
+    }
+
+    /// One sample a pixel, whose standard errors are NaN, beside a picture that knows its own well: those a hundred times smaller would
+    /// have the first exact, and its noise a difference. By Σd/√Σd² the two are the same, and a tenth more light is not: 0.1 · 1.5 is
+    /// some half of the standard deviation of a pixel, and some 30 of that of the mean of 4096.
+    #[test]
+    fn a_picture_that_cannot_tell_its_noise_is_not_taken_as_exact() {
+        let reference = render(4, 1.0, 0.003, 1.0);
+        let found = |gain: f64| {
+            let one = render_of(1, 3, 1.0, 0.3, gain);
+            assert!(one.parts[0].channel("stderr.R").unwrap().iter().all(|e| e.is_nan()));
+            [
+                compare(&one, &reference, &CompareOptions::default()),
+                compare(&reference, &one, &CompareOptions::default()),
+            ]
+        };
+        for (gain, verdict) in [(1.0, Verdict::Same), (1.1, Verdict::Different)] {
+            for c in found(gain) {
+                assert_eq!((c.verdict, c.noise), (verdict, Some(NoiseSource::Differences)), "{}", c.table());
+            }
+        }
     }
 
     #[test]

@@ -97,8 +97,10 @@ impl<'a> Pair<'a> {
         width: u32,
         variance: Option<(&'a [f32], u32)>,
     ) -> Pair<'a> {
-        // Standard errors of which none is finite (one replicate) say nothing.
-        let errors = errors.map(|plane| plane.filter(|errors| errors.iter().any(|e| e.is_finite())));
+        // Standard errors of which none is finite (one replicate) say that there is noise and not how much. Beside them those of
+        // the other would have this picture exact: the differences tell the noise of both.
+        let tells = |plane: &Option<&[f32]>| plane.is_none_or(|errors| errors.iter().any(|e| e.is_finite()));
+        let errors = if errors.iter().all(tells) { errors } else { [None; 2] };
         let is_few = |k: usize| variance.is_none() && known[k].samples.is_some_and(|samples| samples < FEW);
         let about =
             [0, 1].map(|k| errors[k].filter(|_| is_few(k)).map(|errors| variances_about(errors, width as usize)));
