@@ -7,6 +7,7 @@ use abbe::batch::frame::{self, Frame, FrameJob};
 use abbe::film::compare::GLOBAL_ALPHA;
 use abbe::film::error::ErrorEstimate;
 use abbe::film::filter::{Filter, FilterSampler};
+use abbe::film::resolve::Image;
 use abbe::math::statistics::{Moments, student_t_half_width};
 use abbe::spectrum::ColourSpace;
 use common::{Bench, bench_with};
@@ -291,4 +292,60 @@ fn bands_of_merged_photons_say_how_much_their_means_vary() {
     };
     let both = frames[0].shared_errors_of_bands(0, &errors, Sharing::All);
     assert!((both / (blue.max(red) * widened(2.0) / widened(1.0)) - 1.0).abs() < 1e-9, "{both}, {blue}, {red}");
+}
+
+/// Pictures of one to three samples, of which one to three of the four replicates know. As `abbe compare` has it where standard errors
+/// are lacking, Σd of two of them is within z √(s Σd²), s how many times the variance of a sum is that of independent pixels; by s = 1
+/// some pairs of neighbours of 24 would differ. One replicate tells nothing of s: of pixels that may all err alike it is their number,
+/// of cells that of their pixels, of photons the span of the filter, for a gaussian of standard deviation σ (∫h)²/∫h² = 4πσ².
+#[test]
+fn pictures_of_few_samples_say_how_much_their_means_vary() {
+    let gaussian = |stddev: f64| format!("height: 24, filter: {{gaussian: {{stddev: {stddev}}}}}");
+    let stage = |filter: &str, techniques: &str, rest: &str| {
+        let with =
+            |yaml: &str| yaml.replace("height: 24", filter).replace("SAMPLES", &format!("SAMPLES, {techniques}"));
+        with(STAGE) + LAMP + "- sphere: {center: [0.2, -0.2, 0], radius: 0.7, material: red}\n" + rest
+    };
+    let cases = [
+        ("merged", MERGED.replace("64", "SAMPLES"), 480.0),
+        ("dealt and shared", stage(&gaussian(0.5), "techniques: {reuse: on}", ""), 64.0),
+        ("photons", stage(&gaussian(0.8), "tile: 32", "integrator: light_tracer\n"), 8.04),
+    ];
+    let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
+    let z = student_t_half_width(1.0 - GLOBAL_ALPHA / 3.0, f64::INFINITY);
+    for (name, yaml, most) in cases {
+        for samples in 1..4 {
+            let bench = bench_with(&yaml.replace("SAMPLES", &samples.to_string()), &[]);
+            let sharing = Finish::of(&bench.prepared).sharing;
+            let picture = |seed: u64| {
+                let frame = frame_of(&bench, 1000 * seed);
+                let image = frame.resolve(&rgb_from_xyz);
+                let shared = frame.shared_errors(&image, &rgb_from_xyz, sharing);
+                (image, shared)
+            };
+            let pictures: Vec<_> = (0..24).map(picture).collect();
+            let differ = |shared: &dyn Fn(f64) -> f64| {
+                let beyond = |pair: &&[(Image, f64)]| {
+                    let [(a, of_a), (b, of_b)] = pair else { unreachable!() };
+                    let shared = shared(of_a.max(*of_b));
+                    (0..3).any(|c| {
+                        let d: Moments = a.rgb[c].iter().zip(&b.rgb[c]).map(|(a, b)| f64::from(a - b)).collect();
+                        let squares = d.variance() * (d.count - 1) as f64 + d.count as f64 * d.mean * d.mean;
+                        (d.count as f64 * d.mean).abs() > z * (shared * squares).sqrt()
+                    })
+                };
+                pictures.windows(2).filter(beyond).count()
+            };
+            println!("{name}, {samples}: {} differ if independent; said {}", differ(&|_| 1.0), pictures[0].1);
+            assert_eq!(differ(&|shared| shared), 0, "{name}, {samples}");
+            if samples == 1 {
+                assert!(differ(&|_| 1.0) > 0, "{name}");
+                assert!(
+                    pictures.iter().all(|(_, shared)| (shared / most - 1.0).abs() < 0.02),
+                    "{name}: {}",
+                    pictures[0].1
+                );
+            }
+        }
+    }
 }

@@ -411,7 +411,7 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
     // Bands come first.
     let mut errors = band_errors(finish, frame, 0..finish.spectral_channels().start);
     let shared = match finish.bands {
-        true => frame.shared_errors_of_bands(0, &errors, finish.sharing),
+        true => shared_errors_of_bands(finish, frame, 0..finish.spectral_channels().start, &errors),
         false => frame.shared_errors(image, &finish.rgb_from_xyz(), finish.sharing),
     };
     let layer = |(i, channel): (usize, &Channel)| {
@@ -498,6 +498,15 @@ fn band_errors(finish: &Finish, frame: &Frame, channels: Range<usize>) -> Vec<Ve
     if finish.output.exr.stderr { channels.map(error).collect() } else { Vec::new() }
 }
 
+/// What pixels share of the errors of the bands that are `channels`, which is no less where those are not written.
+fn shared_errors_of_bands(finish: &Finish, frame: &Frame, channels: Range<usize>, written: &[Vec<f32>]) -> f64 {
+    if !written.is_empty() {
+        return frame.shared_errors_of_bands(channels.start, written, finish.sharing);
+    }
+    let errors: Vec<Vec<f32>> = channels.clone().map(|i| frame.layer_error(i)).collect();
+    frame.shared_errors_of_bands(channels.start, &errors, finish.sharing)
+}
+
 /// The path of the spectral file beside the EXR at `path`: `name.spectral.exr`, and before the number of a frame.
 #[must_use]
 pub fn spectral_path(path: &Path) -> PathBuf {
@@ -540,7 +549,7 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
     let text = |name: &str, value: &str| (name.to_owned(), Attribute::Text(value.to_owned()));
     attributes.extend([text("spectralLayoutVersion", "1.0"), text("emissiveUnits", "W.m^-2.sr^-1")]);
     let errors = band_errors(finish, frame, channels.clone());
-    attributes.extend(shared_errors(frame.shared_errors_of_bands(channels.start, &errors, finish.sharing)));
+    attributes.extend(shared_errors(shared_errors_of_bands(finish, frame, channels.clone(), &errors)));
     let own = finish.layers[channels.clone()].iter().zip(errors);
     let errors: Vec<(String, ChannelData)> =
         own.map(|(channel, plane)| (stderr_name(&channel.name), ChannelData::F32(whole(plane, channel)))).collect();

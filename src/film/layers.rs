@@ -311,15 +311,34 @@ impl LayerSums {
         channel: usize,
         divisors: Option<[u64; REPLICATES]>,
     ) -> Option<[f64; REPLICATES]> {
+        let means = self.replicates_or_zero(index, channel, divisors)?;
+        (!self.divisors(index, divisors).contains(&0)).then_some(means)
+    }
+
+    /// The same, zero of replicates without samples; `None` where sums are not kept by replicate.
+    #[must_use]
+    pub fn replicates_or_zero(
+        &self,
+        index: usize,
+        channel: usize,
+        divisors: Option<[u64; REPLICATES]>,
+    ) -> Option<[f64; REPLICATES]> {
         let Layout { channels, kept: Kept::ByReplicate | Kept::Weighed } = self.layout else { return None };
-        let place = |replicate| self.place(index, replicate);
-        let counts = divisors.unwrap_or_else(|| std::array::from_fn(|r| u64::from(self.counts[place(r)])));
-        let mean = |replicate| self.sums[place(replicate) * channels + channel].value() / counts[replicate] as f64;
+        let counts = self.divisors(index, divisors);
+        let mean = |replicate: usize| match counts[replicate] {
+            0 => 0.0,
+            count => self.sums[self.place(index, replicate) * channels + channel].value() / count as f64,
+        };
         let mut means = std::array::from_fn(|replicate| [mean(replicate)]);
         if let Some(weights) = self.weights(index) {
             even(&mut means, counts, weights);
         }
-        means.iter().all(|[x]: &[f64; 1]| x.is_finite()).then(|| means.map(|[x]| x))
+        Some(means.map(|[x]| x))
+    }
+
+    /// What the sums of the replicates of the pixel at `index` are divided by: what is `given`, or how many samples they have.
+    fn divisors(&self, index: usize, given: Option<[u64; REPLICATES]>) -> [u64; REPLICATES] {
+        given.unwrap_or_else(|| std::array::from_fn(|r| u64::from(self.counts[self.place(index, r)])))
     }
 
     /// The variances of the means of one channel, pixel by pixel, from the spread of the replicates as

@@ -334,16 +334,28 @@ pub fn replicate_light(
     index: usize,
     rgb_from_xyz: &[[f64; 3]; 3],
 ) -> Option<[[f64; 3]; REPLICATES]> {
-    let mut means = replicate_means(film, index, rgb_from_xyz)?;
+    let has_all =
+        !counts(&film.cells()[index]).contains(&0) && splats.is_none_or(|splats| !splats.photons.contains(&0));
+    has_all.then(|| light_or_zero(film, splats, index, rgb_from_xyz))
+}
+
+/// The same, zero of replicates without samples.
+pub(super) fn light_or_zero(
+    film: &Film,
+    splats: Option<&Splats>,
+    index: usize,
+    rgb_from_xyz: &[[f64; 3]; 3],
+) -> [[f64; 3]; REPLICATES] {
+    let mut means = Sums::of(film, index).means_or_zero(rgb_from_xyz);
     let unit = 2f64.powi(film.exponent());
     means.iter_mut().flatten().for_each(|x| *x *= unit);
     if let Some(splats) = splats {
-        let light = splats.replicates(index, rgb_from_xyz)?;
+        let light = splats.sums(index).means_or_zero(rgb_from_xyz);
         for (mean, light) in means.iter_mut().flatten().zip(light.iter().flatten()) {
-            *mean += light;
+            *mean += light * unit;
         }
     }
-    Some(means)
+    means
 }
 
 /// The same of further channel `channel`, where that is summed by replicate.
@@ -356,6 +368,21 @@ pub(super) fn replicates_of_layer(
     let mut means = film.layers.replicates(index, channel, None)?;
     if let Some(splats) = splats {
         let light = splats.replicates_of_layer(index, channel)?;
+        means.iter_mut().zip(light).for_each(|(mean, light)| *mean += light);
+    }
+    Some(means)
+}
+
+/// The same, zero of replicates without samples; `None` where it is not summed by replicate.
+pub(super) fn layer_or_zero(
+    film: &Film,
+    splats: Option<&Splats>,
+    index: usize,
+    channel: usize,
+) -> Option<[f64; REPLICATES]> {
+    let mut means = film.layers.replicates_or_zero(index, channel, None)?;
+    if let Some(splats) = splats {
+        let light = splats.film.layers.replicates_or_zero(index, channel, Some(splats.photons))?;
         means.iter_mut().zip(light).for_each(|(mean, light)| *mean += light);
     }
     Some(means)

@@ -3,14 +3,17 @@
 use super::accumulate::{Film, REPLICATES};
 use super::compare::GLOBAL_ALPHA;
 use super::error::Values;
-use super::resolve::{Splats, counts, replicate_light, replicates_of_layer};
+use super::resolve::{Splats, counts, layer_or_zero, light_or_zero};
 use crate::math::statistics::student_t_half_width;
 use std::collections::HashMap;
 
 /// For the value of `values` where it is most, of standard errors `errors` by pixel: what is splatted falls into `span` pixels
-/// together ([`Filter::span`](super::filter::Filter::span)).
+/// together ([`Filter::span`](super::filter::Filter::span)). Where replicates tell nothing all of the variance may be of that.
 #[must_use]
 pub fn by_filter(splats: &Splats, values: Values, errors: &[&[f32]], span: f64) -> f64 {
+    if are_unknown(errors) {
+        return span;
+    }
     // Variances, and what was splatted of them.
     let mut sums = vec![[0.0; 2]; errors.len()];
     let mut add = |value: usize, pixel: usize, splatted: f64| {
@@ -37,13 +40,20 @@ pub fn by_filter(splats: &Splats, values: Values, errors: &[&[f32]], span: f64) 
     sums.into_iter().map(shared).fold(1.0, f64::max)
 }
 
+/// Whether replicates tell nothing: there is one, of one sample a pixel, or sums are not kept by them.
+fn are_unknown(errors: &[&[f32]]) -> bool {
+    !errors.iter().copied().flatten().any(|error| error.is_finite())
+}
+
 /// At the most, for the value of `values` where it is most, of standard errors `errors` by pixel, where pixels may share them with all
-/// in their cell of so many on a side, aligned to the frame, or with every other where there are no cells; 1 where replicates are empty.
+/// in their cell of so many on a side, aligned to the frame, or with every other where there are no cells.
 ///
-/// What the sum of a cell varies by is told by the sums of its replicates, with three degrees of freedom, that of all by as many times
-/// (Σv)²/Σv², with v that of each. [`compare`](super::compare) takes what a file says for known and its scores for normal: so
-/// variances are multiplied by (t/z)², t and z the quantiles of Student and Gauss at its level, and what is beyond z standard
-/// errors is beyond t of those that were found.
+/// What the sum of a cell varies by is told by the sums of its R replicates, as far as they have samples, with R − 1 degrees of freedom,
+/// that of all by as many times (Σv)²/Σv², with v that of each. [`compare`](super::compare) takes what a file says for known and its
+/// scores for normal: so variances are multiplied by (t/z)², t and z the quantiles of Student and Gauss at its level, and what is
+/// beyond z standard errors is beyond t of those that were found.
+///
+/// Where replicates tell nothing all pixels of a cell may err alike, and the sum of n such varies n times as much.
 #[must_use]
 pub fn in_cells(film: &Film, splats: Option<&Splats>, values: Values, errors: &[&[f32]], cell: Option<u32>) -> f64 {
     /// Of a cell and a value: sums by replicate, and the variances of the pixels.
@@ -53,18 +63,26 @@ pub fn in_cells(film: &Film, splats: Option<&Splats>, values: Values, errors: &[
         own: f64,
     }
     let place = |x: i32| cell.map_or(0, |cell| x.div_euclid(cell as i32));
+    if are_unknown(errors) {
+        let pixels = film.window().pixels() as f64;
+        return cell.map_or(pixels, |cell| f64::from(cell * cell).min(pixels));
+    }
+    // Of two samples a pixel, or three, some have none.
+    let has_samples = |r: &usize| film.cells().iter().any(|pixel| pixel[*r].count > 0);
+    let replicates: Vec<usize> = (0..REPLICATES).filter(has_samples).collect();
     let read = |pixel: usize, light: &mut Vec<[f64; REPLICATES]>| {
         light.clear();
         match values {
             Values::Colours(rgb_from_xyz, _) => {
-                let replicates = replicate_light(film, splats, pixel, rgb_from_xyz);
-                light.extend(replicates.iter().flat_map(|all| (0..3).map(move |c| all.map(|colour| colour[c]))));
+                let all = light_or_zero(film, splats, pixel, rgb_from_xyz);
+                light.extend((0..3).map(|c| all.map(|colour| colour[c])));
             }
             Values::Bands(first, count) => {
-                light.extend((first..first + count).map_while(|band| replicates_of_layer(film, splats, pixel, band)));
+                light.extend((first..first + count).map_while(|band| layer_or_zero(film, splats, pixel, band)));
             }
         }
-        light.len() == errors.len()
+        let counts = counts(&film.cells()[pixel]);
+        light.len() == errors.len() && replicates.iter().all(|r| counts[*r] > 0)
     };
     let mut cells: HashMap<[i32; 2], ([f64; REPLICATES], Vec<Sums>)> = HashMap::new();
     let mut light = Vec::new();
@@ -78,7 +96,7 @@ pub fn in_cells(film: &Film, splats: Option<&Splats>, values: Values, errors: &[
             *all += count as f64;
         }
         for ((sums, value), errors) in sums.iter_mut().zip(&light).zip(errors) {
-            (0..REPLICATES).for_each(|r| sums.light[r] += value[r]);
+            replicates.iter().for_each(|&r| sums.light[r] += value[r]);
             sums.own += f64::from(errors[i]) * f64::from(errors[i]);
         }
     }
@@ -92,14 +110,14 @@ pub fn in_cells(film: &Film, splats: Option<&Splats>, values: Values, errors: &[
         for (_, (samples, sums)) in &cells {
             let Sums { light, own: of_pixels } = sums[value];
             let total: f64 = samples.iter().sum();
-            let mean = (0..REPLICATES).map(|r| samples[r] * light[r]).sum::<f64>() / total;
-            let spread: f64 = (0..REPLICATES).map(|r| samples[r] * (light[r] - mean).powi(2)).sum();
-            let variance = spread / ((REPLICATES - 1) as f64 * total);
+            let mean = replicates.iter().map(|&r| samples[r] * light[r]).sum::<f64>() / total;
+            let spread: f64 = replicates.iter().map(|&r| samples[r] * (light[r] - mean).powi(2)).sum();
+            let variance = spread / ((replicates.len() - 1) as f64 * total);
             all += variance;
             squares += variance * variance;
             own += of_pixels;
         }
-        let dof = (REPLICATES - 1) as f64 * (all * all / squares);
+        let dof = (replicates.len() - 1) as f64 * (all * all / squares);
         (quantile(dof) / quantile(f64::INFINITY)).powi(2) * all / own
     };
     // Without errors there is nothing to share: 0/0.

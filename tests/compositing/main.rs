@@ -282,8 +282,8 @@ fn a_spectral_file_is_light_again() {
     }
 }
 
-/// Bands of the picture and of the spectral file have their standard errors beside them, as data, and say how much of them pixels
-/// share; a picture without a wish for them has neither.
+/// Bands of the picture and of the spectral file have their standard errors beside them, as data; a picture without a wish for them
+/// has none. Both say how much of them pixels share, by which `abbe compare` judges the bands.
 #[test]
 fn bands_stand_beside_their_standard_errors() {
     let place = TempDir::new().unwrap();
@@ -314,14 +314,36 @@ fn bands_stand_beside_their_standard_errors() {
     );
     assert!(plane(&spectral, bands[1]).iter().any(|e| *e > 0.0));
     let shared = |part: &ExrPart| part.text("abbe/sharedErrors").map(|x| x.parse::<f64>().unwrap());
-    assert!([&picture, &spectral].iter().all(|part| shared(part).unwrap() > 1.0));
+    let told = [&picture, &spectral].map(shared);
+    assert!(told.iter().all(|shared| shared.unwrap() > 1.0));
     // Each file has the error of its own bands: red and its double have that of all light, the mean over wavelengths another.
     let own = |part: &ExrPart| part.text("abbe/relativeErrorState").is_some();
     assert!(own(&picture) && own(&spectral));
     let [picture, spectral] = parts("precision: float");
     assert_eq!((names(&picture).len(), names(&spectral).len()), (2, 4));
-    assert_eq!([&picture, &spectral].map(shared), [None, None]);
+    assert_eq!([&picture, &spectral].map(shared), told);
     assert!(own(&picture) && own(&spectral));
+}
+
+/// Beside colours, without standard errors, bands are not summed by replicate: what pixels share of their errors is then all that they
+/// can, of a cell the number of its pixels, of which this picture has 24.
+#[test]
+fn bands_that_do_not_know_their_errors_may_share_all_of_them() {
+    let place = TempDir::new().unwrap();
+    let path = |name: &str| place.path().join(name);
+    let shared = |reuse: &str| {
+        let text = format!(
+            "camera: {{origin: [0, 1, 5], target: [0, 1, 0], fov_deg: 40}}\nimage: {{width: 6, height: 4}}\n\
+             render: {{samples: 8, techniques: {{reuse: {reuse}}}}}\noutput: {{spectral: {{bands: 1}}}}\n\
+             shapes: [{{plane: {{normal: [0, 1, 0]}}}}, {{sphere: {{center: [0, 4, 0], radius: 1, emission: 5}}}}]\n"
+        );
+        common::write(&path("s.yaml"), text.as_bytes());
+        let overrides = Overrides { output: Some(path("out.exr")), ..Overrides::default() };
+        let report = batch::render_batch(&path("s.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+        read_exr(&path("out.spectral.exr")).unwrap().parts[0].text("abbe/sharedErrors").map(str::to_owned)
+    };
+    assert_eq!((shared("on").as_deref(), shared("off")), (Some("24.000"), None));
 }
 
 /// Radiance 1 at 400 nm to 4 at 700 nm is 750 in a band of response 1, whatever the sensitivity, and 1.5, 2.5 and 3.5 in the
