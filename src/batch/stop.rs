@@ -289,7 +289,8 @@ pub struct Forecast {
     pub seconds: f64,
     /// Relative RMSE at the end.
     pub error: f64,
-    /// Between what that lies, 95 times of 100, as far as it goes on as it has.
+    /// Between what that lies, 95 times of 100, as far as it goes on as it has. An error that ends the render is no more than its
+    /// target.
     pub error_between: [f64; 2],
     /// Between what the seconds lie, 95 times of 100, as far as an error ends the render; a sample is taken to last as long as before.
     pub seconds_between: [f64; 2],
@@ -311,12 +312,15 @@ impl Forecast {
         let samples_between = stop.target().map_or([most; 2], |target| fit.samples_between(target, most)).map(within);
         let seconds = |samples: f64| elapsed + (samples - now) * rate;
         let error = fit.error_at(samples);
-        let error_between = match stop.target() {
-            None => fit.error_between(samples),
+        // What is told at the end scatters, below a target as well: a render ends where it is told that or less.
+        let [low, high] = fit.error_between(samples);
+        let high = match stop.target() {
+            None => high,
             // What ends the render is reached, or all else ends before.
-            Some(_) if samples_between[1] < most => [error; 2],
-            Some(_) => [error, fit.error_between(most)[1].max(error)],
+            Some(_) if samples_between[1] < most => error,
+            Some(_) => fit.error_between(most)[1].max(error),
         };
+        let error_between = [low, high];
         Some(Forecast {
             made_at: last.samples,
             samples,
@@ -467,10 +471,19 @@ mod tests {
         let stop = Stop { error: Some(0.01), ..FREE };
         let f = Forecast::of(&milestones(&[16, 32, 64], 1.0), &stop, 1 << 16).unwrap();
         assert!((f.samples - 1e4).abs() < 1e-6 && (f.seconds - 10.0).abs() < 1e-9 && (f.error - 0.01).abs() < 1e-12);
-        // A target that is reached is what comes; where samples end before, more than it may come.
-        assert_eq!(f.error_between, [f.error; 2]);
-        let short = Forecast::of(&milestones(&[16, 32, 64], 1.0), &stop, 10_000).unwrap();
-        assert!(short.error_between[0] == short.error && short.error_between[1] > 0.011, "{short:?}");
+        // What ends the render is the target or less; where samples end before, as many as it takes or a fortieth of them, what comes is
+        // as without a target.
+        let free = |samples| Forecast::of(&milestones(&[16, 32, 64], 1.0), &FREE, samples).unwrap().error_between;
+        let near = |a: [f64; 2], b: [f64; 2]| a.iter().zip(b).all(|(a, b)| (a / b - 1.0).abs() < 1e-9);
+        assert!(near(f.error_between, [free(10_000)[0], f.error]), "{f:?}");
+        for most in [10_000, 256] {
+            let short = Forecast::of(&milestones(&[16, 32, 64], 1.0), &stop, most).unwrap();
+            assert!(near(short.error_between, free(most)), "{short:?}");
+            assert!(
+                short.error_between[0] < 0.9 * short.error && short.error_between[1] > 1.1 * short.error,
+                "{short:?}"
+            );
+        }
         let all = milestones(&[4, 8, 16, 32, 64], 1.2);
         let quarter = Forecast::at_a_quarter(&all, &FREE, 64).unwrap();
         assert_eq!(quarter.made_at, 16);
