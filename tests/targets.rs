@@ -250,6 +250,22 @@ fn against_a_closed_form_the_sheet_finds_the_bias_that_is_there() {
     assert_eq!(abbe(&place, "accuracy scene.yaml --truth 0").0, 2);
 }
 
+/// A board that shines with 1 fills the frame and nothing is beyond it: of a picture that is rendered for half its width beyond each
+/// edge it is (1/2)² = a quarter, so that light of 1 in every pixel is found to a quarter, in a copy of an eighth of its width as well.
+#[test]
+fn the_small_copy_has_as_much_beyond_the_frame_as_the_picture() {
+    let place = Place::of(
+        "camera: {origin: [0, 0, 2], target: [0, 0, 0], orthographic_height: 2}\nimage: {width: 64, height: 64, overscan: 32}\n\
+         render: {samples: 16}\nshapes:\n- rectangle: {corner: [-1, -1, 0], edge_u: [2, 0, 0], edge_v: [0, 2, 0], emission: 1}\n",
+    );
+    let (code, said) = abbe(&place, "accuracy scene.yaml -o sheet --pixels 64 --rounds 1 --knob samples --truth 1");
+    assert_eq!(code, 0, "{said}");
+    let sheet = &place.json("sheet/accuracy.json")[0];
+    assert_eq!(sheet["size"], serde_json::json!([8, 8]));
+    let green = sheet["rows"][0]["light"][1]["value"].as_f64().unwrap();
+    assert!((green - 0.25).abs() < 0.01, "{green}");
+}
+
 /// A coloured wall fills the view, in coloured light that is the same from everywhere. Its radiance is that of the light times
 /// its reflectance, wavelength by wavelength; three numbers are multiplied instead. Both colours are those of smooth
 /// spectra, so both products are known. Bounds are four errors of the sheet and the 2e-4 that upsampling may be off by.

@@ -164,6 +164,8 @@ pub fn sheet(
     overrides.set.extend([
         ("image.width".to_owned(), size[0].to_string()),
         ("image.height".to_owned(), size[1].to_string()),
+        // What is beyond the frame has the share of the picture that it has.
+        ("image.overscan".to_owned(), (f64::from(written.image.overscan) * scale).round().to_string()),
         ("render.stop".to_owned(), "{}".to_owned()),
     ]);
     if written.image.crop.is_some() {
