@@ -33,9 +33,9 @@ pub fn page(title: &str, command: &str, sheets: &[Sheet], without: &[(String, St
          <h1>What accuracy costs: {0}</h1>\n<p>Made by <code>{1}</code> with Abbe {2}.</p>\n\
          <p class=\"note\">Each knob is moved by itself around the chosen setting, on a small copy of the scene. Noise is √relMSE \
          with its 95 % interval; bias is √relMSE of what several renders have in common against a reference of sixteen times the \
-         samples, given where it stands out by three standard errors, else what it is below by as many. Time is the least \
+         samples, or a closed form, given where it stands out by three standard errors, else what it is below by as many. Time is the least \
          of the renders (the most in brackets). Efficiency is 1 / (noise² · time) over that of the chosen setting; \
-         its standard error counts that of the noise and half of how far the times lie apart. In the plots bands are intervals, dashed lines biases, the dotted line the target.</p>\n",
+         its standard error counts that of the noise and half of how far the times lie apart, of two renders all of it. In the plots bands are intervals, dashed lines biases, the dotted line the target.</p>\n",
         escaped(title),
         escaped(command),
         env!("CARGO_PKG_VERSION")
