@@ -1,5 +1,5 @@
 //! Light that lamps without extent throw onto the way through a medium: found at distances that are drawn toward them
-//! ([`equiangular`]) as well as at the ends of flights, and weighed by the power heuristic.
+//! ([`crate::scene::equiangular`]) as well as at the ends of flights, and weighed by the power heuristic.
 
 use super::lights::power_heuristic;
 use super::{Path, Tracer};
