@@ -81,8 +81,11 @@ struct Picture {
 }
 
 fn frame_of(bench: &Bench, seed: u64) -> Frame {
-    let filter = FilterSampler::new(Filter::Box).unwrap();
-    let job = FrameJob { seed, ..bench.prepared.job(&filter) };
+    frame_by(bench, &FilterSampler::new(Filter::Box).unwrap(), seed)
+}
+
+fn frame_by(bench: &Bench, filter: &FilterSampler, seed: u64) -> Frame {
+    let job = FrameJob { seed, ..bench.prepared.job(filter) };
     frame::render(&job, &|_| {}, &AtomicBool::new(false)).unwrap()
 }
 
@@ -309,7 +312,7 @@ fn pictures_of_few_samples_say_how_much_their_means_vary() {
     let cases = [
         ("merged", MERGED.replace("64", "SAMPLES"), 480.0),
         ("dealt and shared", stage(&gaussian(0.5), "techniques: {reuse: on}", ""), 64.0),
-        ("photons", stage(&gaussian(0.8), "tile: 32", "integrator: light_tracer\n"), 8.04),
+        ("photons", stage(&gaussian(0.8), "techniques: {splatting: off}", "integrator: light_tracer\n"), 8.04),
     ];
     let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
     let z = student_t_half_width(1.0 - GLOBAL_ALPHA / 3.0, f64::INFINITY);
@@ -317,8 +320,9 @@ fn pictures_of_few_samples_say_how_much_their_means_vary() {
         for samples in 1..4 {
             let bench = bench_with(&yaml.replace("SAMPLES", &samples.to_string()), &[]);
             let sharing = Finish::of(&bench.prepared).sharing;
+            let filter = bench.prepared.sampler().unwrap();
             let picture = |seed: u64| {
-                let frame = frame_of(&bench, 1000 * seed);
+                let frame = frame_by(&bench, &filter, 1000 * seed);
                 let image = frame.resolve(&rgb_from_xyz);
                 let shared = frame.shared_errors(&image, &rgb_from_xyz, sharing);
                 (image, shared)

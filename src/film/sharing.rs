@@ -53,7 +53,8 @@ fn are_unknown(errors: &[&[f32]]) -> bool {
 /// scores for normal: so variances are multiplied by (t/z)², t and z the quantiles of Student and Gauss at its level, and what is
 /// beyond z standard errors is beyond t of those that were found.
 ///
-/// Where replicates tell nothing all pixels of a cell may err alike, and the sum of n such varies n times as much.
+/// Where replicates tell nothing all pixels of a cell may err alike, and the sum of n such varies n times as much; no sum of n varies
+/// more, whatever few replicates tell.
 #[must_use]
 pub fn in_cells(film: &Film, splats: Option<&Splats>, values: Values, errors: &[&[f32]], cell: Option<u32>) -> f64 {
     /// Of a cell and a value: sums by replicate, and the variances of the pixels.
@@ -63,9 +64,10 @@ pub fn in_cells(film: &Film, splats: Option<&Splats>, values: Values, errors: &[
         own: f64,
     }
     let place = |x: i32| cell.map_or(0, |cell| x.div_euclid(cell as i32));
+    let pixels = film.window().pixels() as f64;
+    let most = cell.map_or(pixels, |cell| f64::from(cell * cell).min(pixels));
     if are_unknown(errors) {
-        let pixels = film.window().pixels() as f64;
-        return cell.map_or(pixels, |cell| f64::from(cell * cell).min(pixels));
+        return most;
     }
     // Of two samples a pixel, or three, some have none.
     let has_samples = |r: &usize| film.cells().iter().any(|pixel| pixel[*r].count > 0);
@@ -121,5 +123,5 @@ pub fn in_cells(film: &Film, splats: Option<&Splats>, values: Values, errors: &[
         (quantile(dof) / quantile(f64::INFINITY)).powi(2) * all / own
     };
     // Without errors there is nothing to share: 0/0.
-    (0..errors.len()).map(bound).filter(|shared| shared.is_finite()).fold(1.0, f64::max)
+    (0..errors.len()).map(bound).filter(|shared| shared.is_finite()).fold(1.0, f64::max).min(most)
 }
