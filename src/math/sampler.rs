@@ -89,7 +89,7 @@ impl Sampler<'_> {
     pub fn set(&self, set: Set) -> [f64; 4] {
         let bits = match self.octet {
             Some(octet) if set.index() < SHARED_SETS => octet.set(set, self.lane),
-            _ => points([key(self.stream, set)], [self.index])[0],
+            _ => points([key(self.stream, set.index())], [self.index])[0],
         };
         // Written out: `map` of an array calls a function for each element.
         [unit(bits[0]), unit(bits[1]), unit(bits[2]), unit(bits[3])]
@@ -110,7 +110,7 @@ impl Sampler<'_> {
             *index = index.wrapping_add(i);
         }
         let mut numbers = [[0.0; 4]; PARTS as usize];
-        let points = points([key(self.stream, set); PARTS as usize], indices);
+        let points = points([key(self.stream, set.index()); PARTS as usize], indices);
         for (numbers, bits) in numbers.iter_mut().flatten().zip(points.as_flattened()) {
             *numbers = unit(*bits);
         }
@@ -215,10 +215,10 @@ impl Octet {
     #[inline(never)]
     fn make(&self, set: Set) {
         let place = set.index();
-        let mut keys = [key(self.streams[0], set); Octet::SAMPLES];
+        let mut keys = [key(self.streams[0], place); Octet::SAMPLES];
         if !self.alike {
             for (key_of, stream) in keys.iter_mut().zip(self.streams) {
-                *key_of = key(stream, set);
+                *key_of = key(stream, place);
             }
         }
         self.sets[place as usize].set(points(keys, self.indices));
@@ -236,10 +236,10 @@ pub fn unit(x: u32) -> f64 {
     f64::from(x) * (1.0 / 4_294_967_296.0)
 }
 
-/// What `set` of a stream is scrambled by.
+/// What the set of `index` of a stream is scrambled by.
 #[inline(always)]
-fn key(stream: u32, set: Set) -> u64 {
-    mix64(u64::from(stream) << 32 | u64::from(set.index()))
+fn key(stream: u32, index: u32) -> u64 {
+    mix64(u64::from(stream) << 32 | u64::from(index))
 }
 
 /// The points of samples in units of 2⁻³², each scrambled by its own of `keys`.

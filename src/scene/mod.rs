@@ -490,9 +490,9 @@ impl Scene {
             }
     }
 
-    /// The surface at a hit.
+    /// The surface at a hit. Within what follows paths it would crowd out what they carry.
     #[must_use]
-    #[inline]
+    #[inline(never)]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         if let Some(watch) = &self.watch {
             watch.met(self, ray, hit);
