@@ -307,16 +307,23 @@ fn includes_are_read_in_place_and_do_not_run_in_circles() {
     );
 }
 
-/// Files that include each other twice would be read 2^15 times.
-#[test]
-fn includes_do_not_multiply_without_end() {
+/// A scene, s.xml, that includes 0.xml, which includes 1.xml so many `times`, and so on `deep`; the last is as it is given.
+fn includes(deep: usize, times: usize, last: &str) -> tempfile::TempDir {
     let directory = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
     write("s.xml", &GOOD.replace("</scene>", "<include filename=\"0.xml\"/></scene>"));
-    for i in 0..20 {
-        let twice = format!("<include filename=\"{}.xml\"/>", i + 1).repeat(2);
-        write(&format!("{i}.xml"), &format!("<scene version=\"3.0.0\">{twice}</scene>"));
+    for i in 0..deep {
+        let all = format!("<include filename=\"{}.xml\"/>", i + 1).repeat(times);
+        write(&format!("{i}.xml"), &format!("<scene version=\"3.0.0\">{all}</scene>"));
     }
+    write(&format!("{deep}.xml"), &format!("<scene version=\"3.0.0\">{last}</scene>"));
+    directory
+}
+
+/// Files that include each other twice would be read 2^15 times.
+#[test]
+fn includes_do_not_multiply_without_end() {
+    let directory = includes(20, 2, "");
     let begin = Instant::now();
     let (code, message) = outcome(&abbe(directory.path(), &["plan", "s.xml"]));
     assert_eq!(
@@ -329,14 +336,7 @@ fn includes_do_not_multiply_without_end() {
 /// A file of 1 MiB, which is included four times by one that is included four times, and so on: 4⁸ MiB are 64 GiB.
 #[test]
 fn what_is_included_again_and_again_is_counted_each_time() {
-    let directory = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| std::fs::write(directory.path().join(name), text).unwrap();
-    write("s.xml", &GOOD.replace("</scene>", "<include filename=\"0.xml\"/></scene>"));
-    for i in 0..8 {
-        let often = format!("<include filename=\"{}.xml\"/>", i + 1).repeat(4);
-        write(&format!("{i}.xml"), &format!("<scene version=\"3.0.0\">{often}</scene>"));
-    }
-    write("8.xml", &format!("<scene version=\"3.0.0\"><!--{}--></scene>", "x".repeat(1 << 20)));
+    let directory = includes(8, 4, &format!("<!--{}-->", "x".repeat(1 << 20)));
     let (code, message) = outcome(&abbe(directory.path(), &["plan", "s.xml"]));
     assert_eq!(code, 2, "{message}");
     assert!(message.starts_with("error: 7.xml:1:"), "{message}");

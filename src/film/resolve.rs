@@ -20,6 +20,7 @@
 
 use crate::film::Window;
 use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES, Sum};
+use crate::film::layers::LayerSums;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -365,12 +366,7 @@ pub(super) fn replicates_of_layer(
     index: usize,
     channel: usize,
 ) -> Option<[f64; REPLICATES]> {
-    let mut means = film.layers.replicates(index, channel, None)?;
-    if let Some(splats) = splats {
-        let light = splats.replicates_of_layer(index, channel)?;
-        means.iter_mut().zip(light).for_each(|(mean, light)| *mean += light);
-    }
-    Some(means)
+    of_layers(film, splats, |layers, divisors| layers.replicates(index, channel, divisors))
 }
 
 /// The same, zero of replicates without samples; `None` where it is not summed by replicate.
@@ -380,12 +376,21 @@ pub(super) fn layer_or_zero(
     index: usize,
     channel: usize,
 ) -> Option<[f64; REPLICATES]> {
-    let mut means = film.layers.replicates_or_zero(index, channel, None)?;
+    of_layers(film, splats, |layers, divisors| layers.replicates_or_zero(index, channel, divisors))
+}
+
+/// What `means` says of the sums of the camera and of what is splatted, which are divided by photons, together.
+fn of_layers(
+    film: &Film,
+    splats: Option<&Splats>,
+    means: impl Fn(&LayerSums, Option<[u64; REPLICATES]>) -> Option<[f64; REPLICATES]>,
+) -> Option<[f64; REPLICATES]> {
+    let mut all = means(&film.layers, None)?;
     if let Some(splats) = splats {
-        let light = splats.film.layers.replicates_or_zero(index, channel, Some(splats.photons))?;
-        means.iter_mut().zip(light).for_each(|(mean, light)| *mean += light);
+        let light = means(&splats.film.layers, Some(splats.photons))?;
+        all.iter_mut().zip(light).for_each(|(mean, light)| *mean += light);
     }
-    Some(means)
+    Some(all)
 }
 
 /// A further channel of `film`, its mean over samples, with `splats` added.

@@ -25,9 +25,9 @@ const MOST: i32 = 20;
 
 impl Scene {
     /// The power of two by which a film divides the light of the scene, [`crate::film::accumulate::Film::exponent`]: 0 where
-    /// the brightest of what its lights, of [`Light::power`] `powers`, its fog and the `ambient` light of `whitted` show lies between 2⁻²⁴ and 2²⁰. A darker
-    /// scene is raised to one, with 2³⁸ left above; a brighter one lowered to 2²⁰, so that all of 2⁻⁶⁰ of the brightest or
-    /// more keeps its mantissa. `boxes` are those of the objects.
+    /// the brightest of what its lights, of [`Light::power`] `powers`, its fog and the `ambient` light of `whitted` show lies
+    /// between 2⁻²⁴ and 2²⁰. A darker scene is raised to one, with 2³⁸ left above; a brighter one lowered to 2²⁰, so that all of
+    /// 2⁻⁶⁰ of the brightest or more keeps its mantissa. `boxes` are those of the objects.
     pub(super) fn film_exponent(&self, powers: &[f64], ambient: Option<f64>, boxes: &[Aabb]) -> i32 {
         let lamps = || self.lights.iter().zip(powers.iter().copied());
         let shown = lamps().filter_map(|(light, power)| match light {

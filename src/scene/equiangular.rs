@@ -31,7 +31,7 @@ pub struct Lamp {
 
 /// What a lamp sees of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch {
+struct Stretch {
     /// Distances along the ray, metres; the second may be infinite.
     from: f64,
     to: f64,
@@ -136,8 +136,7 @@ impl Stretch {
     }
 
     /// A distance on it, by `u` in [0, 1).
-    #[must_use]
-    pub fn sample(&self, u: f64) -> f64 {
+    fn sample(&self, u: f64) -> f64 {
         let (sin, cos) = sin_cos_turn(self.angle * u / TAU);
         // D tan(α + φ) − D tan α, where tan α = a / D.
         let a = self.from - self.foot;
@@ -146,8 +145,7 @@ impl Stretch {
     }
 
     /// The density of [`Stretch::sample`] at distance `t`, 1/m.
-    #[must_use]
-    pub fn density(&self, t: f64) -> f64 {
+    fn density(&self, t: f64) -> f64 {
         if t < self.from || t > self.to {
             return 0.0;
         }

@@ -161,6 +161,12 @@ impl Medium {
         if scatters { dimmed } else { Dimmed { passing: Lanes::ONE, ..dimmed } }
     }
 
+    /// Whether paths look for lamps with rays of their own where it scatters them.
+    #[must_use]
+    pub fn asks_lights(&self) -> bool {
+        self.shadow_rays && self.scatters()
+    }
+
     /// Whether it scatters light.
     #[must_use]
     pub fn scatters(&self) -> bool {
@@ -185,33 +191,26 @@ impl Medium {
     #[must_use]
     pub fn scattering_at(&self, ray: &Ray, t: f64, nm: Lanes, rho: Lanes) -> (Lanes, f64) {
         let point = ray.at(t);
-        let (scattering, extinction) = match &self.filling {
-            Filling::Even { absorption, scattering } => {
-                let scattering = scattering.eval(nm);
-                let extinction = absorption.eval(nm) + scattering;
-                (scattering, extinction * (MediumLanes { extinction, scattering }).transmittance(t))
+        let (scattering, density) = match self.lanes(nm) {
+            Ok(lanes) => {
+                let albedo = match &self.filling {
+                    Filling::EvenExtinction { albedo, .. } => albedo.eval(point, nm),
+                    _ => Lanes::ONE,
+                };
+                (lanes.scattering * albedo, lanes.extinction * lanes.transmittance(t))
             }
-            Filling::EvenExtinction { extinction, albedo, .. } => {
-                let extinction = extinction.eval(nm);
-                let lanes = MediumLanes { extinction, scattering: extinction };
-                (extinction * albedo.eval(point, nm), extinction * lanes.transmittance(t))
-            }
-            Filling::Varying(varying) => {
+            Err(varying) => {
                 let extinction = varying.extinction.eval(point, nm) * varying.scale;
                 (extinction * varying.albedo.eval(point, nm), extinction)
             }
         };
-        (scattering, f64::from((rho * extinction).reduce_add() / rho.reduce_add()))
+        (scattering, f64::from((rho * density).reduce_add() / rho.reduce_add()))
     }
 
     /// Whether it is the same everywhere and scatters nothing.
     #[must_use]
     pub fn is_clear(&self) -> bool {
-        match &self.filling {
-            Filling::Even { scattering, .. } => scattering.is_black(),
-            Filling::EvenExtinction { scatters, .. } => !scatters,
-            Filling::Varying(_) => false,
-        }
+        !matches!(self.filling, Filling::Varying(_)) && !self.scatters()
     }
 
     /// What light keeps over `distance` in a medium that [is clear](Medium::is_clear): exp(−σ_a `distance`). None of another.

@@ -282,12 +282,21 @@ fn a_spectral_file_is_light_again() {
     }
 }
 
+/// The picture of a scene and its spectral file.
+fn with_spectral(text: &str) -> [ExrPart; 2] {
+    let place = TempDir::new().unwrap();
+    let path = |name: &str| place.path().join(name);
+    common::write(&path("s.yaml"), text.as_bytes());
+    let overrides = Overrides { output: Some(path("out.exr")), ..Overrides::default() };
+    let report = batch::render_batch(&path("s.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+    assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+    ["out.exr", "out.spectral.exr"].map(|name| read_exr(&path(name)).unwrap().parts.remove(0))
+}
+
 /// Bands of the picture and of the spectral file have their standard errors beside them, as data; a picture without a wish for them
 /// has none. Both say how much of them pixels share, by which `abbe compare` judges the bands.
 #[test]
 fn bands_stand_beside_their_standard_errors() {
-    let place = TempDir::new().unwrap();
-    let path = |name: &str| place.path().join(name);
     let parts = |exr: &str| {
         let text = format!(
             "camera: {{origin: [0, 1, 5], target: [0, 1, 0], fov_deg: 40}}\n\
@@ -295,11 +304,7 @@ fn bands_stand_beside_their_standard_errors() {
              render: {{samples: 8, techniques: {{reuse: on}}}}\noutput: {{exr: {{{exr}}}, spectral: {{bands: 1}}}}\n\
              shapes: [{{plane: {{normal: [0, 1, 0]}}}}, {{sphere: {{center: [0, 4, 0], radius: 1, emission: 5}}}}]\n"
         );
-        common::write(&path("s.yaml"), text.as_bytes());
-        let overrides = Overrides { output: Some(path("out.exr")), ..Overrides::default() };
-        let report = batch::render_batch(&path("s.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
-        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
-        ["out.exr", "out.spectral.exr"].map(|name| read_exr(&path(name)).unwrap().parts.remove(0))
+        with_spectral(&text)
     };
     let names = |part: &ExrPart| part.channels.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     let [picture, spectral] = parts("precision: float, stderr: true");
@@ -329,19 +334,13 @@ fn bands_stand_beside_their_standard_errors() {
 /// can, of a cell the number of its pixels, of which this picture has 24.
 #[test]
 fn bands_that_do_not_know_their_errors_may_share_all_of_them() {
-    let place = TempDir::new().unwrap();
-    let path = |name: &str| place.path().join(name);
     let shared = |reuse: &str| {
         let text = format!(
             "camera: {{origin: [0, 1, 5], target: [0, 1, 0], fov_deg: 40}}\nimage: {{width: 6, height: 4}}\n\
              render: {{samples: 8, techniques: {{reuse: {reuse}}}}}\noutput: {{spectral: {{bands: 1}}}}\n\
              shapes: [{{plane: {{normal: [0, 1, 0]}}}}, {{sphere: {{center: [0, 4, 0], radius: 1, emission: 5}}}}]\n"
         );
-        common::write(&path("s.yaml"), text.as_bytes());
-        let overrides = Overrides { output: Some(path("out.exr")), ..Overrides::default() };
-        let report = batch::render_batch(&path("s.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
-        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
-        read_exr(&path("out.spectral.exr")).unwrap().parts[0].text("abbe/sharedErrors").map(str::to_owned)
+        with_spectral(&text)[1].text("abbe/sharedErrors").map(str::to_owned)
     };
     assert_eq!((shared("on").as_deref(), shared("off")), (Some("24.000"), None));
 }

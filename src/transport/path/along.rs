@@ -33,11 +33,7 @@ pub(super) struct Along<'a> {
 impl Tracer<'_> {
     /// Whether light is looked for along the way of the path through `medium`.
     pub(super) fn looks_along(&self, path: &Path, medium: &Medium) -> bool {
-        self.plan.equiangular
-            && medium.shadow_rays
-            && medium.scatters()
-            && self.settings.light_samples > 0
-            && !self.is_last(path)
+        self.plan.equiangular && medium.asks_lights() && self.settings.light_samples > 0 && !self.is_last(path)
     }
 
     /// The way of `path` through `medium` to a surface at `distance`.

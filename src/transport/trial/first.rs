@@ -1,7 +1,7 @@
 //! What the first vertices of paths do: whether they share what paths find, and how many shadow rays they send; and whether
 //! any vertex sends some to light that is even over all directions.
 
-use super::{MOST, STREAM, Tried, decided, judge, variance};
+use super::{MOST, STREAM, Tried, cost_of_error, decided, judge, variance};
 use crate::film::accumulate::REPLICATES;
 use crate::math::sampler::{PARTS, Sampler, Set, pairs};
 use crate::scene::Scene;
@@ -54,6 +54,8 @@ struct Way {
     shadow_rays: u32,
     /// Variance times cost.
     cost: f64,
+    /// The same where it has been rendered with so many, and is not worked out.
+    tried: Option<f64>,
     /// That over what it is with one shadow ray; where one is best, what the best of several would have. Not a number where that is not known.
     ratio: f64,
     /// Whether vertices of different pixels saw each other.
@@ -88,9 +90,9 @@ fn several_ways(settings: &PathSettings) -> bool {
 pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wishes: Wishes) -> Option<First> {
     let Shot { scene, plan, seed, .. } = *shot;
     let Integrator::Path(settings) = &plan.integrator else { return None };
-    let try_out = |asks_even_sky, reuse, shadow_rays| {
+    let try_out = |asks_even_sky, reuse, shadow_rays, equiangular| {
         let layers = LayerPlan::default();
-        let plan = EffectPlan { reuse, shadow_rays, asks_even_sky, layers, ..plan.clone() };
+        let plan = EffectPlan { reuse, shadow_rays, asks_even_sky, equiangular, layers, ..plan.clone() };
         try_groups(&Shot { plan: &plan, seed: seed ^ STREAM, ..*shot }, samples)
     };
     let single = single(census, settings);
@@ -98,7 +100,7 @@ pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wis
     let way = |sky: bool, reuse: bool| {
         // Where the sky is the only light, nobody is asked.
         let fixed = if scene.asked(sky).is_nobody() { Some(1) } else { fixed };
-        Way::find(fixed, reuse, |shadow_rays| try_out(sky, reuse, shadow_rays))
+        Way::find(fixed, reuse, |shadow_rays| try_out(sky, reuse, shadow_rays, false))
     };
     let obstacle = reuse::obstacle(scene, census, plan, moments.len());
     let wish = obstacle.map_or_else(|| decided(wishes.reuse), |_| Some(false));
@@ -110,7 +112,7 @@ pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wis
     let best = |sky: bool| match (wish, fixed, sky_wish) {
         // What is settled needs no trial.
         (Some(reuse), Some(shadow_rays), Some(_)) => {
-            (reuse, settled.to_owned(), Way { shadow_rays, cost: f64::NAN, ratio: f64::NAN, meets: true })
+            (reuse, settled.to_owned(), Way { shadow_rays, cost: f64::NAN, tried: None, ratio: f64::NAN, meets: true })
         }
         (Some(reuse), ..) => (reuse, settled.to_owned(), way(sky, reuse)),
         (None, ..) => {
@@ -151,25 +153,20 @@ pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wis
     };
     said.push(Effect { name: "paths shared by pixels".into(), on: reuse, reason: why });
     said.push(Effect { name: rays, on: count > 1, reason: of_rays });
-    let equiangular = along(scene, wishes.equiangular, |equiangular| {
-        let layers = LayerPlan::default();
-        let plan = EffectPlan { reuse, shadow_rays: count, asks_even_sky, equiangular, layers, ..plan.clone() };
-        let tried = try_groups(&Shot { plan: &plan, seed: seed ^ STREAM, ..*shot }, samples);
-        variance(&tried) * tried.rays
+    let along = along(scene, wishes.equiangular, |equiangular| match way.tried {
+        Some(cost) if !equiangular => cost,
+        _ => cost_of_error(&try_out(asks_even_sky, reuse, count, equiangular)),
     });
-    let equiangular = equiangular.is_some_and(|effect| {
-        said.push(effect.clone());
-        effect.on
-    });
+    let equiangular = along.as_ref().is_some_and(|effect| effect.on);
+    said.extend(along);
     Some(First { reuse, shadow_rays: count, asks_even_sky, equiangular, said })
 }
 
 /// Whether distances in media are drawn toward lamps without extent; nothing where there are no such lamps or media. `cost` is
 /// variance times cost with it and without.
 fn along(scene: &Scene, wish: Use, cost: impl Fn(bool) -> f64) -> Option<Effect> {
-    let looks = |medium: &Medium| medium.scatters() && medium.shadow_rays;
     let lamps = scene.lights.iter().filter(|light| light.position().is_some()).count();
-    if lamps == 0 || !scene.media.iter().any(looks) {
+    if lamps == 0 || !scene.media.iter().any(Medium::asks_lights) {
         return None;
     }
     let (on, reason) = match decided(wish) {
@@ -186,14 +183,14 @@ impl Way {
     fn find(fixed: Option<u32>, reuse: bool, try_out: impl Fn(u32) -> Tried) -> Way {
         let one = try_out(fixed.unwrap_or(1));
         let meets = one.pairs > 0;
-        let way = |shadow_rays, cost, ratio| Way { shadow_rays, cost, ratio, meets };
         let variance_of_one = variance(&one);
         let cost = variance_of_one * one.rays;
+        let way = |shadow_rays, ratio| Way { shadow_rays, cost, tried: Some(cost), ratio, meets };
         if let Some(shadow_rays) = fixed {
-            return way(shadow_rays, cost, f64::NAN);
+            return way(shadow_rays, f64::NAN);
         }
         if variance_of_one.is_nan() || variance_of_one <= 0.0 || reuse && !meets {
-            return way(1, cost, f64::NAN);
+            return way(1, f64::NAN);
         }
         let several = try_out(PROBED);
         // V = a + b n^-1.5 and C = c + d (n − 1) of n rays, over those of one ray: what evenly spread rays find at the edge of a
@@ -205,8 +202,8 @@ impl Way {
         let best = counts().skip(1).min_by(|a, b| ratio(*a).total_cmp(&ratio(*b))).unwrap_or(1);
         let least = ratio(best);
         match judge(least, WORTH_IT).0 {
-            true => way(best, cost * least, least),
-            false => way(1, cost, least),
+            true => Way { cost: cost * least, tried: None, ..way(best, least) },
+            false => way(1, least),
         }
     }
 }
