@@ -119,24 +119,33 @@ impl EnvironmentLight {
     /// Map to world: turns and mirrors only.
     #[must_use]
     pub fn world_from_map(&self) -> DMat3 {
-        let turn = DMat4::from_rotation_y(self.rotate_deg.to_radians());
-        let steps = self.transform.iter().filter(|step| !matches!(step, TransformStep::Translate(_)));
-        let linear = DMat3::from_mat4(steps.fold(turn, |before, step| step.matrix() * before));
-        linear * (1.0 / libm::cbrt(linear.determinant().abs()))
+        sphere_transform(self.rotate_deg, &self.transform)
     }
 
     pub(crate) fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         Spectrum::Number(self.scale).check(Role::Emission, at.key("scale"), checker);
-        let at = at.key("transform");
-        let before = checker.count();
-        for (i, step) in self.transform.iter().enumerate() {
-            step.check_in_list(at.index(i), checker);
-        }
-        if checker.count() == before {
-            let map = self.world_from_map();
-            let round = map.is_finite() && is_similarity(map);
-            checker.require(round, at, "turns, mirrors and even scaling", "a transform that stretches or shears");
-        }
+        check_sphere(&self.transform, at.key("transform"), checker);
+    }
+}
+
+/// What `steps` do, after a turn about y, to a sphere of directions: its size and place do not matter.
+pub(crate) fn sphere_transform(rotate_deg: f64, steps: &[TransformStep]) -> DMat3 {
+    let turn = DMat4::from_rotation_y(rotate_deg.to_radians());
+    let steps = steps.iter().filter(|step| !matches!(step, TransformStep::Translate(_)));
+    let linear = DMat3::from_mat4(steps.fold(turn, |before, step| step.matrix() * before));
+    linear * (1.0 / libm::cbrt(linear.determinant().abs()))
+}
+
+/// That a sphere of directions stays one.
+pub(crate) fn check_sphere(steps: &[TransformStep], at: At<'_>, checker: &mut Checker<'_>) {
+    let before = checker.count();
+    for (i, step) in steps.iter().enumerate() {
+        step.check_in_list(at.index(i), checker);
+    }
+    if checker.count() == before {
+        let map = sphere_transform(0.0, steps);
+        let round = map.is_finite() && is_similarity(map);
+        checker.require(round, at, "turns, mirrors and even scaling", "a transform that stretches or shears");
     }
 }
 

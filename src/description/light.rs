@@ -7,6 +7,7 @@ use super::emitter::{EnvironmentLight, Growth, ProjectorLight, check_weight};
 use super::fault::Checker;
 use super::material::given_fields;
 use super::path::At;
+use super::sky::SkyLight;
 use super::spectrum::{Role, Spectrum, Vec3, one};
 use super::transform::parallel;
 use crate::error::in_short;
@@ -25,6 +26,8 @@ pub enum Light {
     Constant(ConstantLight),
     /// From all directions, by an image.
     Environment(EnvironmentLight),
+    /// A clear sky with its sun.
+    Sky(Box<SkyLight>),
     /// A picture thrown from a point.
     Projector(ProjectorLight),
 }
@@ -251,6 +254,12 @@ impl TryFrom<WrittenFog> for Fog {
 }
 
 impl Light {
+    /// Whether it comes from all around, and is seen where nothing else is.
+    #[must_use]
+    pub fn is_around(&self) -> bool {
+        matches!(self, Light::Constant(_) | Light::Environment(_) | Light::Sky(_))
+    }
+
     /// The key under which the light is written.
     #[must_use]
     pub fn kind(&self) -> &'static str {
@@ -260,6 +269,7 @@ impl Light {
             Light::Directional(_) => "directional",
             Light::Constant(_) => "constant",
             Light::Environment(_) => "environment",
+            Light::Sky(_) => "sky",
             Light::Projector(_) => "projector",
         }
     }
@@ -273,6 +283,7 @@ impl Light {
             Light::Directional(light) => light.name.as_deref(),
             Light::Constant(light) => light.name.as_deref(),
             Light::Environment(light) => light.name.as_deref(),
+            Light::Sky(light) => light.name.as_deref(),
             Light::Projector(light) => light.name.as_deref(),
         }
     }
@@ -292,6 +303,7 @@ impl Light {
             Light::Directional(l) => l.sampling_weight,
             Light::Constant(l) => l.sampling_weight,
             Light::Environment(l) => l.sampling_weight,
+            Light::Sky(l) => l.sampling_weight,
             Light::Projector(l) => l.sampling_weight,
         }
     }
@@ -340,6 +352,7 @@ impl Light {
             }
             Light::Constant(constant) => constant.radiance.check(Role::Emission, at.key("radiance"), checker),
             Light::Environment(environment) => environment.check(at, checker),
+            Light::Sky(sky) => sky.check(at, checker),
             Light::Projector(projector) => projector.check(at, checker),
         }
     }

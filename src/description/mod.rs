@@ -294,6 +294,17 @@
 //! - environment: {file: sky.exr, scale: 1, rotate_deg: 0, mapping: texels, transform: [{scale: [-1, 1, 1]}]}
 //!                                   # ~ all but file; rotate_deg is about y; mapping: texels, mitsuba: where rows and
 //!                                   # columns lie; transform as of shapes: turns and mirrors
+//! - sky:                            # a clear day, in W·m⁻²·sr⁻¹·nm⁻¹: zenith +y, north -z, east +x
+//!     sun: {elevation_deg: 40, azimuth_deg: 120}   # ~ azimuth_deg: 0, from north toward east; or
+//!                                   # direction: [1, 2, 3], toward it in the world; or latitude_deg, longitude_deg and,
+//!                                   # with defaults, utc_offset, year, month, day, hour: where it stands there
+//!     turbidity: 3                  # ~ 1 to 10
+//!     albedo: 0.3                   # ~ of the ground
+//!     sky_scale: 1                  # ~
+//!     sun_scale: 1                  # ~ two lights, one without sun and one without sky, have layers of their own
+//!     sun_angle_deg: 0.5358         # ~ a wider disc gives the same light
+//!     limb_darkening: false         # ~
+//!     transform: []                 # ~ as of an environment
 //! - projector:
 //!     origin: [0, 2, 0]
 //!     target: [0, 2, -1]
@@ -474,6 +485,7 @@ mod print;
 mod scene;
 mod settings;
 mod shape;
+mod sky;
 mod spectrum;
 mod texture;
 mod transform;
@@ -520,6 +532,7 @@ pub use shape::{
     Caps, Cone, Cube, CurveBasis, Curves, Cylinder, Disk, Geometry, Instance, Layout, Mesh, Normals, Plane, Rectangle,
     SdfGrid, SdfNormals, Shape, Sphere, Winding,
 };
+pub use sky::{SkyLight, Sun, SunPlace};
 pub use spectrum::{
     Abbe, Blackbody, Cauchy, FilePath, Illuminant, Index, Line, NumberedFormula, Scaled, Sellmeier, Spectrum,
     SpectrumOrTexture, Vec3,

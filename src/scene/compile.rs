@@ -320,7 +320,7 @@ impl<'a> Compiler<'a> {
             all_asked,
             uneven_asked,
             light_exponent: 0,
-            has_sky: d.lights.iter().any(|l| matches!(l, written::Light::Constant(_) | written::Light::Environment(_))),
+            has_sky: d.lights.iter().any(written::Light::is_around),
             dark,
             light_groups: lights::groups(d, &light_names),
             wavelengths,

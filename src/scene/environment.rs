@@ -8,6 +8,7 @@ mod table;
 
 use super::bands::{self, Bands};
 use super::bvh::prefetch;
+use super::daylight::Daylight;
 use super::texture::{Texel, spread};
 use crate::math::elementary::atan2;
 use crate::math::sampler::{GOLDEN, Octet};
@@ -50,7 +51,12 @@ pub struct Environment {
     all: OnceLock<Table>,
     /// Measured spectra in place of the texels' own, which then say how bright they are.
     bands: Option<Bands>,
+    /// A sky by formulas in place of the texels, which then say how bright it is without its sun.
+    day: Option<Box<Daylight>>,
 }
+
+/// Texels of a sky by formulas: a degree and a half.
+const DAY: [usize; 2] = [256, 128];
 
 /// Which directions are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -174,6 +180,7 @@ impl Environment {
             brighter,
             all,
             bands: None,
+            day: None,
         }
     }
 
@@ -195,6 +202,48 @@ impl Environment {
         let grey: Vec<[f32; 3]> = bands.means().into_iter().map(|x| [x; 3]).collect();
         let map = Environment::new(&grey, [width, height], scale, mapping, world_from_map, Carried::Spectra);
         Ok(Environment { bands: Some(bands.scaled(scale as f32)), ..map })
+    }
+
+    /// The light of a day. Its own frame is that of a map: +y up, and the middle column along −z.
+    #[must_use]
+    pub fn of_day(day: Daylight, world_from_map: DMat3) -> Environment {
+        let [width, height] = DAY;
+        let white = illuminant::d65().luminance();
+        let pixel = |i: usize| {
+            let at = DVec2::new((i % width) as f64 + 0.5, (i / width) as f64 + 0.5);
+            let direction = direction_of(at / DVec2::new(width as f64, height as f64), 0.5).0;
+            [(day.sky_luminance(direction) / white) as f32; 3]
+        };
+        let sky: Vec<[f32; 3]> = (0..width * height).into_par_iter().map(pixel).collect();
+        let map = Environment::new(&sky, DAY, 1.0, Mapping::Texels, world_from_map, Carried::Spectra);
+        let sun = day.sun_power() / (4.0 * PI);
+        Environment {
+            mean_luminance: map.mean_luminance + sun,
+            brighter_luminance: map.brighter_luminance + sun,
+            brighter: Table::of_each(&map.texels, width, map.brighter.floor),
+            all: Table::of_each(&map.texels, width, 0.0).into(),
+            day: Some(Box::new(day)),
+            ..map
+        }
+    }
+
+    /// Toward the middle of the sun that stands in a sky by formulas, and its irradiance across that.
+    #[must_use]
+    pub fn sun(&self, nm: Lanes) -> Option<(DVec3, Lanes)> {
+        let (direction, irradiance) = self.day.as_ref()?.sun(nm)?;
+        Some((self.world_from_map * direction, irradiance))
+    }
+
+    /// The share of a day's light that is the sun's, of which as many directions are drawn.
+    fn sun_share(&self, drawn: Drawn) -> f64 {
+        let all = match drawn {
+            Drawn::All => self.mean_luminance,
+            Drawn::Brighter => self.brighter_luminance,
+        };
+        match &self.day {
+            Some(day) if all > 0.0 => (day.sun_power() / (4.0 * PI * all)).min(1.0),
+            _ => 0.0,
+        }
     }
 
     /// The direction in which `other`, turned otherwise, shows what this map shows in `direction`.
@@ -238,12 +287,18 @@ impl Environment {
     /// Radiance from `direction` (pointing away from the viewer).
     #[must_use]
     pub fn radiance(&self, direction: DVec3, nm: Lanes) -> Lanes {
+        if let Some(day) = &self.day {
+            return day.radiance(self.world_from_map.transpose() * direction, nm);
+        }
         self.light(&self.corners(self.place(direction).at), nm)
     }
 
     /// Radiance from where `sample` points.
     #[must_use]
     pub fn radiance_of(&self, sample: &EnvironmentSample, nm: Lanes) -> Lanes {
+        if self.day.is_some() {
+            return self.radiance(sample.direction, nm);
+        }
         self.light(&self.corners(sample.at), nm)
     }
 
@@ -274,6 +329,20 @@ impl Environment {
     /// A direction by brightness; `None` for a black map.
     #[must_use]
     pub fn sample(&self, u: DVec2, drawn: Drawn) -> Option<EnvironmentSample> {
+        let Some(day) = &self.day else { return self.sample_texels(u, drawn) };
+        let share = self.sun_share(drawn);
+        let direction = if u.x < share {
+            self.world_from_map * day.sample_sun(DVec2::new(u.x / share, u.y))
+        } else {
+            self.sample_texels(DVec2::new((u.x - share) / (1.0 - share), u.y), drawn)?.direction
+        };
+        let place = self.place(direction);
+        let pdf_solid_angle = self.density(&place, &self.corners(place.at), drawn, direction);
+        (pdf_solid_angle > 0.0).then_some(EnvironmentSample { direction, pdf_solid_angle, at: place.at })
+    }
+
+    /// The same of the texels alone.
+    fn sample_texels(&self, u: DVec2, drawn: Drawn) -> Option<EnvironmentSample> {
         let table = self.table(drawn);
         let (at, pdf, left_edge) = match &table.density {
             Density::Constant(table) => {
@@ -300,9 +369,7 @@ impl Environment {
                 (at, density[cell.row] * (left + (right - left) * x), 0.0)
             }
         };
-        let (sin_theta, cos_theta) = sin_cos_turn(0.5 * at.y);
-        let (sin_phi, cos_phi) = sin_cos_turn(if at.x < left_edge { at.x + 1.0 - left_edge } else { at.x - left_edge });
-        let d = DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi);
+        let (d, sin_theta) = direction_of(at, left_edge);
         let pdf_solid_angle = pdf / (2.0 * PI * PI * sin_theta);
         (sin_theta > 0.0 && pdf > 0.0).then(|| EnvironmentSample {
             direction: self.world_from_map * d,
@@ -345,17 +412,29 @@ impl Environment {
     pub fn radiance_and_pdf(&self, direction: DVec3, drawn: Drawn, nm: Lanes) -> (Lanes, f64) {
         let place = self.place(direction);
         let corners = self.corners(place.at);
-        (self.light(&corners, nm), self.density(&place, &corners, drawn))
+        let light = if self.day.is_some() { self.radiance(direction, nm) } else { self.light(&corners, nm) };
+        (light, self.density(&place, &corners, drawn, direction))
     }
 
     /// Density of [`Environment::sample`] at `direction`, sr⁻¹.
     #[must_use]
     pub fn pdf(&self, direction: DVec3, drawn: Drawn) -> f64 {
         let place = self.place(direction);
-        self.density(&place, &self.corners(place.at), drawn)
+        self.density(&place, &self.corners(place.at), drawn, direction)
     }
 
-    fn density(&self, place: &Place, corners: &Corners, drawn: Drawn) -> f64 {
+    fn density(&self, place: &Place, corners: &Corners, drawn: Drawn, direction: DVec3) -> f64 {
+        let of_texels = self.density_of_texels(place, corners, drawn);
+        match &self.day {
+            None => of_texels,
+            Some(day) => {
+                let share = self.sun_share(drawn);
+                share * day.sun_pdf(self.world_from_map.transpose() * direction) + (1.0 - share) * of_texels
+            }
+        }
+    }
+
+    fn density_of_texels(&self, place: &Place, corners: &Corners, drawn: Drawn) -> f64 {
         if place.sin_theta <= 0.0 {
             return 0.0;
         }
@@ -389,6 +468,10 @@ impl Environment {
         let place = |i: usize| DVec2::new((i as f64 + 0.5) / DRAWS as f64, ((i as f64 + 0.5) * GOLDEN).fract());
         let draws = (0..DRAWS).filter_map(|i| self.sample(place(i), Drawn::All));
         let share = |sample: EnvironmentSample| {
+            if let Some(day) = &self.day {
+                let spectrum = day.spectrum(self.world_from_map.transpose() * sample.direction);
+                return (1.0 / (4.0 * PI * sample.pdf_solid_angle * DRAWS as f64), spectrum);
+            }
             let corners = self.corners(sample.at);
             let nearest = usize::from(corners.x > 0.5) + 2 * usize::from(corners.y > 0.5);
             let spectrum = match &self.bands {
@@ -409,9 +492,24 @@ impl Environment {
         if let Some(bands) = &self.bands {
             return bands.representatives();
         }
+        if let Some(day) = &self.day {
+            let sky = spread(self.texels.len(), 16).map(|i| {
+                let at = DVec2::new((i % self.width) as f64 + 0.5, (i / self.width) as f64 + 0.5);
+                day.spectrum(direction_of(at / DVec2::new(self.width as f64, self.height as f64), 0.5).0)
+            });
+            return sky.chain([day.sun_spectrum()]).collect();
+        }
         let texels = spread(self.texels.len(), 16).map(|i| &self.texels[i]);
         texels.map(|t| Spectrum::Sigmoid { c: t.coefficients, scale: t.scale }.times(&self.illuminant)).collect()
     }
+}
+
+/// The direction in a map's frame of a place on it, in turns and half turns, and its sine to the axis; the edge at `left` looks
+/// along −z.
+fn direction_of(at: DVec2, left: f64) -> (DVec3, f64) {
+    let (sin_theta, cos_theta) = sin_cos_turn(0.5 * at.y);
+    let (sin_phi, cos_phi) = sin_cos_turn(if at.x < left { at.x + 1.0 - left } else { at.x - left });
+    (DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi), sin_theta)
 }
 
 /// Texels of light: a colour, and twice the greatest channel.

@@ -19,6 +19,7 @@ pub mod choice;
 pub mod compile;
 pub mod compound;
 pub mod curves;
+pub mod daylight;
 pub mod emission;
 pub mod environment;
 pub mod equiangular;

@@ -268,6 +268,11 @@ impl Tracer<'_> {
 
     /// Direction, irradiance across it, distance and primitive of a light, as a single point.
     fn toward(&self, light: &Light, from: DVec3) -> Option<(DVec3, Lanes, f64, Option<Departure>)> {
+        if let Light::Environment(map) = light
+            && let Some((wi, irradiance)) = map.sun(self.nm)
+        {
+            return Some((wi, irradiance, f64::INFINITY, None));
+        }
         if light.is_environment() {
             return None;
         }

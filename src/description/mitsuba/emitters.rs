@@ -4,14 +4,18 @@ use glam::{DMat3, DMat4, DVec3};
 
 use super::super::fault::Fault;
 use super::super::node::{Node, quote};
+use super::super::sky::SunPlace;
 use super::super::transform::{is_mirror, is_similarity};
 use super::object::{Bag, Family};
 use super::parse::ABOUT_ONE;
 use super::sensors::field_of_view;
 use super::spectra::{Role, not_negative};
-use super::{DAYLIGHT, Fields, Import, entry, list, matrix, named, number, numbers, text};
+use super::{DAYLIGHT, Fields, Import, SKY_FROM_MITSUBA, boolean, entry, list, matrix, named, number, numbers, text};
 
-const EMITTERS: [&str; 6] = ["point", "constant", "envmap", "spot", "directional", "projector"];
+const EMITTERS: [&str; 7] = ["point", "constant", "envmap", "spot", "directional", "projector", "sunsky"];
+
+/// Emitters that are all around, of which a scene has one.
+pub(super) const AROUND: [&str; 3] = ["constant", "envmap", "sunsky"];
 
 /// Emitters that are a part of a shape.
 const SHINING: [&str; 2] = ["area", "directionalarea"];
@@ -38,6 +42,7 @@ impl Import<'_> {
             "spot" => self.spot(&bag, &mut fields)?,
             "directional" => self.directional(&bag, &mut fields)?,
             "projector" => self.projector(&bag, &mut fields)?,
+            "sunsky" => self.sunsky(&bag, &mut fields)?,
             // It stands here for a <ref> of that shape.
             _ if self.shining.contains(&index) => return Ok(()),
             _ if SHINING.contains(&plugin) => return Err(bag.fault("expected a <shape> around it, found it alone")),
@@ -164,6 +169,85 @@ impl Import<'_> {
         fields.add("irradiance", irradiance);
         Ok("directional")
     }
+
+    fn sunsky(&mut self, bag: &Bag<'_>, fields: &mut Fields) -> Result<&'static str, Fault> {
+        let to_world = bag.transform("to_world")?.unwrap_or(DMat4::IDENTITY);
+        let linear = DMat3::from_mat4(to_world);
+        keeps_lengths(bag, to_world)?;
+        let given = PLACE_AND_TIME.into_iter().find(|name| bag.has(name));
+        let direction = match (bag.vector("sun_direction")?, given) {
+            (Some(_), Some(given)) => {
+                let message = format!("expected either sun_direction or place and time, found both (also {given})");
+                return Err(bag.fault_of("sun_direction", message));
+            }
+            (Some(direction), None) => DVec3::from(direction),
+            (None, _) => linear * sun_by_place(bag)?,
+        };
+        let place = bag.place(given.unwrap_or("sun_direction"));
+        if direction.try_normalize().is_none() {
+            return Err(bag.fault_of("sun_direction", "expected a vector with a direction, found one of length zero"));
+        }
+        let toward = entry(place, "direction", numbers(place, &direction.to_array()));
+        fields.add("sun", toward);
+        for (from, to, [least, most], what) in [
+            ("turbidity", "turbidity", [1.0, 10.0], "a number from 1 to 10"),
+            ("sky_scale", "sky_scale", [0.0, f64::INFINITY], "a number of 0 or more"),
+            ("sun_scale", "sun_scale", [0.0, f64::INFINITY], "a number of 0 or more"),
+            ("sun_aperture", "sun_angle_deg", [1e-4, 90.0], "an angle from 0.0001 to 90 degrees"),
+        ] {
+            if let Some(value) = bag.float(from)? {
+                if !(least..=most).contains(&value) {
+                    return Err(bag.fault_of(from, format!("expected {what}, found {value}")));
+                }
+                fields.add(to, number(bag.place(from), value));
+            }
+        }
+        if let Some(albedo) = self.spectrum(bag, "albedo", Role::Reflectance)? {
+            fields.add("albedo", albedo);
+        }
+        if let Some(complex) = bag.boolean("complex_sun")? {
+            fields.add("limb_darkening", boolean(bag.place("complex_sun"), complex));
+        }
+        let place = bag.place("to_world");
+        let frame = DMat4::from_mat3(linear * SKY_FROM_MITSUBA.transpose());
+        fields.add("transform", list(place, [entry(place, "matrix", matrix(place, frame))]));
+        Ok("sky")
+    }
+}
+
+/// What tells where the sun stands, besides its direction.
+const PLACE_AND_TIME: [&str; 9] =
+    ["latitude", "longitude", "timezone", "year", "month", "day", "hour", "minute", "second"];
+
+/// Toward the sun at a place and time, in Mitsuba's frame of the sky. There the sun of noon on the northern half of the Earth
+/// stands at +x and that of the morning at −y.
+fn sun_by_place(bag: &Bag<'_>) -> Result<DVec3, Fault> {
+    let whole = |name: &'static str, or: u32, most: u32| -> Result<u32, Fault> {
+        let Some(value) = bag.integer(name)? else { return Ok(or) };
+        match u32::try_from(value).ok().filter(|value| (1..=most).contains(value)) {
+            Some(value) => Ok(value),
+            None => Err(bag.fault_of(name, format!("expected a whole number from 1 to {most}, found {value}"))),
+        }
+    };
+    let real = |name: &'static str, or: f64, most: f64| -> Result<f64, Fault> {
+        let value = bag.float(name)?.unwrap_or(or);
+        match value.abs() <= most {
+            true => Ok(value),
+            false => Err(bag.fault_of(name, format!("expected a number from -{most} to {most}, found {value}"))),
+        }
+    };
+    let place = SunPlace {
+        latitude_deg: real("latitude", 35.6894, 90.0)?,
+        longitude_deg: real("longitude", 139.6917, 360.0)?,
+        utc_offset: real("timezone", 9.0, 24.0)?,
+        year: whole("year", 2010, 2100)?,
+        month: whole("month", 7, 12)?,
+        day: whole("day", 10, 31)?,
+        hour: real("hour", 15.0, 1e6)? + (real("minute", 0.0, 1e6)? + real("second", 0.0, 1e6)? / 60.0) / 60.0,
+    };
+    let [elevation, azimuth] = place.angles();
+    let ((up, level), (sin, cos)) = (libm::sincos(elevation), libm::sincos(azimuth));
+    Ok(DVec3::new(-level * cos, -level * sin, up))
 }
 
 fn envmap(bag: &Bag<'_>, fields: &mut Fields) -> Result<&'static str, Fault> {
@@ -262,6 +346,42 @@ mod tests {
         let Light::Projector(projector) = &scene.lights[1] else { panic!("a projector") };
         assert_eq!((projector.up, projector.v, projector.fov_deg), ([0.0, 1.0, 0.0], Growth::Down, 30.0));
         assert_eq!((projector.origin, projector.target), ([1.0, 2.0, 3.0], [1.0, 2.0, 4.0]));
+    }
+
+    /// Where Mitsuba 3.9.1 has the sun (`sun_direction` of its `sunsky`), in f32, whose hours since 2000 are 1e5 with steps of
+    /// 0.008: some 0.1 degrees.
+    #[test]
+    fn the_sun_stands_where_mitsuba_has_it() {
+        let sun = |fields: &str| {
+            let scene = good(&format!("<emitter type=\"sunsky\">{fields}</emitter>"));
+            let Light::Sky(sky) = &scene.lights[0] else { panic!("a sky") };
+            let world_from_sky = sky.world_from_sky();
+            assert!((world_from_sky * DVec3::Y - DVec3::Z).length() < 1e-15);
+            world_from_sky * sky.sun.in_sky(world_from_sky)
+        };
+        let near = |found: DVec3, x: f64, y: f64, z: f64| {
+            assert!((found - DVec3::new(x, y, z)).length() < 2e-3, "{found}");
+        };
+        near(sun(""), 0.0513854, 0.691748, 0.720308);
+        let fields = [("latitude", 51.5), ("longitude", -0.1), ("timezone", 1.0), ("hour", 9.0), ("minute", 30.0)];
+        let fields = fields.map(|(name, x)| format!("<float name=\"{name}\" value=\"{x}\"/>")).concat();
+        let date = [("year", 2003), ("month", 2), ("day", 28)];
+        let date = date.map(|(name, x)| format!("<integer name=\"{name}\" value=\"{x}\"/>")).concat();
+        near(sun(&(fields + &date + "<float name=\"second\" value=\"15\"/>")), 0.524434, -0.817841, 0.236864);
+    }
+
+    #[test]
+    fn a_sun_is_told_once_and_within_its_limits() {
+        let told = |fields: &str| fault(&format!("<emitter type=\"sunsky\">{fields}</emitter>"), &[]);
+        let direction = "<vector name=\"sun_direction\" value=\"0, 0, 1\"/>";
+        let both = told(&format!("{direction}<float name=\"hour\" value=\"3\"/>"));
+        assert!(both.ends_with("expected either sun_direction or place and time, found both (also hour)"), "{both}");
+        let hazy = told("<float name=\"turbidity\" value=\"11\"/>");
+        assert!(hazy.ends_with("expected a number from 1 to 10, found 11"), "{hazy}");
+        let month = told("<integer name=\"month\" value=\"13\"/>");
+        assert!(month.ends_with("expected a whole number from 1 to 12, found 13"), "{month}");
+        let two = fault(&"<emitter type=\"sunsky\"/>".repeat(2), &[]);
+        assert!(two.ends_with("expected one environment, found another"), "{two}");
     }
 
     /// What grows to the left with +y up grows to the right in a mirror, and with -y up; a scale leaves the directions of a spot.

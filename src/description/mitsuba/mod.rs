@@ -37,7 +37,7 @@ mod xml;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use glam::DMat4;
+use glam::{DMat3, DMat4, DVec3};
 
 use super::edit::Setting;
 use super::fault::Fault;
@@ -54,6 +54,9 @@ const FILM: f64 = 106.856_914_916_767 / 106.750_259_399_414_06;
 /// What Mitsuba's D65 of scale 1 is of ours. Ours has luminance 1. Theirs has 0.999894136 on their film:
 /// the integral of its table, divided by 98.997417518762 there, against ȳ over 106.7502594.
 const DAYLIGHT: f64 = 0.999_894_136 / FILM;
+
+/// Turns Mitsuba's frame of a sky, +z up and +x where the sun of noon stands, into ours, +y up and that at −z.
+const SKY_FROM_MITSUBA: DMat3 = DMat3::from_cols(DVec3::NEG_Z, DVec3::NEG_X, DVec3::Y);
 
 /// Parameters of a scene that are about the structures in which Mitsuba looks for surfaces.
 const SEARCH: [&str; 12] = [
@@ -190,7 +193,7 @@ impl<'a> Import<'a> {
             self.shape(shape)?;
         }
         let emitters = root.objects(Family::Emitter);
-        let around = |index: &&usize| ["constant", "envmap"].contains(&self.bag(**index).object.plugin.as_str());
+        let around = |index: &&usize| emitters::AROUND.contains(&self.bag(**index).object.plugin.as_str());
         if let Some(second) = emitters.iter().filter(around).nth(1) {
             return Err(self.bag(*second).fault("expected one environment, found another"));
         }

@@ -1,6 +1,7 @@
 //! Lights, and how often each is looked for.
 
 use super::super::bands::{self, Bands};
+use super::super::daylight::{Conditions, Daylight};
 use super::super::environment::{Environment, Mapping};
 use super::super::light::{Light, Slide};
 use super::super::projector::Projector;
@@ -9,7 +10,7 @@ use super::super::texture::Texture;
 use super::super::{Geometry, LightGroups, load};
 use super::{Compiler, vec3};
 use crate::description as written;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_short};
 use crate::scene::camera::{self, Camera};
 use crate::spectrum::illuminant;
 use glam::DVec2;
@@ -136,6 +137,27 @@ impl<'a> Compiler<'a> {
                 let (map, note) = map.map_err(|e| self.asked(&format!("{at}.file"), e))?;
                 note.iter().for_each(|note| self.note(&format!("{at}.file"), note));
                 Light::Environment(map)
+            }
+            written::Light::Sky(l) => {
+                let world_from_sky = l.world_from_sky();
+                let sun = l.sun.in_sky(world_from_sky);
+                if sun.y < 0.0 {
+                    let below = -libm::atan2(sun.y, sun.x.hypot(sun.z)).to_degrees();
+                    self.note(
+                        &format!("{at}.sun"),
+                        &format!("{} degrees below the horizon: it is dark", in_short(below)),
+                    );
+                }
+                let day = Daylight::new(&Conditions {
+                    sun,
+                    turbidity: l.turbidity,
+                    albedo: self.reflectance(&format!("{at}.albedo"), &l.albedo),
+                    sky_scale: l.sky_scale,
+                    sun_scale: l.sun_scale,
+                    sun_half_angle: 0.5 * l.sun_angle_deg.to_radians(),
+                    limb_darkening: l.limb_darkening,
+                });
+                Light::Environment(Arc::new(Environment::of_day(day, world_from_sky)))
             }
             written::Light::Projector(l) => return Ok(self.projector(at, l)),
         }))

@@ -43,6 +43,16 @@ impl Table {
         };
         Table { floor, density }
     }
+
+    /// Of texels that tell of a light that is not mixed of them: each stands for itself.
+    pub(super) fn of_each(texels: &[Texel], width: usize, floor: f64) -> Table {
+        let height = texels.len() / width;
+        let weight = |(i, texel): (usize, &Texel)| {
+            texel.above(floor) * libm::sin(PI * ((i / width) as f64 + 0.5) / height as f64)
+        };
+        let weights: Vec<f64> = texels.iter().enumerate().map(weight).collect();
+        Table { floor, density: Density::Constant(PiecewiseConstant2d::new(&weights, width, height)) }
+    }
 }
 
 impl Density {

@@ -1,6 +1,6 @@
 //! Lights.
 
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 
 use super::super::super::camera::FovAxis;
 use super::super::super::emitter::{EmissionDirection, EnvironmentMapping, Growth};
@@ -12,13 +12,12 @@ use super::super::super::transform::{matrix_of, rotation};
 use super::spectra::Role;
 use super::textures::Stands;
 use super::xml::numbers;
-use super::{DAYLIGHT, Export, joined};
+use super::{DAYLIGHT, Export, SKY_FROM_MITSUBA, joined};
 
 impl Export<'_> {
     /// A light of the scene's list.
     pub(super) fn light(&mut self, i: usize, light: &Light) {
-        let around = |light: &Light| matches!(light, Light::Constant(_) | Light::Environment(_));
-        if around(light) && self.scene.lights[..i].iter().any(around) {
+        if light.is_around() && self.scene.lights[..i].iter().any(Light::is_around) {
             self.instead("emitter", &format!("lights[{i}]"), "nothing: Mitsuba has one environment");
             self.end();
             return;
@@ -33,6 +32,7 @@ impl Export<'_> {
             Light::Constant(l) => Export::light_shortfall(&l.radiance),
             Light::Environment(l) => (l.mapping != EnvironmentMapping::Mitsuba)
                 .then(|| "the same image on Mitsuba's grid, shifted by half a row toward the poles".to_owned()),
+            Light::Sky(l) => Export::reflectance_shortfall(&[&l.albedo], "a grey ground").map(str::to_owned),
             Light::Projector(l) => self.shining_shortfall(&l.irradiance, stands(l.v)),
         };
         if let Some(why) = &why {
@@ -88,6 +88,19 @@ impl Export<'_> {
                 // Its left edge, where ours has the middle, looks along -z.
                 let turn = if l.mapping == EnvironmentMapping::Mitsuba { 0.0 } else { 180.0 };
                 self.placing(matrix_of(&l.transform) * rotation(DVec3::Y, l.rotate_deg + turn));
+            }
+            Light::Sky(l) => {
+                self.xml.open("emitter", &open("sunsky"));
+                let world_from_sky = l.world_from_sky();
+                let sun = world_from_sky * l.sun.in_sky(world_from_sky);
+                self.xml.value("vector", "sun_direction", numbers(&sun.to_array()));
+                self.xml.value("float", "turbidity", l.turbidity);
+                self.spectrum("albedo", &l.albedo, Role::Reflectance);
+                self.xml.value("float", "sky_scale", l.sky_scale);
+                self.xml.value("float", "sun_scale", l.sun_scale);
+                self.xml.value("float", "sun_aperture", l.sun_angle_deg);
+                self.xml.value("boolean", "complex_sun", l.limb_darkening);
+                self.placing(DMat4::from_mat3(world_from_sky * SKY_FROM_MITSUBA));
             }
             Light::Projector(l) => {
                 self.xml.open("emitter", &open("projector"));

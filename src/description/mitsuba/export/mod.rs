@@ -40,7 +40,7 @@ use super::super::path::{self, Segment, field};
 use super::super::print::{Printer, relative};
 use super::super::scene::SceneDescription;
 use super::super::settings::{Coverage, Integrator, Technique};
-use super::{DAYLIGHT, FILM};
+use super::{DAYLIGHT, FILM, SKY_FROM_MITSUBA};
 use spectra::can_be_band;
 use xml::Xml;
 
@@ -202,9 +202,8 @@ impl<'a> Export<'a> {
             }
             _ => return,
         };
-        let around = |light: &Light| matches!(light, Light::Constant(_) | Light::Environment(_));
-        let delta = |light: &Light| !around(light);
-        if !path.opaque_sky && !path.hide_emitters && self.scene.lights.iter().any(around) {
+        let delta = |light: &Light| !light.is_around();
+        if !path.opaque_sky && !path.hide_emitters && self.scene.lights.iter().any(Light::is_around) {
             self.lose("integrator.path.opaque_sky", "an alpha of 1 where light from infinity is seen");
         }
         if path.coverage == Coverage::Surfaces && shapes().any(|shape| self.is_pane(&shape.material)) {
