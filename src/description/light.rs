@@ -155,6 +155,9 @@ pub struct DirectionalLight {
     pub direction: Vec3,
     /// On a surface that faces it, W·m⁻²·nm⁻¹.
     pub irradiance: Spectrum,
+    /// Angle of the disc that it comes from, degrees; default 0, all of it parallel. A disc is seen where nothing else is.
+    #[serde(default)]
+    pub angle_deg: f64,
     /// How often the light is chosen, relative to its power; default 1. At 0 it is only seen, and lights what
     /// scattering happens to find it from.
     #[serde(default = "one")]
@@ -349,6 +352,10 @@ impl Light {
             Light::Directional(directional) => {
                 checker.direction(at.key("direction"), directional.direction);
                 directional.irradiance.check(Role::Emission, at.key("irradiance"), checker);
+                let angle = directional.angle_deg;
+                // Smaller ones end in what f64 tells apart.
+                let within = angle == 0.0 || (1e-4..=180.0).contains(&angle);
+                checker.require(within, at.key("angle_deg"), "0, or an angle from 0.0001 to 180 degrees", angle);
             }
             Light::Constant(constant) => constant.radiance.check(Role::Emission, at.key("radiance"), checker),
             Light::Environment(environment) => environment.check(at, checker),
@@ -431,6 +438,10 @@ mod tests {
             light("directional: {direction: [0, 0, 0], irradiance: -1}"),
             "dir/s.yaml:3:28: lights[0].directional.direction: expected a vector with a direction, found [0, 0, 0]\n\
              dir/s.yaml:3:51: lights[0].directional.irradiance: expected a number of 0 or more, found -1"
+        );
+        assert_eq!(
+            light("directional: {direction: [0, -1, 0], irradiance: 1, angle_deg: 181}"),
+            "dir/s.yaml:3:66: lights[0].directional.angle_deg: expected 0, or an angle from 0.0001 to 180 degrees, found 181"
         );
         assert_eq!(
             light("environment: {file: sky.exr, scale: -1}"),

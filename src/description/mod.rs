@@ -289,7 +289,7 @@
 //!     texture: earth                # ~ none; multiplies the intensity, over the square around the edge of the light
 //!     up: [0, 0, 1]                 # ~ [0, 1, 0]: of the texture
 //!     v: up                         # ~ up, down: which way the texture's v grows
-//! - directional: {direction: [0, -1, 0], irradiance: 3}                # W·m⁻²·nm⁻¹
+//! - directional: {direction: [0, -1, 0], irradiance: 3, angle_deg: 0}  # W·m⁻²·nm⁻¹; ~ angle_deg: of the disc it comes from
 //! - constant: {radiance: 0.1}                                          # W·m⁻²·sr⁻¹·nm⁻¹
 //! - environment: {file: sky.exr, scale: 1, rotate_deg: 0, mapping: texels, transform: [{scale: [-1, 1, 1]}]}
 //!                                   # ~ all but file; rotate_deg is about y; mapping: texels, mitsuba: where rows and

@@ -12,7 +12,7 @@ use crate::math::frame::Frame;
 use crate::math::warp::{self, one_minus_cos};
 use crate::spectrum::{LANES, Lanes, Outside, Spectrum};
 use glam::{DVec2, DVec3};
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::LazyLock;
 
 /// Wavelengths of the fits.
@@ -35,7 +35,7 @@ const POWERS: usize = 4;
 const LIMB: usize = 6;
 
 /// Half the angle of the sun's disc for which the fits are made, radians.
-const SUN_HALF_ANGLE: f64 = 0.5 * 0.5358 * std::f64::consts::PI / 180.0;
+const SUN_HALF_ANGLE: f64 = 0.5 * 0.5358 * PI / 180.0;
 
 static DATA: LazyLock<Vec<f32>> = LazyLock::new(|| {
     let bytes = include_bytes!("daylight/hosek_wilkie.f32");
@@ -89,9 +89,11 @@ struct Dome {
 struct Disc {
     half_angle: f64,
     /// Mean radiance over the disc.
-    mean: Bands,
+    mean: Spectrum,
     /// What its radiance is made of, where it is not even.
     limb: Option<Box<Limb>>,
+    /// Whether it is hidden where it hangs below the horizon.
+    sets: bool,
 }
 
 /// The radiance of a place of the disc.
@@ -116,10 +118,26 @@ impl Daylight {
             let scale = sun_scale * solid(SUN_HALF_ANGLE) / solid(*sun_half_angle);
             let limb = Limb::new(*turbidity, scale);
             // Over the disc as it is: a wider one gives the same light.
-            let mean = limb.mean(*sun);
-            Disc { half_angle: *sun_half_angle, mean, limb: limb_darkening.then(|| Box::new(limb)) }
+            let mean = spectrum_of(&limb.mean(*sun));
+            let limb = limb_darkening.then(|| Box::new(limb));
+            Disc { half_angle: *sun_half_angle, mean, limb, sets: true }
         });
         Daylight { sun: *sun, sky, disc }
+    }
+
+    /// Light from a disc alone, `toward` which is a unit vector, of `half_angle` in radians, up to π/2. A surface that faces
+    /// its middle has the `irradiance`.
+    #[must_use]
+    pub fn of_disc(toward: DVec3, half_angle: f64, irradiance: &Spectrum) -> Daylight {
+        let disc = Disc { half_angle, mean: Spectrum::constant(1.0), limb: None, sets: false };
+        let mean = irradiance.scaled(1.0 / disc.facing());
+        Daylight { sun: toward, sky: None, disc: Some(Disc { mean, ..disc }) }
+    }
+
+    /// Whether there is light beside the disc.
+    #[must_use]
+    pub fn has_sky(&self) -> bool {
+        self.sky.is_some()
     }
 
     /// Radiance from `direction`.
@@ -127,30 +145,29 @@ impl Daylight {
     pub fn radiance(&self, direction: DVec3, nm: Lanes) -> Lanes {
         let mut light =
             self.sky.as_ref().map_or(Lanes::ZERO, |sky| at_wavelengths(&sky.bands(self.sun, direction), nm));
-        if let Some((disc, edge)) = self.of_disc(direction) {
-            // Each is linear between the bands, not their product.
-            light += at_wavelengths(&disc, nm) * edge.map_or(Lanes::ONE, |edge| at_wavelengths(&edge, nm));
+        if let Some(disc) = self.disc.as_ref().filter(|disc| disc.shows(self.sun, direction)) {
+            light += match &disc.limb {
+                None => disc.mean.eval(nm),
+                // Each is linear between the bands, not their product.
+                Some(limb) => {
+                    let [middle, edge] = limb.bands(self.sun, direction, disc.half_angle);
+                    at_wavelengths(&middle, nm) * at_wavelengths(&edge, nm)
+                }
+            };
         }
         light
     }
 
-    /// The spectrum from `direction`.
+    /// The spectrum from `direction`, without the sun.
     #[must_use]
-    pub fn spectrum(&self, direction: DVec3) -> Spectrum {
-        let mut sum = self.sky.as_ref().map_or([0.0; 2 * LANES], |sky| sky.bands(self.sun, direction));
-        if let Some((disc, edge)) = self.of_disc(direction) {
-            let edge = edge.unwrap_or([1.0; 2 * LANES]);
-            for (sum, (disc, edge)) in sum.iter_mut().zip(disc.into_iter().zip(edge)) {
-                *sum += disc * edge;
-            }
-        }
-        spectrum_of(&sum)
+    pub fn sky_spectrum(&self, direction: DVec3) -> Spectrum {
+        self.sky.as_ref().map_or(Spectrum::constant(0.0), |sky| spectrum_of(&sky.bands(self.sun, direction)))
     }
 
-    /// The spectrum of the sun, as a mean over its disc; zero without it.
+    /// The sun's, as a mean over its disc, and the solid angle of that.
     #[must_use]
-    pub fn sun_spectrum(&self) -> Spectrum {
-        self.disc.as_ref().map_or(Spectrum::constant(0.0), |disc| spectrum_of(&disc.mean))
+    pub fn sun_spectrum(&self) -> Option<(Spectrum, f64)> {
+        self.disc.as_ref().map(|disc| (disc.mean.clone(), disc.solid_angle()))
     }
 
     /// Luminance of the sky from `direction`, without the sun, film units.
@@ -163,13 +180,13 @@ impl Daylight {
     #[must_use]
     pub fn sun(&self, nm: Lanes) -> Option<(DVec3, Lanes)> {
         let disc = self.disc.as_ref()?;
-        Some((self.sun, at_wavelengths(&disc.mean, nm) * disc.solid_angle() as f32))
+        Some((self.sun, disc.mean.eval(nm) * disc.facing() as f32))
     }
 
     /// Luminance of the sun times the solid angle of its disc.
     #[must_use]
     pub fn sun_power(&self) -> f64 {
-        self.disc.as_ref().map_or(0.0, |disc| luminance(&disc.mean) * disc.solid_angle())
+        self.disc.as_ref().map_or(0.0, |disc| disc.mean.luminance() * disc.solid_angle())
     }
 
     /// A direction toward the sun.
@@ -183,21 +200,9 @@ impl Daylight {
     #[must_use]
     pub fn sun_pdf(&self, direction: DVec3) -> f64 {
         match &self.disc {
-            Some(disc) if disc.shows(self.sun, direction) => 1.0 / disc.solid_angle(),
+            Some(disc) if disc.holds(self.sun, direction) => 1.0 / disc.solid_angle(),
             _ => 0.0,
         }
-    }
-
-    /// What the sun shows in `direction`, and what is left of that toward its edge.
-    fn of_disc(&self, direction: DVec3) -> Option<(Bands, Option<Bands>)> {
-        let disc = self.disc.as_ref().filter(|disc| direction.y >= 0.0 && disc.shows(self.sun, direction))?;
-        Some(match &disc.limb {
-            None => (disc.mean, None),
-            Some(limb) => {
-                let [middle, edge] = limb.bands(self.sun, direction, disc.half_angle);
-                (middle, Some(edge))
-            }
-        })
     }
 }
 
@@ -262,9 +267,19 @@ impl Disc {
         TAU * one_minus_cos(self.half_angle)
     }
 
+    /// What a surface that faces it has of light of radiance one.
+    fn facing(&self) -> f64 {
+        PI * libm::sin(self.half_angle).powi(2)
+    }
+
     /// Whether `direction` points at the disc about `sun`: by the chord, whose square keeps small angles.
-    fn shows(&self, sun: DVec3, direction: DVec3) -> bool {
+    fn holds(&self, sun: DVec3, direction: DVec3) -> bool {
         (direction - sun).length_squared() <= 2.0 * one_minus_cos(self.half_angle)
+    }
+
+    /// Whether it is seen there.
+    fn shows(&self, sun: DVec3, direction: DVec3) -> bool {
+        self.holds(sun, direction) && !(self.sets && direction.y < 0.0)
     }
 }
 

@@ -204,10 +204,10 @@ impl Environment {
         Ok(Environment { bands: Some(bands.scaled(scale as f32)), ..map })
     }
 
-    /// The light of a day. Its own frame is that of a map: +y up, and the middle column along −z.
+    /// The light of a day, or of a disc alone. Its own frame is that of a map: +y up, and the middle column along −z.
     #[must_use]
     pub fn of_day(day: Daylight, world_from_map: DMat3) -> Environment {
-        let [width, height] = DAY;
+        let [width, height] = if day.has_sky() { DAY } else { [2, 2] };
         let white = illuminant::d65().luminance();
         let pixel = |i: usize| {
             let at = DVec2::new((i % width) as f64 + 0.5, (i / width) as f64 + 0.5);
@@ -215,7 +215,7 @@ impl Environment {
             [(day.sky_luminance(direction) / white) as f32; 3]
         };
         let sky: Vec<[f32; 3]> = (0..width * height).into_par_iter().map(pixel).collect();
-        let map = Environment::new(&sky, DAY, 1.0, Mapping::Texels, world_from_map, Carried::Spectra);
+        let map = Environment::new(&sky, [width, height], 1.0, Mapping::Texels, world_from_map, Carried::Spectra);
         let sun = day.sun_power() / (4.0 * PI);
         Environment {
             mean_luminance: map.mean_luminance + sun,
@@ -466,12 +466,15 @@ impl Environment {
     pub fn shares(&self) -> Vec<(f64, Spectrum)> {
         const DRAWS: usize = 1024;
         let place = |i: usize| DVec2::new((i as f64 + 0.5) / DRAWS as f64, ((i as f64 + 0.5) * GOLDEN).fract());
-        let draws = (0..DRAWS).filter_map(|i| self.sample(place(i), Drawn::All));
+        let draws = (0..DRAWS).filter_map(|i| self.sample_texels(place(i), Drawn::All));
+        if let Some(day) = &self.day {
+            let sky = draws.map(|sample| {
+                let spectrum = day.sky_spectrum(self.world_from_map.transpose() * sample.direction);
+                (1.0 / (4.0 * PI * sample.pdf_solid_angle * DRAWS as f64), spectrum)
+            });
+            return sky.chain(day.sun_spectrum().map(|(sun, angle)| (angle / (4.0 * PI), sun))).collect();
+        }
         let share = |sample: EnvironmentSample| {
-            if let Some(day) = &self.day {
-                let spectrum = day.spectrum(self.world_from_map.transpose() * sample.direction);
-                return (1.0 / (4.0 * PI * sample.pdf_solid_angle * DRAWS as f64), spectrum);
-            }
             let corners = self.corners(sample.at);
             let nearest = usize::from(corners.x > 0.5) + 2 * usize::from(corners.y > 0.5);
             let spectrum = match &self.bands {
@@ -495,9 +498,9 @@ impl Environment {
         if let Some(day) = &self.day {
             let sky = spread(self.texels.len(), 16).map(|i| {
                 let at = DVec2::new((i % self.width) as f64 + 0.5, (i / self.width) as f64 + 0.5);
-                day.spectrum(direction_of(at / DVec2::new(self.width as f64, self.height as f64), 0.5).0)
+                day.sky_spectrum(direction_of(at / DVec2::new(self.width as f64, self.height as f64), 0.5).0)
             });
-            return sky.chain([day.sun_spectrum()]).collect();
+            return sky.chain(day.sun_spectrum().map(|(sun, _)| sun)).collect();
         }
         let texels = spread(self.texels.len(), 16).map(|i| &self.texels[i]);
         texels.map(|t| Spectrum::Sigmoid { c: t.coefficients, scale: t.scale }.times(&self.illuminant)).collect()

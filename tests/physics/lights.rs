@@ -64,6 +64,31 @@ fn the_sun_lights_a_floor_by_the_cosine() {
     }
 }
 
+/// Of a disc wholly above the horizon the irradiance of a tilted surface is E cos θ of its middle, whatever its width: ∫ ω dω
+/// over a cone lies along its axis. Behind a wall that hides the half of it that is farther from the zenith, with its edge
+/// through the middle, half is left but for the cosine: of a disc at the zenith exactly half.
+#[test]
+fn a_wide_sun_lights_a_floor_by_the_cosine_and_has_half_shadows() {
+    let found = |sun: &str, shapes: &str| {
+        let scene = floor("path", sun, shapes);
+        scene.estimate_of(&ray(v(0.0, 1.0, 3.0), v(0.0, 0.0, 0.0)), 1 << 15, |light, _| {
+            f64::from(light.radiance.reduce_add()) / LANES as f64
+        })
+    };
+    for (elevation, angle) in [(90.0f64, 0.5), (40.0, 30.0), (60.0, 1e-3)] {
+        let (sin, cos) = elevation.to_radians().sin_cos();
+        let sun = format!("[{{directional: {{direction: [{cos}, -{sin}, 0], irradiance: 3, angle_deg: {angle}}}}}]");
+        let light = found(&sun, "");
+        let expected = 0.6 / PI * 3.0 * sin;
+        assert!((light.mean - expected).abs() < 4.0 * light.error + 1e-6, "{elevation}: {} {expected}", light.mean);
+        assert!(light.error < 0.01 * expected);
+    }
+    let sun = "[{directional: {direction: [0, -1, 0], irradiance: 3, angle_deg: 2}}]";
+    let roof = "- rectangle: {corner: [0, 2, -5], edge_u: [5, 0, 0], edge_v: [0, 0, 10], material: {diffuse: {reflectance: 0}}}";
+    let half = found(sun, roof);
+    assert!((half.mean - 0.3 / PI * 3.0).abs() < 4.0 * half.error, "{}", half.mean);
+}
+
 /// E = ∫ L cos θ dω over the sky, by the midpoint rule over bands of equal solid angle, and that of the sun. The rule of 256 by 512
 /// misses what a smooth sky turns within a step, 1e-4; the estimate is within four standard errors. `whitted` has the sun alone.
 #[test]

@@ -13,7 +13,7 @@ use crate::description as written;
 use crate::error::{Error, Result, in_short};
 use crate::scene::camera::{self, Camera};
 use crate::spectrum::illuminant;
-use glam::DVec2;
+use glam::{DMat3, DVec2};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -107,7 +107,13 @@ impl<'a> Compiler<'a> {
                     return Ok(None);
                 };
                 let irradiance = self.light_spectrum(&format!("{at}.irradiance"), &l.irradiance);
-                Light::Directional { direction, irradiance }
+                match l.angle_deg > 0.0 {
+                    false => Light::Directional { direction, irradiance },
+                    true => {
+                        let disc = Daylight::of_disc(-direction, 0.5 * l.angle_deg.to_radians(), &irradiance);
+                        Light::Environment(Arc::new(Environment::of_day(disc, DMat3::IDENTITY)))
+                    }
+                }
             }
             written::Light::Constant(l) => {
                 Light::Constant { radiance: self.light_spectrum(&format!("{at}.radiance"), &l.radiance) }

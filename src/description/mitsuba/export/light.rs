@@ -28,7 +28,10 @@ impl Export<'_> {
                 let slide = l.texture.as_ref().and_then(|texture| self.pictures_shortfall(texture, stands(l.v)));
                 joined([Export::light_shortfall(&l.intensity), slide])
             }
-            Light::Directional(l) => Export::light_shortfall(&l.irradiance),
+            Light::Directional(l) => {
+                let parallel = (l.angle_deg > 0.0).then(|| "parallel light".to_owned());
+                joined([Export::light_shortfall(&l.irradiance), parallel])
+            }
             Light::Constant(l) => Export::light_shortfall(&l.radiance),
             Light::Environment(l) => (l.mapping != EnvironmentMapping::Mitsuba)
                 .then(|| "the same image on Mitsuba's grid, shifted by half a row toward the poles".to_owned()),

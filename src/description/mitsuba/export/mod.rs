@@ -202,7 +202,10 @@ impl<'a> Export<'a> {
             }
             _ => return,
         };
-        let delta = |light: &Light| !light.is_around();
+        let delta = |light: &Light| match light {
+            Light::Directional(l) => l.angle_deg == 0.0,
+            _ => !light.is_around(),
+        };
         if !path.opaque_sky && !path.hide_emitters && self.scene.lights.iter().any(Light::is_around) {
             self.lose("integrator.path.opaque_sky", "an alpha of 1 where light from infinity is seen");
         }
