@@ -307,9 +307,12 @@ impl Limb {
         let x = elevation - FRAC_PI_2 * (piece as f64 / PIECES as f64).powi(3);
         let sum = |powers: &[f32], x: f64| powers.iter().rev().fold(0.0, |sum, c| sum * x + f64::from(*c));
         let mut all = [[0.0; 2 * LANES]; 2];
-        for band in 0..BANDS {
-            all[0][band] = (self.scale * sum(&self.pieces[piece][band], x)).max(0.0) as f32;
-            all[1][band] = sum(&self.edge[band], cos).max(0.0) as f32;
+        let [middle, edge] = &mut all;
+        for (middle, powers) in middle.iter_mut().zip(&self.pieces[piece]) {
+            *middle = (self.scale * sum(powers, x)).max(0.0) as f32;
+        }
+        for (edge, powers) in edge.iter_mut().zip(&self.edge) {
+            *edge = sum(powers, cos).max(0.0) as f32;
         }
         all
     }

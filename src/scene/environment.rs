@@ -53,6 +53,8 @@ pub struct Environment {
     bands: Option<Bands>,
     /// A sky by formulas in place of the texels, which then say how bright it is without its sun.
     day: Option<Box<Daylight>>,
+    /// The share of its light that is the sun's, of all and of what is brighter than the mean.
+    sun_shares: [f64; 2],
 }
 
 /// Texels of a sky by formulas: a degree and a half.
@@ -181,6 +183,7 @@ impl Environment {
             all,
             bands: None,
             day: None,
+            sun_shares: [0.0; 2],
         }
     }
 
@@ -217,9 +220,11 @@ impl Environment {
         let sky: Vec<[f32; 3]> = (0..width * height).into_par_iter().map(pixel).collect();
         let map = Environment::new(&sky, [width, height], 1.0, Mapping::Texels, world_from_map, Carried::Spectra);
         let sun = day.sun_power() / (4.0 * PI);
+        let luminances = [map.mean_luminance + sun, map.brighter_luminance + sun];
         Environment {
-            mean_luminance: map.mean_luminance + sun,
-            brighter_luminance: map.brighter_luminance + sun,
+            mean_luminance: luminances[0],
+            brighter_luminance: luminances[1],
+            sun_shares: luminances.map(|all| if all > 0.0 { (sun / all).min(1.0) } else { 0.0 }),
             brighter: Table::of_each(&map.texels, width, map.brighter.floor),
             all: Table::of_each(&map.texels, width, 0.0).into(),
             day: Some(Box::new(day)),
@@ -234,15 +239,11 @@ impl Environment {
         Some((self.world_from_map * direction, irradiance))
     }
 
-    /// The share of a day's light that is the sun's, of which as many directions are drawn.
+    /// How many of a day's directions are drawn toward its sun.
     fn sun_share(&self, drawn: Drawn) -> f64 {
-        let all = match drawn {
-            Drawn::All => self.mean_luminance,
-            Drawn::Brighter => self.brighter_luminance,
-        };
-        match &self.day {
-            Some(day) if all > 0.0 => (day.sun_power() / (4.0 * PI * all)).min(1.0),
-            _ => 0.0,
+        match drawn {
+            Drawn::All => self.sun_shares[0],
+            Drawn::Brighter => self.sun_shares[1],
         }
     }
 
