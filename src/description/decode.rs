@@ -36,10 +36,7 @@ pub(crate) fn decode<T: DeserializeOwned>(node: &Node, sources: &Sources) -> Res
 /// For `deserialize_with`: a whole number that is to lie from `LEAST` to `MOST`, as is told of what is no `u32`. Of the others
 /// [`Checker::whole_between`](super::fault::Checker::whole_between) tells it, together with all other faults.
 pub(crate) fn whole<'de, D: Deserializer<'de>, const LEAST: u32, const MOST: u32>(de: D) -> Result<u32, D::Error> {
-    de.deserialize_u32(Whole(match MOST {
-        u32::MAX => format!("a whole number of {LEAST} or more"),
-        _ => format!("a whole number from {LEAST} to {MOST}"),
-    }))
+    de.deserialize_u32(Whole(format!("a whole number from {LEAST} to {MOST}")))
 }
 
 /// [`whole`] of a field that need not be there, with `serde(default)`.
@@ -508,7 +505,11 @@ mod tests {
             ),
             (
                 "integrator: {path: {max_depth: -1}}",
-                "2:32: integrator.path.max_depth: expected a whole number of 1 or more, found -1",
+                "2:32: integrator.path.max_depth: expected a whole number from 1 to 4294967295, found -1",
+            ),
+            (
+                "integrator: {path: {max_depth: 4294967296}}",
+                "2:32: integrator.path.max_depth: expected a whole number from 1 to 4294967295, found 4294967296",
             ),
             ("image: {crop: {x: -1}}", "2:19: image.crop.x: expected a whole number from 0 to 65535, found -1"),
             (

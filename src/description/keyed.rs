@@ -618,7 +618,7 @@ mod tests {
         assert_eq!(path.max_depth, Some(3));
         assert_eq!(
             scene(&[("s.yaml", &text(1))]).unwrap_err(),
-            "DIR/s.yaml:3:36: integrator.path.max_depth: expected a whole number of 1 or more, found 2.5"
+            "DIR/s.yaml:3:36: integrator.path.max_depth: expected a whole number from 1 to 4294967295, found 2.5"
         );
     }
 }
