@@ -284,7 +284,7 @@ impl Time {
     #[must_use]
     pub fn duration(&self) -> Option<Duration> {
         match self {
-            Time::Number(seconds) => Duration::try_from_secs_f64(*seconds).ok(),
+            Time::Number(seconds) => of_seconds(*seconds),
             Time::Name(text) => duration(text),
         }
     }
@@ -300,8 +300,14 @@ pub fn duration(text: &str) -> Option<Duration> {
         Some((at, 'h')) => (&text[..at], 3600.0),
         _ => (text, 1.0),
     };
-    let seconds: f64 = number.trim().parse().ok()?;
-    Duration::try_from_secs_f64(seconds * unit).ok()
+    let number: f64 = number.trim().parse().ok()?;
+    of_seconds(number * unit)
+}
+
+/// A time of `seconds`. 0 may mean never: what is greater is a nanosecond at the least.
+fn of_seconds(seconds: f64) -> Option<Duration> {
+    let time = Duration::try_from_secs_f64(seconds).ok()?;
+    Some(if seconds > 0.0 { time.max(Duration::from_nanos(1)) } else { time })
 }
 
 /// `techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, splatting: auto, shadow_rays: auto, even_sky: auto,
@@ -519,6 +525,12 @@ mod tests {
         let render = |text: &str| scene(&format!("render: {text}")).render;
         let stop = render("{stop: {time: 2m}}");
         assert_eq!(stop.stop.time.clone().unwrap().duration(), Some(Duration::from_secs(120)));
+        assert_eq!(duration("0"), Some(Duration::ZERO));
+        for least in ["1e-300", "1e-10s", "4e-10", "1e-300h"] {
+            assert_eq!(duration(least), Some(Duration::from_nanos(1)), "{least}");
+        }
+        let short = render("{stop: {time: 1.0e-300}}").stop;
+        assert_eq!(short.time.unwrap().duration(), Some(Duration::from_nanos(1)));
         assert_eq!((stop.most_samples(), render("{samples: 7}").most_samples()), (MOST_SAMPLES, 7));
         assert_eq!(render("{samples: 7, stop: {error: 0.1, samples: 9}}").most_samples(), 9);
     }
