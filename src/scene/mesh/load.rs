@@ -288,7 +288,10 @@ mod tests {
         let text = String::from_utf8(quad("ascii")).unwrap();
         for (from, to, expected) in [
             ("4 0 1 2 3", "4 0 1 2 9", "triangle 1 names vertex 9, but there are only 4 (counted from 0)"),
-            ("4 0 1 2 3", "4 0 1 2 -1", "names vertex 4294967295"),
+            ("4 0 1 2 3", "4 0 1 2 -1", "face 0: expected the number of a vertex, from 0, found -1"),
+            ("4 0 1 2 3", "4 0 1 1.5 3", "face 0: expected the number of a vertex, from 0, found 1.5"),
+            ("4 0 1 2 3", "4 0 nan 2 3", "face 0: expected the number of a vertex, from 0, found NaN"),
+            ("4 0 1 2 3", "4 4294967297 1 2 3", "face 0: expected the number of a vertex, from 0, found 4294967297"),
             ("4 0 1 2 3", "2 0 1", "face 0: expected 3 or more vertices, found 2"),
             ("1 1 0 1 1", "1 1e99 0 1 1", "vertex 2 is at [1, inf, 0]: expected finite numbers"),
             ("float x", "float q", "expected vertices with x, y and z"),

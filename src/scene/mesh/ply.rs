@@ -294,9 +294,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
                     if let Some(x) = uvs.iter().find(|x| !x.is_finite()) {
                         return Err(format!("face {i}: texcoord: expected finite numbers, found {x}"));
                     }
+                    // Text and types with a sign or fractions can say what is no number of a vertex.
+                    let is_number = |x: &f64| x.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(x);
+                    if let Some(x) = list.iter().find(|x| !is_number(x)) {
+                        return Err(format!("face {i}: expected the number of a vertex, from 0, found {x}"));
+                    }
                     let uv = |k: usize| uvs.get(2 * k..2 * k + 2).map_or(DVec2::ZERO, DVec2::from_slice);
-                    // An index that is none becomes one that no file has vertices for: casts saturate.
-                    let corner = |k: usize| if list[k] < 0.0 { u32::MAX } else { list[k] as u32 };
+                    let corner = |k: usize| list[k] as u32;
                     if list.len() > 3 {
                         fans.push(out.triangles.len()..out.triangles.len() + list.len() - 2);
                     }
