@@ -470,6 +470,23 @@ fn coinciding_control_points_make_no_phantoms() {
     assert_eq!(point.closest(&Ray::new(DVec3::new(0.0, -1.0, 0.01), DVec3::Y), FAR), None);
 }
 
+/// A thousand points at one place after a thread: a thousand segments without any length, each of which was halved into 2,000
+/// parts by every ray near it (75 s for these rays).
+#[test]
+fn control_points_at_one_place_take_no_time() {
+    let start = std::time::Instant::now();
+    let mut control = vec![[0.0, 0.0, 0.0, 0.1], [1.0, 0.0, 0.0, 0.1], [2.0, 0.0, 0.0, 0.1], [3.0, 0.0, 0.0, 0.1]];
+    control.extend([[3.0, 0.0, 0.0, 2.0]; 1000]);
+    let all = curves(&control, Basis::BSpline);
+    for k in 0..100 {
+        // The circles lie across x, in which the thread goes from (0 + 4 + 2)/6 to 3.
+        let x = 0.5 + 0.04 * f64::from(k);
+        let ray = Ray::new(DVec3::new(x, -9.0, 0.05), DVec3::Y);
+        assert_eq!(all.any(&ray, FAR), x > 1.0 && x < 3.0, "{x}");
+    }
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+}
+
 #[test]
 fn too_few_points_are_refused_in_words() {
     let fault = |n: usize, basis| {

@@ -226,6 +226,10 @@ impl Tube {
         if x.low > r.high || -x.high > r.high || y.low > r.high || -y.high > r.high {
             return None;
         }
+        // Where four control points coincide no circle is orthogonal to the curve, and F is zero everywhere.
+        if self.slopes.iter().all(|slope| slope[..3] == [0.0; 3]) {
+            return None;
+        }
         let whole =
             Part { points, slopes: [0, 1, 2].map(|i: usize| space.vector(self.slopes[i])), from: 0.0, width: 1.0 };
         let mut search = Search { tube: self, whole, t_max, found: None, count: 0 };
