@@ -517,6 +517,9 @@ fn check_highlight(highlight: Option<Highlight>, at: At<'_>, checker: &mut Check
     if let Some(highlight) = highlight {
         let at = at.key("highlight");
         checker.not_negative(at.key("strength"), highlight.strength);
+        // A factor on light, and held as light is.
+        let held = highlight.strength <= f64::from(f32::MAX);
+        checker.require(held, at.key("strength"), "a number from 0 to 3.4e38", highlight.strength);
         checker.not_negative(at.key("exponent"), highlight.exponent);
     }
 }
@@ -549,6 +552,10 @@ mod tests {
         assert_eq!(
             a("diffuse: {reflectance: 2}"),
             "dir/s.yaml:3:30: materials.a.diffuse.reflectance: expected a number from 0 to 1, found 2"
+        );
+        assert_eq!(
+            a("diffuse: {highlight: {strength: 1.0e39}}"),
+            "dir/s.yaml:3:39: materials.a.diffuse.highlight.strength: expected a number from 0 to 3.4e38, found 1e39"
         );
         assert_eq!(
             a("diffuse: {highlight: {strength: -1, exponent: -2}}"),

@@ -426,7 +426,8 @@
 //!
 //! # Bounds
 //! Of fields whose bounds do not stand beside them above; `a` is any name. Roughness, thickness and sampling have theirs in every
-//! material. Coordinates and lengths reach 1e60, light 3.4e38; a black body has 50 to 1e12 K, a line a width of 0.01 nm or more.
+//! material. Coordinates and lengths reach 1e60, light and the strength of highlights 3.4e38; a black body has 50 to 1e12 K, a
+//! line a width of 0.01 nm or more.
 //! ```yaml
 //! # bounds
 //! camera.shutter.moments: [2, 256]

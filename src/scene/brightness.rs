@@ -3,6 +3,7 @@
 use super::Scene;
 use super::bvh::Aabb;
 use super::light::Light;
+use super::material::Material;
 use crate::math::sampler::GOLDEN;
 use crate::math::warp::{one_minus_cos, uniform_cone};
 use crate::math::{Frame, Ray};
@@ -25,9 +26,9 @@ const MOST: i32 = 20;
 
 impl Scene {
     /// The power of two by which a film divides the light of the scene, [`crate::film::accumulate::Film::exponent`]: 0 where
-    /// the brightest of what its lights, of [`Light::power`] `powers`, its fog and the `ambient` light of `whitted` show lies
-    /// between 2⁻²⁴ and 2²⁰. A darker scene is raised to one, with 2³⁸ left above; a brighter one lowered to 2²⁰, so that all of
-    /// 2⁻⁶⁰ of the brightest or more keeps its mantissa. `boxes` are those of the objects.
+    /// the brightest of what its lights, of [`Light::power`] `powers`, and its fog show, and in `whitted` highlights and the
+    /// `ambient` light, lies between 2⁻²⁴ and 2²⁰. A darker scene is raised to one, with 2³⁸ left above; a brighter one lowered
+    /// to 2²⁰, so that all of 2⁻⁶⁰ of the brightest or more keeps its mantissa. `boxes` are those of the objects.
     pub(super) fn film_exponent(&self, powers: &[f64], ambient: Option<f64>, boxes: &[Aabb]) -> i32 {
         let lamps = || self.lights.iter().zip(powers.iter().copied());
         let shown = lamps().filter_map(|(light, power)| match light {
@@ -48,7 +49,11 @@ impl Scene {
         cones.sort_by(|a, b| b.1.total_cmp(&a.1));
         let lit = cones.iter().take(ASKED).map(|(cone, power)| self.lit(cone, *power));
         let fog = self.fog.as_ref().map(|fog| fog.colour.luminance());
-        let brightness = shown.chain(lit).chain(fog).chain(ambient);
+        // Where a white wall shows 1/π of what arrives, a highlight shows its strength.
+        let strengths = self.materials.iter().flat_map(Material::leaves).filter_map(|m| Some(m.highlight?.strength));
+        let strongest = strengths.fold(0.0, f32::max);
+        let highlight = if ambient.is_some() { (PI * f64::from(strongest)).max(1.0) } else { 1.0 };
+        let brightness = shown.chain(lit).map(|b| b * highlight).chain(fog).chain(ambient);
         let brightest = brightness.filter(|b| b.is_finite()).fold(0.0, f64::max);
         if brightest < f64::MIN_POSITIVE {
             return 0;
@@ -173,5 +178,18 @@ mod tests {
         };
         assert!((29..=31).contains(&ambient(2f64.powi(50))), "{}", ambient(2f64.powi(50)));
         assert_eq!(ambient(0.5), 0);
+        // And so do its highlights, of 2⁵⁰ π/π where a white wall shows 1; of `path` there are none.
+        let highlight = |integrator: &str, strength: f64| {
+            let material = format!("{{mirror: {{highlight: {{strength: {strength:e}}}}}}}");
+            let lamp = format!("point: {{position: [0, 1, 0], intensity: {}}}", std::f64::consts::PI);
+            exponent(&format!(
+                "integrator: {integrator}\nlights: [{lamp}]\n\
+                 shapes: [plane: {{normal: [0, 1, 0], material: {{mask: {{opacity: 0.5, material: {material}}}}}}}]\n"
+            ))
+        };
+        let strength = 2f64.powi(50) / std::f64::consts::PI;
+        let found = highlight("whitted", strength);
+        assert!((29..=31).contains(&found), "{found}");
+        assert_eq!((highlight("path", strength), highlight("whitted", 50.0)), (0, 0));
     }
 }
