@@ -4,7 +4,8 @@
 mod common;
 
 use common::place::{Place, Ran, pixels};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 /// Pictures, parts and checkpoints of more than ten kilobytes.
 const SCENE: &str = "camera: {origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}\n\
@@ -78,6 +79,33 @@ fn a_checkpoint_for_which_there_is_no_room_costs_nothing() {
     let said: Vec<&str> = ran.out.lines().filter(|line| line.contains("no checkpoint")).collect();
     let is = |line: &str, event: &str| line.contains(&format!("\"event\":\"{event}\""));
     assert!(said.len() == 2 && is(said[0], "note") && is(said[1], "done"), "{}", ran.out);
+}
+
+/// Somebody tidies up while a picture or a part is rendered, before a checkpoint or where there is none: it is written all the same,
+/// and a note says where.
+#[test]
+fn a_directory_that_is_removed_while_a_picture_is_rendered_is_made_again() {
+    for (interval, part, name) in [
+        ("0.4s", &[][..], "scene.exr"),
+        ("0", &[], "scene.exr"),
+        ("0", &["--samples", "0-2047"], "scene.samples0-2047.exr"),
+    ] {
+        let place = Place::of(SCENE);
+        let long = ["render", "scene.yaml", "-o", "out/new", "--spp", "2048", "--checkpoint-interval", interval];
+        let mut command = Command::new(env!("CARGO_BIN_EXE_abbe"));
+        command.args(long).args(part).current_dir(place.directory.path()).stderr(Stdio::piped());
+        let child = command.stdout(Stdio::null()).spawn().unwrap();
+        while !place.path("out/new").exists() {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        // What is tried out there is over.
+        std::thread::sleep(Duration::from_millis(200));
+        std::fs::remove_dir_all(place.path("out")).unwrap();
+        let ended = child.wait_with_output().unwrap();
+        let told = String::from_utf8(ended.stderr).unwrap();
+        assert!(ended.status.success() && told.contains("out/new was removed meanwhile, and is made again"), "{told}");
+        assert!(place.names("out/new").contains(&name.to_owned()), "{:?}", place.names("out/new"));
+    }
 }
 
 #[test]

@@ -143,7 +143,21 @@ impl<'a> Keeper<'a> {
         Ok(std::mem::take(&mut lock(&self.notes)))
     }
 
+    /// Makes the directory of `file` again, where somebody removed it while the picture was rendered: that may have taken days.
+    ///
+    /// # Errors
+    /// As [`output::prepare_place`].
+    pub fn keep_place(&self, file: &Path) -> Result<()> {
+        let directory = output::directory_of(file);
+        if !directory.exists() {
+            output::prepare_place(file)?;
+            self.note(format!("{} was removed meanwhile, and is made again", directory.display()));
+        }
+        Ok(())
+    }
+
     fn write(&self, part: &Part, milestones: &[Milestone], elapsed: Duration) -> Result<()> {
+        self.keep_place(self.path)?;
         part_file::write(&place(self.path), self.identity, part, milestones, elapsed, self.numerics())
     }
 

@@ -240,6 +240,7 @@ fn render_and_write(
     if !portion.is_all() {
         report.measure_part(&begun, keeper.numerics());
         let written = Instant::now();
+        keeper.keep_place(&exr_path)?;
         part_file::write(&exr_path, &identity, &begun.part, &[], begun.elapsed, keeper.numerics())?;
         report.files = vec![exr_path.clone()];
         report.seconds.writing = written.elapsed().as_secs_f64();
@@ -253,6 +254,7 @@ fn render_and_write(
     report.measure(finish, &frame, keeper.numerics());
     report.forecast = Forecast::at_a_quarter(&frame.milestones, &prepared.stop, prepared.samples);
     let target = prepared.stop.check(&frame.milestones);
+    keeper.keep_place(&exr_path)?;
     let written = finish::write(finish, &frame, target, &exr_path, report);
     // What cannot be written can still be resumed.
     if report.files.is_empty() {
