@@ -81,8 +81,11 @@ fn start(bytes: &[u8], version: u16, index: u32) -> Result<usize, String> {
     let damaged = || "truncated: the table of meshes at the end is incomplete".to_owned();
     let (body, count) = bytes.split_last_chunk::<4>().ok_or_else(damaged)?;
     let count = u32::from_le_bytes(*count);
+    if count == 0 {
+        return Err("expected meshes, found a table of none at the end".into());
+    }
     if index >= count {
-        return Err(format!("expected a mesh from 0 to {}, found {index}", i64::from(count) - 1));
+        return Err(format!("expected a mesh from 0 to {}, found {index}", count - 1));
     }
     let size: usize = if version == 4 { 8 } else { 4 };
     let table = usize::try_from(count).ok().and_then(|n| body.len().checked_sub(n.checked_mul(size)?));
@@ -210,6 +213,8 @@ mod tests {
                     assert!(!with || mesh.uvs[2] == DVec2::new(0.25, 0.5));
                 }
                 assert_eq!(read(&bytes, 3).unwrap_err(), "expected a mesh from 0 to 2, found 3");
+                let none = [&bytes[..bytes.len() - 4], &[0; 4]].concat();
+                assert_eq!(read(&none, 3).unwrap_err(), "expected meshes, found a table of none at the end");
             }
         }
     }
