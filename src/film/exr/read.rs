@@ -290,6 +290,10 @@ fn words(e: ::exr::error::Error) -> String {
     match e {
         ::exr::error::Error::NotSupported(what) => format!("not supported: {what}"),
         ::exr::error::Error::Invalid(what) => format!("not a valid OpenEXR file: {what}"),
+        // Of a place to go on from that is beyond what a file can have.
+        ::exr::error::Error::Io(e) if e.kind() == std::io::ErrorKind::InvalidInput => {
+            "not a valid OpenEXR file: its table of chunks points beyond its end".to_owned()
+        }
         ::exr::error::Error::Io(e) => e.to_string(),
         ::exr::error::Error::Aborted => "reading was stopped".to_string(),
     }
@@ -306,6 +310,23 @@ mod tests {
         let path = dir.path().join("a.exr");
         std::fs::write(&path, bytes).unwrap();
         (dir, path)
+    }
+
+    /// The first chunk begins behind the table, which has one entry for each row of `zips`. A place of 2⁶⁴ − 1 was told as "Invalid
+    /// argument (os error 22)".
+    #[test]
+    fn a_table_of_chunks_that_points_nowhere_is_told_in_words() {
+        let image = image(0.5);
+        let beauty =
+            beauty(&image, Base::Rgba, Vec::new(), rec709(), Precision::Half, StandardError::Leave, Compression::Zips);
+        let mut bytes = encode_exr(&beauty.exr).unwrap();
+        let rows = image.window.height as usize;
+        let entry = |bytes: &[u8], at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        let table = (0..bytes.len() - 8).find(|&at| entry(&bytes, at) == (at + 8 * rows) as u64).unwrap();
+        bytes[table..table + 8].fill(0xff);
+        let (_dir, path) = file(&bytes);
+        let e = read_exr(&path).unwrap_err().to_string();
+        assert!(e.ends_with("not a valid OpenEXR file: its table of chunks points beyond its end"), "{e}");
     }
 
     #[test]
