@@ -9,7 +9,7 @@ use super::material::given_fields;
 use super::path::At;
 use super::sky::SkyLight;
 use super::spectrum::{Role, Spectrum, Vec3, one};
-use super::transform::parallel;
+use super::transform::{check_place, parallel};
 use crate::error::in_short;
 
 /// A light that is not a surface. Surfaces emit by their field `emission`.
@@ -315,15 +315,22 @@ impl Light {
         let at = at.key(self.kind());
         check_weight(self.sampling_weight(), at, checker);
         match self {
-            Light::Point(point) => point.intensity.check(Role::Emission, at.key("intensity"), checker),
+            Light::Point(point) => {
+                check_place(point.position, at.key("position"), checker);
+                point.intensity.check(Role::Emission, at.key("intensity"), checker);
+            }
             Light::Spot(spot) => {
+                check_place(spot.position, at.key("position"), checker);
                 match spot.aim {
-                    Aim::Target(target) => checker.require(
-                        target != spot.position,
-                        at.key("target"),
-                        "a point other than the position",
-                        format_args!("{target:?}"),
-                    ),
+                    Aim::Target(target) => {
+                        check_place(target, at.key("target"), checker);
+                        checker.require(
+                            target != spot.position,
+                            at.key("target"),
+                            "a point other than the position",
+                            format_args!("{target:?}"),
+                        );
+                    }
                     Aim::Direction(direction) => checker.direction(at.key("direction"), direction),
                 }
                 let cutoff = spot.cutoff_deg;
@@ -407,6 +414,19 @@ mod tests {
             spot(", direction: [0, 0, 0]"),
             "dir/s.yaml:3:56: lights[0].spot.direction: expected a vector with a direction, found [0, 0, 0]"
         );
+    }
+
+    #[test]
+    fn lamps_are_as_near_as_all_things() {
+        for (lamp, column) in [("point", 21), ("spot", 20)] {
+            let aim = if lamp == "spot" { ", target: [0, 0, 0]" } else { "" };
+            assert_eq!(
+                light(&format!("{lamp}: {{position: [0, 1.0e61, 0], intensity: 1{aim}}}")),
+                format!(
+                    "dir/s.yaml:3:{column}: lights[0].{lamp}.position: expected three numbers up to 1e60, found [0.0, 1e61, 0.0]"
+                )
+            );
+        }
     }
 
     #[test]

@@ -182,7 +182,15 @@ pub(crate) fn check_steps(steps: &[TransformStep], at: At<'_>, checker: &mut Che
         checker.fault(at, format!("expected a transform that can be inverted, found determinant {determinant}"));
         return None;
     }
+    let place = matrix.w_axis.truncate().abs().max_element();
+    checker.require(place <= *LENGTHS.end(), at, "a transform to places up to 1e60", in_short(place));
     Some(linear)
+}
+
+/// Whether `point` is as near as all lengths are.
+pub(crate) fn check_place(point: Vec3, at: At<'_>, checker: &mut Checker<'_>) {
+    let reached = DVec3::from(point).abs().max_element() <= *LENGTHS.end();
+    checker.require(reached, at, "three numbers up to 1e60", format_args!("{point:?}"));
 }
 
 /// Whether there are a view from `origin` to `target` and a direction `up`, of the fields of `at`.
@@ -190,8 +198,7 @@ pub(crate) fn check_view(origin: Vec3, target: Vec3, up: Vec3, at: At<'_>, check
     let before = checker.count();
     let greatest = |v: Vec3| DVec3::from(v).abs().max_element();
     for (key, point) in [("origin", origin), ("target", target)] {
-        let found = format_args!("{point:?}");
-        checker.require(greatest(point) <= *LENGTHS.end(), at.key(key), "three numbers up to 1e60", found);
+        check_place(point, at.key(key), checker);
     }
     checker.direction(at.key("up"), up);
     let holds = up == [0.0; 3] || LENGTHS.contains(&greatest(up));
@@ -267,6 +274,10 @@ mod tests {
         assert_eq!(
             transform("cube", "[{scale: 1e100}, {scale: 1e100}]"),
             format!("dir/s.yaml:3:34: {} a transform that can be inverted, found determinant inf", at(""))
+        );
+        assert_eq!(
+            transform("cube", "[{translate: [0, 2.5e60, 0]}, {scale: 2}]"),
+            format!("dir/s.yaml:3:34: {} a transform to places up to 1e60, found 5e60", at(""))
         );
     }
 
