@@ -117,6 +117,8 @@ struct Import<'a> {
     names: HashMap<usize, String>,
     /// Under which name a texture stands there a second time, for numbers.
     for_numbers: HashMap<usize, String>,
+    /// Groups without shapes.
+    empty: HashSet<usize>,
     /// The emitters that shapes have.
     shining: HashSet<usize>,
     /// Names that no other object may be given.
@@ -149,6 +151,7 @@ impl<'a> Import<'a> {
             lights: Vec::new(),
             names: HashMap::new(),
             for_numbers: HashMap::new(),
+            empty: HashSet::new(),
             shining: HashSet::new(),
             taken,
             has_media: integrators::has_media(document),
@@ -674,6 +677,23 @@ mod tests {
         let scene =
             good(&(group("id=\"shapegroup 5\"") + &instance(&group("")) + &instance("<ref id=\"shapegroup 5\"/>")));
         assert_eq!(scene.groups.len(), 2, "{:?}", scene.groups.keys());
+    }
+
+    /// Mitsuba 3.9.1 renders both as if neither the group nor its copies were there; they have to hold all the same.
+    #[test]
+    fn copies_of_an_empty_group_are_not_seen() {
+        let group = "<shape type=\"shapegroup\" id=\"g\"/>";
+        let copy = "<shape type=\"instance\"><ref id=\"g\"/></shape>";
+        let counts = |text: &str| {
+            let scene = good(text);
+            (scene.groups.len(), scene.shapes.len())
+        };
+        assert_eq!(counts(group), (0, 0));
+        assert_eq!(counts(&format!("{group}{copy}{copy}<shape type=\"sphere\"/>")), (0, 1));
+        let merge = "<shape type=\"shapegroup\" id=\"g\"><shape type=\"merge\"/></shape>";
+        assert_eq!(counts(&format!("{merge}{copy}")), (0, 0));
+        let wrong = copy.replace("/></shape>", "/><float name=\"gg\" value=\"1\"/></shape>");
+        assert!(fault(&format!("{group}{wrong}"), &[]).contains("found \"gg\""));
     }
 
     /// As Mitsuba has it: what is a part of another object may stand in the scene, to be named from there.

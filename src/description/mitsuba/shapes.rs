@@ -59,6 +59,9 @@ impl Import<'_> {
             fields.add("transform", list(at, [entry(at, "matrix", matrix(at, to_world))]));
         }
         let kind = self.form(&bag, to_world, &mut fields)?;
+        if kind == "nothing" {
+            return bag.finish();
+        }
         if kind == "instance" {
             if let Some(name) = named(self.document, bag.object) {
                 fields.add("name", text(bag.object.place, name));
@@ -73,7 +76,7 @@ impl Import<'_> {
         Ok(())
     }
 
-    /// The form of a shape: its fields, but for the transform, and its kind.
+    /// The form of a shape: its fields, but for the transform, and its kind: `nothing` of a copy of an empty group.
     fn form(&mut self, bag: &Bag<'_>, to_world: DMat4, fields: &mut Fields) -> Result<&'static str, Fault> {
         let place = bag.object.place;
         let mirrored = is_mirror(to_world);
@@ -135,6 +138,9 @@ impl Import<'_> {
                 let found = bag.only(Family::Shape)?;
                 let group = found.ok_or_else(|| bag.fault("expected a reference to a shapegroup, found none"))?;
                 let name = self.group(group)?;
+                if self.empty.contains(&group) {
+                    return Ok("nothing");
+                }
                 fields.add("group", text(place, name));
                 return Ok("instance");
             }
@@ -168,8 +174,13 @@ impl Import<'_> {
         bag.finish()?;
         let shapes = std::mem::replace(&mut self.shapes, outside);
         let name = self.name_for(index);
-        let node = list(bag.object.place, shapes);
-        self.groups.push(self.entry(index, &name, node));
+        // What nothing is in is no group of ours, and no copy of it is seen.
+        if shapes.is_empty() {
+            self.empty.insert(index);
+        } else {
+            let node = list(bag.object.place, shapes);
+            self.groups.push(self.entry(index, &name, node));
+        }
         Ok(name)
     }
 
