@@ -76,7 +76,7 @@ impl Import<'_> {
                 Ok(Some(colour(place, self.coefficients(place, name, *rgb), role)))
             }
             Value::Spectrum(SpectrumValue::Uniform(value)) => Ok(Some(number(place, *value))),
-            Value::Spectrum(SpectrumValue::Table(pairs)) => Ok(Some(table(place, pairs))),
+            Value::Spectrum(SpectrumValue::Table(pairs)) => Ok(Some(self.written_table(place, pairs))),
             Value::Spectrum(SpectrumValue::File(path)) => Ok(Some(file(place, path))),
             Value::Object(index) if bag.document.objects[*index].family == Family::Texture => {
                 match self.spectrum_plugin(*index, role)? {
@@ -108,6 +108,23 @@ impl Import<'_> {
             self.notes.push((place, note));
         }
         taken
+    }
+
+    /// The pairs of a scene. Where no light is simulated at any of their wavelengths they are 0, and told; in µm, as it seems,
+    /// they are left to be refused.
+    fn written_table(&mut self, place: Place, pairs: &[[f64; 2]]) -> Node {
+        let samples: Vec<(f64, f64)> = pairs.iter().map(|[nm, value]| (*nm, *value)).collect();
+        let ([low, high], [first, last]) =
+            (BAND_NM, [pairs.first(), pairs.last()].map(|pair| pair.map_or(0.0, |p| p[0])));
+        let misses = |unit: f64| last * unit < low || first * unit > high;
+        if !(misses(1.0) && misses(1e3)) || Curve::from_samples(&samples, Outside::Zero).is_err() {
+            return table(place, pairs);
+        }
+        let message = format!(
+            "a spectrum of {first} to {last} nm is taken for 0, as in Mitsuba: light is simulated from {low} to {high} nm"
+        );
+        self.notes.push((place, message));
+        number(place, 0.0)
     }
 
     /// The spectrum or `{texture: name}` of a property.
@@ -275,7 +292,7 @@ impl Import<'_> {
                 }
             }
             "regular" | "irregular" if bag.has("value") => match bag.value("value") {
-                Some(Value::Spectrum(SpectrumValue::Table(pairs))) => table(place, pairs),
+                Some(Value::Spectrum(SpectrumValue::Table(pairs))) => self.written_table(place, pairs),
                 Some(Value::Spectrum(SpectrumValue::File(path))) => file(place, path),
                 other => {
                     let found = other.map_or(String::new(), |value| value.kind(bag.document));
@@ -289,7 +306,7 @@ impl Import<'_> {
                 let step = (most - least) / (values.len().max(2) - 1) as f64;
                 let pairs: Vec<[f64; 2]> =
                     values.iter().enumerate().map(|(i, value)| [least + step * i as f64, *value]).collect();
-                table(place, &pairs)
+                self.written_table(place, &pairs)
             }
             "irregular" => {
                 let (nm, values) = (floats(&bag, "wavelengths")?, floats(&bag, "values")?);
@@ -298,7 +315,7 @@ impl Import<'_> {
                     return Err(bag.fault_of("values", message));
                 }
                 let pairs: Vec<[f64; 2]> = nm.iter().zip(&values).map(|(nm, value)| [*nm, *value]).collect();
-                table(place, &pairs)
+                self.written_table(place, &pairs)
             }
             "blackbody" => {
                 let kelvin = bag.required("temperature", bag.float("temperature"))?;
@@ -525,6 +542,27 @@ mod tests {
         let scene = good(&format!("<emitter type=\"constant\">{spectrum}</emitter>"));
         let Light::Constant(light) = &scene.lights[0] else { panic!("a constant light") };
         light.radiance.clone()
+    }
+
+    /// Mitsuba 3.9.1 is black under all but the one that reaches the band. What would be visible in µm is left to be refused.
+    #[test]
+    fn what_is_wholly_infrared_or_ultraviolet_is_dark() {
+        let regular = |least: u32, most: u32| {
+            let ends = format!(
+                "<float name=\"wavelength_min\" value=\"{least}\"/><float name=\"wavelength_max\" value=\"{most}\"/>"
+            );
+            format!(
+                "<spectrum type=\"regular\" name=\"radiance\">{ends}<string name=\"values\" value=\"1, 2\"/></spectrum>"
+            )
+        };
+        let pairs = |pairs: &str| format!("<spectrum name=\"radiance\" value=\"{pairs}\"/>");
+        let dark = [regular(100, 359), regular(831, 900), pairs("300:1, 350:2"), pairs("900:1, 950:2, 1000:0")];
+        for spectrum in dark {
+            assert_eq!(radiance(&spectrum), Spectrum::Number(0.0), "{spectrum}");
+        }
+        // What reaches the band is what it says.
+        assert!(matches!(radiance(&pairs("300:1, 361:2")), Spectrum::ZeroOutside(_)));
+        assert!(matches!(radiance(&pairs("0.4:1, 0.7:2")), Spectrum::ZeroOutside(_)));
     }
 
     /// Mitsuba 3.9.1 shows this sky as 1.0371 0.2862 0.0860, and one of `<rgb>`, under D65, as 0.9005 0.2998 0.0998.
