@@ -10,7 +10,7 @@
 
 use crate::math::frame::Frame;
 use crate::math::warp::{self, one_minus_cos};
-use crate::spectrum::{LANES, Lanes, Outside, Spectrum};
+use crate::spectrum::{Carried, LANES, Lanes, Outside, Spectrum};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::LazyLock;
@@ -67,6 +67,8 @@ pub struct Conditions {
     pub sun_half_angle: f64,
     /// Whether its disc darkens toward the edge, and reddens downward.
     pub limb_darkening: bool,
+    /// What its spectra become. As three numbers the disc is even.
+    pub carried: Carried,
 }
 
 /// The light of a day.
@@ -75,6 +77,8 @@ pub struct Daylight {
     sun: DVec3,
     sky: Option<Dome>,
     disc: Option<Disc>,
+    /// What each band gives to red, green and blue, where these are carried.
+    colours: Option<[[f32; BANDS]; 3]>,
 }
 
 /// The sky without the sun.
@@ -109,7 +113,8 @@ impl Daylight {
     /// The light under `conditions`; none with the sun below the horizon.
     #[must_use]
     pub fn new(conditions: &Conditions) -> Daylight {
-        let Conditions { sun, turbidity, albedo, sky_scale, sun_scale, sun_half_angle, limb_darkening } = conditions;
+        let Conditions { sun, turbidity, albedo, sky_scale, sun_scale, sun_half_angle, limb_darkening, carried } =
+            conditions;
         let up = sun.y >= 0.0;
         let elevation = libm::atan2(sun.y, sun.x.hypot(sun.z));
         let sky = (up && *sky_scale > 0.0).then(|| Dome::new(elevation, *turbidity, albedo, *sky_scale));
@@ -118,11 +123,11 @@ impl Daylight {
             let scale = sun_scale * solid(SUN_HALF_ANGLE) / solid(*sun_half_angle);
             let limb = Limb::new(*turbidity, scale);
             // Over the disc as it is: a wider one gives the same light.
-            let mean = spectrum_of(&limb.mean(*sun));
-            let limb = limb_darkening.then(|| Box::new(limb));
+            let mean = carried.light(spectrum_of(&limb.mean(*sun)));
+            let limb = (*limb_darkening && *carried == Carried::Spectra).then(|| Box::new(limb));
             Disc { half_angle: *sun_half_angle, mean, limb, sets: true }
         });
-        Daylight { sun: *sun, sky, disc }
+        Daylight { sun: *sun, sky, disc, colours: carried.shares_of(&TENTS) }
     }
 
     /// Light from a disc alone, `toward` which is a unit vector, of `half_angle` in radians, up to π/2. A surface that faces
@@ -131,7 +136,7 @@ impl Daylight {
     pub fn of_disc(toward: DVec3, half_angle: f64, irradiance: &Spectrum) -> Daylight {
         let disc = Disc { half_angle, mean: Spectrum::constant(1.0), limb: None, sets: false };
         let mean = irradiance.scaled(1.0 / disc.facing());
-        Daylight { sun: toward, sky: None, disc: Some(Disc { mean, ..disc }) }
+        Daylight { sun: toward, sky: None, disc: Some(Disc { mean, ..disc }), colours: None }
     }
 
     /// Whether there is light beside the disc.
@@ -143,8 +148,18 @@ impl Daylight {
     /// Radiance from `direction`.
     #[must_use]
     pub fn radiance(&self, direction: DVec3, nm: Lanes) -> Lanes {
-        let mut light =
-            self.sky.as_ref().map_or(Lanes::ZERO, |sky| at_wavelengths(&sky.bands(self.sun, direction), nm));
+        let mut light = self.sky.as_ref().map_or(Lanes::ZERO, |sky| {
+            let bands = sky.bands(self.sun, direction);
+            match &self.colours {
+                None => at_wavelengths(&bands, nm),
+                Some(shares) => {
+                    let sum =
+                        |shares: &[f32; BANDS]| shares.iter().zip(bands).map(|(share, light)| share * light).sum();
+                    let rgb: [f32; 3] = shares.each_ref().map(sum);
+                    Lanes::new(nm.to_array().map(|nm| rgb[Carried::channel(nm)].max(0.0)))
+                }
+            }
+        });
         if let Some(disc) = self.disc.as_ref().filter(|disc| disc.shows(self.sun, direction)) {
             light += match &disc.limb {
                 None => disc.mean.eval(nm),
@@ -368,15 +383,18 @@ fn spectrum_of(bands: &Bands) -> Spectrum {
     Spectrum::from_samples(&samples, Outside::Zero).expect("bands rise, and their light is finite")
 }
 
-/// Luminance in film units: each band stands for a tent between its neighbours.
+/// What each band stands for: a tent between its neighbours.
+static TENTS: LazyLock<[Spectrum; BANDS]> = LazyLock::new(|| {
+    std::array::from_fn(|band| {
+        let mut only = [0.0; 2 * LANES];
+        only[band] = 1.0;
+        spectrum_of(&only)
+    })
+});
+
+/// Luminance in film units.
 fn luminance(bands: &Bands) -> f64 {
-    static WEIGHTS: LazyLock<[f64; BANDS]> = LazyLock::new(|| {
-        std::array::from_fn(|band| {
-            let mut only = [0.0; 2 * LANES];
-            only[band] = 1.0;
-            spectrum_of(&only).luminance()
-        })
-    });
+    static WEIGHTS: LazyLock<[f64; BANDS]> = LazyLock::new(|| TENTS.each_ref().map(Spectrum::luminance));
     WEIGHTS.iter().zip(bands).map(|(weight, light)| weight * f64::from(*light)).sum()
 }
 
@@ -385,6 +403,7 @@ mod tests {
     use super::*;
     use crate::math::sampler::uniform;
     use crate::scene::environment::{Drawn, Environment};
+    use crate::spectrum::carried::PLACES_NM;
     use glam::DMat3;
 
     fn day(sun: [f64; 3], turbidity: f64, albedo: f64) -> Conditions {
@@ -396,6 +415,7 @@ mod tests {
             sun_scale: 1.0,
             sun_half_angle: SUN_HALF_ANGLE,
             limb_darkening: false,
+            carried: Carried::Spectra,
         }
     }
 
@@ -505,6 +525,27 @@ mod tests {
         for degrees in [1e-4, 0.1, 5.0, 90.0] {
             // The mean is kept in f32.
             assert!((power(degrees) / power(0.5358) - 1.0).abs() < 1e-6, "{degrees}");
+        }
+    }
+
+    /// Three numbers in place of the spectrum are its colour, but for what is below zero; f32 and its sums of eleven, of which
+    /// some are negative.
+    #[test]
+    fn as_three_numbers_a_sky_has_its_colour() {
+        let spectral = day([0.2, 0.4, -1.0], 2.0, 0.3);
+        let colours = Daylight::new(&Conditions { carried: Carried::Colours, ..spectral.clone() });
+        let spectral = Daylight::new(&spectral);
+        let [red, green, blue] = PLACES_NM.map(|nm| nm as f32);
+        let nm = Lanes::new([red, green, blue, red, green, blue, red, green]);
+        for direction in [DVec3::Y, DVec3::new(0.5, 0.1, 0.3).normalize(), spectral.sun] {
+            let mut expected = Carried::Colours.light(spectral.sky_spectrum(direction)).eval(nm);
+            if direction == spectral.sun {
+                expected += Carried::Colours.light(spectral.sun_spectrum().expect("a sun").0).eval(nm);
+            }
+            let found = colours.radiance(direction, nm).to_array();
+            for (found, expected) in found.into_iter().zip(expected.to_array()) {
+                assert!((found / expected - 1.0).abs() < 1e-5, "{found} {expected}");
+            }
         }
     }
 

@@ -12,7 +12,8 @@
 //!   does that, k is zero and n does;
 //! * a refractive index is that of the sodium line: no dispersion.
 //!
-//! Thin films and pictures of measured spectra are computed at the three wavelengths: no colour is made of them first.
+//! Thin films and pictures of measured spectra are computed at the three wavelengths: no colour is made of them first. A sky by
+//! formulas has its colour in each direction.
 
 use crate::spectrum::colour::{ColourSpace, Matrix, inverse, times};
 use crate::spectrum::illuminant::d65;
@@ -106,6 +107,23 @@ impl Carried {
             Carried::Colours if scale > 0.0 => (self.coefficients(rgb.map(|v| v / scale)), scale),
             Carried::Spectra | Carried::Colours => upsample::emission_coefficients(rgb),
         }
+    }
+
+    /// Of light that is a sum of `parts`, what each gives to red, green and blue; `None` where spectra are carried.
+    #[must_use]
+    pub fn shares_of<const N: usize>(self, parts: &[Spectrum; N]) -> Option<[[f32; N]; 3]> {
+        let colours = || parts.each_ref().map(rgb);
+        (self == Carried::Colours).then(|| {
+            let colours = colours();
+            std::array::from_fn(|c| colours.map(|colour| colour[c] as f32))
+        })
+    }
+
+    /// Which of red, green and blue is carried at `nm`.
+    #[must_use]
+    pub fn channel(nm: f32) -> usize {
+        let [first, second] = BORDERS_NM.map(|border| border as f32);
+        2 - usize::from(nm >= first) - usize::from(nm >= second)
     }
 
     /// From which wavelengths are drawn where the scene does not matter.

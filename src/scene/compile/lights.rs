@@ -162,6 +162,7 @@ impl<'a> Compiler<'a> {
                     sun_scale: l.sun_scale,
                     sun_half_angle: 0.5 * l.sun_angle_deg.to_radians(),
                     limb_darkening: l.limb_darkening,
+                    carried: self.shelf.carried,
                 });
                 Light::Environment(Arc::new(Environment::of_day(day, world_from_sky)))
             }
