@@ -168,7 +168,7 @@ forms! {
         /// Metres.
         radius: f64 = [],
     }
-    /// `rectangle: {corner, edge_u, edge_v}`; the normal is edge_u × edge_v.
+    /// `rectangle: {corner, edge_u, edge_v}`; the normal is edge_u × edge_v, before its transform.
     "rectangle" Rectangle {
         /// Where u = v = 0, metres.
         corner: Vec3 = [],

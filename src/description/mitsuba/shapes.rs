@@ -97,8 +97,6 @@ impl Import<'_> {
             "disk" => {
                 fields.add("normal", numbers(place, &DVec3::Z.to_array()));
                 fields.add("radius", number(place, 1.0));
-                // The normal is carried along as a normal; ours is that of the edges after the transform.
-                turned = mirrored;
                 "disk"
             }
             "rectangle" => {
@@ -106,7 +104,6 @@ impl Import<'_> {
                 fields.add("corner", numbers(place, &[-1.0, -1.0, 0.0]));
                 fields.add("edge_u", numbers(place, &[2.0, 0.0, 0.0]));
                 fields.add("edge_v", numbers(place, &[0.0, 2.0, 0.0]));
-                turned = mirrored;
                 "rectangle"
             }
             "cube" => {

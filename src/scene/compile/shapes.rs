@@ -14,8 +14,10 @@ impl Compiler<'_> {
         let m = shape.world_from_object();
         let point = |p: [f64; 3]| m.transform_point3(vec3(p));
         let vector = |v: [f64; 3]| m.transform_vector3(vec3(v));
+        let determinant = DMat3::from_mat4(m).determinant();
+        let mirrored = determinant < 0.0;
         // Uniform by the checks of the description for shapes that need it.
-        let scale = libm::cbrt(DMat3::from_mat4(m).determinant().abs());
+        let scale = libm::cbrt(determinant.abs());
         let made: std::result::Result<Shape, String> = match &shape.geometry {
             written::Geometry::Sphere(s) => {
                 let rotation = DMat3::from_mat4(m) * (1.0 / scale);
@@ -25,7 +27,8 @@ impl Compiler<'_> {
             written::Geometry::Plane(p) => {
                 let normal = vec3(p.normal);
                 let tangent = carried(m, normal, p.tangent.map(vec3)).unwrap_or_default();
-                Plane::new(point(p.point), normal_transform(m, normal), tangent).map(Shape::Plane)
+                let made = Plane::new(point(p.point), normal_transform(m, normal), tangent);
+                made.map(|plane| Shape::Plane(if mirrored { plane.mirrored() } else { plane }))
             }
             written::Geometry::Disk(d) => {
                 let frame = match vec3(d.normal).try_normalize() {
@@ -36,10 +39,12 @@ impl Compiler<'_> {
                     }
                 };
                 let (u, v) = (vector((frame.s * d.radius).into()), vector((frame.t * d.radius).into()));
-                Disk::new(point(d.center), u, v).map(Shape::Disk)
+                let made = Disk::new(point(d.center), u, v);
+                made.map(|disk| Shape::Disk(if mirrored { disk.mirrored() } else { disk }))
             }
             written::Geometry::Rectangle(r) => {
-                Rectangle::new(point(r.corner), vector(r.edge_u), vector(r.edge_v)).map(Shape::Rectangle)
+                let made = Rectangle::new(point(r.corner), vector(r.edge_u), vector(r.edge_v));
+                made.map(|patch| Shape::Rectangle(if mirrored { patch.mirrored() } else { patch }))
             }
             written::Geometry::Cube(c) => {
                 let [x, y, z] = c.size.xyz();
@@ -204,6 +209,44 @@ mod tests {
             assert!((a.uv - DVec2::new(0.1, 0.3)).abs().max_element() < 1e-14, "{plane}: {}", a.uv);
             assert!((a.uv - b.uv).abs().max_element() < 1e-14, "{plane}: {} {}", a.uv, b.uv);
             assert!((rotation(75.0) * a.tangent).dot(b.tangent) > 1.0 - 1e-14, "{plane}");
+        }
+    }
+
+    /// A mirror shows the image of everything: at the image of a point are its texture coordinates, and its normal is the image of
+    /// the normal, on the side from which the thing shines.
+    #[test]
+    fn flat_things_and_their_fronts_are_mirrored_as_they_are() {
+        let mirror = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
+        for thing in [
+            "plane: {point: [0.1, 0.2, 0], normal: [0.2, 1, 0.3]",
+            "plane: {point: [0.1, 0.2, 0], normal: [0.2, 1, 0.3], tangent: [1, 2, 0]",
+            "disk: {center: [0.1, 0.2, 0], normal: [0.2, 1, 0.3], radius: 0.7",
+            "rectangle: {corner: [0.1, 0.2, 0], edge_u: [1, 0.2, 0.3], edge_v: [0.1, 1, -2]",
+            "cube: {center: [0.1, 0.2, 0], size: [1, 2, 3]",
+        ] {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n- {thing}}}\n\
+                 - {thing}, transform: [{{rotate: {{axis: [0.2, 1, 0.3], deg: 75}}}}, {{scale: [-1, 1, 1]}}]}}\n"
+            );
+            let description = SceneDescription::parse(&text, Path::new("s.yaml")).unwrap();
+            let scene = compile(&description, "s").unwrap();
+            let [Geometry::Shape(plain), Geometry::Shape(turned)] = [0, 1].map(|i| &scene.objects[i].geometry) else {
+                panic!("two shapes");
+            };
+            let moved = mirror * rotation(75.0);
+            let mut random = Random::new(3);
+            for _ in 0..1000 {
+                let sample = plain.sample_area(random.pair());
+                // One point of a plane is chosen always.
+                let beside = if plain.bounds().is_none() { random.pair().extend(0.3) } else { DVec3::ZERO };
+                let a = plain.surface(sample.point + beside, sample.face);
+                let b = turned.surface(moved * a.point, sample.face);
+                let apart = (a.uv - b.uv).abs();
+                // At the seam of a disk 0 is 1.
+                let apart = apart.min((1.0 - apart).abs());
+                assert!(apart.max_element() < 1e-12, "{thing}: {} {}", a.uv, b.uv);
+                assert!((moved * a.normal - b.normal).length() < 1e-12, "{thing}: {} {}", a.normal, b.normal);
+            }
         }
     }
 

@@ -15,6 +15,7 @@ use std::f64::consts::PI;
 #[derive(Clone, Debug)]
 pub struct Plane {
     pub(super) point: DVec3,
+    /// Along u, along v, and the normal; left-handed where it is mirrored.
     pub(super) frame: Frame,
 }
 
@@ -50,6 +51,13 @@ impl Plane {
             ));
         }
         Ok(Plane { point, frame: Frame::from_normal_and_tangent(normal, tangent) })
+    }
+
+    /// The same plane with v running the other way, as in a mirror.
+    #[must_use]
+    pub fn mirrored(mut self) -> Plane {
+        self.frame.t = -self.frame.t;
+        self
     }
 
     #[inline]
@@ -149,6 +157,12 @@ impl Patch {
         Ok(Patch { origin, u, v, normal, to_a, to_b, jacobian, pad, margin })
     }
 
+    /// The same points and coordinates with the normal on the other side.
+    fn turned(mut self) -> Patch {
+        self.normal = -self.normal;
+        self
+    }
+
     /// Where the ray's line meets the plane of the patch. Moves along the ray to near the patch
     /// first (each coordinate rounded once, so the new start is on the line to within rounding
     /// of the patch's own size), then solves there: the edges are as sharp from far as from near.
@@ -230,6 +244,12 @@ impl Disk {
         Patch::new("center", center, edge_u, edge_v).map(Disk)
     }
 
+    /// The same disk with its normal against `edge_u` × `edge_v`: a mirror leaves the front in front, but not the cross product.
+    #[must_use]
+    pub fn mirrored(self) -> Disk {
+        Disk(self.0.turned())
+    }
+
     #[inline]
     pub(super) fn intersect(&self, ray: &Ray, t_max: f64, departing: Option<u8>) -> Option<ShapeHit> {
         if departing.is_some() {
@@ -295,6 +315,12 @@ impl Rectangle {
     /// In words: numbers not finite, an edge of length zero, parallel edges.
     pub fn new(corner: DVec3, edge_u: DVec3, edge_v: DVec3) -> Result<Rectangle, String> {
         Patch::new("corner", corner, edge_u, edge_v).map(Rectangle)
+    }
+
+    /// As [`Disk::mirrored`].
+    #[must_use]
+    pub fn mirrored(self) -> Rectangle {
+        Rectangle(self.0.turned())
     }
 
     #[inline]

@@ -90,7 +90,7 @@ impl Export<'_> {
             // A picture on it repeats by the metre, which the coordinates of a rectangle cannot say.
             Geometry::Plane(plane) if self.is_textured(shape) => {
                 self.open("ply", shape);
-                self.mesh(plane_mesh(&standing(plane, world)));
+                self.mesh(plane_mesh(&standing(plane, world), is_mirror(world)));
             }
             Geometry::Plane(plane) => {
                 self.open("rectangle", shape);
@@ -192,7 +192,7 @@ impl Export<'_> {
         let mirrored = is_mirror(shape.world_from_object());
         let turned = match &shape.geometry {
             // One that is mirrored is turned inside out by Mitsuba.
-            Geometry::Sphere(_) | Geometry::Disk(_) | Geometry::Rectangle(_) => mirrored,
+            Geometry::Sphere(_) => mirrored,
             Geometry::Mesh(mesh) => self.is_turned(mesh, mirrored),
             _ => false,
         };
@@ -425,7 +425,8 @@ fn cone_mesh(cone: &Cone) -> String {
     text
 }
 
-/// Where a plane stands and which way u and v run on it, a metre each: it is moved and turned by `world`, but not stretched.
+/// Where a plane stands and which way u and v run on it, a metre each, but for v of one that is mirrored, which runs the other
+/// way: it is moved and turned by `world`, but not stretched.
 fn standing(plane: &Plane, world: DMat4) -> DAffine3 {
     let linear = DMat3::from_mat4(world);
     let normal = (linear.inverse().transpose() * DVec3::from(plane.normal)).normalize_or_zero();
@@ -436,13 +437,15 @@ fn standing(plane: &Plane, world: DMat4) -> DAffine3 {
     DAffine3::from_cols(s, t, n, world.transform_point3(plane.point.into()))
 }
 
-/// The square that stands for a plane as a PLY whose texture coordinates are metres.
-fn plane_mesh(placement: &DAffine3) -> String {
+/// The square that stands for a plane as a PLY whose texture coordinates are metres. The order of its corners is that of the
+/// front, whichever way v runs.
+fn plane_mesh(placement: &DAffine3, mirrored: bool) -> String {
     let mut text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n\
          property double u\nproperty double v\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
         .to_owned();
     for (u, v) in [(-PLANE, -PLANE), (PLANE, -PLANE), (PLANE, PLANE), (-PLANE, PLANE)] {
         let p = placement.transform_point3(DVec3::new(u, v, 0.0));
+        let v = if mirrored { -v } else { v };
         text.push_str(&format!("{} {} {} {u} {v}\n", p.x, p.y, p.z));
     }
     text + "3 0 1 2\n3 0 2 3\n"
