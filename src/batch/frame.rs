@@ -180,7 +180,7 @@ impl Frame {
     /// The further channel `channel` where its values stand once, not samples.
     #[must_use]
     pub fn layer_once(&self, channel: usize) -> Vec<f32> {
-        self.film.layers.sums_of(channel).into_iter().map(|x| x as f32).collect()
+        self.film.layers.once(channel)
     }
 
     /// The further channel `channel`, its mean over samples; bands and light by its ways come first.

@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Version of the format; another one is refused.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 
 /// Of the planes of mattes, before their rank.
 const MATTES: &str = "cameraMattes.";

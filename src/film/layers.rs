@@ -192,15 +192,14 @@ impl LayerSums {
         self.counts[place] += 1;
     }
 
-    /// Adds what stands in a pixel once, however many samples it has: the number of each of `channels`.
+    /// Adds what stands in a pixel once, however many samples it has: the number of each of `channels`. It is kept by its bits, as
+    /// nothing is added to it: places may be farther away than a sum of samples holds.
     pub fn add_once(&mut self, index: usize, values: impl IntoIterator<Item = (usize, f32)>) {
         let start = self.place(index, 0) * self.layout.channels;
         for (channel, x) in values {
-            match fault(x) {
-                Some(cause) => self.invalid.record(cause),
-                None => {
-                    let _ = self.sums[start + channel].add(x);
-                }
+            match check(x, f32::INFINITY) {
+                Err(cause) => self.invalid.record(cause),
+                Ok(()) => self.sums[start + channel].0 += i128::from(x.to_bits()),
             }
         }
     }
@@ -288,6 +287,13 @@ impl LayerSums {
     #[must_use]
     pub fn sums_of(&self, channel: usize) -> Vec<f64> {
         self.sets_of(channel).map(|sets| total(sets).0).collect()
+    }
+
+    /// What [`LayerSums::add_once`] put into one channel, pixel by pixel; 0 where that is nothing.
+    #[must_use]
+    pub fn once(&self, channel: usize) -> Vec<f32> {
+        let pixels = self.sets_of(channel).map(|sets| sets.map(|(Sum(bits), _)| bits).sum::<i128>());
+        pixels.map(|bits| f32::from_bits(bits as u32)).collect()
     }
 
     /// The means of one channel, pixel by pixel, as [`resolve`](super::resolve) has them; 0 where there is no sample.
@@ -467,6 +473,22 @@ mod tests {
         // (1 + 0 + 3) / 3 and (0 + 1 − 2) / 3.
         assert_eq!((sums.plane(0), sums.plane(1)), (vec![4.0 / 3.0], vec![-1.0 / 3.0]));
         assert_eq!(sums.invalid, InvalidCounts { nan: 1, infinite: 1, negative: 0, overflow: 0 });
+    }
+
+    /// A depth may be any number of 32 bits, in whatever sets the samples are, which have zeros in its channel; what is no number is
+    /// counted.
+    #[test]
+    fn what_stands_once_comes_back_at_any_size() {
+        let values = [3e12, -1e38, 1e-30, 0.0, -2.5, f32::INFINITY, f32::NAN];
+        for kept in [Kept::Together, Kept::ByReplicate] {
+            let mut sums = LayerSums::new(Layout { channels: 2, kept }, values.len());
+            for (index, &x) in values.iter().enumerate() {
+                (0..REPLICATES).for_each(|replicate| sums.add(index, replicate, 1.0, &[1.0, 0.0]));
+                sums.add_once(index, [(1, x)]);
+            }
+            assert_eq!(sums.once(1), [3e12, -1e38, 1e-30, 0.0, -2.5, 0.0, 0.0], "{kept:?}");
+            assert_eq!(sums.invalid, InvalidCounts { nan: 1, infinite: 1, ..InvalidCounts::default() });
+        }
     }
 
     #[test]
