@@ -223,7 +223,8 @@
 //!   card: {two_sided: {front: clay, back: lacquer}}                  # ~ back is the front's; no glass, and beside
 //!                                                # a back of its own nothing thin or of hair, which scatters light through
 //!   waves: {bump: {height: {texture: earth}, scale: 1, material: clay}}
-//!                                                # ~ scale; metres along the normal
+//!                                                # ~ scale; metres along the normal; of bilinear pictures, as else
+//!                                                # there are no slopes
 //!   scales: {normal_map: {normals: {texture: earth}, material: clay}}
 //!                                                # both: turn: true, shadowing: true
 //! media:

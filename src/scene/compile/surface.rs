@@ -315,6 +315,12 @@ impl<'a> Compiler<'a> {
             written::Material::TwoSided(m) => plain(self.sides(&place, m)),
             written::Material::Bump(m) => {
                 let heights = self.named_numbers(&m.height.texture);
+                if !heights.has_slopes() {
+                    self.note(
+                        &at("height"),
+                        "the texture has no slopes by u and v, so that the surface stays smooth; pictures with filter bilinear have",
+                    );
+                }
                 let form = ReliefForm::Heights { heights, scale: m.scale };
                 let relief = Relief { form, turn: m.turn, shadowing: m.shadowing };
                 let inner = self.inner(&at("material"), &m.material);
@@ -520,5 +526,34 @@ mod tests {
         let told = compile(&description, "s").unwrap_err().to_string();
         let expected = "s.yaml:5:23: materials.\"Material.001\".dielectric.ior: unknown glass \"none\"";
         assert!(told.starts_with(expected), "{told}");
+    }
+
+    /// Light goes by the slopes of heights, not by the heights: those of a volume, of steps between texels or cells and of single
+    /// numbers are zero, so that a surface is as if it had none.
+    #[test]
+    fn heights_without_slopes_are_told() {
+        let told = |texture: &str| {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\n\
+                 volumes: {{haze: {{constant: {{value: 0.5}}}}}}\n\
+                 textures:\n  waves: {{image: {{file: waves.pgm}}}}\n  h: {texture}\n\
+                 materials: {{m: {{bump: {{height: {{texture: h}}, material: {{diffuse: {{}}}}}}}}}}\n\
+                 shapes: [sphere: {{radius: 1, material: m}}]\n"
+            );
+            let directory = tempfile::tempdir().unwrap();
+            std::fs::write(directory.path().join("waves.pgm"), b"P5 2 2 255\n0123").unwrap();
+            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
+            compile(&description, "s")
+                .unwrap()
+                .notes
+                .iter()
+                .any(|note| note.contains("m.bump.height: the texture has no slopes"))
+        };
+        for flat in ["{volume: haze}", "{image: {file: waves.pgm, filter: nearest}}", "{checkerboard: {a: 0, b: 1}}"] {
+            assert!(told(flat), "{flat}");
+        }
+        for raised in ["{image: {file: waves.pgm}}", "{checkerboard: {a: 0, b: {texture: waves}}}"] {
+            assert!(!told(raised), "{raised}");
+        }
     }
 }

@@ -127,6 +127,16 @@ impl Scalar {
         }
     }
 
+    /// Whether its derivatives are anywhere more than zero.
+    #[must_use]
+    pub fn has_slopes(&self) -> bool {
+        match self {
+            Scalar::Uniform(_) | Scalar::Volume(_) | Scalar::Attribute(_) => false,
+            Scalar::Image(image) => image.grid.interpolation != Interpolation::Nearest,
+            Scalar::Checkerboard { a, b, .. } => a.has_slopes() || b.has_slopes(),
+        }
+    }
+
     /// True for anything but one number.
     #[must_use]
     pub fn varies(&self) -> bool {
