@@ -29,6 +29,20 @@ impl Frame {
         }
     }
 
+    /// The axes of the world turned by the least angle that takes z to the unit vector `n`: where `n` turns, the frame follows it
+    /// without a jump, but for `n` = −z, where [`Frame::from_normal`] jumps all along z = 0.
+    #[must_use]
+    pub fn by_least_turn(n: DVec3) -> Frame {
+        let across = n.x * n.x + n.y * n.y;
+        if n.z < 0.0 && across < f64::MIN_POSITIVE {
+            return Frame::from_normal(n);
+        }
+        // 1/(1 + z), without a difference: (1 + z)(1 − z) = x² + y².
+        let a = if n.z < 0.0 { (1.0 - n.z) / across } else { 1.0 / (1.0 + n.z) };
+        let b = -n.x * n.y * a;
+        Frame { s: DVec3::new(1.0 - n.x * n.x * a, b, -n.x), t: DVec3::new(b, 1.0 - n.y * n.y * a, -n.y), n }
+    }
+
     /// A frame about the unit vector `n` whose `s` lies as near to `tangent` as it can.
     /// Falls back to [`Frame::from_normal`] where `tangent` is parallel to `n` or zero.
     #[must_use]
@@ -95,12 +109,28 @@ mod tests {
             let phi = 2.399_963 * f64::from(i);
             let r = (1.0 - z * z).max(0.0).sqrt();
             let n = DVec3::new(r * phi.cos(), r * phi.sin(), z).normalize();
-            let f = Frame::from_normal(n);
-            // Each entry is a handful of roundings of numbers of size one.
-            let tolerance = 8.0 * f64::EPSILON;
-            assert!(f.s.dot(f.t).abs() <= tolerance && f.s.dot(n).abs() <= tolerance);
-            assert!((f.s.length() - 1.0).abs() <= tolerance && (f.t.length() - 1.0).abs() <= tolerance);
-            assert!((f.s.cross(f.t) - n).length() <= tolerance);
+            for f in [Frame::from_normal(n), Frame::by_least_turn(n)] {
+                // Each entry is a handful of roundings of numbers of size one.
+                let tolerance = 8.0 * f64::EPSILON;
+                assert!(f.s.dot(f.t).abs() <= tolerance && f.s.dot(n).abs() <= tolerance);
+                assert!((f.s.length() - 1.0).abs() <= tolerance && (f.t.length() - 1.0).abs() <= tolerance);
+                assert!((f.s.cross(f.t) - n).length() <= tolerance);
+            }
+        }
+    }
+
+    /// A turn by θ that follows n twists by (1 − cos θ) dφ beside: a step of n moves s by no more than 1 + tan(θ/2) of it, which at
+    /// z = 0 is 2.
+    #[test]
+    fn frames_by_the_least_turn_follow_the_normal_without_a_jump() {
+        for i in 0..100u32 {
+            let (sin, cos) = libm::sincos(f64::from(i));
+            let [above, below] = [1e-6, -1e-6].map(|z| DVec3::new(cos, sin, z).normalize());
+            let step = (above - below).length();
+            for (a, b) in [(above, below), (DVec3::new(cos, sin, 0.0), DVec3::new(cos, sin, -0.0))] {
+                let moved = (Frame::by_least_turn(a).s - Frame::by_least_turn(b).s).length();
+                assert!(moved <= 2.1 * step, "{a} {b}: {moved} for {step}");
+            }
         }
     }
 }

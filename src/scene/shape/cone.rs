@@ -54,7 +54,7 @@ impl Cone {
         check_point("apex", apex)?;
         check_length("radius", radius)?;
         let height = check_direction("apex - base", apex - base)?;
-        let frame = Frame::from_normal((apex - base) / height);
+        let frame = Frame::by_least_turn((apex - base) / height);
         let scale = largest(base).max(largest(apex)).max(height).max(radius);
         let pad = |steps: f64| if cap { 0.0 } else { steps * f64::EPSILON * scale / height };
         Ok(Cone {

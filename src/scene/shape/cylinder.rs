@@ -55,7 +55,7 @@ impl Cylinder {
         check_point("top", top)?;
         check_length("radius", radius)?;
         let length = check_direction("top - base", top - base)?;
-        let frame = Frame::from_normal((top - base) / length);
+        let frame = Frame::by_least_turn((top - base) / length);
         let scale = largest(base).max(largest(top)).max(length).max(radius);
         // What closes an open end from without shares its rim but for a few roundings: the wall is longer by as much.
         // Points of it keep 64 steps of `Ray::leaving` from there, so that the step does not lead out.

@@ -40,7 +40,7 @@ impl Plane {
         check_point("point", point)?;
         let normal = normal / check_direction("normal", normal)?;
         if tangent == DVec3::ZERO {
-            return Ok(Plane { point, frame: Frame::from_normal(normal) });
+            return Ok(Plane { point, frame: Frame::by_least_turn(normal) });
         }
         let tangent = tangent / check_direction("tangent", tangent)?;
         // The cross product of parallel unit vectors is rounding error: below 4 ε it has no direction.

@@ -168,7 +168,13 @@ impl Export<'_> {
             _ => None,
         };
         let seam = match &shape.geometry {
-            Geometry::Cylinder(cylinder) => cylinder.seam.map(|seam| world.transform_vector3(seam.into())),
+            Geometry::Cylinder(cylinder) => {
+                // About an axis that runs down z the one that is chosen here is not Mitsuba's.
+                let axis = (DVec3::from(cylinder.top) - DVec3::from(cylinder.base)).normalize_or_zero();
+                let chosen = || axis.z.is_sign_negative().then(|| Frame::by_least_turn(axis).s);
+                let seam = cylinder.seam.map(DVec3::from).or_else(chosen);
+                seam.map(|seam| world.transform_vector3(seam))
+            }
             _ => None,
         };
         match (why, layout) {
@@ -431,7 +437,7 @@ fn standing(plane: &Plane, world: DMat4) -> DAffine3 {
     let linear = DMat3::from_mat4(world);
     let normal = (linear.inverse().transpose() * DVec3::from(plane.normal)).normalize_or_zero();
     // One that is chosen turns with the plane, too.
-    let chosen = || Frame::from_normal(DVec3::from(plane.normal).normalize_or_zero()).s;
+    let chosen = || Frame::by_least_turn(DVec3::from(plane.normal).normalize_or_zero()).s;
     let tangent = plane.tangent.map_or_else(chosen, DVec3::from);
     let Frame { s, t, n } = Frame::from_normal_and_tangent(normal, linear * tangent);
     DAffine3::from_cols(s, t, n, world.transform_point3(plane.point.into()))
@@ -453,7 +459,7 @@ fn plane_mesh(placement: &DAffine3, mirrored: bool) -> String {
 
 /// The unit square or disk across z, moved, turned and scaled.
 fn placed(centre: DVec3, normal: DVec3, scale: f64) -> DMat4 {
-    let frame = Frame::from_normal(normal.normalize_or_zero());
+    let frame = Frame::by_least_turn(normal.normalize_or_zero());
     let column = |v: DVec3, by: f64| (v * by).extend(0.0);
     DMat4::from_cols(
         column(frame.s, scale),
