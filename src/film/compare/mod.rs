@@ -25,6 +25,7 @@ mod noise;
 
 use crate::film::exr::{ExrFile, Samples};
 use channels::{not_compared, pairs};
+use noise::Pair;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
@@ -98,12 +99,26 @@ pub enum NoiseSource {
     Differences,
 }
 
+impl NoiseSource {
+    /// The source in words.
+    fn words(self) -> &'static str {
+        match self {
+            NoiseSource::StandardErrors => "the standard errors of both",
+            NoiseSource::OneStandardError => "the standard errors of one; the other is taken as exact",
+            NoiseSource::SampleVariance => "the variance file; B is taken as exact",
+            NoiseSource::Differences => "the differences themselves",
+        }
+    }
+}
+
 /// The figures of one channel; B is the reference. Figures are of the pixels that are finite in both pictures.
 /// In JSON a figure that is not finite becomes `null`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct ChannelFigures {
     /// Its name.
     pub name: String,
+    /// Where its noise is known from.
+    pub noise: NoiseSource,
     /// Mean of A.
     pub mean_a: f64,
     /// Mean of B.
@@ -120,7 +135,7 @@ pub struct ChannelFigures {
     pub global_p: f64,
     /// √ mean (a − b)².
     pub rmse: f64,
-    /// Mean of (a − b)² / (b² + 0.01·m²), m the mean of B over the compared channels.
+    /// Mean of (a − b)² / (b² + 0.01·m²), m the mean of B over the colours, of any other channel over it alone.
     pub rel_mse: f64,
     /// Mean of |a − b| / (|a| + |b| + 0.01·|m|).
     pub smape: f64,
@@ -162,7 +177,7 @@ pub struct Comparison {
     pub reason: String,
     /// Whether all compared values are equal bit for bit.
     pub identical: bool,
-    /// Where the noise is known from; none where nothing could be compared.
+    /// Where the noise is known from; none where nothing could be compared, or channels differ in that.
     pub noise: Option<NoiseSource>,
     /// The figures of each compared channel.
     pub channels: Vec<ChannelFigures>,
@@ -192,12 +207,15 @@ pub fn compare(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Comparison
     let count = a.parts[0].window.pixels();
     let finite: Vec<bool> = (0..count).map(|i| pairs.iter().all(|pair| pair.is_finite(i))).collect();
     let pixels = finite.iter().filter(|&&f| f).count();
-    let values = (pixels * pairs.len()).max(1) as f64;
-    let reference_mean = pairs.iter().flat_map(|pair| kept(pair.b, &finite)).sum::<f64>() / values;
-    let channels: Vec<ChannelFigures> = pairs.iter().map(|pair| pair.figures(&finite, reference_mean)).collect();
+    // Colours have one unit. Bands of other widths and a depth beside them have nothing to do with each other's.
+    let are_colours = pairs.iter().all(|pair| ["R", "G", "B", "X", "Y", "Z"].contains(&pair.name.as_str()));
+    let mean_of = |pair: &Pair| kept(pair.b, &finite).sum::<f64>() / pixels.max(1) as f64;
+    let mean_of_all = pairs.iter().map(mean_of).sum::<f64>() / pairs.len() as f64;
+    let figures = |pair: &Pair| pair.figures(&finite, if are_colours { mean_of_all } else { mean_of(pair) });
+    let channels: Vec<ChannelFigures> = pairs.iter().map(figures).collect();
     let smallest = channels.iter().map(|c| c.global_p).fold(1.0, f64::min);
     let global_p = (smallest * channels.len() as f64).min(1.0);
-    let source = pairs[0].noise.source();
+    let source = channels[0].noise;
     let pixel_test = noise::pixel_test(&pairs, &finite);
     let identical = pairs.iter().all(|pair| pair.is_identical());
     let lacks_error = |&i: &usize| finite[i] && pairs.iter().any(|pair| pair.lacks_error(i));
@@ -207,7 +225,7 @@ pub fn compare(a: &ExrFile, b: &ExrFile, options: &CompareOptions) -> Comparison
         verdict: Verdict::Same,
         reason: String::new(),
         identical,
-        noise: Some(source),
+        noise: channels.iter().all(|channel| channel.noise == source).then_some(source),
         channels,
         global_p,
         pixel_test,
@@ -285,7 +303,7 @@ impl Comparison {
         let mut line = |text: String| {
             let _ = writeln!(out, "{}", text.trim_end());
         };
-        if let Some(noise) = self.noise {
+        if !self.channels.is_empty() {
             line(format!(
                 "{:<14}{:>10} ± {:<9}{:>9}{:>10}{:>11}{:>11}{:>11}{:>11}",
                 "channel", "ratio", "s.e.", "z", "p", "RMSE", "relMSE", "SMAPE", "max |d|"
@@ -336,15 +354,7 @@ impl Comparison {
                 layers.dedup();
                 line(format!("not compared             {}", layers.join(", ")));
             }
-            line(format!(
-                "noise known from         {}",
-                match noise {
-                    NoiseSource::StandardErrors => "the standard errors of both",
-                    NoiseSource::OneStandardError => "the standard errors of one; the other is taken as exact",
-                    NoiseSource::SampleVariance => "the variance file; B is taken as exact",
-                    NoiseSource::Differences => "the differences themselves",
-                }
-            ));
+            line(format!("noise known from         {}", self.sources()));
         }
         let verdict = match self.verdict {
             Verdict::Same => "same",
@@ -353,6 +363,22 @@ impl Comparison {
         };
         line(format!("verdict: {verdict}: {}", self.reason));
         out
+    }
+
+    /// Where the noise is known from, with the names of the channels where these differ in that.
+    fn sources(&self) -> String {
+        if let Some(source) = self.noise {
+            return source.words().to_owned();
+        }
+        let mut all: Vec<(NoiseSource, Vec<&str>)> = Vec::new();
+        for ChannelFigures { noise, name, .. } in &self.channels {
+            match all.iter_mut().find(|(source, _)| source == noise) {
+                Some((_, names)) => names.push(name.as_str()),
+                None => all.push((*noise, vec![name.as_str()])),
+            }
+        }
+        let words = |(source, names): &(NoiseSource, Vec<&str>)| format!("{}: {}", names.join(", "), source.words());
+        all.iter().map(words).collect::<Vec<_>>().join("; ")
     }
 }
 
@@ -753,6 +779,27 @@ pub(super) mod tests {
         close(f.smape, 0.5 / (5.0 + 0.015));
         // Σd/√Σd² with 2048 differences of 1.
         close(f.global_z, 2048f64.sqrt());
+    }
+
+    /// A depth of 1e10 beside bands of 470 and 0.5 nm, which have standard errors: b is (1, 3) against (1, 2), n a thousandth of
+    /// that. Each is divided by its own light, so that both have the figures of b alone.
+    #[test]
+    fn channels_of_other_units_have_figures_and_noise_of_their_own() {
+        let bands = |pair: [f32; 2]| {
+            let plane = |name: &str, by: f32| (name.to_string(), pair.map(|x| by * x).repeat(PIXELS / 2));
+            let errors = ["b", "n"].map(|name| (format!("stderr.{name}"), vec![1.0; PIXELS]));
+            let planes = [("Z".to_string(), vec![1e10; PIXELS]), plane("b", 1.0), plane("n", 1.0 / 1024.0)];
+            file(planes.into_iter().chain(errors).collect())
+        };
+        let c = compare(&bands([1.0, 3.0]), &bands([1.0, 2.0]), &CompareOptions::default());
+        let close = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
+        for band in &c.channels[1..] {
+            close(band.rel_mse, 0.5 / (4.0 + 0.0225));
+            close(band.smape, 0.5 / (5.0 + 0.015));
+        }
+        assert_eq!(c.noise, None);
+        let told = "known from         Z: the differences themselves; b, n: the standard errors of both\n";
+        assert!(c.table().contains(told), "{}", c.table());
     }
 
     #[test]

@@ -216,6 +216,7 @@ impl<'a> Pair<'a> {
         let count = |samples: Samples, is: fn(f64) -> bool| samples.iter().filter(|&v| is(v)).count();
         ChannelFigures {
             name: self.name.clone(),
+            noise: self.noise.source(),
             mean_a: sum_a / n,
             mean_b: sum_b / n,
             mean_ratio: ratio,
