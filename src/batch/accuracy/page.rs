@@ -290,8 +290,13 @@ fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     values.into_iter().map(|v| (v, round(v))).collect()
 }
 
+/// A number of one figure.
 fn round(x: f64) -> String {
-    if x >= 1.0 { format!("{x:.0}") } else { format!("{x:.3}").trim_end_matches('0').to_owned() }
+    match x {
+        1.0.. => format!("{x:.0}"),
+        1e-3.. => format!("{x:.3}").trim_end_matches('0').to_owned(),
+        _ => format!("{x:.0e}"),
+    }
 }
 
 /// Text in HTML, also within quotes.
@@ -331,5 +336,7 @@ mod tests {
         let marks: Vec<String> = ticks(0.0, 1.0).into_iter().map(|t| t.1).collect();
         assert_eq!(marks, ["1", "2", "5", "10"]);
         assert!(ticks(-6.0, 3.0).len() <= 10);
+        let marks: Vec<String> = ticks(-3.9, -2.1).into_iter().map(|t| t.1).collect();
+        assert_eq!(marks, ["2e-4", "5e-4", "0.001", "0.002", "0.005"]);
     }
 }
