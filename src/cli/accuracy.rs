@@ -1,6 +1,7 @@
 //! `abbe accuracy`.
 
 use super::AccuracyArguments;
+use super::farm::shell;
 use super::interrupts::Interrupts;
 use super::text::columns;
 use crate::batch;
@@ -90,7 +91,8 @@ pub fn run(arguments: &AccuracyArguments) -> Result<i32> {
         return Ok(code);
     }
     let title = arguments.scene.file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let command = std::env::args_os().skip(1).fold("abbe".to_owned(), |all, word| all + " " + &word.to_string_lossy());
+    let words = std::env::args_os().skip(1).map(|word| shell(&word.to_string_lossy()));
+    let command = words.fold("abbe".to_owned(), |all, word| all + " " + &word);
     write_atomically(&files[0], page(&title, &command, &sheets, &without).as_bytes())?;
     write_json(&files[1], &sheets)?;
     write_atomically(&files[2], csv(&sheets).as_bytes())?;

@@ -112,9 +112,9 @@ fn in_words(path: &Path) -> Result<&str> {
 }
 
 /// A word as a person may paste it into a shell, in quotes where it needs them.
-fn shell(text: &str) -> String {
+pub(super) fn shell(text: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/._-+:,@%=".contains(c);
-    if text.chars().all(plain) { text.to_owned() } else { slurm::word(text) }
+    if !text.is_empty() && text.chars().all(plain) { text.to_owned() } else { slurm::word(text) }
 }
 
 /// What every task is told besides its part of the work, in the words of one that runs in another directory.
@@ -144,5 +144,6 @@ mod tests {
         assert_eq!(shell("file:///a_b/1.json"), "file:///a_b/1.json");
         assert_eq!(shell("/my jobs/it's"), "'/my jobs/it'\\''s'");
         assert_eq!(shell("/$(x)"), "'/$(x)'");
+        assert_eq!(shell(""), "''");
     }
 }
