@@ -328,6 +328,21 @@ fn shipped_scenes_of_known_light_have_it() {
     }
 }
 
+/// A sky that is the same everywhere: three numbers of it are the same in each sample, and differ by rounding alone.
+#[test]
+fn what_differs_by_rounding_alone_has_no_noise() {
+    let place = Place::of(
+        "camera: {origin: [0, 0, 1], target: [0, 0, 0], fov_deg: 40}\nimage: {width: 8, height: 8}\nrender: {samples: 16}\n\
+         lights:\n- constant: {radiance: {illuminant: D65}}\n",
+    );
+    let (code, said) = abbe(&place, "accuracy scene.yaml -o sheet --rounds 2 --pixels 64 --knob transport");
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("to the same noise RGB has no noise"), "{said}");
+    let row = &place.json("sheet/accuracy.json")[0]["rows"][1];
+    let noise = row["noise"][0].as_f64().unwrap();
+    assert!(row["efficiency"]["value"].is_null() && noise < 1e-5, "{row}");
+}
+
 /// Beside layers of light nothing can be traced from the lamps: there is no such knob, and all others have their rows.
 #[test]
 fn a_scene_with_layers_of_light_has_a_sheet() {

@@ -321,7 +321,9 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
         bias_squared: tally.bias_squared(reference),
         light: tally.light(reference),
         efficiency: match own / cost {
-            value if value.is_finite() => Figure { value, error: value * libm::hypot(own_error, error) },
+            value if value.is_finite() && tally.noise_squared().value > ROUNDING => {
+                Figure { value, error: value * libm::hypot(own_error, error) }
+            }
             // Without noise: nothing to weigh.
             _ => Figure { value: f64::INFINITY, error: 0.0 },
         },
