@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Where a comparison with Mitsuba must differ: scenes whose answer is a closed form, rendered by both.
 
-    tools/cross_validate/closed_forms.py [--binary PATH] [--spp N] [--markdown]
+    tools/cross_validate/closed_forms.py [--binary PATH] [--spp N] [--only TEXT] [--markdown]
 
 Every pixel of a scene has the same answer, derived below, so the mean of the picture is compared with it. Abbe must
 agree within 0.1 % and four standard errors, or the exit code is 1; of Mitsuba the figure is only told. Both read the
@@ -165,9 +165,11 @@ def main() -> int:
     parser.add_argument("--only", default="")
     parser.add_argument("--markdown", action="store_true")
     a = parser.parse_args()
+    wanted = [case for case in cases() if a.only in case.name]
+    if not wanted:
+        parser.error(f"no case has {a.only!r} in its name")
     variant = choose_variant()
     names = [variant] if variant == "scalar_spectral" else [variant, "scalar_spectral"]
-    wanted = [case for case in cases() if a.only in case.name]
     peers: dict[str, dict[str, np.ndarray]] = {}
     with tempfile.TemporaryDirectory() as folder:
         files = {case.name: Path(folder) / f"{i}.xml" for i, case in enumerate(wanted)}
