@@ -181,6 +181,9 @@ fn numbers_below_zero_are_told_as_values() {
         ("render", "--time", "-1s", "'-1s' for '--time <TIME>': expected a time"),
         ("farm", "--tiles", "-2", "'-2' for '--tiles <N>': -2 is not in 1..=1024"),
         ("accuracy", "--time", "0", "'0' for '--time <TIME>': expected a time above 0"),
+        ("accuracy", "--truth", "0", "'0' for '--truth <L>': expected a number from 1e-37 to 1e38"),
+        ("accuracy", "--truth", "1e39", "'1e39' for '--truth <L>': expected a number from 1e-37 to 1e38"),
+        ("accuracy", "--truth", "1e-46", "'1e-46' for '--truth <L>': expected a number from 1e-37 to 1e38"),
     ] {
         let ran = place.run(&[verb, "scenes/good.yaml", option, value]);
         assert!(ran.code == 2 && ran.err.contains(words), "{option} {value}: {}", ran.err);
