@@ -1,12 +1,13 @@
 //! What the header of a picture says: what is needed to make it again, and how good it is.
 
-use super::finish::Finish;
+use super::finish::{Finish, integrator};
 use super::frame::Frame;
 use super::report::SceneReport;
 use crate::description::{self, HeaderValue, Standard};
 use crate::film::error::ErrorEstimate;
 use crate::film::exr::{Attribute, TimeCode};
 use crate::spectrum::observer;
+use crate::transport::plan::Integrator;
 
 /// The attribute of a header that says what is wrong with a picture that is written all the same.
 pub(super) const FAULT: &str = "abbe/fault";
@@ -125,10 +126,12 @@ fn rational_rate(rate: f64) -> [u32; 2] {
     }
 }
 
-/// Luminance of what is one in red, green and blue, cd·m⁻²: Y is ∫ L ȳ dλ over that of ȳ, times the sensitivity.
+/// Luminance of what is one in red, green and blue, cd·m⁻²: Y is ∫ L ȳ dλ over that of ȳ, times the sensitivity. Bands and
+/// distances have none.
 fn white_luminance(finish: &Finish) -> Option<f64> {
     let unit = LUMENS_PER_WATT * observer::Y_INTEGRAL;
-    (finish.sensitivity > 0.0 && !finish.bands).then(|| unit / finish.sensitivity)
+    let coloured = !finish.bands && finish.integrator != integrator(&Integrator::Depth);
+    (finish.sensitivity > 0.0 && coloured).then(|| unit / finish.sensitivity)
 }
 
 /// The time code of frame `number` at `rate` frames a second, where that of frame 0 is `start`. More than 30 frames a second

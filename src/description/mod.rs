@@ -588,7 +588,7 @@ mod tests {
     fn the_reference_scene_is_a_scene() {
         let scene = parse(&reference("scene")).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(scene.shapes.len(), 11);
-        assert_eq!(scene.lights.len(), 6);
+        assert_eq!(scene.lights.len(), 7);
         assert_eq!(scene.materials.len(), Material::KINDS.len());
         // What the page calls a default is one.
         let bare = testing::scene("");

@@ -4,6 +4,7 @@ use super::common::ball_of_distances;
 use super::{FRAME, common, plane, render};
 use abbe::batch::{self, Overrides};
 use abbe::film::cryptomatte::id_of;
+use abbe::film::exr::header::read_headers;
 use abbe::film::exr::{ExrPart, read_exr};
 use abbe::spectrum::catalogue;
 use std::sync::atomic::AtomicBool;
@@ -326,6 +327,10 @@ fn layers_and_bands_hold_what_the_picture_holds() {
             let overrides = Overrides { output: Some(path("out.exr")), ..Overrides::default() };
             let report = batch::render_batch(&path("s.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
             assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+            // Distances have no luminance.
+            let header = read_headers(&path("out.exr")).unwrap();
+            let told = header.parts[0].number("whiteLuminance").is_some();
+            assert_eq!(told, integrator == "path" && image.is_empty());
             ["out.exr", "out.spectral.exr"].map(|name| read_exr(&path(name)).unwrap().parts.remove(0))
         };
         let ([picture, spectral], [bands, _]) = (parts(""), parts(", bands: [{name: all, response: 1}]"));
