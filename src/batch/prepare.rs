@@ -172,14 +172,17 @@ pub(super) fn prepare_scene(
     let exponents = moments.iter().map(|moment| moment.light_exponent);
     scene.light_exponent = exponents.fold(scene.light_exponent, i32::max);
     moments.iter_mut().for_each(|moment| moment.light_exponent = scene.light_exponent);
+    let exponents = moments.iter().map(|moment| moment.length_exponent);
+    scene.length_exponent = exponents.fold(scene.length_exponent, i32::max);
+    moments.iter_mut().for_each(|moment| moment.length_exponent = scene.length_exponent);
     let census = motion::census(&scene, &moments);
     let mut plan = EffectPlan::of(&census, integrator, mode);
     plan.effects.extend(blur.said);
     plan.layers = layers::plan(&description, &scene, planned)?;
     if matches!(plan.integrator, Integrator::Depth) {
         // Distances are no brighter where the lamps are.
-        scene.light_exponent = 0;
-        moments.iter_mut().for_each(|moment| moment.light_exponent = 0);
+        scene.light_exponent = scene.length_exponent;
+        moments.iter_mut().for_each(|moment| moment.light_exponent = scene.length_exponent);
     }
     let filter = sampler(&description)?;
     let (seed, wishes) = (description.render.seed, wishes(&description));

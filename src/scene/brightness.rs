@@ -1,9 +1,10 @@
-//! How bright the brightest of a scene is: by which power of two its film counts.
+//! How bright the brightest of a scene is, and how far the farthest: by which powers of two sums count light and lengths.
 
-use super::Scene;
 use super::bvh::Aabb;
 use super::light::Light;
 use super::material::Material;
+use super::shape::Shape;
+use super::{Geometry, Scene};
 use crate::math::sampler::GOLDEN;
 use crate::math::warp::{one_minus_cos, uniform_cone};
 use crate::math::{Frame, Ray};
@@ -54,17 +55,20 @@ impl Scene {
         let strongest = strengths.fold(0.0, f32::max);
         let highlight = if ambient.is_some() { (PI * f64::from(strongest)).max(1.0) } else { 1.0 };
         let brightness = shown.chain(lit).map(|b| b * highlight).chain(fog).chain(ambient);
-        let brightest = brightness.filter(|b| b.is_finite()).fold(0.0, f64::max);
-        if brightest < f64::MIN_POSITIVE {
-            return 0;
-        }
-        // The exponent of the number.
-        let log2 = (brightest.to_bits() >> 52) as i32 - 1023;
-        match log2 {
-            ..-24 => log2.max(-100),
-            MOST.. => (log2 - MOST).min(100),
-            _ => 0,
-        }
+        counted_over(brightness.filter(|b| b.is_finite()).fold(0.0, f64::max))
+    }
+
+    /// The power of two by which sums divide lengths, in the same way: by how far from the origin and from the camera anything
+    /// with an end is, and from the camera a plane.
+    pub(super) fn sums_of_lengths_exponent(&self) -> i32 {
+        let eye = self.camera.eye();
+        let planes = self.objects[..self.standing].iter().filter_map(|object| match &object.geometry {
+            Geometry::Shape(Shape::Plane(plane)) => Some(plane.height(eye).abs()),
+            _ => None,
+        });
+        let bounded = [self.center.length(), (self.center - eye).length()].map(|middle| middle + self.radius);
+        let lengths = bounded.into_iter().chain([eye.length()]).chain(planes);
+        counted_over(lengths.filter(|length| length.is_finite()).fold(0.0, f64::max))
     }
 
     /// How large the least thing is that is seen at `position`, metres.
@@ -89,6 +93,20 @@ impl Scene {
             false => (self.center - position).length().max(self.radius),
         };
         power / (2.0 * PI * spread * distance * distance) / PI
+    }
+}
+
+/// The power of two over which numbers are counted whose greatest is about `most`.
+fn counted_over(most: f64) -> i32 {
+    if most < f64::MIN_POSITIVE {
+        return 0;
+    }
+    // The exponent of the number.
+    let log2 = (most.to_bits() >> 52) as i32 - 1023;
+    match log2 {
+        ..-24 => log2.max(-100),
+        MOST.. => (log2 - MOST).min(100),
+        _ => 0,
     }
 }
 

@@ -320,6 +320,7 @@ impl<'a> Compiler<'a> {
             all_asked,
             uneven_asked,
             light_exponent: 0,
+            length_exponent: 0,
             has_sky: d.lights.iter().any(written::Light::is_around),
             dark,
             light_groups: lights::groups(d, &light_names),
@@ -333,6 +334,7 @@ impl<'a> Compiler<'a> {
         };
         self.note_beside(&mut scene, &boxes, &light_names);
         scene.light_exponent = scene.film_exponent(&powers, ambient, &boxes);
+        scene.length_exponent = scene.sums_of_lengths_exponent();
         let eye = Ray::new(scene.camera.eye(), DVec3::Z);
         self.note_contacts(&mut scene, &contacts, passed_over);
         self.note_overlaps(&mut scene);

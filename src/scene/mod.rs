@@ -114,6 +114,8 @@ pub struct Scene {
     pub near_lamps: Vec<equiangular::Lamp>,
     /// The film counts light over two to this power: `scene/brightness.rs` tells which.
     pub light_exponent: i32,
+    /// And sums count lengths over two to this power.
+    pub length_exponent: i32,
     /// Indices of lights from infinity.
     pub backgrounds: Vec<u32>,
     /// Whether a light from infinity was written, be it with no power: what `opaque_sky` covers all with.

@@ -140,6 +140,8 @@ pub struct LayerPlan {
     pub sensitivity: f64,
     /// Light is counted over two to this power, as the film counts it: sums hold so much only.
     pub exponent: i32,
+    /// Lengths are counted over two to this power.
+    pub length_exponent: i32,
     /// Whether the picture's own integrator gives distances, which are no light.
     pub distances: bool,
     /// How far apart samples of a pixel stand, in pixels: 1/√n.
@@ -163,6 +165,7 @@ impl Default for LayerPlan {
             in_xyz: false,
             sensitivity: 1.0,
             exponent: 0,
+            length_exponent: 0,
             distances: false,
             sample_distance: 1.0,
             mattes: false,
@@ -236,8 +239,10 @@ impl LayerPlan {
     /// Two to which power the numbers of `source` are counted over.
     fn exponent_of(&self, source: &Source) -> i32 {
         match source {
-            Source::Light(None, _) | Source::Band(_) if self.distances => 0,
-            Source::Light(Some(i), _) if matches!(self.integrators[*i], Integrator::Depth) => 0,
+            Source::Light(None, _) | Source::Band(_) if self.distances => self.length_exponent,
+            Source::Light(Some(i), _) if matches!(self.integrators[*i], Integrator::Depth) => self.length_exponent,
+            Source::Surface(Quantity::Depth | Quantity::Position)
+            | Source::Seen(Quantity::Depth | Quantity::Position) => self.length_exponent,
             Source::Light(..) | Source::Band(_) | Source::Ways(..) => self.exponent,
             Source::Surface(_) | Source::Seen(_) | Source::Numerics | Source::Middle(_) => 0,
         }
@@ -438,10 +443,10 @@ impl Values {
                 Source::Surface(quantity) | Source::Seen(quantity) => {
                     let count = quantity.components().len();
                     let start = numbers.len();
-                    numbers.extend(surface.by_ref().take(count));
-                    if squares.is_some() {
+                    numbers.extend(surface.by_ref().take(count).map(|x| x * unit));
+                    if let Some(factor) = squares {
                         numbers.extend_from_within(start..);
-                        numbers[start + count..].iter_mut().for_each(|x| *x *= *x);
+                        numbers[start + count..].iter_mut().for_each(|x| *x = (*x * factor) * (*x * factor));
                     }
                 }
                 Source::Light(of, form) => {

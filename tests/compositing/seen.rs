@@ -463,6 +463,42 @@ fn cards_behind_cards_cover_their_share_in_whitted() {
     }
 }
 
+/// A disk of radius k seen from 4 k: all lengths go with k, in layers as by the integrator `depth`, to some roundings of f32. Where
+/// nothing is seen Z is 1e10 in scenes of any size.
+#[test]
+fn lengths_are_right_at_any_scale() {
+    const LAYERS: [&str; 8] = ["Z", "P.X", "P.Y", "P.Z", "d.T", "p.X", "p.Y", "p.Z"];
+    let seen = |k: f64, integrator: &str| {
+        render(&format!(
+            "camera: {{origin: [0, 0, {:e}], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 8, height: 6}}\n\
+             integrator: {integrator}\nrender: {{samples: 16}}\noutput: {{exr: {{precision: float}}}}\n\
+             layers: [Z, P, {{name: d, surface: depth}}, {{name: p, surface: position}}]\n\
+             lights: [{{constant: {{radiance: 1}}}}]\nshapes: [disk: {{radius: {k:e}, normal: [0, 0, 1]}}]\n",
+            4.0 * k
+        ))
+    };
+    let one = ["path", "depth"].map(|integrator| seen(1.0, integrator));
+    for power in [-100, -70, -40, 0, 25, 38, 60, 100] {
+        let k = 2f64.powi(power);
+        for (integrator, one) in ["path", "depth"].into_iter().zip(&one) {
+            let part = seen(k, integrator);
+            let colours: &[&str] = if integrator == "depth" { &["R", "G", "B"] } else { &[] };
+            for name in LAYERS.iter().chain(colours) {
+                for (i, (found, expected)) in plane(&part, name).iter().zip(plane(one, name)).enumerate() {
+                    let (found, expected) = (f64::from(*found) / k, f64::from(*expected));
+                    match *name {
+                        "Z" if expected == 1e10 => assert_eq!(found * k, 1e10),
+                        _ => assert!(
+                            (found - expected).abs() < 1e-5,
+                            "{name}: {found}, not {expected}, at {i}, 2^{power}"
+                        ),
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// Seen from within a body that has the place, the ball of a weaker one is not there, nor is one of its own kind: what is seen is the
 /// wall around, 3 m away.
 #[test]
