@@ -354,9 +354,11 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// The numbers of [`NUMERICS`], which the film multiplies with the filter's `weight`: they are no light.
-    fn numerics(&self, counted: Counts, weight: f32) -> [f32; 8] {
-        let overflow = || self.xyz.iter().any(|x| (x * weight).abs() >= SAMPLE_LIMIT).then_some(Invalid::Overflow);
+    /// The numbers of [`NUMERICS`], which the film multiplies with the filter's `weight`: they are no light. Light times `unit` is
+    /// what the film adds.
+    fn numerics(&self, counted: Counts, weight: f32, unit: f32) -> [f32; 8] {
+        let is_too_large = |x: &f32| (x * unit * weight).abs() >= SAMPLE_LIMIT;
+        let overflow = || self.xyz.iter().any(is_too_large).then_some(Invalid::Overflow);
         let invalid = Invalid::of(self.radiance).or_else(overflow);
         let is = |cause| u64::from(invalid == Some(cause));
         let Counts { surfaces, robust, rays, self_hits } = counted;
@@ -471,7 +473,12 @@ impl Values {
                 // These stand in the pixel once.
                 Source::Middle(middle) => numbers.extend(middle.components().iter().map(|_| 0.0)),
                 Source::Numerics => {
-                    put(numbers, own.numerics(counted.0, counted.1), squares.map(|factor| [factor; NUMERICS.len()]));
+                    let unit = layers.unit_of(&Source::Light(None, Form::Xyz));
+                    put(
+                        numbers,
+                        own.numerics(counted.0, counted.1, unit),
+                        squares.map(|factor| [factor; NUMERICS.len()]),
+                    );
                 }
             }
         }

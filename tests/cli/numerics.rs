@@ -43,12 +43,12 @@ fn what_robust_arithmetic_was_needed_for_is_counted() {
 #[test]
 fn invalid_samples_are_counted_and_end_with_code_4() {
     let place = batch();
-    let hot = |radiance: &str| {
+    let hot = |radiance: &str, more: &[&str]| {
         let set = format!("lights[0].constant.radiance={radiance}");
-        let ran = place.run(&["render", "scenes/good.yaml", "-q", "-o", "hot", "--set", &set]);
+        let ran = place.run(&[&["render", "scenes/good.yaml", "-q", "-o", "hot", "--set", &set], more].concat());
         (ran, abbe::film::exr::read_exr(&place.path("hot/good.exr")).unwrap())
     };
-    let (ran, file) = hot("3e38");
+    let (ran, file) = hot("3e38", &[]);
     assert_eq!(ran.code, 4);
     assert!(ran.err.contains("64 of 64 samples were invalid") && ran.err.contains("64 NaN"), "{}", ran.err);
     assert!(file.parts[0].channels.iter().all(|(_, c)| c.iter().all(|x| x.is_finite())));
@@ -66,8 +66,10 @@ fn invalid_samples_are_counted_and_end_with_code_4() {
         assert_eq!(std::fs::metadata(place.path("hot/good.exr")).unwrap().modified().unwrap(), written, "{keep}");
     }
     // What f32 holds the film holds.
-    let (ran, file) = hot("1e30");
+    let (ran, file) = hot("1e30", &["--check-numerics"]);
     assert_eq!((ran.code, file.parts[0].text("abbe/invalidSamples")), (0, Some("0")), "{}", ran.err);
     let green = file.parts[0].channel("G").unwrap();
     assert!(green.iter().all(|x| (1e28..1e31).contains(x)), "{green:?}");
+    let overflow = file.parts[0].channel("numerics.overflow").unwrap();
+    assert!(overflow.iter().all(|n| *n == 0.0), "{overflow:?}");
 }
