@@ -1,4 +1,7 @@
 //! Rays that leave the lights, for paths that begin there.
+//!
+//! Their power is told over an area, [`Scene::unit_area`]: it goes with the square of how large a scene is, which f32 does not
+//! hold beyond 10¹⁹ m and below 10⁻¹⁹ m.
 
 use super::environment::Drawn;
 use super::light::{Light, spot_falloff};
@@ -14,8 +17,8 @@ use std::f64::consts::PI;
 pub struct Emission {
     /// From the light.
     pub ray: Ray,
-    /// Spectral power over the density of the ray and of the choice of its light, W·nm⁻¹: its mean is the power of all
-    /// lights.
+    /// Spectral power over the density of the ray and of the choice of its light, W·nm⁻¹ over the unit of area: its mean is the
+    /// power of all lights.
     pub power: Lanes,
     /// Index of the light.
     pub light: u32,
@@ -26,11 +29,11 @@ struct Spot {
     surface: SurfacePoint,
     texture: TexturePoint,
     departure: Departure,
-    /// Area of the shape, m².
+    /// Area of the shape over the unit of area.
     area: f64,
 }
 
-fn spot_on(objects: &[Object], object: u32, u: DVec2) -> Option<Spot> {
+fn spot_on(objects: &[Object], object: u32, u: DVec2, unit_area: f64) -> Option<Spot> {
     let facing = objects[object as usize].facing();
     match &objects[object as usize].geometry {
         Geometry::Shape(shape) => {
@@ -42,7 +45,7 @@ fn spot_on(objects: &[Object], object: u32, u: DVec2) -> Option<Spot> {
                 surface,
                 texture: TexturePoint::new(&surface, part, [0.0; 2]),
                 departure: Departure::new(object, part),
-                area: 1.0 / s.pdf_area,
+                area: 1.0 / (s.pdf_area * unit_area),
             })
         }
         Geometry::Mesh(mesh) => {
@@ -54,7 +57,7 @@ fn spot_on(objects: &[Object], object: u32, u: DVec2) -> Option<Spot> {
                 surface,
                 texture: TexturePoint::new(&surface, part, b.into()),
                 departure: Departure::new(object, part),
-                area: mesh.areas.total(),
+                area: mesh.areas.total() / unit_area,
             })
         }
         // They do not shine.
@@ -68,6 +71,8 @@ pub struct Start<'a> {
     place: Place,
     /// The wavelengths.
     nm: Lanes,
+    /// One over the unit of length.
+    per_length: f32,
 }
 
 enum Place {
@@ -84,7 +89,7 @@ enum Place {
 
 /// The freedom that is left when a [`Start`] has been drawn.
 pub enum Freedom {
-    /// None: this is the ray, and its power over its density, W·nm⁻¹.
+    /// None: this is the ray, and its power over its density, W·nm⁻¹ over the unit of area.
     None(Ray, Lanes),
     /// The direction, from this point.
     Direction(DVec3),
@@ -104,8 +109,8 @@ impl Start<'_> {
         }
     }
 
-    /// The ray in `direction`, with its power by solid angle over the density of its start, W·sr⁻¹·nm⁻¹; `None` where
-    /// there is no light.
+    /// The ray in `direction`, with its power by solid angle over the density of its start, W·sr⁻¹·nm⁻¹ over the unit of
+    /// area; `None` where there is no light.
     #[must_use]
     pub fn toward(&self, direction: DVec3) -> Option<(Ray, Lanes)> {
         match (&self.place, self.light) {
@@ -115,13 +120,13 @@ impl Start<'_> {
                 (cos > 0.0).then(|| (spot.ray(direction), light()))
             }
             (Place::Point(position), Light::Point { intensity, .. }) => {
-                Some((Ray::new(*position, direction), intensity.eval(self.nm)))
+                Some((Ray::new(*position, direction), over_area(intensity.eval(self.nm), self.per_length)))
             }
             (Place::Point(position), Light::Spot { axis, beam, cutoff, intensity, slide, .. }) => {
                 let falloff = spot_falloff(direction, *axis, *beam, *cutoff);
                 let slide = || slide.as_ref().map_or(Lanes::ONE, |slide| slide.eval(-direction, *position, self.nm));
-                (falloff > 0.0)
-                    .then(|| (Ray::new(*position, direction), intensity.eval(self.nm) * slide() * falloff as f32))
+                let light = || over_area(intensity.eval(self.nm) * slide() * falloff as f32, self.per_length);
+                (falloff > 0.0).then(|| (Ray::new(*position, direction), light()))
             }
             _ => None,
         }
@@ -138,6 +143,11 @@ impl Start<'_> {
     }
 }
 
+/// `power` over the unit of area, of which the side is one over `per_length`. By two steps, since f32 does not hold all squares.
+fn over_area(power: Lanes, per_length: f32) -> Lanes {
+    power * per_length * per_length
+}
+
 impl Spot {
     fn ray(&self, direction: DVec3) -> Ray {
         Ray::leaving(self.surface.point, self.surface.scale, self.surface.normal, direction, self.departure)
@@ -145,6 +155,13 @@ impl Spot {
 }
 
 impl Scene {
+    /// The area by which the power of light on its way from the lights is told, m²: 1 but in scenes so large or small that sums
+    /// count lengths over a power of two; then its square.
+    #[must_use]
+    pub fn unit_area(&self) -> f64 {
+        2f64.powi(2 * self.length_exponent)
+    }
+
     /// A ray of a light that `u_light` chooses; `None` where there is none.
     ///
     /// Light from infinity comes through a disc as wide as the bounded part of the scene: a plane without end gets
@@ -158,8 +175,8 @@ impl Scene {
         Some(Emission { ray, power: power * (1.0 / probability) as f32, light: i as u32 })
     }
 
-    /// A ray of light `i` as it shines by itself, and its power over its density, W·nm⁻¹: `u_start` and `u_rest` as for
-    /// [`Scene::start`].
+    /// A ray of light `i` as it shines by itself, and its power over its density, W·nm⁻¹ over the unit of area: `u_start` and
+    /// `u_rest` as for [`Scene::start`].
     #[must_use]
     pub fn shine(&self, i: usize, u_start: DVec2, u_rest: DVec2, nm: Lanes) -> Option<(Ray, Lanes)> {
         let start = self.start(i, u_start, u_rest, nm)?;
@@ -197,17 +214,18 @@ impl Scene {
     #[must_use]
     pub fn start(&self, i: usize, u: DVec2, rest: DVec2, nm: Lanes) -> Option<Start<'_>> {
         let light = &self.lights[i];
+        let (unit_area, per_length) = (self.unit_area(), 2f32.powi(-self.length_exponent));
         let place = match light {
-            Light::Area { object, .. } => Place::Surface(spot_on(&self.objects, *object, u)?),
+            Light::Area { object, .. } => Place::Surface(spot_on(&self.objects, *object, u, unit_area)?),
             Light::AlongNormal { object, exitance } => {
-                let spot = spot_on(&self.objects, *object, u)?;
+                let spot = spot_on(&self.objects, *object, u, unit_area)?;
                 let power = exitance.eval(&spot.texture, nm) * spot.area as f32;
                 Place::Beam { ray: spot.ray(spot.surface.normal), power }
             }
             Light::Point { position, .. } | Light::Spot { position, .. } => Place::Point(*position),
             Light::Projector(projector) => {
                 let (ray, power) = projector.emit(rest, nm);
-                Place::Beam { ray, power }
+                Place::Beam { ray, power: over_area(power, per_length) }
             }
             Light::Directional { direction, irradiance } => {
                 Place::Infinity { direction: *direction, irradiance: irradiance.eval(nm) }
@@ -222,12 +240,12 @@ impl Scene {
                 Place::Infinity { direction: -s.direction, irradiance }
             }
         };
-        Some(Start { light, place, nm })
+        Some(Start { light, place, nm, per_length })
     }
 
-    /// The area of the disc through which light from infinity comes, m².
+    /// The area of the disc through which light from infinity comes, over the unit of area.
     fn section(&self) -> f32 {
-        (PI * self.radius * self.radius) as f32
+        (PI * self.radius * self.radius / self.unit_area()) as f32
     }
 
     /// A ray from outside the scene.

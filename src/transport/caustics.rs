@@ -217,6 +217,8 @@ impl Caustics {
             Freedom::Place(direction) => {
                 // From outside everything that has an end.
                 let back = (ball.center - scene.center).length() + scene.radius + ball.radius;
+                // Powers are told over that area.
+                density *= scene.unit_area();
                 (scene.from_infinity(x, direction, back), start.irradiance())
             }
             Freedom::None(..) => return None,

@@ -28,7 +28,7 @@ pub struct Photon<L> {
 /// Wavelengths that went together.
 #[derive(Clone, Copy, Debug)]
 pub struct Together {
-    /// Spectral power over the hero's density, W·nm⁻¹.
+    /// Spectral power over the hero's density, W·nm⁻¹ over [`Scene::unit_area`](crate::scene::Scene::unit_area).
     pub power: Lanes,
     /// Density of each lane over the hero's.
     pub rho: Lanes,
@@ -37,7 +37,7 @@ pub struct Together {
 /// A wavelength that parted from the others; none led it.
 #[derive(Clone, Copy, Debug)]
 pub struct Alone {
-    /// Spectral power over its density, W·nm⁻¹.
+    /// Spectral power over its density, in the same unit.
     pub power: f32,
     /// Which.
     pub lane: u8,
@@ -94,6 +94,8 @@ impl Photons {
 #[derive(Debug)]
 pub struct PhotonMap {
     radius: f64,
+    /// By which the powers of photons are told, m².
+    unit_area: f64,
     /// Paths that were followed for them.
     paths: f64,
     together: Buckets<Together>,
@@ -101,14 +103,15 @@ pub struct PhotonMap {
 }
 
 impl PhotonMap {
-    /// Sorts the photons of `paths` paths for collecting within `radius` metres. Who followed the paths, and in how many
-    /// `pieces`, makes no difference.
+    /// Sorts the photons of `paths` paths, whose power is told over `unit_area`, for collecting within `radius` metres. Who
+    /// followed the paths, and in how many `pieces`, makes no difference.
     #[must_use]
-    pub fn new(pieces: &[Photons], paths: u64, radius: f64) -> PhotonMap {
+    pub fn new(pieces: &[Photons], paths: u64, radius: f64, unit_area: f64) -> PhotonMap {
         let together: Vec<&[_]> = pieces.iter().map(|p| p.together.as_slice()).collect();
         let alone: Vec<&[_]> = pieces.iter().map(|p| p.alone.as_slice()).collect();
         PhotonMap {
             radius,
+            unit_area,
             paths: paths as f64,
             together: Buckets::new(&together, radius),
             alone: Buckets::new(&alone, radius),
@@ -121,7 +124,7 @@ impl PhotonMap {
     pub fn gather(&self, point: DVec3, normal: DVec3, mut scatter: impl FnMut(&Photon<Together>) -> Lanes) -> Lanes {
         let mut sum = Lanes::ZERO;
         self.each_near(point, normal, |photon| sum += scatter(photon) * photon.light.power);
-        sum * (1.0 / (std::f64::consts::PI * self.radius * self.radius * self.paths)) as f32
+        sum * (self.unit_area / (std::f64::consts::PI * self.radius * self.radius * self.paths)) as f32
     }
 
     /// Shows `visit` the photons around `point` on a surface of `normal`.
@@ -297,7 +300,7 @@ mod tests {
         let pieces = photons(3000);
         let all: Vec<Photon<Together>> = pieces.iter().flat_map(Photons::iter).collect();
         for radius in [0.01, 0.3, 5.0] {
-            let map = PhotonMap::new(&pieces, 3000, radius);
+            let map = PhotonMap::new(&pieces, 3000, radius, 1.0);
             for i in 0..50 {
                 let point = DVec3::new(f64::from(i) * 0.07 - 1.7, 0.001, 0.9 - f64::from(i) * 0.031);
                 let found = map.gather(point, DVec3::Y, |_| Lanes::ONE).to_array();
@@ -320,7 +323,7 @@ mod tests {
     /// radius 0.5 there are 147 of 3000 photons, evenly laid.
     #[test]
     fn a_shower_has_its_density() {
-        let map = PhotonMap::new(&photons(3000), 3000, 0.5);
+        let map = PhotonMap::new(&photons(3000), 3000, 0.5, 1.0);
         let found = f64::from(map.gather(DVec3::ZERO, DVec3::Y, |_| Lanes::ONE).to_array()[0]);
         // Low-discrepancy points err less than the 8 % of independent ones.
         assert!((found / (1.5 / 16.0) - 1.0).abs() < 0.08, "{found}");
@@ -336,7 +339,7 @@ mod tests {
             for photon in pieces.iter_mut().flat_map(|piece| &mut piece.together) {
                 photon.point += DVec3::new(away, 0.5 * away, -away);
             }
-            let map = PhotonMap::new(&pieces, 10_000, 1e-4);
+            let map = PhotonMap::new(&pieces, 10_000, 1e-4, 1.0);
             let fullest = map.together.starts.windows(2).map(|pair| pair[1] - pair[0]).max();
             assert!(fullest.is_some_and(|count| count < 16), "{away}: {fullest:?}");
         }

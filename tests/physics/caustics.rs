@@ -717,3 +717,47 @@ fn a_camera_in_the_middle_of_a_mirror_sees_its_light() {
     // No sample is invalid.
     render(&bench);
 }
+
+/// A floor, glass, a mirror and lamps, all times a power of two, are the same picture, by paths from the camera and the lights
+/// with photons as by paths from the lights alone: powers of lamps go with the square, beyond what f32 holds.
+#[test]
+fn light_from_the_lamps_is_the_same_at_any_scale() {
+    let scene = |k: f64, integrator: &str| {
+        let [one, two, half] = [k, 2.0 * k, 0.5 * k];
+        let text = format!(
+            "camera: {{origin: [0, {one:e}, {:e}], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 24, height: 24}}\n\
+             integrator: {{{integrator}: {{}}}}\n\
+             render: {{samples: 16, techniques: {{light_tracing: on, merging: on}}}}\nshapes:\n\
+             - rectangle: {{corner: [{:e}, {:e}, {two:e}], edge_u: [{:e}, 0, 0], edge_v: [0, 0, {:e}]}}\n\
+             - sphere: {{radius: {half:e}, material: {{dielectric: {{ior: 1.5}}}}}}\n\
+             - sphere: {{center: [{one:e}, {two:e}, 0], radius: {half:e}, emission: 3}}\n\
+             - rectangle: {{corner: [{:e}, {two:e}, 0], edge_u: [{half:e}, 0, 0], edge_v: [0, 0, {half:e}], emission: 2,\n    \
+                 emission_direction: normal}}\n\
+             - rectangle: {{corner: [{:e}, {:e}, {:e}], edge_u: [{:e}, 0, 0], edge_v: [0, {two:e}, 0], material: {{mirror: {{}}}}}}\n\
+             lights: [directional: {{direction: [1, -2, 0.5], irradiance: 1}}]\n",
+            5.0 * k,
+            -two,
+            -half,
+            4.0 * k,
+            -4.0 * k,
+            -one,
+            -two,
+            -half,
+            -two,
+            4.0 * k
+        );
+        render(&bench_with(&text, &[]))
+    };
+    for integrator in ["path", "light_tracer"] {
+        let expected = scene(1.0, integrator);
+        let mean = expected.rgb[1].iter().sum::<f32>() / expected.rgb[1].len() as f32;
+        assert!(mean > 0.02, "{integrator}: {mean}");
+        for power in [-90, -66, 66, 90] {
+            let found = scene(2f64.powi(power), integrator);
+            let all = found.rgb.iter().flatten().zip(expected.rgb.iter().flatten());
+            for (found, expected) in all {
+                assert!((found - expected).abs() < 1e-5 * mean, "{integrator}, 2^{power}: {found}, not {expected}");
+            }
+        }
+    }
+}

@@ -152,7 +152,10 @@ impl Part<'_> {
             return None;
         }
         let followed = paths_of_a_sample(job, light_paths);
-        Some((PhotonMap::new(&photons, followed, merge::radius(first_radius, index)), wavelength))
+        Some((
+            PhotonMap::new(&photons, followed, merge::radius(first_radius, index), job.scene.unit_area()),
+            wavelength,
+        ))
     }
 }
 
