@@ -341,6 +341,7 @@ impl<'a> Compiler<'a> {
         self.note_meshes(&mut scene);
         self.note_lost_light(&mut scene, &light_names);
         scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);
+        self.note_strangers(&mut scene);
         Ok(scene)
     }
 

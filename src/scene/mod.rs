@@ -7,6 +7,7 @@
 pub mod ahead;
 pub mod along_normal;
 mod apart;
+mod around;
 pub mod bands;
 mod beside;
 mod brightness;

@@ -3,6 +3,7 @@
 use super::Compiler;
 use crate::description as written;
 use crate::scene::apart::Contact;
+use crate::scene::around::Stranger;
 use crate::scene::bvh::Aabb;
 use crate::scene::material::Material;
 use crate::scene::shape::Shape;
@@ -55,6 +56,36 @@ impl Compiler<'_> {
         if passed_over > 0 {
             let note = "more bodies that light goes into are not looked at for faces that they share; leave gaps there";
             scene.notes.push(format!("{passed_over} {note}"));
+        }
+    }
+
+    /// Notes which bodies stand in another medium than they are taken to, as nothing is written of it.
+    pub(super) fn note_strangers(&self, scene: &mut Scene) {
+        let name = |medium: Option<u32>| {
+            let known = self.medium_ids.iter().find(|(_, id)| Some(**id) == medium);
+            known.map_or(written::VACUUM, |(name, _)| *name)
+        };
+        let told = |stranger: &Stranger| {
+            let shape = self.description.shapes.get(stranger.object as usize)?;
+            let (side, is_written) = match stranger.within {
+                true => ("inside", shape.inside.is_some()),
+                false => ("outside", shape.outside.is_some()),
+            };
+            let note = format!(
+                "stands in {medium}, but its {side}, which is not written, is taken to be what the camera is in; {side}: {medium} \
+                 says where it stands",
+                medium = name(stranger.medium),
+            );
+            let at = format!("shapes[{}].{}", stranger.object, shape.geometry.kind());
+            (!is_written).then(|| self.description.fault(&at, &note))
+        };
+        let notes: Vec<String> = scene.strangers().iter().filter_map(told).collect();
+        if notes.len() > TOLD {
+            let more = notes.len() - TOLD;
+            scene.notes.extend(notes.into_iter().take(TOLD));
+            scene.notes.push(format!("{more} more bodies stand in another medium than they say"));
+        } else {
+            scene.notes.extend(notes);
         }
     }
 
