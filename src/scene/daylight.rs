@@ -37,6 +37,9 @@ const LIMB: usize = 6;
 /// Half the angle of the sun's disc for which the fits are made, radians.
 const SUN_HALF_ANGLE: f64 = 0.5 * 0.5358 * PI / 180.0;
 
+/// The most light of a place that is looked at before: others may be some times brighter, and f32 still holds them.
+const MOST: f32 = f32::MAX / 16.0;
+
 static DATA: LazyLock<Vec<f32>> = LazyLock::new(|| {
     let bytes = include_bytes!("daylight/hosek_wilkie.f32");
     bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
@@ -110,33 +113,48 @@ struct Limb {
 }
 
 impl Daylight {
-    /// The light under `conditions`; none with the sun below the horizon.
+    /// The light under `conditions`, dark with the sun below the horizon; `None` where it is more than f32 holds.
     #[must_use]
-    pub fn new(conditions: &Conditions) -> Daylight {
+    pub fn new(conditions: &Conditions) -> Option<Daylight> {
         let Conditions { sun, turbidity, albedo, sky_scale, sun_scale, sun_half_angle, limb_darkening, carried } =
             conditions;
         let up = sun.y >= 0.0;
         let elevation = libm::atan2(sun.y, sun.x.hypot(sun.z));
-        let sky = (up && *sky_scale > 0.0).then(|| Dome::new(elevation, *turbidity, albedo, *sky_scale));
-        let disc = (up && *sun_scale > 0.0).then(|| {
-            let solid = |half_angle: f64| one_minus_cos(half_angle);
-            let scale = sun_scale * solid(SUN_HALF_ANGLE) / solid(*sun_half_angle);
+        let holds = |bands: &Bands| bands.iter().all(|light| *light <= MOST);
+        let mut sky = None;
+        if up && *sky_scale > 0.0 {
+            let dome = Dome::new(elevation, *turbidity, albedo, *sky_scale);
+            // A sky is brightest about the sun or at the horizon.
+            let horizon = DVec3::new(sun.x, 0.0, sun.z).try_normalize().unwrap_or(DVec3::X);
+            if ![*sun, DVec3::Y, horizon, -horizon].iter().all(|direction| holds(&dome.bands(*sun, *direction))) {
+                return None;
+            }
+            sky = Some(dome);
+        }
+        let mut disc = None;
+        if up && *sun_scale > 0.0 {
+            let scale = sun_scale * one_minus_cos(SUN_HALF_ANGLE) / one_minus_cos(*sun_half_angle);
             let limb = Limb::new(*turbidity, scale);
             // Over the disc as it is: a wider one gives the same light.
-            let mean = carried.light(spectrum_of(&limb.mean(*sun)));
+            let mean = limb.mean(*sun);
+            if !holds(&mean) {
+                return None;
+            }
             let limb = (*limb_darkening && *carried == Carried::Spectra).then(|| Box::new(limb));
-            Disc { half_angle: *sun_half_angle, mean, limb, sets: true }
-        });
-        Daylight { sun: *sun, sky, disc, colours: carried.shares_of(&TENTS) }
+            let mean = carried.light(spectrum_of(&mean));
+            disc = Some(Disc { half_angle: *sun_half_angle, mean, limb, sets: true });
+        }
+        Some(Daylight { sun: *sun, sky, disc, colours: carried.shares_of(&TENTS) })
     }
 
     /// Light from a disc alone, `toward` which is a unit vector, of `half_angle` in radians, up to π/2. A surface that faces
-    /// its middle has the `irradiance`.
+    /// its middle has the `irradiance`. `None` where its radiance is more than f32 holds.
     #[must_use]
-    pub fn of_disc(toward: DVec3, half_angle: f64, irradiance: &Spectrum) -> Daylight {
+    pub fn of_disc(toward: DVec3, half_angle: f64, irradiance: &Spectrum) -> Option<Daylight> {
         let disc = Disc { half_angle, mean: Spectrum::constant(1.0), limb: None, sets: false };
-        let mean = irradiance.scaled(1.0 / disc.facing());
-        Daylight { sun: toward, sky: None, disc: Some(Disc { mean, ..disc }), colours: None }
+        let factor = 1.0 / disc.facing();
+        let mean = (irradiance.max() * factor <= f64::from(MOST)).then(|| irradiance.scaled(factor))?;
+        Some(Daylight { sun: toward, sky: None, disc: Some(Disc { mean, ..disc }), colours: None })
     }
 
     /// Whether there is light beside the disc.
@@ -419,6 +437,10 @@ mod tests {
         }
     }
 
+    fn shining(conditions: &Conditions) -> Daylight {
+        Daylight::new(conditions).expect("light that f32 holds")
+    }
+
     const NM: [f32; LANES] = [365.0, 405.0, 450.0, 510.0, 555.0, 610.0, 680.0, 719.0];
 
     /// What Mitsuba 3.9.1 (`sunsky`, scalar_spectral) has in `direction` at [`NM`], told in six digits. Both compute in f32:
@@ -433,7 +455,7 @@ mod tests {
 
     #[test]
     fn the_sky_is_that_of_the_fits() {
-        let sky = |sun, turbidity, albedo| Daylight::new(&Conditions { sun_scale: 0.0, ..day(sun, turbidity, albedo) });
+        let sky = |sun, turbidity, albedo| shining(&Conditions { sun_scale: 0.0, ..day(sun, turbidity, albedo) });
         let clear = sky([-0.2, 0.5, -0.6], 3.0, 0.3);
         shows(
             &clear,
@@ -478,7 +500,7 @@ mod tests {
             limb_darkening: true,
             ..day([0.0, 0.3, -1.0], 2.5, 0.3)
         };
-        let sun = Daylight::new(&sun);
+        let sun = shining(&sun);
         shows(
             &sun,
             [0.0, 0.287348, -0.957826],
@@ -502,8 +524,8 @@ mod tests {
     fn an_even_disc_gives_what_one_that_darkens_does() {
         let even = day([0.3, 0.1, -1.0], 3.0, 0.3);
         let sky_scale = 0.0;
-        let [even, limb] = [false, true]
-            .map(|limb_darkening| Daylight::new(&Conditions { sky_scale, limb_darkening, ..even.clone() }));
+        let [even, limb] =
+            [false, true].map(|limb_darkening| shining(&Conditions { sky_scale, limb_darkening, ..even.clone() }));
         let nm = Lanes::new([360.0, 400.0, 440.0, 480.0, 520.0, 560.0, 600.0, 640.0]);
         let mut sum = Lanes::ZERO;
         for i in 0..4096 {
@@ -520,7 +542,7 @@ mod tests {
     fn a_wider_sun_gives_the_same_light() {
         let power = |degrees: f64| {
             let sun_half_angle = (0.5 * degrees).to_radians();
-            Daylight::new(&Conditions { sun_half_angle, ..day([0.0, 1.0, 0.2], 3.0, 0.3) }).sun_power()
+            shining(&Conditions { sun_half_angle, ..day([0.0, 1.0, 0.2], 3.0, 0.3) }).sun_power()
         };
         for degrees in [1e-4, 0.1, 5.0, 90.0] {
             // The mean is kept in f32.
@@ -533,8 +555,8 @@ mod tests {
     #[test]
     fn as_three_numbers_a_sky_has_its_colour() {
         let spectral = day([0.2, 0.4, -1.0], 2.0, 0.3);
-        let colours = Daylight::new(&Conditions { carried: Carried::Colours, ..spectral.clone() });
-        let spectral = Daylight::new(&spectral);
+        let colours = shining(&Conditions { carried: Carried::Colours, ..spectral.clone() });
+        let spectral = shining(&spectral);
         let [red, green, blue] = PLACES_NM.map(|nm| nm as f32);
         let nm = Lanes::new([red, green, blue, red, green, blue, red, green]);
         for direction in [DVec3::Y, DVec3::new(0.5, 0.1, 0.3).normalize(), spectral.sun] {
@@ -549,11 +571,26 @@ mod tests {
         }
     }
 
+    /// Its light is refused before any of it is infinite, however it comes to be so bright.
+    #[test]
+    fn light_beyond_f32_is_no_day() {
+        let day = day([0.2, 0.4, -1.0], 3.0, 0.3);
+        let holds = |conditions: Conditions| Daylight::new(&conditions).is_some();
+        for (scale, expected) in [(1e30, true), (1e38, false)] {
+            assert_eq!(holds(Conditions { sky_scale: scale, ..day.clone() }), expected, "{scale}");
+            assert_eq!(holds(Conditions { sun_scale: scale, ..day.clone() }), expected, "{scale}");
+        }
+        // A millionth of a degree, 3e11 times as bright.
+        assert!(!holds(Conditions { sun_scale: 1e25, sun_half_angle: 1e-8, ..day }));
+        assert!(Daylight::of_disc(DVec3::Y, 1e-6, &Spectrum::constant(1e30)).is_none());
+        assert!(Daylight::of_disc(DVec3::Y, 1e-6, &Spectrum::constant(1e20)).is_some());
+    }
+
     #[test]
     fn below_the_horizon_is_nothing() {
-        let noon = Daylight::new(&day([0.0, 1.0, 0.0], 3.0, 0.3));
+        let noon = shining(&day([0.0, 1.0, 0.0], 3.0, 0.3));
         assert_eq!(noon.radiance(DVec3::new(1.0, -1e-9, 0.0), Lanes::new(NM)), Lanes::ZERO);
-        let night = Daylight::new(&day([1.0, -0.01, 0.0], 3.0, 0.3));
+        let night = shining(&day([1.0, -0.01, 0.0], 3.0, 0.3));
         assert_eq!(night.radiance(DVec3::Y, Lanes::new(NM)), Lanes::ZERO);
         assert_eq!(Environment::of_day(night, DMat3::IDENTITY).mean_luminance(), 0.0);
     }
@@ -563,7 +600,7 @@ mod tests {
     #[test]
     fn directions_are_drawn_by_the_density_that_is_told() {
         for (sun, half_angle) in [([0.2, 0.4, -1.0], SUN_HALF_ANGLE), ([1.0, 0.0, 0.0], 0.3)] {
-            let day = Daylight::new(&Conditions { sun_half_angle: half_angle, ..day(sun, 3.0, 0.3) });
+            let day = shining(&Conditions { sun_half_angle: half_angle, ..day(sun, 3.0, 0.3) });
             let turned = DMat3::from_rotation_x(1.0);
             let map = Environment::of_day(day, turned);
             let n = 1 << 16;

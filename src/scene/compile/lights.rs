@@ -111,7 +111,7 @@ impl<'a> Compiler<'a> {
                     false => Light::Directional { direction, irradiance },
                     true => {
                         let disc = Daylight::of_disc(-direction, 0.5 * l.angle_deg.to_radians(), &irradiance);
-                        Light::Environment(Arc::new(Environment::of_day(disc, DMat3::IDENTITY)))
+                        return Ok(self.day(&format!("{at}.angle_deg"), disc, DMat3::IDENTITY));
                     }
                 }
             }
@@ -164,10 +164,18 @@ impl<'a> Compiler<'a> {
                     limb_darkening: l.limb_darkening,
                     carried: self.shelf.carried,
                 });
-                Light::Environment(Arc::new(Environment::of_day(day, world_from_sky)))
+                return Ok(self.day(at, day, world_from_sky));
             }
             written::Light::Projector(l) => return Ok(self.projector(at, l)),
         }))
+    }
+
+    /// A sky, or a disc at infinity; a fault where it is brighter than f32 holds.
+    fn day(&mut self, at: &str, day: Option<Daylight>, world_from_sky: DMat3) -> Option<Light> {
+        if day.is_none() {
+            self.fault(at, "expected light up to 3.4e38, found more");
+        }
+        Some(Light::Environment(Arc::new(Environment::of_day(day?, world_from_sky))))
     }
 
     fn spot(&mut self, at: &str, l: &'a written::SpotLight) -> Option<Light> {
