@@ -298,7 +298,8 @@
 //! - sky:                            # a clear day, in W·m⁻²·sr⁻¹·nm⁻¹: zenith +y, north -z, east +x
 //!     sun: {elevation_deg: 40, azimuth_deg: 120}   # ~ azimuth_deg: 0, from north toward east; or
 //!                                   # direction: [1, 2, 3], toward it in the world; or latitude_deg, longitude_deg and,
-//!                                   # with defaults, utc_offset, year, month, day, hour: where it stands there
+//!                                   # with defaults, utc_offset, year, month, day, hour: where it stands there; below
+//!                                   # the horizon all is dark, as the fits have no twilight
 //!     turbidity: 3                  # ~ 1 to 10
 //!     albedo: 0.3                   # ~ of the ground
 //!     sky_scale: 1                  # ~
