@@ -212,11 +212,7 @@ impl Environment {
     pub fn of_day(day: Daylight, world_from_map: DMat3) -> Environment {
         let [width, height] = if day.has_sky() { DAY } else { [2, 2] };
         let white = illuminant::d65().luminance();
-        let pixel = |i: usize| {
-            let at = DVec2::new((i % width) as f64 + 0.5, (i / width) as f64 + 0.5);
-            let direction = direction_of(at / DVec2::new(width as f64, height as f64), 0.5).0;
-            [(day.sky_luminance(direction) / white) as f32; 3]
-        };
+        let pixel = |i: usize| [(day.sky_luminance(toward_texel(i, [width, height])) / white) as f32; 3];
         let sky: Vec<[f32; 3]> = (0..width * height).into_par_iter().map(pixel).collect();
         let map = Environment::new(&sky, [width, height], 1.0, Mapping::Texels, world_from_map, Carried::Spectra);
         let sun = day.sun_power() / (4.0 * PI);
@@ -332,11 +328,12 @@ impl Environment {
     pub fn sample(&self, u: DVec2, drawn: Drawn) -> Option<EnvironmentSample> {
         let Some(day) = &self.day else { return self.sample_texels(u, drawn) };
         let share = self.sun_share(drawn);
-        let direction = if u.x < share {
-            self.world_from_map * day.sample_sun(DVec2::new(u.x / share, u.y))
-        } else {
-            self.sample_texels(DVec2::new((u.x - share) / (1.0 - share), u.y), drawn)?.direction
-        };
+        if u.x >= share {
+            let sample = self.sample_texels(DVec2::new((u.x - share) / (1.0 - share), u.y), drawn)?;
+            let pdf_solid_angle = self.with_sun(day, sample.pdf_solid_angle, drawn, sample.direction);
+            return Some(EnvironmentSample { pdf_solid_angle, ..sample });
+        }
+        let direction = self.world_from_map * day.sample_sun(DVec2::new(u.x / share, u.y));
         let place = self.place(direction);
         let pdf_solid_angle = self.density(&place, &self.corners(place.at), drawn, direction);
         (pdf_solid_angle > 0.0).then_some(EnvironmentSample { direction, pdf_solid_angle, at: place.at })
@@ -428,11 +425,14 @@ impl Environment {
         let of_texels = self.density_of_texels(place, corners, drawn);
         match &self.day {
             None => of_texels,
-            Some(day) => {
-                let share = self.sun_share(drawn);
-                share * day.sun_pdf(self.world_from_map.transpose() * direction) + (1.0 - share) * of_texels
-            }
+            Some(day) => self.with_sun(day, of_texels, drawn, direction),
         }
+    }
+
+    /// The density at `direction` of a day, of whose texels alone it is `of_texels`.
+    fn with_sun(&self, day: &Daylight, of_texels: f64, drawn: Drawn, direction: DVec3) -> f64 {
+        let share = self.sun_share(drawn);
+        share * day.sun_pdf(self.world_from_map.transpose() * direction) + (1.0 - share) * of_texels
     }
 
     fn density_of_texels(&self, place: &Place, corners: &Corners, drawn: Drawn) -> f64 {
@@ -497,10 +497,8 @@ impl Environment {
             return bands.representatives();
         }
         if let Some(day) = &self.day {
-            let sky = spread(self.texels.len(), 16).map(|i| {
-                let at = DVec2::new((i % self.width) as f64 + 0.5, (i / self.width) as f64 + 0.5);
-                day.sky_spectrum(direction_of(at / DVec2::new(self.width as f64, self.height as f64), 0.5).0)
-            });
+            let sky =
+                spread(self.texels.len(), 16).map(|i| day.sky_spectrum(toward_texel(i, [self.width, self.height])));
             return sky.chain(day.sun_spectrum().map(|(sun, _)| sun)).collect();
         }
         let texels = spread(self.texels.len(), 16).map(|i| &self.texels[i]);
@@ -514,6 +512,12 @@ fn direction_of(at: DVec2, left: f64) -> (DVec3, f64) {
     let (sin_theta, cos_theta) = sin_cos_turn(0.5 * at.y);
     let (sin_phi, cos_phi) = sin_cos_turn(if at.x < left { at.x + 1.0 - left } else { at.x - left });
     (DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi), sin_theta)
+}
+
+/// The direction in a map's frame of the middle of a texel of [`Mapping::Texels`].
+fn toward_texel(i: usize, [width, height]: [usize; 2]) -> DVec3 {
+    let at = DVec2::new((i % width) as f64 + 0.5, (i / width) as f64 + 0.5);
+    direction_of(at / DVec2::new(width as f64, height as f64), 0.5).0
 }
 
 /// Texels of light: a colour, and twice the greatest channel.
