@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// Σ c_k z^k by Horner's rule.
 #[inline(always)]
-fn polynomial<const N: usize>(c: &[f64; N], z: f64) -> f64 {
+pub(super) fn polynomial<const N: usize>(c: &[f64; N], z: f64) -> f64 {
     c.iter().rev().fold(0.0, |sum: f64, &c| sum.mul_add(z, c))
 }
 

@@ -3,6 +3,32 @@
 //! The platform's `sin` and `cos` differ in the last bit between C libraries, which would
 //! break bit-identical merging; [`sin_cos_turn`] is a polynomial of our own, the rest is `libm`.
 
+use super::elementary::polynomial;
+
+/// (sin √z / √z − 1) / z: Taylor's series to the 17th degree of the sine.
+const SIN: [f64; 8] = [
+    -1.0 / 6.0,
+    1.0 / 120.0,
+    -1.0 / 5040.0,
+    1.0 / 362_880.0,
+    -1.0 / 39_916_800.0,
+    1.0 / 6_227_020_800.0,
+    -1.0 / 1_307_674_368_000.0,
+    1.0 / 355_687_428_096_000.0,
+];
+
+/// (cos √z − 1) / z, to the 16th degree of the cosine.
+const COS: [f64; 8] = [
+    -0.5,
+    1.0 / 24.0,
+    -1.0 / 720.0,
+    1.0 / 40_320.0,
+    -1.0 / 3_628_800.0,
+    1.0 / 479_001_600.0,
+    -1.0 / 87_178_291_200.0,
+    1.0 / 20_922_789_888_000.0,
+];
+
 /// Sine and cosine of 2π·`u` for `u` in [0, 1].
 ///
 /// The angle is reduced to [−π/4, π/4] exactly, in turns; there the Taylor series to degree
@@ -12,25 +38,7 @@
 pub fn sin_cos_turn(u: f64) -> (f64, f64) {
     let quarter = (u * 4.0 + 0.5).floor();
     // u·4 − quarter is exact: both are multiples of ulp(u·4) and near each other.
-    let x = (u * 4.0 - quarter) * std::f64::consts::FRAC_PI_2;
-    let z = x * x;
-    let sin = x
-        * (1.0
-            + z * (-1.0 / 6.0
-                + z * (1.0 / 120.0
-                    + z * (-1.0 / 5040.0
-                        + z * (1.0 / 362_880.0
-                            + z * (-1.0 / 39_916_800.0
-                                + z * (1.0 / 6_227_020_800.0
-                                    + z * (-1.0 / 1_307_674_368_000.0 + z * (1.0 / 355_687_428_096_000.0)))))))));
-    let cos = 1.0
-        + z * (-0.5
-            + z * (1.0 / 24.0
-                + z * (-1.0 / 720.0
-                    + z * (1.0 / 40_320.0
-                        + z * (-1.0 / 3_628_800.0
-                            + z * (1.0 / 479_001_600.0
-                                + z * (-1.0 / 87_178_291_200.0 + z * (1.0 / 20_922_789_888_000.0))))))));
+    let (sin, cos) = sin_cos_quarter(u * 4.0 - quarter);
     // Quarter 0 has (sin, cos), 1 (cos, −sin), 2 (−sin, −cos), 3 (−cos, sin): by bits, for nobody can foretell which it is.
     let quarter = quarter as i64 as u64;
     let swapped = (sin.to_bits() ^ cos.to_bits()) & (quarter & 1).wrapping_neg();
@@ -39,6 +47,15 @@ pub fn sin_cos_turn(u: f64) -> (f64, f64) {
         f64::from_bits(sin.to_bits() ^ swapped ^ sign(quarter)),
         f64::from_bits(cos.to_bits() ^ swapped ^ sign(quarter.wrapping_add(1))),
     )
+}
+
+/// Sine and cosine of `q` quarter turns, for `q` in [−½, ½]: those of [`sin_cos_turn`].
+#[must_use]
+#[inline(always)]
+pub fn sin_cos_quarter(q: f64) -> (f64, f64) {
+    let x = q * std::f64::consts::FRAC_PI_2;
+    let z = x * x;
+    ((x * z).mul_add(polynomial(&SIN, z), x), z.mul_add(polynomial(&COS, z), 1.0))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Maps from the unit square to the domains that are sampled, with their densities.
 
-use crate::math::trig::sin_cos_turn;
+use crate::math::trig::{sin_cos_quarter, sin_cos_turn};
 use glam::{DVec2, DVec3};
 
 /// Uniform on the unit disc; concentric map of Shirley and Chiu 1997.
@@ -11,16 +11,13 @@ pub fn concentric_disk(u: DVec2) -> DVec2 {
     if a == 0.0 && b == 0.0 {
         return DVec2::ZERO;
     }
-    // Angle in turns: 1/8 of a turn spans the ratio −1…1 of the smaller to the larger coordinate.
+    // The smaller coordinate is to the larger as the angle from the larger's axis is to an eighth of a turn.
     // One or the other by bits: nobody can foretell which.
     let wide = u64::from(a.abs() > b.abs()).wrapping_neg();
     let either = |x: f64, y: f64| f64::from_bits(y.to_bits() ^ (x.to_bits() ^ y.to_bits()) & wide);
     let r = either(a, b);
-    let share = 0.125 * (either(b, a) / r);
-    let turn = either(share, 0.25 - share);
-    let around = f64::from_bits(1f64.to_bits() & u64::from(turn < 0.0).wrapping_neg());
-    let (sin, cos) = sin_cos_turn(turn + around);
-    DVec2::new(r * cos, r * sin)
+    let (sin, cos) = sin_cos_quarter(0.5 * (either(b, a) / r));
+    DVec2::new(r * either(cos, sin), r * either(sin, cos))
 }
 
 /// The inverse of [`concentric_disk`], of points inside the disc.
