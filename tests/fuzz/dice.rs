@@ -224,7 +224,7 @@ impl Dice {
     }
 
     pub fn lamp(&mut self) -> String {
-        match self.below(5) {
+        match self.below(6) {
             0 => format!("- point: {{position: {}, intensity: {}}}\n", self.vector(), self.light()),
             1 => format!(
                 "- spot: {{position: {}, direction: {}, cutoff_deg: {}, intensity: {}{}}}\n",
@@ -234,7 +234,12 @@ impl Dice {
                 self.light(),
                 self.one(&["", ", texture: map"])
             ),
-            2 => format!("- directional: {{direction: {}, irradiance: {}}}\n", self.vector(), self.light()),
+            2 => format!(
+                "- directional: {{direction: {}, irradiance: {}{}}}\n",
+                self.vector(),
+                self.light(),
+                self.one(&["", ", angle_deg: 0.5", ", angle_deg: 1.0e-12", ", angle_deg: 179"])
+            ),
             3 => format!(
                 "- projector: {{origin: {}, target: {}, fov_deg: {}, scale: {}, irradiance: {{texture: map}}}}\n",
                 self.vector(),
@@ -242,7 +247,28 @@ impl Dice {
                 1.0 + 150.0 * self.unit(),
                 self.size()
             ),
-            _ => format!("- constant: {{radiance: {}}}\n", self.light()),
+            4 => format!("- constant: {{radiance: {}}}\n", self.light()),
+            _ => {
+                let sun = match self.below(3) {
+                    0 => format!("{{direction: {}}}", self.vector()),
+                    1 => format!("{{elevation_deg: {}, azimuth_deg: {}}}", 180.0 * self.unit() - 90.0, self.number()),
+                    _ => format!(
+                        "{{latitude_deg: {}, longitude_deg: 8, hour: {}}}",
+                        180.0 * self.unit() - 90.0,
+                        self.number()
+                    ),
+                };
+                format!(
+                    "- sky: {{sun: {sun}, turbidity: {}, albedo: {}, sky_scale: {}, sun_scale: {}, sun_angle_deg: {}, \
+                     limb_darkening: {}}}\n",
+                    1.0 + 9.0 * self.unit(),
+                    self.share(),
+                    self.one(&["0", "1", "1.0e-6", "1.0e+6"]),
+                    self.one(&["0", "1", "1.0e-6", "1.0e+6"]),
+                    self.one(&["0.5", "0.01", "30", "170"]),
+                    self.one(&["true", "false"])
+                )
+            }
         }
     }
 

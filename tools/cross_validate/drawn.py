@@ -30,7 +30,7 @@ METALS = ("Au", "Ag", "Cu", "Al", "Cr", "W", "none")
 OPEN = ("mask", "null", "thindielectric")
 # Light that no scattered ray meets.
 DELTA = {"point", "spot", "projector", "directional"}
-SKIES = {"constant", "envmap"}
+SKIES = {"constant", "envmap", "sunsky"}
 # What `ptracer` does otherwise than `path` (known): lamps that are turned balls, bands, clipping planes, moved middles; things behind
 # what is open; geometric normals of mirrored cubes, slopes, tints by the luminance of a few wavelengths. Hair is not reciprocal.
 UNTRACED = (
@@ -403,7 +403,7 @@ class Draw:
         """A light, and its kind; whether paths start from it alone."""
         near = ("area", "area", "point", "spot", "projector")
         # Skies in `ptracer` are known, and nothing else finds light along normals.
-        kind = self.one(*near, *(["directionalarea"] if traced else ["constant", "envmap", "directional"]))
+        kind = self.one(*near, *(["directionalarea"] if traced else ["constant", "envmap", "sunsky", "directional"]))
         if kind == "directionalarea":
             shines = plugin("emitter", kind, self.light("radiance", 3))
             return plugin("shape", self.one("rectangle", "disk"), self.above('<scale value="0.8"/>'), shines), kind
@@ -426,6 +426,13 @@ class Draw:
             picture = self.one("sky.exr", "sky.exr", "patch.png")
             file, turn = leaf("string", "filename", ASSETS / picture), self.maybe(lambda: to_world(self.turn()))
             return plugin("emitter", kind, file, self.float("scale", 0.5, 2), turn), kind
+        if kind == "sunsky":
+            sun = f"{self.between(-1, 1)}, {self.between(-1, 1)}, {self.between(0.3, 1)}"
+            air = self.float("turbidity", 1.5, 8) + self.spectrum("albedo", 0, 1) + self.float("sky_scale", 1, 5)
+            # Wide enough to be found by chance; that of an even disc is known.
+            disc = self.float("sun_aperture", 3, 15) + self.float("sun_scale", 0, 1) + leaf("boolean", "complex_sun", "true")
+            up = to_world('<rotate x="1" angle="-90"/>')
+            return plugin("emitter", kind, leaf("vector", "sun_direction", sun), air, disc, up), kind
         if kind == "spot":
             edge = self.float("cutoff_angle", 15, 60) + self.maybe(lambda: leaf("float", "beam_width", "10"))
             shade = self.maybe(lambda: self.texture("texture"))
