@@ -305,10 +305,21 @@ fn one_a_cell(knots: &[(f64, f32)], count: usize) -> Option<Vec<Option<usize>>> 
 
 /// Value and slope per nm at `nm` of what is linear between `knots` and level beyond them: just above it, where it jumps there.
 fn along(knots: &[(f64, f32)], nm: f64) -> (f64, f64) {
-    let next = knots.partition_point(|knot| knot.0 <= nm);
+    let next = knots_up_to(knots, nm);
     let (knot, value) = knots[next.max(1) - 1];
     let slope = slope_below(knots, next);
     (slope.mul_add(nm - knot, f64::from(value)), slope)
+}
+
+/// How many knots lie at or below `nm`: found at once where they are evenly far apart.
+fn knots_up_to(knots: &[(f64, f32)], nm: f64) -> usize {
+    let last = knots.len() - 1;
+    let (first, end) = (knots[0].0, knots[last].0);
+    let guess = ((nm - first) / (end - first) * last as f64) as usize;
+    match knots.get(guess..guess.saturating_add(2)) {
+        Some([below, above]) if below.0 <= nm && nm < above.0 => guess + 1,
+        _ => knots.partition_point(|knot| knot.0 <= nm),
+    }
 }
 
 /// The slope per nm between the knot before the `k`th and that; level before the first and beyond the last.
