@@ -95,6 +95,15 @@ pub(crate) fn read_tables(root: &mut Node, sources: &mut Sources) -> Result<bool
     let told = each(root, &mut |node| {
         found = true;
         let Some(file) = node.get_mut(KEYS).filter(|keys| keys.get(FILE).is_some()) else { return Ok(()) };
+        // All that is said of the table stands beside `keys`.
+        if let Value::Map(entries) = &file.value
+            && let Some(Entry { key, key_place, .. }) = entries.iter().find(|entry| entry.key != FILE)
+        {
+            let beside = if key == INTERPOLATION { ", which stands beside keys" } else { "" };
+            let message = format!("expected {FILE} alone, found {}{beside}", quote(key));
+            let fault = Fault::at_place(*key_place, message).under(Segment::Key(key.clone()));
+            return Err(fault.under(Segment::Key(KEYS.to_owned())));
+        }
         let Some(Node { place, value: Value::Text(name) }) = file.get(FILE) else { return Ok(()) };
         let (path, at) = (sources.file(*place, name), sources.describe(*place));
         match table(&path, sources) {
@@ -229,7 +238,10 @@ impl<'a> Track<'a> {
         for Entry { key, key_place, node: value } in entries {
             let under = |fault: Fault| fault.under(Segment::Key(key.clone()));
             if key == INTERPOLATION {
-                interpolation = named(value).map_err(under)?;
+                // Without value it is not written.
+                if !matches!(value.value, Value::Null) {
+                    interpolation = named(value).map_err(under)?;
+                }
             } else if table && key == KEYS {
                 let Value::List(rows) = &value.value else {
                     return Err(under(Fault::expected(value, "a list of [frame, value], or {file: …}")));
@@ -406,6 +418,7 @@ mod tests {
         assert_eq!(x("{-10: 4, -5: 5, 5: 0}", 0.0), 2.5);
         assert_eq!(x("{keys: [[0, 1], [0.5, 2]]}", 0.25), 1.5);
         assert_eq!(x("{7: 3}", 1.0), 3.0);
+        assert_eq!(x("{0: 1, 4: 3, interpolation: }", 1.0), 1.5);
     }
 
     /// What is no number at any key is told at every frame, and names are no frames where names stand.
@@ -574,6 +587,14 @@ mod tests {
         assert_eq!(says("1\n"), format!("DIR/p.csv: line 1, column 1: {line} \"1\"; {named}"));
         // One line of names may stand first; further ones are rows with other separators.
         assert_eq!(says("1;2\n2;3\n3, 4\n"), format!("DIR/p.csv: line 2, column 1: {line} \"2;3\"; {named}"));
+        // What stands beside the name of the file would say nothing.
+        for (key, beside) in [("interpolation: smooth", ", which stands beside keys"), ("scale: 2", "")] {
+            let text = text.replace("p.csv}", &format!("p.csv, {key}}}"));
+            let key = key.split(':').next().unwrap();
+            let place = "DIR/s.yaml:4:52: shapes[0].sphere.center.keys";
+            let message = format!("{place}.{key}: expected file alone, found \"{key}\"{beside}");
+            assert_eq!(scene(&[("s.yaml", &text), ("p.csv", table)]).unwrap_err(), message);
+        }
         let empty = "expected lines of a frame and one number or more, with commas, found none";
         assert_eq!(says("# frame, x, y, z\n"), format!("DIR/p.csv: {empty}; {named}"));
         assert_eq!(
