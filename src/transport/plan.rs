@@ -194,8 +194,17 @@ pub(super) fn some_of(names: &[String]) -> String {
     }
 }
 
+/// Why paths of at most `max_depth` segments bring no light over several surfaces; `None` where they do.
+fn too_short(max_depth: Option<u32>) -> Option<&'static str> {
+    match max_depth {
+        Some(..=1) => Some("max_depth 1 leaves emission alone"),
+        Some(2) => Some("max_depth 2 leaves emission and direct light alone"),
+        _ => None,
+    }
+}
+
 /// The techniques of the path tracer for this scene.
-fn path_techniques(census: &Census, chromatic: bool) -> Vec<Effect> {
+fn path_techniques(census: &Census, settings: &PathSettings, chromatic: bool) -> Vec<Effect> {
     let (extended, lights) = (census.extended_lights(), census.lights());
     let technique = |name: &'static str, on, here: String, absent: &str| Effect {
         name: name.into(),
@@ -206,18 +215,22 @@ fn path_techniques(census: &Census, chromatic: bool) -> Vec<Effect> {
         [] => String::new(),
         dark => format!("; without power and left out: {}", some_of(dark)),
     };
+    // Light is looked for from where paths scatter, if they do, and met by what they scatter.
+    let ends = settings.max_depth.is_some_and(|depth| depth < 2).then_some("max_depth 1 ends paths where they scatter");
+    let unasked = ends.or((settings.light_samples == 0).then_some("light_samples is 0"));
+    let unmet = unasked.or((settings.scatter_samples == 0).then_some("scatter_samples is 0"));
     vec![
         technique(
             "next-event estimation",
-            lights > 0,
+            lights > 0 && unasked.is_none(),
             format!("of {lights} lights, chosen by what each may give{dark}"),
-            &format!("there is no light{dark}"),
+            unasked.filter(|_| lights > 0).unwrap_or(&format!("there is no light{dark}")),
         ),
         technique(
             "multiple importance sampling",
-            extended > 0,
+            extended > 0 && unmet.is_none(),
             format!("{extended} lights can also be met by chance"),
-            "no light can be met by chance",
+            unmet.filter(|_| extended > 0).unwrap_or("no light can be met by chance"),
         ),
         technique(
             "hero wavelengths",
@@ -339,8 +352,8 @@ impl EffectPlan {
             if path { "the camera is a pinhole" } else { "whitted uses a pinhole" },
         );
         let (follows, absent) = match &integrator {
-            Integrator::Path(_) => ("path follows light over every surface", None),
-            Integrator::Light(_) => ("light_tracer follows light over every surface", None),
+            Integrator::Path(path) => ("path follows light over every surface", too_short(path.max_depth)),
+            Integrator::Light(light) => ("light_tracer follows light over every surface", too_short(light.max_depth)),
             Integrator::Whitted(_) => ("", Some("whitted knows light of mirrors and glass only, and an ambient term")),
             Integrator::Depth => ("", Some("depth looks for no light")),
             Integrator::Nothing => ("", Some("none looks for no light")),
@@ -349,8 +362,10 @@ impl EffectPlan {
         // Not an effect but a consequence; forced on with the effects that call for it.
         let bends = !(census.dispersive.is_empty() && census.rough_dispersive.is_empty());
         let chromatic = bends || census.chromatic_media > 0 || mode == EffectMode::All;
-        let techniques =
-            if matches!(integrator, Integrator::Path(_)) { path_techniques(census, chromatic) } else { Vec::new() };
+        let techniques = match &integrator {
+            Integrator::Path(settings) => path_techniques(census, settings, chromatic),
+            _ => Vec::new(),
+        };
         let shows_light = matches!(integrator, Integrator::Path(_) | Integrator::Light(_));
         EffectPlan {
             lit: census.lights() > 0 || census.fog || !shows_light,
@@ -397,6 +412,33 @@ mod tests {
         let plan = EffectPlan::of(&census, path(), EffectMode::Auto);
         let dispersion = plan.effects.iter().find(|e| e.name == "dispersion").unwrap();
         assert!(dispersion.on && dispersion.reason.contains("prism") && plan.chromatic);
+    }
+
+    /// `light_samples: 0` leaves shadow rays out, `scatter_samples: 0` what scattering meets, and either the weighing of both;
+    /// of segments the first shows emission, the second direct light, and only further ones light over several surfaces.
+    #[test]
+    fn what_the_integrator_leaves_out_is_off_with_its_field() {
+        let census = Census { area_lights: vec!["lamp".into()], ..Census::default() };
+        let plan = |settings| EffectPlan::of(&census, Integrator::Path(settings), EffectMode::Auto);
+        let usual = PathSettings::default();
+        let (next_event, weighing, indirect) =
+            ("next-event estimation", "multiple importance sampling", "indirect light");
+        let cases = [
+            (PathSettings { light_samples: 0, ..usual }, "light_samples", [false, false, true]),
+            (PathSettings { scatter_samples: 0, ..usual }, "scatter_samples", [true, false, true]),
+            (PathSettings { max_depth: Some(1), ..usual }, "max_depth 1", [false, false, false]),
+            (PathSettings { max_depth: Some(2), ..usual }, "max_depth 2", [true, true, false]),
+            (PathSettings { max_depth: Some(3), ..usual }, "", [true, true, true]),
+            (usual, "", [true, true, true]),
+        ];
+        for (settings, field, on) in cases {
+            let plan = plan(settings);
+            for (name, on) in [next_event, weighing, indirect].into_iter().zip(on) {
+                let said = plan.effects.iter().chain(&plan.techniques).find(|said| said.name == name).unwrap();
+                assert_eq!(said.on, on, "{field}: {said:?}");
+                assert!(on || said.reason.contains(field), "{said:?}");
+            }
+        }
     }
 
     #[test]
