@@ -285,6 +285,7 @@ impl<'a> Compiler<'a> {
             written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
         });
         self.note_few_wavelengths(&wavelengths, &bands);
+        self.note_unused_filter();
         let ambient = match &d.integrator {
             written::Integrator::Whitted(whitted) => {
                 Some(self.light_spectrum("integrator.whitted.ambient", &whitted.ambient).luminance())

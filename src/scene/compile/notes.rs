@@ -14,6 +14,17 @@ impl<'a> Compiler<'a> {
         }
     }
 
+    /// Tells of a filter that draws no rays: those of `whitted` stand on a grid.
+    pub(super) fn note_unused_filter(&mut self) {
+        let whitted = matches!(self.description.integrator, written::Integrator::Whitted(_));
+        if whitted && self.description.image.filter != written::Filter::Box {
+            self.note(
+                "image.filter",
+                "whitted takes no filter: a pixel is the mean of its grid of rays, as under a box",
+            );
+        }
+    }
+
     /// All notes with their places, but for those on materials that nothing shows.
     pub(super) fn told_notes(&self) -> Vec<String> {
         let mut used = BTreeSet::new();
@@ -76,6 +87,21 @@ mod tests {
         assert_eq!(told.len(), names.len(), "{told:?}");
         for name in names {
             assert!(told.iter().any(|note| note.contains(name)), "{name}: {told:?}");
+        }
+    }
+
+    #[test]
+    fn a_filter_that_whitted_does_not_take_is_told() {
+        let text = |filter: &str, integrator: &str| format!("image: {{filter: {filter}}}\nintegrator: {integrator}\n");
+        let message = "whitted takes no filter: a pixel is the mean of its grid of rays, as under a box";
+        assert_eq!(
+            notes(&text("{gaussian: {stddev: 2}}", "whitted")),
+            [format!("s.yaml:2:17: image.filter: {message}")]
+        );
+        for [filter, integrator] in
+            [["box", "whitted"], ["mitchell", "path"], ["mitchell", "light_tracer"], ["mitchell", "depth"]]
+        {
+            assert_eq!(notes(&text(filter, integrator)), Vec::<String>::new(), "{filter}, {integrator}");
         }
     }
 
