@@ -115,8 +115,9 @@
 //!                                   # stderr: standard errors of colours and of bands, stderr.R, stderr.NAME;
 //!                                   # rgba, rgb, xyza, xyz, luminance_alpha, luminance; single, multipart: each layer in
 //!                                   # a part of its own; attributes of the header by name, text or numbers, such as
-//!                                   # {owner: us, timeCode: "01:00:00:00"} (of frame 0): standard ones of OpenEXR by
-//!                                   # their types, other numbers int where they are whole and fit, else double
+//!                                   # {owner: us, timeCode: "01:00:00:00"} (of frame 0; where frames_per_second is not
+//!                                   # written, 30 frames are a second): standard ones of OpenEXR by their types, other
+//!                                   # numbers int where they are whole and fit, else double
 //!   spectral: ~                     # or {bands: 31, from_nm: 400, to_nm: 700}: a further file, NAME.spectral.exr, of mean
 //!                                   # radiance in bands (layout 1.0 of Fichet, Pacanowski and Wilkie); ~ from 400 to 700;
 //!                                   # 0.01 nm wide at the least
@@ -298,8 +299,9 @@
 //! - sky:                            # a clear day, in W·m⁻²·sr⁻¹·nm⁻¹: zenith +y, north -z, east +x
 //!     sun: {elevation_deg: 40, azimuth_deg: 120}   # ~ azimuth_deg: 0, from north toward east; or
 //!                                   # direction: [1, 2, 3], toward it in the world; or latitude_deg, longitude_deg and,
-//!                                   # with defaults, utc_offset, year, month, day, hour: where it stands there; below
-//!                                   # the horizon all is dark, as the fits have no twilight
+//!                                   # with defaults, utc_offset: longitude_deg / 15, rounded, year: 2000, month: 6, day: 21,
+//!                                   # hour: 12: where it stands there; below the horizon all is dark, as the fits have no
+//!                                   # twilight
 //!     turbidity: 3                  # ~ 1 to 10
 //!     albedo: 0.3                   # ~ of the ground
 //!     sky_scale: 1                  # ~
@@ -449,6 +451,13 @@
 //! materials.a.conductor.film.thickness_nm: [0, 1.0e9]
 //! materials.a.principled.sampling.specular: [1.0e-6, 1.0e6]      # of others 0, too
 //! materials.a.hair.tilt_deg: [-10, 10]
+//! lights[0].sky.sun.elevation_deg: [-90, 90]             # and latitude_deg
+//! lights[0].sky.sun.longitude_deg: [-360, 360]
+//! lights[0].sky.sun.utc_offset: [-24, 24]
+//! lights[0].sky.sun.year: [1900, 2100]
+//! lights[0].sky.sun.hour: [-1.0e6, 1.0e6]
+//! lights[0].sky.sun_angle_deg: [0.0001, 90]
+//! lights[0].directional.angle_deg: [0.0001, 180]         # or 0
 //! ```
 //!
 //! # Faults
@@ -646,10 +655,19 @@ mod tests {
                 ("principled", _) => "{principled: {}}",
                 _ => "{hair: {}}",
             };
+            let light = if field.contains("directional") {
+                "directional: {direction: [0, -1, 0], irradiance: 1}"
+            } else if field.ends_with("elevation_deg") {
+                "sky: {sun: {elevation_deg: 0}}"
+            } else {
+                "sky: {sun: {latitude_deg: 0, longitude_deg: 0}}"
+            };
             let camera = testing::CAMERA.replace("fov_deg", "shutter: {open: -0.25, close: 0.25}, fov_deg");
             std::fs::write(
                 &file,
-                format!("{camera}output: {{spectral: {{bands: 3}}}}\nmaterials: {{a: {material}}}\n"),
+                format!(
+                    "{camera}output: {{spectral: {{bands: 3}}}}\nmaterials: {{a: {material}}}\nlights: [{light}]\n"
+                ),
             )
             .unwrap();
             let set = [(field.to_owned(), number.to_string())];

@@ -216,7 +216,9 @@ impl Sun {
                 within("latitude_deg", place.latitude_deg, 90.0, checker);
                 within("longitude_deg", place.longitude_deg, 360.0, checker);
                 let offset = place.utc_offset;
-                checker.require(offset.abs() <= 24.0, at.key("utc_offset"), "from -24 to 24 hours", offset);
+                // One that is not written follows from the longitude, which has been told.
+                let within = offset.abs() <= 24.0 || place.longitude_deg.abs() > 360.0;
+                checker.require(within, at.key("utc_offset"), "from -24 to 24 hours", offset);
                 let year = place.year;
                 checker.require((1900..=2100).contains(&year), at.key("year"), "a year from 1900 to 2100", year);
                 let month = place.month;
@@ -335,6 +337,11 @@ mod tests {
              dir/s.yaml:3:65: lights[0].sky.sun_angle_deg: expected an angle from 0.0001 to 90 degrees, found 0\n\
              dir/s.yaml:3:76: lights[0].sky.albedo: expected a number from 0 to 1, found 1.5\n\
              dir/s.yaml:3:92: lights[0].sky.sky_scale: expected a number of 0 or more, found -1"
+        );
+        // The offset that follows from the longitude, 33 hours, is not written.
+        assert_eq!(
+            light("sun: {latitude_deg: 50, longitude_deg: 500}"),
+            "dir/s.yaml:3:48: lights[0].sky.sun.longitude_deg: expected an angle from -360 to 360 degrees, found 500"
         );
         assert_eq!(
             light("sun: {latitude_deg: 50, longitude_deg: 11, year: 2023, month: 2, day: 29}"),
