@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::decode::decode;
 use super::fault::Fault;
 use super::keyed;
-use super::node::{Entry, Node, Place, Sources, Value, quote};
+use super::node::{Entry, Node, Place, Sources, Value, did_you_mean, quote};
 use super::path::{self, Segment};
 use super::spectrum::FilePath;
 use super::yaml::{self, MAX_BYTES, MAX_DEPTH};
@@ -239,10 +239,20 @@ impl Setting {
     /// If the path leads through something that cannot hold it.
     pub(crate) fn apply(&self, root: &mut Node) -> std::result::Result<(), Fault> {
         let mut node = root;
+        // Where a name leads to no list, that beside it which may have been meant.
+        let mut hint = String::new();
         for (depth, segment) in self.path.iter().enumerate() {
             let inner = match segment {
-                Segment::Key(key) => child(node, key, self.place),
-                Segment::Index(index) => item(node, *index),
+                Segment::Key(key) => {
+                    hint = match &node.value {
+                        Value::Map(entries) if node.get(key).is_none() => {
+                            did_you_mean(key, entries.iter().map(|entry| entry.key.as_str()))
+                        }
+                        _ => String::new(),
+                    };
+                    child(node, key, self.place)
+                }
+                Segment::Index(index) => item(node, *index).map_err(|message| message + &std::mem::take(&mut hint)),
             };
             node = inner.map_err(|message| Fault::at_place(self.place, message).under_path(&self.path[..depth]))?;
         }
@@ -463,6 +473,10 @@ mod tests {
             "--set shapes[2].sphere.radius=3: shapes: expected an index from 0 to 1, found 2"
         );
         assert_eq!(says("lights[0].point", "3"), "--set lights[0].point=3: lights: expected a list, found nothing");
+        assert_eq!(
+            says("shape[0].sphere.radius", "3"),
+            "--set shape[0].sphere.radius=3: shape: expected a list, found nothing; did you mean \"shapes\"?"
+        );
         assert_eq!(
             says("shapes.sphere", "3"),
             "--set shapes.sphere=3: shapes: expected a map that may hold \"sphere\", found a list of 2"
