@@ -286,6 +286,9 @@ impl TryFrom<WrittenLayer> for Layer {
         if squares && matches!(content, LayerContent::Ways { .. }) {
             return Err("expected squares of a surface or of light by an integrator, found ways".to_owned());
         }
+        if squares_name.is_some() && !squares {
+            return Err("expected squares: true beside squares_name, found squares_name alone".to_owned());
+        }
         let squares = squares.then(|| squares_name.unwrap_or_else(|| format!("m2_{name}")));
         Ok(Layer { name, content, squares })
     }
@@ -399,6 +402,19 @@ mod tests {
             faults("layers: [{name: k, ways: []}]\n"),
             "dir/s.yaml:2:26: layers[0].ways: expected one way or more, found none"
         );
+    }
+
+    /// Their name would name nothing.
+    #[test]
+    fn a_name_of_squares_that_nobody_asks_for_is_refused() {
+        for squares in ["", ", squares: false"] {
+            assert_eq!(
+                faults(&format!("layers: [{{name: k, surface: depth, squares_name: q{squares}}}]\n")),
+                "dir/s.yaml:2:10: layers[0]: expected squares: true beside squares_name, found squares_name alone"
+            );
+        }
+        let layers = scene("layers: [{name: k, surface: depth, squares_name: q, squares: true}]\n").layers;
+        assert_eq!(layers[0].squares.as_deref(), Some("q"));
     }
 
     /// Mattes would show both as one.
