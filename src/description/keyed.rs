@@ -419,6 +419,9 @@ mod tests {
         assert_eq!(x("{keys: [[0, 1], [0.5, 2]]}", 0.25), 1.5);
         assert_eq!(x("{7: 3}", 1.0), 3.0);
         assert_eq!(x("{0: 1, 4: 3, interpolation: }", 1.0), 1.5);
+        // What is merged stands where it is named: 1 at 0, 3 at 4, 5 at 8; and 1 at 0, 5 at 2.
+        assert_eq!(x("{<<: {0: 1, 4: 3}, 8: 5}", 6.0), 4.0);
+        assert_eq!(x("{0: 1, <<: {0: 9, 2: 5}}", 1.0), 3.0);
     }
 
     /// What is no number at any key is told at every frame, and names are no frames where names stand.

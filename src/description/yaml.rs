@@ -440,7 +440,8 @@ struct Key(String);
 // ---------------------------------------------------------------------------------------------
 // Merge keys.
 
-/// Writes out `<<: *defaults`: the fields of the named map, or maps, that are not written here.
+/// Writes out `<<: *defaults`: the fields of the named map, or maps, that are not written here, where `<<` stands, as the
+/// order of frames counts.
 fn merge(node: &mut Node, budget: &mut usize) -> Result<(), Fault> {
     match &mut node.value {
         Value::List(items) => {
@@ -454,6 +455,7 @@ fn merge(node: &mut Node, budget: &mut usize) -> Result<(), Fault> {
             }
             if let Some(i) = entries.iter().position(|entry| entry.key == MERGE_KEY) {
                 let Entry { node: from, .. } = entries.remove(i);
+                let mut place = i;
                 let from = match from.value {
                     Value::List(maps) => maps,
                     _ => vec![from],
@@ -471,7 +473,9 @@ fn merge(node: &mut Node, budget: &mut usize) -> Result<(), Fault> {
                     *budget = budget.checked_sub(cost).ok_or_else(|| {
                         Fault::at_place(node.place, format!("expected at most {MAX_NODES} values in all, found more"))
                     })?;
-                    entries.extend(absent);
+                    let added = absent.len();
+                    entries.splice(place..place, absent);
+                    place += added;
                 }
             }
         }
@@ -667,7 +671,7 @@ mod tests {
             let Some(Value::Map(entries)) = root.get(key).map(|node| &node.value) else { panic!("a map") };
             entries.iter().map(|e| format!("{}={}", e.key, e.node.found())).collect::<Vec<_>>().join(" ")
         };
-        assert_eq!(values("a"), "x=5 y=2");
+        assert_eq!(values("a"), "y=2 x=5");
         assert_eq!(values("b"), "y=3 z=4 x=1");
         assert_eq!(refusal("a: {<<: 3}"), "f.yaml:1:9: a.<<: expected a map or a list of maps, found 3");
     }
