@@ -12,10 +12,13 @@ use super::{Compiler, vec3};
 use crate::description as written;
 use crate::error::{Error, Result, in_short};
 use crate::scene::camera::{self, Camera};
-use crate::spectrum::illuminant;
+use crate::spectrum::{Spectrum, illuminant};
 use glam::{DMat3, DVec2};
 use std::collections::HashMap;
 use std::sync::Arc;
+
+/// Of light that f32 does not hold.
+const TOO_BRIGHT: &str = "expected light up to 3.4e38, found more";
 
 impl<'a> Compiler<'a> {
     /// A texture as light: the colours of a picture are lit by D65 or what it names.
@@ -24,6 +27,10 @@ impl<'a> Compiler<'a> {
             written::SpectrumOrTexture::Texture(name) => {
                 let mut texture = self.named_texture(name);
                 self.light_up(&mut texture, name);
+                // Its brightest place is among them.
+                if !texture.representatives().iter().all(Spectrum::is_finite) {
+                    self.fault(at, TOO_BRIGHT);
+                }
                 texture
             }
             written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.light_spectrum(at, s)),
@@ -142,6 +149,10 @@ impl<'a> Compiler<'a> {
                 });
                 let (map, note) = map.map_err(|e| self.asked(&format!("{at}.file"), e))?;
                 note.iter().for_each(|note| self.note(&format!("{at}.file"), note));
+                // The scale makes the texels brighter.
+                if !map.mean_luminance().is_finite() {
+                    self.fault(at, TOO_BRIGHT);
+                }
                 Light::Environment(map)
             }
             written::Light::Sky(l) => {
@@ -173,7 +184,7 @@ impl<'a> Compiler<'a> {
     /// A sky, or a disc at infinity; a fault where it is brighter than f32 holds.
     fn day(&mut self, at: &str, day: Option<Daylight>, world_from_sky: DMat3) -> Option<Light> {
         if day.is_none() {
-            self.fault(at, "expected light up to 3.4e38, found more");
+            self.fault(at, TOO_BRIGHT);
         }
         Some(Light::Environment(Arc::new(Environment::of_day(day?, world_from_sky))))
     }
@@ -199,6 +210,10 @@ impl<'a> Compiler<'a> {
             }
         };
         let intensity = self.light_spectrum(&format!("{at}.intensity"), &l.intensity);
+        let thrown = |slide: &Slide| slide.texture.representatives().iter().all(|s| s.times(&intensity).is_finite());
+        if !slide.as_deref().is_none_or(thrown) {
+            self.fault(at, TOO_BRIGHT);
+        }
         Some(Light::Spot { position, axis, beam: l.beam_deg.to_radians(), cutoff, intensity, slide })
     }
 
@@ -208,6 +223,10 @@ impl<'a> Compiler<'a> {
             return None;
         };
         let irradiance = self.emission_texture(&format!("{at}.irradiance"), &l.irradiance);
+        let brightest = irradiance.representatives().iter().map(Spectrum::max).fold(0.0, f64::max);
+        if brightest * l.scale > f64::from(f32::MAX) {
+            self.fault(&format!("{at}.scale"), TOO_BRIGHT);
+        }
         let resolution = match &irradiance {
             Texture::Image(image) => [image.grid.width as u32, image.grid.height as u32],
             _ => [1, 1],

@@ -339,6 +339,53 @@ mod tests {
         }
     }
 
+    /// A picture of 100 at 1e37 is 1e39, and so is 1e37 at a scale of 100; at 1e34 each is light.
+    #[test]
+    fn light_that_no_float_holds_by_a_picture_or_a_scale_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut picture = b"PF\n2 2\n-1\n".to_vec();
+        picture.extend([100f32; 12].iter().flat_map(|x| x.to_le_bytes()));
+        std::fs::write(directory.path().join("hot.pfm"), picture).unwrap();
+        let told = |written: &str, scale: &str| {
+            let text = format!("camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\n{written}\n");
+            let path = directory.path().join("s.yaml");
+            let description = SceneDescription::parse(&text.replace("SCALE", scale), &path).unwrap();
+            compile(&description, "s").err().map(|error| error.to_string()).unwrap_or_default()
+        };
+        let hot = "textures: {hot: {image: {file: hot.pfm, illuminant: E}}}\n";
+        let throws = "origin: [0, 1, 5], target: [0, 1, 0], fov_deg: 40";
+        for (written, field) in [
+            (
+                "textures: {hot: {image: {file: hot.pfm, illuminant: {name: E, scale: SCALE}}}}\n\
+                 shapes: [{sphere: {radius: 1, emission: {texture: hot}}}]"
+                    .to_owned(),
+                "shapes[0].sphere.emission",
+            ),
+            ("lights: [{environment: {file: hot.pfm, scale: SCALE}}]".to_owned(), "lights[0].environment"),
+            (
+                format!(
+                    "{hot}lights: [{{spot: {{position: [0, 1, 5], target: [0, 1, 0], intensity: SCALE, texture: hot}}}}]"
+                ),
+                "lights[0].spot",
+            ),
+            (
+                format!("{hot}lights: [{{projector: {{{throws}, irradiance: {{texture: hot}}, scale: SCALE}}}}]"),
+                "lights[0].projector.scale",
+            ),
+            (
+                format!("lights: [{{projector: {{{throws}, irradiance: SCALE, scale: 100}}}}]"),
+                "lights[0].projector.scale",
+            ),
+        ] {
+            let much = told(&written, "1.0e+37");
+            assert!(
+                much.ends_with(&format!(": {field}: expected light up to 3.4e38, found more")),
+                "{written}: {much}"
+            );
+            assert_eq!(told(&written, "1.0e+34"), "", "{written}");
+        }
+    }
+
     /// The files say so between two whole nanometres, on either side of a jump, and beyond the band alone, where the line to
     /// the next sample is at (7 − 0.5) · 130/200 + 0.5 = 4.725 as the band ends. That nothing is too bright beyond the band
     /// alone is no fault: 1.2 at 900 nm is at 0.955 there.
