@@ -81,8 +81,9 @@ fn chunks(bytes: &[u8], damaged: &mut Option<String>) -> Option<PngFacts> {
                 };
             }
             b"tEXt" => {
-                let end = content.iter().position(|b| *b == 0)?;
-                facts.texts.push((latin1(&content[..end]), latin1(&content[end + 1..])));
+                // Without the zero between them all is keyword: a fault beside the picture keeps nobody from reading that.
+                let end = content.iter().position(|b| *b == 0).unwrap_or(content.len());
+                facts.texts.push((latin1(&content[..end]), latin1(content.get(end + 1..).unwrap_or_default())));
             }
             b"IEND" => {
                 if rank == 0 {
@@ -202,6 +203,19 @@ mod tests {
             assert!(inspect(&path).unwrap_err().to_string().ends_with(&message), "{told}");
         }
     }
+
+    /// The picture is whole, whatever is wrong with a text beside it.
+    #[test]
+    fn a_text_without_its_zero_is_a_keyword_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let bytes = encode_png(&grey(0.3, 5), &PngSettings::default()).unwrap();
+        let texts = [tags::chunk(b"tEXt", b"marked"), tags::text("Author", "us")].concat();
+        std::fs::write(&path, [&bytes[..33], &texts, &bytes[33..]].concat()).unwrap();
+        let found = inspect(&path).unwrap().texts;
+        assert_eq!(found, [("marked", ""), ("Author", "us")].map(|(k, t)| (k.to_owned(), t.to_owned())));
+    }
+
     /// The chunk that counts most is heard, and only where it says something else than what is taken for granted.
     #[test]
     fn colours_that_are_not_srgb_are_told() {
