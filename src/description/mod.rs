@@ -60,9 +60,9 @@
 //!                                   # shine; by light_tracer their light alone, as by Mitsuba's ptracer;
 //!                                   # light_samples, scatter_samples: each sample follows as many whole paths as the
 //!                                   # greater says; 0: without shadow rays, or without light met by scattering
-//!                                   # coverage: what alpha counts: surfaces and media, not holes and boundaries; or what
-//!                                   # light is scattered by, of panes what they mirror (scattering); or the first thing of
-//!                                   # any kind (first_hit)
+//!                                   # coverage: what alpha counts: surfaces and media, not holes and boundaries; or media and
+//!                                   # what light is scattered by, of panes what they mirror (scattering); or the first thing
+//!                                   # of any kind (first_hit); of media what they scatter or absorb
 //!                                   # delta_caustics: mirrors, glass and the coats of plastics throw the light of points, spots,
 //!                                   # projectors and directional lights, too, which path tracers do not meet (false in
 //!                                   # Mitsuba's XML)

@@ -174,6 +174,9 @@ impl Tracer<'_> {
                     seen = f64::INFINITY;
                     continue;
                 }
+                // What only absorbs dims it, too, without chance. Of the hero, whose chance decides where light is scattered: where
+                // it does, one is left here.
+                walk.veil(flight.weight.to_array()[0]);
             }
 
             match self.meet::<CHROMATIC, MEDIA>(path, &mut walk, hit, None, joint.as_deref_mut()) {

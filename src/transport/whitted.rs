@@ -44,7 +44,7 @@ pub fn radiance(
     let seen = tracer.trace(ray, scene.camera_inside, Lanes::ONE, 0, scene.camera.reach(ray));
     Incoming {
         radiance: seen.light,
-        alpha: 1.0 - seen.open,
+        alpha: 1.0 - seen.open * (seen.kept.reduce_add() / LANES as f32),
         depth: seen.first.map_or(f64::INFINITY, |point| scene.camera.depth(point)),
         ..Incoming::NONE
     }
@@ -60,8 +60,10 @@ struct Tracer<'a> {
 /// What a ray brings.
 struct Arrived {
     light: Lanes,
-    /// Share that nothing covers.
+    /// Share that no surface covers.
     open: f32,
+    /// What media on the way leave of what is behind.
+    kept: Lanes,
     /// The first point that covers some of it.
     first: Option<DVec3>,
 }
@@ -113,17 +115,15 @@ impl Tracer<'_> {
     fn trace(&self, ray: &Ray, mut inside: Inside, weight: Lanes, depth: u32, mut reach: f64) -> Arrived {
         let scene = self.scene;
         let mut ray = *ray;
-        let mut arrived = Arrived { light: Lanes::ZERO, open: 1.0, first: None };
-        // What media on the way leave of the light.
-        let mut kept = Lanes::ONE;
+        let mut arrived = Arrived { light: Lanes::ZERO, open: 1.0, kept: Lanes::ONE, first: None };
         // What goes straight on does so here, and only mirrors and glass by recursion.
         for _ in 0..=MAX_BOUNDARIES {
             let hit = scene.closest(&ray, reach);
-            kept *= self.clear(&inside, hit.map_or(f64::INFINITY, |hit| hit.t));
+            arrived.kept *= self.clear(&inside, hit.map_or(f64::INFINITY, |hit| hit.t));
             let Some(hit) = hit else {
                 let all = &scene.backgrounds;
                 let sky = all.iter().map(|&i| scene.lights[i as usize].background(ray.direction, self.nm));
-                arrived.light += sky.fold(Lanes::ZERO, |a, b| a + b) * kept * arrived.open;
+                arrived.light += sky.fold(Lanes::ZERO, |a, b| a + b) * arrived.kept * arrived.open;
                 return arrived;
             };
             reach -= hit.t;
@@ -145,8 +145,8 @@ impl Tracer<'_> {
                 let vertex = Vertex { scene, hit: &hit, surface: &surface, at: &hit.texture_point(&surface), wo };
                 let standing = Standing::new(seen_normal(&surface, wo), surface.tangent);
                 let at = Meeting { x: &vertex, standpoint };
-                let sent = self.scattered(&at, material, standing, weight * kept * arrived.open, depth);
-                arrived.light += (emitted + sent.light) * kept * arrived.open;
+                let sent = self.scattered(&at, material, standing, weight * arrived.kept * arrived.open, depth);
+                arrived.light += (emitted + sent.light) * arrived.kept * arrived.open;
                 let straight = sent.straight as f32;
                 if straight < 1.0 {
                     arrived.first.get_or_insert(surface.point);

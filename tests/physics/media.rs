@@ -1,8 +1,9 @@
 //! Fog, smoke and coloured glass.
 
 use super::LAMP;
-use super::common::{Bench, SPREAD_NM, assert_close, bench, mean, ray, v};
+use super::common::{Bench, SPREAD_NM, assert_close, bench, mean, ray, v, wavelengths};
 use abbe::math::Ray;
+use abbe::math::sampler::Sampler;
 use abbe::scene::through::Way;
 use abbe::spectrum::observer;
 use glam::DVec3;
@@ -34,6 +35,29 @@ fn light_through_an_absorbing_slab_falls_exponentially_in_every_lane() {
         for (nm, found) in SPREAD_NM.iter().zip(found) {
             assert_close(found, (-filter(*nm) * length).exp(), 2e-6);
         }
+    }
+}
+
+/// What only absorbs covers what is behind it by the share that it takes, 1 − exp(−σ d): of its first wavelength by `path`, whose
+/// chance that alone decides, of all by `whitted`. So in the mean does what scatters, and what varies.
+#[test]
+fn what_only_absorbs_covers_by_the_share_that_it_takes() {
+    let straight = ray(v(0.1, 0.2, 5.0), v(0.1, 0.2, 0.0));
+    let sampler = Sampler::new(1, [0, 0], 0, 0);
+    let taken = SPREAD_NM.map(|nm| 1.0 - (-filter(nm) * 2.0).exp());
+    for (integrator, expected) in [("path", taken[0]), ("whitted", taken.iter().sum::<f64>() / 8.0)] {
+        let slab = filled(FILTER, "{boundary: {}}", &format!("integrator: {integrator}"));
+        let alpha = slab.incoming(&straight, &wavelengths(SPREAD_NM), &sampler).alpha;
+        assert_close(alpha.into(), expected, 2e-6);
+    }
+    let varying = "{heterogeneous: {extinction: {volume: grey}, albedo: 0}}";
+    for medium in ["{homogeneous: {absorption: 0.2, scattering: 0.2}}", "{homogeneous: {absorption: 0.4}}", varying] {
+        let slab = bench(&format!(
+            "volumes: {{grey: {{constant: {{value: 0.4, transform: [{{scale: 4}}, {{translate: [-2, -2, -2]}}]}}}}}}\n\
+             media: {{m: {medium}}}\nshapes: [{{cube: {{size: 2, material: {{boundary: {{}}}}, inside: m}}}}]\n"
+        ));
+        let alpha = slab.estimate_of(&straight, 8192, |light, _| light.alpha.into());
+        alpha.assert_is(1.0 - (-0.8f64).exp(), 2e-2);
     }
 }
 

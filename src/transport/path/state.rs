@@ -95,6 +95,12 @@ impl Walk {
     pub(super) fn cover(&mut self) {
         self.alpha = 1.0;
     }
+
+    /// Something that lets the share `through` of what is behind it come through.
+    #[inline]
+    pub(super) fn veil(&mut self, through: f32) {
+        self.alpha = 1.0 - (1.0 - self.alpha) * through;
+    }
 }
 
 /// What a path has done with what it met.
