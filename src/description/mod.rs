@@ -324,10 +324,12 @@
 //! scaling. An instance takes any that can be inverted.
 //!
 //! An `sdf_grid` is the zero of signed distances, positive outside, on a grid that fills the unit cube before its
-//! transform; the file is Mitsuba's `.vol`. `curves` are read from lines of `x y z radius`; an empty line ends a curve.
+//! transform; the file is Mitsuba's `.vol`; u and v are 0 all over it, so that pictures and boards show one colour there.
+//! `curves` are read from lines of `x y z radius`; an empty line ends a curve.
 //! `linear` has round joints and ends and wants two points or more a curve, `bspline` (uniform and cubic, open at the
-//! ends) four. A transform moves the points and leaves the radii. Rays meet curves from outside only; u runs about a curve
-//! and v along all of the file. Neither form shines.
+//! ends) four. A transform moves the points and leaves the radii. Rays meet curves from outside only; v runs along all of
+//! the file and u about a curve, from the horizontal with z up, as in Mitsuba: pictures stay where they are as a transform
+//! turns a curve about itself; an instance takes them along. Neither form shines.
 //!
 //! Bodies of `dielectric` may overlap where they have a `priority`, any whole number: the higher one has the place, of
 //! equal ones that which is written first. Light then goes by the ratio of the indices of the two that truly meet, and the

@@ -573,6 +573,13 @@ impl<'a> Compiler<'a> {
         if let Some(fault) = self.unfit_for_a_body(&self.materials[material as usize], &geometry, closed, shape) {
             self.fault(&format!("{at}.material"), fault);
         }
+        let reliefs = self.materials[material as usize].compound().map_or(0, |compound| compound.reliefs);
+        if matches!(geometry, Geometry::Sdf(_)) && reliefs > 0 {
+            self.note(
+                at,
+                "u and v are 0 all over it, so that its bumps and normal maps turn all normals alike and show no picture",
+            );
+        }
         let transmits = self.materials[material as usize].transmits();
         let empty = closed && transmits;
         let enclosed = if empty { None } else { camera_medium };

@@ -515,6 +515,7 @@ fn facets(alpha: f64, distribution: written::Distribution) -> Option<Microfacets
 mod tests {
     use crate::description::SceneDescription;
     use crate::scene::compile::compile;
+    use crate::scene::grid::testing::vol;
     use std::path::Path;
 
     /// Blender numbers what has no name of its own: a fault of `Material.001` was told at the line of `Material`.
@@ -555,5 +556,36 @@ mod tests {
         for raised in ["{image: {file: waves.pgm}}", "{checkerboard: {a: 0, b: {texture: waves}}}"] {
             assert!(!told(raised), "{raised}");
         }
+    }
+
+    /// A grid of distances has no u and v, so that what goes by them is the same all over it. Nothing is said of such a material on
+    /// a sphere, nor of a grid without bumps.
+    #[test]
+    fn reliefs_on_a_grid_of_distances_are_told() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("waves.pgm"), b"P5 2 2 255\n0123").unwrap();
+        std::fs::write(
+            directory.path().join("grid.vol"),
+            vol([2; 3], 1, &[-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0]),
+        )
+        .unwrap();
+        let told = |shape: &str, material: &str| {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\n\
+                 textures: {{t: {{image: {{file: waves.pgm, raw: true}}}}}}\nmaterials:\n  m: {material}\n\
+                 shapes: [{shape}]\n"
+            );
+            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
+            let notes = compile(&description, "s").unwrap().notes;
+            notes.iter().any(|note| note.contains("shapes[0].sdf_grid: u and v are 0 all over it"))
+        };
+        let grid = "sdf_grid: {file: grid.vol, material: m}";
+        let bump = "{bump: {height: {texture: t}, material: {diffuse: {}}}}";
+        let within = format!("{{blend: {{weight: 0.5, first: {{diffuse: {{}}}}, second: {bump}}}}}");
+        for relief in [bump, "{normal_map: {normals: {texture: t}, material: {diffuse: {}}}}", within.as_str()] {
+            assert!(told(grid, relief), "{relief}");
+            assert!(!told("sphere: {radius: 1, material: m}", relief), "{relief}");
+        }
+        assert!(!told(grid, "{diffuse: {}}"));
     }
 }
