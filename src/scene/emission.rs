@@ -12,6 +12,9 @@ use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
+/// By how much of the size of what it is aimed at light from infinity may begin beside its line: less than f32 tells.
+const BLUR: f64 = 1.0 / (1u64 << 26) as f64;
+
 /// A ray of light.
 #[derive(Clone, Copy, Debug)]
 pub struct Emission {
@@ -252,25 +255,55 @@ impl Scene {
     fn arriving_ray(&self, direction: DVec3, u: DVec2) -> Ray {
         let frame = Frame::from_normal(direction);
         let disk = warp::concentric_disk(u) * self.radius;
-        self.from_infinity(self.center + frame.s * disk.x + frame.t * disk.y, direction, self.radius)
+        self.from_infinity(self.center + frame.s * disk.x + frame.t * disk.y, direction, self.radius, self.radius)
     }
 
     /// Light from infinity that comes to `to` in `direction`, from as far before it as everything that has an end lies
-    /// within, `back`.
+    /// within, `far`. A place so far out is rounded by as many units of the last place: where that is more than `BLUR` of
+    /// `near`, the size of what it is to meet, it begins as near as that.
     ///
-    /// Planes may stand farther out, and may let light through: it begins behind all that it has to cross. Twice the way
-    /// to one is behind it, however that is rounded.
+    /// Planes, and then other things, may stand farther out, and may let light through: it begins behind all that it has to
+    /// cross. Twice the way to one is behind it, however that is rounded.
     #[must_use]
-    pub fn from_infinity(&self, to: DVec3, direction: DVec3, mut back: f64) -> Ray {
+    pub fn from_infinity(&self, to: DVec3, direction: DVec3, near: f64, far: f64) -> Ray {
         let farther = |back: f64| {
             let out = Ray::new(to - direction * back, -direction);
             self.closest(&out, f64::INFINITY).map(|hit| 2.0 * (back + hit.t)).filter(|far| far.is_finite())
         };
-        if self.has_planes {
+        let is_blurred = far * f64::EPSILON > near * BLUR;
+        let mut back = if is_blurred { near } else { far };
+        if self.has_planes || is_blurred {
             while let Some(far) = farther(back) {
                 back = far;
             }
         }
         Ray::new(to - direction * back, direction)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile;
+
+    /// 10¹⁵ m away the places of f64 are an eighth of a metre apart. Light that is aimed at something a metre wide keeps to its line
+    /// there, to a few roundings of a metre, and begins behind what stands in its way.
+    #[test]
+    fn light_from_infinity_keeps_to_its_line_whatever_stands_far_away() {
+        let (to, direction) = (DVec3::new(0.1, 0.2, 0.3), DVec3::new(-0.6, -0.8, 0.0));
+        for (place, stands_before) in [("[1.0e15, 0, 0]", false), ("[6.0e14, 8.0e14, 0]", true)] {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n- sphere: {{radius: 0.5}}\n\
+                 - sphere: {{center: {place}, radius: 1000}}\n"
+            );
+            let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
+            let scene = compile(&description, "s").unwrap();
+            let ray = scene.from_infinity(to, direction, 1.0, 4.0 * scene.radius);
+            let back = to - ray.origin;
+            assert_eq!(back.length() > 1e15, stands_before, "{place}: {back}");
+            let beside = back.cross(direction).length();
+            assert!(stands_before || beside < 4.0 * f64::EPSILON, "{place}: {beside}");
+        }
     }
 }

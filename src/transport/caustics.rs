@@ -215,11 +215,12 @@ impl Caustics {
         let (ray, power) = match freedom {
             Freedom::Direction(_) => start.toward(x)?,
             Freedom::Place(direction) => {
-                // From outside everything that has an end.
-                let back = (ball.center - scene.center).length() + scene.radius + ball.radius;
+                // From outside the ball, or everything that has an end.
+                let (near, far) =
+                    (2.0 * ball.radius, (ball.center - scene.center).length() + scene.radius + ball.radius);
                 // Powers are told over that area.
                 density *= scene.unit_area();
-                (scene.from_infinity(x, direction, back), start.irradiance())
+                (scene.from_infinity(x, direction, near, far), start.irradiance())
             }
             Freedom::None(..) => return None,
         };
