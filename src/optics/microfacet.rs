@@ -13,7 +13,7 @@ use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
 /// The family of the distribution.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Distribution {
     /// Trowbridge and Reitz 1975: long tails.
     #[default]

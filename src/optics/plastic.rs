@@ -96,7 +96,7 @@ impl Plastic {
 }
 
 /// Transmission of a rough coat against the cosine, and its diffuse reflectance from inside:
-/// computed once a material.
+/// computed once a coat.
 #[derive(Clone, Debug)]
 pub struct CoatTable {
     /// T at cos = i / (len − 1).
@@ -106,7 +106,7 @@ pub struct CoatTable {
 }
 
 /// How the diffuse reflectance of a rough coat from inside, 2 ∫ R(c) c dc, is taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DiffuseMean {
     /// The integral.
     Integral,

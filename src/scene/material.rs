@@ -10,7 +10,7 @@ use crate::optics::dielectric::{Dielectric, RelativeIndex, RoughDielectric, Tint
 use crate::optics::fresnel::Model;
 use crate::optics::hair::{Fibre, Hair};
 use crate::optics::microfacet::{Distribution, Microfacets};
-use crate::optics::plastic::{Base, Coats, DiffuseMean, Plastic, RoughPlastic};
+use crate::optics::plastic::{Base, Coats, Plastic, RoughPlastic};
 use crate::optics::thin_film::ThinFilm;
 use crate::spectrum::{BAND_NM, Lanes, RefractiveIndex, Spectrum};
 use glam::DVec3;
@@ -203,19 +203,19 @@ pub struct Coat {
 }
 
 impl Coat {
-    /// Computes the tables.
+    /// A coat with the `tables` of the range of its index over that outside.
     #[must_use]
     pub fn new(
         interior: RefractiveIndex,
         exterior: RefractiveIndex,
         facets: Option<Microfacets>,
-        mean: DiffuseMean,
+        tables: impl FnOnce([f64; 2]) -> Arc<Coats>,
     ) -> Coat {
         // Formulas and tables have no peak within a nanometre.
         let range = BAND_NM[0] as u32..=BAND_NM[1] as u32;
         let etas = range.map(|nm| interior.at(f64::from(nm)) / exterior.at(f64::from(nm)));
         let (low, high) = etas.fold((f64::INFINITY, 0.0f64), |(low, high), eta| (low.min(eta), high.max(eta)));
-        Coat { interior, exterior, facets, tables: Arc::new(Coats::new(low, high, facets.as_ref(), mean)) }
+        Coat { interior, exterior, facets, tables: tables([low, high]) }
     }
 
     /// Index of the coat over that outside.

@@ -3,10 +3,13 @@
 //! Frames of a batch mostly share their pictures and meshes, and reading those can cost more than a small frame. Pictures
 //! are kept as they are rendered (decoded and upsampled), meshes as they were read. What a scene does not ask for is
 //! forgotten after it, so that a batch of any length holds what one scene holds. A file that has changed is read again.
+//! The tables of coats, which take some 20 ms each, are kept as well, for all that have the same coat.
 
 use super::environment::Environment;
 use super::mesh::MeshSource;
 use super::texture::{DataImage, ImageTexture};
+use crate::optics::microfacet::{Distribution, Microfacets};
+use crate::optics::plastic::{Coats, DiffuseMean};
 use crate::spectrum::Carried;
 use std::collections::HashMap;
 use std::hash::Hash;
@@ -83,7 +86,32 @@ impl<K: Eq + Hash, V: Clone> Kept<K, V> {
     }
 }
 
-/// Pictures, skies and meshes.
+/// What makes one coat differ from another: the range of its index, its facets, and how their mean is taken. Numbers as bits.
+type CoatKey = ([u64; 2], Option<(Distribution, [u64; 2])>, DiffuseMean);
+
+/// The tables of coats.
+#[derive(Debug, Default)]
+pub struct KeptCoats {
+    /// And whether the scene at hand has asked for them.
+    tables: HashMap<CoatKey, (Arc<Coats>, bool)>,
+}
+
+impl KeptCoats {
+    /// [`Coats::new`], computed once.
+    pub fn get(&mut self, [low, high]: [f64; 2], facets: Option<&Microfacets>, mean: DiffuseMean) -> Arc<Coats> {
+        let rough = facets.map(|facets| (facets.distribution, [facets.alpha, facets.ratio].map(f64::to_bits)));
+        let compute = || (Arc::new(Coats::new(low, high, facets, mean)), true);
+        let (tables, wanted) = self.tables.entry(([low, high].map(f64::to_bits), rough, mean)).or_insert_with(compute);
+        *wanted = true;
+        tables.clone()
+    }
+
+    fn forget(&mut self) {
+        self.tables.retain(|_, (_, wanted)| std::mem::take(wanted));
+    }
+}
+
+/// Pictures, skies, meshes and coats.
 #[derive(Debug, Default)]
 pub struct Shelf {
     /// What they are made for: others have a shelf of their own.
@@ -96,6 +124,8 @@ pub struct Shelf {
     pub skies: Kept<Vec<u64>, (Arc<Environment>, Option<String>)>,
     /// Meshes, by their index in the file.
     pub meshes: Kept<u32, Arc<MeshSource>>,
+    /// Tables of the coats of plastics.
+    pub coats: KeptCoats,
 }
 
 impl Shelf {
@@ -105,6 +135,7 @@ impl Shelf {
         self.numbers.forget();
         self.skies.forget();
         self.meshes.forget();
+        self.coats.forget();
     }
 }
 

@@ -400,7 +400,8 @@ impl<'a> Compiler<'a> {
             written::DiffuseMean::Integral => DiffuseMean::Integral,
             written::DiffuseMean::Nodes => DiffuseMean::Nodes,
         };
-        let coat = Box::new(Coat::new(interior, exterior, facets, mean));
+        let coats = &mut self.shelf.coats;
+        let coat = Box::new(Coat::new(interior, exterior, facets, |range| coats.get(range, facets.as_ref(), mean)));
         Kind::Plastic { reflectance, coat, nonlinear: m.nonlinear, tint }
     }
 
@@ -514,9 +515,14 @@ fn facets(alpha: f64, distribution: written::Distribution) -> Option<Microfacets
 #[cfg(test)]
 mod tests {
     use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
+    use crate::optics::plastic::Coats;
+    use crate::scene::compile::{compile, compile_with};
     use crate::scene::grid::testing::vol;
+    use crate::scene::material::Kind;
+    use crate::scene::shelf::Shelf;
+    use crate::scene::{Object, Scene};
     use std::path::Path;
+    use std::sync::Arc;
 
     /// Blender numbers what has no name of its own: a fault of `Material.001` was told at the line of `Material`.
     #[test]
@@ -587,5 +593,40 @@ mod tests {
             assert!(!told("sphere: {radius: 1, material: m}", relief), "{relief}");
         }
         assert!(!told(grid, "{diffuse: {}}"));
+    }
+
+    /// Tables take longer than all else of a small scene: materials with the same coat share them, and so do scenes in a row, such
+    /// as the moments of one that moves. What lies under a coat has no part in them; all that is the coat's has.
+    #[test]
+    fn tables_of_a_coat_are_computed_once() {
+        let scene = |shelf: &mut Shelf| {
+            let coats = [
+                "reflectance: 0.2, roughness: 0.1",
+                "reflectance: 0.7, roughness: 0.1, nonlinear: true",
+                "roughness: 0.2",
+                "roughness: 0.1, ior: 1.4",
+                "roughness: 0.1, distribution: beckmann",
+                "roughness: 0.1, diffuse_mean: nodes",
+                "roughness: 0",
+            ];
+            let shapes = coats.map(|coat| format!("- sphere: {{radius: 1, material: {{plastic: {{{coat}}}}}}}\n"));
+            let camera = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n";
+            let text = format!("{camera}shapes:\n{}", shapes.concat());
+            compile_with(&SceneDescription::parse(&text, Path::new("s.yaml")).unwrap(), "s", shelf).unwrap()
+        };
+        let tables = |scene: &Scene| -> Vec<Arc<Coats>> {
+            let of = |object: &Object| match &scene.materials[object.material as usize].kind {
+                Kind::Plastic { coat, .. } => coat.tables.clone(),
+                _ => panic!("plastic"),
+            };
+            scene.objects.iter().map(of).collect()
+        };
+        let mut shelf = Shelf::default();
+        let (first, second) = (tables(&scene(&mut shelf)), tables(&scene(&mut shelf)));
+        for (i, a) in first.iter().enumerate() {
+            for (j, b) in second.iter().enumerate() {
+                assert_eq!(Arc::ptr_eq(a, b), i.max(1) == j.max(1), "{i} {j}");
+            }
+        }
     }
 }
