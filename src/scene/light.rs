@@ -498,7 +498,7 @@ mod tests {
         // One voxel to the left of x = 1, the other to the right.
         let volume = Volume::Grid(Arc::new(GridVolume {
             size: [2, 1, 1],
-            values: Voxels::Grey(vec![0.25, 0.75]),
+            values: Voxels::Grey([0.25, 0.75].into()),
             between: Between::Nearest,
             wrap: Wrap::Clamp,
             local_from_world: DAffine3::from_scale(DVec3::splat(0.5)),

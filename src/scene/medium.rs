@@ -420,7 +420,7 @@ mod tests {
     fn along_x(values: &[f32]) -> Volume {
         Volume::Grid(Arc::new(GridVolume {
             size: [values.len(), 1, 1],
-            values: Voxels::Grey(values.to_vec()),
+            values: Voxels::Grey(values.into()),
             local_from_world: DAffine3::IDENTITY,
             between: Between::Trilinear,
             wrap: Wrap::Clamp,

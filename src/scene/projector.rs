@@ -224,7 +224,7 @@ mod tests {
     fn a_volume_has_the_value_at_the_projector() {
         let (between, wrap) = (Between::Nearest, Wrap::Clamp);
         let local_from_world = DAffine3::from_scale(DVec3::splat(0.25));
-        let values = Voxels::Grey(vec![1.0, 5.0]);
+        let values = Voxels::Grey([1.0, 5.0].into());
         let grid =
             GridVolume { size: [2, 1, 1], values, local_from_world, between, wrap, brightest: Default::default() };
         let place = Camera::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(9.0, 2.0, 3.0), DVec3::Y).unwrap();

@@ -1,13 +1,14 @@
 //! What one scene of a batch has read, for the next one that names the same files.
 //!
-//! Frames of a batch mostly share their pictures and meshes, and reading those can cost more than a small frame. Pictures
-//! are kept as they are rendered (decoded and upsampled), meshes as they were read. What a scene does not ask for is
-//! forgotten after it, so that a batch of any length holds what one scene holds. A file that has changed is read again.
-//! The tables of coats, which take some 20 ms each, are kept as well, for all that have the same coat.
+//! Frames of a batch mostly share their pictures, meshes and volumes, and reading those can cost more than a small frame.
+//! Pictures and volumes are kept as they are rendered (decoded and upsampled), meshes as they were read. What a scene does
+//! not ask for is forgotten after it, so that a batch of any length holds what one scene holds. A file that has changed is
+//! read again. The tables of coats, which take some 20 ms each, are kept as well, for all that have the same coat.
 
 use super::environment::Environment;
 use super::mesh::MeshSource;
 use super::texture::{DataImage, ImageTexture};
+use super::volume::Unplaced;
 use crate::optics::microfacet::{Distribution, Microfacets};
 use crate::optics::plastic::{Coats, DiffuseMean};
 use crate::spectrum::Carried;
@@ -111,7 +112,7 @@ impl KeptCoats {
     }
 }
 
-/// Pictures, skies, meshes and coats.
+/// Pictures, skies, meshes, volumes and coats.
 #[derive(Debug, Default)]
 pub struct Shelf {
     /// What they are made for: others have a shelf of their own.
@@ -124,6 +125,8 @@ pub struct Shelf {
     pub skies: Kept<Vec<u64>, (Arc<Environment>, Option<String>)>,
     /// Meshes, by their index in the file.
     pub meshes: Kept<u32, Arc<MeshSource>>,
+    /// Volumes, as colours or raw. They share their voxels, wherever they are placed.
+    pub volumes: Kept<bool, Unplaced>,
     /// Tables of the coats of plastics.
     pub coats: KeptCoats,
 }
@@ -135,6 +138,7 @@ impl Shelf {
         self.numbers.forget();
         self.skies.forget();
         self.meshes.forget();
+        self.volumes.forget();
         self.coats.forget();
     }
 }

@@ -57,15 +57,28 @@ pub struct GridVolume {
     pub brightest: OnceLock<Option<usize>>,
 }
 
-/// The numbers of a grid.
+/// The numbers of a grid, which all that is made of one file shares.
 #[derive(Clone, Debug)]
 pub enum Voxels {
     /// The same at every wavelength.
-    Grey(Vec<f32>),
+    Grey(Arc<[f32]>),
     /// Sigmoid coefficients and scale.
-    Coloured(Vec<[f32; 4]>),
+    Coloured(Arc<[[f32; 4]]>),
     /// Three numbers that are no colour; a scalar of them is their luminance.
-    Raw(Vec<[f32; 3]>),
+    Raw(Arc<[[f32; 3]]>),
+}
+
+/// A grid as its file has it, in no place yet.
+#[derive(Clone, Debug)]
+pub struct Unplaced {
+    /// Voxels in x, y, z.
+    pub size: [usize; 3],
+    /// Lower corner of the box that the file names.
+    pub min: DVec3,
+    /// Upper corner of it.
+    pub max: DVec3,
+    /// By voxel, x fastest.
+    pub values: Voxels,
 }
 
 impl Voxels {
@@ -78,7 +91,8 @@ impl Voxels {
             let [a, b, c] = carried.coefficients(if scale > 0.0 { rgb.map(|v| v / scale) } else { [0.0; 3] });
             [a, b, c, scale]
         };
-        Voxels::Coloured(colours.par_iter().map(voxel).collect())
+        let voxels: Vec<[f32; 4]> = colours.par_iter().map(voxel).collect();
+        Voxels::Coloured(voxels.into())
     }
 }
 
@@ -671,7 +685,7 @@ mod tests {
         let colours: Vec<[f32; 3]> = noise(3 * 7 * 9 * 5).chunks_exact(3).map(|c| [c[0], c[1], 3.0 * c[2]]).collect();
         let turned =
             DAffine3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7) * DAffine3::from_scale(DVec3::new(0.5, 1.0, 2.0));
-        for values in [Voxels::Grey(noise(7 * 9 * 5)), Voxels::upsampled(&colours, Carried::Spectra)] {
+        for values in [Voxels::Grey(noise(7 * 9 * 5).into()), Voxels::upsampled(&colours, Carried::Spectra)] {
             for wrap in [Wrap::Clamp, Wrap::Mirror, Wrap::Repeat] {
                 for (between, local_from_world) in [
                     (Between::Trilinear, DAffine3::IDENTITY),
@@ -711,7 +725,7 @@ mod tests {
     /// Along an axis, along an edge, from inside, past the box, and from a corner.
     #[test]
     fn rays_in_special_places_march_through_the_box_and_no_further() {
-        let volume = Volume::Grid(Arc::new(grid([8, 8, 8], Voxels::Grey(noise(512)))));
+        let volume = Volume::Grid(Arc::new(grid([8, 8, 8], Voxels::Grey(noise(512).into()))));
         let bounds = Bounds::new(&volume);
         let length = |origin: [f64; 3], direction: [f64; 3], t_max: f64| -> f64 {
             let ray = Ray::new(origin.into(), DVec3::from(direction).normalize());

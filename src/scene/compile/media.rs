@@ -8,7 +8,7 @@ use crate::optics::phase::{Phase, PhaseTable};
 use crate::scene::grid::Grid;
 use crate::scene::medium::{Filling, Medium, PhaseBlend, PhaseFunction, Varying};
 use crate::scene::texture::Wrap;
-use crate::scene::volume::{Between, GridVolume, Volume, Voxels};
+use crate::scene::volume::{Between, GridVolume, Unplaced, Volume, Voxels};
 use crate::scene::{Geometry, Object, Scene};
 use crate::spectrum::{Carried, Outside, Spectrum};
 use glam::{DAffine3, DVec3};
@@ -35,8 +35,10 @@ impl Compiler<'_> {
             }),
             written::Volume::Grid(grid) => {
                 self.files.push(grid.file.to_path_buf());
-                let loaded = grid_volume(grid, world_from_local, self.shelf.carried);
-                Ok(Volume::Grid(Arc::new(loaded.map_err(|e| self.asked(&format!("{at}.grid.file"), e))?)))
+                let carried = self.shelf.carried;
+                let read = self.shelf.volumes.get(&grid.file, grid.raw, || read_grid(&grid.file, grid.raw, carried));
+                let placed = read.and_then(|read| place_grid(grid, read, world_from_local));
+                Ok(Volume::Grid(Arc::new(placed.map_err(|e| self.asked(&format!("{at}.grid.file"), e))?)))
             }
         }
     }
@@ -217,26 +219,31 @@ impl Compiler<'_> {
 /// # Errors
 /// [`Error::Input`] where the file is missing or broken, holds numbers below zero, or has neither one channel
 /// nor three.
-fn grid_volume(written: &written::GridVolume, world_from_local: DAffine3, carried: Carried) -> Result<GridVolume> {
-    let path: &Path = &written.file;
+/// The voxels of a file, as colours or `raw`.
+fn read_grid(path: &Path, raw: bool, carried: Carried) -> Result<Unplaced> {
     let grid = Grid::load(path)?;
     if let Some(i) = grid.values.iter().position(|v| *v < 0.0) {
         let found = grid.values[i];
         return Err(Error::input(path, format!("expected numbers of 0 or more, found {found} as value {i}")));
     }
     let triples = || grid.values.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect::<Vec<_>>();
-    let values = match (grid.channels, written.raw) {
-        (1, _) => Voxels::Grey(grid.values),
-        (3, true) => Voxels::Raw(triples()),
+    let values = match (grid.channels, raw) {
+        (1, _) => Voxels::Grey(grid.values.into()),
+        (3, true) => Voxels::Raw(triples().into()),
         (3, false) => Voxels::upsampled(&triples(), carried),
         (n, _) => return Err(Error::input(path, format!("expected 1 channel or 3, found {n}"))),
     };
+    Ok(Unplaced { size: grid.size, min: grid.min, max: grid.max, values })
+}
+
+/// What was read for `written`, where that stands.
+fn place_grid(written: &written::GridVolume, grid: Unplaced, world_from_local: DAffine3) -> Result<GridVolume> {
     let mut local_from_world = world_from_local.inverse();
     if written.file_box {
         let extent = grid.max - grid.min;
         if extent.min_element() <= 0.0 {
             let (min, max) = (grid.min, grid.max);
-            return Err(Error::input(path, format!("expected a box with a volume, found {min} to {max}")));
+            return Err(Error::input(&written.file, format!("expected a box with a volume, found {min} to {max}")));
         }
         // Mitsuba's order: from the world by the transform, then from the file's box to the unit cube.
         local_from_world =
@@ -244,7 +251,7 @@ fn grid_volume(written: &written::GridVolume, world_from_local: DAffine3, carrie
     }
     Ok(GridVolume {
         size: grid.size,
-        values,
+        values: grid.values,
         local_from_world,
         between: match written.filter {
             written::VolumeFilter::Trilinear => Between::Trilinear,
@@ -257,4 +264,44 @@ fn grid_volume(written: &written::GridVolume, world_from_local: DAffine3, carrie
         },
         brightest: OnceLock::new(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::SceneDescription;
+    use crate::scene::compile::compile_with;
+    use crate::scene::grid::testing::vol;
+    use crate::scene::material::Kind;
+    use crate::scene::shelf::Shelf;
+    use crate::scene::texture::Texture;
+
+    /// A cloud is read once for all the scenes of its way, such as the moments while a shutter is open: they share its numbers,
+    /// and each has a place of its own.
+    #[test]
+    fn voxels_of_a_volume_that_moves_are_read_once() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("cloud.vol"), vol([2, 1, 1], 1, &[0.25, 0.75])).unwrap();
+        let mut shelf = Shelf::default();
+        let mut placed = |x: f64| {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\n\
+                 volumes: {{v: {{grid: {{file: cloud.vol, transform: [{{translate: [{x}, 0, 0]}}]}}}}}}\n\
+                 textures: {{t: {{volume: v}}}}\n\
+                 shapes: [sphere: {{radius: 1, material: {{diffuse: {{reflectance: {{texture: t}}}}}}}}]\n"
+            );
+            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
+            let scene = compile_with(&description, "s", &mut shelf).unwrap();
+            match &scene.materials[scene.objects[0].material as usize].kind {
+                Kind::Diffuse { reflectance: Texture::Volume(Volume::Grid(grid)) } => grid.clone(),
+                _ => panic!("a volume"),
+            }
+        };
+        let (here, there) = (placed(0.0), placed(2.0));
+        let (Voxels::Grey(a), Voxels::Grey(b)) = (&here.values, &there.values) else { panic!("one channel") };
+        assert!(Arc::ptr_eq(a, b));
+        // The middle of the second voxel.
+        let at = DVec3::new(0.75, 0.5, 0.5);
+        assert_eq!([here.scalar(at), there.scalar(at + DVec3::X * 2.0)], [0.75; 2]);
+    }
 }
