@@ -31,6 +31,33 @@ fn slides_keep_what_mitsuba_cannot_say() {
     }
 }
 
+/// Where it is told to, Mitsuba's `twosided` lets light through: so it does in the file, and read back.
+#[test]
+fn two_sides_may_let_light_through() {
+    let card = |sides: &str| {
+        format!(
+            "rectangle: {{corner: [-1, 0, 0], edge_u: [2, 0, 0], edge_v: [0, 1, 0], material: {{two_sided: {{{sides}}}}}}}"
+        )
+    };
+    for (sides, plugin) in [
+        ("front: {mask: {opacity: 0.4, material: {diffuse: {two_sided: false}}}}", "mask"),
+        ("front: {thin_dielectric: {ior: 1.5}}, back: {diffuse: {reflectance: 0.2}}", "thindielectric"),
+        ("front: {thin_dielectric: {ior: 1.5}}", "thindielectric"),
+        ("front: {principled_thin: {diff_trans: 1}}", "principledthin"),
+        ("front: {hair: {absorption: 0.5}}", "hair"),
+    ] {
+        let (losses, xml) = exported_with("", &card(sides));
+        assert!(losses.iter().all(|loss| loss.starts_with("integrator.")), "{losses:?}");
+        for words in
+            [format!("<bsdf type=\"{plugin}\">"), "<boolean name=\"allow_transmission\" value=\"true\"/>".to_owned()]
+        {
+            assert!(xml.contains(&words) && !xml.contains("instead"), "{xml}");
+        }
+    }
+    let (_, opaque) = exported_with("", &card("front: {diffuse: {}}, back: {mirror: {reflectance: 0.5}}"));
+    assert!(!opaque.contains("allow_transmission"), "{opaque}");
+}
+
 /// A file that Mitsuba refuses, or another picture without a word, is none: what it has no words for is told, all of it.
 #[test]
 fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {

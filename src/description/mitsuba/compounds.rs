@@ -15,6 +15,10 @@ fn same(a: &Node, b: &Node) -> bool {
     matches!((&a.value, &b.value), (super::Value::Float(a), super::Value::Float(b)) if a == b)
 }
 
+/// Materials that let light through and are not told whether they have two sides.
+const CLEAR: [&str; 6] =
+    ["dielectric", "dispersivedielectric", "thindielectric", "roughdielectric", "principledthin", "hair"];
+
 impl Import<'_> {
     /// A number, or `{texture: name}`; `None` where it is not written.
     pub(crate) fn number_or_texture(&mut self, bag: &Bag<'_>, name: &'static str) -> Result<Option<Node>, Fault> {
@@ -102,7 +106,7 @@ impl Import<'_> {
         }
         match inner[..] {
             // Named once for all who refer to it, it stands on its own.
-            [one] if !self.is_compound(one) => self.bsdf(one, Sides::Both),
+            [one] if !self.is_compound(one) && !self.is_clear(one) => self.bsdf(one, Sides::Both),
             [one] => {
                 let mut fields = Fields::new(bag.object.place);
                 fields.add("front", self.material(one)?);
@@ -125,10 +129,16 @@ impl Import<'_> {
         }
         let bag = self.bag(index);
         match bag.object.plugin.as_str() {
-            "dielectric" | "dispersivedielectric" | "thindielectric" | "roughdielectric" => Some(index),
-            "null" | "mask" | "principledthin" | "hair" => Some(index),
+            "null" | "mask" => Some(index),
+            clear if CLEAR.contains(&clear) => Some(index),
             _ => bag.objects(Family::Bsdf).into_iter().find_map(|inner| self.lets_through(inner, seen)),
         }
+    }
+
+    /// Whether a material is one of those that let light through.
+    fn is_clear(&self, index: usize) -> bool {
+        let plugin = self.document.objects[index].plugin.as_str();
+        CLEAR.contains(&plugin)
     }
 
     /// Whether a material is made of others.
@@ -260,7 +270,11 @@ mod tests {
         for open in [mask, blend, "<bsdf type=\"null\"/>", "<bsdf type=\"dielectric\"/>"] {
             assert!(told(open, "").ends_with("lets no light through inside <twosided>"), "{open}: {}", told(open, ""));
         }
-        assert_eq!(told(mask, "<boolean name=\"allow_transmission\" value=\"true\"/>"), "none");
+        let allowed = "<boolean name=\"allow_transmission\" value=\"true\"/>";
+        for open in [mask, blend, "null", "thindielectric", "principledthin", "hair"] {
+            let inside = if open.starts_with('<') { open.to_owned() } else { format!("<bsdf type=\"{open}\"/>") };
+            assert_eq!(told(&inside, allowed), "none", "{open}");
+        }
         assert_eq!(told("<bsdf type=\"diffuse\"/>", ""), "none");
     }
 

@@ -122,6 +122,9 @@ impl Export<'_> {
 
     pub(super) fn two_sided(&mut self, field: &str, m: &TwoSided, attributes: &Attributes) {
         self.open_owned("bsdf", attributes);
+        if self.either_transmits(m) {
+            self.xml.value("boolean", "allow_transmission", true);
+        }
         for (key, side) in [("front", Some(&m.front)), ("back", m.back.as_ref())] {
             match side.map(|side| &**side) {
                 // Each is seen from one side only.
@@ -221,6 +224,11 @@ impl Export<'_> {
         })
     }
 
+    /// Whether light may come through one of two sides.
+    fn either_transmits(&self, m: &TwoSided) -> bool {
+        [Some(&m.front), m.back.as_ref()].into_iter().flatten().any(|side| self.transmits(side))
+    }
+
     /// What Mitsuba gets in place of such a material, where it cannot express it.
     pub(super) fn compound_shortfall(&self, material: &Material) -> Option<String> {
         let colour =
@@ -242,11 +250,6 @@ impl Export<'_> {
                 }
                 HairColour::Absorption(s) => Export::constant_shortfall(&[s], "a grey absorption"),
             },
-            Material::TwoSided(m) => {
-                let sides = [Some(&m.front), m.back.as_ref()];
-                let through = sides.into_iter().flatten().any(|side| self.transmits(side));
-                through.then(|| "two sides of grey: Mitsuba's twosided lets no light through".to_owned())
-            }
             Material::Bump(m) => (!self.has_relief(&m.height.texture))
                 .then(|| "what it covers: Mitsuba has no slopes but of pictures".to_owned()),
             Material::NormalMap(m) => (!self.has_relief(&m.normals.texture))

@@ -175,10 +175,6 @@ impl Export<'_> {
             Material::Hair(m) => self.hair(m, &named("hair", inner_id)),
             Material::Mask(m) => self.mask(field, m, &named("mask", inner_id)),
             Material::Blend(m) => self.blend(field, m, &named("blendbsdf", inner_id)),
-            // What lets light through cannot have two sides.
-            Material::TwoSided(_) if self.shortfall(material).is_some() => {
-                self.open_owned("bsdf", &named("diffuse", inner_id));
-            }
             Material::TwoSided(m) => self.two_sided(field, m, &named("twosided", inner_id)),
             Material::Bump(m) => self.bump(field, m, &named("bumpmap", inner_id)),
             Material::NormalMap(m) => self.normal_map(field, m, &named("normalmap", inner_id)),
