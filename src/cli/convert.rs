@@ -24,7 +24,7 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
     let output = arguments.output.as_deref();
     let file = output.filter(|path| !is_stream(path));
     let path = file.unwrap_or(Path::new(""));
-    let exported = description::export(&scene, path, &mesh::normals_of, &sdf::is_closed);
+    let exported = description::export(&scene, path, &mesh::normals_of, &mesh::for_mitsuba, &sdf::is_closed);
     match file {
         Some(path) => {
             let beside = |name: &String| directory_of(path).join(name);
@@ -35,7 +35,7 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
         }
         None if !exported.files.is_empty() => {
             return Err(Error::Config(
-                "expected -o FILE.xml, for a cone becomes a mesh that is written beside the scene; found none".into(),
+                "expected -o FILE.xml, for a mesh has to be written beside the scene; found none".into(),
             ));
         }
         None => {}

@@ -33,7 +33,7 @@ fn prepared(file: &Path, directory: &Path, again: bool) -> (batch::Prepared, des
     let entry = batch::entries(file, &overrides).unwrap_or_else(|error| panic!("{error}")).remove(0);
     let xml = directory.join("scene.xml");
     let scene = entry.scene(&overrides.set).unwrap_or_else(|error| panic!("{error}"));
-    let exported = description::export(&scene, &xml, &mesh::normals_of, &sdf::is_closed);
+    let exported = description::export(&scene, &xml, &mesh::normals_of, &mesh::for_mitsuba, &sdf::is_closed);
     if !again {
         return (batch::prepare(&entry, &overrides).unwrap_or_else(|error| panic!("{error}")), exported);
     }
@@ -272,7 +272,7 @@ fn bands_are_exported() {
         };
         let ours = scene_of(&yaml);
         let xml = directory.path().join("s.xml");
-        let exported = description::export(&ours, &xml, &mesh::normals_of, &sdf::is_closed);
+        let exported = description::export(&ours, &xml, &mesh::normals_of, &mesh::for_mitsuba, &sdf::is_closed);
         std::fs::write(&xml, &exported.xml).unwrap();
         let theirs = scene_of(&xml);
         (ours.image.bands, theirs.image.bands, exported)
@@ -304,6 +304,37 @@ fn a_second_environment_is_told() {
     let (_, exported) = prepared(&yaml, directory.path(), false);
     let losses: Vec<String> = exported.losses.iter().map(|l| format!("{}: {}", l.field, l.instead)).collect();
     assert_eq!(losses, ["lights[1]: nothing: Mitsuba has one environment"]);
+    same_picture(&yaml);
+}
+
+/// A file that Mitsuba refuses is written anew, once, beside the scene: nothing is lost, and reading it back takes the file.
+#[test]
+fn meshes_that_mitsuba_does_not_read_are_written_anew() {
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
+               property list uchar int vertex_indices\nend_header\n-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n4 0 1 2 3\n";
+    common::write(&directory.path().join("square.ply"), ply.as_bytes());
+    let obj = "v -1 -1 1\nv 1 -1 1\nv 1 1 1\nvt 0 0\nvt 1 0\nvt 1 1\n";
+    common::write(&directory.path().join("back.obj"), format!("{obj}f -3/-3 -2/-2 -1/-1\n").as_bytes());
+    common::write(&directory.path().join("plain.obj"), format!("{obj}f 1/1 2/2 3/3\n").as_bytes());
+    let of = |file: &str, more: &str| {
+        format!("- mesh: {{file: {file}, normals: vertex, winding: world, flip_v: true, {more}}}\n")
+    };
+    let scene = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nintegrator: {path: {opaque_sky: true}}\nlights: [{constant: {radiance: 1}}]\n\
+                 textures: {board: {checkerboard: {a: 0.2, b: 0.7, scale: [4, 3]}}}\nmaterials: {m: {diffuse: {reflectance: {texture: board}}}}\n\
+                 shapes:\n"
+        .to_owned()
+        + &["square.ply", "back.obj", "plain.obj", "back.obj"].map(|file| of(file, "material: m")).concat();
+    common::write(&yaml, scene.as_bytes());
+    let (_, exported) = prepared(&yaml, directory.path(), false);
+    assert_eq!(exported.losses, []);
+    let names: Vec<&str> = exported.files.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["scene.shape0.ply", "scene.shape1.ply"]);
+    for (name, times) in [(names[0], 1), (names[1], 2), ("plain.obj", 1)] {
+        let found = exported.xml.matches(&format!("name=\"filename\" value=\"{name}\"")).count();
+        assert_eq!(found, times, "{name}: {}", exported.xml);
+    }
     same_picture(&yaml);
 }
 

@@ -11,6 +11,7 @@
 //! Triangles are wound counterclockwise seen from outside. A transform that mirrors reverses the
 //! winding, so that outside stays outside.
 
+mod anew;
 pub mod attribute;
 mod load;
 mod obj;
@@ -21,6 +22,7 @@ pub mod together;
 mod tree;
 mod triangle;
 
+pub use anew::for_mitsuba;
 pub use load::{Sources, load};
 pub use tree::{MAX_TRIANGLES, MeshHit, MeshTree};
 pub use triangle::{TriangleHit, TriangleRay};

@@ -4,6 +4,7 @@
 //! numbers follow `v`; the weight or the colour that may come after them is not used.
 
 use super::MeshSource;
+use super::anew::{has_direction, is_fan};
 use super::polygon::unfold;
 use glam::{DVec2, DVec3};
 use std::collections::HashMap;
@@ -270,6 +271,58 @@ fn corner(word: &[u8], counts: [usize; 3], line: usize) -> Result<Corner, String
         out[k] = from_one.and_then(|i| u32::try_from(i).ok()).ok_or_else(fault)?;
     }
     Ok(out)
+}
+
+/// What Mitsuba takes for a line is shorter, in bytes.
+const LINE: usize = 1024;
+
+/// Whether Mitsuba reads the same mesh from `bytes` as `source`: see [`super::anew`].
+pub(super) fn is_plain(bytes: &[u8], source: &MeshSource) -> bool {
+    if crate::input::without_mark(bytes).len() != bytes.len() {
+        return false;
+    }
+    // How many there are, and how many corners name one.
+    let (mut counts, mut named) = ([0; 3], [0; 3]);
+    let mut triangles = source.triangles.as_slice();
+    for line in bytes.split(|&b| b == b'\n') {
+        if line.len() >= LINE || line.trim_ascii_end().ends_with(b"\\") {
+            return false;
+        }
+        let mut words = Words { rest: line };
+        match words.next() {
+            Some(b"v") => counts[0] += 1,
+            Some(b"vt") => {
+                counts[1] += 1;
+                if words.count() < 2 {
+                    return false;
+                }
+            }
+            Some(b"vn") => {
+                counts[2] += 1;
+                if !numbers::<3>(words, 0).map(DVec3::from).is_ok_and(has_direction) {
+                    return false;
+                }
+            }
+            Some(b"f") => {
+                let mut corners = 0usize;
+                for word in words {
+                    corners += 1;
+                    for (k, part) in word.split(|&b| b == b'/').enumerate().filter(|(_, part)| !part.is_empty()) {
+                        if !short_whole(part).is_some_and(|i| (1..=counts[k]).contains(&i)) {
+                            return false;
+                        }
+                        named[k] += 1;
+                    }
+                }
+                let fan = corners.checked_sub(2).and_then(|count| triangles.split_off(..count));
+                if !fan.is_some_and(is_fan) {
+                    return false;
+                }
+            }
+            _ => {}
+        }
+    }
+    (1..3).all(|k| counts[k] == 0 || named[k] == named[0])
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! attributes, see [`super::attribute`]. Faces may have a list `texcoord`, u and v of each corner, as MeshLab writes it.
 
 use super::MeshSource;
+use super::anew::has_direction;
 use super::attribute::{Attribute, Channel, Column, Element, named_columns};
 use super::polygon::unfold;
 use glam::{DVec2, DVec3};
@@ -326,6 +327,49 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
     part_at_seams(&mut out, &corner_uvs);
     fans.into_iter().for_each(|fan| unfold(&out.positions, &mut out.triangles[fan]));
     Ok(out)
+}
+
+/// Whether Mitsuba reads the same mesh from `bytes` as `source`: see [`super::anew`].
+pub(super) fn is_plain(bytes: &[u8], source: &MeshSource) -> bool {
+    let mut rest = bytes;
+    let Ok(header) = header(&mut rest) else { return false };
+    let head = &bytes[..bytes.len() - rest.len()];
+    if head.split(|&b| b == b'\n').any(|line| line.trim_ascii_start().starts_with(b"obj_info")) {
+        return false;
+    }
+    // Where all faces are triangles, each row is as long as the next.
+    let mut length = 0;
+    for (name, count, properties) in &header.elements {
+        let lists: Vec<&Property> = properties.iter().filter(|property| property.list.is_some()).collect();
+        let is_known = match (name.as_str(), &lists[..]) {
+            ("vertex", []) => {
+                let placed = ["x", "y", "z", "nx", "ny", "nz", "u", "v", "texture_u", "texture_v", "s", "t"];
+                let mut placed = properties.iter().filter(|property| placed.contains(&property.name.as_str()));
+                let has = |name: &str| properties.iter().any(|property| property.name == name);
+                // It does not know the last pair.
+                let [others @ .., _] = UV_NAMES;
+                placed.all(|property| property.kind.unit() == 1.0)
+                    && (source.uvs.is_empty() || others.iter().any(|[u, v]| has(u) && has(v)))
+            }
+            ("face", [_]) => *count == source.triangles.len(),
+            (_, lists) => lists.is_empty(),
+        };
+        if !is_known {
+            return false;
+        }
+        let row = properties.iter().map(|property| match (property.list, header.big) {
+            (None, None) => 1,
+            (None, Some(_)) => property.kind.size(),
+            (Some(_), None) => 4,
+            (Some(count), Some(_)) => count.size() + 3 * property.kind.size(),
+        });
+        length += count * row.sum::<usize>();
+    }
+    let found = match header.big {
+        Some(_) => rest.len(),
+        None => rest.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).count(),
+    };
+    found == length && source.normals.iter().all(|normal| has_direction(*normal))
 }
 
 /// Gives the corners of all triangles the coordinates `uvs`; nothing where there are none. A vertex whose corners have several becomes as

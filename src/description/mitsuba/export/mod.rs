@@ -28,7 +28,8 @@ mod xml;
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use glam::DVec3;
 
@@ -75,12 +76,13 @@ pub enum MeshNormals {
     Inward,
 }
 
-/// Writes `scene` for the file `path`. `normals` reads mesh `index` of a file, `closed` tells whether the grid of one bounds a
-/// solid.
+/// Writes `scene` for the file `path`. `normals` reads mesh `index` of a file, `anew` gives a PLY of it where Mitsuba does not read
+/// the same from the file, `closed` tells whether the grid of one bounds a solid.
 pub fn export(
     scene: &SceneDescription,
     path: &Path,
     normals: &dyn Fn(&Path, u32) -> MeshNormals,
+    anew: &dyn Fn(&Path, u32) -> Option<Vec<u8>>,
     closed: &dyn Fn(&Path) -> bool,
 ) -> Exported {
     let nothing = Node::new(Default::default(), Value::Null);
@@ -89,17 +91,36 @@ pub fn export(
     let stem = path.file_stem().map_or(String::new(), |stem| format!("{}.", stem.to_string_lossy()));
     let directory = path.parent().unwrap_or(Path::new(""));
     let (losses, files) = (Vec::new(), Vec::new());
-    let (ids, mentioned) = (BTreeSet::new(), BTreeSet::new());
+    let (ids, mentioned, meshes) = (BTreeSet::new(), BTreeSet::new(), BTreeMap::new());
     let xml = Xml::default();
     // Each file is read once.
     let known = RefCell::new(BTreeMap::new());
     let normals = &|file: &Path, index: u32| {
         *known.borrow_mut().entry((file.to_owned(), index)).or_insert_with(|| normals(file, index))
     };
+    let known: RefCell<BTreeMap<_, Option<Rc<[u8]>>>> = RefCell::default();
+    let anew = &|file: &Path, index: u32| {
+        let read = || anew(file, index).map(Rc::from);
+        known.borrow_mut().entry((file.to_owned(), index)).or_insert_with(read).clone()
+    };
     let known = RefCell::new(BTreeMap::new());
     let closed = &|file: &Path| *known.borrow_mut().entry(file.to_owned()).or_insert_with(|| closed(file));
-    let mut export =
-        Export { scene, root, sources, normals, closed, directory, stem, ids, mentioned, xml, losses, files };
+    let mut export = Export {
+        scene,
+        root,
+        sources,
+        normals,
+        anew,
+        closed,
+        directory,
+        stem,
+        ids,
+        mentioned,
+        xml,
+        losses,
+        files,
+        meshes,
+    };
     export.scene();
     export.missing_light();
     let Export { xml, mut losses, files, .. } = export;
@@ -113,6 +134,7 @@ struct Export<'a> {
     root: &'a Node,
     sources: &'a Sources,
     normals: &'a dyn Fn(&Path, u32) -> MeshNormals,
+    anew: &'a dyn Fn(&Path, u32) -> Option<Rc<[u8]>>,
     closed: &'a dyn Fn(&Path) -> bool,
     directory: &'a Path,
     /// Before the names of files that are written beside the scene.
@@ -124,6 +146,8 @@ struct Export<'a> {
     xml: Xml,
     losses: Vec<Loss>,
     files: Vec<(String, Vec<u8>)>,
+    /// Those of them that stand for a mesh of a file.
+    meshes: BTreeMap<(PathBuf, u32), String>,
 }
 
 /// Settings that are about the work and the files, not about the light: Mitsuba has other words for

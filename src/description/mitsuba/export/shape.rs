@@ -80,7 +80,8 @@ impl Export<'_> {
             }
             Geometry::Cone(cone) => {
                 self.open("ply", shape);
-                self.mesh(cone_mesh(cone));
+                let name = self.mesh(cone_mesh(cone).into_bytes());
+                self.xml.value("string", "filename", name);
                 self.placing(world);
             }
             Geometry::Disk(disk) => {
@@ -90,7 +91,8 @@ impl Export<'_> {
             // A picture on it repeats by the metre, which the coordinates of a rectangle cannot say.
             Geometry::Plane(plane) if self.is_textured(shape) => {
                 self.open("ply", shape);
-                self.mesh(plane_mesh(&standing(plane, world), is_mirror(world)));
+                let name = self.mesh(plane_mesh(&standing(plane, world), is_mirror(world)).into_bytes());
+                self.xml.value("string", "filename", name);
             }
             Geometry::Plane(plane) => {
                 self.open("rectangle", shape);
@@ -112,9 +114,10 @@ impl Export<'_> {
                 self.placing(world * DMat4::from_translation(cube.center.into()) * DMat4::from_scale(half));
             }
             Geometry::Mesh(mesh) => {
-                let plugin = mesh_plugin(&mesh.file);
+                let anew = self.mesh_anew(mesh);
+                let plugin = if anew.is_some() { "ply" } else { mesh_plugin(&mesh.file) };
                 self.open(plugin, shape);
-                let file = self.file(&mesh.file);
+                let file = anew.unwrap_or_else(|| self.file(&mesh.file));
                 self.xml.value("string", "filename", file);
                 match plugin {
                     "serialized" => self.xml.value("integer", "shape_index", mesh.index),
@@ -282,19 +285,32 @@ impl Export<'_> {
     }
 
     /// Whether a shape that Mitsuba can express would be read as another: a tube and a mesh on which other directions would be
-    /// drawn, and media that are crossed.
+    /// drawn, media that are crossed, and meshes that are written anew.
     fn reads_otherwise(&self, shape: &Shape) -> bool {
         let mirrored = is_mirror(shape.world_from_object());
         let turned = matches!(&shape.geometry, Geometry::Mesh(mesh) if self.is_turned(mesh, mirrored));
+        let anew = matches!(&shape.geometry, Geometry::Mesh(mesh) if (self.anew)(&mesh.file, mesh.index).is_some());
         let tube = self.mirrored_tube(shape).is_some();
-        turned || tube || self.has_crossed_media(shape)
+        turned || anew || tube || self.has_crossed_media(shape)
     }
 
-    /// A mesh in a file of its own.
-    fn mesh(&mut self, ply: String) {
+    /// The name of a new file with a mesh.
+    fn mesh(&mut self, ply: Vec<u8>) -> String {
         let name = format!("{}shape{}.ply", self.stem, self.files.len());
-        self.xml.value("string", "filename", &name);
-        self.files.push((name, ply.into_bytes()));
+        self.files.push((name.clone(), ply));
+        name
+    }
+
+    /// The same of a mesh whose file Mitsuba does not read; one for all shapes that have it.
+    fn mesh_anew(&mut self, mesh: &Mesh) -> Option<String> {
+        let ply = (self.anew)(&mesh.file, mesh.index)?;
+        let key = (mesh.file.to_path_buf(), mesh.index);
+        if let Some(name) = self.meshes.get(&key) {
+            return Some(name.clone());
+        }
+        let name = self.mesh(ply.to_vec());
+        self.meshes.insert(key, name.clone());
+        Some(name)
     }
 
     /// Whether what covers it or shines from it depends on its texture coordinates.
