@@ -307,6 +307,31 @@ fn a_second_environment_is_told() {
     same_picture(&yaml);
 }
 
+/// Light adds up: a sky and its sun, each by itself, are one sky for Mitsuba. Two that are not alike are not.
+#[test]
+fn skies_that_are_alike_are_one() {
+    let directory = tempfile::tempdir().unwrap();
+    let yaml = directory.path().join("s.yaml");
+    let export = |second: &str| {
+        let scene = format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nintegrator: {{path: {{opaque_sky: true}}}}\nshapes: [{{sphere: {{radius: 1}}}}]\n\
+             light_groups: {{day: [air], noon: [disc]}}\nlights:\n\
+             - sky: {{name: air, sun: {{elevation_deg: 40}}, turbidity: 2, sky_scale: 0.5, sun_scale: 0}}\n\
+             - sky: {{name: disc, sun: {{elevation_deg: 40}}, {second}, sky_scale: 0, sun_scale: 0.25}}\n"
+        );
+        common::write(&yaml, scene.as_bytes());
+        same_picture(&yaml);
+        prepared(&yaml, directory.path(), false).1
+    };
+    let exported = export("turbidity: 2");
+    assert_eq!(exported.losses, []);
+    assert_eq!(exported.xml.matches("<emitter type=\"sunsky\"").count(), 1, "{}", exported.xml);
+    for scale in ["<float name=\"sky_scale\" value=\"0.5\"/>", "<float name=\"sun_scale\" value=\"0.25\"/>"] {
+        assert!(exported.xml.contains(scale), "{}", exported.xml);
+    }
+    assert_eq!(export("turbidity: 3").losses[0].instead, "nothing: Mitsuba has one environment");
+}
+
 /// A file that Mitsuba refuses is written anew, once, beside the scene: nothing is lost, and reading it back takes the file.
 #[test]
 fn meshes_that_mitsuba_does_not_read_are_written_anew() {

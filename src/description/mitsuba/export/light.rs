@@ -6,6 +6,7 @@ use super::super::super::camera::FovAxis;
 use super::super::super::emitter::{EmissionDirection, EnvironmentMapping, Growth};
 use super::super::super::light::{Aim, Light};
 use super::super::super::shape::Shape;
+use super::super::super::sky::SkyLight;
 use super::super::super::spectrum::SpectrumOrTexture;
 use super::super::super::texture::Texture;
 use super::super::super::transform::{matrix_of, rotation};
@@ -17,11 +18,20 @@ use super::{DAYLIGHT, Export, SKY_FROM_MITSUBA, joined};
 impl Export<'_> {
     /// A light of the scene's list.
     pub(super) fn light(&mut self, i: usize, light: &Light) {
-        if light.is_around() && self.scene.lights[..i].iter().any(Light::is_around) {
-            self.instead("emitter", &format!("lights[{i}]"), "nothing: Mitsuba has one environment");
+        let around: Vec<&Light> =
+            self.scene.lights.iter().filter(|other| light.is_around() && other.is_around()).collect();
+        if let Some(first) = around.first().filter(|first| !std::ptr::eq(**first, light)) {
+            let field = format!("lights[{i}]");
+            match sky_like(first, light) {
+                // Its light is in that of the first.
+                Some(_) => self.restate("emitter", &field),
+                None => self.instead("emitter", &field, "nothing: Mitsuba has one environment"),
+            }
             self.end();
             return;
         }
+        let skies: Vec<&SkyLight> = around.into_iter().filter_map(|other| sky_like(light, other)).collect();
+        let is_sum = skies.len() > 1;
         let why = match light {
             Light::Point(l) => Export::light_shortfall(&l.intensity),
             Light::Spot(l) => {
@@ -38,8 +48,10 @@ impl Export<'_> {
             Light::Sky(l) => Export::reflectance_shortfall(&[&l.albedo], "a grey ground").map(str::to_owned),
             Light::Projector(l) => self.shining_shortfall(&l.irradiance, stands(l.v)),
         };
-        if let Some(why) = &why {
-            self.instead("emitter", &format!("lights[{i}]"), why.as_str());
+        match &why {
+            Some(why) => self.instead("emitter", &format!("lights[{i}]"), why.as_str()),
+            None if is_sum => self.restate("emitter", &format!("lights[{i}]")),
+            None => {}
         }
         let id = light.name().and_then(|name| self.emitter_id(name));
         let open = |plugin| {
@@ -99,8 +111,9 @@ impl Export<'_> {
                 self.xml.value("vector", "sun_direction", numbers(&sun.to_array()));
                 self.xml.value("float", "turbidity", l.turbidity);
                 self.spectrum("albedo", &l.albedo, Role::Reflectance);
-                self.xml.value("float", "sky_scale", l.sky_scale);
-                self.xml.value("float", "sun_scale", l.sun_scale);
+                let sum = |scale: fn(&SkyLight) -> f64| skies.iter().map(|sky| scale(sky)).sum::<f64>();
+                self.xml.value("float", "sky_scale", sum(|sky| sky.sky_scale));
+                self.xml.value("float", "sun_scale", sum(|sky| sky.sun_scale));
                 self.xml.value("float", "sun_aperture", l.sun_angle_deg);
                 self.xml.value("boolean", "complex_sun", l.limb_darkening);
                 self.placing(DMat4::from_mat3(world_from_sky * SKY_FROM_MITSUBA));
@@ -124,9 +137,9 @@ impl Export<'_> {
                 self.xml.value("float", "scale", l.scale);
             }
         }
-        self.weight(light.sampling_weight());
+        self.weight(if is_sum { skies.iter().map(|sky| sky.sampling_weight).sum() } else { light.sampling_weight() });
         self.xml.close();
-        if why.is_some() {
+        if why.is_some() || is_sum {
             self.end();
         }
     }
@@ -234,6 +247,22 @@ impl Export<'_> {
             self.illuminant_of(inner).is_some_and(|lit| lit != Lit::AsItIs) || self.shines_by_squares(inner)
         })
     }
+}
+
+/// The second of two skies that are one but for how bright sky and sun are, so that their light is that of one sky.
+fn sky_like<'l>(first: &Light, second: &'l Light) -> Option<&'l SkyLight> {
+    let (first, second): (&SkyLight, &'l SkyLight) = match (first, second) {
+        (Light::Sky(first), Light::Sky(second)) => (first, second),
+        _ => return None,
+    };
+    let as_bright = SkyLight {
+        name: first.name.clone(),
+        sky_scale: first.sky_scale,
+        sun_scale: first.sun_scale,
+        sampling_weight: first.sampling_weight,
+        ..second.clone()
+    };
+    (as_bright == *first).then_some(second)
 }
 
 /// What multiplies a picture where it shines.
