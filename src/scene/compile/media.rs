@@ -214,12 +214,11 @@ impl Compiler<'_> {
     }
 }
 
-/// Reads the grid of a volume.
+/// The voxels of a file, as colours or `raw`.
 ///
 /// # Errors
 /// [`Error::Input`] where the file is missing or broken, holds numbers below zero, or has neither one channel
 /// nor three.
-/// The voxels of a file, as colours or `raw`.
 fn read_grid(path: &Path, raw: bool, carried: Carried) -> Result<Unplaced> {
     let grid = Grid::load(path)?;
     if let Some(i) = grid.values.iter().position(|v| *v < 0.0) {
