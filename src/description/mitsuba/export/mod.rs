@@ -98,7 +98,7 @@ pub fn export(
     let normals = &|file: &Path, index: u32| {
         *known.borrow_mut().entry((file.to_owned(), index)).or_insert_with(|| normals(file, index))
     };
-    let known: RefCell<BTreeMap<_, Option<Rc<[u8]>>>> = RefCell::default();
+    let known: RefCell<BTreeMap<_, Option<Contents>>> = RefCell::default();
     let anew = &|file: &Path, index: u32| {
         let read = || anew(file, index).map(Rc::from);
         known.borrow_mut().entry((file.to_owned(), index)).or_insert_with(read).clone()
@@ -129,12 +129,15 @@ pub fn export(
     Exported { xml: xml.finish(), losses, files }
 }
 
+/// Of a file.
+type Contents = Rc<[u8]>;
+
 struct Export<'a> {
     scene: &'a SceneDescription,
     root: &'a Node,
     sources: &'a Sources,
     normals: &'a dyn Fn(&Path, u32) -> MeshNormals,
-    anew: &'a dyn Fn(&Path, u32) -> Option<Rc<[u8]>>,
+    anew: &'a dyn Fn(&Path, u32) -> Option<Contents>,
     closed: &'a dyn Fn(&Path) -> bool,
     directory: &'a Path,
     /// Before the names of files that are written beside the scene.
