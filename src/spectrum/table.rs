@@ -20,6 +20,8 @@ pub struct Table {
     /// What lanes are looked up in.
     search: Search,
     outside: Outside,
+    /// First and last knot, nm: lanes look no further for them.
+    range: [f64; 2],
 }
 
 /// Two ways to the value at a wavelength.
@@ -97,7 +99,7 @@ impl Table {
         let knots: Vec<_> =
             values.iter().enumerate().map(|(i, &value)| (first + step * i as f64, value as f32)).collect();
         let search = Search::grid(&knots, step);
-        Table { knots, search, outside }
+        Table::with(knots, search, outside)
     }
 
     /// [`Table::new`] of samples known to be in order.
@@ -107,7 +109,12 @@ impl Table {
             Some(step) => Search::grid(&knots, step),
             None => Search::cells(&knots).unwrap_or_else(|| Search::crowded(&knots)),
         };
-        Table { knots, search, outside }
+        Table::with(knots, search, outside)
+    }
+
+    fn with(knots: Vec<(f64, f32)>, search: Search, outside: Outside) -> Table {
+        let range = [knots[0].0, knots[knots.len() - 1].0];
+        Table { knots, search, outside, range }
     }
 
     /// The value at each wavelength (nm), which must be within the band.
@@ -134,7 +141,7 @@ impl Table {
         match self.outside {
             Outside::Hold => value,
             Outside::Zero => {
-                let [first, last] = self.range().map(|nm| Lanes::splat(nm as f32));
+                let [first, last] = self.range.map(|nm| Lanes::splat(nm as f32));
                 value & (nm.simd_ge(first) & nm.simd_le(last))
             }
         }
@@ -143,7 +150,7 @@ impl Table {
     /// The value at `nm`.
     #[must_use]
     pub fn at(&self, nm: f64) -> f64 {
-        if self.outside == Outside::Zero && !(self.range()[0]..=self.range()[1]).contains(&nm) {
+        if self.outside == Outside::Zero && !(self.range[0]..=self.range[1]).contains(&nm) {
             return 0.0;
         }
         along(&self.knots, nm).0
@@ -185,7 +192,7 @@ impl Table {
     /// First and last knot, nm.
     #[must_use]
     pub fn range(&self) -> [f64; 2] {
-        [self.knots[0].0, self.knots[self.knots.len() - 1].0]
+        self.range
     }
 
     /// What holds beyond the range.
@@ -348,7 +355,7 @@ fn columns(of: impl Fn(usize) -> [f32; 4]) -> [Lanes; 4] {
 }
 
 /// The values at `nm` among crowded knots. The same number of steps for any wavelength: a loop that
-/// ended as soon as it could would be mispredicted.
+/// ended as soon as it could would be mispredicted. By itself, so that cells need no stack for it.
 #[inline(never)]
 fn among_crowded(entries: &[[f32; 3]], start: &[u16], steps: u16, nm: Lanes) -> Lanes {
     let mut values = [0.0; LANES];
