@@ -94,17 +94,13 @@ pub fn export(
     let (ids, mentioned, meshes) = (BTreeSet::new(), BTreeSet::new(), BTreeMap::new());
     let xml = Xml::default();
     // Each file is read once.
-    let known = RefCell::new(BTreeMap::new());
-    let normals = &|file: &Path, index: u32| {
-        *known.borrow_mut().entry((file.to_owned(), index)).or_insert_with(|| normals(file, index))
-    };
-    let known: RefCell<BTreeMap<_, Option<Contents>>> = RefCell::default();
-    let anew = &|file: &Path, index: u32| {
-        let read = || anew(file, index).map(Rc::from);
-        known.borrow_mut().entry((file.to_owned(), index)).or_insert_with(read).clone()
-    };
-    let known = RefCell::new(BTreeMap::new());
-    let closed = &|file: &Path| *known.borrow_mut().entry(file.to_owned()).or_insert_with(|| closed(file));
+    let known = RefCell::default();
+    let normals = &|file: &Path, index: u32| once(&known, (file.to_owned(), index), || normals(file, index));
+    let known = RefCell::default();
+    let anew =
+        &|file: &Path, index: u32| once(&known, (file.to_owned(), index), || anew(file, index).map(Contents::from));
+    let known = RefCell::default();
+    let closed = &|file: &Path| once(&known, file.to_owned(), || closed(file));
     let mut export = Export {
         scene,
         root,
@@ -127,6 +123,11 @@ pub fn export(
     let mut told = BTreeSet::new();
     losses.retain(|loss| told.insert((loss.field.clone(), loss.instead.clone())));
     Exported { xml: xml.finish(), losses, files }
+}
+
+/// What is `known` of `key`, else what `read` finds, which is known from then on.
+fn once<K: Ord, V: Clone>(known: &RefCell<BTreeMap<K, V>>, key: K, read: impl FnOnce() -> V) -> V {
+    known.borrow_mut().entry(key).or_insert_with(read).clone()
 }
 
 /// Of a file.
