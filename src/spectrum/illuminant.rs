@@ -3,7 +3,7 @@
 use crate::error::in_short;
 use crate::spectrum::Spectrum;
 use crate::spectrum::table::{Outside, Table};
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, OnceLock};
 
 /// First radiation constant for radiance, 2 h c², W·m²·sr⁻¹, from the exact h and c of the SI.
 const C1L: f64 = 2.0 * 6.626_070_15e-34 * 299_792_458.0 * 299_792_458.0;
@@ -55,20 +55,35 @@ fn normalised(spectrum: &Spectrum) -> Spectrum {
     spectrum.scaled(1.0 / spectrum.luminance())
 }
 
-static ILLUMINANTS: LazyLock<Vec<(&'static str, Spectrum)>> = LazyLock::new(|| {
-    let mut all = vec![("E", Spectrum::constant(1.0))];
-    for line in include_str!("data/illuminants.txt").lines().filter(|line| !line.starts_with('#')) {
-        let mut words = line.split(' ');
-        let name = words.next().unwrap_or_default();
-        let mut numbers = words.map(|x| x.parse::<f64>().expect("the illuminants' table holds numbers"));
-        let first = numbers.next().expect("first wavelength");
-        let step = numbers.next().expect("step");
-        let values: Vec<f64> = numbers.collect();
-        let table = Table::uniform(first, step, &values, Outside::Zero);
-        all.push((name, normalised(&Spectrum::Table(Arc::new(table)))));
-    }
-    all
+/// The illuminant that is 1 everywhere.
+const EVEN: &str = "E";
+
+/// The rest of a line of the table, and the illuminant once somebody has asked for it: to scale one takes as long as to compile a small scene.
+struct Tabulated {
+    name: &'static str,
+    numbers: &'static str,
+    spectrum: OnceLock<Spectrum>,
+}
+
+static TABULATED: LazyLock<Vec<Tabulated>> = LazyLock::new(|| {
+    let lines = include_str!("data/illuminants.txt").lines().filter(|line| !line.starts_with('#'));
+    let named = lines.map(|line| line.split_once(' ').expect("an illuminant has a name and numbers"));
+    named.map(|(name, numbers)| Tabulated { name, numbers, spectrum: OnceLock::new() }).collect()
 });
+
+impl Tabulated {
+    fn spectrum(&self) -> Spectrum {
+        let made = self.spectrum.get_or_init(|| {
+            let number = |x: &str| x.parse::<f64>().expect("the illuminants' table holds numbers");
+            let mut numbers = self.numbers.split(' ').map(number);
+            let first = numbers.next().expect("first wavelength");
+            let step = numbers.next().expect("step");
+            let values: Vec<f64> = numbers.collect();
+            normalised(&Spectrum::Table(Arc::new(Table::uniform(first, step, &values, Outside::Zero))))
+        });
+        made.clone()
+    }
+}
 
 /// A CIE illuminant by name, scaled to luminance Y = 1: A, B, C, D50, D55, D65, D75, E, F1 to F12,
 /// F3.1 to F3.15, HP1 to HP5, LED-B1 to LED-B5, LED-BH1, LED-RGB1, LED-V1, LED-V2. Letter case
@@ -77,8 +92,11 @@ static ILLUMINANTS: LazyLock<Vec<(&'static str, Spectrum)>> = LazyLock::new(|| {
 /// # Errors
 /// In words, with near misses, if there is no such illuminant.
 pub fn illuminant(name: &str) -> Result<Spectrum, String> {
-    match ILLUMINANTS.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) {
-        Some((_, spectrum)) => Ok(spectrum.clone()),
+    if name.eq_ignore_ascii_case(EVEN) {
+        return Ok(Spectrum::constant(1.0));
+    }
+    match TABULATED.iter().find(|light| light.name.eq_ignore_ascii_case(name)) {
+        Some(light) => Ok(light.spectrum()),
         None => Err(super::catalogue::unknown("illuminant", name, &illuminant_names())),
     }
 }
@@ -86,15 +104,13 @@ pub fn illuminant(name: &str) -> Result<Spectrum, String> {
 /// The names that [`illuminant`] knows.
 #[must_use]
 pub fn illuminant_names() -> Vec<&'static str> {
-    ILLUMINANTS.iter().map(|(name, _)| *name).collect()
+    std::iter::once(EVEN).chain(TABULATED.iter().map(|light| light.name)).collect()
 }
-
-static D65: LazyLock<Spectrum> = LazyLock::new(|| illuminant("D65").expect("the table of illuminants holds D65"));
 
 /// Daylight D65 of luminance Y = 1: the white of Rec.709.
 #[must_use]
 pub fn d65() -> Spectrum {
-    D65.clone()
+    illuminant("D65").expect("the table of illuminants holds D65")
 }
 
 #[cfg(test)]

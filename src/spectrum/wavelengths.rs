@@ -17,9 +17,9 @@
 
 mod density;
 
-use crate::spectrum::observer::{Y_INTEGRAL, matching};
-use crate::spectrum::{BAND_NM, LANES, Lanes, Spectrum};
-use density::{Density, Interval, rec709};
+use crate::spectrum::observer::xyz_of_lane;
+use crate::spectrum::{BAND_NM, ColourSpace, LANES, Lanes, Spectrum};
+use density::{Density, Interval};
 
 /// The eight wavelengths of a path, in nm, and one over the density each was drawn with, in nm.
 ///
@@ -337,11 +337,9 @@ impl Lattice {
         let weights = samples
             .iter()
             .map(|s| {
-                let (nm, inv_pdf) = (s.nm.to_array(), s.inv_pdf.to_array());
-                let rgb: [[f64; 3]; LANES] = std::array::from_fn(|k| {
-                    rec709(matching(f64::from(nm[k]))).map(|v| v * f64::from(inv_pdf[k]) / (LANES as f64 * Y_INTEGRAL))
-                });
-                std::array::from_fn(|c| Lanes::new(std::array::from_fn(|k| rgb[k][c] as f32)))
+                let of_lane = |k| ColourSpace::Rec709.from_xyz(xyz_of_lane(Lanes::ONE, k, s));
+                let rgb: [[f32; 3]; LANES] = std::array::from_fn(of_lane);
+                std::array::from_fn(|c| Lanes::new(std::array::from_fn(|k| rgb[k][c])))
             })
             .collect();
         Lattice { samples, weights }
@@ -371,9 +369,9 @@ impl Lattice {
 
 #[cfg(test)]
 mod tests {
-    use super::density::{PIECES, UNEVEN, whole};
+    use super::density::{PIECES, UNEVEN, rec709, whole};
     use super::*;
-    use crate::spectrum::observer::{tristimulus, xyz};
+    use crate::spectrum::observer::{Y_INTEGRAL, matching, tristimulus, xyz};
     use crate::spectrum::{illuminant::d65, upsample::reflectance};
 
     fn lines() -> Spectrum {
