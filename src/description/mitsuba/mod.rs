@@ -24,6 +24,7 @@ mod hair;
 mod integrators;
 mod media;
 mod metals;
+mod nodes;
 mod object;
 mod parse;
 mod principled;
@@ -37,7 +38,7 @@ mod xml;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DVec3};
 
 use super::edit::Setting;
 use super::fault::Fault;
@@ -45,6 +46,7 @@ use super::medium::{UNCHANGED, VACUUM};
 use super::node::{Entry, Node, Place, Sources, Value};
 use super::yaml::{MAX_NODES, weight};
 use crate::error::Result;
+use nodes::{Fields, boolean, entry, list, matrix, number, numbers, text, whole};
 use object::{Bag, Document, Family, Object};
 pub(crate) use parse::Define;
 
@@ -290,78 +292,6 @@ fn named(document: &Document, object: &Object) -> Option<String> {
     let id = object.id.as_ref()?;
     let name = id.strip_suffix(&format!(" ({})", object.family.tag()));
     Some(name.filter(|name| !document.has(object.family, name)).unwrap_or(id).to_owned())
-}
-
-/// A map under construction whose fields stand at one place, unless they know a better one.
-struct Fields {
-    place: Place,
-    entries: Vec<Entry>,
-}
-
-impl Fields {
-    fn new(place: Place) -> Fields {
-        Fields { place, entries: Vec::new() }
-    }
-
-    fn add(&mut self, key: &str, node: Node) {
-        self.entries.push(Entry { key: key.to_owned(), key_place: node.place, node });
-    }
-
-    /// Adds a field if there is something to say.
-    fn maybe(&mut self, key: &str, node: Option<Node>) {
-        if let Some(node) = node {
-            self.add(key, node);
-        }
-    }
-
-    fn extend(&mut self, other: Fields) {
-        self.entries.extend(other.entries);
-    }
-
-    fn map(self) -> Node {
-        Node::new(self.place, Value::Map(self.entries))
-    }
-
-    /// `{kind: {…}}`
-    fn kind(self, kind: &str) -> Node {
-        let place = self.place;
-        entry(place, kind, self.map())
-    }
-}
-
-/// `{key: node}`
-fn entry(place: Place, key: &str, node: Node) -> Node {
-    Node::new(place, Value::Map(vec![Entry { key: key.to_owned(), key_place: place, node }]))
-}
-
-fn number(place: Place, value: f64) -> Node {
-    Node::new(place, Value::Float(value))
-}
-
-fn whole(place: Place, value: i64) -> Node {
-    Node::new(place, u64::try_from(value).map_or(Value::Signed(value), Value::Unsigned))
-}
-
-fn boolean(place: Place, value: bool) -> Node {
-    Node::new(place, Value::Bool(value))
-}
-
-fn text(place: Place, value: impl Into<String>) -> Node {
-    Node::new(place, Value::Text(value.into()))
-}
-
-fn list(place: Place, values: impl IntoIterator<Item = Node>) -> Node {
-    Node::new(place, Value::List(values.into_iter().collect()))
-}
-
-fn numbers(place: Place, values: &[f64]) -> Node {
-    list(place, values.iter().map(|value| number(place, *value)))
-}
-
-/// The rows of a matrix on column vectors.
-fn matrix(place: Place, matrix: DMat4) -> Node {
-    let rows = matrix.transpose().to_cols_array_2d();
-    list(place, rows.iter().map(|row| numbers(place, row)))
 }
 
 #[cfg(test)]
