@@ -21,6 +21,7 @@ mod compounds;
 mod emitters;
 pub(crate) mod export;
 mod hair;
+mod indices;
 mod integrators;
 mod media;
 mod metals;
