@@ -321,7 +321,7 @@ fn hang(bag: &Bag<'_>, fields: &mut Fields, to_world: DMat4, up: DVec3) {
 
 /// What is not written shines like D65 of luminance 1.
 fn one(bag: &Bag<'_>) -> Node {
-    super::spectra::d65(bag.object.place, 1.0)
+    super::daylight::d65(bag.object.place, 1.0)
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@
 
 mod bsdfs;
 mod compounds;
+mod daylight;
 mod emitters;
 pub(crate) mod export;
 mod hair;

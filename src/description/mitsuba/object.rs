@@ -261,6 +261,13 @@ impl<'a> Bag<'a> {
         })
     }
 
+    pub(crate) fn rgb(&self, name: &'static str) -> Asked<[f64; 3]> {
+        self.typed(name, "an rgb colour", |value| match value {
+            Value::Rgb(rgb) => Some(*rgb),
+            _ => None,
+        })
+    }
+
     pub(crate) fn transform(&self, name: &'static str) -> Asked<DMat4> {
         self.typed(name, "a transform", |value| match value {
             Value::Transform(value) => Some(*value),
