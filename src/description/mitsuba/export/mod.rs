@@ -20,8 +20,10 @@
 mod compounds;
 mod integrator;
 mod light;
+mod meshes;
 mod sensor;
 mod shape;
+mod sides;
 mod spectra;
 mod surface;
 mod textures;

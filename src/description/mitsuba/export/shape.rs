@@ -6,21 +6,15 @@ use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
 
 use super::super::super::medium::{UNCHANGED, VACUUM};
 use super::super::super::shape::{
-    Caps, Cone, Cube, CurveBasis, Geometry, Layout, Mesh, Normals, Plane, SdfNormals, Shape, Sphere, Winding,
+    Caps, Cube, CurveBasis, Geometry, Layout, Mesh, Normals, Plane, SdfNormals, Shape, Sphere,
 };
 use super::super::super::spectrum::SpectrumOrTexture;
 use super::super::super::transform::{is_mirror, is_similarity};
+use super::meshes::{PLANE, SEGMENTS, cone_mesh, plane_mesh};
 use super::textures::Stands;
 use super::xml::numbers;
-use super::{Export, MeshNormals, ends_in, joined};
+use super::{Export, ends_in, joined};
 use crate::math::Frame;
-use crate::math::trig::sin_cos_turn;
-
-/// Half the side of what stands for a plane without end, metres.
-///
-/// Mitsuba's f32 loses light on larger ones that lie aslant: a diffuse one of 1e4 m is up to 15 % too dark there, one of
-/// 2.5e3 m agrees within the noise of 1e-3.
-const PLANE: f64 = 2.5e3;
 
 impl Export<'_> {
     /// The shapes of a group.
@@ -221,56 +215,6 @@ impl Export<'_> {
         }
     }
 
-    /// Whether Mitsuba has the outside of a mesh on the side from which its corners are clockwise in the world. It goes by the
-    /// normals of the file, which a mirror leaves on their side while it turns the order of the corners round.
-    fn is_against_its_corners(&self, mesh: &Mesh, mirrored: bool) -> bool {
-        mesh.normals != Normals::Face
-            && match (self.normals)(&mesh.file, mesh.index) {
-                MeshNormals::Missing => false,
-                MeshNormals::Outward => mirrored,
-                MeshNormals::Inward => !mirrored,
-            }
-    }
-
-    /// Whether Mitsuba has the outside of a mesh where its inside is.
-    fn is_turned(&self, mesh: &Mesh, mirrored: bool) -> bool {
-        match (mesh.winding, mesh.normals) {
-            (Winding::World, Normals::File | Normals::Vertex | Normals::Face) => false,
-            // Ours are not those of the file.
-            (Winding::World, Normals::Smooth) => self.is_against_its_corners(mesh, mirrored),
-            (Winding::Object, _) => mirrored != self.is_against_its_corners(mesh, mirrored),
-        }
-    }
-
-    /// Whether Mitsuba would have the media of a mesh on the wrong sides: it tells those by the order of the corners, and the
-    /// outside of a surface by the normals.
-    fn has_crossed_media(&self, shape: &Shape) -> bool {
-        let sides = self.sides(shape);
-        match &shape.geometry {
-            Geometry::Mesh(mesh) if sides[0] != sides[1] && self.transmits(&shape.material) => {
-                self.is_against_its_corners(mesh, is_mirror(shape.world_from_object()))
-            }
-            _ => false,
-        }
-    }
-
-    /// The media inside and outside of a shape, as they are written or else follow: outside is what the camera is in, on
-    /// both sides of what is open; a closed body is empty.
-    fn sides<'s>(&'s self, shape: &'s Shape) -> [Option<&'s str>; 2] {
-        let around = self.scene.medium.as_deref().filter(|_| self.transmits(&shape.material));
-        let closed = match &shape.geometry {
-            Geometry::Sphere(_) | Geometry::Cube(_) | Geometry::Mesh(_) => true,
-            Geometry::SdfGrid(grid) => around.is_none() || (self.closed)(&grid.file),
-            Geometry::Cylinder(cylinder) => cylinder.caps == Caps::Both,
-            Geometry::Cone(cone) => cone.cap,
-            Geometry::Disk(_) | Geometry::Plane(_) | Geometry::Rectangle(_) => false,
-            Geometry::Curves(_) | Geometry::Instance(_) => false,
-        };
-        let enclosed = if closed { None } else { around };
-        let unwritten = if shape.flip_normals { [around, enclosed] } else { [enclosed, around] };
-        [shape.inside.as_deref().or(unwritten[0]), shape.outside.as_deref().or(unwritten[1])]
-    }
-
     /// The scale of a cylinder that is mirrored, but looks like one that is not. As a lamp it sends too little light in Mitsuba.
     fn mirrored_tube(&self, shape: &Shape) -> Option<f64> {
         let world = shape.world_from_object();
@@ -373,23 +317,6 @@ impl Export<'_> {
             .then(|| "the same shape with its normals outward: Mitsuba's has no others".to_owned());
         joined([own, flipped, grey, self.sides_shortfall(shape).map(str::to_owned)])
     }
-
-    /// What Mitsuba gets in place of the media of a shape: there a side that is not named is empty if the other is, and
-    /// a shape that names neither leaves a ray in what it is in.
-    fn sides_shortfall(&self, shape: &Shape) -> Option<&'static str> {
-        if self.scene.media.is_empty() || !self.transmits(&shape.material) {
-            return None;
-        }
-        let sides = self.sides(shape);
-        let unchanged = sides.map(|side| side == Some(UNCHANGED));
-        let medium = sides.map(|side| side.is_some_and(|s| s != VACUUM));
-        match (unchanged, medium) {
-            ([true, true], _) => None,
-            ([true, _] | [_, true], _) => Some("empty space on the side that leaves the medium as it is"),
-            (_, [false, false]) => Some("the medium of one side on the other, too"),
-            _ => None,
-        }
-    }
 }
 
 /// Whether Mitsuba's plugin can turn the normals round.
@@ -408,45 +335,6 @@ fn mesh_plugin(file: &Path) -> &'static str {
     }
 }
 
-/// Sides of the mesh that stands for a cone.
-const SEGMENTS: u32 = 256;
-
-/// A cone as a PLY of smooth sides: each triangle has its corners and their normals for itself.
-fn cone_mesh(cone: &Cone) -> String {
-    let (base, apex) = (DVec3::from(cone.base), DVec3::from(cone.apex));
-    let axis = apex - base;
-    let height = axis.length();
-    let frame = Frame::from_normal(axis / height);
-    let turn = |k: f64| {
-        let (sin, cos) = sin_cos_turn((k / f64::from(SEGMENTS)).fract());
-        frame.s * cos + frame.t * sin
-    };
-    let slope = |k: f64| (turn(k) * height + frame.n * cone.radius).normalize_or_zero();
-    let mut corners: Vec<(DVec3, DVec3)> = Vec::new();
-    for k in 0..SEGMENTS {
-        let k = f64::from(k);
-        let ring = [k, k + 1.0].map(|k| base + turn(k) * cone.radius);
-        corners.extend([(ring[0], slope(k)), (ring[1], slope(k + 1.0)), (apex, slope(k + 0.5))]);
-        if cone.cap {
-            corners.extend([ring[1], ring[0], base].map(|corner| (corner, -frame.n)));
-        }
-    }
-    let mut text = format!(
-        "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
-         property double nx\nproperty double ny\nproperty double nz\nelement face {}\n\
-         property list uchar int vertex_indices\nend_header\n",
-        corners.len(),
-        corners.len() / 3
-    );
-    for (p, n) in &corners {
-        text.push_str(&format!("{} {} {} {} {} {}\n", p.x, p.y, p.z, n.x, n.y, n.z));
-    }
-    for i in (0..corners.len()).step_by(3) {
-        text.push_str(&format!("3 {i} {} {}\n", i + 1, i + 2));
-    }
-    text
-}
-
 /// Where a plane stands and which way u and v run on it, a metre each, but for v of one that is mirrored, which runs the other
 /// way: it is moved and turned by `world`, but not stretched.
 fn standing(plane: &Plane, world: DMat4) -> DAffine3 {
@@ -457,20 +345,6 @@ fn standing(plane: &Plane, world: DMat4) -> DAffine3 {
     let tangent = plane.tangent.map_or_else(chosen, DVec3::from);
     let Frame { s, t, n } = Frame::from_normal_and_tangent(normal, linear * tangent);
     DAffine3::from_cols(s, t, n, world.transform_point3(plane.point.into()))
-}
-
-/// The square that stands for a plane as a PLY whose texture coordinates are metres. The order of its corners is that of the
-/// front, whichever way v runs.
-fn plane_mesh(placement: &DAffine3, mirrored: bool) -> String {
-    let mut text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n\
-         property double u\nproperty double v\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
-        .to_owned();
-    for (u, v) in [(-PLANE, -PLANE), (PLANE, -PLANE), (PLANE, PLANE), (-PLANE, PLANE)] {
-        let p = placement.transform_point3(DVec3::new(u, v, 0.0));
-        let v = if mirrored { -v } else { v };
-        text.push_str(&format!("{} {} {} {u} {v}\n", p.x, p.y, p.z));
-    }
-    text + "3 0 1 2\n3 0 2 3\n"
 }
 
 /// The unit square or disk across z, moved, turned and scaled.
