@@ -32,7 +32,6 @@ impl Export<'_> {
     /// A shape of a list: the scene's, or a group's.
     pub(super) fn shape(&mut self, list: &str, i: usize, shape: &Shape) {
         let why = self.shape_shortfall(shape);
-        let mirrored_tube = self.mirrored_tube(shape);
         let reads_otherwise = self.reads_otherwise(shape);
         match &why {
             Some(why) => self.instead("shape", &format!("{list}[{i}]"), why.as_str()),
@@ -41,6 +40,21 @@ impl Export<'_> {
         }
         let kind = shape.geometry.kind();
         let field = format!("{list}[{i}].{kind}");
+        self.plugin(&field, shape);
+        // The shapes of a group have their own.
+        if !matches!(shape.geometry, Geometry::Instance(_)) {
+            self.surface(&field, shape);
+        }
+        self.xml.close();
+        if why.is_some() || reads_otherwise {
+            self.end();
+        } else {
+            self.coordinates(&field, shape);
+        }
+    }
+
+    /// Opens the plugin of a shape, with what it says of the form and its place. Caps of a cylinder are shapes before it.
+    fn plugin(&mut self, field: &str, shape: &Shape) {
         let world = shape.world_from_object();
         match &shape.geometry {
             Geometry::Sphere(sphere) => {
@@ -57,12 +71,12 @@ impl Export<'_> {
                         let outward = DVec3::from(at) - DVec3::from(from);
                         self.xml.open("shape", &[("type", "disk")]);
                         self.placing(world * placed(at.into(), outward, cylinder.radius));
-                        self.surface(&field, shape);
+                        self.surface(field, shape);
                         self.xml.close();
                     }
                 }
                 self.open("cylinder", shape);
-                let (place, scale, rest) = match mirrored_tube {
+                let (place, scale, rest) = match self.mirrored_tube(shape) {
                     Some(scale) => (world, scale, DMat4::IDENTITY),
                     None => (DMat4::IDENTITY, 1.0, world),
                 };
@@ -154,39 +168,26 @@ impl Export<'_> {
                 self.placing(world);
             }
         }
-        // The shapes of a group have their own.
-        if !matches!(shape.geometry, Geometry::Instance(_)) {
-            self.surface(&field, shape);
-        }
-        self.xml.close();
-        let layout = match &shape.geometry {
-            Geometry::Sphere(sphere) => Some(sphere.layout),
-            Geometry::Cube(cube) => Some(cube.layout),
-            _ => None,
-        };
-        let seam = match &shape.geometry {
+    }
+
+    /// How coordinates run on a shape, where ours do otherwise than Mitsuba's.
+    fn coordinates(&mut self, field: &str, shape: &Shape) {
+        match &shape.geometry {
+            // No picture lies on it, but the same random numbers shall mean the same directions.
+            Geometry::Sphere(Sphere { layout: Layout::YUp, .. }) | Geometry::Cube(Cube { layout: Layout::YUp, .. }) => {
+                self.xml.instruction(&format!("set {field}.layout: y_up"));
+            }
+            // Nor does a picture follow it, but layers of coordinates do. It is read back where the world has it.
             Geometry::Cylinder(cylinder) => {
                 // About an axis that runs down z the one that is chosen here is not Mitsuba's.
                 let axis = (DVec3::from(cylinder.top) - DVec3::from(cylinder.base)).normalize_or_zero();
                 let chosen = || axis.z.is_sign_negative().then(|| Frame::by_least_turn(axis).s);
-                let seam = cylinder.seam.map(DVec3::from).or_else(chosen);
-                seam.map(|seam| world.transform_vector3(seam))
-            }
-            _ => None,
-        };
-        match (why, layout) {
-            (Some(_), _) => self.end(),
-            (None, _) if reads_otherwise => self.end(),
-            // No picture lies on it, but the same random numbers shall mean the same directions.
-            (None, Some(Layout::YUp)) => {
-                self.xml.instruction(&format!("set {field}.layout: y_up"));
-            }
-            (None, _) => {
-                // Nor does a picture follow it, but layers of coordinates do. It is read back where the world has it.
-                if let Some(seam) = seam {
+                if let Some(seam) = cylinder.seam.map(DVec3::from).or_else(chosen) {
+                    let seam = shape.world_from_object().transform_vector3(seam);
                     self.xml.instruction(&format!("set {field}.seam: [{}]", numbers(&seam.to_array())));
                 }
             }
+            _ => {}
         }
     }
 
