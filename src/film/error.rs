@@ -46,11 +46,18 @@
 //! half of the replicates: the sum then says nothing of the error, least of all that there is none. And replicates that agree
 //! everywhere show that there is no noise only where they agree on light: a black pixel may be one whose light nobody has met.
 
-use super::accumulate::{Film, REPLICATES};
-use super::resolve::{Image, Splats, counts, layer, replicate_light, replicates_of_layer};
+mod sums;
+mod values;
+
+pub use values::Values;
+
+use super::accumulate::Film;
+use super::resolve::{Image, Splats, counts};
 use crate::math::statistics::student_t_half_width;
 use rayon::prelude::*;
 use std::fmt;
+use sums::Sums;
+use values::Measured;
 
 /// The error of a whole picture with its interval.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -145,38 +152,6 @@ impl fmt::Display for NoEstimate {
     }
 }
 
-/// What some pixels add to the estimate.
-#[derive(Clone, Copy, Default)]
-struct Sums {
-    pixels: u64,
-    /// Pixels whose replicates differ.
-    noisy: u64,
-    /// Pixels without any light.
-    black: u64,
-    /// Pixels of which one replicate has at least twice the samples of another.
-    uneven: u64,
-    /// Σ q, q a pixel's expected relative squared error.
-    error: f64,
-    /// What is taken off for the noise of the values that variances are divided by.
-    further: f64,
-    /// Its magnitudes, pixel by pixel.
-    further_of_pixels: f64,
-    /// Σ q with variances divided by values of other replicates.
-    crossed: f64,
-    /// Σ q².
-    squares: f64,
-    /// Σ q of pixels of which one replicate has most of the spread.
-    heavy: f64,
-    /// Σ tr(WΣ)² of single pixels.
-    own: f64,
-    /// The same of what was splatted.
-    splatted: f64,
-    /// Σ uᵀWv for each way to pair the replicates.
-    pairs: [f64; 3],
-    /// Σ (uᵀWv)² of single pixels, over the ways to pair.
-    pair_squares: f64,
-}
-
 /// The three ways to make two pairs of four.
 pub const PAIRINGS: [[usize; 4]; 3] = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2]];
 
@@ -197,80 +172,6 @@ pub fn floor_about(mean: f64) -> f64 {
     0.01 * mean * mean
 }
 
-/// Of what the error of a picture is told.
-#[derive(Clone, Copy, Debug)]
-pub enum Values<'a> {
-    /// Of its colours: the matrix that makes them of XYZ, and the picture in them. One f is of them all.
-    Colours(&'a [[f64; 3]; 3], &'a Image),
-    /// Of bands of the spectrum, layers from this one on and so many, summed by replicate. Each has an f of its own, as they have
-    /// nothing to do with each other's units; one without any light is left out.
-    Bands(usize, usize),
-}
-
-/// A value of a pixel.
-#[derive(Clone, Copy)]
-struct Value {
-    /// What the picture shows.
-    mean: f64,
-    /// And by each replicate.
-    replicates: [f64; REPLICATES],
-    /// What was splatted of that, where it matters.
-    splatted: Option<[f64; REPLICATES]>,
-}
-
-/// What is measured of a picture.
-struct Measured<'a> {
-    film: &'a Film,
-    splats: Option<Splats<'a>>,
-    values: Values<'a>,
-    /// The means of the bands, pixel by pixel.
-    bands: Vec<Vec<f32>>,
-    /// f of each value.
-    floors: Vec<f64>,
-    /// Whether it matters what was splatted.
-    apart: bool,
-}
-
-impl<'a> Measured<'a> {
-    fn new(film: &'a Film, splats: Option<Splats<'a>>, values: Values<'a>, apart: bool) -> Measured<'a> {
-        let (bands, floors) = match values {
-            Values::Colours(_, image) => (Vec::new(), vec![floor(image); 3]),
-            Values::Bands(first, count) => {
-                let bands: Vec<Vec<f32>> =
-                    (first..first + count).map(|band| layer(film, splats.as_ref(), band)).collect();
-                let floors = bands.iter().map(|plane| floor_of(plane.iter().copied(), plane.len())).collect();
-                (bands, floors)
-            }
-        };
-        Measured { film, splats, values, bands, floors, apart }
-    }
-
-    /// Puts the values of a pixel into `into`; false if a replicate has no sample.
-    fn read(&self, index: usize, into: &mut Vec<Value>) -> bool {
-        into.clear();
-        let splats = self.splats.as_ref();
-        match self.values {
-            Values::Colours(rgb_from_xyz, image) => {
-                let Some(light) = replicate_light(self.film, splats, index, rgb_from_xyz) else { return false };
-                let splatted = splats.filter(|_| self.apart).and_then(|splats| splats.replicates(index, rgb_from_xyz));
-                into.extend((0..3).map(|c| Value {
-                    mean: f64::from(image.rgb[c][index]),
-                    replicates: light.map(|light| light[c]),
-                    splatted: splatted.map(|light| light.map(|light| light[c])),
-                }));
-            }
-            Values::Bands(first, _) => {
-                for (band, plane) in (first..).zip(&self.bands) {
-                    let Some(replicates) = replicates_of_layer(self.film, splats, index, band) else { return false };
-                    let splatted = splats.filter(|_| self.apart).and_then(|s| s.replicates_of_layer(index, band));
-                    into.push(Value { mean: f64::from(plane[index]), replicates, splatted });
-                }
-            }
-        }
-        true
-    }
-}
-
 /// How noisy the picture is that `film` and `splats` hold, in `values`; on the current rayon pool. What is splatted has
 /// `overlap` ([`Filter::overlap`](super::filter::Filter::overlap)) with its neighbours; pixels of each cell of so many on a side,
 /// aligned to the frame, may share what they find, or each with every other where there are no cells.
@@ -284,37 +185,9 @@ pub fn relative_error(
     overlap: f64,
     cell: Option<u32>,
 ) -> Result<ErrorEstimate, NoEstimate> {
-    let window = film.window();
-    let pixels = window.pixels();
     let measured = Measured::new(film, splats, values, overlap > 1.0);
     let everywhere = cell.is_none();
-    let cell = cell.unwrap_or(1);
-    // No cell lies in two blocks.
-    let side = ((pixels as f64 / BLOCKS as f64).sqrt() as u32 / cell * cell).max(cell);
-    let before = [window.x, window.y].map(|x| x.rem_euclid(cell as i32) as u32);
-    let rows = (before[1] + window.height).div_ceil(side);
-    let columns = (before[0] + window.width).div_ceil(side);
-    let blocks: Vec<Sums> = (0..rows * columns)
-        .into_par_iter()
-        .map(|block| {
-            let mut sums = Sums::default();
-            let mut values = Vec::new();
-            let span =
-                |i: u32, before: u32, size: u32| (i * side).saturating_sub(before)..((i + 1) * side - before).min(size);
-            for y in span(block / columns, before[1], window.height) {
-                for x in span(block % columns, before[0], window.width) {
-                    let index = y as usize * window.width as usize + x as usize;
-                    if measured.read(index, &mut values) {
-                        let counts = counts(&film.cells()[index]);
-                        let [least, most] = [counts.iter().min(), counts.iter().max()].map(|n| n.copied().unwrap_or(0));
-                        sums.uneven += u64::from(most >= 2 * least);
-                        sums.add(&values, &measured.floors);
-                    }
-                }
-            }
-            sums
-        })
-        .collect();
+    let blocks = blocks(&measured, cell.unwrap_or(1));
     let mut all = Sums::default();
     // tr(WΣ)² of different pixels, by their pairs and by what the filter shares.
     let by_pairs =
@@ -322,20 +195,7 @@ pub fn relative_error(
     let by_filter = |sums: &Sums| (overlap - 1.0) * sums.splatted;
     let mut in_blocks = 0.0;
     for block in &blocks {
-        all.pixels += block.pixels;
-        all.noisy += block.noisy;
-        all.black += block.black;
-        all.uneven += block.uneven;
-        all.error += block.error;
-        all.further += block.further;
-        all.further_of_pixels += block.further_of_pixels;
-        all.crossed += block.crossed;
-        all.squares += block.squares;
-        all.heavy += block.heavy;
-        all.own += block.own;
-        all.splatted += block.splatted;
-        all.pair_squares += block.pair_squares;
-        all.pairs.iter_mut().zip(block.pairs).for_each(|(sum, pair)| *sum += pair);
+        all.join(block);
         in_blocks += by_pairs(block);
     }
     match all.pixels {
@@ -376,110 +236,42 @@ pub fn relative_error(
     })
 }
 
-impl Sums {
-    /// Adds a pixel, given f of each of its values.
-    fn add(&mut self, values: &[Value], floors: &[f64]) {
-        self.pixels += 1;
-        self.noisy += u64::from(values.iter().any(|v| v.replicates.iter().any(|x| *x != v.replicates[0])));
-        self.black += u64::from(values.iter().all(|v| v.mean == 0.0));
-        let channels = floors.iter().filter(|f| **f > 0.0).count() as f64;
-        let (mut error, mut plain, mut further, mut crossed) = (0.0, 0.0, 0.0, 0.0);
-        let mut shares = [0.0; REPLICATES];
-        let mut pairs = [0.0; 3];
-        let (mut own, mut splatted) = (Gram::default(), Gram::default());
-        for (value, &floor) in values.iter().zip(floors) {
-            let x = value.replicates;
-            let mean = x.iter().sum::<f64>() / REPLICATES as f64;
-            let deviations = x.map(|x| x - mean);
-            let squares: f64 = deviations.iter().map(|d| d * d).sum();
-            if squares == 0.0 {
-                continue;
+/// The sums of each block of whole cells of so many pixels on a side; on the current rayon pool.
+fn blocks(measured: &Measured, cell: u32) -> Vec<Sums> {
+    let window = measured.film.window();
+    // No cell lies in two blocks.
+    let side = ((window.pixels() as f64 / BLOCKS as f64).sqrt() as u32 / cell * cell).max(cell);
+    let before = [window.x, window.y].map(|x| x.rem_euclid(cell as i32) as u32);
+    let rows = (before[1] + window.height).div_ceil(side);
+    let columns = (before[0] + window.width).div_ceil(side);
+    (0..rows * columns)
+        .into_par_iter()
+        .map(|block| {
+            let mut sums = Sums::default();
+            let mut values = Vec::new();
+            let span =
+                |i: u32, before: u32, size: u32| (i * side).saturating_sub(before)..((i + 1) * side - before).min(size);
+            for y in span(block / columns, before[1], window.height) {
+                for x in span(block % columns, before[0], window.width) {
+                    let index = y as usize * window.width as usize + x as usize;
+                    if measured.read(index, &mut values) {
+                        let counts = counts(&measured.film.cells()[index]);
+                        let [least, most] = [counts.iter().min(), counts.iter().max()].map(|n| n.copied().unwrap_or(0));
+                        sums.uneven += u64::from(most >= 2 * least);
+                        sums.add(&values, &measured.floors);
+                    }
+                }
             }
-            let value_squared = value.mean * value.mean;
-            let g = 1.0 / (value_squared + floor);
-            // Derivatives of g.
-            let first = -2.0 * value.mean * g * g;
-            let second = (6.0 * value_squared - 2.0 * floor) * g * g * g;
-            let variance = squares / 12.0;
-            let third = deviations.iter().map(|d| d.powi(3)).sum::<f64>() / 24.0;
-            let mut fourth = 0.0;
-            for (pair, [i, j, k, l]) in pairs.iter_mut().zip(PAIRINGS) {
-                let product = (x[i] - x[j]) * (x[k] - x[l]);
-                *pair += product * g / channels;
-                fourth += product * product / PAIRINGS.len() as f64 / 64.0;
-            }
-            further += (0.5 * second * fourth + first * third) / channels;
-            plain += variance * g / channels;
-            error += (variance * g - 0.5 * second * fourth - first * third) / channels;
-            crossed += self::crossed(x, floor) / channels;
-            for (share, d) in shares.iter_mut().zip(deviations) {
-                *share += d * d * g;
-            }
-            own.add(deviations, g / channels);
-            if let Some(x) = value.splatted {
-                let mean = x.iter().sum::<f64>() / REPLICATES as f64;
-                splatted.add(x.map(|x| x - mean), g / channels);
-            }
-        }
-        self.error += error;
-        self.further += further;
-        self.further_of_pixels += further.abs();
-        self.crossed += crossed;
-        self.squares += error * error;
-        let largest = shares.iter().copied().fold(0.0, f64::max);
-        if largest > ONE_REPLICATE * shares.iter().sum::<f64>() {
-            self.heavy += error;
-        }
-        for (sum, pair) in self.pairs.iter_mut().zip(pairs) {
-            *sum += pair;
-            self.pair_squares += pair * pair;
-        }
-        // W of the mean itself is as much larger or smaller as the size is that it makes.
-        self.own += if plain > 0.0 { own.trace() * (error.max(0.0) / plain).powi(2) } else { 0.0 };
-        self.splatted += splatted.trace();
-    }
-}
-
-/// q of a value with replicates `x`, the variance σ² of their mean told by two of them and divided by what the other two show,
-/// y. That varies by 2σ², so that E g(y) is g(μ) + g″(μ) σ² to second order, whatever σ² was told from: the latter is taken off.
-fn crossed(x: [f64; REPLICATES], floor: f64) -> f64 {
-    let ways = PAIRINGS.iter().flat_map(|&[i, j, k, l]| [[i, j, k, l], [k, l, i, j]]);
-    let q = |[i, j, k, l]: [usize; REPLICATES]| {
-        let variance = |a: usize, b: usize| (x[a] - x[b]).powi(2) / 8.0;
-        let value_squared = (0.5 * (x[k] + x[l])).powi(2);
-        let g = 1.0 / (value_squared + floor);
-        let second = (6.0 * value_squared - 2.0 * floor) * g * g * g;
-        variance(i, j) * (g - second * variance(k, l))
-    };
-    ways.map(q).sum::<f64>() / (2 * PAIRINGS.len()) as f64
-}
-
-/// Of the replicates' deviations d in the values of a pixel: Σ g dₐ dᵇ.
-#[derive(Clone, Copy, Default)]
-struct Gram([[f64; REPLICATES]; REPLICATES]);
-
-impl Gram {
-    fn add(&mut self, deviations: [f64; REPLICATES], g: f64) {
-        for (row, a) in self.0.iter_mut().zip(deviations) {
-            for (product, b) in row.iter_mut().zip(deviations) {
-                *product += a * b * g;
-            }
-        }
-    }
-
-    /// tr(WΣ)².
-    fn trace(&self) -> f64 {
-        let squares: f64 = self.0.iter().flatten().map(|x| x * x).sum();
-        let trace = (0..REPLICATES).map(|r| self.0[r][r]).sum::<f64>() / 12.0;
-        (squares / 144.0 - trace * trace / 3.0) * 0.9
-    }
+            sums
+        })
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::film::Window;
-    use crate::film::accumulate::TileBuffer;
+    use crate::film::accumulate::{REPLICATES, TileBuffer};
     use crate::film::resolve::resolve;
     use crate::math::sampler::uniform;
     use crate::math::statistics::Moments;
@@ -644,17 +436,6 @@ mod tests {
         assert!(!estimate(&firefly).unwrap().1.valid);
         let rare = film(3, 32, 4, |_, u| if u < 0.005 { 200.0 } else { 1.0 });
         assert!(!estimate(&rare).unwrap().1.valid);
-    }
-
-    /// One replicate of four has X: by the spread of all, v = X²/16; by two of them, the others dark, (X²/8)/f for half of the
-    /// ways to choose and nothing for the rest. Of noise of 1e-4 it is as if the divisor were known, within twice the noise.
-    #[test]
-    fn crossed_values_do_not_know_of_a_bright_path() {
-        assert_eq!(crossed([4.0, 0.0, 0.0, 0.0], 0.25), 4.0);
-        let x = [1.0, 1.0001, 0.9999, 1.00006];
-        let mean = x.iter().sum::<f64>() / 4.0;
-        let variance = x.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / 12.0;
-        assert!((crossed(x, 0.01) / (variance / (mean * mean + 0.01)) - 1.0).abs() < 2e-4);
     }
 
     /// Half of the pixels have the first four values in their replicates, half the others. What the noise of divisors takes off is
