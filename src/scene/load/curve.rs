@@ -1,6 +1,6 @@
 //! Curves from files of text.
 
-use super::{extension, words};
+use super::decoded::{extension, words};
 use std::path::Path;
 
 /// Reads a curve: two columns, wavelength in nm and value, separated by commas, semicolons or

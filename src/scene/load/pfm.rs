@@ -3,7 +3,7 @@
 //!
 //! The scale's size is a factor on the values, as for Mitsuba.
 
-use super::LARGEST;
+use super::decoded::LARGEST;
 use image::DynamicImage;
 
 /// More bytes than any number has that is written with sense.
