@@ -157,20 +157,9 @@ pub fn sheet(
     stop: &AtomicBool,
 ) -> Result<std::result::Result<Sheet, String>> {
     let written = entry.scene(&overrides.set)?;
-    let [width, height] = [written.image.width, written.image.height].map(f64::from);
-    let scale = (f64::from(settings.pixels) / (width * height)).sqrt().min(1.0);
-    let size = [width, height].map(|side| ((side * scale).round() as u32).max(8));
+    let (size, small) = small_copy(&written.image, settings.pixels);
     let mut overrides = overrides.clone();
-    overrides.set.extend([
-        ("image.width".to_owned(), size[0].to_string()),
-        ("image.height".to_owned(), size[1].to_string()),
-        // What is beyond the frame has the share of the picture that it has.
-        ("image.overscan".to_owned(), (f64::from(written.image.overscan) * scale).round().to_string()),
-        ("render.stop".to_owned(), "{}".to_owned()),
-    ]);
-    if written.image.crop.is_some() {
-        overrides.set.push(("image.crop".to_owned(), "null".to_owned()));
-    }
+    overrides.set.extend(small);
     if !matches!(written.integrator, description::Integrator::Path(_)) {
         return Ok(Err(
             "only `path` has knobs to weigh; whatever else computes the light has no noise, or no choice".into()
@@ -190,20 +179,8 @@ pub fn sheet(
     };
     tell("reference");
     let more = samples.saturating_mul(REFERENCE);
-    let full = Trial {
-        knob: "reference",
-        value: String::new(),
-        set: [
-            ("render.samples", more.to_string()),
-            ("integrator.path.max_depth", "null".into()),
-            ("render.techniques.merging", "off".into()),
-        ]
-        .map(|(key, value)| (key.to_owned(), value))
-        .into(),
-        way: Way::AsSet,
-    };
     let seed = chosen.description.render.seed;
-    let full = desk.render(&full, seed ^ SEED_OF_THE_REFERENCE, None)?;
+    let full = desk.render(&full_setting(more), seed ^ SEED_OF_THE_REFERENCE, None)?;
     let reference = match settings.truth {
         Some(radiance) => Reference::known(&full.image, radiance),
         None => Reference::new(&full.image, full.replicates),
@@ -255,19 +232,42 @@ pub fn sheet(
         rows.push(row(trial, tally, &tallies[0], &reference, target, png));
     }
     if settings.moves(knobs::FILE) {
-        // What half cannot hold is written in full.
-        let rounded = images[0].as_ref().and_then(rounding);
-        let value = rounded.map_or(knobs::FULL, |_| "half").into();
-        let bias_squared = Figure { value: rounded.unwrap_or(0.0), error: 0.0 };
-        let mut row = Row { knob: knobs::FILE, value, chosen: false, bias_squared, ..rows[0].clone() };
-        row.to_target = row.reaches(target, rows[0].bias().unwrap_or(0.0));
-        rows.push(row);
+        rows.push(row_of_file(&rows[0], images[0].as_ref(), target));
     }
     let advice = advice::sentences(&rows);
     let reference = settings.truth.is_none().then_some((more, reference.noise));
     let png = png::encode_png(&full.image, &settings_of_png).map_err(Error::Render)?;
     let bands = finish.bands;
     Ok(Ok(Sheet { scene: chosen.scene.name, size, target, reference, png, rows, advice, failed, bands }))
+}
+
+/// Width and height, pixels, of a copy of a picture with about so many `pixels`, and what is set for it.
+fn small_copy(image: &description::Image, pixels: u32) -> ([u32; 2], Vec<(String, String)>) {
+    let [width, height] = [image.width, image.height].map(f64::from);
+    let scale = (f64::from(pixels) / (width * height)).sqrt().min(1.0);
+    let size = [width, height].map(|side| ((side * scale).round() as u32).max(8));
+    let mut set = vec![
+        ("image.width".to_owned(), size[0].to_string()),
+        ("image.height".to_owned(), size[1].to_string()),
+        // What is beyond the frame has the share of the picture that it has.
+        ("image.overscan".to_owned(), (f64::from(image.overscan) * scale).round().to_string()),
+        ("render.stop".to_owned(), "{}".to_owned()),
+    ];
+    if image.crop.is_some() {
+        set.push(("image.crop".to_owned(), "null".to_owned()));
+    }
+    (size, set)
+}
+
+/// The setting of the reference.
+fn full_setting(samples: u32) -> Trial {
+    let set = [
+        ("render.samples", samples.to_string()),
+        ("integrator.path.max_depth", "null".into()),
+        ("render.techniques.merging", "off".into()),
+    ];
+    let set = set.map(|(key, value)| (key.to_owned(), value)).into();
+    Trial { knob: "reference", value: String::new(), set, way: Way::AsSet }
 }
 
 /// relMSE of what has no noise and no bias, at most: sums in f32 and the inverse of a matrix are off by 1e-5.
@@ -292,6 +292,16 @@ fn rounding(image: &Image) -> Option<f64> {
     let floor = error::floor(image);
     let all: Moments = values.map(|(x, rounded)| (rounded - x).powi(2) / (x * x + floor)).collect();
     Some(all.mean)
+}
+
+/// The row of a file of half precision, of the `image` of the chosen setting. What half cannot hold is written in full.
+fn row_of_file(chosen: &Row, image: Option<&Image>, target: f64) -> Row {
+    let rounded = image.and_then(rounding);
+    let value = rounded.map_or(knobs::FULL, |_| "half").into();
+    let bias_squared = Figure { value: rounded.unwrap_or(0.0), error: 0.0 };
+    let mut row = Row { knob: knobs::FILE, value, chosen: false, bias_squared, ..chosen.clone() };
+    row.to_target = row.reaches(target, chosen.bias().unwrap_or(0.0));
+    row
 }
 
 fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, target: f64, png: Vec<u8>) -> Row {
