@@ -47,6 +47,47 @@ fn prepared(file: &Path, directory: &Path, again: bool) -> (batch::Prepared, des
     (read.unwrap_or_else(|error| panic!("{}: {error}\n{}", file.display(), exported.xml)), exported)
 }
 
+/// A scene in a directory of its own, with the files that it names.
+struct Folder {
+    directory: tempfile::TempDir,
+    yaml: PathBuf,
+}
+
+impl Folder {
+    fn new() -> Folder {
+        let directory = tempfile::tempdir().unwrap();
+        Folder { yaml: directory.path().join("s.yaml"), directory }
+    }
+
+    /// Puts a file beside the scene.
+    fn add(&self, name: &str, bytes: &[u8]) {
+        common::write(&self.directory.path().join(name), bytes);
+    }
+
+    /// Puts `scene` in place of the one before.
+    fn write(&self, scene: &str) {
+        common::write(&self.yaml, scene.as_bytes());
+    }
+
+    /// What the export of `scene` says.
+    fn export(&self, scene: &str) -> description::Exported {
+        self.write(scene);
+        prepared(&self.yaml, self.directory.path(), false).1
+    }
+
+    /// The same of a scene that comes back.
+    fn export_and_back(&self, scene: &str) -> description::Exported {
+        let exported = self.export(scene);
+        same_picture(&self.yaml);
+        exported
+    }
+}
+
+/// What an export loses, field by field.
+fn told(exported: &description::Exported) -> Vec<String> {
+    exported.losses.iter().map(|loss| format!("{}: {}", loss.field, loss.instead)).collect()
+}
+
 /// Placing by a matrix rather than by steps rounds otherwise, in the sixteenth digit: a path then goes the same way
 /// but for one in a billion, and its light differs in the seventh digit, the last of f32. The lattice of wavelengths
 /// is chosen from the same spectra. So all pixels agree within 1e-4 of the mean but for those, at most 1 in 100, in
@@ -77,8 +118,7 @@ fn same_picture(file: &Path) {
 /// What Mitsuba has words for is not said in ours.
 #[test]
 fn a_scene_of_plain_things_loses_nothing() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     let scene = "
 camera: {origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40, fov_axis: y, lens: {radius: 0.1, focus_distance: 5}}
 image: {filter: {gaussian: {stddev: 0.4}}}
@@ -101,25 +141,21 @@ lights:
 - spot: {position: [2, 3, 3], direction: [-1, -1, -1], intensity: {rgb: [1, 2, 3]}}
 - constant: {radiance: 0.1}
 ";
-    common::write(&yaml, scene.as_bytes());
-    let (_, exported) = prepared(&yaml, directory.path(), false);
+    let exported = folder.export_and_back(scene);
     assert_eq!(exported.losses, []);
     assert!(!exported.xml.contains("instead"), "{}", exported.xml);
-    same_picture(&yaml);
 
     // What its glass throws of the point and the spot, no path tracer of Mitsuba's finds.
-    common::write(&yaml, scene.replace("delta_caustics: false, opaque_sky: true", "opaque_sky: true").as_bytes());
-    let (_, exported) = prepared(&yaml, directory.path(), false);
+    let caustics = scene.replace("delta_caustics: false, opaque_sky: true", "opaque_sky: true");
+    let exported = folder.export_and_back(&caustics);
     let losses: Vec<&str> = exported.losses.iter().map(|loss| loss.field.as_str()).collect();
     assert_eq!(losses, ["integrator.path.delta_caustics"]);
-    same_picture(&yaml);
 }
 
 /// Paths from the lights are cut short by panes there, which matters where paths end and panes are.
 #[test]
 fn paths_of_the_light_tracer_are_shorter_there() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     let losses = |depth: &str, material: &str| {
         let scene = format!(
             "camera: {{origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}}\nintegrator: {{light_tracer: {{{depth}}}}}\nshapes:\n\
@@ -127,10 +163,7 @@ fn paths_of_the_light_tracer_are_shorter_there() {
              - rectangle: {{corner: [-2, -1, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4], material: {{diffuse: {{}}}}}}\n\
              - disk: {{center: [0, 3, 0], normal: [0, -1, 0], radius: 0.5, emission: 1}}\n"
         );
-        common::write(&yaml, scene.as_bytes());
-        let (_, exported) = prepared(&yaml, directory.path(), false);
-        same_picture(&yaml);
-        exported.losses.into_iter().map(|loss| loss.field).collect::<Vec<String>>()
+        folder.export_and_back(&scene).losses.into_iter().map(|loss| loss.field).collect::<Vec<String>>()
     };
     let pane = "{thin_dielectric: {ior: 1.5}}";
     assert_eq!(losses("max_depth: 4", pane), ["integrator.light_tracer.count_crossings"]);
@@ -144,8 +177,7 @@ fn paths_of_the_light_tracer_are_shorter_there() {
 #[test]
 fn a_scene_of_all_that_mitsuba_has_plugins_for_loses_nothing() {
     let root = env!("CARGO_MANIFEST_DIR");
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     let scene = format!(
         "
 camera: {{origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 50}}
@@ -201,11 +233,9 @@ lights:
 - spot: {{position: [3, 4, 3], target: [0, 0, 0], intensity: 20, texture: coat, cutoff_deg: 30}}
 "
     );
-    common::write(&yaml, scene.as_bytes());
-    let (_, exported) = prepared(&yaml, directory.path(), false);
+    let exported = folder.export_and_back(&scene);
     assert_eq!(exported.losses, []);
     assert!(!exported.xml.contains("instead"), "{}", exported.xml);
-    same_picture(&yaml);
 }
 
 /// Where u begins is seen by layers alone where nothing has a picture on it; the seam comes back with the world's transform.
@@ -215,13 +245,12 @@ fn the_seam_of_a_cylinder_comes_back() {
     for more in
         ["", ", seam: [0, 0, 1]", ", seam: [1, 0, 2], transform: [{scale: 1.5}, {rotate: {axis: [1, 2, 3], deg: 40}}]"]
     {
-        let directory = tempfile::tempdir().unwrap();
-        let yaml = directory.path().join("s.yaml");
+        let folder = Folder::new();
         let camera = "camera: {origin: [0, 0.5, 5], target: [0, 0.5, 0], fov_deg: 40}";
-        common::write(&yaml, format!("{camera}\nintegrator: none\nshapes: [{{{tube}{more}}}}}]\n").as_bytes());
+        folder.write(&format!("{camera}\nintegrator: none\nshapes: [{{{tube}{more}}}}}]\n"));
         let ray = Ray::new(DVec3::new(0.1, 0.4, 5.0), DVec3::NEG_Z);
         let [ours, theirs] = [false, true].map(|again| {
-            let (prepared, _) = prepared(&yaml, directory.path(), again);
+            let (prepared, _) = prepared(&folder.yaml, folder.directory.path(), again);
             let hit = prepared.scene.closest(&ray, f64::INFINITY).unwrap();
             prepared.scene.surface(&ray, &hit).uv
         });
@@ -232,16 +261,12 @@ fn the_seam_of_a_cylinder_comes_back() {
 /// Each loss names its field, and its reason names what Mitsuba lacks.
 #[test]
 fn what_mitsuba_lacks_is_told_by_name() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
-    common::write(
-        &yaml,
-        b"camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nfog: {colour: 1, density: 1}\nmaterials:\n  flint: {dielectric: {ior: {glass: N-SF11}}}\nshapes:\n- cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 1, material: flint}\n- plane: {normal: [0, 1, 0]}\n",
+    let folder = Folder::new();
+    let exported = folder.export(
+        "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nfog: {colour: 1, density: 1}\nmaterials:\n  flint: {dielectric: {ior: {glass: N-SF11}}}\nshapes:\n- cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 1, material: flint}\n- plane: {normal: [0, 1, 0]}\n",
     );
-    let (_, exported) = prepared(&yaml, directory.path(), false);
-    let losses: Vec<String> = exported.losses.iter().map(|l| format!("{}: {}", l.field, l.instead)).collect();
     assert_eq!(
-        losses,
+        told(&exported),
         [
             "fog: nothing: Mitsuba has no fog by depth",
             // n_d of N-SF11 by its data sheet: 1.78472.
@@ -257,21 +282,20 @@ fn what_mitsuba_lacks_is_told_by_name() {
 /// Bands are a film of Mitsuba's, too, unless one is of a colour.
 #[test]
 fn bands_are_exported() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     let back = |response: &str| {
         let scene = format!(
             "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nintegrator: {{path: {{opaque_sky: true}}}}\nlights: [{{constant: {{radiance: 1}}}}]\nimage:\n  bands:\n  \
              - {{name: first, response: {{table: [[400, 1], [450.5, 0.25]]}}}}\n  - {{name: 'S0.500,0nm', response: {response}}}\n"
         );
-        common::write(&yaml, scene.as_bytes());
+        folder.write(&scene);
         let scene_of = |file: &Path| {
             let none = Overrides::default();
             let entry = batch::entries(file, &none).unwrap_or_else(|error| panic!("{error}")).remove(0);
             entry.scene(&none.set).unwrap_or_else(|error| panic!("{error}"))
         };
-        let ours = scene_of(&yaml);
-        let xml = directory.path().join("s.xml");
+        let ours = scene_of(&folder.yaml);
+        let xml = folder.directory.path().join("s.xml");
         let exported = description::export(&ours, &xml, &mesh::normals_of, &mesh::for_mitsuba, &sdf::is_closed);
         std::fs::write(&xml, &exported.xml).unwrap();
         let theirs = scene_of(&xml);
@@ -296,22 +320,16 @@ fn bands_are_exported() {
 /// Mitsuba has one environment.
 #[test]
 fn a_second_environment_is_told() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     let scene = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nintegrator: {path: {opaque_sky: true}}\nshapes: [{sphere: {radius: 1}}]\n\
                  lights: [{constant: {radiance: 0.5}}, {constant: {radiance: {rgb: [0.1, 0.5, 0.3]}}}]\n";
-    common::write(&yaml, scene.as_bytes());
-    let (_, exported) = prepared(&yaml, directory.path(), false);
-    let losses: Vec<String> = exported.losses.iter().map(|l| format!("{}: {}", l.field, l.instead)).collect();
-    assert_eq!(losses, ["lights[1]: nothing: Mitsuba has one environment"]);
-    same_picture(&yaml);
+    assert_eq!(told(&folder.export_and_back(scene)), ["lights[1]: nothing: Mitsuba has one environment"]);
 }
 
 /// Light adds up: a sky and its sun, each by itself, are one sky for Mitsuba. Two that are not alike are not.
 #[test]
 fn skies_that_are_alike_are_one() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     let export = |second: &str| {
         let scene = format!(
             "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nintegrator: {{path: {{opaque_sky: true}}}}\nshapes: [{{sphere: {{radius: 1}}}}]\n\
@@ -319,9 +337,7 @@ fn skies_that_are_alike_are_one() {
              - sky: {{name: air, sun: {{elevation_deg: 40}}, turbidity: 2, sky_scale: 0.5, sun_scale: 0}}\n\
              - sky: {{name: disc, sun: {{elevation_deg: 40}}, {second}, sky_scale: 0, sun_scale: 0.25}}\n"
         );
-        common::write(&yaml, scene.as_bytes());
-        same_picture(&yaml);
-        prepared(&yaml, directory.path(), false).1
+        folder.export_and_back(&scene)
     };
     let exported = export("turbidity: 2");
     assert_eq!(exported.losses, []);
@@ -335,14 +351,13 @@ fn skies_that_are_alike_are_one() {
 /// A file that Mitsuba refuses is written anew, once, beside the scene: nothing is lost, and reading it back takes the file.
 #[test]
 fn meshes_that_mitsuba_does_not_read_are_written_anew() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
                property list uchar int vertex_indices\nend_header\n-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n4 0 1 2 3\n";
-    common::write(&directory.path().join("square.ply"), ply.as_bytes());
+    folder.add("square.ply", ply.as_bytes());
     let obj = "v -1 -1 1\nv 1 -1 1\nv 1 1 1\nvt 0 0\nvt 1 0\nvt 1 1\n";
-    common::write(&directory.path().join("back.obj"), format!("{obj}f -3/-3 -2/-2 -1/-1\n").as_bytes());
-    common::write(&directory.path().join("plain.obj"), format!("{obj}f 1/1 2/2 3/3\n").as_bytes());
+    folder.add("back.obj", format!("{obj}f -3/-3 -2/-2 -1/-1\n").as_bytes());
+    folder.add("plain.obj", format!("{obj}f 1/1 2/2 3/3\n").as_bytes());
     let of = |file: &str, more: &str| {
         format!("- mesh: {{file: {file}, normals: vertex, winding: world, flip_v: true, {more}}}\n")
     };
@@ -351,8 +366,7 @@ fn meshes_that_mitsuba_does_not_read_are_written_anew() {
                  shapes:\n"
         .to_owned()
         + &["square.ply", "back.obj", "plain.obj", "back.obj"].map(|file| of(file, "material: m")).concat();
-    common::write(&yaml, scene.as_bytes());
-    let (_, exported) = prepared(&yaml, directory.path(), false);
+    let exported = folder.export_and_back(&scene);
     assert_eq!(exported.losses, []);
     let names: Vec<&str> = exported.files.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["scene.shape0.ply", "scene.shape1.ply"]);
@@ -360,42 +374,35 @@ fn meshes_that_mitsuba_does_not_read_are_written_anew() {
         let found = exported.xml.matches(&format!("name=\"filename\" value=\"{name}\"")).count();
         assert_eq!(found, times, "{name}: {}", exported.xml);
     }
-    same_picture(&yaml);
 }
 
 /// Mitsuba's colours of optical constants end at 1.
 #[test]
 fn colours_of_metals_above_one_are_told() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     let losses = |eta: &str| {
         let scene = format!(
             "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nintegrator: {{path: {{opaque_sky: true}}}}\nshapes:\n\
              - sphere: {{radius: 0.5, material: {{conductor: {{eta: {eta}, k: 1, distribution: beckmann}}}}}}\n\
              lights: [{{constant: {{radiance: 1}}}}]\n"
         );
-        common::write(&yaml, scene.as_bytes());
-        let (_, exported) = prepared(&yaml, directory.path(), false);
-        same_picture(&yaml);
-        exported.losses.into_iter().map(|loss| format!("{}: {}", loss.field, loss.instead)).collect::<Vec<String>>()
+        told(&folder.export_and_back(&scene))
     };
     assert_eq!(losses("{rgb: [0.2, 0.9, 1]}"), [""; 0]);
-    let told = "its colour at every fifth nanometre: Mitsuba has none above 1 there, and no multiples";
-    assert_eq!(losses("{rgb: [0.2, 0.9, 1.1]}"), [format!("shapes[0].sphere.material: {told}")]);
-    assert_eq!(losses("{scaled: {by: 2, of: {rgb: [0.2, 0.5, 0.4]}}}"), [format!("shapes[0].sphere.material: {told}")]);
+    let sampled = "shapes[0].sphere.material: its colour at every fifth nanometre: Mitsuba has none above 1 there, and no multiples";
+    assert_eq!(losses("{rgb: [0.2, 0.9, 1.1]}"), [sampled]);
+    assert_eq!(losses("{scaled: {by: 2, of: {rgb: [0.2, 0.5, 0.4]}}}"), [sampled]);
 }
 
 /// Films, absorption, priorities and indices from files come back by the lines that Mitsuba passes over.
 #[test]
 fn optical_materials_come_back() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     let metal = b"DATA:\n- type: tabulated nk\n  data: |\n    0.3 0.2 3\n    0.9 0.6 9\n";
-    common::write(&directory.path().join("m.yml"), metal);
-    common::write(&directory.path().join("w.csv"), b"wl,n,k\n0.3,1.4,1e-8\n0.9,1.3,2e-7\n");
-    common::write(
-        &yaml,
-        b"camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes:\n\
+    folder.add("m.yml", metal);
+    folder.add("w.csv", b"wl,n,k\n0.3,1.4,1e-8\n0.9,1.3,2e-7\n");
+    let exported = folder.export_and_back(
+        "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes:\n\
         - sphere: {center: [-1, 0, 0], radius: 0.5, material: {conductor: {file: m.yml, film: {ior: 2.4, thickness_nm: 50}}}}\n\
         - sphere: {radius: 0.4, material: {dielectric: {ior: {file: w.csv}, absorption: {color: 0.5, at: 0.3}, priority: 2}}}\n\
         - sphere: {center: [0.3, 0, 0], radius: 0.4, material: {dielectric: {ior: 1.5, priority: 1, film: {ior: {formula: \
@@ -403,26 +410,21 @@ fn optical_materials_come_back() {
         - sphere: {center: [1.2, 0, 0], radius: 0.4, material: {thin_dielectric: {ior: 1.33, thickness_nm: 300}}}\n\
         lights: [{constant: {radiance: 0.8}}]\n",
     );
-    let (_, exported) = prepared(&yaml, directory.path(), false);
     let told = &exported.losses[1].instead;
     assert!(told.contains("no absorption") && told.contains("no priority"), "{told}");
-    same_picture(&yaml);
 }
 
 /// What the paths of lamps without extent are aimed at here, and is told as missing there: materials that throw light in single
 /// directions, be it a part of it.
 #[test]
 fn what_is_made_of_mirrors_is_told_as_a_mirror_is() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     let loses = |material: &str| {
         let scene = format!(
             "camera: {{origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}}\ntextures: {{board: {{checkerboard: {{a: 0, b: 1}}}}}}\nshapes:\n\
              - sphere: {{radius: 0.5, material: {material}}}\nlights: [point: {{position: [2, 3, 1], intensity: 1}}]\n"
         );
-        common::write(&yaml, scene.as_bytes());
-        let (_, exported) = prepared(&yaml, directory.path(), false);
-        exported.losses.iter().any(|loss| loss.field == "integrator.path.delta_caustics")
+        folder.export(&scene).losses.iter().any(|loss| loss.field == "integrator.path.delta_caustics")
     };
     let blend = |second: &str| format!("{{blend: {{first: {{mirror: {{}}}}, second: {{{second}: {{}}}}}}}}");
     assert!(loses("{mirror: {}}"));
@@ -438,11 +440,9 @@ fn what_is_made_of_mirrors_is_told_as_a_mirror_is() {
 /// alpha of its own, nor has what is behind a pane.
 #[test]
 fn lamps_keep_their_names_and_pictures_their_alpha() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
-    common::write(
-        &yaml,
-        b"camera: {origin: [0, 1, 5], target: [0, 0.5, 0], fov_deg: 40}\nlayers: [light_groups, crypto_object]\n\
+    let folder = Folder::new();
+    let exported = folder.export_and_back(
+        "camera: {origin: [0, 1, 5], target: [0, 0.5, 0], fov_deg: 40}\nlayers: [light_groups, crypto_object]\n\
           light_groups: {key: [sun], fill: [sky, panel], red: [clay]}\nassets: {all: [clay thing, gold]}\n\
           integrator: {path: {max_depth: 4, light_samples: 2, count_crossings: true}}\nmedia: {smoke: {homogeneous: {scattering: 1}}}\n\
           materials: {clay: {diffuse: {}}, gold: {conductor: {metal: gold}}}\nshapes:\n\
@@ -454,7 +454,6 @@ fn lamps_keep_their_names_and_pictures_their_alpha() {
           lights:\n- constant: {name: sky, radiance: 0.3}\n- directional: {name: sun, direction: [1, -2, -1], irradiance: 0.5}\n\
           - point: {name: clay, position: [0, 3, 3], intensity: {rgb: [3, 0, 0]}}\n",
     );
-    let (_, exported) = prepared(&yaml, directory.path(), false);
     let told: Vec<&str> = exported.losses.iter().map(|loss| loss.field.as_str()).collect();
     for field in ["opaque_sky", "coverage", "count_crossings"] {
         assert!(told.contains(&format!("integrator.path.{field}").as_str()), "{field}: {told:?}");
@@ -464,24 +463,21 @@ fn lamps_keep_their_names_and_pictures_their_alpha() {
     {
         assert!(exported.xml.contains(said), "{said}: {}", exported.xml);
     }
-    same_picture(&yaml);
 
     // Paths from the lights that meet media are no ptracer's.
-    let text = std::fs::read_to_string(&yaml).unwrap();
+    let text = std::fs::read_to_string(&folder.yaml).unwrap();
     let traced = text.replace("layers: [light_groups, crypto_object]\n", "");
     let (from, to) = (traced.find("integrator").unwrap(), traced.find("\nmedia").unwrap());
-    common::write(&yaml, format!("{}integrator: light_tracer{}", &traced[..from], &traced[to..]).as_bytes());
-    let (_, exported) = prepared(&yaml, directory.path(), false);
-    assert!(exported.losses.iter().any(|loss| loss.field == "integrator.light_tracer"), "{:?}", exported.losses);
-    same_picture(&yaml);
+    let traced = format!("{}integrator: light_tracer{}", &traced[..from], &traced[to..]);
+    let losses = folder.export_and_back(&traced).losses;
+    assert!(losses.iter().any(|loss| loss.field == "integrator.light_tracer"), "{losses:?}");
 }
 
 /// A picture on a plane repeats by the metre along the tangent for Mitsuba, too, which reads none of our instructions, and turns with
 /// it; a plane that is mirrored keeps its front. What else has no texture coordinates there, or others, is told.
 #[test]
 fn pictures_on_planes_stay_where_they_are() {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     let scene = |more: &str| {
         format!(
             "camera: {{origin: [0.3, 2, 4], target: [0.2, 0, 0], fov_deg: 40}}\nintegrator: {{path: {{max_depth: 2}}}}\n\
@@ -498,8 +494,8 @@ fn pictures_on_planes_stay_where_they_are() {
         "- plane: {point: [0, -0.2, 0], normal: [0, 1, 0], material: {two_sided: {front: {diffuse: {}}, back: {diffuse: {reflectance: 0}}}}, transform: [scale: [-1, 1, 1]]}\n",
     ];
     for plane in planes {
-        common::write(&yaml, scene(plane).as_bytes());
-        let (ours, exported) = prepared(&yaml, directory.path(), false);
+        folder.write(&scene(plane));
+        let (ours, exported) = prepared(&folder.yaml, folder.directory.path(), false);
         let ours = Bench { prepared: ours, directory: tempfile::tempdir().unwrap() }.picture();
         let plain: String = exported
             .xml
@@ -507,11 +503,9 @@ fn pictures_on_planes_stay_where_they_are() {
             .enumerate()
             .map(|(i, piece)| if i == 0 { piece } else { piece.split_once("?>").unwrap().1 })
             .collect();
-        let xml = directory.path().join("plain.xml");
-        common::write(&xml, plain.as_bytes());
-        for (name, bytes) in &exported.files {
-            common::write(&directory.path().join(name), bytes);
-        }
+        folder.add("plain.xml", plain.as_bytes());
+        exported.files.iter().for_each(|(name, bytes)| folder.add(name, bytes));
+        let xml = folder.directory.path().join("plain.xml");
         let overrides = small();
         let entry = batch::entries(&xml, &overrides).unwrap().remove(0);
         let theirs = batch::prepare(&entry, &overrides).unwrap_or_else(|error| panic!("{error}\n{plain}"));
@@ -521,24 +515,21 @@ fn pictures_on_planes_stay_where_they_are() {
         assert!(mean > 0.01, "{plane}: the picture is black");
         assert!(differing * 100 <= ours.y.len(), "{plane}: {differing} pixels differ\n{plain}");
     }
-    for (shape, told) in [
+    for (shape, words) in [
         (
             "cylinder: {base: [0, 0, 0], top: [0, 1, 0], radius: 0.5, material: tiles}",
             ", with Mitsuba's texture coordinates: ",
         ),
         ("cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 0.5, material: tiles}", " without texture coordinates, "),
     ] {
-        common::write(&yaml, scene(&format!("- {shape}\n")).as_bytes());
-        let (_, exported) = prepared(&yaml, directory.path(), false);
-        let losses: Vec<String> = exported.losses.iter().map(|loss| format!("{loss:?}")).collect();
-        assert!(losses.iter().any(|loss| loss.contains(told)), "{losses:?}");
+        let losses = told(&folder.export(&scene(&format!("- {shape}\n"))));
+        assert!(losses.iter().any(|loss| loss.contains(words)), "{losses:?}");
     }
 }
 
 /// The losses of a scene of a floor under an even sky, `head` and `shape`, and its text for Mitsuba; read back it is the same.
 fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
-    let directory = tempfile::tempdir().unwrap();
-    let yaml = directory.path().join("s.yaml");
+    let folder = Folder::new();
     for (name, bytes) in [
         ("red.csv", "400,0.1\n550,0.1\n600,0.7\n700,0.8\n"),
         ("inky.csv", "wl,n,k\n0.3,1.5,1e-7\n0.9,1.5,2e-7\n"),
@@ -547,7 +538,7 @@ fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
         ("inward.obj", &sides::tetrahedron("-1")),
         ("bare.obj", &sides::tetrahedron("")),
     ] {
-        common::write(&directory.path().join(name), bytes.as_bytes());
+        folder.add(name, bytes.as_bytes());
     }
     let parts = [
         ("camera: ", "camera: {origin: [0, 1, 4], target: [0, 0.5, 0], fov_deg: 40}\n"),
@@ -557,8 +548,6 @@ fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
     let missing: String = parts.iter().filter(|(key, _)| !head.contains(key)).map(|(_, part)| *part).collect();
     let floor = "rectangle: {corner: [-2, 0, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4]}";
     let head = head.replace("EARTH", concat!(env!("CARGO_MANIFEST_DIR"), "/textures/earth.jpg"));
-    common::write(&yaml, format!("{missing}{head}shapes:\n- {floor}\n- {shape}\n").as_bytes());
-    let (_, exported) = prepared(&yaml, directory.path(), false);
-    same_picture(&yaml);
-    (exported.losses.into_iter().map(|loss| format!("{}: {}", loss.field, loss.instead)).collect(), exported.xml)
+    let exported = folder.export_and_back(&format!("{missing}{head}shapes:\n- {floor}\n- {shape}\n"));
+    (told(&exported), exported.xml)
 }
