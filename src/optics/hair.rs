@@ -252,9 +252,7 @@ mod tests {
     ];
 
     fn sphere(n: u32) -> impl Iterator<Item = DVec3> {
-        (0..n * n).map(move |i| {
-            warp::uniform_sphere(DVec2::new(f64::from(i % n) + 0.5, f64::from(i / n) + 0.5) / f64::from(n))
-        })
+        warp::midpoints(n).map(warp::uniform_sphere)
     }
 
     /// Without absorption the shares are F + (1 − F)² + (1 − F)² F + … = 1, M and N are densities: all

@@ -177,17 +177,14 @@ mod tests {
 
     const FAMILIES: [Distribution; 2] = [Distribution::Ggx, Distribution::Beckmann];
 
-    fn grid(n: u32) -> impl Iterator<Item = DVec2> {
-        (0..n * n).map(move |i| DVec2::new(f64::from(i % n) + 0.5, f64::from(i / n) + 0.5) / f64::from(n))
-    }
-
     /// ∫ D(m) cos θ dm = 1 (Walter et al. 2007, eq. 4). With m drawn with density cos θ/π the
     /// mean of π D is one; 1024² midpoints of a function of width α = 0.3 leave 1e-3.
     #[test]
     fn facets_cover_the_mean_surface_once() {
         for distribution in FAMILIES {
             let m = Microfacets::anisotropic(distribution, 0.3, 0.2);
-            let mean = grid(1024).map(|u| m.density(warp::cosine_hemisphere(u)) * PI).sum::<f64>() / 1_048_576.0;
+            let mean =
+                warp::midpoints(1024).map(|u| m.density(warp::cosine_hemisphere(u)) * PI).sum::<f64>() / 1_048_576.0;
             assert!((mean - 1.0).abs() < 1e-3, "{distribution:?} {mean}");
         }
     }
@@ -221,7 +218,7 @@ mod tests {
                 let stated = hemisphere.iter().filter(|(m, _)| seen(*m)).map(|(m, w)| (*m, facets.pdf(wo, *m) * w));
                 let (whole, mean) = stated.fold((0.0, DVec3::ZERO), |(n, sum), (m, w)| (n + w, sum + m * w));
                 assert!((whole - 1.0).abs() < 1e-4, "{distribution:?} {alpha} {z}: {whole}");
-                let sampled = grid(512).map(|u| facets.sample(wo, u)).sum::<DVec3>() / 262_144.0;
+                let sampled = warp::midpoints(512).map(|u| facets.sample(wo, u)).sum::<DVec3>() / 262_144.0;
                 let off = (sampled - mean).abs().max_element();
                 assert!(off < 2.0 / 512.0, "{distribution:?} {alpha} {z}: {sampled} {mean}");
             }
@@ -234,7 +231,7 @@ mod tests {
     fn terms_at_once_are_the_terms_one_by_one() {
         for distribution in FAMILIES {
             for alpha in [1e-4, 0.05, 0.5, 2.0] {
-                for u in grid(16) {
+                for u in warp::midpoints(16) {
                     let facets = Microfacets { distribution, alpha, ratio: 0.7 };
                     let wo = warp::cosine_hemisphere(u);
                     let m = facets.sample(wo, DVec2::new(u.y, 0.37));
@@ -270,7 +267,7 @@ mod tests {
                 for z in [1e-7, 1e-4, 0.5, 1.0] {
                     let m = Microfacets::isotropic(distribution, alpha);
                     let wo = DVec3::new((1.0f64 - z * z).sqrt(), 0.0, z);
-                    for u in grid(32).chain([DVec2::ZERO, DVec2::new(0.0, 1.0 - 2f64.powi(-32))]) {
+                    for u in warp::midpoints(32).chain([DVec2::ZERO, DVec2::new(0.0, 1.0 - 2f64.powi(-32))]) {
                         let h = m.sample(wo, u);
                         assert!(
                             h.is_finite() && m.pdf(wo, h).is_finite() && m.pdf(wo, h) >= 0.0,

@@ -153,10 +153,6 @@ mod tests {
         ]
     }
 
-    fn grid(n: u32) -> impl Iterator<Item = DVec2> {
-        (0..n * n).map(move |i| DVec2::new(f64::from(i % n) + 0.5, f64::from(i / n) + 0.5) / f64::from(n))
-    }
-
     /// ∫ p dω = 1, by 65,536 midpoints in the cosine (the functions are symmetric about the axis); the
     /// sharpest has a width of 0.06 there, so the error h²/24 · f″/f is below 1e-7; at the five kinks of a table
     /// it is at most h² times the change of slope, 1e-8.
@@ -184,7 +180,7 @@ mod tests {
                 _ => 0.0,
             };
             let wo = DVec3::new(0.6, 0.0, 0.8);
-            let mean = grid(256).map(|u| -wo.dot(phase.sample(wo, u))).sum::<f64>() / 65_536.0;
+            let mean = warp::midpoints(256).map(|u| -wo.dot(phase.sample(wo, u))).sum::<f64>() / 65_536.0;
             assert!(
                 (mean - expected).abs() < if matches!(phase, Phase::Table(_)) { 2.5e-4 } else { 1e-4 },
                 "{phase:?} {mean} {expected}"
@@ -239,7 +235,7 @@ mod tests {
             let peak = phase.eval(DVec3::Z, -DVec3::Z * g.signum());
             let expected = (1.0 + g.abs()) / (4.0 * PI * (1.0 - g.abs()).powi(2));
             assert!(((peak - expected) / expected).abs() < 1e-9, "{peak} {expected}");
-            for u in grid(64).chain([DVec2::ZERO, DVec2::splat(1.0 - 2f64.powi(-32))]) {
+            for u in warp::midpoints(64).chain([DVec2::ZERO, DVec2::splat(1.0 - 2f64.powi(-32))]) {
                 let wi = phase.sample(DVec3::Z, u);
                 assert!(wi.is_finite() && (wi.length() - 1.0).abs() < 1e-12, "{u} {wi}");
             }

@@ -536,6 +536,7 @@ mod tests {
     use super::*;
     use crate::film::Window;
     use crate::film::exr::ExrPart;
+    use crate::math::warp;
     use crate::spectrum::LANES;
     use std::path::Path;
 
@@ -551,10 +552,6 @@ mod tests {
         [Mapping::Texels, Mapping::Poles].into_iter().flat_map(move |mapping| drawn.map(|drawn| (mapping, drawn)))
     }
 
-    fn grid(n: u32) -> impl Iterator<Item = DVec2> {
-        (0..n * n).map(move |i| DVec2::new(f64::from(i % n) + 0.5, f64::from(i / n) + 0.5) / f64::from(n))
-    }
-
     fn green(map: &Environment, direction: DVec3) -> f64 {
         f64::from(map.radiance(direction.normalize(), Lanes::splat(550.0)).to_array()[0])
     }
@@ -563,7 +560,7 @@ mod tests {
     fn density_of_sampled_directions_is_the_stated_one() {
         for (mapping, drawn) in ways() {
             let map = bright_spot(mapping);
-            for u in grid(64) {
+            for u in warp::midpoints(64) {
                 let s = map.sample(u, drawn).unwrap();
                 assert!((s.direction.length() - 1.0).abs() < 1e-14);
                 let pdf = map.pdf(s.direction, drawn);
@@ -580,7 +577,7 @@ mod tests {
     fn density_integrates_to_one() {
         for (mapping, drawn) in ways() {
             let map = bright_spot(mapping);
-            let mean = grid(512).map(|u| map.pdf(crate::math::warp::uniform_sphere(u), drawn)).sum::<f64>() / 262_144.0;
+            let mean = warp::midpoints(512).map(|u| map.pdf(warp::uniform_sphere(u), drawn)).sum::<f64>() / 262_144.0;
             assert!((mean * 4.0 * PI - 1.0).abs() < 5e-3, "{}", mean * 4.0 * PI);
         }
     }
@@ -594,7 +591,7 @@ mod tests {
             let at = |u| map.sample(u, Drawn::All).map_or(0.0, |s| green(&map, s.direction) / s.pdf_solid_angle);
             let irrational = |i: u32| (DVec2::new(0.754_877_666, 0.569_840_291) * f64::from(i)).fract();
             let sampled = (0..65536).map(|i| at(irrational(i))).sum::<f64>() / 65536.0;
-            let swept = grid(512).map(|u| green(&map, crate::math::warp::uniform_sphere(u))).sum::<f64>() / 262_144.0;
+            let swept = warp::midpoints(512).map(|u| green(&map, warp::uniform_sphere(u))).sum::<f64>() / 262_144.0;
             assert!((sampled / (4.0 * PI * swept) - 1.0).abs() < 2e-3, "{mapping:?} {sampled} {}", 4.0 * PI * swept);
         }
     }
@@ -716,7 +713,7 @@ mod tests {
             for bright in [3 * w + 11, 4 * w, 5 * w + w - 1, 2, 7 * w + 9] {
                 let pixels: Vec<[f32; 3]> = (0..w * h).map(|i| [if i == bright { 50.0 } else { 0.0 }; 3]).collect();
                 let map = Environment::new(&pixels, [w, h], 1.0, mapping, DMat3::IDENTITY, Carried::Spectra);
-                let shining = grid(128).map(crate::math::warp::uniform_sphere).filter(|d| green(&map, *d) > 0.0);
+                let shining = warp::midpoints(128).map(warp::uniform_sphere).filter(|d| green(&map, *d) > 0.0);
                 let densities: Vec<f64> = shining.map(|d| map.pdf(d, Drawn::All)).collect();
                 assert!(densities.len() > 16 && densities.iter().all(|pdf| *pdf > 0.0), "{mapping:?} {bright}");
             }

@@ -120,17 +120,13 @@ mod tests {
     use super::*;
     use crate::math::warp;
 
-    fn grid(n: u32) -> impl Iterator<Item = DVec2> {
-        (0..n * n).map(move |i| DVec2::new(f64::from(i % n) + 0.5, f64::from(i / n) + 0.5) / f64::from(n))
-    }
-
     /// ∫ D(m) cos θ dm = 1 for any distribution of facets over a plane. With m drawn with density
     /// cos θ/π the mean of π D is one; 1024² midpoints leave 1e-3 at these widths.
     #[test]
     fn facets_cover_the_mean_surface_once() {
         let coat = CoatFacets { alpha: 0.1 };
         let n = 1024.0 * 1024.0;
-        let mean = grid(1024).map(|u| coat.density(warp::cosine_hemisphere(u)) * PI).sum::<f64>() / n;
+        let mean = warp::midpoints(1024).map(|u| coat.density(warp::cosine_hemisphere(u)) * PI).sum::<f64>() / n;
         assert!((mean - 1.0).abs() < 1e-3, "{mean}");
     }
 
@@ -142,8 +138,9 @@ mod tests {
             DVec3::new(v.x, v.y, v.z.abs())
         };
         let coat = CoatFacets { alpha: 0.1 };
-        let sampled = grid(512).map(|u| coat.sample(u).z).sum::<f64>() / 262_144.0;
-        let integral = grid(2048).map(uniform).map(|m| coat.pdf(m) * m.z).sum::<f64>() * 2.0 * PI / (2048.0 * 2048.0);
+        let sampled = warp::midpoints(512).map(|u| coat.sample(u).z).sum::<f64>() / 262_144.0;
+        let integral =
+            warp::midpoints(2048).map(uniform).map(|m| coat.pdf(m) * m.z).sum::<f64>() * 2.0 * PI / (2048.0 * 2048.0);
         assert!((sampled / integral - 1.0).abs() < 1e-3, "{sampled} {integral}");
     }
 
@@ -151,7 +148,7 @@ mod tests {
     #[test]
     fn masking_of_the_coat_is_that_of_its_facets() {
         let facets = Microfacets::isotropic(Distribution::Ggx, 0.25);
-        for u in grid(16) {
+        for u in warp::midpoints(16) {
             let (wo, wi) = (warp::cosine_hemisphere(u), warp::cosine_hemisphere(DVec2::new(u.y, 0.3)));
             let expected = facets.masking(wo, wo) * facets.masking(wi, wi);
             assert!((CoatFacets::masking(wo, wi) / expected - 1.0).abs() < 1e-14);

@@ -265,17 +265,15 @@ fn sampled_directions_follow_the_stated_density() {
 }
 
 fn directions(n: u32) -> impl Iterator<Item = DVec3> {
-    (0..n * n)
-        .map(move |i| warp::uniform_sphere(DVec2::new(f64::from(i % n) + 0.5, f64::from(i / n) + 0.5) / f64::from(n)))
+    warp::midpoints(n).map(warp::uniform_sphere)
 }
 
 /// All light that comes back from the half or whole sphere under light 1, by samples of the surface itself:
-/// the mean weight over 256² midpoints and 16 lobes.
+/// the mean weight over 64² midpoints and 16 lobes.
 fn albedo(bsdf: &Bsdf, wo: DVec3) -> f64 {
     const N: u32 = 64;
     let mut sum = 0.0;
-    for i in 0..N * N {
-        let u = DVec2::new(f64::from(i % N) + 0.5, f64::from(i / N) + 0.5) / f64::from(N);
+    for u in warp::midpoints(N) {
         for k in 0..16 {
             let u_lobe = (f64::from(k) + u.x) / 16.0;
             sum += bsdf.sample(wo, u_lobe, u).map_or(0.0, |s| f64::from(s.weight.to_array()[0]) * s.eta2);
