@@ -7,6 +7,7 @@
 //! byte of type, and a body; text ends in a zero. Type 4 makes an image (whether to show it, name, width, height, number and
 //! names of channels), type 3 sets a rectangle of one channel (whether to show it, name, channel, x, y, width, height, floats).
 
+use super::frame::lock;
 use crate::film::resolve::Image;
 use std::io::{ErrorKind, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -106,10 +107,6 @@ impl Viewer {
             std::thread::sleep(Duration::from_millis(2));
         }
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 /// What an I/O error means for a viewer.
