@@ -6,12 +6,11 @@ use abbe::batch::checkpoint::Keep;
 use abbe::batch::frame::Progress;
 use abbe::batch::report::{SceneReport, Status};
 use abbe::batch::{self, Overrides, Portion, Samples, Turn, Watcher, merge};
-use abbe::film::accumulate::Film;
 use abbe::film::exr::read_exr;
 use abbe::math::statistics::Moments;
 use abbe::spectrum::ColourSpace;
 use common::place::{Place, pixels};
-use common::{Bench, bench_with};
+use common::{Bench, bench_with, on_threads, sums};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -28,16 +27,6 @@ fn scene(render: &str) -> String {
          - sphere: {{center: [0, 1, 0], radius: 1, material: {{dielectric: {{ior: {{glass: N-SF11}}}}}}}}\n\
          - sphere: {{center: [1, 3, 1], radius: 0.2, emission: 20}}\n"
     )
-}
-
-/// The bits of all sums of a film.
-fn sums(film: &Film) -> Vec<([i128; 3], i64, u32, u32)> {
-    let cells = film.cells().iter().flatten();
-    cells.map(|c| (c.xyz.each_ref().map(|s| s.0), c.alpha, c.count, c.dropped)).collect()
-}
-
-fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
 }
 
 #[test]

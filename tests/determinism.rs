@@ -9,7 +9,7 @@ use abbe::batch::{self, Overrides};
 use abbe::film::Window;
 use abbe::film::accumulate::Film;
 use abbe::film::exr::{ExrFile, read_exr};
-use common::{Bench, bench_with, grey_png, try_bench, write};
+use common::{Bench, bench_with, grey_png, on_threads, try_bench, write};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -90,16 +90,10 @@ fn scene(text: &str, integrator: &str, render: &str) -> Bench {
     bench_with(&text, &[("map.png", &map)])
 }
 
-/// The bits of all sums of a film.
+/// The bits of all sums of a film, and of the weights of its layers.
 fn sums(film: &Film) -> Vec<([i128; 3], i64, u32, u32)> {
-    let cells = film.cells().iter().flatten();
-    let own = cells.map(|c| (c.xyz.each_ref().map(|s| s.0), c.alpha, c.count, c.dropped));
     let weights = film.layers.weight_units().iter().map(|units| ([0; 3], *units, 0, 0));
-    own.chain(weights).collect()
-}
-
-fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+    common::sums(film).into_iter().chain(weights).collect()
 }
 
 /// What computes the light; [`SHARED`] has paths share what they find wherever they can, and send several shadow rays, [`DEALT`]

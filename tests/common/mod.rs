@@ -323,6 +323,17 @@ impl Estimate {
     }
 }
 
+/// The bits of all sums of a film.
+pub fn sums(film: &Film) -> Vec<([i128; 3], i64, u32, u32)> {
+    let cells = film.cells().iter().flatten();
+    cells.map(|c| (c.xyz.each_ref().map(|s| s.0), c.alpha, c.count, c.dropped)).collect()
+}
+
+/// What `work` comes to on a pool of so many threads.
+pub fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+}
+
 /// Relative difference of `found` from `expected` is at most `tolerance`.
 #[track_caller]
 pub fn assert_close(found: f64, expected: f64, tolerance: f64) {

@@ -3,9 +3,8 @@
 //! In the texts below `P(x, y, z)` is a point, `L(x)` a length, `I(x)` one over a length and `S(x)` a length squared; the
 //! rest has no unit of length.
 
-use crate::common::{Bench, ball_of_distances, bench_with, grey_png};
+use crate::common::{Bench, ball_of_distances, bench_with, grey_png, sums};
 use crate::meshes::icosphere;
-use abbe::film::accumulate::Film;
 
 /// Where the unit scene lies: size, and the place of its origin.
 #[derive(Clone, Copy)]
@@ -179,12 +178,6 @@ fn bench(subject: &Subject, frame: Frame) -> Bench {
             ("g.vol", &ball_of_distances()),
         ],
     )
-}
-
-/// The bits of all sums of a film.
-fn sums(film: &Film) -> Vec<([i128; 3], i64, u32, u32)> {
-    let cells = film.cells().iter().flatten();
-    cells.map(|c| (c.xyz.each_ref().map(|s| s.0), c.alpha, c.count, c.dropped)).collect()
 }
 
 /// Case O39: sizes 2^k give the same bits.
