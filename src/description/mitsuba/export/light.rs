@@ -2,7 +2,6 @@
 
 use glam::{DMat4, DVec3};
 
-use super::super::super::camera::FovAxis;
 use super::super::super::emitter::{EmissionDirection, EnvironmentMapping, Growth};
 use super::super::super::light::{Aim, Light};
 use super::super::super::shape::Shape;
@@ -10,6 +9,7 @@ use super::super::super::sky::SkyLight;
 use super::super::super::spectrum::SpectrumOrTexture;
 use super::super::super::texture::Texture;
 use super::super::super::transform::{matrix_of, rotation};
+use super::sensor::fov_axis;
 use super::spectra::Role;
 use super::textures::Stands;
 use super::xml::numbers;
@@ -32,7 +32,23 @@ impl Export<'_> {
         }
         let skies: Vec<&SkyLight> = around.into_iter().filter_map(|other| sky_like(light, other)).collect();
         let is_sum = skies.len() > 1;
-        let why = match light {
+        let why = self.emitter_shortfall(light);
+        match &why {
+            Some(why) => self.instead("emitter", &format!("lights[{i}]"), why.as_str()),
+            None if is_sum => self.restate("emitter", &format!("lights[{i}]")),
+            None => {}
+        }
+        self.emitter(light, &skies);
+        self.weight(if is_sum { skies.iter().map(|sky| sky.sampling_weight).sum() } else { light.sampling_weight() });
+        self.xml.close();
+        if why.is_some() || is_sum {
+            self.end();
+        }
+    }
+
+    /// What Mitsuba gets in place of a light that it cannot express.
+    fn emitter_shortfall(&self, light: &Light) -> Option<String> {
+        match light {
             Light::Point(l) => Export::light_shortfall(&l.intensity),
             Light::Spot(l) => {
                 let slide = l.texture.as_ref().and_then(|texture| self.pictures_shortfall(texture, stands(l.v)));
@@ -47,12 +63,11 @@ impl Export<'_> {
                 .then(|| "the same image on Mitsuba's grid, shifted by half a row toward the poles".to_owned()),
             Light::Sky(l) => Export::reflectance_shortfall(&[&l.albedo], "a grey ground").map(str::to_owned),
             Light::Projector(l) => self.shining_shortfall(&l.irradiance, stands(l.v)),
-        };
-        match &why {
-            Some(why) => self.instead("emitter", &format!("lights[{i}]"), why.as_str()),
-            None if is_sum => self.restate("emitter", &format!("lights[{i}]")),
-            None => {}
         }
+    }
+
+    /// Opens the plugin of a light and writes what it is. A sky is as bright as all of `skies` together.
+    fn emitter(&mut self, light: &Light, skies: &[&SkyLight]) {
         let id = light.name().and_then(|name| self.emitter_id(name));
         let open = |plugin| {
             [Some(("type", plugin)), id.as_deref().map(|id| ("id", id))].into_iter().flatten().collect::<Vec<_>>()
@@ -75,10 +90,7 @@ impl Export<'_> {
                     Aim::Target(target) => target,
                     Aim::Direction(_) => target.into(),
                 };
-                self.xml.open("transform", &[("name", "to_world")]);
-                let [origin, target, up] = [l.position, target, up.into()].map(|v| numbers(&v));
-                self.xml.leaf("lookat", &[("origin", &origin), ("target", &target), ("up", &up)]);
-                self.xml.close();
+                self.looking([l.position, target, up.into()]);
                 self.xml.value("float", "cutoff_angle", l.cutoff_deg);
                 self.xml.value("float", "beam_width", l.beam_deg);
                 self.spectrum("intensity", &l.intensity, Role::Emission);
@@ -120,27 +132,12 @@ impl Export<'_> {
             }
             Light::Projector(l) => {
                 self.xml.open("emitter", &open("projector"));
-                self.xml.open("transform", &[("name", "to_world")]);
-                let [origin, target, up] = [l.origin, l.target, l.up].map(|v| numbers(&v));
-                self.xml.leaf("lookat", &[("origin", &origin), ("target", &target), ("up", &up)]);
-                self.xml.close();
+                self.looking([l.origin, l.target, l.up]);
                 self.xml.value("float", "fov", l.fov_deg);
-                let axis = match l.fov_axis {
-                    FovAxis::X => "x",
-                    FovAxis::Y => "y",
-                    FovAxis::Smaller => "smaller",
-                    FovAxis::Larger => "larger",
-                    FovAxis::Diagonal => "diagonal",
-                };
-                self.xml.value("string", "fov_axis", axis);
+                self.xml.value("string", "fov_axis", fov_axis(l.fov_axis));
                 self.shining("irradiance", &l.irradiance, stands(l.v));
                 self.xml.value("float", "scale", l.scale);
             }
-        }
-        self.weight(if is_sum { skies.iter().map(|sky| sky.sampling_weight).sum() } else { light.sampling_weight() });
-        self.xml.close();
-        if why.is_some() || is_sum {
-            self.end();
         }
     }
 
@@ -149,6 +146,14 @@ impl Export<'_> {
         let id = self.id(name, "emitter");
         let id = if self.ids.contains(&id) { format!("{name} (emitter)") } else { id };
         self.ids.insert(id.clone()).then_some(id)
+    }
+
+    /// From where a light looks, at what, and what is up for it.
+    fn looking(&mut self, points: [[f64; 3]; 3]) {
+        let [origin, target, up] = points.map(|v| numbers(&v));
+        self.xml.open("transform", &[("name", "to_world")]);
+        self.xml.leaf("lookat", &[("origin", &origin), ("target", &target), ("up", &up)]);
+        self.xml.close();
     }
 
     /// The emission of a shape.

@@ -46,15 +46,8 @@ impl<'a> Export<'a> {
             self.xml.instruction(&format!("set camera.lens: {{radius: {radius}, focus_distance: {focus_distance}}}"));
         }
         if let Projection::Perspective { fov_deg, fov_axis } = projection {
-            let axis = match fov_axis {
-                FovAxis::X => "x",
-                FovAxis::Y => "y",
-                FovAxis::Smaller => "smaller",
-                FovAxis::Larger => "larger",
-                FovAxis::Diagonal => "diagonal",
-            };
             self.xml.value("float", "fov", fov_deg);
-            self.xml.value("string", "fov_axis", axis);
+            self.xml.value("string", "fov_axis", self::fov_axis(*fov_axis));
         }
         if *principal_point != [0.0; 2] && plugin == "perspective" {
             // Theirs says where the middle of the picture looks, ours where the axis falls on it.
@@ -186,5 +179,16 @@ impl<'a> Export<'a> {
             }
         }
         self.xml.close();
+    }
+}
+
+/// Mitsuba's word for the side of a picture that an angle is of.
+pub(super) fn fov_axis(axis: FovAxis) -> &'static str {
+    match axis {
+        FovAxis::X => "x",
+        FovAxis::Y => "y",
+        FovAxis::Smaller => "smaller",
+        FovAxis::Larger => "larger",
+        FovAxis::Diagonal => "diagonal",
     }
 }
