@@ -1,13 +1,13 @@
 //! Rays that leave the lights, for paths that begin there.
 //!
-//! Their power is told over an area, [`Scene::unit_area`]: it goes with the square of how large a scene is, which f32 does not
-//! hold beyond 10¹⁹ m and below 10⁻¹⁹ m.
+//! Their power is told over an area of its own, [`Power::unit_area`]: it goes with the square of how large lamps, and what they are
+//! aimed at, are, which f32 does not hold beyond 10¹⁹ m and below 10⁻¹⁹ m.
 
 use super::environment::Drawn;
 use super::light::{Light, spot_falloff};
 use super::texture::TexturePoint;
 use super::{Geometry, Object, Scene, SurfacePoint};
-use crate::math::{Departure, Frame, Ray, warp};
+use crate::math::{Departure, Frame, Ray, inverse_power_of_two, warp};
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -15,14 +15,41 @@ use std::f64::consts::PI;
 /// By how much of the size of what it is aimed at light from infinity may begin beside its line: less than f32 tells.
 const BLUR: f64 = 1.0 / (1u64 << 26) as f64;
 
+/// Spectral power.
+#[derive(Clone, Copy, Debug)]
+pub struct Power {
+    /// W·nm⁻¹ over the unit of area.
+    pub lanes: Lanes,
+    /// The unit of area, m²: a power of two, by which the largest of the lanes is about one. So the bits of a picture do not know it.
+    pub unit_area: f64,
+}
+
+impl Power {
+    /// Of so much over a square metre.
+    fn new(lanes: Lanes) -> Power {
+        let largest = lanes.to_array().into_iter().fold(0.0, f32::max);
+        let scale = inverse_power_of_two(f64::from(largest)).min(MOST_SCALE);
+        Power { lanes: lanes * scale as f32, unit_area: 1.0 / scale }
+    }
+
+    /// So many times as much.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Power {
+        let scale = inverse_power_of_two(factor);
+        Power { lanes: self.lanes * (factor * scale) as f32, unit_area: self.unit_area / scale }
+    }
+}
+
+/// The greatest power of two of f32.
+const MOST_SCALE: f64 = (1u128 << 127) as f64;
+
 /// A ray of light.
 #[derive(Clone, Copy, Debug)]
 pub struct Emission {
     /// From the light.
     pub ray: Ray,
-    /// Spectral power over the density of the ray and of the choice of its light, W·nm⁻¹ over the unit of area: its mean is the
-    /// power of all lights.
-    pub power: Lanes,
+    /// Spectral power over the density of the ray and of the choice of its light: its mean is the power of all lights.
+    pub power: Power,
     /// Index of the light.
     pub light: u32,
 }
@@ -32,11 +59,11 @@ struct Spot {
     surface: SurfacePoint,
     texture: TexturePoint,
     departure: Departure,
-    /// Area of the shape over the unit of area.
+    /// Area of the shape, m².
     area: f64,
 }
 
-fn spot_on(objects: &[Object], object: u32, u: DVec2, unit_area: f64) -> Option<Spot> {
+fn spot_on(objects: &[Object], object: u32, u: DVec2) -> Option<Spot> {
     let facing = objects[object as usize].facing();
     match &objects[object as usize].geometry {
         Geometry::Shape(shape) => {
@@ -48,7 +75,7 @@ fn spot_on(objects: &[Object], object: u32, u: DVec2, unit_area: f64) -> Option<
                 surface,
                 texture: TexturePoint::new(&surface, part, [0.0; 2]),
                 departure: Departure::new(object, part),
-                area: 1.0 / (s.pdf_area * unit_area),
+                area: 1.0 / s.pdf_area,
             })
         }
         Geometry::Mesh(mesh) => {
@@ -60,7 +87,7 @@ fn spot_on(objects: &[Object], object: u32, u: DVec2, unit_area: f64) -> Option<
                 surface,
                 texture: TexturePoint::new(&surface, part, b.into()),
                 departure: Departure::new(object, part),
-                area: mesh.areas.total() / unit_area,
+                area: mesh.areas.total(),
             })
         }
         // They do not shine.
@@ -74,15 +101,13 @@ pub struct Start<'a> {
     place: Place,
     /// The wavelengths.
     nm: Lanes,
-    /// One over the unit of length.
-    per_length: f32,
 }
 
 enum Place {
     /// On a shape that shines in all directions of a hemisphere.
     Surface(Spot),
     /// On a shape that shines along its normal, or a point that throws its light one way only.
-    Beam { ray: Ray, power: Lanes },
+    Beam { ray: Ray, power: Power },
     /// A point.
     Point(DVec3),
     /// Infinitely far: where the light goes, and what falls on an area across it over the density of the direction,
@@ -92,8 +117,8 @@ enum Place {
 
 /// The freedom that is left when a [`Start`] has been drawn.
 pub enum Freedom {
-    /// None: this is the ray, and its power over its density, W·nm⁻¹ over the unit of area.
-    None(Ray, Lanes),
+    /// None: this is the ray, and its power over its density.
+    None(Ray, Power),
     /// The direction, from this point.
     Direction(DVec3),
     /// The place of the ray, whose direction this is.
@@ -112,43 +137,36 @@ impl Start<'_> {
         }
     }
 
-    /// The ray in `direction`, with its power by solid angle over the density of its start, W·sr⁻¹·nm⁻¹ over the unit of
-    /// area; `None` where there is no light.
+    /// The ray in `direction`, with its power by solid angle, sr⁻¹, over the density of its start; `None` where there is no light.
     #[must_use]
-    pub fn toward(&self, direction: DVec3) -> Option<(Ray, Lanes)> {
+    pub fn toward(&self, direction: DVec3) -> Option<(Ray, Power)> {
         match (&self.place, self.light) {
             (Place::Surface(spot), Light::Area { radiance, .. }) => {
                 let cos = direction.dot(spot.surface.normal);
-                let light = || radiance.eval(&spot.texture, self.nm) * (cos * spot.area) as f32;
+                let light = || Power::new(radiance.eval(&spot.texture, self.nm)).times(cos * spot.area);
                 (cos > 0.0).then(|| (spot.ray(direction), light()))
             }
             (Place::Point(position), Light::Point { intensity, .. }) => {
-                Some((Ray::new(*position, direction), over_area(intensity.eval(self.nm), self.per_length)))
+                Some((Ray::new(*position, direction), Power::new(intensity.eval(self.nm))))
             }
             (Place::Point(position), Light::Spot { axis, beam, cutoff, intensity, slide, .. }) => {
                 let falloff = spot_falloff(direction, *axis, *beam, *cutoff);
                 let slide = || slide.as_ref().map_or(Lanes::ONE, |slide| slide.eval(-direction, *position, self.nm));
-                let light = || over_area(intensity.eval(self.nm) * slide() * falloff as f32, self.per_length);
+                let light = || Power::new(intensity.eval(self.nm) * slide() * falloff as f32);
                 (falloff > 0.0).then(|| (Ray::new(*position, direction), light()))
             }
             _ => None,
         }
     }
 
-    /// For light from infinity: what falls on an area across its direction, over the density of the direction,
-    /// W·m⁻²·nm⁻¹.
+    /// For light from infinity: what falls on an area across its direction, by that area, m⁻², over the density of the direction.
     #[must_use]
-    pub fn irradiance(&self) -> Lanes {
-        match &self.place {
+    pub fn irradiance(&self) -> Power {
+        Power::new(match &self.place {
             Place::Infinity { irradiance, .. } => *irradiance,
             Place::Surface(_) | Place::Beam { .. } | Place::Point(_) => Lanes::ZERO,
-        }
+        })
     }
-}
-
-/// `power` over the unit of area, of which the side is one over `per_length`. By two steps, since f32 does not hold all squares.
-fn over_area(power: Lanes, per_length: f32) -> Lanes {
-    power * per_length * per_length
 }
 
 impl Spot {
@@ -158,13 +176,6 @@ impl Spot {
 }
 
 impl Scene {
-    /// The area by which the power of light on its way from the lights is told, m²: 1 but in scenes so large or small that sums
-    /// count lengths over a power of two; then its square.
-    #[must_use]
-    pub fn unit_area(&self) -> f64 {
-        2f64.powi(2 * self.length_exponent)
-    }
-
     /// A ray of a light that `u_light` chooses; `None` where there is none.
     ///
     /// Light from infinity comes through a disc as wide as the bounded part of the scene: a plane without end gets
@@ -175,22 +186,24 @@ impl Scene {
         let environment = self.lights[i].is_environment();
         let (u_start, u_rest) = if environment { (u_direction, u_point) } else { (u_point, u_direction) };
         let (ray, power) = self.shine(i, u_start, u_rest, nm)?;
-        Some(Emission { ray, power: power * (1.0 / probability) as f32, light: i as u32 })
+        Some(Emission { ray, power: power.times(1.0 / probability), light: i as u32 })
     }
 
-    /// A ray of light `i` as it shines by itself, and its power over its density, W·nm⁻¹ over the unit of area: `u_start` and
-    /// `u_rest` as for [`Scene::start`].
+    /// A ray of light `i` as it shines by itself, and its power over its density: `u_start` and `u_rest` as for
+    /// [`Scene::start`].
     #[must_use]
-    pub fn shine(&self, i: usize, u_start: DVec2, u_rest: DVec2, nm: Lanes) -> Option<(Ray, Lanes)> {
+    pub fn shine(&self, i: usize, u_start: DVec2, u_rest: DVec2, nm: Lanes) -> Option<(Ray, Power)> {
         let start = self.start(i, u_start, u_rest, nm)?;
         Some(match start.freedom() {
             Freedom::None(ray, power) => (ray, power),
             Freedom::Direction(_) => {
                 let (direction, factor) = self.spread(&start, u_rest);
                 let (ray, power) = start.toward(direction).filter(|_| factor.is_finite())?;
-                (ray, power * factor as f32)
+                (ray, power.times(factor))
             }
-            Freedom::Place(direction) => (self.arriving_ray(direction, u_rest), start.irradiance() * self.section()),
+            Freedom::Place(direction) => {
+                (self.arriving_ray(direction, u_rest), start.irradiance().times(self.section()))
+            }
         })
     }
 
@@ -217,18 +230,17 @@ impl Scene {
     #[must_use]
     pub fn start(&self, i: usize, u: DVec2, rest: DVec2, nm: Lanes) -> Option<Start<'_>> {
         let light = &self.lights[i];
-        let (unit_area, per_length) = (self.unit_area(), 2f32.powi(-self.length_exponent));
         let place = match light {
-            Light::Area { object, .. } => Place::Surface(spot_on(&self.objects, *object, u, unit_area)?),
+            Light::Area { object, .. } => Place::Surface(spot_on(&self.objects, *object, u)?),
             Light::AlongNormal { object, exitance } => {
-                let spot = spot_on(&self.objects, *object, u, unit_area)?;
-                let power = exitance.eval(&spot.texture, nm) * spot.area as f32;
+                let spot = spot_on(&self.objects, *object, u)?;
+                let power = Power::new(exitance.eval(&spot.texture, nm)).times(spot.area);
                 Place::Beam { ray: spot.ray(spot.surface.normal), power }
             }
             Light::Point { position, .. } | Light::Spot { position, .. } => Place::Point(*position),
             Light::Projector(projector) => {
                 let (ray, power) = projector.emit(rest, nm);
-                Place::Beam { ray, power: over_area(power, per_length) }
+                Place::Beam { ray, power: Power::new(power) }
             }
             Light::Directional { direction, irradiance } => {
                 Place::Infinity { direction: *direction, irradiance: irradiance.eval(nm) }
@@ -243,12 +255,12 @@ impl Scene {
                 Place::Infinity { direction: -s.direction, irradiance }
             }
         };
-        Some(Start { light, place, nm, per_length })
+        Some(Start { light, place, nm })
     }
 
-    /// The area of the disc through which light from infinity comes, over the unit of area.
-    fn section(&self) -> f32 {
-        (PI * self.radius * self.radius / self.unit_area()) as f32
+    /// The area of the disc through which light from infinity comes, m².
+    fn section(&self) -> f64 {
+        PI * self.radius * self.radius
     }
 
     /// A ray from outside the scene.

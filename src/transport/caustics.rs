@@ -19,7 +19,7 @@ use super::guide::Guide;
 use crate::math::{Frame, Ray, warp};
 use crate::scene::Scene;
 use crate::scene::casters::Ball;
-use crate::scene::emission::{Emission, Freedom};
+use crate::scene::emission::{Emission, Freedom, Power};
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -168,8 +168,8 @@ impl Caustics {
         let index = self.sums.partition_point(|&sum| sum <= u_source);
         let source = self.sources.get(index)?;
         let light = source.light as usize;
-        let aimed = |ray, power: Lanes, density: f64, cell| {
-            let emission = Emission { ray, power: power * (1.0 / density) as f32, light: source.light };
+        let aimed = |ray, power: Power, density: f64, cell| {
+            let emission = Emission { ray, power: power.times(1.0 / density), light: source.light };
             Aimed { emission, source: index, target: source.target, cell }
         };
         let own_density = |cell| source.probability * source.guide.density(cell);
@@ -218,8 +218,6 @@ impl Caustics {
                 // From outside the ball, or everything that has an end.
                 let (near, far) =
                     (2.0 * ball.radius, (ball.center - scene.center).length() + scene.radius + ball.radius);
-                // Powers are told over that area.
-                density *= scene.unit_area();
                 (scene.from_infinity(x, direction, near, far), start.irradiance())
             }
             Freedom::None(..) => return None,

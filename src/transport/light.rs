@@ -138,7 +138,7 @@ pub fn trace(
         }),
     };
     let Some(emission) = emission else { return traced };
-    let start = largest(emission.power);
+    let start = largest(emission.power.lanes);
     if start.is_nan() || start <= 0.0 {
         return traced;
     }
@@ -147,6 +147,7 @@ pub fn trace(
         sampler: &sampler,
         wavelengths: &wavelengths,
         start,
+        unit_area: emission.power.unit_area,
         splat,
         photons,
         target,
@@ -158,7 +159,7 @@ pub fn trace(
     };
     walk.follow(Beam {
         ray: emission.ray,
-        power: emission.power,
+        power: emission.power.lanes,
         rho: Lanes::ONE,
         nm: wavelengths.nm,
         alone: None,
@@ -181,13 +182,14 @@ pub(super) fn seen_in_sharp(
     wavelengths: &SampledWavelengths,
     sampler: &Sampler,
 ) -> Option<Photon<Together>> {
-    let mut seen = Photons::default();
+    let mut seen = Photons::over(1.0);
     let splat = &mut |_: &SampledWavelengths, _| {};
     let mut walk = Walk {
         paths,
         sampler,
         wavelengths,
         start: 1.0,
+        unit_area: 1.0,
         splat,
         photons: Some(&mut seen),
         target: Target::Own,
@@ -229,7 +231,7 @@ fn past_lamps(scene: &Scene, ray: &Ray) -> Ray {
 #[derive(Clone, Copy)]
 struct Beam {
     ray: Ray,
-    /// Over the hero's density.
+    /// Over the hero's density and the unit of area of the walk.
     power: Lanes,
     /// Density of each lane over the hero's, as in `path`.
     rho: Lanes,
@@ -286,6 +288,8 @@ struct Walk<'a, 'b> {
     wavelengths: &'a SampledWavelengths,
     /// Largest power at the start.
     start: f64,
+    /// By which power is told, m².
+    unit_area: f64,
     splat: &'b mut dyn FnMut(&SampledWavelengths, Splat),
     /// Where photons are left, if they are wanted.
     photons: Option<&'b mut Photons>,
@@ -664,13 +668,14 @@ impl<'a> Walk<'a, '_> {
         let Some(photons) = &mut self.photons else { return };
         let (point, came, normal) = (surface.point, -beam.ray.direction.as_vec3(), surface.normal.as_vec3());
         let (vertices, group) = (beam.vertex, self.group);
+        let power = beam.power * (self.unit_area / photons.unit_area) as f32;
         match beam.alone {
             None => {
-                let light = Together { power: beam.power, rho: beam.rho };
+                let light = Together { power, rho: beam.rho };
                 photons.together.push(Photon { point, came, normal, light, vertices, group });
             }
             Some(lane) => {
-                let power = beam.power.to_array()[0] * (LANES as f32 / beam.rho.reduce_add());
+                let power = power.to_array()[0] * (LANES as f32 / beam.rho.reduce_add());
                 let light = Alone { power, lane: lane as u8 };
                 photons.alone.push(Photon { point, came, normal, light, vertices, group });
             }

@@ -3,6 +3,7 @@
 //! A photon of wavelengths that went together carries all of them, one of a wavelength that parted from the others only
 //! itself: each kind has a list of its own, so that the many of the second kind are half as large. Directions are in f32.
 
+use crate::math::inverse_power_of_two;
 use crate::math::sampler::mix64;
 use crate::spectrum::Lanes;
 use glam::{DVec3, Vec3};
@@ -28,7 +29,7 @@ pub struct Photon<L> {
 /// Wavelengths that went together.
 #[derive(Clone, Copy, Debug)]
 pub struct Together {
-    /// Spectral power over the hero's density, W·nm⁻¹ over [`Scene::unit_area`](crate::scene::Scene::unit_area).
+    /// Spectral power over the hero's density, W·nm⁻¹ over [`Photons::unit_area`].
     pub power: Lanes,
     /// Density of each lane over the hero's.
     pub rho: Lanes,
@@ -75,8 +76,10 @@ impl<L: Light> Photon<L> {
 }
 
 /// Photons in the order in which they were left.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Photons {
+    /// By which their powers are told, m².
+    pub unit_area: f64,
     /// Of wavelengths that went together.
     pub together: Vec<Photon<Together>>,
     /// Of single ones.
@@ -84,6 +87,18 @@ pub struct Photons {
 }
 
 impl Photons {
+    /// None yet, whose powers are to be told over `unit_area`.
+    #[must_use]
+    pub fn over(unit_area: f64) -> Photons {
+        Photons { unit_area, together: Vec::new(), alone: Vec::new() }
+    }
+
+    /// None yet, to be collected within `radius` metres.
+    #[must_use]
+    pub fn within(radius: f64) -> Photons {
+        Photons::over(1.0 / inverse_power_of_two(radius * radius))
+    }
+
     /// All of them, with all lanes.
     pub fn iter(&self) -> impl Iterator<Item = Photon<Together>> {
         self.together.iter().copied().chain(self.alone.iter().map(Photon::together))
@@ -103,15 +118,15 @@ pub struct PhotonMap {
 }
 
 impl PhotonMap {
-    /// Sorts the photons of `paths` paths, whose power is told over `unit_area`, for collecting within `radius` metres. Who
+    /// Sorts the photons of `paths` paths, whose powers are told over one area, for collecting within `radius` metres. Who
     /// followed the paths, and in how many `pieces`, makes no difference.
     #[must_use]
-    pub fn new(pieces: &[Photons], paths: u64, radius: f64, unit_area: f64) -> PhotonMap {
+    pub fn new(pieces: &[Photons], paths: u64, radius: f64) -> PhotonMap {
         let together: Vec<&[_]> = pieces.iter().map(|p| p.together.as_slice()).collect();
         let alone: Vec<&[_]> = pieces.iter().map(|p| p.alone.as_slice()).collect();
         PhotonMap {
             radius,
-            unit_area,
+            unit_area: pieces.first().map_or(1.0, |piece| piece.unit_area),
             paths: paths as f64,
             together: Buckets::new(&together, radius),
             alone: Buckets::new(&alone, radius),
@@ -275,7 +290,7 @@ mod tests {
         let mut pieces = Vec::new();
         for i in 0..n {
             if i % 1000 == 0 {
-                pieces.push(Photons::default());
+                pieces.push(Photons::over(1.0));
             }
             let u = Sampler::new(7, [0, 0], 0, i).set(Set::Camera);
             let point = DVec3::new(4.0 * u[0] - 2.0, 0.0, 4.0 * u[1] - 2.0);
@@ -300,7 +315,7 @@ mod tests {
         let pieces = photons(3000);
         let all: Vec<Photon<Together>> = pieces.iter().flat_map(Photons::iter).collect();
         for radius in [0.01, 0.3, 5.0] {
-            let map = PhotonMap::new(&pieces, 3000, radius, 1.0);
+            let map = PhotonMap::new(&pieces, 3000, radius);
             for i in 0..50 {
                 let point = DVec3::new(f64::from(i) * 0.07 - 1.7, 0.001, 0.9 - f64::from(i) * 0.031);
                 let found = map.gather(point, DVec3::Y, |_| Lanes::ONE).to_array();
@@ -323,7 +338,7 @@ mod tests {
     /// radius 0.5 there are 147 of 3000 photons, evenly laid.
     #[test]
     fn a_shower_has_its_density() {
-        let map = PhotonMap::new(&photons(3000), 3000, 0.5, 1.0);
+        let map = PhotonMap::new(&photons(3000), 3000, 0.5);
         let found = f64::from(map.gather(DVec3::ZERO, DVec3::Y, |_| Lanes::ONE).to_array()[0]);
         // Low-discrepancy points err less than the 8 % of independent ones.
         assert!((found / (1.5 / 16.0) - 1.0).abs() < 0.08, "{found}");
@@ -339,7 +354,7 @@ mod tests {
             for photon in pieces.iter_mut().flat_map(|piece| &mut piece.together) {
                 photon.point += DVec3::new(away, 0.5 * away, -away);
             }
-            let map = PhotonMap::new(&pieces, 10_000, 1e-4, 1.0);
+            let map = PhotonMap::new(&pieces, 10_000, 1e-4);
             let fullest = map.together.starts.windows(2).map(|pair| pair[1] - pair[0]).max();
             assert!(fullest.is_some_and(|count| count < 16), "{away}: {fullest:?}");
         }

@@ -761,3 +761,36 @@ fn light_from_the_lamps_is_the_same_at_any_scale() {
         }
     }
 }
+
+/// Light of a lamp, with and without extent, is the same beside something 10³⁰ m away that no ray meets: its power does not know how
+/// far a scene reaches, whose square f32 does not hold.
+#[test]
+fn what_stands_far_away_takes_no_light_of_a_lamp() {
+    let scene = |lamp: &str, far: &str, integrator: &str| {
+        let text = format!(
+            "camera: {{origin: [0, 1, 2], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 24, height: 24}}\n\
+             integrator: {{{integrator}: {{}}}}\n\
+             render: {{samples: 16, techniques: {{light_tracing: on, merging: on}}}}\nshapes:\n\
+             - rectangle: {{corner: [-2, -0.5, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4]}}\n\
+             - sphere: {{radius: 0.5, material: {{dielectric: {{ior: 1.5}}}}}}\n\
+             - rectangle: {{corner: [-2, -0.5, -1], edge_u: [4, 0, 0], edge_v: [0, 2, 0], material: {{mirror: {{}}}}}}\n{far}{lamp}"
+        );
+        render(&bench_with(&text, &[]))
+    };
+    let lamps = [
+        "- sphere: {center: [1, 2, 0], radius: 0.25, emission: 9}\n",
+        "lights: [point: {position: [-1, 2, 0], intensity: 1}]\n",
+        "lights: [spot: {position: [0, 2, 1], target: [0, 0, 0], cutoff_deg: 40, intensity: 2}]\n",
+    ];
+    for (lamp, integrator) in
+        lamps.iter().flat_map(|lamp| ["path", "light_tracer"].map(|integrator| (lamp, integrator)))
+    {
+        let expected = scene(lamp, "", integrator);
+        let mean = expected.rgb[1].iter().sum::<f32>() / expected.rgb[1].len() as f32;
+        assert!(mean > 0.01, "{integrator}, {lamp}: {mean}");
+        let found = scene(lamp, "- sphere: {center: [0, -1.0e30, 0], radius: 1.0e20}\n", integrator);
+        for (found, expected) in found.rgb.iter().flatten().zip(expected.rgb.iter().flatten()) {
+            assert!((found - expected).abs() < 1e-5 * mean, "{integrator}, {lamp}: {found}, not {expected}");
+        }
+    }
+}

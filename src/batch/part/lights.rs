@@ -67,6 +67,7 @@ impl Part<'_> {
     ) -> bool {
         let paths = paths_of_a_sample(self.job, light_paths);
         let wanted = photons.is_some();
+        let radius = light_paths.caustics.and_then(|caustics| caustics.merging).unwrap_or(1.0);
         let own = self.own_paths();
         let known = lock(&self.lights).clone();
         let mut more: BTreeMap<u32, Vec<Range<u64>>> = BTreeMap::new();
@@ -81,7 +82,7 @@ impl Part<'_> {
             units.extend(cuts.filter(|(_, _, add)| *add || wanted));
         }
         let trace = |(number, (sample, unit, add)): (usize, (u32, Range<u64>, bool))| {
-            let mut left = Photons::default();
+            let mut left = Photons::within(radius);
             // One is followed however soon the pauses come.
             if pause.ending() || number > 0 && pause.wanted() {
                 return (left, None);
@@ -152,10 +153,7 @@ impl Part<'_> {
             return None;
         }
         let followed = paths_of_a_sample(job, light_paths);
-        Some((
-            PhotonMap::new(&photons, followed, merge::radius(first_radius, index), job.scene.unit_area()),
-            wavelength,
-        ))
+        Some((PhotonMap::new(&photons, followed, merge::radius(first_radius, index)), wavelength))
     }
 }
 

@@ -39,7 +39,7 @@ impl Walk<'_, '_> {
         let before = beam.inside();
         let inside = if came * went < 0.0 { scene.beyond(object, at.surface, entry.direction, before) } else { before };
         let ray = scene.leave(at.surface, at.hit, entry.direction);
-        let light = f * (view.shadowing * (cosines * entry.density * scene.unit_area()) as f32);
+        let light = f * (view.shadowing * (cosines * entry.density * self.unit_area) as f32);
         let distance = free(entry.distance, None, at.surface.point, &ray);
         self.send(beam, at.surface.point, &ray, inside, &Entry { distance, ..entry }, light);
     }
@@ -51,7 +51,7 @@ impl Walk<'_, '_> {
             return;
         }
         let f = medium.phase.eval(point, -beam.ray.direction, entry.direction);
-        let light = Lanes::splat((f * entry.density * self.paths.scene.unit_area()) as f32);
+        let light = Lanes::splat((f * entry.density * self.unit_area) as f32);
         self.send(beam, point, &Ray::new(point, entry.direction), beam.inside(), &entry, light);
     }
 

@@ -300,7 +300,7 @@ impl Walk<'_, '_> {
             let cosines = to * adjoint(from, to, true_from, true_to);
             let fogged = self.clear(surface.point);
             light[lane] = packet.beam.power.to_array()[lane]
-                * (reflectance * FRAC_1_PI * (cosines * entry.density * scene.unit_area()) as f32)
+                * (reflectance * FRAC_1_PI * (cosines * entry.density * self.unit_area) as f32)
                 * fogged;
             if light[lane] != 0.0 {
                 rays[lane] = scene.leave(surface, hit, entry.direction);

@@ -40,7 +40,7 @@ fn from_lights(paths: &LightPaths, seen: Option<&Seen>, round: u32, indices: Ran
         .into_par_iter()
         .map(|i| {
             let mut splats: Vec<(DVec2, Colour)> = Vec::new();
-            let (mut photons, mut collected) = (Photons::default(), Vec::new());
+            let (mut photons, mut collected) = (Photons::within(seen.map_or(1.0, |seen| seen.radius)), Vec::new());
             let traced = trace(paths, round, i, seen.map(|_| &mut photons), &mut |wavelengths, splat| {
                 let (pixel, colour) = (splat.place.floor(), Colour::of(splat.xyz(wavelengths)));
                 // Colours that come to one pixel together make up for each other.
@@ -57,7 +57,8 @@ fn from_lights(paths: &LightPaths, seen: Option<&Seen>, round: u32, indices: Ran
             };
             let splats = splats.iter().map(arrival).collect();
             if let (Some(seen), Some(wavelengths)) = (seen, &traced.wavelengths) {
-                photons.iter().for_each(|photon| seen.collect(&photon, wavelengths, &mut collected));
+                let unit_area = photons.unit_area;
+                photons.iter().for_each(|photon| seen.collect(&photon, unit_area, wavelengths, &mut collected));
             }
             let (source, place) = traced.began.unwrap_or((usize::MAX, DVec2::ZERO));
             Landed { source, place, splats, collected, rays: traced.rays, unfound: traced.unfound }

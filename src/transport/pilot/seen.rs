@@ -29,8 +29,6 @@ pub(super) struct Seen {
     widened: f64,
     /// The first radius of merging, metres.
     pub radius: f64,
-    /// By which the powers of photons are told, m².
-    unit_area: f64,
 }
 
 /// Light that came to some pixels.
@@ -85,21 +83,20 @@ impl Seen {
         let radius = FIRST_RADIUS * pixel;
         let pixels = size.x * size.y / (BLOCKS * BLOCKS * tries as usize) as f64;
         let widened = pixels.sqrt().max(1.0);
-        let places = [Photons { together: places, ..Photons::default() }];
-        let unit_area = scene.unit_area();
-        (radius > 0.0).then(|| Seen {
-            map: PhotonMap::new(&places, 1, radius * widened, 1.0),
-            pixels,
-            widened,
-            radius,
-            unit_area,
-        })
+        let places = [Photons { together: places, ..Photons::over(1.0) }];
+        (radius > 0.0).then(|| Seen { map: PhotonMap::new(&places, 1, radius * widened), pixels, widened, radius })
     }
 
-    /// Where the light of a photon would come to.
-    pub fn collect(&self, photon: &Photon<Together>, wavelengths: &SampledWavelengths, arrivals: &mut Vec<Arrival>) {
+    /// Where the light of a photon, whose power is told over `unit_area`, would come to.
+    pub fn collect(
+        &self,
+        photon: &Photon<Together>,
+        unit_area: f64,
+        wavelengths: &SampledWavelengths,
+        arrivals: &mut Vec<Arrival>,
+    ) {
         let light = photon.light.power * (LANES as f32 / photon.light.rho.reduce_add());
-        let scale = ALBEDO * self.unit_area / (PI * PI * self.radius * self.radius);
+        let scale = ALBEDO * unit_area / (PI * PI * self.radius * self.radius);
         let colour = Colour::of(observer::xyz(light, wavelengths));
         let (by_area, square) = (colour.y * scale, colour.square() * scale * scale);
         if by_area <= 0.0 {
