@@ -266,6 +266,32 @@ fn the_small_copy_has_as_much_beyond_the_frame_as_the_picture() {
     assert!((green - 0.25).abs() < 0.01, "{green}");
 }
 
+/// A lit board of 4 × 4 pixels before nothing: sixteen carry the error of the picture, fewer than an interval is believed of, by
+/// `accuracy` as by `render`. One that fills the frame has 256.
+#[test]
+fn the_sheet_says_what_has_not_converged_as_renders_do() {
+    let scene = |half: f64| {
+        format!(
+            "camera: {{origin: [0, 0, 2], target: [0, 0, 0], orthographic_height: 2}}\nimage: {{width: 16, height: 16}}\n\
+             render: {{samples: 16}}\nshapes:\n\
+             - rectangle: {{corner: [-{half}, -{half}, 0], edge_u: [{side}, 0, 0], edge_v: [0, {side}, 0]}}\n\
+             - sphere: {{center: [0, 3, 3], radius: 0.5, emission: 1}}\n",
+            side = 2.0 * half
+        )
+    };
+    for (half, converged) in [(0.25, false), (1.0, true)] {
+        let place = Place::of(&scene(half));
+        let (code, said) = abbe(&place, "accuracy scene.yaml -o sheet --rounds 2 --knob file");
+        assert_eq!(code, 0, "{said}");
+        assert_eq!(said.contains("not converged"), !converged, "{said}");
+        let row = &place.json("sheet/accuracy.json")[0]["rows"][0];
+        assert_eq!(row["converged"], converged, "{row}");
+        let (code, said) = abbe(&place, "render scene.yaml -o scene.exr");
+        assert_eq!(code, 0, "{said}");
+        assert_eq!(said.contains("not converged"), !converged, "{said}");
+    }
+}
+
 /// A coloured wall fills the view, in coloured light that is the same from everywhere. Its radiance is that of the light times
 /// its reflectance, wavelength by wavelength; three numbers are multiplied instead. Both colours are those of smooth
 /// spectra, so both products are known. Bounds are four errors of the sheet and the 2e-4 that upsampling may be off by.

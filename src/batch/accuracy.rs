@@ -87,6 +87,8 @@ pub struct Point {
     pub seconds: f64,
     /// Noise with the ends of its interval.
     pub noise: [f64; 3],
+    /// Whether the interval can be believed: whether the pictures of all rounds have converged.
+    pub converged: bool,
 }
 
 /// What a setting costs and gives.
@@ -106,6 +108,8 @@ pub struct Row {
     pub most_seconds: f64,
     /// √relMSE of the noise, with its interval of 95 %.
     pub noise: [f64; 3],
+    /// As [`Point::converged`].
+    pub converged: bool,
     /// relMSE of what is not noise.
     pub bias_squared: Figure,
     /// Red, green and blue over those of the reference.
@@ -328,6 +332,7 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
         seconds: end.seconds,
         most_seconds: tally.most_seconds(),
         noise: end.noise,
+        converged: end.converged,
         bias_squared: tally.bias_squared(reference),
         light: tally.light(reference),
         efficiency: match own / cost {

@@ -371,6 +371,18 @@ fn estimate(film: &Film, splats: Option<&SplatFilm>, gauge: &Gauge) -> Estimate 
     Estimate { error, unknown, resolved: Some((space, image)) }
 }
 
+/// Whether the interval of the error of `image`, the picture in the colours of `space`, can be believed.
+pub(super) fn converged(
+    film: &Film,
+    splats: Option<&SplatFilm>,
+    space: &[[f64; 3]; 3],
+    image: &Image,
+    gauge: &Gauge,
+) -> bool {
+    let values = Values::Colours(space, image);
+    told(film, splats.map(SplatFilm::splats), values, gauge).is_ok_and(|error| error.valid)
+}
+
 /// The error of `values`, where replicates tell one; it is known where nothing shines.
 fn told(
     film: &Film,

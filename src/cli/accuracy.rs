@@ -118,7 +118,7 @@ fn text(sheet: &Sheet) -> String {
 fn csv(sheets: &[Sheet]) -> String {
     let mut out = String::from(
         "scene,knob,value,samples,seconds,most_seconds,noise,noise_low,noise_high,bias_squared,bias_squared_error,red,\
-         red_error,green,green_error,blue,blue_error,efficiency,efficiency_error,seconds_to_target\n",
+         red_error,green,green_error,blue,blue_error,efficiency,efficiency_error,seconds_to_target,converged\n",
     );
     for sheet in sheets {
         for r in &sheet.rows {
@@ -128,7 +128,7 @@ fn csv(sheets: &[Sheet]) -> String {
             let _ = write!(out, ",{:e},{:e}", r.bias_squared.value, r.bias_squared.error);
             r.light.iter().for_each(|f| out += &format!(",{:e},{:e}", f.value, f.error));
             let target = r.to_target.map_or(String::new(), |t| format!("{t:e}"));
-            let _ = writeln!(out, ",{:e},{:e},{target}", r.efficiency.value, r.efficiency.error);
+            let _ = writeln!(out, ",{:e},{:e},{target},{}", r.efficiency.value, r.efficiency.error, r.converged);
         }
     }
     out

@@ -128,6 +128,7 @@ mod tests {
             seconds,
             most_seconds: seconds,
             noise: [noise; 3],
+            converged: true,
             bias_squared: Figure { value: bias_squared, error: 1e-6 },
             light,
             efficiency: Figure { value: 1.0 / (seconds * noise * noise), error: 0.05 },

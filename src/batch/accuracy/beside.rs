@@ -6,7 +6,7 @@
 use super::desk::{Outcome, Pass};
 use super::figures::Reference;
 use crate::batch::part::SplatFilm;
-use crate::batch::{Overrides, part_file};
+use crate::batch::{Overrides, frame, part_file};
 use crate::error::{Error, Result};
 use crate::film::resolve;
 use crate::spectrum::ColourSpace;
@@ -85,6 +85,9 @@ fn read(part: &Path, reference: Option<&Reference>) -> Result<Outcome> {
     let lights = || splats.as_ref().map(SplatFilm::splats);
     let replicates = resolve::replicates(&film, lights(), &space);
     let noise = reference.map_or(Vec::new(), |reference| reference.noise_of(&replicates));
-    let passes = vec![Pass { samples: written.header.finish.samples, seconds: written.header.seconds, noise }];
-    Ok(Outcome { image: resolve::resolve(&film, lights(), &space), replicates, passes })
+    let image = resolve::resolve(&film, lights(), &space);
+    let finish = &written.header.finish;
+    let converged = frame::converged(&film, splats.as_ref(), &space, &image, &finish.gauge());
+    let passes = vec![Pass { samples: finish.samples, seconds: written.header.seconds, noise, converged }];
+    Ok(Outcome { image, replicates, passes })
 }

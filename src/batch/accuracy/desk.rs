@@ -3,7 +3,7 @@
 use super::figures::{Reference, Replicates};
 use super::knobs::{self, Trial, Way};
 use super::{FEWEST, REFERENCE, Settings};
-use crate::batch::frame::{FrameJob, pass_end};
+use crate::batch::frame::{self, FrameJob, pass_end};
 use crate::batch::part::{Part, Share, SplatFilm};
 use crate::batch::prepare::prepare_scene;
 use crate::batch::{BatchEntry, Overrides, Prepared};
@@ -48,6 +48,8 @@ pub struct Pass {
     pub seconds: f64,
     /// noise² of each block; empty without a reference.
     pub noise: Vec<f64>,
+    /// Whether the picture's own interval of its error can be believed.
+    pub converged: bool,
 }
 
 impl<'a> Desk<'a> {
@@ -135,6 +137,12 @@ impl<'a> Desk<'a> {
             };
             parts.iter().map(of).reduce(|a, b| sum(a, &b)).map_or(Vec::new(), |all| over(all, parts.len()))
         };
+        let converged = |part: &Part| {
+            part.look(|film, splats| {
+                let image = resolve::resolve(film, splats.map(SplatFilm::splats), &space);
+                frame::converged(film, splats, &space, &image, &part.job().gauge)
+            })
+        };
         let (mut passes, mut elapsed, mut at) = (Vec::new(), Duration::ZERO, 0);
         while at < samples {
             let end = pass_end(at, samples);
@@ -147,7 +155,8 @@ impl<'a> Desk<'a> {
                 return Err(Error::Stopped("stopped before its sheet was done, which begins anew".into()));
             }
             let noise = reference.map_or(Vec::new(), |reference| reference.noise_of(&replicates()));
-            passes.push(Pass { samples: end, seconds: elapsed.as_secs_f64(), noise });
+            let converged = reference.is_some() && parts.iter().all(converged);
+            passes.push(Pass { samples: end, seconds: elapsed.as_secs_f64(), noise, converged });
             at = end;
         }
         let replicates = replicates();

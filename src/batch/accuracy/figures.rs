@@ -204,7 +204,10 @@ impl Tally {
     pub fn curve(&self) -> Vec<Point> {
         let point = |pass: usize| {
             let seconds = self.passes.iter().map(|round| round[pass].seconds).fold(f64::INFINITY, f64::min);
-            Point { samples: self.passes[0][pass].samples, seconds, noise: self.interval(self.noise_after(pass)) }
+            let (samples, noise) = (self.passes[0][pass].samples, self.interval(self.noise_after(pass)));
+            // Rounds that happened to miss rare bright paths look alike.
+            let converged = self.passes.iter().all(|round| round[pass].converged);
+            Point { samples, seconds, noise, converged }
         };
         (0..self.passes[0].len()).map(point).collect()
     }
@@ -306,7 +309,7 @@ mod tests {
         for round in 0..rounds {
             let outcome = outcome(seed * 100 + round, light, sigma);
             let noise = reference.noise_of(&outcome.replicates);
-            tally.add(Outcome { passes: vec![Pass { samples: 4, seconds: 1.0, noise }], ..outcome });
+            tally.add(Outcome { passes: vec![Pass { samples: 4, seconds: 1.0, noise, converged: true }], ..outcome });
         }
         tally
     }
@@ -345,7 +348,7 @@ mod tests {
     /// Two rounds of which one has twice the noise in all four blocks, 4 and 8 in all: their mean varies by 8/2, by blocks alone by 4 · ½/2.
     #[test]
     fn what_blocks_share_counts_for_the_error_of_the_noise() {
-        let round = |noise: f64| vec![Pass { samples: 4, seconds: 1.0, noise: vec![noise; 4] }];
+        let round = |noise: f64| vec![Pass { samples: 4, seconds: 1.0, noise: vec![noise; 4], converged: true }];
         let tally = Tally { passes: vec![round(1.0), round(2.0)], ..Tally::default() };
         let Figure { value, error } = tally.noise_squared();
         assert_eq!((value, error), (6.0, 2.0));

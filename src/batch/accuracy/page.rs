@@ -32,10 +32,10 @@ pub fn page(title: &str, command: &str, sheets: &[Sheet], without: &[(String, St
          <meta name=\"viewport\" content=\"width=device-width\"><style>{STYLE}</style></head><body>\n\
          <h1>What accuracy costs: {0}</h1>\n<p>Made by <code>{1}</code> with Abbe {2}.</p>\n\
          <p class=\"note\">Each knob is moved by itself around the chosen setting, on a small copy of the scene. Noise is √relMSE \
-         with its 95 % interval; bias is √relMSE of what several renders have in common against a reference of sixteen times the \
+         with its 95 % interval, which is withheld where a picture of one of the rounds has not converged; bias is √relMSE of what several renders have in common against a reference of sixteen times the \
          samples, or a closed form, given where it stands out by three standard errors, else what it is below by as many. Time is the least \
          of the renders (the most in brackets). Efficiency is 1 / (noise² · time) over that of the chosen setting; \
-         its standard error counts that of the noise and half of how far the times lie apart, of two renders all of it. In the plots bands are intervals, dashed lines biases, the dotted line the target.</p>\n",
+         its standard error counts that of the noise and half of how far the times lie apart, of two renders all of it. In the plots bands are intervals, hollow points are of pictures that have not converged, dashed lines biases, the dotted line the target.</p>\n",
         escaped(title),
         escaped(command),
         env!("CARGO_PKG_VERSION")
@@ -169,7 +169,10 @@ pub fn cells(row: &Row) -> [String; 10] {
         row.samples.to_string(),
         format!("{:.3} ({:.3})", row.seconds, row.most_seconds),
         per_cent(row.noise[0]),
-        format!("{}-{}", per_cent(row.noise[1]), per_cent(row.noise[2])),
+        match row.converged {
+            true => format!("{}-{}", per_cent(row.noise[1]), per_cent(row.noise[2])),
+            false => "not converged".to_owned(),
+        },
         row.bias().map_or(format!("<{}", per_cent(row.bias_bound())), per_cent),
         light.join(" "),
         match row.efficiency {
@@ -233,7 +236,8 @@ fn plot(chosen: &Row, rows: &[Row], target: f64) -> String {
         let colour = COLOURS[i.min(COLOURS.len() - 1)];
         let path = |of: usize, reverse: bool| {
             let at = |p: &super::Point| format!("{:.1} {:.1}", x(p.seconds), y(p.noise[of]));
-            let mut steps: Vec<String> = row.curve.iter().filter(|p| p.seconds > 0.0).map(at).collect();
+            let shown = |p: &&super::Point| p.seconds > 0.0 && (of == 0 || p.converged);
+            let mut steps: Vec<String> = row.curve.iter().filter(shown).map(at).collect();
             if reverse {
                 steps.reverse();
             }
@@ -242,17 +246,16 @@ fn plot(chosen: &Row, rows: &[Row], target: f64) -> String {
         if row.curve.is_empty() {
             continue;
         }
-        let _ = write!(
-            svg,
-            "<path d=\"M{}L{}Z\" fill=\"{colour}\" opacity=\"0.12\"/><path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.6\"/>",
-            path(1, false),
-            path(2, true),
-            path(0, false)
-        );
+        if row.curve.iter().any(|p| p.converged) {
+            let (low, high) = (path(1, false), path(2, true));
+            let _ = write!(svg, "<path d=\"M{low}L{high}Z\" fill=\"{colour}\" opacity=\"0.12\"/>");
+        }
+        let _ = write!(svg, "<path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.6\"/>", path(0, false));
         for p in row.curve.iter().filter(|p| p.seconds > 0.0) {
+            let fill = if p.converged { colour } else { "#fff" };
             let _ = write!(
                 svg,
-                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2\" fill=\"{colour}\"/>",
+                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2\" fill=\"{fill}\" stroke=\"{colour}\"/>",
                 x(p.seconds),
                 y(p.noise[0])
             );
