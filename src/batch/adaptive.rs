@@ -19,7 +19,7 @@
 //! λ comes from whole cells, every sixteenth of them. The pilot is a pure function of scene and settings, so that parts of a picture agree.
 //! Costs are counted in rays, not in seconds.
 
-use super::frame::{FrameJob, light_unit};
+use super::frame::FrameJob;
 use super::part::Breaks;
 use super::unit::render_unit;
 use crate::film::Window;
@@ -274,7 +274,6 @@ struct Tried {
 pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
     let seed = mix64(job.seed ^ STREAM);
     let shot = Shot { scene: job.scene, plan: job.plan, filter: job.filter, seed, photons: None };
-    let unit = light_unit(job.scene);
     let grid = Grid::of(job.window);
     let half = SIDE / 2;
     let each = first / REPLICATES as u32;
@@ -299,7 +298,7 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
                     let (sample, work) = transport::sample(&shot, place.map(|x| x as u32), replicate as u32, index);
                     rays += OVERHEAD + work.rays;
                     if Invalid::of(sample.radiance).is_none() {
-                        let rgb = ColourSpace::Rec709.from_xyz(sample.xyz.map(|x| x * unit * sample.weight));
+                        let rgb = ColourSpace::Rec709.from_xyz(sample.xyz.map(|x| x * sample.weight));
                         for (sum, x) in mean.iter_mut().zip(rgb) {
                             *sum += f64::from(x) / f64::from(each);
                         }

@@ -228,11 +228,6 @@ pub fn pass_end(at: u32, most: u32) -> u32 {
     doublings.into_iter().find(|end| *end > at).unwrap_or(most).min(most)
 }
 
-/// What light is multiplied by on its way to the film; a power of two.
-pub(super) fn light_unit(scene: &Scene) -> f32 {
-    f32::from_bits(((127 - scene.light_exponent) as u32) << 23)
-}
-
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }

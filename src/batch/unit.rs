@@ -1,7 +1,7 @@
 //! A work unit: some samples of the pixels of a tile.
 
 use super::adaptive::{self, Allocation};
-use super::frame::{FrameJob, light_unit};
+use super::frame::FrameJob;
 use super::splatting::{self, Block, Dealt, Pool};
 use crate::film::accumulate::{Invalid, REPLICATES, TileBuffer};
 use crate::film::layers::{self, Layout};
@@ -53,7 +53,7 @@ pub(super) fn render_unit(
             wanted.extend(indices.map(address));
         }
     };
-    let sums = Sums { tile, runs: Runs::default(), unit: light_unit(scene) };
+    let sums = Sums { tile, runs: Runs::default() };
     let mut unit = Unit { shot, moments, memory: Samples::default(), sums, pools: Vec::new(), numbers: Vec::new() };
     let window = unit.sums.tile.window();
     if plan.splatting {
@@ -129,7 +129,7 @@ impl Unit<'_> {
             pools.iter_mut().take(some.len()).for_each(|pool| pool.reset(channels));
             let mut give = |i: usize, pixel: [i32; 2], sample: &PixelSample, values: &[f32]| {
                 if sums.is_valid(pixel, some[i].0, sample) {
-                    let light = (sample.xyz.map(|x| x * sums.unit * sample.weight), sample.alpha * sample.weight);
+                    let light = (sample.xyz.map(|x| x * sample.weight), sample.alpha * sample.weight);
                     sums.check(pixel, sample.weight, values, numbers);
                     pools[i].add(block, shot.filter, (pixel, sample.place), light, numbers);
                 }
@@ -194,8 +194,6 @@ fn follow(
 struct Sums<'a> {
     tile: &'a mut TileBuffer,
     runs: Runs,
-    /// What light is multiplied by.
-    unit: f32,
 }
 
 /// Sums of pixels by replicate.
@@ -251,7 +249,7 @@ impl Sums<'_> {
         let replicate = stream as usize % REPLICATES;
         self.layer((index, place), replicate, sample.weight, values);
         if self.is_valid(pixel, stream, sample) {
-            let xyz = sample.xyz.map(|x| x * self.unit * sample.weight);
+            let xyz = sample.xyz.map(|x| x * sample.weight);
             let alpha = sample.alpha * sample.weight;
             if !self.runs.light[place][replicate].add(xyz, alpha) {
                 self.tile.add(pixel, replicate, xyz, alpha);

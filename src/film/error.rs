@@ -136,6 +136,8 @@ pub enum NoEstimate {
     Black,
     /// Pixels are so noisy that what they are divided by takes off more than there is.
     Noisy,
+    /// Values are more than 32-bit floats hold.
+    Overflow,
     /// Nothing differs between replicates, and some pixels are black: without noise, or of light that was not met.
     Unmet,
 }
@@ -147,6 +149,7 @@ impl fmt::Display for NoEstimate {
             NoEstimate::OnePixel => "fewer than two pixels have samples",
             NoEstimate::Black => "the picture is black",
             NoEstimate::Noisy => "the light of most pixels is too rare to tell how bright they are",
+            NoEstimate::Overflow => "values are more than 32-bit floats hold",
             NoEstimate::Unmet => "no pixel is noisy, but those that are black may have light that was not met",
         })
     }
@@ -201,6 +204,7 @@ pub fn relative_error(
     match all.pixels {
         0 => return Err(NoEstimate::FewReplicates),
         n if n == all.black => return Err(NoEstimate::Black),
+        _ if all.error.is_nan() => return Err(NoEstimate::Overflow),
         1 => return Err(NoEstimate::OnePixel),
         _ if all.noisy == 0 && all.black > 0 => return Err(NoEstimate::Unmet),
         _ if all.noisy > 0 && all.error <= 0.0 => return Err(NoEstimate::Noisy),
@@ -374,6 +378,16 @@ mod tests {
     fn an_estimate_below_nothing_is_unknown() {
         let rare = film_of(|pixel, replicate| if (pixel + replicate) % 4 < 2 { 3.0 } else { 0.0 });
         assert_eq!(estimate(&rare).unwrap_err(), NoEstimate::Noisy);
+    }
+
+    /// One value of a picture is infinite, and so is the mean that errors are relative to.
+    #[test]
+    fn the_error_of_what_floats_do_not_hold_is_unknown() {
+        let film = film(5, 8, 2, |_, u| 0.5 + u);
+        let mut image = resolve(&film, None, &IDENTITY);
+        image.rgb[0][5] = f32::INFINITY;
+        let error = relative_error(&film, None, Values::Colours(&IDENTITY, &image), 1.0, Some(1));
+        assert_eq!(error.unwrap_err(), NoEstimate::Overflow);
     }
 
     /// Half of the pixels as above, the others noisy by just as much as leaves something: the interval ends at numbers, which

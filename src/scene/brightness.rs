@@ -26,6 +26,12 @@ const ASKED: usize = 64;
 const MOST: i32 = 20;
 
 impl Scene {
+    /// What light is multiplied by before it is added up; a power of two.
+    #[must_use]
+    pub fn light_unit(&self) -> f32 {
+        f32::from_bits(((127 - self.light_exponent) as u32) << 23)
+    }
+
     /// The power of two by which a film divides the light of the scene, [`crate::film::accumulate::Film::exponent`]: 0 where
     /// the brightest of what its lights, of [`Light::power`] `powers`, and its fog show, and in `whitted` highlights and the
     /// `ambient` light, lies between 2⁻²⁴ and 2²⁰. A darker scene is raised to one, with 2³⁸ left above; a brighter one lowered

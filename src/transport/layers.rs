@@ -253,12 +253,18 @@ impl LayerPlan {
         one_over_two_to(self.exponent_of(source))
     }
 
+    /// And the light of a further `integrator`.
+    #[must_use]
+    pub fn unit_of_integrator(&self, integrator: &Integrator) -> f32 {
+        one_over_two_to(if matches!(integrator, Integrator::Depth) { self.length_exponent } else { self.exponent })
+    }
+
     /// Light in the terms of the picture.
     fn as_the_picture(&self, xyz: [f32; 3]) -> [f32; 3] {
         if self.in_xyz { xyz } else { rgb(&self.rgb_from_xyz, xyz) }
     }
 
-    /// What `light` that paths from the lights bring from a lamp of `group` adds to these channels.
+    /// What `light` that paths from the lights bring from a lamp of `group`, of which the film adds `xyz`, adds to these channels.
     pub fn append_traced(
         &self,
         scene: &Scene,
@@ -271,10 +277,10 @@ impl LayerPlan {
         for layer in &self.layers {
             let unit = self.unit_of(&layer.source);
             match layer.source {
-                Source::Band(i) => numbers.push(in_band(scene, i, wavelengths, light) * unit),
+                Source::Band(i) => numbers.push(in_band(scene, i, wavelengths, light * unit)),
                 Source::Ways(ways, of) => {
                     let counts = ways.holds(Way::Caustic) && of.is_none_or(|of| of == group);
-                    let light = xyz.map(|x| x * unit * self.sensitivity as f32);
+                    let light = xyz.map(|x| x * self.sensitivity as f32);
                     numbers.extend(if counts { self.as_the_picture(light) } else { [0.0; 3] });
                 }
                 Source::Surface(_) | Source::Seen(_) | Source::Light(..) | Source::Numerics | Source::Middle(_) => {}
@@ -347,17 +353,16 @@ fn channels(name: &str, components: &[&str], holds: Holds, exponent: i32) -> imp
 pub struct Seen {
     /// Radiance.
     pub radiance: Lanes,
-    /// CIE XYZ of it.
+    /// CIE XYZ of it, as sums count it.
     pub xyz: [f32; 3],
     /// Coverage.
     pub alpha: f32,
 }
 
 impl Seen {
-    /// The numbers of [`NUMERICS`], which the film multiplies with the filter's `weight`: they are no light. Light times `unit` is
-    /// what the film adds.
-    fn numerics(&self, counted: Counts, weight: f32, unit: f32) -> [f32; 8] {
-        let is_too_large = |x: &f32| (x * unit * weight).abs() >= SAMPLE_LIMIT;
+    /// The numbers of [`NUMERICS`], which the film multiplies with the filter's `weight`: they are no light.
+    fn numerics(&self, counted: Counts, weight: f32) -> [f32; 8] {
+        let is_too_large = |x: &f32| (x * weight).abs() >= SAMPLE_LIMIT;
         let overflow = || self.xyz.iter().any(is_too_large).then_some(Invalid::Overflow);
         let invalid = Invalid::of(self.radiance).or_else(overflow);
         let is = |cause| u64::from(invalid == Some(cause));
@@ -453,7 +458,7 @@ impl Values {
                 }
                 Source::Light(of, form) => {
                     let seen = of.map_or(own, |i| others[i]);
-                    let xyz = seen.xyz.map(|x| x * unit * sensitivity);
+                    let xyz = seen.xyz.map(|x| x * sensitivity);
                     match form {
                         Form::Xyz => put(numbers, xyz, squares.map(|factor| [factor; 3])),
                         Form::Rgba => {
@@ -463,22 +468,18 @@ impl Values {
                     }
                 }
                 Source::Band(i) => {
-                    put(numbers, [in_band(scene, i, wavelengths, own.radiance) * unit], squares.map(|factor| [factor]));
+                    put(numbers, [in_band(scene, i, wavelengths, own.radiance * unit)], squares.map(|factor| [factor]));
                 }
                 Source::Ways(ways, group) => {
                     let light = ledger.map_or(Lanes::ZERO, |ledger| ledger.light(ways, group));
-                    let xyz = observer::xyz(light, wavelengths).map(|x| x * unit * sensitivity);
+                    let xyz = observer::xyz(light * unit, wavelengths).map(|x| x * sensitivity);
                     numbers.extend(layers.as_the_picture(xyz));
                 }
                 // These stand in the pixel once.
                 Source::Middle(middle) => numbers.extend(middle.components().iter().map(|_| 0.0)),
                 Source::Numerics => {
-                    let unit = layers.unit_of(&Source::Light(None, Form::Xyz));
-                    put(
-                        numbers,
-                        own.numerics(counted.0, counted.1, unit),
-                        squares.map(|factor| [factor; NUMERICS.len()]),
-                    );
+                    let squares = squares.map(|factor| [factor; NUMERICS.len()]);
+                    put(numbers, own.numerics(counted.0, counted.1), squares);
                 }
             }
         }

@@ -52,12 +52,13 @@ pub struct Splat {
 }
 
 impl Splat {
-    /// CIE XYZ of the light.
+    /// CIE XYZ of the light times `unit`.
     #[must_use]
-    pub fn xyz(&self, wavelengths: &SampledWavelengths) -> [f32; 3] {
+    pub fn xyz(&self, unit: f32, wavelengths: &SampledWavelengths) -> [f32; 3] {
+        let light = self.light * unit;
         match self.alone {
-            Some(lane) => observer::xyz_of_lane(self.light, lane, wavelengths),
-            None => observer::xyz(self.light, wavelengths),
+            Some(lane) => observer::xyz_of_lane(light, lane, wavelengths),
+            None => observer::xyz(light, wavelengths),
         }
     }
 }

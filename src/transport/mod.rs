@@ -72,7 +72,7 @@ pub struct PixelSample {
     pub radiance: Lanes,
     /// Its wavelengths.
     pub wavelengths: SampledWavelengths,
-    /// CIE XYZ of the light.
+    /// CIE XYZ of the light, times [`Scene::light_unit`]: what f32 holds of bright light may be more in XYZ than it holds.
     pub xyz: [f32; 3],
     /// Coverage.
     pub alpha: f32,
@@ -343,8 +343,8 @@ impl Begun {
 
     /// What the film needs of the light.
     #[inline]
-    fn finish(&mut self) {
-        self.sample.xyz = observer::xyz(self.sample.radiance, &self.sample.wavelengths);
+    fn finish(&mut self, scene: &Scene) {
+        self.sample.xyz = observer::xyz(self.sample.radiance * scene.light_unit(), &self.sample.wavelengths);
     }
 
     /// Appends the numbers of the layers of the finished sample.
@@ -364,7 +364,8 @@ impl Begun {
             ledger,
             |integrator| {
                 let light = self.light(shot, sampler, integrator, shot.fog(integrator), None);
-                let xyz = observer::xyz(light.radiance, &wavelengths);
+                let unit = shot.plan.layers.unit_of_integrator(integrator);
+                let xyz = observer::xyz(light.radiance * unit, &wavelengths);
                 layers::Seen { radiance: light.radiance, xyz, alpha: light.alpha }
             },
         );
@@ -389,7 +390,7 @@ pub fn sample(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Pixe
     let integrator = &shot.plan.integrator;
     let light = begun.light(shot, &sampler, integrator, shot.fog(integrator), None);
     begun.see(&light);
-    begun.finish();
+    begun.finish(shot.scene);
     (begun.sample, Work { events: begun.events, rays: begun.rays(shot.scene) })
 }
 
@@ -483,7 +484,7 @@ impl Samples {
                 }
             }
         }
-        begun.iter_mut().for_each(Begun::finish);
+        begun.iter_mut().for_each(|begun| begun.finish(shot.scene));
         layers.numbers.clear();
         if !shot.plan.layers.layers.is_empty() {
             for (i, begun) in begun.iter().enumerate() {

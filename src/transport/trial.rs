@@ -104,7 +104,8 @@ fn try_out(shot: &Shot, each: u32) -> Tried {
                     let Incoming { radiance, events, .. } = light;
                     // A ray to the next vertex and one to a light from each.
                     rays += f64::from(1 + 2 * events);
-                    let rgb = ColourSpace::Rec709.from_xyz(observer::xyz(radiance, &wavelengths));
+                    let rgb =
+                        ColourSpace::Rec709.from_xyz(observer::xyz(radiance * shot.scene.light_unit(), &wavelengths));
                     for (sum, value) in sum.iter_mut().zip(rgb) {
                         *sum += f64::from(value) / f64::from(each);
                     }

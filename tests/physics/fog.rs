@@ -50,6 +50,18 @@ fn fog_hides_the_background() {
     }
 }
 
+/// XYZ is light over a density of wavelengths, some hundred times as much, of which f32 holds 3.4e38: the film's unit comes first.
+#[test]
+fn fog_is_as_bright_as_f32_holds() {
+    for integrator in ["path", "{whitted: {grid: 1}}"] {
+        let sky = "lights: [{constant: {radiance: 0.8}}]\n";
+        let scene = bench(&format!("integrator: {integrator}\nfog: {{colour: 1.0e38, density: 0.01}}\n{sky}"));
+        let picture = scene.grey().picture();
+        assert_eq!(picture.invalid, 0);
+        picture.assert_all(1e38, 1e33);
+    }
+}
+
 /// A tilted floor: each pixel has its own depth, and the fog is that of its ray's first hit.
 #[test]
 fn fog_follows_the_depth_of_each_pixel() {

@@ -1,7 +1,7 @@
 //! Paths from the lights of a part: which of them, and what they leave on the picture.
 
 use super::{Breaks, Part};
-use crate::batch::frame::{FrameJob, light_unit, lock};
+use crate::batch::frame::{FrameJob, lock};
 use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT};
 use crate::film::resolve::Splats;
 use crate::spectrum::SampledWavelengths;
@@ -211,16 +211,14 @@ impl Landed {
             self.invalid.record(cause);
             return;
         }
-        let unit = light_unit(scene);
-        let light = splat.xyz(wavelengths);
-        let xyz = light.map(|x| x * unit);
+        let xyz = splat.xyz(scene.light_unit(), wavelengths);
         // Told once, however many pixels it is dealt to.
         if xyz.iter().any(|x| x.abs() >= SAMPLE_LIMIT) {
             self.invalid.record(Invalid::Overflow);
             return;
         }
         let mut numbers = Vec::new();
-        plan.layers.append_traced(scene, wavelengths, splat.light, light, splat.group, &mut numbers);
+        plan.layers.append_traced(scene, wavelengths, splat.light, xyz, splat.group, &mut numbers);
         filter.deal(splat.place, window, |pixel, share| {
             self.pixels.push((pixel, xyz.map(|x| x * share)));
             self.numbers.extend(numbers.iter().map(|x| x * share));

@@ -71,7 +71,7 @@ struct Shown {
 pub(super) fn from_camera(shot: &Shot, moments: &[Scene], (pixels, each): (u32, u32)) -> Camera {
     let show = |pixel: [u32; 2], replicate: u32| {
         let mut shown = Shown::default();
-        let share = 1.0 / each as f32;
+        let share = shot.scene.light_unit() / each as f32;
         for index in 0..each {
             let scene = scene_at(shot.scene, moments, |count| moment(shot.seed, pixel, replicate, index, count));
             let (light, wavelengths) = probe(&Shot { scene, ..*shot }, pixel, replicate, index);

@@ -31,7 +31,7 @@ struct Landed {
 
 /// Paths `indices` of one round, in the order of their numbers.
 fn from_lights(paths: &LightPaths, seen: Option<&Seen>, round: u32, indices: Range<u64>) -> Vec<Landed> {
-    let [width, height] = paths.scene.camera.resolution.map(f64::from);
+    let (unit, [width, height]) = (paths.scene.light_unit(), paths.scene.camera.resolution.map(f64::from));
     let block_of = |place: DVec2| {
         let index = |x: f64, size: f64| ((x / size * BLOCKS as f64).max(0.0) as usize).min(BLOCKS - 1);
         index(place.y, height) * BLOCKS + index(place.x, width)
@@ -42,7 +42,7 @@ fn from_lights(paths: &LightPaths, seen: Option<&Seen>, round: u32, indices: Ran
             let mut splats: Vec<(DVec2, Colour)> = Vec::new();
             let (mut photons, mut collected) = (Photons::within(seen.map_or(1.0, |seen| seen.radius)), Vec::new());
             let traced = trace(paths, round, i, seen.map(|_| &mut photons), &mut |wavelengths, splat| {
-                let (pixel, colour) = (splat.place.floor(), Colour::of(splat.xyz(wavelengths)));
+                let (pixel, colour) = (splat.place.floor(), Colour::of(splat.xyz(unit, wavelengths)));
                 // Colours that come to one pixel together make up for each other.
                 match splats.iter_mut().find(|(p, _)| *p == pixel) {
                     Some((_, sum)) => *sum = *sum + colour,

@@ -29,6 +29,8 @@ pub(super) struct Seen {
     widened: f64,
     /// The first radius of merging, metres.
     pub radius: f64,
+    /// What light is multiplied by.
+    light_unit: f32,
 }
 
 /// Light that came to some pixels.
@@ -84,7 +86,13 @@ impl Seen {
         let pixels = size.x * size.y / (BLOCKS * BLOCKS * tries as usize) as f64;
         let widened = pixels.sqrt().max(1.0);
         let places = [Photons { together: places, ..Photons::over(1.0) }];
-        (radius > 0.0).then(|| Seen { map: PhotonMap::new(&places, 1, radius * widened), pixels, widened, radius })
+        (radius > 0.0).then(|| Seen {
+            map: PhotonMap::new(&places, 1, radius * widened),
+            pixels,
+            widened,
+            radius,
+            light_unit: scene.light_unit(),
+        })
     }
 
     /// Where the light of a photon, whose power is told over `unit_area`, would come to.
@@ -95,7 +103,7 @@ impl Seen {
         wavelengths: &SampledWavelengths,
         arrivals: &mut Vec<Arrival>,
     ) {
-        let light = photon.light.power * (LANES as f32 / photon.light.rho.reduce_add());
+        let light = photon.light.power * self.light_unit * (LANES as f32 / photon.light.rho.reduce_add());
         let scale = ALBEDO * unit_area / (PI * PI * self.radius * self.radius);
         let colour = Colour::of(observer::xyz(light, wavelengths));
         let (by_area, square) = (colour.y * scale, colour.square() * scale * scale);
