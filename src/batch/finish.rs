@@ -102,7 +102,7 @@ pub enum Sharing {
     All,
     /// Those near each other.
     Near {
-        /// [`Filter::span`](crate::film::filter::Filter::span), where light is splatted; else 1.
+        /// Where light is splatted, the more of [`Filter::span`](crate::film::filter::Filter::span) and [`EffectPlan::span`]; else 1.
         span: f64,
         /// [`Filter::overlap`](crate::film::filter::Filter::overlap), likewise.
         overlap: f64,
@@ -124,7 +124,7 @@ impl Sharing {
         let filter = splats.then(|| filter(&description.image.filter));
         let of = |part: fn(&Filter) -> f64| filter.as_ref().map_or(1.0, part);
         let cell = if plan.shares_cells() { adaptive::SIDE } else { 1 };
-        Sharing::Near { span: of(Filter::span), overlap: of(Filter::overlap), cell }
+        Sharing::Near { span: of(Filter::span).max(plan.span), overlap: of(Filter::overlap), cell }
     }
 }
 

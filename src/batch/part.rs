@@ -10,7 +10,7 @@
 //!
 //! A part can pause between two units of work and tell exactly what it has done: that is what a checkpoint holds.
 
-mod lights;
+pub(super) mod lights;
 
 use super::adaptive::{self, Allocation};
 use super::frame::{FrameJob, Milestone, lock};

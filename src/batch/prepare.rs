@@ -3,6 +3,7 @@
 use super::adaptive;
 use super::finish::{self, Finish, Sharing};
 use super::frame::{Frame, FrameJob, Gauge};
+use super::part::lights::paths_of;
 use super::stop::{self, Stop};
 use super::{Overrides, layers, motion, names, splatting};
 use crate::description::{self, BatchEntry, LayerContent, SceneDescription};
@@ -16,6 +17,7 @@ use crate::scene::compile;
 use crate::scene::shelf::Shelf;
 use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Channel, Layer, Source};
+use crate::transport::light;
 use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{
     Coverage, EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings,
@@ -212,6 +214,12 @@ pub(super) fn prepare_scene(
         (plan.reuse, plan.shadow_rays, plan.asks_even_sky) = (first.reuse, first.shadow_rays, first.asks_even_sky);
         plan.techniques.extend(first.said);
         plan.equiangular = first.equiangular;
+    }
+    // Where photons are merged all pixels share.
+    if plan.caustics.as_ref().is_none_or(|caustics| caustics.merging.is_none())
+        && let Some(paths) = paths_of(&plan, &scene, &moments, &filter, window(&description), seed)
+    {
+        plan.span = light::span(&paths, &filter, &window(&description));
     }
     let trials = choosing.elapsed();
     if overrides.check_numerics && !moments.is_empty() {

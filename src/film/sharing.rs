@@ -8,7 +8,8 @@ use crate::math::statistics::student_t_half_width;
 use std::collections::HashMap;
 
 /// For the value of `values` where it is most, of standard errors `errors` by pixel: what is splatted falls into `span` pixels
-/// together ([`Filter::span`](super::filter::Filter::span)). Where replicates tell nothing all of the variance may be of that.
+/// together, by the filter ([`Filter::span`](super::filter::Filter::span)) and since a path is seen in several. Where replicates tell
+/// nothing all of the variance may be of that.
 #[must_use]
 pub fn by_filter(splats: &Splats, values: Values, errors: &[&[f32]], span: f64) -> f64 {
     if are_unknown(errors) {

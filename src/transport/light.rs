@@ -11,7 +11,10 @@
 
 mod connect;
 mod packet;
+mod span;
 mod views;
+
+pub use span::span;
 
 use self::views::{Place, View};
 use super::caustics::{Caustics, Target};

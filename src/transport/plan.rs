@@ -161,6 +161,8 @@ pub struct EffectPlan {
     pub lit: bool,
     /// Wavelengths that part at glass that the camera looks at are followed together.
     pub packets: bool,
+    /// In how many pixels light of paths from the lights falls together ([`super::light::span()`]); 1 where there are none.
+    pub span: f64,
     /// Paths of pixels near each other share what they find.
     pub reuse: bool,
     /// Each sample goes to all pixels of its cell whose filters hold it.
@@ -375,6 +377,7 @@ impl EffectPlan {
             nested,
             depth_fog,
             packets: path && !census.dispersive.is_empty(),
+            span: 1.0,
             reuse: false,
             splatting: false,
             shadow_rays: 1,

@@ -2,14 +2,17 @@
 
 use super::{Breaks, Part};
 use crate::batch::frame::{FrameJob, lock};
+use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT};
+use crate::film::filter::FilterSampler;
 use crate::film::resolve::Splats;
+use crate::scene::Scene;
 use crate::spectrum::SampledWavelengths;
 use crate::transport;
 use crate::transport::light::{Bounds, LightPaths, Splat};
 use crate::transport::merge::{self, WavelengthCell};
 use crate::transport::photons::{PhotonMap, Photons};
-use crate::transport::plan::Integrator;
+use crate::transport::plan::{EffectPlan, Integrator};
 use glam::DVec2;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -171,6 +174,18 @@ fn pieces(paths: u64, own: &Range<u64>, there: &[Range<u64>]) -> Vec<(Range<u64>
 /// The paths from the lights that the plan calls for.
 pub(super) fn light_paths<'a>(job: &FrameJob<'a>) -> Option<LightPaths<'a>> {
     let FrameJob { scene, moments, plan, filter, window, seed, .. } = *job;
+    paths_of(plan, scene, moments, filter, window, seed)
+}
+
+/// The paths from the lights that `plan` calls for, with the light that `filter` deals to pixels of `window`.
+pub(in crate::batch) fn paths_of<'a>(
+    plan: &'a EffectPlan,
+    scene: &'a Scene,
+    moments: &'a [Scene],
+    filter: &FilterSampler,
+    window: Window,
+    seed: u64,
+) -> Option<LightPaths<'a>> {
     let (settings, caustics) = match &plan.integrator {
         Integrator::Light(settings) => (*settings, None),
         Integrator::Path(settings) => (settings.of_light_paths(), Some(plan.caustics.as_deref()?)),
