@@ -73,6 +73,37 @@ pub struct Choice {
     scale: f64,
 }
 
+/// In which lights are judged: their places and the points that ask, as f32.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    /// Its middle: that of the scene.
+    pub center: DVec3,
+    /// What is 1 or a little more in it: how far the scene reaches from there.
+    pub radius: f64,
+    /// The eye of the camera.
+    pub eye: DVec3,
+}
+
+/// By how many times as far as half of the lamps are from the eye a scene may reach: f32 then tells their places to 2⁻¹⁰ of that.
+const FAR: f64 = (1u64 << 14) as f64;
+
+impl Frame {
+    /// For `gifts`. Where something stands so far away that f32 does not tell places at all well that are about the eye, that is the
+    /// middle, and the distance from there within which half of the lamps are is 1.
+    fn about(self, gifts: &[Gift]) -> Frame {
+        let distance = |gift: &Gift| match gift {
+            Gift::Near(extent) => Some((extent.center - self.eye).length()),
+            Gift::Distant { .. } => None,
+        };
+        let mut distances: Vec<f64> = gifts.iter().filter_map(distance).collect();
+        distances.sort_by(f64::total_cmp);
+        match distances.len().checked_sub(1).map(|last| distances[last / 2]) {
+            Some(half) if half > 0.0 && self.radius > FAR * half => Frame { center: self.eye, radius: half, ..self },
+            _ => self,
+        }
+    }
+}
+
 /// A point that asks for light, and how it judges the lights.
 #[derive(Clone, Debug)]
 pub struct Asker {
@@ -106,26 +137,22 @@ struct Root {
 }
 
 impl Choice {
-    /// Of `lights` of [`Light::power`] `powers`, which count as often as `weights` say. `None` where every point would choose
-    /// alike.
+    /// Of `lights` of [`Light::power`] `powers`, which count as often as `weights` say, in a scene of this `frame`. `None` where every
+    /// point would choose alike.
     #[must_use]
-    pub fn of(
-        lights: &[Light],
-        powers: &[f64],
-        weights: &[f64],
-        objects: &[Object],
-        center: DVec3,
-        radius: f64,
-    ) -> Option<Choice> {
+    pub fn of(lights: &[Light], powers: &[f64], weights: &[f64], objects: &[Object], frame: Frame) -> Option<Choice> {
         if lights.len() < 2 {
             return None;
         }
+        let gifts: Vec<Gift> =
+            lights.iter().zip(powers).map(|(light, &power)| Gift::of(light, power, objects)).collect();
+        let Frame { center, radius, .. } = frame.about(&gifts);
         // A power of two, so that a scene times a power of two has the same tree; its square is finite.
         let scale = inverse_power_of_two(radius.clamp(1e-150, 1e150));
         let mut near = Vec::new();
         let mut distant = Vec::new();
-        for (((i, light), &power), &weight) in (0u32..).zip(lights).zip(powers).zip(weights) {
-            match Gift::of(light, power, objects) {
+        for ((i, gift), &weight) in (0u32..).zip(gifts).zip(weights) {
+            match gift {
                 Gift::Near(extent) => {
                     let intensity = weight * extent.intensity * scale * scale;
                     let center = (extent.center - center) * scale;
@@ -609,12 +636,18 @@ mod tests {
         assert!(arrived.iter().all(|&n| n > 100), "{arrived:?}");
     }
 
-    /// Two equal lamps at distances 1 and 3: nine to one, but for the share by power.
+    /// Two equal lamps at distances 1 and 3: nine to one, but for the share by power; also beside something that stands far away.
     #[test]
     fn the_nearer_of_two_equal_lamps_is_chosen_by_the_square_of_the_distance() {
-        let scene = scene(&(point(1.0, 3.0, 0.0, 1.0) + &point(-3.0, 3.0, 0.0, 1.0)), "");
-        let p = scene.asked(true).probability(0, DVec3::new(0.0, 3.0, 0.0), None, 0.0);
-        assert!((p - (BY_POWER * 0.5 + (1.0 - BY_POWER) * 0.9)).abs() < 1e-6, "{p}");
+        let far = |distance: &str| {
+            format!("- sphere: {{center: [0, -{distance}, 0], radius: 1, material: {{diffuse: {{}}}}}}\n")
+        };
+        for (shapes, off) in [(String::new(), 1e-6), (far("1.0e4"), 1e-3), (far("1.0e8"), 1e-6), (far("1.0e30"), 1e-6)]
+        {
+            let scene = scene(&(point(1.0, 3.0, 0.0, 1.0) + &point(-3.0, 3.0, 0.0, 1.0)), &shapes);
+            let p = scene.asked(true).probability(0, DVec3::new(0.0, 3.0, 0.0), None, 0.0);
+            assert!((p - (BY_POWER * 0.5 + (1.0 - BY_POWER) * 0.9)).abs() < off, "{shapes}{p}");
+        }
     }
 
     /// Of a thousand lamps in a cloud the mean over lamps of (share of the light / probability) · share, which is the

@@ -22,7 +22,7 @@ mod surface;
 use super::apart::put_apart;
 use super::bvh::{Aabb, Bvh};
 use super::camera::Camera;
-use super::choice::{Asked, Choice};
+use super::choice::{self, Asked, Choice};
 use super::equiangular;
 use super::few::Few;
 use super::instance::Group;
@@ -271,7 +271,8 @@ impl<'a> Compiler<'a> {
         let powers: Vec<f64> = lights.iter().map(|light| light.power(&objects, radius)).collect();
         let asked = |weights: &[f64]| {
             let by_power = lights::light_cdf(&powers, weights);
-            Asked::new(by_power, Choice::of(&lights, &powers, weights, &objects, center, radius))
+            let frame = choice::Frame { center, radius, eye: camera.eye() };
+            Asked::new(by_power, Choice::of(&lights, &powers, weights, &objects, frame))
         };
         let all_asked = asked(&weights);
         let is_even = |light: &Light| matches!(light, Light::Constant { .. });
