@@ -395,6 +395,17 @@ mod tests {
         );
     }
 
+    /// They would be black, and not add up to the picture.
+    #[test]
+    fn light_groups_belong_to_paths() {
+        for integrator in ["whitted", "depth", "none"] {
+            assert_eq!(
+                faults(&format!("integrator: {integrator}\nlayers: [Z, light_groups]\n")),
+                "dir/s.yaml:3:13: layers[1]: expected the integrator path, which knows the ways of light, found another"
+            );
+        }
+    }
+
     /// It would be black.
     #[test]
     fn a_layer_of_no_way_is_refused() {

@@ -300,12 +300,12 @@ impl SceneDescription {
             let taken = self.layers[..i].iter().any(|other| other.name == layer.name);
             let at = at.key("layers");
             layer.check(taken, at.index(i), &mut checker);
-            if let LayerContent::Ways { group, .. } = &layer.content {
+            if matches!(layer.content, LayerContent::Ways { .. } | LayerContent::LightGroups) {
                 let path = matches!(self.integrator, Integrator::Path(_));
                 checker.require(path, at.index(i), "the integrator path, which knows the ways of light", "another");
-                if let Some(group) = group {
-                    checker.known(at.index(i).key("light_group"), "light group", group, &groups);
-                }
+            }
+            if let LayerContent::Ways { group: Some(group), .. } = &layer.content {
+                checker.known(at.index(i).key("light_group"), "light group", group, &groups);
             }
         }
         self.render.check(at.key("render"), &mut checker);
