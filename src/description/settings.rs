@@ -161,7 +161,7 @@ pub struct WhittedIntegrator {
 
 impl WhittedIntegrator {
     /// Samples of a pixel: one a point of the grid, and at least four, because the wavelengths of
-    /// fewer would not do. The 32 of four sets integrate a colour to 0.5 %, the 8 of one set only to
+    /// fewer would not do. The 32 of four sets integrate the colour of smooth light to 0.5 %, the 8 of one set only to
     /// 10 %; with one point it is traced four times.
     #[must_use]
     pub fn samples(&self) -> u32 {

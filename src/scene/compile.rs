@@ -285,7 +285,10 @@ impl<'a> Compiler<'a> {
             written::Wavelengths::Visible => WavelengthDistribution::visible(),
             written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
         });
-        self.note_few_wavelengths(&wavelengths, &bands);
+        let coloured = d.image.bands.is_empty() && self.shelf.carried.wavelengths().is_none();
+        let lit = lights.iter().zip(&powers).filter(|(_, power)| coloured && **power > 0.0);
+        let emitters: Vec<Spectrum> = lit.flat_map(|(light, _)| light.spectra()).filter(|s| !s.is_black()).collect();
+        self.note_few_wavelengths(&wavelengths, &bands, &emitters);
         self.note_unused_filter();
         let ambient = match &d.integrator {
             written::Integrator::Whitted(whitted) => {

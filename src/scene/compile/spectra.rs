@@ -4,7 +4,7 @@ use super::super::{Band, load};
 use super::Compiler;
 use crate::description as written;
 use crate::error::{Error, in_short};
-use crate::spectrum::observer::quadrature;
+use crate::spectrum::observer::{quadrature, tristimulus, xyz};
 use crate::spectrum::{
     BAND_NM, LANES, Outside, SampledWavelengths, Spectrum, WavelengthDistribution, illuminant, upsample,
 };
@@ -182,8 +182,14 @@ impl Compiler<'_> {
         all
     }
 
-    /// Tells how far off `bands` are in even light where `whitted` has too few of `wavelengths` for them.
-    pub(super) fn note_few_wavelengths(&mut self, wavelengths: &WavelengthDistribution, bands: &[Band]) {
+    /// Tells how far off `bands` are in even light, and the colour of even light of the `emitters`, where `whitted` has too few
+    /// of `wavelengths` for them.
+    pub(super) fn note_few_wavelengths(
+        &mut self,
+        wavelengths: &WavelengthDistribution,
+        bands: &[Band],
+        emitters: &[Spectrum],
+    ) {
         let written::Integrator::Whitted(w) = &self.description.integrator else { return };
         // The lattice of a pixel: sets that begin evenly spread over the distance from lane to lane.
         let sets = w.samples();
@@ -205,11 +211,34 @@ impl Compiler<'_> {
             );
             self.note("integrator.whitted", &message);
         }
+        // Of X, Y and Z, over the largest.
+        let off = |light: &Spectrum| {
+            let exact = tristimulus(light);
+            let found = drawn.iter().fold([0.0; 3], |sum: [f64; 3], w| {
+                let one = xyz(light.eval(w.nm), w);
+                std::array::from_fn(|c| sum[c] + f64::from(one[c]) / f64::from(sets))
+            });
+            let largest = exact.iter().fold(0.0, |a: f64, b| a.max(*b));
+            (0..3).map(|c| (found[c] - exact[c]).abs() / largest).fold(0.0, f64::max)
+        };
+        let worst = emitters.iter().map(off).fold(0.0, f64::max);
+        if worst > WORST_COLOUR {
+            let message = format!(
+                "{} wavelengths a pixel are few for the spectra of the lamps: their colour is off by up to {:.1} %; a larger grid \
+                 has more",
+                drawn.len() * LANES,
+                100.0 * worst
+            );
+            self.note("integrator.whitted", &message);
+        }
     }
 }
 
 /// How far off a band may be by the wavelengths of `whitted` without a word.
 const WORST_BAND: f64 = 0.1;
+
+/// How far off the colour of a lamp may be by them.
+const WORST_COLOUR: f64 = 0.01;
 
 /// The smallest f32 that is not below `nm`.
 fn not_below(nm: f64) -> f32 {
@@ -295,6 +324,30 @@ mod tests {
         assert!(told.len() == 1 && parts.iter().all(|part| told[0].contains(part)), "{told:?}");
         for (integrator, bands) in [("{whitted: {grid: 8}}", 31), ("whitted", 2), ("path", 31)] {
             assert_eq!(notes(integrator, bands), [""; 0], "{integrator} {bands}");
+        }
+    }
+
+    /// The white of F12 has lines of a few nanometres, of which 32 wavelengths miss or double some; 512 lie 1 nm apart and less.
+    /// Of daylight, of a black body and of one line 32 are enough, as each jump has its share. Light of no power is not
+    /// looked at, nor is that of a picture of bands, which has no colour.
+    #[test]
+    fn lamps_that_have_few_wavelengths_are_told() {
+        let notes = |settings: &str, lamp: &str| {
+            compiled(&format!("{settings}\nlights: [constant: {{radiance: {lamp}}}]")).unwrap().notes
+        };
+        let told = notes("integrator: whitted", "{illuminant: F12}");
+        let words = "32 wavelengths a pixel are few for the spectra of the lamps: their colour is off by up to";
+        assert!(told.len() == 1 && told[0].contains(words), "{told:?}");
+        for (settings, lamp) in [
+            ("integrator: path", "{illuminant: F12}"),
+            ("integrator: {whitted: {grid: 8}}", "{illuminant: F12}"),
+            ("integrator: whitted\nimage: {bands: [{name: all, response: 1}]}", "{illuminant: F12}"),
+            ("integrator: whitted", "{illuminant: {name: F12, scale: 0}}"),
+            ("integrator: whitted", "{illuminant: D65}"),
+            ("integrator: whitted", "{blackbody: {kelvin: 2800}}"),
+            ("integrator: whitted", "{lines: [{nm: 589}]}"),
+        ] {
+            assert_eq!(notes(settings, lamp), [""; 0], "{settings} {lamp}");
         }
     }
 
