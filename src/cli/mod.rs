@@ -62,7 +62,7 @@ enum Verb {
     #[command(after_help = "Example:\n  abbe export configs/scenes/flint.yaml -o flint.xml")]
     Export(ConvertArguments),
     /// Say whether two EXR files show the same picture, within their noise (exit 0 same, 1 different, 2 of different
-    /// size or channels or the answer could not be written, 3 missing or damaged)
+    /// size or channels, too few pixels or the answer could not be written, 3 missing or damaged)
     #[command(after_help = "Example:\n  abbe compare ours.exr theirs.exr --json figures.json")]
     Compare(CompareArguments),
     /// Say what is in a picture: size, colours, layers and their numbers, error, camera, scene

@@ -25,6 +25,7 @@ mod noise;
 mod table;
 
 use crate::film::exr::{ExrFile, Samples};
+use crate::math::statistics::normal_two_sided_p;
 use channels::{not_compared, pairs};
 use noise::Pair;
 use std::collections::BTreeSet;
@@ -69,7 +70,7 @@ pub enum Verdict {
     Same,
     /// A test does, or there are values that are not finite.
     Different,
-    /// The pictures are of different things.
+    /// The pictures are of different things, or of too few pixels to tell.
     CannotCompare,
 }
 
@@ -234,14 +235,14 @@ fn judge(c: &Comparison, count: usize, options: &CompareOptions) -> (Verdict, St
         return (Verdict::Same, "all compared values are identical".to_string());
     }
     let level = GLOBAL_ALPHA / c.channels.len() as f64;
-    let biased = c.channels.iter().find(|channel| {
-        // A ratio that is not a number (reference black) is beyond any tolerance.
-        let within = (channel.mean_ratio - 1.0).abs() <= options.mean_tolerance;
-        channel.global_p < level && !within
-    });
+    // A ratio that is not a number (reference black) is beyond any tolerance.
+    let is_within = |channel: &ChannelFigures| {
+        channel.max_difference == 0.0 || (channel.mean_ratio - 1.0).abs() <= options.mean_tolerance
+    };
+    let biased = c.channels.iter().find(|channel| channel.global_p < level && !is_within(channel));
     if let Some(channel) = biased {
         let reason = format!(
-            "the mean of {} differs: ratio {:.5} ± {:.5}, {:.1} standard errors",
+            "the mean of {} differs: ratio {:.5} ± {:.5}, z {:.1}",
             channel.name, channel.mean_ratio, channel.mean_ratio_error, channel.global_z
         );
         return (Verdict::Different, reason);
@@ -257,6 +258,11 @@ fn judge(c: &Comparison, count: usize, options: &CompareOptions) -> (Verdict, St
                 n => format!(" ({n} pixels without a standard error: not tested singly)"),
             };
             (Verdict::Same, format!("means and pixels agree within their noise{untested}"))
+        }
+        // Of n differences Σd/√Σd² is √n at the most, whatever they are.
+        None if normal_two_sided_p((c.pixels as f64).sqrt()) >= level && !c.channels.iter().all(is_within) => {
+            let few = format!("{} pixels are too few to judge by their differences alone", c.pixels);
+            (Verdict::CannotCompare, few + "; output.exr.stderr writes standard errors")
         }
         None => (Verdict::Same, "means agree within the noise (no variances: single pixels not tested)".to_string()),
     }

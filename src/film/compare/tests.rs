@@ -119,6 +119,34 @@ fn one_per_cent_of_bias_is_seen_by_the_global_test_alone() {
     }
 }
 
+/// By differences alone n pixels have a score of √n at the most, whatever they hold: 12 have p = 5.3e-4 and 13 have 3.1e-4, and
+/// of three channels each is judged at 3.3e-4. Fewer are not called the same for that.
+#[test]
+fn a_few_pixels_without_standard_errors_are_not_judged() {
+    let flat = |width: u32, value: f32, error: Option<f32>| {
+        let window = Window::full(width, 1);
+        let plane = |value: f32| vec![value; window.pixels()];
+        let errors = error.iter().flat_map(|e| ["R", "G", "B"].map(|n| (format!("stderr.{n}"), plane(*e))));
+        let channels = ["R", "G", "B"].map(|n| (n.to_string(), plane(value))).into_iter().chain(errors).collect();
+        ExrFile {
+            display: window,
+            chromaticities: None,
+            parts: vec![ExrPart { name: None, window, channels, integers: Vec::new(), texts: Vec::new() }],
+        }
+    };
+    let verdict = |width: u32, value: f32, error: Option<f32>, mean_tolerance: f64| {
+        let options = CompareOptions { mean_tolerance, ..CompareOptions::default() };
+        compare(&flat(width, value, error), &flat(width, 1.0, error), &options).verdict
+    };
+    for width in [1, 12] {
+        assert_eq!(verdict(width, 100.0, None, 0.0), Verdict::CannotCompare, "{width}");
+        assert_eq!(verdict(width, 1.0, None, 0.0), Verdict::Same, "{width}");
+        assert_eq!(verdict(width, 1.01, None, 0.02), Verdict::Same, "{width}");
+        assert_eq!(verdict(width, 100.0, Some(0.01), 0.0), Verdict::Different, "{width}");
+    }
+    assert_eq!(verdict(13, 100.0, None, 0.0), Verdict::Different);
+}
+
 /// The ratio's standard error against theory: √2 · 0.15/64 / 1.5 = 0.0022 (B as noisy as A).
 #[test]
 fn the_error_of_the_ratio_is_that_of_the_noise() {
