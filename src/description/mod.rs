@@ -54,7 +54,8 @@
 //!                                   #           lights to the camera
 //!                                   #   {whitted: {max_depth: 10, grid: 2, ambient: 0,
 //!                                   #              transparent_shadows: false}},
-//!                                   #   depth: the distance to the first surface, m; none: black
+//!                                   #   depth: the distance to the first surface, m, as light that is even over the spectrum: Y
+//!                                   #           is it, red, green and blue are 1.2, 0.95 and 0.91 of it; none: black
 //!                                   # max_depth of a path counts segments: 1 emission, 2 direct light;
 //!                                   # hide_emitters: lights that the camera sees itself are left out, with the shapes that
 //!                                   # shine; by light_tracer their light alone, as by Mitsuba's ptracer;
@@ -269,7 +270,8 @@
 //! - disk: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1}            # ~ center origin
 //! - rectangle: {corner: [0, 0, 0], edge_u: [1, 0, 0], edge_v: [0, 0, -1]}   # normal edge_u × edge_v
 //! - cube: {center: [0, 0, 0], size: [1, 2, 3]}                         # ~ center origin; or size: 2
-//!                                   # sphere and cube: layout: y_up ~ or z_up, how u and v lie on them
+//!                                   # sphere and cube: layout: how u and v lie on them, y_up ~ with the top of pictures at +y
+//!                                   # and, of a sphere, their middle at +z, or z_up, as in Mitsuba
 //! - cylinder: {base: [0, 0, 0], top: [0, 1, 0], radius: 0.5, caps: both}    # ~ both, none, base, top;
 //!                                   # seam: [1, 0, 0] is where u = 0, as seen from the axis, ~ chosen
 //! - cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 0.5, cap: true}   # ~ cap
@@ -294,8 +296,9 @@
 //! - directional: {direction: [0, -1, 0], irradiance: 3, angle_deg: 0}  # W·m⁻²·nm⁻¹; ~ angle_deg: of the disc it comes from
 //! - constant: {radiance: 0.1}                                          # W·m⁻²·sr⁻¹·nm⁻¹
 //! - environment: {file: sky.exr, scale: 1, rotate_deg: 0, mapping: texels, transform: [{scale: [-1, 1, 1]}]}
-//!                                   # ~ all but file; rotate_deg is about y; mapping: texels, mitsuba: where rows and
-//!                                   # columns lie; transform as of shapes: turns and mirrors
+//!                                   # ~ all but file; rotate_deg is about y; mapping: columns to the right turn from -z toward
+//!                                   # +x, from the middle of the picture (texels) or from its left edge, with the first and the
+//!                                   # last row at the poles (mitsuba); transform as of shapes: turns and mirrors
 //! - sky:                            # a clear day, in W·m⁻²·sr⁻¹·nm⁻¹: zenith +y, north -z, east +x
 //!     sun: {elevation_deg: 40, azimuth_deg: 120}   # ~ azimuth_deg: 0, from north toward east; or
 //!                                   # direction: [1, 2, 3], toward it in the world; or latitude_deg, longitude_deg and,
