@@ -8,21 +8,26 @@
 use super::prepare::hash_text;
 use crate::description::{SceneDescription, ShutterTimes};
 use crate::error::Result;
-use crate::scene::Scene;
 use crate::scene::bvh::Aabb;
 use crate::scene::census::Census;
 use crate::scene::compile;
+use crate::scene::curves::Curves;
 use crate::scene::shelf::Shelf;
+use crate::scene::{Geometry, Scene};
 use crate::transport::middle;
 use crate::transport::plan::{Effect, Integrator};
 use glam::{DMat4, DVec2, DVec3, DVec4};
+use std::collections::HashSet;
+use std::sync::Arc;
 
 /// Moments where little moves: what turns in its place moves by no more than this tells.
 const LEAST: u32 = 16;
 /// Moments where much does.
 const MOST: u32 = 64;
-/// Triangles of all moments, each of which has its own: 130 bytes each.
-const TRIANGLES: usize = 16_000_000;
+/// Bytes of the triangles and the curves that move, of which each moment has its own.
+const BYTES: usize = 16_000_000 * TRIANGLE;
+/// Bytes of a triangle and of its share of what finds it.
+const TRIANGLE: usize = 130;
 /// Places along each side of the picture at which planes and skies are looked at.
 const PLACES: u32 = 5;
 
@@ -67,12 +72,18 @@ pub fn moments(
         Some(count) => (count, "as the scene says".to_owned()),
         None => {
             let mut at = |time| compile::compile_with(&motion.at(time)?, name, shelf);
-            let way = travelled(&at(open)?, &at(close)?);
-            let triangles = Census::of(still).triangles.max(1);
+            let (open, close) = (at(open)?, at(close)?);
+            let way = travelled(&open, &close);
+            let (triangles, curves) = (Census::of(still).triangles, moving_curves(&open, &close));
             let count = (way.round() as u32).clamp(LEAST, MOST);
-            let fits = (TRIANGLES / triangles).clamp(2, MOST as usize) as u32;
+            let fits = moments_that_fit(triangles, curves);
             let what = format!("what moves travels {way:.0} pixels");
-            if count > fits { (fits, format!("{what}; each has {triangles} triangles")) } else { (count, what) }
+            if count > fits {
+                let curves = if curves == 0 { String::new() } else { format!(", curves of {} MB", curves / 1_000_000) };
+                (fits, format!("{what}; each has {triangles} triangles{curves}"))
+            } else {
+                (count, what)
+            }
         }
     };
     let time = |k: u32| open + (close - open) * (f64::from(k) + 0.5) / f64::from(count);
@@ -90,6 +101,23 @@ pub fn moments(
 #[must_use]
 pub fn census(still: &Scene, moments: &[Scene]) -> Census {
     moments.iter().map(Census::of).fold(Census::of(still), Census::join)
+}
+
+/// Bytes of the curves of a moment that do not stand where they do in another: those that do are there once.
+fn moving_curves(open: &Scene, close: &Scene) -> usize {
+    fn curves(scene: &Scene) -> impl Iterator<Item = &Arc<Curves>> {
+        scene.objects.iter().filter_map(|object| match &object.geometry {
+            Geometry::Curves(curves) => Some(curves),
+            _ => None,
+        })
+    }
+    let standing: HashSet<*const Curves> = curves(open).map(Arc::as_ptr).collect();
+    curves(close).filter(|curves| !standing.contains(&Arc::as_ptr(curves))).map(|curves| curves.bytes()).sum()
+}
+
+/// How many moments have room, of so many triangles and bytes of curves each.
+fn moments_that_fit(triangles: usize, curves: usize) -> u32 {
+    (BYTES / (triangles * TRIANGLE + curves).max(1)).clamp(2, MOST as usize) as u32
 }
 
 /// The longest way between two moments, pixels, of the corner of a box, and of what has no end at places that are spread over
@@ -115,4 +143,40 @@ fn travelled(open: &Scene, close: &Scene) -> f64 {
     let spread = |i: u32| (DVec2::new(f64::from(i % PLACES), f64::from(i / PLACES)) + 0.5) / f64::from(PLACES);
     let endless = (0..PLACES * PLACES).filter_map(|i| middle::passes(open, close, spread(i) * size));
     ways.chain(endless).fold(0.0, f64::max).min(across)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 65 MB a moment 32 are 2.08 GB, however the bytes are shared out; what takes none leaves as many as there may be, and
+    /// what takes too much the two ends.
+    #[test]
+    fn triangles_and_curves_that_move_leave_room_for_fewer_moments() {
+        assert_eq!(moments_that_fit(500_000, 0), 32);
+        assert_eq!(moments_that_fit(0, 65_000_000), 32);
+        assert_eq!(moments_that_fit(250_000, 32_500_000), 32);
+        assert_eq!([moments_that_fit(0, 0), moments_that_fit(0, usize::MAX >> 1)], [MOST, 2]);
+    }
+
+    /// Two tufts of the same hairs, of which one moves: its bytes are those that each moment has.
+    #[test]
+    fn curves_that_stand_cost_moments_nothing() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("hair.txt"), "0 0 0 0.1\n0 1 0 0.1\n\n1 0 0 0.1\n1 1 0 0.1\n").unwrap();
+        let mut shelf = Shelf::default();
+        let mut at = |x: f64| {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\n\
+                 shapes:\n- curves: {{file: hair.txt, basis: linear}}\n\
+                 - curves: {{file: hair.txt, basis: linear, transform: [{{translate: [{x}, 0, 0]}}]}}\n"
+            );
+            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
+            compile::compile_with(&description, "s", &mut shelf).unwrap()
+        };
+        let (open, close) = (at(3.0), at(4.0));
+        let Geometry::Curves(moved) = &close.objects[1].geometry else { panic!("curves") };
+        assert_eq!(moving_curves(&open, &close), moved.bytes());
+        assert_eq!(moving_curves(&open, &at(3.0)), 0);
+    }
 }

@@ -252,6 +252,8 @@ pub(super) fn prepare_scene(
             Some(Box::new(scene))
         }
     };
+    // They were for moments: rendering would only hold them, beside the curves that were made of them.
+    shelf.strands = Default::default();
     let source = entry.path.clone();
     let prepared = Prepared { description, scene, moments, plan, samples, planned, stop, hash, source, next, trials };
     check_files(&prepared)?;

@@ -68,6 +68,7 @@ use shape::Detail;
 use shape::Shape;
 pub use shape::SurfacePoint;
 use std::path::PathBuf;
+use std::sync::Arc;
 use texture::TexturePoint;
 use watch::Watch;
 
@@ -235,8 +236,8 @@ pub enum Geometry {
     Mesh(Box<TriangleMesh>),
     /// A signed distance on a grid.
     Sdf(Box<SdfGrid>),
-    /// Curves with a thickness.
-    Curves(Box<Curves>),
+    /// Curves with a thickness. Scenes in which they have the same place share them.
+    Curves(Arc<Curves>),
     /// A copy of a group. No hit names it: the child is the object that was met.
     Instance(Box<Instance>),
 }

@@ -1,12 +1,15 @@
 //! What one scene of a batch has read, for the next one that names the same files.
 //!
 //! Frames of a batch mostly share their pictures, meshes and volumes, and reading those can cost more than a small frame.
-//! Pictures and volumes are kept as they are rendered (decoded and upsampled), meshes as they were read. What a scene does
-//! not ask for is forgotten after it, so that a batch of any length holds what one scene holds. A file that has changed is
-//! read again. The tables of coats, which take some 20 ms each, are kept as well, for all that have the same coat.
+//! Pictures and volumes are kept as they are rendered (decoded and upsampled), and so are distance grids; meshes as they were
+//! read; curves where they stand. What a scene does not ask for is forgotten after it, so that a batch of any length holds what
+//! one scene holds. A file that has changed is read again. The tables of coats, which take some 20 ms each, are kept as well,
+//! for all that have the same coat.
 
+use super::curves::{Basis, Curves, Strands};
 use super::environment::Environment;
 use super::mesh::MeshSource;
+use super::sdf::Distances;
 use super::texture::{DataImage, ImageTexture};
 use super::volume::Unplaced;
 use crate::optics::microfacet::{Distribution, Microfacets};
@@ -26,18 +29,22 @@ fn stamp(path: &Path) -> Option<Stamp> {
     Some((data.len(), data.modified().ok()))
 }
 
-/// Things that were made of files: of each file, of as many kinds as there are `K`.
-#[derive(Debug)]
-pub struct Kept<K, V> {
-    things: HashMap<(PathBuf, K), Thing<V>>,
-}
-
 #[derive(Debug)]
 struct Thing<V> {
     made: V,
-    of: Stamp,
     /// Whether the scene at hand has asked for it.
     wanted: bool,
+}
+
+/// Keeps what was asked for since the last call.
+fn forget<K, V>(things: &mut HashMap<K, Thing<V>>) {
+    things.retain(|_, thing| std::mem::take(&mut thing.wanted));
+}
+
+/// Things that were made of files as they were then: of each file, of as many kinds as there are `K`.
+#[derive(Debug)]
+pub struct Kept<K, V> {
+    things: HashMap<(PathBuf, K), Thing<(V, Stamp)>>,
 }
 
 impl<K, V> Default for Kept<K, V> {
@@ -50,15 +57,16 @@ impl<K: Eq + Hash, V: Clone> Kept<K, V> {
     /// Whether `key` is here, made of `path` as it is now.
     #[must_use]
     pub fn has(&self, path: &Path, key: K) -> bool {
-        self.things.get(&(path.to_path_buf(), key)).is_some_and(|thing| stamp(path) == Some(thing.of))
+        self.things.get(&(path.to_path_buf(), key)).is_some_and(|thing| stamp(path) == Some(thing.made.1))
     }
 
     /// What is here, made of `path` as it is now.
     pub fn find(&mut self, path: &Path, key: K) -> Option<V> {
         let thing = self.things.get_mut(&(path.to_path_buf(), key))?;
-        (stamp(path) == Some(thing.of)).then(|| {
+        let (made, of) = &thing.made;
+        (stamp(path) == Some(*of)).then(|| {
             thing.wanted = true;
-            thing.made.clone()
+            made.clone()
         })
     }
 
@@ -77,13 +85,13 @@ impl<K: Eq + Hash, V: Clone> Kept<K, V> {
         let of = stamp(path);
         let made = make()?;
         if let Some(of) = of {
-            self.things.insert((path.to_path_buf(), key), Thing { made: made.clone(), of, wanted: true });
+            self.things.insert((path.to_path_buf(), key), Thing { made: (made.clone(), of), wanted: true });
         }
         Ok(made)
     }
 
     fn forget(&mut self) {
-        self.things.retain(|_, thing| std::mem::take(&mut thing.wanted));
+        forget(&mut self.things);
     }
 }
 
@@ -93,26 +101,28 @@ type CoatKey = ([u64; 2], Option<(Distribution, [u64; 2])>, DiffuseMean);
 /// The tables of coats.
 #[derive(Debug, Default)]
 pub struct KeptCoats {
-    /// And whether the scene at hand has asked for them.
-    tables: HashMap<CoatKey, (Arc<Coats>, bool)>,
+    tables: HashMap<CoatKey, Thing<Arc<Coats>>>,
 }
 
 impl KeptCoats {
     /// [`Coats::new`], computed once.
     pub fn get(&mut self, [low, high]: [f64; 2], facets: Option<&Microfacets>, mean: DiffuseMean) -> Arc<Coats> {
         let rough = facets.map(|facets| (facets.distribution, [facets.alpha, facets.ratio].map(f64::to_bits)));
-        let compute = || (Arc::new(Coats::new(low, high, facets, mean)), true);
-        let (tables, wanted) = self.tables.entry(([low, high].map(f64::to_bits), rough, mean)).or_insert_with(compute);
-        *wanted = true;
-        tables.clone()
+        let compute = || Thing { made: Arc::new(Coats::new(low, high, facets, mean)), wanted: true };
+        let tables = self.tables.entry(([low, high].map(f64::to_bits), rough, mean)).or_insert_with(compute);
+        tables.wanted = true;
+        tables.made.clone()
     }
 
     fn forget(&mut self) {
-        self.tables.retain(|_, (_, wanted)| std::mem::take(wanted));
+        forget(&mut self.tables);
     }
 }
 
-/// Pictures, skies, meshes, volumes and coats.
+/// A place and what control points mean: what makes curves of one file differ. Numbers as bits.
+pub type CurvesKey = ([u64; 12], Basis);
+
+/// Pictures, skies, meshes, volumes, distance grids, curves and coats.
 #[derive(Debug, Default)]
 pub struct Shelf {
     /// What they are made for: others have a shelf of their own.
@@ -127,6 +137,12 @@ pub struct Shelf {
     pub meshes: Kept<u32, Arc<MeshSource>>,
     /// Volumes, as colours or raw. They share their voxels, wherever they are placed.
     pub volumes: Kept<bool, Unplaced>,
+    /// Distance grids. They share their numbers, wherever they are placed.
+    pub distances: Kept<(), Distances>,
+    /// Curves as their files have them, while the moments of a scene are made.
+    pub strands: Kept<(), Arc<Strands>>,
+    /// Curves in the world, which are one wherever they stay in their place.
+    pub curves: Kept<CurvesKey, Arc<Curves>>,
     /// Tables of the coats of plastics.
     pub coats: KeptCoats,
 }
@@ -139,6 +155,9 @@ impl Shelf {
         self.skies.forget();
         self.meshes.forget();
         self.volumes.forget();
+        self.distances.forget();
+        self.strands.forget();
+        self.curves.forget();
         self.coats.forget();
     }
 }

@@ -7,12 +7,15 @@ use crate::error::{Error, Result};
 /// A control point: x, y, z and radius.
 pub type ControlPoint = [f64; 4];
 
+/// The control points of each curve of a file.
+pub type Strands = Vec<Vec<ControlPoint>>;
+
 /// Reads a file of curves.
 ///
 /// # Errors
 /// [`Error::Input`] with the line: no file, a line without four finite numbers, a negative radius, no
 /// curve at all.
-pub fn load(path: &Path) -> Result<Vec<Vec<ControlPoint>>> {
+pub fn load(path: &Path) -> Result<Strands> {
     let bytes = crate::input::read(path).map_err(|e| Error::input(path, format!("cannot read: {e}")))?;
     let text = std::str::from_utf8(crate::input::without_mark(&bytes));
     let text = text.map_err(|_| Error::input(path, "expected text, found other bytes"))?;
@@ -23,8 +26,8 @@ pub fn load(path: &Path) -> Result<Vec<Vec<ControlPoint>>> {
 ///
 /// # Errors
 /// The first fault in words.
-pub fn parse(text: &str) -> std::result::Result<Vec<Vec<ControlPoint>>, String> {
-    let mut curves: Vec<Vec<ControlPoint>> = Vec::new();
+pub fn parse(text: &str) -> std::result::Result<Strands, String> {
+    let mut curves = Strands::new();
     let mut open = false;
     for (i, line) in text.lines().enumerate() {
         let line = line.trim();

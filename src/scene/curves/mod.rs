@@ -20,7 +20,7 @@ mod plain;
 mod tests;
 mod tube;
 
-pub use file::{ControlPoint, load};
+pub use file::{ControlPoint, Strands, load};
 
 use super::bvh::{Aabb, Bvh};
 use super::shape::SurfacePoint;
@@ -30,7 +30,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use tube::{RaySpace, Tube};
 
 /// What control points mean.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Basis {
     /// Straight lines from point to point.
     Linear,

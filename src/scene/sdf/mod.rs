@@ -31,6 +31,7 @@ use crate::math::{Frame, Ray};
 use cubic::Cubic;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Where the shading normals of a grid come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,22 +42,30 @@ pub enum SdfNormals {
     Smooth,
 }
 
+/// A signed distance on a grid, in no place yet. What is made of it shares the numbers.
+#[derive(Clone, Debug)]
+pub struct Distances {
+    /// Points along each axis.
+    size: [usize; 3],
+    values: Arc<[f32]>,
+    /// For each cell: no piece of the surface is nearer than this many cells, along any axis; 0 where
+    /// the cell has one.
+    empty: Arc<[u8]>,
+    closed: bool,
+    /// The least and the greatest corner of the cells that hold a piece of the surface, in cells.
+    tight: [DVec3; 2],
+}
+
 /// A signed distance on a grid, in the world.
 #[derive(Clone, Debug)]
 pub struct SdfGrid {
-    /// Points along each axis.
-    size: [usize; 3],
-    values: Vec<f32>,
-    /// For each cell: no piece of the surface is nearer than this many cells, along any axis; 0 where
-    /// the cell has one.
-    empty: Vec<u8>,
+    pub(in crate::scene) distances: Distances,
     /// The corner of the grid, in the world.
     origin: DVec3,
     /// World vectors from those of the grid, whose unit is a cell.
     world_from_grid: DMat3,
     grid_from_world: DMat3,
     normals: SdfNormals,
-    closed: bool,
     bounds: Aabb,
     /// The largest coordinate of the box of the grid, or its largest edge.
     scale: f64,
@@ -125,17 +134,16 @@ impl Cell {
 /// Whether the grid in a file bounds a solid; one that cannot be read does.
 #[must_use]
 pub fn is_closed(file: &Path) -> bool {
-    let grid = Grid::load(file).ok().and_then(|g| SdfGrid::new(&g, &DAffine3::IDENTITY, SdfNormals::Analytic).ok());
-    grid.is_none_or(|grid| grid.is_closed())
+    let distances = Grid::load(file).ok().and_then(|grid| Distances::new(grid).ok());
+    distances.is_none_or(|distances| distances.is_closed())
 }
 
-impl SdfGrid {
-    /// A grid in the world; that of the file fills the unit cube, whatever box the file names.
+impl Distances {
+    /// The distances of a grid, which fills the unit cube, whatever box the file names.
     ///
     /// # Errors
-    /// In words: more than one channel, fewer than two points along an axis, no surface, too many cells,
-    /// a transform that cannot be inverted.
-    pub fn new(grid: &Grid, world_from_object: &DAffine3, normals: SdfNormals) -> Result<SdfGrid, String> {
+    /// In words: more than one channel, fewer than two points along an axis, no surface, too many cells.
+    pub fn new(grid: Grid) -> Result<Distances, String> {
         if grid.channels != 1 {
             return Err(format!("expected distances, one channel, found {}", grid.channels));
         }
@@ -146,14 +154,6 @@ impl SdfGrid {
         let cells = [nx - 1, ny - 1, nz - 1];
         if cells.iter().map(|&n| n as u128).product::<u128>() > i32::MAX as u128 {
             return Err(format!("expected fewer than 2³¹ cells, found a grid of {nx} × {ny} × {nz} points"));
-        }
-        let extent = DVec3::from(cells.map(|n| n as f64));
-        let linear = world_from_object.matrix3;
-        let world_from_grid = linear * DMat3::from_diagonal(extent.recip());
-        let grid_from_world = world_from_grid.inverse();
-        let origin = world_from_object.translation;
-        if !(grid_from_world.is_finite() && world_from_grid.is_finite() && origin.is_finite()) {
-            return Err("expected a transform that can be inverted".into());
         }
 
         // The surface is in a cell unless all its corners are on one side.
@@ -187,7 +187,42 @@ impl SdfGrid {
             return Err("expected values of both signs, found none where the distance is zero".into());
         }
         spread(&mut empty, cells);
+        Ok(Distances { size: grid.size, values: grid.values.into(), empty: empty.into(), closed, tight: [low, high] })
+    }
 
+    /// Whether the surface bounds a solid: it does not reach the sides of the grid.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        self.closed
+    }
+
+    /// Whether both are the same numbers in memory.
+    #[cfg(test)]
+    pub(in crate::scene) fn shares(&self, other: &Distances) -> bool {
+        Arc::ptr_eq(&self.values, &other.values) && Arc::ptr_eq(&self.empty, &other.empty)
+    }
+
+    /// Cells along each axis: whole numbers, as are the coordinates of cells below.
+    fn cells(&self) -> DVec3 {
+        DVec3::from(self.size.map(|n| n as f64 - 1.0))
+    }
+}
+
+impl SdfGrid {
+    /// Distances in the world.
+    ///
+    /// # Errors
+    /// In words: a transform that cannot be inverted.
+    pub fn new(distances: Distances, world_from_object: &DAffine3, normals: SdfNormals) -> Result<SdfGrid, String> {
+        let extent = distances.cells();
+        let linear = world_from_object.matrix3;
+        let world_from_grid = linear * DMat3::from_diagonal(extent.recip());
+        let grid_from_world = world_from_grid.inverse();
+        let origin = world_from_object.translation;
+        if !(grid_from_world.is_finite() && world_from_grid.is_finite() && origin.is_finite()) {
+            return Err("expected a transform that can be inverted".into());
+        }
+        let [low, high] = distances.tight;
         let corner = |low: DVec3, high: DVec3, i: usize| {
             let pick = |a: usize| if i >> a & 1 == 0 { low[a] } else { high[a] };
             origin + world_from_grid * DVec3::new(pick(0), pick(1), pick(2))
@@ -198,24 +233,13 @@ impl SdfGrid {
         // A corner has four roundings of numbers up to `scale`, a surface point twice as many.
         let pad = 16.0 * f64::EPSILON * scale;
         let bounds = Aabb { min: tight.min - pad, max: tight.max + pad };
-        Ok(SdfGrid {
-            size: grid.size,
-            values: grid.values.clone(),
-            empty,
-            origin,
-            world_from_grid,
-            grid_from_world,
-            normals,
-            closed,
-            bounds,
-            scale,
-        })
+        Ok(SdfGrid { distances, origin, world_from_grid, grid_from_world, normals, bounds, scale })
     }
 
     /// From the unit cube that the grid fills to the world.
     #[must_use]
     pub fn placement(&self) -> DAffine3 {
-        let extent = DVec3::from(self.size.map(|n| (n - 1) as f64));
+        let extent = self.cells();
         DAffine3 { matrix3: self.world_from_grid * DMat3::from_diagonal(extent), translation: self.origin }
     }
 
@@ -228,42 +252,41 @@ impl SdfGrid {
     /// Whether the surface bounds a solid: it does not reach the sides of the grid.
     #[must_use]
     pub fn is_closed(&self) -> bool {
-        self.closed
+        self.distances.is_closed()
     }
 
-    /// Memory of the lists.
+    /// Memory of the lists, which it may share.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of::<SdfGrid>() + 4 * self.values.capacity() + self.empty.capacity()
+        size_of::<SdfGrid>() + 4 * self.distances.values.len() + self.distances.empty.len()
     }
 
-    /// Cells along each axis: whole numbers, as are the coordinates of cells below.
     fn cells(&self) -> DVec3 {
-        DVec3::from(self.size.map(|n| n as f64 - 1.0))
+        self.distances.cells()
     }
 
     #[inline]
     fn cell_index(&self, c: DVec3) -> usize {
-        let n = [self.size[0] - 1, self.size[1] - 1];
+        let n = [self.distances.size[0] - 1, self.distances.size[1] - 1];
         (c.z as usize * n[1] + c.y as usize) * n[0] + c.x as usize
     }
 
     fn cell_at(&self, index: u32) -> DVec3 {
-        let (i, nx, ny) = (index as usize, self.size[0] - 1, self.size[1] - 1);
+        let (i, nx, ny) = (index as usize, self.distances.size[0] - 1, self.distances.size[1] - 1);
         DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64)
     }
 
     /// Index of the value at the least corner of a cell.
     #[inline]
     fn first_corner(&self, c: DVec3) -> usize {
-        (c.z as usize * self.size[1] + c.y as usize) * self.size[0] + c.x as usize
+        (c.z as usize * self.distances.size[1] + c.y as usize) * self.distances.size[0] + c.x as usize
     }
 
     #[inline]
     fn cell(&self, c: DVec3) -> Cell {
-        let [nx, ny, _] = self.size;
+        let [nx, ny, _] = self.distances.size;
         let first = self.first_corner(c);
-        let at = |i: usize| f64::from(self.values[i]);
+        let at = |i: usize| f64::from(self.distances.values[i]);
         let pair = |i: usize| [at(i), at(i + 1)];
         let ([a, b], [c, d]) = (pair(first), pair(first + nx));
         let ([e, f], [g, h]) = (pair(first + nx * ny), pair(first + nx * ny + nx));
@@ -313,7 +336,9 @@ impl SdfGrid {
         let side = match departing {
             Some(_) => first.0[1..].iter().copied().find(|&c| c != 0.0).unwrap_or(1.0),
             // Far from the surface all corners are on that side.
-            None if self.empty[self.cell_index(cell)] > 0 => f64::from(self.values[self.first_corner(cell)]),
+            None if self.distances.empty[self.cell_index(cell)] > 0 => {
+                f64::from(self.distances.values[self.first_corner(cell)])
+            }
             None => first.0[0] + 0.0,
         };
         let side = 1.0f64.copysign(side);
@@ -323,7 +348,7 @@ impl SdfGrid {
         let mut t = 0.0f64;
         loop {
             let index = self.cell_index(cell);
-            let reach = self.empty[index];
+            let reach = self.distances.empty[index];
             let count = f64::from(reach.max(1));
 
             // Where the ray leaves the cells that are known: this one, or all that are nearer than the surface.

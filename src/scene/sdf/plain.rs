@@ -28,9 +28,10 @@ impl SdfGrid {
 
         // The interpolant is linear in x, y and z by turns, and so in each a polynomial of the ray.
         let first = self.first_corner(corner);
-        let [nx, ny, _] = self.size;
+        let [nx, ny, _] = self.distances.size;
         let p = o + d * enter;
-        let along_x = |i: usize| lerp(constant(self.values[i]), constant(self.values[i + 1]), p.x, d.x);
+        let along_x =
+            |i: usize| lerp(constant(self.distances.values[i]), constant(self.distances.values[i + 1]), p.x, d.x);
         let along_y = |i: usize| lerp(along_x(i), along_x(i + nx), p.y, d.y);
         let cubic = lerp(along_y(first), along_y(first + nx * ny), p.z, d.z);
         Some(enter + first_root(cubic, leave - enter)?)

@@ -18,8 +18,13 @@ fn grid(n: usize, mut f: impl FnMut(DVec3) -> f64) -> Grid {
     Grid { size: [n; 3], channels: 1, min: DVec3::ZERO, max: DVec3::ONE, values }
 }
 
+/// `grid` where `map` puts it.
+fn placed(grid: &Grid, map: &DAffine3, normals: SdfNormals) -> Result<SdfGrid, String> {
+    SdfGrid::new(Distances::new(grid.clone())?, map, normals)
+}
+
 fn sdf(grid: &Grid) -> SdfGrid {
-    SdfGrid::new(grid, &DAffine3::IDENTITY, SdfNormals::Analytic).unwrap()
+    placed(grid, &DAffine3::IDENTITY, SdfNormals::Analytic).unwrap()
 }
 
 fn sphere(n: usize) -> SdfGrid {
@@ -229,7 +234,7 @@ fn scales_by_powers_of_two_give_the_same_bits() {
     let unit = sdf(&grid);
     for k in [-150, -20, 30, 170] {
         let s = 2f64.powi(k);
-        let scaled = SdfGrid::new(&grid, &DAffine3::from_scale(DVec3::splat(s)), SdfNormals::Analytic).unwrap();
+        let scaled = placed(&grid, &DAffine3::from_scale(DVec3::splat(s)), SdfNormals::Analytic).unwrap();
         for _ in 0..500 {
             let ray = through(&mut random);
             let big = Ray::new(ray.origin * s, ray.direction);
@@ -248,14 +253,14 @@ fn scales_by_powers_of_two_give_the_same_bits() {
 fn stretched_and_sheared_grids_are_the_same_surface() {
     let mut random = Random::new(9);
     let grid = grid(17, |p| (p - 0.5).length() - 0.3);
-    let unit = SdfGrid::new(&grid, &DAffine3::IDENTITY, SdfNormals::Smooth).unwrap();
+    let unit = placed(&grid, &DAffine3::IDENTITY, SdfNormals::Smooth).unwrap();
     for _ in 0..100 {
         let m = DMat3::from_cols(random.direction(), random.direction() * 3.0, random.direction() * 0.5);
         if m.determinant().abs() < 0.1 {
             continue;
         }
         let map = DAffine3 { matrix3: m, translation: random.direction() * 10.0 };
-        let moved = SdfGrid::new(&grid, &map, SdfNormals::Smooth).unwrap();
+        let moved = placed(&grid, &map, SdfNormals::Smooth).unwrap();
         for _ in 0..50 {
             let ray = through(&mut random);
             let image = Ray::new(map.transform_point3(ray.origin), m * ray.direction);
@@ -283,7 +288,7 @@ fn stretched_and_sheared_grids_are_the_same_surface() {
 
 #[test]
 fn a_grid_without_a_surface_is_refused_in_words() {
-    let fault = |grid: &Grid| SdfGrid::new(grid, &DAffine3::IDENTITY, SdfNormals::Smooth).unwrap_err();
+    let fault = |grid: &Grid| placed(grid, &DAffine3::IDENTITY, SdfNormals::Smooth).unwrap_err();
     assert!(fault(&grid(3, |_| 1.0)).contains("both signs"));
     assert!(fault(&grid(3, |_| -1.0)).contains("both signs"));
     assert!(fault(&grid(3, |_| 0.0)).contains("both signs, found zeros alone"));
@@ -300,7 +305,7 @@ fn smooth_normals_are_those_of_mitsuba() {
     let grid = Grid::load(std::path::Path::new(file)).unwrap();
     let scale = DVec3::new(2.4, 2.0, 2.2);
     let map = DAffine3::from_scale(scale) * DAffine3::from_translation(DVec3::new(-0.5, 0.0, -0.5));
-    let sdf = SdfGrid::new(&grid, &map, SdfNormals::Smooth).unwrap();
+    let sdf = placed(&grid, &map, SdfNormals::Smooth).unwrap();
     let cases = [
         (
             [0.004_035_927, -0.028_062_772, -0.999_598_03],
