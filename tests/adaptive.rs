@@ -248,3 +248,32 @@ fn dealt_samples_are_as_many_as_were_asked_for() {
         assert!((mean / 64.0 - 1.0).abs() < 0.2, "{filter}, {reuse}: {mean}");
     }
 }
+
+/// Of one cell to sixteen a pixel a quarter told so little that pictures of which 64 samples were asked for took 32 to 256. The share of a
+/// cell is the square root of a ratio of variances that 64 pixels show each, uncertain by some tenth; then both of its halves
+/// are rounded to powers of two, by no more than √2, so that each picture is within 3/2, and the mean of many is nearer.
+#[test]
+fn pictures_of_few_cells_take_as_many_samples_as_were_asked_for() {
+    for [width, height] in [[8, 8], [16, 8], [16, 16], [24, 24]] {
+        let mean = |seed: u64| {
+            let text = format!(
+                "camera: {{origin: [0, 1.6, 6], target: [0, 0.9, 0], fov_deg: 40}}\n\
+                 image: {{width: {width}, height: {height}, filter: box}}\n\
+                 render: {{samples: 64, seed: {seed}, techniques: {{adaptive: on, shadow_rays: 1, reuse: off}}}}\n\
+                 shapes:\n\
+                 - plane: {{normal: [0, 1, 0]}}\n\
+                 - sphere: {{center: [0, 1, 0], radius: 0.8, material: {{plastic: {{reflectance: 0.4, roughness: 0.2}}}}}}\n\
+                 - sphere: {{center: [-3, 5, 4], radius: 1.5, emission: 8}}\n\
+                 lights: [constant: {{radiance: 0.3}}]\n"
+            );
+            let film = bench_with(&text, &[]).film();
+            let all: u64 = film.cells().iter().flatten().map(|cell| u64::from(cell.count)).sum();
+            all as f64 / film.cells().len() as f64
+        };
+        let means: Vec<f64> = (1..=8).map(mean).collect();
+        let all = means.iter().sum::<f64>() / means.len() as f64;
+        println!("{width} x {height}: {all}, {means:?}");
+        assert!(means.iter().all(|mean| (64.0 / 1.5..=64.0 * 1.5).contains(mean)), "{width} x {height}: {means:?}");
+        assert!((all / 64.0 - 1.0).abs() < 0.2, "{width} x {height}: {means:?}");
+    }
+}

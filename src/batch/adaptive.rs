@@ -66,6 +66,9 @@ const OVERHEAD: f64 = 1.0;
 const ONE_OF: usize = 16;
 const CELLS: usize = 64;
 
+/// Cells of a picture of which all are tried so.
+const FEW: usize = 16;
+
 /// Tells the pilot's numbers from the picture's.
 const STREAM: u64 = 0x6164_6170_7469_7665;
 
@@ -330,7 +333,7 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
         let variance = 0.5 * (variance(&pixels, 0, floor) + variance(&pixels, 1, floor));
         wish(variance, tried[cell].cost / cost)
     };
-    let wishes: Vec<f64> = match job.plan.splatting || job.plan.reuse {
+    let wishes: Vec<f64> = match job.plan.splatting || job.plan.reuse || grid.cells() <= FEW {
         false => (0..grid.cells()).filter(|cell| !tried[*cell].pixels.is_empty()).map(wish).collect(),
         true => wishes_of_whole_cells(job, first, seed, (floor, &costs), pause)?,
     };
