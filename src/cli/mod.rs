@@ -19,6 +19,7 @@ mod text;
 
 use crate::description::SAMPLES_LIMIT;
 use crate::error::{Error, Result};
+use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -213,7 +214,7 @@ struct FarmArguments {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
     threads: usize,
     /// The program, as the machines of the farm call it
-    #[arg(long, value_name = "PATH", default_value = "abbe")]
+    #[arg(long, value_name = "PATH", default_value = "abbe", value_parser = NonEmptyStringValueParser::new())]
     program: String,
     /// Print nothing but errors
     #[arg(short, long)]

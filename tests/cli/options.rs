@@ -168,6 +168,18 @@ fn more_threads_than_processors_can_be_are_refused() {
     }
 }
 
+/// Every task of the job would have begun by a word that is none.
+#[test]
+fn a_job_of_no_program_is_refused() {
+    let place = batch();
+    for format in ["slurm", "openjd"] {
+        let ran = place.run(&["farm", "scenes/good.yaml", "--format", format, "--program", "", "-o", "job"]);
+        let told = "error: a value is required for '--program <PATH>' but none was supplied";
+        assert!(ran.code == 2 && ran.err.starts_with(told), "{}", ran.err);
+        assert!(!place.path("job").exists());
+    }
+}
+
 /// They are values of their options, with words on what was expected, and no other options.
 #[test]
 fn numbers_below_zero_are_told_as_values() {
