@@ -119,7 +119,7 @@ pub(crate) fn read_tables(root: &mut Node, sources: &mut Sources) -> Result<bool
 }
 
 /// The rows `[frame, value]` of a file of numbers with commas between them; a value of several numbers is a list. Empty
-/// lines and those that begin with # say nothing, nor does a first line of names.
+/// lines and those that begin with # say nothing, nor does a first line of names, which a row with other separators is not.
 fn table(path: &Path, sources: &mut Sources) -> Result<Vec<Node>, String> {
     let bytes = read_bytes(path).map_err(|error| format!("cannot be read: {error}"))?;
     let text = str::from_utf8(crate::input::without_mark(&bytes)).map_err(|_| "expected text in UTF-8".to_owned())?;
@@ -142,7 +142,11 @@ fn table(path: &Path, sources: &mut Sources) -> Result<Vec<Node>, String> {
                 numbers.push(value);
                 rows.push(Node::new(place, Value::List(numbers)));
             }
-            None if rows.is_empty() && !has_names && fields.iter().all(|field| field.parse::<f64>().is_err()) => {
+            None if rows.is_empty()
+                && !has_names
+                && !begins_with_number(text)
+                && fields.iter().all(|field| field.parse::<f64>().is_err()) =>
+            {
                 has_names = true;
             }
             _ => {
@@ -160,6 +164,12 @@ fn table(path: &Path, sources: &mut Sources) -> Result<Vec<Node>, String> {
         return Err("expected lines of a frame and one number or more, with commas, found none".to_owned());
     }
     Ok(rows)
+}
+
+/// Whether the first word of `line` is a number, whatever separates words.
+fn begins_with_number(line: &str) -> bool {
+    let word = line.split(|c: char| c == ';' || c.is_whitespace()).find(|word| !word.is_empty());
+    word.is_some_and(|word| word.parse::<f64>().is_ok())
 }
 
 /// The place of the first keyed value.
@@ -588,8 +598,13 @@ mod tests {
         let named = "it is named at DIR/s.yaml:4:45";
         assert_eq!(says("1, 2, 3, 4\n2, a\n"), format!("DIR/p.csv: line 2, column 4: {line} \"2, a\"; {named}"));
         assert_eq!(says("1\n"), format!("DIR/p.csv: line 1, column 1: {line} \"1\"; {named}"));
-        // One line of names may stand first; further ones are rows with other separators.
-        assert_eq!(says("1;2\n2;3\n3, 4\n"), format!("DIR/p.csv: line 2, column 1: {line} \"2;3\"; {named}"));
+        // One line of names may stand first, but no row with other separators: the value of frame 1 would be lost.
+        for row in ["1;2;3;4", "1 2 3 4", "1.5\t2"] {
+            let quoted = row.replace('\t', "\\t");
+            let told = format!("DIR/p.csv: line 1, column 1: {line} \"{quoted}\"; {named}");
+            assert_eq!(says(&format!("{row}\n20, 4, 5, 6\n")), told);
+        }
+        assert_eq!(says("frame;x\nt;y\n3, 4\n"), format!("DIR/p.csv: line 2, column 1: {line} \"t;y\"; {named}"));
         // What stands beside the name of the file would say nothing.
         for (key, beside) in [("interpolation: smooth", ", which stands beside keys"), ("scale: 2", "")] {
             let text = text.replace("p.csv}", &format!("p.csv, {key}}}"));
