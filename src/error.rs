@@ -43,6 +43,10 @@ pub enum Error {
         message: String,
     },
 
+    /// The system refuses something else that a process needs, such as to hear signals: exit code 1.
+    #[error("{0}")]
+    System(String),
+
     /// The render ran but its samples cannot be trusted: exit code 4.
     #[error("{0}")]
     Render(String),
@@ -64,7 +68,7 @@ impl Error {
     #[must_use]
     pub fn exit_code(&self) -> i32 {
         match self {
-            Error::Output { .. } | Error::Threads { .. } => 1,
+            Error::Output { .. } | Error::Threads { .. } | Error::System(_) => 1,
             Error::Config(_) => 2,
             Error::Input { .. } => 3,
             Error::Render(_) => 4,

@@ -8,6 +8,7 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::ffi::{c_int, c_void};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Bytes of a large page: of x86-64, and of 64-bit ARM with small pages of 4 KiB.
 const PAGE: usize = 1 << 21;
@@ -26,12 +27,39 @@ unsafe extern "C" {
     fn free(block: *mut c_void);
     fn madvise(start: *mut c_void, length: usize, advice: c_int) -> c_int;
     fn mallopt(parameter: c_int, value: c_int) -> c_int;
+    fn write(file: c_int, bytes: *const c_void, length: usize) -> isize;
 }
 
 /// Keeps blocks that have pages of their own so, whatever was freed before: to be called once, at the start.
 pub fn keep_large_blocks_apart() {
     // SAFETY: a number is set; a library that does not know it leaves all as it was.
     unsafe { mallopt(OWN_PAGES.0, OWN_PAGES.1) };
+}
+
+/// Whether the system has refused memory.
+static REFUSED: AtomicBool = AtomicBool::new(false);
+
+/// `block`, which is null where the system has refused it.
+fn noted(block: *mut u8) -> *mut u8 {
+    if block.is_null() {
+        REFUSED.store(true, Ordering::Relaxed);
+    }
+    block
+}
+
+/// Lets the process end with `exit_code` and a sentence where it cannot go on without memory that the system refuses, as under
+/// `ulimit -v`: the library aborts it. To be called once, at the start; where it cannot be, a signal ends the process as before.
+pub fn end_in_words(exit_code: c_int) {
+    let end = move || {
+        const SAID: &str = "error: the system gives no more memory (ulimit -v?)\n";
+        if REFUSED.load(Ordering::Relaxed) {
+            // SAFETY: of `SAID` no more than its bytes are read.
+            unsafe { write(2, SAID.as_ptr().cast(), SAID.len()) };
+            signal_hook::low_level::exit(exit_code);
+        }
+    };
+    // SAFETY: `end` only does what a handler of signals may: it allocates nothing, takes no lock and does not panic.
+    let _ = unsafe { signal_hook::low_level::register(signal_hook::consts::SIGABRT, end) };
 }
 
 /// The allocator.
@@ -58,13 +86,13 @@ unsafe impl GlobalAlloc for LargePages {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         if !is_large(&layout) {
             // SAFETY: as the caller's.
-            return unsafe { System.alloc(layout) };
+            return noted(unsafe { System.alloc(layout) });
         }
-        let Some(size) = layout.size().checked_next_multiple_of(PAGE) else { return std::ptr::null_mut() };
+        let Some(size) = layout.size().checked_next_multiple_of(PAGE) else { return noted(std::ptr::null_mut()) };
         let mut block = std::ptr::null_mut();
         // SAFETY: the alignment is a power of two and a multiple of the size of a pointer.
         if unsafe { posix_memalign(&mut block, PAGE, size) } != 0 {
-            return std::ptr::null_mut();
+            return noted(std::ptr::null_mut());
         }
         advise(block.cast(), size);
         block.cast()
@@ -73,12 +101,12 @@ unsafe impl GlobalAlloc for LargePages {
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         if !is_large(&layout) {
             // SAFETY: as the caller's.
-            return unsafe { System.alloc_zeroed(layout) };
+            return noted(unsafe { System.alloc_zeroed(layout) });
         }
         if layout.align() <= ALIGNED {
             // Pages that nobody touches stay none, so they are not made large.
             // SAFETY: any size is allowed.
-            return unsafe { calloc(1, layout.size()) }.cast();
+            return noted(unsafe { calloc(1, layout.size()) }.cast());
         }
         // SAFETY: as the caller's; the block has the size of the layout at least.
         unsafe {
@@ -105,7 +133,7 @@ unsafe impl GlobalAlloc for LargePages {
         let new = unsafe { Layout::from_size_align_unchecked(size, layout.align()) };
         if !is_large(&layout) && !is_large(&new) {
             // SAFETY: as the caller's.
-            return unsafe { System.realloc(block, layout, size) };
+            return noted(unsafe { System.realloc(block, layout, size) });
         }
         // SAFETY: both blocks hold what is copied, and they are distinct.
         unsafe {

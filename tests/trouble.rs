@@ -419,3 +419,48 @@ fn samples_may_be_cut_into_even_ranges() {
         ran.err
     );
 }
+
+/// Files that the system refuses, and threads that hear signals, are trouble of that process: by 4 a picture would be there,
+/// with samples that cannot be trusted.
+#[test]
+fn what_the_system_refuses_is_no_picture_with_invalid_samples() {
+    let place = Place::of(SCENE);
+    for files in 4..=8 {
+        let script = format!("ulimit -n {files}; exec \"$0\" render scene.yaml -q -o out --threads 1");
+        let mut command = Command::new("bash");
+        command.args(["-c", &script, env!("CARGO_BIN_EXE_abbe")]).current_dir(place.directory.path());
+        let ran = Ran::of(command.output().unwrap());
+        assert!([0, 1, 3, 127].contains(&ran.code), "{files}: {} {}", ran.code, ran.err);
+    }
+}
+
+/// Where a process may have little address space, each limit is too small for another piece of its memory, of the distances of a
+/// large grid above all, which have 16 MB in the file and as many once they are read: it says so, and ends by a code of the
+/// table, where it ended by SIGABRT. [`Ran::of`] takes no signals.
+#[cfg(all(target_os = "linux", target_env = "gnu", target_pointer_width = "64"))]
+#[test]
+fn memory_that_the_system_refuses_is_told() {
+    let scene = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n\
+                 image: {width: 16, height: 12}\n\
+                 render: {samples: 4}\n\
+                 shapes: [sdf_grid: {file: ball.vol}]\n\
+                 lights: [constant: {radiance: 1}]\n";
+    let place = Place::of(scene);
+    const POINTS: i32 = 160;
+    let head = [1, POINTS, POINTS, POINTS, 1].map(i32::to_le_bytes).concat();
+    let distances = (0..POINTS.pow(3)).flat_map(|i| (((i % POINTS) as f32) - 80.5).to_le_bytes());
+    let bounds = [0f32, 0.0, 0.0, 1.0, 1.0, 1.0].map(f32::to_le_bytes).concat();
+    let vol = [b"VOL\x03".to_vec(), head, bounds, distances.collect()].concat();
+    std::fs::write(place.path("ball.vol"), vol).unwrap();
+    let mut codes = Vec::new();
+    for megabytes in (48..=192).step_by(8) {
+        let script = format!("ulimit -v {}; exec \"$0\" render scene.yaml -q -o out --threads 1", megabytes << 10);
+        let mut command = Command::new("bash");
+        command.args(["-c", &script, env!("CARGO_BIN_EXE_abbe")]).env_remove("RUST_BACKTRACE");
+        let ran = Ran::of(command.current_dir(place.directory.path()).output().unwrap());
+        let said = ran.err.contains("error: the system gives no more memory (ulimit -v?)\n");
+        assert!(said == (ran.code == 33) && (ran.code == 0) == ran.err.is_empty(), "{megabytes}: {}", ran.err);
+        codes.push(ran.code);
+    }
+    assert!(codes.contains(&33) && codes.ends_with(&[0]), "{codes:?}");
+}

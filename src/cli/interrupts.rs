@@ -22,7 +22,7 @@ impl Interrupts {
     /// Sets the flags from now on.
     ///
     /// # Errors
-    /// [`Error::Render`](crate::error::Error::Render) if the system refuses.
+    /// [`Error::System`](crate::error::Error::System) if the system refuses.
     #[cfg(unix)]
     pub fn listen() -> Result<Interrupts> {
         use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
@@ -58,7 +58,7 @@ impl Interrupts {
 /// which would end the process without a word. Programs that it starts are not touched.
 ///
 /// # Errors
-/// [`Error::Render`](crate::error::Error::Render) if the system refuses.
+/// [`Error::System`](crate::error::Error::System) if the system refuses.
 pub fn take_size_limits_for_errors() -> Result<()> {
     #[cfg(unix)]
     signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default()).map_err(refused)?;
@@ -68,5 +68,5 @@ pub fn take_size_limits_for_errors() -> Result<()> {
 /// What keeps the process from hearing signals.
 #[cfg(unix)]
 fn refused(e: std::io::Error) -> crate::error::Error {
-    crate::error::Error::Render(format!("cannot listen for signals: {e}"))
+    crate::error::Error::System(format!("cannot listen for signals: {e}"))
 }

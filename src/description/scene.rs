@@ -642,9 +642,8 @@ mod tests {
         match error {
             Error::Config(text) => text.lines().all(placed),
             Error::Input { .. } => true,
-            Error::Output { .. } | Error::Threads { .. } | Error::Render(_) | Error::Memory(_) | Error::Stopped(_) => {
-                false
-            }
+            Error::Output { .. } | Error::Threads { .. } | Error::System(_) => false,
+            Error::Render(_) | Error::Memory(_) | Error::Stopped(_) => false,
         }
     }
 
