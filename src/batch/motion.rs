@@ -177,6 +177,6 @@ mod tests {
         let (open, close) = (at(3.0), at(4.0));
         let Geometry::Curves(moved) = &close.objects[1].geometry else { panic!("curves") };
         assert_eq!(moving_curves(&open, &close), moved.bytes());
-        assert_eq!(moving_curves(&open, &at(3.0)), 0);
+        assert_eq!(moving_curves(&close, &at(4.0)), 0);
     }
 }

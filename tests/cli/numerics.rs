@@ -38,31 +38,35 @@ fn what_robust_arithmetic_was_needed_for_is_counted() {
     assert!(taken.code == 2 && taken.err.contains("give yours another"), "{}", taken.err);
 }
 
-/// Light beyond what f32 holds: samples are dropped, counted by cause, and the exit code says so. The
+/// Three lights whose sum is beyond what f32 holds: samples are dropped, counted by cause, and the exit code says so. The
 /// picture is written all the same, and every pixel of it is finite.
 #[test]
 fn invalid_samples_are_counted_and_end_with_code_4() {
     let place = batch();
+    let lights = |radiance: &str| {
+        let light = format!("{{constant: {{radiance: {radiance}}}}}");
+        format!("lights=[{light}, {light}, {light}]")
+    };
     let hot = |radiance: &str, more: &[&str]| {
-        let set = format!("lights[0].constant.radiance={radiance}");
+        let set = lights(radiance);
         let ran = place.run(&[&["render", "scenes/good.yaml", "-q", "-o", "hot", "--set", &set], more].concat());
         (ran, abbe::film::exr::read_exr(&place.path("hot/good.exr")).unwrap())
     };
     let (ran, file) = hot("3e38", &[]);
     assert_eq!(ran.code, 4);
-    assert!(ran.err.contains("64 of 64 samples were invalid") && ran.err.contains("64 NaN"), "{}", ran.err);
+    assert!(ran.err.contains("64 of 64 samples were invalid") && ran.err.contains("64 infinite"), "{}", ran.err);
     assert!(file.parts[0].channels.iter().all(|(_, c)| c.iter().all(|x| x.is_finite())));
     assert_eq!(file.parts[0].text("abbe/invalidSamples"), Some("64"));
-    assert_eq!(file.parts[0].text("abbe/invalidByCause"), Some("64 0 0 0"));
+    assert_eq!(file.parts[0].text("abbe/invalidByCause"), Some("0 64 0 0"));
     // So it is when the picture is found there, which nothing changes.
     let written = std::fs::metadata(place.path("hot/good.exr")).unwrap().modified().unwrap();
     for keep in ["--resume", "--skip-existing"] {
-        let set = "lights[0].constant.radiance=3e38";
-        let again = place.run(&["render", "scenes/good.yaml", "-q", "-o", "hot", "--set", set, keep]);
+        let set = lights("3e38");
+        let again = place.run(&["render", "scenes/good.yaml", "-q", "-o", "hot", "--set", &set, keep]);
         assert_eq!((again.code, again.err.lines().last()), (4, ran.err.lines().last()), "{keep}");
         let report: serde_json::Value =
             serde_json::from_slice(&std::fs::read(place.path("hot/report.json")).unwrap()).unwrap();
-        assert_eq!(report["scenes"][0]["invalid"]["nan"], 64, "{keep}");
+        assert_eq!(report["scenes"][0]["invalid"]["infinite"], 64, "{keep}");
         assert_eq!(std::fs::metadata(place.path("hot/good.exr")).unwrap().modified().unwrap(), written, "{keep}");
     }
     // What f32 holds the film holds.
