@@ -178,9 +178,9 @@ pub(super) fn prepare_scene(
     scene.length_exponent = exponents.fold(scene.length_exponent, i32::max);
     moments.iter_mut().for_each(|moment| moment.length_exponent = scene.length_exponent);
     let census = motion::census(&scene, &moments);
-    let mut plan = EffectPlan::of(&census, integrator, mode);
+    let layers = layers::plan(&description, &scene, planned)?;
+    let mut plan = EffectPlan::of(&census, integrator, layers, mode);
     plan.effects.extend(blur.said);
-    plan.layers = layers::plan(&description, &scene, planned)?;
     if matches!(plan.integrator, Integrator::Depth) {
         // Distances are no brighter where the lamps are.
         scene.light_exponent = scene.length_exponent;

@@ -100,8 +100,7 @@ pub struct Shot<'a> {
 impl<'a> Shot<'a> {
     /// Depth fog before what `integrator` shows, where there is some: a distance is no light, nor is nothing.
     fn fog(&self, integrator: &Integrator) -> Option<&'a DepthFog> {
-        let shows_light = !matches!(integrator, Integrator::Depth | Integrator::Nothing);
-        depth_fog(self.scene, self.plan).filter(|_| shows_light)
+        depth_fog(self.scene, self.plan).filter(|_| integrator.shows_light())
     }
 }
 

@@ -29,6 +29,23 @@ pub enum Integrator {
     Nothing,
 }
 
+impl Integrator {
+    /// Whether what it gives is light: a distance is none, nor is nothing.
+    #[must_use]
+    pub fn shows_light(&self) -> bool {
+        self.no_light().is_none()
+    }
+
+    /// Why it gives none; `None` where it does.
+    fn no_light(&self) -> Option<&'static str> {
+        match self {
+            Integrator::Depth => Some("depth looks for no light"),
+            Integrator::Nothing => Some("none looks for no light"),
+            Integrator::Path(_) | Integrator::Whitted(_) | Integrator::Light(_) => None,
+        }
+    }
+}
+
 /// Settings of the light tracer.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSettings {
@@ -251,13 +268,27 @@ impl EffectPlan {
         self.reuse || self.splatting
     }
 
-    /// Decides from the census of a scene.
+    /// Decides from the census of a scene, and by what its picture and its `layers` show.
     #[must_use]
-    pub fn of(census: &Census, integrator: Integrator, mode: EffectMode) -> EffectPlan {
+    pub fn of(census: &Census, integrator: Integrator, layers: LayerPlan, mode: EffectMode) -> EffectPlan {
         let path = !matches!(integrator, Integrator::Whitted(_));
+        // Who shows light: the picture, else a layer.
+        let lighting = std::iter::once(&integrator).chain(&layers.integrators).find(|one| one.shows_light());
+        let no_light = integrator.no_light();
         let mut effects: Vec<Effect> = Vec::new();
-        // An effect of the scene: on if the scene has it, or if everything is forced on.
+        let unseen = |name: &str| match name {
+            "depth of field" => false,
+            "textures" | "interference" | "nested bodies" => layers.layers.is_empty(),
+            _ => true,
+        };
+        // An effect of the scene: on if the scene has it, or if everything is forced on. Without light it is told as off; whatever
+        // layers take of it stays.
         let mut effect = |name: &'static str, present: bool, here: String, absent: &str| {
+            let in_force = present || mode == EffectMode::All;
+            let (present, absent) = match no_light.filter(|_| lighting.is_none() && unseen(name)) {
+                Some(none) => (false, none),
+                None => (present, absent),
+            };
             let on = present || mode == EffectMode::All;
             let reason = match (present, mode) {
                 (true, _) => here,
@@ -265,7 +296,7 @@ impl EffectPlan {
                 (false, EffectMode::All) => format!("forced by effects: all ({absent})"),
             };
             effects.push(Effect { name: name.into(), on, reason });
-            on
+            in_force
         };
         let count = |n: usize, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
 
@@ -353,12 +384,11 @@ impl EffectPlan {
             "the lens has a radius".into(),
             if path { "the camera is a pinhole" } else { "whitted uses a pinhole" },
         );
-        let (follows, absent) = match &integrator {
+        let (follows, absent) = match lighting.unwrap_or(&integrator) {
             Integrator::Path(path) => ("path follows light over every surface", too_short(path.max_depth)),
             Integrator::Light(light) => ("light_tracer follows light over every surface", too_short(light.max_depth)),
             Integrator::Whitted(_) => ("", Some("whitted knows light of mirrors and glass only, and an ambient term")),
-            Integrator::Depth => ("", Some("depth looks for no light")),
-            Integrator::Nothing => ("", Some("none looks for no light")),
+            Integrator::Depth | Integrator::Nothing => ("", no_light),
         };
         effect("indirect light", absent.is_none(), follows.into(), absent.unwrap_or_default());
         // Not an effect but a consequence; forced on with the effects that call for it.
@@ -386,7 +416,7 @@ impl EffectPlan {
             all_dispersive: mode == EffectMode::All,
             caustics: None,
             adaptive: None,
-            layers: LayerPlan::default(),
+            layers,
             effects,
             techniques,
         }
@@ -403,7 +433,7 @@ mod tests {
 
     #[test]
     fn an_empty_scene_calls_for_nothing_but_light_over_surfaces() {
-        let plan = EffectPlan::of(&Census::default(), path(), EffectMode::Auto);
+        let plan = EffectPlan::of(&Census::default(), path(), LayerPlan::default(), EffectMode::Auto);
         let on: Vec<_> = plan.effects.iter().filter(|e| e.on).map(|e| e.name.as_ref()).collect();
         assert_eq!(on, ["indirect light"]);
         assert!(!plan.chromatic && !plan.media && !plan.depth_fog);
@@ -412,7 +442,7 @@ mod tests {
     #[test]
     fn a_prism_calls_for_dispersion_by_name() {
         let census = Census { dispersive: vec!["prism".into()], ..Census::default() };
-        let plan = EffectPlan::of(&census, path(), EffectMode::Auto);
+        let plan = EffectPlan::of(&census, path(), LayerPlan::default(), EffectMode::Auto);
         let dispersion = plan.effects.iter().find(|e| e.name == "dispersion").unwrap();
         assert!(dispersion.on && dispersion.reason.contains("prism") && plan.chromatic);
     }
@@ -422,7 +452,8 @@ mod tests {
     #[test]
     fn what_the_integrator_leaves_out_is_off_with_its_field() {
         let census = Census { area_lights: vec!["lamp".into()], ..Census::default() };
-        let plan = |settings| EffectPlan::of(&census, Integrator::Path(settings), EffectMode::Auto);
+        let plan =
+            |settings| EffectPlan::of(&census, Integrator::Path(settings), LayerPlan::default(), EffectMode::Auto);
         let usual = PathSettings::default();
         let (next_event, weighing, indirect) =
             ("next-event estimation", "multiple importance sampling", "indirect light");
@@ -444,9 +475,37 @@ mod tests {
         }
     }
 
+    /// A distance is behind no fog and needs no lamp; a layer of light has both.
+    #[test]
+    fn where_no_light_is_shown_its_effects_are_off() {
+        let census = Census {
+            area_lights: vec!["lamp".into()],
+            refractive: vec!["ball".into()],
+            reflective: vec!["mirror".into()],
+            dispersive: vec!["ball".into()],
+            media: 1,
+            fog: true,
+            lens: true,
+            ..Census::default()
+        };
+        let on = |integrator: Integrator, integrators: Vec<Integrator>| -> Vec<String> {
+            let layers = LayerPlan { integrators, ..LayerPlan::default() };
+            let plan = EffectPlan::of(&census, integrator, layers, EffectMode::Auto);
+            plan.effects.into_iter().filter(|e| e.on).map(|e| e.name.into_owned()).collect()
+        };
+        let light = ["dispersion", "refraction", "specular reflection", "area lights", "media", "depth fog"];
+        let all = [&light[..], &["depth of field", "indirect light"]].concat();
+        assert_eq!(on(path(), Vec::new()), all);
+        for integrator in [Integrator::Depth, Integrator::Nothing] {
+            assert_eq!(on(integrator.clone(), Vec::new()), ["depth of field"]);
+            assert_eq!(on(integrator.clone(), vec![Integrator::Depth]), ["depth of field"]);
+            assert_eq!(on(integrator, vec![path()]), all);
+        }
+    }
+
     #[test]
     fn everything_can_be_forced_on_and_says_so() {
-        let plan = EffectPlan::of(&Census::default(), path(), EffectMode::All);
+        let plan = EffectPlan::of(&Census::default(), path(), LayerPlan::default(), EffectMode::All);
         assert!(plan.effects.iter().all(|e| e.on));
         assert!(plan.effects[0].reason.contains("effects: all"));
     }
