@@ -165,6 +165,16 @@ fn pictures<'a>(d: &'a SceneDescription, shelf: &Shelf) -> impl Iterator<Item = 
     textures.chain(skies)
 }
 
+/// Whether it has an inside that its normals point out of, so that nothing but light through it comes in.
+fn encloses(geometry: &Geometry) -> bool {
+    match geometry {
+        Geometry::Shape(shape) => shape.is_closed(),
+        Geometry::Mesh(mesh) => mesh.mesh.open_edges() == 0 && !mesh.mesh.is_inside_out(),
+        Geometry::Sdf(sdf) => sdf.is_closed(),
+        Geometry::Curves(_) | Geometry::Instance(_) => false,
+    }
+}
+
 fn vec3(v: [f64; 3]) -> DVec3 {
     DVec3::from_array(v)
 }
@@ -589,23 +599,34 @@ impl<'a> Compiler<'a> {
         let enclosed = if empty { None } else { camera_medium };
         let (behind, before) = if shape.flip_normals { (camera_medium, enclosed) } else { (enclosed, camera_medium) };
         let behind = self.absorbing(at, material, closed, &geometry, shape).or(behind);
-        let unchanged = |side: &Option<String>| side.as_deref() == Some(written::UNCHANGED);
-        let medium = |side: &Option<String>, otherwise: Option<u32>| match side.as_deref() {
+        // What light never crosses may stand in any medium: it tells of none unless that is written.
+        // Nor is a path ever within a closed body of it, unless that is a lamp which shines inward.
+        let entered = transmits || is_lamp && shape.flip_normals;
+        let mut sides = [("inside", shape.inside.as_ref(), behind), ("outside", shape.outside.as_ref(), before)];
+        let (field, written, otherwise) = &mut sides[usize::from(shape.flip_normals)];
+        let is_named = written.is_some_and(|name| ![written::VACUUM, written::UNCHANGED].contains(&name.as_str()));
+        if is_named && !entered && encloses(&geometry) {
+            let note = "light cannot enter, so that it changes nothing; what the camera is in says the scene's medium";
+            self.note(&format!("{at}.{field}"), note);
+            (*written, *otherwise) = (None, camera_medium);
+        }
+        let silent = !transmits && sides.iter().all(|(_, written, _)| written.is_none());
+        let unchanged = sides.iter().all(|(_, written, _)| written.is_some_and(|name| name == written::UNCHANGED));
+        let medium = |side: Option<&String>, otherwise: Option<u32>| match side.map(String::as_str) {
             None => otherwise,
             Some(written::VACUUM | written::UNCHANGED) => None,
             Some(name) => Some(self.medium_ids[name]),
         };
-        // What light never crosses may stand in any medium: it tells of none unless that is written.
-        let silent = !transmits && shape.inside.is_none() && shape.outside.is_none();
+        let [inside, outside] = sides.map(|(_, written, otherwise)| medium(written, otherwise));
         Ok(Some(Object {
             name,
             geometry,
             material,
             light,
             detail,
-            inside: medium(&shape.inside, behind),
-            outside: medium(&shape.outside, before),
-            keeps_medium: unchanged(&shape.inside) && unchanged(&shape.outside) || silent,
+            inside,
+            outside,
+            keeps_medium: unchanged || silent,
             flipped: shape.flip_normals,
             is_lamp,
             body: 0,

@@ -269,6 +269,7 @@ fn place_grid(written: &written::GridVolume, grid: Unplaced, world_from_local: D
 mod tests {
     use super::*;
     use crate::description::SceneDescription;
+    use crate::scene::census::Census;
     use crate::scene::compile::compile_with;
     use crate::scene::grid::testing::vol;
     use crate::scene::material::Kind;
@@ -302,5 +303,30 @@ mod tests {
         // The middle of the second voxel.
         let at = DVec3::new(0.75, 0.5, 0.5);
         assert_eq!([here.scalar(at), there.scalar(at + DVec3::X * 2.0)], [0.75; 2]);
+    }
+
+    /// No path gets into what light does not cross. What it was said to hold counted as a medium and kept pixels from sharing paths.
+    #[test]
+    fn what_light_cannot_enter_holds_no_medium() {
+        let made = |shape: &str| {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nmedia: {{m: {{homogeneous: {{scattering: 1}}}}}}\n\
+                 shapes: [{{{shape}}}]\n"
+            );
+            let description = SceneDescription::parse(&text, Path::new("s.yaml")).unwrap();
+            let scene = compile_with(&description, "s", &mut Shelf::default()).unwrap();
+            let told = scene.notes.iter().any(|note| note.contains("light cannot enter"));
+            (Census::of(&scene).media, told)
+        };
+        assert_eq!(made("sphere: {radius: 1, inside: m}"), (0, true));
+        assert_eq!(made("sphere: {radius: 1, inside: m, emission: 1}"), (0, true));
+        assert_eq!(made("cube: {size: 1, outside: m, flip_normals: true}"), (0, true));
+        assert_eq!(made("sphere: {radius: 1, inside: m, outside: m}"), (1, true));
+        // Around it, beside it, and within a lamp that shines inward there may be one.
+        assert_eq!(made("sphere: {radius: 1, outside: m}"), (1, false));
+        assert_eq!(made("rectangle: {corner: [0, 0, 0], edge_u: [1, 0, 0], edge_v: [0, 1, 0], inside: m}"), (1, false));
+        assert_eq!(made("sphere: {radius: 1, outside: m, flip_normals: true, emission: 1}"), (1, false));
+        assert_eq!(made("sphere: {radius: 1, inside: m, material: {boundary: {}}}"), (1, false));
+        assert_eq!(made("sphere: {radius: 1, inside: m, material: {mask: {material: {diffuse: {}}}}}"), (1, false));
     }
 }
