@@ -20,7 +20,7 @@ use crate::transport::layers::{Channel, Layer, Source};
 use crate::transport::light;
 use crate::transport::pilot::{self, Use, Wishes};
 use crate::transport::plan::{
-    Coverage, EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings,
+    Coverage, Effect, EffectMode, EffectPlan, Integrator, LightSettings, PathSettings, WhittedSettings,
 };
 use crate::transport::trial::{self, first};
 use crate::transport::{Shot, Spread};
@@ -221,6 +221,7 @@ pub(super) fn prepare_scene(
     {
         plan.span = light::span(&paths, &filter, &window(&description));
     }
+    plan.techniques.extend(asked_in_vain(&description));
     let trials = choosing.elapsed();
     if overrides.check_numerics && !moments.is_empty() {
         let expected = "--check-numerics: expected a scene in which nothing moves, or --set camera.shutter=null";
@@ -296,6 +297,30 @@ fn wish(technique: description::Technique) -> Use {
         description::Technique::On => Use::On,
         description::Technique::Off => Use::Off,
     }
+}
+
+/// Techniques that are asked for where no paths start from the camera, which is what they are for.
+fn asked_in_vain(description: &SceneDescription) -> Vec<Effect> {
+    let written = &description.render.techniques;
+    let of_whitted = matches!(description.integrator, description::Integrator::Whitted(_));
+    let on = |technique: description::Technique| technique == description::Technique::On;
+    let several = matches!(written.shadow_rays, description::ShadowRays::Number(2..));
+    // Splatting is for all samples that are drawn, and tells of itself.
+    let asked = [
+        ("light tracing", on(written.light_tracing)),
+        ("wavelength packets", on(written.packets)),
+        ("photon merging", on(written.merging)),
+        ("adaptive sampling", on(written.adaptive)),
+        ("splatting", on(written.splatting) && of_whitted),
+        ("shadow rays to the even sky", on(written.even_sky)),
+        ("paths shared by pixels", on(written.reuse)),
+        ("several shadow rays from the first vertex", several),
+        ("equiangular sampling", on(written.equiangular)),
+    ];
+    let of_path = matches!(description.integrator, description::Integrator::Path(_));
+    let told = asked.into_iter().filter(|(_, asked)| *asked && !of_path);
+    told.map(|(name, _)| Effect { name: name.into(), on: false, reason: "no paths start from the camera".into() })
+        .collect()
 }
 
 /// Techniques that the description asks for or forbids.
@@ -463,6 +488,34 @@ pub fn window(description: &SceneDescription) -> Window {
             let description::Image { width, height, overscan, .. } = description.image;
             let (x, y) = (-(overscan as i32), -(overscan as i32));
             Window { x, y, width: width + 2 * overscan, height: height + 2 * overscan }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Adaptive sampling, and others of paths from the camera, were passed over without a word.
+    #[test]
+    fn techniques_that_the_integrator_lacks_are_told_where_they_are_asked_for() {
+        let told = |integrator: &str, techniques: &str| -> Vec<String> {
+            let text = format!(
+                "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nintegrator: {integrator}\n\
+                 render: {{techniques: {{{techniques}}}}}\n"
+            );
+            let description = SceneDescription::parse(&text, Path::new("s.yaml")).unwrap();
+            let told = asked_in_vain(&description);
+            assert!(told.iter().all(|technique| !technique.on));
+            told.into_iter().map(|technique| technique.name.into_owned()).collect()
+        };
+        let asked = "adaptive: on, splatting: on, shadow_rays: 4, reuse: off";
+        let several = "several shadow rays from the first vertex";
+        assert_eq!(told("path", asked), [""; 0]);
+        assert_eq!(told("whitted", asked), ["adaptive sampling", "splatting", several]);
+        for integrator in ["light_tracer", "depth", "none"] {
+            assert_eq!(told(integrator, asked), ["adaptive sampling", several]);
+            assert_eq!(told(integrator, "shadow_rays: 1"), [""; 0]);
         }
     }
 }
