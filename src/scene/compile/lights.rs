@@ -197,7 +197,13 @@ impl<'a> Compiler<'a> {
         let position = vec3(l.position);
         let cutoff = l.cutoff_deg.to_radians();
         let slide = match &l.texture {
-            None => None,
+            None => {
+                let idle = [("up", l.up.is_some()), ("v", l.v != written::Growth::default())];
+                for (field, _) in idle.into_iter().filter(|(_, written)| *written) {
+                    self.note(&format!("{at}.{field}"), "it is the texture's, and there is none");
+                }
+                None
+            }
             Some(name) => {
                 let up = vec3(l.up.unwrap_or([0.0, 1.0, 0.0]));
                 let Some(world_from_spot) = Camera::look_at(position, position + axis, up) else {

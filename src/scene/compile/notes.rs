@@ -90,6 +90,27 @@ mod tests {
         }
     }
 
+    /// Without a texture a spot looks alike all around its axis.
+    #[test]
+    fn what_a_spot_says_of_no_texture_is_told() {
+        let spot = |more: &str| {
+            notes(&format!(
+                "textures: {{t: {{checkerboard: {{a: 0, b: 1}}}}}}\n\
+                 lights: [{{spot: {{position: [0, 3, 0], target: [0, 0, 0], intensity: 1{more}}}}}]\n"
+            ))
+        };
+        let idle = spot(", up: [1, 0, 0], v: down");
+        assert_eq!(idle.len(), 2, "{idle:?}");
+        for (note, field) in idle.iter().zip(["up", "v"]) {
+            assert!(
+                note.ends_with(&format!("lights[0].spot.{field}: it is the texture's, and there is none")),
+                "{note}"
+            );
+        }
+        assert_eq!(spot(""), [""; 0]);
+        assert_eq!(spot(", up: [1, 0, 0], v: down, texture: t"), [""; 0]);
+    }
+
     #[test]
     fn a_filter_that_whitted_does_not_take_is_told() {
         let text = |filter: &str, integrator: &str| format!("image: {{filter: {filter}}}\nintegrator: {integrator}\n");
