@@ -459,14 +459,17 @@ impl SceneArguments {
             paths.add_rules(&rules).map_err(|message| Error::input(file, message))?;
         }
         let mut set = self.set.clone();
-        if let Some(spp) = self.spp {
-            set.push(("render.samples".into(), spp.to_string()));
-        }
-        if let Some(seed) = self.seed {
-            set.push(("render.seed".into(), seed.to_string()));
-        }
-        if let Some(frames) = &self.frames {
-            set.push(("render.frames".into(), format!("\"{frames}\"")));
+        let own = [
+            ("--spp", "render.samples", self.spp.map(|spp| spp.to_string())),
+            ("--seed", "render.seed", self.seed.map(|seed| seed.to_string())),
+            ("--frames", "render.frames", self.frames.as_ref().map(|frames| format!("\"{frames}\""))),
+        ];
+        for (option, key, value) in own {
+            let Some(value) = value else { continue };
+            if let Some((_, other)) = self.set.iter().find(|(set, _)| set == key) {
+                complain(&format!("note: --set {key}={other} is passed over, for {option} says {value}"));
+            }
+            set.push((key.into(), value));
         }
         Ok(crate::batch::Overrides {
             set,
