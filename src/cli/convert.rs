@@ -5,7 +5,7 @@ use crate::batch;
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::output::{Inputs, directory_of, is_stream, write_atomically};
-use crate::scene::{mesh, sdf};
+use crate::scene::{load, mesh, sdf};
 use std::path::Path;
 
 /// Prints the scene as YAML, or writes it.
@@ -24,7 +24,9 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
     let output = arguments.output.as_deref();
     let file = output.filter(|path| !is_stream(path));
     let path = file.unwrap_or(Path::new(""));
-    let exported = description::export(&scene, path, &mesh::normals_of, &mesh::for_mitsuba, &sdf::is_closed);
+    let pictures = &load::for_mitsuba;
+    let (normals, meshes) = (&mesh::normals_of, &mesh::for_mitsuba);
+    let exported = description::export(&scene, path, normals, meshes, pictures, &sdf::is_closed);
     match file {
         Some(path) => {
             let beside = |name: &String| directory_of(path).join(name);
@@ -35,7 +37,7 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
         }
         None if !exported.files.is_empty() => {
             return Err(Error::Config(
-                "expected -o FILE.xml, for a mesh has to be written beside the scene; found none".into(),
+                "expected -o FILE.xml, for a mesh or a picture has to be written beside the scene; found none".into(),
             ));
         }
         None => {}

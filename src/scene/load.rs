@@ -1,10 +1,12 @@
 //! Pictures and tables from files.
 
+mod anew;
 mod curve;
 mod decoded;
 mod jpeg;
 mod pfm;
 
+pub use anew::for_mitsuba;
 pub use curve::samples;
 pub use decoded::{Counted, Decoded, Pictures, Wanted, open};
 

@@ -8,7 +8,7 @@ mod words;
 use abbe::batch::{self, Overrides};
 use abbe::description;
 use abbe::math::Ray;
-use abbe::scene::{mesh, sdf};
+use abbe::scene::{load, mesh, sdf};
 use common::Bench;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -27,13 +27,19 @@ fn shipped() -> Vec<PathBuf> {
     files
 }
 
+/// The export of a scene as the verb makes it.
+fn exported(scene: &description::SceneDescription, xml: &Path) -> description::Exported {
+    let (normals, meshes) = (&mesh::normals_of, &mesh::for_mitsuba);
+    description::export(scene, xml, normals, meshes, &load::for_mitsuba, &sdf::is_closed)
+}
+
 /// The scene of `file`, and what its export says; the export is read where `again` says so.
 fn prepared(file: &Path, directory: &Path, again: bool) -> (batch::Prepared, description::Exported) {
     let overrides = small();
     let entry = batch::entries(file, &overrides).unwrap_or_else(|error| panic!("{error}")).remove(0);
     let xml = directory.join("scene.xml");
     let scene = entry.scene(&overrides.set).unwrap_or_else(|error| panic!("{error}"));
-    let exported = description::export(&scene, &xml, &mesh::normals_of, &mesh::for_mitsuba, &sdf::is_closed);
+    let exported = exported(&scene, &xml);
     if !again {
         return (batch::prepare(&entry, &overrides).unwrap_or_else(|error| panic!("{error}")), exported);
     }
@@ -296,7 +302,7 @@ fn bands_are_exported() {
         };
         let ours = scene_of(&folder.yaml);
         let xml = folder.directory.path().join("s.xml");
-        let exported = description::export(&ours, &xml, &mesh::normals_of, &mesh::for_mitsuba, &sdf::is_closed);
+        let exported = exported(&ours, &xml);
         std::fs::write(&xml, &exported.xml).unwrap();
         let theirs = scene_of(&xml);
         (ours.image.bands, theirs.image.bands, exported)
@@ -315,6 +321,30 @@ fn bands_are_exported() {
         assert_eq!(exported.losses[0].field, "image.bands");
         assert!(exported.xml.contains("<film type=\"hdrfilm\">"), "{}", exported.xml);
     }
+}
+
+/// A PGM, which Mitsuba refuses, stands in a new file, one for all who name it; read back, the scene is what it was.
+#[test]
+fn pictures_that_mitsuba_refuses_are_written_beside_the_scene() {
+    let directory = tempfile::tempdir().unwrap();
+    let pgm = b"P5\n2 1\n255\n\x10\xa0";
+    common::write(&directory.path().join("a.pgm"), pgm);
+    let yaml = directory.path().join("s.yaml");
+    let scene = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nintegrator: {path: {opaque_sky: true}}\n\
+                 textures: {t: {image: {file: a.pgm}}}\nshapes: [{rectangle: {corner: [-1, -1, 0], edge_u: [2, 0, 0], edge_v: [0, 2, 0], \
+                 material: {diffuse: {reflectance: {texture: t}}}}}]\nlights: [{environment: {file: a.pgm, mapping: mitsuba}}]\n";
+    common::write(&yaml, scene.as_bytes());
+    let (_, exported) = prepared(&yaml, directory.path(), false);
+    assert_eq!(exported.losses, []);
+    let names: Vec<&str> = exported.files.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["scene.picture0.png"]);
+    assert_eq!(
+        exported.xml.matches("<string name=\"filename\" value=\"scene.picture0.png\"/>").count(),
+        2,
+        "{}",
+        exported.xml
+    );
+    same_picture(&yaml);
 }
 
 /// Mitsuba has one environment.

@@ -15,7 +15,7 @@ pub(super) const LARGEST: u64 = 1 << 31;
 /// What is read.
 const KINDS: &str = "a PNG, JPEG, BMP, TGA, PNM, PFM, HDR or EXR picture";
 
-fn decode(path: &Path) -> Result<image::DynamicImage> {
+pub(super) fn decode(path: &Path) -> Result<image::DynamicImage> {
     let mut bytes = crate::input::read(path).map_err(|e| Error::input(path, words(&e)))?;
     // Radiance pictures have either signature; the decoder knows one.
     if bytes.starts_with(b"#?RGBE") {
@@ -100,7 +100,7 @@ pub(super) const COLOURS: [[&str; 3]; 2] = [["R", "G", "B"], ["r", "g", "b"]];
 
 /// The file with the part first that has a picture. Where colours are in layers alone, they are those of the one layer that
 /// has red, green and blue, or among several those of Blender's `Combined`.
-fn with_picture_first(mut file: exr::ExrFile) -> exr::ExrFile {
+pub(super) fn with_picture_first(mut file: exr::ExrFile) -> exr::ExrFile {
     let is_band = |(name, _): &(String, Vec<f32>)| name.starts_with("S0.") || name.starts_with("T.");
     let has = |part: &exr::ExrPart, before: &str, names: [&str; 3]| {
         names.iter().all(|name| part.channel(&format!("{before}{name}")).is_some())

@@ -33,15 +33,18 @@ impl Export<'_> {
         let skies: Vec<&SkyLight> = around.into_iter().filter_map(|other| sky_like(light, other)).collect();
         let is_sum = skies.len() > 1;
         let why = self.emitter_shortfall(light);
+        // What has a new file is read back from its own.
+        let is_anew = matches!(light, Light::Environment(l) if (self.pictures)(&l.file).is_some());
+        let reads_otherwise = is_sum || is_anew;
         match &why {
             Some(why) => self.instead("emitter", &format!("lights[{i}]"), why.as_str()),
-            None if is_sum => self.restate("emitter", &format!("lights[{i}]")),
+            None if reads_otherwise => self.restate("emitter", &format!("lights[{i}]")),
             None => {}
         }
         self.emitter(light, &skies);
         self.weight(if is_sum { skies.iter().map(|sky| sky.sampling_weight).sum() } else { light.sampling_weight() });
         self.xml.close();
-        if why.is_some() || is_sum {
+        if why.is_some() || reads_otherwise {
             self.end();
         }
     }
@@ -59,8 +62,11 @@ impl Export<'_> {
                 joined([Export::light_shortfall(&l.irradiance), parallel])
             }
             Light::Constant(l) => Export::light_shortfall(&l.radiance),
-            Light::Environment(l) => (l.mapping != EnvironmentMapping::Mitsuba)
-                .then(|| "the same image on Mitsuba's grid, shifted by half a row toward the poles".to_owned()),
+            Light::Environment(l) => {
+                let shifted = (l.mapping != EnvironmentMapping::Mitsuba)
+                    .then(|| "the same image on Mitsuba's grid, shifted by half a row toward the poles".to_owned());
+                joined([shifted, self.spectra(&l.file).map(str::to_owned)])
+            }
             Light::Sky(l) => Export::reflectance_shortfall(&[&l.albedo], "a grey ground").map(str::to_owned),
             Light::Projector(l) => self.shining_shortfall(&l.irradiance, stands(l.v)),
         }
@@ -109,7 +115,7 @@ impl Export<'_> {
             }
             Light::Environment(l) => {
                 self.xml.open("emitter", &open("envmap"));
-                let file = self.file(&l.file);
+                let file = self.picture_file(&l.file);
                 self.xml.value("string", "filename", file);
                 self.xml.value("float", "scale", l.scale / DAYLIGHT);
                 // Its left edge, where ours has the middle, looks along -z.

@@ -62,6 +62,17 @@ pub struct Exported {
     pub files: Vec<(String, Vec<u8>)>,
 }
 
+/// A picture as Mitsuba reads it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PictureAnew {
+    /// By which the kind of its file is known.
+    pub extension: &'static str,
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// Whether it has colours in place of spectra.
+    pub loses_spectra: bool,
+}
+
 /// Where the normals of a mesh file point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeshNormals {
@@ -74,12 +85,13 @@ pub enum MeshNormals {
 }
 
 /// Writes `scene` for the file `path`. `normals` reads mesh `index` of a file, `anew` gives a PLY of it where Mitsuba does not read
-/// the same from the file, `closed` tells whether the grid of one bounds a solid.
+/// the same from the file, `pictures` the same of pictures, `closed` tells whether the grid of one bounds a solid.
 pub fn export(
     scene: &SceneDescription,
     path: &Path,
     normals: &dyn Fn(&Path, u32) -> MeshNormals,
     anew: &dyn Fn(&Path, u32) -> Option<Vec<u8>>,
+    pictures: &dyn Fn(&Path) -> Option<PictureAnew>,
     closed: &dyn Fn(&Path) -> bool,
 ) -> Exported {
     let nothing = Node::new(Default::default(), Value::Null);
@@ -88,7 +100,7 @@ pub fn export(
     let stem = path.file_stem().map_or(String::new(), |stem| format!("{}.", stem.to_string_lossy()));
     let directory = path.parent().unwrap_or(Path::new(""));
     let (losses, files) = (Vec::new(), Vec::new());
-    let (ids, mentioned, meshes) = (BTreeSet::new(), BTreeSet::new(), BTreeMap::new());
+    let (ids, mentioned, meshes, images) = (BTreeSet::new(), BTreeSet::new(), BTreeMap::new(), BTreeMap::new());
     let xml = Xml::default();
     // Each file is read once.
     let known = RefCell::default();
@@ -97,6 +109,8 @@ pub fn export(
     let anew =
         &|file: &Path, index: u32| once(&known, (file.to_owned(), index), || anew(file, index).map(Contents::from));
     let known = RefCell::default();
+    let pictures = &|file: &Path| once(&known, file.to_owned(), || pictures(file).map(Rc::new));
+    let known = RefCell::default();
     let closed = &|file: &Path| once(&known, file.to_owned(), || closed(file));
     let mut export = Export {
         scene,
@@ -104,6 +118,7 @@ pub fn export(
         sources,
         normals,
         anew,
+        pictures,
         closed,
         directory,
         stem,
@@ -113,6 +128,7 @@ pub fn export(
         losses,
         files,
         meshes,
+        images,
     };
     export.scene();
     export.missing_light();
@@ -136,6 +152,7 @@ struct Export<'a> {
     sources: &'a Sources,
     normals: &'a dyn Fn(&Path, u32) -> MeshNormals,
     anew: &'a dyn Fn(&Path, u32) -> Option<Contents>,
+    pictures: &'a dyn Fn(&Path) -> Option<Rc<PictureAnew>>,
     closed: &'a dyn Fn(&Path) -> bool,
     directory: &'a Path,
     /// Before the names of files that are written beside the scene.
@@ -149,6 +166,8 @@ struct Export<'a> {
     files: Vec<(String, Vec<u8>)>,
     /// Those of them that stand for a mesh of a file.
     meshes: BTreeMap<(PathBuf, u32), String>,
+    /// Those that stand for a picture.
+    images: BTreeMap<PathBuf, String>,
 }
 
 /// Settings that are about the work and the files, not about the light: Mitsuba has other words for

@@ -34,8 +34,14 @@ impl<'a> Export<'a> {
         if let Some(why) = why {
             self.instead("texture", &super::field(&["textures", name]), why);
         }
+        // It is read back from its own file.
+        let is_anew =
+            why.is_none() && matches!(texture, Texture::Image(image) if (self.pictures)(&image.file).is_some());
+        if is_anew {
+            self.restate("texture", &super::field(&["textures", name]));
+        }
         self.texture_as(&[("id", &id)], texture, Stands::Upright);
-        if why.is_some() {
+        if why.is_some() || is_anew {
             self.end();
         } else if self.loses_illuminant(name) {
             let written = self.named("textures", name).and_then(|node| node.get("image")?.get("illuminant"));
@@ -47,8 +53,15 @@ impl<'a> Export<'a> {
     /// What Mitsuba gets in place of a texture that it cannot express.
     fn texture_shortfall(&self, texture: &Texture) -> Option<&'static str> {
         match texture {
-            Texture::Image(image) => (image.wrap_v.is_some_and(|wrap| wrap != image.wrap))
-                .then_some("one way to go on beyond the edges for u and v"),
+            Texture::Image(image) => {
+                match (image.wrap_v.is_some_and(|wrap| wrap != image.wrap), self.spectra(&image.file)) {
+                    (true, None) => Some("one way to go on beyond the edges for u and v"),
+                    (true, Some(_)) => {
+                        Some("one way to go on beyond the edges for u and v, and colours in place of its spectra")
+                    }
+                    (false, spectra) => spectra,
+                }
+            }
             Texture::Checkerboard(board) => {
                 Export::either_shortfall(&[&board.a, &board.b], "grey squares in place of a spectrum")
             }
@@ -95,9 +108,26 @@ impl<'a> Export<'a> {
         self.xml.open("texture", &all);
     }
 
+    /// What Mitsuba gets in place of the spectra of a picture, if it has some.
+    pub(super) fn spectra(&self, file: &Path) -> Option<&'static str> {
+        (self.pictures)(file).filter(|anew| anew.loses_spectra).map(|_| "colours in place of its spectra")
+    }
+
+    /// The name of a picture as Mitsuba reads it: its own, or of a new file.
+    pub(super) fn picture_file(&mut self, file: &Path) -> String {
+        let Some(anew) = (self.pictures)(file) else { return self.file(file) };
+        if let Some(name) = self.images.get(file) {
+            return name.clone();
+        }
+        let name = format!("{}picture{}.{}", self.stem, self.files.len(), anew.extension);
+        self.files.push((name.clone(), anew.bytes.clone()));
+        self.images.insert(file.to_owned(), name.clone());
+        name
+    }
+
     fn bitmap(&mut self, attributes: &[(&str, &str)], image: &ImageTexture, raw: bool, stands: Stands) {
         self.open_texture("bitmap", attributes);
-        let file = self.file(&image.file);
+        let file = self.picture_file(&image.file);
         self.xml.value("string", "filename", file);
         let filter = match image.filter {
             TextureFilter::Bilinear => "bilinear",

@@ -1,0 +1,245 @@
+//! Picture files for Mitsuba, which reads fewer than are read here.
+//!
+//! What it refuses (3.9.1): EXR files with more channels than those of colours, spectral ones among them; of PNM all but `P6`; of BMP
+//! all but 8, 24 and 32 bits without packing behind a header of 40 bytes; TGA files without the footer of version 2, with palettes
+//! or with 16 bits. It takes other colours from palettes in BMP, which it has for grey, and from `P6` of 16 bits.
+
+use super::decoded::{COLOURS, decode, extension, with_picture_first};
+use crate::description::PictureAnew;
+use crate::film::exr::{self, ChannelData, ColourEncoding, Compression, ExrImage, ExrPart, Layout};
+use crate::scene::bands::{Bands, Quantity};
+use crate::spectrum::observer::tristimulus;
+use crate::spectrum::{ColourSpace, illuminant};
+use std::collections::BTreeSet;
+use std::io::Cursor;
+use std::path::Path;
+
+/// The channels of a picture that Mitsuba takes for one, besides A.
+const TAKEN: [&[&str]; 3] = [&["R", "G", "B"], &["Y"], &["X", "Y", "Z"]];
+
+/// The picture of a file that Mitsuba refuses or takes for another picture, as it reads it; `None` of files that it reads as they are
+/// read here, and of those that cannot be read.
+#[must_use]
+pub fn for_mitsuba(path: &Path) -> Option<PictureAnew> {
+    if extension(path) == "exr" {
+        return exr_anew(path);
+    }
+    let bytes = crate::input::read(path).ok()?;
+    if is_plain(&bytes) {
+        return None;
+    }
+    let mut png = Vec::new();
+    decode(path).ok()?.write_to(&mut Cursor::new(&mut png), image::ImageFormat::Png).ok()?;
+    Some(PictureAnew { extension: "png", bytes: png, loses_spectra: false })
+}
+
+/// Whether Mitsuba reads a picture of a kind that is told by its first bytes, or its last.
+fn is_plain(bytes: &[u8]) -> bool {
+    let number = |at: usize, count: usize| {
+        let number = bytes.get(at..at + count)?;
+        Some(number.iter().rev().fold(0, |number, byte| number << 8 | u32::from(*byte)))
+    };
+    match bytes {
+        [b'P', b'6', ..] => {
+            let mut words = bytes[2..].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).take(3);
+            words.all(|word| word.iter().all(u8::is_ascii_digit)) && header_word(bytes, 3) == Some(b"255".as_slice())
+        }
+        [b'P', b'1'..=b'7', ..] => false,
+        // Size of the header, bits of a pixel, packing.
+        [b'B', b'M', ..] => {
+            number(14, 4) == Some(40) && matches!(number(28, 2), Some(24 | 32)) && number(30, 4) == Some(0)
+        }
+        _ if image::guess_format(bytes).is_ok() || super::pfm::is(bytes) || bytes.starts_with(b"#?") => true,
+        // TGA has nothing to tell it by at its beginning.
+        _ => {
+            let footer = bytes.len().checked_sub(18).is_some_and(|at| bytes[at..].starts_with(b"TRUEVISION-XFILE."));
+            footer && matches!(bytes[2], 2 | 3 | 10 | 11) && matches!(bytes[16], 8 | 24 | 32)
+        }
+    }
+}
+
+/// A word of the header of a PNM file, from 0 on.
+fn header_word(bytes: &[u8], index: usize) -> Option<&[u8]> {
+    bytes.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).nth(index)
+}
+
+/// The same of EXR.
+fn exr_anew(path: &Path) -> Option<PictureAnew> {
+    let file = exr::read_exr(path).ok()?;
+    if is_plain_exr(&file) {
+        return None;
+    }
+    let file = with_picture_first(file);
+    let part = &file.parts[0];
+    let (channels, primaries, loses_spectra) = match Bands::of(path, part).ok()? {
+        Some(bands) => (colours_of(&bands), ColourSpace::Rec709.chromaticities(), true),
+        None => (channels_of(part)?, file.primaries(), false),
+    };
+    let image = ExrImage {
+        frame: [part.window.width, part.window.height],
+        window: crate::film::Window::full(part.window.width, part.window.height),
+        channels: channels.into_iter().map(|(name, plane)| (name.to_owned(), ChannelData::F32(plane))).collect(),
+        colour: Some(ColourEncoding { primaries, interop_id: None }),
+        attributes: Vec::new(),
+        data: BTreeSet::new(),
+        compression: Compression::Zips,
+        layout: Layout::Single,
+    };
+    let bytes = exr::encode_exr(&image).ok()?;
+    Some(PictureAnew { extension: "exr", bytes, loses_spectra })
+}
+
+/// Whether Mitsuba takes the first part of a file for the picture that is taken here. It looks at what stands behind the last dot.
+fn is_plain_exr(file: &exr::ExrFile) -> bool {
+    let names = file.parts[0].channels.iter().map(|(name, _)| name.rsplit_once('.').unwrap_or(("", name)));
+    let layers: BTreeSet<&str> = names.clone().map(|(layer, _)| layer).collect();
+    let mut letters: Vec<String> = names.map(|(_, letter)| letter.to_ascii_uppercase()).collect();
+    letters.retain(|letter| letter != "A");
+    letters.sort_unstable();
+    let taken = |channels: &&[&str]| {
+        let mut channels = channels.to_vec();
+        channels.sort_unstable();
+        letters == channels
+    };
+    let is_first = file.parts.len() == 1 || file.parts[0].channel("R").is_some();
+    is_first && layers.len() == 1 && TAKEN.iter().any(taken)
+}
+
+/// The channels of the picture alone, as they stand in the file.
+fn channels_of(part: &ExrPart) -> Option<Vec<(&'static str, Vec<f32>)>> {
+    let all = |names: &[&'static str]| -> Option<Vec<(&'static str, Vec<f32>)>> {
+        names.iter().map(|name| Some((*name, part.channel(name)?.to_vec()))).collect()
+    };
+    let [rgb, grey, xyz] = TAKEN;
+    all(rgb).or_else(|| all(xyz)).or_else(|| all(grey))
+}
+
+/// The colours of spectra: of radiance as it is, of what reflects in daylight.
+fn colours_of(bands: &Bands) -> Vec<(&'static str, Vec<f32>)> {
+    let daylight = illuminant::d65();
+    let colour = |i: usize| {
+        let spectrum = bands.spectrum(i);
+        let (seen, most) = match bands.quantity {
+            Quantity::Radiance => (spectrum, f32::MAX),
+            Quantity::Reflectance => (spectrum.times(&daylight), 1.0),
+        };
+        let xyz = tristimulus(&seen).map(|x| x as f32);
+        ColourSpace::Rec709.from_xyz(xyz).map(|x| x.clamp(0.0, most))
+    };
+    let pixels: Vec<[f32; 3]> = (0..bands.len()).map(colour).collect();
+    COLOURS[0].into_iter().zip(0..3).map(|(name, k)| (name, pixels.iter().map(|pixel| pixel[k]).collect())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{open, picture};
+    use super::*;
+
+    /// What is written in place of a file, in the same folder, and both as they are read.
+    fn both(name: &str, bytes: &[u8]) -> Option<[Vec<[f32; 3]>; 2]> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let anew = for_mitsuba(&path)?;
+        let other = folder.path().join(format!("anew.{}", anew.extension));
+        std::fs::write(&other, &anew.bytes).unwrap();
+        assert!(for_mitsuba(&other).is_none(), "{name}");
+        Some([&path, &other].map(|path| picture(path, open(path).unwrap()).unwrap().pixels))
+    }
+
+    fn exr(names: &[&str]) -> Vec<u8> {
+        let planes = names
+            .iter()
+            .zip(1..)
+            .map(|(name, k)| ((*name).to_owned(), ChannelData::F32((0..2).map(|i| 0.125 * (k + i) as f32).collect())));
+        let image = ExrImage {
+            frame: [2, 1],
+            window: crate::film::Window::full(2, 1),
+            channels: planes.collect(),
+            colour: Some(ColourEncoding::of(ColourSpace::Rec709)),
+            attributes: Vec::new(),
+            data: BTreeSet::new(),
+            compression: Compression::None,
+            layout: Layout::Single,
+        };
+        exr::encode_exr(&image).unwrap()
+    }
+
+    /// Mitsuba 3.9.1 says of the first that it has no known pixel format.
+    #[test]
+    fn channels_beside_colours_are_left_out_of_exr() {
+        for names in
+            [&["R", "G", "B", "Z"][..], &["R", "G", "B", "A", "albedo.R"], &["Y", "id.X"], &["X", "Y", "Z", "W"]]
+        {
+            let [read, anew] = both("a.exr", &exr(names)).unwrap_or_else(|| panic!("{names:?}"));
+            assert_eq!(read, anew, "{names:?}");
+        }
+        for names in
+            [&["R", "G", "B"][..], &["R", "G", "B", "A"], &["Y"], &["X", "Y", "Z"], &["view.R", "view.G", "view.B"]]
+        {
+            assert!(both("a.exr", &exr(names)).is_none(), "{names:?}");
+        }
+    }
+
+    /// A reflectance of one half everywhere is grey of one half.
+    #[test]
+    fn spectra_become_colours() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let planes = ["T.400,0nm", "T.700,0nm"].map(|name| (name.to_owned(), ChannelData::F32(vec![0.5; 2])));
+        let image = ExrImage {
+            frame: [2, 1],
+            window: crate::film::Window::full(2, 1),
+            channels: planes.to_vec(),
+            colour: None,
+            attributes: Vec::new(),
+            data: BTreeSet::new(),
+            compression: Compression::None,
+            layout: Layout::Single,
+        };
+        exr::write_exr(&path, &image).unwrap();
+        let anew = for_mitsuba(&path).unwrap();
+        assert!(anew.loses_spectra);
+        std::fs::write(&path, &anew.bytes).unwrap();
+        let pixels = picture(&path, open(&path).unwrap()).unwrap().pixels;
+        // The white of D65 is that of Rec. 709 to the digits in which either is stated.
+        assert!(pixels.iter().flatten().all(|x| (x - 0.5).abs() < 1e-3), "{pixels:?}");
+    }
+
+    /// Mitsuba 3.9.1 knows no format of the first five, and reads the low bytes of the sixth for high ones.
+    #[test]
+    fn what_mitsuba_reads_otherwise_of_other_pictures_is_written_anew() {
+        let tga = |kind: u8, bits: u8, footer: &[u8]| {
+            let head = [0, 0, kind, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, bits, 0x20];
+            [&head[..], &[10, 20, 30, 40, 50, 60][..2 * usize::from(bits / 8)], footer].concat()
+        };
+        let bmp = |header: u8, bits: u8, pixels: &[u8]| {
+            let mut file = [b"BM".as_slice(), &[0; 8], &[14 + header, 0, 0, 0, header, 0, 0, 0]].concat();
+            file.extend([2, 0, 0, 0, 1, 0, 0, 0, 1, 0, bits, 0]);
+            file.resize(14 + usize::from(header), 0);
+            file.extend(pixels);
+            file
+        };
+        let whole = b"\0\0\0\0\0\0\0\0TRUEVISION-XFILE.\0";
+        for (name, bytes) in [
+            ("a.pgm", b"P5\n2 1\n255\n\x10\xa0".to_vec()),
+            ("a.pbm", b"P1\n2 1\n0 1\n".to_vec()),
+            ("a.ppm", b"P3\n2 1\n255\n1 2 3 40 50 60\n".to_vec()),
+            ("a.tga", tga(2, 24, b"")),
+            ("a.tga", tga(2, 16, whole)),
+            ("a.ppm", b"P6\n2 1\n65535\n\x01\x02\x03\x04\x05\x06\x10\x20\x30\x40\x50\x60".to_vec()),
+            ("a.bmp", bmp(108, 24, &[1, 2, 3, 40, 50, 60, 0, 0])),
+        ] {
+            let [read, anew] = both(name, &bytes).unwrap_or_else(|| panic!("{name}"));
+            assert_eq!(read, anew, "{name}");
+        }
+        for (name, bytes) in [
+            ("a.ppm", b"P6\n2 1\n255\n\x01\x02\x03\x04\x05\x06".to_vec()),
+            ("a.tga", tga(2, 24, whole)),
+            ("a.bmp", bmp(40, 24, &[1, 2, 3, 40, 50, 60, 0, 0])),
+            ("a.pfm", b"Pf\n2 1\n-1\n\0\0\0\0\0\0\x80\x3f".to_vec()),
+        ] {
+            assert!(both(name, &bytes).is_none(), "{name}");
+        }
+    }
+}
