@@ -333,7 +333,35 @@ impl Layer {
     }
 }
 
+impl Quantity {
+    /// What it is of, as its channels are named.
+    fn components(self) -> &'static [&'static str] {
+        match self {
+            Quantity::Depth => &["T"],
+            Quantity::Uv | Quantity::DuvDx | Quantity::DuvDy => &["U", "V"],
+            Quantity::Primitive | Quantity::Shape => &["I"],
+            Quantity::Albedo => &["R", "G", "B"],
+            Quantity::Position
+            | Quantity::GeometricNormal
+            | Quantity::ShadingNormal
+            | Quantity::DpDu
+            | Quantity::DpDv => &["X", "Y", "Z"],
+        }
+    }
+}
+
 impl Layer {
+    /// Whether two may not have their names: one name does for things of a surface whose components have others.
+    pub(crate) fn clashes(&self, other: &Layer) -> bool {
+        let apart = match (&self.content, &other.content) {
+            (LayerContent::Surface(a), LayerContent::Surface(b)) => {
+                !a.components().iter().any(|component| b.components().contains(component))
+            }
+            _ => false,
+        };
+        self.name == other.name && !apart
+    }
+
     pub(crate) fn check(&self, taken: bool, at: At<'_>, checker: &mut Checker<'_>) {
         check_channel(&self.name, taken, at.key("name"), checker);
         if let LayerContent::Ways { ways, .. } = &self.content {
@@ -445,6 +473,13 @@ mod tests {
         assert_eq!(
             faults("layers:\n- {name: a, surface: depth}\n- {name: a, light: path}\n"),
             "dir/s.yaml:4:10: layers[1].name: expected a name of its own, found \"a\" again"
+        );
+        // a.T beside a.U and a.V, but no second a.T.
+        let layers = "layers: [{name: a, surface: depth}, {name: a, surface: uv}]\n";
+        assert_eq!(scene(layers).layers.len(), 2);
+        assert_eq!(
+            faults(&layers.replace("uv", "depth")),
+            "dir/s.yaml:2:44: layers[1].name: expected a name of its own, found \"a\" again"
         );
         assert_eq!(
             faults("layers:\n- {name: a, light: whitted}\n"),

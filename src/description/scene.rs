@@ -297,7 +297,7 @@ impl SceneDescription {
         }
         let groups: BTreeSet<&str> = self.light_groups.keys().map(String::as_str).collect();
         for (i, layer) in self.layers.iter().enumerate() {
-            let taken = self.layers[..i].iter().any(|other| other.name == layer.name);
+            let taken = self.layers[..i].iter().any(|other| layer.clashes(other));
             let at = at.key("layers");
             layer.check(taken, at.index(i), &mut checker);
             if matches!(layer.content, LayerContent::Ways { .. } | LayerContent::LightGroups) {

@@ -188,11 +188,11 @@ impl Import<'_> {
         layers.extend(further);
         let place = bag.place("aovs");
         let written = bag.required("aovs", bag.text("aovs"))?;
-        for token in written.split([' ', ',', ';']).filter(|token| !token.is_empty()) {
+        for token in written.split([' ', ',']).filter(|token| !token.is_empty()) {
             let quantity = |kind: &str| QUANTITIES.iter().find(|(theirs, _)| *theirs == kind).map(|(_, ours)| *ours);
-            let parts: Vec<&str> = token.split(':').collect();
+            let parts: Vec<&str> = token.split(':').filter(|part| !part.is_empty()).collect();
             let (name, quantity) = match parts[..] {
-                [name, kind] if !name.is_empty() => (name, quantity(kind)),
+                [name, kind] => (name, quantity(kind)),
                 _ => ("", None),
             };
             let Some(quantity) = quantity else {
@@ -423,6 +423,10 @@ mod tests {
         };
         assert!(aov("nn").contains("aovs: expected name:type with a type among albedo, depth"), "{}", aov("nn"));
         assert!(aov("nn:normal").ends_with("found \"nn:normal\""), "{}", aov("nn:normal"));
+        // So they do to Mitsuba 3.9.1: semicolons part nothing, colons at the ends say nothing, and names may come twice.
+        assert!(aov("a:depth;b:uv").ends_with("found \"a:depth;b:uv\""), "{}", aov("a:depth;b:uv"));
+        assert_eq!(aov("a:depth, a:uv a:albedo:,"), "none");
+        assert!(aov("a:depth,a:depth").ends_with("expected a name of its own, found \"a\" again"));
         let two = "<integrator type=\"direct\"><integer name=\"shading_samples\" value=\"4\"/>\
                    <integer name=\"bsdf_samples\" value=\"4\"/></integrator>";
         assert!(fault(two, &[]).ends_with("expected either shading_samples or this, found both"));
