@@ -8,6 +8,7 @@ use super::super::node::Node;
 use super::bsdfs::Sides;
 use super::object::{Bag, Family, SpectrumValue, Value};
 use super::spectra::Role;
+use super::textures::Use;
 use super::{Fields, Import, boolean, entry, number, text};
 
 /// Whether two nodes are the same number.
@@ -22,6 +23,10 @@ const CLEAR: [&str; 6] =
 impl Import<'_> {
     /// A number, or `{texture: name}`; `None` where it is not written.
     pub(crate) fn number_or_texture(&mut self, bag: &Bag<'_>, name: &'static str) -> Result<Option<Node>, Fault> {
+        self.number_as(bag, name, Use::Numbers)
+    }
+
+    fn number_as(&mut self, bag: &Bag<'_>, name: &'static str, used: Use) -> Result<Option<Node>, Fault> {
         let Some(value) = bag.value(name) else { return Ok(None) };
         let place = bag.place(name);
         match value {
@@ -38,7 +43,7 @@ impl Import<'_> {
                         Err(bag.fault_of(name, message))
                     }
                     None => {
-                        let texture = self.declare_numbers(*index)?;
+                        let texture = self.declare_numbers(*index, used)?;
                         Ok(Some(entry(place, "texture", text(place, texture))))
                     }
                 }
@@ -52,9 +57,18 @@ impl Import<'_> {
 
     /// A share from 0 to 1, to which Mitsuba clamps numbers.
     pub(crate) fn share(&mut self, bag: &Bag<'_>, name: &'static str) -> Result<Option<Node>, Fault> {
-        let node = self.number_or_texture(bag, name)?;
+        let node = self.number_as(bag, name, Use::Clamped)?;
         Ok(node.map(|node| match node.value {
             super::Value::Float(share) => number(node.place, share.clamp(0.0, 1.0)),
+            _ => node,
+        }))
+    }
+
+    /// A number of 0 or more, to which Mitsuba clamps it, or a texture of those.
+    pub(super) fn least(&mut self, bag: &Bag<'_>, name: &'static str) -> Result<Option<Node>, Fault> {
+        let node = self.number_as(bag, name, Use::Clamped)?;
+        Ok(node.map(|node| match node.value {
+            super::Value::Float(x) => number(node.place, x.max(0.0)),
             _ => node,
         }))
     }
@@ -65,11 +79,12 @@ impl Import<'_> {
             super::Value::Float(x) => number(node.place, x.max(LEAST_ALPHA)),
             _ => node,
         };
-        let brushed = [self.number_or_texture(bag, "alpha_u")?, self.number_or_texture(bag, "alpha_v")?];
+        let mut alpha = |name| self.number_as(bag, name, Use::Clamped);
+        let brushed = [alpha("alpha_u")?, alpha("alpha_v")?];
         let place = bag.object.place;
         match brushed {
             [None, None] => {
-                let alpha = self.number_or_texture(bag, "alpha")?.unwrap_or_else(|| number(place, 0.1));
+                let alpha = alpha("alpha")?.unwrap_or_else(|| number(place, 0.1));
                 fields.add("roughness", clamped(alpha));
             }
             // Plastic is the same along u and v: this is one number for it.
@@ -173,7 +188,7 @@ impl Import<'_> {
         let place = bag.object.place;
         let mut fields = Fields::new(place);
         let height = bag.only(Family::Texture)?.ok_or_else(|| bag.fault("expected a <texture> inside, found none"))?;
-        let height = self.declare_numbers(height)?;
+        let height = self.declare_numbers(height, Use::Numbers)?;
         fields.add("height", entry(place, "texture", text(place, height)));
         if let Some(scale) = bag.float("scale")? {
             fields.add("scale", number(bag.place("scale"), scale));
@@ -185,7 +200,7 @@ impl Import<'_> {
         let place = bag.place("normalmap");
         let mut fields = Fields::new(bag.object.place);
         let normals = bag.required("normalmap", bag.object("normalmap", &[Family::Texture]))?;
-        let normals = self.declare_numbers(normals)?;
+        let normals = self.declare_numbers(normals, Use::Numbers)?;
         fields.add("normals", entry(place, "texture", text(place, normals)));
         self.relief(bag, fields, "normal_map")
     }
@@ -204,7 +219,7 @@ impl Import<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::{Material, MaterialRef, NumberOrTexture};
+    use super::super::super::{Material, MaterialRef, NumberOrTexture, Spectrum, SpectrumOrTexture, Texture};
     use super::super::tests::{fault, good};
 
     /// The material of a sphere.
@@ -227,6 +242,27 @@ mod tests {
             let Material::Blend(blend) = material(&blend) else { panic!("a blend") };
             assert_eq!(blend.weight, NumberOrTexture::Number(share));
         }
+    }
+
+    /// So are those of the squares of a board, by which Mitsuba 3.9.1 gives the pictures of 0 for -1, too; not where it clamps nothing.
+    #[test]
+    fn squares_of_shares_are_clamped() {
+        let board = |name: &str| {
+            format!(
+                "<texture type=\"checkerboard\" name=\"{name}\" id=\"t\"><float name=\"color0\" value=\"-1\"/>\
+                 <float name=\"color1\" value=\"0.5\"/></texture>"
+            )
+        };
+        let of = |bsdf: &str| good(&format!("<shape type=\"sphere\">{bsdf}</shape>")).textures["t as numbers"].clone();
+        let mask = format!("<bsdf type=\"mask\">{}<bsdf type=\"diffuse\"/></bsdf>", board("opacity"));
+        let metal = format!("<bsdf type=\"roughconductor\">{}</bsdf>", board("alpha"));
+        for bsdf in [mask, metal] {
+            let Texture::Checkerboard(board) = of(&bsdf) else { panic!("a board") };
+            let number = |x: f64| SpectrumOrTexture::Spectrum(Spectrum::Number(x));
+            assert_eq!((board.b, board.a), (number(0.0), number(0.5)));
+        }
+        let burley = format!("<shape type=\"sphere\"><bsdf type=\"principled\">{}</bsdf></shape>", board("roughness"));
+        assert!(fault(&burley, &[]).contains("expected a number of 0 or more, found -1"), "{}", fault(&burley, &[]));
     }
 
     /// What is the same everywhere and at all wavelengths is a number, in whatever words.

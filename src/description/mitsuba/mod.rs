@@ -120,7 +120,7 @@ struct Import<'a> {
     /// Under which name an object stands in one of the maps.
     names: HashMap<usize, String>,
     /// Under which name a texture stands there a second time, for numbers.
-    for_numbers: HashMap<usize, String>,
+    for_numbers: HashMap<(usize, textures::Use), String>,
     /// Groups without shapes.
     empty: HashSet<usize>,
     /// The emitters that shapes have.

@@ -53,19 +53,19 @@ impl Import<'_> {
 
     /// The name of a texture that is asked for numbers. Mitsuba's checkerboard then has its colours the other
     /// way round, so it stands in `textures` a second time.
-    pub(crate) fn declare_numbers(&mut self, index: usize) -> Result<String, Fault> {
+    pub(crate) fn declare_numbers(&mut self, index: usize, used: Use) -> Result<String, Fault> {
         let bag = self.bag(index);
         if bag.object.plugin != "checkerboard" {
             return self.declare_texture(index);
         }
-        if let Some(name) = self.for_numbers.get(&index) {
+        if let Some(name) = self.for_numbers.get(&(index, used)) {
             return Ok(name.clone());
         }
-        let node = self.checkerboard(&bag, Use::Numbers)?;
+        let node = self.checkerboard(&bag, used)?;
         bag.finish()?;
         let plain = bag.object.id.clone().unwrap_or_else(|| format!("checkerboard {index}"));
         let name = self.made(format!("{plain} as numbers"));
-        self.for_numbers.insert(index, name.clone());
+        self.for_numbers.insert((index, used), name.clone());
         self.textures.push(self.entry(index, &name, node));
         Ok(name)
     }
@@ -76,6 +76,7 @@ impl Import<'_> {
         let keys = if used == Use::Spectra { ["a", "b"] } else { ["b", "a"] };
         for (ours, theirs, default) in [(keys[0], "color0", 0.4), (keys[1], "color1", 0.2)] {
             let colour = match used {
+                Use::Clamped => self.least(bag, theirs)?,
                 Use::Spectra => self.spectrum_or_cell(bag, theirs, Role::Reflectance)?,
                 Use::Numbers => self.number_or_texture(bag, theirs)?,
             };
@@ -89,8 +90,10 @@ impl Import<'_> {
 }
 
 /// What a texture is asked for.
-#[derive(Clone, Copy, PartialEq)]
-enum Use {
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Use {
+    /// Numbers of which Mitsuba takes those below 0 for 0.
+    Clamped,
     Spectra,
     Numbers,
 }
