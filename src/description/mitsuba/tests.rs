@@ -31,6 +31,22 @@ pub(super) fn good(text: &str) -> SceneDescription {
     scene(text, &[]).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// Mitsuba 3.9.1 gives the same picture, of each step by itself, on shapes, lights, textures and cameras alike.
+#[test]
+fn the_last_row_of_a_matrix_is_passed_over() {
+    let rectangle = |last: &str| {
+        format!(
+            "<shape type=\"rectangle\"><transform name=\"to_world\"><matrix value=\"1 0 0 0 0 1 0 0 0 0 1 0 {last}\"/>\
+             <translate x=\"2\"/></transform></shape>"
+        )
+    };
+    let (affine, projective) = (good(&rectangle("0 0 0 1")), good(&rectangle("0.2 0.1 0 3")));
+    assert_eq!(projective.shapes, affine.shapes);
+    let said = "the last row of the matrix, [0.2, 0.1, 0, 3], is taken for 0, 0, 0, 1, as in Mitsuba";
+    let told = |scene: &SceneDescription| scene.locator.notes().iter().any(|note| note.ends_with(said));
+    assert!(told(&projective) && !told(&affine));
+}
+
 #[test]
 fn parameters_are_filled_in_anywhere_in_a_value() {
     let text = "<default name=\"r\" value=\"2\"/><default name=\"radius\" value=\"7\"/>\

@@ -1,7 +1,5 @@
 //! Textures.
 
-use glam::DVec4;
-
 use super::super::fault::Fault;
 use super::super::node::Node;
 use super::object::{Bag, Family};
@@ -76,9 +74,9 @@ impl Import<'_> {
         let keys = if used == Use::Spectra { ["a", "b"] } else { ["b", "a"] };
         for (ours, theirs, default) in [(keys[0], "color0", 0.4), (keys[1], "color1", 0.2)] {
             let colour = match used {
-                Use::Clamped => self.least(bag, theirs)?,
                 Use::Spectra => self.spectrum_or_cell(bag, theirs, Role::Reflectance)?,
                 Use::Numbers => self.number_or_texture(bag, theirs)?,
+                Use::Clamped => self.least(bag, theirs)?,
             };
             fields.add(ours, colour.unwrap_or_else(|| number(place, default)));
         }
@@ -92,10 +90,10 @@ impl Import<'_> {
 /// What a texture is asked for.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Use {
-    /// Numbers of which Mitsuba takes those below 0 for 0.
-    Clamped,
     Spectra,
     Numbers,
+    /// Numbers of which Mitsuba takes those below 0 for 0.
+    Clamped,
 }
 
 fn bitmap(bag: &Bag<'_>) -> Result<Node, Fault> {
@@ -131,9 +129,6 @@ fn bitmap(bag: &Bag<'_>) -> Result<Node, Fault> {
 /// What is done to u and v: the first two rows of an affine map.
 fn to_uv(bag: &Bag<'_>) -> Result<Option<[[f64; 3]; 2]>, Fault> {
     let Some(matrix) = bag.transform("to_uv")? else { return Ok(None) };
-    if matrix.row(3) != DVec4::W {
-        return Err(bag.fault_of("to_uv", "expected an affine transform of u and v, found a projective one"));
-    }
     Ok(Some([matrix.row(0), matrix.row(1)].map(|row| [row.x, row.y, row.w])))
 }
 

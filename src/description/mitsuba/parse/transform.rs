@@ -1,9 +1,9 @@
 //! `<transform>`: its steps as one matrix.
 
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3, DVec4};
 
 use super::super::super::fault::Fault;
-use super::super::super::node::did_you_mean;
+use super::super::super::node::{Place, did_you_mean};
 use super::super::super::transform::rotation;
 use super::super::xml::{Attribute, Element};
 use super::{Parser, attribute, check_attributes};
@@ -71,7 +71,7 @@ impl Parser<'_> {
                         [a, b, c, d, e, f, g, h, i] => {
                             DMat4::from_cols_array(&[a, d, g, 0.0, b, e, h, 0.0, c, f, i, 0.0, 0.0, 0.0, 0.0, 1.0])
                         }
-                        ref m if m.len() == 16 => DMat4::from_cols_slice(m).transpose(),
+                        ref m if m.len() == 16 => self.affine(DMat4::from_cols_slice(m).transpose(), written.place),
                         ref m => {
                             let message = format!("expected 9 or 16 numbers, found {}", m.len());
                             return Err(Fault::at_place(written.place, message));
@@ -105,6 +105,17 @@ impl Parser<'_> {
             true => Ok(matrix),
             false => Err(Fault::at_place(element.place, "expected finite numbers in the transform, found others")),
         }
+    }
+
+    /// Mitsuba's transforms are affine: the last row of a matrix is 0, 0, 0, 1 in each step, whatever stands there.
+    fn affine(&mut self, matrix: DMat4, place: Place) -> DMat4 {
+        let last = matrix.row(3);
+        if last != DVec4::W {
+            let message = format!("the last row of the matrix, {last}, is taken for 0, 0, 0, 1, as in Mitsuba");
+            self.sources.note(place, message);
+        }
+        let rows = [matrix.row(0), matrix.row(1), matrix.row(2), DVec4::W];
+        DMat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose()
     }
 
     fn triple(&mut self, attribute: &Attribute) -> std::result::Result<DVec3, Fault> {
