@@ -31,6 +31,28 @@ fn slides_keep_what_mitsuba_cannot_say() {
     }
 }
 
+/// Mitsuba 3.9.1 shows a picture on a disk where it is here, whichever way that looks, and on a tube unless its seam is elsewhere.
+#[test]
+fn pictures_on_disks_and_tubes_lie_where_mitsuba_has_them() {
+    let head =
+        "textures: {photo: {image: {file: EARTH}}}\nmaterials: {card: {diffuse: {reflectance: {texture: photo}}}}\n";
+    let tube = |base: &str, top: &str, more: &str| {
+        format!("cylinder: {{base: {base}, top: {top}, radius: 0.2, caps: none, material: card{more}}}")
+    };
+    let (low, high) = ("[0, 0.5, 0]", "[0.3, 1, 0.4]");
+    for (shape, is_lost) in [
+        ("disk: {center: [0, 1, 0], normal: [0.3, 0.5, 1], radius: 0.5, material: card}".to_owned(), false),
+        ("disk: {center: [0, 1, 0], normal: [0, 0, -1], radius: 0.5, material: card}".to_owned(), false),
+        (tube(low, high, ""), false),
+        (tube(high, low, ""), true),
+        (tube(low, high, ", seam: [0, 0, 1]"), true),
+    ] {
+        let (losses, _) = exported_with(head, &shape);
+        let told = ["shapes[1]: the same shape with Mitsuba's texture coordinates"];
+        assert_eq!(losses, if is_lost { &told[..] } else { &[] }, "{shape}");
+    }
+}
+
 /// Where it is told to, Mitsuba's `twosided` lets light through: so it does in the file, and read back.
 #[test]
 fn two_sides_may_let_light_through() {

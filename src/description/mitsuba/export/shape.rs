@@ -6,7 +6,7 @@ use glam::{DAffine3, DMat3, DMat4, DVec3, DVec4};
 
 use super::super::super::medium::{UNCHANGED, VACUUM};
 use super::super::super::shape::{
-    Caps, Cube, CurveBasis, Geometry, Layout, Mesh, Normals, Plane, SdfNormals, Shape, Sphere,
+    Caps, Cube, CurveBasis, Cylinder, Geometry, Layout, Mesh, Normals, Plane, SdfNormals, Shape, Sphere,
 };
 use super::super::super::spectrum::SpectrumOrTexture;
 use super::super::super::transform::{is_mirror, is_similarity};
@@ -179,10 +179,7 @@ impl Export<'_> {
             }
             // Nor does a picture follow it, but layers of coordinates do. It is read back where the world has it.
             Geometry::Cylinder(cylinder) => {
-                // About an axis that runs down z the one that is chosen here is not Mitsuba's.
-                let axis = (DVec3::from(cylinder.top) - DVec3::from(cylinder.base)).normalize_or_zero();
-                let chosen = || axis.z.is_sign_negative().then(|| Frame::by_least_turn(axis).s);
-                if let Some(seam) = cylinder.seam.map(DVec3::from).or_else(chosen) {
+                if let Some(seam) = seam(cylinder) {
                     let seam = shape.world_from_object().transform_vector3(seam);
                     self.xml.instruction(&format!("set {field}.seam: [{}]", numbers(&seam.to_array())));
                 }
@@ -299,7 +296,9 @@ impl Export<'_> {
             Geometry::Sphere(Sphere { layout: Layout::ZUp, .. }) | Geometry::Cube(Cube { layout: Layout::ZUp, .. }) => {
                 None
             }
-            Geometry::Sphere(_) | Geometry::Cylinder(_) | Geometry::Disk(_) | Geometry::Cube(_) if textured => {
+            // The coordinates of a disk are Mitsuba's, and those of a tube whose seam is where Mitsuba has it.
+            Geometry::Cylinder(cylinder) if textured && seam(cylinder).is_none() => None,
+            Geometry::Sphere(_) | Geometry::Cylinder(_) | Geometry::Cube(_) if textured => {
                 said("the same shape with Mitsuba's texture coordinates")
             }
             Geometry::Sphere(_) | Geometry::Cylinder(_) | Geometry::Disk(_) | Geometry::Cube(_) => None,
@@ -318,6 +317,13 @@ impl Export<'_> {
             .then(|| "the same shape with its normals outward: Mitsuba's has no others".to_owned());
         joined([own, flipped, grey, self.sides_shortfall(shape).map(str::to_owned)])
     }
+}
+
+/// Where u = 0 on a cylinder that has it elsewhere than Mitsuba: as it is written, or about an axis that runs down z.
+fn seam(cylinder: &Cylinder) -> Option<DVec3> {
+    let axis = (DVec3::from(cylinder.top) - DVec3::from(cylinder.base)).normalize_or_zero();
+    let chosen = || axis.z.is_sign_negative().then(|| Frame::by_least_turn(axis).s);
+    cylinder.seam.map(DVec3::from).or_else(chosen)
 }
 
 /// Whether Mitsuba's plugin can turn the normals round.
