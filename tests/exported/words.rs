@@ -53,6 +53,25 @@ fn pictures_on_disks_and_tubes_lie_where_mitsuba_has_them() {
     }
 }
 
+/// Of the parameter of the file, of the ends by which kinds are told apart, and of what separates words.
+#[test]
+fn names_are_those_that_they_were() {
+    for name in ["$spp", "of $spp samples", "red (bsdf)", "red (texture)", "two\\twords", "two\\nlines"] {
+        let head = format!(
+            "textures: {{\"{name}\": {{checkerboard: {{a: 0.2, b: 0.7}}}}}}\n\
+             materials: {{\"{name}\": {{diffuse: {{reflectance: {{texture: \"{name}\"}}}}}}}}\n\
+             groups: {{\"{name}\": [{{sphere: {{radius: 0.2, material: \"{name}\"}}}}]}}\n"
+        );
+        // The sphere and the cone stand there as they were written, too.
+        let shapes = format!(
+            "instance: {{group: \"{name}\"}}\n\
+             - cone: {{base: [0, 0, 0], apex: [0, 1, 0], radius: 0.3, material: \"{name}\", name: \"{name}\"}}"
+        );
+        let (_, xml) = exported_with(&head, &shapes);
+        assert!(xml.contains("value=\"$spp\""), "{xml}");
+    }
+}
+
 /// Where it is told to, Mitsuba's `twosided` lets light through: so it does in the file, and read back.
 #[test]
 fn two_sides_may_let_light_through() {

@@ -206,7 +206,8 @@ impl<'a> Export<'a> {
         }
         let used = self.used_materials();
         for (name, material) in self.scene.materials.iter().filter(|(name, _)| used.contains(name.as_str())) {
-            self.material(&field(&["materials", name]), material, Some(name));
+            let id = self.id(name, "bsdf");
+            self.material(&field(&["materials", name]), material, Some(&id));
         }
         for (name, medium) in &self.scene.media {
             self.medium(name, medium);
@@ -267,7 +268,8 @@ impl<'a> Export<'a> {
             "medium" => materials || textures,
             _ => materials || textures || self.scene.media.contains_key(name),
         };
-        if taken { format!("{name} ({kind})") } else { name.to_owned() }
+        // What looks like such an end would be taken away.
+        if taken || name.ends_with(&format!(" ({kind})")) { format!("{name} ({kind})") } else { name.to_owned() }
     }
 
     /// Says that Mitsuba gets something else.

@@ -68,7 +68,7 @@ impl<'a> Export<'a> {
             self.xml.leaf("ref", &[("name", "medium"), ("id", &id)]);
         }
         self.xml.open("sampler", &[("type", "independent")]);
-        self.xml.value("integer", "sample_count", "$spp");
+        self.xml.parameter("integer", "sample_count", "spp");
         self.xml.close();
         self.film();
         self.xml.close();

@@ -132,7 +132,10 @@ impl Export<'_> {
     /// The material of a shape.
     pub(super) fn material_ref(&mut self, field: &str, material: &MaterialRef) {
         match material {
-            MaterialRef::Name(name) => self.xml.leaf("ref", &[("id", name)]),
+            MaterialRef::Name(name) => {
+                let id = self.id(name, "bsdf");
+                self.xml.leaf("ref", &[("id", &id)]);
+            }
             MaterialRef::Inline(material) => self.material(field, material, None),
         }
     }

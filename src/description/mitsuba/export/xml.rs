@@ -38,6 +38,11 @@ impl Xml {
         self.leaf(tag, &[("name", name), ("value", &value.to_string())]);
     }
 
+    /// `<tag name="…" value="$parameter"/>`
+    pub(super) fn parameter(&mut self, tag: &str, name: &str, parameter: &str) {
+        self.line(&format!("<{tag} name=\"{name}\" value=\"${parameter}\"/>"));
+    }
+
     /// `<?abbe …?>`
     pub(super) fn instruction(&mut self, text: &str) {
         // Within a quoted string of YAML the two characters may be told apart.
@@ -59,7 +64,9 @@ fn escaped(value: &str) -> String {
         .replace('<', "&lt;")
         .replace('"', "&quot;")
         .replace('$', "\\$")
-        .replace("\\$spp", "$spp")
+        .replace('\t', "&#9;")
+        .replace('\n', "&#10;")
+        .replace('\r', "&#13;")
 }
 
 /// `1, 2, 3`
