@@ -25,8 +25,8 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
     let file = output.filter(|path| !is_stream(path));
     let path = file.unwrap_or(Path::new(""));
     let pictures = &load::for_mitsuba;
-    let (normals, meshes) = (&mesh::normals_of, &mesh::for_mitsuba);
-    let exported = description::export(&scene, path, normals, meshes, pictures, &sdf::is_closed);
+    let (normals, meshes, bare) = (&mesh::normals_of, &mesh::for_mitsuba, &mesh::lacks_coordinates);
+    let exported = description::export(&scene, path, normals, meshes, pictures, &sdf::is_closed, bare);
     match file {
         Some(path) => {
             let beside = |name: &String| directory_of(path).join(name);

@@ -29,8 +29,8 @@ fn shipped() -> Vec<PathBuf> {
 
 /// The export of a scene as the verb makes it.
 fn exported(scene: &description::SceneDescription, xml: &Path) -> description::Exported {
-    let (normals, meshes) = (&mesh::normals_of, &mesh::for_mitsuba);
-    description::export(scene, xml, normals, meshes, &load::for_mitsuba, &sdf::is_closed)
+    let (normals, meshes, bare) = (&mesh::normals_of, &mesh::for_mitsuba, &mesh::lacks_coordinates);
+    description::export(scene, xml, normals, meshes, &load::for_mitsuba, &sdf::is_closed, bare)
 }
 
 /// The scene of `file`, and what its export says; the export is read where `again` says so.
@@ -557,6 +557,11 @@ fn pictures_on_planes_stay_where_they_are() {
     }
 }
 
+/// A triangle with colours at its corners.
+const PAINTED: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+    property float r\nproperty float g\nproperty float b\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+    0 0.2 0 1 0 0\n1 0.2 0 0 1 0\n0 1.2 0 0 0 1\n3 0 1 2\n";
+
 /// The losses of a scene of a floor under an even sky, `head` and `shape`, and its text for Mitsuba; read back it is the same.
 fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
     let folder = Folder::new();
@@ -567,6 +572,7 @@ fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
         ("outward.obj", &sides::tetrahedron("1")),
         ("inward.obj", &sides::tetrahedron("-1")),
         ("bare.obj", &sides::tetrahedron("")),
+        ("painted.ply", PAINTED),
     ] {
         folder.add(name, bytes.as_bytes());
     }

@@ -72,6 +72,31 @@ fn names_are_those_that_they_were() {
     }
 }
 
+/// Mitsuba 3.9.1 reads such a scene and ends by a fault of memory as soon as it renders.
+#[test]
+fn lamps_have_no_attributes_of_their_mesh_there() {
+    let head = "textures: {paint: {mesh_attribute: {name: vertex_color}}}\n";
+    let mesh = |rest: &str| format!("mesh: {{file: painted.ply, normals: vertex, winding: world, {rest}}}");
+    let (losses, xml) = exported_with(head, &mesh("emission: {texture: paint}"));
+    assert_eq!(
+        losses,
+        ["shapes[1]: an even radiance of 1: Mitsuba crashes where a lamp has the attributes of its mesh"]
+    );
+    assert!(xml.contains("<spectrum name=\"radiance\" value=\"1\"/>"), "{xml}");
+    let (losses, _) = exported_with(head, &mesh("material: {diffuse: {reflectance: {texture: paint}}}"));
+    assert_eq!(losses, [""; 0]);
+    // It wants texture coordinates of others, too.
+    let bare = "an even radiance of 1: Mitsuba wants texture coordinates of a mesh that shines by a texture";
+    let head = "textures: {photo: {image: {file: EARTH}}}\n";
+    for shape in [
+        &mesh("emission: {texture: photo}"),
+        "cone: {base: [0, 0, 0], apex: [0, 1, 0], radius: 0.3, emission: {texture: photo}}",
+    ] {
+        let (losses, _) = exported_with(head, shape);
+        assert!(losses.len() == 1 && losses[0].ends_with(bare), "{losses:?}");
+    }
+}
+
 /// Where it is told to, Mitsuba's `twosided` lets light through: so it does in the file, and read back.
 #[test]
 fn two_sides_may_let_light_through() {

@@ -148,6 +148,12 @@ pub fn normals_of(path: &Path, index: u32) -> MeshNormals {
     }
 }
 
+/// Whether mesh `index` of a file has no texture coordinates; false of a file that cannot be read.
+#[must_use]
+pub fn lacks_coordinates(path: &Path, index: u32) -> bool {
+    load(path, index).is_ok_and(|source| source.uvs.is_empty())
+}
+
 /// A mesh in the world.
 #[derive(Clone, Debug)]
 pub struct Mesh {

@@ -4,7 +4,7 @@ use glam::{DMat4, DVec3};
 
 use super::super::super::emitter::{EmissionDirection, EnvironmentMapping, Growth};
 use super::super::super::light::{Aim, Light};
-use super::super::super::shape::Shape;
+use super::super::super::shape::{Geometry, Shape};
 use super::super::super::sky::SkyLight;
 use super::super::super::spectrum::SpectrumOrTexture;
 use super::super::super::texture::Texture;
@@ -169,9 +169,27 @@ impl Export<'_> {
             Some(EmissionDirection::All) | None => "area",
         };
         self.xml.open("emitter", &[("type", plugin)]);
-        self.shining("radiance", emission, Stands::Upright);
+        match self.even(shape) {
+            Some(_) => self.xml.value("spectrum", "radiance", 1),
+            None => self.shining("radiance", emission, Stands::Upright),
+        }
         self.weight(shape.sampling_weight.unwrap_or(1.0));
         self.xml.close();
+    }
+
+    /// Why a shape shines evenly there, in place of by its texture: Mitsuba looks for texture coordinates where light begins, and crashes
+    /// at attributes.
+    pub(super) fn even(&self, shape: &Shape) -> Option<&'static str> {
+        let texture = shape.emission.as_ref()?.name()?;
+        let is_bare = match &shape.geometry {
+            Geometry::Cone(_) => true,
+            Geometry::Mesh(mesh) => (self.bare)(&mesh.file, mesh.index),
+            _ => false,
+        };
+        if self.has_attribute(texture) {
+            return Some("an even radiance of 1: Mitsuba crashes where a lamp has the attributes of its mesh");
+        }
+        is_bare.then_some("an even radiance of 1: Mitsuba wants texture coordinates of a mesh that shines by a texture")
     }
 
     fn weight(&mut self, weight: f64) {

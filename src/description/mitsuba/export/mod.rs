@@ -85,7 +85,8 @@ pub enum MeshNormals {
 }
 
 /// Writes `scene` for the file `path`. `normals` reads mesh `index` of a file, `anew` gives a PLY of it where Mitsuba does not read
-/// the same from the file, `pictures` the same of pictures, `closed` tells whether the grid of one bounds a solid.
+/// the same from the file, `pictures` the same of pictures, `closed` tells whether the grid of one bounds a solid, `bare` whether
+/// a mesh has no texture coordinates.
 pub fn export(
     scene: &SceneDescription,
     path: &Path,
@@ -93,6 +94,7 @@ pub fn export(
     anew: &dyn Fn(&Path, u32) -> Option<Vec<u8>>,
     pictures: &dyn Fn(&Path) -> Option<PictureAnew>,
     closed: &dyn Fn(&Path) -> bool,
+    bare: &dyn Fn(&Path, u32) -> bool,
 ) -> Exported {
     let nothing = Node::new(Default::default(), Value::Null);
     let no_sources = Sources::default();
@@ -112,6 +114,8 @@ pub fn export(
     let pictures = &|file: &Path| once(&known, file.to_owned(), || pictures(file).map(Rc::new));
     let known = RefCell::default();
     let closed = &|file: &Path| once(&known, file.to_owned(), || closed(file));
+    let known = RefCell::default();
+    let bare = &|file: &Path, index: u32| once(&known, (file.to_owned(), index), || bare(file, index));
     let mut export = Export {
         scene,
         root,
@@ -120,6 +124,7 @@ pub fn export(
         anew,
         pictures,
         closed,
+        bare,
         directory,
         stem,
         ids,
@@ -154,6 +159,7 @@ struct Export<'a> {
     anew: &'a dyn Fn(&Path, u32) -> Option<Contents>,
     pictures: &'a dyn Fn(&Path) -> Option<Rc<PictureAnew>>,
     closed: &'a dyn Fn(&Path) -> bool,
+    bare: &'a dyn Fn(&Path, u32) -> bool,
     directory: &'a Path,
     /// Before the names of files that are written beside the scene.
     stem: String,

@@ -315,7 +315,8 @@ impl Export<'_> {
         };
         let flipped = (shape.flip_normals && !can_be_flipped(&shape.geometry))
             .then(|| "the same shape with its normals outward: Mitsuba's has no others".to_owned());
-        joined([own, flipped, grey, self.sides_shortfall(shape).map(str::to_owned)])
+        let even = self.even(shape).map(str::to_owned);
+        joined([own, flipped, even, grey, self.sides_shortfall(shape).map(str::to_owned)])
     }
 }
 

@@ -249,6 +249,15 @@ impl<'a> Export<'a> {
         }
     }
 
+    /// Whether it has numbers of a mesh in it.
+    pub(super) fn has_attribute(&self, texture: &str) -> bool {
+        match self.scene.textures.get(texture) {
+            Some(Texture::MeshAttribute(_)) => true,
+            Some(written) => written.inner().into_iter().any(|inner| self.has_attribute(inner)),
+            None => false,
+        }
+    }
+
     /// Whether what it shows depends on how u and v run.
     pub(super) fn texture_follows_uv(&self, name: &str) -> bool {
         match self.scene.textures.get(name) {
