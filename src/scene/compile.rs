@@ -417,6 +417,7 @@ impl<'a> Compiler<'a> {
 
     /// The lights that are no shapes, behind those that are.
     fn lights(&mut self, lamps: &mut Lamps) -> Result<()> {
+        self.lie_on(Surface::Light);
         for (i, light) in self.description.lights.iter().enumerate() {
             let at = format!("lights[{i}].{}", light.kind());
             let weight = light.sampling_weight();
@@ -432,6 +433,7 @@ impl<'a> Compiler<'a> {
                 None => {}
             }
         }
+        self.lie_on(Surface::Unknown);
         Ok(())
     }
 

@@ -18,6 +18,8 @@ pub(super) enum Surface {
     Unknown,
     /// One without attributes.
     Shape,
+    /// None: a light throws it.
+    Light,
     /// A mesh.
     Mesh(OfMesh),
 }
@@ -75,6 +77,7 @@ impl<'a> Compiler<'a> {
         let message = match &self.surface {
             Surface::Unknown => return None,
             Surface::Shape => format!("expected a mesh that has the attribute {name}, found another shape"),
+            Surface::Light => format!("expected a mesh that has the attribute {name}, found a light that throws it"),
             Surface::Mesh(mesh) => {
                 let attributes = &mesh.source.attributes;
                 match attributes.iter().find(|a| a.name == name) {
@@ -124,6 +127,22 @@ mod tests {
         let description = SceneDescription::parse(&format!("{head}{text}"), &directory.path().join("s.yaml"));
         let made = description.and_then(|description| compile(&description, "s"));
         made.err().map(|error| error.to_string()).unwrap_or_default()
+    }
+
+    /// It was white there, without a word.
+    #[test]
+    fn no_light_throws_attributes_of_a_mesh() {
+        let attribute = "textures: {a: {mesh_attribute: {name: vertex_color}}, b: {checkerboard: {a: 0, b: {texture: a}}}}\n\
+                         materials: {m: {diffuse: {reflectance: {texture: b}}}}\n";
+        assert_eq!(fault(attribute), "");
+        let slide = "spot: {position: [0, 0, 3], target: [0, 0, 0], intensity: 1, texture: a}";
+        let picture = "projector: {origin: [0, 0, 3], target: [0, 0, 0], fov_deg: 40, irradiance: {texture: b}}";
+        for light in [slide, picture] {
+            let told = fault(&format!("{attribute}lights: [{{{light}}}]\n"));
+            let expected = "textures.a.mesh_attribute.name: expected a mesh that has the attribute vertex_color, found a light that \
+                            throws it";
+            assert!(told.ends_with(expected), "{told}");
+        }
     }
 
     /// Each of 60 holds the one before twice: 2⁶⁰ looks, if none were kept. 2¹² colours are as many as there may be, and 2¹²
