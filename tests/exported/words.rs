@@ -97,6 +97,19 @@ fn lamps_have_no_attributes_of_their_mesh_there() {
     }
 }
 
+/// Under D65 stands the picture as it was written, which need not say what light it is of.
+#[test]
+fn lamps_with_pictures_that_stand_as_they_were_come_back() {
+    let lamp = "rectangle: {corner: [-1, 0.2, 0], edge_u: [2, 0, 0], edge_v: [0, 1, 0], emission: {texture: photo}}";
+    for illuminant in ["", ", illuminant: {name: D65, scale: 2}"] {
+        let head =
+            format!("textures: {{photo: {{image: {{file: EARTH, wrap_v: clamp, scale: [1.5, 2]{illuminant}}}}}}}\n");
+        let (losses, xml) = exported_with(&head, lamp);
+        assert_eq!(losses, ["textures.photo: one way to go on beyond the edges for u and v"]);
+        assert!(xml.contains("<ref name=\"picture\" id=\"photo\"/>"), "{xml}");
+    }
+}
+
 /// Where it is told to, Mitsuba's `twosided` lets light through: so it does in the file, and read back.
 #[test]
 fn two_sides_may_let_light_through() {

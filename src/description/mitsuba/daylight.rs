@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::super::fault::Fault;
-use super::super::node::{Node, Place};
+use super::super::node::{Entry, Node, Place, Value};
 use super::object::{Bag, Family};
 use super::spectra::{Role, SPECTRA, at, colour, not_negative, sampled, table};
 use super::{DAYLIGHT, Fields, Import, number, text};
@@ -94,13 +94,13 @@ pub(super) fn d65(place: Place, scale: f64) -> Node {
 /// D65 of luminance `scale` times a number, a colour of a surface or a table; `None` of anything else.
 fn in_daylight(place: Place, of: &Node, scale: f64) -> Option<Node> {
     let daylight = illuminant::d65().scaled(scale * DAYLIGHT);
-    if let super::Value::Float(by) = of.value {
+    if let Value::Float(by) = of.value {
         return Some(sampled(place, BAND_NM, &daylight.scaled(by)));
     }
     let (knots, curve) = if let Some(rgb) = of.get("rgb") {
         (BAND_NM.to_vec(), upsample::reflectance(floats_of(rgb)?.try_into().ok()?).ok()?)
     } else {
-        let super::Value::List(rows) = &of.get("zero_outside").unwrap_or(of).get("table")?.value else { return None };
+        let Value::List(rows) = &of.get("zero_outside").unwrap_or(of).get("table")?.value else { return None };
         let rows: Option<Vec<[f64; 2]>> = rows.iter().map(|row| floats_of(row)?.try_into().ok()).collect();
         let samples: Vec<(f64, f64)> = rows?.into_iter().map(|[nm, value]| (nm, value)).collect();
         let curve = Curve::from_samples(&samples, Outside::Zero).ok()?;
@@ -123,7 +123,14 @@ fn picture_in_daylight(place: Place, mut picture: Node, scale: f64) -> Option<No
     let mut fields = Fields::new(place);
     fields.add("name", text(place, "D65"));
     fields.add("scale", number(place, scale * DAYLIGHT));
-    *picture.get_mut("image")?.get_mut("illuminant")? = fields.map();
+    let lit = fields.map();
+    let image = picture.get_mut("image")?;
+    if let Some(illuminant) = image.get_mut("illuminant") {
+        *illuminant = lit;
+    } else if let Value::Map(written) = &mut image.value {
+        // Of a picture that stands as it was written.
+        written.push(Entry { key: "illuminant".to_owned(), key_place: place, node: lit });
+    }
     Some(picture)
 }
 
@@ -138,9 +145,9 @@ fn board_in_daylight(place: Place, mut board: Node, scale: f64) -> Option<Node> 
 
 /// The numbers of a list of them.
 fn floats_of(list: &Node) -> Option<Vec<f64>> {
-    let super::Value::List(items) = &list.value else { return None };
+    let Value::List(items) = &list.value else { return None };
     let float = |item: &Node| match item.value {
-        super::Value::Float(x) => Some(x),
+        Value::Float(x) => Some(x),
         _ => None,
     };
     items.iter().map(float).collect()
