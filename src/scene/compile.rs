@@ -451,7 +451,8 @@ impl<'a> Compiler<'a> {
         let is_small = |mesh: &TriangleMesh| mesh.tree.as_ref().is_some_and(MeshTree::is_small);
         let one = one.filter(|(mesh, material)| is_small(mesh) && !material.lets_through());
         let few = one.and_then(|_| Few::of(objects, &all, boxes));
-        let together = if few.is_none() { Together::take(objects, boxes) } else { None };
+        let opaque = |object: &Object| object.body == 0 && !self.materials[object.material as usize].lets_through();
+        let together = if few.is_none() { Together::take(objects, boxes, opaque) } else { None };
         let alone: Vec<u32> = all.into_iter().filter(|&i| !together.as_ref().is_some_and(|t| t.holds(i))).collect();
         let bvh = Bvh::build(&alone.iter().map(|&i| boxes[i as usize]).collect::<Vec<Aabb>>()).named(&alone);
         let few = few.or_else(|| Few::of(objects, &alone, boxes));

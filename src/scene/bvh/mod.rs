@@ -102,6 +102,16 @@ impl Node {
         self.children[slot] = child;
     }
 
+    /// The same node with its children in other slots: those of `from`, one after the other.
+    fn arranged(&self, from: &[usize]) -> Node {
+        let mut node = Node::EMPTY;
+        for (to, &slot) in from.iter().enumerate() {
+            let plane = |i: usize| self.planes[i].as_array()[slot];
+            node.set(to, [0, 2, 4].map(plane), [1, 3, 5].map(plane), self.children[slot]);
+        }
+        node
+    }
+
     /// Moves what its children name: nodes by `node`, positions over the alignment by `position`.
     fn rebase(&mut self, node: u32, position: u32) {
         for child in self.children.iter_mut().filter(|child| **child != EMPTY_CHILD) {
@@ -126,6 +136,17 @@ pub struct Bvh {
     /// Least and largest coordinates of the root, in tree coordinates.
     root: [f64x4; 2],
     bounds: Aabb,
+}
+
+/// A tree that becomes a part of another.
+#[derive(Clone, Copy, Debug)]
+pub struct Joint<'a> {
+    /// The tree.
+    pub tree: &'a Bvh,
+    /// How many primitives it has.
+    pub count: u32,
+    /// Whether a search without an order goes there before it goes to the others.
+    pub first: bool,
 }
 
 /// What a visit makes of the search.
@@ -181,22 +202,21 @@ impl Bvh {
     }
 
     /// One tree over the primitives of several, which are all finite: their numbers and positions in [`Bvh::order`]
-    /// follow one another as the trees do. Below its upper nodes it has the shape that they have. `counts` are how many
-    /// primitives each has.
+    /// follow one another as the trees do. Below its upper nodes it has the shape that they have.
     ///
     /// # Panics
     /// Over more than 2²⁸ positions, or where some of the trees have blocks and some have not.
     #[must_use]
-    pub fn joined(parts: &[(&Bvh, u32)]) -> Bvh {
-        let align = parts.first().map_or(1, |(part, _)| part.align);
-        assert!(parts.iter().all(|(part, _)| part.align == align), "trees of one kind");
-        let tree = Bvh::space(parts.iter().fold(Aabb::EMPTY, |all, (part, _)| all.union(&part.bounds)));
+    pub fn joined(parts: &[Joint]) -> Bvh {
+        let align = parts.first().map_or(1, |part| part.tree.align);
+        assert!(parts.iter().all(|part| part.tree.align == align), "trees of one kind");
+        let tree = Bvh::space(parts.iter().fold(Aabb::EMPTY, |all, part| all.union(&part.tree.bounds)));
 
         // The upper nodes: over the boxes of the parts, one a leaf.
         let mut whole: Vec<Primitive> = (0..)
             .zip(parts)
-            .map(|(index, (part, _))| {
-                let (lo, hi) = tree.rounded(&part.bounds);
+            .map(|(index, part)| {
+                let (lo, hi) = tree.rounded(&part.tree.bounds);
                 Primitive { lo, hi, index }
             })
             .collect();
@@ -206,24 +226,26 @@ impl Bvh {
             builder.run();
         }
         let Builder { mut nodes, order: upper, .. } = builder;
+        let is_first = |child: u32| parts[upper[(child & POSITION) as usize] as usize].first;
+        put_first(&mut nodes, is_first);
 
         // Below them the nodes of the parts, moved.
         let mut starts = Vec::with_capacity(parts.len());
         let (mut node, mut position, mut number) = (nodes.len() as u32, 0, 0);
-        for (part, count) in parts {
+        for part in parts {
             starts.push((node, position, number));
-            node += part.nodes.len() as u32;
-            position += part.order.len() as u32 / align;
-            number += count;
+            node += part.tree.nodes.len() as u32;
+            position += part.tree.order.len() as u32 / align;
+            number += part.count;
         }
         assert!(position as usize * align as usize <= MAX_POSITIONS, "more primitives than one tree can address");
         let moved: Vec<Vec<Node>> = parts
             .par_iter()
             .zip(&starts)
-            .map(|((part, _), &(node, position, _))| {
-                let mut moved = part.nodes.clone();
+            .map(|(part, &(node, position, _))| {
+                let mut moved = part.tree.nodes.clone();
                 moved.iter_mut().for_each(|new| new.rebase(node, position));
-                tree.take_planes(&mut moved, part);
+                tree.take_planes(&mut moved, part.tree);
                 moved
             })
             .collect();
@@ -235,8 +257,8 @@ impl Bvh {
         }
         moved.iter().for_each(|moved| nodes.extend(moved));
         let mut order = Vec::with_capacity(position as usize * align as usize);
-        for ((part, _), (_, _, number)) in parts.iter().zip(&starts) {
-            order.extend(part.order.iter().map(|&i| if i == NO_PRIMITIVE { i } else { i + number }));
+        for (part, (_, _, number)) in parts.iter().zip(&starts) {
+            order.extend(part.tree.order.iter().map(|&i| if i == NO_PRIMITIVE { i } else { i + number }));
         }
         Bvh { nodes, bounded: order.len() as u32, align, order, ..tree }
     }
@@ -518,6 +540,27 @@ fn fit(nodes: &mut [Node], leaf: impl Fn(usize, usize) -> ([f32; 3], [f32; 3])) 
             nodes[id].set(slot, part.0, part.1, child);
             widen(&mut of_node[id], part.0, part.1);
         }
+    }
+}
+
+/// Has [`Bvh::descend`] without `SORTED` visit leaves that are `first`, by their child words, before others of the same node.
+fn put_first(nodes: &mut [Node], first: impl Fn(u32) -> bool) {
+    let mut holds_first = vec![false; nodes.len()];
+    // A node stands before its children.
+    for id in (0..nodes.len()).rev() {
+        let node = &nodes[id];
+        let used = node.children.iter().filter(|child| **child != EMPTY_CHILD).count();
+        let is_first = |slot: &usize| match node.children[*slot] {
+            child if child & LEAF == 0 => holds_first[child as usize],
+            child => first(child),
+        };
+        // The slots as they are visited: the first, then from the last to the second.
+        let visited = |i: usize| if i == 0 { 0 } else { used - i };
+        let mut order: Vec<usize> = (0..used).map(visited).collect();
+        order.sort_by_key(|slot| !is_first(slot));
+        let slots: Vec<usize> = (0..used).map(|slot| order[visited(slot)]).collect();
+        holds_first[id] = order.first().is_some_and(is_first);
+        nodes[id] = node.arranged(&slots);
     }
 }
 

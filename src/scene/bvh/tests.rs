@@ -343,7 +343,9 @@ fn a_joined_tree_finds_what_one_of_all_finds() {
     ];
     for count in 1..=3 {
         let trees: Vec<Bvh> = sets[..count].iter().map(|set| Bvh::build_blocks(set)).collect();
-        let parts: Vec<(&Bvh, u32)> = trees.iter().zip(&sets).map(|(tree, set)| (tree, set.len() as u32)).collect();
+        let joints = trees.iter().zip(&sets);
+        let joints = joints.map(|(tree, set)| Joint { tree, count: set.len() as u32, first: set.len() == 1 });
+        let parts: Vec<Joint> = joints.collect();
         let joined = Bvh::joined(&parts);
         let all: Vec<Aabb> = sets[..count].iter().flatten().copied().collect();
         assert_eq!(joined.bounds(), Bvh::build(&all).bounds());
@@ -353,6 +355,27 @@ fn a_joined_tree_finds_what_one_of_all_finds() {
             met += assert_none_is_lost(&joined, &all, &ray);
         }
         assert!(met >= 4000, "{met}");
+    }
+}
+
+/// Five sets of boxes around one another, and a ray that meets them all: a search without an order visits the one that is
+/// put first before it visits any other, whichever it is, and each once.
+#[test]
+fn what_is_put_first_is_visited_first() {
+    let sets = [1.0, 2.0, 3.0, 4.0, 5.0].map(|size| vec![Aabb { min: DVec3::splat(-size), max: DVec3::splat(size) }]);
+    let trees = sets.each_ref().map(|set| Bvh::build_blocks(set));
+    let ray = Ray::new(DVec3::new(-9.0, 0.1, 0.2), DVec3::X);
+    for first in 0..sets.len() {
+        let joints = (0..).zip(&trees).map(|(i, tree)| Joint { tree, count: 1, first: i == first });
+        let joined = Bvh::joined(&joints.collect::<Vec<Joint>>());
+        let mut visited = Vec::new();
+        joined.any(&ray, f64::INFINITY, |i| {
+            visited.push(i as usize);
+            false
+        });
+        assert_eq!(visited[0], first, "{visited:?}");
+        visited.sort_unstable();
+        assert_eq!(visited, [0, 1, 2, 3, 4]);
     }
 }
 

@@ -24,9 +24,10 @@ pub struct Together {
 
 impl Together {
     /// Takes the trees of all meshes among `objects` that belong together: of one origin and comparable size. `boxes`
-    /// are the objects'. None where there are no meshes.
+    /// are the objects'. None where there are no meshes. Shadow rays look for those that are `opaque` first: of the others
+    /// none matters where one of them stands in the way.
     #[must_use]
-    pub fn take(objects: &mut [Object], boxes: &[Aabb]) -> Option<Together> {
+    pub fn take(objects: &mut [Object], boxes: &[Aabb], opaque: impl Fn(&Object) -> bool) -> Option<Together> {
         fn mesh(object: &Object) -> Option<&TriangleMesh> {
             match &object.geometry {
                 Geometry::Mesh(mesh) => Some(mesh),
@@ -38,7 +39,7 @@ impl Together {
         let largest = meshes().max_by(|&a, &b| size(a).total_cmp(&size(b)))?;
         let origin = mesh(&objects[largest])?.mesh.origin;
 
-        let (mut first, mut object, mut parts) = (vec![NONE; objects.len()], Vec::new(), Vec::new());
+        let (mut first, mut object) = (vec![NONE; objects.len()], Vec::new());
         for i in meshes() {
             let Some(TriangleMesh { mesh, tree: Some(_), .. }) = mesh(&objects[i]) else { continue };
             let fits = object.len() + mesh.triangles.len() <= MAX_TRIANGLES;
@@ -47,14 +48,17 @@ impl Together {
                 object.resize(object.len() + mesh.triangles.len(), i as u32);
             }
         }
+        let (mut parts, mut in_front) = (Vec::new(), Vec::new());
         for (i, taken) in objects.iter_mut().enumerate() {
+            let is_opaque = opaque(taken);
             if let Geometry::Mesh(mesh) = &mut taken.geometry
                 && first[i] != NONE
             {
                 parts.extend(mesh.tree.take());
+                in_front.push(is_opaque);
             }
         }
-        Some(Together { tree: MeshTree::joined(parts), first, object })
+        Some(Together { tree: MeshTree::joined(parts, &in_front), first, object })
     }
 
     /// Whether the triangles of an object are here.
@@ -149,7 +153,7 @@ mod tests {
         let trees = meshes.each_ref().map(MeshTree::build);
         let boxes = meshes.each_ref().map(Mesh::bounds);
         let mut objects: Vec<Object> = meshes.into_iter().map(object).collect();
-        let together = Together::take(&mut objects, &boxes).unwrap();
+        let together = Together::take(&mut objects, &boxes, |_| true).unwrap();
         for (i, object) in (0..).zip(&objects) {
             let Geometry::Mesh(mesh) = &object.geometry else { panic!("{i}") };
             assert_eq!((together.holds(i), mesh.tree.is_none()), (i < 2, i < 2), "{i}");

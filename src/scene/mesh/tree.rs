@@ -17,7 +17,7 @@
 use super::Mesh;
 use super::triangle::{TriangleHit, TriangleRay, area_vector};
 use crate::math::Ray;
-use crate::scene::bvh::{Aabb, Bvh, NO_PRIMITIVE, Next, TreeRay, prefetch};
+use crate::scene::bvh::{Aabb, Bvh, Joint, NO_PRIMITIVE, Next, TreeRay, prefetch};
 use glam::DVec3;
 use rayon::prelude::*;
 use wide::f32x8;
@@ -121,17 +121,18 @@ impl MeshTree {
     }
 
     /// One hierarchy over the triangles of several meshes of one [`Mesh::origin`]: triangles are numbered through, mesh
-    /// after mesh.
+    /// after mesh. [`MeshTree::any_of`] looks for those of meshes that are `first` before it looks for others.
     ///
     /// # Panics
     /// Over more than [`MAX_TRIANGLES`], or where `parts` is empty.
     #[must_use]
-    pub fn joined(mut parts: Vec<MeshTree>) -> MeshTree {
+    pub fn joined(mut parts: Vec<MeshTree>, first: &[bool]) -> MeshTree {
         if parts.len() == 1 {
             return parts.remove(0);
         }
-        let trees: Vec<(&Bvh, u32)> = parts.iter().map(|tree| (&tree.bvh, tree.triangles)).collect();
-        let bvh = Bvh::joined(&trees);
+        let joints = parts.iter().zip(first);
+        let joints = joints.map(|(tree, &first)| Joint { tree: &tree.bvh, count: tree.triangles, first });
+        let bvh = Bvh::joined(&joints.collect::<Vec<Joint>>());
         let part: Vec<(u32, u32)> =
             (0..).zip(&parts).flat_map(|(i, tree)| (0..tree.blocks.len() as u32).map(move |k| (i, k))).collect();
         let blocks =
