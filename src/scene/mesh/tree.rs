@@ -192,11 +192,11 @@ impl MeshTree {
         skip: Option<u32>,
         mut met: impl FnMut(MeshHit) -> Option<f64>,
     ) {
+        let skip = skip.unwrap_or(NO_PRIMITIVE);
         let mut visit = |ready: &Ready, first: usize, mut t_max: f64| {
             let mut next = Next::Go;
-            self.hits_of(ready, first, |hit| {
+            self.hits_of(ready, first, [skip], |hit| {
                 if hit.hit.t < t_max
-                    && Some(hit.triangle) != skip
                     && let Some(t) = met(hit)
                 {
                     t_max = t;
@@ -231,9 +231,9 @@ impl MeshTree {
     /// Shows `met` the triangles that `ray` hits at 0 < t < `t_max`, other than those in `skip`, in any order, until
     /// it says stop; true if it did. A hit on the edge of two triangles is one on both.
     pub fn any_of(&self, ray: &Ray, t_max: f64, skip: [Option<u32>; 2], mut met: impl FnMut(MeshHit) -> bool) -> bool {
-        let mut visit = |ready: &Ready, first: usize| {
-            self.hits_of(ready, first, |hit| hit.hit.t < t_max && !skip.contains(&Some(hit.triangle)) && met(hit))
-        };
+        let skip = skip.map(|triangle| triangle.unwrap_or(NO_PRIMITIVE));
+        let mut visit =
+            |ready: &Ready, first: usize| self.hits_of(ready, first, skip, |hit| hit.hit.t < t_max && met(hit));
         let local = self.local(ray);
         if self.is_small() {
             let ready = Ready::small(&local, self.extent);
@@ -247,17 +247,26 @@ impl MeshTree {
         })
     }
 
-    /// Shows `met` where a ray meets the triangles of the block that starts at position `first`, at t > 0, until it says
-    /// stop; true if it did.
+    /// Shows `met` where a ray meets the triangles of the block that starts at position `first`, other than those in
+    /// `skip`, at t > 0, until it says stop; true if it did.
     #[inline(always)]
-    fn hits_of(&self, ready: &Ready, first: usize, mut met: impl FnMut(MeshHit) -> bool) -> bool {
+    fn hits_of<const N: usize>(
+        &self,
+        ready: &Ready,
+        first: usize,
+        skip: [u32; N],
+        mut met: impl FnMut(MeshHit) -> bool,
+    ) -> bool {
         let block = &self.blocks[first / LANES];
         let mut mask = ready.coarse.may_hit(block);
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize % LANES;
             mask &= mask - 1;
-            if let Some(hit) = block.meet(&ready.exact, lane)
-                && met(MeshHit { triangle: self.bvh.order()[first + lane], hit })
+            // A ray meets the triangle that it leaves about where it begins: that is not tried, as rounding would decide.
+            let triangle = self.bvh.order()[first + lane];
+            if !skip.contains(&triangle)
+                && let Some(hit) = block.meet(&ready.exact, lane)
+                && met(MeshHit { triangle, hit })
             {
                 return true;
             }
