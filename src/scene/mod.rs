@@ -57,7 +57,7 @@ use few::Few;
 use glam::{DVec2, DVec3};
 use instance::{AffineMap, Instance, PartHit};
 use light::Light;
-use material::Material;
+use material::{Kind, Material};
 pub use medium::Medium;
 use mesh::together::Together;
 use mesh::{AreaTable, Mesh, MeshTree};
@@ -216,12 +216,16 @@ impl Object {
     /// The medium that a ray in `direction`, which was in `before`, is in after it has crossed the surface.
     #[must_use]
     pub fn beyond(&self, surface: &SurfacePoint, direction: DVec3, before: Option<u32>) -> Option<u32> {
-        if self.keeps_medium {
-            before
-        } else if direction.dot(surface.normal) < 0.0 {
-            self.inside
-        } else {
-            self.outside
+        self.medium_beyond(direction.dot(surface.normal) < 0.0, before)
+    }
+
+    /// The same of a ray that goes to the side away from the normal, or to that of the normal.
+    #[must_use]
+    fn medium_beyond(&self, inward: bool, before: Option<u32>) -> Option<u32> {
+        match inward {
+            _ if self.keeps_medium => before,
+            true => self.inside,
+            false => self.outside,
         }
     }
 }
@@ -503,6 +507,21 @@ impl Scene {
             watch.met(self, ray, hit);
         }
         self.surface_with(ray, hit, self.objects[hit.object as usize].detail)
+    }
+
+    /// The medium beyond `hit` on the boundary of a medium, where `ray` is in `before`: [`Object::beyond`] without the
+    /// rest of the surface. None where the surface is something else as well.
+    #[must_use]
+    pub fn beyond_boundary(&self, ray: &Ray, hit: &Hit, before: Option<u32>) -> Option<Option<u32>> {
+        let object = &self.objects[hit.object as usize];
+        let is_boundary = matches!(self.materials[object.material as usize].kind, Kind::Boundary) && object.body == 0;
+        match &object.geometry {
+            Geometry::Mesh(mesh) if is_boundary && hit.instance.is_none() && self.watch.is_none() => {
+                let inward = ray.direction.dot(mesh.mesh.area_vector(hit.part)) * object.facing() < 0.0;
+                Some(object.medium_beyond(inward, before))
+            }
+            _ => None,
+        }
     }
 
     /// The map of the instance that was met.

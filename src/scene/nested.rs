@@ -322,6 +322,46 @@ mod tests {
         compile(&description, "s").unwrap()
     }
 
+    /// Cubes of triangles with a medium on one side of them, two of them with normals that point the other way, and one that
+    /// is of glass: of a boundary the side of a ray is told as by the whole surface, of glass not.
+    #[test]
+    fn a_boundary_tells_what_is_beyond_it_without_its_surface() {
+        const CUBE: &str = "v -1 -1 -1\nv 1 -1 -1\nv -1 1 -1\nv 1 1 -1\nv -1 -1 1\nv 1 -1 1\nv -1 1 1\nv 1 1 1\n\
+            f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("cube.obj"), CUBE).unwrap();
+        let mut text = String::from(
+            "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n\
+             media: {fog: {homogeneous: {scattering: 1, absorption: 1}}}\nshapes:\n",
+        );
+        for (material, side, flip, x) in [
+            ("boundary: {}", "inside", false, 0.0),
+            ("boundary: {}", "inside", true, 3.0),
+            ("boundary: {}", "outside", true, 6.0),
+            ("dielectric: {ior: 1.5}", "inside", false, 9.0),
+        ] {
+            text += &format!(
+                "- mesh: {{file: cube.obj, material: {{{material}}}, {side}: fog, flip_normals: {flip}, \
+                 transform: [{{translate: [{x}, 0, 0]}}]}}\n"
+            );
+        }
+        let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
+        let scene = compile(&description, "s").unwrap();
+        let mut random = crate::scene::shape::testing::Random::new(4);
+        let mut met = [[0; 2]; 4];
+        for _ in 0..2_000 {
+            let origin = DVec3::new(9.0 * random.uniform(), 0.0, 0.0) + random.direction();
+            let ray = Ray::new(origin, random.direction());
+            let Some(hit) = scene.closest(&ray, f64::INFINITY) else { continue };
+            let object = &scene.objects[hit.object as usize];
+            let expected = object.beyond(&scene.surface(&ray, &hit), ray.direction, None);
+            let expected = (hit.object < 3).then_some(expected);
+            assert_eq!(scene.beyond_boundary(&ray, &hit, None), expected, "{ray:?} {hit:?}");
+            met[hit.object as usize][usize::from(expected == Some(None))] += 1;
+        }
+        assert!(met[..3].iter().flatten().all(|&n| n > 50) && met[3][0] > 50, "{met:?}");
+    }
+
     /// Two bodies in the very same place: whoever is in one is in both.
     #[test]
     fn bodies_with_the_same_surface_do_not_hide_each_other() {

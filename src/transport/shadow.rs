@@ -61,7 +61,7 @@ impl Shadow<'_> {
         if let Way::Blocked = way {
             return None;
         }
-        if let Way::Open(crossed) = way {
+        if let Way::Open(crossed) = &way {
             let hits = crossed.hits();
             if hits.len() > panes as usize {
                 return None;
@@ -71,10 +71,14 @@ impl Shadow<'_> {
                 let dimmed = dim(inside.medium, &Ray::new(ray.at(from), ray.direction), hit.t - from, crossings);
                 through *= dimmed.through;
                 passing *= dimmed.passing;
+                from = hit.t;
+                if let Some(medium) = scene.beyond_boundary(ray, hit, inside.medium) {
+                    inside.medium = medium;
+                    continue;
+                }
                 let (straight, _) = self.pass(ray, hit, &mut inside)?;
                 through *= straight.weight * straight.share as f32;
                 passing *= straight.share as f32;
-                from = hit.t;
             }
             let last = Ray::new(ray.at(from), ray.direction);
             let dimmed = dim(inside.medium, &last, distance - from, hits.len() as u32);
