@@ -1,7 +1,7 @@
 //! What shines, and how a path finds it.
 
 use super::along_normal;
-use super::environment::{Drawn, Environment};
+use super::environment::{Drawn, Environment, EnvironmentSample};
 use super::projector::Projector;
 use super::shape::{Shape, TowardSample};
 use super::texture::{Texture, TexturePoint};
@@ -360,15 +360,30 @@ impl Light {
             }
             Light::Environment(map) => {
                 let s = map.sample(u, drawn)?;
-                Some(Arriving {
-                    wi: s.direction,
-                    distance: f64::INFINITY,
-                    radiance: map.radiance_of(&s, nm),
-                    density: Some(s.pdf_solid_angle),
-                    target: None,
-                })
+                Some(arriving_from_sky(&s, map.radiance_of(&s, nm)))
             }
         }
+    }
+
+    /// [`Light::arriving`], but that the radiance of a map of the sky is left black and the place that is to be looked up noted in
+    /// `sky`: to look it up takes two thirds as long as to draw it, and is in vain where something stands in the way.
+    #[must_use]
+    #[inline]
+    #[expect(clippy::too_many_arguments, reason = "what arrives where, and what is left to do")]
+    pub fn arriving_unseen<'a>(
+        &'a self,
+        objects: &[Object],
+        from: DVec3,
+        normal: Option<DVec3>,
+        u: DVec2,
+        drawn: Drawn,
+        nm: Lanes,
+        sky: &mut Option<(&'a Environment, EnvironmentSample)>,
+    ) -> Option<Arriving> {
+        let Light::Environment(map) = self else { return self.arriving(objects, from, normal, u, drawn, nm) };
+        let s = map.sample(u, drawn)?;
+        *sky = Some((map, s));
+        Some(arriving_from_sky(&s, Lanes::ZERO))
     }
 
     /// Luminous power, in film units times m²: by which lights are chosen. `radius` is that of the
@@ -455,6 +470,10 @@ impl Lamp<'_> {
             target: Some(Departure::new(self.object, u32::from(s.face))),
         })
     }
+}
+
+fn arriving_from_sky(s: &EnvironmentSample, radiance: Lanes) -> Arriving {
+    Arriving { wi: s.direction, distance: f64::INFINITY, radiance, density: Some(s.pdf_solid_angle), target: None }
 }
 
 /// Direction, distance and 1/d² times `falloff`.

@@ -191,9 +191,14 @@ impl Tracer<'_> {
         let Some((lamp, chance)) = self.asked().choose(asker, u_light) else { return };
         // How often it is chosen.
         let probability = chance * f64::from(count);
-        let Some(light) = scene.lights[lamp].arriving(&scene.objects, point, normal, u, self.drawn(), self.nm) else {
-            return;
+        let (sender, drawn) = (&scene.lights[lamp], self.drawn());
+        // A sky is looked up when it is known that its light arrives; what is left for later needs it now.
+        let mut sky = None;
+        let light = match later {
+            Some(_) => sender.arriving(&scene.objects, point, normal, u, drawn, self.nm),
+            None => sender.arriving_unseen(&scene.objects, point, normal, u, drawn, self.nm, &mut sky),
         };
+        let Some(light) = light else { return };
         let (f, pdf) = eval(light.wi);
         if f.simd_eq(Lanes::ZERO).all() {
             return;
@@ -201,7 +206,6 @@ impl Tracer<'_> {
         let ray = leave(light.wi);
         let distance = free(light.distance, light.target, point, &ray);
         let traced = self.leaves(path, lamp as u32);
-        let value = f * light.radiance;
         let led = if CHROMATIC { path.rho * pdf } else { pdf };
         let weight = |passing: Option<Lanes>| match light.density {
             None => share(lamp as u32) / probability,
@@ -216,7 +220,7 @@ impl Tracer<'_> {
         if let Some(later) = later
             && !scene.has_boundaries
         {
-            let light_found = path.share_of::<CHROMATIC>(value, weight(None));
+            let light_found = path.share_of::<CHROMATIC>(f * light.radiance, weight(None));
             later.push(Question { ray, distance, target: light.target, light: light_found, traced });
             return;
         }
@@ -240,11 +244,13 @@ impl Tracer<'_> {
         };
         let Some((through, passing)) = shadow.cast::<MEDIA>(&ray, distance) else { return };
         let weight = weight(Some(passing));
+        let radiance = sky.map_or(light.radiance, |(map, place)| map.radiance_of(&place, self.nm));
+        let value = f * radiance * through;
         if traced {
-            path.leave_out::<CHROMATIC>(value * through, weight);
+            path.leave_out::<CHROMATIC>(value, weight);
             return;
         }
-        let found = path.share_of::<CHROMATIC>(value * through, weight);
+        let found = path.share_of::<CHROMATIC>(value, weight);
         self.enter(path, found, lamp, || first(light.wi));
     }
 
