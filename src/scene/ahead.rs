@@ -117,8 +117,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::compiled_in;
     use crate::scene::shape::testing::Random;
     use glam::DVec3;
 
@@ -140,8 +139,7 @@ mod tests {
         cube(0.5, 3.0, "diffuse");
         text += "- sphere: {center: [0, 3, 0], radius: 0.5, material: {diffuse: {}}}\n\
                  - sphere: {center: [0, 0, 3], radius: 0.5, material: {boundary: {}}}\n";
-        let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-        compile(&description, "s").unwrap()
+        compiled_in(directory.path(), &text)
     }
 
     /// A path that goes straight on through boundaries meets what searches of their own find, in the same order and at

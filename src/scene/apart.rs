@@ -291,8 +291,7 @@ fn met(object: &Object, probe: &Probe) -> Option<(DVec3, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::{self, compiled_in};
 
     /// The notes and boxes of a scene of these shapes.
     fn compiled(shapes: &str) -> (Vec<String>, Vec<Aabb>) {
@@ -301,8 +300,7 @@ mod tests {
              materials:\n  glass: {{dielectric: {{ior: 1.5}}}}\n  water: {{dielectric: {{ior: 1.33, priority: 1}}}}\n  \
              ice: {{dielectric: {{ior: 1.31, priority: 2}}}}\nshapes:\n{shapes}"
         );
-        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-        let scene = compile(&description, "s").unwrap();
+        let scene = testing::compiled(&text);
         (scene.notes.clone(), scene.objects.iter().map(Object::bounds).collect())
     }
 
@@ -439,8 +437,7 @@ mod tests {
             "camera: {{origin: [0, 0.3, 5], target: [0, 0, 0], fov_deg: 40}}\nmaterials: {{glass: {{dielectric: {{ior: 1.5}}}}}}\n\
              shapes:\n{TABLE}- mesh: {{file: cube.obj, material: glass}}\n"
         );
-        let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-        let scene = compile(&description, "s").unwrap();
+        let scene = compiled_in(directory.path(), &text);
         let bottom = scene.objects[1].bounds().min.y;
         assert!(bottom > 4.0 * 2f64.powi(-46) && bottom < 1e-11, "{bottom}");
         let ray = Ray::new(DVec3::new(0.1, 5.0, 0.2), -DVec3::Y);
@@ -455,8 +452,7 @@ mod tests {
         let walls = "- rectangle: {corner: [1, 0, 1], edge_u: [0, 2, 0], edge_v: [0, 0, -2]}\n\
             - rectangle: {corner: [-1, 0, 1], edge_u: [0, 2, 0], edge_v: [0, 0, -2]}\n";
         let held = text.replace("shapes:\n", &format!("shapes:\n{walls}"));
-        let description = SceneDescription::parse(&held, &directory.path().join("s.yaml")).unwrap();
-        let notes = compile(&description, "s").unwrap().notes;
+        let notes = compiled_in(directory.path(), &held).notes;
         let told = |what: &str| notes.iter().filter(|note| note.contains(what)).count();
         assert_eq!((told("shapes[2]: it is put off"), told("it has no room"), notes.len()), (1, 2, 3), "{notes:?}");
     }

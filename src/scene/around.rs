@@ -84,8 +84,7 @@ fn is_open(geometry: &Geometry) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::compiled;
 
     /// A ball of glass and a pane in a ball of smoke, which is all that differs from what the camera is in; whatever stands before
     /// them. What says where it is, what light never crosses, and what stands beside the smoke is not told.
@@ -98,8 +97,7 @@ mod tests {
                  - rectangle: {{corner: [-1, -1, 5], edge_u: [2, 0, 0], edge_v: [0, 2, 0]}}\n\
                  - sphere: {{radius: 2, inside: smoke, material: {{boundary: {{}}}}}}\n{shapes}\n"
             );
-            let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-            compile(&description, "s").unwrap().notes
+            compiled(&text).notes
         };
         let glass = |more: &str| format!("- sphere: {{radius: 0.5, material: {{dielectric: {{ior: 1.5}}}}{more}}}");
         let pane = "- rectangle: {corner: [0.2, 0.2, -1], edge_u: [0.5, 0, 0], edge_v: [0, 0.5, 0], \

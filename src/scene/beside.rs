@@ -204,8 +204,7 @@ impl Scene {
 
 #[cfg(test)]
 mod tests {
-    use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::{compiled, compiled_in};
     use crate::scene::light::Light;
 
     #[test]
@@ -213,8 +212,7 @@ mod tests {
         let text = "camera: {origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}\n\
             shapes: [rectangle: {name: wall, corner: [-1, 0, 5], edge_u: [2, 0, 0], edge_v: [0, 2, 0]}]\n\
             lights:\n- point: {position: [0, 1, 4], intensity: 1}\n- point: {position: [0.5, 1, 5], intensity: 1}\n";
-        let description = SceneDescription::parse(text, std::path::Path::new("s.yaml")).unwrap();
-        let notes = compile(&description, "s").unwrap().notes;
+        let notes = compiled(text).notes;
         let told = [
             "s.yaml:1:9: camera: stands on wall: it sees from the side to which it looks",
             "s.yaml:5:10: lights[1].point: lies on wall: it shines from the side that it is aimed at, or that is seen",
@@ -228,8 +226,7 @@ mod tests {
              shapes:\n- rectangle: {{corner: [-1, 2, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2]}}\n{more}\
              lights: [point: {{position: [0, {y}, 0], intensity: 1}}]\n"
         );
-        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-        let scene = compile(&description, "s").unwrap();
+        let scene = compiled(&text);
         (scene.lights.iter().find_map(Light::position).unwrap().y, scene.notes.len())
     }
 
@@ -245,8 +242,7 @@ mod tests {
                 "camera: {{origin: [0.1, 0.2, 0], target: [0.1, 0.2, -1], fov_deg: 40}}\n\
                  materials: {{glass: {{dielectric: {{ior: 1.5}}}}}}\nshapes:\n{shapes}"
             );
-            let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-            let eye = compile(&description, "s").unwrap().camera.eye();
+            let eye = compiled(&text).camera.eye();
             assert!(eye.z < -1e-11 && eye.z > -1e-8, "{eye}");
         }
     }
@@ -262,8 +258,7 @@ mod tests {
                 "camera: {{origin: [0, 3, 5], target: [0, 0.3, 0], fov_deg: 40}}\n\
                  shapes:\n- mesh: {{file: table.obj{placed}}}\nlights: [point: {{position: [0.2, {y}, 0], intensity: 1}}]\n"
             );
-            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-            let scene = compile(&description, "s").unwrap();
+            let scene = compiled_in(directory.path(), &text);
             let above = scene.lights[0].position().unwrap().y - f64::from(y as f32);
             assert!(above > 0.0 && above < 1e-8, "{y}: {above}");
         }
@@ -284,8 +279,7 @@ mod tests {
                 "camera: {{origin: [0, 1, 6], target: [0, 0.5, 0], fov_deg: 40}}\ngroups: {{g: [{{{child}}}]}}\n\
                  shapes:\n- plane: {{normal: [0, 1, 0]}}\n- instance: {{group: g, transform: [{{scale: [1.0e10, 1, 1]}}]}}\n"
             );
-            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-            let scene = compile(&description, "s").unwrap();
+            let scene = compiled_in(directory.path(), &text);
             assert_eq!((scene.camera.eye().y, scene.notes.len()), (1.0, 0), "{child}: {:?}", scene.notes);
         }
     }

@@ -141,13 +141,11 @@ impl Cone {
 
 #[cfg(test)]
 mod tests {
-    use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::compiled;
 
     fn exponent(text: &str) -> i32 {
         let text = format!("camera: {{origin: [0, 5, 9], target: [0, 0, 0], fov_deg: 40}}\n{text}");
-        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-        compile(&description, "s").unwrap().light_exponent
+        compiled(&text).light_exponent
     }
 
     /// A lamp where a ball touches the top of a pole, in whichever order: it lights nothing there that is seen, and the sky of 0.1

@@ -63,8 +63,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::compiled_in;
     use crate::scene::few::tests::bits;
     use crate::scene::shape::testing::Random;
     use glam::DVec3;
@@ -83,8 +82,7 @@ mod tests {
             text +=
                 &format!("- mesh: {{file: solid.obj, transform: [{{translate: [{}, -0.3, 0.2]}}]}}\n", i as f64 - 0.5);
         }
-        let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-        compile(&description, "s").unwrap()
+        compiled_in(directory.path(), &text)
     }
 
     /// Any of eight rays, from anywhere and on from what they met, with what they meet of the same bits as alone, and the

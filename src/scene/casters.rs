@@ -229,8 +229,7 @@ fn merge_nearest(balls: &mut Vec<Ball>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::{compiled, compiled_in};
 
     fn ball(x: f64, radius: f64) -> Ball {
         Ball { center: DVec3::new(x, 0.0, 0.0), radius }
@@ -269,8 +268,7 @@ mod tests {
             .for_each(|i| text += &format!("  - sphere: {{center: [{i}, 0, 0], radius: 0.1, material: silver}}\n"));
         text += "shapes:\n";
         (0..MANY).for_each(|i| text += &format!("- instance: {{group: many, transform: [translate: [0, {i}, 0]]}}\n"));
-        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-        let casters = Casters::of(&compile(&description, "s").unwrap(), &[]);
+        let casters = Casters::of(&compiled(&text), &[]);
         assert_eq!(casters.casts.iter().filter(|casts| **casts).count(), MANY);
         assert_eq!(casters.names.len(), MANY);
         assert!(begin.elapsed() < std::time::Duration::from_secs(20));
@@ -286,8 +284,7 @@ mod tests {
         let text = "camera: {origin: [0, 3, 9], target: [0, 0, 0], fov_deg: 40}\nshapes:\n\
             - mesh: {file: floor.obj, material: {diffuse: {}}}\n\
             - mesh: {file: glass.obj, material: {dielectric: {ior: 1.5}}}\n";
-        let description = SceneDescription::parse(text, &directory.path().join("s.yaml")).unwrap();
-        let scene = compile(&description, "s").unwrap();
+        let scene = compiled_in(directory.path(), text);
         assert!(scene.together.is_some());
         let casters = Casters::of(&scene, &[]);
         assert_eq!((casters.casts, casters.balls.len()), (vec![false, true], 1));

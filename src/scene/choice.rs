@@ -524,9 +524,8 @@ impl Asked {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::SceneDescription;
     use crate::scene::Scene;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::compiled;
     use crate::scene::environment::Drawn;
     use crate::scene::shape::testing::Random;
 
@@ -535,8 +534,7 @@ mod tests {
             "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nlights:\n{lights}shapes:\n\
              - sphere: {{center: [0, 0, 0], radius: 1, material: {{diffuse: {{}}}}}}\n{shapes}"
         );
-        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-        compile(&description, "s").unwrap()
+        compiled(&text)
     }
 
     fn point(x: f64, y: f64, z: f64, intensity: f64) -> String {

@@ -717,3 +717,22 @@ fn extent(objects: &[Object], boxes: &[Aabb], camera: &Camera) -> (DVec3, f64) {
         None => (camera.world_from_camera.translation, 1.0),
     }
 }
+
+/// Scenes for tests.
+#[cfg(test)]
+pub(crate) mod testing {
+    use super::{Scene, compile};
+    use crate::description::SceneDescription;
+    use std::path::Path;
+
+    /// The scene of `text`.
+    pub(crate) fn compiled(text: &str) -> Scene {
+        compiled_in(Path::new(""), text)
+    }
+
+    /// The scene of `text` in a directory that has the files which it names.
+    pub(crate) fn compiled_in(directory: &Path, text: &str) -> Scene {
+        let description = SceneDescription::parse(text, &directory.join("s.yaml")).unwrap();
+        compile(&description, "s").unwrap()
+    }
+}

@@ -296,8 +296,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::compiled;
 
     /// 10¹⁵ m away the places of f64 are an eighth of a metre apart. Light that is aimed at something a metre wide keeps to its line
     /// there, to a few roundings of a metre, and begins behind what stands in its way.
@@ -309,8 +308,7 @@ mod tests {
                 "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n- sphere: {{radius: 0.5}}\n\
                  - sphere: {{center: {place}, radius: 1000}}\n"
             );
-            let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-            let scene = compile(&description, "s").unwrap();
+            let scene = compiled(&text);
             let ray = scene.from_infinity(to, direction, 1.0, 4.0 * scene.radius);
             let back = to - ray.origin;
             assert_eq!(back.length() > 1e15, stands_before, "{place}: {back}");

@@ -203,15 +203,13 @@ fn of_lanes(mut mask: u32, objects: f64x4) -> impl Iterator<Item = u32> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::description::SceneDescription;
     use crate::math::Departure;
     use crate::scene::Scene;
     use crate::scene::bvh::Bvh;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::compiled;
     use crate::scene::shape::testing::{KINDS, Random, random_shape};
     use crate::scene::through::Way;
     use glam::DVec3;
-    use std::path::Path;
 
     /// `count` shapes of all kinds that overlap, every third the same as the one before; half of them let light through.
     pub(in crate::scene) fn scene(count: usize, random: &mut Random) -> Scene {
@@ -220,8 +218,7 @@ pub(super) mod tests {
             let material = if i / 3 % 2 == 0 { "diffuse" } else { "boundary" };
             text += &format!("- sphere: {{radius: 1, material: {{{material}: {{}}}}}}\n");
         }
-        let description = SceneDescription::parse(&text, Path::new("s.yaml")).unwrap();
-        let mut scene = compile(&description, "s").unwrap();
+        let mut scene = compiled(&text);
         for i in 0..count {
             let (center, size) = (random.direction() * 4.0 * random.uniform(), random.log_uniform(-1.0, 0.3));
             let shape = random_shape((random.uniform() * KINDS as f64) as usize, center, size, random);
@@ -322,7 +319,7 @@ pub(super) mod tests {
             let mut text = String::from("camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nshapes:\n");
             text += &"- sphere: {radius: 1}\n".repeat(spheres);
             text += &"- cube: {size: [1, 1, 1]}\n".repeat(cubes);
-            compile(&SceneDescription::parse(&text, Path::new("s.yaml")).unwrap(), "s").unwrap()
+            compiled(&text)
         };
         let few = [(1, 0), (MOST, 0), (MOST + 1, 0), (0, 4), (0, 5), (5, 5), (4, 5)];
         let found = few.map(|(spheres, cubes)| compiled(spheres, cubes).few.is_some());

@@ -312,14 +312,12 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::{compiled, compiled_in};
 
     /// A scene of these shapes.
     fn scene(shapes: &str) -> Scene {
         let text = format!("camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n{shapes}");
-        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-        compile(&description, "s").unwrap()
+        compiled(&text)
     }
 
     /// Cubes of triangles with a medium on one side of them, two of them with normals that point the other way, and one that
@@ -345,8 +343,7 @@ mod tests {
                  transform: [{{translate: [{x}, 0, 0]}}]}}\n"
             );
         }
-        let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-        let scene = compile(&description, "s").unwrap();
+        let scene = compiled_in(directory.path(), &text);
         let mut random = crate::scene::shape::testing::Random::new(4);
         let mut met = [[0; 2]; 4];
         for _ in 0..2_000 {

@@ -156,14 +156,12 @@ impl Scene {
 #[cfg(test)]
 mod tests {
 
-    use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::compiled;
 
     /// Notes of overlaps in a scene of these shapes.
     fn notes(shapes: &str) -> Vec<String> {
         let text = format!("camera: {{origin: [0, 0.3, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n{shapes}");
-        let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-        let mut notes = compile(&description, "s").unwrap().notes;
+        let mut notes = compiled(&text).notes;
         notes.retain(|note| note.contains(": overlaps "));
         notes
     }

@@ -113,9 +113,8 @@ fn nearest_turn(d: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::description::SceneDescription;
     use crate::math::Ray;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::compiled;
     use glam::DVec3;
 
     /// What is thin, e to a length of 2, has ∂p/∂u and ∂p/∂v of its own measures: once around a wire of radius e are 2πe, on a cone
@@ -160,8 +159,7 @@ mod tests {
             ] {
                 let text =
                     format!("camera: {{origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes: [{{{form}}}]\n");
-                let description = SceneDescription::parse(&text, std::path::Path::new("s.yaml")).unwrap();
-                let scene = compile(&description, "s").unwrap();
+                let scene = compiled(&text);
                 let ray = Ray::new(eye, direction);
                 let hit = scene.closest(&ray, f64::INFINITY).unwrap();
                 let partials = scene.uv_gradient(&hit, &scene.surface_with_texture(&ray, &hit)).partials();
@@ -179,8 +177,7 @@ mod tests {
     fn texture_coordinates_of_a_plane_run_alike_everywhere() {
         let text =
             "camera: {origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}\nshapes: [plane: {normal: [0, 1, 0]}]\n";
-        let description = SceneDescription::parse(text, std::path::Path::new("s.yaml")).unwrap();
-        let scene = compile(&description, "s").unwrap();
+        let scene = compiled(text);
         for x in [1.0, 1500.0, 3000.0, -9000.0, 1e7] {
             let ray = Ray::new(DVec3::new(x, 1.0, 0.3 * x), DVec3::NEG_Y);
             let hit = scene.closest(&ray, f64::INFINITY).unwrap();

@@ -298,7 +298,7 @@ mod tests {
     use super::*;
     use crate::description::SceneDescription;
     use crate::film::{Window, exr};
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::compiled_in;
     use crate::scene::texture::TexturePoint;
     use crate::spectrum::{Lanes, Spectrum};
     use glam::DVec3;
@@ -340,8 +340,7 @@ mod tests {
                  textures: {{t: {{image: {{file: light.exr{written}}}}}}}\n\
                  shapes: [sphere: {{radius: 1, emission: {{texture: t}}}}]\n"
             );
-            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-            let scene = compile(&description, "s").unwrap();
+            let scene = compiled_in(directory.path(), &text);
             let Light::Area { radiance, .. } = &scene.lights[0] else { panic!("a shape that shines") };
             let found = radiance.eval(&TexturePoint::default(), Lanes::splat(450.0)).to_array()[0];
             assert!((found - expected).abs() < 1e-6, "{found} for {expected}");

@@ -62,13 +62,11 @@ impl<'a> Compiler<'a> {
 
 #[cfg(test)]
 mod tests {
-    use crate::description::SceneDescription;
-    use crate::scene::compile::compile;
-    use std::path::Path;
+    use crate::scene::compile::testing::compiled;
 
     fn notes(text: &str) -> Vec<String> {
         let text = format!("camera: {{origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}}\n{text}");
-        compile(&SceneDescription::parse(&text, Path::new("s.yaml")).unwrap(), "s").unwrap().notes
+        compiled(&text).notes
     }
 
     /// Materials that something has are told of, whatever their names; those that nothing has are not, though their names begin

@@ -134,12 +134,10 @@ fn normal_transform(m: DMat4, n: DVec3) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
-    use crate::description::SceneDescription;
     use crate::scene::Geometry;
-    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::compiled;
     use crate::scene::shape::testing::Random;
     use glam::{DMat3, DVec2, DVec3};
-    use std::path::Path;
 
     /// Texture coordinates belong to the thing, however it is turned, resized and mirrored; to a rounding of the largest
     /// coordinate over the least radius.
@@ -165,8 +163,7 @@ mod tests {
                     "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n- {thing}}}\n\
                      - {thing}, transform: [{written}]}}\n"
                 );
-                let description = SceneDescription::parse(&text, Path::new("s.yaml")).unwrap();
-                let scene = compile(&description, "s").unwrap();
+                let scene = compiled(&text);
                 let [Geometry::Shape(plain), Geometry::Shape(turned)] = [0, 1].map(|i| &scene.objects[i].geometry)
                 else {
                     panic!("two shapes");
@@ -198,8 +195,7 @@ mod tests {
                 "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n- plane: {{{plane}}}\n\
                  - plane: {{{plane}, transform: [{{rotate: {{axis: [0.2, 1, 0.3], deg: 75}}}}]}}\n"
             );
-            let description = SceneDescription::parse(&text, Path::new("s.yaml")).unwrap();
-            let scene = compile(&description, "s").unwrap();
+            let scene = compiled(&text);
             let [Geometry::Shape(plain), Geometry::Shape(turned)] = [0, 1].map(|i| &scene.objects[i].geometry) else {
                 panic!("two shapes");
             };
@@ -228,8 +224,7 @@ mod tests {
                 "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n- {thing}}}\n\
                  - {thing}, transform: [{{rotate: {{axis: [0.2, 1, 0.3], deg: 75}}}}, {{scale: [-1, 1, 1]}}]}}\n"
             );
-            let description = SceneDescription::parse(&text, Path::new("s.yaml")).unwrap();
-            let scene = compile(&description, "s").unwrap();
+            let scene = compiled(&text);
             let [Geometry::Shape(plain), Geometry::Shape(turned)] = [0, 1].map(|i| &scene.objects[i].geometry) else {
                 panic!("two shapes");
             };
@@ -264,8 +259,7 @@ mod tests {
             let [before, after] = ["1.0e-6", "-1.0e-6"].map(|z| {
                 let camera = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n";
                 let text = format!("{camera}shapes:\n- {}\n", thing.replace('Z', z));
-                let description = SceneDescription::parse(&text, Path::new("s.yaml")).unwrap();
-                compile(&description, "s").unwrap()
+                compiled(&text)
             });
             let (Geometry::Shape(before), Geometry::Shape(after)) =
                 (&before.objects[0].geometry, &after.objects[0].geometry)

@@ -516,6 +516,7 @@ fn facets(alpha: f64, distribution: written::Distribution) -> Option<Microfacets
 mod tests {
     use crate::description::SceneDescription;
     use crate::optics::plastic::Coats;
+    use crate::scene::compile::testing::compiled_in;
     use crate::scene::compile::{compile, compile_with};
     use crate::scene::grid::testing::vol;
     use crate::scene::material::Kind;
@@ -581,8 +582,7 @@ mod tests {
                  textures: {{t: {{image: {{file: waves.pgm, raw: true}}}}}}\nmaterials:\n  m: {material}\n\
                  shapes: [{shape}]\n"
             );
-            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-            let notes = compile(&description, "s").unwrap().notes;
+            let notes = compiled_in(directory.path(), &text).notes;
             notes.iter().any(|note| note.contains("shapes[0].sdf_grid: u and v are 0 all over it"))
         };
         let grid = "sdf_grid: {file: grid.vol, material: m}";

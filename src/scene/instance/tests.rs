@@ -3,15 +3,14 @@
 use super::*;
 use crate::description::SceneDescription;
 use crate::scene::Scene;
-use crate::scene::compile::compile;
+use crate::scene::compile::testing::compiled;
 use crate::scene::shape::testing::Random;
 use std::path::Path;
 
 const CAMERA: &str = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n";
 
 fn scene(text: &str) -> Scene {
-    let description = SceneDescription::parse(&format!("{CAMERA}{text}"), Path::new("s.yaml")).unwrap();
-    compile(&description, "s").unwrap()
+    compiled(&format!("{CAMERA}{text}"))
 }
 
 /// A turn, an even scaling that mirrors, and a move, as steps.

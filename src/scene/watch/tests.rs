@@ -1,15 +1,12 @@
 //! Whether textbook and robust arithmetic see the same surfaces, and where they part.
 
 use super::*;
-use crate::description::SceneDescription;
-use crate::scene::compile::compile;
+use crate::scene::compile::testing::compiled;
 use crate::scene::shape::testing::Random;
-use std::path::Path;
 
 fn scene(text: &str) -> Scene {
     let camera = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n";
-    let description = SceneDescription::parse(&format!("{camera}{text}"), Path::new("s.yaml")).unwrap();
-    let mut scene = compile(&description, "s").unwrap();
+    let mut scene = compiled(&format!("{camera}{text}"));
     scene.watch = Some(Box::default());
     scene
 }
