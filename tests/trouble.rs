@@ -453,7 +453,7 @@ fn memory_that_the_system_refuses_is_told() {
     let vol = [b"VOL\x03".to_vec(), head, bounds, distances.collect()].concat();
     std::fs::write(place.path("ball.vol"), vol).unwrap();
     let mut codes = Vec::new();
-    for megabytes in (48..=192).step_by(8) {
+    for megabytes in (48..=192).step_by(16).chain([2048]) {
         let script = format!("ulimit -v {}; exec \"$0\" render scene.yaml -q -o out --threads 1", megabytes << 10);
         let mut command = Command::new("bash");
         command.args(["-c", &script, env!("CARGO_BIN_EXE_abbe")]).env_remove("RUST_BACKTRACE");
