@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::film::layers::Kept;
 use crate::scene::Scene;
 use crate::scene::casters::Casters;
-use crate::transport::layers::{Form, Layer, LayerPlan, Quantity, Source};
+use crate::transport::layers::{Form, Layer, LayerPlan, Source};
 use crate::transport::middle::Middle;
 use crate::transport::ways::{Way, Ways};
 
@@ -78,8 +78,8 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
             | LayerContent::Variance
             | LayerContent::StandardError
             | LayerContent::SampleCount => continue,
-            LayerContent::Surface(quantity) => Source::Surface(self::quantity(*quantity)),
-            LayerContent::Seen(quantity) => Source::Seen(self::quantity(*quantity)),
+            LayerContent::Surface(quantity) => Source::Surface(*quantity),
+            LayerContent::Seen(quantity) => Source::Seen(*quantity),
             LayerContent::Light { of, form } => {
                 let form = match form {
                     description::LightForm::Rgba => Form::Rgba,
@@ -124,21 +124,4 @@ fn ways(ways: &[description::LightWay]) -> Ways {
         Written::MediaIndirect => Ways::of(&[Way::MediaIndirect]),
     };
     ways.iter().map(one).fold(Ways::of(&[]), Ways::or)
-}
-
-fn quantity(quantity: description::Quantity) -> Quantity {
-    match quantity {
-        description::Quantity::Depth => Quantity::Depth,
-        description::Quantity::Position => Quantity::Position,
-        description::Quantity::Uv => Quantity::Uv,
-        description::Quantity::GeometricNormal => Quantity::GeometricNormal,
-        description::Quantity::ShadingNormal => Quantity::ShadingNormal,
-        description::Quantity::DpDu => Quantity::DpDu,
-        description::Quantity::DpDv => Quantity::DpDv,
-        description::Quantity::DuvDx => Quantity::DuvDx,
-        description::Quantity::DuvDy => Quantity::DuvDy,
-        description::Quantity::Albedo => Quantity::Albedo,
-        description::Quantity::Primitive => Quantity::Primitive,
-        description::Quantity::Shape => Quantity::Shape,
-    }
 }

@@ -134,31 +134,33 @@ impl Matte {
     }
 }
 
-/// Something of a surface.
+/// Something that the camera sees of the first surface that its ray meets; zero where there is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
-    /// Distance along the ray.
+    /// Distance along the ray, metres.
     Depth,
-    /// Where it is.
+    /// Point, metres.
     Position,
     /// Texture coordinates.
     Uv,
-    /// The true normal.
+    /// True normal, outward.
     GeometricNormal,
-    /// The interpolated normal.
+    /// Interpolated normal.
     ShadingNormal,
-    /// ∂p/∂u.
+    /// ∂p/∂u, metres.
     DpDu,
-    /// ∂p/∂v.
+    /// ∂p/∂v, metres.
     DpDv,
-    /// ∂(u, v)/∂x from one sample to the next.
+    /// ∂(u, v)/∂x: how much the texture coordinates change from this sample to the next to the right, where
+    /// samples stand 1/√n pixels apart.
     DuvDx,
-    /// ∂(u, v)/∂y from one sample to the next.
+    /// The same downward.
     DuvDy,
-    /// Colour of the material.
+    /// Colour of the material, in the colour space of the file: of what is seen [`Bsdf::albedo`](crate::optics::bsdf::Bsdf::albedo) in daylight; of what is met
+    /// that of a diffuse base in light of equal energy, else π f for light along the normal.
     Albedo,
-    /// Number of the face or triangle, from 0.
+    /// Number of the triangle or face, from 0.
     Primitive,
     /// Number of the shape, from 1.
     Shape,
@@ -334,8 +336,9 @@ impl Layer {
 }
 
 impl Quantity {
-    /// What it is of, as its channels are named.
-    fn components(self) -> &'static [&'static str] {
+    /// Names of its components, as OpenEXR layers have them.
+    #[must_use]
+    pub fn components(self) -> &'static [&'static str] {
         match self {
             Quantity::Depth => &["T"],
             Quantity::Uv | Quantity::DuvDx | Quantity::DuvDy => &["U", "V"],

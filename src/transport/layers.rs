@@ -6,6 +6,7 @@
 use super::middle::{Covering, Middle, first_covering};
 use super::plan::{EffectPlan, Integrator};
 use super::ways::{Ledger, Way, Ways};
+use crate::description::Quantity;
 use crate::film::accumulate::{Invalid, SAMPLE_LIMIT};
 use crate::film::layers::{Kept, Layout};
 use crate::math::{Frame, Ray};
@@ -16,55 +17,6 @@ use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, Spectrum, illuminant, observer};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
-
-/// Something that the camera sees of the first surface that its ray meets; zero where there is none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Distance along the ray, metres.
-    Depth,
-    /// Point, metres.
-    Position,
-    /// Texture coordinates.
-    Uv,
-    /// True normal, outward.
-    GeometricNormal,
-    /// Interpolated normal.
-    ShadingNormal,
-    /// ∂p/∂u, metres.
-    DpDu,
-    /// ∂p/∂v, metres.
-    DpDv,
-    /// ∂(u, v)/∂x: how much the texture coordinates change from this sample to the next to the right, where
-    /// samples stand 1/√n pixels apart.
-    DuvDx,
-    /// The same downward.
-    DuvDy,
-    /// Colour of the material, in the colour space of the file: of what is seen [`Bsdf::albedo`](crate::optics::bsdf::Bsdf::albedo) in daylight; of what is met
-    /// that of a diffuse base in light of equal energy, else π f for light along the normal.
-    Albedo,
-    /// Number of the triangle or face, from 0.
-    Primitive,
-    /// Number of the shape, from 1.
-    Shape,
-}
-
-impl Quantity {
-    /// Names of its components, as OpenEXR layers have them.
-    #[must_use]
-    pub fn components(self) -> &'static [&'static str] {
-        match self {
-            Quantity::Depth => &["T"],
-            Quantity::Uv | Quantity::DuvDx | Quantity::DuvDy => &["U", "V"],
-            Quantity::Primitive | Quantity::Shape => &["I"],
-            Quantity::Albedo => &["R", "G", "B"],
-            Quantity::Position
-            | Quantity::GeometricNormal
-            | Quantity::ShadingNormal
-            | Quantity::DpDu
-            | Quantity::DpDv => &["X", "Y", "Z"],
-        }
-    }
-}
 
 /// How light is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
