@@ -337,30 +337,20 @@ impl Light {
                 along_normal::arriving(&lamp.geometry, lamp.facing(), *object, exitance, from, u, nm)
             }
             Light::Projector(projector) => projector.arriving(from, nm),
-            Light::Directional { direction, irradiance } => Some(Arriving {
-                wi: -*direction,
-                distance: f64::INFINITY,
-                radiance: irradiance.eval(nm),
-                density: None,
-                target: None,
-            }),
+            Light::Directional { direction, irradiance } => {
+                Some(Arriving::from_infinity(-*direction, irradiance.eval(nm), None))
+            }
             Light::Constant { radiance } => {
                 let wi = match normal {
                     Some(n) => Frame::from_normal(n).to_world(warp::cosine_hemisphere(u)),
                     None => warp::uniform_sphere(u),
                 };
                 let density = self.background_pdf(wi, normal, drawn);
-                (density > 0.0).then(|| Arriving {
-                    wi,
-                    distance: f64::INFINITY,
-                    radiance: radiance.eval(nm),
-                    density: Some(density),
-                    target: None,
-                })
+                (density > 0.0).then(|| Arriving::from_infinity(wi, radiance.eval(nm), Some(density)))
             }
             Light::Environment(map) => {
                 let s = map.sample(u, drawn)?;
-                Some(arriving_from_sky(&s, map.radiance_of(&s, nm)))
+                Some(Arriving::from_infinity(s.direction, map.radiance_of(&s, nm), Some(s.pdf_solid_angle)))
             }
         }
     }
@@ -383,7 +373,7 @@ impl Light {
         let Light::Environment(map) = self else { return self.arriving(objects, from, normal, u, drawn, nm) };
         let s = map.sample(u, drawn)?;
         *sky = Some((map, s));
-        Some(arriving_from_sky(&s, Lanes::ZERO))
+        Some(Arriving::from_infinity(s.direction, Lanes::ZERO, Some(s.pdf_solid_angle)))
     }
 
     /// Luminous power, in film units times m²: by which lights are chosen. `radius` is that of the
@@ -472,8 +462,10 @@ impl Lamp<'_> {
     }
 }
 
-fn arriving_from_sky(s: &EnvironmentSample, radiance: Lanes) -> Arriving {
-    Arriving { wi: s.direction, distance: f64::INFINITY, radiance, density: Some(s.pdf_solid_angle), target: None }
+impl Arriving {
+    fn from_infinity(wi: DVec3, radiance: Lanes, density: Option<f64>) -> Arriving {
+        Arriving { wi, distance: f64::INFINITY, radiance, density, target: None }
+    }
 }
 
 /// Direction, distance and 1/d² times `falloff`.
