@@ -148,6 +148,7 @@ fn travelled(open: &Scene, close: &Scene) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::compile::testing::compiled_with;
 
     /// Of 65 MB a moment 32 are 2.08 GB, however the bytes are shared out; what takes none leaves as many as there may be, and
     /// what takes too much the two ends.
@@ -171,8 +172,7 @@ mod tests {
                  shapes:\n- curves: {{file: hair.txt, basis: linear}}\n\
                  - curves: {{file: hair.txt, basis: linear, transform: [{{translate: [{x}, 0, 0]}}]}}\n"
             );
-            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-            compile::compile_with(&description, "s", &mut shelf).unwrap()
+            compiled_with(directory.path(), &text, &mut shelf)
         };
         let (open, close) = (at(3.0), at(4.0));
         let Geometry::Curves(moved) = &close.objects[1].geometry else { panic!("curves") };

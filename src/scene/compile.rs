@@ -721,7 +721,7 @@ fn extent(objects: &[Object], boxes: &[Aabb], camera: &Camera) -> (DVec3, f64) {
 /// Scenes for tests.
 #[cfg(test)]
 pub(crate) mod testing {
-    use super::{Scene, compile};
+    use super::{Scene, Shelf, compile_with};
     use crate::description::SceneDescription;
     use std::path::Path;
 
@@ -732,7 +732,12 @@ pub(crate) mod testing {
 
     /// The scene of `text` in a directory that has the files which it names.
     pub(crate) fn compiled_in(directory: &Path, text: &str) -> Scene {
+        compiled_with(directory, text, &mut Shelf::default())
+    }
+
+    /// The same with what the scene before it has read.
+    pub(crate) fn compiled_with(directory: &Path, text: &str, shelf: &mut Shelf) -> Scene {
         let description = SceneDescription::parse(text, &directory.join("s.yaml")).unwrap();
-        compile(&description, "s").unwrap()
+        compile_with(&description, "s", shelf).unwrap()
     }
 }

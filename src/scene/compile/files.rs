@@ -55,9 +55,8 @@ impl Compiler<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::SceneDescription;
     use crate::scene::Scene;
-    use crate::scene::compile::compile_with;
+    use crate::scene::compile::testing::compiled_with;
     use crate::scene::grid::testing::vol;
     use glam::DVec3;
 
@@ -67,8 +66,7 @@ mod tests {
             "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\n\
              shapes: [{shape}, transform: [{{translate: [{x}, 0, 0]}}]}}]\n"
         );
-        let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-        compile_with(&description, "s", shelf).unwrap()
+        compiled_with(directory.path(), &text, shelf)
     }
 
     /// The moments while a shutter is open share the numbers of a grid, and each has it in its own place. Between -1 and 1

@@ -268,9 +268,8 @@ fn place_grid(written: &written::GridVolume, grid: Unplaced, world_from_local: D
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::SceneDescription;
     use crate::scene::census::Census;
-    use crate::scene::compile::compile_with;
+    use crate::scene::compile::testing::{compiled, compiled_with};
     use crate::scene::grid::testing::vol;
     use crate::scene::material::Kind;
     use crate::scene::shelf::Shelf;
@@ -290,8 +289,7 @@ mod tests {
                  textures: {{t: {{volume: v}}}}\n\
                  shapes: [sphere: {{radius: 1, material: {{diffuse: {{reflectance: {{texture: t}}}}}}}}]\n"
             );
-            let description = SceneDescription::parse(&text, &directory.path().join("s.yaml")).unwrap();
-            let scene = compile_with(&description, "s", &mut shelf).unwrap();
+            let scene = compiled_with(directory.path(), &text, &mut shelf);
             match &scene.materials[scene.objects[0].material as usize].kind {
                 Kind::Diffuse { reflectance: Texture::Volume(Volume::Grid(grid)) } => grid.clone(),
                 _ => panic!("a volume"),
@@ -313,8 +311,7 @@ mod tests {
                 "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nmedia: {{m: {{homogeneous: {{scattering: 1}}}}}}\n\
                  shapes: [{{{shape}}}]\n"
             );
-            let description = SceneDescription::parse(&text, Path::new("s.yaml")).unwrap();
-            let scene = compile_with(&description, "s", &mut Shelf::default()).unwrap();
+            let scene = compiled(&text);
             let told = scene.notes.iter().any(|note| note.contains("light cannot enter"));
             (Census::of(&scene).media, told)
         };

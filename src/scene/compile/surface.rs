@@ -516,8 +516,8 @@ fn facets(alpha: f64, distribution: written::Distribution) -> Option<Microfacets
 mod tests {
     use crate::description::SceneDescription;
     use crate::optics::plastic::Coats;
-    use crate::scene::compile::testing::compiled_in;
-    use crate::scene::compile::{compile, compile_with};
+    use crate::scene::compile::compile;
+    use crate::scene::compile::testing::{compiled_in, compiled_with};
     use crate::scene::grid::testing::vol;
     use crate::scene::material::Kind;
     use crate::scene::shelf::Shelf;
@@ -612,7 +612,7 @@ mod tests {
             let shapes = coats.map(|coat| format!("- sphere: {{radius: 1, material: {{plastic: {{{coat}}}}}}}\n"));
             let camera = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n";
             let text = format!("{camera}shapes:\n{}", shapes.concat());
-            compile_with(&SceneDescription::parse(&text, Path::new("s.yaml")).unwrap(), "s", shelf).unwrap()
+            compiled_with(Path::new(""), &text, shelf)
         };
         let tables = |scene: &Scene| -> Vec<Arc<Coats>> {
             let of = |object: &Object| match &scene.materials[object.material as usize].kind {
