@@ -102,17 +102,28 @@ impl Sampler<'_> {
         Sampler { stream: self.stream, index, lane: 0, octet: None }
     }
 
-    /// The numbers of `set` of the first [`PARTS`] of `count` [`Sampler::part`]s.
+    /// The numbers of `set` of `count` [`Sampler::part`]s, at most [`PARTS`]; what is beyond them means nothing.
     #[must_use]
     pub fn parts(&self, set: Set, count: u32) -> [[f64; 4]; PARTS as usize] {
-        let mut indices = [self.index.wrapping_mul(count); PARTS as usize];
+        // Side by side, but not many more than are asked for.
+        match count {
+            ..=2 => self.first_parts::<2>(set, count),
+            3..=4 => self.first_parts::<4>(set, count),
+            _ => self.first_parts::<8>(set, count),
+        }
+    }
+
+    fn first_parts<const N: usize>(&self, set: Set, count: u32) -> [[f64; 4]; PARTS as usize] {
+        let mut indices = [self.index.wrapping_mul(count); N];
         for (index, i) in indices.iter_mut().zip(0..) {
             *index = index.wrapping_add(i);
         }
+        let points = points([key(self.stream, set.index()); N], indices);
         let mut numbers = [[0.0; 4]; PARTS as usize];
-        let points = points([key(self.stream, set.index()); PARTS as usize], indices);
-        for (numbers, bits) in numbers.iter_mut().flatten().zip(points.as_flattened()) {
-            *numbers = unit(*bits);
+        for (numbers, bits) in numbers.iter_mut().zip(points) {
+            for (number, bits) in numbers.iter_mut().zip(bits) {
+                *number = unit(bits);
+            }
         }
         numbers
     }
