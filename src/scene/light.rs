@@ -3,7 +3,7 @@
 use super::along_normal;
 use super::environment::{Drawn, Environment, EnvironmentSample};
 use super::projector::Projector;
-use super::shape::{Shape, TowardSample};
+use super::shape::{Shape, Sphere, TowardSample};
 use super::texture::{Texture, TexturePoint};
 use super::{Geometry, Hit, Object, SurfacePoint};
 use crate::math::frame::Frame;
@@ -285,6 +285,7 @@ impl Light {
                             _ if facing < 0.0 => lamp.arriving(shape.sample_inward(from, u)?, nm),
                             // The most common lamp has code of its own.
                             Shape::Rectangle(patch) => lamp.arriving(patch.sample_toward(from, u)?, nm),
+                            Shape::Sphere(ball) => lamp.arriving_from_ball(ball, from, u, nm),
                             _ => lamp.arriving(shape.sample_toward(from, u)?, nm),
                         }
                     }
@@ -439,6 +440,19 @@ struct Lamp<'a> {
 }
 
 impl Lamp<'_> {
+    /// The light of a point of a ball; `None` from inside.
+    #[inline(always)]
+    fn arriving_from_ball(&self, ball: &Sphere, from: DVec3, u: DVec2, nm: Lanes) -> Option<Arriving> {
+        // Of what shines evenly, seen from outside, nothing needs to be known but where it is.
+        if let Texture::Uniform(spectrum) = self.radiance
+            && let Some((wi, distance, density)) = ball.look_toward(from, u)
+        {
+            let target = Some(Departure::new(self.object, 0));
+            return Some(Arriving { wi, distance, radiance: spectrum.eval(nm), density: Some(density), target });
+        }
+        self.arriving(self.shape.sample_toward(from, u)?, nm)
+    }
+
     /// The light of one of its points; `None` from its back.
     #[inline(always)]
     fn arriving(&self, s: TowardSample, nm: Lanes) -> Option<Arriving> {

@@ -199,33 +199,46 @@ impl Sphere {
         let Some(cap) = self.cone(from) else {
             return toward_by_area(from, self.sample_area(u));
         };
-        let local = uniform_cone(u, cap.one_minus_cos);
-        let frame = Frame::from_normal(cap.axis);
-        let direction = frame.to_world(local);
-        // Near root of t² − 2 t d cos θ + (d² − r²) = 0 in the form without cancellation.
-        let foot = cap.distance * local.z;
-        let sine = (local.x * local.x + local.y * local.y).sqrt();
-        let side = cap.distance * sine;
-        let half = ((self.radius - side) * (self.radius + side)).max(0.0).sqrt();
-        let distance = cap.power / (foot + half);
+        let Seen { frame, local, sine, side, half, distance } = self.seen(&cap, u);
         // From the middle to there, across the way and along it: without cancellation, however small the sphere.
         let across = DVec2::new(local.x, local.y) * distance;
         let along = -(side * sine + half * local.z);
         let normal = frame.to_world(DVec3::new(across.x, across.y, along)).normalize_or(-cap.axis);
         Some(TowardSample {
-            direction,
+            direction: frame.to_world(local),
             distance,
             point: self.at_normal(normal),
             normal,
             face: 0,
             scale: self.scale(),
-            pdf_solid_angle: 1.0 / (TAU * cap.one_minus_cos),
+            pdf_solid_angle: cap.density(),
         })
+    }
+
+    /// Direction, distance and density in sr⁻¹ of [`super::Shape::sample_toward`] from outside; `None` from inside or on it.
+    #[must_use]
+    #[inline(always)]
+    pub fn look_toward(&self, from: DVec3, u: DVec2) -> Option<(DVec3, f64, f64)> {
+        let cap = self.cone(from)?;
+        let seen = self.seen(&cap, u);
+        Some((seen.frame.to_world(seen.local), seen.distance, cap.density()))
+    }
+
+    /// The point of the surface that is seen in a direction of the cone.
+    #[inline(always)]
+    fn seen(&self, cap: &Cap, u: DVec2) -> Seen {
+        let local = uniform_cone(u, cap.one_minus_cos);
+        // Near root of t² − 2 t d cos θ + (d² − r²) = 0 in the form without cancellation.
+        let foot = cap.distance * local.z;
+        let sine = (local.x * local.x + local.y * local.y).sqrt();
+        let side = cap.distance * sine;
+        let half = ((self.radius - side) * (self.radius + side)).max(0.0).sqrt();
+        Seen { frame: Frame::from_normal(cap.axis), local, sine, side, half, distance: cap.power / (foot + half) }
     }
 
     pub(super) fn pdf_toward(&self, from: DVec3, direction: DVec3, hit_t: f64, hit_normal: DVec3) -> f64 {
         match self.cone(from) {
-            Some(cap) => 1.0 / (TAU * cap.one_minus_cos),
+            Some(cap) => cap.density(),
             None => solid_angle_density(1.0 / self.area(), hit_t, direction.dot(hit_normal)),
         }
     }
@@ -239,6 +252,28 @@ struct Cap {
     /// Power of the point: d² − r².
     power: f64,
     one_minus_cos: f64,
+}
+
+impl Cap {
+    /// Of a direction that is uniform in it, sr⁻¹.
+    fn density(&self) -> f64 {
+        1.0 / (TAU * self.one_minus_cos)
+    }
+}
+
+/// A point of a sphere as it is seen from outside.
+struct Seen {
+    /// About the way to the centre.
+    frame: Frame,
+    /// The direction to the point in that frame.
+    local: DVec3,
+    /// Sine of the angle between the ways to the point and to the centre.
+    sine: f64,
+    /// How far from the centre the line to the point passes.
+    side: f64,
+    /// Along that line from where it is nearest to the centre to the surface.
+    half: f64,
+    distance: f64,
 }
 
 #[cfg(test)]
