@@ -281,6 +281,21 @@ mod tests {
     use super::*;
     use glam::DMat3;
 
+    /// A look at an even ball is the look at any, to the bit; from inside and on it there is none.
+    #[test]
+    fn looks_go_where_samples_lie() {
+        let sphere = Sphere::new(DVec3::new(1.0, -2.0, 0.5), 0.75, DMat3::IDENTITY).unwrap();
+        for k in 0..64 {
+            let u = DVec2::new(f64::from(k) / 64.0, (f64::from(k) * 0.618).fract());
+            for from in [DVec3::ZERO, DVec3::new(1.0, -1.24, 0.5), DVec3::splat(1e6)] {
+                let seen = sphere.sample_toward(from, u).unwrap();
+                assert_eq!(sphere.look_toward(from, u), Some((seen.direction, seen.distance, seen.pdf_solid_angle)));
+            }
+            assert_eq!(sphere.look_toward(sphere.center, u), None);
+            assert_eq!(sphere.look_toward(sphere.at_normal(DVec3::X), u), None);
+        }
+    }
+
     /// Points that are seen lie on the side that is seen and in their direction, however small the sphere is beside its distance.
     #[test]
     fn what_is_seen_of_a_small_sphere_faces_who_sees_it() {
