@@ -36,6 +36,8 @@ SelectTypeParameters=CR_Core
 SchedulerType=sched/backfill
 SchedulerParameters=batch_sched_delay=1,sched_interval=1,bf_interval=1
 KillWait=10
+# Fewer than the tasks of most jobs.
+MaxArraySize=3
 JobRequeue=1
 PreemptType=preempt/partition_prio
 PreemptMode=REQUEUE

@@ -20,12 +20,14 @@ const GIVEN_UP: i32 = 1;
 /// The most bytes of a job's name, with which the names of its logs begin: file systems take 255.
 const LONGEST: usize = 100;
 
+/// The number of the line in which a task stands. Arrays after the first are told where they begin.
+const NUMBER: &str = "number=$((${1:-0} + SLURM_ARRAY_TASK_ID))\n";
+
 /// The files of the bundle.
 #[must_use]
 pub fn files(job: &Job) -> Vec<BundleFile> {
     let (tasks, pictures) = tables(job);
-    let count = |table: &str| table.lines().count().max(1) - 1;
-    let (last_task, last_picture) = (count(&tasks), count(&pictures));
+    let submit = submit(job, tasks.lines().count(), pictures.lines().count());
     let mut all = vec![
         BundleFile { name: "tasks.tsv", text: tasks, executable: false },
         BundleFile { name: "render.sbatch", text: render(job), executable: true },
@@ -34,7 +36,7 @@ pub fn files(job: &Job) -> Vec<BundleFile> {
         all.push(BundleFile { name: "pictures.tsv", text: pictures, executable: false });
         all.push(BundleFile { name: "merge.sbatch", text: merge(job), executable: true });
     }
-    all.push(BundleFile { name: "submit.sh", text: submit(job, last_task, last_picture), executable: true });
+    all.push(BundleFile { name: "submit.sh", text: submit, executable: true });
     all
 }
 
@@ -124,7 +126,8 @@ fn render(job: &Job) -> String {
     };
     head(job, "render", &directives)
         + &format!(
-            "line=$(sed -n \"$((SLURM_ARRAY_TASK_ID + 1))p\" tasks.tsv)\n\
+            "{NUMBER}\
+             line=$(sed -n \"$((number + 1))p\" tasks.tsv)\n\
              IFS=$'\\t' read -r scene frames tile samples <<<\"$line\"\n\
              what=()\n\
              [ \"$frames\" = - ] || what+=(--frames \"$frames\")\n\
@@ -133,7 +136,7 @@ fn render(job: &Job) -> String {
              # The process ends by itself before the kernel kills it.\n\
              [ -z \"${{SLURM_MEM_PER_NODE:-}}\" ] || what+=(--memory-limit \"${{SLURM_MEM_PER_NODE}}M\")\n\
              restarts=${{SLURM_RESTART_COUNT:-0}}\n\
-             echo \"task $SLURM_ARRAY_TASK_ID: $line: on ${{SLURMD_NODENAME:-?}}, begun again $restarts times\"\n\
+             echo \"task $number: $line: on ${{SLURMD_NODENAME:-?}}, begun again $restarts times\"\n\
              {command}\n\
              code=$?\n\
              # 75: stopped, and kept in a checkpoint; 137: killed. Both go on elsewhere, but not for ever.\n\
@@ -151,29 +154,47 @@ fn render(job: &Job) -> String {
 
 fn merge(job: &Job) -> String {
     head(job, "merge", "")
-        + "IFS=$'\\t' read -r scene frame <<<\"$(sed -n \"$((SLURM_ARRAY_TASK_ID + 1))p\" pictures.tsv)\"\n\
+        + NUMBER
+        + "IFS=$'\\t' read -r scene frame <<<\"$(sed -n \"$((number + 1))p\" pictures.tsv)\"\n\
            place=\"$pictures/parts/$scene\"\n\
            [ \"$frame\" = - ] || place=\"$place/$frame\"\n\
            # 3: a part is missing, damaged or of another picture.\n\
            srun --ntasks=1 \"$abbe\" merge \"$place\" -o \"$pictures\"\n"
 }
 
-fn submit(job: &Job, last_task: usize, last_picture: usize) -> String {
+/// Sends the tasks off as arrays of what Slurm takes at the most; the number of the first of each is told to its script.
+fn submit(job: &Job, tasks: usize, pictures: usize) -> String {
     let mut out = format!(
         "#!/bin/bash\n\
-         # submit.sh [options of sbatch, as -p spot --mem=4G --cpus-per-task=8]: {} pictures in {} tasks\n\
+         # submit.sh [options of sbatch, as -p spot --mem=4G --cpus-per-task=8]: {} pictures in {tasks} tasks\n\
          set -euo pipefail\n\
          cd \"$(dirname \"${{BASH_SOURCE[0]}}\")\"\n\
          mkdir -p log\n\
-         render=$(sbatch --parsable --array=0-{last_task} \"$@\" render.sbatch)\n\
+         most=$({{ scontrol show config || true; }} | sed -n 's/^MaxArraySize *= *\\([1-9][0-9]*\\).*/\\1/p')\n\
+         # submit SCRIPT TASKS [options]: the jobs, with colons between\n\
+         submit() {{\n    \
+             local script=$1 tasks=$2 first=0 jobs=() many job\n    \
+             shift 2\n    \
+             while ((first < tasks)); do\n        \
+                 many=$((tasks - first))\n        \
+                 ((many <= ${{most:-1001}})) || many=${{most:-1001}}\n        \
+                 job=$(sbatch --parsable --array=0-$((many - 1)) \"$@\" \"$script\" \"$first\") || {{\n            \
+                     [ ${{#jobs[@]}} = 0 ] || echo \"already submitted: scancel ${{jobs[*]}}\" >&2\n            \
+                     return 1\n        \
+                 }}\n        \
+                 jobs+=(\"${{job%%;*}}\")\n        \
+                 first=$((first + many))\n    \
+             done\n    \
+             (IFS=:; echo \"${{jobs[*]}}\")\n\
+         }}\n\
+         render=$(submit render.sbatch {tasks} \"$@\")\n\
          echo \"render: job $render\"\n",
         job.count(),
-        last_task + 1
     );
     if job.cut.parts() {
         let _ = write!(
             out,
-            "merge=$(sbatch --parsable --array=0-{last_picture} -d afterany:\"$render\" \"$@\" merge.sbatch)\n\
+            "merge=$(submit merge.sbatch {pictures} -d afterany:\"$render\" \"$@\")\n\
              echo \"merge: job $merge\"\n"
         );
     }
@@ -212,6 +233,58 @@ mod tests {
         // A name may begin like an option.
         assert!(render(&job(Cut { tiles: 1, ranges: 1, frames: 1 })).contains(" --scene=\"$scene\" "));
         assert_eq!(word("it's"), "'it'\\''s'");
+    }
+
+    /// An array takes what Slurm's `MaxArraySize` says: ten tasks go in arrays of four, four and two, and what merges waits for all.
+    /// Where it cannot be asked they are 1001 at the most. A refusal ends the script and tells what is waiting already.
+    #[cfg(unix)]
+    #[test]
+    fn more_tasks_than_an_array_takes_go_in_several() {
+        let place = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| {
+            use std::os::unix::fs::PermissionsExt;
+            let path = place.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+        };
+        for file in files(&job(Cut { tiles: 2, ranges: 1, frames: 2 })) {
+            write(file.name, &file.text);
+        }
+        // Jobs are numbered from 10 on; the one of this number among all is refused.
+        write(
+            "sbatch",
+            "#!/bin/bash\necho \"$*\" >>calls\nn=$(wc -l <calls)\n[ -z \"${REFUSED:-}\" ] || ((n < REFUSED)) || exit 7\n\
+             echo \"$((9 + n));here\"\n",
+        );
+        let submit = |config: &str, refused: &str| {
+            write("scontrol", config);
+            _ = std::fs::remove_file(place.path().join("calls"));
+            let path = format!("{}:{}", place.path().display(), std::env::var("PATH").unwrap());
+            let done = std::process::Command::new(place.path().join("submit.sh"))
+                .args(["-p", "two words"])
+                .envs([("PATH", path.as_str()), ("REFUSED", refused)])
+                .output()
+                .unwrap();
+            let calls = std::fs::read_to_string(place.path().join("calls")).unwrap();
+            let [out, err] = [done.stdout, done.stderr].map(|said| String::from_utf8(said).unwrap());
+            (done.status.success(), calls, out, err)
+        };
+        let (succeeded, calls, out, err) = submit("#!/bin/bash\necho 'MaxArraySize            = 4'\n", "");
+        assert!(succeeded, "{err}");
+        assert_eq!(
+            calls,
+            "--parsable --array=0-3 -p two words render.sbatch 0\n\
+             --parsable --array=0-3 -p two words render.sbatch 4\n\
+             --parsable --array=0-1 -p two words render.sbatch 8\n\
+             --parsable --array=0-3 -d afterany:10:11:12 -p two words merge.sbatch 0\n\
+             --parsable --array=0-2 -d afterany:10:11:12 -p two words merge.sbatch 4\n"
+        );
+        assert_eq!(out, "render: job 10:11:12\nmerge: job 13:14\n");
+        let (succeeded, calls, ..) = submit("#!/bin/bash\nexit 1\n", "");
+        assert!(succeeded && calls.starts_with("--parsable --array=0-9 -p two words render.sbatch 0\n"), "{calls}");
+        let (succeeded, calls, out, err) = submit("#!/bin/bash\necho 'MaxArraySize = 4'\n", "3");
+        assert!(!succeeded && calls.lines().count() == 3 && out.is_empty(), "{calls}{out}");
+        assert_eq!(err, "already submitted: scancel 10 11\n");
     }
 
     /// Within `${…:-…}` an apostrophe began a text that did not end, and a brace ended the path.
