@@ -58,7 +58,7 @@ pub struct PathIntegrator {
     #[serde(default = "one", deserialize_with = "whole::<_, 0, MAX_SPLIT>")]
     pub light_samples: u32,
     /// Paths that one sample follows from its camera ray, if more than `light_samples`; with 0 light arrives by shadow rays
-    /// only, and mirrors are black; default 1.
+    /// only, and mirrors are black, and so is what is behind panes and boundaries if `count_crossings`; default 1.
     #[serde(default = "one", deserialize_with = "whole::<_, 0, MAX_SPLIT>")]
     pub scatter_samples: u32,
     /// Whether going straight through a thin pane or the boundary of a medium ends a segment for `max_depth`, so that lamps behind

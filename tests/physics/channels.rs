@@ -305,6 +305,30 @@ fn each_technique_alone_has_the_same_mean() {
     assert_agree("three of each", &one("light_samples: 3, scatter_samples: 3"), &both);
 }
 
+/// The camera sees a lamp, or a sky of radiance 1 with nothing before it, without a technique. Behind an open sheet that counts as
+/// a vertex only what scatters there meets it; where such sheets do not count it is seen as before.
+#[test]
+fn shadow_rays_alone_show_no_light_behind_what_counts() {
+    let seen = |sheet: &str, behind: &str, settings: &str| {
+        let scene = format!(
+            "{PARALLEL}image: {{width: 1, height: 1}}\nintegrator: {{path: {{max_depth: 2, {settings}}}}}\nshapes:\n\
+             - rectangle: {{corner: [-2, -2, 0], edge_u: [4, 0, 0], edge_v: [0, 4, 0], material: {sheet}}}\n{behind}"
+        );
+        bench_with(&scene, &[]).sample([0, 0], 0).radiance.to_array()[0]
+    };
+    let sky = "lights: [{constant: {radiance: 1}}]\n";
+    let lamp = "- rectangle: {corner: [-2, -2, -1], edge_u: [4, 0, 0], edge_v: [0, 4, 0], emission: 1}\n";
+    for sheet in ["{boundary: {}}", "{mask: {opacity: 0, material: {diffuse: {}}}}", "{thin_dielectric: {ior: 1}}"] {
+        for behind in [sky, lamp] {
+            let by = |scatter: &str, counts: bool| {
+                seen(sheet, behind, &format!("scatter_samples: {scatter}, count_crossings: {counts}"))
+            };
+            let all = [by("1", true), by("1", false), by("0", false), by("0", true)];
+            assert_eq!(all, [1.0, 1.0, 1.0, 0.0], "{sheet} {behind}");
+        }
+    }
+}
+
 /// The greater of the two counts is that of the paths: which of them it is makes no difference.
 #[test]
 fn counts_of_shadow_and_scattered_rays_are_counts_of_paths() {

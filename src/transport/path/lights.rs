@@ -69,9 +69,10 @@ impl Tracer<'_> {
         Found { light: share, group: self.scene.light_groups.of[light as usize], alone: path.alone }
     }
 
-    /// Whether light that the path meets counts: always for the camera, else where scattering is a technique.
+    /// Whether light that the path meets counts: always for the camera, else where scattering is a technique. To go straight
+    /// through what counts as a vertex is to scatter there.
     pub(super) fn meets_lights(&self, path: &Path) -> bool {
-        self.settings.scatter_samples > 0 || path.vertices == 0
+        self.settings.scatter_samples > 0 || self.events(path) == 0
     }
 
     /// Light from infinity along a ray that met nothing.
