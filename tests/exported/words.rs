@@ -209,7 +209,15 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
         ),
         (
             "",
+            // Nothing is bent by the index around it, and what is not bent is not scattered: the picture is that of smooth glass.
             "sphere: {radius: 0.5, material: {dielectric: {roughness: 0.2, ior: 1.5, exterior_ior: 1.5}}}",
+            &[],
+            &["<bsdf type=\"dielectric\">", "<float name=\"int_ior\" value=\"1.5\"/>"],
+        ),
+        (
+            "",
+            // Half a step of a 32-bit float above 1.5 is 6e-8.
+            "sphere: {radius: 0.5, material: {dielectric: {roughness: 0.2, ior: 1.50000001, exterior_ior: 1.5}}}",
             &[
                 "shapes[1].sphere.material: an index a millionth above that around it: Mitsuba wants those of what is rough to differ",
             ],
