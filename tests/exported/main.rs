@@ -158,6 +158,27 @@ lights:
     assert_eq!(losses, ["integrator.path.delta_caustics"]);
 }
 
+/// Mitsuba 3.9.1 shows no light of a `directionalarea` but by `ptracer`, which sees no media; distances need none.
+#[test]
+fn light_along_normals_is_lost_where_paths_start_at_the_camera() {
+    let folder = Folder::new();
+    let losses = |integrator: &str, media: &str| {
+        let scene = format!(
+            "camera: {{origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}}\nintegrator: {integrator}\n{media}shapes:\n\
+             - rectangle: {{corner: [-2, -1, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4], material: {{diffuse: {{}}}}}}\n\
+             - disk: {{center: [0, 3, 0], normal: [0, -1, 0], radius: 0.5, emission: 1, emission_direction: normal}}\n\
+             - disk: {{center: [1, 3, 0], normal: [0, -1, 0], radius: 0.5, emission: 1}}\n"
+        );
+        folder.export_and_back(&scene).losses.into_iter().map(|loss| loss.field).collect::<Vec<String>>()
+    };
+    let lamp = "shapes[1].disk.emission_direction";
+    let media = "media: {smoke: {homogeneous: {scattering: 1}}}\nmedium: smoke\n";
+    assert_eq!(losses("path", ""), [lamp]);
+    assert_eq!(losses("{light_tracer: {count_crossings: true}}", ""), [""; 0]);
+    assert_eq!(losses("{light_tracer: {count_crossings: true}}", media), ["integrator.light_tracer", lamp]);
+    assert_eq!(losses("depth", ""), [""; 0]);
+}
+
 /// Paths from the lights are cut short by panes there, which matters where paths end and panes are.
 #[test]
 fn paths_of_the_light_tracer_are_shorter_there() {

@@ -1,5 +1,6 @@
 //! The integrator, and which light Mitsuba's do not know.
 
+use super::super::super::emitter::EmissionDirection;
 use super::super::super::light::Light;
 use super::super::super::settings::{Coverage, Integrator, Technique};
 use super::Export;
@@ -83,6 +84,19 @@ impl Export<'_> {
 
     /// Says which light Mitsuba's integrators do not know.
     pub(super) fn missing_light(&mut self) {
+        let scene = self.scene;
+        let meets_parallel = match &scene.integrator {
+            // With media it is a path tracer, too.
+            Integrator::LightTracer(_) => scene.media.is_empty(),
+            Integrator::Path(_) | Integrator::Whitted(_) => false,
+            Integrator::Depth(_) | Integrator::None(_) => true,
+        };
+        for (i, shape) in scene.shapes.iter().enumerate().filter(|_| !meets_parallel) {
+            if shape.emission.is_some() && shape.emission_direction == Some(EmissionDirection::Normal) {
+                let field = format!("shapes[{i}].{}.emission_direction", shape.geometry.kind());
+                self.lose(&field, "no light: along normals Mitsuba's ptracer alone finds it");
+            }
+        }
         let shapes = || self.scene.shapes.iter().chain(self.scene.groups.values().flatten());
         let path = match &self.scene.integrator {
             Integrator::Path(path) => path,
