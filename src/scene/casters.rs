@@ -46,6 +46,8 @@ pub struct Casters {
     pub casts: Vec<bool>,
     /// Balls that hold all of them, at most [`MAX_BALLS`].
     pub balls: Vec<Ball>,
+    /// Boxes that hold all of them, as many at the most.
+    pub boxes: Vec<Aabb>,
     /// Names, one for each object that stands in the scene itself.
     pub names: Vec<String>,
     /// Whether any of them has an index that depends on wavelength.
@@ -189,6 +191,11 @@ impl Casters {
             match ball {
                 Some(ball) => {
                     casters.balls.push(ball);
+                    match casters.boxes.last_mut() {
+                        // What is beyond shares the last.
+                        Some(last) if casters.balls.len() > MAX_BALLS => *last = last.union(&bounds),
+                        _ => casters.boxes.push(bounds),
+                    }
                     casters.names.push(object.name.clone());
                 }
                 None => casters.endless.push(object.name.clone()),

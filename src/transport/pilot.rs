@@ -20,7 +20,7 @@ use crate::scene::Scene;
 use crate::scene::casters::{self, Casters};
 use crate::scene::light::Light;
 use crate::transport::layers;
-use aims::is_small;
+use aims::{chance, is_small};
 use camera::from_camera;
 use glam::DVec2;
 use rounds::Round;
@@ -81,7 +81,8 @@ const EVEN: u32 = 16;
 /// Tells the pilot's numbers from the picture's.
 const STREAM: u64 = 0x7069_6c6f_7470_696c;
 
-/// How often the pilot must have met light of the class on its paths from the camera to trust what they say about it.
+/// How often paths from the camera must have met light of the class to trust what they say about it: those of the pilot, and those
+/// of the picture, whose stated error counts what they have met.
 const ENOUGH: usize = 16;
 
 /// What light tracing with merging costs beyond its rays: 1.05 to 1.3 in scenes of the gallery.
@@ -140,9 +141,13 @@ pub fn decide(
     if casters.is_empty() && in_part.is_empty() {
         return left_off("nothing mirrors or refracts sharply");
     }
-    // What no path from the camera finds is worth its noise.
+    let chances: Vec<f64> = (0..scene.lights.len()).map(|i| chance(scene, i, &casters)).collect();
+    let few = |chance: f64| chance * paths(scene, samples) < ENOUGH as f64;
+    let is_rare = |(light, chance): (&Light, &f64)| light.may_be_met() && casters.single && few(*chance);
+    let rare: Vec<bool> = scene.lights.iter().zip(&chances).map(is_rare).collect();
+    // What no path from the camera finds, or hardly any, is worth its noise.
     let unfound = without_extent && (casters.single || in_part.single);
-    if filter.leaves_gaps() && wishes.light_tracing == Use::Auto && !unfound {
+    if filter.leaves_gaps() && wishes.light_tracing == Use::Auto && !unfound && !rare.contains(&true) {
         return left_off("the filter leaves gaps between pixels: little of what comes to the picture would be in any");
     }
     if let Some(curve) = scenes().find_map(casters::one_way) {
@@ -182,7 +187,9 @@ pub fn decide(
         return left_off(&format!("light from infinity cannot be aimed at what has no end: {name}"));
     }
     let (casters, in_part) = (&casters, &in_part);
-    run(&Trial { scene, moments, plan, settings, filter, seed, samples, wishes, casters, in_part }, caustics)
+    let trial =
+        Trial { scene, moments, plan, settings, filter, seed, samples, wishes, casters, in_part, chances, rare };
+    run(&trial, caustics)
 }
 
 /// What a decision rests on.
@@ -199,13 +206,23 @@ struct Trial<'a> {
     casters: &'a Casters,
     /// What throws light of lamps without extent alone.
     in_part: &'a Casters,
+    /// For each light, how often a path from the camera may meet it by what throws its light.
+    chances: Vec<f64>,
+    /// For each light, whether it has an extent, but one so small that all paths from the camera are not expected to meet it by what
+    /// throws it in single directions often enough for the stated error to know of it.
+    rare: Vec<bool>,
+}
+
+/// Paths from the camera for the whole picture.
+fn paths(scene: &Scene, samples: u32) -> f64 {
+    let [width, height] = scene.camera.resolution.map(f64::from);
+    width * height * f64::from(samples)
 }
 
 impl Trial<'_> {
     /// Paths from the camera for the whole picture.
     fn paths(&self) -> f64 {
-        let [width, height] = self.scene.camera.resolution.map(f64::from);
-        width * height * f64::from(self.samples)
+        paths(self.scene, self.samples)
     }
 
     /// Pixels of a block to try, and the samples of each of two replicates there: together no more than a hundredth of the
@@ -261,9 +278,12 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let most_rays = SHARE * trial.paths() * camera.rays;
     let (mut found, mut followed, mut rays) = (Round::default(), 0, 0.0);
     let endless = endless_odds(scene, &caustics);
-    let possible = endless && (trial.casters.single || trial.in_part.single);
+    let traced = || (0..scene.lights.len()).filter(|&i| caustics.traced[i]);
+    let rare = traced().any(|i| trial.rare[i]);
+    let chance = traced().map(|i| trial.chances[i]).fold(0.0, f64::max);
+    let possible = rare || endless && (trial.casters.single || trial.in_part.single);
     let patience = PATIENCE * trial.paths() * camera.rays;
-    // As soon as one path has found light that no path from the camera could, it is traced.
+    // As soon as one path has found light that no path from the camera could, or that hardly any would, it is traced.
     let (mut unfound, mut unfound_gathered) = (false, false);
     for number in 0.. {
         let paths = LightPaths {
@@ -300,10 +320,11 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     }
 
     // Paths from the camera that find light of mean m with a probability p have a variance of m² / p, whether or not so
-    // few paths met it; for a lamp without extent p is zero.
+    // few paths met it; for a lamp without extent p is zero, and where none was met no more than the largest lamp's chance.
     let square = |means: &[f64]| means.iter().zip(&weights).map(|(m, w)| w * m * m).sum::<f64>() / means.len() as f64;
     let by_chance = |means: &[f64], met: usize| match square(means) {
         square if square > 0.0 && endless => f64::INFINITY,
+        square if square > 0.0 && met == 0 => square / chance.min(1.0 / camera.paths as f64),
         square => square * camera.paths as f64 / met.max(1) as f64,
     };
     // Light that is seen in mirrors and glass: often met, it is known what it costs to leave it to chance, else it is told

@@ -9,7 +9,8 @@ use crate::scene::light::Light;
 use crate::scene::{Geometry, Scene};
 use crate::transport::caustics::{Caustics, Source, Target};
 use crate::transport::guide::{Find, Guide};
-use std::f64::consts::PI;
+use glam::DVec3;
+use std::f64::consts::{PI, TAU};
 
 /// Share of the paths that go where the pilot found nothing: it may have missed something.
 const ANYWHERE: f64 = 0.2;
@@ -27,30 +28,50 @@ pub(super) fn is_small(scene: &Scene, i: usize, casters: &Casters) -> bool {
         | Light::AlongNormal { .. } => true,
         _ if casters.is_empty() => false,
         Light::Constant { .. } => false,
-        Light::Environment(map) => has_sun(map),
+        Light::Environment(map) => sun(map).is_some(),
         Light::Area { object, .. } => {
             let lamp = &scene.objects[*object as usize];
-            let b: Aabb = lamp.bounds();
-            let centre = 0.5 * b.min + 0.5 * b.max;
-            let radius = match &lamp.geometry {
-                // Of a flat or curved surface the half diagonal of its box is the radius at most.
-                Geometry::Shape(_) | Geometry::Mesh(_) => 0.5 * (b.max - b.min).length(),
+            let (centre, radius) = match &lamp.geometry {
+                Geometry::Shape(_) | Geometry::Mesh(_) => around(&lamp.bounds()),
                 Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => return false,
             };
             // How near to a mirror without end it is does not bound how it is seen there.
             !casters.endless.is_empty()
-                || casters.balls.iter().any(|ball| {
-                    let distance = (ball.center - centre).length();
-                    let sine = radius / distance;
-                    // 1 − cos of the half angle: its solid angle over 2π.
-                    sine < 1.0 && 1.0 - (1.0 - sine * sine).sqrt() < SMALL
-                })
+                || casters.balls.iter().any(|ball| share_of_hemisphere(radius, (ball.center - centre).length()) < SMALL)
         }
     }
 }
 
-/// Whether a fifth of an environment's light comes from less than a two-hundredth of the sphere.
-fn has_sun(map: &Environment) -> bool {
+/// About how often a path from the camera may meet light `i` by what casts: the share of the hemisphere that it takes at the nearest of
+/// that, as flat mirrors and panes show it. One where nothing bounds it, none of lamps without extent.
+pub(super) fn chance(scene: &Scene, i: usize, casters: &Casters) -> f64 {
+    match &scene.lights[i] {
+        light if !light.may_be_met() => 0.0,
+        Light::Area { object, .. } if casters.endless.is_empty() => {
+            let (centre, radius) = around(&scene.objects[*object as usize].bounds());
+            let distance = |b: &Aabb| (centre - centre.clamp(b.min, b.max)).length();
+            share_of_hemisphere(radius, casters.boxes.iter().map(distance).fold(f64::INFINITY, f64::min))
+        }
+        Light::Environment(map) => sun(map).unwrap_or(1.0),
+        _ => 1.0,
+    }
+}
+
+/// The middle of a box, and half its diagonal: of a flat or curved surface in it the radius at most.
+fn around(b: &Aabb) -> (DVec3, f64) {
+    (0.5 * b.min + 0.5 * b.max, 0.5 * (b.max - b.min).length())
+}
+
+/// 1 − cos of the half angle of a ball: its solid angle over 2π; one from within.
+fn share_of_hemisphere(radius: f64, distance: f64) -> f64 {
+    let sine = radius / distance;
+    // Without cancellation.
+    if sine < 1.0 { sine * sine / (1.0 + (1.0 - sine * sine).sqrt()) } else { 1.0 }
+}
+
+/// Where a fifth of an environment's light comes from less than a two-hundredth of the sphere: the solid angle, over 2π, from which all
+/// of it would come were it as bright.
+fn sun(map: &Environment) -> Option<f64> {
     const DRAWS: u32 = 4096;
     let sampler = |i| Sampler::new(STREAM, [0, 0], 0, i);
     let mut densities: Vec<f64> = (0..DRAWS)
@@ -58,11 +79,10 @@ fn has_sun(map: &Environment) -> bool {
         .collect();
     densities.sort_by(|a, b| b.total_cmp(a));
     let mut angle = 0.0;
-    let bright = densities.iter().take_while(|&&density| {
+    for density in densities.iter().take(DRAWS as usize / 5 + 1) {
         angle += 1.0 / (density * f64::from(DRAWS));
-        angle < 4.0 * PI * 0.005
-    });
-    bright.count() > DRAWS as usize / 5
+    }
+    (densities.len() > DRAWS as usize / 5 && angle < 4.0 * PI * 0.005).then_some(5.0 * angle / TAU)
 }
 
 impl Caustics {

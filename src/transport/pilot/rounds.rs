@@ -133,10 +133,11 @@ impl Trial<'_> {
                 for arrival in &landed.collected {
                     round.gathered[arrival.block] += arrival.pixels * arrival.y;
                 }
-                round.unfound |= landed.unfound && splatted + collected > 0.0;
-                round.unfound_gathered |= landed.unfound && collected > 0.0;
                 if splatted + collected > 0.0 {
                     let source = &caustics.sources[landed.source];
+                    let unfound = landed.unfound || self.rare[source.light as usize];
+                    round.unfound |= unfound;
+                    round.unfound_gathered |= unfound && collected > 0.0;
                     let density = source.probability * source.guide.density(landed.place);
                     arrived.push(Arrived { source: landed.source, place: landed.place, density, splatted, collected });
                 }
