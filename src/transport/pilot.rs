@@ -95,6 +95,9 @@ const FAINT: f64 = 0.1;
 /// Share of the rest's variance above which light that is met in mirrors and glass is worth merging.
 const WORTH: f64 = 0.3;
 
+/// What no path finds where none is traced from the lights.
+const MISSING: &str = "what mirrors and glass throw of lamps without extent is missing";
+
 /// Nothing traced from the lights, for this reason.
 #[must_use]
 pub fn left_off(reason: &str) -> (Option<Arc<Caustics>>, Vec<Effect>) {
@@ -130,10 +133,9 @@ pub fn decide(
         if !scenes().any(throws) {
             return left_off("nothing mirrors or refracts sharply");
         }
-        return left_off(
-            "a lamp goes on or off, or something begins or ceases to mirror or refract, while the shutter is open: \
-             what mirrors and glass throw of lamps without extent is missing",
-        );
+        let reason =
+            "a lamp goes on or off, or something begins or ceases to mirror or refract, while the shutter is open";
+        return left_off(&format!("{reason}: {MISSING}"));
     }
     let casters = Casters::of(scene, moments);
     let without_extent = settings.delta_caustics && scene.lights.iter().any(|light| !light.may_be_met());
@@ -150,23 +152,25 @@ pub fn decide(
     if filter.leaves_gaps() && wishes.light_tracing == Use::Auto && !unfound && !rare.contains(&true) {
         return left_off("the filter leaves gaps between pixels: little of what comes to the picture would be in any");
     }
+    // What cannot be traced has no path that finds it.
+    let lost = |reason: &str| if unfound { left_off(&format!("{reason}: {MISSING}")) } else { left_off(reason) };
     if let Some(curve) = scenes().find_map(casters::one_way) {
         let name = &curve.name;
-        return left_off(&format!("light leaves {name}, a curve, unseen: its way back from the lights is another"));
+        return lost(&format!("light leaves {name}, a curve, unseen, and its way back from the lights is another"));
     }
     if settings.scatter_samples == 0 || settings.max_depth.is_some_and(|depth| depth < 3) {
         return left_off("paths are too short for light of mirrors and glass");
     }
     if settings.count_crossings && scenes().any(|scene| scene.has_boundaries) {
         if settings.max_depth.is_some() {
-            return left_off("panes count for the length of paths");
+            return lost("panes count for the length of paths");
         }
         if settings.hide_emitters {
-            return left_off("lamps are hidden up to the first pane only");
+            return lost("lamps are hidden up to the first pane only");
         }
     }
     if plan.layers.layers.iter().any(|layer| matches!(layer.source, layers::Source::Light(..))) {
-        return left_off("layers of light are measured path by path from the camera");
+        return lost("layers of light are measured path by path from the camera");
     }
     let wanted = |light: &Light| settings.delta_caustics || light.may_be_met();
     // No path begins at a light of weight 0: what it throws is met by chance or not at all.
@@ -184,7 +188,7 @@ pub fn decide(
     let caustics = Caustics::untrained(scene, &casters, &in_part, traced, packets);
     if caustics.sources.is_empty() {
         let name = casters.endless.iter().chain(&in_part.endless).next().map_or("", String::as_str);
-        return left_off(&format!("light from infinity cannot be aimed at what has no end: {name}"));
+        return lost(&format!("light from infinity cannot be aimed at what has no end, {name}"));
     }
     let (casters, in_part) = (&casters, &in_part);
     let trial =

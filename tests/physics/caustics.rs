@@ -386,6 +386,41 @@ fn no_light_is_traced_through_fibres_of_glass() {
     }
 }
 
+/// A path from the camera meets no point, so that what the ball throws of its light is found from the lamp alone: where nothing is
+/// traced the plan says that it is missing. Of a lamp with an extent chance finds it.
+#[test]
+fn that_light_of_points_is_missing_where_none_is_traced_is_said() {
+    let layers = "layers: [{name: two, light: {path: {max_depth: 2}}}]\n";
+    let fibre = "- curves: {name: fibre, file: fibre.txt, basis: linear, material: glass}\n";
+    let pane =
+        "- disk: {center: [0, 1, -1], normal: [0, 1, 0], radius: 0.5, material: {thin_dielectric: {ior: 1.5}}}\n";
+    let endless = "- plane: {point: [0, -5, 0], normal: [0, 1, 0], material: {mirror: {}}}\n";
+    let sun = "lights: [directional: {direction: [0.3, -1, -0.2], irradiance: 1}]\n";
+    let clay = BALL.replace("glass", "floor");
+    let counted = "9, count_crossings: true";
+    let hidden = "null, count_crossings: true, hide_emitters: true";
+    for (what, caster, depth, more, light) in [
+        ("layers of light are measured", BALL, "null", layers, POINT),
+        ("light leaves fibre", BALL, "null", fibre, POINT),
+        ("panes count", BALL, counted, pane, POINT),
+        ("lamps are hidden", BALL, hidden, pane, POINT),
+        ("light from infinity cannot be aimed", clay.as_str(), "null", endless, sun),
+    ] {
+        let said = |light: &str| {
+            // Shapes come before what begins a field of its own.
+            let more = if more.starts_with('-') { format!("{more}{light}") } else { format!("{light}{more}") };
+            let text = Case { what, light: "", depth, ..AREA }.scene("path", "auto", "auto", 64) + &more;
+            let curve = ("fibre.txt", b"0.5 0 0.9 0.05\n1.5 0.5 0.9 0.05\n".as_slice());
+            techniques(&bench_with(&text.replace(BALL, caster), &[curve]))
+        };
+        let missing = "what mirrors and glass throw of lamps without extent is missing";
+        let (tracing, _, reason) = said(light);
+        assert!(!tracing && reason.starts_with(what) && reason.ends_with(missing), "{what}: {reason}");
+        let (_, _, reason) = said(LAMP);
+        assert!(!reason.contains(missing), "{what}: {reason}");
+    }
+}
+
 /// A camera behind a pane of solid glass sees the floor through it only: paths from the lights cannot be joined to it,
 /// and yet the caustic of a point light under the ball is there, as bright as without the pane but for what that reflects.
 #[test]
