@@ -144,7 +144,8 @@
 //!   marble: {volume: haze}          # a volume where it is cut by the surface
 //!   rust: {mesh_attribute: {name: vertex_color, scale: 1}}   # numbers of the .ply file of the mesh; ~ scale
 //!   floor: {checkerboard: {a: 0.1, b: {rgb: [0.9, 0.8, 0.7]}, scale: [12, 12]}}   # scale default [1, 1]
-//!                                   # a and b may be textures; uv as above
+//!                                   # a and b may be textures; uv as above. Where it shines, {rgb: …} is light with the spectrum of
+//!                                   # that reflectance, up to 1, without the D65 that pictures have and {rgb: …} as an emission
 //! volumes:
 //!   haze: {constant: {value: 0.5, transform: [{scale: 2}]}}
 //!                                   # transform as of shapes, from the unit cube; default none
