@@ -18,8 +18,8 @@ const ANYWHERE: f64 = 0.2;
 /// Half of the solid angle of a hemisphere in which light counts as coming from one place, over 2π.
 const SMALL: f64 = 0.3;
 
-/// Whether light `i` comes from so small a part of the sphere, seen from what casts, that chance finds it seldom.
-pub(super) fn is_small(scene: &Scene, i: usize, casters: &Casters) -> bool {
+/// Whether light `i`, of this [`chance`], comes from so small a part of the sphere, seen from what casts, that chance finds it seldom.
+pub(super) fn is_small(scene: &Scene, i: usize, chance: f64, casters: &Casters) -> bool {
     match &scene.lights[i] {
         Light::Point { .. }
         | Light::Spot { .. }
@@ -28,7 +28,7 @@ pub(super) fn is_small(scene: &Scene, i: usize, casters: &Casters) -> bool {
         | Light::AlongNormal { .. } => true,
         _ if casters.is_empty() => false,
         Light::Constant { .. } => false,
-        Light::Environment(map) => sun(map).is_some(),
+        Light::Environment(_) => chance < 1.0,
         Light::Area { object, .. } => {
             let lamp = &scene.objects[*object as usize];
             let (centre, radius) = match &lamp.geometry {
