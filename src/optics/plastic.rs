@@ -339,13 +339,17 @@ impl RoughPlastic<'_> {
         if wo.z <= 0.0 || wi.z <= 0.0 {
             return Evaluation::NONE;
         }
+        self.eval_by(wo, wi, self.transmission(wo.z))
+    }
+
+    /// [`RoughPlastic::eval`] of directions before the surface, where the coat lets `into` of light along `wo` through.
+    fn eval_by(&self, wo: DVec3, wi: DVec3, into: Lanes) -> Evaluation {
         let m = (wo + wi).normalize();
         let cos = wo.dot(m);
         let reflected = self.base.eta.lanes(|eta| fresnel::dielectric(Model::Exact, cos, eta).reflected);
         let Terms { flow, pdf } = self.facets.terms(wo, wi, m);
-        let into = self.transmission(wo.z);
         let p = self.coat_share(into);
-        let base = self.diffuse_part(wo, wi);
+        let base = self.diffuse(into, wi);
         Evaluation {
             f: base + self.base.tint * reflected * (0.25 * flow) as f32,
             pdf: Lanes::splat((p * pdf / (4.0 * cos) + (1.0 - p) * wi.z / PI) as f32),
@@ -357,20 +361,30 @@ impl RoughPlastic<'_> {
         if wo.z <= 0.0 || wi.z <= 0.0 {
             return Lanes::ZERO;
         }
-        self.base.albedo() * self.transmission(wo.z) * self.transmission(wi.z) * (1.0 / PI) as f32
+        self.diffuse(self.transmission(wo.z), wi)
+    }
+
+    /// The same, where the coat lets `into` of light along `wo` through.
+    fn diffuse(&self, into: Lanes, wi: DVec3) -> Lanes {
+        self.base.albedo() * into * self.transmission(wi.z) * (1.0 / PI) as f32
     }
 
     pub(super) fn sample(&self, wo: DVec3, u_lobe: f64, u: DVec2) -> Option<BsdfSample> {
         if wo.z <= 0.0 {
             return None;
         }
-        let wi = if u_lobe < self.coat_share(self.transmission(wo.z)) {
+        let into = self.transmission(wo.z);
+        let wi = if u_lobe < self.coat_share(into) {
             let m = self.facets.sample(wo, u);
             m * (2.0 * wo.dot(m)) - wo
         } else {
             warp::cosine_hemisphere(u)
         };
-        from_evaluation(wi, wi.z, self.eval(wo, wi), false, 1.0)
+        // A facet may send light into the surface.
+        if wi.z <= 0.0 {
+            return None;
+        }
+        from_evaluation(wi, wi.z, self.eval_by(wo, wi, into), false, 1.0)
     }
 }
 
