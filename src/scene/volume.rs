@@ -127,8 +127,24 @@ impl GridVolume {
         self.index(std::array::from_fn(|axis| self.wrapped(p[axis].floor(), axis)))
     }
 
+    #[inline]
     fn neighbours(&self, place: DVec3) -> Neighbours {
-        let p = place.to_array().map(|x| x - 0.5);
+        let place = place - DVec3::splat(0.5);
+        let first = place.floor();
+        let [nx, ny, nz] = self.size;
+        let last = DVec3::new((nx - 1) as f64, (ny - 1) as f64, (nz - 1) as f64);
+        // Between the outermost centres nothing wraps.
+        if first.cmpge(DVec3::ZERO).all() && first.cmplt(last).all() {
+            let share = (place - first).as_vec3().to_array();
+            let near = [first.x as i64 as usize, first.y as i64 as usize, first.z as i64 as usize];
+            return Neighbours { near, far: [near[0] + 1, near[1] + 1, near[2] + 1], share };
+        }
+        self.wrapped_neighbours(place)
+    }
+
+    #[inline(never)]
+    fn wrapped_neighbours(&self, place: DVec3) -> Neighbours {
+        let p = place.to_array();
         Neighbours {
             near: std::array::from_fn(|axis| self.wrapped(p[axis].floor(), axis)),
             far: std::array::from_fn(|axis| self.wrapped(p[axis].floor() + 1.0, axis)),
@@ -137,19 +153,23 @@ impl GridVolume {
     }
 
     /// Σ weight · f(voxel) over the eight neighbours.
+    #[inline(always)]
     fn blend<T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>>(
         &self,
         n: &Neighbours,
         f: impl Fn(usize) -> T,
     ) -> T {
         let mix = |a: T, b: T, share: f32| a * (1.0 - share) + b * share;
-        let along_x =
-            |y: usize, z: usize| mix(f(self.index([n.near[0], y, z])), f(self.index([n.far[0], y, z])), n.share[0]);
+        let along_x = |y: usize, z: usize| {
+            let row = self.index([0, y, z]);
+            mix(f(row + n.near[0]), f(row + n.far[0]), n.share[0])
+        };
         let along_y = |z: usize| mix(along_x(n.near[1], z), along_x(n.far[1], z), n.share[1]);
         mix(along_y(n.near[2]), along_y(n.far[2]), n.share[2])
     }
 
     /// f(voxel) at `point`, between voxels as they are mixed.
+    #[inline(always)]
     fn value<T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f32, Output = T>>(
         &self,
         point: DVec3,
@@ -165,16 +185,16 @@ impl GridVolume {
     /// One number at `point`: the value, or the luminance of three.
     #[must_use]
     pub fn scalar(&self, point: DVec3) -> f64 {
-        f64::from(self.value(point, |i| match &self.values {
-            Voxels::Grey(values) => values[i],
-            Voxels::Raw(values) => {
+        f64::from(match &self.values {
+            Voxels::Grey(values) => self.value(point, |i| values[i]),
+            Voxels::Raw(values) => self.value(point, |i| {
                 let [r, g, b] = values[i];
                 let weight = REC709_OF_MITSUBA.map(|weight| weight as f32);
                 weight[0] * r + weight[1] * g + weight[2] * b
-            }
+            }),
             // Never asked for: compiling refuses a coloured grid where a number is wanted.
-            Voxels::Coloured(values) => values[i][3],
-        }))
+            Voxels::Coloured(values) => self.value(point, |i| values[i][3]),
+        })
     }
 
     /// The three numbers at `point`, equal for a grid of one.

@@ -133,35 +133,36 @@ impl Bounds {
 
     /// The stretches of `ray` up to `t_max` inside the volume, each with its bound.
     #[must_use]
+    #[inline]
     pub fn march(&self, ray: &Ray, t_max: f64) -> March<'_> {
         let (enter, leave) = self.span(ray, t_max);
         let origin = self.place_from_world.transform_point3(ray.origin);
         let direction = self.place_from_world.transform_vector3(ray.direction);
         let (inside, outside) = slab(origin, direction, [DVec3::ZERO, DVec3::from(self.size)], [enter, leave]);
-        let meets = enter < leave;
-        if !meets {
-            return March {
-                bounds: self,
-                origin,
-                direction,
-                at: 0.0,
-                inside: 0.0,
-                outside: 0.0,
-                leave: 0.0,
-                block: None,
-            };
-        }
-        let through_grid = inside < outside;
-        March {
+        let (origin, direction) = (origin.to_array(), direction.to_array());
+        let mut march = March {
             bounds: self,
             origin,
             direction,
-            at: enter,
-            inside: if through_grid { inside } else { leave },
-            outside: if through_grid { outside } else { leave },
-            leave,
-            block: None,
+            at: 0.0,
+            inside: 0.0,
+            outside: 0.0,
+            leave: 0.0,
+            block: [0; 3],
+            faces: [f64::INFINITY; 3],
+        };
+        if enter < leave {
+            (march.at, march.inside, march.outside, march.leave) = (enter, leave, leave, leave);
+            if inside < outside {
+                (march.inside, march.outside) = (inside, outside);
+                for axis in 0..3 {
+                    let place = direction[axis].mul_add(inside, origin[axis]) / march.edge(axis);
+                    march.block[axis] = (place.max(0.0) as usize).min(self.blocks[axis] - 1);
+                    march.faces[axis] = march.face(axis);
+                }
+            }
         }
+        march
     }
 }
 
@@ -201,13 +202,16 @@ pub struct Stretch {
 #[derive(Debug)]
 pub struct March<'a> {
     bounds: &'a Bounds,
-    origin: DVec3,
-    direction: DVec3,
+    origin: [f64; 3],
+    direction: [f64; 3],
     at: f64,
     inside: f64,
     outside: f64,
     leave: f64,
-    block: Option<[usize; 3]>,
+    /// The block that the ray is in, once it is inside of the grid.
+    block: [usize; 3],
+    /// Where the ray meets the face of the block that lies ahead along each axis.
+    faces: [f64; 3],
 }
 
 impl March<'_> {
@@ -216,11 +220,20 @@ impl March<'_> {
         // The last block may hang over: all but it have the same edge.
         if self.bounds.blocks[axis] == 1 { self.bounds.size[axis] } else { BLOCK as f64 }
     }
+
+    /// Where the ray meets the face of the block ahead along `axis`; nowhere where it runs beside it.
+    #[inline]
+    fn face(&self, axis: usize) -> f64 {
+        let (o, d) = (self.origin[axis], self.direction[axis]);
+        let face = (self.block[axis] + usize::from(d > 0.0)) as f64 * self.edge(axis);
+        if d == 0.0 { f64::INFINITY } else { (face - o) / d }
+    }
 }
 
 impl Iterator for March<'_> {
     type Item = Stretch;
 
+    #[inline]
     fn next(&mut self) -> Option<Stretch> {
         let from = self.at;
         let goes_on = from < self.leave;
@@ -236,39 +249,25 @@ impl Iterator for March<'_> {
             self.at = self.leave;
             return Some(Stretch { from, to: self.leave, bound: global });
         }
-        let (o, d) = (self.origin.to_array(), self.direction.to_array());
-        let block = self.block.unwrap_or_else(|| {
-            std::array::from_fn(|axis| {
-                let place = d[axis].mul_add(from, o[axis]) / self.edge(axis);
-                (place.max(0.0) as usize).min(self.bounds.blocks[axis] - 1)
-            })
-        });
         // The nearest of the faces ahead.
         let (mut to, mut across) = (self.outside, None);
         for axis in 0..3 {
-            if d[axis] == 0.0 {
-                continue;
-            }
-            let face = (block[axis] + usize::from(d[axis] > 0.0)) as f64 * self.edge(axis);
-            let t = (face - o[axis]) / d[axis];
-            if t < to {
-                (to, across) = (t, Some(axis));
+            if self.faces[axis] < to {
+                (to, across) = (self.faces[axis], Some(axis));
             }
         }
-        let i = (block[2] * self.bounds.blocks[1] + block[1]) * self.bounds.blocks[0] + block[0];
-        let bound = f64::from(self.bounds.values[i]);
+        let (block, blocks) = (self.block, self.bounds.blocks);
+        let bound = f64::from(self.bounds.values[(block[2] * blocks[1] + block[1]) * blocks[0] + block[0]]);
         // Rounding may put a face a little behind: the stretch is then empty, not negative.
         let to = to.max(from);
         self.at = to;
-        self.block = None;
         match across {
             None => self.at = self.outside,
             Some(axis) => {
-                let next = if d[axis] > 0.0 { block[axis] + 1 } else { block[axis].wrapping_sub(1) };
-                if next < self.bounds.blocks[axis] {
-                    let mut block = block;
-                    block[axis] = next;
-                    self.block = Some(block);
+                let next = if self.direction[axis] > 0.0 { block[axis] + 1 } else { block[axis].wrapping_sub(1) };
+                if next < blocks[axis] {
+                    self.block[axis] = next;
+                    self.faces[axis] = self.face(axis);
                 } else {
                     self.at = self.outside.max(to);
                 }
