@@ -188,18 +188,25 @@ pub(super) fn words(e: &std::io::Error) -> String {
     }
 }
 
+/// Pictures of so many pixels at the most have their colours numbered in a table of their own size.
+const SMALL: usize = 1 << 18;
+
 /// The colours of pixels (red, green, blue in turn).
 pub(super) fn count(pixels: &[u8]) -> Counted {
+    let pixels = pixels.as_chunks().0;
+    if pixels.len() <= SMALL {
+        return count_few(pixels);
+    }
     // For each of the 2²⁴ colours its number among those met so far, from 1; only the pages that hold a colour
     // of the picture become memory.
     let mut number = vec![0u32; 1 << 24];
     let mut colours: Vec<[u8; 3]> = Vec::new();
     let numbers = pixels
-        .chunks_exact(3)
-        .map(|p| {
-            let number = &mut number[usize::from(p[0]) << 16 | usize::from(p[1]) << 8 | usize::from(p[2])];
+        .iter()
+        .map(|&[r, g, b]| {
+            let number = &mut number[usize::from(r) << 16 | usize::from(g) << 8 | usize::from(b)];
             if *number == 0 {
-                colours.push([p[0], p[1], p[2]]);
+                colours.push([r, g, b]);
                 *number = colours.len() as u32;
             }
             *number - 1
@@ -208,11 +215,46 @@ pub(super) fn count(pixels: &[u8]) -> Counted {
     Counted { colours, numbers }
 }
 
+/// The same with at least twice as many places as pixels, since memory that is touched for the first time is dearer than to look for
+/// a place.
+fn count_few(pixels: &[[u8; 3]]) -> Counted {
+    let bits = (2 * pixels.len()).next_power_of_two().ilog2().max(1);
+    let mut places = vec![0u32; 1 << bits];
+    let mut colours: Vec<[u8; 3]> = Vec::new();
+    let number = |&[r, g, b]: &[u8; 3]| {
+        // The golden ratio of 2³² keeps neighbours apart (Knuth, The Art of Computer Programming 3, section 6.4).
+        let hash = u32::from_be_bytes([0, r, g, b]).wrapping_mul(0x9e37_79b1);
+        let mut at = (hash >> (32 - bits)) as usize;
+        while places[at] != 0 && colours[places[at] as usize - 1] != [r, g, b] {
+            at = (at + 1) & (places.len() - 1);
+        }
+        if places[at] == 0 {
+            colours.push([r, g, b]);
+            places[at] = colours.len() as u32;
+        }
+        places[at] - 1
+    };
+    let numbers = pixels.iter().map(number).collect();
+    Counted { colours, numbers }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::{exr_colours, picture};
     use super::*;
     use crate::film::Window;
+
+    /// All 2¹⁸ colours of six bits a channel: numbers go as they are met, in a small picture and in a large one that has them twice.
+    #[test]
+    fn colours_are_numbered_as_they_are_met() {
+        let pixel = |i: u32| [i >> 10 & 0xfc, i >> 4 & 0xfc, i << 2 & 0xfc].map(|x| x as u8);
+        let once: Vec<[u8; 3]> = (0..1 << 18).map(|i| pixel(i * 77 % (1 << 18))).collect();
+        for times in [1, 2] {
+            let found = count(once.repeat(times).as_flattened());
+            assert!(found.colours == once);
+            assert!(found.numbers.iter().copied().eq((0..times).flat_map(|_| 0..1 << 18)));
+        }
+    }
 
     /// Parts of one pixel each: the value of red in what is taken for the picture, and whether there is one.
     #[test]
