@@ -20,6 +20,7 @@ mod density;
 use crate::spectrum::observer::xyz_of_lane;
 use crate::spectrum::{BAND_NM, ColourSpace, LANES, Lanes, Spectrum};
 use density::{Density, Interval};
+use rayon::prelude::*;
 
 /// The eight wavelengths of a path, in nm, and one over the density each was drawn with, in nm.
 ///
@@ -181,22 +182,28 @@ impl WavelengthDistribution {
             ("em", Density::mixture([(0.1, &visible), (0.9, &emission)])),
         ]
         .map(|(name, density)| (name, density.distribution_cut(String::new(), points, &jumps)));
-        let noise = candidates.each_ref().map(|(_, distribution)| {
+        let noise_of = |(_, distribution): &(&str, WavelengthDistribution)| {
             let lattice = Lattice::of(distribution);
-            let factors: Vec<Vec<Lanes>> = chosen.iter().map(|r| lattice.values(r)).collect();
+            let lights: Vec<Vec<Lanes>> = shares.0.iter().map(|(_, spectrum, _)| lattice.values(spectrum)).collect();
+            // Of each reflectance, under every light.
+            let of_factor = |reflectance: &&Spectrum| -> Vec<Option<f64>> {
+                let factor = lattice.values(reflectance);
+                lights.iter().map(|light| lattice.noise(light, Some(&factor))).collect()
+            };
+            let factors: Vec<Vec<Option<f64>>> = chosen.par_iter().map(of_factor).collect();
             let (mut sum, mut weights) = (0.0, 0.0);
-            for (weight, spectrum, _) in &shares.0 {
-                let light = lattice.values(spectrum);
+            for (i, (weight, ..)) in shares.0.iter().enumerate() {
                 // Light that the lattice does not see, as it steps over a narrow line, is seldom met by paths.
-                sum += weight * lattice.noise(&light, None).unwrap_or(f64::INFINITY);
+                sum += weight * lattice.noise(&lights[i], None).unwrap_or(f64::INFINITY);
                 weights += weight;
-                for factor in &factors {
-                    sum += weight * lattice.noise(&light, Some(factor)).unwrap_or(0.0);
+                for of_factor in &factors {
+                    sum += weight * of_factor[i].unwrap_or(0.0);
                     weights += weight;
                 }
             }
             sum / weights
-        });
+        };
+        let noise: Vec<f64> = candidates.par_iter().map(noise_of).collect();
         let best = (1..3).fold(0, |best, i| if noise[i] < noise[best] { i } else { best });
         let what =
             ["by the eye", "half by the eye, half by the emitters", "a tenth by the eye, the rest by the emitters"];
