@@ -9,6 +9,7 @@ use super::inverse_sigmoid;
 use crate::spectrum::colour::ColourSpace;
 use crate::spectrum::{illuminant, observer};
 use std::sync::LazyLock;
+use wide::f64x4;
 
 /// A wavelength, the same as t in [−1, 1], and how much a reflectance of 1 there adds to red,
 /// green, blue.
@@ -42,21 +43,25 @@ pub(super) static NODES: LazyLock<Vec<Node>> = LazyLock::new(|| {
 fn colour_and_jacobian(c: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
     let mut rgb = [0.0; 3];
     let mut jacobian = [[0.0; 3]; 3];
-    for node in NODES.iter() {
-        let t = node.t;
-        let x = (c[0] * t + c[1]) * t + c[2];
-        let square = 1.0 + x * x;
+    let [c0, c1, c2] = c.map(f64x4::splat);
+    for nodes in NODES.chunks(4) {
+        // Roots and quotients of four side by side; they are added in turn.
+        let t = f64x4::new(std::array::from_fn(|i| nodes.get(i).map_or(0.0, |node| node.t)));
+        let x = (c0 * t + c1) * t + c2;
+        let square = f64x4::ONE + x * x;
         let r = square.sqrt();
-        let small = 0.5 / (r * (r + x.abs()));
-        let s = if x < 0.0 { small } else { 1.0 - small };
-        let slope = 0.5 / (square * r);
-        for k in 0..3 {
-            let w = node.rgb[k];
-            rgb[k] += w * s;
-            let d = w * slope;
-            jacobian[k][0] += d * t * t;
-            jacobian[k][1] += d * t;
-            jacobian[k][2] += d;
+        let small = f64x4::HALF / (r * (r + x.abs()));
+        let s = x.simd_lt(f64x4::ZERO).select(small, f64x4::ONE - small).to_array();
+        let slope = (f64x4::HALF / (square * r)).to_array();
+        for ((node, s), slope) in nodes.iter().zip(s).zip(slope) {
+            for k in 0..3 {
+                let w = node.rgb[k];
+                rgb[k] += w * s;
+                let d = w * slope;
+                jacobian[k][0] += d * node.t * node.t;
+                jacobian[k][1] += d * node.t;
+                jacobian[k][2] += d;
+            }
         }
     }
     (rgb, jacobian)
