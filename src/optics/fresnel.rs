@@ -78,6 +78,32 @@ pub fn dielectric(model: Model, cos: f64, eta: f64) -> Split {
     }
 }
 
+/// [`dielectric`] by the exact equations at four cosines, side by side and to the same bits: the reflected and the transmitted
+/// share and the cosine of the refracted direction.
+#[must_use]
+pub fn dielectric_of_four(cos: f64x4, eta: f64) -> [f64x4; 3] {
+    let (less, more) = (eta - 1.0, eta + 1.0);
+    let q = less * more;
+    let (less_missing, more_missing) = ((eta - (less + 1.0)), (eta - (more - 1.0)));
+    let missing = less.mul_add(more, -q) + less.mul_add(more_missing, less_missing * more);
+    if q == 0.0 {
+        return [f64x4::ZERO, f64x4::ONE, cos];
+    }
+    let (all, square, q) = (f64x4::splat(eta), f64x4::splat(eta * eta), f64x4::splat(q));
+    let g2 = cos.mul_add(cos, q) + f64x4::splat(missing);
+    let g = g2.sqrt();
+    let cos_transmitted = g / all;
+    let (s, p) = (cos + g, square.mul_add(cos, g));
+    let total = (g2.simd_le(f64x4::ZERO) & q.simd_lt(f64x4::ZERO)) | s.simd_eq(f64x4::ZERO) | p.simd_eq(f64x4::ZERO);
+    let rs = q / (s * s);
+    let rp = q * (square + f64x4::ONE).mul_add(cos * cos, -f64x4::ONE) / (p * p);
+    let (a, b) = (all.mul_add(cos, cos_transmitted), all.mul_add(cos_transmitted, cos));
+    let reflected = f64x4::HALF * rs.mul_add(rs, rp * rp);
+    let transmitted = f64x4::splat(2.0 * eta) * cos * cos_transmitted * (f64x4::ONE / (a * a) + f64x4::ONE / (b * b));
+    let or = |at_total: f64x4, else_: f64x4| total.select(at_total, else_);
+    [or(f64x4::ONE, reflected), or(f64x4::ZERO, transmitted), or(f64x4::ZERO, cos_transmitted)]
+}
+
 /// Mean of the exact reflectance over the cosine-weighted hemisphere, ∫₀¹ 2 c R(c) dc.
 ///
 /// Midpoint rule on 4096 intervals in c². R is smooth but for a square root at total reflection
@@ -148,6 +174,26 @@ mod tests {
 
     fn relative(a: f64, b: f64) -> f64 {
         ((a - b) / b).abs()
+    }
+
+    /// From grazing to straight, through the critical angle of indices below one, and without an interface.
+    #[test]
+    fn four_cosines_give_the_bits_of_one() {
+        for eta in [0.4_f64, 0.67, 0.999, 1.0, 1.0001, 1.5, 2.42] {
+            let critical = (1.0 - eta * eta).max(0.0).sqrt();
+            for cosines in [[0.0, 1e-9, 1e-3, critical], [critical.next_up(), 0.3, 0.5, 0.6], [0.7, 0.8, 0.95, 1.0]] {
+                let [reflected, transmitted, cos_transmitted] =
+                    dielectric_of_four(f64x4::new(cosines), eta).map(f64x4::to_array);
+                for (i, cos) in cosines.into_iter().enumerate() {
+                    let found = Split {
+                        reflected: reflected[i],
+                        transmitted: transmitted[i],
+                        cos_transmitted: cos_transmitted[i],
+                    };
+                    assert_eq!(found, dielectric(Model::Exact, cos, eta), "{eta} {cos}");
+                }
+            }
+        }
     }
 
     /// Closed forms: R(0°) = ((η−1)/(η+1))²; the grazing T and the R of a nearly matched index were

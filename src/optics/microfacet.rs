@@ -11,6 +11,7 @@ use crate::math::elementary::{exp_down, log1p};
 use crate::math::trig::sin_cos_turn;
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
+use wide::f64x4;
 
 /// The family of the distribution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -31,6 +32,38 @@ pub struct Microfacets {
     pub alpha: f64,
     /// Width along local y over that along x; one for an isotropic surface.
     pub ratio: f64,
+}
+
+/// Four directions, side by side.
+#[derive(Clone, Copy, Debug)]
+pub struct Four {
+    /// Along x.
+    pub x: f64x4,
+    /// Along y.
+    pub y: f64x4,
+    /// Along z.
+    pub z: f64x4,
+}
+
+impl Four {
+    /// These.
+    #[must_use]
+    pub fn of(all: [DVec3; 4]) -> Four {
+        let along = |part: fn(DVec3) -> f64| f64x4::new(all.map(part));
+        Four { x: along(|v| v.x), y: along(|v| v.y), z: along(|v| v.z) }
+    }
+
+    /// The products of each with its like.
+    #[must_use]
+    pub fn dot(self, other: Four) -> f64x4 {
+        self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    /// Each part by itself.
+    #[must_use]
+    pub fn with(self, other: Four, f: impl Fn(f64x4, f64x4) -> f64x4) -> Four {
+        Four { x: f(self.x, other.x), y: f(self.y, other.y), z: f(self.z, other.z) }
+    }
 }
 
 /// The facets between two directions.
@@ -96,6 +129,24 @@ impl Microfacets {
                 if a >= 1.6 { 1.0 } else { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) }
             }
         }
+    }
+
+    /// [`Microfacets::masking`] of four directions and facets, side by side and to the same bits.
+    #[must_use]
+    pub fn masking_of_four(&self, v: Four, m: Four) -> f64x4 {
+        let y = v.y * f64x4::splat(self.ratio);
+        let tan2_alpha = (v.x * v.x + y * y) / (v.z * v.z) * f64x4::splat(self.alpha * self.alpha);
+        let (one, two) = (f64x4::ONE, f64x4::splat(2.0));
+        let seen = match self.distribution {
+            Distribution::Ggx => two / (one + (one + tan2_alpha).sqrt()),
+            Distribution::Beckmann => {
+                let a = one / tan2_alpha.sqrt();
+                let [c, d, e, f] = [3.535, 2.181, 2.276, 2.577].map(f64x4::splat);
+                a.simd_ge(f64x4::splat(1.6)).select(one, (c * a + d * a * a) / (one + e * a + f * a * a))
+            }
+        };
+        let seen = tan2_alpha.simd_eq(f64x4::ZERO).select(one, seen);
+        (v.dot(m) * v.z).simd_le(f64x4::ZERO).select(f64x4::ZERO, seen)
     }
 
     /// G₁(v) / |v.z|, which is finite down to grazing; `v` sees the facet from the front.

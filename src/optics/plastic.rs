@@ -10,15 +10,16 @@
 //! the lanes, so that no wavelength leads.
 
 use super::bsdf::{BsdfSample, Evaluation, coat_probability, from_evaluation, mirror};
-use super::dielectric::{RelativeIndex, refract};
+use super::dielectric::RelativeIndex;
 use super::fresnel::{self, Model};
 use super::mean;
-use super::microfacet::{Distribution, Microfacets, Terms};
+use super::microfacet::{Distribution, Four, Microfacets, Terms};
 use crate::math::warp;
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
+use wide::f64x4;
 
 /// The base under a coat, shared by both kinds.
 #[derive(Clone, Copy, Debug)]
@@ -130,15 +131,18 @@ impl CoatTable {
         let cosine = |i: u32| f64::from(i) / f64::from(COAT_ENTRIES - 1);
         let seen = Facets::new(facets);
         let critical = (1.0 - (eta * eta).recip()).max(0.0).sqrt();
-        let transmitted = |wo: DVec3, m: DVec3| {
-            let split = fresnel::dielectric(Model::Exact, wo.dot(m), eta);
-            let wt = refract(wo, m, eta, split.cos_transmitted);
-            if wt.z < 0.0 { split.transmitted * facets.masking(wt, m) } else { 0.0 }
+        let transmitted = |wo: Four, m: Four| {
+            let cos = wo.dot(m);
+            let [_, through, cos_transmitted] = fresnel::dielectric_of_four(cos, eta);
+            // As `refract` has it.
+            let wt = m.with(wo, |m, wo| (m * cos - wo) / f64x4::splat(eta) - m * cos_transmitted);
+            wt.z.simd_lt(f64x4::ZERO).select(through * facets.masking_of_four(wt, m), f64x4::ZERO)
         };
-        let reflected = |wo: DVec3, m: DVec3| {
-            let wi = m * (2.0 * wo.dot(m)) - wo;
-            let f = fresnel::dielectric(Model::Exact, wo.dot(m), 1.0 / eta).reflected;
-            if wi.z > 0.0 { f * facets.masking(wi, m) } else { 0.0 }
+        let reflected = |wo: Four, m: Four| {
+            let cos = wo.dot(m);
+            let wi = m.with(wo, |m, wo| m * (f64x4::splat(2.0) * cos) - wo);
+            let [back, ..] = fresnel::dielectric_of_four(cos, 1.0 / eta);
+            wi.z.simd_gt(f64x4::ZERO).select(back * facets.masking_of_four(wi, m), f64x4::ZERO)
         };
         let entries: Vec<(f32, f64)> = (0..COAT_ENTRIES)
             .into_par_iter()
@@ -259,7 +263,7 @@ const FACETS_BEFORE: u32 = 1597;
 struct Facets<'a> {
     facets: &'a Microfacets,
     /// Drawn once, where they do not depend on who looks.
-    drawn: Vec<DVec3>,
+    drawn: Vec<Four>,
 }
 
 /// A lattice that gives facets with y > 0, moved for each entry of a table, so that what it misses is another thing for each.
@@ -275,39 +279,42 @@ impl Facets<'_> {
     fn new(facets: &Microfacets) -> Facets<'_> {
         let drawn = match facets.distribution {
             Distribution::Ggx => Vec::new(),
-            Distribution::Beckmann => lattice(0).map(|u| facets.sample(DVec3::Z, u)).collect(),
+            Distribution::Beckmann => in_fours(lattice(0).map(|u| facets.sample(DVec3::Z, u))).collect(),
         };
         Facets { facets, drawn }
     }
 
     /// The means of `f(wo, m)` over the facets m that a direction of cosine `cos` sees.
-    fn mean<const N: usize>(&self, cos: f64, entry: u32, f: impl Fn(DVec3, DVec3) -> [f64; N]) -> [f64; N] {
+    fn mean<const N: usize>(&self, cos: f64, entry: u32, f: impl Fn(Four, Four) -> [f64x4; N]) -> [f64; N] {
         let cos = cos.max(1e-3); // the limit at grazing; the table is interpolated from there
-        let wo = DVec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+        let one = DVec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+        let wo = Four::of([one; 4]);
         let mut sum = [0.0; N];
-        let mut add = |m: DVec3, weight: f64| {
+        let mut add = |m: Four, weight: f64x4| {
+            let seen = wo.dot(m).simd_gt(f64x4::ZERO);
             for (sum, x) in sum.iter_mut().zip(f(wo, m)) {
-                *sum += x * weight;
+                // In turn: the same bits as one by one.
+                seen.select(x * weight, f64x4::ZERO).to_array().into_iter().for_each(|x| *sum += x);
             }
         };
         match self.facets.distribution {
             // Those that are drawn are those that are seen.
-            Distribution::Ggx => lattice(entry).for_each(|u| {
-                let m = self.facets.sample(wo, u);
-                if wo.dot(m) > 0.0 {
-                    add(m, 1.0);
-                }
-            }),
+            Distribution::Ggx => {
+                in_fours(lattice(entry).map(|u| self.facets.sample(one, u))).for_each(|m| add(m, f64x4::ONE));
+            }
+            // Heitz 2018, eq. 3, the density of visible facets, over D(m) cos θ.
             Distribution::Beckmann => self.drawn.iter().for_each(|&m| {
-                let seen = wo.dot(m);
-                if seen > 0.0 {
-                    // Heitz 2018, eq. 3, the density of visible facets, over D(m) cos θ.
-                    add(m, self.facets.masking(wo, m) * seen / (wo.z * m.z));
-                }
+                add(m, self.facets.masking_of_four(wo, m) * wo.dot(m) / (wo.z * m.z));
             }),
         }
         sum.map(|x| x / f64::from(FACETS))
     }
+}
+
+/// Four by four.
+fn in_fours(mut all: impl Iterator<Item = DVec3>) -> impl Iterator<Item = Four> {
+    const { assert!(FACETS.is_multiple_of(4)) };
+    std::iter::from_fn(move || Some(Four::of([all.next()?, all.next()?, all.next()?, all.next()?])))
 }
 
 /// A diffuse base under a rough coat.
