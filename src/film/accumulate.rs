@@ -180,17 +180,20 @@ impl Sum {
     #[must_use]
     #[inline]
     pub fn value(self) -> f64 {
+        // Below this what is above the lowest 32 bits has 53 bits at the most.
+        const FITS: i128 = 1 << 84;
+        const LOW: f64 = (1u64 << 32) as f64;
+        if (-FITS..FITS).contains(&self.0) {
+            // Two parts that are exact, added and rounded at once.
+            let (high, low) = ((self.0 >> 32) as i64, self.0 as u32);
+            return (high as f64).mul_add(LOW, f64::from(low)) * QUANTUM;
+        }
+        // The first 64 bits, the last of which also says whether anything follows: rounded once to 53.
         let size = self.0.unsigned_abs();
-        let value = match (size >> 64) as u64 {
-            0 => size as u64 as f64,
-            high => {
-                // The first 64 bits, the last of which also says whether anything follows: rounded once to 53.
-                let shift = high.leading_zeros();
-                let aligned = size << shift;
-                let first = (aligned >> 64) as u64 | u64::from(aligned as u64 != 0);
-                first as f64 * f64::from_bits(u64::from(1023 + 64 - shift) << 52)
-            }
-        };
+        let shift = size.leading_zeros();
+        let aligned = size << shift;
+        let first = (aligned >> 64) as u64 | u64::from(aligned as u64 != 0);
+        let value = first as f64 * f64::from_bits(u64::from(1023 + 64 - shift) << 52);
         if self.0 < 0 { -value * QUANTUM } else { value * QUANTUM }
     }
 }
@@ -499,6 +502,16 @@ mod tests {
     use super::*;
     use crate::math::sampler::mix64;
     use proptest::prelude::*;
+
+    /// Around what has 53 bits above the lowest 32, halfway between two f64, and at the ends of the range: as the language rounds.
+    #[test]
+    fn a_sum_is_rounded_once() {
+        let ends =
+            [0, 1 << 31, (1 << 53) + 1, (1 << 84) - (1 << 30), 1 << 84, (1 << 84) + (1 << 31), 3 << 100, i128::MAX - 1];
+        for x in ends.into_iter().flat_map(|x: i128| [x - 1, x, x + 1]).flat_map(|x| [x, -x]) {
+            assert_eq!(Sum(x).value(), x as f64 * QUANTUM, "{x}");
+        }
+    }
 
     /// 2⁵⁵ pixels of 256 bytes are more than a process can address. Nothing is written then, as 4 would say.
     #[test]

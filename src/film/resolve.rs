@@ -85,6 +85,7 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
         assert_eq!(splats.film.window(), film.window(), "splats cover the window of the film");
         assert_eq!(splats.film.exponent(), film.exponent(), "splats count light as the film does");
     }
+    let unit = 2f64.powi(film.exponent());
     let resolved: Vec<Resolved> = (0..pixels)
         .into_par_iter()
         .with_min_len(1024)
@@ -102,7 +103,6 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
                     pixel.variance[c] += light.variance[c];
                 }
             }
-            let unit = 2f64.powi(film.exponent());
             Resolved {
                 rgb: pixel.rgb.map(|x| (x * unit) as f32),
                 standard_error: pixel.variance.map(|v| (v.sqrt() * unit) as f32),
@@ -304,6 +304,7 @@ impl Sums<'_> {
 }
 
 /// The sum of `cells`, which is exact and rounded once, over `divisor`.
+#[inline]
 fn colours(cells: &[Cell], divisor: u64, rgb_from_xyz: &[[f64; 3]; 3]) -> [f64; 3] {
     let mut sums = [Sum::default(); 3];
     for cell in cells {

@@ -1,8 +1,9 @@
 //! What pixels add to the estimate; symbols as on the page of [`super`].
 
 use super::super::accumulate::REPLICATES;
-use super::values::Value;
+use super::values::Four;
 use super::{ONE_REPLICATE, PAIRINGS};
+use wide::f64x4;
 
 /// What some pixels add to the estimate.
 #[derive(Clone, Copy, Default)]
@@ -38,60 +39,60 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// Adds a pixel, given f of each of its values.
-    pub(super) fn add(&mut self, values: &[Value], floors: &[f64]) {
+    /// Adds a pixel, given f of each of its values, of which `counted` are told of.
+    pub(super) fn add(&mut self, values: &[Four], floors: &[f64x4], counted: usize) {
+        let all = |holds: &dyn Fn(&Four) -> bool| values.iter().all(holds);
         self.pixels += 1;
-        self.noisy += u64::from(values.iter().any(|v| v.replicates.iter().any(|x| *x != v.replicates[0])));
-        self.black += u64::from(values.iter().all(|v| v.mean == 0.0));
-        let channels = floors.iter().filter(|f| **f > 0.0).count() as f64;
-        let (mut error, mut plain, mut further, mut crossed) = (0.0, 0.0, 0.0, 0.0);
-        let mut shares = [0.0; REPLICATES];
-        let mut pairs = [0.0; 3];
+        self.noisy += u64::from(!all(&|v| v.replicates.iter().all(|x| x.simd_eq(v.replicates[0]).all())));
+        self.black += u64::from(all(&|v| v.means.simd_eq(f64x4::ZERO).all()));
+        let share = f64x4::splat(1.0 / counted.max(1) as f64);
+        let (mut plain, mut further, mut crossed) = (f64x4::ZERO, f64x4::ZERO, f64x4::ZERO);
+        let mut shares = f64x4::ZERO;
+        let mut pairs = [f64x4::ZERO; PAIRINGS.len()];
         let (mut own, mut splatted) = (Gram::default(), Gram::default());
-        for (value, &floor) in values.iter().zip(floors) {
-            let x = value.replicates;
-            let mean = x.iter().sum::<f64>() / REPLICATES as f64;
-            let deviations = x.map(|x| x - mean);
-            let squares: f64 = deviations.iter().map(|d| d * d).sum();
-            if squares == 0.0 {
-                continue;
-            }
-            let value_squared = value.mean * value.mean;
-            let g = 1.0 / (value_squared + floor);
+        for (four, &floor) in values.iter().zip(floors) {
+            let x = four.replicates;
+            let deviations = deviations(x);
+            let squares = deviations.map(|d| d * d).into_iter().sum::<f64x4>();
+            // Those that do not differ add nothing, though f and they may be zero.
+            let still = squares.simd_eq(f64x4::ZERO);
+            let differing = |x: f64x4| still.select(f64x4::ZERO, x);
+            let (two, half) = (f64x4::splat(2.0), f64x4::HALF);
+            let value_squared = four.means * four.means;
+            let g = differing(f64x4::ONE / (value_squared + floor));
             // Derivatives of g.
-            let first = -2.0 * value.mean * g * g;
-            let second = (6.0 * value_squared - 2.0 * floor) * g * g * g;
-            let variance = squares / 12.0;
-            let third = deviations.iter().map(|d| d.powi(3)).sum::<f64>() / 24.0;
-            let mut fourth = 0.0;
+            let first = -two * four.means * g * g;
+            let second = (f64x4::splat(6.0) * value_squared - two * floor) * g * g * g;
+            let third = deviations.map(|d| d * d * d).into_iter().sum::<f64x4>() * f64x4::splat(1.0 / 24.0);
+            let g = g * share;
+            let mut fourth = f64x4::ZERO;
             for (pair, [i, j, k, l]) in pairs.iter_mut().zip(PAIRINGS) {
                 let product = (x[i] - x[j]) * (x[k] - x[l]);
-                *pair += product * g / channels;
-                fourth += product * product / PAIRINGS.len() as f64 / 64.0;
+                *pair += product * g;
+                fourth += product * product;
             }
-            further += (0.5 * second * fourth + first * third) / channels;
-            plain += variance * g / channels;
-            error += (variance * g - 0.5 * second * fourth - first * third) / channels;
-            crossed += self::crossed(x, floor) / channels;
-            for (share, d) in shares.iter_mut().zip(deviations) {
-                *share += d * d * g;
-            }
-            own.add(deviations, g / channels);
-            if let Some(x) = value.splatted {
-                let mean = x.iter().sum::<f64>() / REPLICATES as f64;
-                splatted.add(x.map(|x| x - mean), g / channels);
+            let fourth = fourth * f64x4::splat(1.0 / (64 * PAIRINGS.len()) as f64);
+            further += (half * second * fourth + first * third) * share;
+            plain += squares * f64x4::splat(1.0 / 12.0) * g;
+            crossed += differing(self::crossed(x, floor)) * share;
+            shares += own.add(deviations, g);
+            if let Some(x) = four.splatted {
+                splatted.add(self::deviations(x), g);
             }
         }
+        let [plain, further, crossed] = [plain, further, crossed].map(f64x4::reduce_add);
+        let error = plain - further;
         self.error += error;
         self.further += further;
         self.further_of_pixels += further.abs();
         self.crossed += crossed;
         self.squares += error * error;
-        let largest = shares.iter().copied().fold(0.0, f64::max);
-        if largest > ONE_REPLICATE * shares.iter().sum::<f64>() {
+        let largest = shares.to_array().into_iter().fold(0.0, f64::max);
+        if largest > ONE_REPLICATE * shares.reduce_add() {
             self.heavy += error;
         }
         for (sum, pair) in self.pairs.iter_mut().zip(pairs) {
+            let pair = pair.reduce_add();
             *sum += pair;
             self.pair_squares += pair * pair;
         }
@@ -119,37 +120,55 @@ impl Sums {
     }
 }
 
-/// q of a value with replicates `x`, the variance σ² of their mean told by two of them and divided by what the other two show,
+/// How far the replicates of four values are from their means.
+fn deviations(x: [f64x4; REPLICATES]) -> [f64x4; REPLICATES] {
+    let mean = x.into_iter().sum::<f64x4>() * f64x4::splat(1.0 / REPLICATES as f64);
+    x.map(|x| x - mean)
+}
+
+/// q of four values with replicates `x`, the variance σ² of their mean told by two of them and divided by what the other two show,
 /// y. That varies by 2σ², so that E g(y) is g(μ) + g″(μ) σ² to second order, whatever σ² was told from: the latter is taken off.
-fn crossed(x: [f64; REPLICATES], floor: f64) -> f64 {
-    let ways = PAIRINGS.iter().flat_map(|&[i, j, k, l]| [[i, j, k, l], [k, l, i, j]]);
-    let q = |[i, j, k, l]: [usize; REPLICATES]| {
-        let variance = |a: usize, b: usize| (x[a] - x[b]).powi(2) / 8.0;
-        let value_squared = (0.5 * (x[k] + x[l])).powi(2);
-        let g = 1.0 / (value_squared + floor);
-        let second = (6.0 * value_squared - 2.0 * floor) * g * g * g;
-        variance(i, j) * (g - second * variance(k, l))
+fn crossed(x: [f64x4; REPLICATES], floor: f64x4) -> f64x4 {
+    // Of two replicates the variance that they tell, and g less what is taken off by it.
+    let of_two = |a: usize, b: usize| {
+        let difference = x[a] - x[b];
+        let variance = difference * difference * f64x4::splat(1.0 / 8.0);
+        let value = f64x4::HALF * (x[a] + x[b]);
+        let value_squared = value * value;
+        let g = f64x4::ONE / (value_squared + floor);
+        let second = (f64x4::splat(6.0) * value_squared - f64x4::splat(2.0) * floor) * g * g * g;
+        (variance, g - second * variance)
     };
-    ways.map(q).sum::<f64>() / (2 * PAIRINGS.len()) as f64
+    let mut sum = f64x4::ZERO;
+    for [i, j, k, l] in PAIRINGS {
+        let ((v, g), (w, h)) = (of_two(i, j), of_two(k, l));
+        sum += v * h + w * g;
+    }
+    sum * f64x4::splat(1.0 / (2 * PAIRINGS.len()) as f64)
 }
 
 /// Of the replicates' deviations d in the values of a pixel: Σ g dₐ dᵇ.
 #[derive(Clone, Copy, Default)]
-struct Gram([[f64; REPLICATES]; REPLICATES]);
+struct Gram([f64x4; REPLICATES]);
 
 impl Gram {
-    fn add(&mut self, deviations: [f64; REPLICATES], g: f64) {
-        for (row, a) in self.0.iter_mut().zip(deviations) {
-            for (product, b) in row.iter_mut().zip(deviations) {
-                *product += a * b * g;
+    /// Adds four values, and gives g d² of each replicate.
+    fn add(&mut self, deviations: [f64x4; REPLICATES], g: f64x4) -> f64x4 {
+        let mut squares = f64x4::ZERO;
+        for (d, g) in f64x4::transpose(deviations).into_iter().zip(g.to_array()) {
+            let weighed = d * f64x4::splat(g);
+            squares += d * weighed;
+            for (row, a) in self.0.iter_mut().zip(d.to_array()) {
+                *row += f64x4::splat(a) * weighed;
             }
         }
+        squares
     }
 
     /// tr(WΣ)².
     fn trace(&self) -> f64 {
-        let squares: f64 = self.0.iter().flatten().map(|x| x * x).sum();
-        let trace = (0..REPLICATES).map(|r| self.0[r][r]).sum::<f64>() / 12.0;
+        let squares = self.0.iter().map(|row| *row * *row).sum::<f64x4>().reduce_add();
+        let trace = (0..REPLICATES).map(|r| self.0[r].to_array()[r]).sum::<f64>() / 12.0;
         (squares / 144.0 - trace * trace / 3.0) * 0.9
     }
 }
@@ -157,11 +176,13 @@ impl Gram {
 #[cfg(test)]
 mod tests {
     use super::crossed;
+    use wide::f64x4;
 
     /// One replicate of four has X: by the spread of all, v = X²/16; by two of them, the others dark, (X²/8)/f for half of the
     /// ways to choose and nothing for the rest. Of noise of 1e-4 it is as if the divisor were known, within twice the noise.
     #[test]
     fn crossed_values_do_not_know_of_a_bright_path() {
+        let crossed = |x: [f64; 4], floor| crossed(x.map(f64x4::splat), f64x4::splat(floor)).to_array()[0];
         assert_eq!(crossed([4.0, 0.0, 0.0, 0.0], 0.25), 4.0);
         let x = [1.0, 1.0001, 0.9999, 1.00006];
         let mean = x.iter().sum::<f64>() / 4.0;
