@@ -17,6 +17,7 @@ use crate::film::exr::{self, Attribute, ChannelData, ColourEncoding, ExrImage, L
 use crate::film::filter::Filter;
 use crate::film::heat;
 use crate::film::layers::{Kept, Layout};
+use crate::film::output;
 use crate::film::png::{self, PngSettings};
 use crate::film::resolve::Image;
 use crate::scene::camera::{Camera, Projection};
@@ -339,11 +340,15 @@ pub fn write(
     }
     let spectral = spectral_path(exr_path);
     write_spectral(&spectral, finish, frame, &image, report)?;
-    // Packed together but written one after the other: where the first cannot be written, nothing of the picture is left.
-    let (written_exr, png) =
-        rayon::join(|| write_exr(exr_path, finish, frame, &image, report), || png::encode_png(&image, &settings));
-    written_exr?;
-    png::write_encoded(&png_path, png)?;
+    let (exr, png) =
+        rayon::join(|| sealed_exr(exr_path, finish, frame, &image, report), || png::encode_png(&image, &settings));
+    let (exr, bytes) = exr?;
+    // They come to the disk together but are named one after the other: where the first cannot be written, nothing of the picture
+    // is left.
+    let both = [Some((exr_path, &*bytes)), png.as_ref().ok().map(|png| (&*png_path, &**png))];
+    output::write_together(&both.into_iter().flatten().collect::<Vec<_>>())?;
+    note_loss(exr_path, finish, &exr, report)?;
+    png.map_err(|message| Error::output(&png_path, message))?;
     report.files = vec![exr_path.to_path_buf(), png_path];
     report.files.extend((!finish.spectral_channels().is_empty()).then_some(spectral));
     report.seconds.writing = written.elapsed().as_secs_f64();
@@ -374,11 +379,24 @@ pub fn check_files(finish: &Finish, frame: &Frame) -> std::result::Result<(), St
     spectral_image(&one, frame, &image, &report).map_or(Ok(()), |file| exr::encode_exr(&file).map(drop))
 }
 
-fn write_exr(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneReport) -> Result<()> {
+/// The EXR of a picture that is to be at `path`, and its bytes.
+fn sealed_exr(
+    path: &Path,
+    finish: &Finish,
+    frame: &Frame,
+    image: &Image,
+    report: &mut SceneReport,
+) -> Result<(ExrImage, Vec<u8>)> {
     let mut file = exr_image(finish, frame, image, report);
-    write_sealed(path, &mut file)?;
+    seal(path, &mut file)?;
+    let bytes = exr::encode_exr(&file).map_err(|message| Error::output(path, message))?;
+    Ok((file, bytes))
+}
+
+/// Notes what packing has changed in `file`, which is at `path`.
+fn note_loss(path: &Path, finish: &Finish, file: &ExrImage, report: &mut SceneReport) -> Result<()> {
     if file.compression.loses() {
-        let loss = exr::loss(path, &file)?;
+        let loss = exr::loss(path, file)?;
         report.notes.push(format!(
             "DWA compression of level {} changes values by {:.2e} in the root mean square, at most {:.2e}; their mean is {:.2e}",
             finish.output.exr.dwa_level, loss.root_mean_square, loss.most, loss.mean
@@ -567,9 +585,14 @@ fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneR
 
 /// Writes a file that says what its channels add up to, so that damage shows.
 fn write_sealed(path: &Path, file: &mut ExrImage) -> Result<()> {
+    seal(path, file)?;
+    exr::write_exr(path, file)
+}
+
+fn seal(path: &Path, file: &mut ExrImage) -> Result<()> {
     let hash = Attribute::Text(file.content_hash().map_err(|message| Error::output(path, message))?);
     file.attributes.push(("abbe/contentHash".to_owned(), hash));
-    exr::write_exr(path, file)
+    Ok(())
 }
 
 /// 128 bits of BLAKE3 over the numbers of a picture.

@@ -6,6 +6,7 @@
 //! A symbolic link stays, and the file at its end is replaced. Devices and FIFOs are written to as they stand.
 
 use crate::error::{Error, Result};
+use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fs::{File, Metadata, OpenOptions};
@@ -41,24 +42,86 @@ pub fn write_pieces(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::
     replace(&file, write).map_err(|e| Error::output(path, words(&file, &e)))
 }
 
+/// Writes files that belong together, replacing what stands there. They reach the disk at the same time, on the current rayon pool,
+/// and take their names in turn: one that cannot be written leaves those behind it without theirs.
+///
+/// # Errors
+/// As [`write_atomically`], of the first.
+pub fn write_together(files: &[(&Path, &[u8])]) -> Result<()> {
+    let fill = |&(path, bytes): &(&Path, &[u8])| match target(path)? {
+        Target::Stream(_) => Ok(None),
+        Target::File(file) => match fill(&file, |out| out.write_all(bytes)) {
+            Ok(nameless) => Ok(Some(nameless)),
+            Err(e) => Err(Error::output(path, words(&file, &e))),
+        },
+    };
+    let filled: Vec<Result<Option<Nameless>>> = files.par_iter().map(fill).collect();
+    let mut named: Vec<PathBuf> = Vec::new();
+    let all = files.iter().zip(filled).try_for_each(|(&(path, bytes), filled)| match filled? {
+        None => write_atomically(path, bytes),
+        Some(nameless) => {
+            let file = nameless.path.clone();
+            nameless.take_name().map_err(|e| Error::output(path, words(&file, &e)))?;
+            named.push(file);
+            Ok(())
+        }
+    });
+    // One directory is brought to the disk once.
+    named.dedup_by(|a, b| directory_of(a) == directory_of(b));
+    let kept = named.iter().try_for_each(|file| keep_name(file).map_err(|e| Error::output(file, words(file, &e))));
+    all.and(kept)
+}
+
 /// Writes to a temporary file, which then takes the place of the one at `path`.
 fn replace(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> std::io::Result<()> {
-    let (file, temporary) = open_temporary(path)?;
-    let fill = || -> std::io::Result<()> {
-        take_after(&file, path)?;
-        let mut writer = BufWriter::new(file);
-        write(&mut writer)?;
-        writer.into_inner()?.sync_all()?;
-        std::fs::rename(&temporary, path)
-    };
-    if let Err(e) = fill() {
-        // What went wrong first is told.
-        let _ = std::fs::remove_file(&temporary);
-        return Err(e);
+    fill(path, write)?.take_name()?;
+    keep_name(path)
+}
+
+/// A file that is whole and on the disk under a temporary name. It is removed where it gets no other.
+struct Nameless {
+    temporary: Option<PathBuf>,
+    /// Its name.
+    path: PathBuf,
+}
+
+impl Nameless {
+    fn take_name(mut self) -> std::io::Result<()> {
+        if let Some(temporary) = &self.temporary {
+            std::fs::rename(temporary, &self.path)?;
+        }
+        self.temporary = None;
+        Ok(())
     }
-    // The name has to reach the disk, too. The file is there already, so what a directory does not do by its nature is no fault.
+}
+
+impl Drop for Nameless {
+    fn drop(&mut self) {
+        if let Some(temporary) = &self.temporary {
+            // What went wrong first is told.
+            let _ = std::fs::remove_file(temporary);
+        }
+    }
+}
+
+/// Writes to a temporary file what is to be at `path`.
+fn fill(path: &Path, write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> std::io::Result<Nameless> {
+    let (file, temporary) = open_temporary(path)?;
+    let nameless = Nameless { temporary: Some(temporary), path: path.to_path_buf() };
+    take_after(&file, path)?;
+    let mut writer = BufWriter::new(file);
+    write(&mut writer)?;
+    writer.into_inner()?.sync_all()?;
+    Ok(nameless)
+}
+
+/// Brings the name of the file at `path` to the disk, too. The file is there already, so what a directory does not do by its nature
+/// is no fault.
+fn keep_name(path: &Path) -> std::io::Result<()> {
     #[cfg(unix)]
     File::open(directory_of(path)).and_then(|directory| directory.sync_all()).or_else(unless_it_cannot_be)?;
+    #[cfg(not(unix))]
+    let _ = path;
     Ok(())
 }
 
@@ -354,6 +417,22 @@ mod tests {
         write_atomically(&path, b"new").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    /// The second is a directory: the first is there, the third is not, and nothing else.
+    #[test]
+    fn files_that_belong_together_take_their_names_in_turn() {
+        let dir = tempfile::tempdir().unwrap();
+        let paths = ["a", "b", "c"].map(|name| dir.path().join(name));
+        let files = [0, 1, 2].map(|i| (&*paths[i], [&b"one"[..], b"two", b"three"][i]));
+        std::fs::create_dir(&paths[1]).unwrap();
+        assert!(write_together(&files).unwrap_err().to_string().contains("it is a directory"));
+        assert_eq!(std::fs::read(&paths[0]).unwrap(), b"one");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
+        std::fs::remove_dir(&paths[1]).unwrap();
+        write_together(&files).unwrap();
+        assert!(files.iter().all(|(path, bytes)| std::fs::read(path).unwrap() == *bytes));
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 3);
     }
 
     #[test]

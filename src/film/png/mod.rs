@@ -139,15 +139,8 @@ pub fn holds(path: &Path, size: [u32; 2], texts: &[(String, String)]) -> bool {
 /// # Errors
 /// [`Error::Output`].
 pub fn write_png(path: &Path, image: &Image, settings: &PngSettings) -> Result<()> {
-    write_encoded(path, encode_png(image, settings))
-}
-
-/// Writes what [`encode_png`] gave.
-///
-/// # Errors
-/// [`Error::Output`].
-pub fn write_encoded(path: &Path, bytes: std::result::Result<Vec<u8>, String>) -> Result<()> {
-    write_atomically(path, &bytes.map_err(|message| Error::output(path, message))?)
+    let bytes = encode_png(image, settings).map_err(|message| Error::output(path, message))?;
+    write_atomically(path, &bytes)
 }
 
 /// The bytes of the file.
