@@ -175,8 +175,8 @@ pub fn decide(
     let wanted = |light: &Light| settings.delta_caustics || light.may_be_met();
     // No path begins at a light of weight 0: what it throws is met by chance or not at all.
     let begins = |i: usize| scene.light_probability(i) > 0.0;
-    let traced: Vec<bool> =
-        scene.lights.iter().enumerate().map(|(i, l)| wanted(l) && begins(i) && is_small(scene, i, chances[i], &casters)).collect();
+    let small = |i: usize| is_small(scene, i, chances[i], &casters);
+    let traced: Vec<bool> = scene.lights.iter().enumerate().map(|(i, l)| wanted(l) && begins(i) && small(i)).collect();
     if !traced.contains(&true) {
         return left_off(if settings.delta_caustics {
             "no light is small or has a sun"
