@@ -394,6 +394,7 @@ impl FilterSampler {
 
     /// The sample at `u` in [0, 1)². Increases with `u` along each axis, so stratified numbers stay stratified.
     #[must_use]
+    #[inline(always)]
     pub fn sample(&self, u: DVec2) -> FilterSample {
         let [(x, x_negative), (y, y_negative)] = [u.x, u.y].map(|u| self.axis.at(u));
         let weight = match &self.axis {

@@ -207,19 +207,8 @@ impl Tracer<'_> {
             self.add_background::<CHROMATIC>(path);
             return Step::Ended;
         };
-        let object = &scene.objects[hit.object as usize];
-        // Of what does not shine and ends the path it is enough to know that it is there. Coverage and depth are those of the first
-        // vertex.
-        if !MEDIA
-            && !scene.has_boundaries
-            && path.vertices > 0
-            && object.light.is_none()
-            && self.is_last(path)
-            && scene.watch.is_none()
-        {
-            return Step::Ended;
-        }
         let surface = scene.surface(&path.ray, &hit);
+        let object = &scene.objects[hit.object as usize];
         let is_seen = path.vertices == 0 && !(self.settings.count_crossings && path.crossings > 0);
         if self.settings.hide_emitters && is_seen && object.is_lamp {
             // A lamp that the camera would see itself is not there.
