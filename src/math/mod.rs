@@ -6,6 +6,7 @@
 
 pub mod dd;
 pub mod elementary;
+pub mod four;
 pub mod frame;
 pub mod ray;
 pub mod sampler;

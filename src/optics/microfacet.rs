@@ -8,6 +8,7 @@
 //! Mitsuba 3, so that the two can be compared pixel by pixel.
 
 use crate::math::elementary::{exp_down, log1p};
+use crate::math::four::{Vec4, plain_dot};
 use crate::math::trig::sin_cos_turn;
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
@@ -32,38 +33,6 @@ pub struct Microfacets {
     pub alpha: f64,
     /// Width along local y over that along x; one for an isotropic surface.
     pub ratio: f64,
-}
-
-/// Four directions, side by side.
-#[derive(Clone, Copy, Debug)]
-pub struct Four {
-    /// Along x.
-    pub x: f64x4,
-    /// Along y.
-    pub y: f64x4,
-    /// Along z.
-    pub z: f64x4,
-}
-
-impl Four {
-    /// These.
-    #[must_use]
-    pub fn of(all: [DVec3; 4]) -> Four {
-        let along = |part: fn(DVec3) -> f64| f64x4::new(all.map(part));
-        Four { x: along(|v| v.x), y: along(|v| v.y), z: along(|v| v.z) }
-    }
-
-    /// The products of each with its like.
-    #[must_use]
-    pub fn dot(self, other: Four) -> f64x4 {
-        self.x * other.x + self.y * other.y + self.z * other.z
-    }
-
-    /// Each part by itself.
-    #[must_use]
-    pub fn with(self, other: Four, f: impl Fn(f64x4, f64x4) -> f64x4) -> Four {
-        Four { x: f(self.x, other.x), y: f(self.y, other.y), z: f(self.z, other.z) }
-    }
 }
 
 /// The facets between two directions.
@@ -133,9 +102,10 @@ impl Microfacets {
 
     /// [`Microfacets::masking`] of four directions and facets, side by side and to the same bits.
     #[must_use]
-    pub fn masking_of_four(&self, v: Four, m: Four) -> f64x4 {
-        let y = v.y * f64x4::splat(self.ratio);
-        let tan2_alpha = (v.x * v.x + y * y) / (v.z * v.z) * f64x4::splat(self.alpha * self.alpha);
+    pub fn masking_of_four(&self, v: &Vec4, m: &Vec4) -> f64x4 {
+        let [x, y, z] = *v;
+        let y = y * f64x4::splat(self.ratio);
+        let tan2_alpha = (x * x + y * y) / (z * z) * f64x4::splat(self.alpha * self.alpha);
         let (one, two) = (f64x4::ONE, f64x4::splat(2.0));
         let seen = match self.distribution {
             Distribution::Ggx => two / (one + (one + tan2_alpha).sqrt()),
@@ -146,7 +116,7 @@ impl Microfacets {
             }
         };
         let seen = tan2_alpha.simd_eq(f64x4::ZERO).select(one, seen);
-        (v.dot(m) * v.z).simd_le(f64x4::ZERO).select(f64x4::ZERO, seen)
+        (plain_dot(v, m) * z).simd_le(f64x4::ZERO).select(f64x4::ZERO, seen)
     }
 
     /// G₁(v) / |v.z|, which is finite down to grazing; `v` sees the facet from the front.
@@ -224,9 +194,30 @@ impl Microfacets {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::four::lanes;
     use crate::math::warp;
 
     const FAMILIES: [Distribution; 2] = [Distribution::Ggx, Distribution::Beckmann];
+
+    /// Directions and facets all over, on either side and grazing.
+    #[test]
+    fn four_masked_give_the_bits_of_one() {
+        let at = |i: u32| {
+            let u = f64::from(i) * 0.754_877_666;
+            let z = [1.0, -1.0, 1e-3, 0.4, -0.7][i as usize % 5] * (1.0 - 0.1 * u.fract());
+            DVec3::new((1.0 - z * z).max(0.0).sqrt(), u.fract() - 0.5, z).normalize()
+        };
+        for distribution in [Distribution::Ggx, Distribution::Beckmann] {
+            for facets in [Microfacets::isotropic(distribution, 0.3), Microfacets::anisotropic(distribution, 0.05, 0.9)]
+            {
+                for i in 0..200 {
+                    let (v, m) = ([0, 1, 2, 3].map(|k| at(7 * i + k)), [0, 1, 2, 3].map(|k| at(3 * i + 2 * k)));
+                    let found = facets.masking_of_four(&lanes(v), &lanes(m)).to_array();
+                    assert_eq!(found, [0, 1, 2, 3].map(|k| facets.masking(v[k], m[k])));
+                }
+            }
+        }
+    }
 
     /// ∫ D(m) cos θ dm = 1 (Walter et al. 2007, eq. 4). With m drawn with density cos θ/π the
     /// mean of π D is one; 1024² midpoints of a function of width α = 0.3 leave 1e-3.

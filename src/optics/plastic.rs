@@ -13,7 +13,8 @@ use super::bsdf::{BsdfSample, Evaluation, coat_probability, from_evaluation, mir
 use super::dielectric::RelativeIndex;
 use super::fresnel::{self, Model};
 use super::mean;
-use super::microfacet::{Distribution, Four, Microfacets, Terms};
+use super::microfacet::{Distribution, Microfacets, Terms};
+use crate::math::four::{Vec4, lanes, plain_dot, splat};
 use crate::math::warp;
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
@@ -131,18 +132,18 @@ impl CoatTable {
         let cosine = |i: u32| f64::from(i) / f64::from(COAT_ENTRIES - 1);
         let seen = Facets::new(facets);
         let critical = (1.0 - (eta * eta).recip()).max(0.0).sqrt();
-        let transmitted = |wo: Four, m: Four| {
-            let cos = wo.dot(m);
+        let transmitted = |wo: &Vec4, m: &Vec4| {
+            let cos = plain_dot(wo, m);
             let [_, through, cos_transmitted] = fresnel::dielectric_of_four(cos, eta);
             // As `refract` has it.
-            let wt = m.with(wo, |m, wo| (m * cos - wo) / f64x4::splat(eta) - m * cos_transmitted);
-            wt.z.simd_lt(f64x4::ZERO).select(through * facets.masking_of_four(wt, m), f64x4::ZERO)
+            let wt: Vec4 = std::array::from_fn(|k| (m[k] * cos - wo[k]) / f64x4::splat(eta) - m[k] * cos_transmitted);
+            wt[2].simd_lt(f64x4::ZERO).select(through * facets.masking_of_four(&wt, m), f64x4::ZERO)
         };
-        let reflected = |wo: Four, m: Four| {
-            let cos = wo.dot(m);
-            let wi = m.with(wo, |m, wo| m * (f64x4::splat(2.0) * cos) - wo);
+        let reflected = |wo: &Vec4, m: &Vec4| {
+            let cos = plain_dot(wo, m);
+            let wi: Vec4 = std::array::from_fn(|k| m[k] * (f64x4::splat(2.0) * cos) - wo[k]);
             let [back, ..] = fresnel::dielectric_of_four(cos, 1.0 / eta);
-            wi.z.simd_gt(f64x4::ZERO).select(back * facets.masking_of_four(wi, m), f64x4::ZERO)
+            wi[2].simd_gt(f64x4::ZERO).select(back * facets.masking_of_four(&wi, m), f64x4::ZERO)
         };
         let entries: Vec<(f32, f64)> = (0..COAT_ENTRIES)
             .into_par_iter()
@@ -263,7 +264,7 @@ const FACETS_BEFORE: u32 = 1597;
 struct Facets<'a> {
     facets: &'a Microfacets,
     /// Drawn once, where they do not depend on who looks.
-    drawn: Vec<Four>,
+    drawn: Vec<Vec4>,
 }
 
 /// A lattice that gives facets with y > 0, moved for each entry of a table, so that what it misses is another thing for each.
@@ -285,13 +286,13 @@ impl Facets<'_> {
     }
 
     /// The means of `f(wo, m)` over the facets m that a direction of cosine `cos` sees.
-    fn mean<const N: usize>(&self, cos: f64, entry: u32, f: impl Fn(Four, Four) -> [f64x4; N]) -> [f64; N] {
+    fn mean<const N: usize>(&self, cos: f64, entry: u32, f: impl Fn(&Vec4, &Vec4) -> [f64x4; N]) -> [f64; N] {
         let cos = cos.max(1e-3); // the limit at grazing; the table is interpolated from there
         let one = DVec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
-        let wo = Four::of([one; 4]);
+        let wo = &splat(one);
         let mut sum = [0.0; N];
-        let mut add = |m: Four, weight: f64x4| {
-            let seen = wo.dot(m).simd_gt(f64x4::ZERO);
+        let mut add = |m: &Vec4, weight: f64x4| {
+            let seen = plain_dot(wo, m).simd_gt(f64x4::ZERO);
             for (sum, x) in sum.iter_mut().zip(f(wo, m)) {
                 // In turn: the same bits as one by one.
                 seen.select(x * weight, f64x4::ZERO).to_array().into_iter().for_each(|x| *sum += x);
@@ -300,11 +301,11 @@ impl Facets<'_> {
         match self.facets.distribution {
             // Those that are drawn are those that are seen.
             Distribution::Ggx => {
-                in_fours(lattice(entry).map(|u| self.facets.sample(one, u))).for_each(|m| add(m, f64x4::ONE));
+                in_fours(lattice(entry).map(|u| self.facets.sample(one, u))).for_each(|m| add(&m, f64x4::ONE));
             }
             // Heitz 2018, eq. 3, the density of visible facets, over D(m) cos θ.
-            Distribution::Beckmann => self.drawn.iter().for_each(|&m| {
-                add(m, self.facets.masking_of_four(wo, m) * wo.dot(m) / (wo.z * m.z));
+            Distribution::Beckmann => self.drawn.iter().for_each(|m| {
+                add(m, self.facets.masking_of_four(wo, m) * plain_dot(wo, m) / (wo[2] * m[2]));
             }),
         }
         sum.map(|x| x / f64::from(FACETS))
@@ -312,9 +313,9 @@ impl Facets<'_> {
 }
 
 /// Four by four.
-fn in_fours(mut all: impl Iterator<Item = DVec3>) -> impl Iterator<Item = Four> {
+fn in_fours(mut all: impl Iterator<Item = DVec3>) -> impl Iterator<Item = Vec4> {
     const { assert!(FACETS.is_multiple_of(4)) };
-    std::iter::from_fn(move || Some(Four::of([all.next()?, all.next()?, all.next()?, all.next()?])))
+    std::iter::from_fn(move || Some(lanes([all.next()?, all.next()?, all.next()?, all.next()?])))
 }
 
 /// A diffuse base under a rough coat.

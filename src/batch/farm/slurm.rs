@@ -171,13 +171,14 @@ fn submit(job: &Job, tasks: usize, pictures: usize) -> String {
          cd \"$(dirname \"${{BASH_SOURCE[0]}}\")\"\n\
          mkdir -p log\n\
          most=$({{ scontrol show config || true; }} | sed -n 's/^MaxArraySize *= *\\([1-9][0-9]*\\).*/\\1/p')\n\
+         most=${{most:-1001}}\n\
          # submit SCRIPT TASKS [options]: the jobs, with colons between\n\
          submit() {{\n    \
              local script=$1 tasks=$2 first=0 jobs=() many job\n    \
              shift 2\n    \
              while ((first < tasks)); do\n        \
                  many=$((tasks - first))\n        \
-                 ((many <= ${{most:-1001}})) || many=${{most:-1001}}\n        \
+                 ((many <= most)) || many=$most\n        \
                  job=$(sbatch --parsable --array=0-$((many - 1)) \"$@\" \"$script\" \"$first\") || {{\n            \
                      [ ${{#jobs[@]}} = 0 ] || echo \"already submitted: scancel ${{jobs[*]}}\" >&2\n            \
                      return 1\n        \

@@ -6,26 +6,10 @@
 
 use super::{Cube, Disk, Plane, Rectangle, Sphere};
 use crate::math::Ray;
+use crate::math::four::{Vec4, lanes, splat};
 use crate::scene::shape::flat::Patch;
 use glam::DVec3;
 use wide::f64x4;
-
-/// A vector in each lane.
-pub type Vec4 = [f64x4; 3];
-
-/// `v` in each lane.
-#[inline(always)]
-#[must_use]
-pub fn splat(v: DVec3) -> Vec4 {
-    [f64x4::splat(v.x), f64x4::splat(v.y), f64x4::splat(v.z)]
-}
-
-/// A vector for each lane.
-#[inline(always)]
-#[must_use]
-pub fn lanes([a, b, c, d]: [DVec3; 4]) -> Vec4 {
-    [f64x4::new([a.x, b.x, c.x, d.x]), f64x4::new([a.y, b.y, c.y, d.y]), f64x4::new([a.z, b.z, c.z, d.z])]
-}
 
 /// A ray in each lane: the same for four shapes, or four for a shape that is the same in each lane.
 #[derive(Clone, Copy, Debug)]

@@ -23,8 +23,9 @@
 use super::state::{Path, Walk};
 use super::together::{self, MOST, Wanted, from_lanes};
 use super::{Tracer, sides_differ};
+use crate::math::four::{Vec4, lanes, splat};
 use crate::scene::census::Census;
-use crate::scene::shape::four::{self, Vec4, dot, minus, splat};
+use crate::scene::shape::four::{dot, minus};
 use crate::scene::{Hit, Scene, SurfacePoint};
 use crate::spectrum::Lanes;
 use crate::transport::plan::{EffectPlan, Integrator, PathSettings};
@@ -355,7 +356,7 @@ struct Seen {
 impl Four {
     fn of(joints: &[Joint], first: usize) -> Four {
         let lanes = |of: &dyn Fn(&Vertex) -> DVec3| {
-            four::lanes([0, 1, 2, 3].map(|i| joints.get(first + i).map_or(DVec3::Z, |joint| of(&joint.x))))
+            lanes([0, 1, 2, 3].map(|i| joints.get(first + i).map_or(DVec3::Z, |joint| of(&joint.x))))
         };
         let is_sampled = |joint: &Joint| joint.throughput.simd_gt(Lanes::ZERO).any();
         let bit = |i: usize| u32::from(joints.get(first + i).is_some_and(is_sampled)) << i;
