@@ -10,8 +10,8 @@ use glam::DVec2;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Paths of a round at least and at most.
-const FROM_LIGHTS: [u64; 2] = [1 << 11, 1 << 14];
+/// Paths of a round at least and at most: what they find is kept, some megabytes.
+const FROM_LIGHTS: [u64; 2] = [1 << 11, 1 << 17];
 
 /// Of that many are always as many followed as all.
 const AT_ONCE: u64 = 1 << 11;
