@@ -14,10 +14,12 @@ mod lights;
 mod media;
 mod meshes;
 mod notes;
+mod objects;
 mod principled;
 mod shapes;
 mod spectra;
 mod surface;
+mod wavelengths;
 
 use super::apart::put_apart;
 use super::bvh::{Aabb, Bvh};
@@ -28,20 +30,19 @@ use super::few::Few;
 use super::instance::Group;
 use super::light::Light;
 use super::load::{Pictures, Wanted};
-use super::material::{Kind, Material};
+use super::material::Material;
 use super::medium::Medium;
 use super::mesh::MeshTree;
 use super::mesh::together::Together;
 use super::nested::{Inside, Nested};
-use super::shape::{Detail, Shape};
 use super::shelf::Shelf;
 use super::texture::{Scalar, Texture};
 use super::volume::Volume;
-use super::{Band, DepthFog, FogFalloff, Geometry, Object, Scene, TriangleMesh};
+use super::{DepthFog, FogFalloff, Geometry, Object, Scene, TriangleMesh};
 use crate::description::{self as written, SceneDescription};
 use crate::error::{Error, Result};
 use crate::math::Ray;
-use crate::spectrum::{LANES, Outside, RANDOM, Spectrum, WavelengthDistribution};
+use crate::spectrum::{Outside, Spectrum};
 use attributes::{AtHand, Surface};
 use glam::DVec3;
 use meshes::Meshes;
@@ -165,16 +166,6 @@ fn pictures<'a>(d: &'a SceneDescription, shelf: &Shelf) -> impl Iterator<Item = 
     textures.chain(skies)
 }
 
-/// Whether it has an inside that its normals point out of, so that nothing but light through it comes in.
-fn encloses(geometry: &Geometry) -> bool {
-    match geometry {
-        Geometry::Shape(shape) => shape.is_closed(),
-        Geometry::Mesh(mesh) => mesh.mesh.open_edges() == 0 && !mesh.mesh.is_inside_out(),
-        Geometry::Sdf(sdf) => sdf.is_closed(),
-        Geometry::Curves(_) | Geometry::Instance(_) => false,
-    }
-}
-
 fn vec3(v: [f64; 3]) -> DVec3 {
     DVec3::from_array(v)
 }
@@ -249,15 +240,17 @@ impl<'a> Compiler<'a> {
         })
     }
 
+    /// Everything that is written, made in the order in which the one needs the other.
     fn scene(&mut self, name: &str) -> Result<Scene> {
         let d = self.description;
+        // What is written, piece by piece; all faults show here.
         self.read()?;
         let mut media = self.media();
-        let camera_medium = d.medium.as_ref().map(|name| self.medium_ids[name.as_str()]);
+        let camera_medium = self.camera_medium();
         // Children of groups come after everything that stands in the scene itself.
-        let (children, names_of_children) = self.groups(camera_medium)?;
+        let (children, names_of_children) = self.groups()?;
         let mut lamps = Lamps::default();
-        let (mut objects, mut material_names) = self.objects(camera_medium, &mut lamps)?;
+        let (mut objects, mut material_names) = self.objects(&mut lamps)?;
         self.lights(&mut lamps)?;
         self.unused_textures();
         let camera = self.camera();
@@ -266,6 +259,7 @@ impl<'a> Compiler<'a> {
             return Err(Error::Config(String::new()));
         }
 
+        // Where things are, how rays find them, and who has a place that bodies share.
         let mut boxes: Vec<Aabb> = objects.iter().map(Object::bounds).collect();
         let (contacts, passed_over) = put_apart(&mut objects, &mut boxes, &self.materials);
         let Search { bvh, few, together } = self.search(&mut objects, &boxes);
@@ -276,6 +270,7 @@ impl<'a> Compiler<'a> {
         });
         media.append(&mut self.absorbing);
 
+        // Which lights a point asks, and at which wavelengths.
         let (center, radius) = extent(&objects, &boxes, &camera);
         let Lamps { lights, weights, names: light_names, dark } = lamps;
         let powers: Vec<f64> = lights.iter().map(|light| light.power(&objects, radius)).collect();
@@ -288,17 +283,8 @@ impl<'a> Compiler<'a> {
         let is_even = |light: &Light| matches!(light, Light::Constant { .. });
         let uneven: Vec<f64> = lights.iter().zip(&weights).map(|(l, &w)| if is_even(l) { 0.0 } else { w }).collect();
         let uneven_asked = (uneven != weights).then(|| asked(&uneven));
-        let is_large = |light: &Light| matches!(light, Light::Environment(map) if map.is_large());
         let bands = self.bands();
-        let wavelengths = self.shelf.carried.wavelengths().unwrap_or_else(|| match d.render.wavelengths {
-            written::Wavelengths::Auto => self.wavelengths(&lights, &powers, &objects, &bands),
-            written::Wavelengths::Visible => WavelengthDistribution::visible(),
-            written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
-        });
-        let coloured = d.image.bands.is_empty() && self.shelf.carried.wavelengths().is_none();
-        let lit = lights.iter().zip(&powers).filter(|(_, power)| coloured && **power > 0.0);
-        let emitters: Vec<Spectrum> = lit.flat_map(|(light, _)| light.spectra()).filter(|s| !s.is_black()).collect();
-        self.note_few_wavelengths(&wavelengths, &bands, &emitters);
+        let wavelengths = self.wavelengths(&lights, &powers, &objects, &bands);
         self.note_unused_filter();
         let ambient = match &d.integrator {
             written::Integrator::Whitted(whitted) => {
@@ -306,6 +292,7 @@ impl<'a> Compiler<'a> {
             }
             _ => None,
         };
+        let is_large = |light: &Light| matches!(light, Light::Environment(map) if map.is_large());
         let lets_through = |o: &Object| o.body != 0 || self.materials[o.material as usize].lets_through();
         let parts_media = |o: &Object| !o.keeps_medium && [o.inside, o.outside] != [camera_medium; 2];
         let mut scene = Scene {
@@ -347,6 +334,7 @@ impl<'a> Compiler<'a> {
             notes: self.told_notes(),
             watch: None,
         };
+        // What follows from the whole, and what a person should know of it.
         self.note_beside(&mut scene, &boxes, &light_names);
         scene.light_exponent = scene.film_exponent(&powers, ambient, &boxes);
         scene.length_exponent = scene.sums_of_lengths_exponent();
@@ -393,26 +381,9 @@ impl<'a> Compiler<'a> {
         media
     }
 
-    /// What stands in the scene itself, and the names of its materials. Shapes that shine join the lamps.
-    fn objects(&mut self, camera_medium: Option<u32>, lamps: &mut Lamps) -> Result<(Vec<Object>, Vec<String>)> {
-        let (mut objects, mut material_names) = (Vec::new(), Vec::new());
-        for (i, shape) in self.description.shapes.iter().enumerate() {
-            let at = format!("shapes[{i}].{}", shape.geometry.kind());
-            let name = shape.name_or_kind(i);
-            let index = objects.len() as u32;
-            if let Some(object) = self.object(&at, name, shape, camera_medium, index, &mut lamps.lights)? {
-                if object.light.is_some() {
-                    lamps.names.push(object.name.clone());
-                    lamps.weights.push(shape.sampling_weight.unwrap_or(1.0));
-                } else if object.is_lamp {
-                    lamps.dark.push(object.name.clone());
-                }
-                material_names.push(shape.material_name(&object.name));
-                objects.push(object);
-            }
-        }
-        self.lie_on(Surface::Unknown);
-        Ok((objects, material_names))
+    /// What the camera is in, and all that no body is in.
+    fn camera_medium(&self) -> Option<u32> {
+        self.description.medium.as_ref().map(|name| self.medium_ids[name.as_str()])
     }
 
     /// The lights that are no shapes, behind those that are.
@@ -490,217 +461,6 @@ impl<'a> Compiler<'a> {
             self.materials.push(material);
         }
         Ok(())
-    }
-
-    /// The children of all groups that are copied somewhere, and the names of their materials; each group knows where its
-    /// own will lie.
-    fn groups(&mut self, camera_medium: Option<u32>) -> Result<(Vec<Object>, Vec<String>)> {
-        let d = self.description;
-        let copied: BTreeSet<&str> = d.shapes.iter().filter_map(|shape| shape.geometry.group()).collect();
-        let mut children: Vec<Object> = Vec::new();
-        let mut materials = Vec::new();
-        for (group, shapes) in d.groups.iter().filter(|(name, _)| copied.contains(name.as_str())) {
-            let first = (d.shapes.len() + children.len()) as u32;
-            let start = children.len();
-            let list = written::field(&["groups", group]);
-            for (i, shape) in shapes.iter().enumerate() {
-                let kind = shape.geometry.kind();
-                let name = shape.name.clone().unwrap_or_else(|| format!("{group}.{kind}{i}"));
-                let at = format!("{list}[{i}].{kind}");
-                // No child shines, by the checks of the description.
-                if let Some(child) = self.object(&at, name, shape, camera_medium, first, &mut Vec::new())? {
-                    materials.push(shape.material_name(&child.name));
-                    children.push(child);
-                }
-            }
-            let boxes: Vec<Aabb> = children[start..].iter().map(Object::bounds).collect();
-            let material = children.get(start).map_or(0, |child| child.material);
-            self.groups.insert(group, (Arc::new(Group { first, bvh: Bvh::build(&boxes) }), material));
-        }
-        Ok((children, materials))
-    }
-
-    /// The object that `shape` is; `index` is the one that it will have. Its light goes to `lights`.
-    fn object(
-        &mut self,
-        at: &str,
-        name: String,
-        shape: &'a written::Shape,
-        camera_medium: Option<u32>,
-        index: u32,
-        lights: &mut Vec<Light>,
-    ) -> Result<Option<Object>> {
-        self.lie_on(Surface::Shape);
-        let Some(geometry) = self.geometry(at, shape)? else { return Ok(None) };
-        if let Some(group) = shape.geometry.group() {
-            let (detail, material) = (Detail::Geometry, self.groups[group].1);
-            return Ok(Some(Object {
-                name,
-                geometry,
-                material,
-                light: None,
-                detail,
-                inside: None,
-                outside: None,
-                keeps_medium: false,
-                flipped: false,
-                is_lamp: false,
-                body: 0,
-            }));
-        }
-        let material = match &shape.material {
-            written::MaterialRef::Name(name) if !self.on_surface.contains(name.as_str()) => None,
-            written::MaterialRef::Name(name) => Some(self.named_material(name).as_ref().clone()),
-            written::MaterialRef::Inline(material) => Some(self.material(&format!("{at}.material"), material)),
-        };
-        let material = match (material, &shape.material) {
-            (None, written::MaterialRef::Name(name)) => self.material_ids[name.as_str()],
-            (material, _) => {
-                self.materials.extend(material);
-                self.materials.len() as u32 - 1
-            }
-        };
-        let is_lamp = shape.emission.is_some();
-        let light = shape.emission.as_ref().map(|emission| self.shining(at, shape, emission, index, &geometry));
-        let light = light.filter(|light| !light.is_dark()).map(|light| {
-            lights.push(light);
-            lights.len() as u32 - 1
-        });
-        if is_lamp && matches!(geometry, Geometry::Shape(Shape::Plane(_))) {
-            self.fault(&format!("{at}.emission"), "expected a shape with an end, found a plane: its light is infinite");
-        }
-        let textured = self.materials[material as usize].varies()
-            || light.is_some_and(|l| matches!(&lights[l as usize], Light::Area { radiance, .. } if radiance.varies()));
-        let all = self.description.render.effects == written::Effects::All;
-        let boundary = light.is_none() && matches!(self.materials[material as usize].kind, Kind::Boundary);
-        let detail = match (textured || all, boundary) {
-            (true, _) => Detail::Texture,
-            (false, true) => Detail::Boundary,
-            (false, false) => Detail::Geometry,
-        };
-        // A closed body without a word about its inside is empty if light can enter it. An open one, and one that light cannot
-        // enter but may be in, as in a room, has the same medium on both sides; outside is what the camera is in.
-        let closed = match &geometry {
-            Geometry::Shape(shape) => shape.is_closed(),
-            Geometry::Mesh(_) => true,
-            Geometry::Sdf(sdf) => sdf.is_closed(),
-            // What goes into curves comes out unseen; an instance is none of its own.
-            Geometry::Curves(_) | Geometry::Instance(_) => false,
-        };
-        if let Some(fault) = self.unfit_for_a_body(&self.materials[material as usize], &geometry, closed, shape) {
-            self.fault(&format!("{at}.material"), fault);
-        }
-        let reliefs = self.materials[material as usize].compound().map_or(0, |compound| compound.reliefs);
-        if matches!(geometry, Geometry::Sdf(_)) && reliefs > 0 {
-            self.note(
-                at,
-                "u and v are 0 all over it, so that its bumps and normal maps turn all normals alike and show no picture",
-            );
-        }
-        let transmits = self.materials[material as usize].transmits();
-        let empty = closed && transmits;
-        let enclosed = if empty { None } else { camera_medium };
-        let (behind, before) = if shape.flip_normals { (camera_medium, enclosed) } else { (enclosed, camera_medium) };
-        let behind = self.absorbing(at, material, closed, &geometry, shape).or(behind);
-        // What light never crosses may stand in any medium: it tells of none unless that is written.
-        // Nor is a path ever within a closed body of it, unless that is a lamp which shines inward.
-        let entered = transmits || is_lamp && shape.flip_normals;
-        let mut sides = [("inside", shape.inside.as_ref(), behind), ("outside", shape.outside.as_ref(), before)];
-        let (field, written, otherwise) = &mut sides[usize::from(shape.flip_normals)];
-        let is_named = written.is_some_and(|name| ![written::VACUUM, written::UNCHANGED].contains(&name.as_str()));
-        if is_named && !entered && encloses(&geometry) {
-            let note = "light cannot enter, so that it changes nothing; what the camera is in says the scene's medium";
-            self.note(&format!("{at}.{field}"), note);
-            (*written, *otherwise) = (None, camera_medium);
-        }
-        let silent = !transmits && sides.iter().all(|(_, written, _)| written.is_none());
-        let unchanged = sides.iter().all(|(_, written, _)| written.is_some_and(|name| name == written::UNCHANGED));
-        let medium = |side: Option<&String>, otherwise: Option<u32>| match side.map(String::as_str) {
-            None => otherwise,
-            Some(written::VACUUM | written::UNCHANGED) => None,
-            Some(name) => Some(self.medium_ids[name]),
-        };
-        let [inside, outside] = sides.map(|(_, written, otherwise)| medium(written, otherwise));
-        Ok(Some(Object {
-            name,
-            geometry,
-            material,
-            light,
-            detail,
-            inside,
-            outside,
-            keeps_medium: unchanged || silent,
-            flipped: shape.flip_normals,
-            is_lamp,
-            body: 0,
-        }))
-    }
-
-    /// Wavelengths by the scene's own lights and surfaces.
-    fn wavelengths(
-        &self,
-        lights: &[Light],
-        powers: &[f64],
-        objects: &[Object],
-        bands: &[Band],
-    ) -> WavelengthDistribution {
-        // Of `whitted` a pixel has a lattice of them, as many at least.
-        let points = match &self.description.integrator {
-            written::Integrator::Whitted(w) => {
-                let wavelengths = w.samples() as usize * LANES;
-                (1 << wavelengths.ilog2()).min(RANDOM)
-            }
-            _ => RANDOM,
-        };
-        let mut emitters: Vec<(f64, Spectrum)> = Vec::new();
-        for (light, power) in lights.iter().zip(powers) {
-            let spectra = light.spectra();
-            let weight = power / spectra.len() as f64;
-            emitters.extend(spectra.into_iter().map(|s| (weight, s)));
-        }
-        if !bands.is_empty() {
-            let responses: Vec<&Spectrum> = bands.iter().map(|b| &b.response).collect();
-            // In the place of colours, bands leave them a tenth, for the preview; beside a picture of colours, half.
-            let colours = if self.description.image.bands.is_empty() { 0.5 } else { 0.1 };
-            return WavelengthDistribution::for_bands(&responses, &emitters, colours, points);
-        }
-        let mut reflectances = Vec::new();
-        for object in objects {
-            for leaf in self.materials[object.material as usize].leaves() {
-                match &leaf.kind {
-                    Kind::Diffuse { reflectance } | Kind::Plastic { reflectance, .. } => {
-                        reflectances.extend(reflectance.representatives());
-                    }
-                    Kind::Principled(solid) => reflectances.extend(solid.base.representatives()),
-                    Kind::PrincipledThin(sheet) => reflectances.extend(sheet.base.representatives()),
-                    Kind::Mirror { reflectance } => reflectances.push(reflectance.clone()),
-                    Kind::Conductor { .. }
-                    | Kind::Dielectric { .. }
-                    | Kind::Thin { .. }
-                    | Kind::Hair { .. }
-                    | Kind::Boundary
-                    | Kind::Compound(_) => {}
-                }
-            }
-        }
-        WavelengthDistribution::for_scene(&emitters, &reflectances, points)
-    }
-}
-
-impl Object {
-    /// The object's box; without end for a plane.
-    #[must_use]
-    pub fn bounds(&self) -> Aabb {
-        match &self.geometry {
-            Geometry::Shape(shape) => match shape.bounds() {
-                Some((min, max)) => Aabb { min, max },
-                None => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
-            },
-            Geometry::Mesh(mesh) => mesh.tree.as_ref().map_or_else(|| mesh.mesh.bounds(), MeshTree::bounds),
-            Geometry::Sdf(sdf) => sdf.bounds(),
-            Geometry::Curves(curves) => curves.bounds(),
-            Geometry::Instance(instance) => instance.bounds(),
-        }
     }
 }
 

@@ -49,7 +49,7 @@ pub mod watch;
 use crate::math::sampler::{Octet, Sampler, Set, unit};
 use crate::math::{Departure, Ray};
 use crate::spectrum::{Spectrum, WavelengthDistribution};
-use bvh::Bvh;
+use bvh::{Aabb, Bvh};
 use camera::Camera;
 use choice::Asked;
 use curves::Curves;
@@ -207,6 +207,21 @@ pub struct Object {
 }
 
 impl Object {
+    /// The object's box; without end for a plane.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        match &self.geometry {
+            Geometry::Shape(shape) => match shape.bounds() {
+                Some((min, max)) => Aabb { min, max },
+                None => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
+            },
+            Geometry::Mesh(mesh) => mesh.tree.as_ref().map_or_else(|| mesh.mesh.bounds(), MeshTree::bounds),
+            Geometry::Sdf(sdf) => sdf.bounds(),
+            Geometry::Curves(curves) => curves.bounds(),
+            Geometry::Instance(instance) => instance.bounds(),
+        }
+    }
+
     /// −1 where the normals of the form point the other way, else 1.
     #[must_use]
     pub fn facing(&self) -> f64 {

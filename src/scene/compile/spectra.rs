@@ -4,10 +4,7 @@ use super::super::{Band, load};
 use super::Compiler;
 use crate::description as written;
 use crate::error::{Error, in_short};
-use crate::spectrum::observer::{quadrature, tristimulus, xyz};
-use crate::spectrum::{
-    BAND_NM, LANES, Outside, SampledWavelengths, Spectrum, WavelengthDistribution, illuminant, upsample,
-};
+use crate::spectrum::{BAND_NM, Outside, Spectrum, illuminant, upsample};
 
 /// What a spectrum stands for, which decides how a colour becomes one.
 #[derive(Clone, Copy)]
@@ -181,64 +178,7 @@ impl Compiler<'_> {
         }
         all
     }
-
-    /// Tells how far off `bands` are in even light, and the colour of even light of the `emitters`, where `whitted` has too few
-    /// of `wavelengths` for them.
-    pub(super) fn note_few_wavelengths(
-        &mut self,
-        wavelengths: &WavelengthDistribution,
-        bands: &[Band],
-        emitters: &[Spectrum],
-    ) {
-        let written::Integrator::Whitted(w) = &self.description.integrator else { return };
-        // The lattice of a pixel: sets that begin evenly spread over the distance from lane to lane.
-        let sets = w.samples();
-        let begin = |set: u32| (f64::from(set) + 0.5) / f64::from(sets) / LANES as f64;
-        let drawn: Vec<SampledWavelengths> = (0..sets).map(|set| wavelengths.sample(begin(set))).collect();
-        let off = |Band { response, .. }: &Band| {
-            let found = drawn.iter().map(|w| f64::from((response.eval(w.nm) * w.inv_pdf).reduce_add())).sum::<f64>();
-            let exact: f64 =
-                quadrature(&response.breakpoints()).iter().map(|(nm, width)| response.at(*nm) * width).sum();
-            (found / (drawn.len() * LANES) as f64 / exact - 1.0).abs()
-        };
-        let worst = bands.iter().map(off).fold(0.0, f64::max);
-        if worst > WORST_BAND {
-            let message = format!(
-                "{} wavelengths a pixel are few for {} bands: even light is off by up to {:.0} % in them; a larger grid has more",
-                drawn.len() * LANES,
-                bands.len(),
-                100.0 * worst
-            );
-            self.note("integrator.whitted", &message);
-        }
-        // Of X, Y and Z, over the largest.
-        let off = |light: &Spectrum| {
-            let exact = tristimulus(light);
-            let found = drawn.iter().fold([0.0; 3], |sum: [f64; 3], w| {
-                let one = xyz(light.eval(w.nm), w);
-                std::array::from_fn(|c| sum[c] + f64::from(one[c]) / f64::from(sets))
-            });
-            let largest = exact.iter().fold(0.0, |a: f64, b| a.max(*b));
-            (0..3).map(|c| (found[c] - exact[c]).abs() / largest).fold(0.0, f64::max)
-        };
-        let worst = emitters.iter().map(off).fold(0.0, f64::max);
-        if worst > WORST_COLOUR {
-            let message = format!(
-                "{} wavelengths a pixel are few for the spectra of the lamps: their colour is off by up to {:.1} %; a larger grid \
-                 has more",
-                drawn.len() * LANES,
-                100.0 * worst
-            );
-            self.note("integrator.whitted", &message);
-        }
-    }
 }
-
-/// How far off a band may be by the wavelengths of `whitted` without a word.
-const WORST_BAND: f64 = 0.1;
-
-/// How far off the colour of a lamp may be by them.
-const WORST_COLOUR: f64 = 0.01;
 
 /// The smallest f32 that is not below `nm`.
 fn not_below(nm: f64) -> f32 {
@@ -308,47 +248,6 @@ mod tests {
         assert!(sums.iter().all(|sum| (sum - 1.0).abs() < 1e-6), "{sums:?}");
         let last = &bands("bands: 2, from_nm: 820, to_nm: 830")[1].response;
         assert_eq!([825.0, 830.0].map(|nm| last.eval(Lanes::splat(nm)).to_array()[0]), [0.2; 2]);
-    }
-
-    /// Of 31 bands some have none of 32 wavelengths, and are black. Of 512 each has 8, as half of them go by the bands, and 3 by the
-    /// eye: one more or less is less than a tenth. Two broad bands have enough of 32, and a path draws its own.
-    #[test]
-    fn bands_that_have_few_wavelengths_are_told() {
-        let notes = |integrator: &str, bands: u32| {
-            let light = "lights: [constant: {radiance: 1}]";
-            let written = format!("integrator: {integrator}\noutput: {{spectral: {{bands: {bands}}}}}\n{light}");
-            compiled(&written).unwrap().notes
-        };
-        let told = notes("whitted", 31);
-        let parts = ["s.yaml:2", "32 wavelengths a pixel are few for 31 bands", "off by up to 100 %"];
-        assert!(told.len() == 1 && parts.iter().all(|part| told[0].contains(part)), "{told:?}");
-        for (integrator, bands) in [("{whitted: {grid: 8}}", 31), ("whitted", 2), ("path", 31)] {
-            assert_eq!(notes(integrator, bands), [""; 0], "{integrator} {bands}");
-        }
-    }
-
-    /// The white of F12 has lines of a few nanometres, of which 32 wavelengths miss or double some; 512 lie 1 nm apart and less.
-    /// Of daylight, of a black body and of one line 32 are enough, as each jump has its share. Light of no power is not
-    /// looked at, nor is that of a picture of bands, which has no colour.
-    #[test]
-    fn lamps_that_have_few_wavelengths_are_told() {
-        let notes = |settings: &str, lamp: &str| {
-            compiled(&format!("{settings}\nlights: [constant: {{radiance: {lamp}}}]")).unwrap().notes
-        };
-        let told = notes("integrator: whitted", "{illuminant: F12}");
-        let words = "32 wavelengths a pixel are few for the spectra of the lamps: their colour is off by up to";
-        assert!(told.len() == 1 && told[0].contains(words), "{told:?}");
-        for (settings, lamp) in [
-            ("integrator: path", "{illuminant: F12}"),
-            ("integrator: {whitted: {grid: 8}}", "{illuminant: F12}"),
-            ("integrator: whitted\nimage: {bands: [{name: all, response: 1}]}", "{illuminant: F12}"),
-            ("integrator: whitted", "{illuminant: {name: F12, scale: 0}}"),
-            ("integrator: whitted", "{illuminant: D65}"),
-            ("integrator: whitted", "{blackbody: {kelvin: 2800}}"),
-            ("integrator: whitted", "{lines: [{nm: 589}]}"),
-        ] {
-            assert_eq!(notes(settings, lamp), [""; 0], "{settings} {lamp}");
-        }
     }
 
     /// What only the spectrum itself finds out is told at the field that says it.
