@@ -21,7 +21,7 @@ use crate::scene::casters::{self, Casters};
 use crate::scene::light::Light;
 use crate::transport::layers;
 use aims::{chance, is_small};
-use camera::from_camera;
+use camera::{Camera, from_camera};
 use glam::DVec2;
 use rounds::Round;
 use seen::Seen;
@@ -262,8 +262,70 @@ fn trimmed(values: &[(usize, f64)], weights: &[f64]) -> f64 {
     weighted[..kept].iter().sum::<f64>() / kept as f64
 }
 
+/// What rounds of paths from the lights have found.
+struct Search {
+    /// In the last round.
+    found: Round,
+    /// Paths of all rounds.
+    followed: u64,
+    /// The weight of a squared error in each block.
+    weights: Vec<f64>,
+    /// Whether any round, and what is collected of any, had light that no path from the camera could find, or hardly any would.
+    unfound: bool,
+    unfound_gathered: bool,
+}
+
+/// Follows rounds of paths from the lights, each aimed by what those before it have found. Where it is `possible` that there is
+/// light that nothing else finds, they go on until some is found or the patience ends.
+fn search(
+    trial: &Trial,
+    caustics: &mut Caustics,
+    plan: &EffectPlan,
+    seen: Option<&Seen>,
+    camera: &Camera,
+    possible: bool,
+) -> Search {
+    let Trial { scene, moments, settings, seed, .. } = *trial;
+    let high = DVec2::from_array(scene.camera.resolution.map(f64::from));
+    let mut weights = relative(&camera.means);
+    let mut learnt = vec![Vec::new(); caustics.sources.len()];
+    let most_rays = SHARE * trial.paths() * camera.rays;
+    let patience = PATIENCE * trial.paths() * camera.rays;
+    let (mut followed, mut rays) = (0, 0.0);
+    // As soon as one path has found light that no path from the camera could, or that hardly any would, it is traced.
+    let (mut unfound, mut unfound_gathered) = (false, false);
+    let mut number = 0;
+    loop {
+        let paths = LightPaths {
+            scene,
+            moments,
+            plan,
+            settings: settings.of_light_paths(),
+            caustics: Some(&*caustics),
+            seed: seed ^ STREAM,
+            bounds: Bounds { low: DVec2::ZERO, high },
+            wavelength: None,
+        };
+        let found = trial.round(&paths, seen, number, &weights, most_rays, &mut learnt);
+        followed += found.paths;
+        rays += found.rays * found.paths as f64;
+        unfound |= found.unfound;
+        unfound_gathered |= found.unfound_gathered;
+        caustics.learn(&mut learnt);
+        if number + 1 < ROUNDS {
+            // What the lights send there is part of the picture that errors are relative to.
+            let means: Vec<f64> = camera.means.iter().zip(&found.thrown).map(|(a, b)| a + b).collect();
+            weights = relative(&means);
+        } else if !possible || unfound || found.came() || rays >= patience {
+            return Search { found, followed, weights, unfound, unfound_gathered };
+        }
+        number += 1;
+    }
+}
+
+/// Tries what `caustics` would trace, and decides by what it finds.
 fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Effect>) {
-    let Trial { scene, moments, plan, settings, filter, seed, wishes, .. } = *trial;
+    let Trial { scene, moments, plan, filter, seed, wishes, .. } = *trial;
     let seen = match wishes.merging {
         Use::Off => None,
         Use::Auto | Use::On => Seen::of(trial, plan, &caustics),
@@ -275,45 +337,14 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let camera = from_camera(&shot, moments, trial.tries());
     let [width, height] = scene.camera.resolution.map(f64::from);
     let pixels = width * height;
-
-    let bounds = Bounds { low: DVec2::ZERO, high: DVec2::new(width, height) };
-    let mut weights = relative(&camera.means);
-    let mut learnt = vec![Vec::new(); caustics.sources.len()];
-    let most_rays = SHARE * trial.paths() * camera.rays;
-    let (mut found, mut followed, mut rays) = (Round::default(), 0, 0.0);
     let endless = endless_odds(scene, &caustics);
     let traced = || (0..scene.lights.len()).filter(|&i| caustics.traced[i]);
     let rare = traced().any(|i| trial.rare[i]);
     let chance = traced().map(|i| trial.chances[i]).fold(0.0, f64::max);
+    // Whether there may be light that no path from the camera finds, or hardly any.
     let possible = rare || endless && (trial.casters.single || trial.in_part.single);
-    let patience = PATIENCE * trial.paths() * camera.rays;
-    // As soon as one path has found light that no path from the camera could, or that hardly any would, it is traced.
-    let (mut unfound, mut unfound_gathered) = (false, false);
-    for number in 0.. {
-        let paths = LightPaths {
-            scene,
-            moments,
-            plan: &with_all,
-            settings: settings.of_light_paths(),
-            caustics: Some(&caustics),
-            seed: seed ^ STREAM,
-            bounds,
-            wavelength: None,
-        };
-        found = trial.round(&paths, seen.as_ref(), number, &weights, most_rays, &mut learnt);
-        followed += found.paths;
-        rays += found.rays * found.paths as f64;
-        unfound |= found.unfound;
-        unfound_gathered |= found.unfound_gathered;
-        caustics.learn(&mut learnt);
-        // What the lights send there is part of the picture that errors are relative to.
-        let means: Vec<f64> = camera.means.iter().zip(&found.thrown).map(|(a, b)| a + b).collect();
-        if number + 1 < ROUNDS {
-            weights = relative(&means);
-        } else if !possible || unfound || found.came() || rays >= patience {
-            break;
-        }
-    }
+    let searched = search(trial, &mut caustics, &with_all, seen.as_ref(), &camera, possible);
+    let Search { found, followed, weights, unfound, unfound_gathered } = searched;
     // It may be there all the same.
     let missing = possible && !found.came();
     if !found.came() && !unfound && !possible && wishes.light_tracing == Use::Auto {
