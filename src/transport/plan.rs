@@ -222,6 +222,50 @@ fn too_short(max_depth: Option<u32>) -> Option<&'static str> {
     }
 }
 
+/// So many of something.
+fn count(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
+/// The effects of a scene, one after the other.
+struct Told {
+    mode: EffectMode,
+    /// Why neither the picture nor a layer shows light, where that is so.
+    unlit: Option<&'static str>,
+    has_layers: bool,
+    effects: Vec<Effect>,
+}
+
+impl Told {
+    /// An effect of the scene: on if the scene has it, or if everything is forced on. Without light it is told as off; whatever
+    /// layers take of it stays. Returns whether it is simulated.
+    fn effect(&mut self, name: &'static str, present: bool, here: String, absent: &str) -> bool {
+        let forced = self.mode == EffectMode::All;
+        let in_force = present || forced;
+        let unseen = match name {
+            "depth of field" => false,
+            "textures" | "interference" | "nested bodies" => !self.has_layers,
+            _ => true,
+        };
+        let (present, absent) = match self.unlit.filter(|_| unseen) {
+            Some(none) => (false, none),
+            None => (present, absent),
+        };
+        let reason = match (present, forced) {
+            (true, _) => here,
+            (false, false) => absent.to_owned(),
+            (false, true) => format!("forced by effects: all ({absent})"),
+        };
+        self.effects.push(Effect { name: name.into(), on: present || forced, reason });
+        in_force
+    }
+
+    /// The same of an effect that `things` of the scene have.
+    fn list(&mut self, name: &'static str, things: &[String], here: &str, absent: &str) -> bool {
+        self.effect(name, !things.is_empty(), format!("{here}: {}", some_of(things)), absent)
+    }
+}
+
 /// The techniques of the path tracer for this scene.
 fn path_techniques(census: &Census, settings: &PathSettings, chromatic: bool) -> Vec<Effect> {
     let (extended, lights) = (census.extended_lights(), census.lights());
@@ -275,70 +319,22 @@ impl EffectPlan {
         // Who shows light: the picture, else a layer.
         let lighting = std::iter::once(&integrator).chain(&layers.integrators).find(|one| one.shows_light());
         let no_light = integrator.no_light();
-        let mut effects: Vec<Effect> = Vec::new();
-        let unseen = |name: &str| match name {
-            "depth of field" => false,
-            "textures" | "interference" | "nested bodies" => layers.layers.is_empty(),
-            _ => true,
+        let mut told = Told {
+            mode,
+            unlit: no_light.filter(|_| lighting.is_none()),
+            has_layers: !layers.layers.is_empty(),
+            effects: Vec::new(),
         };
-        // An effect of the scene: on if the scene has it, or if everything is forced on. Without light it is told as off; whatever
-        // layers take of it stays.
-        let mut effect = |name: &'static str, present: bool, here: String, absent: &str| {
-            let in_force = present || mode == EffectMode::All;
-            let (present, absent) = match no_light.filter(|_| lighting.is_none() && unseen(name)) {
-                Some(none) => (false, none),
-                None => (present, absent),
-            };
-            let on = present || mode == EffectMode::All;
-            let reason = match (present, mode) {
-                (true, _) => here,
-                (false, EffectMode::Auto) => absent.to_owned(),
-                (false, EffectMode::All) => format!("forced by effects: all ({absent})"),
-            };
-            effects.push(Effect { name: name.into(), on, reason });
-            in_force
-        };
-        let count = |n: usize, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
 
         let bent = census.dispersive.iter().chain(&census.rough_dispersive);
         let dispersive: Vec<String> = bent.chain(&census.coloured_coats).cloned().collect();
-        effect(
-            "dispersion",
-            !dispersive.is_empty(),
-            format!("index depends on wavelength: {}", some_of(&dispersive)),
-            "no index depends on wavelength",
-        );
-        effect(
-            "refraction",
-            !census.refractive.is_empty(),
-            format!("transparent: {}", some_of(&census.refractive)),
-            "nothing is transparent",
-        );
-        effect(
-            "interference",
-            !census.films.is_empty(),
-            format!("thin films, at each wavelength: {}", some_of(&census.films)),
-            "no surface has a thin film",
-        );
-        effect(
-            "specular reflection",
-            !census.reflective.is_empty(),
-            format!("mirrors and metals: {}", some_of(&census.reflective)),
-            "no mirrors and no metals",
-        );
-        effect(
-            "textures",
-            !census.textured.is_empty(),
-            format!("varying over the surface: {}", some_of(&census.textured)),
-            "every surface has one spectrum",
-        );
-        effect(
-            "area lights",
-            !census.area_lights.is_empty(),
-            format!("shining: {}", some_of(&census.area_lights)),
-            "no surface shines",
-        );
-        effect(
+        told.list("dispersion", &dispersive, "index depends on wavelength", "no index depends on wavelength");
+        told.list("refraction", &census.refractive, "transparent", "nothing is transparent");
+        told.list("interference", &census.films, "thin films, at each wavelength", "no surface has a thin film");
+        told.list("specular reflection", &census.reflective, "mirrors and metals", "no mirrors and no metals");
+        told.list("textures", &census.textured, "varying over the surface", "every surface has one spectrum");
+        told.list("area lights", &census.area_lights, "shining", "no surface shines");
+        told.effect(
             "lights without extent",
             census.delta_lights > 0,
             count(
@@ -348,14 +344,14 @@ impl EffectPlan {
             ),
             "no point, spot, projector or directional light",
         );
-        effect(
+        told.effect(
             "environment",
             census.backgrounds > 0,
             count(census.backgrounds, "light from infinity", "lights from infinity"),
             "no light from infinity",
         );
         let clear = count(census.clear_media, "medium that dims light", "media that dim light");
-        let media = effect(
+        let media = told.effect(
             "media",
             if path { census.media > 0 } else { census.clear_media > 0 },
             match (path, census.media - census.clear_media) {
@@ -371,14 +367,10 @@ impl EffectPlan {
                 false => "whitted leaves out media that scatter or vary",
             },
         );
-        let nested = effect(
-            "nested bodies",
-            !census.nested.is_empty(),
-            format!("the higher priority has the place: {}", some_of(&census.nested)),
-            "no body has a priority",
-        );
-        let depth_fog = effect("depth fog", census.fog, "the scene asks for it".into(), "the scene has none");
-        effect(
+        let nested =
+            told.list("nested bodies", &census.nested, "the higher priority has the place", "no body has a priority");
+        let depth_fog = told.effect("depth fog", census.fog, "the scene asks for it".into(), "the scene has none");
+        told.effect(
             "depth of field",
             path && census.lens,
             "the lens has a radius".into(),
@@ -390,7 +382,7 @@ impl EffectPlan {
             Integrator::Whitted(_) => ("", Some("whitted knows light of mirrors and glass only, and an ambient term")),
             Integrator::Depth | Integrator::Nothing => ("", no_light),
         };
-        effect("indirect light", absent.is_none(), follows.into(), absent.unwrap_or_default());
+        told.effect("indirect light", absent.is_none(), follows.into(), absent.unwrap_or_default());
         // Not an effect but a consequence; forced on with the effects that call for it.
         let bends = !(census.dispersive.is_empty() && census.rough_dispersive.is_empty());
         let chromatic = bends || census.chromatic_media > 0 || mode == EffectMode::All;
@@ -417,7 +409,7 @@ impl EffectPlan {
             caustics: None,
             adaptive: None,
             layers,
-            effects,
+            effects: told.effects,
             techniques,
         }
     }
