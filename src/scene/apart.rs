@@ -96,6 +96,32 @@ impl Withdrawal {
             touched.push((other, normal));
         }
     }
+
+    /// Makes a body smaller, or moves a mesh, where it has room, and tells of all that it touches; `parted` says of something
+    /// whether both should overlap, but were parted.
+    fn carry_out(&self, geometry: &mut Geometry, parted: impl Fn(u32) -> bool) -> Vec<Contact> {
+        let by = APART * self.scale * (self.rank + 1) as f64 * if self.leaves { 1.0 } else { -1.0 };
+        // Into which direction a mesh moves that much from each face, if it can.
+        let inward: DVec3 = self.touched.iter().map(|(_, normal)| -*normal).sum();
+        let least = self.touched.iter().map(|(_, n)| -n.dot(inward)).filter(|d| *d > 0.1).fold(f64::INFINITY, f64::min);
+        let is_done = match geometry {
+            Geometry::Shape(shape) => shape.inset(by).map(|smaller| *shape = smaller).is_some(),
+            Geometry::Mesh(mesh) if mesh.mesh.may_be_closed() && least.is_finite() => {
+                mesh.shift(inward * (by / least));
+                true
+            }
+            Geometry::Mesh(_) | Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => false,
+        };
+        let is_mesh = is_mesh(geometry);
+        let mut told = HashSet::new();
+        let contact = |&(other, normal): &(u32, DVec3)| {
+            let left = !is_mesh || -normal.dot(inward) > 0.1;
+            let parted = parted(other);
+            let by = (is_done && left && !parted).then_some(by);
+            told.insert((other, by.is_some())).then_some(Contact { body: self.body as u32, other, by, parted })
+        };
+        self.touched.iter().filter_map(contact).collect()
+    }
 }
 
 /// Puts bodies apart that share faces, and says which, and how many more bodies were not looked at; `boxes` are the objects'.
@@ -108,9 +134,25 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
     if bodies.is_empty() || objects.len() < 2 {
         return (Vec::new(), all - bodies.len());
     }
-    let volume = |i: usize| (boxes[i].max - boxes[i].min).element_product();
     let ranked: Vec<bool> =
         objects.iter().map(|o| materials[o.material as usize].body().is_ok_and(|body| body.is_some())).collect();
+    let mut found = withdrawals(objects, boxes, &bodies, &ranked);
+    share_scales(&mut found);
+    let leaving: HashSet<u32> = found.iter().filter(|one| one.leaves).map(|one| one.body as u32).collect();
+    let mut contacts = Vec::new();
+    for one in found {
+        // Of bodies with priorities one may have had to leave something else.
+        let parted =
+            |other: u32| ranked[one.body] && ranked[other as usize] && (one.leaves || leaving.contains(&other));
+        contacts.extend(one.carry_out(&mut objects[one.body].geometry, parted));
+        boxes[one.body] = objects[one.body].bounds();
+    }
+    (contacts, all - bodies.len())
+}
+
+/// Which bodies are to withdraw, and from what: the largest first. `ranked` are the objects with a priority.
+fn withdrawals(objects: &[Object], boxes: &[Aabb], bodies: &[usize], ranked: &[bool]) -> Vec<Withdrawal> {
+    let volume = |i: usize| (boxes[i].max - boxes[i].min).element_product();
     // Opaque, or a sheet, which has no inside to withdraw to.
     let mut stays = vec![[true, true]; objects.len()];
     bodies.iter().for_each(|&i| stays[i] = [false, !is_closed(&objects[i].geometry)]);
@@ -124,7 +166,7 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
         one.touches(other as u32, normal, is_mesh(&objects[body].geometry));
     };
     let mut points_of_guests = POINTS;
-    for &body in &bodies {
+    for &body in bodies {
         let pad = REACH * boxes[body].min.abs().max(boxes[body].max.abs()).max_element();
         let near = |b: &Aabb, min: DVec3, max: DVec3| b.min.cmple(max + pad).all() && b.max.cmpge(min - pad).all();
         let others: Vec<usize> =
@@ -132,6 +174,7 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
         if others.is_empty() {
             continue;
         }
+        // What points of the body lie on.
         let mut met_others = HashSet::new();
         for probe in probes(&objects[body].geometry, points) {
             for &other in others.iter().filter(|&&i| near(&boxes[i], probe.point, probe.point)) {
@@ -153,6 +196,7 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
                 }
             }
         }
+        // What has points that lie on the body, where those of the body have not found it.
         let is_guest = |i: usize| stays[i][0] && has_points(&objects[i].geometry) && !met_others.contains(&i);
         for &guest in others.iter().filter(|&&i| is_guest(i)) {
             let points = points_of_guests.min(POINTS_OF_GUEST);
@@ -169,36 +213,7 @@ pub(super) fn put_apart(objects: &mut [Object], boxes: &mut [Aabb], materials: &
     // Of two that lie in one another the smaller withdraws by more; what touches shares a scale.
     let mut found: Vec<Withdrawal> = found.into_values().collect();
     found.sort_by(|a, b| volume(b.body).total_cmp(&volume(a.body)).then(a.body.cmp(&b.body)));
-    share_scales(&mut found);
-    let leaving: HashSet<u32> = found.iter().filter(|one| one.leaves).map(|one| one.body as u32).collect();
-    let mut contacts = Vec::new();
-    for one in found {
-        let by = APART * one.scale * (one.rank + 1) as f64 * if one.leaves { 1.0 } else { -1.0 };
-        // Into which direction a mesh moves that much from each face, if it can.
-        let inward: DVec3 = one.touched.iter().map(|(_, normal)| -*normal).sum();
-        let least = one.touched.iter().map(|(_, n)| -n.dot(inward)).filter(|d| *d > 0.1).fold(f64::INFINITY, f64::min);
-        let done = match &mut objects[one.body].geometry {
-            Geometry::Shape(shape) => shape.inset(by).map(|smaller| *shape = smaller),
-            Geometry::Mesh(mesh) if mesh.mesh.may_be_closed() && least.is_finite() => {
-                mesh.shift(inward * (by / least));
-                Some(())
-            }
-            Geometry::Mesh(_) | Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => None,
-        };
-        boxes[one.body] = objects[one.body].bounds();
-        let is_mesh = is_mesh(&objects[one.body].geometry);
-        let mut told = HashSet::new();
-        for (other, normal) in one.touched {
-            let left = !is_mesh || -normal.dot(inward) > 0.1;
-            // Of bodies with priorities one may have had to leave something else.
-            let parted = ranked[one.body] && ranked[other as usize] && (one.leaves || leaving.contains(&other));
-            let by = done.map(|()| by).filter(|_| left && !parted);
-            if told.insert((other, by.is_some())) {
-                contacts.push(Contact { body: one.body as u32, other, by, parted });
-            }
-        }
-    }
-    (contacts, all - bodies.len())
+    found
 }
 
 /// Whether points are drawn on it.
