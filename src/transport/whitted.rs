@@ -13,7 +13,7 @@ use super::plan::{EffectPlan, WhittedSettings};
 use super::shadow::MAX_BOUNDARIES;
 use crate::math::{Departure, Frame, Ray};
 use crate::optics::bsdf::Pane;
-use crate::optics::dielectric::{RelativeIndex, refract};
+use crate::optics::dielectric::{RelativeIndex, Tint, refract};
 use crate::optics::fresnel::{self, Model};
 use crate::scene::compound::{Composition, Slopes, Standing, Vertex, share};
 use crate::scene::environment::Drawn;
@@ -381,115 +381,147 @@ impl Tracer<'_> {
 
     /// Light from mirrors and through glass.
     fn specular(&self, seen: &Seen, weight: Lanes, depth: u32) -> Lanes {
-        let Seen { x: &Vertex { surface, hit, at, wo, .. }, standpoint, material, normal, slopes } = *seen;
-        let geometric = surface.normal;
-        let leave = |direction: DVec3| self.scene.leave(surface, hit, direction);
+        let Seen { x: &Vertex { at, wo, .. }, standpoint, material, normal, .. } = *seen;
         let frame = Frame::from_normal(normal);
         let local = frame.to_local(wo);
         let cos = local.z.abs();
-        let follow = |share: Lanes, wi: DVec3, inside: Inside| -> Lanes {
-            let share = share * slopes.shadowing(wi) as f32;
-            let onward = weight * share;
-            if visible(onward) {
-                self.trace(&leave(wi), inside, onward, depth + 1, f64::INFINITY).light * share
-            } else {
-                Lanes::ZERO
-            }
-        };
-        // A shading normal that leans may send light to the wrong side of the true surface, where it
-        // would see through it: that light is lost, as in `path`.
-        let sides = |wi: DVec3| wi.dot(geometric) * wo.dot(geometric);
-        let reflect = |share: Lanes| -> Lanes {
-            let wi = frame.to_world(DVec3::new(-local.x, -local.y, local.z));
-            if sides(wi) > 0.0 { follow(share, wi, standpoint.here) } else { Lanes::ZERO }
-        };
-        let cross = |share: Lanes, wi: DVec3| {
-            if sides(wi) < 0.0 { follow(share, wi, standpoint.beyond) } else { Lanes::ZERO }
-        };
+        let bounce = Bounce { tracer: self, seen, frame, local, weight, depth };
         match &material.kind {
             Kind::Diffuse { .. } | Kind::Hair { .. } | Kind::Boundary | Kind::Compound(_) => Lanes::ZERO,
-            Kind::Mirror { reflectance } => reflect(reflectance.eval(self.nm)),
+            Kind::Mirror { reflectance } => bounce.reflect(reflectance.eval(self.nm)),
             // Rough metal and rough glass are shown smooth: a single ray knows one direction.
             Kind::Conductor { eta, k, tint, fresnel, film, .. } => {
-                reflect(metal(eta, k, tint, *fresnel, film.as_deref(), at, self.nm).reflectance(cos))
+                bounce.reflect(metal(eta, k, tint, *fresnel, film.as_deref(), at, self.nm).reflectance(cos))
             }
             Kind::Plastic { coat, tint, .. } => {
                 let r = coat.eta(self.nm).lanes(|eta| fresnel::dielectric(Model::Exact, cos, eta).reflected);
                 let tint = tint.as_ref().map_or(Lanes::ONE, |tint| tint.eval(at, self.nm));
-                reflect(tint * r)
+                bounce.reflect(tint * r)
             }
             Kind::Principled(solid) => {
                 let front = local.z > 0.0;
                 let parts = solid.at(at, self.nm).smooth(cos, front);
                 if !material.transmits() {
-                    return reflect(parts.reflected);
+                    return bounce.reflect(parts.reflected);
                 }
                 let eta = if front { solid.eta } else { 1.0 / solid.eta };
                 let split = fresnel::dielectric(Model::Exact, cos, eta);
                 let wi = refract(local, DVec3::Z * local.z.signum(), eta, split.cos_transmitted);
                 let transmitted = parts.transmitted * (1.0 / (eta * eta)) as f32;
-                reflect(parts.reflected) + cross(transmitted, frame.to_world(wi))
+                bounce.reflect(parts.reflected) + bounce.cross(transmitted, frame.to_world(wi))
             }
             Kind::PrincipledThin(sheet) => {
                 let parts = sheet.at(at, self.nm).smooth(cos);
-                reflect(parts.reflected) + cross(parts.transmitted, -wo)
+                bounce.reflect(parts.reflected) + bounce.cross(parts.transmitted, -wo)
             }
             Kind::Thin { interior, exterior, tints, thickness } => {
                 let tint = Tints::at(tints.as_deref(), at, self.nm);
                 let waves = thickness.as_ref().map(|t| t.waves(at, self.nm, exterior));
                 let pane = Pane::new(cos, &relative_index(interior, exterior, self.nm, false), waves);
                 let reflected = tint.reflected * pane.reflected * (1.0 - pane.share) as f32;
-                reflect(reflected) + cross(tint.transmitted * pane.transmitted * pane.share as f32, -wo)
+                bounce.reflect(reflected) + bounce.cross(tint.transmitted * pane.transmitted * pane.share as f32, -wo)
             }
             Kind::Dielectric { interior, exterior, fresnel: model, tints, film, .. } => {
                 let tint = Tints::at(tints.as_deref(), at, self.nm);
                 let exterior = standpoint.around.unwrap_or(exterior);
                 // As paths do under a film (`Material::bsdf`).
                 let index = relative_index(interior, exterior, self.nm, self.plan.all_dispersive && film.is_none());
-                let m = DVec3::Z * local.z.signum();
-                let toward = |eta: f64| if local.z > 0.0 { eta } else { 1.0 / eta };
-                // Radiance that crosses scales by 1/η².
-                let bent = |eta: f64, reflected: Option<f64>| {
-                    let mut split = fresnel::dielectric(*model, cos, eta);
-                    if let Some(reflected) = reflected {
-                        (split.reflected, split.transmitted) = (reflected, 1.0 - reflected);
-                    }
-                    let wi = frame.to_world(refract(local, m, eta, split.cos_transmitted));
-                    (split.reflected as f32, (split.transmitted / (eta * eta)) as f32, wi)
-                };
                 let filmed = film
                     .as_ref()
                     .map(|film| film.at(at, self.nm, exterior).over_dielectric(cos, index.each(), local.z > 0.0));
-                match index {
-                    RelativeIndex::Constant(eta) if filmed.is_some() => {
-                        let (_, _, wi) = bent(toward(eta), None);
-                        let r = Lanes::new(filmed.unwrap_or_default().map(|r| r as f32));
-                        let scale = (1.0 / (toward(eta) * toward(eta))) as f32;
-                        reflect(tint.reflected * r) + cross(tint.transmitted * (Lanes::ONE - r) * scale, wi)
+                bounce.glass(*model, &index, filmed, &tint)
+            }
+        }
+    }
+}
+
+/// Light that is mirrored and refracted at a vertex.
+struct Bounce<'a> {
+    tracer: &'a Tracer<'a>,
+    seen: &'a Seen<'a>,
+    frame: Frame,
+    /// The direction to the viewer, in the frame.
+    local: DVec3,
+    /// The share that reaches the eye.
+    weight: Lanes,
+    depth: u32,
+}
+
+impl Bounce<'_> {
+    /// The `share` that goes to the viewer of what arrives from `wi`, in which direction there is `inside`.
+    fn follow(&self, share: Lanes, wi: DVec3, inside: Inside) -> Lanes {
+        let Vertex { surface, hit, .. } = *self.seen.x;
+        let share = share * self.seen.slopes.shadowing(wi) as f32;
+        let onward = self.weight * share;
+        if !visible(onward) {
+            return Lanes::ZERO;
+        }
+        let ray = self.tracer.scene.leave(surface, hit, wi);
+        self.tracer.trace(&ray, inside, onward, self.depth + 1, f64::INFINITY).light * share
+    }
+
+    /// Above zero where `wi` is on the viewer's side of the true surface. A shading normal that leans may send light to the wrong
+    /// side, where it would see through it: that light is lost, as in `path`.
+    fn sides(&self, wi: DVec3) -> f64 {
+        let Vertex { surface, wo, .. } = *self.seen.x;
+        wi.dot(surface.normal) * wo.dot(surface.normal)
+    }
+
+    /// Light that is mirrored.
+    fn reflect(&self, share: Lanes) -> Lanes {
+        let wi = self.frame.to_world(DVec3::new(-self.local.x, -self.local.y, self.local.z));
+        if self.sides(wi) > 0.0 { self.follow(share, wi, self.seen.standpoint.here) } else { Lanes::ZERO }
+    }
+
+    /// Light that comes through from `wi`.
+    fn cross(&self, share: Lanes, wi: DVec3) -> Lanes {
+        if self.sides(wi) < 0.0 { self.follow(share, wi, self.seen.standpoint.beyond) } else { Lanes::ZERO }
+    }
+
+    /// Both at a face of glass. Under a film the share that each lane reflects is `filmed`.
+    fn glass(&self, model: Model, index: &RelativeIndex, filmed: Option<[f64; LANES]>, tint: &Tint) -> Lanes {
+        let local = self.local;
+        let m = DVec3::Z * local.z.signum();
+        let toward = |eta: f64| if local.z > 0.0 { eta } else { 1.0 / eta };
+        // Radiance that crosses scales by 1/η².
+        let bent = |eta: f64, reflected: Option<f64>| {
+            let mut split = fresnel::dielectric(model, local.z.abs(), eta);
+            if let Some(reflected) = reflected {
+                (split.reflected, split.transmitted) = (reflected, 1.0 - reflected);
+            }
+            let wi = self.frame.to_world(refract(local, m, eta, split.cos_transmitted));
+            (split.reflected as f32, (split.transmitted / (eta * eta)) as f32, wi)
+        };
+        match index {
+            RelativeIndex::Constant(eta) => {
+                let eta = toward(*eta);
+                let (r, t, wi) = bent(eta, None);
+                let (reflected, transmitted) = match filmed {
+                    None => (tint.reflected * r, tint.transmitted * t),
+                    Some(filmed) => {
+                        let r = Lanes::new(filmed.map(|r| r as f32));
+                        (tint.reflected * r, tint.transmitted * (Lanes::ONE - r) * (1.0 / (eta * eta)) as f32)
                     }
-                    RelativeIndex::Constant(eta) => {
-                        let (r, t, wi) = bent(toward(eta), None);
-                        reflect(tint.reflected * r) + cross(tint.transmitted * t, wi)
+                };
+                self.reflect(reflected) + self.cross(transmitted, wi)
+            }
+            RelativeIndex::Dispersive(all) => {
+                let lanes: [_; LANES] = std::array::from_fn(|k| bent(toward(all[k]), filmed.map(|f| f[k])));
+                let mut light = self.reflect(tint.reflected * Lanes::new(lanes.map(|l| l.0)));
+                // Lanes with the very same index stay together; others part.
+                let mut done = [false; LANES];
+                for k in 0..LANES {
+                    if done[k] {
+                        continue;
                     }
-                    RelativeIndex::Dispersive(all) => {
-                        let lanes: [_; LANES] = std::array::from_fn(|k| bent(toward(all[k]), filmed.map(|f| f[k])));
-                        let mut light = reflect(tint.reflected * Lanes::new(lanes.map(|l| l.0)));
-                        // Lanes with the very same index stay together; others part.
-                        let mut done = [false; LANES];
-                        for k in 0..LANES {
-                            if done[k] {
-                                continue;
-                            }
-                            let share: [f32; LANES] = std::array::from_fn(|j| {
-                                let together = !done[j] && all[j] == all[k];
-                                done[j] |= together;
-                                if together { lanes[j].1 } else { 0.0 }
-                            });
-                            light += cross(tint.transmitted * Lanes::new(share), lanes[k].2);
-                        }
-                        light
-                    }
+                    let share: [f32; LANES] = std::array::from_fn(|j| {
+                        let together = !done[j] && all[j] == all[k];
+                        done[j] |= together;
+                        if together { lanes[j].1 } else { 0.0 }
+                    });
+                    light += self.cross(tint.transmitted * Lanes::new(share), lanes[k].2);
                 }
+                light
             }
         }
     }
