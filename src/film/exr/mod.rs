@@ -377,32 +377,8 @@ pub fn beauty(
 ) -> Beauty {
     let colours: Vec<(&str, &Vec<f32>)> = base.colours().iter().map(|&(name, i)| (name, &image.rgb[i])).collect();
     let in_colours = base != Base::Nothing || layers.iter().any(|layer| layer.kind == PlaneKind::Colour);
-    // The picture and each layer of light by itself: a dim one may lie beside a bright one.
     let of_colours: Vec<&Vec<f32>> = colours.iter().map(|(_, plane)| *plane).collect();
-    let mut of_layers: BTreeMap<&str, Vec<&Vec<f32>>> = BTreeMap::new();
-    for layer in layers.iter().filter(|layer| layer.kind != PlaneKind::Data) {
-        of_layers.entry(group(&layer.name)).or_default().push(&layer.plane);
-    }
-    let (narrow, lossy) = (precision == Precision::Half, compression.loses());
-    let lost = |planes: &[&Vec<f32>]| if narrow || lossy { half_loses(planes) } else { None };
-    let colours_lost = lost(&of_colours);
-    let wide = !narrow || colours_lost.is_some();
-    let layers_lost: Vec<(String, String)> =
-        of_layers.iter().filter_map(|(name, planes)| Some(((*name).to_owned(), lost(planes)?))).collect();
-    let told = |(name, why): &(String, String)| format!("layer {name}: {why}");
-    let beyond_half = colours_lost.or_else(|| {
-        let told: Vec<String> = layers_lost.iter().map(told).collect();
-        (!told.is_empty()).then(|| told.join("; "))
-    });
-    let planes: Vec<&Vec<f32>> = of_colours.iter().chain(of_layers.values().flatten()).copied().collect();
-    let beyond_dwa = if lossy { beyond_half.clone().or_else(|| not_finite(&planes)) } else { None };
-    let compression = if beyond_dwa.is_some() { Compression::Zips } else { compression };
-    let note = match (beyond_half.filter(|_| narrow), beyond_dwa) {
-        (Some(why), None) => Some(format!("{why}: written as 32-bit float")),
-        (Some(why), Some(_)) => Some(format!("{why}: written as 32-bit float, packed as ZIPS in place of DWA")),
-        (None, Some(why)) => Some(format!("{why}: packed as ZIPS in place of DWA")),
-        (None, None) => None,
-    };
+    let Packing { wide, wide_layers, compression, note } = packing(&of_colours, &layers, precision, compression);
     let data = |plane: &[f32], wide: bool| {
         if wide {
             ChannelData::F32(plane.to_vec())
@@ -426,7 +402,7 @@ pub fn beauty(
     for layer in layers {
         let samples = match layer.kind {
             PlaneKind::Colour | PlaneKind::Band => {
-                data(&layer.plane, wide || layers_lost.iter().any(|(name, _)| name == group(&layer.name)))
+                data(&layer.plane, wide || wide_layers.iter().any(|name| name == group(&layer.name)))
             }
             PlaneKind::Data => ChannelData::F32(layer.plane),
         };
@@ -446,6 +422,47 @@ pub fn beauty(
         layout: Layout::Single,
     };
     Beauty { exr, note }
+}
+
+/// How the numbers of a file are kept.
+struct Packing {
+    /// Whether all light is 32-bit floats, and which layers of it are in any case.
+    wide: bool,
+    wide_layers: Vec<String>,
+    compression: Compression,
+    /// Why it is not as was asked for.
+    note: Option<String>,
+}
+
+/// What the picture's own planes of `colours` and each layer of light allow by itself: a dim one may lie beside a bright one.
+fn packing(colours: &[&Vec<f32>], layers: &[LayerPlane], precision: Precision, compression: Compression) -> Packing {
+    let mut of_layers: BTreeMap<&str, Vec<&Vec<f32>>> = BTreeMap::new();
+    for layer in layers.iter().filter(|layer| layer.kind != PlaneKind::Data) {
+        of_layers.entry(group(&layer.name)).or_default().push(&layer.plane);
+    }
+    let (narrow, lossy) = (precision == Precision::Half, compression.loses());
+    let lost = |planes: &[&Vec<f32>]| if narrow || lossy { half_loses(planes) } else { None };
+    let colours_lost = lost(colours);
+    let wide = !narrow || colours_lost.is_some();
+    let layers_lost: Vec<(&str, String)> =
+        of_layers.iter().filter_map(|(name, planes)| Some((*name, lost(planes)?))).collect();
+    let beyond_half = colours_lost.or_else(|| {
+        let told: Vec<String> = layers_lost.iter().map(|(name, why)| format!("layer {name}: {why}")).collect();
+        (!told.is_empty()).then(|| told.join("; "))
+    });
+    let planes: Vec<&Vec<f32>> = colours.iter().chain(of_layers.values().flatten()).copied().collect();
+    let beyond_dwa = if lossy { beyond_half.clone().or_else(|| not_finite(&planes)) } else { None };
+    Packing {
+        wide,
+        wide_layers: layers_lost.iter().map(|(name, _)| (*name).to_owned()).collect(),
+        compression: if beyond_dwa.is_some() { Compression::Zips } else { compression },
+        note: match (beyond_half.filter(|_| narrow), beyond_dwa) {
+            (Some(why), None) => Some(format!("{why}: written as 32-bit float")),
+            (Some(why), Some(_)) => Some(format!("{why}: written as 32-bit float, packed as ZIPS in place of DWA")),
+            (None, Some(why)) => Some(format!("{why}: packed as ZIPS in place of DWA")),
+            (None, None) => None,
+        },
+    }
 }
 
 /// The layer of a channel: its name up to the last point.
