@@ -15,15 +15,21 @@ mod merge;
 mod plan;
 mod progress;
 mod render;
+mod streams;
 mod text;
+mod threads;
+mod values;
 
-use crate::description::SAMPLES_LIMIT;
 use crate::error::{Error, Result};
 use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use streams::{complain, lost, note_loss, prefixed, say};
+use threads::use_threads;
+use values::{
+    duration, frames, host_and_port, key_value, name_value, path_map, radiance, relative_error, samples, seed, share,
+    some_time, spp, threads, tile,
+};
 
 /// A spectral batch renderer: wavelengths, dispersion, an error bar on every image.
 #[derive(Debug, Parser)]
@@ -337,112 +343,6 @@ enum PlanFormat {
     Json,
 }
 
-fn host_and_port(text: &str) -> std::result::Result<String, String> {
-    let named = |(host, port): &(&str, &str)| !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port > 0);
-    match text.rsplit_once(':').filter(named) {
-        Some(_) => Ok(text.to_owned()),
-        None => Err("expected HOST:PORT, as localhost:14158".into()),
-    }
-}
-
-/// More threads than this help nobody: so many processors a process is bound to at the most (Linux, `cpu_set_t`).
-const MOST_THREADS: usize = 1024;
-
-fn threads(text: &str) -> std::result::Result<usize, String> {
-    match text.parse() {
-        Ok(n) if n <= MOST_THREADS => Ok(n),
-        Ok(n) => Err(format!("{n} is not in 0..={MOST_THREADS}")),
-        Err(_) => Err(format!("expected a whole number from 0 to {MOST_THREADS}")),
-    }
-}
-
-fn spp(text: &str) -> std::result::Result<u32, String> {
-    match text.parse::<i64>() {
-        Ok(n) if (1..=i64::from(SAMPLES_LIMIT)).contains(&n) => Ok(n as u32),
-        Ok(n) => Err(format!("{n} is not in 1..={SAMPLES_LIMIT}")),
-        Err(_) => Err(format!("expected a whole number from 1 to {SAMPLES_LIMIT}")),
-    }
-}
-
-fn seed(text: &str) -> std::result::Result<u64, String> {
-    text.parse().map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
-}
-
-fn duration(text: &str) -> std::result::Result<std::time::Duration, String> {
-    crate::description::duration(text).ok_or_else(|| "expected a time, as 90s, 10m or 2h".into())
-}
-
-fn some_time(text: &str) -> std::result::Result<std::time::Duration, String> {
-    let time = duration(text)?;
-    if time.is_zero() { Err("expected a time above 0, as 90s, 10m or 2h".into()) } else { Ok(time) }
-}
-
-/// Frames, which are read again where they belong.
-fn frames(text: &str) -> std::result::Result<String, String> {
-    crate::description::frames(text).map(|_| text.to_owned())
-}
-
-fn path_map(text: &str) -> std::result::Result<String, String> {
-    crate::description::PathMap::default().add(text).map(|()| text.to_owned())
-}
-
-/// A relative error, or per cent.
-fn relative_error(text: &str) -> std::result::Result<f64, String> {
-    let (number, unit) = match text.trim().strip_suffix('%') {
-        Some(number) => (number.trim(), 0.01),
-        None => (text.trim(), 1.0),
-    };
-    let share = number.parse::<f64>().ok().map(|x| x * unit).filter(|x| *x > 0.0 && *x < 1.0);
-    share.ok_or_else(|| "expected an error above 0 and below 1, as 0.01 or 1%".into())
-}
-
-/// Two whole numbers around a mark.
-fn pair(text: &str, mark: char) -> Option<[u32; 2]> {
-    let (a, b) = text.split_once(mark)?;
-    Some([a.trim().parse().ok()?, b.trim().parse().ok()?])
-}
-
-fn tile(text: &str) -> std::result::Result<[u32; 2], String> {
-    pair(text, '/').ok_or_else(|| "expected i/n, as 2/8: the third of eight tiles".into())
-}
-
-fn samples(text: &str) -> std::result::Result<crate::batch::Samples, String> {
-    use crate::batch::Samples;
-    let one = || text.trim().parse().ok().map(|n| [n, n]);
-    let range = || pair(text, '-').or_else(one).map(Samples::Range);
-    let expected = "expected a-b, as 0-63: the first 64 samples; or i/n, as 2/8: the third of eight ranges";
-    pair(text, '/').map(Samples::Nth).or_else(range).ok_or_else(|| expected.into())
-}
-
-/// Of which the red, 1.2 times as much, and the blue are numbers of a picture, which has 32-bit floats.
-fn radiance(text: &str) -> std::result::Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if (1e-37..=1e38).contains(&x) => Ok(x),
-        _ => Err("expected a number from 1e-37 to 1e38, as 0.8".into()),
-    }
-}
-
-fn share(text: &str) -> std::result::Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if (0.0..1.0).contains(&x) => Ok(x),
-        _ => Err("expected a number from 0 up to 1, as 0.003".into()),
-    }
-}
-
-fn key_value(text: &str) -> std::result::Result<(String, String), String> {
-    match text.split_once('=') {
-        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.to_owned())),
-        _ => Err("expected KEY=VALUE, for example camera.fov_deg=25".into()),
-    }
-}
-
-fn name_value(text: &str) -> std::result::Result<(String, String), String> {
-    match text.split_once('=') {
-        Some((name, value)) if !name.trim().is_empty() => Ok((name.trim().to_owned(), value.to_owned())),
-        _ => Err("expected NAME=VALUE, for example res=256".into()),
-    }
-}
-
 impl SceneArguments {
     /// What the arguments say over the files.
     ///
@@ -551,6 +451,14 @@ fn code_of(e: &Error, verb: Option<&Verb>) -> i32 {
     }
 }
 
+/// The exit code of a process that would end with `code` if all that it had to say was read.
+fn after_loss(code: i32, verb: Option<&Verb>) -> i32 {
+    let Some(why) = lost() else { return code };
+    let error = Error::output(Path::new("the standard output"), why);
+    complain(&prefixed(&error));
+    if code == 0 { code_of(&error, verb) } else { code }
+}
+
 impl Verb {
     /// Threads that were asked for, 0 for as many as are granted; none where nothing is rendered.
     fn threads(&self) -> Option<usize> {
@@ -564,78 +472,4 @@ impl Verb {
             }
         }
     }
-}
-
-/// Makes the pool of as many threads as were asked for, else as the farm grants, else as the cpuset has cores; the latter
-/// where nothing is rendered, too (`None`). Renders do not block, so the pool may be the global one; a second call in one
-/// process keeps it.
-///
-/// # Errors
-/// [`Error::Config`] where the farm grants more than can be meant; [`Error::Threads`] where the system has none to give.
-fn use_threads(asked: Option<usize>) -> Result<()> {
-    let granted = ["SLURM_CPUS_PER_TASK", "CUE_THREADS", "OMP_NUM_THREADS"];
-    let granted = || {
-        let set = |v| Some((v, std::env::var_os(v).filter(|text| !text.is_empty())?));
-        let Some((by, text)) = granted.into_iter().find_map(set) else { return Ok(None) };
-        let text = text.to_string_lossy();
-        // Of a list, as of OpenMP, the first is for what begins.
-        match text.split(',').next().unwrap_or_default().trim().parse() {
-            Ok(0) => Ok(None),
-            Ok(n) => Ok(Some((by, n))),
-            Err(_) => Err(Error::Config(format!("{by}: expected a number of threads, found {text:?}"))),
-        }
-    };
-    let wanted = match asked {
-        None => None,
-        Some(0) => granted()?,
-        Some(n) => Some(("--threads", n)),
-    };
-    let threads = match wanted {
-        Some((by, n)) if n > MOST_THREADS => {
-            return Err(Error::Config(format!("{by}: expected at most {MOST_THREADS} threads, found {n}")));
-        }
-        Some((_, n)) => n,
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
-    match rayon::ThreadPoolBuilder::new().num_threads(threads).build_global() {
-        // Without a cause it is that there is a pool already.
-        Err(e) if std::error::Error::source(&e).is_some() => Err(Error::Threads { threads, message: e.to_string() }),
-        _ => Ok(()),
-    }
-}
-
-/// Why something could not be said, the first time.
-static LOST: OnceLock<String> = OnceLock::new();
-
-/// Writes to the standard output. What cannot be written ends the process with an error, but not before its work is done.
-fn say(text: &str) {
-    let mut out = std::io::stdout().lock();
-    note_loss(out.write_all(text.as_bytes()).and_then(|()| out.flush()));
-}
-
-/// Keeps why the standard output was not written to. A reader that went away, as in `abbe plan … | head`, is no fault.
-fn note_loss(written: std::io::Result<()>) {
-    if let Err(e) = written
-        && e.kind() != std::io::ErrorKind::BrokenPipe
-    {
-        LOST.get_or_init(|| e.to_string());
-    }
-}
-
-/// The exit code of a process that would end with `code` if all that it had to say was read.
-fn after_loss(code: i32, verb: Option<&Verb>) -> i32 {
-    let Some(why) = LOST.get() else { return code };
-    let lost = Error::output(Path::new("the standard output"), why);
-    complain(&prefixed(&lost));
-    if code == 0 { code_of(&lost, verb) } else { code }
-}
-
-/// Writes a line to the standard error, if anyone listens.
-fn complain(line: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{line}");
-}
-
-/// Each line of the message with `error: ` before it.
-fn prefixed(e: &Error) -> String {
-    e.to_string().lines().map(|line| format!("error: {line}")).collect::<Vec<_>>().join("\n")
 }
