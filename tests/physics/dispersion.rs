@@ -1,8 +1,8 @@
 //! Each wavelength bends by its own index: a prism against Snell's law by hand.
 
 use super::LAMP;
-use super::channels::{render, render_with};
 use super::common::{Bench, Estimate, bench, bench_with, wavelengths};
+use super::pictures::{render, render_with};
 use abbe::film::accumulate::REPLICATES;
 use abbe::film::filter::Filter;
 use abbe::film::resolve::{self, Splats};

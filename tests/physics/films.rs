@@ -2,8 +2,8 @@
 //!
 //! The reference is Airy's sum with complex numbers, written here apart from the renderer's matrices.
 
-use super::channels::{assert_agree, render_with};
 use super::common::{Bench, SPREAD_NM, assert_close, bench, bench_with, ray, try_bench, v, wavelengths};
+use super::pictures::{assert_agree, render_with};
 use super::{across_the_unit_sphere, assert_invisible_in_every_sample, in_even_light};
 use abbe::film::filter::Filter;
 use abbe::math::sampler::Sampler;

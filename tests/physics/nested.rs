@@ -1,7 +1,7 @@
 //! Bodies that overlap: the one of higher priority has the place.
 
-use super::channels::{assert_agree, render_with};
 use super::common::{CAMERA, SPREAD_NM, assert_close, bench, bench_with, ray, try_bench, v, wavelengths};
+use super::pictures::{assert_agree, render_with};
 use super::{LAMP, across_the_unit_sphere, assert_invisible_in_every_sample, in_even_light};
 use abbe::batch::frame::Frame;
 use abbe::film::filter::Filter;
