@@ -247,7 +247,7 @@ pub(crate) fn enumerate<'a>(names: impl Iterator<Item = &'a str>) -> String {
 ///
 /// Damerau's distance (insertion, deletion, substitution, transposition), at most a third of the
 /// letters and at least one; the first in alphabetical order among equals.
-pub(crate) fn near_miss<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+fn near_miss<'a>(found: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // The distance takes time quadratic in the length, and nobody misspells that much.
     const LONGEST: usize = 100;
     let letters = found.chars().count();

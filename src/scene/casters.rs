@@ -65,7 +65,7 @@ pub const MAX_BALLS: usize = 64;
 
 /// Width of microfacets below which a surface counts as sharp, as in LuxCore: light that it throws from a small lamp is
 /// met by chance too seldom.
-pub const SHARP_ALPHA: f64 = 0.05;
+const SHARP_ALPHA: f64 = 0.05;
 
 /// Whether facets are so narrow that chance seldom finds what they mirror.
 fn is_narrow(facets: Option<&Roughness>) -> bool {

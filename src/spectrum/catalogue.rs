@@ -136,7 +136,7 @@ pub fn glass(name: &str) -> Result<RefractiveIndex, String> {
 
 /// All names that [`glass`] knows, without aliases.
 #[must_use]
-pub fn glass_names() -> Vec<&'static str> {
+fn glass_names() -> Vec<&'static str> {
     SUBSTANCES.iter().map(|s| s.name).collect()
 }
 
@@ -194,7 +194,7 @@ pub fn metal(name: &str) -> Result<(Spectrum, Spectrum), String> {
 
 /// All names that [`metal`] knows, without aliases.
 #[must_use]
-pub fn metal_names() -> Vec<&'static str> {
+fn metal_names() -> Vec<&'static str> {
     METALS.iter().map(|m| m.name).collect()
 }
 

@@ -103,7 +103,7 @@ pub fn illuminant(name: &str) -> Result<Spectrum, String> {
 
 /// The names that [`illuminant`] knows.
 #[must_use]
-pub fn illuminant_names() -> Vec<&'static str> {
+fn illuminant_names() -> Vec<&'static str> {
     std::iter::once(EVEN).chain(TABULATED.iter().map(|light| light.name)).collect()
 }
 

@@ -100,7 +100,7 @@ const MISSING: &str = "what mirrors and glass throw of lamps without extent is m
 
 /// Nothing traced from the lights, for this reason.
 #[must_use]
-pub fn left_off(reason: &str) -> (Option<Arc<Caustics>>, Vec<Effect>) {
+fn left_off(reason: &str) -> (Option<Arc<Caustics>>, Vec<Effect>) {
     (None, vec![technique("light tracing", false, reason.to_owned())])
 }
 

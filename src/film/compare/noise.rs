@@ -7,7 +7,7 @@ use crate::spectrum::luminance::REC709_OF_MITSUBA;
 use half::f16;
 
 /// Linear Rec.709 to XYZ with the digits that Mitsuba 3 and its references use.
-pub(super) const XYZ_FROM_RGB: [[f64; 3]; 3] =
+const XYZ_FROM_RGB: [[f64; 3]; 3] =
     [[0.412_453, 0.357_580, 0.180_423], REC709_OF_MITSUBA, [0.019_334, 0.119_193, 0.950_227]];
 
 /// A channel of both pictures with what is known of its noise.
@@ -166,7 +166,7 @@ impl<'a> Pair<'a> {
     }
 
     /// The difference of a pixel in standard errors, and their degrees of freedom.
-    pub fn score(&self, i: usize) -> Option<(f64, f64)> {
+    fn score(&self, i: usize) -> Option<(f64, f64)> {
         let mut variance = self.variance(i)?;
         for (estimated, about) in variance.estimated.iter_mut().zip(&self.about) {
             *estimated = about.as_ref().map_or(*estimated, |about| estimated.max(about[i]));

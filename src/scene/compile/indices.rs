@@ -19,7 +19,7 @@ const MOST_K: f64 = 0.1;
 const DARKEST: f64 = f32::MIN_POSITIVE as f64;
 
 /// The whole nanometres of the band.
-pub(super) fn nanometres() -> impl Iterator<Item = f64> {
+fn nanometres() -> impl Iterator<Item = f64> {
     (BAND_NM[0] as u32..=BAND_NM[1] as u32).map(f64::from)
 }
 

@@ -22,7 +22,7 @@ const TOO_BRIGHT: &str = "expected light up to 3.4e38, found more";
 
 impl<'a> Compiler<'a> {
     /// A texture as light: the colours of a picture are lit by D65 or what it names.
-    pub(super) fn emission_texture(&mut self, at: &str, s: &'a written::SpectrumOrTexture) -> Texture {
+    fn emission_texture(&mut self, at: &str, s: &'a written::SpectrumOrTexture) -> Texture {
         match s {
             written::SpectrumOrTexture::Texture(name) => {
                 let mut texture = self.named_texture(name);

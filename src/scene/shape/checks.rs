@@ -27,13 +27,13 @@ pub fn leaving(s: &SurfacePoint, face: u8, direction: DVec3) -> Ray {
     Ray::leaving(s.point, s.scale, s.normal, direction, Departure::new(0, u32::from(face)))
 }
 
-pub fn is_in(point: DVec3, (low, high): (DVec3, DVec3)) -> bool {
+fn is_in(point: DVec3, (low, high): (DVec3, DVec3)) -> bool {
     point.cmpge(low).all() && point.cmple(high).all()
 }
 
 /// The least exit cosine for which the side of the surface that a direction is on is known: a point
 /// is rounded to a few ε of `scale`, which turns the normal by that over the radius of curvature.
-pub fn least_cosine(shape: &Shape, s: &SurfacePoint, size: f64) -> f64 {
+fn least_cosine(shape: &Shape, s: &SurfacePoint, size: f64) -> f64 {
     let curvature_radius = match shape {
         // Near the apex the side curves within its distance from the axis; v is clamped below one,
         // so nearer than 2⁻²³ of the height that distance is not known here: nothing is asked.

@@ -52,7 +52,7 @@ fn roots(a: Dd, b: Dd, c: Dd) -> Option<(Dd, Dd)> {
     Some((t0.min(t1), t0.max(t1)))
 }
 
-pub fn sphere_reference(ray: &Ray, center: DVec3, radius: f64) -> Reference {
+fn sphere_reference(ray: &Ray, center: DVec3, radius: f64) -> Reference {
     let (o, d) = (Dd3::from(ray.origin) - Dd3::from(center), Dd3::from(ray.direction));
     let r2 = Dd::from(radius) * Dd::from(radius);
     let (a, b, c) = (d.dot(d), o.dot(d), o.dot(o) - r2);
@@ -65,7 +65,7 @@ pub fn sphere_reference(ray: &Ray, center: DVec3, radius: f64) -> Reference {
     reference
 }
 
-pub fn cylinder_reference(ray: &Ray, base: DVec3, top: DVec3, radius: f64) -> Reference {
+fn cylinder_reference(ray: &Ray, base: DVec3, top: DVec3, radius: f64) -> Reference {
     let (o, d) = (Dd3::from(ray.origin) - Dd3::from(base), Dd3::from(ray.direction));
     let axis = Dd3::from(top) - Dd3::from(base);
     let l2 = axis.dot(axis);
@@ -82,7 +82,7 @@ pub fn cylinder_reference(ray: &Ray, base: DVec3, top: DVec3, radius: f64) -> Re
     reference
 }
 
-pub fn cone_reference(ray: &Ray, base: DVec3, apex: DVec3, radius: f64) -> Reference {
+fn cone_reference(ray: &Ray, base: DVec3, apex: DVec3, radius: f64) -> Reference {
     let (o, d) = (Dd3::from(ray.origin) - Dd3::from(apex), Dd3::from(ray.direction));
     // From the apex into the cone; inside ρ ≤ r z / l, that is l² |o × axis|² ≤ r² (o · axis)².
     let axis = Dd3::from(base) - Dd3::from(apex);
@@ -109,7 +109,7 @@ pub fn cone_reference(ray: &Ray, base: DVec3, apex: DVec3, radius: f64) -> Refer
     reference
 }
 
-pub fn cube_reference(ray: &Ray, center: DVec3, edges: [DVec3; 3]) -> Reference {
+fn cube_reference(ray: &Ray, center: DVec3, edges: [DVec3; 3]) -> Reference {
     let (o, d) = (Dd3::from(ray.origin) - Dd3::from(center), Dd3::from(ray.direction));
     let mut reference = Reference::LINE;
     for i in 0..3 {
