@@ -1,6 +1,6 @@
 //! Cones, closed or open.
 
-use super::cylinder::{BASE, Part, WALL, cap_surface, disk_extent, frame_at_seam};
+use super::cylinder::{BASE, Cap, Part, WALL, disk_extent, frame_at_seam};
 use super::exact::{along, cone_form, cross, dot, rows_times};
 use super::plain::Plain;
 use super::span::{Exit, Faces, Span};
@@ -186,7 +186,9 @@ impl Cone {
     pub(super) fn surface(&self, point: DVec3, face: u8, detail: Detail) -> SurfacePoint {
         if face != WALL {
             let local = self.frame.to_local(point - self.base);
-            return cap_surface(&self.frame, self.turn, self.base, 0.0, -1.0, self.radius, local, self.scale);
+            let Cone { frame, turn, base, radius, .. } = self;
+            let cap = Cap { frame, turn: *turn, base: *base, height: 0.0, side: -1.0, radius: *radius };
+            return cap.surface(local, self.scale);
         }
         let local = self.frame.to_local(point - self.apex);
         let rho = (local.x * local.x + local.y * local.y).sqrt();

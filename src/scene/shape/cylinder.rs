@@ -15,7 +15,7 @@ use std::f64::consts::{PI, TAU};
 
 pub(super) const WALL: u8 = 0;
 pub(super) const BASE: u8 = 1;
-pub(super) const TOP: u8 = 2;
+const TOP: u8 = 2;
 
 /// A cylinder from `base` to `top`. Faces: wall 0, base cap 1, top cap 2.
 ///
@@ -187,7 +187,9 @@ impl Cylinder {
         let local = self.frame.to_local(point - self.base);
         if face != WALL {
             let (height, side) = if face == BASE { (0.0, -1.0) } else { (self.length, 1.0) };
-            return cap_surface(&self.frame, self.turn, self.base, height, side, self.radius, local, self.scale);
+            let Cylinder { frame, turn, base, radius, .. } = self;
+            let cap = Cap { frame, turn: *turn, base: *base, height, side, radius: *radius };
+            return cap.surface(local, self.scale);
         }
         let normal = (self.frame.s * local.x + self.frame.t * local.y).normalize_or(self.frame.s);
         let height = local.z.clamp(self.heights.0, self.heights.1);
@@ -350,31 +352,37 @@ pub(super) fn disk_extent(frame: &Frame, radius: f64) -> DVec3 {
     (frame.s * frame.s + frame.t * frame.t).map(f64::sqrt) * radius
 }
 
-/// The point of a cap at `height` along the frame's n nearest to `local`; `side` is +1 where the cap's
-/// normal is n and −1 where it is −n.
-#[expect(clippy::too_many_arguments, reason = "a cap of either shape, where it lies and how it is seen")]
-pub(super) fn cap_surface(
-    frame: &Frame,
-    turn: f64,
-    base: DVec3,
-    height: f64,
-    side: f64,
-    radius: f64,
-    local: DVec3,
-    scale: f64,
-) -> SurfacePoint {
-    // A hit at the rim may round to either side of it.
-    let at = DVec2::new(local.x, local.y).clamp_length_max(radius);
-    let normal = frame.n * side;
-    SurfacePoint {
-        point: base + (frame.s * at.x + frame.t * at.y + frame.n * height),
-        scale,
-        normal,
-        shading_normal: normal,
-        // Seen from outside: u to the right, v upward.
-        uv: (DVec2::splat(0.5) + DVec2::new(at.x, at.y * side * turn) * (0.5 / radius))
-            .clamp(DVec2::ZERO, DVec2::splat(BELOW_ONE)),
-        tangent: frame.s,
+/// A cap of a cylinder or cone.
+pub(super) struct Cap<'a> {
+    /// That of the shape: n is the axis.
+    pub frame: &'a Frame,
+    /// −1 where u of the shape runs the other way about the axis, else 1.
+    pub turn: f64,
+    pub base: DVec3,
+    /// Where it lies along n from the base.
+    pub height: f64,
+    /// +1 where its normal is n, −1 where it is −n.
+    pub side: f64,
+    pub radius: f64,
+}
+
+impl Cap<'_> {
+    /// Its point nearest to `local`, which counts from the base in the frame.
+    pub(super) fn surface(&self, local: DVec3, scale: f64) -> SurfacePoint {
+        let Cap { frame, turn, base, height, side, radius } = *self;
+        // A hit at the rim may round to either side of it.
+        let at = DVec2::new(local.x, local.y).clamp_length_max(radius);
+        let normal = frame.n * side;
+        SurfacePoint {
+            point: base + (frame.s * at.x + frame.t * at.y + frame.n * height),
+            scale,
+            normal,
+            shading_normal: normal,
+            // Seen from outside: u to the right, v upward.
+            uv: (DVec2::splat(0.5) + DVec2::new(at.x, at.y * side * turn) * (0.5 / radius))
+                .clamp(DVec2::ZERO, DVec2::splat(BELOW_ONE)),
+            tangent: frame.s,
+        }
     }
 }
 
