@@ -10,16 +10,18 @@
 //! itself, L E, is the camera's part (`path` of one segment). Wavelengths are carried as in [`path`].
 
 mod connect;
+mod flight;
 mod packet;
 mod span;
 mod views;
 
 pub use span::span;
 
+use self::flight::{Landing, Met};
 use self::views::{Place, View};
 use super::caustics::{Caustics, Target};
 use super::merge::WavelengthCell;
-use super::path::{self, seen_normal};
+use super::path;
 use super::photons::{Alone, Photon, Photons, Together};
 use super::plan::{EffectPlan, LightSettings};
 use super::shadow::MAX_BOUNDARIES;
@@ -27,10 +29,9 @@ use super::{moment_at, scene_at};
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::optics::bsdf::{Bsdf, BsdfSample, Chosen};
-use crate::scene::compound::{Compound, Leaf, Vertex, below};
+use crate::scene::compound::below;
 use crate::scene::light::Light;
-use crate::scene::material::Kind;
-use crate::scene::nested::{Bodies, Crossing as Meeting};
+use crate::scene::nested::Bodies;
 use crate::scene::{Hit, Inside, Medium, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
@@ -161,19 +162,8 @@ pub fn trace(
         rays: 0,
         ahead: None,
     };
-    walk.follow(Beam {
-        ray: emission.ray,
-        power: emission.power.lanes,
-        rho: Lanes::ONE,
-        nm: wavelengths.nm,
-        alone: None,
-        chosen: false,
-        medium: None,
-        bodies: if paths.plan.nested { scene.bodies_around(&emission.ray) } else { Bodies::NONE },
-        vertex: 0,
-        crossings: 0,
-        unfound: false,
-    });
+    let bodies = if paths.plan.nested { scene.bodies_around(&emission.ray) } else { Bodies::NONE };
+    walk.follow(Beam::begin(emission.ray, emission.power.lanes, wavelengths.nm, None, bodies));
     (traced.rays, traced.unfound) = (walk.rays, walk.unfound);
     traced
 }
@@ -204,19 +194,8 @@ pub(super) fn seen_in_sharp(
         ahead: None,
     };
     let ray = if walk.hides_lamps() { past_lamps(paths.scene, ray) } else { *ray };
-    walk.follow(Beam {
-        ray,
-        power: Lanes::ONE,
-        rho: Lanes::ONE,
-        nm: wavelengths.nm,
-        alone: None,
-        chosen: false,
-        medium: Some(paths.scene.camera_inside.medium),
-        bodies: paths.scene.camera_inside.bodies,
-        vertex: 0,
-        crossings: 0,
-        unfound: false,
-    });
+    let Inside { medium, bodies } = paths.scene.camera_inside;
+    walk.follow(Beam::begin(ray, Lanes::ONE, wavelengths.nm, Some(medium), bodies));
     seen.iter().next()
 }
 
@@ -258,6 +237,23 @@ struct Beam {
 }
 
 impl Beam {
+    /// All wavelengths together, before the first vertex.
+    fn begin(ray: Ray, power: Lanes, nm: Lanes, medium: Option<Option<u32>>, bodies: Bodies) -> Beam {
+        Beam {
+            ray,
+            power,
+            rho: Lanes::ONE,
+            nm,
+            alone: None,
+            chosen: false,
+            medium,
+            bodies,
+            vertex: 0,
+            crossings: 0,
+            unfound: false,
+        }
+    }
+
     fn inside(&self) -> Inside {
         Inside { medium: self.medium.flatten(), bodies: self.bodies }
     }
@@ -273,16 +269,6 @@ impl Beam {
         let value = light.to_array()[0];
         Lanes::new(std::array::from_fn(|k| if k == lane { value } else { 0.0 }))
     }
-}
-
-/// What a path meets of a material that is made of others: that, all of it, and the number that chose.
-type Part<'a> = (Leaf<'a>, &'a Compound, f64);
-
-/// What ends a flight.
-#[expect(clippy::large_enum_variant, reason = "surfaces are what is met, and a box would cost an allocation each")]
-enum Met<'a> {
-    Surface { hit: Hit, surface: SurfacePoint, part: Option<Part<'a>>, pane: bool, meeting: Option<Meeting<'a>> },
-    Medium { point: DVec3, medium: &'a Medium },
 }
 
 /// A walk from a light and what it has cost.
@@ -328,11 +314,6 @@ impl<'a> Walk<'a, '_> {
         Numbers { flight, lobe, roulette, lens, scatter }
     }
 
-    /// The numbers of a flight after some boundaries.
-    fn set_of_flight(vertex: u32, crossings: u32) -> Set {
-        Set::Extra((vertex + 1).wrapping_add(crossings << 16))
-    }
-
     /// Whether nothing may be met any more after `events`: the camera is one segment further than the next surface.
     fn is_last(&self, events: u32) -> bool {
         self.paths.settings.max_depth.is_some_and(|depth| events + 2 > depth)
@@ -348,6 +329,7 @@ impl<'a> Walk<'a, '_> {
         self.lamp.is_some_and(|lamp| !lamp.may_be_met())
     }
 
+    /// Follows a beam to its end: at each surface and each point of a medium its light goes to the camera, and it goes on.
     fn follow(&mut self, mut beam: Beam) {
         let LightPaths { scene, plan, caustics, .. } = *self.paths;
         loop {
@@ -355,30 +337,17 @@ impl<'a> Walk<'a, '_> {
             if self.is_last(beam.events()) {
                 return;
             }
-            let Numbers { flight: u_flight, lobe: u_lobe, roulette: u_roulette, lens: u_lens, scatter: u_scatter } =
-                self.numbers(vertex);
-            let Some(met) = self.fly(&mut beam, u_flight) else { return };
+            let numbers = self.numbers(vertex);
+            let Some(met) = self.fly(&mut beam, numbers.flight) else { return };
             let came = -beam.ray.direction;
-            let (hit, surface, part, pane, meeting) = match met {
-                Met::Surface { hit, surface, part, pane, meeting } => (hit, surface, part, pane, meeting),
-                Met::Medium { point, medium } => {
-                    // Next to the light something sharp is wanted.
-                    if caustics.is_some() && vertex == 0 {
-                        return;
-                    }
-                    self.connect_medium(&beam, point, medium, u_lens);
-                    if !self.goes_on(&mut beam) {
-                        return;
-                    }
-                    let went = medium.phase.sample(point, came, u_scatter);
-                    beam.ray = Ray::new(point, went);
-                    beam.vertex += 1;
-                    if !self.survives(&mut beam, false, u_roulette) {
-                        return;
-                    }
-                    continue;
-                }
+            let Landing { hit, surface, part, pane, meeting } = match met {
+                Met::Surface(landing) => landing,
+                Met::Medium { point, medium } => match self.scatter_in_medium(&mut beam, point, medium, &numbers) {
+                    true => continue,
+                    false => return,
+                },
             };
+            let Numbers { lobe: u_lobe, roulette: u_roulette, lens: u_lens, scatter: u_scatter, .. } = numbers;
             let object = &scene.objects[hit.object as usize];
             let sharp = caustics.is_some_and(|c| c.is_sharp(hit.object));
             // What else is next to a lamp without extent counts as far as it throws light in a single direction.
@@ -460,6 +429,22 @@ impl<'a> Walk<'a, '_> {
                 return;
             }
         }
+    }
+
+    /// Sends the light of a point in a medium to the camera, and the beam on from there; false where it ends.
+    fn scatter_in_medium(&mut self, beam: &mut Beam, point: DVec3, medium: &Medium, numbers: &Numbers) -> bool {
+        // Next to the light something sharp is wanted.
+        if self.paths.caustics.is_some() && beam.vertex == 0 {
+            return false;
+        }
+        self.connect_medium(beam, point, medium, numbers.lens);
+        if !self.goes_on(beam) {
+            return false;
+        }
+        let went = medium.phase.sample(point, -beam.ray.direction, numbers.scatter);
+        beam.ray = Ray::new(point, went);
+        beam.vertex += 1;
+        self.survives(beam, false, numbers.roulette)
     }
 
     /// Notes that a beam is thrown in a single direction.
@@ -558,113 +543,6 @@ impl<'a> Walk<'a, '_> {
     /// Which wavelength goes on: the same answer for each of them, wherever they are.
     fn chosen_lane(&self) -> usize {
         (self.sampler.set(Set::Extra(CHOSEN))[0] * LANES as f64) as usize
-    }
-
-    /// The next thing that the beam meets, other than boundaries and open panes, which it crosses.
-    fn fly(&mut self, beam: &mut Beam, u_flight: f64) -> Option<Met<'a>> {
-        let scene = self.paths.scene;
-        for crossings in 0..MAX_BOUNDARIES {
-            let set = Walk::set_of_flight(beam.vertex, crossings);
-            let hit = self.ahead.take().or_else(|| {
-                self.rays += 1;
-                scene.closest(&beam.ray, f64::INFINITY)
-            });
-            let surface = hit.map(|hit| scene.surface(&beam.ray, &hit));
-            if self.paths.plan.media {
-                let known = beam.medium.unwrap_or_else(|| {
-                    // The side on which the beam meets the first surface between media tells what it is in.
-                    let told = hit.zip(surface).and_then(|(hit, surface)| {
-                        let object = &scene.objects[hit.object as usize];
-                        (!object.keeps_medium).then(|| object.beyond(&surface, -beam.ray.direction, None))
-                    });
-                    let before = told.unwrap_or_else(|| scene.medium_around(&beam.ray));
-                    scene.inside(beam.bodies, before).medium
-                });
-                if beam.medium.is_none()
-                    && self.lamp.is_some_and(Light::is_distant)
-                    && let Some(medium) = known
-                {
-                    beam.power *= self.arrived(beam, &scene.media[medium as usize]);
-                    if beam.power.simd_eq(Lanes::ZERO).all() {
-                        return None;
-                    }
-                }
-                beam.medium = Some(known);
-                if let Some(medium) = known.map(|m| &scene.media[m as usize]) {
-                    let u = if crossings == 0 { u_flight } else { self.sampler.set(set)[0] };
-                    let distance = hit.map_or(f64::INFINITY, |h| h.t);
-                    let flight = medium.fly(&beam.ray, distance, beam.nm, u, || self.sampler.walk(set));
-                    beam.power *= flight.weight;
-                    beam.rho *= flight.ratio;
-                    if let Some(t) = flight.scattered_at {
-                        return Some(Met::Medium { point: beam.ray.at(t), medium });
-                    }
-                }
-            }
-            let (hit, surface) = hit.zip(surface)?;
-            let direction = beam.ray.direction;
-            let object = &scene.objects[hit.object as usize];
-            let material = &scene.materials[object.material as usize];
-            let meeting = scene.crossing(object, &surface, direction, &beam.bodies);
-            let hidden = meeting.is_some_and(|meeting| !meeting.shows);
-            // Of a material made of others, what this path meets, if anything.
-            let (shown, part) = match &material.kind {
-                _ if hidden => (None, None),
-                Kind::Compound(compound) => {
-                    // Whoever collects photons chooses one of its materials; they lie there for all of them.
-                    let sharp = self.paths.caustics.is_some_and(|caustics| caustics.is_sharp(hit.object));
-                    if beam.vertex > 0 && !sharp {
-                        self.leave_photon(beam, &surface);
-                    }
-                    let (at, wo) = (&hit.texture_point(&surface), -direction);
-                    let x = Vertex { scene, hit: &hit, surface: &surface, at, wo };
-                    let u = self.sampler.set(set)[2];
-                    let mut leaf = compound.resolve(&x, seen_normal(&surface, wo), u);
-                    // What goes straight on is seen from behind, where the holes may be others.
-                    if compound.sided && self.lamp.is_some() {
-                        let behind = Vertex { wo: direction, ..x };
-                        let open = compound.resolve(&behind, seen_normal(&surface, direction), u).is_none();
-                        match (&leaf, open) {
-                            (None, false) => return None,
-                            (Some(_), true) => {
-                                // Of the two ways one is followed.
-                                let place = CHOSEN + 1 + beam.vertex.wrapping_add(crossings << 16);
-                                beam.power *= 2.0;
-                                if self.sampler.set(Set::Extra(place))[0] < 0.5 {
-                                    leaf = None;
-                                }
-                            }
-                            _ => {}
-                        }
-                    }
-                    (leaf.as_ref().map(|leaf| leaf.material), leaf.map(|leaf| (leaf, &**compound, u)))
-                }
-                _ => (Some(material), None),
-            };
-            if let Some(shown) = shown.filter(|m| !matches!(m.kind, Kind::Boundary)) {
-                match shown.straight(&surface, direction, || hit.texture_point(&surface), beam.nm) {
-                    Some(straight) if self.sampler.set(set)[1] < straight.share => beam.power *= straight.weight,
-                    pane => return Some(Met::Surface { hit, surface, part, pane: pane.is_some(), meeting }),
-                }
-            }
-            beam.crossings += u32::from(self.paths.settings.count_crossings);
-            if self.is_last(beam.events()) {
-                return None;
-            }
-            let beyond = scene.beyond(object, &surface, direction, beam.inside());
-            beam.medium = beam.medium.map(|_| beyond.medium);
-            beam.bodies = beyond.bodies;
-            beam.ray = scene.leave(&surface, &hit, direction);
-        }
-        None
-    }
-
-    /// What `medium`, in which a beam of light from infinity begins, has left of it: the way from there is endless, as that
-    /// of a shadow ray to such a light is. Where extinction is above zero nothing comes through.
-    fn arrived(&self, beam: &Beam, medium: &Medium) -> Lanes {
-        let back = Ray::new(beam.ray.origin, -beam.ray.direction);
-        let distance = self.paths.scene.closest(&back, f64::INFINITY).map_or(f64::INFINITY, |hit| hit.t);
-        medium.dim(&back, distance, beam.nm, || self.sampler.walk(Set::Extra(0))).through
     }
 
     /// Leaves a photon where the beam has come to, if photons are wanted.
