@@ -3,20 +3,18 @@
 //! Names of channels are those of OpenEXR layers: `name.R`, `name.X`, …; components of colour are linear in the
 //! primaries of the file.
 
-use super::middle::{Covering, Middle, first_covering};
-use super::plan::{EffectPlan, Integrator};
-use super::ways::{Ledger, Way, Ways};
+mod first;
+mod values;
+
+pub use values::{Sampled, Seen, Values};
+
+use super::middle::Middle;
+use super::plan::Integrator;
+use super::ways::{Way, Ways};
 use crate::description::Quantity;
-use crate::film::accumulate::{Invalid, SAMPLE_LIMIT};
 use crate::film::layers::{Kept, Layout};
-use crate::math::{Frame, Ray};
-use crate::scene::compound::{Composition, Vertex, share};
-use crate::scene::material::Material;
-use crate::scene::watch::Counts;
-use crate::scene::{Hit, Scene, SurfacePoint};
-use crate::spectrum::{LANES, Lanes, SampledWavelengths, Spectrum, illuminant, observer};
-use glam::{DVec2, DVec3};
-use std::f64::consts::PI;
+use crate::scene::Scene;
+use crate::spectrum::{LANES, Lanes, SampledWavelengths, Spectrum, illuminant};
 
 /// How light is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -300,291 +298,13 @@ fn channels(name: &str, components: &[&str], holds: Holds, exponent: i32) -> imp
     })
 }
 
-/// One sample of light, for layers.
-#[derive(Clone, Copy, Debug)]
-pub struct Seen {
-    /// Radiance.
-    pub radiance: Lanes,
-    /// CIE XYZ of it, as sums count it.
-    pub xyz: [f32; 3],
-    /// Coverage.
-    pub alpha: f32,
-}
-
-impl Seen {
-    /// The numbers of [`NUMERICS`], which the film multiplies with the filter's `weight`: they are no light.
-    fn numerics(&self, counted: Counts, weight: f32) -> [f32; 8] {
-        let is_too_large = |x: &f32| (x * weight).abs() >= SAMPLE_LIMIT;
-        let overflow = || self.xyz.iter().any(is_too_large).then_some(Invalid::Overflow);
-        let invalid = Invalid::of(self.radiance).or_else(overflow);
-        let is = |cause| u64::from(invalid == Some(cause));
-        let Counts { surfaces, robust, rays, self_hits } = counted;
-        let causes = [Invalid::Nan, Invalid::Infinite, Invalid::Negative, Invalid::Overflow].map(is);
-        let [nan, infinite, negative, overflow] = causes;
-        [surfaces, robust, rays, self_hits, nan, infinite, negative, overflow].map(|n| n as f32 / weight)
-    }
-}
-
-/// The numbers of samples, each in the order of the channels.
-#[derive(Debug, Default)]
-pub struct Values {
-    /// The numbers.
-    pub numbers: Vec<f32>,
-    /// What one sample sees of the first surface, in the order of the layers.
-    surface: Vec<f32>,
-    /// Its light of the further integrators.
-    others: Vec<Seen>,
-}
-
-impl Values {
-    /// Looks at what is more than the picture's own light: the first surface that `ray` meets, that which it shows by the
-    /// numbers `u` of its crossings, and the `light` of further integrators.
-    #[inline(never)]
-    #[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
-    fn look(
-        &mut self,
-        scene: &Scene,
-        plan: &EffectPlan,
-        wavelengths: &SampledWavelengths,
-        ray: &Ray,
-        neighbours: impl Fn(DVec2) -> Ray,
-        u: impl Fn(u32, Option<f64>) -> f64,
-        light: impl Fn(&Integrator) -> Seen,
-    ) {
-        self.others.clear();
-        self.others.extend(plan.layers.integrators.iter().map(light));
-        self.surface.clear();
-        let (mut met, mut seen) = (None, None);
-        for layer in &plan.layers.layers {
-            let (quantity, first) = match layer.source {
-                Source::Surface(quantity) => (quantity, met.get_or_insert_with(|| First::met(scene, ray))),
-                Source::Seen(quantity) => (quantity, seen.get_or_insert_with(|| First::seen(scene, plan, ray, &u))),
-                _ => continue,
-            };
-            match first {
-                Some(first) => {
-                    first.append(scene, plan, wavelengths, ray, &neighbours, quantity, &mut self.surface);
-                }
-                None => self.surface.extend(quantity.components().iter().map(|_| 0.0)),
-            }
-        }
-    }
-
-    /// Appends the numbers of one sample. `light` gives the light of an integrator, `neighbours` the ray of a sample
-    /// some pixels away, `u` the number that decides at a crossing of its ray; `counted` is what was counted on its way, and
-    /// the weight of the filter.
-    #[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
-    #[inline]
-    pub fn append(
-        &mut self,
-        scene: &Scene,
-        plan: &EffectPlan,
-        wavelengths: &SampledWavelengths,
-        ray: &Ray,
-        neighbours: impl Fn(DVec2) -> Ray,
-        u: impl Fn(u32, Option<f64>) -> f64,
-        own: Seen,
-        counted: (Counts, f32),
-        ledger: Option<&Ledger>,
-        light: impl Fn(&Integrator) -> Seen,
-    ) {
-        let layers = &plan.layers;
-        if !layers.own_light_only() {
-            self.look(scene, plan, wavelengths, ray, neighbours, u, light);
-        }
-        let Values { numbers, surface, others } = self;
-        let mut surface = surface.iter();
-        let sensitivity = layers.sensitivity as f32;
-        for layer in &layers.layers {
-            let unit = layers.unit_of(&layer.source);
-            let squares = layer.squares.is_some().then(|| one_over_two_to(lowered(layers.exponent_of(&layer.source))));
-            match layer.source {
-                Source::Surface(quantity) | Source::Seen(quantity) => {
-                    let count = quantity.components().len();
-                    let start = numbers.len();
-                    numbers.extend(surface.by_ref().take(count).map(|x| x * unit));
-                    if let Some(factor) = squares {
-                        numbers.extend_from_within(start..);
-                        numbers[start + count..].iter_mut().for_each(|x| *x = (*x * factor) * (*x * factor));
-                    }
-                }
-                Source::Light(of, form) => {
-                    let seen = of.map_or(own, |i| others[i]);
-                    let xyz = seen.xyz.map(|x| x * sensitivity);
-                    match form {
-                        Form::Xyz => put(numbers, xyz, squares.map(|factor| [factor; 3])),
-                        Form::Rgba => {
-                            let [r, g, b] = rgb(&layers.rgb_from_xyz, xyz);
-                            put(numbers, [r, g, b, seen.alpha], squares.map(|factor| [factor, factor, factor, 1.0]));
-                        }
-                    }
-                }
-                Source::Band(i) => {
-                    put(numbers, [in_band(scene, i, wavelengths, own.radiance * unit)], squares.map(|factor| [factor]));
-                }
-                Source::Ways(ways, group) => {
-                    let light = ledger.map_or(Lanes::ZERO, |ledger| ledger.light(ways, group));
-                    let xyz = observer::xyz(light * unit, wavelengths).map(|x| x * sensitivity);
-                    numbers.extend(layers.as_the_picture(xyz));
-                }
-                // These stand in the pixel once.
-                Source::Middle(middle) => numbers.extend(middle.components().iter().map(|_| 0.0)),
-                Source::Numerics => {
-                    let squares = squares.map(|factor| [factor; NUMERICS.len()]);
-                    put(numbers, own.numerics(counted.0, counted.1), squares);
-                }
-            }
-        }
-    }
-}
-
 /// What `light` adds to a band.
 fn in_band(scene: &Scene, band: usize, wavelengths: &SampledWavelengths, light: Lanes) -> f32 {
     let counted = light * wavelengths.inv_pdf * scene.bands[band].response.eval(wavelengths.nm);
     counted.reduce_add() / LANES as f32
 }
 
-/// Appends `values`, and the squares of so many times each if they are wanted.
-#[inline]
-fn put<const N: usize>(numbers: &mut Vec<f32>, values: [f32; N], squares: Option<[f32; N]>) {
-    numbers.extend_from_slice(&values);
-    if let Some(factors) = squares {
-        let lowered = values.iter().zip(factors).map(|(x, factor)| x * factor);
-        numbers.extend(lowered.map(|x| x * x));
-    }
-}
-
 fn rgb(matrix: &[[f64; 3]; 3], xyz: [f32; 3]) -> [f32; 3] {
     let xyz = xyz.map(f64::from);
     matrix.map(|row| (row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2]) as f32)
-}
-
-/// The first surface that a camera ray meets, or shows.
-struct First {
-    hit: Hit,
-    surface: SurfacePoint,
-    /// Its normal in light, where it is what the ray shows.
-    normal: Option<DVec3>,
-}
-
-impl First {
-    fn met(scene: &Scene, ray: &Ray) -> Option<First> {
-        let hit = scene.closest(ray, scene.camera.reach(ray))?;
-        Some(First { hit, surface: scene.surface_with_texture(ray, &hit), normal: None })
-    }
-
-    fn seen(scene: &Scene, plan: &EffectPlan, ray: &Ray, u: impl Fn(u32, Option<f64>) -> f64) -> Option<First> {
-        let Covering { hit, surface, normal } = first_covering(scene, plan, ray, u)?;
-        Some(First { hit, surface, normal: Some(normal) })
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "all that a sample is made of")]
-    fn append(
-        &self,
-        scene: &Scene,
-        plan: &EffectPlan,
-        wavelengths: &SampledWavelengths,
-        ray: &Ray,
-        neighbours: &impl Fn(DVec2) -> Ray,
-        quantity: Quantity,
-        values: &mut Vec<f32>,
-    ) {
-        let surface = &self.surface;
-        let three = |v: DVec3| v.to_array().map(|x| x as f32);
-        match quantity {
-            Quantity::Depth => values.push(self.hit.t as f32),
-            Quantity::Position => values.extend(three(surface.point)),
-            Quantity::Uv => values.extend(surface.uv.to_array().map(|x| x as f32)),
-            Quantity::GeometricNormal => values.extend(three(surface.normal)),
-            Quantity::ShadingNormal => {
-                values.extend(three(self.normal.unwrap_or_else(|| self.shading_normal(scene, ray))));
-            }
-            Quantity::DpDu | Quantity::DpDv => {
-                let [du, dv] = scene.uv_gradient(&self.hit, surface).partials();
-                values.extend(three(if quantity == Quantity::DpDu { du } else { dv }));
-            }
-            Quantity::DuvDx | Quantity::DuvDy => {
-                let step = if quantity == Quantity::DuvDx { DVec2::X } else { DVec2::Y };
-                let other = neighbours(step * plan.layers.sample_distance);
-                let change = self.uv_change(scene, &other);
-                values.extend(change.to_array().map(|x| x as f32));
-            }
-            Quantity::Albedo => {
-                let mut albedo = self.albedo(scene, plan, wavelengths.nm, ray);
-                // Of what is seen in the light of day, so that grey is grey.
-                if self.normal.is_some() {
-                    albedo *= plan.layers.white.eval(wavelengths.nm);
-                }
-                let xyz = observer::xyz(albedo, wavelengths);
-                values.extend(rgb(&plan.layers.rgb_from_xyz, xyz));
-            }
-            Quantity::Primitive => values.push(self.hit.part as f32),
-            Quantity::Shape => values.push((self.hit.object + 1) as f32),
-        }
-    }
-
-    /// How much u and v change from this point to where another ray meets the tangent plane.
-    fn uv_change(&self, scene: &Scene, other: &Ray) -> DVec2 {
-        let n = self.surface.normal;
-        let distance = (self.surface.point - other.origin).dot(n) / other.direction.dot(n);
-        let change = scene.uv_gradient(&self.hit, &self.surface).change(other.at(distance) - self.surface.point);
-        if change.is_finite() { change } else { DVec2::ZERO }
-    }
-
-    /// The normal of the outermost relief, or the interpolated one.
-    fn shading_normal(&self, scene: &Scene, ray: &Ray) -> DVec3 {
-        let (surface, hit) = (&self.surface, &self.hit);
-        let material = &scene.materials[scene.objects[hit.object as usize].material as usize];
-        let relief = material.compound().filter(|c| matches!(c.composition, Composition::Relief { .. }));
-        let vertex = Vertex { scene, hit, surface, at: &hit.texture_point(surface), wo: -ray.direction };
-        let leaf = relief.and_then(|compound| compound.resolve(&vertex, surface.shading_normal, 0.5));
-        leaf.map_or(surface.shading_normal, |leaf| leaf.frame.n)
-    }
-
-    /// The colour of the material: see [`Quantity::Albedo`].
-    fn albedo(&self, scene: &Scene, plan: &EffectPlan, nm: Lanes, ray: &Ray) -> Lanes {
-        let object = &scene.objects[self.hit.object as usize];
-        let material = &scene.materials[object.material as usize];
-        self.albedo_of(material, plan, nm, ray)
-    }
-
-    fn albedo_of(&self, material: &Material, plan: &EffectPlan, nm: Lanes, ray: &Ray) -> Lanes {
-        let surface = &self.surface;
-        if let Some(compound) = material.compound() {
-            let inner = |material: &Material| self.albedo_of(material, plan, nm, ray);
-            return match &compound.composition {
-                Composition::Mask { inner: material, .. } | Composition::Relief { inner: material, .. } => {
-                    inner(material)
-                }
-                Composition::Blend { weight, first, second } => {
-                    let at = self.hit.texture_point(surface);
-                    let mut w = share(weight, &at);
-                    // What is seen is no hole: each part counts by how much of it covers.
-                    if self.normal.is_some() {
-                        let covers = |part: &Material| 1.0 - part.open(surface, ray.direction, &at);
-                        let [first, second] = [(1.0 - w) * covers(first), w * covers(second)];
-                        w = if first + second > 0.0 { second / (first + second) } else { w };
-                    }
-                    let w = w as f32;
-                    inner(first) * (1.0 - w) + inner(second) * w
-                }
-                Composition::TwoSided { front, back } => {
-                    inner(if ray.direction.dot(surface.normal) > 0.0 { back } else { front })
-                }
-            };
-        }
-        let bsdf = material.bsdf(&self.hit.texture_point(surface), nm, plan.all_dispersive);
-        let frame = Frame::from_normal_and_tangent(surface.shading_normal, surface.tangent);
-        let mut wo = frame.to_local(-ray.direction);
-        match bsdf.base() {
-            // Mitsuba's stand-in where nothing is diffuse, as if all light came along the normal: a highlight.
-            None if self.normal.is_none() => {
-                if material.two_sided {
-                    wo.z = wo.z.abs();
-                }
-                bsdf.eval(wo, DVec3::Z).f * PI as f32
-            }
-            _ => bsdf.albedo(wo),
-        }
-    }
 }

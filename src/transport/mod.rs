@@ -351,23 +351,24 @@ impl Begun {
     fn layers(&self, shot: &Shot, sampler: &Sampler, ledger: Option<&Ledger>, values: &mut layers::Values) {
         let Begun { ray, sample: PixelSample { radiance, wavelengths, xyz, alpha, weight, place }, counted, .. } =
             *self;
-        values.append(
-            shot.scene,
-            shot.plan,
-            &wavelengths,
-            &ray,
-            |step| shot.scene.camera.ray(place + step, || pairs(sampler.set(Set::Lens)).0),
-            |crossing, left| deciding(shot, sampler, self.at, crossing, left),
-            layers::Seen { radiance, xyz, alpha },
-            (counted, weight),
+        let sampled = layers::Sampled {
+            scene: shot.scene,
+            plan: shot.plan,
+            wavelengths: &wavelengths,
+            ray: &ray,
+            neighbours: |step: DVec2| shot.scene.camera.ray(place + step, || pairs(sampler.set(Set::Lens)).0),
+            u: |crossing: u32, left: Option<f64>| deciding(shot, sampler, self.at, crossing, left),
+            own: layers::Seen { radiance, xyz, alpha },
+            counted,
+            weight,
             ledger,
-            |integrator| {
-                let light = self.light(shot, sampler, integrator, shot.fog(integrator), None);
-                let unit = shot.plan.layers.unit_of_integrator(integrator);
-                let xyz = observer::xyz(light.radiance * unit, &wavelengths);
-                layers::Seen { radiance: light.radiance, xyz, alpha: light.alpha }
-            },
-        );
+        };
+        values.append(&sampled, |integrator| {
+            let light = self.light(shot, sampler, integrator, shot.fog(integrator), None);
+            let unit = shot.plan.layers.unit_of_integrator(integrator);
+            let xyz = observer::xyz(light.radiance * unit, &wavelengths);
+            layers::Seen { radiance: light.radiance, xyz, alpha: light.alpha }
+        });
     }
 }
 
