@@ -5,7 +5,7 @@ use super::environment::{Drawn, Environment, EnvironmentSample};
 use super::projector::Projector;
 use super::shape::{Shape, Sphere, TowardSample};
 use super::texture::{Texture, TexturePoint};
-use super::{Geometry, Hit, Object, SurfacePoint};
+use super::{Geometry, Hit, Object, SurfacePoint, TriangleMesh};
 use crate::math::frame::Frame;
 use crate::math::warp::{self, one_minus_cos};
 use crate::math::{Departure, Ray};
@@ -276,11 +276,10 @@ impl Light {
     ) -> Option<Arriving> {
         match self {
             Light::Area { object, radiance } => {
-                let target = |part: u32| Some(Departure::new(*object, part));
                 let facing = objects[*object as usize].facing();
                 match &objects[*object as usize].geometry {
                     Geometry::Shape(shape) => {
-                        let lamp = Lamp { object: *object, shape, facing, radiance };
+                        let lamp = Lamp { object: *object, form: shape, facing, radiance };
                         match shape {
                             _ if facing < 0.0 => lamp.arriving(shape.sample_inward(from, u)?, nm),
                             // The most common lamp has code of its own.
@@ -290,26 +289,7 @@ impl Light {
                         }
                     }
                     Geometry::Mesh(mesh) => {
-                        let (i, u_x) = mesh.areas.sample(u.x)?;
-                        let b = warp::triangle(DVec2::new(u_x, u.y));
-                        let surface = mesh.mesh.boundary(i, b.x, b.y);
-                        let offset = surface.point - from;
-                        let distance = offset.length();
-                        let wi = offset / distance;
-                        let cos = -wi.dot(surface.normal) * facing;
-                        (cos > 0.0 && distance > 0.0).then(|| Arriving {
-                            wi,
-                            distance,
-                            radiance: match radiance {
-                                Texture::Uniform(spectrum) => spectrum.eval(nm),
-                                varying => {
-                                    let surface = mesh.mesh.surface(i, b.x, b.y);
-                                    varying.eval(&TexturePoint::new(&surface, i, b.into()), nm)
-                                }
-                            },
-                            density: Some(distance * distance / (mesh.areas.total() * cos)),
-                            target: target(i),
-                        })
+                        Lamp { object: *object, form: &**mesh, facing, radiance }.arriving(from, u, nm)
                     }
                     Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => None,
                 }
@@ -431,15 +411,15 @@ impl Light {
     }
 }
 
-/// A shape that shines.
-struct Lamp<'a> {
+/// A shape or a mesh that shines.
+struct Lamp<'a, F> {
     object: u32,
-    shape: &'a Shape,
+    form: &'a F,
     facing: f64,
     radiance: &'a Texture,
 }
 
-impl Lamp<'_> {
+impl Lamp<'_, Shape> {
     /// The light of a point of a ball; `None` from inside.
     #[inline(always)]
     fn arriving_from_ball(&self, ball: &Sphere, from: DVec3, u: DVec2, nm: Lanes) -> Option<Arriving> {
@@ -450,7 +430,7 @@ impl Lamp<'_> {
             let target = Some(Departure::new(self.object, 0));
             return Some(Arriving { wi, distance, radiance: spectrum.eval(nm), density: Some(density), target });
         }
-        self.arriving(self.shape.sample_toward(from, u)?, nm)
+        self.arriving(self.form.sample_toward(from, u)?, nm)
     }
 
     /// The light of one of its points; `None` from its back.
@@ -462,7 +442,7 @@ impl Lamp<'_> {
         let radiance = match self.radiance {
             Texture::Uniform(spectrum) => spectrum.eval(nm),
             varying => {
-                let surface = self.shape.surface(s.point, s.face);
+                let surface = self.form.surface(s.point, s.face);
                 varying.eval(&TexturePoint::new(&surface, u32::from(s.face), [0.0; 2]), nm)
             }
         };
@@ -472,6 +452,34 @@ impl Lamp<'_> {
             radiance,
             density: Some(s.pdf_solid_angle),
             target: Some(Departure::new(self.object, u32::from(s.face))),
+        })
+    }
+}
+
+impl Lamp<'_, TriangleMesh> {
+    /// The light of a point of a triangle, drawn by area; `None` from its back.
+    #[inline(always)]
+    fn arriving(&self, from: DVec3, u: DVec2, nm: Lanes) -> Option<Arriving> {
+        let TriangleMesh { mesh, areas, .. } = self.form;
+        let (i, u_x) = areas.sample(u.x)?;
+        let b = warp::triangle(DVec2::new(u_x, u.y));
+        let surface = mesh.boundary(i, b.x, b.y);
+        let offset = surface.point - from;
+        let distance = offset.length();
+        let wi = offset / distance;
+        let cos = -wi.dot(surface.normal) * self.facing;
+        (cos > 0.0 && distance > 0.0).then(|| Arriving {
+            wi,
+            distance,
+            radiance: match self.radiance {
+                Texture::Uniform(spectrum) => spectrum.eval(nm),
+                varying => {
+                    let surface = mesh.surface(i, b.x, b.y);
+                    varying.eval(&TexturePoint::new(&surface, i, b.into()), nm)
+                }
+            },
+            density: Some(distance * distance / (areas.total() * cos)),
+            target: Some(Departure::new(self.object, i)),
         })
     }
 }
