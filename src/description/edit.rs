@@ -17,7 +17,7 @@ use crate::input;
 
 /// The maps that an included file may hold.
 pub(super) const SHARED: [&str; 4] = ["materials", "textures", "volumes", "media"];
-const INCLUDE: &str = "include";
+pub(super) const INCLUDE: &str = "include";
 
 /// Reads a file to a tree.
 ///

@@ -6,16 +6,23 @@
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
+use super::edit::INCLUDE;
 use super::node::{Entry, Node, Sources, Value};
 use super::scene::SceneDescription;
 
 /// Columns up to which a map or list stands on one line.
 const WIDTH: usize = 110;
 
-/// A scene as a document in `directory`: what was read, with includes and settings in their places.
+/// A scene as a document in `directory`: what was read, with settings and what it includes in their places.
 #[must_use]
 pub fn yaml(scene: &SceneDescription, directory: &Path) -> String {
-    scene.tree().map_or(String::new(), |(root, sources)| Printer { sources, directory }.document(root))
+    let Some((root, sources)) = scene.tree() else { return String::new() };
+    let mut root = root.clone();
+    if let Value::Map(entries) = &mut root.value {
+        // It would be there twice.
+        entries.retain(|entry| entry.key != INCLUDE);
+    }
+    Printer { sources, directory }.document(&root)
 }
 
 /// Prints trees for a document in a directory.
@@ -174,7 +181,7 @@ pub(crate) fn relative(path: &Path, directory: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use super::super::edit;
+    use super::super::{edit, load};
     use super::*;
     use proptest::prelude::*;
 
@@ -232,6 +239,29 @@ mod tests {
         assert_eq!(printed("dir"), "a: {file: x.png}\n");
         assert_eq!(printed(""), "a: {file: dir/x.png}\n");
         assert_eq!(printed("dir/sub"), "a: {file: \"../x.png\"}\n");
+    }
+
+    /// A document in another directory has what its scene includes, which names a file from where it stands.
+    #[test]
+    fn a_document_includes_nothing_and_lacks_nothing() {
+        let place = tempfile::tempdir().unwrap();
+        let path = |name: &str| place.path().join(name);
+        let write = |name: &str, text: &str| std::fs::write(path(name), text).unwrap();
+        for name in ["presets", "far"] {
+            std::fs::create_dir(path(name)).unwrap();
+        }
+        let camera = "camera: {origin: [0, 1, 5], target: [0, 0, 0], fov_deg: 40}\n";
+        let shapes = "shapes: [{sphere: {radius: 1, material: m}}]\n";
+        let (textures, materials) =
+            ("textures: {t: {image: {file: FILE}}}\n", "materials: {m: {diffuse: {reflectance: {texture: t}}}}\n");
+        write("s.yaml", &format!("include: [presets/p.yaml]\n{camera}{shapes}"));
+        write("presets/p.yaml", &format!("{textures}{materials}").replace("FILE", "t.png"));
+        let scene = |name: &str| load(&path(name)).unwrap().entries()[0].scene(&[]).unwrap();
+        let printed = yaml(&scene("s.yaml"), &path("far"));
+        let expected = format!("{camera}{shapes}{textures}{materials}").replace("FILE", "\"../presets/t.png\"");
+        assert_eq!(printed, expected);
+        write("far/s.yaml", &printed);
+        assert_eq!(scene("far/s.yaml").materials, scene("s.yaml").materials);
     }
 
     proptest! {
