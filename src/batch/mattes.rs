@@ -11,17 +11,22 @@ pub(super) fn mattes(description: &SceneDescription, scene: &Scene) -> Vec<Matte
         LayerContent::Matte(matte) => Some(matte),
         _ => None,
     });
+    // Children of groups come after the shapes of the scene itself. What is seen of an instance is a child, which has a material;
+    // the object and the asset are the instance.
+    let instances = description.shapes.iter().map(|shape| shape.geometry.group().is_some());
+    let objects = || scene.objects.iter().zip(&description.shapes);
     let matte = |matte: description::Matte| Matte {
         layer: matte.layer().to_owned(),
         of_parts: matte == description::Matte::Material,
         names: match matte {
-            description::Matte::Object => scene.objects.iter().map(|object| object.name.clone()).collect(),
-            description::Matte::Material => scene.material_names.clone(),
+            description::Matte::Object => objects().map(|(object, _)| Some(object.name.clone())).collect(),
+            description::Matte::Material => {
+                let instances = instances.clone().chain(std::iter::repeat(false));
+                scene.material_names.iter().zip(instances).map(|(name, is)| (!is).then(|| name.clone())).collect()
+            }
             description::Matte::Asset => {
                 let assets = assets(description);
-                let shapes = description.shapes.iter().map(Some).chain(std::iter::repeat(None));
-                let objects = scene.objects.iter().zip(shapes);
-                objects.map(|(object, shape)| asset(&assets, &object.name, shape).0.to_owned()).collect()
+                objects().map(|(object, shape)| Some(asset(&assets, &object.name, shape).0.to_owned())).collect()
             }
         },
     };
@@ -35,8 +40,8 @@ fn assets(description: &SceneDescription) -> HashMap<&str, &str> {
 }
 
 /// What the object `name` is part of, and what that is: one of the `assets`, else the group that its `shape` copies, else itself.
-fn asset<'a>(assets: &HashMap<&str, &'a str>, name: &'a str, shape: Option<&'a Shape>) -> (&'a str, &'static str) {
-    match (assets.get(name), shape.and_then(|shape| shape.geometry.group())) {
+fn asset<'a>(assets: &HashMap<&str, &'a str>, name: &'a str, shape: &'a Shape) -> (&'a str, &'static str) {
+    match (assets.get(name), shape.geometry.group()) {
         (Some(asset), _) => (asset, "an asset"),
         (None, Some(group)) => (group, "a group"),
         (None, None) => (name, "a shape"),
@@ -72,7 +77,7 @@ pub(super) fn shared_names(description: &SceneDescription) -> Vec<String> {
             description::Matte::Asset => {
                 let assets = assets(description);
                 for (shape, name) in named() {
-                    let (asset, what) = asset(&assets, &name, Some(shape));
+                    let (asset, what) = asset(&assets, &name, shape);
                     means(asset, what);
                 }
             }

@@ -20,8 +20,8 @@ pub struct Matte {
     pub layer: String,
     /// Whether the lower half of a number counts, what is seen of an object, and not the upper one, the object.
     pub of_parts: bool,
-    /// By that half.
-    pub names: Vec<String>,
+    /// By that half; none for what is never seen by that half.
+    pub names: Vec<Option<String>>,
 }
 
 /// Pairs of id and coverage that every file has.
@@ -35,7 +35,7 @@ impl Matte {
     /// least six, so that coverage adds up to that of the samples.
     #[must_use]
     pub fn write(&self, film: &Film) -> Written {
-        let ids: Vec<f32> = self.names.iter().map(|name| id_of(name)).collect();
+        let ids: Vec<f32> = self.names.iter().map(|name| name.as_deref().map_or(0.0, id_of)).collect();
         let pixel = |(i, cells): (usize, &PixelCells)| {
             let samples: u64 = cells.iter().map(|cell| u64::from(cell.count) + u64::from(cell.dropped)).sum();
             let mut counts: BTreeMap<u32, u64> = BTreeMap::new();
@@ -70,7 +70,7 @@ impl Matte {
     fn attributes(&self) -> Vec<(String, Attribute)> {
         // Names are sorted, each once.
         let manifest: BTreeMap<&str, String> =
-            self.names.iter().map(|name| (name.as_str(), format!("{:08x}", id_of(name).to_bits()))).collect();
+            self.names.iter().flatten().map(|name| (name.as_str(), format!("{:08x}", id_of(name).to_bits()))).collect();
         // A map of texts always is JSON.
         let manifest = serde_json::to_string(&manifest).unwrap_or_default();
         let key = key(&self.layer);
@@ -162,7 +162,8 @@ mod tests {
             for (name, number) in names.into_iter().zip(0u64..) {
                 film.layers.mattes.add(0, 1, number << 32, if name == "d" { 1 } else { 2 });
             }
-            let matte = Matte { layer: "M".into(), of_parts: false, names: names.map(str::to_owned).to_vec() };
+            let matte =
+                Matte { layer: "M".into(), of_parts: false, names: names.map(|name| Some(name.to_owned())).to_vec() };
             let (channels, _) = matte.write(&film);
             let value = |data: &ChannelData| match data {
                 ChannelData::F32(plane) => plane[0],
@@ -181,7 +182,7 @@ mod tests {
         for (number, count) in [(2, 3), (3, 1), (1 << 32 | 1, 2)] {
             film.layers.mattes.add(0, 1, number, count);
         }
-        let names = ["a", "b", "x", "y"].map(str::to_owned).to_vec();
+        let names = ["a", "b", "x", "y"].map(|name| Some(name.to_owned())).to_vec();
         let of = |matte: &Matte| -> Vec<f32> {
             let (channels, _) = matte.write(&film);
             let names: Vec<&str> = channels.iter().map(|(name, _)| name.as_str()).collect();

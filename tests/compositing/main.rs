@@ -8,6 +8,7 @@ mod seen;
 use abbe::batch::{self, Overrides};
 use abbe::film::cryptomatte::id_of;
 use abbe::film::exr::{ExrPart, read_exr};
+use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use tempfile::TempDir;
 
@@ -202,6 +203,37 @@ fn mattes_know_objects_materials_and_assets() {
         assert_eq!((text("name"), text("hash"), text("conversion")), (layer, "MurmurHash3_32", "uint32_to_float32"));
         let manifest: serde_json::Value = serde_json::from_str(text("manifest")).unwrap();
         assert_eq!(manifest[names[0]], format!("{:08x}", ids[0]));
+    }
+}
+
+/// What a manifest names can be had as a matte: an instance is an object and part of its group, and what is seen of it are shapes
+/// of the group, which have materials.
+#[test]
+fn a_manifest_names_what_can_be_seen_and_nothing_else() {
+    let text = "materials: {clay: {diffuse: {reflectance: 0.4}}}\nlights: [{constant: {radiance: 1}}]\n\
+                groups: {tree: [{sphere: {center: [0, 1, 0], radius: 0.4, material: clay}}, \
+                {cylinder: {base: [0, 0, 0], top: [0, 1, 0], radius: 0.2}}]}\n\
+                layers: [crypto_object, crypto_material, crypto_asset]\nshapes:\n\
+                - instance: {name: left, group: tree, transform: [{translate: [-1, 0, 0]}]}\n\
+                - instance: {group: tree}\n- sphere: {name: ball, center: [1, 0.5, 0], radius: 0.5}\n";
+    let part = render(&format!("{FRAME}{text}"));
+    for (layer, names) in [
+        ("CryptoObject", vec!["ball", "instance1", "left"]),
+        ("CryptoMaterial", vec!["ball", "clay", "tree.cylinder1"]),
+        ("CryptoAsset", vec!["ball", "tree"]),
+    ] {
+        let key = &format!("{:08x}", id_of(layer).to_bits())[..7];
+        let text = part.text(&format!("cryptomatte/{key}/manifest")).unwrap();
+        let manifest: BTreeMap<String, String> = serde_json::from_str(text).unwrap();
+        assert_eq!(manifest.keys().collect::<Vec<_>>(), names, "{layer}");
+        for name in names {
+            let seen =
+                (0..3).flat_map(|i| [("R", "G"), ("B", "A")].map(|pair| (i, pair))).any(|(i, (id, coverage))| {
+                    let of = |channel: &str| plane(&part, &format!("{layer}{i:02}.{channel}"));
+                    of(id).iter().zip(of(coverage)).any(|(id, x)| id.to_bits() == id_of(name).to_bits() && *x > 0.0)
+                });
+            assert!(seen, "{layer}: {name}");
+        }
     }
 }
 
