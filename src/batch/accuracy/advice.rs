@@ -77,8 +77,9 @@ fn off(chosen: &Row, row: &Row) -> Option<String> {
 }
 
 /// What is lost, what is the same, and what comes to the same noise sooner or later. What the chosen setting lacks as well is no
-/// matter of the knob.
+/// matter of the knob. Where that lacks nothing that stands out, perhaps for its noise, the two may still differ.
 fn trade(chosen: &Row, rows: &[Row]) -> String {
+    let lacking = off(chosen, chosen).is_some();
     let mut parts: Vec<String> = Vec::new();
     let (mut same, mut as_chosen): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
     let mut speed: Vec<String> = Vec::new();
@@ -98,10 +99,16 @@ fn trade(chosen: &Row, rows: &[Row]) -> String {
             speed.push(format!("{} takes {} of the time", row.value, figures(1.0 / row.efficiency.value)));
         }
     }
-    for (values, what) in [(&same, "the same light"), (&as_chosen, "what the chosen setting finds")] {
+    let as_what = match lacking {
+        true => ["finds what the chosen setting finds", "find what the chosen setting finds"],
+        false => [
+            "stands out from the reference but not from the chosen setting",
+            "stand out from the reference but not from the chosen setting",
+        ],
+    };
+    for (values, [one, several]) in [(&same, ["finds the same light", "find the same light"]), (&as_chosen, as_what)] {
         if !values.is_empty() {
-            let verb = if values.len() == 1 { "finds" } else { "find" };
-            parts.push(format!("{} {verb} {what}", list(values)));
+            parts.push(format!("{} {}", list(values), if values.len() == 1 { one } else { several }));
         }
     }
     if !same.is_empty() || !as_chosen.is_empty() {
@@ -176,6 +183,21 @@ mod tests {
             sentences[1].1,
             "1 finds 50.0 % less green (bias 30.0 %) in 0.50 of the time; 8 finds the same light; to the same noise 8 \
              takes 2.00 of the time."
+        );
+    }
+
+    /// The chosen setting is so noisy that it may have the bias that stands out of the knob, or none.
+    #[test]
+    fn a_bias_that_stands_out_is_not_said_to_be_that_of_a_noisy_setting() {
+        let chosen =
+            Row { bias_squared: Figure { value: 0.0, error: 2e-4 }, ..row("chosen", "as written", 1.0, 1.0, 0.0, 1.0) };
+        let rows = [chosen, row("transport", "RGB", 1.5, 0.5, 4e-4, 1.003)];
+        assert!(rows[1].bias().is_some() && rows[1].finds_as(&rows[0]));
+        let (_, sentence) = &sentences(&rows)[0];
+        assert!(
+            sentence
+                .starts_with("RGB stands out from the reference but not from the chosen setting; to the same noise"),
+            "{sentence}"
         );
     }
 
