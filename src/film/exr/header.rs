@@ -33,7 +33,7 @@ pub struct Header {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Value {
-    /// `string`.
+    /// `string`; `timecode` as `01:02:03:04`.
     Text(String),
     /// `stringvector`.
     Texts(Vec<String>),
@@ -294,6 +294,12 @@ fn value(kind: &str, bytes: &[u8]) -> Option<Value> {
             let [n, d]: [[u8; 4]; 2] = words().collect::<Vec<_>>().try_into().ok()?;
             Some(Value::Numbers(vec![i32::from_le_bytes(n).into(), u32::from_le_bytes(d).into()]))
         }
+        "timecode" => match bytes {
+            &[frames, seconds, minutes, hours, _, _, _, _] => {
+                Some(Value::Text(time([hours, minutes, seconds, frames])))
+            }
+            _ => None,
+        },
         "compression" | "lineOrder" | "envmap" => match bytes {
             [code] => Some(Value::Code(*code)),
             _ => None,
@@ -301,6 +307,17 @@ fn value(kind: &str, bytes: &[u8]) -> Option<Value> {
         "chlist" => channels(bytes).map(Value::Channels),
         _ => Some(Value::Bytes { bytes: bytes.len() }),
     }
+}
+
+/// The time of a time code for 60 fields, decimal digits with flags above them: bit 6 of the frames says that some are dropped, bit 7
+/// of the seconds that this is the second of two frames.
+fn time([hours, minutes, seconds, frames]: [u8; 4]) -> String {
+    let number = |byte: u8, tens: u8| 10 * (byte >> 4 & tens) + (byte & 0xf);
+    let dropped = if frames & 0x40 == 0 { ':' } else { ';' };
+    let second = if seconds & 0x80 == 0 { "" } else { ", the second of two" };
+    let (hours, minutes) = (number(hours, 3), number(minutes, 7));
+    let (seconds, frames) = (number(seconds, 7), number(frames, 3));
+    format!("{hours:02}:{minutes:02}:{seconds:02}{dropped}{frames:02}{second}")
 }
 
 /// Each channel: its name and a zero, its type, linearity and three bytes, its sampling in x and y; then a zero.
@@ -356,6 +373,17 @@ mod tests {
         assert_eq!(part.text("colorInteropID"), Some("lin_rec709_scene"));
         assert!((part.numbers::<8>("chromaticities").unwrap()[0] - 0.64).abs() < 1e-7);
         assert_eq!(part.unreadable(), None);
+    }
+
+    #[test]
+    fn a_time_code_is_read_as_it_is_said() {
+        let code = |bits: u32| value("timecode", &[bits.to_le_bytes(), [0; 4]].concat());
+        let text = |text: &str| Some(Value::Text(text.to_owned()));
+        assert_eq!(code(0x0102_0304), text("01:02:03:04"));
+        assert_eq!(code(0x2359_5929), text("23:59:59:29"));
+        assert_eq!(code(0x0102_0344), text("01:02:03;04"));
+        assert_eq!(code(0x0102_8304), text("01:02:03:04, the second of two"));
+        assert_eq!(value("timecode", &[0; 4]), None);
     }
 
     /// What cannot be read is said in one line, by the header alone.
