@@ -535,6 +535,28 @@ mod tests {
         );
     }
 
+    /// A scene without a camera may have been meant for a batch, and a layer for a name, by its own keys alone.
+    #[test]
+    fn what_a_choice_may_be_is_no_cure_for_what_is_further_in() {
+        let alone = |scene: &str, setting: &[(String, String)]| {
+            with(&[("s.yaml", scene)], |directory| {
+                let document = load(&directory.join("s.yaml")).unwrap();
+                let error = document.entries()[0].scene(setting).unwrap_err();
+                in_words(&error, directory)
+            })
+        };
+        assert_eq!(
+            alone("integrator: pathtracer\n", &[]),
+            "DIR/s.yaml:1:13: integrator: expected one of path, whitted, depth, light_tracer, none, found \"pathtracer\"; did \
+             you mean \"path\"?"
+        );
+        assert!(alone("scene: []\n", &[]).ends_with("fog, scenes, found \"scene\"; did you mean \"scenes\"?"));
+        // All of a setting is at one place.
+        let setting = ("layers".to_owned(), "[{name: n, surface: normal}]".to_owned());
+        let told = alone(CAMERA, &[setting]);
+        assert!(told.contains("layers[0].surface: expected one of depth, position, uv, "), "{told}");
+    }
+
     #[test]
     fn a_parameter_that_no_scene_has_is_told_where_it_stands() {
         let scene = "<scene version=\"3.0.0\"><default name=\"res\" value=\"8\"/><integrator type=\"path\">\

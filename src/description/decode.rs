@@ -268,10 +268,7 @@ impl<'de> Deserializer<'de> for De<'_> {
             }
             _ if variants.contains(&"inline") => visitor
                 .visit_enum(Choice { kind: "inline", content: Some(self.node), key: None, de: self })
-                .map_err(|fault| match fault.place.is_none_or(|place| self.node.stands_at(place)) {
-                    true => fault.or_one_of(kinds_in_words(variants)),
-                    false => fault,
-                }),
+                .map_err(|fault| fault.or_one_of(kinds_in_words(variants))),
             Value::Map(entries) if entries.len() == 1 => {
                 let Entry { key, key_place, .. } = &entries[0];
                 Err(Fault::unknown(*key_place, key, kinds_in_words(variants)).under(Segment::Key(key.clone())))

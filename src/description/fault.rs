@@ -85,10 +85,14 @@ impl Fault {
     }
 
     /// For a choice between forms: a fault at the choice itself could also have been cured by
-    /// one of `others`.
+    /// one of `others`. So could be a key that is none of its kinds, and nothing further in.
     pub(crate) fn or_one_of<'a>(mut self, others: impl IntoIterator<Item = &'a str>) -> Fault {
-        if self.steps.len() <= 1
-            && let Message::NoneOf { expected, .. } = &mut self.message
+        if let Message::NoneOf { expected, name, .. } = &mut self.message
+            && match &self.steps[..] {
+                [] => true,
+                [Segment::Key(key)] => Some(key) == name.as_ref(),
+                _ => false,
+            }
         {
             // Forms in words, as "a number", are read more easily before the others.
             let (forms, names): (Vec<_>, Vec<_>) = others.into_iter().partition(|other| other.starts_with("a "));

@@ -134,12 +134,6 @@ impl Node {
         Node { place, value }
     }
 
-    /// Whether `place` is that of the node itself or of a key in it, not of something further in.
-    pub(crate) fn stands_at(&self, place: Place) -> bool {
-        let keys = if let Value::Map(entries) = &self.value { entries.as_slice() } else { &[] };
-        self.place == place || keys.iter().any(|entry| entry.key_place == place)
-    }
-
     /// The entry of a map; `None` also when this is no map.
     pub(crate) fn entry(&self, key: &str) -> Option<&Entry> {
         match &self.value {
