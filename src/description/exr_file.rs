@@ -226,7 +226,8 @@ pub(crate) fn check_scene(scene: &SceneDescription, checker: &mut Checker<'_>) {
     }
     let xyz = matches!(output.exr.channels, Channels::Xyz | Channels::Xyza);
     if xyz && layers.iter().any(|layer| layer.name == "Z") {
-        checker.fault(exr.key("channels"), "expected no channel Z of colour where Z is a layer, found xyz");
+        let at = exr.key("channels");
+        checker.fault(at, format!("expected no channel Z of colour where Z is a layer, found {}", checker.written(at)));
     }
 }
 
@@ -407,6 +408,19 @@ mod tests {
     fn an_aces_container_holds_nothing_else() {
         let found = faults("output: {exr: {aces_container: true}}");
         assert!(
+    #[test]
+    fn depth_has_no_place_beside_the_z_of_a_colour() {
+        for channels in ["xyz", "xyza"] {
+            assert_eq!(
+                faults(&format!("layers: [Z]\noutput: {{exr: {{channels: {channels}}}}}\n")),
+                format!(
+                    "dir/s.yaml:3:26: output.exr.channels: expected no channel Z of colour where Z is a layer, found the text \
+                     \"{channels}\""
+                )
+            );
+        }
+    }
+
             found.starts_with("dir/s.yaml:2:32: output.exr.aces_container: expected colour aces2065-1,"),
             "{found}"
         );
