@@ -73,7 +73,7 @@ pub(super) fn attributes(
         all.retain(|(other, _)| other != name);
         let value = match value {
             HeaderValue::Number(value) => number(name, *value),
-            HeaderValue::Name(written) => match description::time_code(written).filter(|_| name == "timeCode") {
+            HeaderValue::Text(written) => match description::time_code(written).filter(|_| name == "timeCode") {
                 Some(code) => Attribute::TimeCode(time_code(code, finish.frame_number, finish.frames_per_second)),
                 None => text(written),
             },

@@ -247,7 +247,7 @@ mod tests {
         );
         assert_eq!(
             faults("render: {frames: [1, 2]}"),
-            "dir/s.yaml:2:18: render.frames: expected one of a number, a name, found a list of 2"
+            "dir/s.yaml:2:18: render.frames: expected one of a number, text, found a list of 2"
         );
         assert_eq!(
             faults("render: {frames: 1-3, seed_per_frame: 1}"),

@@ -162,14 +162,14 @@ struct WrittenEntry {
 #[serde(rename_all = "snake_case")]
 enum Parameter {
     Number(f64),
-    Name(String),
+    Text(String),
 }
 
 impl Parameter {
     fn text(self) -> String {
         match self {
             Parameter::Number(value) => value.to_string(),
-            Parameter::Name(text) => text,
+            Parameter::Text(text) => text,
         }
     }
 }

@@ -4,9 +4,9 @@
 //! - a field whose value is null (`fog:` or `fog: ~`) is not written;
 //! - an enum is a map with one key, the kind: `sphere: {radius: 1}`; a kind whose fields all have
 //!   defaults may stand alone as text: `filter: gaussian`;
-//! - a variant may also be chosen by the form of the value: a variant renamed `number`, `list` or
-//!   `name` takes a bare number, list or text; a variant renamed `inline` takes whatever the other
-//!   variants do not;
+//! - a variant may also be chosen by the form of the value: a variant renamed `number`, `list`,
+//!   `name` or `text` takes a bare number, list or text (a name, or other text); a variant renamed
+//!   `inline` takes whatever the other variants do not;
 //! - a [`FilePath`](super::FilePath) starts from the directory of the text in which it stands.
 
 use std::fmt;
@@ -20,7 +20,8 @@ use super::node::{Entry, Node, Place, Sources, Value, enumerate};
 use super::path::Segment;
 
 /// Names of variants that are chosen by form, and what they are called in a message.
-const BY_FORM: [(&str, &str); 4] = [("number", "a number"), ("list", "a list"), ("name", "a name"), ("inline", "")];
+const BY_FORM: [(&str, &str); 5] =
+    [("number", "a number"), ("list", "a list"), ("name", "a name"), ("text", "text"), ("inline", "")];
 
 /// The name by which [`super::FilePath`] asks for its treatment.
 pub(crate) const FILE_PATH: &str = "FilePath";
@@ -248,6 +249,7 @@ impl<'de> Deserializer<'de> for De<'_> {
         let by_form = match &self.node.value {
             Value::Unsigned(_) | Value::Signed(_) | Value::Float(_) => "number",
             Value::Text(text) if variants.contains(&"number") && overflowing(text) => "number",
+            Value::Text(_) if variants.contains(&"text") => "text",
             Value::Text(_) => "name",
             Value::List(_) => "list",
             _ => "",

@@ -30,7 +30,7 @@ pub enum HeaderValue {
     /// A number.
     Number(f64),
     /// Text.
-    Name(String),
+    Text(String),
 }
 
 /// Header attributes by name.
@@ -205,7 +205,7 @@ pub(crate) fn check_scene(scene: &SceneDescription, checker: &mut Checker<'_>) {
     let (output, layers) = (&scene.output, &scene.layers);
     let at = At::ROOT.key("output");
     let exr = at.key("exr");
-    if let Some(HeaderValue::Name(text)) = output.exr.attributes.get("timeCode")
+    if let Some(HeaderValue::Text(text)) = output.exr.attributes.get("timeCode")
         && let Some([.., frames]) = time_code(text)
     {
         let rate = counted_rate(scene.render.frames_per_second);
@@ -248,13 +248,13 @@ pub(crate) fn check(output: &Output, at: At<'_>, checker: &mut Checker<'_>) {
         checker.require(!name.contains('\0'), at, "a name without a zero byte", format_args!("{name:?}"));
         let (expected, fits) = match (standard(name), value) {
             (None, _) => continue,
-            (Some(Standard::Text), value) => ("text", matches!(value, HeaderValue::Name(_))),
+            (Some(Standard::Text), value) => ("text", matches!(value, HeaderValue::Text(_))),
             (Some(Standard::Float), HeaderValue::Number(number)) => {
                 ("a number that a 32-bit float holds", number.abs() <= f64::from(f32::MAX))
             }
-            (Some(Standard::Float), HeaderValue::Name(_)) => ("a number", false),
+            (Some(Standard::Float), HeaderValue::Text(_)) => ("a number", false),
             (Some(Standard::TimeCode), value) => {
-                let fits = matches!(value, HeaderValue::Name(text) if time_code(text).is_some());
+                let fits = matches!(value, HeaderValue::Text(text) if time_code(text).is_some());
                 ("a time code, as \"01:02:03:04\"", fits)
             }
             (Some(Standard::Other), _) => {
@@ -368,6 +368,10 @@ mod tests {
             let found = faults(&format!("output: {{exr: {{attributes: {{{value}}}}}}}"));
             assert_eq!(found.split_once("attributes.").map(|(_, told)| told), Some(expected));
         }
+        assert_eq!(
+            faults("output: {exr: {attributes: {shot: [1, 2]}}}"),
+            "dir/s.yaml:2:35: output.exr.attributes.shot: expected one of a number, text, found a list of 2"
+        );
         scene("output: {exr: {attributes: {shot: 123456789, big: 1e300, owner: '3', focus: 2, xDensity: 72}}}");
     }
 
@@ -405,10 +409,6 @@ mod tests {
     }
 
     #[test]
-    fn an_aces_container_holds_nothing_else() {
-        let found = faults("output: {exr: {aces_container: true}}");
-        assert!(
-    #[test]
     fn depth_has_no_place_beside_the_z_of_a_colour() {
         for channels in ["xyz", "xyza"] {
             assert_eq!(
@@ -421,6 +421,10 @@ mod tests {
         }
     }
 
+    #[test]
+    fn an_aces_container_holds_nothing_else() {
+        let found = faults("output: {exr: {aces_container: true}}");
+        assert!(
             found.starts_with("dir/s.yaml:2:32: output.exr.aces_container: expected colour aces2065-1,"),
             "{found}"
         );

@@ -14,7 +14,7 @@ pub enum Frames {
     /// One.
     Number(f64),
     /// As [`frames`] reads it.
-    Name(String),
+    Text(String),
 }
 
 impl Frames {
@@ -25,7 +25,7 @@ impl Frames {
     pub fn list(&self) -> Result<Vec<i32>, String> {
         match self {
             Frames::Number(frame) => frames(&frame.to_string()),
-            Frames::Name(text) => frames(text),
+            Frames::Text(text) => frames(text),
         }
     }
 }

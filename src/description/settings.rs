@@ -276,7 +276,7 @@ pub enum Time {
     /// Seconds.
     Number(f64),
     /// With its unit.
-    Name(String),
+    Text(String),
 }
 
 impl Time {
@@ -285,7 +285,7 @@ impl Time {
     pub fn duration(&self) -> Option<Duration> {
         match self {
             Time::Number(seconds) => of_seconds(*seconds),
-            Time::Name(text) => duration(text),
+            Time::Text(text) => duration(text),
         }
     }
 }
@@ -449,7 +449,7 @@ impl Render {
         if let Some(time) = &self.stop.time {
             let found = match time {
                 Time::Number(seconds) => in_short(*seconds),
-                Time::Name(text) => format!("\"{text}\""),
+                Time::Text(text) => format!("\"{text}\""),
             };
             let holds = time.duration().is_some_and(|time| !time.is_zero());
             checker.require(holds, stop.key("time"), "a time greater than 0, as 60, 90s, 10m or 2h", found);
