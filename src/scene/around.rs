@@ -119,4 +119,22 @@ mod tests {
             assert!(notes(&silent).is_empty(), "{silent}: {:?}", notes(&silent));
         }
     }
+
+    /// A bubble in a ball of glass that absorbs, of which no medium has the name: `outside: vacuum` would be wrong.
+    #[test]
+    fn a_bubble_in_glass_that_absorbs_is_told_to_have_a_priority() {
+        let notes = |priorities: [&str; 2]| {
+            let [ball, bubble] = priorities;
+            let text = format!(
+                "camera: {{origin: [0, 0, 9], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n\
+                 - sphere: {{radius: 2, material: {{dielectric: {{ior: 1.5, absorption: {{color: 0.5, at: 0.3}}{ball}}}}}}}\n\
+                 - sphere: {{radius: 1, material: {{dielectric: {{ior: 1{bubble}}}}}}}\n"
+            );
+            compiled(&text).notes
+        };
+        let told = "s.yaml:4:11: shapes[1].sphere: stands in a body that absorbs, but its outside, which is not written, is taken \
+                    to be what the camera is in; a priority of each says where it stands";
+        assert_eq!(notes(["", ", exterior_ior: 1.5"]), [told]);
+        assert!(notes([", priority: 1", ", priority: 2"]).is_empty());
+    }
 }

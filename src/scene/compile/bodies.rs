@@ -61,9 +61,10 @@ impl Compiler<'_> {
 
     /// Notes which bodies stand in another medium than they are taken to, as nothing is written of it.
     pub(super) fn note_strangers(&self, scene: &mut Scene) {
-        let name = |medium: Option<u32>| {
-            let known = self.medium_ids.iter().find(|(_, id)| Some(**id) == medium);
-            known.map_or(written::VACUUM, |(name, _)| *name)
+        // What a material absorbs with has none.
+        let name = |medium: Option<u32>| match medium {
+            None => Some(written::VACUUM),
+            Some(medium) => self.medium_ids.iter().find(|(_, id)| **id == medium).map(|(name, _)| *name),
         };
         let told = |stranger: &Stranger| {
             let shape = self.description.shapes.get(stranger.object as usize)?;
@@ -71,10 +72,14 @@ impl Compiler<'_> {
                 true => ("inside", shape.inside.is_some()),
                 false => ("outside", shape.outside.is_some()),
             };
+            let medium = name(stranger.medium);
+            let says = match medium {
+                Some(name) => format!("{side}: {name} says"),
+                None => "a priority of each says".to_owned(),
+            };
             let note = format!(
-                "stands in {medium}, but its {side}, which is not written, is taken to be what the camera is in; {side}: {medium} \
-                 says where it stands",
-                medium = name(stranger.medium),
+                "stands in {}, but its {side}, which is not written, is taken to be what the camera is in; {says} where it stands",
+                medium.unwrap_or("a body that absorbs"),
             );
             let at = format!("shapes[{}].{}", stranger.object, shape.geometry.kind());
             (!is_written).then(|| self.description.fault(&at, &note))
