@@ -240,8 +240,9 @@
 //!   cloud: {heterogeneous: {extinction: {volume: haze}, albedo: 0.9, scale: 1}}        # and phase, shadow_rays
 //! light_groups: {key: [ball]}       # lamps by group, for layers; names as given or made of kind and number (point0)
 //! assets: {toys: [ball]}            # shapes by what they are part of, for mattes; ~ the group of an instance, or itself
-//! medium: smoke                     # what the camera is in and all space where no body is; default none. It has no end:
-//!                                   # light from infinity comes through only at wavelengths that it lets pass unhindered
+//! medium: smoke                     # what the camera is in, also within a body, but for those with a priority, and all space where
+//!                                   # no body is; default none. It has no end: light from infinity comes through only at
+//!                                   # wavelengths that it lets pass unhindered
 //! fog: {colour: 0.8, start: 5, end: 40}
 //!                                   # or {colour, density: 0.1, falloff: exp}: exp (default), exp2
 //! groups:                           # shapes that are seen where an instance copies them; none of them shines

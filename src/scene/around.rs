@@ -1,11 +1,13 @@
 //! Bodies that stand in another medium than they say.
 //!
 //! A surface between media tells what is on either side of it; what is not written there is what the camera is in. On the straight
-//! way from the camera to a body, through all that is before it, the medium behind one surface has to be that before the next.
+//! way from the camera to a body, through all that is before it, the medium behind one surface has to be that before the next, and
+//! that of a closed body around the camera what the camera is in.
 
 use super::nested::Bodies;
 use super::{Geometry, Object, Scene};
 use crate::math::Ray;
+use glam::DVec3;
 
 /// Bodies to which the way is looked at; a bound on time.
 const MOST_BODIES: usize = 1024;
@@ -20,8 +22,21 @@ pub struct Stranger {
     pub object: u32,
     /// What is there.
     pub medium: Option<u32>,
-    /// Whether that is on its inside, as it may be of what is open; else on its outside.
-    pub within: bool,
+    /// What it says is there.
+    pub own: Option<u32>,
+    /// Where that is.
+    pub side: Side,
+}
+
+/// Where a body is met in another medium than it says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// On its outside.
+    Outside,
+    /// On its inside, as it may be of what is open or turned round.
+    Inside,
+    /// Within it, as it is closed and around the camera.
+    Camera,
 }
 
 impl Scene {
@@ -45,19 +60,32 @@ impl Scene {
     fn stranger_before(&self, object: u32) -> Option<Stranger> {
         let bounds = self.objects[object as usize].bounds();
         let way = 0.5 * bounds.min + 0.5 * bounds.max - self.camera.eye();
-        let direction = way.try_normalize().filter(|_| bounds.is_finite())?;
+        if !bounds.is_finite() {
+            return None;
+        }
+        // A camera in its very middle may look anywhere.
+        let direction = way.normalize_or(DVec3::Z);
         let (mut ray, mut inside) = (Ray::new(self.camera.eye(), direction), self.camera_inside);
+        let mut at_eye = true;
         for _ in 0..MOST_SURFACES {
             let hit = self.closest(&ray, f64::INFINITY)?;
             let (met, surface) = (&self.objects[hit.object as usize], self.surface(&ray, &hit));
             // Among bodies with a priority surfaces need not be what they say.
             let asked = hit.instance.is_none() && inside.bodies == Bodies::NONE && tells(met);
-            if asked && met.beyond(&surface, -direction, None) != inside.medium {
-                let within = direction.dot(surface.normal) > 0.0;
-                let stranger = Stranger { object: hit.object, medium: inside.medium, within };
-                // A camera in a closed body is not where it says.
-                return (!within || is_open(&met.geometry)).then_some(stranger);
+            let own = met.beyond(&surface, -direction, None);
+            if asked && own != inside.medium {
+                let behind = direction.dot(surface.normal) > 0.0;
+                let leaves = behind != met.flipped && !is_open(&met.geometry);
+                let side = match (leaves, behind) {
+                    (true, _) if at_eye => Side::Camera,
+                    // Something before it changed what is there.
+                    (true, _) => return None,
+                    (false, true) => Side::Inside,
+                    (false, false) => Side::Outside,
+                };
+                return Some(Stranger { object: hit.object, medium: inside.medium, own, side });
             }
+            at_eye &= met.keeps_medium;
             if hit.object == object {
                 return None;
             }
@@ -136,5 +164,43 @@ mod tests {
                     to be what the camera is in; a priority of each says where it stands";
         assert_eq!(notes(["", ", exterior_ior: 1.5"]), [told]);
         assert!(notes([", priority: 1", ", priority: 2"]).is_empty());
+    }
+
+    /// A camera in water that only the cube around it tells of, in its middle or not, and one in clear glass in fog: neither is in
+    /// what the body holds. Where both say the same, and where a body has a priority, nothing is told.
+    #[test]
+    fn a_camera_in_a_body_that_holds_another_medium_is_told() {
+        let notes = |eye: &str, medium: &str, body: &str| {
+            let text = format!(
+                "camera: {{origin: {eye}, target: [0, 0, -9], fov_deg: 40}}\n\
+                 media: {{water: {{homogeneous: {{absorption: 1}}}}}}\n{medium}\nshapes:\n\
+                 - sphere: {{center: [0, 0, -1], radius: 0.1}}\n- cube: {{size: 4, {body}}}\n"
+            );
+            compiled(&text).notes
+        };
+        let told = |own: &str, medium: &str| {
+            [format!(
+                "s.yaml:6:9: shapes[1].cube: the camera is inside, in {own}, but is taken to be in {medium}: medium says what \
+                 the camera is in, but for bodies with a priority"
+            )]
+        };
+        let water = "inside: water, material: {boundary: {}}";
+        let turned = "outside: water, inside: vacuum, material: {boundary: {}}, flip_normals: true";
+        let glass = "outside: water, material: {dielectric: {ior: 1.5}}";
+        let tinted = "material: {dielectric: {ior: 1.5, absorption: {color: 0.5, at: 0.3}}}";
+        for eye in ["[0, 0, 0]", "[0.3, 0.2, 1]"] {
+            assert_eq!(notes(eye, "", water), told("water", "vacuum"));
+            assert_eq!(notes(eye, "", turned), told("water", "vacuum"));
+            assert_eq!(notes(eye, "medium: water", glass), told("vacuum", "water"));
+            assert_eq!(notes(eye, "", tinted), told("a body that absorbs", "vacuum"));
+        }
+        for (eye, medium, body) in [
+            ("[0, 0, 5]", "", water),
+            ("[0, 0, 0]", "medium: water", "inside: water, outside: vacuum, material: {boundary: {}}"),
+            ("[0, 0, 0]", "", "inside: water, material: {dielectric: {ior: 1.33, priority: 1}}"),
+            ("[0, 0, 0]", "", "material: {dielectric: {ior: 1.5}}"),
+        ] {
+            assert!(notes(eye, medium, body).is_empty(), "{eye} {body}: {:?}", notes(eye, medium, body));
+        }
     }
 }

@@ -3,7 +3,7 @@
 use super::Compiler;
 use crate::description as written;
 use crate::scene::apart::Contact;
-use crate::scene::around::Stranger;
+use crate::scene::around::{Side, Stranger};
 use crate::scene::bvh::Aabb;
 use crate::scene::material::Material;
 use crate::scene::shape::Shape;
@@ -59,30 +59,39 @@ impl Compiler<'_> {
         }
     }
 
-    /// Notes which bodies stand in another medium than they are taken to, as nothing is written of it.
+    /// Notes which bodies stand in another medium than they are taken to, as nothing is written of it, and which are around a camera
+    /// that is taken to be in another one.
     pub(super) fn note_strangers(&self, scene: &mut Scene) {
         // What a material absorbs with has none.
         let name = |medium: Option<u32>| match medium {
             None => Some(written::VACUUM),
             Some(medium) => self.medium_ids.iter().find(|(_, id)| **id == medium).map(|(name, _)| *name),
         };
+        let place = |medium: Option<u32>| name(medium).unwrap_or("a body that absorbs");
         let told = |stranger: &Stranger| {
             let shape = self.description.shapes.get(stranger.object as usize)?;
-            let (side, is_written) = match stranger.within {
-                true => ("inside", shape.inside.is_some()),
-                false => ("outside", shape.outside.is_some()),
+            let medium = place(stranger.medium);
+            let stands = |side: &str| {
+                let says = match name(stranger.medium) {
+                    Some(name) => format!("{side}: {name} says"),
+                    None => "a priority of each says".to_owned(),
+                };
+                format!(
+                    "stands in {medium}, but its {side}, which is not written, is taken to be what the camera is in; {says} where \
+                     it stands"
+                )
             };
-            let medium = name(stranger.medium);
-            let says = match medium {
-                Some(name) => format!("{side}: {name} says"),
-                None => "a priority of each says".to_owned(),
+            let note = match stranger.side {
+                Side::Outside => shape.outside.is_none().then(|| stands("outside"))?,
+                Side::Inside => shape.inside.is_none().then(|| stands("inside"))?,
+                Side::Camera => format!(
+                    "the camera is inside, in {own}, but is taken to be in {medium}: medium says what the camera is in, but for \
+                     bodies with a priority",
+                    own = place(stranger.own),
+                ),
             };
-            let note = format!(
-                "stands in {}, but its {side}, which is not written, is taken to be what the camera is in; {says} where it stands",
-                medium.unwrap_or("a body that absorbs"),
-            );
             let at = format!("shapes[{}].{}", stranger.object, shape.geometry.kind());
-            (!is_written).then(|| self.description.fault(&at, &note))
+            Some(self.description.fault(&at, &note))
         };
         let notes: Vec<String> = scene.strangers().iter().filter_map(told).collect();
         if notes.len() > TOLD {
