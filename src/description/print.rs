@@ -264,6 +264,15 @@ mod tests {
         assert_eq!(scene("far/s.yaml").materials, scene("s.yaml").materials);
     }
 
+    #[test]
+    fn a_name_like_a_merge_key_reads_back() {
+        let mut sources = Sources::default();
+        let node = read("materials: {\"<<\": {diffuse: {reflectance: 0.5}}}\n", &mut sources);
+        let printed = Printer { sources: &sources, directory: Path::new("dir") }.document(&node);
+        assert_eq!(printed, "materials: {\"<<\": {diffuse: {reflectance: 0.5}}}\n");
+        assert!(same(&node, &read(&printed, &mut sources)));
+    }
+
     proptest! {
         #[test]
         fn any_text_and_number_reads_back(text in ".{0,12}", x in any::<f64>().prop_filter("finite", |x| x.is_finite())) {

@@ -12,10 +12,10 @@
 //! [`MAX_BYTES`] of text.
 
 use std::cell::Cell;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fmt;
 
-use granit_parser::{ErrorKind, Event, Options, Parser, ScanError, Span};
+use granit_parser::{ErrorKind, Event, Options, Parser, ScalarStyle, ScanError, Span};
 use serde::Deserialize;
 use serde::de::{self, DeserializeSeed, Deserializer, EnumAccess, MapAccess, SeqAccess, Visitor};
 
@@ -33,6 +33,7 @@ pub(crate) const MAX_NODES: usize = 4_000_000;
 /// Bytes of text that weigh as much as a node: about what a node takes in memory.
 const TEXT_PER_NODE: usize = 64;
 
+/// What a key is that stands for the fields of another map, if it is not in quotes.
 const MERGE_KEY: &str = "<<";
 
 /// Reads one document.
@@ -52,12 +53,19 @@ pub(crate) fn read(bytes: &[u8], source: u32) -> Result<Node, Fault> {
     })?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
 
-    let mut builder = Builder { source, budget: MAX_NODES, frames: Vec::new(), anchors: HashMap::new(), root: None };
+    let mut builder = Builder {
+        source,
+        budget: MAX_NODES,
+        frames: Vec::new(),
+        anchors: HashMap::new(),
+        merges: BTreeSet::new(),
+        root: None,
+    };
     let Some(mut root) = builder.build(text)? else {
         return Ok(Node::new(start, Value::Null));
     };
     interpret(&mut root, text)?;
-    merge(&mut root, &mut builder.budget)?;
+    merge(&mut root, &builder.merges, &mut builder.budget)?;
     Ok(root)
 }
 
@@ -86,6 +94,8 @@ struct Builder {
     frames: Vec<Frame>,
     /// Finished nodes that aliases may name, and how deep they nest.
     anchors: HashMap<usize, (Node, usize)>,
+    /// Where keys stand that are [`MERGE_KEY`].
+    merges: BTreeSet<Place>,
     root: Option<Node>,
 }
 
@@ -118,14 +128,19 @@ impl Builder {
                         return Err(Fault::at_place(at, "expected one document, found the start of a second"));
                     }
                 }
-                Event::Scalar(text, _, anchor, tag) => {
+                Event::Scalar(text, style, anchor, tag) => {
                     self.no_tag(at, tag.is_some())?;
                     self.charge(1 + text.len() / TEXT_PER_NODE, at)?;
                     match self.expects_key() {
                         true if anchor != 0 => {
                             return Err(self.fault(at, "expected a plain name as key, found an anchor"));
                         }
-                        true => self.key(&text, at)?,
+                        true => {
+                            if style == ScalarStyle::Plain && text == MERGE_KEY {
+                                self.merges.insert(at);
+                            }
+                            self.key(&text, at)?;
+                        }
                         false => self.finish_node(Node::new(at, Value::Text(text.into_owned())), 0, anchor)?,
                     }
                 }
@@ -441,19 +456,19 @@ struct Key(String);
 // Merge keys.
 
 /// Writes out `<<: *defaults`: the fields of the named map, or maps, that are not written here, where `<<` stands, as the
-/// order of frames counts.
-fn merge(node: &mut Node, budget: &mut usize) -> Result<(), Fault> {
+/// order of frames counts. Such keys are where `merges` says.
+fn merge(node: &mut Node, merges: &BTreeSet<Place>, budget: &mut usize) -> Result<(), Fault> {
     match &mut node.value {
         Value::List(items) => {
             for (i, item) in items.iter_mut().enumerate() {
-                merge(item, budget).map_err(|fault| fault.under(Segment::Index(i)))?;
+                merge(item, merges, budget).map_err(|fault| fault.under(Segment::Index(i)))?;
             }
         }
         Value::Map(entries) => {
             for entry in entries.iter_mut() {
-                merge(&mut entry.node, budget).map_err(|fault| fault.under(Segment::Key(entry.key.clone())))?;
+                merge(&mut entry.node, merges, budget).map_err(|fault| fault.under(Segment::Key(entry.key.clone())))?;
             }
-            if let Some(i) = entries.iter().position(|entry| entry.key == MERGE_KEY) {
+            if let Some(i) = entries.iter().position(|entry| merges.contains(&entry.key_place)) {
                 let Entry { node: from, .. } = entries.remove(i);
                 let mut place = i;
                 let from = match from.value {
@@ -674,5 +689,13 @@ mod tests {
         assert_eq!(values("a"), "y=2 x=5");
         assert_eq!(values("b"), "y=3 z=4 x=1");
         assert_eq!(refusal("a: {<<: 3}"), "f.yaml:1:9: a.<<: expected a map or a list of maps, found 3");
+    }
+
+    /// YAML 1.1, "Merge Key Language-Independent Type": what is in quotes is text.
+    #[test]
+    fn a_merge_key_in_quotes_is_a_name() {
+        let root = tree("base: &b {'<<': 1, y: 2}\na: {\"<<\": {x: 3}}\nb: {<<: *b, z: 4}\n");
+        assert_eq!(root.get("a").unwrap().get("<<").unwrap().found(), "a map with x");
+        assert_eq!(root.get("b").unwrap().found(), "a map with <<, y, z");
     }
 }
