@@ -605,6 +605,8 @@ fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
     let missing: String = parts.iter().filter(|(key, _)| !head.contains(key)).map(|(_, part)| *part).collect();
     let floor = "rectangle: {corner: [-2, 0, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4]}";
     let head = head.replace("EARTH", concat!(env!("CARGO_MANIFEST_DIR"), "/textures/earth.jpg"));
+    let waves = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/cross_validate/mitsuba/assets/waves.png");
+    let head = head.replace("WAVES", waves);
     let exported = folder.export_and_back(&format!("{missing}{head}shapes:\n- {floor}\n- {shape}\n"));
     (told(&exported), exported.xml)
 }

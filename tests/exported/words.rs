@@ -144,7 +144,7 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
         format!("rectangle: {{corner: [-1, 0, 0], edge_u: [2, 0, 0], edge_v: [0, 1, 0], material: {{{material}}}}}")
     };
     let textures = "textures: {earth: {image: {file: EARTH}}, data: {image: {file: EARTH, raw: true}}, \
-                    board: {checkerboard: {a: {texture: earth}, b: 0.3}}}\n";
+                    board: {checkerboard: {a: {texture: earth}, b: 0.3}}, waves: {image: {file: WAVES, raw: true}}}\n";
     let grey = card("diffuse: {}");
     const BALL: &str = "sphere: {center: [0, 0.5, 0], radius: 0.5, material: {boundary: {}}, inside: m}";
     let cases: &[(&str, &str, &[&str], &[&str])] = &[
@@ -259,6 +259,14 @@ fn what_mitsuba_would_refuse_is_written_otherwise_and_told() {
             textures,
             &card("bump: {height: {texture: board}, material: {diffuse: {}}}"),
             &["shapes[1].rectangle.material: what it covers: Mitsuba has no slopes but of pictures"],
+            &["<bsdf type=\"mask\">"],
+        ),
+        (
+            textures,
+            &card("normal_map: {normals: {texture: waves}, material: {diffuse: {}}}"),
+            &[
+                "shapes[1].rectangle.material: what it covers: normals are written for Mitsuba as pictures in colour alone",
+            ],
             &["<bsdf type=\"mask\">"],
         ),
         (

@@ -138,29 +138,33 @@ impl Export<'_> {
     }
 
     pub(super) fn bump(&mut self, field: &str, m: &Bump, attributes: &Attributes) {
-        if self.relief(attributes, None, &m.height.texture, m.turn, m.shadowing) {
+        let texture = &m.height.texture;
+        let has_slopes = self.has_slopes(texture);
+        self.relief(attributes, None, has_slopes.then_some(texture), m.turn, m.shadowing);
+        if has_slopes {
             self.xml.value("float", "scale", m.scale);
         }
         self.material_ref(&format!("{field}.bump.material"), &m.material);
     }
 
     pub(super) fn normal_map(&mut self, field: &str, m: &NormalMap, attributes: &Attributes) {
-        self.relief(attributes, Some("normalmap"), &m.normals.texture, m.turn, m.shadowing);
+        let texture = &m.normals.texture;
+        let normals = self.has_normals(texture).then_some(texture);
+        self.relief(attributes, Some("normalmap"), normals, m.turn, m.shadowing);
         self.material_ref(&format!("{field}.normal_map.material"), &m.material);
     }
 
-    /// Begins a relief of `texture`, which the plugin knows by `name`; where Mitsuba has none, and the answer is no, a plugin that
-    /// leaves the material in it as it is.
+    /// Begins a relief of `texture`, which the plugin knows by `name`; where Mitsuba has none, a plugin that leaves the material
+    /// in it as it is.
     fn relief(
         &mut self,
         attributes: &Attributes,
         name: Option<&str>,
-        texture: &str,
+        texture: Option<&String>,
         turn: bool,
         shadowing: bool,
-    ) -> bool {
-        let has_relief = self.has_relief(texture);
-        if has_relief {
+    ) {
+        if let Some(texture) = texture {
             self.open_owned("bsdf", attributes);
             self.numbers_of(name, texture);
             self.xml.value("boolean", "flip_invalid_normals", turn);
@@ -171,7 +175,6 @@ impl Export<'_> {
             self.open_owned("bsdf", &all);
             self.xml.value("float", "opacity", 1.0);
         }
-        has_relief
     }
 
     /// The material that a reference means.
@@ -250,10 +253,10 @@ impl Export<'_> {
                 }
                 HairColour::Absorption(s) => Export::constant_shortfall(&[s], "a grey absorption"),
             },
-            Material::Bump(m) => (!self.has_relief(&m.height.texture))
+            Material::Bump(m) => (!self.has_slopes(&m.height.texture))
                 .then(|| "what it covers: Mitsuba has no slopes but of pictures".to_owned()),
-            Material::NormalMap(m) => (!self.has_relief(&m.normals.texture))
-                .then(|| "what it covers: Mitsuba has no normals but of pictures".to_owned()),
+            Material::NormalMap(m) => (!self.has_normals(&m.normals.texture))
+                .then(|| "what it covers: normals are written for Mitsuba as pictures in colour alone".to_owned()),
             _ => None,
         }
     }

@@ -231,9 +231,18 @@ impl<'a> Export<'a> {
         own.or_else(|| inner.find_map(|texture| self.pictures_shortfall(texture, stands)))
     }
 
-    /// Whether Mitsuba finds slopes and normals in it.
-    pub(super) fn has_relief(&self, texture: &str) -> bool {
+    /// Whether Mitsuba finds slopes in it.
+    pub(super) fn has_slopes(&self, texture: &str) -> bool {
         matches!(self.scene.textures.get(texture), None | Some(Texture::Image(_)))
+    }
+
+    /// Whether Mitsuba finds normals in it, of which grey ones have one number where three are wanted.
+    pub(super) fn has_normals(&self, texture: &str) -> bool {
+        match self.scene.textures.get(texture) {
+            Some(Texture::Image(image)) => has_colours(&image.file),
+            Some(_) => false,
+            None => true,
+        }
     }
 
     /// Whether Mitsuba refuses to take the mean of it.
