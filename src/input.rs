@@ -1,7 +1,8 @@
 //! Files that are read: regular ones. A FIFO or a device may keep its reader waiting, or never end.
 
+use std::alloc::{Layout, handle_alloc_error};
 use std::fs::File;
-use std::io::{Error, Result};
+use std::io::{Error, ErrorKind, Result};
 use std::path::Path;
 
 /// Refuses what is no regular file.
@@ -40,11 +41,20 @@ pub fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes)
 }
 
-/// All bytes of a regular file.
+/// All bytes of a regular file. Without memory for them the process ends, as wherever else it needs some.
 ///
 /// # Errors
 /// As [`check`] and [`std::fs::read`].
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     check(path)?;
-    std::fs::read(path)
+    std::fs::read(path).map_err(end_without_memory)
+}
+
+/// `e`, unless it says that there is no memory: that is no fault of the file.
+#[must_use]
+pub fn end_without_memory(e: Error) -> Error {
+    if e.kind() == ErrorKind::OutOfMemory {
+        handle_alloc_error(Layout::new::<u8>());
+    }
+    e
 }
