@@ -2,7 +2,7 @@
 
 use super::finish;
 use super::prepare::{colour_space, integrator};
-use crate::description::{self, LayerContent, SceneDescription};
+use crate::description::{self, DEFAULT_GROUP, LayerContent, SceneDescription};
 use crate::error::Result;
 use crate::film::layers::Kept;
 use crate::scene::Scene;
@@ -38,18 +38,21 @@ pub(super) fn plan(description: &SceneDescription, scene: &Scene, samples: u32) 
     for (i, band) in scene.bands.iter().enumerate() {
         plan.layers.push(Layer { name: band.name.clone(), source: Source::Band(i), squares: None });
     }
-    let group = |name: &String| description.light_groups.keys().position(|key| key == name).map(|i| i as u8 + 1);
+    let groups = &scene.light_groups;
+    // One that has no number of its own is that of the rest.
+    let group = |name: &String| groups.names.iter().position(|key| key == name).map_or(0, |i| i as u8 + 1);
     // Those to which paths from the lights add come first.
     for layer in &description.layers {
         match &layer.content {
             LayerContent::Ways { ways, group: of } => {
-                let source = Source::Ways(self::ways(ways), of.as_ref().and_then(group));
+                let source = Source::Ways(self::ways(ways), of.as_ref().map(group));
                 plan.layers.push(Layer { name: layer.name.clone(), source, squares: None });
             }
             LayerContent::LightGroups => {
-                let groups = &scene.light_groups;
                 // Depth fog is of no lamp.
-                let rest = (groups.of.contains(&0) || scene.fog.is_some()).then(|| "default".to_owned());
+                let is_named = description.light_groups.contains_key(DEFAULT_GROUP);
+                let has_rest = is_named || groups.of.contains(&0) || scene.fog.is_some();
+                let rest = has_rest.then(|| DEFAULT_GROUP.to_owned());
                 let numbers = if rest.is_some() { 0 } else { 1 }..groups.count();
                 for (name, i) in rest.iter().chain(&groups.names).zip(numbers) {
                     let source = Source::Ways(Ways::ALL, Some(i));

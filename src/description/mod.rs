@@ -238,7 +238,8 @@
 //!                                                #   {blend: {weight: 0.3, of: [isotropic, {hg: 0.8}]}}
 //!   milk: {homogeneous: {extinction: 5, albedo: 0.99, scale: 1, shadow_rays: true}}    # ~ scale, shadow_rays
 //!   cloud: {heterogeneous: {extinction: {volume: haze}, albedo: 0.9, scale: 1}}        # and phase, shadow_rays
-//! light_groups: {key: [ball]}       # lamps by group, for layers; names as given or made of kind and number (point0)
+//! light_groups: {key: [ball]}       # lamps by group, for layers; names as given or made of kind and number (point0);
+//!                                   # lamps in none are in the group default, into which others may be put by name
 //! assets: {toys: [ball]}            # shapes by what they are part of, for mattes; ~ the group of an instance, or itself
 //! medium: smoke                     # what the camera is in, also within a body, but for those with a priority, and all space where
 //!                                   # no body is; default none. It has no end: light from infinity comes through only at
@@ -542,7 +543,7 @@ pub(crate) use path::field;
 pub use path_map::PathMap;
 pub use principled::{Contrast, Luminance, Principled, PrincipledThin, Sampling, ThinSampling};
 pub use print::yaml;
-pub use scene::{Locator, SceneDescription};
+pub use scene::{DEFAULT_GROUP, Locator, SceneDescription};
 pub use settings::{
     Coverage, DepthIntegrator, Effects, Integrator, LightTracerIntegrator, MOST_SAMPLES, NoIntegrator, PathIntegrator,
     Render, SAMPLES_LIMIT, ShadowRays, Stop, Technique, Techniques, Time, Wavelengths, WhittedIntegrator, duration,

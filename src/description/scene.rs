@@ -28,6 +28,9 @@ use super::texture::Texture;
 use super::volume::Volume;
 use crate::error::Result;
 
+/// The light group of lamps that are in no other. Lamps may be put into it by name, too.
+pub const DEFAULT_GROUP: &str = "default";
+
 /// Everything that one picture is made of.
 ///
 /// It has passed validation: numbers are finite and in range, names refer to something. What only
@@ -295,7 +298,7 @@ impl SceneDescription {
             let expected = "an integrator that follows camera rays, since there are layers";
             checker.require(false, at.key("integrator"), expected, "light_tracer");
         }
-        let groups: BTreeSet<&str> = self.light_groups.keys().map(String::as_str).collect();
+        let groups: BTreeSet<&str> = self.light_groups.keys().map(String::as_str).chain([DEFAULT_GROUP]).collect();
         for (i, layer) in self.layers.iter().enumerate() {
             let taken = self.layers[..i].iter().any(|other| layer.clashes(other));
             let at = at.key("layers");

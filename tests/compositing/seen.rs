@@ -250,6 +250,28 @@ fn light_by_its_ways_is_in_the_terms_of_the_picture() {
     }
 }
 
+/// Lamps that are in no group are in `default`, whether others are put into it or not, and a layer may name it.
+#[test]
+fn lamps_in_no_group_are_in_the_group_default() {
+    let picture = |groups: &str| {
+        render(&format!(
+            "{FRAME}light_groups: {groups}\nlayers: [light_groups, {{name: rest, light_group: default}}]\n\
+             lights: [{{constant: {{name: sky, radiance: 0.2}}}}, {{point: {{position: [0, 3, 0], intensity: 3}}}}]\n\
+             shapes: [{{plane: {{normal: [0, 1, 0]}}}}, {{sphere: {{name: lamp, center: [1, 2, 0], radius: 0.3, emission: 9}}}}]\n"
+        ))
+    };
+    let (left, named) = (picture("{key: [lamp]}"), picture("{key: [lamp], default: [sky]}"));
+    let channel = |(name, _): &(String, _)| name.clone();
+    assert!(named.channels.iter().map(channel).eq(left.channels.iter().map(channel)));
+    for layer in ["light_default", "light_key", "rest"] {
+        for colour in ["R", "G", "B"] {
+            let of = |part, layer| plane(part, &format!("{layer}.{colour}")).to_vec();
+            assert_eq!(of(&named, layer), of(&left, layer), "{layer}.{colour}");
+            assert!(layer != "rest" || of(&named, layer) == of(&named, "light_default"));
+        }
+    }
+}
+
 /// Depth fog is of no lamp: it is in a group of its own where each lamp has one.
 #[test]
 fn depth_fog_is_light_of_no_lamp() {

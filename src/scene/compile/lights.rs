@@ -259,11 +259,13 @@ fn growth(v: written::Growth) -> f64 {
 /// The groups that the lights of these names are in.
 pub(super) fn groups(d: &written::SceneDescription, lights: &[String]) -> LightGroups {
     let mut numbers: HashMap<&str, u8> = HashMap::new();
-    for (names, number) in d.light_groups.values().zip(1..) {
+    // What is put into the group of lamps that are in no other is in no other.
+    let others = || d.light_groups.iter().filter(|(name, _)| *name != written::DEFAULT_GROUP);
+    for ((_, names), number) in others().zip(1..) {
         numbers.extend(names.iter().map(|name| (name.as_str(), number)));
     }
     let of = |light: &String| numbers.get(light.as_str()).copied().unwrap_or(0);
-    LightGroups { names: d.light_groups.keys().cloned().collect(), of: lights.iter().map(of).collect() }
+    LightGroups { names: others().map(|(name, _)| name.clone()).collect(), of: lights.iter().map(of).collect() }
 }
 
 /// Running sums of the probabilities with which lights are chosen: half by power, half evenly, so
