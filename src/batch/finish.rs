@@ -472,11 +472,15 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         report.notes.push("an ACES container holds half floats only: the file is none".to_owned());
     }
     if finish.variance {
-        // Beside bands of the colours that the PNG is made of.
-        let base = if finish.bands { exr::Base::Rgb } else { finish.base() };
-        for &(name, i) in base.colours() {
-            let variance = image.standard_error[i].iter().map(|x| x * x).collect();
-            file.push_data(format!("variance.{name}"), ChannelData::F32(variance));
+        let squares = |errors: &[f32]| ChannelData::F32(errors.iter().map(|x| x * x).collect());
+        // Bands stand in place of colours.
+        for i in 0..finish.spectral_channels().start {
+            let channel = &finish.layers[i];
+            let error = whole(band_error(finish, frame, i), channel);
+            file.push_data(format!("variance.{}", channel.name), squares(&error));
+        }
+        for &(name, i) in finish.base().colours() {
+            file.push_data(format!("variance.{name}"), squares(&image.standard_error[i]));
         }
     }
     if finish.sample_count {
@@ -510,10 +514,14 @@ fn whole(mut plane: Vec<f32>, channel: &Channel) -> Vec<f32> {
 
 /// The standard errors of the bands that are `channels`, as their sums count them; none where they are not wanted.
 fn band_errors(finish: &Finish, frame: &Frame, channels: Range<usize>) -> Vec<Vec<f32>> {
-    // As of colours: samples that are not random would be the same again.
-    let none = || vec![0.0; frame.film.window().pixels()];
-    let error = |i: usize| if finish.is_random() { frame.layer_error(i) } else { none() };
+    let error = |i: usize| band_error(finish, frame, i);
     if finish.output.exr.stderr { channels.map(error).collect() } else { Vec::new() }
+}
+
+/// The standard error of the band that is `channel`, as its sums count it.
+fn band_error(finish: &Finish, frame: &Frame, channel: usize) -> Vec<f32> {
+    // As of colours: samples that are not random would be the same again.
+    if finish.is_random() { frame.layer_error(channel) } else { vec![0.0; frame.film.window().pixels()] }
 }
 
 /// What pixels share of the errors of the bands that are `channels`, which is no less where those are not written.

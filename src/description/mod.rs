@@ -85,7 +85,7 @@
 //!                                   # P, uv, motion (X to the right, Y up, in pixels, until the next frame): of the ray
 //!                                   # through the middle of the pixel, not filtered; normal, albedo (in daylight; of metal at
 //!                                   # normal incidence, of clear glass 1): means over it, of what is seen, not of holes;
-//!                                   # variance, stderr: of the pixel's mean; sampleCount;
+//!                                   # variance, stderr: of the pixel's mean, or of each of its bands; sampleCount;
 //!                                   # crypto_object, crypto_material, crypto_asset: Cryptomatte
 //! render:                           # these are the defaults
 //!   samples: 64                     # paths per pixel

@@ -325,6 +325,30 @@ fn with_spectral(text: &str) -> [ExrPart; 2] {
     ["out.exr", "out.spectral.exr"].map(|name| read_exr(&path(name)).unwrap().parts.remove(0))
 }
 
+/// A band that is called R stands in place of a colour, and `variance.R` is its own: it was that of the colour shown.
+#[test]
+fn the_variance_of_a_picture_of_bands_is_that_of_its_bands() {
+    let picture = |integrator: &str| {
+        let text = format!(
+            "camera: {{origin: [0, 1, 5], target: [0, 1, 0], fov_deg: 40}}\n\
+             image: {{width: 6, height: 4, bands: [{{name: R, response: 1}}, {{name: uv.a, response: 2}}]}}\n\
+             integrator: {integrator}\nrender: {{samples: 8}}\nlayers: [variance, stderr]\noutput: {{spectral: {{bands: 1}}}}\n\
+             shapes: [{{plane: {{normal: [0, 1, 0]}}}}, {{sphere: {{center: [0, 4, 0], radius: 1, emission: 5}}}}]\n"
+        );
+        with_spectral(&text)[0].clone()
+    };
+    for integrator in ["path", "whitted"] {
+        let picture = picture(integrator);
+        let names: Vec<&str> = picture.channels.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["R", "stderr.R", "stderr.uv.a", "uv.a", "variance.R", "variance.uv.a"]);
+        for band in ["R", "uv.a"] {
+            let of = |what: &str| plane(&picture, &format!("{what}.{band}"));
+            assert_eq!(of("variance"), of("stderr").iter().map(|e| e * e).collect::<Vec<_>>());
+            assert_eq!(of("stderr").iter().any(|e| *e > 0.0), integrator == "path");
+        }
+    }
+}
+
 /// Bands of the picture and of the spectral file have their standard errors beside them, as data; a picture without a wish for them
 /// has none. Both say how much of them pixels share, by which `abbe compare` judges the bands.
 #[test]
