@@ -349,8 +349,7 @@ pub fn write(
     output::write_together(&both.into_iter().flatten().collect::<Vec<_>>())?;
     note_loss(exr_path, finish, &exr, report)?;
     png.map_err(|message| Error::output(&png_path, message))?;
-    report.files = vec![exr_path.to_path_buf(), png_path];
-    report.files.extend((!finish.spectral_channels().is_empty()).then_some(spectral));
+    report.files = files(finish, exr_path);
     report.seconds.writing = written.elapsed().as_secs_f64();
     sound
 }
@@ -543,6 +542,13 @@ pub fn spectral_path(path: &Path) -> PathBuf {
         Some((name, number)) => format!("{name}.spectral.{number}.exr"),
         None => format!("{stem}.spectral.exr"),
     })
+}
+
+/// The files of the picture at `path`.
+#[must_use]
+pub fn files(finish: &Finish, path: &Path) -> Vec<PathBuf> {
+    let spectral = finish.output.spectral.map(|_| spectral_path(path));
+    [path.to_path_buf(), path.with_extension("png")].into_iter().chain(spectral).collect()
 }
 
 /// All files that the picture at `path` may have.

@@ -221,8 +221,10 @@ fn render_and_write(
         report.status = Status::Skipped;
         if part.is_none() {
             report.recall(finish, &exr_path);
+            report.files = finish::files(finish, &exr_path);
+        } else {
+            report.files = vec![exr_path];
         }
-        report.files = vec![exr_path];
         return ended;
     }
     // A place that cannot be written to is told before the work, not after.

@@ -184,7 +184,7 @@ pub struct SceneReport {
     pub wavelengths: String,
     /// What a person should know.
     pub notes: Vec<String>,
-    /// Files written.
+    /// Files written, or there already.
     #[serde(serialize_with = "all_in_text")]
     pub files: Vec<PathBuf>,
     /// What is wrong with the picture although it is written, which its header tells.
