@@ -143,6 +143,8 @@ enum Fault {
     Twice(usize, Range<u32>),
     /// These samples of a thing are in none.
     Missing(usize, Range<u32>),
+    /// There is no memory to count them.
+    NoMemory,
 }
 
 /// Checks that `claims` have the samples below `samples` of all things below `things` exactly once: in the order of their
@@ -151,7 +153,7 @@ fn cover(mut claims: Vec<Claim>, things: usize, samples: u32) -> std::result::Re
     claims.sort_by_key(|claim| claim.samples.start);
     let mut done = Vec::new();
     if done.try_reserve_exact(things).is_err() {
-        return Err(Fault::Missing(0, 0..samples));
+        return Err(Fault::NoMemory);
     }
     done.resize(things, 0u32);
     for claim in claims.iter().filter(|claim| !claim.samples.is_empty()) {
@@ -191,6 +193,8 @@ fn check_cover(parts: &[Written], out: &Path) -> Result<()> {
         Error::input(&parts[part].path, format!("overlap: {other} has {} of the same rows, too", words(samples)))
     };
     let incomplete = |what: String| Error::input(out, format!("cannot be merged from {} parts: {what}", parts.len()));
+    let no_memory =
+        || Error::Memory(format!("{}: the parts of {window} take more memory than there is", out.display()));
 
     let mut claims = Vec::new();
     for (part, written) in parts.iter().enumerate() {
@@ -217,6 +221,7 @@ fn check_cover(parts: &[Written], out: &Path) -> Result<()> {
                 finish.samples - 1
             ))
         }
+        Fault::NoMemory => no_memory(),
     })?;
 
     // Paths from the lights, in pieces between which nobody cuts.
@@ -240,6 +245,7 @@ fn check_cover(parts: &[Written], out: &Path) -> Result<()> {
             cuts[thing],
             cuts[thing + 1] - 1
         )),
+        Fault::NoMemory => no_memory(),
     })
 }
 
@@ -271,5 +277,11 @@ mod tests {
             assert!(matches!(cover(more, 9, 8), Err(Fault::Twice(_, samples)) if samples == (7..8)), "{thing}");
         }
         assert!(matches!(cover(parts(), 10, 8), Err(Fault::Missing(9, _))));
+    }
+
+    /// It was told as if samples were missing.
+    #[test]
+    fn more_things_than_memory_can_count_are_no_fault_of_the_parts() {
+        assert!(matches!(cover(Vec::new(), usize::MAX, 8), Err(Fault::NoMemory)));
     }
 }
