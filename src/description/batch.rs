@@ -93,6 +93,8 @@ pub struct BatchEntry {
     pub name: String,
     /// The scene's file, relative to the working directory.
     pub path: PathBuf,
+    /// What stands in it, where it cannot be read again.
+    bytes: Option<Arc<[u8]>>,
     /// Where the batch names the file; `None` for a scene on its own.
     place: Option<Place>,
     /// The batch's `output` and `render`, laid over the scene's.
@@ -124,11 +126,15 @@ pub fn load_mapped(path: &Path, map: PathMap) -> Result<Document> {
         return Ok(Document::Scene(BatchEntry::alone(path, sources)?));
     }
     let nothing_read = sources.clone();
-    let root = edit::read_named(path, &mut sources)?;
+    let bytes = edit::named_bytes(path).map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
+    let root = edit::read_bytes_as(&bytes, path, &mut sources)?;
     if root.get("scenes").is_some() {
         return Ok(Document::Batch(Batch::of_tree(&root, &sources)?));
     }
-    Ok(Document::Scene(BatchEntry::alone(path, nothing_read)?))
+    let mut entry = BatchEntry::alone(path, nothing_read)?;
+    // What another process writes can be read once.
+    entry.bytes = edit::is_of_the_system(path).then(|| bytes.into());
+    Ok(Document::Scene(entry))
 }
 
 fn stem(path: &Path) -> Option<String> {
@@ -229,6 +235,7 @@ impl Batch {
                 name,
                 defines: entry.define.into_iter().map(define).collect(),
                 path: entry.file.0,
+                bytes: None,
                 place: node.get("file").map(|file| file.place),
                 layers: Arc::clone(&layers),
                 settings,
@@ -256,6 +263,7 @@ impl BatchEntry {
         Ok(BatchEntry {
             name,
             path: path.to_path_buf(),
+            bytes: None,
             place: None,
             layers: Arc::default(),
             settings: Vec::new(),
@@ -312,9 +320,10 @@ impl BatchEntry {
     /// [`Error::Config`] if it is not YAML or cannot be changed so.
     pub fn animation(&self, overrides: &[(String, String)]) -> Result<Animation> {
         let mut sources = Sources::clone(&self.sources);
-        let read = match mitsuba::is_xml(&self.path) {
-            true => mitsuba::read(&self.path, &self.defines, &mut sources),
-            false => edit::read_file(&self.path, &mut sources),
+        let read = match &self.bytes {
+            _ if mitsuba::is_xml(&self.path) => mitsuba::read(&self.path, &self.defines, &mut sources),
+            Some(bytes) => edit::read_bytes_as(bytes, &self.path, &mut sources),
+            None => edit::read_file(&self.path, &mut sources),
         };
         let mut root = read.map_err(|error| match (error, self.place) {
             (Error::Input { path, message }, Some(place)) => {

@@ -28,22 +28,15 @@ pub(crate) fn read_file(path: &Path, sources: &mut Sources) -> Result<Node> {
     read_bytes_as(&bytes, path, sources)
 }
 
-/// [`read_file`] of the file that the command line names, which may be what another process writes: `/dev/stdin`, or the
-/// `/dev/fd/63` of a shell's `<(…)`.
-///
-/// # Errors
-/// As there.
-pub(crate) fn read_named(path: &Path, sources: &mut Sources) -> Result<Node> {
-    let bytes = named_bytes(path).map_err(|error| Error::input(path, format!("cannot be read: {error}")))?;
-    read_bytes_as(&bytes, path, sources)
+/// The bytes of a file that the command line names, at most one more than may be read. It may be what another process writes:
+/// `/dev/stdin`, or the `/dev/fd/63` of a shell's `<(…)`.
+pub(crate) fn named_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+    if is_of_the_system(path) { File::open(path).and_then(read_most) } else { read_bytes(path) }
 }
 
-/// The bytes of a file that the command line names, at most one more than may be read.
-pub(crate) fn named_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
-    match ["/dev", "/proc"].iter().any(|system| path.starts_with(system)) {
-        true => File::open(path).and_then(read_most),
-        false => read_bytes(path),
-    }
+/// Whether what stands at `path` may be no file that can be read again.
+pub(crate) fn is_of_the_system(path: &Path) -> bool {
+    ["/dev", "/proc"].iter().any(|system| path.starts_with(system))
 }
 
 /// Reads the bytes of a file to a tree.

@@ -248,17 +248,25 @@ fn what_is_no_regular_file_is_refused() {
     }
 }
 
-/// A batch is read once, and may come from another process.
+/// What another process writes can be read once: a batch, or a scene, which was read again.
 #[cfg(unix)]
 #[test]
-fn a_batch_may_come_by_the_standard_input() {
+fn a_batch_or_a_scene_may_come_by_the_standard_input() {
+    use crate::common::place::{Ran, pixels};
     let scene = format!("{SMALL}lights: [{{constant: {{radiance: 1}}}}]\n");
     let place = Place::with(&[("s.yaml", &scene)]);
-    let script = "echo \"scenes: [{file: $PWD/s.yaml}]\" | \"$0\" render /dev/stdin -q -o out";
-    let mut command = std::process::Command::new("sh");
-    command.args(["-c", script, env!("CARGO_BIN_EXE_abbe")]).current_dir(place.directory.path());
-    assert!(command.status().unwrap().success());
+    let piped = |text: &str, arguments: &str| {
+        let mut command = std::process::Command::new("sh");
+        command.args(["-c", &format!("{text} | \"$0\" {arguments}"), env!("CARGO_BIN_EXE_abbe")]);
+        Ran::of(command.current_dir(place.directory.path()).output().unwrap())
+    };
+    let batch = "echo \"scenes: [{file: $PWD/s.yaml}]\"";
+    assert_eq!(piped(batch, "render /dev/stdin -q -o out").code, 0);
     assert_eq!(place.names("out"), ["report.json", "s.exr", "s.png"]);
+    let ran = piped("cat s.yaml", "render /dev/stdin -q -o alone");
+    assert_eq!((ran.code, ran.err.as_str()), (0, ""));
+    assert_eq!(place.names("alone"), ["report.json", "stdin.exr", "stdin.png"]);
+    assert!(pixels(&place.path("alone/stdin.exr")) == pixels(&place.path("out/s.exr")));
 }
 
 #[test]
