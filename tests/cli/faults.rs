@@ -248,7 +248,7 @@ fn what_is_no_regular_file_is_refused() {
     }
 }
 
-/// What another process writes can be read once: a batch, or a scene, which was read again.
+/// What another process writes can be read once: a batch, or a scene, which was read again. Tasks of a farm cannot read it at all.
 #[cfg(unix)]
 #[test]
 fn a_batch_or_a_scene_may_come_by_the_standard_input() {
@@ -267,6 +267,8 @@ fn a_batch_or_a_scene_may_come_by_the_standard_input() {
     assert_eq!((ran.code, ran.err.as_str()), (0, ""));
     assert_eq!(place.names("alone"), ["report.json", "stdin.exr", "stdin.png"]);
     assert!(pixels(&place.path("alone/stdin.exr")) == pixels(&place.path("out/s.exr")));
+    let ran = piped(batch, "farm /dev/stdin --format slurm -o job");
+    assert!(ran.code == 3 && ran.err.contains("expected a file that tasks can read"), "{}", ran.err);
 }
 
 #[test]
