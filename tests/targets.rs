@@ -417,6 +417,7 @@ fn another_build_has_a_row_of_its_own() {
     assert_eq!(rows[5]["value"], program);
     let (code, said) = abbe(&place, "accuracy scene.yaml --knob depht");
     assert!(code == 2 && said.contains("expected one of samples, depth, sampler"), "{code} {said}");
+    assert!(said.contains("found \"depht\"; did you mean \"depth\"?"), "{said}");
     let (code, said) = abbe(&place, "accuracy scene.yaml -o file --rounds 2 --knob file");
     assert_eq!(code, 0, "{said}");
     let rows = &place.json("file/accuracy.json")[0]["rows"];

@@ -57,7 +57,11 @@ pub fn run(arguments: &FarmArguments) -> Result<i32> {
         FarmFormat::Slurm => shown("", "/submit.sh") + "\n",
     };
     if !arguments.quiet {
-        super::say(&format!("{} pictures; start with\n{start}", job.count()));
+        let pictures = match job.count() {
+            1 => "1 picture".into(),
+            count => format!("{count} pictures"),
+        };
+        super::say(&format!("{pictures}; start with\n{start}"));
     }
     Ok(0)
 }

@@ -535,6 +535,7 @@ pub use material::{
 pub use medium::{Coefficients, HeterogeneousMedium, HomogeneousMedium, Medium, Phase, PhaseBlend};
 pub(crate) use medium::{UNCHANGED, VACUUM};
 pub use mitsuba::export::{Exported, Loss, MeshNormals, PictureAnew, export};
+pub(crate) use node::did_you_mean;
 pub use optical_data::{OpticalData, optical_data};
 pub use output::{
     Channels, Colour, Compression, Exposure, Exr, Output, Png, PngDither, PngSpace, Precision, Tonemap, WhiteBalance,

@@ -2,7 +2,7 @@
 
 use super::super::{Prepared, adaptive, motion, splatting};
 use super::Settings;
-use crate::description::LayerContent;
+use crate::description::{LayerContent, did_you_mean};
 use crate::error::{Error, Result};
 use crate::film::accumulate::REPLICATES;
 use crate::spectrum::Carried;
@@ -91,7 +91,8 @@ pub fn wanted(chosen: &Prepared, settings: &Settings<'_>) -> Result<Vec<Trial>> 
     names.dedup();
     names.push(FILE);
     if let Some(unknown) = settings.knobs.iter().find(|name| !names.contains(&name.as_str())) {
-        return Err(Error::Config(format!("--knob: expected one of {}; found \"{unknown}\"", names.join(", "))));
+        let hint = did_you_mean(unknown, names.iter().copied());
+        return Err(Error::Config(format!("--knob: expected one of {}, found \"{unknown}\"{hint}", names.join(", "))));
     }
     all.retain(|t| t.knob == CHOSEN || settings.moves(t.knob));
     if let Some(build) = settings.beside {
