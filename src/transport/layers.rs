@@ -44,7 +44,7 @@ pub enum Source {
     Middle(Middle),
 }
 
-/// Components of [`Source::Numerics`], all a sample: of [`Counts`], and samples that light cannot make, by cause.
+/// Components of [`Source::Numerics`], all a sample: of [`watch::Counts`](crate::scene::watch::Counts), and samples that light cannot make, by cause.
 pub const NUMERICS: [&str; 8] = ["surfaces", "robust", "rays", "selfHits", "nan", "infinite", "negative", "overflow"];
 
 /// A group of channels.
