@@ -303,7 +303,7 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                 break 'batch;
             }
             watcher.scene_begins(Turn { scene: [i, entries.len()], frame: [n, frames] }, &label);
-            let prepared = description.and_then(|d| prepare_one_of(entry, d, overrides, &mut shelf));
+            let prepared = description.and_then(|d| prepare_one_of(entry, d, overrides, &mut shelf, stop));
             if i + 1 == entries.len() && n + 1 == frames {
                 // Nobody comes after the last one.
                 shelf = Shelf::default();

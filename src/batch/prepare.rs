@@ -27,6 +27,7 @@ use crate::transport::{Shot, Spread};
 use glam::DVec2;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// What may be written is what a film holds.
@@ -100,7 +101,7 @@ impl Prepared {
 /// # Errors
 /// [`Error::Config`] and [`Error::Input`], as [`compile::compile`].
 pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
-    prepare_one_of(entry, entry.scene(&overrides.set)?, overrides, &mut Shelf::default())
+    prepare_one_of(entry, entry.scene(&overrides.set)?, overrides, &mut Shelf::default(), &AtomicBool::new(false))
 }
 
 /// [`prepare_scene`] of one of the pictures of a batch. What is asked of all of them asks nothing of those by `whitted`.
@@ -109,9 +110,10 @@ pub(super) fn prepare_one_of(
     mut description: SceneDescription,
     overrides: &Overrides,
     shelf: &mut Shelf,
+    stop: &AtomicBool,
 ) -> Result<Prepared> {
     let spared = spare_whitted(&mut description, entry, overrides);
-    let mut prepared = prepare_scene(entry, description, overrides, shelf, |_| {})?;
+    let mut prepared = prepare_scene(entry, description, overrides, shelf, stop, |_| {})?;
     if spared {
         let note = "whitted has no noise: the time or error that is given to all has no say";
         prepared.scene.notes.push(note.into());
@@ -144,14 +146,19 @@ pub(super) fn check_stop(description: &SceneDescription) -> Result<()> {
 }
 
 /// Compiles a scene that has been read, with what the scene before has read (see [`compile::compile_with`]), has `alter`
-/// change it, and plans it.
+/// change it, and plans it, unless there comes an `interrupt`.
 pub(super) fn prepare_scene(
     entry: &BatchEntry,
     description: SceneDescription,
     overrides: &Overrides,
     shelf: &mut Shelf,
+    interrupt: &AtomicBool,
     alter: impl FnOnce(&mut Scene),
 ) -> Result<Prepared> {
+    let go_on = || match interrupt.load(Ordering::Relaxed) {
+        true => Err(Error::Stopped("stopped while it was prepared; --resume goes on".into())),
+        false => Ok(()),
+    };
     let mut scene = compile::compile_with(&description, &entry.name, shelf)?;
     alter(&mut scene);
     let integrator = integrator(&description, &description.integrator)?;
@@ -193,7 +200,10 @@ pub(super) fn prepare_scene(
         plan.packets = packets;
         plan.techniques.push(said);
     }
-    let (caustics, said) = pilot::decide(&scene, &moments, &plan, &filter, seed, planned, wishes);
+    go_on()?;
+    let shot = Shot { scene: &scene, plan: &plan, filter: &filter, seed, photons: None };
+    let (caustics, said) = pilot::decide(&shot, &moments, planned, wishes, interrupt);
+    go_on()?;
     plan.caustics = caustics;
     plan.techniques.extend(said);
     let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
@@ -215,6 +225,7 @@ pub(super) fn prepare_scene(
         plan.techniques.extend(first.said);
         plan.equiangular = first.equiangular;
     }
+    go_on()?;
     // Where photons are merged all pixels share.
     if plan.caustics.as_ref().is_none_or(|caustics| caustics.merging.is_none())
         && let Some(paths) = paths_of(&plan, &scene, &moments, &filter, window(&description), seed)

@@ -26,6 +26,7 @@ use glam::DVec2;
 use rounds::Round;
 use seen::Seen;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use words::{say, technique};
 
 /// Whether a technique is used.
@@ -111,17 +112,17 @@ fn correspond(a: &Scene, b: &Scene) -> bool {
 }
 
 /// Decides for a picture of `samples` a pixel, and returns what to trace and what to say of it. `moments` are the scene
-/// while the shutter is open, of which each path sees one; none where nothing is blurred.
+/// while the shutter is open, of which each path sees one; none where nothing is blurred. It looks for light until `stop` says so
+/// at the latest, and what it then says means nothing.
 #[must_use]
 pub fn decide(
-    scene: &Scene,
+    shot: &Shot,
     moments: &[Scene],
-    plan: &EffectPlan,
-    filter: &FilterSampler,
-    seed: u64,
     samples: u32,
     wishes: Wishes,
+    stop: &AtomicBool,
 ) -> (Option<Arc<Caustics>>, Vec<Effect>) {
+    let Shot { scene, plan, filter, seed, .. } = *shot;
     let Integrator::Path(settings) = &plan.integrator else { return (None, Vec::new()) };
     if wishes.light_tracing == Use::Off {
         return left_off("the scene says so");
@@ -192,7 +193,7 @@ pub fn decide(
     }
     let (casters, in_part) = (&casters, &in_part);
     let trial =
-        Trial { scene, moments, plan, settings, filter, seed, samples, wishes, casters, in_part, chances, rare };
+        Trial { scene, moments, plan, settings, filter, seed, samples, wishes, casters, in_part, chances, rare, stop };
     run(&trial, caustics)
 }
 
@@ -215,6 +216,8 @@ struct Trial<'a> {
     /// For each light, whether it has an extent, but one so small that all paths from the camera are not expected to meet it by what
     /// throws it in single directions often enough for the stated error to know of it.
     rare: Vec<bool>,
+    /// Whether nobody waits for it any more.
+    stop: &'a AtomicBool,
 }
 
 /// Paths from the camera for the whole picture.
@@ -312,11 +315,12 @@ fn search(
         unfound |= found.unfound;
         unfound_gathered |= found.unfound_gathered;
         caustics.learn(&mut learnt);
-        if number + 1 < ROUNDS {
+        let stopped = trial.stop.load(Ordering::Relaxed);
+        if number + 1 < ROUNDS && !stopped {
             // What the lights send there is part of the picture that errors are relative to.
             let means: Vec<f64> = camera.means.iter().zip(&found.thrown).map(|(a, b)| a + b).collect();
             weights = relative(&means);
-        } else if !possible || unfound || found.came() || rays >= patience {
+        } else if !possible || unfound || found.came() || rays >= patience || stopped {
             return Search { found, followed, weights, unfound, unfound_gathered };
         }
         number += 1;

@@ -97,7 +97,11 @@ impl<'a> Desk<'a> {
         let mut overrides = self.overrides.clone();
         overrides.set.extend(set.iter().cloned());
         let description = self.entry.scene(&overrides.set)?;
-        prepare_scene(self.entry, description, &overrides, &mut self.shelves[carried as usize].borrow_mut(), alter)
+        let shelf = &mut self.shelves[carried as usize].borrow_mut();
+        prepare_scene(self.entry, description, &overrides, shelf, self.stop, alter).map_err(|error| match error {
+            Error::Stopped(_) => stopped(),
+            error => error,
+        })
     }
 
     /// Renders a setting; with a reference the noise of each pass is known.
@@ -152,7 +156,7 @@ impl<'a> Desk<'a> {
             }
             elapsed += start.elapsed();
             if self.stop.load(Ordering::Relaxed) {
-                return Err(Error::Stopped("stopped before its sheet was done, which begins anew".into()));
+                return Err(stopped());
             }
             let noise = reference.map_or(Vec::new(), |reference| reference.noise_of(&replicates()));
             let converged = reference.is_some() && parts.iter().all(converged);
@@ -183,6 +187,10 @@ pub fn sum(mut a: Vec<Option<Replicates>>, b: &[Option<Replicates>]) -> Vec<Opti
         *a = a.zip(*b).map(|(a, b)| std::array::from_fn(|r| std::array::from_fn(|c| a[r][c] + b[r][c])));
     }
     a
+}
+
+fn stopped() -> Error {
+    Error::Stopped("stopped before its sheet was done, which begins anew".into())
 }
 
 fn over(mut all: Vec<Option<Replicates>>, parts: usize) -> Vec<Option<Replicates>> {
