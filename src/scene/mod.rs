@@ -207,6 +207,23 @@ pub struct Object {
 }
 
 impl Object {
+    /// One that does not shine, has nothing that varies, and tells of no media.
+    fn plain(name: String, geometry: Geometry, material: u32) -> Object {
+        Object {
+            name,
+            geometry,
+            material,
+            light: None,
+            detail: Detail::Geometry,
+            inside: None,
+            outside: None,
+            keeps_medium: false,
+            flipped: false,
+            is_lamp: false,
+            body: 0,
+        }
+    }
+
     /// The object's box; without end for a plane.
     #[must_use]
     pub fn bounds(&self) -> Aabb {

@@ -84,19 +84,7 @@ impl<'a> Compiler<'a> {
         self.lie_on(Surface::Shape);
         let Some(geometry) = self.geometry(at, shape)? else { return Ok(None) };
         if let Some(group) = shape.geometry.group() {
-            return Ok(Some(Object {
-                name,
-                geometry,
-                material: self.groups[group].1,
-                light: None,
-                detail: Detail::Geometry,
-                inside: None,
-                outside: None,
-                keeps_medium: false,
-                flipped: false,
-                is_lamp: false,
-                body: 0,
-            }));
+            return Ok(Some(Object::plain(name, geometry, self.groups[group].1)));
         }
         let material = self.material_index(at, &shape.material);
         let light = shape.emission.as_ref().map(|emission| self.shining(at, shape, emission, index, &geometry));

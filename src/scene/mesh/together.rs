@@ -109,7 +109,6 @@ impl Together {
 mod tests {
     use super::*;
     use crate::scene::mesh::{AreaTable, Mesh, MeshSource, NormalMode, Winding};
-    use crate::scene::shape::Detail;
     use crate::scene::shape::testing::Random;
     use glam::{DAffine3, DVec3};
 
@@ -123,19 +122,8 @@ mod tests {
 
     fn object(mesh: Mesh) -> Object {
         let (tree, areas) = (Some(MeshTree::build(&mesh)), AreaTable::new(&mesh));
-        Object {
-            name: String::new(),
-            geometry: Geometry::Mesh(Box::new(TriangleMesh { mesh, tree, areas })),
-            material: 0,
-            light: None,
-            detail: Detail::Geometry,
-            inside: None,
-            outside: None,
-            keeps_medium: false,
-            flipped: false,
-            is_lamp: false,
-            body: 0,
-        }
+        let geometry = Geometry::Mesh(Box::new(TriangleMesh { mesh, tree, areas }));
+        Object::plain(String::new(), geometry, 0)
     }
 
     /// Of four meshes the third is a thousandth of the others in size and the fourth lies far away: those keep their
