@@ -326,7 +326,7 @@ pub fn write(
     }
     report.pixel_hash = pixel_hash(&image);
     let written = Instant::now();
-    let png_path = exr_path.with_extension("png");
+    let [_, png_path, spectral] = places(exr_path);
     let mut settings = finish.png_settings(&image);
     settings.texts.extend(finish.png_marks(&report.pixel_hash));
     report.png = Some(Developed {
@@ -338,7 +338,6 @@ pub fn write(
     if report.error.is_some() {
         report.error_map = heat::error_map(&image, finish.space().matrix_to_xyz()[1], contact::SIDE);
     }
-    let spectral = spectral_path(exr_path);
     write_spectral(&spectral, finish, frame, &image, report)?;
     let (exr, png) =
         rayon::join(|| sealed_exr(exr_path, finish, frame, &image, report), || png::encode_png(&image, &settings));
@@ -547,8 +546,8 @@ pub fn spectral_path(path: &Path) -> PathBuf {
 /// The files of the picture at `path`.
 #[must_use]
 pub fn files(finish: &Finish, path: &Path) -> Vec<PathBuf> {
-    let spectral = finish.output.spectral.map(|_| spectral_path(path));
-    [path.to_path_buf(), path.with_extension("png")].into_iter().chain(spectral).collect()
+    let [exr, png, spectral] = places(path);
+    [exr, png].into_iter().chain(finish.output.spectral.map(|_| spectral)).collect()
 }
 
 /// All files that the picture at `path` may have.

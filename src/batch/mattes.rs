@@ -13,7 +13,6 @@ pub(super) fn mattes(description: &SceneDescription, scene: &Scene) -> Vec<Matte
     });
     // Children of groups come after the shapes of the scene itself. What is seen of an instance is a child, which has a material;
     // the object and the asset are the instance.
-    let instances = description.shapes.iter().map(|shape| shape.geometry.group().is_some());
     let objects = || scene.objects.iter().zip(&description.shapes);
     let matte = |matte: description::Matte| Matte {
         layer: matte.layer().to_owned(),
@@ -21,7 +20,8 @@ pub(super) fn mattes(description: &SceneDescription, scene: &Scene) -> Vec<Matte
         names: match matte {
             description::Matte::Object => objects().map(|(object, _)| Some(object.name.clone())).collect(),
             description::Matte::Material => {
-                let instances = instances.clone().chain(std::iter::repeat(false));
+                let instances = description.shapes.iter().map(|shape| shape.geometry.group().is_some());
+                let instances = instances.chain(std::iter::repeat(false));
                 scene.material_names.iter().zip(instances).map(|(name, is)| (!is).then(|| name.clone())).collect()
             }
             description::Matte::Asset => {
