@@ -160,6 +160,30 @@ fn stopped_it_ends_with_75_and_goes_on_where_it_was() {
     assert!(!checkpoint.exists());
 }
 
+/// The sums of a million pixels take 256 MiB, all else some 100: not twice the sums, where a checkpoint is read.
+#[test]
+fn a_picture_goes_on_in_the_memory_that_it_began_in() {
+    let place = Place::of(
+        "camera: {origin: [0, 1.5, 6], target: [0, 0.7, 0], fov_deg: 40}\n\
+         image: {width: 1024, height: 1024}\n\
+         shapes: [plane: {normal: [0, 1, 0]}]\n\
+         lights: [constant: {radiance: 1}]\n",
+    );
+    let further = ["--resume", "--spp", "4096", "--checkpoint-interval", "0.2s", "--memory-limit", "430M"];
+    let checkpoint = place.path("a.exr.checkpoint");
+    for _ in 0..2 {
+        let mut child = command(&place, "a.exr", &further).spawn().unwrap();
+        match checkpoint.exists() {
+            // Reading takes a part of a second.
+            true => std::thread::sleep(Duration::from_secs(3)),
+            false => assert!(appears(&mut child, &checkpoint)),
+        }
+        signal(&child, "TERM");
+        let done = Ran::of(child.wait_with_output().unwrap());
+        assert_eq!(done.code, 75, "{}", done.err);
+    }
+}
+
 /// What a mirror throws of a lamp that stands in a closed box is looked for, in vain, by an eighth of the rays of the picture: half an
 /// hour of so many samples.
 #[test]

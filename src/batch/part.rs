@@ -224,6 +224,17 @@ pub struct Part<'a> {
     allocation: OnceLock<Allocation>,
 }
 
+fn empty_film(job: &FrameJob, window: Window, layers: Layout) -> Result<Film> {
+    let film = Film::new(job.scene.camera.resolution, window)?;
+    Ok(film.with_layers(layers).with_exponent(job.scene.light_exponent))
+}
+
+/// Empty sums of paths from the lights, where there are any; they land anywhere.
+fn empty_splats(job: &FrameJob) -> Result<Option<SplatFilm>> {
+    let film = light_paths(job).map(|_| empty_film(job, job.window, light_layers(job))).transpose()?;
+    Ok(film.map(|film| SplatFilm { film, paths: [0; REPLICATES] }))
+}
+
 /// The layers to which paths from the lights add.
 fn light_layers(job: &FrameJob) -> Layout {
     Layout { channels: job.plan.layers.light_channels(), kept: job.plan.layers.kept.without_weights() }
@@ -243,21 +254,15 @@ impl<'a> Part<'a> {
     /// # Errors
     /// [`Error::Memory`] if the memory cannot be had.
     pub fn new(job: &'a FrameJob<'a>, share: Share) -> Result<Part<'a>> {
-        let layers = job.plan.layers.layout();
-        let exponent = job.scene.light_exponent;
+        let splats = empty_splats(job)?;
+        let film = empty_film(job, share.rows(job.window), job.plan.layers.layout())?;
+        Ok(Part::of(job, share, film, splats))
+    }
+
+    /// Nothing yet of `share`, with sums that are empty or become what others have done.
+    fn of(job: &'a FrameJob<'a>, share: Share, film: Film, splats: Option<SplatFilm>) -> Part<'a> {
         let window = share.rows(job.window);
-        let film = |window, layers| {
-            let film = Film::new(job.scene.camera.resolution, window)?;
-            Ok(film.with_layers(layers).with_exponent(exponent))
-        };
-        let splats = match light_paths(job) {
-            Some(paths) => {
-                let film = film(job.window, light_layers(job))?;
-                Some((paths, Mutex::new(SplatFilm { film, paths: [0; REPLICATES] })))
-            }
-            None => None,
-        };
-        let film = Mutex::new(film(window, layers)?);
+        let splats = light_paths(job).zip(splats.map(Mutex::new));
         let start = share.samples.start;
         // Who has part of a cell of pixels that share renders all of it: tiles are of whole ones, halved or not.
         let (side, least) = match job.plan.shares_cells() {
@@ -267,7 +272,8 @@ impl<'a> Part<'a> {
         let tiles = shares(window, side, least, rayon::current_num_threads());
         let tiles = tiles.into_iter().map(|window| Tile { window, done: AtomicU32::new(start) }).collect();
         let lights = Mutex::new(LightsDone { below: start, more: Vec::new() });
-        Ok(Part { job, share, window, film, splats, tiles, lights, layers, allocation: OnceLock::new() })
+        let (layers, film, allocation) = (job.plan.layers.layout(), Mutex::new(film), OnceLock::new());
+        Part { job, share, window, film, splats, tiles, lights, layers, allocation }
     }
 
     /// A part whose `film` and `splats` hold what `claims` say, with samples shared out by `allocation`; they are of this
@@ -283,7 +289,9 @@ impl<'a> Part<'a> {
         film: Film,
         splats: Option<SplatFilm>,
     ) -> Result<Part<'a>> {
-        let mut part = Part::new(job, share)?;
+        // No sums beside those that there are: together they may be more than the memory holds.
+        let splats = splats.map_or_else(|| empty_splats(job), |splats| Ok(Some(splats)))?;
+        let mut part = Part::of(job, share, film, splats);
         if let Some(allocation) = allocation {
             part.allocation = OnceLock::from(allocation);
         }
@@ -292,10 +300,6 @@ impl<'a> Part<'a> {
         } else {
             let tile = |(window, done): &(Window, Range<u32>)| Tile { window: *window, done: AtomicU32::new(done.end) };
             part.tiles = claims.camera.iter().map(tile).collect();
-        }
-        part.film = Mutex::new(film);
-        if let (Some((_, own)), Some(splats)) = (&mut part.splats, splats) {
-            *own = Mutex::new(splats);
         }
         let own = part.own_paths();
         let mut lights = LightsDone { below: part.share.samples.start, more: Vec::new() };
