@@ -315,6 +315,7 @@ pub fn write(
     exr_path: &Path,
     report: &mut SceneReport,
 ) -> Result<()> {
+    let written = Instant::now();
     let (counted, dropped) = frame.film.samples();
     let paths: u64 = frame.splats.iter().flat_map(|splats| splats.paths).sum();
     let sound = frame::check_invalid(&frame.invalid(), counted + dropped + paths).and(target);
@@ -325,7 +326,6 @@ pub fn write(
         image.standard_error.iter_mut().for_each(|plane| plane.fill(0.0));
     }
     report.pixel_hash = pixel_hash(&image);
-    let written = Instant::now();
     let [_, png_path, spectral] = places(exr_path);
     let mut settings = finish.png_settings(&image);
     settings.texts.extend(finish.png_marks(&report.pixel_hash));

@@ -237,7 +237,9 @@ fn render_and_write(
         }
     }
     let mut keeper = Keeper::new(&overrides.keep, stop, &exr_path, &identity, prepared.scene.watch.as_deref(), watcher);
+    let asked = Instant::now();
     let begun = keeper.begin(&job, share)?;
+    report.seconds.loading += asked.elapsed().as_secs_f64();
     let begun = go_on(begun, &|p| watcher.progress(p), &keeper)?;
     if !portion.is_all() {
         report.measure_part(&begun, keeper.numerics());

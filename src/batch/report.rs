@@ -65,7 +65,7 @@ pub enum Status {
 /// Wall times in seconds.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Seconds {
-    /// Reading and compiling the scene.
+    /// Reading and compiling the scene, and making its sums empty or what a checkpoint holds.
     pub loading: f64,
     /// Trials before the render, which choose techniques.
     pub trials: f64,

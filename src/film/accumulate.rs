@@ -266,6 +266,11 @@ impl Cell {
     }
 }
 
+/// Makes `sums` `count` empty ones. The system clears memory when it is first touched, so all threads do.
+pub(super) fn fill<T: Default + Send>(sums: &mut Vec<T>, count: usize) {
+    (0..count).into_par_iter().map(|_| T::default()).collect_into_vec(sums);
+}
+
 /// The replicates of a pixel.
 pub type PixelCells = [Cell; REPLICATES];
 
@@ -376,7 +381,7 @@ impl Film {
             let megabytes = Film::bytes(window, Layout::default()) / 1_000_000;
             return Err(Error::Memory(format!("film: {window} needs {megabytes} MB, more than there is")));
         }
-        cells.resize(window.pixels(), PixelCells::default());
+        fill(&mut cells, window.pixels());
         let (invalid, layers) = (InvalidCounts::default(), LayerSums::default());
         Ok(Film { frame, window, cells, exponent: 0, invalid, layers })
     }

@@ -7,7 +7,9 @@
 //! its own channel and counted by cause; colour does not hear of it.
 
 use super::Window;
-use super::accumulate::{ALPHA_QUANTUM, Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum, check};
+use super::accumulate::{
+    ALPHA_QUANTUM, Invalid, InvalidCounts, REPLICATES, SAMPLE_LIMIT, SAMPLES_LIMIT, Sum, check, fill,
+};
 use super::mattes::Mattes;
 use super::resolve::{HALF, even, mean_of_replicates};
 use super::run::LayerRun;
@@ -80,9 +82,18 @@ impl LayerSums {
     /// Empty sums for each of `pixels`.
     #[must_use]
     pub fn new(layout: Layout, pixels: usize) -> LayerSums {
-        let mut sums = LayerSums::default();
-        sums.reset(layout, pixels);
-        sums
+        let mut all = LayerSums { layout, ..LayerSums::default() };
+        let (sets, weights) = LayerSums::sizes(layout, pixels);
+        fill(&mut all.sums, layout.channels * sets);
+        fill(&mut all.counts, sets);
+        fill(&mut all.weights, weights);
+        all
+    }
+
+    /// How many sets have numbers, and how many weights.
+    fn sizes(Layout { channels, kept }: Layout, pixels: usize) -> (usize, usize) {
+        let sets = if channels > 0 { kept.sets() * pixels } else { 0 };
+        (sets, if kept == Kept::Weighed { REPLICATES * pixels } else { 0 })
     }
 
     /// Empties the sums, keeping their memory.
@@ -93,14 +104,10 @@ impl LayerSums {
         self.weights.clear();
         self.mattes.clear();
         self.invalid = InvalidCounts::default();
-        if layout.channels > 0 {
-            let sets = layout.kept.sets() * pixels;
-            self.sums.resize(layout.channels * sets, Sum::default());
-            self.counts.resize(sets, 0);
-        }
-        if layout.kept == Kept::Weighed {
-            self.weights.resize(REPLICATES * pixels, 0);
-        }
+        let (sets, weights) = LayerSums::sizes(layout, pixels);
+        self.sums.resize(layout.channels * sets, Sum::default());
+        self.counts.resize(sets, 0);
+        self.weights.resize(weights, 0);
     }
 
     /// The memory that they take.
