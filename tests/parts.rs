@@ -129,7 +129,7 @@ fn same(whole: &Path, merged: &Path, what: &str) {
 
 /// A report without what a clock says, how the error fell on the way, and names of files.
 fn timeless(mut report: Value) -> Value {
-    for field in ["seconds", "threads"] {
+    for field in ["seconds", "threads", "peak_memory"] {
         report[field] = Value::Null;
     }
     for field in ["seconds", "msamples_per_second", "halving_seconds", "convergence", "files"] {

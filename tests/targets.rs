@@ -458,6 +458,23 @@ fn a_memory_limit_ends_the_process_with_a_code_of_its_own() {
     assert!(!place.path("bands.exr").exists());
 }
 
+/// Colours and coverage of 512 × 512 pixels take 64 MiB.
+#[test]
+fn the_memory_of_a_picture_is_told_before_and_after() {
+    let place = Place::of(SCENE);
+    let picture = "scene.yaml --spp 1 --set image.width=512 --set image.height=512";
+    let (code, said) = abbe(&place, &format!("plan {picture}"));
+    assert!(code == 0 && said.contains("memory: 64 MiB for the sums"), "{code} {said}");
+    let (code, said) = abbe(&place, &format!("plan {picture} --format json"));
+    assert!(code == 0 && said.contains("\"sums_bytes\": 67108864"), "{code} {said}");
+    let (code, said) = abbe(&place, &format!("render {picture} -o out"));
+    let peak = place.json("out/report.json")["peak_memory"].as_u64().unwrap();
+    assert!(
+        peak > 64 << 20 && said.contains(&format!(", {} MiB at the most;", peak.div_ceil(1 << 20))),
+        "{code} {said}"
+    );
+}
+
 /// Samples that are shared out by noise leave a picture that knows its error, and may end at one.
 #[test]
 fn adaptive_sampling_knows_its_error() {

@@ -1,7 +1,7 @@
 //! What is looked at before a picture is begun: whether it fits into memory, and whether its files may go where they are to.
 
 use super::prepare::Prepared;
-use super::{Overrides, ends_in, finish, names, output_path};
+use super::{Overrides, ends_in, finish, memory, names, output_path};
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
@@ -9,7 +9,7 @@ use crate::film::output::Inputs;
 use std::path::Path;
 
 /// Refuses a picture whose sums, of `rows` and `needed` bytes, are more than the machine's memory or `limit`, before it is begun.
-pub(super) fn memory(description: &SceneDescription, rows: Window, needed: u64, limit: Option<u64>) -> Result<()> {
+pub(super) fn fits(description: &SceneDescription, rows: Window, needed: u64, limit: Option<u64>) -> Result<()> {
     let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
     if let Some(limit) = limit.filter(|limit| needed > *limit) {
         let [needed, limit] = [needed, limit].map(mebibytes);
@@ -18,7 +18,7 @@ pub(super) fn memory(description: &SceneDescription, rows: Window, needed: u64, 
         )));
     }
     let room = Vec::<u8>::new().try_reserve_exact(usize::try_from(needed).unwrap_or(usize::MAX));
-    if room.is_ok() && machine_memory().is_none_or(|there| needed <= there) {
+    if room.is_ok() && memory::of_machine().is_none_or(|there| needed <= there) {
         return Ok(());
     }
     let description::Image { overscan, crop, .. } = &description.image;
@@ -30,15 +30,6 @@ pub(super) fn memory(description: &SceneDescription, rows: Window, needed: u64, 
     let message =
         format!("expected a picture that fits into memory, found {rows}, which takes {} MiB", mebibytes(needed));
     Err(Error::Config(description.fault(field, &message)))
-}
-
-/// Bytes of memory and swap of the machine, where it tells.
-fn machine_memory() -> Option<u64> {
-    let all = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let kilobytes = |name: &str| -> Option<u64> {
-        all.lines().find_map(|line| line.strip_prefix(name))?.trim().trim_end_matches("kB").trim().parse().ok()
-    };
-    Some(1024 * (kilobytes("MemTotal:")? + kilobytes("SwapTotal:").unwrap_or(0)))
 }
 
 /// The place that `option` gives for `scenes` scenes.

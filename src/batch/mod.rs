@@ -15,6 +15,7 @@ pub mod frame;
 mod header;
 mod layers;
 mod mattes;
+pub mod memory;
 pub mod merge;
 pub mod motion;
 pub mod names;
@@ -211,7 +212,7 @@ fn render_and_write(
     let identity = Identity::new(Finish::of(prepared), &prepared.source, &prepared.plan);
     let finish = &identity.finish;
     let share = portion.share(job.window, job.samples, finish.rows())?;
-    checks::memory(description, share.rows(job.window), part::Part::bytes(&job, &share), overrides.memory_limit)?;
+    checks::fits(description, share.rows(job.window), part::Part::bytes(&job, &share), overrides.memory_limit)?;
     let part = (!portion.is_all()).then_some(&share);
     if part.is_some() {
         report.samples = share.samples.end - share.samples.start;

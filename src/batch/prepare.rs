@@ -4,6 +4,7 @@ use super::adaptive;
 use super::finish::{self, Finish, Sharing};
 use super::frame::{Frame, FrameJob, Gauge};
 use super::part::lights::paths_of;
+use super::part::{Part, Share};
 use super::stop::{self, Stop};
 use super::{Overrides, layers, motion, names, splatting};
 use crate::description::{self, BatchEntry, LayerContent, SceneDescription};
@@ -67,6 +68,15 @@ impl Prepared {
     /// As [`FilterSampler::new`] and [`FilterSampler::within`].
     pub fn sampler(&self) -> Result<FilterSampler> {
         sampler(&self.description)
+    }
+
+    /// The memory that the sums of the whole picture take, in bytes: the scene and, while they are written, files take more.
+    ///
+    /// # Errors
+    /// As [`Prepared::sampler`].
+    pub fn sums(&self) -> Result<u64> {
+        let filter = self.sampler()?;
+        Ok(Part::bytes(&self.job(&filter), &Share::all(self.samples)))
     }
 
     /// The whole picture, sampled by `filter`.

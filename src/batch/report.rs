@@ -2,8 +2,8 @@
 
 use super::finish::Finish;
 use super::frame::{self, Begun, Frame};
-use super::names;
 use super::stop::{Fit, Forecast};
+use super::{memory, names};
 use crate::error::Error;
 use crate::film::accumulate::{Film, InvalidCounts, PixelCells};
 use crate::film::error::ErrorEstimate;
@@ -29,6 +29,8 @@ pub struct Report {
     pub seconds: f64,
     /// Threads that rendered.
     pub threads: usize,
+    /// Bytes of memory that the process had at the most, where the system tells.
+    pub peak_memory: Option<u64>,
     /// Each scene.
     pub scenes: Vec<SceneReport>,
     /// The page of the contact sheet.
@@ -242,6 +244,7 @@ impl Report {
             source: source.to_path_buf(),
             seconds: elapsed.as_secs_f64(),
             threads: rayon::current_num_threads(),
+            peak_memory: memory::peak(),
             scenes,
             contact_sheet: None,
             file: None,

@@ -1,5 +1,6 @@
 //! `--memory-limit`: the process ends by itself, with a sentence and exit code 33, before the system kills it without.
 
+use crate::batch::memory::resident;
 use crate::error::{Error, Result};
 use std::time::Duration;
 
@@ -46,13 +47,6 @@ pub fn watch(limit: u64) -> Result<()> {
     };
     let started = std::thread::Builder::new().name("memory".into()).spawn(look);
     started.map(drop).map_err(|e| Error::Threads { threads: 1, message: e.to_string() })
-}
-
-/// Bytes of the process that are in memory.
-fn resident() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-    Some(line.trim().trim_end_matches("kB").trim().parse::<u64>().ok()? * 1024)
 }
 
 #[cfg(test)]

@@ -12,8 +12,9 @@ pub fn run(arguments: &PlanArguments) -> Result<i32> {
     let mut all = Vec::new();
     let mut codes = Vec::new();
     for entry in batch::entries(&arguments.scene.file, &overrides)? {
-        let prepared = match batch::prepare(&entry, &overrides) {
-            Ok(prepared) => prepared,
+        let prepared = batch::prepare(&entry, &overrides).and_then(|prepared| Ok((prepared.sums()?, prepared)));
+        let (sums, prepared) = match prepared {
+            Ok(both) => both,
             Err(e) => {
                 super::complain(&super::prefixed(&e));
                 codes.push(e.exit_code());
@@ -37,7 +38,8 @@ pub fn run(arguments: &PlanArguments) -> Result<i32> {
                 for note in &prepared.scene.notes {
                     let _ = writeln!(text, "  note: {note}");
                 }
-                let _ = writeln!(text, "  wavelengths: {}\n", prepared.scene.wavelengths.describe());
+                let _ = writeln!(text, "  wavelengths: {}", prepared.scene.wavelengths.describe());
+                let _ = writeln!(text, "  memory: {} MiB for the sums of the picture\n", sums.div_ceil(1 << 20));
                 super::say(&text);
             }
             PlanFormat::Json => all.push(json!({
@@ -48,6 +50,7 @@ pub fn run(arguments: &PlanArguments) -> Result<i32> {
                 "techniques": prepared.plan.techniques,
                 "notes": prepared.scene.notes,
                 "wavelengths": prepared.scene.wavelengths.describe(),
+                "sums_bytes": sums,
             })),
         }
     }

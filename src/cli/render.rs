@@ -256,11 +256,12 @@ pub fn table(report: &Report) -> String {
     let files: usize = done.iter().map(|s| s.files.len()).sum();
     let _ = writeln!(
         out,
-        "\n{files} {} in {}/ after {} on {} threads{}",
+        "\n{files} {} in {}/ after {} on {} threads{}{}",
         if files == 1 { "file" } else { "files" },
         dirs.join("/, "),
         seconds(report.seconds),
         report.threads,
+        report.peak_memory.map_or(String::new(), |bytes| format!(", {} MiB at the most", bytes.div_ceil(1 << 20))),
         report.file.as_ref().map_or(String::new(), |f| format!("; figures in {}", f.display()))
     );
     if let Some(page) = &report.contact_sheet {
