@@ -7,6 +7,8 @@
 //! the five of XML and character references: nothing here grows as it is read. What references write out more than
 //! once is counted where that happens, by [`Import::again`](super::Import::again).
 
+use std::borrow::Cow;
+
 use quick_xml::Reader;
 use quick_xml::escape::unescape;
 use quick_xml::events::{BytesStart, Event};
@@ -69,15 +71,56 @@ pub(crate) fn read(bytes: &[u8], source: u32, budget: &mut usize) -> Result<Elem
         let (limit, found) = (MAX_BYTES >> 20, bytes.len());
         return Err(Fault::at_place(start, format!("expected at most {limit} MiB of text, found {found} bytes")));
     }
-    let text = str::from_utf8(bytes).map_err(|error| {
-        let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
+    let text = decoded(bytes).map_err(|(before, message)| {
         let mut cursor = Cursor::new(&before, source);
-        let place = cursor.place(before.len());
-        Fault::at_place(place, format!("expected text in UTF-8, found the byte 0x{:02x}", bytes[error.valid_up_to()]))
+        Fault::at_place(cursor.place(before.len()), message)
     })?;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     Builder { text, source, cursor: Cursor::new(text, source), open: Vec::new(), root: None, replaced: None, budget }
         .build()
+}
+
+/// What `bytes` say: in UTF-16 or ISO 8859-1 where they begin as such a file does (XML 1.0, appendix F), else in UTF-8. A fault comes
+/// with the text before it.
+fn decoded(bytes: &[u8]) -> Result<Cow<'_, str>, (String, String)> {
+    let from_pair = match bytes {
+        [0xff, 0xfe, ..] | [b'<', 0, ..] => u16::from_le_bytes,
+        [0xfe, 0xff, ..] | [0, b'<', ..] => u16::from_be_bytes,
+        // Its characters are the first 256 of Unicode.
+        _ if is_latin1(bytes) => return Ok(bytes.iter().map(|&byte| char::from(byte)).collect()),
+        _ => {
+            return str::from_utf8(bytes).map(Cow::Borrowed).map_err(|error| {
+                let (before, after) = bytes.split_at(error.valid_up_to());
+                let message = format!("expected text in UTF-8, found the byte 0x{:02x}", after[0]);
+                (String::from_utf8_lossy(before).into_owned(), message)
+            });
+        }
+    };
+    let (pairs, rest) = bytes.as_chunks();
+    let mut text = String::with_capacity(bytes.len() / 2);
+    for c in char::decode_utf16(pairs.iter().map(|&pair| from_pair(pair))) {
+        match c {
+            Ok(c) => text.push(c),
+            Err(error) => {
+                let half = error.unpaired_surrogate();
+                return Err((text, format!("expected text in UTF-16, found 0x{half:04x}, half of a character")));
+            }
+        }
+    }
+    match rest {
+        [] => Ok(text.into()),
+        _ => Err((text, "expected text in UTF-16, found an odd number of bytes".to_owned())),
+    }
+}
+
+/// Whether the declaration of a document says that it is in ISO 8859-1.
+fn is_latin1(bytes: &[u8]) -> bool {
+    let declaration = bytes.strip_prefix(b"<?xml").and_then(|rest| rest.split(|&byte| byte == b'>').next());
+    let value = declaration.and_then(|declaration| {
+        let (_, after) = str::from_utf8(declaration).ok()?.split_once("encoding")?;
+        after.trim_start().strip_prefix('=')?.trim_start().strip_prefix(['"', '\''])?.split(['"', '\'']).next()
+    });
+    value.is_some_and(|value| ["iso-8859-1", "latin1"].iter().any(|name| name.eq_ignore_ascii_case(value)))
 }
 
 /// Counts lines and columns up to offsets that mostly grow.
@@ -348,6 +391,37 @@ mod tests {
         // XML 1.0, section 3.3.3.
         let ends = read(b"<a b='1\n2&#10;3\t4'/>", 0, &mut { MAX_NODES }).unwrap();
         assert_eq!(ends.attribute("b").unwrap().value, "1 2\n3 4");
+    }
+
+    /// Windows' own programs, and those of the years of Mitsuba 0.5, write such files. Mitsuba 3.9.1 reads all of them.
+    #[test]
+    fn text_may_be_in_utf_16_or_latin_1() {
+        let text = |encoding: &str| format!("<?xml version='1.0' encoding='{encoding}'?>\n<a b='\u{e9}'>\n <c/></a>");
+        let pairs = |text: &str, from: fn(u16) -> [u8; 2]| text.encode_utf16().flat_map(from).collect::<Vec<u8>>();
+        let mut files = Vec::new();
+        for mark in ["\u{feff}", ""] {
+            files.extend(
+                [u16::to_le_bytes, u16::to_be_bytes].map(|from| pairs(&(mark.to_owned() + &text("UTF-16")), from)),
+            );
+        }
+        for name in ["ISO-8859-1", "latin1"] {
+            files.push(text(name).chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect());
+        }
+        files.push(text("utf-8").into_bytes());
+        for file in files {
+            let root = read(&file, 0, &mut { MAX_NODES }).unwrap();
+            assert_eq!(root.attribute("b").unwrap().value, "\u{e9}", "{file:?}");
+            assert_eq!((root.children[0].place.line, root.children[0].place.column), (3, 2), "{file:?}");
+        }
+        let wrong = |bytes: &[u8]| {
+            let mut sources = Sources::default();
+            let source = sources.add_file(Path::new("s.xml"));
+            read(bytes, source, &mut { MAX_NODES }).unwrap_err().write(&sources)
+        };
+        let half = pairs("<a>\n ", u16::to_le_bytes).into_iter().chain([0x3d, 0xd8, b'x', 0]).collect::<Vec<u8>>();
+        assert_eq!(wrong(&half), "s.xml:2:2: expected text in UTF-16, found 0xd83d, half of a character");
+        assert_eq!(wrong(b"<\0a\0>"), "s.xml:1:3: expected text in UTF-16, found an odd number of bytes");
+        assert_eq!(wrong(b"<a>\n\xe9"), "s.xml:2:1: expected text in UTF-8, found the byte 0xe9");
     }
 
     #[test]
