@@ -168,6 +168,7 @@ struct WrittenEntry {
 #[serde(rename_all = "snake_case")]
 enum Parameter {
     Number(f64),
+    Boolean(bool),
     Text(String),
 }
 
@@ -175,6 +176,7 @@ impl Parameter {
     fn text(self) -> String {
         match self {
             Parameter::Number(value) => value.to_string(),
+            Parameter::Boolean(value) => value.to_string(),
             Parameter::Text(text) => text,
         }
     }
@@ -580,6 +582,21 @@ mod tests {
                  did you mean \"res\"?"
             );
         });
+    }
+
+    #[test]
+    fn a_parameter_is_a_number_true_or_false_or_text() {
+        let batch = |define: &str| format!("scenes:\n- file: s.xml\n  define: {{{define}}}\n");
+        let value = |define: &str| {
+            with(&[("batch.yaml", &batch(define))], |directory| match load(&directory.join("batch.yaml")) {
+                Ok(document) => document.entries()[0].defines[0].value.clone(),
+                Err(error) => in_words(&error, directory),
+            })
+        };
+        assert_eq!(["a: 1e3", "a: true", "a: false", "a: path"].map(value), ["1000", "true", "false", "path"]);
+        let told =
+            "DIR/batch.yaml:3:15: scenes[0].define.a: expected one of a number, true or false, text, found a list of 1";
+        assert_eq!(value("a: [1]"), told);
     }
 
     #[test]

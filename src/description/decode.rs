@@ -20,8 +20,14 @@ use super::node::{Entry, Node, Place, Sources, Value, enumerate};
 use super::path::Segment;
 
 /// Names of variants that are chosen by form, and what they are called in a message.
-const BY_FORM: [(&str, &str); 5] =
-    [("number", "a number"), ("list", "a list"), ("name", "a name"), ("text", "text"), ("inline", "")];
+const BY_FORM: [(&str, &str); 6] = [
+    ("number", "a number"),
+    ("boolean", "true or false"),
+    ("list", "a list"),
+    ("name", "a name"),
+    ("text", "text"),
+    ("inline", ""),
+];
 
 /// The name by which [`super::FilePath`] asks for its treatment.
 pub(crate) const FILE_PATH: &str = "FilePath";
@@ -251,6 +257,7 @@ impl<'de> Deserializer<'de> for De<'_> {
             Value::Text(text) if variants.contains(&"number") && overflowing(text) => "number",
             Value::Text(_) if variants.contains(&"text") => "text",
             Value::Text(_) => "name",
+            Value::Bool(_) => "boolean",
             Value::List(_) => "list",
             _ => "",
         };
