@@ -53,10 +53,10 @@ fn pictures_on_disks_and_tubes_lie_where_mitsuba_has_them() {
     }
 }
 
-/// Of the parameter of the file, of the ends by which kinds are told apart, and of what separates words.
+/// Of the parameter of the file, of the ends by which kinds are told apart, of what separates words, and of nothing.
 #[test]
 fn names_are_those_that_they_were() {
-    for name in ["$spp", "of $spp samples", "red (bsdf)", "red (texture)", "two\\twords", "two\\nlines"] {
+    for name in ["$spp", "of $spp samples", "red (bsdf)", "red (texture)", "two\\twords", "two\\nlines", ""] {
         let head = format!(
             "textures: {{\"{name}\": {{checkerboard: {{a: 0.2, b: 0.7}}}}}}\n\
              materials: {{\"{name}\": {{diffuse: {{reflectance: {{texture: \"{name}\"}}}}}}}}\n\

@@ -274,8 +274,12 @@ impl<'a> Export<'a> {
             "medium" => materials || textures,
             _ => materials || textures || self.scene.media.contains_key(name),
         };
-        // What looks like such an end would be taken away.
-        if taken || name.ends_with(&format!(" ({kind})")) { format!("{name} ({kind})") } else { name.to_owned() }
+        // What looks like such an end would be taken away, and an empty id is none.
+        if taken || name.is_empty() || name.ends_with(&format!(" ({kind})")) {
+            format!("{name} ({kind})")
+        } else {
+            name.to_owned()
+        }
     }
 
     /// Says that Mitsuba gets something else.
