@@ -24,9 +24,7 @@ pub fn export(arguments: &ConvertArguments) -> Result<i32> {
     let output = arguments.output.as_deref();
     let file = output.filter(|path| !is_stream(path));
     let path = file.unwrap_or(Path::new(""));
-    let pictures = &load::for_mitsuba;
-    let (normals, meshes, bare) = (&mesh::normals_of, &mesh::for_mitsuba, &mesh::lacks_coordinates);
-    let exported = description::export(&scene, path, normals, meshes, pictures, &sdf::is_closed, bare);
+    let exported = description::export(&scene, path, &mesh::FOR_EXPORT, &load::for_mitsuba, &sdf::is_closed);
     match file {
         Some(path) => {
             let beside = |name: &String| directory_of(path).join(name);

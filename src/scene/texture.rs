@@ -2,6 +2,7 @@
 
 mod numbers;
 
+pub(super) use numbers::luminance;
 pub use numbers::{DataImage, Numbers, Scalar};
 
 use super::SurfacePoint;

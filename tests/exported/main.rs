@@ -29,8 +29,7 @@ fn shipped() -> Vec<PathBuf> {
 
 /// The export of a scene as the verb makes it.
 fn exported(scene: &description::SceneDescription, xml: &Path) -> description::Exported {
-    let (normals, meshes, bare) = (&mesh::normals_of, &mesh::for_mitsuba, &mesh::lacks_coordinates);
-    description::export(scene, xml, normals, meshes, &load::for_mitsuba, &sdf::is_closed, bare)
+    description::export(scene, xml, &mesh::FOR_EXPORT, &load::for_mitsuba, &sdf::is_closed)
 }
 
 /// The scene of `file`, and what its export says; the export is read where `again` says so.
@@ -594,6 +593,13 @@ fn exported_with(head: &str, shape: &str) -> (Vec<String>, String) {
         ("inward.obj", &sides::tetrahedron("-1")),
         ("bare.obj", &sides::tetrahedron("")),
         ("painted.ply", PAINTED),
+        (
+            "numbered.ply",
+            &PAINTED
+                .replace("float r", "float paint_0")
+                .replace("float g", "float paint_1")
+                .replace("float b", "float paint_2"),
+        ),
     ] {
         folder.add(name, bytes.as_bytes());
     }

@@ -97,6 +97,25 @@ fn lamps_have_no_attributes_of_their_mesh_there() {
     }
 }
 
+/// Mitsuba 3.9.1 refuses three numbers of a mesh where one is wanted, and where a colour is takes those of a name without "color"
+/// for coefficients: a floor of 0.8, 0.3, 0.1 is 0.995 there. The mean of red, green and blue by luminance is a third of all three.
+#[test]
+fn three_numbers_of_a_mesh_that_mitsuba_takes_otherwise_are_told() {
+    let attribute = |name: &str| format!("textures: {{paint: {{mesh_attribute: {{name: {name}, scale: 0.5}}}}}}\n");
+    let mesh = |file: &str, material: &str| {
+        format!("mesh: {{file: {file}, normals: vertex, winding: world, material: {{{material}}}}}")
+    };
+    let metal = "conductor: {eta: 0.2, k: 3, roughness: {texture: paint}}";
+    let (losses, xml) = exported_with(&attribute("vertex_color"), &mesh("painted.ply", metal));
+    let instead = "0.1667 everywhere: Mitsuba takes no three numbers of a mesh for one";
+    assert_eq!(losses, [format!("textures.paint: {instead}")]);
+    assert!(xml.contains("<float name=\"alpha\" value=\"0.16666"), "{xml}");
+    let paper = "diffuse: {reflectance: {texture: paint}}";
+    assert_eq!(exported_with(&attribute("vertex_color"), &mesh("painted.ply", paper)).0, [""; 0]);
+    let (losses, _) = exported_with(&attribute("vertex_paint"), &mesh("numbered.ply", paper));
+    assert!(losses.len() == 1 && losses[0].starts_with("textures.paint: spectra that have its"), "{losses:?}");
+}
+
 /// Under D65 stands the picture as it was written, which need not say what light it is of.
 #[test]
 fn lamps_with_pictures_that_stand_as_they_were_come_back() {

@@ -3,26 +3,27 @@
 //! What it refuses (3.9.1): of PLY polygons, lists beside the corners of faces, `obj_info` and what follows the last element; of
 //! OBJ numbers that count back, corners before what they name, lines of 1024 bytes, lone texture coordinates and normals of length zero.
 //! It reads another mesh from lines of OBJ that go on after a backslash, from concave faces, where a part of the corners has
-//! coordinates or normals, and from whole numbers as positions in PLY. A PLY of triangles says all of this.
+//! coordinates or normals, and from whole numbers as positions in PLY. A PLY of triangles says all of this. Where a surface is
+//! of colours or other numbers of a PLY, it refuses those beside an alpha and takes whole ones for others.
 
 use super::attribute::Element;
 use super::{MeshSource, load, obj, ply};
 use glam::DVec3;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// A PLY that Mitsuba reads, of mesh `index` of a file that it refuses or takes for another mesh; `None` of files that it reads as
-/// they are read here, and of those that cannot be read.
-#[must_use]
-pub fn for_mitsuba(path: &Path, index: u32) -> Option<Vec<u8>> {
+/// they are read here, and of those that cannot be read. Of attributes those that are `asked` for matter.
+pub(super) fn for_mitsuba(path: &Path, index: u32, asked: &BTreeSet<&str>) -> Option<Vec<u8>> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
-    let is_plain: fn(&[u8], &MeshSource) -> bool = match extension.as_str() {
-        "obj" => obj::is_plain,
-        "ply" => ply::is_plain,
-        _ => return None,
-    };
+    if !["obj", "ply"].contains(&extension.as_str()) {
+        return None;
+    }
     let source = load(path, index).ok()?;
     let bytes = crate::input::read(path).ok()?;
-    (!is_plain(&bytes, &source)).then(|| binary(&source))
+    let is_plain =
+        if extension == "obj" { obj::is_plain(&bytes, &source) } else { ply::is_plain(&bytes, &source, asked) };
+    (!is_plain).then(|| binary(&source))
 }
 
 /// Whether Mitsuba can make it one of length 1, in f32.
@@ -117,9 +118,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();
-        let bytes = for_mitsuba(&path, 0);
+        let asked = BTreeSet::from(["vertex_color", "vertex_heat"]);
+        let bytes = for_mitsuba(&path, 0, &asked);
         if let Some(bytes) = &bytes {
-            assert!(ply::is_plain(bytes, &ply::read(bytes).unwrap()), "{name}: {text}");
+            assert!(ply::is_plain(bytes, &ply::read(bytes).unwrap(), &asked), "{name}: {text}");
         }
         (bytes.map(|bytes| ply::read(&bytes).unwrap()), load(&path, 0).unwrap())
     }
@@ -154,6 +156,36 @@ mod tests {
         let plain = ["f 1 2 3 4\n", "vt 0 1\nvn 0 0 2\nf 1/1/1 2/1/1 3/1/1 # all\n", "o a\ns off\nf 1// 2// 3//\n"];
         for tail in plain {
             assert_eq!(written("a.obj", &format!("{SQUARE}{tail}")).0, None, "{tail}");
+        }
+    }
+
+    /// Mitsuba 3.9.1 takes byte 128 for 128 and a `ushort` of 30000 for 0.177, and refuses colours of four numbers.
+    #[test]
+    fn colours_in_bytes_and_beside_an_alpha_are_written_anew_where_they_are_asked_for() {
+        let ply = |properties: &str, row: &str| {
+            format!(
+                "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{properties}\
+                 element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0 {row}\n1 0 0 {row}\n0 1 0 {row}\n\
+                 3 0 1 2\n"
+            )
+        };
+        let colours = |kind: &str, names: [&str; 3]| names.map(|name| format!("property {kind} {name}\n")).concat();
+        let rgb = ["red", "green", "blue"];
+        for (properties, row) in [
+            (colours("uchar", rgb), "255 128 0"),
+            (colours("float", rgb) + "property float alpha\n", "1 0.5 0 1"),
+            (colours("float", ["r", "g", "b"]) + "property uchar a\n", "1 0.5 0 255"),
+            ("property ushort heat_0\n".to_owned(), "30000"),
+        ] {
+            let (written, read) = written("a.ply", &ply(&properties, row));
+            assert_eq!(written.unwrap_or_else(|| panic!("{properties}")), read, "{properties}");
+        }
+        for (properties, row) in [
+            (colours("float", rgb), "1 0.5 0"),
+            (colours("double", rgb) + "property uchar flags\n", "1 0.5 0 7"),
+            (colours("uchar", ["mark_r", "mark_g", "mark_b"]) + "property float alpha\n", "255 128 0 1"),
+        ] {
+            assert_eq!(written("a.ply", &ply(&properties, row)).0, None, "{properties}");
         }
     }
 

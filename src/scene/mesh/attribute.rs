@@ -9,9 +9,10 @@
 //! green blue` are the attribute `vertex_color` or `face_color`; whole numbers there count from 0 to the
 //! greatest of their type. An attribute has one number or three; other properties are passed over.
 
-use crate::scene::texture::{TexturePoint, even_shares, mean_luminance, spread};
+use crate::scene::texture::{TexturePoint, even_shares, luminance, mean_luminance, spread};
 use crate::spectrum::{Carried, Lanes, Spectrum, upsample};
 use glam::DVec3;
+use std::path::Path;
 use std::sync::Arc;
 
 /// What an attribute has values for.
@@ -139,6 +140,16 @@ impl AttributeTexture {
             None => Spectrum::Constant(self.field.values[i][0] * scale),
         }
     }
+}
+
+/// The mean of the attribute `name` of mesh `index` of a file, as the one number that its three are where one is wanted; `None` where
+/// it has not three, and of a file that cannot be read.
+pub(super) fn mean_of_three(path: &Path, index: u32, name: &str) -> Option<f64> {
+    let source = super::load(path, index).ok()?;
+    let attribute =
+        source.attributes.into_iter().find(|attribute| attribute.name == name && attribute.channels == 3)?;
+    let triples = attribute.values.as_chunks::<3>().0;
+    Some(triples.iter().map(|&rgb| f64::from(luminance(rgb))).sum::<f64>() / triples.len().max(1) as f64)
 }
 
 /// A property of a file that may be part of an attribute.

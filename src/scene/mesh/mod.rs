@@ -22,12 +22,11 @@ pub mod together;
 mod tree;
 mod triangle;
 
-pub use anew::for_mitsuba;
 pub use load::{Sources, load};
 pub use tree::{MAX_TRIANGLES, MeshHit, MeshTree};
 pub use triangle::{TriangleHit, TriangleRay};
 
-use crate::description::MeshNormals;
+use crate::description::{MeshNormals, Meshes};
 use crate::math::{Frame, warp};
 use crate::scene::bvh::Aabb;
 use crate::scene::shape::SurfacePoint;
@@ -137,9 +136,16 @@ impl MeshSource {
     }
 }
 
+/// What exporting a scene asks of meshes.
+pub const FOR_EXPORT: Meshes<'static> = Meshes {
+    normals: &normals_of,
+    anew: &anew::for_mitsuba,
+    bare: &lacks_coordinates,
+    mean_of_three: &attribute::mean_of_three,
+};
+
 /// Where the normals of mesh `index` of a file point; none of a file that cannot be read.
-#[must_use]
-pub fn normals_of(path: &Path, index: u32) -> MeshNormals {
+fn normals_of(path: &Path, index: u32) -> MeshNormals {
     match load(path, index) {
         Ok(source) if source.normals.is_empty() => MeshNormals::Missing,
         Ok(source) if source.is_wound_against_its_normals() => MeshNormals::Inward,
@@ -149,8 +155,7 @@ pub fn normals_of(path: &Path, index: u32) -> MeshNormals {
 }
 
 /// Whether mesh `index` of a file has no texture coordinates; false of a file that cannot be read.
-#[must_use]
-pub fn lacks_coordinates(path: &Path, index: u32) -> bool {
+fn lacks_coordinates(path: &Path, index: u32) -> bool {
     load(path, index).is_ok_and(|source| source.uvs.is_empty())
 }
 

@@ -9,7 +9,7 @@ use super::anew::has_direction;
 use super::attribute::{Attribute, Channel, Column, Element, named_columns};
 use super::polygon::unfold;
 use glam::{DVec2, DVec3};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 /// The type of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -329,8 +329,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshSource, String> {
     Ok(out)
 }
 
-/// Whether Mitsuba reads the same mesh from `bytes` as `source`: see [`super::anew`].
-pub(super) fn is_plain(bytes: &[u8], source: &MeshSource) -> bool {
+/// Whether Mitsuba reads the same mesh from `bytes` as `source`, with the attributes that are `asked` for: see [`super::anew`].
+pub(super) fn is_plain(bytes: &[u8], source: &MeshSource, asked: &BTreeSet<&str>) -> bool {
     let mut rest = bytes;
     let Ok(header) = header(&mut rest) else { return false };
     let head = &bytes[..bytes.len() - rest.len()];
@@ -354,7 +354,12 @@ pub(super) fn is_plain(bytes: &[u8], source: &MeshSource) -> bool {
             ("face", [_]) => *count == source.triangles.len(),
             (_, lists) => lists.is_empty(),
         };
-        if !is_known {
+        let element = match name.as_str() {
+            "vertex" => Some(Element::Vertex),
+            "face" => Some(Element::Face),
+            _ => None,
+        };
+        if !is_known || element.is_some_and(|element| !are_plain(element, properties, asked)) {
             return false;
         }
         let row = properties.iter().map(|property| match (property.list, header.big) {
@@ -370,6 +375,19 @@ pub(super) fn is_plain(bytes: &[u8], source: &MeshSource) -> bool {
         None => rest.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).count(),
     };
     found == length && source.normals.iter().all(|normal| has_direction(*normal))
+}
+
+/// Whether Mitsuba reads the same attributes that are `asked` for from the properties of an element: numbers with fractions, and
+/// colours without an alpha.
+fn are_plain(element: Element, properties: &[Property], asked: &BTreeSet<&str>) -> bool {
+    let columns = columns(properties, |_| false);
+    let is_alone = columns.iter().all(|column| !["a", "alpha"].contains(&column.name.as_str()));
+    let named = named_columns(element, &columns);
+    let mut asked = named.iter().filter(|(attribute, _)| asked.contains(attribute.name.as_str()));
+    asked.all(|(attribute, from)| {
+        let is_colour = ["vertex_color", "face_color"].contains(&attribute.name.as_str());
+        (is_alone || !is_colour) && from.iter().all(|(k, _)| columns[*k].unit == 1.0)
+    })
 }
 
 /// Gives the corners of all triangles the coordinates `uvs`; nothing where there are none. A vertex whose corners have several becomes as

@@ -144,7 +144,8 @@ impl Scalar {
     }
 }
 
-fn luminance(rgb: [f32; 3]) -> f32 {
+/// Three numbers as one: their mean by luminance.
+pub(in crate::scene) fn luminance(rgb: [f32; 3]) -> f32 {
     if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
         return rgb[0];
     }

@@ -39,6 +39,7 @@ use super::super::node::{Node, Sources, Value};
 use super::super::path::{self, Segment, field};
 use super::super::print::{Printer, relative};
 use super::super::scene::SceneDescription;
+use super::super::texture::Texture;
 use super::{DAYLIGHT, FILM, SKY_FROM_MITSUBA};
 use xml::Xml;
 
@@ -84,17 +85,26 @@ pub enum MeshNormals {
     Inward,
 }
 
-/// Writes `scene` for the file `path`. `normals` reads mesh `index` of a file, `anew` gives a PLY of it where Mitsuba does not read
-/// the same from the file, `pictures` the same of pictures, `closed` tells whether the grid of one bounds a solid, `bare` whether
-/// a mesh has no texture coordinates.
+/// What is asked of mesh `index` of a file.
+pub struct Meshes<'a> {
+    /// Where its normals point.
+    pub normals: &'a dyn Fn(&Path, u32) -> MeshNormals,
+    /// A PLY of it where Mitsuba does not read the same from the file; of attributes those of these names matter.
+    pub anew: &'a dyn Fn(&Path, u32, &BTreeSet<&str>) -> Option<Vec<u8>>,
+    /// Whether it has no texture coordinates.
+    pub bare: &'a dyn Fn(&Path, u32) -> bool,
+    /// The mean of its attribute of this name as one number, where that has three.
+    pub mean_of_three: &'a dyn Fn(&Path, u32, &str) -> Option<f64>,
+}
+
+/// Writes `scene` for the file `path`. `pictures` gives a picture anew where Mitsuba does not read the same from its file, `closed`
+/// tells whether the grid of a file bounds a solid.
 pub fn export(
     scene: &SceneDescription,
     path: &Path,
-    normals: &dyn Fn(&Path, u32) -> MeshNormals,
-    anew: &dyn Fn(&Path, u32) -> Option<Vec<u8>>,
+    meshes: &Meshes<'_>,
     pictures: &dyn Fn(&Path) -> Option<PictureAnew>,
     closed: &dyn Fn(&Path) -> bool,
-    bare: &dyn Fn(&Path, u32) -> bool,
 ) -> Exported {
     let nothing = Node::new(Default::default(), Value::Null);
     let no_sources = Sources::default();
@@ -102,20 +112,30 @@ pub fn export(
     let stem = path.file_stem().map_or(String::new(), |stem| format!("{}.", stem.to_string_lossy()));
     let directory = path.parent().unwrap_or(Path::new(""));
     let (losses, files) = (Vec::new(), Vec::new());
-    let (ids, mentioned, meshes, images) = (BTreeSet::new(), BTreeSet::new(), BTreeMap::new(), BTreeMap::new());
+    let (ids, mentioned, new_meshes, images) = (BTreeSet::new(), BTreeSet::new(), BTreeMap::new(), BTreeMap::new());
     let xml = Xml::default();
     // Each file is read once.
     let known = RefCell::default();
-    let normals = &|file: &Path, index: u32| once(&known, (file.to_owned(), index), || normals(file, index));
+    let normals = &|file: &Path, index: u32| once(&known, (file.to_owned(), index), || (meshes.normals)(file, index));
+    let asked = scene.textures.values().filter_map(|texture| match texture {
+        Texture::MeshAttribute(attribute) => Some(attribute.name.as_str()),
+        Texture::Image(_) | Texture::Checkerboard(_) | Texture::Volume(_) => None,
+    });
+    let asked: BTreeSet<&str> = asked.collect();
     let known = RefCell::default();
-    let anew =
-        &|file: &Path, index: u32| once(&known, (file.to_owned(), index), || anew(file, index).map(Contents::from));
+    let anew = &|file: &Path, index: u32| {
+        once(&known, (file.to_owned(), index), || (meshes.anew)(file, index, &asked).map(Contents::from))
+    };
+    let known = RefCell::default();
+    let mean_of_three = &|file: &Path, index: u32, name: &str| {
+        once(&known, (file.to_owned(), index, name.to_owned()), || (meshes.mean_of_three)(file, index, name))
+    };
     let known = RefCell::default();
     let pictures = &|file: &Path| once(&known, file.to_owned(), || pictures(file).map(Rc::new));
     let known = RefCell::default();
     let closed = &|file: &Path| once(&known, file.to_owned(), || closed(file));
     let known = RefCell::default();
-    let bare = &|file: &Path, index: u32| once(&known, (file.to_owned(), index), || bare(file, index));
+    let bare = &|file: &Path, index: u32| once(&known, (file.to_owned(), index), || (meshes.bare)(file, index));
     let mut export = Export {
         scene,
         root,
@@ -125,6 +145,7 @@ pub fn export(
         pictures,
         closed,
         bare,
+        mean_of_three,
         directory,
         stem,
         ids,
@@ -132,7 +153,7 @@ pub fn export(
         xml,
         losses,
         files,
-        meshes,
+        meshes: new_meshes,
         images,
     };
     export.scene();
@@ -160,6 +181,7 @@ struct Export<'a> {
     pictures: &'a dyn Fn(&Path) -> Option<Rc<PictureAnew>>,
     closed: &'a dyn Fn(&Path) -> bool,
     bare: &'a dyn Fn(&Path, u32) -> bool,
+    mean_of_three: &'a dyn Fn(&Path, u32, &str) -> Option<f64>,
     directory: &'a Path,
     /// Before the names of files that are written beside the scene.
     stem: String,

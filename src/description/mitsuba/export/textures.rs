@@ -6,6 +6,7 @@ use std::path::Path;
 use image::{ImageDecoder, ImageReader};
 
 use super::super::super::compound::{NumberOrTexture, Roughness};
+use super::super::super::shape::Geometry;
 use super::super::super::spectrum::{Spectrum, SpectrumOrTexture};
 use super::super::super::texture::{Checkerboard, ImageTexture, Texture, TextureFilter, Wrap};
 use super::spectra::Role;
@@ -171,10 +172,34 @@ impl<'a> Export<'a> {
 
     /// A texture that is asked for colours.
     pub(super) fn colours_of(&mut self, name: &str, texture: &str) {
+        if self.is_curves(texture) {
+            let instead = "spectra that have its three numbers for coefficients: Mitsuba takes those of a name with \"color\" in it \
+                           for colours";
+            self.lose(&super::field(&["textures", texture]), instead);
+        }
         match self.refused(texture, Asked::Colours) {
             Some(image) => self.picture(&[("name", name)], texture, image),
             None => self.texture_ref(&[("name", name)], texture),
         }
+    }
+
+    /// Whether Mitsuba takes three numbers of a mesh for something else than a colour.
+    fn is_curves(&self, texture: &str) -> bool {
+        match self.scene.textures.get(texture) {
+            Some(Texture::MeshAttribute(written)) => {
+                !written.name.contains("color") && self.mean_of_three(&written.name).is_some()
+            }
+            _ => false,
+        }
+    }
+
+    /// The mean of an attribute as one number, where a mesh has three of its name.
+    fn mean_of_three(&self, attribute: &str) -> Option<f64> {
+        let mut shapes = self.scene.shapes.iter().chain(self.scene.groups.values().flatten());
+        shapes.find_map(|shape| match &shape.geometry {
+            Geometry::Mesh(mesh) => (self.mean_of_three)(&mesh.file, mesh.index, attribute),
+            _ => None,
+        })
     }
 
     fn texture_ref(&mut self, attributes: &[(&str, &str)], texture: &str) {
@@ -191,11 +216,20 @@ impl<'a> Export<'a> {
     pub(super) fn numbers_of(&mut self, name: Option<&str>, texture: &str) {
         // Without a name where the plugin takes any texture for what it needs.
         let attributes: Vec<(&str, &str)> = name.map(|name| ("name", name)).into_iter().collect();
-        let Some(Texture::Checkerboard(board)) = self.scene.textures.get(texture) else {
-            return match self.refused(texture, Asked::Numbers) {
-                Some(image) => self.picture(&attributes, texture, image),
-                None => self.texture_ref(&attributes, texture),
-            };
+        let board = match self.scene.textures.get(texture) {
+            Some(Texture::Checkerboard(board)) => board,
+            Some(Texture::MeshAttribute(written)) => {
+                return match (name, self.mean_of_three(&written.name)) {
+                    (Some(name), Some(mean)) => self.even_number(name, texture, mean * written.scale),
+                    _ => self.texture_ref(&attributes, texture),
+                };
+            }
+            _ => {
+                return match self.refused(texture, Asked::Numbers) {
+                    Some(image) => self.picture(&attributes, texture, image),
+                    None => self.texture_ref(&attributes, texture),
+                };
+            }
         };
         self.open_texture("checkerboard", &attributes);
         for (key, colour) in [("color0", &board.b), ("color1", &board.a)] {
@@ -207,6 +241,14 @@ impl<'a> Export<'a> {
         }
         self.board_map(board, Stands::Upright);
         self.xml.close();
+    }
+
+    /// One number in place of the three of a mesh.
+    fn even_number(&mut self, name: &str, texture: &str, mean: f64) {
+        let instead = format!("{mean:.4} everywhere: Mitsuba takes no three numbers of a mesh for one");
+        self.instead("texture", &super::field(&["textures", texture]), instead);
+        self.xml.value("float", name, mean);
+        self.end();
     }
 
     /// A texture that shines or that a light throws; the light tells what is lost. Their v grows downward in slides.
