@@ -4,7 +4,7 @@ use glam::DMat3;
 use serde::Deserialize;
 
 use super::decode::whole_or_none;
-use super::fault::Checker;
+use super::fault::{Checker, Found};
 use super::material::given_fields;
 use super::path::At;
 use super::spectrum::Vec3;
@@ -239,7 +239,7 @@ impl Pose {
                         false,
                         at.key("up"),
                         "a direction across the line of sight",
-                        format_args!("{up:?}, which is parallel to it"),
+                        format_args!("{}, which is parallel to it", up.in_words()),
                     );
                 }
             }
@@ -297,8 +297,7 @@ impl Camera {
             check_length(at.key("focus_distance"), lens.focus_distance, checker);
         }
         let aside = self.principal_point.into_iter().all(|share| share.abs() <= *LENGTHS.end());
-        let found = format_args!("{:?}", self.principal_point);
-        checker.require(aside, at.key("principal_point"), "two numbers from -1e60 to 1e60", found);
+        checker.require(aside, at.key("principal_point"), "two numbers from -1e60 to 1e60", self.principal_point);
         if let Some(shutter) = &self.shutter {
             shutter.check(at.key("shutter"), checker);
         }
@@ -331,13 +330,13 @@ mod tests {
     fn a_camera_that_sees_nothing_is_refused() {
         assert_eq!(
             camera("origin: [1, 2, 3], target: [1, 2, 3], fov_deg: 40"),
-            "dir/s.yaml:1:37: camera.target: expected a point other than the origin, found [1.0, 2.0, 3.0]"
+            "dir/s.yaml:1:37: camera.target: expected a point other than the origin, found [1, 2, 3]"
         );
         // (1, 2, 3)/10 and (3, 6, 9)/7 are parallel up to rounding only.
         assert_eq!(
             camera("origin: [0, 0, 0], target: [0.1, 0.2, 0.3], up: [3, 6, 9], fov_deg: 40"),
             "dir/s.yaml:1:58: camera.up: expected a direction across the line of sight, \
-             found [3.0, 6.0, 9.0], which is parallel to it"
+             found [3, 6, 9], which is parallel to it"
         );
         assert_eq!(
             camera("origin: [0, 0, 0], target: [0, 0, 1], up: [0, 0, 0], fov_deg: 40"),
@@ -396,7 +395,7 @@ mod tests {
             ),
             (
                 format!("{eye}, fov_deg: 9, principal_point: [1.0e160, 0]"),
-                "principal_point: expected two numbers from -1e60 to 1e60, found [1e160, 0.0]",
+                "principal_point: expected two numbers from -1e60 to 1e60, found [1e160, 0]",
             ),
             (
                 format!("{eye}, orthographic_height: 1.0e308"),
@@ -421,30 +420,30 @@ mod tests {
         for (fields, message) in [
             (
                 "origin: [0, 0, 1e300], target: [0, 0, 0]",
-                "1:18: camera.origin: expected three numbers up to 1e60, found [0.0, 0.0, 1e300]",
+                "1:18: camera.origin: expected three numbers up to 1e60, found [0, 0, 1e300]",
             ),
             (
                 "target: [-1e61, 0, 0], origin: [0, 0, 0]",
-                "1:18: camera.target: expected three numbers up to 1e60, found [-1e61, 0.0, 0.0]",
+                "1:18: camera.target: expected three numbers up to 1e60, found [-1e61, 0, 0]",
             ),
             (
                 "up: [0, 1e300, 0], origin: [0, 0, 1], target: [0, 0, 0]",
-                "1:14: camera.up: expected a vector of length from 1e-60 to 1e60, found [0.0, 1e300, 0.0]",
+                "1:14: camera.up: expected a vector of length from 1e-60 to 1e60, found [0, 1e300, 0]",
             ),
             (
                 "up: [0, 1e-300, 0], origin: [0, 0, 1], target: [0, 0, 0]",
-                "1:14: camera.up: expected a vector of length from 1e-60 to 1e60, found [0.0, 1e-300, 0.0]",
+                "1:14: camera.up: expected a vector of length from 1e-60 to 1e60, found [0, 1e-300, 0]",
             ),
             (
                 "origin: [0, 0, 0], target: [0, 0, 1e-300]",
-                "1:37: camera.target: expected a point other than the origin, found [0.0, 0.0, 1e-300]",
+                "1:37: camera.target: expected a point other than the origin, found [0, 0, 1e-300]",
             ),
         ] {
             assert_eq!(told(fields), format!("dir/s.yaml:{message}"));
         }
         assert_eq!(
             faults("lights: [{projector: {origin: [1e300, 0, 0], target: [0, 0, 0], fov_deg: 40}}]"),
-            "dir/s.yaml:2:31: lights[0].projector.origin: expected three numbers up to 1e60, found [1e300, 0.0, 0.0]"
+            "dir/s.yaml:2:31: lights[0].projector.origin: expected three numbers up to 1e60, found [1e300, 0, 0]"
         );
     }
 }

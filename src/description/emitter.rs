@@ -182,7 +182,7 @@ mod tests {
         assert_eq!(projector("target: [0, 1, 1], fov_deg: 40"), "none");
         assert_eq!(
             projector("target: [0, 1, 0], fov_deg: 180, sampling_weight: -1"),
-            "dir/s.yaml:3:42: lights[0].projector.target: expected a point other than the origin, found [0.0, 1.0, 0.0]\n\
+            "dir/s.yaml:3:42: lights[0].projector.target: expected a point other than the origin, found [0, 1, 0]\n\
              dir/s.yaml:3:62: lights[0].projector.fov_deg: expected an angle between 0 and 180 degrees, found 180\n\
              dir/s.yaml:3:84: lights[0].projector.sampling_weight: expected a number of 0 or more, found -1"
         );

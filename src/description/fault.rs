@@ -205,6 +205,13 @@ impl Found for f64 {
     }
 }
 
+/// A point, a vector or a row, as it is written.
+impl<const N: usize> Found for [f64; N] {
+    fn in_words(&self) -> String {
+        format!("[{}]", self.map(in_short).join(", "))
+    }
+}
+
 macro_rules! found_as_displayed {
     ($($type:ty),*) => {$(
         impl Found for $type {

@@ -328,7 +328,7 @@ impl Light {
                             target != spot.position,
                             at.key("target"),
                             "a point other than the position",
-                            format_args!("{target:?}"),
+                            target,
                         );
                     }
                     Aim::Direction(direction) => checker.direction(at.key("direction"), direction),
@@ -408,7 +408,7 @@ mod tests {
         assert_eq!(spot(", target: [0, 0, 0], direction: [0, 1, 0]"), format!("{place}target and direction"));
         assert_eq!(
             spot(", target: [0, 1, 0]"),
-            "dir/s.yaml:3:53: lights[0].spot.target: expected a point other than the position, found [0.0, 1.0, 0.0]"
+            "dir/s.yaml:3:53: lights[0].spot.target: expected a point other than the position, found [0, 1, 0]"
         );
         assert_eq!(
             spot(", direction: [0, 0, 0]"),
@@ -423,7 +423,7 @@ mod tests {
             assert_eq!(
                 light(&format!("{lamp}: {{position: [0, 1.0e61, 0], intensity: 1{aim}}}")),
                 format!(
-                    "dir/s.yaml:3:{column}: lights[0].{lamp}.position: expected three numbers up to 1e60, found [0.0, 1e61, 0.0]"
+                    "dir/s.yaml:3:{column}: lights[0].{lamp}.position: expected three numbers up to 1e60, found [0, 1e61, 0]"
                 )
             );
         }

@@ -437,12 +437,7 @@ impl Geometry {
             Geometry::Cylinder(cylinder) => {
                 checker.positive(at.key("radius"), cylinder.radius);
                 let apart = cylinder.base != cylinder.top;
-                checker.require(
-                    apart,
-                    at.key("top"),
-                    "a point other than the base",
-                    format_args!("{:?}", cylinder.top),
-                );
+                checker.require(apart, at.key("top"), "a point other than the base", cylinder.top);
                 if let Some(seam) = cylinder.seam {
                     checker.direction(at.key("seam"), seam);
                     let along = [0, 1, 2].map(|i| cylinder.top[i] - cylinder.base[i]);
@@ -455,7 +450,7 @@ impl Geometry {
             Geometry::Cone(cone) => {
                 checker.positive(at.key("radius"), cone.radius);
                 let apart = cone.base != cone.apex;
-                checker.require(apart, at.key("apex"), "a point other than the base", format_args!("{:?}", cone.apex));
+                checker.require(apart, at.key("apex"), "a point other than the base", cone.apex);
             }
             Geometry::Mesh(_) | Geometry::SdfGrid(_) | Geometry::Curves(_) => {}
             Geometry::Instance(instance) => checker.group(at.key("group"), &instance.group),
@@ -496,7 +491,7 @@ mod tests {
             ("cube: {size: [1, -1, 1]}", "3:20: shapes[0].cube.size[1]: expected a number greater than 0, found -1"),
             (
                 "cylinder: {base: [0, 1, 0], top: [0, 1, 0], radius: 1}",
-                "3:36: shapes[0].cylinder.top: expected a point other than the base, found [0.0, 1.0, 0.0]",
+                "3:36: shapes[0].cylinder.top: expected a point other than the base, found [0, 1, 0]",
             ),
             (
                 "cylinder: {base: [0, 0, 0], top: [0, 1, 0], radius: 1, seam: [0, -2, 0]}",
@@ -504,7 +499,7 @@ mod tests {
             ),
             (
                 "cone: {base: [0, 0, 0], apex: [0, 0, 0], radius: 1}",
-                "3:33: shapes[0].cone.apex: expected a point other than the base, found [0.0, 0.0, 0.0]",
+                "3:33: shapes[0].cone.apex: expected a point other than the base, found [0, 0, 0]",
             ),
             ("mesh: {file: ''}", "3:16: shapes[0].mesh.file: expected the path of a file, found empty text"),
             (

@@ -203,7 +203,7 @@ fn about(out: &mut String, part: &PartFacts, frame: Window, first: bool) {
         line(out, "frame", &frame);
     }
     if let Some(camera) = &part.camera {
-        let point = |p: [f64; 3]| format!("({})", p.map(short).join(", "));
+        let point = |p: [f64; 3]| format!("[{}]", p.map(short).join(", "));
         let fov = match camera.fov_deg {
             Some([x, y]) => format!("; it sees {x:.1} by {y:.1} degrees"),
             None => String::new(),
