@@ -2,7 +2,9 @@
 
 mod common;
 
-use abbe::batch::{self, Overrides, report::Report};
+use abbe::batch::checkpoint::Keep;
+use abbe::batch::report::{Report, Status};
+use abbe::batch::{self, Overrides};
 use abbe::film::Window;
 use abbe::film::compare::{CompareOptions, Verdict, compare};
 use abbe::film::exr::{ExrFile, SHARED_ERRORS, read_exr};
@@ -31,7 +33,12 @@ struct Written {
 
 /// Renders through the batch with `more` in the scene.
 fn written(more: &str) -> Written {
-    let bench = bench_with(&format!("{SCENE}{IMAGE}render: {{samples: 16, seed: 5}}\n{more}"), &[]);
+    written_as(IMAGE, more)
+}
+
+/// [`written`] with another `image`.
+fn written_as(image: &str, more: &str) -> Written {
+    let bench = bench_with(&format!("{SCENE}{image}render: {{samples: 16, seed: 5}}\n{more}"), &[]);
     let out = bench.directory.path().join("out");
     let overrides = Overrides { output: Some(out.clone()), ..Overrides::default() };
     let yaml = bench.directory.path().join("scene.yaml");
@@ -210,6 +217,25 @@ fn the_png_shows_the_crop() {
             assert!((f64::from(pixel.0[c]) - exact).abs() < 1.2, "pixel {i}, {name}: {exact}, {}", pixel.0[c]);
         }
     }
+}
+
+/// Overscan changes nothing inside the frame, and none of it is shown: not by the light that a meter sees, either. The picture is found
+/// again.
+#[test]
+fn the_png_ends_at_the_frame() {
+    let png = |overscan: u32| {
+        let image = format!("image: {{width: 20, height: 12, overscan: {overscan}}}\n");
+        let w = written_as(&image, "output: {png: {exposure: auto}}\n");
+        let yaml = w.bench.directory.path().join("scene.yaml");
+        let keep = Keep { skip_existing: true, ..Keep::default() };
+        let again = Overrides { output: w.path.parent().map(PathBuf::from), keep, ..Overrides::default() };
+        let report = batch::render_batch(&yaml, &again, &(), &AtomicBool::new(false)).unwrap();
+        assert!(matches!(report.scenes[0].status, Status::Skipped), "{:?}", report.scenes[0].status);
+        image::open(w.path.with_extension("png")).unwrap().into_rgb8()
+    };
+    let frame = png(0);
+    assert_eq!(frame.dimensions(), (20, 12));
+    assert!(png(5) == frame);
 }
 
 /// Alpha is coverage: one on the ball and the wall, zero beside them, between at the edges.

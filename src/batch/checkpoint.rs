@@ -181,7 +181,8 @@ impl<'a> Keeper<'a> {
     fn snapshot(&self, part: &Part) -> Result<()> {
         let finish = &self.identity.finish;
         let image = self.look(part, &finish.rgb_from_xyz());
-        png::write_png(&snapshot_place(self.path), &image, &finish.png_settings(&image))
+        let shown = image.shown();
+        png::write_png(&snapshot_place(self.path), &shown, &finish.png_settings(&shown))
     }
 
     /// What is not worth losing the render for: told at once, and in the report. The same trouble twice in a row is told once.
@@ -277,7 +278,8 @@ fn picture_ended(path: &Path, finish: &Finish) -> Option<Result<()>> {
         return None;
     }
     let Found { pixels, fault } = exr_holds(path, finish, Holds::Colours)?;
-    let size = [finish.window.width, finish.window.height];
+    let shown = finish.window.shown(finish.frame);
+    let size = [shown.width, shown.height];
     let mut texts = finish.png_marks(&pixels);
     texts.push(develop::software());
     let bands = |spectral: PathBuf| exr_holds(&spectral, finish, Holds::Bands).is_some_and(|f| f.pixels == pixels);

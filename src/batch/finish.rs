@@ -257,7 +257,7 @@ impl Finish {
         ColourSpace::Rec709.matrix_from_xyz().map(|row| row.map(|x| x * self.sensitivity))
     }
 
-    /// How the PNG of `image` is developed, whose colours are those of the file.
+    /// How the PNG of `image` is developed, as it is shown, whose colours are those of the file.
     #[must_use]
     pub fn png_settings(&self, image: &Image) -> PngSettings {
         develop::settings(&self.output.png, self.white, image, self.space())
@@ -327,7 +327,8 @@ pub fn write(
     }
     report.pixel_hash = pixel_hash(&image);
     let [_, png_path, spectral] = places(exr_path);
-    let mut settings = finish.png_settings(&image);
+    let shown = image.shown();
+    let mut settings = finish.png_settings(&shown);
     settings.texts.extend(finish.png_marks(&report.pixel_hash));
     report.png = Some(Developed {
         exposure_stops: settings.exposure_stops,
@@ -336,11 +337,11 @@ pub fn write(
     });
     // Rays on a grid differ from each other, but not by chance.
     if report.error.is_some() {
-        report.error_map = heat::error_map(&image, finish.space().matrix_to_xyz()[1], contact::SIDE);
+        report.error_map = heat::error_map(&shown, finish.space().matrix_to_xyz()[1], contact::SIDE);
     }
     write_spectral(&spectral, finish, frame, &image, report)?;
     let (exr, png) =
-        rayon::join(|| sealed_exr(exr_path, finish, frame, &image, report), || png::encode_png(&image, &settings));
+        rayon::join(|| sealed_exr(exr_path, finish, frame, &image, report), || png::encode_png(&shown, &settings));
     let (exr, bytes) = exr?;
     // They come to the disk together but are named one after the other: where the first cannot be written, nothing of the picture
     // is left.

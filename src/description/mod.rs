@@ -39,7 +39,8 @@
 //!                                   #   {tent: {radius: 1}}, {gaussian: {stddev: 0.5}}, mitchell (b and c
 //!                                   #   default 1/3, -2 to 2), catmull_rom, {lanczos: {radius: 3}}; whitted takes none
 //!   crop: {x: 0, y: 0, width: 10, height: 10}   # default all; x and y default 0
-//!   overscan: 0                     # default; pixels that are rendered beyond each edge of the frame, without a crop
+//!   overscan: 0                     # default; pixels that are rendered beyond each edge of the frame, without a crop;
+//!                                   #   PNGs end at the frame
 //!   sample_border: true             # default; false: the filter is cut where the picture ends, and takes no light from beyond
 //!   bands: []                       # ~ the OpenEXR file holds bands of the spectrum instead of colour:
 //!                                   #   {name: blue, response: SPECTRUM}: ∫ radiance · response dλ, nm,

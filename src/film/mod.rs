@@ -65,6 +65,17 @@ impl Window {
         inside.then(|| row as usize * self.width as usize + column as usize)
     }
 
+    /// Its part that is in a frame of this size.
+    #[must_use]
+    pub fn shown(&self, frame: [u32; 2]) -> Window {
+        let cut = |start: i32, size: u32, frame: u32| {
+            let end = (i64::from(start) + i64::from(size)).min(i64::from(frame));
+            (start.max(0), (end - i64::from(start.max(0))).max(0) as u32)
+        };
+        let ((x, width), (y, height)) = (cut(self.x, self.width, frame[0]), cut(self.y, self.height, frame[1]));
+        Window { x, y, width, height }
+    }
+
     /// Whether every pixel of `other` lies in this window.
     #[must_use]
     pub fn contains(&self, other: &Window) -> bool {

@@ -22,6 +22,7 @@ use crate::film::Window;
 use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES, Sum};
 use crate::film::layers::LayerSums;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// Light that was splatted from photons: sums that are divided by the photons emitted, not by the
@@ -72,6 +73,30 @@ pub struct Image {
     pub alpha: Vec<f32>,
     /// Standard error of each value of `rgb`; NaN where fewer than two replicates have samples.
     pub standard_error: [Vec<f32>; 3],
+}
+
+impl Image {
+    /// What a person is shown: no pixels of overscan, which lie beyond the frame.
+    #[must_use]
+    pub fn shown(&self) -> Cow<'_, Image> {
+        let window = self.window.shown(self.frame);
+        if window == self.window {
+            return Cow::Borrowed(self);
+        }
+        let (aside, width) = ((window.x - self.window.x) as usize, window.width as usize);
+        let rows = self.window.width as usize;
+        let cut = |plane: &Vec<f32>| -> Vec<f32> {
+            let own = plane.chunks(rows).skip((window.y - self.window.y) as usize).take(window.height as usize);
+            own.flat_map(|row| &row[aside..aside + width]).copied().collect()
+        };
+        Cow::Owned(Image {
+            frame: self.frame,
+            window,
+            rgb: self.rgb.each_ref().map(cut),
+            alpha: cut(&self.alpha),
+            standard_error: self.standard_error.each_ref().map(cut),
+        })
+    }
 }
 
 /// The picture that `film` holds, in the colour space of `rgb_from_xyz`, with `splats` added; on the current rayon pool.
