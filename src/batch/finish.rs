@@ -25,6 +25,7 @@ use crate::spectrum::ColourSpace;
 use crate::transport::layers::{Channel, Holds};
 use crate::transport::plan::{Effect, EffectPlan, Integrator};
 use serde::{Deserialize, Serialize};
+use std::ffi::OsStr;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -535,13 +536,17 @@ fn shared_errors_of_bands(finish: &Finish, frame: &Frame, channels: Range<usize>
 /// The path of the spectral file beside the EXR at `path`: `name.spectral.exr`, and before the number of a frame.
 #[must_use]
 pub fn spectral_path(path: &Path) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let is_number = |n: &str| n.strip_prefix('-').unwrap_or(n).bytes().all(|b| b.is_ascii_digit());
-    let number = stem.rsplit_once('.').filter(|(_, n)| n.ends_with(|c: char| c.is_ascii_digit()) && is_number(n));
-    path.with_file_name(match number {
-        Some((name, number)) => format!("{name}.spectral.{number}.exr"),
-        None => format!("{stem}.spectral.exr"),
-    })
+    let stem = Path::new(path.file_stem().unwrap_or_default());
+    let is_number = |n: &&str| {
+        let digits = n.strip_prefix('-').unwrap_or(n);
+        !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())
+    };
+    let number = stem.extension().and_then(OsStr::to_str).filter(is_number);
+    // Whatever bytes the name has: those of two pictures differ.
+    let name = if number.is_some() { stem.file_stem().unwrap_or_default() } else { stem.as_os_str() };
+    let mut file = name.to_owned();
+    file.push(number.map_or(".spectral.exr".into(), |number| format!(".spectral.{number}.exr")));
+    path.with_file_name(file)
 }
 
 /// The files of the picture at `path`.
@@ -636,5 +641,15 @@ mod tests {
         ] {
             assert_eq!(spectral_path(Path::new(path)), Path::new(expected));
         }
+    }
+
+    /// Two pictures whose names differ by what is no letter had one file of bands.
+    #[cfg(unix)]
+    #[test]
+    fn names_keep_bytes_that_are_no_text() {
+        use std::os::unix::ffi::OsStrExt;
+        let path = |bytes| Path::new(OsStr::from_bytes(bytes));
+        assert_eq!(spectral_path(path(b"o/\xff.exr")), path(b"o/\xff.spectral.exr"));
+        assert_eq!(spectral_path(path(b"o/\xff.0001.exr")), path(b"o/\xff.spectral.0001.exr"));
     }
 }
