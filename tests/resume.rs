@@ -285,6 +285,53 @@ fn a_checkpoint_of_another_scene_or_a_damaged_one_is_refused_and_left() {
     assert!(!place.path("a.exr").exists() && checkpoint.exists());
 }
 
+/// What is there of a render to an error nobody can reach are the first samples of one to another error, however many those are: more,
+/// or fewer, so that what was begun is ended and no more. The picture is that of as many samples in one go. Fewer samples than are
+/// there at the most are another picture's, and so are those of a render that ends by samples alone.
+#[test]
+fn a_checkpoint_goes_on_to_another_error() {
+    for merging in ["off", "on"] {
+        // Techniques are planned for one sample, so that no bound is below that. Glass would be a matter of chance without its photons.
+        let scene = scene(merging).replace("samples: 64", "samples: 1");
+        let matte = scene.replace("{dielectric: {ior: {glass: N-SF11}}}", "{diffuse: {}}");
+        let place = Place::of(if merging == "on" { &scene } else { &matte });
+        let begin = ["--error", "1e-9", "--checkpoint-interval", "0.02s"];
+        let mut child = command(&place, "a.exr", &begin).spawn().unwrap();
+        let checkpoint = place.path("a.exr.checkpoint");
+        assert!(appears(&mut child, &checkpoint));
+        std::thread::sleep(Duration::from_millis(300));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let bytes = std::fs::read(&checkpoint).unwrap();
+        let fewer = vec!["--error", "1e-9", "--set", "render.stop.samples=1"];
+        for (other, expected, found) in [
+            (fewer, "expected a checkpoint of tile 0/1, samples 0-0", "found one of tile 0/1, samples 0-"),
+            (vec!["--spp", "64"], "samples: expected 64", "found 65536"),
+        ] {
+            let done = run(&place, "a.exr", &[&["--resume"], &other[..]].concat());
+            assert!(done.code == 3 && done.err.contains(expected) && done.err.contains(found), "{}", done.err);
+            assert!(std::fs::read(&checkpoint).unwrap() == bytes);
+        }
+        for error in ["90%", "25%"] {
+            std::fs::write(&checkpoint, &bytes).unwrap();
+            let done = run(&place, "a.exr", &["--resume", "--error", error]);
+            assert_eq!(done.code, 0, "{}", done.err);
+            assert!(done.err.contains("resumed at") && !checkpoint.exists(), "{}", done.err);
+            let samples = place.json("report.json")["scenes"][0]["samples"].to_string();
+            let most = format!("render.stop.samples={samples}");
+            assert_eq!(run(&place, "b.exr", &["--error", "1e-9", "--set", &most]).code, 0);
+            assert!(pixels(&place.path("a.exr")) == pixels(&place.path("b.exr")), "{merging}, {error}: {samples}");
+            // To another error it is another picture.
+            let kept = |error: &str| {
+                let before = std::fs::metadata(place.path("a.exr")).unwrap().modified().unwrap();
+                assert_eq!(run(&place, "a.exr", &["--skip-existing", "--error", error]).code, 0);
+                std::fs::metadata(place.path("a.exr")).unwrap().modified().unwrap() == before
+            };
+            assert!(kept(error) && !kept("20%"));
+        }
+    }
+}
+
 #[test]
 fn what_is_there_is_skipped_only_if_it_holds() {
     let place = Place::of(&scene("off"));

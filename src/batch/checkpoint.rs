@@ -113,11 +113,7 @@ impl<'a> Keeper<'a> {
             return Begun::new(job, share);
         }
         let written = part_file::open(&file)?;
-        written.header.check_of(&file, self.identity)?;
-        let found = written.header.share();
-        if found != share {
-            return Err(Error::input(&file, format!("expected a checkpoint of {share}, found one of {found}")));
-        }
+        written.header.check_begun(&file, self.identity, &share)?;
         let (mut film, mut splats) = written.empty(share.rows(job.window))?;
         written.add_to(&mut film, splats.as_mut())?;
         let header = &written.header;

@@ -46,13 +46,16 @@ pub struct Finish {
     pub frame: [u32; 2],
     /// The pixels of the picture.
     pub window: Window,
-    /// Samples of a pixel.
+    /// Samples of a pixel; the most of them, where there is a `target`.
     pub samples: u32,
+    /// What else ends the render, if anything does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<Target>,
     /// Where samples are shared out by noise, how many all pixels have before; `samples` is then their mean.
     pub adaptive: Option<u32>,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Hash of the description and of the files it names.
+    /// Hash of the description, without `target`, and of the files it names.
     pub scene_hash: String,
     /// What computes the light.
     pub integrator: String,
@@ -94,6 +97,18 @@ pub struct Finish {
     pub mattes: Vec<Matte>,
     /// What a photographer would say of the camera.
     pub lens: Lens,
+}
+
+/// What ends a render besides its samples.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// Relative error of the picture.
+    pub error: Option<f64>,
+    /// Wall time of rendering, seconds.
+    pub time: Option<f64>,
+    /// Samples of a pixel for which techniques are planned: of what is here alone they decide about pixels.
+    pub planned: u32,
 }
 
 /// Which pixels of a picture share their errors.
@@ -165,7 +180,9 @@ impl Finish {
     /// What the files of `prepared` need.
     #[must_use]
     pub fn of(prepared: &Prepared) -> Finish {
-        let Prepared { description, scene, plan, samples, hash, .. } = prepared;
+        let Prepared { description, scene, plan, samples, planned, stop, hash, .. } = prepared;
+        let time = stop.time.map(|time| time.as_secs_f64());
+        let target = stop.is_open().then_some(Target { error: stop.error, time, planned: *planned });
         let (white, note) = develop::white(&description.output.png, scene);
         let asked = |content: &LayerContent| description.layers.iter().any(|layer| layer.content == *content);
         // Where the files go is no matter of what is in them.
@@ -178,6 +195,7 @@ impl Finish {
             frame: scene.camera.resolution,
             window: window(description),
             samples: *samples,
+            target,
             adaptive: plan.adaptive,
             seed: description.render.seed,
             scene_hash: hash.clone(),

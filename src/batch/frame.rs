@@ -294,13 +294,16 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
     loop {
         let milestones = &begun.milestones;
         let at = milestones.last().map_or(first, |m| m.samples);
-        if at >= most || job.stop.reached(milestones) {
-            break;
-        }
-        let end = if job.stop.is_open() { job.stop.pass_end(milestones, most) } else { Some(pass_end(at, most)) };
-        let Some(end) = end else { break };
+        let end = match job.stop.is_open() {
+            _ if at >= most || job.stop.reached(milestones) => at,
+            true => job.stop.pass_end(milestones, most).unwrap_or(at),
+            false => pass_end(at, most),
+        };
         // What a checkpoint holds beyond is kept.
         let pass = at..end.max(part.reached());
+        if pass.is_empty() {
+            break;
+        }
         let latest = milestones.last().and_then(|m| m.error);
         let forecast = Forecast::of(milestones, &job.stop, most).filter(|_| whole);
         let total = samples_in_all(part, milestones);

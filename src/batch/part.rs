@@ -350,10 +350,12 @@ impl<'a> Part<'a> {
         self.splats.as_ref().map(|(paths, _)| paths_of_a_sample(self.job, paths))
     }
 
-    /// The sample up to which some tile is done.
+    /// The sample up to which some tile, or some path from the lights, is done.
     #[must_use]
     pub fn reached(&self) -> u32 {
-        self.tiles.iter().map(|tile| tile.done.load(Ordering::Relaxed)).max().unwrap_or(0)
+        let lights = lock(&self.lights);
+        let camera = self.tiles.iter().map(|tile| tile.done.load(Ordering::Relaxed));
+        camera.chain(lights.more.iter().map(|(_, sample)| sample + 1)).fold(lights.below, u32::max)
     }
 
     /// The job of which this is a part.

@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Version of the format; another one is refused.
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 
 /// Of the planes of mattes, before their rank.
 const MATTES: &str = "cameraMattes.";
@@ -388,6 +388,29 @@ impl Header {
     /// As [`Header::check_like`].
     pub fn check_of(&self, path: &Path, identity: &Identity) -> Result<()> {
         self.check(path, &identity.finish, &identity.plan_hash)
+    }
+
+    /// Why a render of `identity` as `share` cannot go on from `self`, read from `path`. Where both have targets these may differ: the
+    /// samples that are there are the first ones of either, unless they are more than the most that may be.
+    ///
+    /// # Errors
+    /// As [`Header::check_like`].
+    pub fn check_begun(&self, path: &Path, identity: &Identity, share: &Share) -> Result<()> {
+        let mut finish = identity.finish.clone();
+        let mut found = self.share();
+        if let (Some(target), Some(own)) = (&mut finish.target, self.finish.target)
+            && target.planned == own.planned
+        {
+            (*target, finish.samples) = (own, self.finish.samples);
+            let camera = self.claims.camera.iter().map(|(_, samples)| samples.end);
+            let reached = camera.chain(self.claims.lights.iter().map(|(_, samples)| samples.end)).max();
+            found.samples.end = share.samples.end.max(reached.unwrap_or(0));
+        }
+        self.check(path, &finish, &identity.plan_hash)?;
+        match found == *share {
+            true => Ok(()),
+            false => Err(Error::input(path, format!("expected a checkpoint of {share}, found one of {found}"))),
+        }
     }
 
     fn check(&self, path: &Path, finish: &Finish, plan_hash: &str) -> Result<()> {

@@ -459,11 +459,11 @@ pub(super) fn hash_text(description: &SceneDescription) -> String {
     content.frame = None;
     content.motion = None;
     content.render.frames_per_second = None;
-    // A stop at a number of samples is that number.
+    // A stop at a number of samples is that number; a target stands beside the hash.
     if !stop(description).is_open() {
         content.render.samples = content.render.most_samples();
-        content.render.stop = description::Stop::default();
     }
+    content.render.stop = description::Stop::default();
     format!("{content:?}")
 }
 
