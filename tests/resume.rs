@@ -187,7 +187,7 @@ fn a_picture_goes_on_in_the_memory_that_it_began_in() {
 /// What a mirror throws of a lamp that stands in a closed box is looked for, in vain, by an eighth of the rays of the picture: half an
 /// hour of so many samples.
 #[test]
-fn a_search_for_light_is_stopped() {
+fn a_search_for_light_is_told_and_stopped() {
     let place = Place::of(
         "camera: {origin: [0, 1.6, 6], target: [0, 0.9, 0], fov_deg: 40}\n\
          image: {width: 640, height: 480}\n\
@@ -198,8 +198,8 @@ fn a_search_for_light_is_stopped() {
          - cube: {center: [5, 5, 5], size: 1}\n\
          lights: [point: {position: [5, 5, 5], intensity: 1}, constant: {radiance: 0.3}]\n",
     );
-    let mut child = command(&place, "a.exr", &[]).spawn().unwrap();
-    std::thread::sleep(Duration::from_secs(2));
+    let mut child = place.command(&["render", "scene.yaml", "-o", "a.exr", "--progress", "plain"]).spawn().unwrap();
+    std::thread::sleep(Duration::from_secs(8));
     signal(&child, "TERM");
     let end = Instant::now() + Duration::from_secs(60);
     while child.try_wait().unwrap().is_none() {
@@ -212,6 +212,8 @@ fn a_search_for_light_is_stopped() {
     let done = Ran::of(child.wait_with_output().unwrap());
     assert_eq!(done.code, 75, "{}", done.err);
     assert!(done.err.contains("stopped while it was prepared; --resume goes on"), "{}", done.err);
+    let told = "Progress: 0.0%  scene: looking for light that mirrors or glass throw, at most about ";
+    assert!(done.err.contains(told), "{}", done.err);
     assert!(!place.path("a.exr").exists());
 }
 

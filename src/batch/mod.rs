@@ -44,7 +44,7 @@ pub use prepare::{Prepared, prepare, window};
 use report::{Report, SceneReport, Status};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use stop::Forecast;
 
 /// Scenes whose reports are put in one place at a time.
@@ -88,6 +88,8 @@ pub struct Turn {
 pub trait Watcher: Sync {
     /// A picture begins, whose name is [`names::label`].
     fn scene_begins(&self, turn: Turn, name: &str);
+    /// Before a picture, light that mirrors or glass may throw is looked for: `share` of what may be spent in vain is, after `elapsed`.
+    fn searches(&self, _share: f64, _elapsed: Duration) {}
     /// Samples were done.
     fn progress(&self, progress: Progress);
     /// Something went wrong that does not end the render: its report will say so, but somebody may mend it before.
@@ -179,7 +181,7 @@ fn about_files(directory: &Path, overrides: &Overrides) -> [PathBuf; 3] {
 pub fn render_scene(
     prepared: &Prepared,
     overrides: &Overrides,
-    loading: std::time::Duration,
+    loading: Duration,
     watcher: &dyn Watcher,
     stop: &AtomicBool,
 ) -> (SceneReport, Result<()>) {
@@ -306,7 +308,7 @@ pub fn render_batch(path: &Path, overrides: &Overrides, watcher: &dyn Watcher, s
                 break 'batch;
             }
             watcher.scene_begins(Turn { scene: [i, entries.len()], frame: [n, frames] }, &label);
-            let prepared = description.and_then(|d| prepare_one_of(entry, d, overrides, &mut shelf, stop));
+            let prepared = description.and_then(|d| prepare_one_of(entry, d, overrides, &mut shelf, stop, watcher));
             if i + 1 == entries.len() && n + 1 == frames {
                 // Nobody comes after the last one.
                 shelf = Shelf::default();

@@ -6,7 +6,7 @@ use super::frame::{Frame, FrameJob, Gauge};
 use super::part::lights::paths_of;
 use super::part::{Part, Share};
 use super::stop::{self, Stop};
-use super::{Overrides, layers, motion, names, splatting};
+use super::{Overrides, Watcher, layers, motion, names, splatting};
 use crate::description::{self, BatchEntry, LayerContent, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
@@ -111,7 +111,8 @@ impl Prepared {
 /// # Errors
 /// [`Error::Config`] and [`Error::Input`], as [`compile::compile`].
 pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
-    prepare_one_of(entry, entry.scene(&overrides.set)?, overrides, &mut Shelf::default(), &AtomicBool::new(false))
+    let never = AtomicBool::new(false);
+    prepare_one_of(entry, entry.scene(&overrides.set)?, overrides, &mut Shelf::default(), &never, &())
 }
 
 /// [`prepare_scene`] of one of the pictures of a batch. What is asked of all of them asks nothing of those by `whitted`.
@@ -121,9 +122,10 @@ pub(super) fn prepare_one_of(
     overrides: &Overrides,
     shelf: &mut Shelf,
     stop: &AtomicBool,
+    watcher: &dyn Watcher,
 ) -> Result<Prepared> {
     let spared = spare_whitted(&mut description, entry, overrides);
-    let mut prepared = prepare_scene(entry, description, overrides, shelf, stop, |_| {})?;
+    let mut prepared = prepare_scene(entry, description, overrides, shelf, stop, watcher, |_| {})?;
     if spared {
         let note = "whitted has no noise: the time or error that is given to all has no say";
         prepared.scene.notes.push(note.into());
@@ -156,13 +158,14 @@ pub(super) fn check_stop(description: &SceneDescription) -> Result<()> {
 }
 
 /// Compiles a scene that has been read, with what the scene before has read (see [`compile::compile_with`]), has `alter`
-/// change it, and plans it, unless there comes an `interrupt`.
+/// change it, and plans it, unless there comes an `interrupt`. `watcher` hears what takes long.
 pub(super) fn prepare_scene(
     entry: &BatchEntry,
     description: SceneDescription,
     overrides: &Overrides,
     shelf: &mut Shelf,
     interrupt: &AtomicBool,
+    watcher: &dyn Watcher,
     alter: impl FnOnce(&mut Scene),
 ) -> Result<Prepared> {
     let go_on = || match interrupt.load(Ordering::Relaxed) {
@@ -212,7 +215,14 @@ pub(super) fn prepare_scene(
     }
     go_on()?;
     let shot = Shot { scene: &scene, plan: &plan, filter: &filter, seed, photons: None };
-    let (caustics, said) = pilot::decide(&shot, &moments, planned, wishes, interrupt);
+    let began = Instant::now();
+    let goes_on = |share: Option<f64>| {
+        if let Some(share) = share {
+            watcher.searches(share, began.elapsed());
+        }
+        !interrupt.load(Ordering::Relaxed)
+    };
+    let (caustics, said) = pilot::decide(&shot, &moments, planned, wishes, &goes_on);
     go_on()?;
     plan.caustics = caustics;
     plan.techniques.extend(said);

@@ -9,7 +9,7 @@ use crate::batch::{Turn, Watcher};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
 use serde_json::json;
 use std::io::IsTerminal;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Least time between two lines for one scene.
@@ -61,6 +61,16 @@ impl Teller {
         }
     }
 
+    /// The state, where it is time for a line: that counts as told.
+    fn state_if_due(&self) -> Option<MutexGuard<'_, State>> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let due = state.last_line.elapsed() >= LINE_EVERY;
+        if due {
+            state.last_line = Instant::now();
+        }
+        due.then_some(state)
+    }
+
     /// Takes the bars away.
     pub fn finish(&self) {
         if let Style::Bars { all, batch, scene } = &self.style {
@@ -105,7 +115,7 @@ fn words(p: &Progress) -> String {
 impl Watcher for Teller {
     fn scene_begins(&self, turn: Turn, name: &str) {
         let Turn { scene: [index, count], frame: [frame, frames] } = turn;
-        let mut state = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         name.clone_into(&mut state.scene);
         state.turn = turn;
         state.last_line = Instant::now();
@@ -114,6 +124,8 @@ impl Watcher for Teller {
                 batch.set_length(count as u64);
                 batch.set_position(index as u64);
                 scene.set_prefix(name.to_owned());
+                // Nothing of nothing would be all.
+                scene.set_length(1);
                 scene.set_position(0);
                 scene.set_message("loading");
             }
@@ -136,6 +148,25 @@ impl Watcher for Teller {
         }
     }
 
+    fn searches(&self, share: f64, elapsed: Duration) {
+        // Its rays take the same time each.
+        let left = elapsed.as_secs_f64() * (1.0 - share) / share.max(f64::MIN_POSITIVE);
+        let said = format!("looking for light that mirrors or glass throw, at most about {} more", seconds(left));
+        match &self.style {
+            Style::Bars { scene, .. } => scene.set_message(said),
+            Style::Plain | Style::Json | Style::OpenJd => {
+                let Some(state) = self.state_if_due() else { return };
+                let name = &state.scene;
+                match self.style {
+                    Style::OpenJd => say(&format!("openjd_status: {name}: {said}\n")),
+                    Style::Plain => complain(&format!("Progress: 0.0%  {name}: {said}")),
+                    _ => line(&json!({"event": "search", "scene": name, "done": share, "seconds_left": left})),
+                }
+            }
+            Style::Quiet => {}
+        }
+    }
+
     fn progress(&self, p: Progress) {
         match &self.style {
             Style::Bars { scene, .. } => {
@@ -144,11 +175,7 @@ impl Watcher for Teller {
                 scene.set_message(words(&p));
             }
             Style::Plain | Style::Json | Style::OpenJd => {
-                let mut state = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                if state.last_line.elapsed() < LINE_EVERY {
-                    return;
-                }
-                state.last_line = Instant::now();
+                let Some(state) = self.state_if_due() else { return };
                 let share = p.done as f64 / p.total as f64;
                 if matches!(self.style, Style::OpenJd) {
                     say(&openjd(state.turn, share));
@@ -166,7 +193,7 @@ impl Watcher for Teller {
     }
 
     fn warns(&self, message: &str) {
-        let scene = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner).scene.clone();
+        let scene = self.state.lock().unwrap_or_else(PoisonError::into_inner).scene.clone();
         let note = format!("note: {scene}: {message}");
         match &self.style {
             // Where the bars are not drawn it says nothing.
@@ -191,7 +218,7 @@ impl Watcher for Teller {
             },
             Style::Json => line(&json!({"event": "done", "report": report})),
             Style::OpenJd => {
-                let turn = self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner).turn;
+                let turn = self.state.lock().unwrap_or_else(PoisonError::into_inner).turn;
                 match &report.status {
                     Status::Done | Status::Skipped => say(&openjd(turn, 1.0)),
                     // One line, whatever the message is.

@@ -26,7 +26,6 @@ use glam::DVec2;
 use rounds::Round;
 use seen::Seen;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use words::{say, technique};
 
 /// Whether a technique is used.
@@ -112,15 +111,16 @@ fn correspond(a: &Scene, b: &Scene) -> bool {
 }
 
 /// Decides for a picture of `samples` a pixel, and returns what to trace and what to say of it. `moments` are the scene
-/// while the shutter is open, of which each path sees one; none where nothing is blurred. It looks for light until `stop` says so
-/// at the latest, and what it then says means nothing.
+/// while the shutter is open, of which each path sees one; none where nothing is blurred. `goes_on` hears how much of its patience a
+/// search for light that has found none has used up, if there is one, and ends it where it is false; what is then returned means
+/// nothing.
 #[must_use]
 pub fn decide(
     shot: &Shot,
     moments: &[Scene],
     samples: u32,
     wishes: Wishes,
-    stop: &AtomicBool,
+    goes_on: &(dyn Fn(Option<f64>) -> bool + Sync),
 ) -> (Option<Arc<Caustics>>, Vec<Effect>) {
     let Shot { scene, plan, filter, seed, .. } = *shot;
     let Integrator::Path(settings) = &plan.integrator else { return (None, Vec::new()) };
@@ -192,8 +192,21 @@ pub fn decide(
         return lost(&format!("light from infinity cannot be aimed at what has no end, {name}"));
     }
     let (casters, in_part) = (&casters, &in_part);
-    let trial =
-        Trial { scene, moments, plan, settings, filter, seed, samples, wishes, casters, in_part, chances, rare, stop };
+    let trial = Trial {
+        scene,
+        moments,
+        plan,
+        settings,
+        filter,
+        seed,
+        samples,
+        wishes,
+        casters,
+        in_part,
+        chances,
+        rare,
+        goes_on,
+    };
     run(&trial, caustics)
 }
 
@@ -216,8 +229,8 @@ struct Trial<'a> {
     /// For each light, whether it has an extent, but one so small that all paths from the camera are not expected to meet it by what
     /// throws it in single directions often enough for the stated error to know of it.
     rare: Vec<bool>,
-    /// Whether nobody waits for it any more.
-    stop: &'a AtomicBool,
+    /// Whether to go on, with a search that has used up this share of its patience, if it is one.
+    goes_on: &'a (dyn Fn(Option<f64>) -> bool + Sync),
 }
 
 /// Paths from the camera for the whole picture.
@@ -315,12 +328,14 @@ fn search(
         unfound |= found.unfound;
         unfound_gathered |= found.unfound_gathered;
         caustics.learn(&mut learnt);
-        let stopped = trial.stop.load(Ordering::Relaxed);
+        // The first rounds are no search: they tell what to decide by.
+        let searches = number + 1 >= ROUNDS && possible && !unfound && !found.came() && rays < patience;
+        let stopped = !(trial.goes_on)(searches.then(|| rays / patience));
         if number + 1 < ROUNDS && !stopped {
             // What the lights send there is part of the picture that errors are relative to.
             let means: Vec<f64> = camera.means.iter().zip(&found.thrown).map(|(a, b)| a + b).collect();
             weights = relative(&means);
-        } else if !possible || unfound || found.came() || rays >= patience || stopped {
+        } else if !searches || stopped {
             return Search { found, followed, weights, unfound, unfound_gathered };
         }
         number += 1;

@@ -98,7 +98,7 @@ impl<'a> Desk<'a> {
         overrides.set.extend(set.iter().cloned());
         let description = self.entry.scene(&overrides.set)?;
         let shelf = &mut self.shelves[carried as usize].borrow_mut();
-        prepare_scene(self.entry, description, &overrides, shelf, self.stop, alter).map_err(|error| match error {
+        prepare_scene(self.entry, description, &overrides, shelf, self.stop, &(), alter).map_err(|error| match error {
             Error::Stopped(_) => stopped(),
             error => error,
         })
