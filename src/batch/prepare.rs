@@ -27,6 +27,7 @@ use crate::transport::trial::{self, first};
 use crate::transport::{Shot, Spread};
 use glam::DVec2;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -272,14 +273,14 @@ pub(super) fn prepare_scene(
     let moving =
         description.layers.iter().any(|layer| layer.content == LayerContent::Middle(description::Data::Motion));
     let files = scene.files.iter().chain(moments.iter().flat_map(|moment| &moment.files));
-    let mut hash = hash(&description, &blur.texts, files);
+    let mut hash = hash(&description, &blur.texts, files)?;
     let next = match description.frame.filter(|_| moving) {
         None => None,
         Some(frame) => {
             let later = entry.animation(&overrides.set)?.into_scene(Some(frame.saturating_add(1)))?;
             let scene = compile::compile_with(&later, &entry.name, shelf)?;
             // It is part of the picture.
-            let both = hash + &self::hash(&later, &[], &scene.files);
+            let both = hash + &self::hash(&later, &[], &scene.files)?;
             hash = blake3::hash(both.as_bytes()).to_hex()[..32].to_owned();
             Some(Box::new(scene))
         }
@@ -410,14 +411,19 @@ pub(super) fn integrator(description: &SceneDescription, written: &description::
 
 /// 128 bits of BLAKE3 over what was written, with every default, where each of the `files` that were read stands by what it
 /// holds: two machines, and two working directories, call one file by two names.
+///
+/// # Errors
+/// [`Error::Input`] for one that can be read no more: without it the picture would be of another scene.
 fn hash<'a>(
     description: &SceneDescription,
     moments: &[String],
     files: impl IntoIterator<Item = &'a PathBuf>,
-) -> String {
+) -> Result<String> {
     let mut held: HashMap<String, String> = HashMap::new();
     for file in files {
-        held.entry(format!("{file:?}")).or_insert_with(|| contents(file).unwrap_or_default());
+        if let Entry::Vacant(place) = held.entry(format!("{file:?}")) {
+            place.insert(contents(file).map_err(|e| Error::input(file, format!("cannot be read again: {e}")))?);
+        }
     }
     let mut hasher = blake3::Hasher::new();
     for text in [hash_text(description)].iter().chain(moments) {
@@ -435,14 +441,14 @@ fn hash<'a>(
         }
         hasher.update(rest.as_bytes());
     }
-    hasher.finalize().to_hex()[..32].to_owned()
+    Ok(hasher.finalize().to_hex()[..32].to_owned())
 }
 
 /// The hash of what a file holds, with the ending of its name, from which some readers know what it is.
-fn contents(file: &Path) -> Option<String> {
+fn contents(file: &Path) -> std::io::Result<String> {
     let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(std::fs::File::open(file).ok()?).ok()?;
-    Some(format!("{} {:?}", hasher.finalize().to_hex(), file.extension()))
+    hasher.update_reader(std::fs::File::open(file)?)?;
+    Ok(format!("{} {:?}", hasher.finalize().to_hex(), file.extension()))
 }
 
 /// Bytes of the text in quotes, as `{:?}` writes it, with which `text` begins.
@@ -548,5 +554,22 @@ mod tests {
             assert_eq!(told(integrator, asked), ["adaptive sampling", several]);
             assert_eq!(told(integrator, "shadow_rays: 1"), [""; 0]);
         }
+    }
+
+    /// A scene of the same numbers without its mesh would have had the hash: its parts, and what is there already, would no longer be
+    /// known for its own.
+    #[test]
+    fn a_file_that_cannot_be_read_again_fails_the_picture() {
+        let dir = tempfile::tempdir().unwrap();
+        let [yaml, mesh] = ["s.yaml", "m.obj"].map(|name| dir.path().join(name));
+        let camera = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}";
+        std::fs::write(&yaml, format!("{camera}\nshapes: [mesh: {{file: m.obj}}]\n")).unwrap();
+        std::fs::write(&mesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        let none = Overrides::default();
+        let entry = &crate::batch::entries(&yaml, &none).unwrap()[0];
+        let (description, never) = (entry.scene(&[]).unwrap(), AtomicBool::new(false));
+        let gone = |_: &mut Scene| std::fs::remove_file(&mesh).unwrap();
+        let found = prepare_scene(entry, description, &none, &mut Shelf::default(), &never, &(), gone).unwrap_err();
+        assert!(found.exit_code() == 3 && found.to_string().contains("m.obj: cannot be read again"), "{found}");
     }
 }
