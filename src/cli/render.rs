@@ -57,7 +57,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
         super::say(&table(&report));
     }
     if arguments.quiet || style == ProgressStyle::Json {
-        for (scene, note) in report.scenes.iter().flat_map(|s| s.notes.iter().map(move |note| (s, note))) {
+        for (scene, note) in notes(&report.scenes.iter().collect::<Vec<_>>()) {
             super::complain(&format!("note: {}: {note}", scene.label()));
         }
     }
@@ -165,6 +165,25 @@ fn with_share(part: u64, all: u64) -> String {
     }
 }
 
+/// Pictures, each with the frame of its scene that comes before it, if one does.
+fn with_frame_before<'a>(
+    scenes: &[&'a SceneReport],
+) -> impl Iterator<Item = (&'a SceneReport, Option<&'a SceneReport>)> {
+    scenes
+        .iter()
+        .enumerate()
+        .map(|(i, s)| (*s, i.checked_sub(1).map(|i| scenes[i]).filter(|before| before.name == s.name)))
+}
+
+/// The notes of pictures. What is to be known of every frame of a scene is told once.
+fn notes<'a>(scenes: &[&'a SceneReport]) -> Vec<(&'a SceneReport, &'a String)> {
+    let of = |(s, before): (&'a SceneReport, Option<&'a SceneReport>)| {
+        let known = move |note: &&String| before.is_some_and(|before| before.notes.contains(note));
+        s.notes.iter().filter(move |note| !known(note)).map(move |note| (s, note))
+    };
+    with_frame_before(scenes).flat_map(of).collect()
+}
+
 /// The columns of the table, in order.
 const HEADINGS: [&str; 7] = ["scene", "samples", "time", "Msamples/s", "error (95 %)", "half the error", "invalid"];
 
@@ -200,10 +219,8 @@ pub fn table(report: &Report) -> String {
     let mut rows = vec![HEADINGS.map(String::from)];
     rows.extend(done.iter().map(|s| row(s)));
     out += &columns(&rows, 1);
-    for s in &done {
-        for note in &s.notes {
-            let _ = writeln!(out, "note: {}: {note}", s.label());
-        }
+    for (s, note) in notes(&done) {
+        let _ = writeln!(out, "note: {}: {note}", s.label());
     }
     for s in &done {
         if let Some(png) = s.png.filter(|png| png.metered || png.white.is_some()) {
@@ -246,8 +263,11 @@ pub fn table(report: &Report) -> String {
         );
     }
     let _ = writeln!(out, "\neffects in force:");
-    for s in &done {
-        let _ = writeln!(out, "  {}: {}", s.label(), s.effects_in_force().join(", "));
+    for (s, before) in with_frame_before(&done) {
+        let effects = s.effects_in_force();
+        if before.is_none_or(|before| before.effects_in_force() != effects) {
+            let _ = writeln!(out, "  {}: {}", s.label(), effects.join(", "));
+        }
     }
     let mut dirs: Vec<String> =
         done.iter().flat_map(|s| &s.files).filter_map(|f| f.parent()).map(|d| d.display().to_string()).collect();
@@ -283,6 +303,25 @@ mod tests {
         }
         report.files.extend(written.then(|| "a.exr".into()));
         report
+    }
+
+    /// A note that a frame has and the one before it has not is told again, and so is that of another scene.
+    #[test]
+    fn what_is_known_of_every_frame_is_told_once() {
+        let frame = |name: &str, number: i32, notes: &[&str]| {
+            let notes = notes.iter().map(|note| (*note).to_owned()).collect();
+            SceneReport { notes, ..SceneReport::new(name, Some(number)) }
+        };
+        let frames = [
+            frame("a", 1, &["dark"]),
+            frame("a", 2, &["dark", "cold"]),
+            frame("a", 3, &["cold"]),
+            frame("a", 4, &["dark"]),
+            frame("b", 4, &["dark"]),
+        ];
+        let told: Vec<String> =
+            notes(&frames.iter().collect::<Vec<_>>()).iter().map(|(s, note)| format!("{} {note}", s.label())).collect();
+        assert_eq!(told, ["a.0001 dark", "a.0002 cold", "a.0004 dark", "b.0004 dark"]);
     }
 
     #[test]
