@@ -119,7 +119,7 @@ impl Builder {
         options.block_nesting_limit = MAX_DEPTH;
         let mut documents = 0;
         for event in Parser::new_from_str_with_options(text, options) {
-            let (event, span) = event.map_err(|error| self.syntax(&error))?;
+            let (event, span) = event.map_err(|error| self.syntax(&error, text))?;
             let at = self.place_of(&span);
             match event {
                 Event::DocumentStart(..) => {
@@ -178,7 +178,7 @@ impl Builder {
         Fault::at_place(at, message).under_path(&self.path())
     }
 
-    fn syntax(&self, error: &ScanError) -> Fault {
+    fn syntax(&self, error: &ScanError, text: &str) -> Fault {
         let mark = error.marker();
         let at = place(self.source, mark.line(), mark.col() + 1);
         match error.kind() {
@@ -191,7 +191,15 @@ impl Builder {
             ErrorKind::UnknownAnchor => {
                 self.fault(at, "expected an alias of an anchor above, found one without anchor")
             }
-            _ => self.fault(at, format!("expected YAML, found a fault of syntax: {}", error.info())),
+            _ => {
+                let line = text.lines().nth(mark.line().saturating_sub(1)).unwrap_or_default();
+                let mut here = line.chars().skip(mark.col().saturating_sub(1));
+                // Within braces an opening bracket ends plain text, as in `{dir: o/{scene}}`.
+                let is_text = |c: char| !c.is_whitespace() && !"[{,:".contains(c);
+                let in_text = here.next().is_some_and(is_text) && matches!(here.next(), Some('{' | '['));
+                let hint = if in_text { "; text with brackets in it is written in quotes" } else { "" };
+                self.fault(at, format!("expected YAML, found a fault of syntax: {}{hint}", error.info()))
+            }
         }
     }
 
@@ -576,10 +584,15 @@ mod tests {
 
     #[test]
     fn text_that_is_not_yaml_is_refused_with_its_place() {
-        let cases: [(&str, &str); 9] = [
+        let cases: [(&str, &str); 10] = [
             ("a:\n\tb: 1\n", "f.yaml:2:2: a: expected spaces for indentation, found a tab"),
             ("a: [1,", "f.yaml:1:4: a[1]: expected YAML, found a fault of syntax: unclosed bracket '['"),
             ("a: 'b", "f.yaml:1:4: a: expected YAML, found a fault of syntax: unclosed quote"),
+            (
+                "a: 1\nb: {dir: o/{scene}}",
+                "f.yaml:2:12: b: expected YAML, found a fault of syntax: while parsing a flow mapping, did not find expected \
+                 ',' or '}'; text with brackets in it is written in quotes",
+            ),
             (
                 "a: b: c",
                 "f.yaml:1:5: expected YAML, found a fault of syntax: mapping values are not allowed in this context",
