@@ -535,7 +535,7 @@ pub use material::{
 };
 pub use medium::{Coefficients, HeterogeneousMedium, HomogeneousMedium, Medium, Phase, PhaseBlend};
 pub(crate) use medium::{UNCHANGED, VACUUM};
-pub use mitsuba::export::{Exported, Loss, MeshNormals, Meshes, PictureAnew, export};
+pub use mitsuba::export::{Exported, Loss, MeshNormals, Meshes, PictureAnew, PictureRead, export};
 pub(crate) use node::did_you_mean;
 pub use optical_data::{OpticalData, optical_data};
 pub use output::{

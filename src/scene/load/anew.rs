@@ -4,12 +4,14 @@
 //! all but 8, 24 and 32 bits without packing behind a header of 40 bytes; TGA files without the footer of version 2, with palettes
 //! or with 16 bits. It takes other colours from palettes in BMP, which it has for grey, and from `P6` of 16 bits.
 
-use super::decoded::{COLOURS, decode, extension, with_picture_first};
-use crate::description::PictureAnew;
+use super::decoded::{COLOURS, decode, decoder, extension, with_picture_first};
+use super::pfm;
+use crate::description::{PictureAnew, PictureRead};
 use crate::film::exr::{self, ChannelData, ColourEncoding, Compression, ExrImage, ExrPart, Layout};
 use crate::scene::bands::{Bands, Quantity};
 use crate::spectrum::observer::tristimulus;
 use crate::spectrum::{ColourSpace, illuminant};
+use image::ImageDecoder;
 use std::collections::BTreeSet;
 use std::io::Cursor;
 use std::path::Path;
@@ -17,20 +19,27 @@ use std::path::Path;
 /// The channels of a picture that Mitsuba takes for one, besides A.
 const TAKEN: [&[&str]; 3] = [&["R", "G", "B"], &["Y"], &["X", "Y", "Z"]];
 
-/// The picture of a file that Mitsuba refuses or takes for another picture, as it reads it; `None` of files that it reads as they are
-/// read here, and of those that cannot be read.
+/// What Mitsuba makes of a picture file. One that cannot be read is left to it as it is.
 #[must_use]
-pub fn for_mitsuba(path: &Path) -> Option<PictureAnew> {
-    if extension(path) == "exr" {
-        return exr_anew(path);
-    }
+pub fn for_mitsuba(path: &Path) -> PictureRead {
+    let read = if extension(path) == "exr" { of_exr(path) } else { of_others(path) };
+    read.unwrap_or(PictureRead { coloured: true, anew: None })
+}
+
+/// Of all kinds but EXR.
+fn of_others(path: &Path) -> Option<PictureRead> {
     let bytes = crate::input::read(path).ok()?;
-    if is_plain(&bytes) {
-        return None;
+    if pfm::is(&bytes) {
+        return Some(PictureRead { coloured: pfm::is_coloured(&bytes), anew: None });
+    }
+    let is_plain = is_plain(&bytes);
+    let coloured = decoder(path, bytes).ok()?.color_type().has_color();
+    if is_plain {
+        return Some(PictureRead { coloured, anew: None });
     }
     let mut png = Vec::new();
     decode(path).ok()?.write_to(&mut Cursor::new(&mut png), image::ImageFormat::Png).ok()?;
-    Some(PictureAnew { extension: "png", bytes: png, loses_spectra: false })
+    Some(PictureRead { coloured, anew: Some(PictureAnew { extension: "png", bytes: png, loses_spectra: false }) })
 }
 
 /// Whether Mitsuba reads a picture of a kind that is told by its first bytes, or its last.
@@ -49,7 +58,7 @@ fn is_plain(bytes: &[u8]) -> bool {
         [b'B', b'M', ..] => {
             number(14, 4) == Some(40) && matches!(number(28, 2), Some(24 | 32)) && number(30, 4) == Some(0)
         }
-        _ if image::guess_format(bytes).is_ok() || super::pfm::is(bytes) || bytes.starts_with(b"#?") => true,
+        _ if image::guess_format(bytes).is_ok() || pfm::is(bytes) || bytes.starts_with(b"#?") => true,
         // TGA has nothing to tell it by at its beginning.
         _ => {
             let footer = bytes.len().checked_sub(18).is_some_and(|at| bytes[at..].starts_with(b"TRUEVISION-XFILE."));
@@ -63,11 +72,11 @@ fn header_word(bytes: &[u8], index: usize) -> Option<&[u8]> {
     bytes.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).nth(index)
 }
 
-/// The same of EXR.
-fn exr_anew(path: &Path) -> Option<PictureAnew> {
+/// Of EXR.
+fn of_exr(path: &Path) -> Option<PictureRead> {
     let file = exr::read_exr(path).ok()?;
-    if is_plain_exr(&file) {
-        return None;
+    if let Some(taken) = taken_of(&file) {
+        return Some(PictureRead { coloured: taken.len() > 1, anew: None });
     }
     let file = with_picture_first(file);
     let part = &file.parts[0];
@@ -75,6 +84,7 @@ fn exr_anew(path: &Path) -> Option<PictureAnew> {
         Some(bands) => (colours_of(&bands), ColourSpace::Rec709.chromaticities(), true),
         None => (channels_of(part)?, file.primaries(), false),
     };
+    let coloured = channels.len() > 1;
     let image = ExrImage {
         frame: [part.window.width, part.window.height],
         window: crate::film::Window::full(part.window.width, part.window.height),
@@ -86,11 +96,12 @@ fn exr_anew(path: &Path) -> Option<PictureAnew> {
         layout: Layout::Single,
     };
     let bytes = exr::encode_exr(&image).ok()?;
-    Some(PictureAnew { extension: "exr", bytes, loses_spectra })
+    Some(PictureRead { coloured, anew: Some(PictureAnew { extension: "exr", bytes, loses_spectra }) })
 }
 
-/// Whether Mitsuba takes the first part of a file for the picture that is taken here. It looks at what stands behind the last dot.
-fn is_plain_exr(file: &exr::ExrFile) -> bool {
+/// Which channels Mitsuba takes of a file whose first part it takes for the picture that is taken here; it looks at what stands
+/// behind the last dot.
+fn taken_of(file: &exr::ExrFile) -> Option<&'static [&'static str]> {
     let names = file.parts[0].channels.iter().map(|(name, _)| name.rsplit_once('.').unwrap_or(("", name)));
     let layers: BTreeSet<&str> = names.clone().map(|(layer, _)| layer).collect();
     let mut letters: Vec<String> = names.map(|(_, letter)| letter.to_ascii_uppercase()).collect();
@@ -102,7 +113,7 @@ fn is_plain_exr(file: &exr::ExrFile) -> bool {
         letters == channels
     };
     let is_first = file.parts.len() == 1 || file.parts[0].channel("R").is_some();
-    is_first && layers.len() == 1 && TAKEN.iter().any(taken)
+    TAKEN.into_iter().find(taken).filter(|_| is_first && layers.len() == 1)
 }
 
 /// The channels of the picture alone, as they stand in the file.
@@ -140,10 +151,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
-        let anew = for_mitsuba(&path)?;
+        let read = for_mitsuba(&path);
+        let anew = read.anew?;
         let other = folder.path().join(format!("anew.{}", anew.extension));
         std::fs::write(&other, &anew.bytes).unwrap();
-        assert!(for_mitsuba(&other).is_none(), "{name}");
+        assert_eq!(for_mitsuba(&other), PictureRead { coloured: read.coloured, anew: None }, "{name}");
         Some([&path, &other].map(|path| picture(path, open(path).unwrap()).unwrap().pixels))
     }
 
@@ -181,6 +193,29 @@ mod tests {
         }
     }
 
+    /// Mitsuba 3.9.1 takes no normals from the grey ones: they have one number where it wants three.
+    #[test]
+    fn grey_pictures_of_all_kinds_are_told_from_coloured_ones() {
+        let folder = tempfile::tempdir().unwrap();
+        let pfm = |head: &str, values: usize| [head.as_bytes(), &vec![0; 4 * values]].concat();
+        for (name, bytes, coloured) in [
+            ("y.exr", exr(&["Y"]), false),
+            ("ya.exr", exr(&["Y", "A"]), false),
+            ("layers.exr", exr(&["Y", "id.X"]), false),
+            ("rgb.exr", exr(&["R", "G", "B"]), true),
+            ("xyz.exr", exr(&["X", "Y", "Z", "W"]), true),
+            ("grey.pfm", pfm("Pf\n2 1\n-1\n", 2), false),
+            ("colours.pfm", pfm("PF\n2 1\n-1\n", 6), true),
+            ("grey.pgm", b"P5\n2 1\n255\n\x10\xa0".to_vec(), false),
+            ("colours.ppm", b"P6\n2 1\n255\n\x01\x02\x03\x04\x05\x06".to_vec(), true),
+            ("none.png", b"no picture".to_vec(), true),
+        ] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            assert_eq!(for_mitsuba(&path).coloured, coloured, "{name}");
+        }
+    }
+
     /// A reflectance of one half everywhere is grey of one half.
     #[test]
     fn spectra_become_colours() {
@@ -198,7 +233,7 @@ mod tests {
             layout: Layout::Single,
         };
         exr::write_exr(&path, &image).unwrap();
-        let anew = for_mitsuba(&path).unwrap();
+        let anew = for_mitsuba(&path).anew.unwrap();
         assert!(anew.loses_spectra);
         std::fs::write(&path, &anew.bytes).unwrap();
         let pixels = picture(&path, open(&path).unwrap()).unwrap().pixels;

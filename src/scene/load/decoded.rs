@@ -3,6 +3,7 @@
 use super::{jpeg, pfm};
 use crate::error::{Error, Result};
 use crate::film::exr;
+use image::ImageDecoder;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Display;
@@ -16,11 +17,7 @@ pub(super) const LARGEST: u64 = 1 << 31;
 const KINDS: &str = "a PNG, JPEG, BMP, TGA, PNM, PFM, HDR or EXR picture";
 
 pub(super) fn decode(path: &Path) -> Result<image::DynamicImage> {
-    let mut bytes = crate::input::read(path).map_err(|e| Error::input(path, words(&e)))?;
-    // Radiance pictures have either signature; the decoder knows one.
-    if bytes.starts_with(b"#?RGBE") {
-        bytes.splice(..6, *b"#?RADIANCE");
-    }
+    let bytes = crate::input::read(path).map_err(|e| Error::input(path, words(&e)))?;
     // The decoder makes grey of what is missing.
     if image::guess_format(&bytes).is_ok_and(|format| format == image::ImageFormat::Jpeg) && !jpeg::is_whole(&bytes) {
         return Err(Error::input(path, "expected a JPEG picture to its end, found one cut off: it is damaged"));
@@ -28,6 +25,26 @@ pub(super) fn decode(path: &Path) -> Result<image::DynamicImage> {
     let fault = |e: &dyn Display| Error::input(path, format!("expected {KINDS}: {e}"));
     if pfm::is(&bytes) {
         return pfm::decode(&bytes).map_err(|e| fault(&e));
+    }
+    let decoder = decoder(path, bytes)?;
+    let (width, height) = decoder.dimensions();
+    if width == 0 || height == 0 {
+        return Err(Error::input(path, format!("expected a picture of one pixel or more, found {width} x {height}")));
+    }
+    if decoder.total_bytes() > LARGEST {
+        return Err(Error::input(
+            path,
+            format!("expected a picture of at most 2 GiB, found {width} x {height} pixels"),
+        ));
+    }
+    image::DynamicImage::from_decoder(decoder).map_err(|e| fault(&e))
+}
+
+/// What decodes the `bytes` of the picture `path`, of a kind that the decoders know; they have seen no pixel yet.
+pub(super) fn decoder(path: &Path, mut bytes: Vec<u8>) -> Result<impl ImageDecoder> {
+    // Radiance pictures have either signature; the decoder knows one.
+    if bytes.starts_with(b"#?RGBE") {
+        bytes.splice(..6, *b"#?RADIANCE");
     }
     let mut reader = image::ImageReader::new(Cursor::new(bytes));
     if let Ok(format) = image::ImageFormat::from_path(path) {
@@ -37,18 +54,7 @@ pub(super) fn decode(path: &Path) -> Result<image::DynamicImage> {
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(LARGEST);
     reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(|e| fault(&e))?;
-    let (width, height) = image::ImageDecoder::dimensions(&decoder);
-    if width == 0 || height == 0 {
-        return Err(Error::input(path, format!("expected a picture of one pixel or more, found {width} x {height}")));
-    }
-    if image::ImageDecoder::total_bytes(&decoder) > LARGEST {
-        return Err(Error::input(
-            path,
-            format!("expected a picture of at most 2 GiB, found {width} x {height} pixels"),
-        ));
-    }
-    image::DynamicImage::from_decoder(decoder).map_err(|e| fault(&e))
+    reader.into_decoder().map_err(|e| Error::input(path, format!("expected {KINDS}: {e}")))
 }
 
 /// A file of pixels, as it was decoded.

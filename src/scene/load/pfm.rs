@@ -14,12 +14,17 @@ pub(super) fn is(bytes: &[u8]) -> bool {
     matches!(bytes, [b'P', b'F' | b'f', end, ..] if end.is_ascii_whitespace())
 }
 
+/// Whether it has colours, or grey alone.
+pub(super) fn is_coloured(bytes: &[u8]) -> bool {
+    bytes[1] == b'F'
+}
+
 /// Its pixels, which are linear.
 ///
 /// # Errors
 /// What was expected and what was found.
 pub(super) fn decode(bytes: &[u8]) -> Result<DynamicImage, String> {
-    let channels = if bytes[1] == b'F' { 3 } else { 1 };
+    let channels = if is_coloured(bytes) { 3 } else { 1 };
     let mut rest = &bytes[2..];
     let mut word = |what: &str| {
         let start = rest.iter().position(|b| !b.is_ascii_whitespace());

@@ -34,7 +34,7 @@ impl Export<'_> {
         let is_sum = skies.len() > 1;
         let why = self.emitter_shortfall(light);
         // What has a new file is read back from its own.
-        let is_anew = matches!(light, Light::Environment(l) if (self.pictures)(&l.file).is_some());
+        let is_anew = matches!(light, Light::Environment(l) if (self.pictures)(&l.file).anew.is_some());
         let reads_otherwise = is_sum || is_anew;
         match &why {
             Some(why) => self.instead("emitter", &format!("lights[{i}]"), why.as_str()),

@@ -63,7 +63,16 @@ pub struct Exported {
     pub files: Vec<(String, Vec<u8>)>,
 }
 
-/// A picture as Mitsuba reads it.
+/// What Mitsuba makes of a picture file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PictureRead {
+    /// Whether it finds more than grey. In what cannot be read it does.
+    pub coloured: bool,
+    /// What it has to read in place of a file that it refuses or takes for another picture.
+    pub anew: Option<PictureAnew>,
+}
+
+/// A picture that is written for Mitsuba.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PictureAnew {
     /// By which the kind of its file is known.
@@ -97,13 +106,13 @@ pub struct Meshes<'a> {
     pub mean_of_three: &'a dyn Fn(&Path, u32, &str) -> Option<f64>,
 }
 
-/// Writes `scene` for the file `path`. `pictures` gives a picture anew where Mitsuba does not read the same from its file, `closed`
-/// tells whether the grid of a file bounds a solid.
+/// Writes `scene` for the file `path`. `pictures` tells what Mitsuba makes of a picture, `closed` whether the grid of a file bounds a
+/// solid.
 pub fn export(
     scene: &SceneDescription,
     path: &Path,
     meshes: &Meshes<'_>,
-    pictures: &dyn Fn(&Path) -> Option<PictureAnew>,
+    pictures: &dyn Fn(&Path) -> PictureRead,
     closed: &dyn Fn(&Path) -> bool,
 ) -> Exported {
     let nothing = Node::new(Default::default(), Value::Null);
@@ -131,7 +140,7 @@ pub fn export(
         once(&known, (file.to_owned(), index, name.to_owned()), || (meshes.mean_of_three)(file, index, name))
     };
     let known = RefCell::default();
-    let pictures = &|file: &Path| once(&known, file.to_owned(), || pictures(file).map(Rc::new));
+    let pictures = &|file: &Path| once(&known, file.to_owned(), || Rc::new(pictures(file)));
     let known = RefCell::default();
     let closed = &|file: &Path| once(&known, file.to_owned(), || closed(file));
     let known = RefCell::default();
@@ -178,7 +187,7 @@ struct Export<'a> {
     sources: &'a Sources,
     normals: &'a dyn Fn(&Path, u32) -> MeshNormals,
     anew: &'a dyn Fn(&Path, u32) -> Option<Contents>,
-    pictures: &'a dyn Fn(&Path) -> Option<Rc<PictureAnew>>,
+    pictures: &'a dyn Fn(&Path) -> Rc<PictureRead>,
     closed: &'a dyn Fn(&Path) -> bool,
     bare: &'a dyn Fn(&Path, u32) -> bool,
     mean_of_three: &'a dyn Fn(&Path, u32, &str) -> Option<f64>,

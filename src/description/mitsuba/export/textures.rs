@@ -1,9 +1,6 @@
 //! Textures.
 
-use std::io::BufReader;
 use std::path::Path;
-
-use image::{ImageDecoder, ImageReader};
 
 use super::super::super::compound::{NumberOrTexture, Roughness};
 use super::super::super::shape::Geometry;
@@ -37,7 +34,7 @@ impl<'a> Export<'a> {
         }
         // It is read back from its own file.
         let is_anew =
-            why.is_none() && matches!(texture, Texture::Image(image) if (self.pictures)(&image.file).is_some());
+            why.is_none() && matches!(texture, Texture::Image(image) if (self.pictures)(&image.file).anew.is_some());
         if is_anew {
             self.restate("texture", &super::field(&["textures", name]));
         }
@@ -111,12 +108,14 @@ impl<'a> Export<'a> {
 
     /// What Mitsuba gets in place of the spectra of a picture, if it has some.
     pub(super) fn spectra(&self, file: &Path) -> Option<&'static str> {
-        (self.pictures)(file).filter(|anew| anew.loses_spectra).map(|_| "colours in place of its spectra")
+        let loses_spectra = (self.pictures)(file).anew.as_ref().is_some_and(|anew| anew.loses_spectra);
+        loses_spectra.then_some("colours in place of its spectra")
     }
 
     /// The name of a picture as Mitsuba reads it: its own, or of a new file.
     pub(super) fn picture_file(&mut self, file: &Path) -> String {
-        let Some(anew) = (self.pictures)(file) else { return self.file(file) };
+        let read = (self.pictures)(file);
+        let Some(anew) = &read.anew else { return self.file(file) };
         if let Some(name) = self.images.get(file) {
             return name.clone();
         }
@@ -153,7 +152,7 @@ impl<'a> Export<'a> {
     fn refused(&self, texture: &str, asked: Asked) -> Option<&'a ImageTexture> {
         let raw = asked == Asked::Numbers;
         match self.scene.textures.get(texture) {
-            Some(Texture::Image(image)) => (image.raw != raw && has_colours(&image.file)).then_some(image),
+            Some(Texture::Image(image)) => (image.raw != raw && (self.pictures)(&image.file).coloured).then_some(image),
             _ => None,
         }
     }
@@ -281,7 +280,7 @@ impl<'a> Export<'a> {
     /// Whether Mitsuba finds normals in it, of which grey ones have one number where three are wanted.
     pub(super) fn has_normals(&self, texture: &str) -> bool {
         match self.scene.textures.get(texture) {
-            Some(Texture::Image(image)) => has_colours(&image.file),
+            Some(Texture::Image(image)) => (self.pictures)(&image.file).coloured,
             Some(_) => false,
             None => true,
         }
@@ -344,14 +343,6 @@ fn stored_otherwise(image: &ImageTexture) -> Option<&'static str> {
         (false, true) => Some("its colours by the curve of sRGB: Mitsuba takes raw ones for numbers alone"),
         (false, false) => Some("its numbers as they are stored: Mitsuba takes them from raw pictures alone"),
     }
-}
-
-/// Whether a picture has more than grey. One that cannot be read has.
-fn has_colours(file: &Path) -> bool {
-    let reader = crate::input::open(file).map(|file| ImageReader::new(BufReader::new(file)));
-    let decoder = reader.and_then(|reader| Ok(reader.with_guessed_format()?.into_decoder()));
-    let channels = decoder.ok().and_then(|decoder| Some(decoder.ok()?.color_type().channel_count()));
-    channels.is_none_or(|channels| channels > 2)
 }
 
 /// The map after v ↦ 1 − v.
