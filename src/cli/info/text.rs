@@ -24,6 +24,7 @@ fn size(bytes: u64) -> String {
 
 /// A line of the answer.
 fn line(out: &mut String, what: &str, text: &str) {
+    let [what, text] = [what, text].map(|part| crate::error::one_line(part.to_owned()));
     let _ = writeln!(out, "  {what:<11} {text}");
 }
 
@@ -227,7 +228,7 @@ fn about(out: &mut String, part: &PartFacts, frame: Window, first: bool) {
             (_, Value::Bytes { bytes }) => size(*bytes as u64),
             (_, Value::Channels(_)) => continue,
         };
-        let _ = writeln!(out, "  {name}: {plain}");
+        let _ = writeln!(out, "  {}: {plain}", one_line(name));
     }
 }
 
@@ -295,7 +296,10 @@ fn one_line(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::facts::of;
     use super::*;
+    use crate::film::exr::{Attribute, ChannelData, ColourEncoding, Compression, ExrImage, Layout, write_exr};
+    use crate::spectrum::ColourSpace;
 
     #[test]
     fn numbers_have_some_four_digits() {
@@ -306,6 +310,35 @@ mod tests {
         }
         assert_eq!(size(999), "999 bytes");
         assert_eq!(size(1_234_567), "1.2 MB");
+    }
+
+    /// A file of `channels`, one pixel each, as it is told.
+    fn told(channels: &[&str], layout: Layout, attributes: &[(&str, &str)], colours: &str) -> String {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.exr");
+        let mut colour = ColourEncoding::of(ColourSpace::Rec709);
+        colour.interop_id = Some(colours.to_owned());
+        let image = ExrImage {
+            frame: [1, 1],
+            window: Window::full(1, 1),
+            channels: channels.iter().map(|name| ((*name).to_owned(), ChannelData::F32(vec![0.5]))).collect(),
+            colour: Some(colour),
+            attributes: attributes.iter().map(|(k, v)| ((*k).to_owned(), Attribute::Text((*v).to_owned()))).collect(),
+            data: std::collections::BTreeSet::new(),
+            compression: Compression::None,
+            layout,
+        };
+        write_exr(&path, &image).unwrap();
+        exr(Path::new("a.exr"), 1, &of(&path).unwrap())
+    }
+
+    #[test]
+    fn names_in_a_file_command_nothing_of_the_terminal() {
+        let told = told(&["la\x1b[1m.R", "G\x1b[2m"], Layout::Single, &[("na\x1b[3m", "x\x1b[4m")], "id\x1b[5m\n  z");
+        assert!(!told.contains('\x1b'), "{told:?}");
+        for part in ["la\\u{1b}[1m", "G\\u{1b}[2m", "  na\\u{1b}[3m: x\\u{1b}[4m\n", " id\\u{1b}[5m\\n  z\n"] {
+            assert!(told.contains(part), "{told}");
+        }
     }
 
     #[test]

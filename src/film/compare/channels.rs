@@ -255,6 +255,16 @@ mod tests {
     }
 
     #[test]
+    fn names_of_channels_command_nothing_of_the_terminal() {
+        let one = |name: &str| file(vec![(name.to_string(), vec![1.0; PIXELS])]);
+        for other in ["la\x1b[1m\n.R", "b"] {
+            let c = compare(&one("la\x1b[1m\n.R"), &one(other), &CompareOptions::default());
+            let table = c.table();
+            assert!(table.contains("la\\u{1b}[1m\\n.R") && !table.contains('\x1b'), "{table}");
+        }
+    }
+
+    #[test]
     fn spectral_files_are_compared_band_by_band() {
         let spectral = |seed| {
             let mut f = without_errors(render(seed, 1.0, 0.3, 1.0));

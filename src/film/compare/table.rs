@@ -1,6 +1,7 @@
 //! A comparison as a table for people.
 
 use super::{ACCEPT_FRACTION, ChannelFigures, Comparison, GLOBAL_ALPHA, NoiseSource, Verdict};
+use crate::error::one_line;
 use std::fmt::Write as _;
 
 impl Comparison {
@@ -10,7 +11,7 @@ impl Comparison {
         let mut out = String::new();
         // Writing to a string cannot fail.
         let mut line = |text: String| {
-            let _ = writeln!(out, "{}", text.trim_end());
+            let _ = writeln!(out, "{}", one_line(text.trim_end().to_owned()));
         };
         if !self.channels.is_empty() {
             line(format!(
