@@ -1,6 +1,6 @@
 //! The answer as a person reads it.
 
-use super::facts::{ChannelFacts, ExrFacts, PartFacts};
+use super::facts::{ChannelFacts, ExrFacts, LayerFacts, PartFacts};
 use crate::cli::render::{per_cent, seconds};
 use crate::cli::text::columns;
 use crate::film::Window;
@@ -232,17 +232,23 @@ fn about(out: &mut String, part: &PartFacts, frame: Window, first: bool) {
     }
 }
 
-fn channels(out: &mut String, part: &PartFacts) {
+fn channels<'a>(out: &mut String, part: &'a PartFacts) {
     let mut rows = vec![["  layer", "channel", "type", "least", "mean", "greatest", "not finite"].map(String::from)];
-    for layer in &part.layers {
-        for (i, channel) in layer.channels.iter().enumerate() {
-            let name = if layer.layer.is_empty() { "picture" } else { &layer.layer };
-            rows.push(row(if i == 0 { name } else { "" }, channel));
-        }
-    }
-    let left_out = rows.len().saturating_sub(MOST_CHANNELS + 1);
+    let of_layer = |(i, layer): (usize, &'a LayerFacts)| layer.channels.iter().map(move |channel| (i, channel));
+    let mut all: Vec<(usize, &ChannelFacts)> = part.layers.iter().enumerate().flat_map(of_layer).collect();
+    let left_out = all.len().saturating_sub(MOST_CHANNELS);
     if left_out > 0 {
-        rows.drain(MOST_CHANNELS..MOST_CHANNELS + left_out);
+        all.drain(MOST_CHANNELS - 1..MOST_CHANNELS - 1 + left_out);
+    }
+    let mut above = None;
+    for (i, channel) in all {
+        let name = match part.layers[i].layer.as_str() {
+            _ if above == Some(i) => "",
+            "" => "picture",
+            name => name,
+        };
+        rows.push(row(name, channel));
+        above = Some(i);
     }
     out.push_str(&columns(&rows, 3));
     if left_out > 0 {
@@ -339,6 +345,21 @@ mod tests {
         for part in ["la\\u{1b}[1m", "G\\u{1b}[2m", "  na\\u{1b}[3m: x\\u{1b}[4m\n", " id\\u{1b}[5m\\n  z\n"] {
             assert!(told.contains(part), "{told}");
         }
+    }
+
+    #[test]
+    fn of_many_channels_the_last_has_the_name_of_its_layer() {
+        let many: Vec<String> = (0..70).map(|i| format!("a.{i:02}")).collect();
+        let names = |last: &'static str| many.iter().map(String::as_str).chain([last]).collect::<Vec<_>>();
+        let rows = |last| {
+            let told = told(&names(last), Layout::Single, &[], "x");
+            assert!(told.contains("\n  and 7 channels between;"), "{told}");
+            let rows: Vec<String> =
+                told.lines().map(|line| line.split_whitespace().take(3).collect::<Vec<_>>().join(" ")).collect();
+            rows[rows.len() - 3..rows.len() - 1].to_vec()
+        };
+        assert_eq!(rows("b.R"), ["62 float 0.5", "b R float"]);
+        assert_eq!(rows("a.99"), ["62 float 0.5", "99 float 0.5"]);
     }
 
     #[test]
