@@ -65,8 +65,7 @@ pub fn exr(file: &Path, bytes: u64, exr: &ExrFacts) -> String {
             let name = part.name.as_deref().map_or_else(String::new, |name| format!(" \"{}\"", one_line(name)));
             let _ = writeln!(out, "  part {i}{name}");
         }
-        // What all parts share is said once.
-        about(&mut out, part, exr.frame, i == 0);
+        about(&mut out, part, exr.frame, exr.parts.first().filter(|_| i > 0));
         if exr.part_of_picture.is_none() {
             channels(&mut out, part);
         }
@@ -142,7 +141,8 @@ const TOLD: [&str; 40] = [
     "worldToNDC",
 ];
 
-fn about(out: &mut String, part: &PartFacts, frame: Window, first: bool) {
+/// What a part is; of a further one no more of its attributes than those which are not the first's.
+fn about(out: &mut String, part: &PartFacts, frame: Window, first: Option<&PartFacts>) {
     let kind = match part.kind.as_str() {
         "scanlineimage" => "scan lines",
         "tiledimage" => "tiles",
@@ -153,9 +153,30 @@ fn about(out: &mut String, part: &PartFacts, frame: Window, first: bool) {
     line(out, "stored", &format!("{kind}, {}", part.compression));
     line(out, "window", &window(part.window, frame));
     line(out, "colours", part.colours.as_deref().unwrap_or("not said"));
-    if !first {
-        return;
+    if first.is_none() {
+        made(out, part);
     }
+    let is_first = |name: &str, value| first.is_some_and(|first| first.attributes.get(name) == Some(value));
+    for (name, value) in &part.attributes {
+        if TOLD.contains(&name.as_str()) || is_first(name, value) {
+            continue;
+        }
+        let plain = match (name.as_str(), value) {
+            ("pixelAspectRatio", Value::Number(1.0)) => continue,
+            (_, Value::Text(text)) => one_line(text),
+            (_, Value::Texts(texts)) => one_line(&texts.join(", ")),
+            (_, Value::Number(number)) => short(*number),
+            (_, Value::Numbers(numbers)) => numbers.iter().map(|n| short(*n)).collect::<Vec<_>>().join(" "),
+            (_, Value::Code(code)) => code.to_string(),
+            (_, Value::Bytes { bytes }) => size(*bytes as u64),
+            (_, Value::Channels(_)) => continue,
+        };
+        let _ = writeln!(out, "  {}: {plain}", one_line(name));
+    }
+}
+
+/// How a picture was made, and what it shows.
+fn made(out: &mut String, part: &PartFacts) {
     let text = |name: &str| match part.attributes.get(name) {
         Some(Value::Text(text)) => Some(one_line(text)),
         Some(Value::Number(number)) => Some(number.to_string()),
@@ -216,19 +237,6 @@ fn about(out: &mut String, part: &PartFacts, frame: Window, first: bool) {
         hashes.iter().filter_map(|(what, name)| Some(format!("{what} {}", text(name)?))).collect();
     if !hashes.is_empty() {
         line(out, "hashes", &hashes.join(", "));
-    }
-    for (name, value) in part.attributes.iter().filter(|(name, _)| !TOLD.contains(&name.as_str())) {
-        let plain = match (name.as_str(), value) {
-            ("pixelAspectRatio", Value::Number(1.0)) => continue,
-            (_, Value::Text(text)) => one_line(text),
-            (_, Value::Texts(texts)) => one_line(&texts.join(", ")),
-            (_, Value::Number(number)) => short(*number),
-            (_, Value::Numbers(numbers)) => numbers.iter().map(|n| short(*n)).collect::<Vec<_>>().join(" "),
-            (_, Value::Code(code)) => code.to_string(),
-            (_, Value::Bytes { bytes }) => size(*bytes as u64),
-            (_, Value::Channels(_)) => continue,
-        };
-        let _ = writeln!(out, "  {}: {plain}", one_line(name));
     }
 }
 
@@ -360,6 +368,17 @@ mod tests {
         };
         assert_eq!(rows("b.R"), ["62 float 0.5", "b R float"]);
         assert_eq!(rows("a.99"), ["62 float 0.5", "99 float 0.5"]);
+    }
+
+    #[test]
+    fn a_further_part_tells_what_the_first_does_not() {
+        let key = crate::film::cryptomatte::key("CryptoObject");
+        let hash = format!("cryptomatte/{key}/hash");
+        let told =
+            told(&["R", "CryptoObject00.R"], Layout::Multipart, &[("owner", "us"), (&hash, "MurmurHash3_32")], "x");
+        let (first, further) = told.split_once("  part 1 \"CryptoObject\"\n").unwrap_or_else(|| panic!("{told}"));
+        assert!(first.contains("  owner: us\n") && !first.contains(&hash), "{told}");
+        assert!(further.contains(&format!("  {hash}: MurmurHash3_32\n")) && !further.contains("owner"), "{told}");
     }
 
     #[test]
