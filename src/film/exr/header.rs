@@ -124,8 +124,10 @@ impl Header {
     /// The name of the compression, or its number where that has no name.
     #[must_use]
     pub fn compression(&self) -> String {
-        const NAMES: [&str; 12] =
-            ["none", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB", "HTJ2K256", "HTJ2K32"];
+        const NAMES: [&str; 14] = [
+            "none", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB", "HTJ2K256", "HTJ2K32", "LJ2K",
+            "ZSTD",
+        ];
         match self.get("compression") {
             Some(Value::Code(code)) => {
                 NAMES.get(usize::from(*code)).map_or_else(|| format!("number {code}"), |name| (*name).to_owned())
@@ -403,7 +405,7 @@ mod tests {
         );
         let mut new = ours();
         let at = value_at(&new, "compression", "compression");
-        for (code, name) in [(10, "HTJ2K256"), (13, "number 13")] {
+        for (code, name) in [(10, "HTJ2K256"), (13, "ZSTD"), (14, "number 14")] {
             new[at] = code;
             let refusal = read(&new).1.unwrap_err().to_string();
             assert!(
