@@ -223,7 +223,7 @@ fn too_short(max_depth: Option<u32>) -> Option<&'static str> {
 }
 
 /// So many of something.
-fn count(n: usize, one: &str, many: &str) -> String {
+pub(super) fn count(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
@@ -286,13 +286,13 @@ fn path_techniques(census: &Census, settings: &PathSettings, chromatic: bool) ->
         technique(
             "next-event estimation",
             lights > 0 && unasked.is_none(),
-            format!("of {lights} lights, chosen by what each may give{dark}"),
+            format!("of {}, chosen by what each may give{dark}", count(lights, "light", "lights")),
             unasked.filter(|_| lights > 0).unwrap_or(&format!("there is no light{dark}")),
         ),
         technique(
             "multiple importance sampling",
             extended > 0 && unmet.is_none(),
-            format!("{extended} lights can also be met by chance"),
+            format!("{} can also be met by chance", count(extended, "light", "lights")),
             unmet.filter(|_| extended > 0).unwrap_or("no light can be met by chance"),
         ),
         technique(
@@ -465,6 +465,15 @@ mod tests {
                 assert!(on || said.reason.contains(field), "{said:?}");
             }
         }
+    }
+
+    #[test]
+    fn one_light_is_told_as_one() {
+        let census = Census { area_lights: vec!["lamp".into()], ..Census::default() };
+        let plan = EffectPlan::of(&census, path(), LayerPlan::default(), EffectMode::Auto);
+        let said = |name| plan.techniques.iter().find(|said| said.name == name).unwrap().reason.as_str();
+        assert_eq!(said("next-event estimation"), "of 1 light, chosen by what each may give");
+        assert_eq!(said("multiple importance sampling"), "1 light can also be met by chance");
     }
 
     /// A distance is behind no fog and needs no lamp; a layer of light has both.

@@ -77,6 +77,6 @@ impl Trial<'_> {
 
 fn lamps(scene: &Scene, caustics: &Caustics) -> String {
     let traced = caustics.traced.iter().filter(|t| **t).count();
-    let all = scene.lights.len();
-    if traced == all { format!("{all} lights") } else { format!("{traced} of {all} lights") }
+    let all = plan::count(scene.lights.len(), "light", "lights");
+    if traced == scene.lights.len() { all } else { format!("{traced} of {all}") }
 }
