@@ -6,8 +6,8 @@
 //! the sum of the fourth further channel, in units of 2⁻⁶⁴ over 2 to the power that `finish.layers` has for it,
 //! `cameraLayers.n` its samples, or `cameraLayers0.3` and `cameraLayers0.n` those of replicate 0 where standard errors of layers
 //! are wanted; `cameraMattes.0` is the number of what covers the pixel, times 2³², and how many samples met it,
-//! `cameraMattes.1` of the next. A value is the sum over replicates over the count over replicates; of paths from the lights
-//! over `splat_paths` instead.
+//! `cameraMattes.1` of the next: these are not added as they are, but the counts of each number, wherever it stands. A value is the
+//! sum over replicates over the count over replicates; of paths from the lights over `splat_paths` instead.
 //!
 //! The same file, with what is done so far in `claims`, is a checkpoint.
 

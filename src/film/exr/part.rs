@@ -8,7 +8,7 @@
 //! number = signed(camera0.X.w0 + camera0.X.w1 · 2³²) · 2^shift        signed: two's complement of 32 · words bits
 //! ```
 //!
-//! With no words all numbers are 0 and there is no channel. Numbers of two parts are added as they are. In Python:
+//! With no words all numbers are 0 and there is no channel. Sums and counts of two parts are added as they are. In Python:
 //!
 //! ```text
 //! import json, OpenEXR
