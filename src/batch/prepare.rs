@@ -159,7 +159,7 @@ pub(super) fn check_stop(description: &SceneDescription) -> Result<()> {
 }
 
 /// Compiles a scene that has been read, with what the scene before has read (see [`compile::compile_with`]), has `alter`
-/// change it, and plans it, unless there comes an `interrupt`. `watcher` hears what takes long.
+/// change it and its moments, and plans it, unless there comes an `interrupt`. `watcher` hears what takes long.
 pub(super) fn prepare_scene(
     entry: &BatchEntry,
     description: SceneDescription,
@@ -167,7 +167,7 @@ pub(super) fn prepare_scene(
     shelf: &mut Shelf,
     interrupt: &AtomicBool,
     watcher: &dyn Watcher,
-    alter: impl FnOnce(&mut Scene),
+    alter: impl Fn(&mut Scene),
 ) -> Result<Prepared> {
     let go_on = || match interrupt.load(Ordering::Relaxed) {
         true => Err(Error::Stopped("stopped while it was prepared; --resume goes on".into())),
@@ -191,6 +191,7 @@ pub(super) fn prepare_scene(
     };
     let blur = motion::moments(&entry.name, &description, &scene, &integrator, shelf)?;
     let mut moments = blur.scenes;
+    moments.iter_mut().for_each(&alter);
     // One film counts the light of all.
     let exponents = moments.iter().map(|moment| moment.light_exponent);
     scene.light_exponent = exponents.fold(scene.light_exponent, i32::max);
@@ -532,6 +533,27 @@ pub fn window(description: &SceneDescription) -> Window {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Samples see the moments, and of these one path of the still scene told nothing.
+    #[test]
+    fn what_alters_a_scene_alters_each_of_its_moments() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("s.yaml");
+        let text = "camera: {origin: {0: [0, 0, 5], 1: [1, 0, 5]}, target: [0, 0, 0], fov_deg: 40, shutter: 0.5}\n\
+                    image: {width: 8, height: 8}\nrender: {frames: 0}\nlights: [constant: {radiance: 1}]\n";
+        std::fs::write(&file, text).unwrap();
+        let overrides = Overrides::default();
+        let entry = super::super::entries(&file, &overrides).unwrap().remove(0);
+        let description = entry.scene(&[]).unwrap();
+        let alter = |scene: &mut Scene| scene.wavelengths = scene.wavelengths.with_count(1);
+        let (shelf, go_on) = (&mut Shelf::default(), AtomicBool::new(false));
+        let prepared = prepare_scene(&entry, description, &overrides, shelf, &go_on, alter).unwrap();
+        assert_eq!(prepared.moments.len(), 16);
+        for scene in prepared.moments.iter().chain([&prepared.scene]) {
+            let nm = scene.wavelengths.sample(0.3).nm.to_array();
+            assert_eq!(nm, [nm[0]; 8]);
+        }
+    }
 
     /// Adaptive sampling, and others of paths from the camera, were passed over without a word.
     #[test]

@@ -88,12 +88,7 @@ impl<'a> Desk<'a> {
     }
 
     /// The small copy with further settings and what light is to carry, altered before it is planned.
-    fn prepare_with(
-        &self,
-        set: &[(String, String)],
-        carried: Carried,
-        alter: impl FnOnce(&mut Scene),
-    ) -> Result<Prepared> {
+    fn prepare_with(&self, set: &[(String, String)], carried: Carried, alter: impl Fn(&mut Scene)) -> Result<Prepared> {
         let mut overrides = self.overrides.clone();
         overrides.set.extend(set.iter().cloned());
         let description = self.entry.scene(&overrides.set)?;
