@@ -106,7 +106,7 @@ pub struct Row {
     pub seconds: f64,
     /// The most of the rounds.
     pub most_seconds: f64,
-    /// √relMSE of the noise, with its interval of 95 %.
+    /// √relMSE of the noise, with its interval of 95 %; not a number where no light was met, whose noise nobody knows.
     pub noise: [f64; 3],
     /// As [`Point::converged`].
     pub converged: bool,
@@ -114,9 +114,9 @@ pub struct Row {
     pub bias_squared: Figure,
     /// Red, green and blue over those of the reference.
     pub light: [Figure; 3],
-    /// 1 / (noise² · time) over that of the chosen setting.
+    /// 1 / (noise² · time) over that of the chosen setting; infinite without noise, and not a number where that is unknown.
     pub efficiency: Figure,
-    /// Seconds to the target; none where it cannot be reached.
+    /// Seconds to the target; none where it cannot be reached, or the noise is unknown.
     pub to_target: Option<f64>,
     /// How noise fell.
     pub curve: Vec<Point>,
@@ -225,6 +225,11 @@ pub fn sheet(
             tally.add(outcome);
         }
     }
+    if tallies[0].is_black() {
+        return Ok(Err(format!(
+            "{samples} samples a pixel of the chosen setting meet no light, of which the reference has some: their noise is unknown"
+        )));
+    }
     // All pictures are developed as the reference is: else a meter would hide what is lost.
     let finish = Finish::of(&chosen);
     let settings_of_png = develop::settings(&finish.output.png, finish.white, &full.image, ColourSpace::Rec709);
@@ -324,6 +329,7 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
         (value * tally.seconds(), libm::hypot(error / value, time))
     };
     let ((own, own_error), (cost, error)) = (cost(chosen), cost(tally));
+    let is_black = tally.is_black();
     let mut row = Row {
         knob: trial.knob,
         value: trial.value.clone(),
@@ -331,7 +337,7 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
         samples: end.samples,
         seconds: end.seconds,
         most_seconds: tally.most_seconds(),
-        noise: end.noise,
+        noise: if is_black { [f64::NAN; 3] } else { end.noise },
         converged: end.converged,
         bias_squared: tally.bias_squared(reference),
         light: tally.light(reference),
@@ -339,6 +345,7 @@ fn row(trial: &Trial, tally: &Tally, chosen: &Tally, reference: &Reference, targ
             value if value.is_finite() && tally.noise_squared().value > ROUNDING => {
                 Figure { value, error: value * libm::hypot(own_error, error) }
             }
+            _ if is_black => Figure { value: f64::NAN, error: f64::NAN },
             // Without noise: nothing to weigh.
             _ => Figure { value: f64::INFINITY, error: 0.0 },
         },
@@ -367,7 +374,13 @@ impl Row {
         let left = target * target - self.bias().unwrap_or(0.0).powi(2) - more * more;
         let samples = f64::from(self.samples);
         let fit = Fit::with_slope(samples, self.noise[0], self.exponent());
-        (left > 0.0).then(|| self.seconds * fit.samples_for(left.sqrt()) / samples)
+        (left > 0.0 && self.meets_light()).then(|| self.seconds * fit.samples_for(left.sqrt()) / samples)
+    }
+
+    /// Whether any light was met, so that there is noise to know.
+    #[must_use]
+    pub fn meets_light(&self) -> bool {
+        !self.noise[0].is_nan()
     }
 
     /// √relMSE of the bias, where it stands out.

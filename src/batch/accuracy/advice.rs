@@ -45,18 +45,27 @@ fn list(words: &[String]) -> String {
 
 /// How noise falls with samples: from the fewest to the most.
 fn convergence(chosen: &Row, rows: &[Row]) -> String {
-    let all = || rows.iter().chain([chosen]);
+    let all = || rows.iter().chain([chosen]).filter(|row| row.meets_light());
     let (Some(few), Some(many)) = (all().min_by_key(|r| r.samples), all().max_by_key(|r| r.samples)) else {
         return String::new();
     };
     let ratio = f64::from(many.samples) / f64::from(few.samples);
-    format!(
-        "{} times the samples take {} of the time for {} of the noise: variance falls as samples^-{:.2}",
+    let exponent = 2.0 * libm::log(few.noise[0] / many.noise[0]) / libm::log(ratio);
+    let told = format!(
+        "{} times the samples take {} of the time for {} of the noise: {}",
         ratio.round(),
         figures(many.seconds / few.seconds),
         figures(many.noise[0] / few.noise[0]),
-        2.0 * libm::log(few.noise[0] / many.noise[0]) / libm::log(ratio)
-    )
+        if exponent > 0.0 { format!("variance falls as samples^-{exponent:.2}") } else { "it does not fall".into() }
+    );
+    in_the_dark(rows).into_iter().chain((ratio > 1.0).then_some(told)).collect::<Vec<_>>().join("; ")
+}
+
+/// Which settings meet no light, if any: of their noise nothing is known.
+fn in_the_dark(rows: &[Row]) -> Option<String> {
+    let dark: Vec<String> = rows.iter().filter(|row| !row.meets_light()).map(|row| row.value.clone()).collect();
+    let verb = if dark.len() == 1 { "meets" } else { "meet" };
+    (!dark.is_empty()).then(|| format!("{} {verb} no light", list(&dark)))
 }
 
 /// What a setting finds in place of the truth, and in what time; nothing if no more than that.
@@ -80,10 +89,10 @@ fn off(chosen: &Row, row: &Row) -> Option<String> {
 /// matter of the knob. Where that lacks nothing that stands out, perhaps for its noise, the two may still differ.
 fn trade(chosen: &Row, rows: &[Row]) -> String {
     let lacking = off(chosen, chosen).is_some();
-    let mut parts: Vec<String> = Vec::new();
+    let mut parts: Vec<String> = in_the_dark(rows).into_iter().collect();
     let (mut same, mut as_chosen): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
     let mut speed: Vec<String> = Vec::new();
-    for row in rows {
+    for row in rows.iter().filter(|row| row.meets_light()) {
         let alike = match off(chosen, row) {
             None => &mut same,
             Some(_) if row.finds_as(chosen) => &mut as_chosen,
@@ -199,6 +208,34 @@ mod tests {
                 .starts_with("RGB stands out from the reference but not from the chosen setting; to the same noise"),
             "{sentence}"
         );
+    }
+
+    /// Light so rare that few samples miss it: that they agree on black is no noise of 0, and no variance falls from there.
+    #[test]
+    fn a_setting_that_meets_no_light_is_not_said_to_be_without_noise() {
+        let unknown = Figure { value: f64::NAN, error: f64::NAN };
+        let dark = |knob, value, samples| Row {
+            samples,
+            noise: [f64::NAN; 3],
+            efficiency: unknown,
+            light: [Figure { value: 0.0, error: 0.0 }; 3],
+            ..row(knob, value, 0.25, 1.0, 0.0, 0.0)
+        };
+        let more = |noise| Row { samples: 256, ..row("samples", "x 4", 4.0, noise, 0.0, 1.0) };
+        let chosen = || row("chosen", "as written", 1.0, 1.0, 0.0, 1.0);
+        let told = |rows: &[Row]| sentences(rows)[0].1.clone();
+        let begin = "x 1/4 and x 1/2 meet no light; 4 times the samples take 4.00 of the time for";
+        for (noise, end) in [
+            (0.5, "0.50 of the noise: variance falls as samples^-1.00."),
+            (2.0, "2.00 of the noise: it does not fall."),
+        ] {
+            let rows = [chosen(), dark("samples", "x 1/4", 16), dark("samples", "x 1/2", 32), more(noise)];
+            assert_eq!(told(&rows), format!("{begin} {end}"));
+        }
+        assert_eq!(told(&[chosen(), dark("samples", "x 1/4", 16)]), "x 1/4 meets no light.");
+        let rows = [chosen(), dark("sampler", "independent", 64)];
+        assert_eq!(told(&rows), "independent meets no light.");
+        assert_eq!(rows[1].reaches(0.1, 0.0), None);
     }
 
     #[test]

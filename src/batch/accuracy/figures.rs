@@ -177,6 +177,12 @@ impl Tally {
         [value.sqrt(), value.sqrt() / stretch, value.sqrt() * stretch]
     }
 
+    /// Whether no light was met.
+    #[must_use]
+    pub fn is_black(&self) -> bool {
+        self.replicates.iter().flatten().flatten().flatten().all(|x| *x == 0.0)
+    }
+
     /// How many rounds there are.
     #[must_use]
     pub fn rounds(&self) -> usize {

@@ -133,12 +133,12 @@ fn section(out: &mut String, number: usize, sheet: &Sheet) {
     for row in sheet.rows.iter().filter(|row| row.knob != "file") {
         let _ = writeln!(
             out,
-            "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><figcaption>{} {}: {:.2} s, noise {:.2} %</figcaption></figure>",
+            "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><figcaption>{} {}: {:.2} s, noise {}</figcaption></figure>",
             base64(&row.png),
             escaped(row.knob),
             escaped(&row.value),
             row.seconds,
-            100.0 * row.noise[0]
+            if row.meets_light() { format!("{:.2} %", 100.0 * row.noise[0]) } else { UNKNOWN.to_owned() }
         );
     }
     out.push_str("</div>\n");
@@ -158,6 +158,9 @@ pub fn held_against(sheet: &Sheet) -> String {
 pub const HEADINGS: [&str; 10] =
     ["knob", "value", "samples", "time, s", "noise, %", "95 %", "bias, %", "R, G, B", "efficiency", "to target, s"];
 
+/// What no figure is known of.
+const UNKNOWN: &str = "unknown";
+
 /// A row of the table.
 #[must_use]
 pub fn cells(row: &Row) -> [String; 10] {
@@ -168,7 +171,7 @@ pub fn cells(row: &Row) -> [String; 10] {
         row.value.clone(),
         row.samples.to_string(),
         format!("{:.3} ({:.3})", row.seconds, row.most_seconds),
-        per_cent(row.noise[0]),
+        if row.meets_light() { per_cent(row.noise[0]) } else { UNKNOWN.to_owned() },
         match row.converged {
             true => format!("{}-{}", per_cent(row.noise[1]), per_cent(row.noise[2])),
             false => "not converged".to_owned(),
@@ -176,12 +179,17 @@ pub fn cells(row: &Row) -> [String; 10] {
         row.bias().map_or(format!("<{}", per_cent(row.bias_bound())), per_cent),
         light.join(" "),
         match row.efficiency {
+            Figure { value, .. } if value.is_nan() => UNKNOWN.to_owned(),
             Figure { value, .. } if !value.is_finite() => "no noise".to_owned(),
             // Of a single round nobody knows how far times lie apart.
             Figure { value, error } if !error.is_finite() => format!("{value:.2} ± ?"),
             Figure { value, error } => format!("{value:.2} ± {error:.2}"),
         },
-        row.to_target.map_or("never".into(), |t| format!("{t:.2}")),
+        match row.to_target {
+            Some(t) => format!("{t:.2}"),
+            None if row.meets_light() => "never".to_owned(),
+            None => UNKNOWN.to_owned(),
+        },
     ]
 }
 
