@@ -242,24 +242,25 @@ fn plot(chosen: &Row, rows: &[Row], target: f64) -> String {
     let _ = write!(svg, "<path d=\"M{left} {0:.1}H{right}\" stroke=\"#888\" stroke-dasharray=\"1 3\"/>", y(target));
     for (i, row) in all().enumerate() {
         let colour = COLOURS[i.min(COLOURS.len() - 1)];
+        // Powers of ten have no place for a noise of 0, such as of samples that met no light.
+        let shown = || row.curve.iter().filter(|p| p.seconds > 0.0 && p.noise[0] > 0.0);
         let path = |of: usize, reverse: bool| {
             let at = |p: &super::Point| format!("{:.1} {:.1}", x(p.seconds), y(p.noise[of]));
-            let shown = |p: &&super::Point| p.seconds > 0.0 && (of == 0 || p.converged);
-            let mut steps: Vec<String> = row.curve.iter().filter(shown).map(at).collect();
+            let mut steps: Vec<String> = shown().filter(|p| of == 0 || p.converged).map(at).collect();
             if reverse {
                 steps.reverse();
             }
             steps.join("L")
         };
-        if row.curve.is_empty() {
-            continue;
-        }
-        if row.curve.iter().any(|p| p.converged) {
+        if shown().any(|p| p.converged) {
             let (low, high) = (path(1, false), path(2, true));
             let _ = write!(svg, "<path d=\"M{low}L{high}Z\" fill=\"{colour}\" opacity=\"0.12\"/>");
         }
-        let _ = write!(svg, "<path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.6\"/>", path(0, false));
-        for p in row.curve.iter().filter(|p| p.seconds > 0.0) {
+        if shown().next().is_some() {
+            let line = path(0, false);
+            let _ = write!(svg, "<path d=\"M{line}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.6\"/>");
+        }
+        for p in shown() {
             let fill = if p.converged { colour } else { "#fff" };
             let _ = write!(
                 svg,
@@ -332,6 +333,7 @@ pub(in crate::batch) fn base64(bytes: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Point;
     use super::*;
 
     /// The vectors of RFC 4648, section 10.
@@ -340,6 +342,34 @@ mod tests {
         for (text, code) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
             assert_eq!(base64(text.as_bytes()), code);
         }
+    }
+
+    #[test]
+    fn where_no_light_was_met_nothing_is_told_of_noise() {
+        let point = |noise| Point { samples: 16, seconds: 0.1, noise: [noise; 3], converged: false };
+        let unknown = Figure { value: f64::NAN, error: f64::NAN };
+        let nothing = Figure { value: 0.0, error: 0.0 };
+        let dark = Row {
+            knob: "sampler",
+            value: "independent".into(),
+            chosen: false,
+            samples: 16,
+            seconds: 0.1,
+            most_seconds: 0.2,
+            noise: [f64::NAN; 3],
+            converged: false,
+            bias_squared: nothing,
+            light: [nothing; 3],
+            efficiency: unknown,
+            to_target: None,
+            curve: vec![point(0.0)],
+            png: Vec::new(),
+        };
+        let [.., noise, interval, _, _, efficiency, to_target] = cells(&dark);
+        assert_eq!([noise, interval, efficiency, to_target], ["unknown", "not converged", "unknown", "unknown"]);
+        let chosen = Row { noise: [0.1; 3], curve: vec![point(0.1)], ..dark.clone() };
+        let svg = plot(&chosen, &[dark], 0.1);
+        assert_eq!((svg.matches("<circle").count(), svg.contains("NaN")), (1, false), "{svg}");
     }
 
     #[test]
