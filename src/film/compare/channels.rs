@@ -4,12 +4,19 @@ use super::noise::{Known, Pair};
 use super::{CompareOptions, Origin};
 use crate::film::Window;
 use crate::film::accumulate::REPLICATES;
-use crate::film::exr::{ExrFile, ExrPart, SHARED_ERRORS, stderr_name};
+use crate::film::exr::{ExrFile, ExrPart, SHARED_ERRORS, part, stderr_name};
 use crate::spectrum::colour;
 use std::collections::BTreeSet;
 
 /// What is to be compared, or why nothing can be.
 pub(super) fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions<'a>) -> Result<Vec<Pair<'a>>, String> {
+    for (name, file) in [("A", a), ("B", b)] {
+        if file.parts[0].text(part::JSON).is_some() {
+            return Err(format!(
+                "{name} holds sums of a part or a checkpoint, no light: `abbe merge` makes a picture of it"
+            ));
+        }
+    }
     let (window_a, window_b) = (a.parts[0].window, b.parts[0].window);
     same_window("data windows", window_a, window_b, options.origin)?;
     same_window("display windows", a.display, b.display, options.origin)?;
@@ -165,6 +172,10 @@ mod tests {
         let mut other = a.clone();
         other.parts[0].channels.iter_mut().for_each(|(name, _)| name.push('x'));
         assert_eq!(reason(&other), "the channels differ: R, G, B against Rx, Gx, Bx");
+        // Words of whole numbers, of which the lower ones are as good as random.
+        let mut sums = a.clone();
+        sums.parts[0].texts.push(("abbe/part".into(), "{}".into()));
+        assert!(reason(&sums).starts_with("B holds sums of a part or a checkpoint"));
     }
 
     /// The channels of `file` in a part for each name before a point, as `layout: multipart` has it.

@@ -56,7 +56,7 @@ impl Plane {
 }
 
 /// Where the description of a part stands.
-const JSON: &str = "abbe/part";
+pub const JSON: &str = "abbe/part";
 /// Where its checksum stands.
 const HASH: &str = "abbe/partHash";
 /// Rows of a chunk.
