@@ -71,7 +71,8 @@
 //! layers:                           # further channels of the OpenEXR file, each name.COMPONENT; default none
 //! - {name: nn, surface: shading_normal}         # of the first surface: depth (T), position (X, Y, Z), uv (U, V),
 //!                                   # geometric_normal, shading_normal, dp_du, dp_dv (X, Y, Z), duv_dx, duv_dy (U, V),
-//!                                   # albedo (R, G, B), primitive, shape (I)
+//!                                   # albedo (R, G, B), primitive, shape (I). duv_dx, duv_dy are what u and v change by over
+//!                                   # 1/√samples of a pixel to the right and down, as in Mitsuba
 //! - {name: direct, light: {path: {max_depth: 2}}, form: rgba, squares: false}
 //!                                   # light: ~ of the picture, path, depth, none; ~ form rgba, xyz; ~ squares: the mean
 //!                                   # of squares as m2_direct.R, …, or under squares_name
