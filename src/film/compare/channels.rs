@@ -243,11 +243,11 @@ mod tests {
         // Further layers of either file and alpha are none of the picture's colours; the table names them.
         let c = compare(
             &channels(&["A", "B", "G", "R", "Z", "stderr.R"]),
-            &channels(&["B", "G", "R", "normal.X", "normal.Y"]),
+            &channels(&["B", "G", "R", "normal.X", "normal.X.T", "normal.Y"]),
             &CompareOptions::default(),
         );
         assert!(c.verdict == Verdict::Same && c.identical);
-        let told = "not compared             A, Z, normal.*\n";
+        let told = "not compared             A, Z, normal.*, normal.X.*\n";
         assert!(c.table().contains(told), "{}", c.table());
     }
 

@@ -2,6 +2,7 @@
 
 use super::{ACCEPT_FRACTION, ChannelFigures, Comparison, GLOBAL_ALPHA, NoiseSource, Verdict};
 use crate::error::one_line;
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 impl Comparison {
@@ -60,9 +61,8 @@ impl Comparison {
             if !self.not_compared.is_empty() {
                 let layer =
                     |name: &String| name.rsplit_once('.').map_or(name.clone(), |(layer, _)| format!("{layer}.*"));
-                let mut layers: Vec<String> = self.not_compared.iter().map(layer).collect();
-                layers.dedup();
-                line(format!("not compared             {}", layers.join(", ")));
+                let layers: BTreeSet<String> = self.not_compared.iter().map(layer).collect();
+                line(format!("not compared             {}", Vec::from_iter(layers).join(", ")));
             }
             line(format!("noise known from         {}", self.sources()));
         }
