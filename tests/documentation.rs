@@ -74,7 +74,6 @@ fn links_lead_to_files_and_headings_that_are_there() {
     assert!(seen > 20, "{seen} links were found");
 }
 
-/// Names of four words or more in backticks are those of tests.
 #[test]
 fn exit_codes_are_the_same_on_both_pages() {
     let table = |page: &str| -> Vec<String> {
@@ -90,6 +89,7 @@ fn exit_codes_are_the_same_on_both_pages() {
     assert_eq!(table_of_readme, table("docs/farm.md"));
 }
 
+/// Names of four words or more in backticks are those of tests.
 #[test]
 fn tests_that_pages_name_are_there() {
     let sources = ["src", "tests", "tools"].iter().flat_map(|folder| files(Path::new(folder)));
