@@ -61,6 +61,7 @@ def test_mattes_in_parts_have_their_manifests_beside_them(render):
     single, header = official(render("one", layers=MATTES))
     path = render("parts", layers=MATTES, output={"exr": {"layout": "multipart"}})
     with OpenEXR.File(str(path), separate_channels=True) as file:
+        assert len(file.parts) == 1 + len(MATTES)
         for part in file.parts[1:]:
             assert all(np.array_equal(c.pixels, single[name]) for name, c in part.channels.items())
             own = {name for name in part.header if name.startswith("cryptomatte/")}
