@@ -136,6 +136,8 @@ def test_attributes_are_legible_to_both(render):
     assert "Abbe" in header["software"] or "abbe" in header["software"]
     assert spec.getattribute("Software") == header["software"]
     assert float(header["pixelAspectRatio"]) == 1.0
+    # A radiance of one at every wavelength, in cd/m²: 683.002 lm/W times the sum of the CIE's ȳ of 1931, a value a nanometre.
+    assert abs(float(np.ravel(header["whiteLuminance"])[0]) / (683.002 * 106.857) - 1) < 1e-5
     standard = {
         "channels",
         "compression",
