@@ -161,6 +161,7 @@ mod tests {
             (23.98, [24_000, 1001]),
             (12.5, [12_500, 1000]),
             (0.004, [4, 1000]),
+            (1.001, [1001, 1000]),
             (1e6, [1_000_000, 1]),
         ]) {
             assert_eq!(rational_rate(rate), rational, "{rate}");
@@ -194,5 +195,8 @@ mod tests {
         assert_eq!(code(Some(120.0), 90), ([1, 0, 0, 22], false));
         assert_eq!(code(Some(24.0), -24 * 3600 - 1), ([23, 59, 59, 23], false));
         assert_eq!(code(None, 45), ([1, 0, 0, 0], false));
+        // 49 frames of 24 a second behind 01:02:03:00.
+        let TimeCode { hours, minutes, seconds, frames, .. } = time_code([1, 2, 3, 4], Some(45), Some(24.0));
+        assert_eq!([hours, minutes, seconds, frames], [1, 2, 5, 1]);
     }
 }

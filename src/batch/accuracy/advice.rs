@@ -155,6 +155,12 @@ mod tests {
     }
 
     #[test]
+    fn numbers_have_two_or_three_figures_whatever_they_round_to() {
+        let said = [0.996, 1.234, 9.94, 9.96, 99.4, 99.6, 1234.0].map(figures);
+        assert_eq!(said, ["1.00", "1.23", "9.94", "10.0", "99.4", "100", "1234"]);
+    }
+
+    #[test]
     fn a_sentence_tells_what_is_lost_what_is_the_same_and_what_it_takes() {
         let rows = [
             row("chosen", "as written", 1.0, 1.0, 0.0, 1.0),

@@ -320,6 +320,15 @@ mod tests {
         tally
     }
 
+    /// Of two numbers, 0 and 2, the standard error is 1 and has one degree of freedom: Student's t is Cauchy's, whose two sides beyond
+    /// x have the probability 1 − 2 atan(x)/π. Here that is the one of a normal number beyond three: x = cot(p π/2).
+    #[test]
+    fn an_error_told_by_two_numbers_is_as_wide_as_cauchys() {
+        let two: Moments = [0.0, 2.0].into_iter().collect();
+        let expected = 1.0 / (libm::tan(0.5 * std::f64::consts::PI * normal_two_sided_p(SIGNIFICANT)) * SIGNIFICANT);
+        assert!((wide(&two) / expected - 1.0).abs() < 1e-9, "{} for {expected}", wide(&two));
+    }
+
     /// Light of 1, w = 1/1.01, replicates of variance 0.04: noise² of a picture is 0.01/1.01. Over 200 tallies the interval
     /// holds it 95 % of the time: binomial standard deviation 1.5 %, four of them.
     #[test]
