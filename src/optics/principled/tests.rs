@@ -350,6 +350,21 @@ fn widths_are_bounded_and_stretched_by_the_aspect() {
 }
 
 /// Neither surface makes the closed set of scattering functions larger than rough metal does.
+/// R₀ = ((n − 1)/(n + 1))² is 0.08 times the number, but for a surface that transmits, which has a thousandth of that at least and
+/// no index of one.
+#[test]
+fn an_index_by_specular_or_by_number_is_the_contrast_that_is_asked_for() {
+    for (specular, transmits, expected) in
+        [(0.5, false, 0.04), (0.0, false, 0.0), (1.0, true, 0.08), (0.25, true, 0.02), (0.0, true, 8e-5)]
+    {
+        let n = index_of_specular(specular, transmits);
+        let reflected = ((n - 1.0) / (n + 1.0)).powi(2);
+        assert!((reflected - expected).abs() < 1e-15, "{specular} {transmits}: {reflected}");
+    }
+    let by_number = [(1.0, false), (1.0, true), (1.5, true)].map(|(eta, transmits)| index_of_eta(eta, transmits));
+    assert_eq!(by_number, [1.0, 1.001, 1.5]);
+}
+
 #[test]
 fn records_are_no_larger_than_a_rough_metal() {
     assert!(size_of::<Principled>() <= 128 && size_of::<PrincipledThin>() <= 128);
