@@ -375,6 +375,26 @@ mod tests {
         assert!(RefractiveIndex::formula(4, &[1.0]).is_err());
     }
 
+    /// Each formula with a resonance at λ² = 0.3 µm², and the same of no strength.
+    #[test]
+    fn each_formula_is_refused_for_its_resonance_in_the_band() {
+        let formulas: [(u32, &dyn Fn(f64) -> Vec<f64>); 8] = [
+            (1, &|strength| vec![0.1, strength, 0.3f64.sqrt()]),
+            (2, &|strength| vec![0.1, strength, 0.3]),
+            (2, &|strength| vec![0.0, strength, 0.3]),
+            (4, &|strength| vec![2.0, strength, 2.0, 0.3, 1.0, 0.0, 0.0, 0.0, 1.0]),
+            (4, &|strength| vec![2.0, 0.0, 0.0, 0.0, 1.0, strength, 2.0, 0.3, 1.0]),
+            (6, &|strength| vec![0.1, strength, 1.0 / 0.3]),
+            (8, &|strength| vec![0.1, strength, 0.3, 0.0]),
+            (9, &|strength| vec![2.0, strength, 0.3, 0.0, 0.0, 1.0]),
+        ];
+        for (number, of) in formulas {
+            let told = |strength| RefractiveIndex::formula(number, &of(strength)).unwrap().check_band();
+            assert!(told(1.0).unwrap_err().contains("resonance at 547.7 nm"), "{number}: {:?}", told(1.0));
+            assert_eq!(told(0.0), Ok(()), "{number}");
+        }
+    }
+
     #[test]
     fn an_index_that_fails_in_the_band_is_refused_in_words() {
         // A resonance at 0.5 µm.

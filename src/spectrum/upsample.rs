@@ -291,7 +291,7 @@ mod tests {
         for nm in [400.0, 560.0, 700.0] {
             assert!((white.at(nm) / illuminant::d65().at(nm) - 1.0).abs() < 1e-6);
         }
-        for rgb in [[3.0, 0.2, 0.0], [1e6, 1e5, 2e4], [0.0, 0.0, 1e-6]] {
+        for rgb in [[3.0, 0.2, 0.0], [1e6, 1e5, 2e4], [0.3, 4.0, 0.2], [0.0, 0.0, 1e-6]] {
             let size = rgb.iter().copied().fold(0.0, f64::max);
             // The emission already holds D65: divide by the colour of a white emission.
             let (c, scale) = emission_coefficients(rgb.map(|v| v as f32));
