@@ -480,6 +480,23 @@ mod tests {
         assert!(!valid([[2.0, 2.0, 1.0, 1.0], [2.0, 1.0, 1.0, 0.25]]));
     }
 
+    /// Of 64 pixels some are off by δ in one replicate, which has 3/4 of the spread, the others by ±√(3/8) δ in two, which have half
+    /// of it each: δ²/16 is the variance of all, so that they share the error alike, and what the noise of divisors takes off is a
+    /// thousandth of it. Where those of the first kind are more than half, the picture is told to have not converged.
+    #[test]
+    fn light_that_single_replicates_bring_makes_the_interval_invalid() {
+        let valid = |uneven: usize| {
+            let delta = 1.0f32 / 64.0;
+            let even = delta * 0.375f32.sqrt();
+            let light = move |pixel: usize, replicate: usize| {
+                let levels = if pixel < uneven { [delta, 0.0, 0.0, 0.0] } else { [even, -even, 0.0, 0.0] };
+                1.0 + levels[(pixel + replicate) % REPLICATES]
+            };
+            estimate(&film_of(light)).unwrap().1.valid
+        };
+        assert_eq!([0, 30, 34, 64].map(valid), [true, true, false, false]);
+    }
+
     /// All 64 pixels are off by δ, δ, −δ, −δ in their four replicates. Of one the trace is (4δ²g)²/240 = δ⁴g²/15, the pairs are 0, 4δ²g and
     /// 4δ²g, and pairs of different pixels have 63 · 32 δ⁴g²/192 = 10.5 δ⁴g² a pixel: 157.5 times as much, none of it in blocks of a pixel.
     /// The logarithm of the interval goes as the root of the sum times 1 + 3/2k. A pixel's error is δ²g/3, so that k is 64 · 15/9 of

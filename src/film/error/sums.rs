@@ -175,8 +175,29 @@ impl Gram {
 
 #[cfg(test)]
 mod tests {
-    use super::crossed;
+    use super::super::values::Four;
+    use super::{Sums, crossed};
     use wide::f64x4;
+
+    /// ½ g″σ⁴ + g′κ₃ of one value, by hand. Of 2, 1, 1, 1 the mean is 5/4 and Σd³ 3/8, so that κ₃ is (2/3)(3/8)/16 = 1/64, of which f =
+    /// 7/16 takes g′ = −2 · 5/4 / 4 times; as three of four agree, no pairs differ twice. Of 2, 2, 1, 1 κ₃ is 0 and σ⁴ is 1/96 by the pairs;
+    /// with f = 7/4 g is 1/4 and g″ (6 · 9/4 − 2 · 7/4)/64. The variance of the mean is Σd²/12.
+    #[test]
+    fn what_noisy_divisors_take_off_is_of_second_order() {
+        for (x, floor, plain, further) in [
+            ([2.0, 1.0, 1.0, 1.0], 7.0 / 16.0, 1.0 / 32.0, -5.0 / 8.0 / 64.0),
+            ([2.0, 2.0, 1.0, 1.0], 7.0 / 4.0, 1.0 / 48.0, 0.5 * (10.0 / 64.0) / 96.0),
+        ] {
+            let mean = x.iter().sum::<f64>() / 4.0;
+            let first = |x| f64x4::new([x, 0.0, 0.0, 0.0]);
+            let four = Four { means: first(mean), replicates: x.map(first), splatted: None };
+            let mut sums = Sums::default();
+            sums.add(&[four], &[f64x4::splat(floor)], 1);
+            let close = |found: f64, expected: f64| (found / expected - 1.0).abs() < 1e-14;
+            assert!(close(sums.further, further), "{x:?}: {} for {further}", sums.further);
+            assert!(close(sums.error, plain - further), "{x:?}: {} for {plain} - {further}", sums.error);
+        }
+    }
 
     /// One replicate of four has X: by the spread of all, v = X²/16; by two of them, the others dark, (X²/8)/f for half of the
     /// ways to choose and nothing for the rest. Of noise of 1e-4 it is as if the divisor were known, within twice the noise.
