@@ -79,12 +79,13 @@ mod tests {
     use super::*;
     use crate::film::Window;
 
-    /// Left half: value 1, error 0.001; right half: value 1, error 1. The mean is 1, so the errors are divided by √1.01.
+    /// Quarters of value 1, above an error of 0.001 and one of 1.01, below the other way round. The mean is 1, so the errors are divided
+    /// by √1.01.
     #[test]
     fn each_block_has_the_colour_of_its_own_error() {
-        let (width, height) = (8u32, 4u32);
+        let (width, height) = (8u32, 8u32);
         let n = (width * height) as usize;
-        let error: Vec<f32> = (0..n).map(|i| if i % 8 < 4 { 0.001 } else { 1.01 }).collect();
+        let error: Vec<f32> = (0..n).map(|i| if (i % 8 < 4) == (i < 32) { 0.001 } else { 1.01 }).collect();
         let plane = vec![1.0f32; n];
         let mut image = Image {
             frame: [width, height],
@@ -94,8 +95,9 @@ mod tests {
             standard_error: [error.clone(), error.clone(), error],
         };
         let map = error_map(&image, [0.2, 0.7, 0.1], 2).unwrap();
-        assert_eq!((map.width, map.height), (2, 1));
-        assert_eq!(map.rgb, [0, 0, 4, 252, 255, 164]);
+        assert_eq!((map.width, map.height), (2, 2));
+        let (dark, bright) = ([0, 0, 4], [252, 255, 164]);
+        assert_eq!(map.rgb, [dark, bright, bright, dark].concat());
         image.standard_error[1].fill(f32::NAN);
         assert_eq!(error_map(&image, [0.2, 0.7, 0.1], 2), None);
     }

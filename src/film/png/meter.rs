@@ -75,13 +75,15 @@ mod tests {
         assert_eq!(stops(&grey(f32::NAN, 4), REC709, Tonemap::None), 0.0);
     }
 
-    /// A lamp over a hundredth of the picture, a quarter of it black: neither moves the exposure of the rest.
+    /// A lamp over a hundredth of the picture, a tenth of it in deep shadow and a quarter black: none of them moves the exposure of the
+    /// rest.
     #[test]
     fn neither_a_lamp_nor_the_dark_decides() {
         let mut image = grey(0.18, 100);
         let even = stops(&image, REC709, Tonemap::None);
         for plane in &mut image.rgb {
             plane[..100].fill(1e6);
+            plane[6500..7500].fill(1e-4);
             plane[7500..].fill(0.0);
         }
         assert!((stops(&image, REC709, Tonemap::None) - even).abs() < 1e-12);

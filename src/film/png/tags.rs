@@ -111,21 +111,34 @@ mod tests {
     use super::*;
 
     /// The published CRC of the sRGB chunk with intent 0, and the colorants that Apple's Display P3 profile states:
-    /// red 0.51512, 0.24120, -0.00105 (to its 16 bits).
+    /// red 0.51512, 0.24120, -0.00105 (to its 16 bits). All three make the white D50, and the curve is IEC 61966-2-1's on both sides
+    /// of its joint: numbers of 2⁻¹⁷ at the most off, of which a value has a few.
     #[test]
     fn tags_are_those_of_the_standards() {
         assert_eq!(chunk(b"sRGB", &[0])[9..], [0xae, 0xce, 0x1c, 0xe9]);
         let profile = display_p3();
         assert_eq!(u32::from_be_bytes(profile[..4].try_into().unwrap()) as usize, profile.len());
-        let entry = 128 + 4 + 4 * 12;
-        assert_eq!(&profile[entry..entry + 4], b"rXYZ");
-        let at = u32::from_be_bytes(profile[entry + 4..entry + 8].try_into().unwrap()) as usize;
-        let number = |i: usize| {
-            let bytes = profile[at + 8 + 4 * i..at + 12 + 4 * i].try_into().unwrap();
-            f64::from(i32::from_be_bytes(bytes)) / 65536.0
+        // The numbers of a tag, `skipped` bytes behind its kind.
+        let numbers = |tag: &[u8; 4], kind: &[u8; 4], skipped: usize| {
+            let entry = profile[132..].chunks(12).find(|entry| entry[..4] == tag[..]).unwrap();
+            let [at, length] = [4, 8].map(|k| u32::from_be_bytes(entry[k..k + 4].try_into().unwrap()) as usize);
+            assert_eq!(&profile[at..at + 4], kind);
+            let of = |bytes: &[u8]| f64::from(i32::from_be_bytes(bytes.try_into().unwrap())) / 65536.0;
+            profile[at + 8 + skipped..at + length].chunks(4).map(of).collect::<Vec<f64>>()
         };
-        for (i, expected) in [0.51512, 0.24120, -0.00105].into_iter().enumerate() {
-            assert!((number(i) - expected).abs() < 5e-5, "{i}: {}", number(i));
+        let [red, green, blue] = [b"rXYZ", b"gXYZ", b"bXYZ"].map(|tag| numbers(tag, b"XYZ ", 0));
+        for (i, (expected, white)) in [(0.51512, 0.9642), (0.24120, 1.0), (-0.00105, 0.8249)].into_iter().enumerate() {
+            assert!((red[i] - expected).abs() < 5e-5, "{i}: {}", red[i]);
+            let sum = red[i] + green[i] + blue[i];
+            assert!((sum - white).abs() < 5e-5, "{i}: {sum}");
+        }
+        for tag in [b"rTRC", b"gTRC", b"bTRC"] {
+            let [g, a, b, c, d] = numbers(tag, b"para", 4).try_into().unwrap();
+            for x in [0.01f64, 0.04, 0.05, 0.5, 1.0] {
+                let expected = if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) };
+                let found = if x >= d { (a * x + b).powf(g) } else { c * x };
+                assert!((found - expected).abs() < 5e-5, "{x}: {found} for {expected}");
+            }
         }
     }
 }
