@@ -158,6 +158,11 @@ mod tests {
         assert_eq!(reason(&moved), "the data windows differ: 64x64 at (0, 0) against 64x64 at (5, 0)");
         let ignore = CompareOptions { origin: Origin::Ignore, ..CompareOptions::default() };
         assert_eq!(compare(&a, &moved, &ignore).verdict, Verdict::Same);
+        let mut low = a.clone();
+        low.parts[0].window.height /= 2;
+        low.parts[0].channels.iter_mut().for_each(|(_, plane)| plane.truncate(PIXELS / 2));
+        let told = compare(&a, &low, &ignore).reason;
+        assert_eq!(told, "the data windows differ: 64x64 at (0, 0) against 64x32 at (0, 0)");
         let mut wide = a.clone();
         wide.chromaticities = Some([[0.713, 0.293], [0.165, 0.830], [0.128, 0.044], [0.32168, 0.33767]]);
         assert!(reason(&wide).starts_with("the colour primaries differ"));

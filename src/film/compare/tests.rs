@@ -414,6 +414,10 @@ fn figures_equal_their_definitions() {
     close(f.smape, 0.5 / (5.0 + 0.015));
     // Σd/√Σd² with 2048 differences of 1.
     close(f.global_z, 2048f64.sqrt());
+    // Nothing is no part of something, and all of nothing.
+    let ratio = |pair: [f32; 2], of| compare(&y(pair), &y(of), &CompareOptions::default()).channels[0].mean_ratio;
+    assert_eq!(ratio([0.0; 2], [1.0, 3.0]), 0.0);
+    assert_eq!(ratio([0.0; 2], [0.0; 2]), 1.0);
 }
 
 /// A depth of 1e10 beside bands of 470 and 0.5 nm, which have standard errors: b is (1, 3) against (1, 2), n a thousandth of
