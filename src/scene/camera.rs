@@ -343,13 +343,17 @@ mod tests {
     use super::*;
 
     fn camera(lens: Option<Lens>) -> Camera {
+        clipped(lens, 0.0)
+    }
+
+    fn clipped(lens: Option<Lens>, near: f64) -> Camera {
         let resolution = [200, 100];
         Camera::new(
             Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y).unwrap(),
             Projection::perspective(90f64.to_radians(), FovAxis::X, resolution),
             resolution,
             lens,
-            [0.0, f64::INFINITY],
+            [near, f64::INFINITY],
             DVec2::ZERO,
         )
     }
@@ -371,16 +375,21 @@ mod tests {
         assert!(lens(0.0).is_none() && lens(1e-9).is_some());
     }
 
+    /// And begin in the near plane, of which they cross as much of the lens as is left there: a quarter a metre before the focus.
     #[test]
     fn all_rays_of_a_lens_meet_in_the_plane_of_focus() {
-        let camera = camera(Some(Lens { radius: 0.5, focus_distance: 4.0 }));
+        let lens = Lens { radius: 0.5, focus_distance: 4.0 };
         let pixel = DVec2::new(30.0, 80.0);
         let focus = DVec3::new(-0.7, -0.3, -1.0) * 4.0;
-        for u in [[0.0, 0.0], [0.9, 0.1], [0.5, 0.99]] {
-            let ray = camera.ray(pixel, || DVec2::from(u));
+        for (near, u) in
+            [0.0, 3.0].into_iter().flat_map(|near| [[0.0, 0.0], [0.9, 0.1], [0.5, 0.99]].map(|u| (near, u)))
+        {
+            let ray = clipped(Some(lens), near).ray(pixel, || DVec2::from(u));
             let t = (focus - ray.origin).dot(ray.direction);
             assert!((ray.at(t) - focus).length() < 16.0 * f64::EPSILON);
-            assert!(ray.origin.length() <= 0.5 && ray.origin.z == 0.0);
+            assert!((ray.origin.z + near).abs() < 16.0 * f64::EPSILON);
+            let beside = (ray.origin - focus * (near / 4.0)).length();
+            assert!(beside <= 0.5 * (1.0 - near / 4.0) + 16.0 * f64::EPSILON, "{near}: {beside}");
         }
     }
 

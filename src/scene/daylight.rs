@@ -595,6 +595,24 @@ mod tests {
         assert_eq!(Environment::of_day(night, DMat3::IDENTITY).mean_luminance(), 0.0);
     }
 
+    /// The spectra that stand for a day make up its mean luminance, of the sky alone, of the sun alone, and of both. Texels have the light of
+    /// their middles: of the row of 128 at the horizon half may be too much or too little, π/256 of an even sky, and no more than
+    /// twice that of one that is brightest there.
+    #[test]
+    fn the_luminance_of_a_day_is_that_of_its_spectra() {
+        for (sky_scale, sun_scale) in [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+            let day = shining(&Conditions { sky_scale, sun_scale, ..day([0.2, 0.9, -1.0], 3.0, 0.3) });
+            let map = Environment::of_day(day, DMat3::from_rotation_x(1.0));
+            let sum: f64 = map.shares().iter().map(|(share, spectrum)| share * spectrum.luminance()).sum();
+            let off = if sky_scale > 0.0 { std::f64::consts::PI / 128.0 } else { 1e-6 };
+            assert!(
+                (sum / map.mean_luminance() - 1.0).abs() < off,
+                "{sky_scale} {sun_scale}: {sum} {}",
+                map.mean_luminance()
+            );
+        }
+    }
+
     /// Σ 1/p over drawn directions is the solid angle that is drawn from: half the sphere, and of a sun on the horizon the half
     /// that hangs below. What the mean of so many scatters by is told by its own terms; four times that.
     #[test]
