@@ -434,6 +434,29 @@ mod tests {
         assert!((found / expected - 1.0).abs() < off, "{filter:?}: {found} for {expected}");
     }
 
+    /// By hand: a tent of radius 2 has ¾ at ½; Mitchell and Netravali's cubic with b = c = ⅓ 8/9, 1/18 and −5/144 at 0, 1 and 1½; Catmull
+    /// and Rom's 9/16 and −1/16 at ½ and 1½; Lanczos's of radius 3 sin(3π/2)/(3π/2) · sin(π/2)/(π/2) = −4/3π² at 1½. All over what
+    /// they have in the middle, as factors do not count.
+    #[test]
+    fn filters_have_the_values_of_their_formulas() {
+        let (mitchell, cut) = (Filter::Mitchell { b: 1.0 / 3.0, c: 1.0 / 3.0 }, (-8.0f64).exp());
+        for (filter, middle, x, expected) in [
+            (Filter::Tent { radius: 2.0 }, 1.0, 0.5, 0.75),
+            (Filter::Gaussian { stddev: 0.5 }, 1.0 - cut, 1.0, (-2.0f64).exp() - cut),
+            (mitchell, 8.0 / 9.0, 1.0, 1.0 / 18.0),
+            (mitchell, 8.0 / 9.0, 1.5, -5.0 / 144.0),
+            (Filter::CatmullRom, 1.0, 0.5, 9.0 / 16.0),
+            (Filter::CatmullRom, 1.0, 1.5, -1.0 / 16.0),
+            (Filter::Lanczos { radius: 3.0 }, 1.0, 1.5, -4.0 / (3.0 * std::f64::consts::PI.powi(2))),
+            (Filter::Lanczos { radius: 3.0 }, 1.0, 3.1, 0.0),
+        ] {
+            for x in [x, -x] {
+                let found = filter.eval(x) / filter.eval(0.0);
+                assert!((found - expected / middle).abs() < 1e-14, "{filter:?} at {x}: {found} for {expected}");
+            }
+        }
+    }
+
     /// Closed forms of (∫f)²/∫f², squared for the plane: 1; a tent of radius r 3r/2; a Gaussian 2√π σ, cut at 4σ.
     #[test]
     fn spans_are_those_of_the_squares() {
@@ -601,6 +624,16 @@ mod tests {
                 let expected = integral(-1.25, high.x) / integral(low.x, high.x);
                 assert!((lit / weights - expected).abs() < 1e-4, "{filter:?} at {i}: {} for {expected}", lit / weights);
             }
+        }
+        // Near a corner, too: weights are a product of one of each axis, so that their mean is that of two lines over what both have.
+        for filter in FILTERS {
+            let sampler = FilterSampler::new(filter).unwrap().within(low, high).unwrap();
+            let weight = |x: f64, y: f64| f64::from(sampler.sample_at(DVec2::new(-2.5, 2.5), DVec2::new(x, y)).weight);
+            let n = 1 << 16;
+            let mean = |of: &dyn Fn(f64) -> f64| (0..n).map(|k| of((f64::from(k) + 0.5) / f64::from(n))).sum::<f64>();
+            let [along, up] = [mean(&|x| weight(x, 0.5)), mean(&|y| weight(0.5, y))].map(|sum| sum / f64::from(n));
+            let all = along * up / weight(0.5, 0.5);
+            assert!((all - 1.0).abs() < 8e-4, "{filter:?}: {all}");
         }
         // Where no edge is near nothing changes, and filters without negative lobes count one.
         let whole = FilterSampler::new(Filter::Mitchell { b: 1.0 / 3.0, c: 1.0 / 3.0 }).unwrap();

@@ -69,19 +69,20 @@ mod tests {
 
     #[test]
     fn counts_add_up_in_any_order() {
-        let (window, right) = (Window::full(2, 1), Window { x: 1, y: 0, width: 1, height: 1 });
+        // The lower two of three rows, on the right.
+        let (window, right) = (Window::full(2, 3), Window { x: 1, y: 1, width: 1, height: 2 });
         let mut whole = Mattes::default();
         let mut part = Mattes::default();
-        for (pixel, number) in [(0, 7), (1, 9), (1, 3), (1, 9)] {
-            whole.add(pixel, 2, number, 1);
-            if pixel == 1 {
-                part.add(0, 1, number, 1);
+        for (pixel, number) in [(0, 7), (3, 9), (3, 3), (5, 3), (3, 9)] {
+            whole.add(pixel, 6, number, 1);
+            if pixel > 0 {
+                part.add((pixel - 3) / 2, 2, number, 1);
             }
         }
-        assert_eq!((whole.of(0), whole.of(1)), (&[(7, 1)][..], &[(3, 1), (9, 2)][..]));
+        assert_eq!([0, 3, 5].map(|i| whole.of(i)), [&[(7, 1)][..], &[(3, 1), (9, 2)], &[(3, 1)]]);
         let mut merged = Mattes::default();
         merged.merge(window, &part, right);
-        merged.add(0, 2, 7, 1);
+        merged.add(0, 6, 7, 1);
         assert_eq!((merged.most(), &merged), (2, &whole));
     }
 }

@@ -349,6 +349,32 @@ fn xyz_scores(pairs: &[Pair], i: usize) -> Option<[f64; 3]> {
 mod tests {
     use super::*;
 
+    /// A row of seven pixels: 0, 1 and 4 about the first, 1, 4, 16 and 25 about the one in the middle, which is not known. Of seven such
+    /// rows one under the other as much stands about the middle of each of five.
+    #[test]
+    fn errors_about_a_pixel_are_the_mean_of_the_squares_that_are_known() {
+        let row = [0.0, 1.0, 2.0, f32::NAN, 4.0, 5.0, 6.0];
+        for rows in [1, 7] {
+            let found = variances_about(&row.repeat(rows), 7);
+            let middle = &found[rows / 2 * 7..][..7];
+            assert_eq!([middle[0], middle[3], middle[6]], [5.0 / 3.0, 46.0 / 4.0, 77.0 / 3.0]);
+        }
+        assert_eq!(variances_about(&[f32::INFINITY], 1), [0.0]);
+    }
+
+    /// Half floats from 1 to 2 are 2⁻¹⁰ apart: each of two pictures is off by an even error, of a twelfth of the square of that, besides
+    /// what its standard errors say. Where neither was rounded nothing is added.
+    #[test]
+    fn rounding_to_half_floats_is_noise_of_its_own() {
+        let known = [Known { shared: 1.0, dof: 3.0, samples: None }; 2];
+        let errors = [Some(&[0.25f32; 2][..]); 2];
+        for (values, expected) in [([1.0f32, 1.5], 2.0 * 0.5f64.powi(20) / 12.0), ([1.1, 1.3], 0.0)] {
+            let pair = Pair::new("Y".into(), [Samples::Float(&values); 2], errors, known, 2, None);
+            let found = pair.variance(1).unwrap();
+            assert_eq!((found.estimated, found.known), ([0.0625; 2], expected));
+        }
+    }
+
     /// Halves near 1 are 2⁻¹⁰ apart, near 65504 they are 32 apart, and subnormals 2⁻²⁴.
     #[test]
     fn the_step_of_half_floats_is_the_distance_to_the_next() {

@@ -121,6 +121,22 @@ mod tests {
         }
     }
 
+    /// Orange of luminance y = 1.57 would have a red of 4/(1 + y) = 1.55: it is drawn towards the grey y/(1 + y) until its red is 1, which
+    /// keeps the luminance and the ratio of what the channels differ by. Green of as much is within the gamut and stays.
+    #[test]
+    fn colours_that_cannot_be_shown_are_drawn_to_the_grey_of_their_luminance() {
+        let tone = Tone::new(Tonemap::Reinhard, Space::Srgb);
+        let y_of = |rgb: [f64; 3]| (0..3).map(|c| tone.luminance[c] * rgb[c]).sum::<f64>();
+        let orange = [4.0, 1.0, 0.1];
+        let [r, g, b] = tone.apply(orange);
+        let y = y_of(orange);
+        assert!((r - 1.0).abs() < 1e-12 && (y_of([r, g, b]) - y / (1.0 + y)).abs() < 1e-6, "{r} {g} {b}");
+        assert!(((r - g) / (g - b) - 3.0 / 0.9).abs() < 1e-9, "{r} {g} {b}");
+        let green = [0.5, 1.9, 0.2];
+        let y = y_of(green);
+        assert_eq!(tone.apply(green), green.map(|v| v / (1.0 + y)));
+    }
+
     /// Reinhard: 1 → 1/2. Hill's ACES fit of 1: (1.0245786 − 0.000090537)/(0.983729 + 0.432951 + 0.238081) = 0.61911,
     /// times its row sum 1.0000 of the output matrix. AgX pins 0.18 to 1/2 encoded with power 2.2, black at −10 stops
     /// and white at +6.5.
