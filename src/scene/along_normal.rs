@@ -213,7 +213,7 @@ mod tests {
         assert!((0..6).all(|i| (0..i).all(|j| sides[i].dot(sides[j]) < 0.5)), "{sides:?}");
     }
 
-    /// Two triangles of areas 1 and 3: the mean over u of what one of them gives is the exitance.
+    /// Two triangles of areas 1 and 3: the mean over u of what one of them gives is the exitance, at the origin and far from it.
     #[test]
     fn triangles_of_a_mesh_give_the_exitance_in_the_mean() {
         let source = mesh::MeshSource {
@@ -221,17 +221,20 @@ mod tests {
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             ..mesh::MeshSource::default()
         };
-        let made =
-            mesh::Mesh::new(&source, &DAffine3::IDENTITY, mesh::NormalMode::Face, mesh::Winding::Object).unwrap();
-        let (tree, areas) = (Some(mesh::MeshTree::build(&made)), mesh::AreaTable::new(&made));
-        let geometry = Geometry::Mesh(Box::new(TriangleMesh { mesh: made, tree, areas }));
-        for from in [DVec3::new(0.2, 0.4, 1.0), DVec3::new(-0.2, 0.4, 2.0)] {
-            let at = |i: u32| light(&geometry, from, DVec2::new((f64::from(i) + 0.5) / 64.0, 0.5));
-            let mean = (0..64).filter_map(at).map(|a| f64::from(a.radiance.to_array()[0])).sum::<f64>() / 64.0;
-            assert!((mean - 1.0).abs() < 1e-6, "{mean}");
+        for place in [DVec3::ZERO, DVec3::new(1024.0, 2048.0, -512.0)] {
+            let moved = DAffine3::from_translation(place);
+            let made = mesh::Mesh::new(&source, &moved, mesh::NormalMode::Face, mesh::Winding::Object).unwrap();
+            let (tree, areas) = (Some(mesh::MeshTree::build(&made)), mesh::AreaTable::new(&made));
+            let geometry = Geometry::Mesh(Box::new(TriangleMesh { mesh: made, tree, areas }));
+            for from in [DVec3::new(0.2, 0.4, 1.0), DVec3::new(-0.2, 0.4, 2.0)] {
+                let at = |i: u32| light(&geometry, place + from, DVec2::new((f64::from(i) + 0.5) / 64.0, 0.5));
+                let found: Vec<Arriving> = (0..64).filter_map(at).collect();
+                assert!(found.iter().all(|a| a.wi == -DVec3::Z && a.distance == from.z), "{place} {from}: {found:?}");
+                let mean = found.iter().map(|a| f64::from(a.radiance.to_array()[0])).sum::<f64>() / 64.0;
+                assert!((mean - 1.0).abs() < 1e-6, "{place} {from}: {mean}");
+            }
+            let beside = place + DVec3::new(0.9, 1.9, 1.0);
+            assert!((0..64).all(|i| light(&geometry, beside, DVec2::splat(f64::from(i) / 64.0)).is_none()));
         }
-        assert!(
-            (0..64).all(|i| light(&geometry, DVec3::new(0.9, 1.9, 1.0), DVec2::splat(f64::from(i) / 64.0)).is_none())
-        );
     }
 }

@@ -423,6 +423,15 @@ impl Texture {
 mod tests {
     use super::*;
 
+    /// Four texels a, b, c, d, over three copies to either side: the last one held, abcd abcd, and abcd dcba.
+    #[test]
+    fn texels_beyond_the_picture_are_those_of_its_copies() {
+        let at = |wrap| [-9, -8, -5, -4, -1, 0, 3, 4, 7, 8, 11, 12].map(|i| wrapped(f64::from(i), 4, wrap));
+        assert_eq!(at(Wrap::Clamp), [0, 0, 0, 0, 0, 0, 3, 3, 3, 3, 3, 3]);
+        assert_eq!(at(Wrap::Repeat), [3, 0, 3, 0, 3, 0, 3, 0, 3, 0, 3, 0]);
+        assert_eq!(at(Wrap::Mirror), [0, 0, 3, 3, 0, 0, 3, 3, 0, 0, 3, 3]);
+    }
+
     /// Grey texels (coefficients c₂ alone) of values 0.2 and 0.8 in a 2 × 2 board.
     fn board(wrap: Wrap, interpolation: Interpolation) -> ImageTexture {
         let grey = |v: f64| upsample::coefficients([v as f32; 3]);

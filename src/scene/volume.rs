@@ -412,7 +412,7 @@ mod tests {
     #[test]
     fn colours_are_mixed_as_sigmoids_and_scales() {
         let colours = [[0.2f32, 0.5, 0.1], [4.0, 1.0, 2.0]];
-        let grid = grid([2, 1, 1], Voxels::upsampled(&colours, Carried::Spectra));
+        let mut grid = grid([2, 1, 1], Voxels::upsampled(&colours, Carried::Spectra));
         let nm = Lanes::new([400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 700.0, 750.0]);
         let both = colours.map(|c| upsample::unbounded(c.map(f64::from)).unwrap().eval(nm).to_array());
         let found = [0.25, 0.75].map(|x| grid.eval(DVec3::new(x, 0.5, 0.5), nm).to_array());
@@ -425,5 +425,7 @@ mod tests {
             let expected = 0.5 * (found[0][lane] / 1.0 + found[1][lane] / 8.0) * 4.5;
             assert!((middle[lane] / expected - 1.0).abs() < 1e-5, "{lane}: {} {expected}", middle[lane]);
         }
+        grid.between = Between::Nearest;
+        assert_eq!([0.1, 0.9].map(|x| grid.eval(DVec3::new(x, 0.5, 0.5), nm).to_array()), found);
     }
 }

@@ -241,6 +241,32 @@ mod tests {
         assert!(message.contains("attribute vertex_heat of number 0 is NaN"), "{message}");
     }
 
+    /// A colour in whole numbers is a share of the greatest that their type holds, to the rounding of f32.
+    #[test]
+    fn ply_colours_are_shares_of_their_type() {
+        for (kind, most) in [
+            ("char", "127"),
+            ("uchar", "255"),
+            ("short", "32767"),
+            ("ushort", "65535"),
+            ("int", "2147483647"),
+            ("uint", "4294967295"),
+            ("long", "9223372036854775807"),
+            ("ulong", "18446744073709551615"),
+            ("float", "1"),
+            ("double", "1"),
+        ] {
+            let text = format!(
+                "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                 element face 1\nproperty list uchar int vertex_index\nproperty {kind} r\nproperty {kind} g\n\
+                 property {kind} b\nend_header\n0 0 0\n1 0 0\n1 1 0\n3 0 1 2 {most} 0 {most}\n"
+            );
+            let colours = read("a.ply", text.as_bytes()).unwrap().attributes.remove(0).values;
+            assert!(colours.len() == 3 && colours[1] == 0.0, "{kind}: {colours:?}");
+            assert!([colours[0], colours[2]].iter().all(|c| (c - 1.0).abs() <= f32::EPSILON), "{kind}: {colours:?}");
+        }
+    }
+
     /// Two triangles of a quad with coordinates at their corners, which agree at vertex 0 alone: vertex 2 becomes two, with all that
     /// it has. A face may have none.
     #[test]

@@ -92,4 +92,18 @@ mod tests {
         let v = DVec3::new(1.0, e, 1.0);
         assert_eq!(cone_form(v, v), e * e);
     }
+
+    /// Of whole numbers of 50 bits each of the three squares is rounded. The form is m² + n² − k², to its own rounding and to that of what
+    /// twice the precision leaves: 9 · 2⁻¹⁰⁶ of 2¹⁰², below one.
+    #[test]
+    fn cone_form_keeps_what_each_of_its_products_loses() {
+        let (m, n) = (1_034_567_890_123_457i128, 987_654_321_987_651i128);
+        let k = ((m * m + n * n) as f64).sqrt() as i128;
+        for (m, n, k) in [(m, n, k), (m, n, k + 1), (n, m, k - 1), (m - 2, n + 1, k)] {
+            let v = DVec3::new(m as f64, n as f64, k as f64);
+            let expected = (m * m + n * n - k * k) as f64;
+            let off = cone_form(v, v) - expected;
+            assert!(off.abs() <= 1.0 + f64::EPSILON * expected.abs(), "{m} {n} {k}: {off} of {expected}");
+        }
+    }
 }

@@ -446,6 +446,24 @@ mod tests {
         }
     }
 
+    /// What is met on an edge is moved inward along the rectangle, as far as the margin of its coordinates says: to 16 ε, some eight roundings
+    /// of numbers up to 4.
+    #[test]
+    fn what_is_met_on_an_edge_lies_within_it() {
+        let (u, v) = (DVec3::new(2.0, 0.0, 0.0), DVec3::new(1.0, 3.0, 0.0));
+        let rectangle = Rectangle::new(DVec3::Z, u, v).unwrap();
+        let point = |at: DVec2| DVec3::Z + u * at.x + v * at.y;
+        let (low, high) = (rectangle.0.margin, 1.0 - rectangle.0.margin);
+        assert!(low.min_element() > 100.0 * f64::EPSILON);
+        for [x, y] in [[0.0, 0.5], [1.0, 0.5], [0.5, 0.0], [0.5, 1.0], [0.0, 1.0], [0.3, 0.4]] {
+            let at = DVec2::new(x, y);
+            let within = at.clamp(low, high);
+            let s = rectangle.surface(point(at));
+            assert!((s.uv - within).length() < 16.0 * f64::EPSILON, "{at}: {}", s.uv - within);
+            assert!((s.point - point(within)).length() < 16.0 * f64::EPSILON, "{at}: {}", s.point - point(within));
+        }
+    }
+
     /// Coordinates are affine: centre + 0.3 u + 0.4 v has radius 0.5 whatever u and v are.
     #[test]
     fn texture_coordinates_of_skewed_shapes_are_affine() {
