@@ -337,6 +337,10 @@ mod tests {
             };
             let expected = of_slopes / (0.4 * 0.1 * m.z.powi(4));
             assert!((facets.density(m) / expected - 1.0).abs() < 1e-12, "{distribution:?}");
+            // Along the normal nothing does.
+            assert_eq!(facets.masking(DVec3::Z, DVec3::Z), 1.0);
+            let along = lanes([DVec3::Z; 4]);
+            assert_eq!(facets.masking_of_four(&along, &along).to_array(), [1.0; 4]);
             // Seen along x only the width along x masks, along y only that along y.
             for (wide, v) in [(0.4, DVec3::new(0.8, 0.0, 0.6)), (0.1, DVec3::new(0.0, 0.8, 0.6))] {
                 let expected = Microfacets::isotropic(distribution, wide).masking(v, DVec3::Z);
