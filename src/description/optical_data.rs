@@ -392,10 +392,15 @@ mod tests {
             with("0.404 0.7065").unwrap().note.unwrap(),
             "the formula is stated for 404 to 706 nm and continued to 360 to 830 nm"
         );
-        assert_eq!(
-            with("0.5 2.5").unwrap_err(),
-            "a.yml: line 8, column 23: DATA[0].wavelength_range: expected a range that covers 405 to 700 nm, found 500 to 2500 nm"
-        );
+        for (range, found) in [("0.5 2.5", "500 to 2500"), ("0.3 0.6", "300 to 600")] {
+            assert_eq!(
+                with(range).unwrap_err(),
+                format!(
+                    "a.yml: line 8, column 23: DATA[0].wavelength_range: expected a range that covers 405 to 700 nm, \
+                     found {found} nm"
+                )
+            );
+        }
     }
 
     #[test]

@@ -522,6 +522,10 @@ mod tests {
              dir/s.yaml:2:33: render.stop.time: expected a time greater than 0, as 60, 90s, 10m or 2h, found \"5 days\"\n\
              dir/s.yaml:2:50: render.stop.samples: expected a whole number from 1 to 134217728, found 0"
         );
+        assert_eq!(
+            faults("render: {stop: {error: 1}}"),
+            "dir/s.yaml:2:24: render.stop.error: expected a number above 0 and below 1 (1 % is 0.01), found 1"
+        );
         let render = |text: &str| scene(&format!("render: {text}")).render;
         let stop = render("{stop: {time: 2m}}");
         assert_eq!(stop.stop.time.clone().unwrap().duration(), Some(Duration::from_secs(120)));

@@ -47,6 +47,22 @@ fn the_last_row_of_a_matrix_is_passed_over() {
     assert!(told(&projective) && !told(&affine));
 }
 
+/// Mitsuba's documentation: `d65` has a `scale` of 1, `hair` an `eumelanin` of 1.3 and a `pheomelanin` of 0.2.
+#[test]
+fn what_is_not_written_is_what_mitsuba_takes() {
+    let float = |name: &str, value: f64| format!("<float name=\"{name}\" value=\"{value}\"/>");
+    let lamp = |scale: &str| {
+        let light = format!("<spectrum type=\"d65\" name=\"radiance\">{scale}</spectrum>");
+        good(&format!("<emitter type=\"constant\">{light}</emitter>")).lights
+    };
+    assert_eq!(lamp(""), lamp(&float("scale", 1.0)));
+    assert_ne!(lamp(""), lamp(&float("scale", 2.0)));
+    let hair = |pigments: &str| good(&format!("<bsdf type=\"hair\" id=\"h\">{pigments}</bsdf>")).materials;
+    let written = |eumelanin, pheomelanin| hair(&(float("eumelanin", eumelanin) + &float("pheomelanin", pheomelanin)));
+    assert_eq!(hair(""), written(1.3, 0.2));
+    assert!(hair("") != written(1.3, 0.4) && hair("") != written(2.6, 0.2));
+}
+
 #[test]
 fn parameters_are_filled_in_anywhere_in_a_value() {
     let text = "<default name=\"r\" value=\"2\"/><default name=\"radius\" value=\"7\"/>\
