@@ -266,6 +266,7 @@ fn curves_are_not_met_where_they_are_left() {
                 p[0] += offset;
             }
             let all = curves(&control, basis);
+            let mut met = 0;
             for _ in 0..5000 {
                 let k = 4 + (random.uniform() * 30.0) as usize;
                 let target = DVec3::new(control[k][0], control[k][1], control[k][2]) + random.direction() * 0.1;
@@ -290,7 +291,9 @@ fn curves_are_not_met_where_they_are_left() {
                     // Out through the far side and in again elsewhere, or into a piece of another segment.
                     assert!(next.segment != hit.segment || next.t > 1e-3, "{next:?} {back:?}");
                 }
+                met += 1;
             }
+            assert!(met > 1000, "{basis:?} {offset}: {met}");
         }
     }
 }

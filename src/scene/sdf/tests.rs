@@ -254,6 +254,7 @@ fn stretched_and_sheared_grids_are_the_same_surface() {
     let mut random = Random::new(9);
     let grid = grid(17, |p| (p - 0.5).length() - 0.3);
     let unit = placed(&grid, &DAffine3::IDENTITY, SdfNormals::Smooth).unwrap();
+    let (mut met, mut apart) = (0, 0);
     for _ in 0..100 {
         let m = DMat3::from_cols(random.direction(), random.direction() * 3.0, random.direction() * 0.5);
         if m.determinant().abs() < 0.1 {
@@ -265,6 +266,7 @@ fn stretched_and_sheared_grids_are_the_same_surface() {
             let ray = through(&mut random);
             let image = Ray::new(map.transform_point3(ray.origin), m * ray.direction);
             let (a, b) = (unit.intersect(&ray, FAR, None), moved.intersect(&image, FAR, None));
+            apart += u32::from(a.is_some() != b.is_some());
             let (Some(a), Some(b)) = (a, b) else { continue };
             let (p, q) = (unit.surface(ray.at(a.t), a.cell), moved.surface(image.at(b.t), b.cell));
             if p.normal.dot(ray.direction).abs() < 0.1 || a.cell != b.cell {
@@ -282,8 +284,10 @@ fn stretched_and_sheared_grids_are_the_same_surface() {
             assert!(p.shading_normal.dot((p.point - 0.5).normalize()) > 0.995, "{}", p.shading_normal);
             let image = (m.inverse().transpose() * p.shading_normal).normalize();
             assert!((q.shading_normal - image).abs().max_element() < 1e-9);
+            met += 1;
         }
     }
+    assert!(met > 1000 && apart == 0, "{met} {apart}");
 }
 
 #[test]
