@@ -330,6 +330,7 @@ impl<'a> Compiler<'a> {
             bands,
             center,
             radius,
+            lit_within: f64::INFINITY,
             files: std::mem::take(&mut self.files),
             notes: self.told_notes(),
             watch: None,
@@ -342,7 +343,11 @@ impl<'a> Compiler<'a> {
         self.note_contacts(&mut scene, &contacts, passed_over);
         self.note_overlaps(&mut scene);
         self.note_meshes(&mut scene);
-        self.note_lost_light(&mut scene, &light_names);
+        let lost = self.loses_distant_light(&scene);
+        if lost {
+            self.note_lost_light(&mut scene, &light_names);
+        }
+        scene.lit_within = scene.lights.iter().map(|light| range(&scene, light, lost)).fold(scene.radius, f64::max);
         scene.camera_inside = scene.inside(scene.bodies_around(&eye), camera_medium);
         self.note_strangers(&mut scene);
         Ok(scene)
@@ -475,6 +480,20 @@ fn extent(objects: &[Object], boxes: &[Aabb], camera: &Camera) -> (DVec3, f64) {
     match finite.reduce(|a, b| a.union(&b)) {
         Some(b) => (b.min * 0.5 + b.max * 0.5, 0.5 * (b.max - b.min).length()),
         None => (camera.world_from_camera.translation, 1.0),
+    }
+}
+
+/// How far from the middle of `scene` what sends out `light` is at the most, where light from infinity may be `lost`.
+fn range(scene: &Scene, light: &Light, lost: bool) -> f64 {
+    match light {
+        Light::Area { object, .. } | Light::AlongNormal { object, .. } => {
+            let ends = scene.objects[*object as usize].bounds().is_finite();
+            if ends { scene.radius } else { f64::INFINITY }
+        }
+        Light::Point { position, .. } | Light::Spot { position, .. } => position.distance(scene.center),
+        Light::Projector(projector) => projector.position().distance(scene.center),
+        Light::Directional { .. } | Light::Constant { .. } | Light::Environment(_) if lost => 0.0,
+        Light::Directional { .. } | Light::Constant { .. } | Light::Environment(_) => f64::INFINITY,
     }
 }
 

@@ -136,6 +136,8 @@ pub struct Scene {
     pub center: DVec3,
     /// Its radius, metres.
     pub radius: f64,
+    /// How far from there anything is that sends out light, metres; infinite where light comes from anywhere.
+    pub lit_within: f64,
     /// True where something that stands in the scene has no end.
     pub has_planes: bool,
     /// True where light may go straight through some object: the boundary of a medium, a pane, a body within another.

@@ -228,6 +228,8 @@ struct Beam {
     medium: Option<Option<u32>>,
     /// The bodies with a priority that it is in.
     bodies: Bodies,
+    /// As that of a path from the camera, with where it is seen from in place of what shines.
+    near: f64,
     /// Vertices so far.
     vertex: u32,
     /// What it went straight through so far, if that counts.
@@ -248,6 +250,7 @@ impl Beam {
             chosen: false,
             medium,
             bodies,
+            near: 0.0,
             vertex: 0,
             crossings: 0,
             unfound: false,
@@ -444,7 +447,10 @@ impl<'a> Walk<'a, '_> {
         let went = medium.phase.sample(point, -beam.ray.direction, numbers.scatter);
         beam.ray = Ray::new(point, went);
         beam.vertex += 1;
-        self.survives(beam, false, numbers.roulette)
+        let Scene { center, radius, ref camera, .. } = *self.paths.scene;
+        let seen_within = radius.max(camera.eye().distance(center));
+        let worth = path::worth(&mut beam.near, seen_within, point.distance(center));
+        self.survives(beam, false, worth, numbers.roulette)
     }
 
     /// Notes that a beam is thrown in a single direction.
@@ -504,14 +510,14 @@ impl<'a> Walk<'a, '_> {
         }
         beam.ray = scene.leave(at.surface, at.hit, went);
         beam.vertex += 1;
-        self.survives(beam, sample.chosen == Chosen::Discrete, roulette)
+        self.survives(beam, sample.chosen == Chosen::Discrete, 1.0, roulette)
     }
 
-    /// Russian roulette on the largest lane; false where the beam ends.
-    fn survives(&self, beam: &mut Beam, discrete: bool, u: f64) -> bool {
+    /// Russian roulette on the largest lane, where what goes on has `worth`; false where the beam ends.
+    fn survives(&self, beam: &mut Beam, discrete: bool, worth: f64, u: f64) -> bool {
         let carried = largest(beam.power) * f64::from(LANES as f32 / beam.rho.reduce_add());
-        let Some(worth) = self.survival(carried, beam.vertex, discrete, u) else { return false };
-        beam.power *= worth;
+        let Some(times) = self.survival(carried * worth, beam.vertex, discrete, u) else { return false };
+        beam.power *= times;
         true
     }
 

@@ -62,6 +62,20 @@ pub(super) fn survival(carried: f64, vertices: u32, discrete: bool) -> f64 {
     (SPARED * carried).min(longest)
 }
 
+/// What going on is worth for a path that a medium scatters at `distance` from the middle of the scene, over where one first did; light
+/// comes from, or is seen from, `within` a distance. `near` is the path's own, zero before.
+///
+/// In an endless medium that takes nothing away, a path comes back from `distance` with the chance `near` / `distance`, and its way
+/// back goes as the square of `distance`. The chance to go on is the root of the quotient of the two: most efficient is one that
+/// goes as the root of the expected square over the expected cost (Arvo and Kirk 1990).
+pub(super) fn worth(near: &mut f64, within: f64, distance: f64) -> f64 {
+    if *near == 0.0 {
+        *near = distance.max(within);
+    }
+    let share = (*near / distance).min(1.0);
+    share * share.sqrt()
+}
+
 /// Light that arrives along a camera ray, entered in a `ledger` if there is one.
 #[must_use]
 #[expect(clippy::too_many_arguments, reason = "all that a path is made of")]
@@ -530,7 +544,7 @@ impl Tracer<'_> {
         }
         path.ray = self.scene.leave(surface, hit, wi);
         path.vertices += 1;
-        self.survives::<CHROMATIC>(path, sample.chosen == Chosen::Discrete, || at.choice.draw(2))
+        self.survives::<CHROMATIC>(path, sample.chosen == Chosen::Discrete, 1.0, || at.choice.draw(2))
     }
 
     /// Light of the photons around a vertex behind mirrors and glass, of lamps of one group or all. A lane could lead both parts of the joined path
@@ -656,12 +670,19 @@ impl Tracer<'_> {
         path.seen |= path.vertices == 0;
         path.specular = false;
         path.vertices += 1;
-        self.survives::<CHROMATIC>(path, false, || choice[2])
+        let worth = worth(&mut path.near, self.scene.lit_within, point.distance(self.scene.center));
+        self.survives::<CHROMATIC>(path, false, worth, || choice[2])
     }
 
-    /// Russian roulette on the largest lane, after a vertex that mirrors or refracts or one that does not; false where the
-    /// path ends.
-    fn survives<const CHROMATIC: bool>(&self, path: &mut Path, discrete: bool, u: impl FnOnce() -> f64) -> bool {
+    /// Russian roulette on the largest lane, after a vertex that mirrors or refracts or one that does not, where `worth` of the light
+    /// comes that came before; false where the path ends.
+    fn survives<const CHROMATIC: bool>(
+        &self,
+        path: &mut Path,
+        discrete: bool,
+        worth: f64,
+        u: impl FnOnce() -> f64,
+    ) -> bool {
         if path.beta.simd_gt(Lanes::ZERO).none() {
             return false;
         }
@@ -669,7 +690,7 @@ impl Tracer<'_> {
             return true;
         }
         let beta = path.beta.to_array().into_iter().fold(0.0f32, f32::max);
-        let carried = f64::from(beta) * LANES as f64 / path.rho_sum::<CHROMATIC>() * path.eta2;
+        let carried = f64::from(beta) * LANES as f64 / path.rho_sum::<CHROMATIC>() * path.eta2 * worth;
         let q = survival(carried, path.vertices, discrete);
         if u() >= q {
             return false;

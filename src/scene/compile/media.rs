@@ -162,8 +162,8 @@ impl Compiler<'_> {
         }
     }
 
-    /// Notes which lights, of these names, are lost in an endless medium. `whitted` knows no media.
-    pub(super) fn note_lost_light(&self, scene: &mut Scene, names: &[String]) {
+    /// Whether light from infinity is lost in an endless medium. `whitted` knows no media.
+    pub(super) fn loses_distant_light(&self, scene: &Scene) -> bool {
         let followed =
             matches!(self.description.integrator, written::Integrator::Path(_) | written::Integrator::LightTracer(_));
         let around = scene.camera_medium.filter(|medium| scene.media[*medium as usize].is_opaque_at_infinity());
@@ -174,15 +174,17 @@ impl Compiler<'_> {
             let alike = far == around && (near == around || object.bounds().is_finite());
             alike || object.keeps_medium || matches!(object.geometry, Geometry::Instance(_))
         };
-        let lost = || {
-            let named = scene.lights.iter().zip(names).filter(|(light, _)| light.is_distant());
-            named.map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(", ")
-        };
-        if followed && around.is_some() && scene.objects.iter().all(holds) && !lost().is_empty() {
+        followed && around.is_some() && scene.objects.iter().all(holds)
+    }
+
+    /// Notes which lights, of these names, come from infinity and are lost.
+    pub(super) fn note_lost_light(&self, scene: &mut Scene, names: &[String]) {
+        let named = scene.lights.iter().zip(names).filter(|(light, _)| light.is_distant());
+        let lost = named.map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(", ");
+        if !lost.is_empty() {
             let note = format!(
                 "has no end: light from infinity comes through it only at wavelengths at which it neither absorbs nor \
-                 scatters: {}",
-                lost()
+                 scatters: {lost}"
             );
             scene.notes.push(self.description.fault("medium", &note));
         }

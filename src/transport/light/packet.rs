@@ -440,7 +440,7 @@ impl Walk<'_, '_> {
             beam.nm = Lanes::splat(nm.to_array()[chosen]);
             beam.alone = Some(chosen);
         }
-        if self.survives(&mut beam, false, numbers.roulette) {
+        if self.survives(&mut beam, false, 1.0, numbers.roulette) {
             self.ahead = Some(hit);
             self.follow(beam);
         }

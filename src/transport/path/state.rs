@@ -30,6 +30,9 @@ pub(super) struct Path {
     pub(super) ray: Ray,
     pub(super) beta: Lanes,
     pub(super) rho: Lanes,
+    /// How far from the middle of the scene what shines is at the most, or where a medium first scattered the path, if that is farther;
+    /// zero before.
+    pub(super) near: f64,
     /// Product of η² over crossings: β shrinks by it in glass and regains it, and roulette must not
     /// take that for a loss.
     pub(super) eta2: f64,
@@ -168,6 +171,7 @@ impl Path {
         ray: Ray { origin: DVec3::ZERO, direction: DVec3::Z, departure: None },
         beta: Lanes::ONE,
         rho: Lanes::ONE,
+        near: 0.0,
         eta2: 1.0,
         inside: Inside::NOTHING,
         previous: None,
