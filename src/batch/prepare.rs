@@ -547,7 +547,7 @@ mod tests {
         let description = entry.scene(&[]).unwrap();
         let alter = |scene: &mut Scene| scene.wavelengths = scene.wavelengths.with_count(1);
         let (shelf, go_on) = (&mut Shelf::default(), AtomicBool::new(false));
-        let prepared = prepare_scene(&entry, description, &overrides, shelf, &go_on, alter).unwrap();
+        let prepared = prepare_scene(&entry, description, &overrides, shelf, &go_on, &(), alter).unwrap();
         assert_eq!(prepared.moments.len(), 16);
         for scene in prepared.moments.iter().chain([&prepared.scene]) {
             let nm = scene.wavelengths.sample(0.3).nm.to_array();

@@ -378,15 +378,16 @@ mod tests {
     /// Each formula with a resonance at λ² = 0.3 µm², and the same of no strength.
     #[test]
     fn each_formula_is_refused_for_its_resonance_in_the_band() {
-        let formulas: [(u32, &dyn Fn(f64) -> Vec<f64>); 8] = [
-            (1, &|strength| vec![0.1, strength, 0.3f64.sqrt()]),
-            (2, &|strength| vec![0.1, strength, 0.3]),
-            (2, &|strength| vec![0.0, strength, 0.3]),
-            (4, &|strength| vec![2.0, strength, 2.0, 0.3, 1.0, 0.0, 0.0, 0.0, 1.0]),
-            (4, &|strength| vec![2.0, 0.0, 0.0, 0.0, 1.0, strength, 2.0, 0.3, 1.0]),
-            (6, &|strength| vec![0.1, strength, 1.0 / 0.3]),
-            (8, &|strength| vec![0.1, strength, 0.3, 0.0]),
-            (9, &|strength| vec![2.0, strength, 0.3, 0.0, 0.0, 1.0]),
+        type OfStrength = fn(f64) -> Vec<f64>;
+        let formulas: [(u32, OfStrength); 8] = [
+            (1, |strength| vec![0.1, strength, 0.3f64.sqrt()]),
+            (2, |strength| vec![0.1, strength, 0.3]),
+            (2, |strength| vec![0.0, strength, 0.3]),
+            (4, |strength| vec![2.0, strength, 2.0, 0.3, 1.0, 0.0, 0.0, 0.0, 1.0]),
+            (4, |strength| vec![2.0, 0.0, 0.0, 0.0, 1.0, strength, 2.0, 0.3, 1.0]),
+            (6, |strength| vec![0.1, strength, 1.0 / 0.3]),
+            (8, |strength| vec![0.1, strength, 0.3, 0.0]),
+            (9, |strength| vec![2.0, strength, 0.3, 0.0, 0.0, 1.0]),
         ];
         for (number, of) in formulas {
             let told = |strength| RefractiveIndex::formula(number, &of(strength)).unwrap().check_band();

@@ -94,12 +94,15 @@ pub enum MeshNormals {
     Inward,
 }
 
+/// What gives a mesh as a PLY where Mitsuba does not read the same from its file; of attributes those of these names matter.
+pub type PlyAnew<'a> = dyn Fn(&Path, u32, &BTreeSet<&str>) -> Option<Vec<u8>> + 'a;
+
 /// What is asked of mesh `index` of a file.
 pub struct Meshes<'a> {
     /// Where its normals point.
     pub normals: &'a dyn Fn(&Path, u32) -> MeshNormals,
-    /// A PLY of it where Mitsuba does not read the same from the file; of attributes those of these names matter.
-    pub anew: &'a dyn Fn(&Path, u32, &BTreeSet<&str>) -> Option<Vec<u8>>,
+    /// It anew, if need be.
+    pub anew: &'a PlyAnew<'a>,
     /// Whether it has no texture coordinates.
     pub bare: &'a dyn Fn(&Path, u32) -> bool,
     /// The mean of its attribute of this name as one number, where that has three.
