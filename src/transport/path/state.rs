@@ -30,8 +30,8 @@ pub(super) struct Path {
     pub(super) ray: Ray,
     pub(super) beta: Lanes,
     pub(super) rho: Lanes,
-    /// How far from the middle of the scene what shines is at the most, or where a medium first scattered the path, if that is farther;
-    /// zero before.
+    /// How far from the middle of the scene a medium that scatters the path lets it go on as anywhere: see [`worth`](super::worth). Zero
+    /// before the first time.
     pub(super) near: f64,
     /// Product of η² over crossings: β shrinks by it in glass and regains it, and roulette must not
     /// take that for a loss.
