@@ -164,7 +164,7 @@ fn more_threads_than_processors_can_be_are_refused() {
     );
     // OpenMP's list, of which the first is for what begins.
     for list in ["1,2", " 1 "] {
-        assert!(render(list).out.contains(" on 1 threads;"), "{list}: {}", render(list).out);
+        assert!(render(list).out.contains(" on 1 threads,"), "{list}: {}", render(list).out);
     }
     for verb in ["render", "merge", "accuracy"] {
         let help = place.run(&[verb, "--help"]).out.split_whitespace().collect::<Vec<_>>().join(" ");
