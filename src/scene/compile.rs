@@ -490,10 +490,11 @@ fn range(scene: &Scene, light: &Light, lost: bool) -> f64 {
             let ends = scene.objects[*object as usize].bounds().is_finite();
             if ends { scene.radius } else { f64::INFINITY }
         }
-        Light::Point { position, .. } | Light::Spot { position, .. } => position.distance(scene.center),
-        Light::Projector(projector) => projector.position().distance(scene.center),
-        Light::Directional { .. } | Light::Constant { .. } | Light::Environment(_) if lost => 0.0,
-        Light::Directional { .. } | Light::Constant { .. } | Light::Environment(_) => f64::INFINITY,
+        _ => match light.position() {
+            Some(position) => position.distance(scene.center),
+            None if lost => 0.0,
+            None => f64::INFINITY,
+        },
     }
 }
 

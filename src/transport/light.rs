@@ -21,9 +21,9 @@ use self::flight::{Landing, Met};
 use self::views::{Place, View};
 use super::caustics::{Caustics, Target};
 use super::merge::WavelengthCell;
-use super::path;
 use super::photons::{Alone, Photon, Photons, Together};
 use super::plan::{EffectPlan, LightSettings};
+use super::roulette;
 use super::shadow::MAX_BOUNDARIES;
 use super::{moment_at, scene_at};
 use crate::math::Ray;
@@ -448,8 +448,8 @@ impl<'a> Walk<'a, '_> {
         beam.ray = Ray::new(point, went);
         beam.vertex += 1;
         let Scene { center, radius, ref camera, .. } = *self.paths.scene;
-        let seen_within = radius.max(camera.eye().distance(center));
-        let worth = path::worth(&mut beam.near, seen_within, point.distance(center));
+        let seen_within = || radius.max(camera.eye().distance(center));
+        let worth = roulette::worth(&mut beam.near, seen_within, point.distance(center));
         self.survives(beam, false, worth, numbers.roulette)
     }
 
@@ -530,7 +530,7 @@ impl<'a> Walk<'a, '_> {
         if vertex + 1 < self.paths.settings.roulette_depth {
             return Some(1.0);
         }
-        let q = path::survival(carried / self.start, vertex, discrete);
+        let q = roulette::survival(carried / self.start, vertex, discrete);
         (u < q).then_some((1.0 / q) as f32)
     }
 

@@ -14,6 +14,7 @@ pub mod path;
 pub mod photons;
 pub mod pilot;
 pub mod plan;
+mod roulette;
 mod shadow;
 pub mod trial;
 pub mod ways;

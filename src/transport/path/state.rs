@@ -30,7 +30,7 @@ pub(super) struct Path {
     pub(super) ray: Ray,
     pub(super) beta: Lanes,
     pub(super) rho: Lanes,
-    /// How far from the middle of the scene a medium that scatters the path lets it go on as anywhere: see [`worth`](super::worth). Zero
+    /// How far from the middle of the scene a medium that scatters the path lets it go on as anywhere: see [`worth`](crate::transport::roulette::worth). Zero
     /// before the first time.
     pub(super) near: f64,
     /// Product of η² over crossings: β shrinks by it in glass and regains it, and roulette must not
