@@ -7,7 +7,7 @@
 //! as it scales radiance (5.2).
 //!
 //! Found are paths L … D E: what a smooth mirror or glass shows cannot be found, and is black. Light that the camera sees
-//! itself, L E, is the camera's part (`path` of one segment). Wavelengths are carried as in [`path`].
+//! itself, L E, is the camera's part (`path` of one segment). Wavelengths are carried as in [`path`](super::path).
 
 mod connect;
 mod flight;
