@@ -36,6 +36,17 @@ fn a_sun_in_an_environment_is_traced_and_an_even_sky_is_not() {
     assert!(!tracing && reason == "no light is small or has a sun", "{reason}");
 }
 
+/// A lamp in the middle of a globe of glass, as in a bulb, is met through the globe alone: seldom from what stands around.
+#[test]
+fn light_of_a_lamp_in_the_middle_of_a_globe_is_traced() {
+    let caster = "sphere: {center: [-1.5, 2, 1], radius: 0.4, material: glass}";
+    let light = "- sphere: {center: [-1.5, 2, 1], radius: 0.2, emission: 50}\n";
+    let globe = Case { what: "globe", caster, light, ..AREA };
+    let (tracing, _, reason) = techniques(&globe.bench("auto", "auto", 64));
+    assert!(tracing, "{reason}");
+    assert_agree("globe", &render(&globe.bench("on", "auto", 256)), &render(&globe.bench("off", "auto", 4096)));
+}
+
 /// No path begins at a lamp that is never looked for: what glass throws of its light stays with paths from the camera, which meet
 /// it by chance.
 #[test]

@@ -31,12 +31,16 @@ pub(super) fn is_small(scene: &Scene, i: usize, chance: f64, casters: &Casters) 
         Light::Environment(_) => chance < 1.0,
         Light::Area { object, .. } => {
             let lamp = &scene.objects[*object as usize];
+            let bounds = lamp.bounds();
             let (centre, radius) = match &lamp.geometry {
-                Geometry::Shape(_) | Geometry::Mesh(_) => around(&lamp.bounds()),
+                Geometry::Shape(_) | Geometry::Mesh(_) => around(&bounds),
                 Geometry::Sdf(_) | Geometry::Curves(_) | Geometry::Instance(_) => return false,
             };
-            // How near to a mirror without end it is does not bound how it is seen there.
+            // How near to a mirror without end it is does not bound how it is seen there. A lamp in a globe is met through the globe by
+            // what stands around it, which may be far off.
+            let in_globe = |globe: &Aabb| bounds.min.cmpgt(globe.min).all() && bounds.max.cmplt(globe.max).all();
             !casters.endless.is_empty()
+                || casters.boxes.iter().any(in_globe)
                 || casters.balls.iter().any(|ball| share_of_hemisphere(radius, (ball.center - centre).length()) < SMALL)
         }
     }
