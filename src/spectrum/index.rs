@@ -25,6 +25,7 @@ pub enum RefractiveIndex {
     /// The same at every wavelength.
     Constant(f64),
     /// n² = 1 + Σ bλ² / (λ² − c).
+    /// See [`RefractiveIndex::sellmeier`].
     Sellmeier {
         /// Strengths.
         b: [f64; 3],
@@ -56,6 +57,14 @@ pub enum RefractiveIndex {
 }
 
 impl RefractiveIndex {
+    /// Sellmeier's formula of strengths `b` and squared resonances `c`, µm². Where a term has no strength its resonance is
+    /// nowhere: at it the term would be 0/0.
+    #[must_use]
+    pub fn sellmeier(b: [f64; 3], c: [f64; 3]) -> RefractiveIndex {
+        let c = std::array::from_fn(|i| if b[i] == 0.0 { 0.0 } else { c[i] });
+        RefractiveIndex::Sellmeier { b, c }
+    }
+
     /// A two-term Cauchy formula from the index at the d line and the Abbe number.
     ///
     /// n(λ) = a + b / λ² with b = (nd − 1) / vd / (λF⁻² − λC⁻²) and a = nd − b / λd².
@@ -114,7 +123,7 @@ impl RefractiveIndex {
                 b[i] = pair[0];
                 c[i] = if number == 1 { pair[1] * pair[1] } else { pair[1] };
             }
-            return Ok(RefractiveIndex::Sellmeier { b, c });
+            return Ok(RefractiveIndex::sellmeier(b, c));
         }
         Ok(RefractiveIndex::Formula { number, coefficients: coefficients.to_vec() })
     }
@@ -262,29 +271,29 @@ fn power(x: f64, e: f64) -> f64 {
 fn numbered(number: u32, c: &[f64], w: f64) -> f64 {
     let w2 = w * w;
     let pairs = |from: usize| c[from..].chunks_exact(2);
+    // A term of no strength is nothing at its resonance, too, where it would be 0/0.
+    let term = |strength: f64, above: f64, below: f64| if strength == 0.0 { 0.0 } else { strength * above / below };
     match number {
-        1 => (1.0 + c[0] + pairs(1).map(|p| p[0] * w2 / (w2 - p[1] * p[1])).sum::<f64>()).sqrt(),
-        2 => (1.0 + c[0] + pairs(1).map(|p| p[0] * w2 / (w2 - p[1])).sum::<f64>()).sqrt(),
+        1 => (1.0 + c[0] + pairs(1).map(|p| term(p[0], w2, w2 - p[1] * p[1])).sum::<f64>()).sqrt(),
+        2 => (1.0 + c[0] + pairs(1).map(|p| term(p[0], w2, w2 - p[1])).sum::<f64>()).sqrt(),
         3 => (c[0] + pairs(1).map(|p| p[0] * power(w, p[1])).sum::<f64>()).sqrt(),
         4 => {
-            let resonance = |i: usize| {
-                if c[i] == 0.0 { 0.0 } else { c[i] * power(w, c[i + 1]) / (w2 - power(c[i + 2], c[i + 3])) }
-            };
+            let resonance = |i: usize| term(c[i], power(w, c[i + 1]), w2 - power(c[i + 2], c[i + 3]));
             (c[0] + resonance(1) + resonance(5) + pairs(9).map(|p| p[0] * power(w, p[1])).sum::<f64>()).sqrt()
         }
         5 => c[0] + pairs(1).map(|p| p[0] * power(w, p[1])).sum::<f64>(),
-        6 => 1.0 + c[0] + pairs(1).map(|p| p[0] / (p[1] - 1.0 / w2)).sum::<f64>(),
+        6 => 1.0 + c[0] + pairs(1).map(|p| term(p[0], 1.0, p[1] - 1.0 / w2)).sum::<f64>(),
         7 => {
             let l = 1.0 / (w2 - 0.028);
             c[0] + l * (c[1] + l * c[2]) + w2 * (c[3] + w2 * (c[4] + w2 * c[5]))
         }
         8 => {
-            let s = c[0] + c[1] * w2 / (w2 - c[2]) + c[3] * w2;
+            let s = c[0] + term(c[1], w2, w2 - c[2]) + c[3] * w2;
             ((1.0 + 2.0 * s) / (1.0 - s)).sqrt()
         }
         9 => {
             let d = w - c[4];
-            (c[0] + c[1] / (w2 - c[2]) + c[3] * d / (d * d + c[5])).sqrt()
+            (c[0] + term(c[1], 1.0, w2 - c[2]) + term(c[3], d, d * d + c[5])).sqrt()
         }
         _ => f64::NAN,
     }
@@ -393,6 +402,29 @@ mod tests {
             let told = |strength| RefractiveIndex::formula(number, &of(strength)).unwrap().check_band();
             assert!(told(1.0).unwrap_err().contains("resonance at 547.7 nm"), "{number}: {:?}", told(1.0));
             assert_eq!(told(0.0), Ok(()), "{number}");
+        }
+    }
+
+    /// A resonance of no strength on a wavelength at which the band is looked at, 0.5 µm, where a term would be 0/0: it is no
+    /// fault, and the others are as without it.
+    #[test]
+    fn a_term_of_no_strength_is_nothing_at_its_resonance() {
+        let formula = |number, c: &[f64]| RefractiveIndex::formula(number, c).unwrap();
+        let pairs = [
+            (RefractiveIndex::sellmeier([1.2, 0.0, -0.0], [0.01, 0.25, 0.25]), formula(2, &[0.0, 1.2, 0.01])),
+            (formula(1, &[0.1, 1.2, 0.1, 0.0, 0.5]), formula(1, &[0.1, 1.2, 0.1])),
+            (formula(2, &[0.0, 1.2, 0.01, 0.0, 0.25]), formula(2, &[0.0, 1.2, 0.01])),
+            (formula(2, &[0.1, 1.2, 0.01, 0.0, 0.25]), formula(2, &[0.1, 1.2, 0.01])),
+            (formula(6, &[0.3, 0.0, 4.0]), formula(6, &[0.3])),
+            (formula(8, &[0.3, 0.0, 0.25, 0.0]), formula(8, &[0.3, 0.0, 0.0, 0.0])),
+            (formula(9, &[2.3, 0.0, 0.25, 0.0, 0.5, 0.0]), formula(9, &[2.3, 0.0, 0.0, 0.0, 0.0, 1.0])),
+        ];
+        for (with, without) in pairs {
+            assert_eq!(with.check_band(), Ok(()), "{with:?}");
+            for nm in [400.0, 500.0, 700.0] {
+                assert_eq!(with.at(nm), without.at(nm), "{with:?} at {nm} nm");
+            }
+            assert_eq!(with.lanes(Lanes::splat(500.0)), without.lanes(Lanes::splat(500.0)), "{with:?}");
         }
     }
 

@@ -34,7 +34,7 @@ impl<'a> Compiler<'a> {
                 }
                 substance.index.clone()
             }),
-            written::Index::Sellmeier(s) => Ok(RefractiveIndex::Sellmeier { b: s.b, c: s.c }),
+            written::Index::Sellmeier(s) => Ok(RefractiveIndex::sellmeier(s.b, s.c)),
             written::Index::Cauchy(c) => Ok(RefractiveIndex::Cauchy { a: vec![c.a, c.b, c.c] }),
             written::Index::Abbe(a) => RefractiveIndex::from_abbe(a.nd, a.vd),
             written::Index::Table(samples) => Ok(RefractiveIndex::Table { samples: samples.clone() }),

@@ -349,7 +349,7 @@ fn at_d(index: &Index) -> f64 {
         Index::Number(n) => return *n,
         Index::Abbe(abbe) => return abbe.nd,
         Index::Glass(name) => catalogue::glass(name).ok(),
-        Index::Sellmeier(s) => Some(RefractiveIndex::Sellmeier { b: s.b, c: s.c }),
+        Index::Sellmeier(s) => Some(RefractiveIndex::sellmeier(s.b, s.c)),
         Index::Cauchy(c) => Some(RefractiveIndex::Cauchy { a: vec![c.a, c.b, c.c] }),
         Index::Table(samples) => Some(RefractiveIndex::Table { samples: samples.clone() }),
         Index::Schott(a) => Some(RefractiveIndex::Schott { a: *a }),
