@@ -82,21 +82,31 @@ impl Scene {
         SPOT * (self.camera.world_from_camera.translation - position).length()
     }
 
-    /// About how bright a white wall is where a lamp of `power` lights the nearest thing, film units.
+    /// About how bright a white wall is where a lamp of `power` lights the nearest thing, film units; or the medium around the
+    /// lamp, where that is brighter.
     fn lit(&self, &Cone { position, axis, spread }: &Cone, power: f64) -> f64 {
         let frame = Frame::from_normal(axis);
         let looks = (0..LOOKS).map(|i| {
             // Evenly spread over the cone: Fibonacci's lattice.
             let u = DVec2::new((f64::from(i) + 0.5) / f64::from(LOOKS), (f64::from(i) * GOLDEN).fract());
             let ray = Ray::new(position, frame.to_world(uniform_cone(u, spread)));
-            self.closest(&ray, f64::INFINITY).map_or(f64::INFINITY, |hit| hit.t)
+            let Some(hit) = self.closest(&ray, f64::INFINITY) else { return (f64::INFINITY, self.camera_medium) };
+            let object = &self.objects[hit.object as usize];
+            let surface = self.surface_with(&ray, &hit, object.detail);
+            (hit.t, object.beyond(&surface, -ray.direction, self.camera_medium))
         });
-        let nearest = looks.fold(f64::INFINITY, f64::min);
+        let looks: Vec<(f64, Option<u32>)> = looks.collect();
+        let nearest = looks.iter().map(|look| look.0).fold(f64::INFINITY, f64::min);
+        let mut around: Vec<u32> = looks.iter().filter_map(|look| look.1).collect();
+        around.sort_unstable();
+        around.dedup();
+        let glows = around.iter().map(|medium| self.media[*medium as usize].glows_like_a_wall_at(position));
+        let glow = glows.fold(f64::INFINITY, f64::min);
         // A lamp that lies on something, or where two things meet, lights a spot beside it that no pixel sees.
         let seen = self.seen_at(position);
         let distance = match nearest.is_finite() {
-            true => nearest.max(seen),
-            false => (self.center - position).length().max(self.radius),
+            true => nearest.min(glow).max(seen),
+            false => (self.center - position).length().max(self.radius).min(glow),
         };
         power / (2.0 * PI * spread * distance * distance) / PI
     }
@@ -174,6 +184,24 @@ mod tests {
         assert_eq!(exponent(&format!("{ground}lights: [point: {{position: [0, 1, 0], intensity: 100}}]\n")), 0);
         let spot = "spot: {position: [0, 1, 0], target: [0, 0, 0], cutoff_deg: 20, intensity: 100}";
         assert_eq!(exponent(&format!("{ground}lights: [{spot}]\n")), 0);
+    }
+
+    /// Smoke around a lamp shows its light, however far the nearest thing is: with a mean free path of 20 m some 1/100 of 10,
+    /// where walls at 10⁹ and 10¹⁸ m show 10⁻¹⁸ and 10⁻³⁶ of it. What only absorbs shows none.
+    #[test]
+    fn smoke_around_a_lamp_is_lit_however_far_the_walls_are() {
+        let air =
+            "media: {air: {homogeneous: {extinction: 0.05, albedo: 0.9}}, tar: {homogeneous: {absorption: 0.05}}}\n";
+        let lamp = "lights: [point: {position: [0, 1, 0], intensity: 10}]\n";
+        for far in [1e9, 1e18] {
+            let wall = format!("plane: {{point: [0, -{far:e}, 0], normal: [0, 1, 0]}}");
+            let around = |medium: &str| exponent(&format!("{air}{lamp}medium: {medium}\nshapes: [{wall}]\n"));
+            assert_eq!(around("air"), 0, "{far:e}");
+            assert!(around("tar") < -50, "{far:e}: {}", around("tar"));
+            let inside = "material: {boundary: {}}, inside: air, outside: vacuum";
+            let ball = format!("{air}{lamp}shapes: [sphere: {{radius: {far:e}, {inside}}}]\n");
+            assert_eq!(exponent(&ball), 0, "{far:e}");
+        }
     }
 
     /// Light of 2⁻⁵⁰ and of 2⁵⁰ is counted in powers of two that bring it into reach.

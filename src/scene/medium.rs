@@ -16,6 +16,7 @@ use crate::optics::medium::{FreeFlight, MediumLanes};
 use crate::optics::phase::Phase;
 use crate::spectrum::{Lanes, Spectrum};
 use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
 
 /// A medium at all wavelengths.
 #[derive(Clone, Debug)]
@@ -205,6 +206,25 @@ impl Medium {
             }
         };
         (scattering, f64::from((rho * density).reduce_add() / rho.reduce_add()))
+    }
+
+    /// How far from a lamp without extent at `point` a white wall shows as much of it as this medium: metres; infinite where
+    /// the medium is not, or scatters nothing.
+    ///
+    /// A ray that passes a lamp of intensity I at the distance d meets ∫ σ_s I / (4π r²) dt = σ_s I / 4d of it, at a mean free
+    /// path σ_s σ_t I / 4; a wall at r shows I / (π r²). Of what varies both are as where it is densest, and all is scattered.
+    #[must_use]
+    pub fn glows_like_a_wall_at(&self, point: DVec3) -> f64 {
+        let (scattering, extinction) = match &self.filling {
+            Filling::Even { absorption, scattering } => (scattering.max(), absorption.max() + scattering.max()),
+            Filling::EvenExtinction { extinction, scatters: true, .. } => (extinction.max(), extinction.max()),
+            Filling::Varying(varying) if varying.scatters && varying.bounds.holds(point) => {
+                let most = f64::from(varying.scale) * varying.bounds.global;
+                (most, most)
+            }
+            Filling::EvenExtinction { .. } | Filling::Varying(_) => (0.0, 0.0),
+        };
+        2.0 / (PI * scattering * extinction).sqrt()
     }
 
     /// Whether it is the same everywhere and scatters nothing.

@@ -63,6 +63,12 @@ impl Bounds {
         self.global * self.extent[0].distance(self.extent[1])
     }
 
+    /// Whether `point` is in the box in which the volume is.
+    #[must_use]
+    pub fn holds(&self, point: DVec3) -> bool {
+        self.extent[0].cmple(point).all() && point.cmple(self.extent[1]).all()
+    }
+
     /// Bounds of blocks of `edge` voxels a side.
     pub(super) fn of(grid: &GridVolume, edge: usize) -> Bounds {
         match &grid.values {
