@@ -124,9 +124,10 @@ pub(crate) fn rotation(axis: DVec3, deg: f64) -> DMat4 {
     DMat4::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z), DVec4::W)
 }
 
+/// Also in f64: one over a determinant below 5.6e-309 is infinite.
 fn is_invertible(linear: DMat3) -> bool {
     let determinant = linear.determinant();
-    determinant.is_finite() && determinant != 0.0
+    determinant.is_finite() && determinant != 0.0 && linear.inverse().is_finite()
 }
 
 /// What a linear map may depart from a similarity, relative to its squared scale.
@@ -269,6 +270,19 @@ mod tests {
         assert_eq!(
             transform("cube", "[{matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 2]]}]"),
             format!("dir/s.yaml:3:87: {} the last row [0, 0, 0, 1], found [0, 0, 0, 2]", at("[0].matrix[3]"))
+        );
+        // The determinant is not 0, but one over it is beyond 1.8·10³⁰⁸.
+        assert_eq!(
+            transform("cube", "[{matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 5.0e-324, 0], [0, 0, 0, 1]]}]"),
+            format!(
+                "dir/s.yaml:3:44: {} a matrix that can be inverted, found one with determinant 5e-324",
+                at("[0].matrix")
+            )
+        );
+        let tiny = transform("cube", "[{scale: 1e-105}]");
+        assert!(
+            tiny.starts_with(&format!("dir/s.yaml:3:34: {} a transform that can be inverted, found", at(""))),
+            "{tiny}"
         );
         // Each step is sound, but the determinant 10⁶⁰⁰ is beyond 1.8·10³⁰⁸.
         assert_eq!(
