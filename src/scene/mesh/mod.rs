@@ -27,6 +27,7 @@ pub use tree::{MAX_TRIANGLES, MeshHit, MeshTree};
 pub use triangle::{TriangleHit, TriangleRay};
 
 use crate::description::{MeshNormals, Meshes};
+use crate::error::in_short;
 use crate::math::{Frame, warp};
 use crate::scene::bvh::Aabb;
 use crate::scene::shape::SurfacePoint;
@@ -203,7 +204,8 @@ impl Mesh {
         let origin = choose_origin(&bounds);
         let positions: Vec<[f32; 3]> = world.iter().map(|&p| (p - origin).as_vec3().to_array()).collect();
         if let Some(i) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err(format!("vertex {i} lies at {} in the world, outside the range of f32", world[i]));
+            let [x, y, z] = world[i].to_array().map(in_short);
+            return Err(format!("vertex {i} lies at [{x}, {y}, {z}] in the world, outside the range of f32"));
         }
 
         let linear = world_from_object.matrix3;

@@ -468,4 +468,7 @@ fn meshes_beyond_what_f32_holds_are_refused() {
     assert_eq!(scaled(1e-38).unwrap_err(), "the mesh is 1e-38 m across in the world, outside the range of f32");
     assert!(scaled(1e-50).is_err());
     assert!(scaled(1e39).unwrap_err().ends_with("in the world, outside the range of f32"));
+    let aside = DAffine3 { translation: DVec3::new(-1e200, 0.5, 0.0), ..DAffine3::from_scale(DVec3::splat(1e300)) };
+    let told = Mesh::new(&source, &aside, NormalMode::Face, Winding::Object).map(|_| ()).unwrap_err();
+    assert_eq!(told, "vertex 0 lies at [-1e200, 0.5, 0] in the world, outside the range of f32");
 }
