@@ -490,7 +490,11 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         report.notes.push("an ACES container holds half floats only: the file is none".to_owned());
     }
     if finish.variance {
-        let squares = |errors: &[f32]| ChannelData::F32(errors.iter().map(|x| x * x).collect());
+        let mut lost = Squares::default();
+        let mut squares = |errors: &[f32]| {
+            errors.iter().for_each(|error| lost.add(*error));
+            ChannelData::F32(errors.iter().map(|x| x * x).collect())
+        };
         // Bands stand in place of colours.
         for i in 0..finish.spectral_channels().start {
             let channel = &finish.layers[i];
@@ -500,6 +504,7 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         for &(name, i) in finish.base().colours() {
             file.push_data(format!("variance.{name}"), squares(&image.standard_error[i]));
         }
+        report.notes.extend(lost.note());
     }
     if finish.sample_count {
         let count = |cells: &PixelCells| cells.iter().map(|cell| cell.count).sum();
@@ -516,6 +521,36 @@ fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneRe
         report.notes.push(format!("{infinite} values are more than 32-bit floats hold: they are written as infinite"));
     }
     file
+}
+
+/// What becomes of standard errors as their squares are written.
+#[derive(Default)]
+struct Squares {
+    /// How many are infinite whose root is not.
+    infinite: usize,
+    /// The greatest root.
+    most: f32,
+}
+
+impl Squares {
+    fn add(&mut self, error: f32) {
+        if error.is_finite() {
+            self.infinite += usize::from((error * error).is_infinite());
+            self.most = self.most.max(error);
+        }
+    }
+
+    /// What 32-bit floats do not hold of them, if anything: the greatest, or all.
+    fn note(&self) -> Option<String> {
+        let lost = match self.infinite {
+            0 if self.most > 0.0 && self.most * self.most < f32::MIN_POSITIVE => {
+                "all values are less than 32-bit floats hold with all digits (1.2e-38)".to_owned()
+            }
+            0 => return None,
+            infinite => format!("{infinite} values are more than 32-bit floats hold: they are written as infinite"),
+        };
+        Some(format!("layer variance: {lost}; a layer stderr holds their roots"))
+    }
 }
 
 /// The attribute that tells how much more the sum of all pixels varies than that of independent ones; none where it is no more.
@@ -647,6 +682,24 @@ fn pixel_hash(image: &Image) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Squares of f32 end at 1.8e19 and begin at 1.1e-19.
+    #[test]
+    fn variances_that_floats_do_not_hold_are_told() {
+        let note = |errors: &[f32]| {
+            let mut squares = Squares::default();
+            errors.iter().for_each(|error| squares.add(*error));
+            squares.note()
+        };
+        let beyond = "layer variance: 2 values are more than 32-bit floats hold: they are written as infinite; \
+                      a layer stderr holds their roots";
+        assert_eq!(note(&[1.9e19, 1.0, 1e25, f32::INFINITY, f32::NAN]).as_deref(), Some(beyond));
+        assert!(note(&[1e-20, 0.0, f32::NAN]).unwrap().contains("less than 32-bit floats hold"));
+        // What is next to nothing beside the rest is no loss.
+        for held in [&[1.8e19f32, 1e-30, 0.0][..], &[1.1e-19, 1e-30], &[0.0, f32::NAN], &[]] {
+            assert_eq!(note(held), None, "{held:?}");
+        }
+    }
 
     #[test]
     fn numbers_of_frames_stay_at_the_end() {
