@@ -1,5 +1,5 @@
-//! Distributions and moments that a claim about noise needs: normal and Student-t tails and
-//! quantiles, running moments, the Šidák correction.
+//! Distributions and moments that a claim about noise needs: tails and quantiles of the normal, of Student's t and
+//! of Fisher's F, running moments, the Šidák correction.
 //!
 //! Everything rests on `libm`, so figures and verdicts are the same on every machine.
 
@@ -78,8 +78,36 @@ pub fn student_t_half_width(confidence: f64, dof: f64) -> f64 {
         return f64::NAN;
     }
     let tail = 1.0 - confidence;
+    bisect(|t| student_t_two_sided_p(t, dof) > tail)
+}
+
+/// P(F ≥ `f`) for Fisher's F with `dof` > 0 degrees of freedom of its numerator and of its denominator, which need not be whole.
+///
+/// I_x(ν₂/2, ν₁/2) at x = ν₂/(ν₂ + ν₁ f) (Abramowitz and Stegun 26.6.2).
+#[must_use]
+pub fn f_upper_p(f: f64, dof: [f64; 2]) -> f64 {
+    if f.is_nan() || !dof.iter().all(|dof| dof.is_finite() && *dof > 0.0) {
+        return f64::NAN;
+    }
+    let ratio = dof[0] * f.max(0.0) / dof[1];
+    let x = 1.0 / (1.0 + ratio);
+    let y = if ratio.is_infinite() { 1.0 } else { ratio / (1.0 + ratio) };
+    regularised_beta(x, y, 0.5 * dof[1], 0.5 * dof[0])
+}
+
+/// The f with P(F ≥ f) = `p`, by bisection of the tail. NaN where `p` is not in (0, 1).
+#[must_use]
+pub fn f_upper_quantile(p: f64, dof: [f64; 2]) -> f64 {
+    if !(p > 0.0 && p < 1.0) || f_upper_p(1.0, dof).is_nan() {
+        return f64::NAN;
+    }
+    bisect(|f| f_upper_p(f, dof) > p)
+}
+
+/// The least positive float at which `is_below` no longer holds.
+fn bisect(is_below: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
-    while student_t_two_sided_p(high, dof) > tail {
+    while is_below(high) {
         low = high;
         high *= 2.0;
     }
@@ -88,11 +116,7 @@ pub fn student_t_half_width(confidence: f64, dof: f64) -> f64 {
         if middle <= low || middle >= high {
             return high;
         }
-        if student_t_two_sided_p(middle, dof) > tail {
-            low = middle;
-        } else {
-            high = middle;
-        }
+        *(if is_below(middle) { &mut low } else { &mut high }) = middle;
     }
 }
 
@@ -249,6 +273,21 @@ mod tests {
         ] {
             assert_close(student_t_half_width(confidence, dof), expected, 1e-11);
         }
+    }
+
+    /// With one degree of freedom above, F is t²; with two the tail is (1 + 2f/ν)^(−ν/2).
+    #[test]
+    fn fisher_tails_equal_their_closed_forms() {
+        for x in [0.1, 1.0, 2.5, 7.0f64] {
+            for dof in [1.0, 3.0, 3.6, 1000.0] {
+                assert_close(f_upper_p(x * x, [1.0, dof]), student_t_two_sided_p(x, dof), 2e-12);
+                assert_close(f_upper_p(x, [2.0, dof]), (1.0 + 2.0 * x / dof).powf(-0.5 * dof), 2e-12);
+            }
+        }
+        for p in [0.5, 0.05, 1e-3] {
+            assert_close(f_upper_quantile(p, [2.0, 6.0]), 3.0 * (p.powf(-1.0 / 3.0) - 1.0), 1e-11);
+        }
+        assert!(f_upper_p(1.0, [0.0, 3.0]).is_nan() && f_upper_quantile(1.0, [1.0, 3.0]).is_nan());
     }
 
     /// The first term of the difference of the tails of t and the normal is φ(t)(t³ + t)/2ν, 1.2e-8 of 0.05
