@@ -76,6 +76,8 @@ struct Compiler<'a> {
     on_surface: BTreeSet<&'a str>,
     /// Textures as spectra and as numbers, once they are asked for.
     textures: HashMap<&'a str, Texture>,
+    /// Textures as light.
+    shining: HashMap<&'a str, lights::Shining>,
     volumes: HashMap<&'a str, Volume>,
     /// Environments, by where they stand among the lights, until they are asked for.
     skies: HashMap<usize, Result<Option<Light>>>,
@@ -187,6 +189,7 @@ impl<'a> Compiler<'a> {
             asks_for_surface: false,
             on_surface: BTreeSet::new(),
             textures: HashMap::new(),
+            shining: HashMap::new(),
             volumes: HashMap::new(),
             skies: HashMap::new(),
             numbers: HashMap::new(),

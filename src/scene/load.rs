@@ -157,6 +157,7 @@ pub fn image_texture(
         grid: Grid::new(width, height),
         illuminant: None,
         bands: None,
+        mean: Arc::default(),
     };
     if let Decoded::Exr(file) = &decoded
         && let Some(bands) = Bands::of(path, &file.parts[0])?

@@ -245,6 +245,8 @@ pub struct ImageTexture {
     pub illuminant: Option<Spectrum>,
     /// Measured spectra in place of the above.
     pub bands: Option<Bands>,
+    /// The mean luminance, once that is asked for: all lamps that show the picture ask for it.
+    pub mean: Arc<OnceLock<f64>>,
 }
 
 /// Places of a texture that tell its mean luminance.
@@ -283,6 +285,27 @@ impl ImageTexture {
     /// What a spectrum of the picture is under its illuminant.
     fn lit(&self, own: Spectrum) -> Spectrum {
         self.illuminant.as_ref().map_or(own.clone(), |illuminant| own.times(illuminant))
+    }
+
+    /// Gives the picture its light.
+    pub fn light_up(&mut self, illuminant: Option<Spectrum>) {
+        self.illuminant = illuminant;
+        // It was that of another light.
+        self.mean = Arc::default();
+    }
+
+    /// [`Texture::mean_luminance`].
+    fn mean_luminance(&self) -> f64 {
+        *self.mean.get_or_init(|| match &self.bands {
+            None => {
+                let brightest = self.texels.brightest().map(|texel| self.spectrum(texel));
+                mean_luminance(self.texels.len(), brightest, |i| self.spectrum(self.texels.at(i)))
+            }
+            Some(bands) => {
+                let at = |i| self.lit(bands.spectrum(i));
+                mean_luminance(bands.len(), bands.brightest().map(at), at)
+            }
+        })
     }
 
     /// The spectrum at `uv`. Spectra are mixed, not coefficients.
@@ -350,16 +373,7 @@ impl Texture {
     pub fn mean_luminance(&self) -> f64 {
         match self {
             Texture::Uniform(spectrum) => spectrum.luminance(),
-            Texture::Image(image) => match &image.bands {
-                None => {
-                    let brightest = image.texels.brightest().map(|texel| image.spectrum(texel));
-                    mean_luminance(image.texels.len(), brightest, |i| image.spectrum(image.texels.at(i)))
-                }
-                Some(bands) => {
-                    let at = |i| image.lit(bands.spectrum(i));
-                    mean_luminance(bands.len(), bands.brightest().map(at), at)
-                }
-            },
+            Texture::Image(image) => image.mean_luminance(),
             Texture::Volume(volume) => volume.mean_luminance(),
             Texture::Attribute(attribute) => attribute.mean_luminance(),
             Texture::Checkerboard { a, b, .. } => 0.5 * (a.mean_luminance() + b.mean_luminance()),
@@ -441,6 +455,7 @@ mod tests {
             grid: Grid { wrap: [wrap; 2], interpolation, ..Grid::new(2, 2) },
             illuminant: None,
             bands: None,
+            mean: Arc::default(),
         }
     }
 

@@ -20,21 +20,44 @@ use std::sync::Arc;
 /// Of light that f32 does not hold.
 const TOO_BRIGHT: &str = "expected light up to 3.4e38, found more";
 
+/// A texture as light.
+#[derive(Clone)]
+pub(super) struct Shining {
+    texture: Texture,
+    /// Whether f32 holds it.
+    is_finite: bool,
+}
+
 impl<'a> Compiler<'a> {
     /// A texture as light: the colours of a picture are lit by D65 or what it names.
     fn emission_texture(&mut self, at: &str, s: &'a written::SpectrumOrTexture) -> Texture {
         match s {
             written::SpectrumOrTexture::Texture(name) => {
-                let mut texture = self.named_texture(name);
-                self.light_up(&mut texture, name);
-                // Its brightest place is among them.
-                if !texture.representatives().iter().all(Spectrum::is_finite) {
+                let Shining { texture, is_finite } = self.shining_texture(name);
+                if !is_finite {
                     self.fault(at, TOO_BRIGHT);
                 }
                 texture
             }
             written::SpectrumOrTexture::Spectrum(s) => Texture::Uniform(self.light_spectrum(at, s)),
         }
+    }
+
+    /// The texture `name` as light: one for all lamps that have it, so that they share what is found out about it.
+    fn shining_texture(&mut self, name: &'a str) -> Shining {
+        if let Some(known) = self.shining.get(name) {
+            return known.clone();
+        }
+        let mut texture = self.named_texture(name);
+        self.light_up(&mut texture, name);
+        // Its brightest place is among them.
+        let is_finite = texture.representatives().iter().all(Spectrum::is_finite);
+        let made = Shining { texture, is_finite };
+        // One that is another on each surface is kept for none.
+        if self.textures.contains_key(name) {
+            self.shining.insert(name, made.clone());
+        }
+        made
     }
 
     /// Gives the pictures in the texture `name` their light.
@@ -53,7 +76,7 @@ impl<'a> Compiler<'a> {
                     let at = written::field(&["textures", name, "image", "illuminant"]);
                     self.light_spectrum(&at, &written::Spectrum::Illuminant(i))
                 });
-                image.illuminant = (!lit.is_constant() || lit.max() != 1.0).then_some(lit);
+                image.light_up((!lit.is_constant() || lit.max() != 1.0).then_some(lit));
             }
             (written::Texture::Checkerboard(board), Texture::Checkerboard { a, b, .. }) => {
                 for (written, texture) in [(&board.a, a), (&board.b, b)] {
@@ -319,6 +342,35 @@ mod tests {
         assert_eq!(light_cdf(&powers, &[1.0, 0.0]), [1.0, 1.0]);
         assert_eq!(light_cdf(&powers, &[0.0, 2.0]), [0.0, 1.0]);
         assert_eq!(light_cdf(&powers, &[0.0, 0.0]), [0.0, 0.0]);
+    }
+
+    /// What one lamp finds out about the picture that it shows all others know, but not a slide, which has the light of its spot.
+    #[test]
+    fn what_many_lamps_show_is_looked_at_once() {
+        let directory = tempfile::tempdir().unwrap();
+        std::fs::write(directory.path().join("t.ppm"), "P3 2 1 255 255 128 0 0 128 255\n").unwrap();
+        let scene = compiled_in(
+            directory.path(),
+            "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n\
+             textures: {t: {image: {file: t.ppm}}}\n\
+             shapes:\n\
+             - sphere: {radius: 1, emission: {texture: t}}\n\
+             - sphere: {center: [3, 0, 0], radius: 1, emission: {texture: t}}\n\
+             lights:\n\
+             - spot: {position: [0, 4, 0], target: [0, 0, 0], up: [0, 0, 1], cutoff_deg: 20, intensity: 1, texture: t}\n",
+        );
+        let mean = |light: &Light| {
+            let texture = match light {
+                Light::Area { radiance, .. } => radiance,
+                Light::Spot { slide: Some(slide), .. } => &slide.texture,
+                other => panic!("{other:?}"),
+            };
+            let Texture::Image(image) = texture else { panic!("{texture:?}") };
+            image.mean.clone()
+        };
+        let means: Vec<_> = scene.lights.iter().map(mean).collect();
+        assert!(Arc::ptr_eq(&means[0], &means[1]) && !Arc::ptr_eq(&means[0], &means[2]));
+        assert!(means.iter().all(|mean| mean.get().is_some_and(|&mean| mean > 0.0)));
     }
 
     /// Radiance of 3 at 400 and 500 nm, as it was measured and behind an even illuminant of 2.

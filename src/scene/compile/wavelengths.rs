@@ -31,8 +31,8 @@ impl Compiler<'_> {
             written::Wavelengths::Uniform => WavelengthDistribution::uniform(),
         });
         let lit = lights.iter().zip(powers).filter(|(_, power)| in_colours && **power > 0.0);
-        let emitters: Vec<Spectrum> = lit.flat_map(|(light, _)| light.spectra()).filter(|s| !s.is_black()).collect();
-        self.note_few_wavelengths(&wavelengths, bands, &emitters);
+        let emitters = lit.flat_map(|(light, _)| light.spectra()).filter(|s| !s.is_black());
+        self.note_few_wavelengths(&wavelengths, bands, emitters);
         wavelengths
     }
 
@@ -88,7 +88,12 @@ impl Compiler<'_> {
 
     /// Tells how far off `bands` are in even light, and the colour of even light of the `emitters`, where `whitted` has too few
     /// of `wavelengths` for them.
-    fn note_few_wavelengths(&mut self, wavelengths: &WavelengthDistribution, bands: &[Band], emitters: &[Spectrum]) {
+    fn note_few_wavelengths(
+        &mut self,
+        wavelengths: &WavelengthDistribution,
+        bands: &[Band],
+        emitters: impl Iterator<Item = Spectrum>,
+    ) {
         let written::Integrator::Whitted(w) = &self.description.integrator else { return };
         // The lattice of a pixel: sets that begin evenly spread over the distance from lane to lane.
         let sets = w.samples();
@@ -111,8 +116,8 @@ impl Compiler<'_> {
             self.note("integrator.whitted", &message);
         }
         // Of X, Y and Z, over the largest.
-        let off = |light: &Spectrum| {
-            let exact = tristimulus(light);
+        let off = |light: Spectrum| {
+            let exact = tristimulus(&light);
             let found = drawn.iter().fold([0.0; 3], |sum: [f64; 3], w| {
                 let one = xyz(light.eval(w.nm), w);
                 std::array::from_fn(|c| sum[c] + f64::from(one[c]) / f64::from(sets))
@@ -120,7 +125,7 @@ impl Compiler<'_> {
             let largest = exact.iter().fold(0.0, |a: f64, b| a.max(*b));
             (0..3).map(|c| (found[c] - exact[c]).abs() / largest).fold(0.0, f64::max)
         };
-        let worst = emitters.iter().map(off).fold(0.0, f64::max);
+        let worst = emitters.map(off).fold(0.0, f64::max);
         if worst > WORST_COLOUR {
             let message = format!(
                 "{} wavelengths a pixel are few for the spectra of the lamps: their colour is off by up to {:.1} %; a larger grid \
