@@ -76,6 +76,8 @@ struct Compiler<'a> {
     on_surface: BTreeSet<&'a str>,
     /// Textures as spectra and as numbers, once they are asked for.
     textures: HashMap<&'a str, Texture>,
+    /// Spectra of lamps, once they are asked for.
+    common: HashMap<spectra::Common, Spectrum>,
     /// Textures as light.
     shining: HashMap<&'a str, lights::Shining>,
     volumes: HashMap<&'a str, Volume>,
@@ -189,6 +191,7 @@ impl<'a> Compiler<'a> {
             asks_for_surface: false,
             on_surface: BTreeSet::new(),
             textures: HashMap::new(),
+            common: HashMap::new(),
             shining: HashMap::new(),
             volumes: HashMap::new(),
             skies: HashMap::new(),

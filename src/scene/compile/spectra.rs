@@ -16,6 +16,13 @@ pub(super) enum Role {
     OpticalConstant,
 }
 
+/// A spectrum of lamps that many of them may have, by the bits of its numbers.
+#[derive(PartialEq, Eq, Hash)]
+pub(super) enum Common {
+    Blackbody { kelvin: u64, scale: u64, normalised: bool },
+    Illuminant { name: String, scale: u64 },
+}
+
 impl Compiler<'_> {
     /// What `s` is carried as.
     pub(super) fn spectrum(&mut self, at: &str, s: &written::Spectrum, outside: Outside, role: Role) -> Spectrum {
@@ -73,16 +80,20 @@ impl Compiler<'_> {
                 })
             }
             written::Spectrum::Blackbody(b) => {
-                let spectrum = if b.normalised {
-                    illuminant::blackbody_normalised(b.kelvin)
-                } else {
-                    illuminant::blackbody(b.kelvin)
-                };
-                self.or(&format!("{at}.blackbody.kelvin"), spectrum, black).scaled(b.scale)
+                let (kelvin, scale) = (b.kelvin.to_bits(), b.scale.to_bits());
+                self.common(Common::Blackbody { kelvin, scale, normalised: b.normalised }, |c| {
+                    let spectrum = if b.normalised {
+                        illuminant::blackbody_normalised(b.kelvin)
+                    } else {
+                        illuminant::blackbody(b.kelvin)
+                    };
+                    c.or(&format!("{at}.blackbody.kelvin"), spectrum, black).scaled(b.scale)
+                })
             }
-            written::Spectrum::Illuminant(i) => {
-                self.or(&format!("{at}.illuminant"), illuminant::illuminant(&i.name), black).scaled(i.scale)
-            }
+            written::Spectrum::Illuminant(i) => self
+                .common(Common::Illuminant { name: i.name.clone(), scale: i.scale.to_bits() }, |c| {
+                    c.or(&format!("{at}.illuminant"), illuminant::illuminant(&i.name), black).scaled(i.scale)
+                }),
             written::Spectrum::Lines(lines) => {
                 let lines: Vec<(f64, f64, f64)> = lines.iter().map(|l| (l.nm, l.power, l.width_nm)).collect();
                 let faults = self.faults.len();
@@ -103,6 +114,20 @@ impl Compiler<'_> {
                 self.written_spectrum(&format!("{at}.scaled.of"), &s.of, outside, role).scaled(s.by)
             }
         }
+    }
+
+    /// A spectrum that is made once for all that have it, as its table is larger than a lamp.
+    fn common(&mut self, spectrum: Common, make: impl FnOnce(&mut Self) -> Spectrum) -> Spectrum {
+        if let Some(known) = self.common.get(&spectrum) {
+            return known.clone();
+        }
+        let faults = self.faults.len();
+        let made = make(self);
+        // What is wrong is told of each.
+        if self.faults.len() == faults {
+            self.common.insert(spectrum, made.clone());
+        }
+        made
     }
 
     /// Refuses a file of more than all light where `s` names one for a share of it; what is written itself has been checked.
@@ -221,7 +246,8 @@ mod tests {
     use crate::error::Result;
     use crate::scene::Scene;
     use crate::scene::compile::compile;
-    use crate::spectrum::Lanes;
+    use crate::scene::light::Light;
+    use crate::spectrum::{Lanes, Spectrum};
 
     /// A scene with a camera, on its first line, and `line`.
     fn compiled(line: &str) -> Result<Scene> {
@@ -269,6 +295,29 @@ mod tests {
                 compiled(&format!("lights: [{{constant: {{radiance: {radiance}}}}}]")).err().unwrap().to_string();
             let expected = format!("s.yaml:2:{}", told.replace("R.", "lights[0].constant.radiance."));
             assert!(found.starts_with(&expected), "{found}");
+        }
+    }
+
+    /// A table takes some 16 KB: lamps share it that have the same spectrum, and none that have another.
+    #[test]
+    fn lamps_of_one_spectrum_share_its_table() {
+        let written = [
+            "{blackbody: {kelvin: 3000, scale: 2}}",
+            "{blackbody: {kelvin: 3000, scale: 2, normalised: false}}",
+            "{blackbody: {kelvin: 3000, scale: 3}}",
+            "{blackbody: {kelvin: 3001, scale: 2}}",
+            "{illuminant: {name: A, scale: 2}}",
+            "{illuminant: {name: D50, scale: 2}}",
+        ];
+        let lamp = |light: &str| format!("- point: {{position: [0, 0, 0], intensity: {light}}}\n");
+        let lamps: String = written.iter().chain(&written).map(|light| lamp(light)).collect();
+        let scene = compiled(&format!("lights:\n{lamps}")).unwrap();
+        let table = |i: usize| match &scene.lights[i] {
+            Light::Point { intensity: Spectrum::Table(table), .. } => table,
+            other => panic!("{other:?}"),
+        };
+        for (i, j) in (0..12).flat_map(|i| (0..12).map(move |j| (i, j))) {
+            assert_eq!(std::sync::Arc::ptr_eq(table(i), table(j)), i % 6 == j % 6, "{i} {j}");
         }
     }
 
