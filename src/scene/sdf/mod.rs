@@ -482,30 +482,32 @@ impl SdfGrid {
 /// Makes of 0 (surface) and 255 (none) the number of cells to the nearest 0, along the axis where it is
 /// farthest, up to 255: two passes over all cells that look at the 13 neighbours already seen.
 fn spread(empty: &mut [u8], cells: [usize; 3]) {
-    let [nx, ny, nz] = cells.map(|n| n as i32);
-    let seen: Vec<(i32, i32, i32)> = (-1..=0)
-        .flat_map(|z| (-1..=1).flat_map(move |y| (-1..=1).map(move |x| (x, y, z))))
-        .filter(|&(x, y, z)| (z, y, x) < (0, 0, 0))
-        .collect();
-    let mut pass = |sign: i32| {
-        let count = nx * ny * nz;
-        let range: Box<dyn Iterator<Item = i32>> =
-            if sign > 0 { Box::new(0..count) } else { Box::new((0..count).rev()) };
-        for i in range {
-            if empty[i as usize] == 0 {
-                continue;
+    let [nx, ny, nz] = cells;
+    // Along a row, with one more at either end.
+    let mut near = vec![u8::MAX; nx + 2];
+    for sign in [1, -1] {
+        for i in 0..ny * nz {
+            let row = if sign > 0 { i } else { ny * nz - 1 - i };
+            // The nearest by way of the four rows beside this one that the pass has been to.
+            near.fill(u8::MAX);
+            for (dy, dz) in [(-1, -1), (0, -1), (1, -1), (-1, 0)] {
+                let y = (row % ny).checked_add_signed(sign * dy).filter(|&y| y < ny);
+                let z = (row / ny).checked_add_signed(sign * dz).filter(|&z| z < nz);
+                let (Some(y), Some(z)) = (y, z) else { continue };
+                let beside = &empty[(z * ny + y) * nx..][..nx];
+                near[1..=nx].iter_mut().zip(beside).for_each(|(near, &cells)| *near = cells.min(*near));
             }
-            let (x, y, z) = (i % nx, i / nx % ny, i / nx / ny);
-            let mut least = empty[i as usize];
-            for &(dx, dy, dz) in &seen {
-                let (x, y, z) = (x + sign * dx, y + sign * dy, z + sign * dz);
-                if (0..nx).contains(&x) && (0..ny).contains(&y) && (0..nz).contains(&z) {
-                    least = least.min(empty[((z * ny + y) * nx + x) as usize].saturating_add(1));
-                }
+            let row = &mut empty[row * nx..][..nx];
+            for (cells, near) in row.iter_mut().zip(near.windows(3)) {
+                *cells = near[0].min(near[1]).min(near[2]).saturating_add(1).min(*cells);
             }
-            empty[i as usize] = least;
+            // And by way of the cell before.
+            let mut before = u8::MAX;
+            let along = |cells: &mut u8| {
+                *cells = before.saturating_add(1).min(*cells);
+                before = *cells;
+            };
+            if sign > 0 { row.iter_mut().for_each(along) } else { row.iter_mut().rev().for_each(along) }
         }
-    };
-    pass(1);
-    pass(-1);
+    }
 }

@@ -345,3 +345,24 @@ fn smooth_normals_are_those_of_mitsuba() {
         assert!((s.shading_normal - DVec3::from(smooth)).abs().max_element() < 1e-4, "{} {smooth:?}", s.shading_normal);
     }
 }
+
+/// Each cell is told its distance to the nearest that has a piece of the surface, along the axis where that is farthest, by looking at
+/// all of them.
+#[test]
+fn cells_know_how_far_the_surface_is() {
+    let mut random = Random::new(8);
+    for cells in [[1, 1, 1], [300, 1, 2], [7, 5, 6], [1, 9, 4], [12, 3, 1]] {
+        let [nx, ny, nz] = cells;
+        let place = |i: usize| [i % nx, i / nx % ny, i / nx / ny];
+        for share in [0.0, 0.01, 0.2] {
+            let all = nx * ny * nz;
+            let surface: Vec<usize> = (0..all).filter(|&i| i == 0 || random.uniform() < share).collect();
+            let mut found = vec![u8::MAX; all];
+            surface.iter().for_each(|&i| found[i] = 0);
+            spread(&mut found, cells);
+            let between = |a: usize, b: usize| (0..3).map(|k| place(a)[k].abs_diff(place(b)[k])).max().unwrap();
+            let expected = |i: usize| surface.iter().map(|&s| between(i, s)).min().unwrap().min(255) as u8;
+            assert_eq!(found, (0..all).map(expected).collect::<Vec<u8>>(), "{cells:?}");
+        }
+    }
+}
