@@ -43,6 +43,12 @@ impl RoundCone {
         self.radius - v * self.taper
     }
 
+    /// The box of the balls from one v to the other.
+    pub fn bounds(&self, from: f64, to: f64) -> (DVec3, DVec3) {
+        let ([p, q], [r, s]) = ([from, to].map(|v| self.center(v)), [from, to].map(|v| self.radius(v)));
+        ((p - r).min(q - s), (p + r).max(q + s))
+    }
+
     /// D above; not positive where one ball holds the other.
     #[inline]
     fn spread(&self) -> f64 {

@@ -61,7 +61,10 @@ enum Pieces {
 #[derive(Clone, Debug)]
 pub struct Curves {
     pieces: Pieces,
+    /// Over the boxes of the pieces; of a cone over those of its parts.
     bvh: Bvh,
+    /// The piece of each box, if they are not in order: parts of cones.
+    parts: Vec<u32>,
     segments: u32,
     bounds: Aabb,
     /// From the control points as written to the world.
@@ -117,25 +120,33 @@ impl Curves {
                 Pieces::Tubes(tubes, first)
             }
         };
-        let pad = |(min, max): (DVec3, DVec3)| {
-            // Surface points have some eight roundings of the coordinates that make them.
-            let pad = 16.0 * f64::EPSILON * min.abs().max(max.abs()).max_element();
-            Aabb { min: min - pad, max: max + pad }
-        };
-        let boxes: Vec<Aabb> = match &pieces {
-            Pieces::Cones(cones) => cones
-                .iter()
-                .map(|c| {
-                    let ball = |v| Aabb { min: c.center(v) - c.radius(v), max: c.center(v) + c.radius(v) };
-                    let both = ball(0.0).union(&ball(1.0));
-                    pad((both.min, both.max))
-                })
-                .collect(),
-            Pieces::Tubes(tubes, _) => tubes.iter().map(|t| pad(t.bounds())).collect(),
-        };
+        // Surface points have some eight roundings of the coordinates that make them.
+        let rounding = |(min, max): (DVec3, DVec3)| 16.0 * f64::EPSILON * min.abs().max(max.abs()).max_element();
+        let (mut boxes, mut parts): (Vec<Aabb>, Vec<u32>) = (Vec::new(), Vec::new());
+        match &pieces {
+            Pieces::Cones(cones) => {
+                for (i, cone) in cones.iter().enumerate() {
+                    // All together are the box of the cone, to the last bit.
+                    let (min, max) = cone.bounds(0.0, 1.0);
+                    let pad = rounding((min, max));
+                    add_parts(cone, [0.0, 1.0], 0, &mut |low, high| {
+                        boxes.push(Aabb { min: low.max(min) - pad, max: high.min(max) + pad });
+                    });
+                    parts.resize(boxes.len(), i as u32);
+                }
+            }
+            Pieces::Tubes(tubes, _) => boxes.extend(tubes.iter().map(|t| {
+                let (min, max) = t.bounds();
+                let pad = rounding((min, max));
+                Aabb { min: min - pad, max: max + pad }
+            })),
+        }
+        if parts.len() == segments.len() {
+            parts = Vec::new();
+        }
         let bvh = Bvh::build(&boxes);
         let bounds = bvh.bounds();
-        Ok(Curves { pieces, bvh, segments: segments.len() as u32, bounds, placement: *world_from_object })
+        Ok(Curves { pieces, bvh, parts, segments: segments.len() as u32, bounds, placement: *world_from_object })
     }
 
     /// How many segments there are.
@@ -157,7 +168,7 @@ impl Curves {
             Pieces::Cones(cones) => cones.capacity() * size_of::<RoundCone>(),
             Pieces::Tubes(tubes, first) => tubes.capacity() * size_of::<Tube>() + 4 * first.capacity(),
         };
-        size_of::<Curves>() + pieces + self.bvh.bytes()
+        size_of::<Curves>() + pieces + self.bvh.bytes() + 4 * self.parts.capacity()
     }
 
     /// The nearest hit with 0 < t < `t_max` from outside.
@@ -196,6 +207,7 @@ impl Curves {
     ) -> Option<CurveHit> {
         let (t, v, segment) = match &self.pieces {
             Pieces::Cones(cones) => {
+                let piece = if self.parts.is_empty() { piece } else { self.parts[piece as usize] };
                 let (t, v) = cones[piece as usize].entry(origin, direction)?;
                 if is_within_joint(cones, piece, v, origin, direction, t) {
                     return None;
@@ -337,15 +349,35 @@ fn tube_of([a, b, c, d]: [ControlPoint; 4], segment: u32) -> Tube {
     }
 }
 
-/// Halves a tube as long as boxes around the halves are much smaller, up to eight pieces.
-fn add_pieces(tube: Tube, depth: u32, pieces: &mut Vec<Tube>) {
-    let area = |t: &Tube| {
-        let (low, high) = t.bounds();
+/// How often a piece is halved at the most: into eight.
+const HALVINGS: u32 = 3;
+
+/// Whether the boxes of both halves, each from its least to its greatest corner, are much smaller than that of the `whole`: by the
+/// surface, to which the number of rays is proportional that meet a box.
+fn is_worth_halving(whole: (DVec3, DVec3), halves: [(DVec3, DVec3); 2]) -> bool {
+    let area = |(low, high): (DVec3, DVec3)| {
         let e = high - low;
         e.x * e.y + e.y * e.z + e.z * e.x
     };
+    area(halves[0]) + area(halves[1]) < 0.8 * area(whole)
+}
+
+/// Tells `add` the boxes of the parts of a cone from one v to the other that is halved as long as that is worth it. A cone stays one
+/// piece, which is met through any of them.
+fn add_parts(cone: &RoundCone, [from, to]: [f64; 2], depth: u32, add: &mut impl FnMut(DVec3, DVec3)) {
+    let (whole, middle) = (cone.bounds(from, to), 0.5 * (from + to));
+    if depth < HALVINGS && is_worth_halving(whole, [cone.bounds(from, middle), cone.bounds(middle, to)]) {
+        add_parts(cone, [from, middle], depth + 1, add);
+        add_parts(cone, [middle, to], depth + 1, add);
+    } else {
+        add(whole.0, whole.1);
+    }
+}
+
+/// Halves a tube as long as that is worth it.
+fn add_pieces(tube: Tube, depth: u32, pieces: &mut Vec<Tube>) {
     let halves = tube.halves();
-    if depth < 3 && area(&halves[0]) + area(&halves[1]) < 0.8 * area(&tube) {
+    if depth < HALVINGS && is_worth_halving(tube.bounds(), [halves[0].bounds(), halves[1].bounds()]) {
         for half in halves {
             add_pieces(half, depth + 1, pieces);
         }

@@ -490,6 +490,30 @@ fn control_points_at_one_place_take_no_time() {
     assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
 }
 
+/// A long thread across all three axes has eight boxes, whose surface is an eighth of that of one; short and straight ones have one.
+/// It is the same piece in all of them.
+#[test]
+fn long_threads_are_looked_for_in_small_boxes() {
+    let ends = |x: f64, y: f64, z: f64| curves(&[[0.0, 0.0, 0.0, 0.01], [x, y, z, 0.01]], Basis::Linear);
+    assert!(ends(0.03, 0.03, 0.03).parts.is_empty());
+    assert!(ends(4.0, 0.0, 0.0).parts.is_empty());
+    let long = ends(4.0, 4.0, 4.0);
+    assert_eq!(long.parts, [0; 8]);
+    let mut random = Random::new(5);
+    for _ in 0..10_000 {
+        // Toward a place on the thread, off it by up to twice its radius.
+        let v = random.uniform();
+        let ray = ray_at(DVec3::splat(4.0 * v) + random.direction() * 0.02 * random.uniform(), 10.0, &mut random);
+        let Pieces::Cones(cones) = &long.pieces else { panic!() };
+        let length = ray.direction.length();
+        let entry = cones[0].entry(ray.origin, ray.direction / length).map(|(t, v)| (t / length, v));
+        let expected = entry.filter(|(t, _)| *t > 0.0);
+        let found = long.closest(&ray, f64::INFINITY).map(|hit| (hit.t, hit.v));
+        assert_eq!(found, expected);
+        assert_eq!(long.any(&ray, f64::INFINITY), expected.is_some());
+    }
+}
+
 #[test]
 fn too_few_points_are_refused_in_words() {
     let fault = |n: usize, basis| {
