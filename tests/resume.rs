@@ -199,8 +199,10 @@ fn a_search_for_light_is_told_and_stopped() {
          lights: [point: {position: [5, 5, 5], intensity: 1}, constant: {radiance: 0.3}]\n",
     );
     let mut child = place.command(&["render", "scene.yaml", "-o", "a.exr", "--progress", "plain"]).spawn().unwrap();
+    let mut plan = place.command(&["plan", "scene.yaml"]).spawn().unwrap();
     std::thread::sleep(Duration::from_secs(8));
     signal(&child, "TERM");
+    plan.kill().unwrap();
     let end = Instant::now() + Duration::from_secs(60);
     while child.try_wait().unwrap().is_none() {
         if Instant::now() > end {
@@ -215,6 +217,8 @@ fn a_search_for_light_is_told_and_stopped() {
     let told = "Progress: 0.0%  scene: looking for light that mirrors or glass throw, at most about ";
     assert!(done.err.contains(told), "{}", done.err);
     assert!(!place.path("a.exr").exists());
+    let planned = String::from_utf8(plan.wait_with_output().unwrap().stderr).unwrap();
+    assert!(planned.contains(told.trim_start_matches("Progress: 0.0%  ")), "{planned}");
 }
 
 /// The second of three scenes is stopped, or about to begin; the third is not begun. None of them has failed.

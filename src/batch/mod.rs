@@ -40,7 +40,7 @@ use frame::{Progress, go_on};
 use part_file::Identity;
 pub use portion::{Portion, Samples};
 use prepare::prepare_one_of;
-pub use prepare::{Prepared, prepare, window};
+pub use prepare::{Prepared, prepare, prepare_watched, window};
 use report::{Report, SceneReport, Status};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -112,8 +112,16 @@ impl Prepared {
 /// # Errors
 /// [`Error::Config`] and [`Error::Input`], as [`compile::compile`].
 pub fn prepare(entry: &BatchEntry, overrides: &Overrides) -> Result<Prepared> {
+    prepare_watched(entry, overrides, &())
+}
+
+/// [`prepare`]; `watcher` hears what takes long.
+///
+/// # Errors
+/// As [`prepare`].
+pub fn prepare_watched(entry: &BatchEntry, overrides: &Overrides, watcher: &dyn Watcher) -> Result<Prepared> {
     let never = AtomicBool::new(false);
-    prepare_one_of(entry, entry.scene(&overrides.set)?, overrides, &mut Shelf::default(), &never, &())
+    prepare_one_of(entry, entry.scene(&overrides.set)?, overrides, &mut Shelf::default(), &never, watcher)
 }
 
 /// [`prepare_scene`] of one of the pictures of a batch. What is asked of all of them asks nothing of those by `whitted`.

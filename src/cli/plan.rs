@@ -1,5 +1,6 @@
 //! `abbe plan`.
 
+use super::progress::Searches;
 use super::{PlanArguments, PlanFormat};
 use crate::batch;
 use crate::error::Result;
@@ -12,7 +13,9 @@ pub fn run(arguments: &PlanArguments) -> Result<i32> {
     let mut all = Vec::new();
     let mut codes = Vec::new();
     for entry in batch::entries(&arguments.scene.file, &overrides)? {
-        let prepared = batch::prepare(&entry, &overrides).and_then(|prepared| Ok((prepared.sums()?, prepared)));
+        let watcher = Searches::of(&entry.name);
+        let prepared = batch::prepare_watched(&entry, &overrides, &watcher);
+        let prepared = prepared.and_then(|prepared| Ok((prepared.sums()?, prepared)));
         let (sums, prepared) = match prepared {
             Ok(both) => both,
             Err(e) => {

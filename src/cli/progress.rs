@@ -86,6 +86,41 @@ fn bar(template: &str) -> BarStyle {
     BarStyle::with_template(template).unwrap_or_else(|_| BarStyle::default_bar()).progress_chars("=> ")
 }
 
+/// That a search goes on, of which `share` was done after `elapsed`, and the most seconds that it takes yet.
+fn search(share: f64, elapsed: Duration) -> (String, f64) {
+    // Its rays take the same time each.
+    let left = elapsed.as_secs_f64() * (1.0 - share) / share.max(f64::MIN_POSITIVE);
+    (format!("looking for light that mirrors or glass throw, at most about {} more", seconds(left)), left)
+}
+
+/// Tells of searches alone, by lines on the standard error.
+pub struct Searches {
+    scene: String,
+    last_line: Mutex<Instant>,
+}
+
+impl Searches {
+    /// Those for the picture `scene`.
+    pub fn of(scene: &str) -> Searches {
+        Searches { scene: scene.to_owned(), last_line: Mutex::new(Instant::now()) }
+    }
+}
+
+impl Watcher for Searches {
+    fn scene_begins(&self, _: Turn, _: &str) {}
+
+    fn searches(&self, share: f64, elapsed: Duration) {
+        let mut last_line = self.last_line.lock().unwrap_or_else(PoisonError::into_inner);
+        if last_line.elapsed() >= LINE_EVERY {
+            *last_line = Instant::now();
+            complain(&format!("{}: {}", self.scene, search(share, elapsed).0));
+        }
+    }
+
+    fn progress(&self, _: Progress) {}
+    fn scene_ends(&self, _: &SceneReport) {}
+}
+
 /// Rate, error so far and time left.
 fn words(p: &Progress) -> String {
     let elapsed = p.elapsed.as_secs_f64().max(1e-9);
@@ -149,9 +184,7 @@ impl Watcher for Teller {
     }
 
     fn searches(&self, share: f64, elapsed: Duration) {
-        // Its rays take the same time each.
-        let left = elapsed.as_secs_f64() * (1.0 - share) / share.max(f64::MIN_POSITIVE);
-        let said = format!("looking for light that mirrors or glass throw, at most about {} more", seconds(left));
+        let (said, left) = search(share, elapsed);
         match &self.style {
             Style::Bars { scene, .. } => scene.set_message(said),
             Style::Plain | Style::Json | Style::OpenJd => {
