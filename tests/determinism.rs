@@ -199,6 +199,29 @@ fn all_effects_give_the_bits_of_those_the_scene_calls_for() {
     }
 }
 
+/// Paths that go side by side send their shadow rays later than one alone does. What comes by them is added to light of photons in
+/// the same order either way.
+#[test]
+fn all_effects_give_the_bits_of_merged_light() {
+    let picture = |effects: &str| {
+        let yaml = format!(
+            "camera: {{origin: [0.2, 0.7, 2.5], target: [0.1, 1.1, -0.2], fov_deg: 60}}\nimage: {{width: 32, height: 24}}\n\
+             render: {{samples: 32, seed: 2, effects: {effects}, \
+             techniques: {{light_tracing: on, merging: on, reuse: on, shadow_rays: 4}}}}\nshapes:\n\
+             - rectangle: {{corner: [-4, 0, 4], edge_u: [8, 0, 0], edge_v: [0, 0, -8], material: {{diffuse: {{reflectance: 0.8}}}}}}\n\
+             - sphere: {{center: [0, 0.7, 0.2], radius: 0.4, material: {{dielectric: {{ior: 1.33}}}}}}\n\
+             - rectangle: {{corner: [1, 2.6, -0.7], edge_u: [0.6, 0, 0], edge_v: [0, 0, 0.5], emission: 1}}\n"
+        );
+        let bench = bench_with(&yaml, &[]);
+        let plan = &bench.prepared.plan;
+        assert!(plan.reuse && plan.caustics.as_ref().is_some_and(|caustics| caustics.merging.is_some()));
+        sums(&bench.film())
+    };
+    let (auto, all) = (picture("auto"), picture("all"));
+    let differ = auto.iter().zip(&all).filter(|(a, b)| a != b).count();
+    assert!(differ == 0, "{differ} of {} sums differ", auto.len());
+}
+
 /// A medium that is declared and fills nothing is none to light that comes from the lamps through dispersive glass, whose
 /// wavelengths go together as long as it is known what they are in.
 #[test]

@@ -381,6 +381,25 @@ impl Tracer<'_> {
         let wo = frame.to_local(at.wo);
         self.foresee(path);
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
+        // First, as light of a shadow ray may be left for later: the order of a sum is the same either way, and so are its bits.
+        if let Some(map) = self.photons
+            && path.specular
+            && path.vertices > 0
+            && !bsdf.is_discrete()
+            && !path.sharp
+        {
+            let of_own = |light: Lanes| path.alone.map_or(light, |lane| Lanes::splat(light.to_array()[lane]));
+            let scatter = |wi| at.eval(bsdf, wo, wi).0;
+            let light = of_own(path.beta * self.merge::<CHROMATIC>(map, path, surface, None, scatter));
+            path.radiance += light;
+            if let Some(ledger) = self.ledger {
+                for group in 0..scene.light_groups.count() {
+                    let light = of_own(path.beta * self.merge::<CHROMATIC>(map, path, surface, Some(group), scatter));
+                    ledger.caustic(Found { light, group, alone: path.alone });
+                }
+            }
+        }
+
         if !bsdf.is_discrete() && self.asks() {
             let toward = path.ray.direction.dot(surface.normal);
             let inside = path.inside;
@@ -403,24 +422,6 @@ impl Tracer<'_> {
                 |wi| scene.leave(surface, hit, wi),
                 later,
             );
-        }
-
-        if let Some(map) = self.photons
-            && path.specular
-            && path.vertices > 0
-            && !bsdf.is_discrete()
-            && !path.sharp
-        {
-            let of_own = |light: Lanes| path.alone.map_or(light, |lane| Lanes::splat(light.to_array()[lane]));
-            let scatter = |wi| at.eval(bsdf, wo, wi).0;
-            let light = of_own(path.beta * self.merge::<CHROMATIC>(map, path, surface, None, scatter));
-            path.radiance += light;
-            if let Some(ledger) = self.ledger {
-                for group in 0..scene.light_groups.count() {
-                    let light = of_own(path.beta * self.merge::<CHROMATIC>(map, path, surface, Some(group), scatter));
-                    ledger.caustic(Found { light, group, alone: path.alone });
-                }
-            }
         }
 
         // Of wavelengths that parted one goes on from where all have been seen.
