@@ -212,7 +212,8 @@ impl Scene {
     /// The bodies that hold `origin` of a ray.
     ///
     /// Whoever leaves a body once more often than it enters it on its way out to infinity has begun inside. Each body is
-    /// asked by itself, so that surfaces in one place do not hide each other.
+    /// asked by itself, so that surfaces in one place do not hide each other. A ray that leaves the surface of a body is itself
+    /// asked about that one: another would go back in unnoticed, as the surface that it begins on is not met again.
     #[must_use]
     pub fn bodies_around(&self, origin: &Ray) -> Bodies {
         // Along no axis, face or diagonal that a person would write.
@@ -229,7 +230,8 @@ impl Scene {
                 continue;
             }
             let Geometry::Instance(instance) = &object.geometry else {
-                add(index, self.depth(index, &ray));
+                let is_left = origin.departure.is_some_and(|departure| departure.object == index);
+                add(index, self.depth(index, if is_left { origin } else { &ray }));
                 continue;
             };
             let (local, _) = instance.map.enter(&ray);

@@ -320,6 +320,22 @@ fn light_through_bodies_is_the_same_from_both_ends() {
     assert_agree("divided", &divided, &path);
 }
 
+/// A ball that shines and is a body itself sends its light into what is around it, wherever on its surface that begins: the weaker
+/// ball of glass beside it is there for all of it.
+#[test]
+fn lamps_that_are_bodies_shine_outward() {
+    let scene = "camera: {origin: [0, 3, 5], target: [0, -1, 2.6], fov_deg: 20}\nimage: {width: 8, height: 8}\n\
+         integrator: INTEGRATOR\nrender: {samples: 4096, techniques: {light_tracing: off}}\nshapes:\n\
+         - rectangle: {corner: [-3, -1, 4], edge_u: [6, 0, 0], edge_v: [0, 0, -6], material: {diffuse: {reflectance: 0.7}}}\n\
+         - sphere: {center: [0, 0.3, 0.8], radius: 0.8, material: {dielectric: {ior: 1.5, priority: 1}}}\n\
+         - sphere: {center: [0, 1.6, -1.2], radius: 0.4, emission: 10, material: {dielectric: {ior: 1.33, priority: 2}}}\n";
+    let path = by(scene, "path");
+    assert_agree("from the lamp", &by(scene, "light_tracer"), &path);
+    let divided = by(&scene.replace("light_tracing: off", "light_tracing: on"), "path");
+    assert!(divided.splats.is_some());
+    assert_agree("divided", &divided, &path);
+}
+
 /// The recursive tracer knows the same bodies: in even light they are invisible but for what it gives up.
 #[test]
 fn whitted_knows_bodies_that_overlap() {
