@@ -219,7 +219,8 @@ pub(super) fn prepare_scene(
     let filter = sampler(&description)?;
     let (seed, wishes) = (description.render.seed, wishes(&description));
     let choosing = Instant::now();
-    if let Some((packets, said)) = trial::packets(&scene, &plan, &filter, seed, planned, wishes.packets) {
+    let shot = Shot { scene: &scene, plan: &plan, filter: &filter, seed, photons: None };
+    if let Some((packets, said)) = trial::packets(&shot, planned, wishes.packets) {
         plan.packets = packets;
         plan.techniques.push(said);
     }

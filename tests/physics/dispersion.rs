@@ -100,6 +100,28 @@ fn a_prism_turns_each_wavelength_by_snells_law() {
     }
 }
 
+/// Bars of light behind a ball of flint: what comes of them in the ball's dark parts is rare and bright, and a good part of the noise.
+/// That packets are worth it seldom depends on how much of it a trial happens to meet.
+#[test]
+fn packets_are_used_where_rare_light_makes_the_noise() {
+    let bar = "edge_u: [0.06, 0, 0], edge_v: [0, 3.2, 0], emission: 2.2";
+    let bars: String = (0..13)
+        .map(|i| format!("- rectangle: {{corner: [{}, 0.3, -3], {bar}}}\n", -3.63 + 0.6 * f64::from(i)))
+        .collect();
+    let used = |seed: &u32| {
+        let scene = format!(
+            "camera: {{origin: [0, 1.6, 7], target: [0, 1.12, 0], fov_deg: 28}}\nimage: {{width: 360, height: 270}}\n\
+             render: {{samples: 64, seed: {seed}, techniques: {{light_tracing: off}}}}\n\
+             lights: [constant: {{radiance: 0.018}}]\nmaterials:\n  flint: {{dielectric: {{ior: {{glass: N-SF11}}}}}}\n  \
+             dark: {{plastic: {{reflectance: 0.03, ior: 1.5}}}}\nshapes:\n\
+             - plane: {{normal: [0, 1, 0], material: dark}}\n\
+             - sphere: {{center: [0, 1.2, 0], radius: 1.2, material: flint}}\n{bars}"
+        );
+        bench_with(&scene, &[]).prepared.plan.packets
+    };
+    assert!((1..=4).filter(used).count() >= 3);
+}
+
 /// Eight wavelengths at once, and a lamp that only those bent least can see: each lane is lit or dark by
 /// its own index. The path tracer's lanes follow their hero; its mean over lanes and heroes is the same.
 #[test]
