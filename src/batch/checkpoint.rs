@@ -7,7 +7,8 @@
 
 use super::Watcher;
 use super::develop;
-use super::finish::{Finish, spectral_path};
+use super::files::spectral_path;
+use super::finish::Finish;
 use super::frame::{self, Begun, FrameJob, Milestone, lock};
 use super::header::FAULT;
 use super::merge::sum;

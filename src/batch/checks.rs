@@ -1,7 +1,7 @@
 //! What is looked at before a picture is begun: whether it fits into memory, and whether its files may go where they are to.
 
 use super::prepare::Prepared;
-use super::{Overrides, ends_in, finish, memory, names, output_path};
+use super::{Overrides, ends_in, files, memory, names, output_path};
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
@@ -64,7 +64,7 @@ pub(super) fn places(prepared: &Prepared, overrides: &Overrides, read: &mut Inpu
     for scene in prepared.moments.iter().chain(prepared.next.as_deref()).chain([&prepared.scene]) {
         read.add(&scene.files);
     }
-    let places = finish::places(&output_path(prepared, overrides));
+    let places = files::places(&output_path(prepared, overrides));
     // A part has no PNG and nothing else beside it.
     read.spare(if overrides.portion.is_all() { &places[..] } else { &places[..1] })
 }

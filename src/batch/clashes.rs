@@ -1,6 +1,6 @@
 //! No two pictures of a job go to one file, and no report: what would be written twice is told before anything is rendered.
 
-use super::{Overrides, about_files, about_place, checkpoint, finish, names, place, spectral_path};
+use super::{Overrides, about_files, about_place, checkpoint, files, names, place, spectral_path};
 use crate::description::{Animation, BatchEntry};
 use crate::error::{Error, Result};
 use crate::film::output::{self, Inputs};
@@ -256,7 +256,7 @@ pub(super) fn check_report(entries: &[BatchEntry], overrides: &Overrides) -> Res
 /// # Errors
 /// [`Error::Config`] with the place.
 pub(super) fn spare(report: &Path, exr: &Path, whole: bool, label: &str) -> Result<()> {
-    let files = finish::places(exr);
+    let files = files::places(exr);
     // A part has nothing of a picture beside it.
     let files = if whole { &files[..] } else { &files[..1] };
     let kept = [checkpoint::place(exr), checkpoint::snapshot_place(exr)];

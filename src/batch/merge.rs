@@ -6,7 +6,8 @@
 
 use super::checks;
 use super::clashes;
-use super::finish::{self, Finish};
+use super::files;
+use super::finish::Finish;
 use super::frame::{Frame, lock};
 use super::names;
 use super::part_file::{self, Header, Written};
@@ -58,8 +59,7 @@ pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Re
     let out = opened.iter().find_map(|(_, part)| Some(picture(out, &part.as_ref().ok()?.header.finish)));
     let out = out.unwrap_or_default();
     // What an earlier merge has written among its parts is none.
-    let earlier: Vec<PathBuf> =
-        finish::places(&out).into_iter().filter_map(|place| place.canonicalize().ok()).collect();
+    let earlier: Vec<PathBuf> = files::places(&out).into_iter().filter_map(|place| place.canonicalize().ok()).collect();
     let is_earlier =
         |path: &PathBuf| path.canonicalize().is_ok_and(|path| earlier.contains(&path)) && !paths.contains(path);
     opened.retain(|(path, part)| part.is_ok() || !is_earlier(path));
@@ -71,7 +71,7 @@ pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Re
         part.header.check_like(&part.path, &first.header)?;
     }
     let finish = &first.header.finish;
-    output::Inputs::of(parts.iter().map(|part| &part.path)).spare(finish::places(&out))?;
+    output::Inputs::of(parts.iter().map(|part| &part.path)).spare(files::places(&out))?;
     if let Some(report) = report {
         clashes::spare(report, &out, true, &names::label(&finish.name, finish.frame_number))?;
     }
@@ -99,7 +99,7 @@ pub fn merge(paths: &[PathBuf], out: &Path, report: Option<&Path>) -> Result<(Re
     let mut scene = SceneReport::new(&finish.name, finish.frame_number);
     scene.describe(finish, start.elapsed());
     scene.measure(finish, &frame, sum(parts.iter().filter_map(|part| part.header.numerics)));
-    let written = finish::write(finish, &frame, Ok(()), &out, &mut scene);
+    let written = files::write(finish, &frame, Ok(()), &out, &mut scene);
     if let Err(e) = &written {
         scene.fail(e);
     }

@@ -10,6 +10,7 @@ mod clashes;
 pub mod contact;
 pub mod develop;
 pub mod farm;
+mod files;
 pub mod finish;
 pub mod frame;
 mod header;
@@ -35,7 +36,8 @@ use crate::film::output::{self, Inputs};
 use crate::scene::shelf::Shelf;
 use checkpoint::{Keep, Keeper};
 use contact::Contact;
-use finish::{Finish, spectral_path};
+use files::spectral_path;
+use finish::Finish;
 use frame::{Progress, go_on};
 use part_file::Identity;
 pub use portion::{Portion, Samples};
@@ -224,7 +226,7 @@ fn render_and_write(
         report.status = Status::Skipped;
         if part.is_none() {
             report.recall(finish, &exr_path);
-            report.files = finish::files(finish, &exr_path);
+            report.files = files::of(finish, &exr_path);
         } else {
             report.files = vec![exr_path];
         }
@@ -262,7 +264,7 @@ fn render_and_write(
     report.forecast = Forecast::at_a_quarter(&frame.milestones, &prepared.stop, prepared.samples);
     let target = prepared.stop.check(&frame.milestones);
     keeper.keep_place(&exr_path)?;
-    let written = finish::write(finish, &frame, target, &exr_path, report);
+    let written = files::write(finish, &frame, target, &exr_path, report);
     // What cannot be written can still be resumed.
     if report.files.is_empty() {
         return written;

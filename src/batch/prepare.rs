@@ -1,7 +1,8 @@
 //! From what was written to what is rendered: a scene compiled and planned, with the hash of all that decides about it.
 
 use super::adaptive;
-use super::finish::{self, Finish, Sharing};
+use super::files;
+use super::finish::{Finish, Sharing};
 use super::frame::{Frame, FrameJob, Gauge};
 use super::part::lights::paths_of;
 use super::part::{Part, Share};
@@ -312,7 +313,7 @@ fn check_files(prepared: &Prepared) -> Result<()> {
     let finish = Finish::of(prepared);
     let frame = Frame::of(one, None, 0, Duration::ZERO, &Gauge { random: false, ..finish.gauge() });
     let field = if description.layers.is_empty() { "output.exr" } else { "layers" };
-    finish::check_files(&finish, &frame).map_err(|message| {
+    files::check_files(&finish, &frame).map_err(|message| {
         Error::Config(description.fault(field, &format!("expected a file that can be written: {message}")))
     })
 }

@@ -1,0 +1,425 @@
+//! The files of a picture: what they are called, and the writing of them.
+
+use super::contact;
+use super::finish::Finish;
+use super::frame::{self, Frame};
+use super::header::attributes;
+use super::prepare::colour_space;
+use super::report::{Developed, SceneReport};
+use crate::description;
+use crate::error::{Error, Result};
+use crate::film::accumulate::PixelCells;
+use crate::film::exr::{self, Attribute, ChannelData, ColourEncoding, ExrImage, LayerPlane, stderr_name};
+use crate::film::heat;
+use crate::film::output;
+use crate::film::png;
+use crate::film::resolve::Image;
+use crate::transport::layers::{Channel, Holds};
+use std::ffi::OsStr;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Writes the EXR at `exr_path` and the PNG beside it, and notes them in the report, which has measured the frame. `target` is
+/// whether that is as good as was asked for.
+///
+/// # Errors
+/// [`Error::Output`] where a file cannot be written, [`Error::Render`] for invalid samples, or `target`; the files are then
+/// written all the same.
+pub fn write(
+    finish: &Finish,
+    frame: &Frame,
+    target: Result<()>,
+    exr_path: &Path,
+    report: &mut SceneReport,
+) -> Result<()> {
+    let written = Instant::now();
+    let (counted, dropped) = frame.film.samples();
+    let paths: u64 = frame.splats.iter().flat_map(|splats| splats.paths).sum();
+    let sound = frame::check_invalid(&frame.invalid(), counted + dropped + paths).and(target);
+    report.fault = sound.as_ref().err().map(ToString::to_string);
+    let mut image = frame.resolve(&finish.rgb_from_xyz());
+    if !finish.is_random() {
+        // Its samples differ by where they are, and would be the same again: there is no noise.
+        image.standard_error.iter_mut().for_each(|plane| plane.fill(0.0));
+    }
+    report.pixel_hash = pixel_hash(&image);
+    let [_, png_path, spectral] = places(exr_path);
+    let shown = image.shown();
+    let mut settings = finish.png_settings(&shown);
+    settings.texts.extend(finish.png_marks(&report.pixel_hash));
+    report.png = Some(Developed {
+        exposure_stops: settings.exposure_stops,
+        metered: finish.output.png.exposure == description::Exposure::Auto,
+        white: finish.white,
+    });
+    // Rays on a grid differ from each other, but not by chance.
+    if report.error.is_some() {
+        report.error_map = heat::error_map(&shown, finish.space().matrix_to_xyz()[1], contact::SIDE);
+    }
+    write_spectral(&spectral, finish, frame, &image, report)?;
+    let (exr, png) =
+        rayon::join(|| sealed_exr(exr_path, finish, frame, &image, report), || png::encode_png(&shown, &settings));
+    let (exr, bytes) = exr?;
+    // They come to the disk together but are named one after the other: where the first cannot be written, nothing of the picture
+    // is left.
+    let both = [Some((exr_path, &*bytes)), png.as_ref().ok().map(|png| (&*png_path, &**png))];
+    output::write_together(&both.into_iter().flatten().collect::<Vec<_>>())?;
+    note_loss(exr_path, finish, &exr, report)?;
+    png.map_err(|message| Error::output(&png_path, message))?;
+    report.files = of(finish, exr_path);
+    report.seconds.writing = written.elapsed().as_secs_f64();
+    sound
+}
+
+/// Makes the files of a picture of one pixel, which has no sample, to see whether the channels and attributes of the whole one
+/// can stand in them.
+///
+/// # Errors
+/// Why they cannot.
+pub fn check_files(finish: &Finish, frame: &Frame) -> std::result::Result<(), String> {
+    let one = Finish { window: frame.film.window(), ..finish.clone() };
+    let image = frame.resolve(&one.rgb_from_xyz());
+    let mut report = SceneReport::new(&one.name, one.frame_number);
+    let file = exr_image(&one, frame, &image, &mut report);
+    // More of them are written where a pixel shows more things.
+    let numbered = |name: &str, layer: &str| {
+        name.strip_prefix(layer).is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    };
+    for matte in &finish.mattes {
+        let layer = |channel: &Channel| channel.name.rsplit_once('.').map_or("", |(layer, _)| layer).to_owned();
+        if let Some(layer) = finish.layers.iter().map(layer).find(|layer| numbered(layer, &matte.layer)) {
+            return Err(format!("the layer `{layer}` has a name of the mattes {}", matte.layer));
+        }
+    }
+    exr::encode_exr(&file)?;
+    spectral_image(&one, frame, &image, &report).map_or(Ok(()), |file| exr::encode_exr(&file).map(drop))
+}
+
+/// The EXR of a picture that is to be at `path`, and its bytes.
+fn sealed_exr(
+    path: &Path,
+    finish: &Finish,
+    frame: &Frame,
+    image: &Image,
+    report: &mut SceneReport,
+) -> Result<(ExrImage, Vec<u8>)> {
+    let mut file = exr_image(finish, frame, image, report);
+    seal(path, &mut file)?;
+    let bytes = exr::encode_exr(&file).map_err(|message| Error::output(path, message))?;
+    Ok((file, bytes))
+}
+
+/// Notes what packing has changed in `file`, which is at `path`.
+fn note_loss(path: &Path, finish: &Finish, file: &ExrImage, report: &mut SceneReport) -> Result<()> {
+    if file.compression.loses() {
+        let loss = exr::loss(path, file)?;
+        report.notes.push(format!(
+            "DWA compression of level {} changes values by {:.2e} in the root mean square, at most {:.2e}; their mean is {:.2e}",
+            finish.output.exr.dwa_level, loss.root_mean_square, loss.most, loss.mean
+        ));
+        if loss.no_longer_finite > 0 {
+            report
+                .notes
+                .push(format!("DWA compression changes {} values between finite and not", loss.no_longer_finite));
+        }
+    }
+    Ok(())
+}
+
+/// The file of a picture, and notes on it.
+fn exr_image(finish: &Finish, frame: &Frame, image: &Image, report: &mut SceneReport) -> ExrImage {
+    let exr = &finish.output.exr;
+    let precision = match exr.precision {
+        description::Precision::Half => exr::Precision::Half,
+        description::Precision::Float => exr::Precision::Float,
+    };
+    let compression = match exr.compression {
+        description::Compression::None => exr::Compression::None,
+        description::Compression::Zips => exr::Compression::Zips,
+        description::Compression::Zip => exr::Compression::Zip,
+        description::Compression::Piz => exr::Compression::Piz,
+        description::Compression::Dwaa => exr::Compression::Dwaa(exr.dwa_level as f32),
+        description::Compression::Dwab => exr::Compression::Dwab(exr.dwa_level as f32),
+    };
+    let error = if exr.stderr { exr::StandardError::Write } else { exr::StandardError::Leave };
+    // Bands come first.
+    let mut errors = band_errors(finish, frame, 0..finish.spectral_channels().start);
+    let shared = match finish.bands {
+        true => shared_errors_of_bands(finish, frame, 0..finish.spectral_channels().start, &errors),
+        false => frame.shared_errors(image, &finish.rgb_from_xyz(), finish.sharing),
+    };
+    let layer = |(i, channel): (usize, &Channel)| {
+        let own = LayerPlane {
+            name: channel.name.clone(),
+            plane: if channel.holds == Holds::Once { frame.layer_once(i) } else { whole(frame.layer(i), channel) },
+            kind: match channel.holds {
+                Holds::Light => exr::PlaneKind::Colour,
+                Holds::Band => exr::PlaneKind::Band,
+                Holds::Data | Holds::Once => exr::PlaneKind::Data,
+            },
+        };
+        let error = errors.get_mut(i).map(|plane| LayerPlane {
+            name: stderr_name(&channel.name),
+            plane: whole(std::mem::take(plane), channel),
+            kind: exr::PlaneKind::Data,
+        });
+        [Some(own), error].into_iter().flatten()
+    };
+    let own = finish.layers.iter().enumerate().filter(|(i, _)| !finish.spectral_channels().contains(i));
+    let own = own.flat_map(layer).collect();
+    let colour = ColourEncoding::of(colour_space(finish.output.colour));
+    let mut beauty = exr::beauty(image, finish.base(), own, colour, precision, error, compression);
+    if frame.film.layers.invalid.total() > 0 {
+        let samples = frame.film.layers.invalid.total();
+        report.notes.push(format!("in {samples} samples a number of a layer could not be added, and counts as zero"));
+    }
+    let as_asked = beauty.note.is_none();
+    report.notes.extend(beauty.note.take());
+    let mut file = beauty.exr;
+    file.layout = match exr.layout {
+        description::FileLayout::Single => exr::Layout::Single,
+        description::FileLayout::Multipart => exr::Layout::Multipart,
+    };
+    file.attributes = attributes(finish, frame, report, report.error.as_ref());
+    file.attributes.extend(shared_errors(shared));
+    if exr.aces_container && as_asked {
+        file.attributes.push(("acesImageContainerFlag".to_owned(), Attribute::Int(1)));
+    } else if exr.aces_container {
+        report.notes.push("an ACES container holds half floats only: the file is none".to_owned());
+    }
+    if finish.variance {
+        let mut lost = Squares::default();
+        let mut squares = |errors: &[f32]| {
+            errors.iter().for_each(|error| lost.add(*error));
+            ChannelData::F32(errors.iter().map(|x| x * x).collect())
+        };
+        // Bands stand in place of colours.
+        for i in 0..finish.spectral_channels().start {
+            let channel = &finish.layers[i];
+            let error = whole(band_error(finish, frame, i), channel);
+            file.push_data(format!("variance.{}", channel.name), squares(&error));
+        }
+        for &(name, i) in finish.base().colours() {
+            file.push_data(format!("variance.{name}"), squares(&image.standard_error[i]));
+        }
+        report.notes.extend(lost.note());
+    }
+    if finish.sample_count {
+        let count = |cells: &PixelCells| cells.iter().map(|cell| cell.count).sum();
+        let counts = frame.film.cells().iter().map(count).collect();
+        file.push_data("sampleCount".to_owned(), ChannelData::U32(counts));
+    }
+    for matte in &finish.mattes {
+        let (channels, attributes) = matte.write(&frame.film);
+        channels.into_iter().for_each(|(name, samples)| file.push_data(name, samples));
+        file.attributes.extend(attributes);
+    }
+    let infinite = image.rgb.iter().flatten().filter(|x| x.is_infinite()).count();
+    if infinite > 0 {
+        report.notes.push(format!("{infinite} values are more than 32-bit floats hold: they are written as infinite"));
+    }
+    file
+}
+
+/// What becomes of standard errors as their squares are written.
+#[derive(Default)]
+struct Squares {
+    /// How many are infinite whose root is not.
+    infinite: usize,
+    /// The greatest root.
+    most: f32,
+}
+
+impl Squares {
+    fn add(&mut self, error: f32) {
+        if error.is_finite() {
+            self.infinite += usize::from((error * error).is_infinite());
+            self.most = self.most.max(error);
+        }
+    }
+
+    /// What 32-bit floats do not hold of them, if anything: the greatest, or all.
+    fn note(&self) -> Option<String> {
+        let lost = match self.infinite {
+            0 if self.most > 0.0 && self.most * self.most < f32::MIN_POSITIVE => {
+                "all values are less than 32-bit floats hold with all digits (1.2e-38)".to_owned()
+            }
+            0 => return None,
+            infinite => format!("{infinite} values are more than 32-bit floats hold: they are written as infinite"),
+        };
+        Some(format!("layer variance: {lost}; a layer stderr holds their roots"))
+    }
+}
+
+/// The attribute that tells how much more the sum of all pixels varies than that of independent ones; none where it is no more.
+fn shared_errors(shared: f64) -> Option<(String, Attribute)> {
+    (shared > 1.0).then(|| (exr::SHARED_ERRORS.to_owned(), Attribute::Text(format!("{shared:.3}"))))
+}
+
+/// The numbers of `channel`, or their standard errors, of which `plane` is as the sums count them.
+fn whole(mut plane: Vec<f32>, channel: &Channel) -> Vec<f32> {
+    let unit = 2f64.powi(channel.exponent);
+    plane.iter_mut().for_each(|x| *x = (f64::from(*x) * unit) as f32);
+    plane
+}
+
+/// The standard errors of the bands that are `channels`, as their sums count them; none where they are not wanted.
+fn band_errors(finish: &Finish, frame: &Frame, channels: Range<usize>) -> Vec<Vec<f32>> {
+    let error = |i: usize| band_error(finish, frame, i);
+    if finish.output.exr.stderr { channels.map(error).collect() } else { Vec::new() }
+}
+
+/// The standard error of the band that is `channel`, as its sums count it.
+fn band_error(finish: &Finish, frame: &Frame, channel: usize) -> Vec<f32> {
+    // As of colours: samples that are not random would be the same again.
+    if finish.is_random() { frame.layer_error(channel) } else { vec![0.0; frame.film.window().pixels()] }
+}
+
+/// What pixels share of the errors of the bands that are `channels`, which is no less where those are not written.
+fn shared_errors_of_bands(finish: &Finish, frame: &Frame, channels: Range<usize>, written: &[Vec<f32>]) -> f64 {
+    if !written.is_empty() {
+        return frame.shared_errors_of_bands(channels.start, written, finish.sharing);
+    }
+    let errors: Vec<Vec<f32>> = channels.clone().map(|i| frame.layer_error(i)).collect();
+    frame.shared_errors_of_bands(channels.start, &errors, finish.sharing)
+}
+
+/// The path of the spectral file beside the EXR at `path`: `name.spectral.exr`, and before the number of a frame.
+#[must_use]
+pub fn spectral_path(path: &Path) -> PathBuf {
+    let stem = Path::new(path.file_stem().unwrap_or_default());
+    let is_number = |n: &&str| {
+        let digits = n.strip_prefix('-').unwrap_or(n);
+        !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())
+    };
+    let number = stem.extension().and_then(OsStr::to_str).filter(is_number);
+    // Whatever bytes the name has: those of two pictures differ.
+    let name = if number.is_some() { stem.file_stem().unwrap_or_default() } else { stem.as_os_str() };
+    let mut file = name.to_owned();
+    file.push(number.map_or(".spectral.exr".into(), |number| format!(".spectral.{number}.exr")));
+    path.with_file_name(file)
+}
+
+/// The files of the picture at `path`.
+#[must_use]
+pub fn of(finish: &Finish, path: &Path) -> Vec<PathBuf> {
+    let [exr, png, spectral] = places(path);
+    [exr, png].into_iter().chain(finish.output.spectral.map(|_| spectral)).collect()
+}
+
+/// All files that the picture at `path` may have.
+#[must_use]
+pub fn places(path: &Path) -> [PathBuf; 3] {
+    [path.to_path_buf(), path.with_extension("png"), spectral_path(path)]
+}
+
+/// Writes bands of the spectrum as Fichet, Pacanowski and Wilkie have them ("An OpenEXR Layout for Spectral Images", JCGT
+/// 10(3), 2021, layout 1.0): `S0.<nm>nm` is the mean spectral radiance of a band around that wavelength, W·m⁻²·sr⁻¹·nm⁻¹;
+/// R, G and B show them, and `stderr.S0.<nm>nm` is the standard error of each value where those are wanted.
+fn write_spectral(path: &Path, finish: &Finish, frame: &Frame, image: &Image, report: &SceneReport) -> Result<()> {
+    match spectral_image(finish, frame, image, report) {
+        Some(mut file) => write_sealed(path, &mut file),
+        None => Ok(()),
+    }
+}
+
+/// What [`write_spectral`] writes, where it writes.
+fn spectral_image(finish: &Finish, frame: &Frame, image: &Image, report: &SceneReport) -> Option<ExrImage> {
+    let channels = finish.spectral_channels();
+    if channels.is_empty() {
+        return None;
+    }
+    let plane = |i: usize| (finish.layers[i].name.clone(), ChannelData::F32(whole(frame.layer(i), &finish.layers[i])));
+    let preview = ["R", "G", "B"].iter().zip(&image.rgb);
+    let preview = preview.map(|(name, plane)| ((*name).to_owned(), ChannelData::F32(plane.clone())));
+    let error = frame.error_of_bands(channels.clone(), &finish.gauge());
+    let mut attributes = attributes(finish, frame, report, error.as_ref());
+    let text = |name: &str, value: &str| (name.to_owned(), Attribute::Text(value.to_owned()));
+    attributes.extend([text("spectralLayoutVersion", "1.0"), text("emissiveUnits", "W.m^-2.sr^-1")]);
+    let errors = band_errors(finish, frame, channels.clone());
+    attributes.extend(shared_errors(shared_errors_of_bands(finish, frame, channels.clone(), &errors)));
+    let own = finish.layers[channels.clone()].iter().zip(errors);
+    let errors: Vec<(String, ChannelData)> =
+        own.map(|(channel, plane)| (stderr_name(&channel.name), ChannelData::F32(whole(plane, channel)))).collect();
+    Some(ExrImage {
+        frame: image.frame,
+        window: image.window,
+        data: errors.iter().map(|(name, _)| name.clone()).collect(),
+        channels: channels.map(plane).chain(preview).chain(errors).collect(),
+        colour: Some(ColourEncoding::of(finish.space())),
+        attributes,
+        compression: exr::Compression::Zip,
+        layout: exr::Layout::Single,
+    })
+}
+
+/// Writes a file that says what its channels add up to, so that damage shows.
+fn write_sealed(path: &Path, file: &mut ExrImage) -> Result<()> {
+    seal(path, file)?;
+    exr::write_exr(path, file)
+}
+
+fn seal(path: &Path, file: &mut ExrImage) -> Result<()> {
+    let hash = Attribute::Text(file.content_hash().map_err(|message| Error::output(path, message))?);
+    file.attributes.push(("abbe/contentHash".to_owned(), hash));
+    Ok(())
+}
+
+/// 128 bits of BLAKE3 over the numbers of a picture.
+fn pixel_hash(image: &Image) -> String {
+    let mut hasher = blake3::Hasher::new();
+    let mut bytes = Vec::new();
+    for plane in image.rgb.iter().chain([&image.alpha]) {
+        bytes.clear();
+        bytes.extend(plane.iter().flat_map(|x| x.to_le_bytes()));
+        hasher.update(&bytes);
+    }
+    hasher.finalize().to_hex()[..32].to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Squares of f32 end at 1.8e19 and begin at 1.1e-19.
+    #[test]
+    fn variances_that_floats_do_not_hold_are_told() {
+        let note = |errors: &[f32]| {
+            let mut squares = Squares::default();
+            errors.iter().for_each(|error| squares.add(*error));
+            squares.note()
+        };
+        let beyond = "layer variance: 2 values are more than 32-bit floats hold: they are written as infinite; \
+                      a layer stderr holds their roots";
+        assert_eq!(note(&[1.9e19, 1.0, 1e25, f32::INFINITY, f32::NAN]).as_deref(), Some(beyond));
+        assert!(note(&[1e-20, 0.0, f32::NAN]).unwrap().contains("less than 32-bit floats hold"));
+        // What is next to nothing beside the rest is no loss.
+        for held in [&[1.8e19f32, 1e-30, 0.0][..], &[1.1e-19, 1e-30], &[0.0, f32::NAN], &[]] {
+            assert_eq!(note(held), None, "{held:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_of_frames_stay_at_the_end() {
+        for (path, expected) in [
+            ("o/a.exr", "o/a.spectral.exr"),
+            ("o/a.0001.exr", "o/a.spectral.0001.exr"),
+            ("o/a.-001.exr", "o/a.spectral.-001.exr"),
+            ("o/a.-.exr", "o/a.-.spectral.exr"),
+            ("o/a.1-1.exr", "o/a.1-1.spectral.exr"),
+        ] {
+            assert_eq!(spectral_path(Path::new(path)), Path::new(expected));
+        }
+    }
+
+    /// Two pictures whose names differ by what is no letter had one file of bands.
+    #[cfg(unix)]
+    #[test]
+    fn names_keep_bytes_that_are_no_text() {
+        use std::os::unix::ffi::OsStrExt;
+        let path = |bytes| Path::new(OsStr::from_bytes(bytes));
+        assert_eq!(spectral_path(path(b"o/\xff.exr")), path(b"o/\xff.spectral.exr"));
+        assert_eq!(spectral_path(path(b"o/\xff.0001.exr")), path(b"o/\xff.spectral.0001.exr"));
+    }
+}
