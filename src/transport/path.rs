@@ -388,18 +388,8 @@ impl Tracer<'_> {
             && !bsdf.is_discrete()
             && !path.sharp
         {
-            let of_own = |light: Lanes| path.alone.map_or(light, |lane| Lanes::splat(light.to_array()[lane]));
-            let scatter = |wi| at.eval(bsdf, wo, wi).0;
-            let light = of_own(path.beta * self.merge::<CHROMATIC>(map, path, surface, None, scatter));
-            path.radiance += light;
-            if let Some(ledger) = self.ledger {
-                for group in 0..scene.light_groups.count() {
-                    let light = of_own(path.beta * self.merge::<CHROMATIC>(map, path, surface, Some(group), scatter));
-                    ledger.caustic(Found { light, group, alone: path.alone });
-                }
-            }
+            self.add_merged::<CHROMATIC, B>(map, path, at, bsdf, wo);
         }
-
         if !bsdf.is_discrete() && self.asks() {
             let toward = path.ray.direction.dot(surface.normal);
             let inside = path.inside;
@@ -510,6 +500,28 @@ impl Tracer<'_> {
         path.ray = self.scene.leave(surface, hit, wi);
         path.vertices += 1;
         self.survives::<CHROMATIC>(path, sample.chosen == Chosen::Discrete, 1.0, || at.choice.draw(2))
+    }
+
+    /// Adds the light of the photons around a vertex behind mirrors and glass.
+    #[inline(never)]
+    fn add_merged<const CHROMATIC: bool, B: Lobes>(
+        &self,
+        map: &PhotonMap,
+        path: &mut Path,
+        at: &Leaving,
+        bsdf: &B,
+        wo: DVec3,
+    ) {
+        let of_own = |light: Lanes| path.alone.map_or(light, |lane| Lanes::splat(light.to_array()[lane]));
+        let merge = |group| self.merge::<CHROMATIC>(map, path, at.surface, group, |wi| at.eval(bsdf, wo, wi).0);
+        let light = of_own(path.beta * merge(None));
+        if let Some(ledger) = self.ledger {
+            for group in 0..self.scene.light_groups.count() {
+                let light = of_own(path.beta * merge(Some(group)));
+                ledger.caustic(Found { light, group, alone: path.alone });
+            }
+        }
+        path.radiance += light;
     }
 
     /// Light of the photons around a vertex behind mirrors and glass, of lamps of one group or all. A lane could lead both parts of the joined path
