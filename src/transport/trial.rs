@@ -3,7 +3,7 @@
 //!
 //! Two ways to spend time are equal where variance times cost is. Both are rendered at places spread over the picture, with as
 //! many evenly spread samples as a replicate of the render has (sixteen at the most), because a hero's colours average out over its
-//! samples; two replicates tell the variance. Costs are counted in rays, so that every machine decides alike.
+//! samples; how replicates differ tells the variance. Costs are counted in rays, so that every machine decides alike.
 
 pub mod first;
 mod packets;
