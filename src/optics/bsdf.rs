@@ -189,6 +189,11 @@ pub trait Lobes {
     fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation;
     /// As [`Bsdf::sample`]; the number for the lobe is drawn where there are several.
     fn sample_by(&self, wo: DVec3, u_lobe: impl FnOnce() -> f64, u: DVec2) -> Option<BsdfSample>;
+    /// Whether it may mirror in a single direction where it may as well do something else.
+    fn may_mirror(&self) -> bool;
+    /// What is mirrored in a single direction, where that is one of several ways that [`Lobes::sample_by`] may take: f · |cos θ| as
+    /// a weight, no matter how often it is taken.
+    fn mirrored(&self, wo: DVec3) -> Option<Lanes>;
     /// Smooth glass.
     fn glass(&self) -> Option<&Dielectric>;
     /// As [`Bsdf::diffuse_share`].
@@ -234,6 +239,16 @@ impl Lobes for Lambert {
     }
 
     #[inline(always)]
+    fn may_mirror(&self) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn mirrored(&self, _: DVec3) -> Option<Lanes> {
+        None
+    }
+
+    #[inline(always)]
     fn glass(&self) -> Option<&Dielectric> {
         None
     }
@@ -258,6 +273,20 @@ impl Lobes for Bsdf<'_> {
     #[inline]
     fn sample_by(&self, wo: DVec3, u_lobe: impl FnOnce() -> f64, u: DVec2) -> Option<BsdfSample> {
         Bsdf::sample(self, wo, u_lobe(), u)
+    }
+
+    #[inline]
+    fn may_mirror(&self) -> bool {
+        matches!(self, Bsdf::Plastic(_) | Bsdf::Dielectric(_))
+    }
+
+    #[inline]
+    fn mirrored(&self, wo: DVec3) -> Option<Lanes> {
+        match self {
+            Bsdf::Plastic(plastic) => plastic.mirrored(wo),
+            Bsdf::Dielectric(glass) => glass.mirrored(wo),
+            _ => None,
+        }
     }
 
     #[inline]

@@ -182,6 +182,16 @@ impl Dielectric {
         all.then(|| BsdfSample::discrete(mirror(wo), self.tint.reflected))
     }
 
+    /// What is mirrored of light of each lane; `None` where the hero is reflected in any case.
+    pub(super) fn mirrored(&self, wo: DVec3) -> Option<Lanes> {
+        let toward = |eta: f64| if wo.z > 0.0 { eta } else { 1.0 / eta };
+        let reflected = match self.film_reflects(wo) {
+            Some(reflected) => Lanes::new(reflected.map(|r| r as f32)),
+            None => self.eta.lanes(|eta| fresnel::dielectric(self.fresnel, wo.z.abs(), toward(eta)).reflected),
+        };
+        (reflected.to_array()[0] < 1.0).then(|| reflected * self.tint.reflected)
+    }
+
     /// What each lane has reflected by the film; `None` where there is none.
     fn film_reflects(&self, wo: DVec3) -> Option<[f64; LANES]> {
         self.film.as_ref().map(|film| film.over_dielectric(wo.z.abs(), self.eta.each(), wo.z > 0.0))

@@ -71,6 +71,11 @@ impl Plastic {
         }
     }
 
+    /// What the coat mirrors; `None` from behind.
+    pub(super) fn mirrored(&self, wo: DVec3) -> Option<Lanes> {
+        (wo.z > 0.0).then(|| self.base.tint * self.coat(wo.z).0)
+    }
+
     pub(super) fn eval(&self, wo: DVec3, wi: DVec3) -> Evaluation {
         if wo.z <= 0.0 || wi.z <= 0.0 {
             return Evaluation::NONE;

@@ -55,10 +55,15 @@ pub struct Environment {
     day: Option<Box<Daylight>>,
     /// The share of its light that is the sun's, of all and of what is brighter than the mean.
     sun_shares: [f64; 2],
+    /// The factor of texels above which they [stand out](Environment::stands_out), where any does.
+    peak: Option<f64>,
 }
 
 /// Texels of a sky by formulas: a degree and a half.
 const DAY: [usize; 2] = [256, 128];
+
+/// How many times as bright as the mean what [stands out](Environment::stands_out) is.
+const PEAK: f64 = 64.0;
 
 /// Which directions are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -170,6 +175,7 @@ impl Environment {
         // The factor is twice the largest channel; for choosing lights half of it will do.
         let [mean_luminance, brighter_luminance] = [mean, above].map(|factor| 0.5 * factor * illuminant.luminance());
         let all = OnceLock::new();
+        let peak = Some(PEAK * mean).filter(|&peak| texels.iter().any(|texel| texel.above(peak) > 0.0));
         Environment {
             texels,
             width,
@@ -184,6 +190,7 @@ impl Environment {
             bands: None,
             day: None,
             sun_shares: [0.0; 2],
+            peak,
         }
     }
 
@@ -224,7 +231,20 @@ impl Environment {
             brighter: Table::of_each(&map.texels, width, map.brighter.floor),
             all: Table::of_each(&map.texels, width, 0.0).into(),
             day: Some(Box::new(day)),
+            peak: None,
             ..map
+        }
+    }
+
+    /// Whether what is in `direction` is so much brighter than the rest that to meet it by chance is noise: in the sun, or on a texel
+    /// many times as bright as the mean.
+    #[must_use]
+    #[inline]
+    pub fn stands_out(&self, direction: DVec3) -> bool {
+        match (&self.day, self.peak) {
+            (Some(day), _) => day.sun_pdf(self.world_from_map.transpose() * direction) > 0.0,
+            (None, Some(peak)) => self.corners(self.place(direction).at).scale_above(peak) > 0.0,
+            (None, None) => false,
         }
     }
 

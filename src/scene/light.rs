@@ -202,6 +202,13 @@ impl Light {
         self.is_environment() || matches!(self, Light::Directional { .. })
     }
 
+    /// Whether light from infinity comes from near `direction` as from a lamp: see [`Environment::stands_out`].
+    #[must_use]
+    #[inline]
+    pub fn stands_out(&self, direction: DVec3) -> bool {
+        matches!(self, Light::Environment(map) if map.stands_out(direction))
+    }
+
     /// Radiance seen along `direction` by a ray that meets nothing.
     #[must_use]
     pub fn background(&self, direction: DVec3, nm: Lanes) -> Lanes {

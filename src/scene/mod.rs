@@ -27,6 +27,7 @@ pub mod equiangular;
 pub mod few;
 pub mod grid;
 pub mod instance;
+pub mod lamps;
 pub mod light;
 pub mod load;
 pub mod material;
@@ -56,6 +57,7 @@ use curves::Curves;
 use few::Few;
 use glam::{DVec2, DVec3};
 use instance::{AffineMap, Instance, PartHit};
+use lamps::Lamps;
 use light::Light;
 use material::{Kind, Material};
 pub use medium::Medium;
@@ -112,6 +114,8 @@ pub struct Scene {
     pub all_asked: Asked,
     /// The same without light that is even over all directions, if there is any: what is scattered finds that, too.
     pub uneven_asked: Option<Asked>,
+    /// Where rays may meet lamps.
+    pub lamps: Lamps,
     /// Lamps without extent, toward which distances in media may be drawn; none where they are many.
     pub near_lamps: Vec<equiangular::Lamp>,
     /// The film counts light over two to this power: `scene/brightness.rs` tells which.

@@ -12,6 +12,7 @@
 
 mod along;
 mod lights;
+mod mirrored;
 mod parting;
 pub mod reuse;
 mod state;
@@ -234,7 +235,9 @@ impl Tracer<'_> {
         }
 
         // Light that the surface itself sends out.
-        if let Some(light) = object.light.filter(|_| self.meets_lights(path)) {
+        if let Some(light) = object.light.filter(|_| self.meets_lights(path))
+            && !path.has_counted(light)
+        {
             self.meet_lamp::<CHROMATIC>(path, light, &hit, &surface);
         }
 
@@ -390,6 +393,7 @@ impl Tracer<'_> {
         {
             self.add_merged::<CHROMATIC, B>(map, path, at, bsdf, wo);
         }
+        path.mirrored_light = self.look_at_mirrored::<CHROMATIC, MEDIA, B>(path, bsdf, wo, at);
         if !bsdf.is_discrete() && self.asks() {
             let toward = path.ray.direction.dot(surface.normal);
             let inside = path.inside;
@@ -479,6 +483,9 @@ impl Tracer<'_> {
             ledger.leave(path.vertices, first, sample.chosen == Chosen::Discrete);
         }
         path.mirrored |= path.sharp && path.vertices == 0;
+        if sample.chosen != Chosen::Discrete || sample.transmitted {
+            path.mirrored_light = None;
+        }
         if path.specular && !path.sharp && sample.chosen != Chosen::Discrete {
             path.specular = false;
             let caustics = self.plan.caustics.as_ref();
@@ -601,6 +608,7 @@ impl Tracer<'_> {
             return false;
         }
         path.sharp = false;
+        path.mirrored_light = None;
         if let Some(ledger) = self.ledger {
             ledger.meet(false);
         }

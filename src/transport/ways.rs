@@ -198,6 +198,15 @@ impl Ledger {
         }
     }
 
+    /// Light that the `vertex`th vertex reflects in a single direction.
+    pub fn mirrored(&self, vertex: u32, found: Found) {
+        match vertex {
+            0 => self.scattered_by(First::Reflected(Lanes::ZERO), found, 1),
+            _ if self.spread.get() => self.caustic(found),
+            _ => self.scattered(found, vertex + 1),
+        }
+    }
+
     fn put(&self, way: Way, found: Found, light: Lanes) {
         let slot = &mut self.sums.borrow_mut()[found.group as usize * WAYS + way as usize];
         match found.alone {

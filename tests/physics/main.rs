@@ -18,6 +18,7 @@ mod glass;
 mod indices;
 mod lights;
 mod media;
+mod mirrored;
 mod nested;
 mod pictures;
 mod reuse;

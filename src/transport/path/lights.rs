@@ -65,7 +65,7 @@ impl Tracer<'_> {
         }
     }
 
-    fn found(&self, path: &Path, share: Lanes, light: u32) -> Found {
+    pub(super) fn found(&self, path: &Path, share: Lanes, light: u32) -> Found {
         Found { light: share, group: self.scene.light_groups.of[light as usize], alone: path.alone }
     }
 
@@ -85,6 +85,9 @@ impl Tracer<'_> {
             return;
         }
         for &i in &self.scene.backgrounds {
+            if path.has_counted(i) {
+                continue;
+            }
             let light = &self.scene.lights[i as usize];
             let (l, weight) = match &path.previous {
                 None => (light.background(path.ray.direction, self.nm), 1.0),
@@ -114,6 +117,12 @@ impl Tracer<'_> {
     #[inline(always)]
     pub(super) fn asks(&self) -> bool {
         self.settings.light_samples > 0 && !self.asked().is_nobody()
+    }
+
+    /// Whether light is both looked for and met.
+    #[inline(always)]
+    pub(super) fn looks_and_meets(&self) -> bool {
+        self.settings.light_samples > 0 && self.settings.scatter_samples > 0
     }
 
     /// Shadow rays from where the path is, if it looks for light there.

@@ -63,6 +63,8 @@ pub(super) struct Path {
     pub(super) alone: Option<usize>,
     /// Whether it goes on for all that parted.
     pub(super) chosen: bool,
+    /// The light that its last vertex mirrors, where that is counted there: the path does not count it again.
+    pub(super) mirrored_light: Option<u32>,
 }
 
 /// How far a path has come, beside what it carries.
@@ -187,6 +189,7 @@ impl Path {
         left: Lanes::ZERO,
         alone: None,
         chosen: false,
+        mirrored_light: None,
     };
 
     /// What has come of it.
@@ -194,6 +197,12 @@ impl Path {
         let events = self.vertices + self.crossings;
         let Path { radiance, left, further, mirrored, .. } = *self;
         Incoming { radiance, alpha, depth, left, events, further, mirrored }
+    }
+
+    /// Whether light `index`, which the path meets, has been counted at its last vertex; once.
+    #[inline]
+    pub(super) fn has_counted(&mut self, index: u32) -> bool {
+        self.mirrored_light.take_if(|light| *light == index).is_some()
     }
 
     pub(super) fn rho_sum<const CHROMATIC: bool>(&self) -> f64 {

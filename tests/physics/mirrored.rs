@@ -1,0 +1,112 @@
+//! Lamps that glass and the coats of plastics mirror: seen at every vertex, with the brightness that they are met with by chance.
+
+use super::common::{Bench, SPREAD_NM, assert_close, bench_with, grey_png, ray, room, v, wavelengths};
+use super::reuse::{assert_layers_add_up, assert_same_light, over_seeds};
+use abbe::math::sampler::Sampler;
+use abbe::optics::fresnel::{self, Model};
+
+const LAMPS: &str = "- rectangle: {corner: [-0.6, 0.9, -0.6], edge_u: [1.2, 0, 0], edge_v: [0, 0, 1.2], emission: 3}\n\
+                     - sphere: {center: [0.6, 0.3, -0.6], radius: 0.3, emission: {rgb: [8, 3, 1]}}\n";
+
+/// Light from the camera's paths alone.
+const ALONE: &str = "light_tracing: off";
+
+fn seen(shapes: &str, before: &str, samples: u32, path: &str, techniques: &str) -> Bench {
+    let yaml = format!(
+        "camera: {{origin: [0, 0, 0.95], target: [0, -0.2, -1], fov_deg: 80}}\nimage: {{width: 20, height: 16}}\n\
+         materials: {{chalk: {{diffuse: {{reflectance: 0.7}}}}}}\nintegrator: {{path: {{max_depth: 6, {path}}}}}\n\
+         render: {{samples: {samples}, techniques: {{reuse: off, shadow_rays: 1, {techniques}}}}}\n\
+         {before}{shapes}"
+    );
+    bench_with(&yaml, &[("sky.png", &grey_png(32, 16, |x, y| if (x, y) == (9, 4) { 255 } else { 1 }))])
+}
+
+/// A path without shadow rays does not look, and meets all lamps by chance.
+#[test]
+fn lamps_that_coats_and_glass_mirror_are_as_bright_as_by_chance() {
+    let walls = room("material: {diffuse: {reflectance: 0.7}}");
+    let ball = |x: f64, material: &str| {
+        format!("- sphere: {{center: [{x}, -0.6, -0.3], radius: 0.4, material: {material}}}\n")
+    };
+    let coats = walls.clone()
+        + &ball(-0.5, "{plastic: {reflectance: 0.3}}")
+        + "- rectangle: {corner: [0.1, -0.9, -0.7], edge_u: [0, 0, 0.8], edge_v: [0.8, 0, 0], material: \
+           {plastic: {ior: {glass: N-SF11}, reflectance: {rgb: [0.6, 0.2, 0.1]}}}}\n"
+        + LAMPS;
+    let glass = walls.clone()
+        + &ball(-0.5, "{dielectric: {ior: {glass: N-SF11}}}")
+        + &ball(0.5, "{dielectric: {ior: 1.5, film: {ior: 1.38, thickness_nm: 200}}}")
+        + LAMPS;
+    let behind = walls.clone()
+        + &ball(-0.5, "{plastic: {reflectance: 0.3}}")
+        + &ball(0.5, "{blend: {weight: 0.5, first: {dielectric: {ior: 1.5}}, second: chalk}}")
+        + "- rectangle: {corner: [-0.9, 0, -0.9], edge_u: [1.8, 0, 0], edge_v: [0, 0, 1.8], material: \
+           {thin_dielectric: {ior: 1.5}}}\n"
+        + LAMPS;
+    let bodies = walls.clone()
+        + "- sphere: {center: [-0.5, -0.6, -0.3], radius: 0.4, material: {dielectric: {ior: 1.5, priority: 2}}}\n\
+           - cube: {center: [0, -0.8, 0], size: [1.6, 0.4, 1.6], material: {dielectric: {ior: 1.33, priority: 1}}}\n"
+        + LAMPS;
+    let open = "shapes:\n- plane: {point: [0, -1, 0], normal: [0, 1, 0], material: chalk}\n".to_owned()
+        + &ball(-0.5, "{plastic: {reflectance: 0.3}}")
+        + &ball(0.5, "{dielectric: {ior: 1.5}}");
+    let sun = "lights: [{sky: {sun: {elevation_deg: 40, azimuth_deg: 20}, sun_angle_deg: 8}}]\n";
+    let peak = "lights: [{environment: {file: sky.png, scale: 30}}]\n";
+    let fog = "media: {fog: {homogeneous: {scattering: {rgb: [0.2, 0.5, 0.3]}, absorption: 0.1}}}\nmedium: fog\n";
+    for (name, before, shapes, techniques, samples) in [
+        ("coats", "", &coats, ALONE, [16, 64]),
+        ("glass, packets", "", &glass, "light_tracing: off, packets: on", [16, 64]),
+        ("glass, lane by lane", "", &glass, "light_tracing: off, packets: off", [64, 256]),
+        ("a pane and a blend", "", &behind, ALONE, [16, 64]),
+        ("bodies with a priority", "", &bodies, ALONE, [16, 64]),
+        ("fog", fog, &coats, ALONE, [64, 256]),
+        ("a wide sun", sun, &open, ALONE, [64, 1024]),
+        ("a bright texel", peak, &open, ALONE, [64, 1024]),
+    ] {
+        let looks = over_seeds(seen(shapes, before, samples[0], "", techniques), 0..24);
+        let met = over_seeds(seen(shapes, before, samples[1], "light_samples: 0", techniques), 100..124);
+        assert_same_light(name, &looks, &met);
+    }
+}
+
+/// Over nothing glass sends back F L of a lamp that it mirrors, in every sample; by chance it was L or nothing.
+#[test]
+fn glass_over_nothing_mirrors_a_lamp_without_noise() {
+    for eta in [1.33, 1.5, 2.4] {
+        let bench = bench_with(
+            &format!(
+                "camera: {{origin: [0, 1, 3], target: [0, 0, 0], fov_deg: 5}}\nrender: {{techniques: {{light_tracing: off}}}}\n\
+                 shapes:\n- rectangle: {{corner: [-5, 0, -5], edge_u: [0, 0, 10], edge_v: [10, 0, 0], material: {{dielectric: {{ior: {eta}}}}}}}\n\
+                 - sphere: {{center: [0, 4, -12], radius: 3, emission: 2}}\n"
+            ),
+            &[],
+        );
+        let lamp = bench.lanes(&ray(v(0.0, 1.0, 3.0), v(0.0, 4.0, -12.0)));
+        for i in 0..32 {
+            let toward = ray(v(0.0, 1.0, 3.0), v(0.02 * f64::from(i) - 0.3, 0.0, 0.0));
+            let reflected = fresnel::dielectric(Model::Exact, -toward.direction.y, eta).reflected;
+            for index in 0..16 {
+                let sampler = Sampler::new(3, [0, 0], 0, index);
+                let light = bench.incoming(&toward, &wavelengths(SPREAD_NM), &sampler).radiance;
+                for (found, lamp) in light.to_array().into_iter().zip(lamp) {
+                    // Two roundings to f32.
+                    assert_close(f64::from(found), reflected * lamp, 2.0 * f64::from(f32::EPSILON) * lamp);
+                }
+            }
+        }
+    }
+}
+
+/// Layers of light change no bit of the picture, and add up to it.
+#[test]
+fn layers_of_mirrored_lamps_add_up_to_the_picture_that_they_leave_as_it_is() {
+    let things = room("material: {diffuse: {reflectance: 0.7}}")
+        + "- sphere: {center: [-0.4, -0.6, -0.3], radius: 0.4, material: {plastic: {}}, name: ball}\n\
+           - sphere: {center: [0.5, -0.6, -0.3], radius: 0.4, material: {dielectric: {ior: 1.5}}}\n"
+        + LAMPS;
+    for techniques in [ALONE, "light_tracing: on"] {
+        let parted = "layers: [emission, direct, indirect, caustic]\n";
+        let of = |before: &str| seen(&things, before, 16, "", techniques);
+        assert_layers_add_up(&of(""), &of(parted));
+    }
+}
