@@ -182,8 +182,25 @@ impl Dielectric {
         all.then(|| BsdfSample::discrete(mirror(wo), self.tint.reflected))
     }
 
+    /// Where light goes that is not reflected, or all that is under total reflection, and the chance of that.
+    #[must_use]
+    pub fn go_through(&self, wo: DVec3) -> Option<(BsdfSample, f64)> {
+        let sample = self.sample(wo, 1.0f64.next_down())?;
+        if !sample.transmitted {
+            return Some((sample, 1.0));
+        }
+        let eta = if wo.z > 0.0 { self.eta.hero() } else { 1.0 / self.eta.hero() };
+        let reflected = match (self.film_reflects(wo), &self.eta) {
+            (None, _) => fresnel::dielectric(self.fresnel, wo.z.abs(), eta).reflected,
+            (Some(each), RelativeIndex::Constant(_)) => each.iter().sum::<f64>() / LANES as f64,
+            (Some(each), RelativeIndex::Dispersive(_)) => each[0],
+        };
+        Some((sample, 1.0 - reflected))
+    }
+
     /// What is mirrored of light of each lane; `None` where the hero is reflected in any case.
-    pub(super) fn mirrored(&self, wo: DVec3) -> Option<Lanes> {
+    #[must_use]
+    pub fn mirrored(&self, wo: DVec3) -> Option<Lanes> {
         let toward = |eta: f64| if wo.z > 0.0 { eta } else { 1.0 / eta };
         let reflected = match self.film_reflects(wo) {
             Some(reflected) => Lanes::new(reflected.map(|r| r as f32)),

@@ -248,6 +248,12 @@ impl Environment {
         }
     }
 
+    /// Whether anything [stands out](Environment::stands_out).
+    #[must_use]
+    pub fn may_stand_out(&self) -> bool {
+        self.peak.is_some() || self.day.as_ref().is_some_and(|day| day.sun_power() > 0.0)
+    }
+
     /// Toward the middle of the sun that stands in a sky by formulas, and its irradiance across that.
     #[must_use]
     pub fn sun(&self, nm: Lanes) -> Option<(DVec3, Lanes)> {

@@ -12,6 +12,8 @@ const FEW: usize = 8;
 #[derive(Debug)]
 pub struct Lamps {
     boxes: Vec<Aabb>,
+    /// Whether light from infinity stands out anywhere.
+    sun: bool,
     tree: Option<Bvh>,
 }
 
@@ -25,7 +27,13 @@ impl Lamps {
         };
         let boxes: Vec<Aabb> = lights.iter().filter_map(bounds).collect();
         let tree = (boxes.len() > FEW).then(|| Bvh::build(&boxes));
-        Lamps { boxes, tree }
+        Lamps { boxes, sun: lights.iter().any(Light::may_stand_out), tree }
+    }
+
+    /// Whether there are none, nor a sun.
+    #[must_use]
+    pub fn are_none(&self) -> bool {
+        self.boxes.is_empty() && !self.sun
     }
 
     /// Whether `ray` comes into the box of a lamp, but for rounding.

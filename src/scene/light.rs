@@ -209,6 +209,12 @@ impl Light {
         matches!(self, Light::Environment(map) if map.stands_out(direction))
     }
 
+    /// Whether light from infinity stands out anywhere.
+    #[must_use]
+    pub fn may_stand_out(&self) -> bool {
+        matches!(self, Light::Environment(map) if map.may_stand_out())
+    }
+
     /// Radiance seen along `direction` by a ray that meets nothing.
     #[must_use]
     pub fn background(&self, direction: DVec3, nm: Lanes) -> Lanes {

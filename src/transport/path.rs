@@ -28,6 +28,7 @@ use crate::math::Frame;
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::optics::bsdf::{Bsdf, BsdfSample, Chosen, Lambert, Lobes};
+use crate::optics::dielectric::Dielectric;
 use crate::scene::ahead::Ahead;
 use crate::scene::compound::{Compound, Leaf, Vertex};
 use crate::scene::material::{Kind, Material, Straight};
@@ -37,6 +38,7 @@ use crate::spectrum::{LANES, Lanes, SampledWavelengths};
 use along::Along;
 use glam::DVec3;
 use lights::{Questions, power_heuristic};
+use mirrored::Counted;
 use reuse::Joint;
 use state::{Choice, Leaving, Path, Previous, Step, Walk};
 use std::cell::Cell;
@@ -393,7 +395,12 @@ impl Tracer<'_> {
         {
             self.add_merged::<CHROMATIC, B>(map, path, at, bsdf, wo);
         }
-        path.mirrored_light = self.look_at_mirrored::<CHROMATIC, MEDIA, B>(path, bsdf, wo, at);
+        path.beyond = path.counted.and_then(Counted::further);
+        path.counted = match path.beyond {
+            // All goes on the way on which the lamp has been counted.
+            Some(beyond) if bsdf.glass().is_some_and(|glass| glass.mirrored(wo).is_none()) => Some(beyond),
+            _ => self.look_at_mirrored::<CHROMATIC, MEDIA, B>(path, bsdf, wo, at),
+        };
         if !bsdf.is_discrete() && self.asks() {
             let toward = path.ray.direction.dot(surface.normal);
             let inside = path.inside;
@@ -431,11 +438,8 @@ impl Tracer<'_> {
         // On along a direction of the material's choice.
         // A pane that did not let the path straight through reflects it.
         let u_lobe = || if at.pane { 0.0 } else { at.choice.draw(1) };
-        if CHROMATIC
-            && self.plan.packets
-            && path.specular
-            && let Some(glass) = bsdf.glass()
-            && glass.parts()
+        if let Some(glass) = bsdf.glass()
+            && self.parts_at::<CHROMATIC>(path, glass)
         {
             return self.part::<MEDIA>(path, glass, wo, u_lobe(), at);
         }
@@ -449,6 +453,12 @@ impl Tracer<'_> {
             }
             None => false,
         }
+    }
+
+    /// Whether wavelengths part at `glass` and go on side by side.
+    #[inline(always)]
+    fn parts_at<const CHROMATIC: bool>(&self, path: &Path, glass: &Dielectric) -> bool {
+        CHROMATIC && self.plan.packets && path.specular && glass.parts()
     }
 
     /// Sends the path on from a surface; false where it ends. `diffuse` is the share of f that is diffuse.
@@ -483,8 +493,10 @@ impl Tracer<'_> {
             ledger.leave(path.vertices, first, sample.chosen == Chosen::Discrete);
         }
         path.mirrored |= path.sharp && path.vertices == 0;
-        if sample.chosen != Chosen::Discrete || sample.transmitted {
-            path.mirrored_light = None;
+        if sample.chosen != Chosen::Discrete {
+            path.counted = None;
+        } else if sample.transmitted {
+            path.counted = path.beyond;
         }
         if path.specular && !path.sharp && sample.chosen != Chosen::Discrete {
             path.specular = false;
@@ -608,7 +620,7 @@ impl Tracer<'_> {
             return false;
         }
         path.sharp = false;
-        path.mirrored_light = None;
+        path.counted = None;
         if let Some(ledger) = self.ledger {
             ledger.meet(false);
         }

@@ -198,12 +198,12 @@ impl Ledger {
         }
     }
 
-    /// Light that the `vertex`th vertex reflects in a single direction.
-    pub fn mirrored(&self, vertex: u32, found: Found) {
+    /// Light that the `vertex`th vertex reflects in a single direction, of which it and so many more, all sharp, are `times` in all.
+    pub fn mirrored(&self, vertex: u32, times: u32, found: Found) {
         match vertex {
-            0 => self.scattered_by(First::Reflected(Lanes::ZERO), found, 1),
+            0 => self.scattered_by(First::Reflected(Lanes::ZERO), found, times),
             _ if self.spread.get() => self.caustic(found),
-            _ => self.scattered(found, vertex + 1),
+            _ => self.scattered(found, vertex + times),
         }
     }
 

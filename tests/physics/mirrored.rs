@@ -47,6 +47,12 @@ fn lamps_that_coats_and_glass_mirror_are_as_bright_as_by_chance() {
         + "- sphere: {center: [-0.5, -0.6, -0.3], radius: 0.4, material: {dielectric: {ior: 1.5, priority: 2}}}\n\
            - cube: {center: [0, -0.8, 0], size: [1.6, 0.4, 1.6], material: {dielectric: {ior: 1.33, priority: 1}}}\n"
         + LAMPS;
+    // Lamps behind glass that is behind glass, through amber and by total reflection.
+    let amber = walls.clone()
+        + "- cube: {center: [-0.45, -0.55, -0.3], size: 0.7, material: {dielectric: {ior: 1.5}}, inside: amber, \
+           transform: [{translate: [0.45, 0.55, 0.3]}, {rotate: {axis: [0.2, 1, 0.1], deg: 30}}, {translate: [-0.45, -0.55, -0.3]}]}\n"
+        + &ball(0.5, "{dielectric: {ior: {glass: N-SF11}}}")
+        + LAMPS;
     let open = "shapes:\n- plane: {point: [0, -1, 0], normal: [0, 1, 0], material: chalk}\n".to_owned()
         + &ball(-0.5, "{plastic: {reflectance: 0.3}}")
         + &ball(0.5, "{dielectric: {ior: 1.5}}");
@@ -59,6 +65,7 @@ fn lamps_that_coats_and_glass_mirror_are_as_bright_as_by_chance() {
         ("glass, lane by lane", "", &glass, "light_tracing: off, packets: off", [64, 256]),
         ("a pane and a blend", "", &behind, ALONE, [16, 64]),
         ("bodies with a priority", "", &bodies, ALONE, [16, 64]),
+        ("amber", "media: {amber: {homogeneous: {absorption: {rgb: [0.2, 0.6, 2]}}}}\n", &amber, ALONE, [16, 64]),
         ("fog", fog, &coats, ALONE, [64, 256]),
         ("a wide sun", sun, &open, ALONE, [64, 1024]),
         ("a bright texel", peak, &open, ALONE, [64, 1024]),
@@ -94,6 +101,25 @@ fn glass_over_nothing_mirrors_a_lamp_without_noise() {
                 }
             }
         }
+    }
+}
+
+/// A slab sends back F + T² F + T² F³ + … = 2 F / (1 + F) of a lamp: once F as it is, the rest out of the glass that mirrors it.
+#[test]
+fn a_slab_mirrors_a_lamp_as_the_series_of_its_reflections_says() {
+    for (glass, eta) in [("1.5", 1.5), ("2.4", 2.4), ("{table: [[360, 1.8], [830, 1.8]]}", 1.8)] {
+        let bench = bench_with(
+            &format!(
+                "camera: {{origin: [0, 1, 3], target: [0, 0, 0], fov_deg: 5}}\nrender: {{techniques: {{light_tracing: off}}}}\n\
+                 shapes:\n- cube: {{center: [0, -0.05, 0], size: [20, 0.1, 20], material: {{dielectric: {{ior: {glass}}}}}}}\n\
+                 - sphere: {{center: [0, 4, -12], radius: 3, emission: 2}}\n"
+            ),
+            &[],
+        );
+        let toward = ray(v(0.0, 1.0, 3.0), v(0.0, 0.0, 0.0));
+        let reflected = fresnel::dielectric(Model::Exact, -toward.direction.y, eta).reflected;
+        let lamp = bench.estimate(&ray(v(0.0, 1.0, 3.0), v(0.0, 4.0, -12.0)), 16).mean;
+        bench.estimate(&toward, 1 << 16).assert_is(lamp * 2.0 * reflected / (1.0 + reflected), 1e-3);
     }
 }
 

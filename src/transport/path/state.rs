@@ -1,5 +1,6 @@
 //! What a path carries from vertex to vertex, and what it knows of the one that it is at.
 
+use super::mirrored::Counted;
 use super::{Incoming, PathSettings};
 use crate::math::sampler::{Sampler, Set};
 use crate::math::{Frame, Ray};
@@ -63,8 +64,10 @@ pub(super) struct Path {
     pub(super) alone: Option<usize>,
     /// Whether it goes on for all that parted.
     pub(super) chosen: bool,
-    /// The light that its last vertex mirrors, where that is counted there: the path does not count it again.
-    pub(super) mirrored_light: Option<u32>,
+    /// A lamp that has been counted at a vertex which mirrors it, where the path has gone on toward it: it does not count it again.
+    pub(super) counted: Option<Counted>,
+    /// The same from beyond the surface that it is at.
+    pub(super) beyond: Option<Counted>,
 }
 
 /// How far a path has come, beside what it carries.
@@ -189,7 +192,8 @@ impl Path {
         left: Lanes::ZERO,
         alone: None,
         chosen: false,
-        mirrored_light: None,
+        counted: None,
+        beyond: None,
     };
 
     /// What has come of it.
@@ -199,10 +203,11 @@ impl Path {
         Incoming { radiance, alpha, depth, left, events, further, mirrored }
     }
 
-    /// Whether light `index`, which the path meets, has been counted at its last vertex; once.
+    /// Whether light `index`, which the path meets, has been counted at a vertex before; once.
     #[inline]
     pub(super) fn has_counted(&mut self, index: u32) -> bool {
-        self.mirrored_light.take_if(|light| *light == index).is_some()
+        let here = Counted { light: index, behind: 0 };
+        self.counted.take_if(|counted| *counted == here).is_some()
     }
 
     pub(super) fn rho_sum<const CHROMATIC: bool>(&self) -> f64 {
