@@ -28,7 +28,6 @@ use super::choice::{self, Asked, Choice};
 use super::equiangular;
 use super::few::Few;
 use super::instance::Group;
-use super::lamps::Lamps as Shining;
 use super::light::Light;
 use super::load::{Pictures, Wanted};
 use super::material::Material;
@@ -305,7 +304,7 @@ impl<'a> Compiler<'a> {
         let mut scene = Scene {
             name: name.to_owned(),
             camera,
-            lamps: Shining::of(&lights, &objects),
+            lamps: super::lamps::Lamps::of(&lights, &objects),
             has_planes: boxes.iter().any(|bounds| !bounds.is_finite()),
             has_boundaries: objects.iter().any(lets_through),
             parts_media: objects.iter().any(parts_media),

@@ -36,7 +36,8 @@ impl Lamps {
         self.boxes.is_empty() && !self.sun
     }
 
-    /// Whether `ray` comes into the box of a lamp, but for rounding.
+    /// Whether `ray` comes into the box of a lamp from without, but for rounding: what is around its origin is met in most directions,
+    /// and by chance.
     #[must_use]
     #[inline]
     pub fn may_be_met(&self, ray: &Ray) -> bool {
@@ -47,14 +48,14 @@ impl Lamps {
     }
 }
 
-/// Whether a ray comes into a box, but for rounding.
+/// Whether a ray comes into a box from without, but for rounding.
 fn comes_into(ray: &Ray, bounds: &Aabb) -> bool {
     let inverse = ray.direction.recip();
     let (a, b) = ((bounds.min - ray.origin) * inverse, (bounds.max - ray.origin) * inverse);
     // What is no number, on a face and along it, bounds nothing.
-    let near = a.min(b).to_array().into_iter().fold(0.0, f64::max);
+    let near = a.min(b).to_array().into_iter().fold(f64::NEG_INFINITY, f64::max);
     let far = a.max(b).to_array().into_iter().fold(f64::INFINITY, f64::min);
-    near <= far
+    near > 0.0 && near <= far
 }
 
 #[cfg(test)]
@@ -88,6 +89,10 @@ mod tests {
                 assert!(!scene.lamps.may_be_met(&Ray::new(beside, DVec3::Y)), "{count} {i}");
             }
         }
+        let around = compiled(
+            "camera: {origin: [0, 3, 9], target: [0, 0, 0], fov_deg: 40}\nshapes: [sphere: {center: [0, 0, 0], radius: 50, emission: 1}]\n",
+        );
+        assert!(!around.lamps.may_be_met(&Ray::new(DVec3::ZERO, DVec3::Y)));
         let unlit = compiled(
             "camera: {origin: [0, 3, 9], target: [0, 0, 0], fov_deg: 40}\nlights: [{constant: {radiance: 1}}]\n",
         );
