@@ -28,7 +28,6 @@ use crate::math::Frame;
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
 use crate::optics::bsdf::{Bsdf, BsdfSample, Chosen, Lambert, Lobes};
-use crate::optics::dielectric::Dielectric;
 use crate::scene::ahead::Ahead;
 use crate::scene::compound::{Compound, Leaf, Vertex};
 use crate::scene::material::{Kind, Material, Straight};
@@ -453,12 +452,6 @@ impl Tracer<'_> {
             }
             None => false,
         }
-    }
-
-    /// Whether wavelengths part at `glass` and go on side by side.
-    #[inline(always)]
-    fn parts_at<const CHROMATIC: bool>(&self, path: &Path, glass: &Dielectric) -> bool {
-        CHROMATIC && self.plan.packets && path.specular && glass.parts()
     }
 
     /// Sends the path on from a surface; false where it ends. `diffuse` is the share of f that is diffuse.

@@ -9,6 +9,12 @@ use crate::optics::dielectric::Dielectric;
 use crate::spectrum::{LANES, Lanes};
 
 impl Tracer<'_> {
+    /// Whether wavelengths part at `glass` and go on side by side.
+    #[inline(always)]
+    pub(super) fn parts_at<const CHROMATIC: bool>(&self, path: &Path, glass: &Dielectric) -> bool {
+        CHROMATIC && self.plan.packets && path.specular && glass.parts()
+    }
+
     /// Sends all eight wavelengths on from a dispersive surface: true where they go on as one, reflected; else all have
     /// been followed to their ends.
     #[inline(never)]
