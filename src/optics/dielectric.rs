@@ -170,10 +170,7 @@ impl Dielectric {
     /// The reflection, where `u_lobe` has every wavelength reflected that decides for itself.
     #[must_use]
     pub fn reflects_all(&self, wo: DVec3, u_lobe: f64) -> Option<BsdfSample> {
-        let reflects = |eta: f64| {
-            let toward = if wo.z > 0.0 { eta } else { 1.0 / eta };
-            u_lobe < fresnel::dielectric(self.fresnel, wo.z.abs(), toward).reflected
-        };
+        let reflects = |eta: f64| u_lobe < self.reflected(wo, eta);
         let all = match self.eta {
             _ if self.film.is_some() => self.film_reflects(wo).is_some_and(|r| r.into_iter().all(|r| u_lobe < r)),
             RelativeIndex::Constant(eta) => reflects(eta),
@@ -189,24 +186,39 @@ impl Dielectric {
         if !sample.transmitted {
             return Some((sample, 1.0));
         }
-        let eta = if wo.z > 0.0 { self.eta.hero() } else { 1.0 / self.eta.hero() };
-        let reflected = match (self.film_reflects(wo), &self.eta) {
-            (None, _) => fresnel::dielectric(self.fresnel, wo.z.abs(), eta).reflected,
-            (Some(each), RelativeIndex::Constant(_)) => each.iter().sum::<f64>() / LANES as f64,
-            (Some(each), RelativeIndex::Dispersive(_)) => each[0],
-        };
-        Some((sample, 1.0 - reflected))
+        Some((sample, 1.0 - self.chance(wo, self.film_reflects(wo).as_ref())))
     }
 
-    /// What is mirrored of light of each lane; `None` where the hero is reflected in any case.
+    /// What is mirrored of light of each lane; `None` where all light is reflected, without chance.
     #[must_use]
     pub fn mirrored(&self, wo: DVec3) -> Option<Lanes> {
-        let toward = |eta: f64| if wo.z > 0.0 { eta } else { 1.0 / eta };
-        let reflected = match self.film_reflects(wo) {
-            Some(reflected) => Lanes::new(reflected.map(|r| r as f32)),
-            None => self.eta.lanes(|eta| fresnel::dielectric(self.fresnel, wo.z.abs(), toward(eta)).reflected),
+        let film = self.film_reflects(wo);
+        let chance = self.chance(wo, film.as_ref());
+        if chance >= 1.0 {
+            return None;
+        }
+        let reflected = match (film, &self.eta) {
+            (Some(each), _) => Lanes::new(each.map(|r| r as f32)),
+            (None, RelativeIndex::Constant(_)) => Lanes::splat(chance as f32),
+            (None, _) => self.eta.lanes(|eta| self.reflected(wo, eta)),
         };
-        (reflected.to_array()[0] < 1.0).then(|| reflected * self.tint.reflected)
+        Some(reflected * self.tint.reflected)
+    }
+
+    /// The chance that light is reflected, of which `film` tells what each lane has reflected, where there is one: the hero's, or the
+    /// mean where all wavelengths go the same two ways.
+    fn chance(&self, wo: DVec3, film: Option<&[f64; LANES]>) -> f64 {
+        match (film, &self.eta) {
+            (None, eta) => self.reflected(wo, eta.hero()),
+            (Some(each), RelativeIndex::Constant(_)) => each.iter().sum::<f64>() / LANES as f64,
+            (Some(each), RelativeIndex::Dispersive(_)) => each[0],
+        }
+    }
+
+    /// Share that a bare interface of the index `eta` reflects.
+    fn reflected(&self, wo: DVec3, eta: f64) -> f64 {
+        let toward = if wo.z > 0.0 { eta } else { 1.0 / eta };
+        fresnel::dielectric(self.fresnel, wo.z.abs(), toward).reflected
     }
 
     /// What each lane has reflected by the film; `None` where there is none.
@@ -218,9 +230,10 @@ impl Dielectric {
     /// wavelengths go the same two ways they are chosen by the mean, so that none leads.
     fn sample_filmed(&self, reflected: [f64; LANES], wo: DVec3, u_lobe: f64) -> Option<BsdfSample> {
         let eta = if wo.z > 0.0 { self.eta.hero() } else { 1.0 / self.eta.hero() };
-        let (share, same) = match self.eta {
-            RelativeIndex::Constant(_) => (reflected.iter().sum::<f64>() / LANES as f64, None),
-            RelativeIndex::Dispersive(all) => (reflected[0], Some(all.map(|e| e == all[0]))),
+        let share = self.chance(wo, Some(&reflected));
+        let same = match self.eta {
+            RelativeIndex::Constant(_) => None,
+            RelativeIndex::Dispersive(all) => Some(all.map(|e| e == all[0])),
         };
         let over = |part: [f64; LANES], share: f64| Lanes::new(part.map(|p| (p / share) as f32));
         if u_lobe < share {

@@ -12,6 +12,7 @@
 
 mod along;
 mod lights;
+mod merged;
 mod mirrored;
 mod parting;
 pub mod reuse;
@@ -23,7 +24,7 @@ use super::photons::PhotonMap;
 use super::plan::{Coverage, EffectPlan, PathSettings};
 use super::roulette::{survival, worth};
 use super::shadow::MAX_BOUNDARIES;
-use super::ways::{First, Found, Ledger};
+use super::ways::{First, Ledger};
 use crate::math::Frame;
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
@@ -512,56 +513,6 @@ impl Tracer<'_> {
         path.ray = self.scene.leave(surface, hit, wi);
         path.vertices += 1;
         self.survives::<CHROMATIC>(path, sample.chosen == Chosen::Discrete, 1.0, || at.choice.draw(2))
-    }
-
-    /// Adds the light of the photons around a vertex behind mirrors and glass.
-    #[inline(never)]
-    fn add_merged<const CHROMATIC: bool, B: Lobes>(
-        &self,
-        map: &PhotonMap,
-        path: &mut Path,
-        at: &Leaving,
-        bsdf: &B,
-        wo: DVec3,
-    ) {
-        let of_own = |light: Lanes| path.alone.map_or(light, |lane| Lanes::splat(light.to_array()[lane]));
-        let merge = |group| self.merge::<CHROMATIC>(map, path, at.surface, group, |wi| at.eval(bsdf, wo, wi).0);
-        let light = of_own(path.beta * merge(None));
-        if let Some(ledger) = self.ledger {
-            for group in 0..self.scene.light_groups.count() {
-                let light = of_own(path.beta * merge(Some(group)));
-                ledger.caustic(Found { light, group, alone: path.alone });
-            }
-        }
-        path.radiance += light;
-    }
-
-    /// Light of the photons around a vertex behind mirrors and glass, of lamps of one group or all. A lane could lead both parts of the joined path
-    /// with the product of its densities.
-    #[inline(never)]
-    fn merge<const CHROMATIC: bool>(
-        &self,
-        map: &PhotonMap,
-        path: &Path,
-        surface: &SurfacePoint,
-        group: Option<u8>,
-        f: impl Fn(DVec3) -> Lanes,
-    ) -> Lanes {
-        map.gather(surface.point, surface.normal, |photon| {
-            if group.is_some_and(|group| photon.group != group) {
-                return Lanes::ZERO;
-            }
-            // The camera's segments and the light's.
-            if self.settings.max_depth.is_some_and(|most| path.vertices + photon.vertices + 2 > most) {
-                return Lanes::ZERO;
-            }
-            let (came, rho) = (photon.came.as_dvec3(), photon.light.rho);
-            let cosine = came.dot(surface.normal).abs();
-            let f = f(came);
-            let led = f64::from(if CHROMATIC { path.rho * rho } else { rho }.reduce_add());
-            let share = LANES as f64 / (led * cosine);
-            if share.is_finite() { f * share as f32 } else { Lanes::ZERO }
-        })
     }
 
     /// What one path meets of a material made of others, chosen by `u`; `None` where it goes straight on.

@@ -4,9 +4,11 @@ use crate::math::sampler::{Sampler, Set};
 use crate::math::{Departure, Ray};
 use crate::scene::material::Straight;
 use crate::scene::medium::Dimmed;
+use crate::scene::nested::Crossing;
 use crate::scene::through::Way;
 use crate::scene::{Hit, Inside, Scene, SurfacePoint};
 use crate::spectrum::Lanes;
+use glam::DVec3;
 
 /// Boundaries of media that a ray crosses at the most: beyond it what it aims at counts as hidden.
 /// A bound on time, far above any scene's nesting.
@@ -114,16 +116,29 @@ impl Shadow<'_> {
     fn pass(&self, ray: &Ray, hit: &Hit, inside: &mut Inside) -> Option<(Straight, SurfacePoint)> {
         let scene = self.scene;
         let object = &scene.objects[hit.object as usize];
-        let material = &scene.materials[object.material as usize];
         let surface = scene.surface(ray, hit);
         let crossing = scene.crossing(object, &surface, ray.direction, &inside.bodies);
-        let straight = if crossing.is_some_and(|c| !c.shows) {
-            Straight::OPEN
-        } else {
-            let direction = if self.to_viewer { -ray.direction } else { ray.direction };
-            material.straight(&surface, direction, || hit.texture_point(&surface), self.nm)?
-        };
+        let direction = if self.to_viewer { -ray.direction } else { ray.direction };
+        let straight = straight(scene, hit, &surface, direction, crossing.as_ref(), self.nm)?;
         *inside = scene.beyond(object, &surface, ray.direction, *inside);
         Some((straight, surface))
     }
+}
+
+/// What of light of the wavelengths `nm` goes straight on in `direction` at `hit`, which is met as `crossing` tells; `None` where nothing can.
+#[inline(always)]
+pub(super) fn straight(
+    scene: &Scene,
+    hit: &Hit,
+    surface: &SurfacePoint,
+    direction: DVec3,
+    crossing: Option<&Crossing>,
+    nm: Lanes,
+) -> Option<Straight> {
+    // Within a body that has the place the surface is not there.
+    if crossing.is_some_and(|crossing| !crossing.shows) {
+        return Some(Straight::OPEN);
+    }
+    let material = &scene.materials[scene.objects[hit.object as usize].material as usize];
+    material.straight(surface, direction, || hit.texture_point(surface), nm)
 }

@@ -10,11 +10,11 @@ use crate::math::sampler::Set;
 use crate::math::{Frame, Ray};
 use crate::optics::bsdf::{Bsdf, Lobes};
 use crate::optics::dielectric::{Dielectric, refract};
-use crate::scene::material::{Kind, Straight};
+use crate::scene::material::Kind;
 use crate::scene::shape::Detail;
 use crate::scene::{Geometry, Inside};
 use crate::spectrum::{LANES, Lanes};
-use crate::transport::shadow::MAX_BOUNDARIES;
+use crate::transport::shadow::{MAX_BOUNDARIES, straight};
 use glam::DVec3;
 
 /// Sets the numbers of shadow rays along the stretches of such a way apart from those of vertices.
@@ -177,12 +177,7 @@ impl Tracer<'_> {
             }
             let material = &scene.materials[object.material as usize];
             let crossing = if MEDIA { scene.crossing(object, &surface, went, &way.inside.bodies) } else { None };
-            let straight = match crossing {
-                Some(crossing) if !crossing.shows => Some(Straight::OPEN),
-                _ if !scene.has_boundaries => None,
-                _ => material.straight(&surface, went, || hit.texture_point(&surface), self.nm),
-            };
-            if let Some(straight) = straight {
+            if let Some(straight) = straight(scene, &hit, &surface, went, crossing.as_ref(), self.nm) {
                 if self.settings.count_crossings {
                     if !may_pass(way.events) {
                         return None;
