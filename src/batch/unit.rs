@@ -72,9 +72,19 @@ pub(super) fn render_unit(
             }
         }
     } else {
-        for pixel in window.iter() {
+        let pixels: Vec<[i32; 2]> = window.iter().collect();
+        let mut left = &pixels[..];
+        while let Some(&pixel) = left.first() {
             want(pixel, &mut wanted);
-            wanted.chunks(LONGEST as usize).for_each(|run| unit.render_pixel(pixel, run));
+            // Where all have as many samples, and see one moment, few of a pixel go with those of the next.
+            let alike = shares.is_none() && moments.is_empty();
+            let together = if alike { Octet::SAMPLES / wanted.len().max(1) } else { 1 };
+            let (some, rest) = left.split_at(together.clamp(1, left.len()));
+            left = rest;
+            match some {
+                [pixel] => wanted.chunks(LONGEST as usize).for_each(|run| unit.render_pixel(*pixel, run)),
+                _ => unit.render_few(some, &wanted),
+            }
         }
     }
 }
@@ -102,6 +112,22 @@ impl Unit<'_> {
             sums.record((pixel, 0), samples[i].0, sample, values, covered);
         });
         sums.end(&[pixel]);
+    }
+
+    /// Renders `samples` of each of `pixels`, in all no more than go side by side.
+    fn render_few(&mut self, pixels: &[[i32; 2]], samples: &[(u32, u32)]) {
+        let Unit { shot, memory, sums, .. } = self;
+        sums.begin(pixels.len());
+        let mut addresses = [Address { pixel: [0; 2], replicate: 0, index: 0 }; Octet::SAMPLES];
+        let all = pixels.iter().flat_map(|&pixel| samples.iter().map(move |&sample| (pixel, sample)));
+        for (to, (pixel, (replicate, index))) in addresses.iter_mut().zip(all) {
+            *to = Address { pixel: address(pixel), replicate, index };
+        }
+        memory.render(shot, &addresses[..pixels.len() * samples.len()], |lane, sample, values, covered| {
+            let (place, i) = (lane / samples.len(), lane % samples.len());
+            sums.record((pixels[place], place), samples[i].0, sample, values, covered);
+        });
+        sums.end(pixels);
     }
 
     /// Renders `samples`, at most [`LONGEST`], of all pixels of a group.

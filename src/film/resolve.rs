@@ -22,6 +22,7 @@ use crate::film::Window;
 use crate::film::accumulate::{Cell, Film, PixelCells, REPLICATES, Sum};
 use crate::film::layers::LayerSums;
 use rayon::prelude::*;
+use rayon::slice::ChunksMut;
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -111,48 +112,42 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
         assert_eq!(splats.film.exponent(), film.exponent(), "splats count light as the film does");
     }
     let unit = 2f64.powi(film.exponent());
-    let resolved: Vec<Resolved> = (0..pixels)
-        .into_par_iter()
-        .with_min_len(1024)
-        .map(|index| {
-            let sums = Sums::of(film, index);
-            let mut pixel = match in_halves(sums.cells) {
-                true => sums.mean_of_halves(rgb_from_xyz),
-                false => sums.mean(rgb_from_xyz),
-            };
-            if let Some(splats) = &splats {
-                // Two independent estimates of two parts of the light: means and variances add.
-                let light = splats.sums(index).mean(rgb_from_xyz);
-                for c in 0..3 {
-                    pixel.rgb[c] += light.rgb[c];
-                    pixel.variance[c] += light.variance[c];
-                }
-            }
-            Resolved {
-                rgb: pixel.rgb.map(|x| (x * unit) as f32),
-                standard_error: pixel.variance.map(|v| (v.sqrt() * unit) as f32),
-                alpha: alpha(sums.cells, sums.weights) as f32,
-            }
-        })
-        .collect();
-    let planes = |of: fn(&Resolved) -> [f32; 3]| {
-        [0, 1, 2].map(|c| resolved.iter().map(|pixel| of(pixel)[c]).collect::<Vec<f32>>())
-    };
-    Image {
-        frame: film.frame(),
-        window: film.window(),
-        rgb: planes(|pixel| pixel.rgb),
-        alpha: resolved.iter().map(|pixel| pixel.alpha).collect(),
-        standard_error: planes(|pixel| pixel.standard_error),
+    let plane = || vec![0.0f32; pixels];
+    let [mut rgb, mut standard_error] = [[plane(), plane(), plane()], [plane(), plane(), plane()]];
+    let mut alphas = plane();
+    fn cut(plane: &mut Vec<f32>) -> ChunksMut<'_, f32> {
+        plane.par_chunks_mut(PIXELS_AT_ONCE)
     }
+    let [red, green, blue] = rgb.each_mut().map(cut);
+    let [of_red, of_green, of_blue] = standard_error.each_mut().map(cut);
+    (red, green, blue, of_red, of_green, of_blue, cut(&mut alphas)).into_par_iter().enumerate().for_each(
+        |(chunk, (red, green, blue, of_red, of_green, of_blue, alphas))| {
+            for (i, covered) in alphas.iter_mut().enumerate() {
+                let index = chunk * PIXELS_AT_ONCE + i;
+                let sums = Sums::of(film, index);
+                let mut pixel = match in_halves(sums.cells) {
+                    true => sums.mean_of_halves(rgb_from_xyz),
+                    false => sums.mean(rgb_from_xyz),
+                };
+                if let Some(splats) = &splats {
+                    // Two independent estimates of two parts of the light: means and variances add.
+                    let light = splats.sums(index).mean(rgb_from_xyz);
+                    for c in 0..3 {
+                        pixel.rgb[c] += light.rgb[c];
+                        pixel.variance[c] += light.variance[c];
+                    }
+                }
+                [red[i], green[i], blue[i]] = pixel.rgb.map(|x| (x * unit) as f32);
+                [of_red[i], of_green[i], of_blue[i]] = pixel.variance.map(|v| (v.sqrt() * unit) as f32);
+                *covered = alpha(sums.cells, sums.weights) as f32;
+            }
+        },
+    );
+    Image { frame: film.frame(), window: film.window(), rgb, alpha: alphas, standard_error }
 }
 
-/// A pixel of an [`Image`].
-struct Resolved {
-    rgb: [f32; 3],
-    standard_error: [f32; 3],
-    alpha: f32,
-}
+/// So many pixels a thread resolves at a time.
+const PIXELS_AT_ONCE: usize = 1024;
 
 struct PixelMean {
     rgb: [f64; 3],
@@ -269,8 +264,10 @@ impl Sums<'_> {
     /// The mean of each replicate, zero where it has none.
     fn means_or_zero(&self, rgb_from_xyz: &[[f64; 3]; 3]) -> [[f64; 3]; REPLICATES] {
         let Sums { cells, divisors, weights } = *self;
-        let own = |r: usize| if divisors[r] > 0 { colours(&cells[r..=r], divisors[r], rgb_from_xyz) } else { [0.0; 3] };
-        let mut means = std::array::from_fn(own);
+        let mut means = [[0.0; 3]; REPLICATES];
+        for (r, mean) in means.iter_mut().enumerate().filter(|(r, _)| divisors[*r] > 0) {
+            *mean = colours(&cells[r..=r], divisors[r], rgb_from_xyz);
+        }
         if let Some(weights) = weights {
             even(&mut means, divisors, weights);
         }
@@ -331,14 +328,16 @@ impl Sums<'_> {
 /// The sum of `cells`, which is exact and rounded once, over `divisor`.
 #[inline]
 fn colours(cells: &[Cell], divisor: u64, rgb_from_xyz: &[[f64; 3]; 3]) -> [f64; 3] {
-    let mut sums = [Sum::default(); 3];
+    let [mut x, mut y, mut z] = [Sum::default(); 3];
     for cell in cells {
-        for (sum, &part) in sums.iter_mut().zip(&cell.xyz) {
-            *sum += part;
-        }
+        x += cell.xyz[0];
+        y += cell.xyz[1];
+        z += cell.xyz[2];
     }
-    let xyz = sums.map(|sum| sum.value() / divisor as f64);
-    rgb_from_xyz.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
+    // Written out: `map` of an array may be compiled as calls.
+    let [x, y, z] = [x.value() / divisor as f64, y.value() / divisor as f64, z.value() / divisor as f64];
+    let [r, g, b] = rgb_from_xyz;
+    [r[0] * x + r[1] * y + r[2] * z, g[0] * x + g[1] * y + g[2] * z, b[0] * x + b[1] * y + b[2] * z]
 }
 
 /// Samples of each replicate of a pixel.

@@ -41,10 +41,10 @@ pub(super) struct Sums {
 impl Sums {
     /// Adds a pixel, given f of each of its values, of which `counted` are told of.
     pub(super) fn add(&mut self, values: &[Four], floors: &[f64x4], counted: usize) {
-        let all = |holds: &dyn Fn(&Four) -> bool| values.iter().all(holds);
         self.pixels += 1;
-        self.noisy += u64::from(!all(&|v| v.replicates.iter().all(|x| x.simd_eq(v.replicates[0]).all())));
-        self.black += u64::from(all(&|v| v.means.simd_eq(f64x4::ZERO).all()));
+        let alike = |v: &Four| v.replicates.iter().all(|x| x.simd_eq(v.replicates[0]).all());
+        self.noisy += u64::from(!values.iter().all(alike));
+        self.black += u64::from(values.iter().all(|v| v.means.simd_eq(f64x4::ZERO).all()));
         let share = f64x4::splat(1.0 / counted.max(1) as f64);
         let (mut plain, mut further, mut crossed) = (f64x4::ZERO, f64x4::ZERO, f64x4::ZERO);
         let mut shares = f64x4::ZERO;
@@ -53,7 +53,8 @@ impl Sums {
         for (four, &floor) in values.iter().zip(floors) {
             let x = four.replicates;
             let deviations = deviations(x);
-            let squares = deviations.map(|d| d * d).into_iter().sum::<f64x4>();
+            let [a, b, c, d] = deviations;
+            let squares = a * a + b * b + c * c + d * d;
             // Those that do not differ add nothing, though f and they may be zero.
             let still = squares.simd_eq(f64x4::ZERO);
             let differing = |x: f64x4| still.select(f64x4::ZERO, x);
@@ -63,7 +64,7 @@ impl Sums {
             // Derivatives of g.
             let first = -two * four.means * g * g;
             let second = (f64x4::splat(6.0) * value_squared - two * floor) * g * g * g;
-            let third = deviations.map(|d| d * d * d).into_iter().sum::<f64x4>() * f64x4::splat(1.0 / 24.0);
+            let third = (a * a * a + b * b * b + c * c * c + d * d * d) * f64x4::splat(1.0 / 24.0);
             let g = g * share;
             let mut fourth = f64x4::ZERO;
             for (pair, [i, j, k, l]) in pairs.iter_mut().zip(PAIRINGS) {
@@ -122,8 +123,9 @@ impl Sums {
 
 /// How far the replicates of four values are from their means.
 fn deviations(x: [f64x4; REPLICATES]) -> [f64x4; REPLICATES] {
-    let mean = x.into_iter().sum::<f64x4>() * f64x4::splat(1.0 / REPLICATES as f64);
-    x.map(|x| x - mean)
+    let [a, b, c, d] = x;
+    let mean = (a + b + c + d) * f64x4::splat(1.0 / REPLICATES as f64);
+    [a - mean, b - mean, c - mean, d - mean]
 }
 
 /// q of four values with replicates `x`, the variance σ² of their mean told by two of them and divided by what the other two show,
