@@ -253,6 +253,10 @@ fn a_shutter_that_cannot_be_is_refused() {
         ran.err
     };
     assert!(says("0").contains("camera.shutter: expected a number greater than 0, found 0"));
+    assert!(
+        says("180").contains("camera.shutter: expected at most 8 frames (a shutter of 180° is 0.5), or when it opens")
+    );
+    assert!(says("180").contains(", found 180"), "{}", says("180"));
     assert!(says("{open: 1, close: 0}").contains("camera.shutter: expected open before close, found 1 and 0"));
     assert!(
         says("{open: 0, close: 1, moments: 1}")

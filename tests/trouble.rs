@@ -381,6 +381,28 @@ fn a_task_that_is_given_up_says_so_by_a_code_of_no_picture() {
     assert_eq!(ends("19").code, 75);
 }
 
+/// Slurm tells the memory of a job as `--mem` or `--mem-per-cpu` asked for it, in MiB.
+#[test]
+fn a_task_knows_its_memory_however_it_was_asked_for() {
+    let place = Place::of(SCENE);
+    assert_eq!(place.run(&["farm", "scene.yaml", "-q", "--format", "slurm", "-o", "job"]).code, 0);
+    let limit = |told: &[(&str, &str)]| {
+        let mut command = Command::new("bash");
+        let srun =
+            "srun() { while (($#)); do [ \"$1\" != --memory-limit ] || echo \"$2\"; shift; done; }; . ./render.sbatch";
+        command.args(["-c", srun]);
+        command.env("SLURM_ARRAY_TASK_ID", "0").envs(told.iter().copied());
+        let ran = Ran::of(command.current_dir(place.path("job")).output().unwrap());
+        assert_eq!((ran.code, ran.err.as_str()), (0, ""));
+        ran.out.lines().nth(1).map(str::to_owned)
+    };
+    assert_eq!(limit(&[]), None);
+    assert_eq!(limit(&[("SLURM_MEM_PER_NODE", "8192")]).as_deref(), Some("8192M"));
+    assert_eq!(limit(&[("SLURM_MEM_PER_CPU", "2048"), ("SLURM_CPUS_ON_NODE", "8")]).as_deref(), Some("16384M"));
+    // Where no memory was asked for and a node tells of none, it says 0.
+    assert_eq!(limit(&[("SLURM_MEM_PER_NODE", "0")]), None);
+}
+
 /// The first task of a job of Slurm, without Slurm.
 fn first_task(place: &Place, job: &str) -> Command {
     let run = "srun() { while [ \"${1#--}\" != \"$1\" ]; do shift; done; \"$@\"; }; . ./render.sbatch";

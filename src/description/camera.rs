@@ -54,6 +54,9 @@ pub struct ShutterTimes {
     pub moments: Option<u32>,
 }
 
+/// Frames for which a shutter may be open that is told by how long: what is more is taken for an angle.
+const LONGEST: f64 = 8.0;
+
 /// The most moments at which a scene is looked at.
 const MOST_MOMENTS: u32 = 256;
 
@@ -69,6 +72,11 @@ impl Shutter {
 
     fn check(&self, at: At<'_>, checker: &mut Checker<'_>) {
         match self {
+            Shutter::Number(share) if *share > LONGEST => {
+                let wanted =
+                    format!("at most {LONGEST} frames (a shutter of 180° is 0.5), or when it opens and closes");
+                checker.fault(at, format!("expected {wanted}, found {}", in_short(*share)));
+            }
             Shutter::Number(share) => checker.positive(at, *share),
             Shutter::Inline(times) => {
                 let found = format!("{} and {}", in_short(times.open), in_short(times.close));

@@ -29,7 +29,7 @@
 //!   clip: {near: 0}                 # ~ near 0, far without end; along the line of sight, m; rays begin at near
 //!   principal_point: [0, 0]         # default; where the line of sight meets the picture, from its middle to the
 //!                                   # right and down, in widths and heights
-//!   shutter: ~                      # for how much of a frame light is taken, around the frame: 0.5; or
+//!   shutter: ~                      # for how much of a frame light is taken, around the frame: 0.5 (180°), at most 8; or
 //!                                   # {open: -0.25, close: 0.25, moments: ~}: in frames, and at how many moments the scene
 //!                                   # is looked at, ~ by what moves
 //! image:

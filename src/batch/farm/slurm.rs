@@ -134,7 +134,8 @@ fn render(job: &Job) -> String {
              {parts}\
              what+=(-o \"$place\")\n\
              # The process ends by itself before the kernel kills it.\n\
-             [ -z \"${{SLURM_MEM_PER_NODE:-}}\" ] || what+=(--memory-limit \"${{SLURM_MEM_PER_NODE}}M\")\n\
+             memory=${{SLURM_MEM_PER_NODE:-$((${{SLURM_MEM_PER_CPU:-0}} * ${{SLURM_CPUS_ON_NODE:-1}}))}}\n\
+             ((memory == 0)) || what+=(--memory-limit \"${{memory}}M\")\n\
              restarts=${{SLURM_RESTART_COUNT:-0}}\n\
              echo \"task $number: $line: on ${{SLURMD_NODENAME:-?}}, begun again $restarts times\"\n\
              {command}\n\
