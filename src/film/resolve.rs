@@ -115,11 +115,11 @@ pub fn resolve(film: &Film, splats: Option<Splats>, rgb_from_xyz: &[[f64; 3]; 3]
     let plane = || vec![0.0f32; pixels];
     let [mut rgb, mut standard_error] = [[plane(), plane(), plane()], [plane(), plane(), plane()]];
     let mut alphas = plane();
-    fn cut(plane: &mut Vec<f32>) -> ChunksMut<'_, f32> {
+    fn cut(plane: &mut [f32]) -> ChunksMut<'_, f32> {
         plane.par_chunks_mut(PIXELS_AT_ONCE)
     }
-    let [red, green, blue] = rgb.each_mut().map(cut);
-    let [of_red, of_green, of_blue] = standard_error.each_mut().map(cut);
+    let [red, green, blue] = rgb.each_mut().map(|plane| cut(plane));
+    let [of_red, of_green, of_blue] = standard_error.each_mut().map(|plane| cut(plane));
     (red, green, blue, of_red, of_green, of_blue, cut(&mut alphas)).into_par_iter().enumerate().for_each(
         |(chunk, (red, green, blue, of_red, of_green, of_blue, alphas))| {
             for (i, covered) in alphas.iter_mut().enumerate() {
