@@ -15,8 +15,8 @@
 //! w = max(¼, λ√(v/c)).
 //!
 //! **Without the rest of the picture**, f, c and λ come from a pilot: one pixel of each quarter of each cell, with random
-//! numbers of its own. Where samples count for several pixels or paths are shared, a pixel by itself does not show the noise that is left, and
-//! λ comes from whole cells, every sixteenth of them. The pilot is a pure function of scene and settings, so that parts of a picture agree.
+//! numbers of its own. Where samples count for several pixels or paths are shared, a pixel by itself does not show the noise that is left:
+//! how much less or more there is, is told by some whole cells. The pilot is a pure function of scene and settings, so that parts of a picture agree.
 //! Costs are counted in rays, not in seconds.
 
 use super::frame::FrameJob;
@@ -63,8 +63,8 @@ const STEPS: f64 = 16.0;
 const OVERHEAD: f64 = 1.0;
 
 /// Of so many cells one is tried where that has to be done with all of its pixels, and so many in all if there are as many.
-const ONE_OF: usize = 16;
-const CELLS: usize = 64;
+const ONE_OF: usize = 64;
+const CELLS: usize = 24;
 
 /// Cells of a picture of which all are tried so.
 const FEW: usize = 16;
@@ -333,15 +333,26 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
         let variance = 0.5 * (variance(&pixels, 0, floor) + variance(&pixels, 1, floor));
         wish(variance, tried[cell].cost / cost)
     };
-    let wishes: Vec<f64> = match job.plan.splatting || job.plan.reuse || grid.cells() <= FEW {
-        false => (0..grid.cells()).filter(|cell| !tried[*cell].pixels.is_empty()).map(wish).collect(),
-        true => wishes_of_whole_cells(job, first, seed, (floor, &costs), pause)?,
+    let has_some = |cell: &usize| !tried[*cell].pixels.is_empty();
+    let wishes: Vec<f64> = (0..grid.cells()).filter(has_some).map(wish).collect();
+    let wishes = match job.plan.splatting || job.plan.reuse || grid.cells() <= FEW {
+        false => wishes,
+        true => {
+            // How much more or less they wish for is told by some, where pixels by themselves tell anything.
+            let whole = wishes_of_whole_cells(job, first, seed, (floor, &costs), pause)?;
+            let sums = whole.iter().filter(|(cell, _)| has_some(cell));
+            let (told, alone) = sums.fold((0.0, 0.0), |(told, alone), &(cell, own)| (told + own, alone + wish(cell)));
+            match told > 0.0 && alone > 0.0 && grid.cells() > FEW {
+                true => wishes.iter().map(|own| own * (told / alone)).collect(),
+                false => whole.into_iter().map(|(_, own)| own).collect(),
+            }
+        }
     };
     let least = LEAST.max(f64::from(first) / f64::from(job.samples));
     Some(Scale { floor, shares: scale(&wishes, least), costs })
 }
 
-/// The wishes of some cells whose pixels all have the `first` samples of the pilot, as [`decide`] will tell them; none if the render is
+/// Some cells, and their wishes, whose pixels all have the `first` samples of the pilot, as [`decide`] will tell them; none if the render is
 /// to pause.
 fn wishes_of_whole_cells(
     job: &FrameJob,
@@ -349,7 +360,7 @@ fn wishes_of_whole_cells(
     seed: u64,
     (floor, costs): (f64, &[f64]),
     pause: &dyn Breaks,
-) -> Option<Vec<f64>> {
+) -> Option<Vec<(usize, f64)>> {
     let job = FrameJob { seed, ..*job };
     let grid = Grid::of(job.window);
     let layout = job.plan.layers.layout();
@@ -357,7 +368,7 @@ fn wishes_of_whole_cells(
     let chosen = |cell: &usize| mix64(seed ^ mix64(*cell as u64)).is_multiple_of(one_of);
     let cells: Vec<usize> = (0..grid.cells()).filter(chosen).collect();
     let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
-    let of_cell = |cell: usize| -> Option<f64> {
+    let of_cell = |cell: usize| -> Option<(usize, f64)> {
         if pause.wanted() {
             return None;
         }
@@ -369,7 +380,7 @@ fn wishes_of_whole_cells(
         film.merge_tile(&tile);
         let pixels = means(&film, window, &rgb_from_xyz);
         let variance = 0.5 * (variance(&pixels, 0, floor) + variance(&pixels, 1, floor));
-        Some(wish(variance, costs[cell]))
+        Some((cell, wish(variance, costs[cell])))
     };
     cells.into_par_iter().map(of_cell).collect()
 }
