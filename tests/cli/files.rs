@@ -173,6 +173,18 @@ fn no_output_takes_the_place_of_what_is_read() {
         assert!(std::fs::read(place.path(file)).unwrap() == bytes, "{arguments:?}");
     }
     assert_eq!(place.names("pictures"), Vec::<String>::new());
+    // What a render leaves in its midst goes when it is done, and would take what is read with it.
+    std::fs::copy(place.path("out/sky.png"), place.path("room.snapshot.png")).unwrap();
+    std::fs::write(place.path("room.exr.checkpoint"), "0, 40\n1, 50\n").unwrap();
+    let texture = "textures: {t: {image: {file: room.snapshot.png}}}\n";
+    let keyed = SMALL.replace("fov_deg: 40", "fov_deg: {keys: {file: room.exr.checkpoint}}");
+    for (text, file) in [(format!("{SMALL}{texture}"), "room.snapshot.png"), (keyed, "room.exr.checkpoint")] {
+        assert!(text.contains(file), "{text}");
+        std::fs::write(place.path("room.yaml"), text).unwrap();
+        let ran = place.run(&["render", "room.yaml", "-q", "-o", "room.exr", "--frames", "0"]);
+        assert!(ran.code == 2 && ran.err.ends_with(&format!(" {file}: {words}\n")), "{}", ran.err);
+        assert!(place.path(file).is_file());
+    }
     // A later scene may read what an earlier one has made.
     let two = "output: {dir: out}\nscenes: [{file: scenes/good.yaml, name: sky}, {file: sky.yaml, name: room}]\n";
     std::fs::write(place.path("two.yaml"), two).unwrap();

@@ -79,7 +79,12 @@ impl Import<'_> {
             super::Value::Float(x) => number(node.place, x.max(LEAST_ALPHA)),
             _ => node,
         };
-        let mut alpha = |name| self.number_as(bag, name, Use::Clamped);
+        let is_plastic = bag.object.plugin == "roughplastic";
+        let mut alpha = |name| match is_plastic {
+            // Plastic is as rough everywhere: by a number, and no spectrum.
+            true => Ok(bag.float(name)?.map(|alpha| number(bag.place(name), alpha))),
+            false => self.number_as(bag, name, Use::Clamped),
+        };
         let brushed = [alpha("alpha_u")?, alpha("alpha_v")?];
         let place = bag.object.place;
         match brushed {
@@ -88,7 +93,7 @@ impl Import<'_> {
                 fields.add("roughness", clamped(alpha));
             }
             // Plastic is the same along u and v: this is one number for it.
-            [Some(u), Some(v)] if !bag.has("alpha") && bag.object.plugin == "roughplastic" && same(&u, &v) => {
+            [Some(u), Some(v)] if !bag.has("alpha") && is_plastic && same(&u, &v) => {
                 fields.add("roughness", clamped(u));
             }
             [Some(u), Some(v)] if !bag.has("alpha") => {
@@ -324,5 +329,10 @@ mod tests {
         let once = "<bsdf type=\"roughplastic\"><float name=\"alpha\" value=\"0.2\"/></bsdf>";
         assert_eq!(material(&plastic("0.2")), material(once));
         assert_ne!(fault(&format!("<shape type=\"sphere\">{}</shape>", plastic("0.3")), &[]), "none");
+        for value in ["spectrum name=\"alpha\" value=\"0.2\"", "rgb name=\"alpha\" value=\"0.2\""] {
+            let told =
+                fault(&format!("<shape type=\"sphere\"><bsdf type=\"roughplastic\"><{value}/></bsdf></shape>"), &[]);
+            assert!(told.contains("alpha: expected a float, found "), "{told}");
+        }
     }
 }

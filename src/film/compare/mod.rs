@@ -252,12 +252,19 @@ fn judge(c: &Comparison, count: usize, options: &CompareOptions) -> (Verdict, St
             let share = 100.0 * test.accepted;
             (Verdict::Different, format!("only {share:.2} % of the pixel values agree within their noise"))
         }
-        Some(_) => {
+        Some(test) => {
             let untested = match c.pixels_without_error {
                 0 => String::new(),
                 n => format!(" ({n} pixels without a standard error: not tested singly)"),
             };
-            (Verdict::Same, format!("means and pixels agree within their noise{untested}"))
+            let beyond = match test.pixels_rejected {
+                n if n <= test.pixels_allowed => String::new(),
+                n => format!(
+                    " but for {n} pixels: {:.2} % of the values may differ by more",
+                    100.0 * (1.0 - ACCEPT_FRACTION)
+                ),
+            };
+            (Verdict::Same, format!("means and pixels agree within their noise{beyond}{untested}"))
         }
         // Of n differences Σd/√Σd² is √n at the most, whatever they are.
         None if normal_two_sided_p((c.pixels as f64).sqrt()) >= level && !c.channels.iter().all(is_within) => {

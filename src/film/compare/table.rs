@@ -36,11 +36,11 @@ impl Comparison {
             line(format!("global p, all channels   {:.3e} (different below {GLOBAL_ALPHA:.0e})", self.global_p));
             if let Some(test) = &self.pixel_test {
                 line(format!(
-                    "pixel values that agree  {:.3} % (different below {} %), {} pixels rejected at {:.1e} (different above {})",
+                    "pixel values that agree  {:.3} %, {} pixels rejected at {:.1e} (different below {} % with more than {} rejected)",
                     100.0 * test.accepted,
-                    100.0 * ACCEPT_FRACTION,
                     test.pixels_rejected,
                     test.alpha,
+                    100.0 * ACCEPT_FRACTION,
                     test.pixels_allowed
                 ));
                 let (mean, deviation) = (test.score_mean, test.score_deviation);

@@ -86,6 +86,8 @@ fn parts_of<'a>(image: &ExrImage, channels: Vec<Channel<'a>>) -> Vec<Part<'a>> {
         Some((layer, _)) if cryptomatte::is_layer(layer) => {
             layer.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned()
         }
+        // The name of the picture's own part.
+        Some(("rgba", _)) => "rgba_".to_owned(),
         Some((layer, _)) => layer.to_owned(),
         None if is_light(name) => "rgba".to_owned(),
         None => name.to_owned(),
@@ -521,6 +523,9 @@ mod tests {
         let other = [&["R", "G", "B", "Z"][..], &light].concat();
         assert_eq!(told(&other, &["Z"], single), "all rgb rec709");
         assert_eq!(told(&other, &["Z"], multi), "rgba rgb rec709, Z none data, light rgb ciexyzd65");
+        // A layer may have the name of the picture's part.
+        let clash = [&picture[..], &["rgba.T"]].concat();
+        assert_eq!(told(&clash, &["rgba.T"], multi), "rgba xyz ciexyzd65, rgba_ none data");
         // Bands are no colour, and stand before all others by their names.
         let bands = [&["a", "b"][..], &light, &albedo].concat();
         let expected = "albedo rgb rec709, a none data, b none data, light rgb ciexyzd65";
