@@ -1,7 +1,7 @@
 //! What is looked at before a picture is begun: whether it fits into memory, and whether its files may go where they are to.
 
 use super::prepare::Prepared;
-use super::{Overrides, checkpoint, ends_in, files, memory, names, output_path};
+use super::{Overrides, ends_in, files, memory, names, output_path};
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::Window;
@@ -64,15 +64,7 @@ pub(super) fn places(prepared: &Prepared, overrides: &Overrides, read: &mut Inpu
     for scene in prepared.moments.iter().chain(prepared.next.as_deref()).chain([&prepared.scene]) {
         read.add(&scene.files);
     }
-    let exr = output_path(prepared, overrides);
-    let [_, png, spectral] = files::places(&exr);
-    // What a render leaves in its midst, and takes away.
-    let mut places = vec![checkpoint::place(&exr), exr.clone()];
-    // A part has no PNG and nothing else beside it.
-    if overrides.portion.is_all() {
-        places.extend([png, spectral, checkpoint::snapshot_place(&exr)]);
-    }
-    read.spare(&places)
+    read.spare(files::touched(&output_path(prepared, overrides), overrides.portion.is_all()))
 }
 
 /// [`output_place`] for the frames of a scene.

@@ -256,11 +256,7 @@ pub(super) fn check_report(entries: &[BatchEntry], overrides: &Overrides) -> Res
 /// # Errors
 /// [`Error::Config`] with the place.
 pub(super) fn spare(report: &Path, exr: &Path, whole: bool, label: &str) -> Result<()> {
-    let files = files::places(exr);
-    // A part has nothing of a picture beside it.
-    let files = if whole { &files[..] } else { &files[..1] };
-    let kept = [checkpoint::place(exr), checkpoint::snapshot_place(exr)];
-    match files.iter().chain(&kept).any(|file| is_place_of(report, file)) {
+    match files::touched(exr, whole).iter().any(|file| is_place_of(report, file)) {
         true => Err(taken(report, &format!("a file of the picture {label}"))),
         false => Ok(()),
     }

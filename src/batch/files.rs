@@ -1,11 +1,11 @@
 //! The files of a picture: what they are called, and the writing of them.
 
-use super::contact;
 use super::finish::Finish;
 use super::frame::{self, Frame};
 use super::header::attributes;
 use super::prepare::colour_space;
 use super::report::{Developed, SceneReport};
+use super::{checkpoint, contact};
 use crate::description;
 use crate::error::{Error, Result};
 use crate::film::accumulate::PixelCells;
@@ -312,6 +312,18 @@ pub fn of(finish: &Finish, path: &Path) -> Vec<PathBuf> {
 #[must_use]
 pub fn places(path: &Path) -> [PathBuf; 3] {
     [path.to_path_buf(), path.with_extension("png"), spectral_path(path)]
+}
+
+/// All files that a render of the picture at `path`, which is `whole` or a part, may write or take away, in its midst as well.
+#[must_use]
+pub fn touched(path: &Path, whole: bool) -> Vec<PathBuf> {
+    let [exr, png, spectral] = places(path);
+    let mut files = vec![exr, checkpoint::place(path), checkpoint::snapshot_place(path)];
+    // A part has nothing of a picture beside it.
+    if whole {
+        files.extend([png, spectral]);
+    }
+    files
 }
 
 /// Writes bands of the spectrum as Fichet, Pacanowski and Wilkie have them ("An OpenEXR Layout for Spectral Images", JCGT

@@ -181,8 +181,11 @@ fn no_output_takes_the_place_of_what_is_read() {
     for (text, file) in [(format!("{SMALL}{texture}"), "room.snapshot.png"), (keyed, "room.exr.checkpoint")] {
         assert!(text.contains(file), "{text}");
         std::fs::write(place.path("room.yaml"), text).unwrap();
-        let ran = place.run(&["render", "room.yaml", "-q", "-o", "room.exr", "--frames", "0"]);
-        assert!(ran.code == 2 && ran.err.ends_with(&format!(" {file}: {words}\n")), "{}", ran.err);
+        // A part has both of them, too.
+        for part in [&[][..], &["--tile", "0/2"]] {
+            let ran = place.run(&[&["render", "room.yaml", "-q", "-o", "room.exr", "--frames", "0"], part].concat());
+            assert!(ran.code == 2 && ran.err.ends_with(&format!(" {file}: {words}\n")), "{part:?}: {}", ran.err);
+        }
         assert!(place.path(file).is_file());
     }
     // A later scene may read what an earlier one has made.
