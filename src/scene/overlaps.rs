@@ -1,4 +1,4 @@
-//! Clear bodies that overlap without saying which of them has the place.
+//! Clear bodies that overlap without saying which of them has the place: two that refract, or two that hold a medium.
 //!
 //! Where a ray is in two bodies at once, and each of them both begins and ends beside the other, neither lies in the
 //! other: the surfaces that the ray crosses then bound nothing that their indices describe. Along a ray a body is a row of
@@ -36,6 +36,17 @@ struct Body {
     object: u32,
     bounds: Aabb,
     ranked: bool,
+    refracts: bool,
+    holds_medium: bool,
+}
+
+/// Two bodies that overlap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Overlap {
+    /// The two objects.
+    pub objects: [u32; 2],
+    /// Whether each of them refracts, so that priorities can say which has the place; else each holds a medium.
+    pub refracting: bool,
 }
 
 /// Intervals of a ray, from and to.
@@ -44,7 +55,7 @@ type Intervals = Vec<[f64; 2]>;
 impl Scene {
     /// Pairs of objects that stand in the scene itself and overlap, of which not both have a priority.
     #[must_use]
-    pub fn overlaps(&self) -> Vec<[u32; 2]> {
+    pub fn overlaps(&self) -> Vec<Overlap> {
         let bodies = self.clear_bodies();
         let mut found = Vec::new();
         let mut looked = 0;
@@ -52,7 +63,9 @@ impl Scene {
             for b in &bodies[i + 1..] {
                 let shared = Aabb { min: a.bounds.min.max(b.bounds.min), max: a.bounds.max.min(b.bounds.max) };
                 let apart = shared.min.cmpge(shared.max).any();
-                if apart || a.ranked && b.ranked || !shared.is_finite() {
+                let refracting = a.refracts && b.refracts;
+                let alike = refracting || a.holds_medium && b.holds_medium;
+                if apart || !alike || a.ranked && b.ranked || !shared.is_finite() {
                     continue;
                 }
                 looked += 1;
@@ -60,14 +73,14 @@ impl Scene {
                     return found;
                 }
                 if self.interleave(a, b, &shared) {
-                    found.push([a.object, b.object]);
+                    found.push(Overlap { objects: [a.object, b.object], refracting });
                 }
             }
         }
         found
     }
 
-    /// Objects that light is refracted by, and that bound a space.
+    /// Objects that bound a space that light goes into, where it is refracted or in another medium.
     fn clear_bodies(&self) -> Vec<Body> {
         let refracts = |object: &Object| {
             let leaves = self.materials[object.material as usize].leaves();
@@ -77,13 +90,18 @@ impl Scene {
                 _ => false,
             })
         };
+        let holds_medium = |object: &Object| {
+            !object.keeps_medium
+                && object.inside != object.outside
+                && self.materials[object.material as usize].transmits()
+        };
         let closed = |object: &Object| match &object.geometry {
             Geometry::Shape(shape) => shape.is_closed() || matches!(shape, Shape::Plane(_)),
             Geometry::Mesh(_) => true,
             Geometry::Sdf(sdf) => sdf.is_closed(),
             Geometry::Curves(_) | Geometry::Instance(_) => false,
         };
-        let is_body = |object: &&Object| closed(object) && refracts(object);
+        let is_body = |object: &&Object| closed(object) && (refracts(object) || holds_medium(object));
         let standing = self.objects[..self.standing].iter().zip(0u32..);
         // Groups are looked through once, however many copies they have.
         let mut groups: HashMap<u32, Option<&Object>> = HashMap::new();
@@ -96,7 +114,8 @@ impl Scene {
                 }),
                 _ => Some(object).filter(is_body),
             }?;
-            Some(Body { object: i, bounds: object.bounds(), ranked: inner.body != 0 })
+            let (refracts, holds_medium) = (refracts(inner), holds_medium(inner));
+            Some(Body { object: i, bounds: object.bounds(), ranked: inner.body != 0, refracts, holds_medium })
         });
         bodies.take(MOST_BODIES).collect()
     }
@@ -160,7 +179,11 @@ mod tests {
 
     /// Notes of overlaps in a scene of these shapes.
     fn notes(shapes: &str) -> Vec<String> {
-        let text = format!("camera: {{origin: [0, 0.3, 5], target: [0, 0, 0], fov_deg: 40}}\nshapes:\n{shapes}");
+        notes_with("", shapes)
+    }
+
+    fn notes_with(media: &str, shapes: &str) -> Vec<String> {
+        let text = format!("camera: {{origin: [0, 0.3, 5], target: [0, 0, 0], fov_deg: 40}}\n{media}shapes:\n{shapes}");
         let mut notes = compiled(&text).notes;
         notes.retain(|note| note.contains(": overlaps "));
         notes
@@ -184,6 +207,27 @@ mod tests {
         // A copy, and a corner of a cube.
         let cube = "- cube: {center: [0.9, 0.9, 0.9], size: 1, material: {principled: {spec_trans: 1}}}\n";
         assert_eq!(notes(&(sphere(0.0, 1.0, "") + cube)).len(), 1);
+    }
+
+    /// Where two media overlap, a path is in the one whose surface it crossed last: another one from the other end.
+    #[test]
+    fn media_that_overlap_are_told() {
+        let told = "overlaps shapes[0], and both hold a medium: where they share a place, light is in the one that it \
+            went into last, and pictures differ by where paths begin; leave them apart";
+        let sphere = |x: f64, material: &str, inside: &str| {
+            format!(
+                "- sphere: {{center: [{x}, 0.1, 0.2], radius: 1, material: {{{material}: {{}}}}, inside: {inside}}}\n"
+            )
+        };
+        let media = "media: {smoke: {homogeneous: {scattering: 1, absorption: 1}}, ink: {homogeneous: {scattering: 0, absorption: 2}}}\n";
+        let of = |shapes: &str| notes_with(media, shapes);
+        let [a, b] = [sphere(0.0, "boundary", "smoke"), sphere(1.5, "boundary", "ink")];
+        assert!(of(&(a.clone() + &b))[0].ends_with(told), "{:?}", of(&(a.clone() + &b)));
+        let glass = sphere(1.5, "dielectric", "ink").replace("dielectric: {}", "dielectric: {ior: 1.5}");
+        assert!(of(&(a.clone() + &glass))[0].ends_with(told));
+        // Apart, and what light does not go into.
+        assert_eq!(of(&(a.clone() + &sphere(2.5, "boundary", "ink"))), [""; 0]);
+        assert_eq!(of(&(a + &sphere(1.5, "diffuse", "ink"))), [""; 0]);
     }
 
     /// Held, touching from outside and from within, with equal faces, apart, opaque, or with priorities.

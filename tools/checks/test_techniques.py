@@ -55,11 +55,15 @@ def dispersive(scene: str, number: int) -> str | None:
 
 
 def in_force(binary: Path, case: SceneFile, technique: str, settings: list) -> bool:
-    """Whether the plan of a scene has a technique; of packets those from the lights or those from the camera."""
+    """Whether the plan of a scene has a technique; of packets those from the lights or those from the camera.
+
+    Media that overlap make other pictures from the lights than from the camera, as a note says: nothing to compare.
+    """
     settings = [f"render.samples={SPP}", *settings]
     command = [binary, "plan", case.path, "--format", "json", *(x for s in settings for x in ("--set", s))]
     plan = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)[0]
-    return any(entry["on"] for entry in plan["techniques"] if entry["name"].startswith(technique))
+    overlapping = any("and both hold a medium" in note for note in plan["notes"])
+    return not overlapping and any(entry["on"] for entry in plan["techniques"] if entry["name"].startswith(technique))
 
 
 def picture(binary: Path, case: SceneFile, settings: list, spp: int, seed: int) -> judge.Picture:

@@ -6,6 +6,7 @@ use crate::scene::apart::Contact;
 use crate::scene::around::{Side, Stranger};
 use crate::scene::bvh::Aabb;
 use crate::scene::material::Material;
+use crate::scene::overlaps::Overlap;
 use crate::scene::shape::Shape;
 use crate::scene::{Geometry, Object, Scene};
 use std::collections::HashMap;
@@ -14,19 +15,25 @@ use std::collections::HashMap;
 const TOLD: usize = 8;
 
 impl Compiler<'_> {
-    /// Notes which bodies overlap without priorities.
+    /// Notes which bodies overlap, and nothing says which of them has the place.
     pub(super) fn note_overlaps(&self, scene: &mut Scene) {
         let pairs = scene.overlaps();
-        for [a, b] in pairs.iter().take(TOLD) {
+        for Overlap { objects: [a, b], refracting } in pairs.iter().take(TOLD) {
             let at = format!("shapes[{b}].{}", self.description.shapes[*b as usize].geometry.kind());
-            let note = format!(
-                "overlaps shapes[{a}], and not both have a priority: where they share a place, light is refracted by \
-                 indices that neither has; a higher priority says which has the place"
-            );
-            scene.notes.push(self.description.fault(&at, &note));
+            let why = if *refracting {
+                "not both have a priority: where they share a place, light is refracted by indices that neither has; a \
+                 higher priority says which has the place"
+            } else {
+                "both hold a medium: where they share a place, light is in the one that it went into last, and pictures \
+                 differ by where paths begin; leave them apart"
+            };
+            scene.notes.push(self.description.fault(&at, &format!("overlaps shapes[{a}], and {why}")));
         }
         if pairs.len() > TOLD {
-            scene.notes.push(format!("{} more pairs of bodies overlap without priorities", pairs.len() - TOLD));
+            scene.notes.push(format!(
+                "{} more pairs of bodies overlap, and nothing says which has the place",
+                pairs.len() - TOLD
+            ));
         }
     }
 
