@@ -129,7 +129,12 @@ def main() -> int:
     if not a.binary.is_file():
         print(f"cross_validate: {a.binary} does not exist; build it with `cargo build --release`", file=sys.stderr)
         return 2
-    mitsuba = Mitsuba(a.variant or choose_variant())
+    with Mitsuba(a.variant or choose_variant()) as mitsuba:
+        return judge_all(cases, a, mitsuba)
+
+
+def judge_all(cases: list, a: argparse.Namespace, mitsuba: Mitsuba) -> int:
+    """Judges the cases, writes the report and tells the exit code."""
     print(f"{mitsuba.name} against {a.binary}, seed {a.seed}")
     print(HEADLINE)
 

@@ -176,8 +176,8 @@ def main() -> int:
         for case in wanted:
             write(case, files[case.name])
         for name in names:
-            peer = Mitsuba(name)
-            peers[name] = {case.name: mitsuba(peer, files[case.name], a.spp) for case in wanted}
+            with Mitsuba(name) as peer:
+                peers[name] = {case.name: mitsuba(peer, files[case.name], a.spp) for case in wanted}
         print(f"{'case':58} {'exact':>6} {'abbe':>9} " + " ".join(f"{n:>16}" for n in names))
         wrong = 0
         rows = []

@@ -94,6 +94,13 @@ class Mitsuba:
         self.pool = None
         self.name = self._call(_name)
 
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.pool is not None:
+            self.pool.shutdown()
+
     def replicates(self, scene: dict, path: Path, samples: int, seeds) -> np.ndarray:
         """Independent renders of `scene`, (passes, h, w, 3); `samples` is their sum."""
         Writer(scene, path.parent).write(path)
