@@ -157,10 +157,11 @@ impl Grid {
     fn value<T: Copy + Add<Output = T> + Mul<f32, Output = T>>(&self, uv: DVec2, texel: impl Fn(usize) -> T) -> T {
         match self.interpolation {
             // A row begins where v of the surface comes to it: at v = 0 as at v = 1 is the first, be it the bottom one or, where v
-            // runs down the picture, as in Mitsuba, the top one.
+            // runs down the picture, as in Mitsuba, the top one. Turned besides, it runs down where u and v have changed hands.
             Interpolation::Nearest => {
                 let (x_axis, y_axis) = (self.uv.matrix2.x_axis, self.uv.matrix2.y_axis);
-                let down = y_axis.y < 0.0 || y_axis.y == 0.0 && x_axis.y < 0.0;
+                let turned = x_axis.y != 0.0 || y_axis.x != 0.0;
+                let down = if turned { self.uv.matrix2.determinant() < 0.0 } else { y_axis.y < 0.0 };
                 let uv = self.uv.transform_point2(uv);
                 let (x, up) = (uv.x * self.width as f64, uv.y * self.height as f64);
                 let height = self.height as f64;
@@ -610,6 +611,11 @@ mod tests {
         let down = Grid { uv: DAffine2::from_cols(DVec2::X, -DVec2::Y, DVec2::Y), ..up };
         let rows = |v: f64| [up, down].map(|grid| grid.value(DVec2::new(0.2, v), |row| row as f32));
         assert_eq!([-1.0, 0.0, 0.5, 1.0].map(rows), [[1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]);
+        for degrees in [30.0, 90.0, 110.0, 180.0, 250.0] {
+            let turn = DAffine2::from_angle(f64::to_radians(degrees));
+            let rows = [up, down].map(|grid| Grid { uv: grid.uv * turn, ..grid }.value(DVec2::ZERO, |row| row as f32));
+            assert_eq!(rows, [1.0, 0.0], "{degrees}");
+        }
     }
 
     /// The bilinear form is quadratic, so that central differences are its derivatives but for rounding
