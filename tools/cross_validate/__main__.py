@@ -29,7 +29,7 @@ import page
 import renderers
 import scene_files
 from judge import Picture, judge
-from renderers import Mitsuba, RenderError, choose_variant
+from renderers import Mitsuba, PeerDied, RenderError, choose_variant
 from scenes import BANDS, Case, all_cases
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -154,7 +154,7 @@ def judge_all(cases: list, a: argparse.Namespace, mitsuba: Mitsuba) -> int:
                 pictures[case.name] = tuple(pair)
                 result = verdict.as_dict()
             except (RenderError, RuntimeError, ValueError, KeyError) as error:
-                result = {"passed": False, "reason": f"{type(error).__name__}: {error}"}
+                result = {"passed": False, "reason": f"{type(error).__name__}: {error}", "undecided": isinstance(error, PeerDied)}
             result["seconds"] = round(time.monotonic() - before, 2)
             attempts.append(result)
             text = row(case.name, result) if "ratio" in result else f"{case.name:28} FAILED {result['reason']}"

@@ -535,6 +535,9 @@ class Draw:
         sensor = self.sensor(*around, traced=traced)
         if traced and re.search(UNTRACED, sensor + ground + bodies + lights):
             return None
+        if "far_clip" in sensor and any(f'"{kind}"' in bodies + ground for kind in OPEN):
+            # Behind what lets light straight through the far plane is forgotten there (known).
+            return None
         if (misty or foggy) and "_clip" in sensor:
             # A body that is cut open has its medium here alone, and fog beyond the far plane is seen here alone (known).
             return None

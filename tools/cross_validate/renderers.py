@@ -30,6 +30,10 @@ class RenderError(RuntimeError):
     """A renderer refused a scene or failed."""
 
 
+class PeerDied(RenderError):
+    """Mitsuba ends in a segmentation fault for every seed: there is nothing to compare."""
+
+
 # -- Abbe ---------------------------------------------------------------------------------------------
 
 
@@ -126,7 +130,7 @@ class Mitsuba:
             except BrokenProcessPool:
                 self.pool = None
                 print(f"{path.stem}: Mitsuba's process died; once more with other seeds", flush=True)
-        raise RenderError(f"Mitsuba's process died {self.TRIES} times")
+        raise PeerDied(f"Mitsuba's process died {self.TRIES} times")
 
     def _call(self, function, *arguments):
         if self.pool is None:
