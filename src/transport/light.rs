@@ -110,6 +110,8 @@ pub struct Traced {
     pub rays: u32,
     /// The source and the place in its guide.
     pub began: Option<(usize, DVec2)>,
+    /// The direction in which it began.
+    pub direction: DVec3,
     /// Its wavelengths.
     pub wavelengths: Option<SampledWavelengths>,
     /// Whether no path from the camera could be the same: a lamp without extent, and what throws its light in a single direction.
@@ -143,6 +145,7 @@ pub fn trace(
         }),
     };
     let Some(emission) = emission else { return traced };
+    traced.direction = emission.ray.direction;
     let start = largest(emission.power.lanes);
     if start.is_nan() || start <= 0.0 {
         return traced;

@@ -386,11 +386,14 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let (kept, mirrored) = (trimmed(&camera.kept, &weights), average(&camera.mirrored, &weights));
     let unmerged = match camera.met_mirrored {
         _ if unfound_gathered => f64::INFINITY,
-        ENOUGH.. => mirrored,
-        met => by_chance(&found.gathered, met),
+        // Of a light that is a sky and a sun they may have met the sky alone, however often.
+        ENOUGH.. => mirrored.max(found.gathered_by_chance),
+        met => by_chance(&found.gathered, met).max(found.gathered_by_chance),
     };
     // What is as good as never found is missing; where that is less than the noise shows, nothing is gained.
-    let faint = !endless && square(&found.gathered) * f64::from(trial.samples) < FAINT * kept;
+    let faint = !endless
+        && found.gathered_by_chance == 0.0
+        && square(&found.gathered) * f64::from(trial.samples) < FAINT * kept;
     let counts = found.collected > 0.0 && !faint && unmerged > WORTH * kept;
     let merging = match wishes.merging {
         Use::On => true,
@@ -412,7 +415,10 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
     let measured = if camera.met >= ENOUGH { average(&camera.all, &weights) } else { f64::INFINITY };
     let without = match unfound || missing {
         true => f64::INFINITY,
-        false => measured.min(kept + mirrored + by_chance(&found.thrown, camera.met)) * a,
+        false => {
+            let by_chance = measured.min(kept + mirrored + by_chance(&found.thrown, camera.met));
+            by_chance.max(kept + found.by_chance) * a
+        }
     };
     if wishes.light_tracing == Use::Auto && without < with {
         let loss = with / without;

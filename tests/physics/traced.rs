@@ -36,6 +36,23 @@ fn a_sun_in_an_environment_is_traced_and_an_even_sky_is_not() {
     assert!(!tracing && reason == "no light is small or has a sun", "{reason}");
 }
 
+/// Paths from the camera meet the dome of a sky through glass often, its sun hardly ever: that they have met the light of the sky
+/// says nothing of the sun's, which is traced, and merged where it is seen in glass, whatever the seed.
+#[test]
+fn the_sun_of_a_sky_is_traced_for_every_seed() {
+    for (seed, ior) in (0..4).flat_map(|seed| [(seed, "1.5"), (seed, "{glass: SF11}")]) {
+        let scene = format!(
+            "camera: {{origin: [1, 3, 4], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 160, height: 120}}\n\
+             integrator: path\nrender: {{samples: 256, seed: {seed}}}\nshapes:\n\
+             - plane: {{normal: [0, 1, 0]}}\n\
+             - sphere: {{center: [0, 0.5, 0], radius: 0.5, material: {{dielectric: {{ior: {ior}}}}}}}\n\
+             lights: [sky: {{sun: {{elevation_deg: 30, azimuth_deg: 20}}, albedo: 0.4}}]\n"
+        );
+        let (tracing, merging, why) = techniques(&bench_with(&scene, &[]));
+        assert!(tracing && merging, "{seed}, {ior}, merging {merging}: {why}");
+    }
+}
+
 /// A lamp in the middle of a globe of glass, as in a bulb, is met through the globe alone: seldom from what stands around.
 #[test]
 fn light_of_a_lamp_in_the_middle_of_a_globe_is_traced() {

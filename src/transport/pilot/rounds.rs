@@ -3,6 +3,7 @@
 use super::camera::Colour;
 use super::seen::{Arrival, Seen};
 use super::{BLOCKS, Trial};
+use crate::spectrum::observer;
 use crate::transport::guide::Find;
 use crate::transport::light::{LightPaths, trace};
 use crate::transport::photons::Photons;
@@ -25,6 +26,8 @@ struct Landed {
     /// What it would collect where mirrors and glass are seen.
     collected: Vec<Arrival>,
     rays: u32,
+    /// Luminance of the sky where it came from.
+    sky: f64,
     /// Whether no path from the camera could be the same.
     unfound: bool,
 }
@@ -61,7 +64,15 @@ fn from_lights(paths: &LightPaths, seen: Option<&Seen>, round: u32, indices: Ran
                 photons.iter().for_each(|photon| seen.collect(&photon, unit_area, wavelengths, &mut collected));
             }
             let (source, place) = traced.began.unwrap_or((usize::MAX, DVec2::ZERO));
-            Landed { source, place, splats, collected, rays: traced.rays, unfound: traced.unfound }
+            let sky = match (paths.caustics.and_then(|caustics| caustics.sources.get(source)), &traced.wavelengths) {
+                (Some(source), Some(wavelengths)) => {
+                    let light = &paths.scene.lights[source.light as usize];
+                    let radiance = light.background(-traced.direction, wavelengths.nm);
+                    Colour::of(observer::xyz(radiance * unit, wavelengths)).y
+                }
+                _ => 0.0,
+            };
+            Landed { source, place, splats, collected, rays: traced.rays, sky, unfound: traced.unfound }
         })
         .collect()
 }
@@ -94,6 +105,10 @@ pub(super) struct Round {
     /// Mean luminance of each block, and the part of it that is collected.
     pub thrown: Vec<f64>,
     pub gathered: Vec<f64>,
+    /// Variance of a path from the camera that finds the light of skies by chance, weighted: of all, and of what is collected. Light
+    /// of mean m that is found as bright as L has one of m L.
+    pub by_chance: f64,
+    pub gathered_by_chance: f64,
     /// Whether any of it, and any of what is collected, is light that no path from the camera could find.
     pub unfound: bool,
     pub unfound_gathered: bool,
@@ -130,6 +145,11 @@ impl Trial<'_> {
                 for arrival in landed.splats.iter().chain(&landed.collected) {
                     round.thrown[arrival.block] += arrival.pixels * arrival.y;
                 }
+                let chanced =
+                    |all: &[Arrival]| all.iter().map(|a| weights[a.block] * a.pixels * a.y * landed.sky).sum::<f64>();
+                let (splats, gathered) = (chanced(&landed.splats), chanced(&landed.collected));
+                round.by_chance += splats + gathered;
+                round.gathered_by_chance += gathered;
                 for arrival in &landed.collected {
                     round.gathered[arrival.block] += arrival.pixels * arrival.y;
                 }
@@ -155,9 +175,12 @@ impl Trial<'_> {
         }
         let paths = round.paths as f64;
         let [width, height] = self.scene.camera.resolution.map(f64::from);
-        let share = (BLOCKS * BLOCKS) as f64 / (width * height * paths);
+        let pixels = width * height * paths;
+        let share = (BLOCKS * BLOCKS) as f64 / pixels;
         round.thrown.iter_mut().chain(&mut round.gathered).for_each(|y| *y *= share);
         Round {
+            by_chance: round.by_chance / pixels,
+            gathered_by_chance: round.gathered_by_chance / pixels,
             rays: round.rays / paths,
             splatted: round.splatted / paths,
             collected: round.collected / paths,
