@@ -43,7 +43,8 @@
 //! degrees of freedom has 2/ν. Of a few cells that share all they find these are few.
 //!
 //! **Where it is unknown.** What is taken off can be more than there is, where light is so rare that its pixels have it in
-//! half of the replicates: the sum then says nothing of the error, least of all that there is none. And replicates that agree
+//! half of the replicates: the sum then says nothing of the error, least of all that there is none. Where few pixels do that to all
+//! others, one in a hundred at the most, nothing is taken off these, and the picture has not converged. And replicates that agree
 //! everywhere show that there is no noise only where they agree on light: a black pixel may be one whose light nobody has met.
 
 mod sums;
@@ -194,7 +195,7 @@ pub fn relative_error(
 ) -> Result<ErrorEstimate, NoEstimate> {
     let measured = Measured::new(film, splats, values, overlap > 1.0);
     let everywhere = cell.is_none();
-    let blocks = blocks(&measured, cell.unwrap_or(1));
+    let mut blocks = blocks(&measured, cell.unwrap_or(1));
     let mut all = Sums::default();
     // tr(WΣ)² of different pixels, by their pairs and by what the filter shares.
     let by_pairs =
@@ -204,6 +205,10 @@ pub fn relative_error(
     for block in &blocks {
         all.join(block);
         in_blocks += by_pairs(block);
+    }
+    if all.are_spoiled_by_few() {
+        blocks.iter_mut().for_each(Sums::restore);
+        all.restore();
     }
     match all.pixels {
         0 => return Err(NoEstimate::FewReplicates),
@@ -383,6 +388,34 @@ mod tests {
     fn an_estimate_below_nothing_is_unknown() {
         let rare = film_of(|pixel, replicate| if (pixel + replicate) % 4 < 2 { 3.0 } else { 0.0 });
         assert_eq!(estimate(&rare).unwrap_err(), NoEstimate::Noisy);
+    }
+
+    /// Of 1024 pixels of 1 with noise of 0.1 in each replicate one has 20, -20, 1 and 1: far more is taken off it than all others have.
+    /// Nothing is: v = (19.5² + 20.5² + 2 · 0.5²) / 12 = 66.75 by g = 1 / (0.5² + 0.01) is 256.7; the others have 0.1² / 4 / 1.01 each, 2.5.
+    /// In 64 of them that is no few.
+    #[test]
+    fn few_pixels_do_not_make_an_estimate_unknown() {
+        let spoiled = |side: u32, spoiled: usize| {
+            let window = Window::full(side, side);
+            let mut tile = TileBuffer::new(window);
+            for pixel in 0..window.pixels() {
+                let place = [pixel % side as usize, pixel / side as usize].map(|x| x as i32);
+                for (replicate, bright) in [20.0, -20.0, 1.0, 1.0].into_iter().enumerate() {
+                    let noise = 12f64.sqrt() * 0.1 * (uniform(7, (4 * pixel + replicate) as u64) - 0.5);
+                    let light = if pixel < spoiled { bright } else { 1.0 + noise };
+                    tile.add(place, replicate, [light as f32; 3], 1.0);
+                }
+            }
+            let mut film = Film::new([side; 2], window).unwrap();
+            film.merge_tile(&tile);
+            estimate(&film).map(|(_, error)| error)
+        };
+        let told = spoiled(32, 1).unwrap();
+        // f follows the mean of all, 0.9995: by 1e-3 of 0.26.
+        let expected = ((66.75 / 0.26 + 1023.0 * 0.0025 / 1.01) / 1024.0_f64).sqrt();
+        assert!((told.rel_rmse / expected - 1.0).abs() < 2e-3, "{told:?} for {expected}");
+        assert!(!told.valid && told.low < told.rel_rmse && told.rel_rmse < told.high && told.high < 10.0, "{told:?}");
+        assert_eq!(spoiled(8, 1).unwrap_err(), NoEstimate::Noisy);
     }
 
     /// The same with some light in the dark replicates, too: X/300 in place of 0 moves x by 0.3 % and v g by 1 %, and less than nothing

@@ -5,6 +5,9 @@ use super::values::Four;
 use super::{ONE_REPLICATE, PAIRINGS};
 use wide::f64x4;
 
+/// See [`Sums::are_spoiled_by_few`]: of the pixels whose replicates differ.
+const FEW: f64 = 0.01;
+
 /// What some pixels add to the estimate.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Sums {
@@ -36,6 +39,11 @@ pub(super) struct Sums {
     pub(super) pairs: [f64; 3],
     /// Σ (uᵀWv)² of single pixels, over the ways to pair.
     pub(super) pair_squares: f64,
+    /// Pixels of which more is taken off than there is.
+    pub(super) lost: u64,
+    /// Their Σ q, and what is taken off them.
+    pub(super) lost_error: f64,
+    pub(super) lost_further: f64,
 }
 
 impl Sums {
@@ -88,6 +96,11 @@ impl Sums {
         self.further_of_pixels += further.abs();
         self.crossed += crossed;
         self.squares += error * error;
+        if error < 0.0 {
+            self.lost += 1;
+            self.lost_error += error;
+            self.lost_further += further;
+        }
         let largest = shares.to_array().into_iter().fold(0.0, f64::max);
         if largest > ONE_REPLICATE * shares.reduce_add() {
             self.heavy += error;
@@ -100,6 +113,17 @@ impl Sums {
         // W of the mean itself is as much larger or smaller as the size is that it makes.
         self.own += if plain > 0.0 { own.trace() * (error.max(0.0) / plain).powi(2) } else { 0.0 };
         self.splatted += splatted.trace();
+    }
+
+    /// Whether a few pixels have more taken off than half of what all others have.
+    pub(super) fn are_spoiled_by_few(&self) -> bool {
+        self.lost as f64 <= FEW * self.noisy as f64 && -self.lost_error > 0.5 * (self.error - self.lost_error)
+    }
+
+    /// Takes nothing off the pixels of which that would be more than there is.
+    pub(super) fn restore(&mut self) {
+        self.error += self.lost_further;
+        self.further -= self.lost_further;
     }
 
     /// Adds what other pixels add.
@@ -117,6 +141,9 @@ impl Sums {
         self.own += other.own;
         self.splatted += other.splatted;
         self.pair_squares += other.pair_squares;
+        self.lost += other.lost;
+        self.lost_error += other.lost_error;
+        self.lost_further += other.lost_further;
         self.pairs.iter_mut().zip(other.pairs).for_each(|(sum, pair)| *sum += pair);
     }
 }
