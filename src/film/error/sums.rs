@@ -120,9 +120,9 @@ impl Sums {
         self.lost as f64 <= FEW * self.noisy as f64 && -self.lost_error > 0.5 * (self.error - self.lost_error)
     }
 
-    /// Takes nothing off the pixels of which that would be more than there is.
-    pub(super) fn restore(&mut self) {
-        self.error += self.lost_further;
+    /// Leaves the pixels out of which more is taken than there is.
+    pub(super) fn leave_lost_out(&mut self) {
+        self.error -= self.lost_error;
         self.further -= self.lost_further;
     }
 
