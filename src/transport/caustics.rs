@@ -6,7 +6,8 @@
 //! never; so it leaves the class out, and paths from the lights, which connect to the camera at every vertex, add it.
 //! Of lamps without extent the class is wider, by all that no path from the camera finds: their light may be thrown in single
 //! directions by what scatters, too, as by the coats of plastics and blends with mirrors, and the vertex next to the camera may be
-//! on a narrow gloss if all before it were sharp.
+//! on a narrow gloss if all before it were sharp. Of what stands out of other light from infinity, a sun or a texel many times as bright
+//! as the mean, so is what is thrown in single directions by things of an end that scatter.
 //! Every path of light belongs to one of the two, so nothing is lost and nothing counted twice, and no weights are
 //! needed.
 //!
@@ -20,6 +21,7 @@ use crate::math::{Frame, Ray, warp};
 use crate::scene::Scene;
 use crate::scene::casters::Ball;
 use crate::scene::emission::{Emission, Freedom, Power};
+use crate::scene::light::Light;
 use crate::spectrum::Lanes;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
@@ -29,7 +31,7 @@ use std::f64::consts::{PI, TAU};
 pub struct Caustics {
     /// For each object, whether it is sharp.
     pub casts: Vec<bool>,
-    /// For each object, whether it throws light of lamps without extent in single directions and scatters the rest.
+    /// For each object, whether it throws light in single directions and scatters the rest.
     pub in_part: Vec<bool>,
     /// For each object, whether it is one of those and has no end.
     pub unending: Vec<bool>,
@@ -242,17 +244,26 @@ impl Caustics {
         ((samples as f64 * self.ratio).round() as u64).max(1)
     }
 
-    /// Whether a path that is aimed at `target` counts where `object` is what it meets first, from a lamp `without_extent` or
-    /// another.
+    /// Whether a path that is aimed at `target` counts where `object` is what it meets first, in `direction` from a `lamp`, if not from
+    /// the camera.
     #[must_use]
-    pub fn begins_at(&self, target: Target, object: u32, without_extent: bool) -> bool {
+    pub fn begins_at(&self, target: Target, object: u32, lamp: Option<&Light>, direction: DVec3) -> bool {
         let unending = self.unending[object as usize];
-        (self.is_sharp(object) || without_extent && self.in_part[object as usize])
+        let counts_in_part =
+            |lamp: &Light| !lamp.may_be_met() || self.throws_in_part(object) && lamp.stands_out(-direction);
+        (self.is_sharp(object) || self.in_part[object as usize] && lamp.is_some_and(counts_in_part))
             && match target {
                 Target::Ball(_) => !unending,
                 Target::Endless => unending,
                 Target::Own => true,
             }
+    }
+
+    /// Whether `object`, which is not sharp, throws light that stands out in single directions, as far as paths from the lights find it.
+    #[must_use]
+    #[inline]
+    pub fn throws_in_part(&self, object: u32) -> bool {
+        self.in_part[object as usize] && !self.unending[object as usize]
     }
 
     /// Whether what a ray met at `object` is sharp.

@@ -28,7 +28,7 @@ use super::shadow::MAX_BOUNDARIES;
 use super::{moment_at, scene_at};
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
-use crate::optics::bsdf::{Bsdf, BsdfSample, Chosen};
+use crate::optics::bsdf::{Bsdf, BsdfSample, Chosen, Lobes};
 use crate::scene::compound::below;
 use crate::scene::light::Light;
 use crate::scene::nested::Bodies;
@@ -112,6 +112,8 @@ pub struct Traced {
     pub began: Option<(usize, DVec2)>,
     /// The direction in which it began.
     pub direction: DVec3,
+    /// What of the light a path from the camera would find, if that is thrown to the lamp by what scatters the rest: a share of it.
+    pub share: f64,
     /// Its wavelengths.
     pub wavelengths: Option<SampledWavelengths>,
     /// Whether no path from the camera could be the same: a lamp without extent, and what throws its light in a single direction.
@@ -162,12 +164,13 @@ pub fn trace(
         group,
         lamp: Some(&scene.lights[emission.light as usize]),
         unfound: false,
+        share: 1.0,
         rays: 0,
         ahead: None,
     };
     let bodies = if paths.plan.nested { scene.bodies_around(&emission.ray) } else { Bodies::NONE };
     walk.follow(Beam::begin(emission.ray, emission.power.lanes, wavelengths.nm, None, bodies));
-    (traced.rays, traced.unfound) = (walk.rays, walk.unfound);
+    (traced.rays, traced.unfound, traced.share) = (walk.rays, walk.unfound, walk.share);
     traced
 }
 
@@ -193,6 +196,7 @@ pub(super) fn seen_in_sharp(
         group: 0,
         lamp: None,
         unfound: false,
+        share: 1.0,
         rays: 0,
         ahead: None,
     };
@@ -295,8 +299,9 @@ struct Walk<'a, 'b> {
     group: u8,
     /// The lamp; none of a walk that begins at the camera.
     lamp: Option<&'a Light>,
-    /// As [`Traced::unfound`].
+    /// As in [`Traced`].
     unfound: bool,
+    share: f64,
     rays: u32,
     /// What the beam that is to be followed meets next, where that is known.
     ahead: Option<Hit>,
@@ -358,7 +363,8 @@ impl<'a> Walk<'a, '_> {
             let sharp = caustics.is_some_and(|c| c.is_sharp(hit.object));
             // What else is next to a lamp without extent counts as far as it throws light in a single direction.
             let in_part = vertex == 0 && caustics.is_some() && !sharp;
-            if vertex == 0 && caustics.is_some_and(|c| !c.begins_at(self.target, hit.object, self.is_without_extent()))
+            if vertex == 0
+                && caustics.is_some_and(|c| !c.begins_at(self.target, hit.object, self.lamp, beam.ray.direction))
             {
                 return;
             }
@@ -430,6 +436,9 @@ impl<'a> Walk<'a, '_> {
                 Chosen::Discrete => self.throw(&mut beam),
                 Chosen::Density(_) if in_part => return,
                 Chosen::Density(_) => {}
+            }
+            if in_part && let Some(mirrored) = bsdf.mirrored(wo) {
+                self.share = f64::from(mirrored.reduce_add()) / LANES as f64;
             }
             if !self.cross(&mut beam, &sample, &at, &view, u_roulette) {
                 return;

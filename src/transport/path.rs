@@ -487,6 +487,9 @@ impl Tracer<'_> {
             ledger.leave(path.vertices, first, sample.chosen == Chosen::Discrete);
         }
         path.mirrored |= path.sharp && path.vertices == 0;
+        if let Some(caustics) = &self.plan.caustics {
+            path.thrown = sample.chosen == Chosen::Discrete && caustics.throws_in_part(hit.object);
+        }
         if sample.chosen != Chosen::Discrete {
             path.counted = None;
         } else if sample.transmitted {
@@ -563,7 +566,7 @@ impl Tracer<'_> {
         if self.is_last(path) {
             return false;
         }
-        path.sharp = false;
+        (path.sharp, path.thrown) = (false, false);
         path.counted = None;
         if let Some(ledger) = self.ledger {
             ledger.meet(false);

@@ -140,7 +140,8 @@ pub fn decide(
     }
     let casters = Casters::of(scene, moments);
     let without_extent = settings.delta_caustics && scene.lights.iter().any(|light| !light.may_be_met());
-    let in_part = if without_extent { Casters::in_part(scene, moments) } else { Casters::none(scene) };
+    let stands_out = scene.lights.iter().any(Light::may_stand_out);
+    let in_part = if without_extent || stands_out { Casters::in_part(scene, moments) } else { Casters::none(scene) };
     if casters.is_empty() && in_part.is_empty() {
         return left_off("nothing mirrors or refracts sharply");
     }

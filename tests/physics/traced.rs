@@ -36,6 +36,36 @@ fn a_sun_in_an_environment_is_traced_and_an_even_sky_is_not() {
     assert!(!tracing && reason == "no light is small or has a sun", "{reason}");
 }
 
+/// What coats, blends and mirrors throw of a disc in the sky, of 440 times its mean, on a floor: traced from the sky by that disc alone,
+/// and by chance. The rest of the sky, and what a floor without end throws, is found by chance in both.
+#[test]
+fn a_sun_that_coats_throw_is_as_bright_as_by_chance() {
+    const COAT: &str = "{plastic: {ior: 2.5, reflectance: 0.2}}";
+    const BLEND: &str =
+        "{blend: {weight: 0.5, first: {mirror: {reflectance: 0.9}}, second: {diffuse: {reflectance: 0.5}}}}";
+    const SKY: &str = "lights: [{environment: {file: sky.png, scale: 100}}]\n";
+    const MIRROR: &str = "- rectangle: {corner: [-2, -1, -2], edge_u: [0, 2.5, 0], edge_v: [2, 0, -1], material: {mirror: {reflectance: 0.8}}}\n\
+        lights: [{environment: {file: sky.png, scale: 100}}]\n";
+    let coat = Case { what: "coat", material: COAT, light: SKY, ..AREA };
+    for (case, mirrors) in [
+        (coat, false),
+        (Case { what: "blend", material: BLEND, ..coat }, false),
+        (Case { what: "coated floor", floor: COAT, ..coat }, false),
+        (Case { what: "depth 3", depth: "3", ..coat }, false),
+        (Case { what: "beside a mirror", light: MIRROR, ..coat }, true),
+    ] {
+        let bench = |tracing: &str, samples| {
+            let sky = grey_png(64, 32, |x, y| if (20..22).contains(&x) && (10..12).contains(&y) { 255 } else { 1 });
+            bench_with(&case.scene("path", tracing, "auto", samples), &[("sky.png", &sky)])
+        };
+        let on = bench("on", 256);
+        let caustics = on.prepared.plan.caustics.as_ref().expect(case.what);
+        assert!(caustics.traced == [true] && caustics.in_part.contains(&true), "{}", case.what);
+        assert_eq!(mirrors, caustics.casts.contains(&true), "{}", case.what);
+        assert_agree(case.what, &render(&on), &render(&bench("off", 4096)));
+    }
+}
+
 /// Paths from the camera meet the dome of a sky through glass often, its sun hardly ever: that they have met the light of the sky
 /// says nothing of the sun's, which is traced, and merged where it is seen in glass, whatever the seed.
 #[test]

@@ -43,12 +43,14 @@ pub(super) struct Question {
 impl Tracer<'_> {
     /// Whether light that the path meets is of the class that is traced from `light`; see [`crate::transport::caustics`].
     pub(super) fn leaves(&self, path: &Path, light: u32) -> bool {
-        self.leaves_from(path, path.sharp, light)
+        self.leaves_from(path, path.sharp, path.thrown, path.ray.direction, light)
     }
 
-    /// The same of light that the path would meet after a vertex that is `sharp` or not.
-    pub(super) fn leaves_from(&self, path: &Path, sharp: bool, light: u32) -> bool {
-        path.seen && sharp && self.plan.caustics.as_ref().is_some_and(|c| c.traced[light as usize])
+    /// The same of light that the path would meet in `direction` after a vertex that is `sharp` or not, or has `thrown` it, in part.
+    pub(super) fn leaves_from(&self, path: &Path, sharp: bool, thrown: bool, direction: DVec3, light: u32) -> bool {
+        path.seen
+            && (sharp || thrown && self.scene.lights[light as usize].stands_out(direction))
+            && self.plan.caustics.as_ref().is_some_and(|c| c.traced[light as usize])
     }
 
     /// Adds light `l` of a lamp that the path has met, found with weight `w`, or leaves it out.

@@ -46,8 +46,9 @@ struct Way {
     ratio: Lanes,
     /// Segments so far, less one, as a path counts them.
     events: u32,
-    /// Whether the last surface is sharp.
+    /// Whether the last surface is sharp, and whether it throws light in part and scatters the rest.
     sharp: bool,
+    in_part: bool,
     /// Surfaces of glass that it has come through, and stretches between surfaces.
     through: u32,
     stretches: u32,
@@ -139,6 +140,7 @@ impl Tracer<'_> {
             ratio: Lanes::ONE,
             events: self.events(path) + 1,
             sharp: path.sharp,
+            in_part: self.plan.caustics.as_ref().is_some_and(|caustics| caustics.throws_in_part(at.hit.object)),
             through: 0,
             stretches: 0,
         };
@@ -208,6 +210,7 @@ impl Tracer<'_> {
             way.weight *= sample.weight * chance as f32;
             way.ratio *= sample.ratio;
             way.sharp = self.plan.caustics.as_ref().is_some_and(|caustics| caustics.is_sharp(hit.object));
+            way.in_part = false;
             way.events += 1;
             way.through += 1;
             if MEDIA && sample.transmitted {
@@ -226,7 +229,7 @@ impl Tracer<'_> {
     fn enter_mirrored<const CHROMATIC: bool>(&self, path: &mut Path, way: &Way, light: u32, emitted: Lanes) {
         let led = if CHROMATIC { f64::from((path.rho * way.ratio).reduce_add()) } else { LANES as f64 };
         let share = path.beta * way.weight * emitted * (LANES as f64 / led) as f32;
-        if self.leaves_from(path, way.sharp, light) {
+        if self.leaves_from(path, way.sharp, way.in_part, way.ray.direction, light) {
             path.left += share;
             return;
         }

@@ -58,6 +58,8 @@ pub(super) struct Path {
     pub(super) mirrored: bool,
     /// Whether the last vertex that it has come to is on something sharp.
     pub(super) sharp: bool,
+    /// Whether the last vertex, on something that scatters, too, has thrown it in a single direction.
+    pub(super) thrown: bool,
     /// Light of paths that are traced from the lights.
     pub(super) left: Lanes,
     /// The lane whose wavelength is in all lanes, after the others took other ways.
@@ -189,6 +191,7 @@ impl Path {
         seen: false,
         mirrored: false,
         sharp: false,
+        thrown: false,
         left: Lanes::ZERO,
         alone: None,
         chosen: false,

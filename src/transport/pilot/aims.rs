@@ -26,6 +26,7 @@ pub(super) fn is_small(scene: &Scene, i: usize, chance: f64, casters: &Casters) 
         | Light::Directional { .. }
         | Light::Projector(_)
         | Light::AlongNormal { .. } => true,
+        Light::Environment(map) if casters.is_empty() => map.may_stand_out() && chance < 1.0,
         _ if casters.is_empty() => false,
         Light::Constant { .. } => false,
         Light::Environment(_) => chance < 1.0,
@@ -107,7 +108,7 @@ impl Caustics {
         let partly: Vec<bool> = objects.clone().map(|i| in_part.casts[i] || is_bounded(i)).collect();
         let unending: Vec<bool> = objects.map(|i| in_part.unending[i] || casters.unending[i]).collect();
         let aimed_at = |light: &Light| -> Vec<Target> {
-            let partly = if light.may_be_met() { None } else { Some(in_part) };
+            let partly = (!light.may_be_met() || light.may_stand_out()).then_some(in_part);
             let endless = |casters: &Casters| !casters.endless.is_empty();
             let balls = casters.balls.iter().chain(partly.iter().flat_map(|casters| &casters.balls));
             let endless = match partly {

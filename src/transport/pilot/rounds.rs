@@ -26,7 +26,7 @@ struct Landed {
     /// What it would collect where mirrors and glass are seen.
     collected: Vec<Arrival>,
     rays: u32,
-    /// Luminance of the sky where it came from.
+    /// Luminance of the sky where it came from, as a path from the camera would find it.
     sky: f64,
     /// Whether no path from the camera could be the same.
     unfound: bool,
@@ -68,7 +68,7 @@ fn from_lights(paths: &LightPaths, seen: Option<&Seen>, round: u32, indices: Ran
                 (Some(source), Some(wavelengths)) => {
                     let light = &paths.scene.lights[source.light as usize];
                     let radiance = light.background(-traced.direction, wavelengths.nm);
-                    Colour::of(observer::xyz(radiance * unit, wavelengths)).y
+                    traced.share * Colour::of(observer::xyz(radiance * unit, wavelengths)).y
                 }
                 _ => 0.0,
             };
