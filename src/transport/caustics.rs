@@ -249,8 +249,7 @@ impl Caustics {
     #[must_use]
     pub fn begins_at(&self, target: Target, object: u32, lamp: Option<&Light>, direction: DVec3) -> bool {
         let unending = self.unending[object as usize];
-        let counts_in_part =
-            |lamp: &Light| !lamp.may_be_met() || self.throws_in_part(object) && lamp.stands_out(-direction);
+        let counts_in_part = |lamp: &Light| !lamp.may_be_met() || lamp.stands_out(-direction);
         (self.is_sharp(object) || self.in_part[object as usize] && lamp.is_some_and(counts_in_part))
             && match target {
                 Target::Ball(_) => !unending,

@@ -10,25 +10,26 @@ pub(super) fn techniques(bench: &Bench) -> (bool, bool, String) {
     (tracing.on, of("photon merging").is_some_and(|t| t.on), tracing.reason.clone())
 }
 
+/// A sky with a white disc, rows 10 and 11 of 32 and columns 20 and 21 of 64, and all else of the code value `rest`.
+fn disc_in_sky(rest: u8) -> Vec<u8> {
+    grey_png(64, 32, |x, y| if (20..22).contains(&x) && (10..12).contains(&y) { 255 } else { rest })
+}
+
 /// A black sky with a white disc of a thousandth of the sphere throws its light through a ball as a parallel light of
 /// the same irradiance does, to the width of the disc; an even sky and a lamp as large as the scene leave it to the camera.
 #[test]
 fn a_sun_in_an_environment_is_traced_and_an_even_sky_is_not() {
-    // Rows 10 and 11 of 32, columns 20 and 21 of 64.
-    let sky = |sun: bool| {
-        grey_png(64, 32, move |x, y| if !sun || (20..22).contains(&x) && (10..12).contains(&y) { 255 } else { 0 })
-    };
     let scene = |tracing: &str, samples: u32| {
         let light = "lights: [{environment: {file: sky.png, scale: 100}}]\n";
         Case { what: "sun", light, ..AREA }.scene("path", tracing, "auto", samples)
     };
-    let sun = |tracing: &str, samples| bench_with(&scene(tracing, samples), &[("sky.png", &sky(true))]);
+    let sun = |tracing: &str, samples| bench_with(&scene(tracing, samples), &[("sky.png", &disc_in_sky(0))]);
     let on = sun("auto", 512);
     let (tracing, _, reason) = techniques(&on);
     assert!(tracing, "{reason}");
     assert_agree("sun", &render(&on), &render(&sun("off", 4096)));
 
-    let even = bench_with(&scene("auto", 64), &[("sky.png", &sky(false))]);
+    let even = bench_with(&scene("auto", 64), &[("sky.png", &disc_in_sky(255))]);
     let (tracing, _, reason) = techniques(&even);
     assert!(!tracing && reason == "no light is small or has a sun", "{reason}");
     let large = "- sphere: {center: [-1.5, 2, 1], radius: 1.9, emission: 1}\n";
@@ -55,8 +56,7 @@ fn a_sun_that_coats_throw_is_as_bright_as_by_chance() {
         (Case { what: "beside a mirror", light: MIRROR, ..coat }, true),
     ] {
         let bench = |tracing: &str, samples| {
-            let sky = grey_png(64, 32, |x, y| if (20..22).contains(&x) && (10..12).contains(&y) { 255 } else { 1 });
-            bench_with(&case.scene("path", tracing, "auto", samples), &[("sky.png", &sky)])
+            bench_with(&case.scene("path", tracing, "auto", samples), &[("sky.png", &disc_in_sky(1))])
         };
         let on = bench("on", 256);
         let caustics = on.prepared.plan.caustics.as_ref().expect(case.what);

@@ -26,10 +26,9 @@ pub(super) fn is_small(scene: &Scene, i: usize, chance: f64, casters: &Casters) 
         | Light::Directional { .. }
         | Light::Projector(_)
         | Light::AlongNormal { .. } => true,
-        Light::Environment(map) if casters.is_empty() => map.may_stand_out() && chance < 1.0,
+        Light::Environment(map) => chance < 1.0 && (map.may_stand_out() || !casters.is_empty()),
         _ if casters.is_empty() => false,
         Light::Constant { .. } => false,
-        Light::Environment(_) => chance < 1.0,
         Light::Area { object, .. } => {
             let lamp = &scene.objects[*object as usize];
             let bounds = lamp.bounds();
