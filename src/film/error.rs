@@ -43,8 +43,11 @@
 //! degrees of freedom has 2/ν. Of a few cells that share all they find these are few.
 //!
 //! **Where it is unknown.** What is taken off can be more than there is, where light is so rare that its pixels have it in
-//! half of the replicates: the sum then says nothing of the error, least of all that there is none. Where few pixels do that to all
-//! others, one in a hundred at the most, these are left out, and the picture has not converged. And replicates that agree
+//! half of the replicates: the sum then says nothing of the error, least of all that there is none. And single wavelengths outside the
+//! gamut have channels of either sign, of which sums may leave next to nothing to divide their noise by; of light that is nowhere less
+//! than nothing a pixel has q between -1/6, by (X, X, 0, 0), and 3, by (X, 0, 0, 0). Where few pixels below nothing or above that, one
+//! in a hundred at the most, make or take more than half of what all others have, they are left out, and the picture has not
+//! converged. Replicates that agree
 //! everywhere show that there is no noise only where they agree on light: a black pixel may be one whose light nobody has met.
 
 mod sums;
@@ -58,7 +61,7 @@ use crate::math::statistics::student_t_half_width;
 use rayon::prelude::*;
 use std::fmt;
 use std::sync::LazyLock;
-use sums::Sums;
+use sums::{Sums, Told};
 use values::Measured;
 
 /// The error of a whole picture with its interval.
@@ -195,21 +198,17 @@ pub fn relative_error(
 ) -> Result<ErrorEstimate, NoEstimate> {
     let measured = Measured::new(film, splats, values, overlap > 1.0);
     let everywhere = cell.is_none();
-    let mut blocks = blocks(&measured, cell.unwrap_or(1));
-    let mut all = Sums::default();
+    let told = blocks(&measured, cell.unwrap_or(1));
+    let mut whole = Told::default();
+    told.iter().for_each(|block| whole.join(block));
+    let spoiled = whole.is_spoiled_by_few();
+    let all = whole.sums(spoiled);
+    let blocks: Vec<Sums> = told.iter().map(|block| block.sums(spoiled)).collect();
     // tr(WΣ)² of different pixels, by their pairs and by what the filter shares.
     let by_pairs =
         |sums: &Sums| (sums.pairs.iter().map(|pair| pair * pair).sum::<f64>() - sums.pair_squares) / (3.0 * 64.0);
     let by_filter = |sums: &Sums| (overlap - 1.0) * sums.splatted;
-    let mut in_blocks = 0.0;
-    for block in &blocks {
-        all.join(block);
-        in_blocks += by_pairs(block);
-    }
-    if all.are_spoiled_by_few() {
-        blocks.iter_mut().for_each(Sums::leave_lost_out);
-        all.leave_lost_out();
-    }
+    let in_blocks = blocks.iter().map(by_pairs).sum::<f64>();
     match all.pixels {
         0 => return Err(NoEstimate::FewReplicates),
         n if n == all.black => return Err(NoEstimate::Black),
@@ -241,7 +240,8 @@ pub fn relative_error(
         high: rel_mse.sqrt() * stretch,
         pixels: all.pixels,
         valid: all.error == 0.0
-            || (2 * all.uneven <= all.pixels
+            || (!spoiled
+                && 2 * all.uneven <= all.pixels
                 && effective >= EFFECTIVE_PIXELS
                 && all.heavy <= HEAVY_SHARE * all.error
                 && share.abs() <= FURTHER_SHARE
@@ -251,7 +251,7 @@ pub fn relative_error(
 }
 
 /// The sums of each block of whole cells of so many pixels on a side; on the current rayon pool.
-fn blocks(measured: &Measured, cell: u32) -> Vec<Sums> {
+fn blocks(measured: &Measured, cell: u32) -> Vec<Told> {
     let window = measured.film.window();
     // No cell lies in two blocks.
     let side = ((window.pixels() as f64 / BLOCKS as f64).sqrt() as u32 / cell * cell).max(cell);
@@ -261,7 +261,7 @@ fn blocks(measured: &Measured, cell: u32) -> Vec<Sums> {
     (0..rows * columns)
         .into_par_iter()
         .map(|block| {
-            let mut sums = Sums::default();
+            let mut told = Told::default();
             let mut values = Vec::new();
             let span =
                 |i: u32, before: u32, size: u32| (i * side).saturating_sub(before)..((i + 1) * side - before).min(size);
@@ -271,12 +271,11 @@ fn blocks(measured: &Measured, cell: u32) -> Vec<Sums> {
                     if measured.read(index, &mut values) {
                         let counts = counts(&measured.film.cells()[index]);
                         let [least, most] = [counts.iter().min(), counts.iter().max()].map(|n| n.copied().unwrap_or(0));
-                        sums.uneven += u64::from(most >= 2 * least);
-                        sums.add(&values, &measured.floors, measured.counted);
+                        told.add(&values, &measured.floors, measured.counted, most >= 2 * least);
                     }
                 }
             }
-            sums
+            told
         })
         .collect()
 }
@@ -391,17 +390,18 @@ mod tests {
     }
 
     /// Of 1024 pixels of 1 with noise of 0.1 in each replicate one has 20, -20, 1 and 1: far more is taken off it than all others have.
-    /// It is left out, and the others have 0.1² / 4 / 1.01 each, told by three degrees of freedom. One of 64 is not few.
+    /// Or it has 20, -20, 0.5 and -0.5: of these nothing is left, and their noise is divided by f alone. It is left out, and the
+    /// others have 0.1² / 4 / 1.01 each, told by three degrees of freedom. One of 64 is not few.
     #[test]
     fn few_pixels_do_not_make_an_estimate_unknown() {
-        let spoiled = |side: u32, spoiled: usize| {
+        let spoiled = |side: u32, values: [f64; REPLICATES]| {
             let window = Window::full(side, side);
             let mut tile = TileBuffer::new(window);
             for pixel in 0..window.pixels() {
                 let place = [pixel % side as usize, pixel / side as usize].map(|x| x as i32);
-                for (replicate, bright) in [20.0, -20.0, 1.0, 1.0].into_iter().enumerate() {
+                for (replicate, bright) in values.into_iter().enumerate() {
                     let noise = 12f64.sqrt() * 0.1 * (uniform(7, (4 * pixel + replicate) as u64) - 0.5);
-                    let light = if pixel < spoiled { bright } else { 1.0 + noise };
+                    let light = if pixel == 0 { bright } else { 1.0 + noise };
                     tile.add(place, replicate, [light as f32; 3], 1.0);
                 }
             }
@@ -409,13 +409,21 @@ mod tests {
             film.merge_tile(&tile);
             estimate(&film).map(|(_, error)| error)
         };
-        let told = spoiled(32, 1).unwrap();
-        let expected = (1023.0 / 1024.0 * 0.0025 / 1.01_f64).sqrt();
+        let expected = (0.0025 / 1.01_f64).sqrt();
         // Four standard errors of the root of a mean of 1023.
         let allowed = 4.0 * 0.5 * (2.0 / 3.0 / 1023.0_f64).sqrt();
-        assert!((told.rel_rmse / expected - 1.0).abs() < allowed, "{told:?} for {expected}");
-        assert!(!told.valid && told.low < told.rel_rmse && told.rel_rmse < told.high && told.high < 10.0, "{told:?}");
-        assert_eq!(spoiled(8, 1).unwrap_err(), NoEstimate::Noisy);
+        let (lost, cancelled) = ([20.0, -20.0, 1.0, 1.0], [20.0, -20.0, 0.5, -0.5]);
+        for values in [lost, cancelled] {
+            let told = spoiled(32, values).unwrap();
+            assert!((told.rel_rmse / expected - 1.0).abs() < allowed, "{told:?} for {expected}");
+            assert!(
+                !told.valid && told.low < told.rel_rmse && told.rel_rmse < told.high && told.high < 0.1,
+                "{told:?}"
+            );
+        }
+        assert_eq!(spoiled(8, lost).unwrap_err(), NoEstimate::Noisy);
+        let told = spoiled(8, cancelled).unwrap();
+        assert!(!told.valid && told.rel_rmse > 1.0, "{told:?}");
     }
 
     /// The same with some light in the dark replicates, too: X/300 in place of 0 moves x by 0.3 % and v g by 1 %, and less than nothing

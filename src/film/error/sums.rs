@@ -5,8 +5,52 @@ use super::values::Four;
 use super::{ONE_REPLICATE, PAIRINGS};
 use wide::f64x4;
 
-/// See [`Sums::are_spoiled_by_few`]: of the pixels whose replicates differ.
+/// See [`Told::is_spoiled_by_few`]: of the pixels whose replicates differ.
 const FEW: f64 = 0.01;
+
+/// The most that q can be of light that is nowhere less than nothing, x = (X, 0, 0, 0): with f = 0 it is v g = 1, from which
+/// g′κ₃ = −2 is taken off.
+const MOST: f64 = 3.0;
+
+/// What the pixels of a block add: those whose q is of a size that it can have, and those where it is below nothing or more than
+/// [`MOST`]. It is where light is rare, and where it cancels: single wavelengths outside the gamut have channels of either sign, and
+/// noise is divided by what is left of them.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Told {
+    plausible: Sums,
+    implausible: Sums,
+}
+
+impl Told {
+    /// Adds a pixel; `uneven` where one of its replicates has at least twice the samples of another.
+    pub(super) fn add(&mut self, values: &[Four], floors: &[f64x4], counted: usize, uneven: bool) {
+        let mut pixel = Sums::of_pixel(values, floors, counted);
+        pixel.uneven = u64::from(uneven);
+        if (0.0..=MOST).contains(&pixel.error) { self.plausible.join(&pixel) } else { self.implausible.join(&pixel) }
+    }
+
+    /// Adds what other pixels add.
+    pub(super) fn join(&mut self, other: &Told) {
+        self.plausible.join(&other.plausible);
+        self.implausible.join(&other.implausible);
+    }
+
+    /// Whether a few implausible pixels count for more than half of what all others do, for it or against it.
+    pub(super) fn is_spoiled_by_few(&self) -> bool {
+        let all = self.plausible.noisy + self.implausible.noisy;
+        let few = self.implausible.noisy as f64 <= FEW * all as f64;
+        few && self.implausible.error_of_pixels > 0.5 * self.plausible.error
+    }
+
+    /// What all pixels add, or those that are plausible.
+    pub(super) fn sums(&self, plausible_only: bool) -> Sums {
+        let mut sums = self.plausible;
+        if !plausible_only {
+            sums.join(&self.implausible);
+        }
+        sums
+    }
+}
 
 /// What some pixels add to the estimate.
 #[derive(Clone, Copy, Default)]
@@ -21,6 +65,8 @@ pub(super) struct Sums {
     pub(super) uneven: u64,
     /// Σ q, q a pixel's expected relative squared error.
     pub(super) error: f64,
+    /// Σ |q|.
+    error_of_pixels: f64,
     /// What is taken off for the noise of the values that variances are divided by.
     pub(super) further: f64,
     /// Its magnitudes, pixel by pixel.
@@ -39,20 +85,14 @@ pub(super) struct Sums {
     pub(super) pairs: [f64; 3],
     /// Σ (uᵀWv)² of single pixels, over the ways to pair.
     pub(super) pair_squares: f64,
-    /// Pixels of which more is taken off than there is.
-    pub(super) lost: u64,
-    /// Their Σ q, and what is taken off them.
-    pub(super) lost_error: f64,
-    pub(super) lost_further: f64,
 }
 
 impl Sums {
-    /// Adds a pixel, given f of each of its values, of which `counted` are told of.
-    pub(super) fn add(&mut self, values: &[Four], floors: &[f64x4], counted: usize) {
-        self.pixels += 1;
+    /// What a pixel adds, given f of each of its values, of which `counted` are told of.
+    fn of_pixel(values: &[Four], floors: &[f64x4], counted: usize) -> Sums {
         let alike = |v: &Four| v.replicates.iter().all(|x| x.simd_eq(v.replicates[0]).all());
-        self.noisy += u64::from(!values.iter().all(alike));
-        self.black += u64::from(values.iter().all(|v| v.means.simd_eq(f64x4::ZERO).all()));
+        let noisy = !values.iter().all(alike);
+        let black = values.iter().all(|v| v.means.simd_eq(f64x4::ZERO).all());
         let share = f64x4::splat(1.0 / counted.max(1) as f64);
         let (mut plain, mut further, mut crossed) = (f64x4::ZERO, f64x4::ZERO, f64x4::ZERO);
         let mut shares = f64x4::ZERO;
@@ -91,48 +131,36 @@ impl Sums {
         }
         let [plain, further, crossed] = [plain, further, crossed].map(f64x4::reduce_add);
         let error = plain - further;
-        self.error += error;
-        self.further += further;
-        self.further_of_pixels += further.abs();
-        self.crossed += crossed;
-        self.squares += error * error;
-        if error < 0.0 {
-            self.lost += 1;
-            self.lost_error += error;
-            self.lost_further += further;
-        }
         let largest = shares.to_array().into_iter().fold(0.0, f64::max);
-        if largest > ONE_REPLICATE * shares.reduce_add() {
-            self.heavy += error;
+        let pairs = pairs.map(f64x4::reduce_add);
+        Sums {
+            pixels: 1,
+            noisy: u64::from(noisy),
+            black: u64::from(black),
+            uneven: 0,
+            error,
+            error_of_pixels: error.abs(),
+            further,
+            further_of_pixels: further.abs(),
+            crossed,
+            squares: error * error,
+            heavy: if largest > ONE_REPLICATE * shares.reduce_add() { error } else { 0.0 },
+            // W of the mean itself is as much larger or smaller as the size is that it makes.
+            own: if plain > 0.0 { own.trace() * (error.max(0.0) / plain).powi(2) } else { 0.0 },
+            splatted: splatted.trace(),
+            pairs,
+            pair_squares: pairs.iter().map(|pair| pair * pair).sum(),
         }
-        for (sum, pair) in self.pairs.iter_mut().zip(pairs) {
-            let pair = pair.reduce_add();
-            *sum += pair;
-            self.pair_squares += pair * pair;
-        }
-        // W of the mean itself is as much larger or smaller as the size is that it makes.
-        self.own += if plain > 0.0 { own.trace() * (error.max(0.0) / plain).powi(2) } else { 0.0 };
-        self.splatted += splatted.trace();
-    }
-
-    /// Whether a few pixels have more taken off than half of what all others have.
-    pub(super) fn are_spoiled_by_few(&self) -> bool {
-        self.lost as f64 <= FEW * self.noisy as f64 && -self.lost_error > 0.5 * (self.error - self.lost_error)
-    }
-
-    /// Leaves the pixels out of which more is taken than there is.
-    pub(super) fn leave_lost_out(&mut self) {
-        self.error -= self.lost_error;
-        self.further -= self.lost_further;
     }
 
     /// Adds what other pixels add.
-    pub(super) fn join(&mut self, other: &Sums) {
+    fn join(&mut self, other: &Sums) {
         self.pixels += other.pixels;
         self.noisy += other.noisy;
         self.black += other.black;
         self.uneven += other.uneven;
         self.error += other.error;
+        self.error_of_pixels += other.error_of_pixels;
         self.further += other.further;
         self.further_of_pixels += other.further_of_pixels;
         self.crossed += other.crossed;
@@ -141,9 +169,6 @@ impl Sums {
         self.own += other.own;
         self.splatted += other.splatted;
         self.pair_squares += other.pair_squares;
-        self.lost += other.lost;
-        self.lost_error += other.lost_error;
-        self.lost_further += other.lost_further;
         self.pairs.iter_mut().zip(other.pairs).for_each(|(sum, pair)| *sum += pair);
     }
 }
@@ -205,7 +230,8 @@ impl Gram {
 #[cfg(test)]
 mod tests {
     use super::super::values::Four;
-    use super::{Sums, crossed};
+    use super::{MOST, Sums, crossed};
+    use crate::math::sampler::uniform;
     use wide::f64x4;
 
     /// ½ g″σ⁴ + g′κ₃ of one value, by hand. Of 2, 1, 1, 1 the mean is 5/4 and Σd³ 3/8, so that κ₃ is (2/3)(3/8)/16 = 1/64, of which f =
@@ -220,11 +246,31 @@ mod tests {
             let mean = x.iter().sum::<f64>() / 4.0;
             let first = |x| f64x4::new([x, 0.0, 0.0, 0.0]);
             let four = Four { means: first(mean), replicates: x.map(first), splatted: None };
-            let mut sums = Sums::default();
-            sums.add(&[four], &[f64x4::splat(floor)], 1);
+            let sums = Sums::of_pixel(&[four], &[f64x4::splat(floor)], 1);
             let close = |found: f64, expected: f64| (found / expected - 1.0).abs() < 1e-14;
             assert!(close(sums.further, further), "{x:?}: {} for {further}", sums.further);
             assert!(close(sums.error, plain - further), "{x:?}: {} for {plain} - {further}", sums.error);
+        }
+    }
+
+    /// With f of a millionth of X²: 3 by one replicate of four, -1/6 by two, within ten times what f changes; and of 4,000 draws of light
+    /// that is nowhere less than nothing, from even to rare, none is beyond these.
+    #[test]
+    fn light_has_a_size_between_bounds() {
+        let q = |x: [f64; 4]| {
+            let four = Four {
+                means: f64x4::splat(x.iter().sum::<f64>() / 4.0),
+                replicates: x.map(f64x4::splat),
+                splatted: None,
+            };
+            Sums::of_pixel(&[four], &[f64x4::splat(1e-6)], 4).error
+        };
+        let [least, most] = [q([1.0, 1.0, 0.0, 0.0]), q([1.0, 0.0, 0.0, 0.0])];
+        assert!((least + 1.0 / 6.0).abs() < 1e-5 && (most - MOST).abs() < 1e-3 && most < MOST, "{least} {most}");
+        for draw in 0..4000 {
+            let rarity = f64::from(1 << (draw % 6));
+            let found = q([0, 1, 2, 3].map(|r| uniform(3, 4 * draw + r).powf(rarity)));
+            assert!((-1.0 / 6.0..=MOST).contains(&found), "{found}");
         }
     }
 
