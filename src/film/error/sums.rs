@@ -42,6 +42,11 @@ impl Told {
         few && self.implausible.error_of_pixels > 0.5 * self.plausible.error
     }
 
+    /// Whether implausible pixels, few or not, count for more than all others do.
+    pub(super) fn is_implausible(&self) -> bool {
+        self.implausible.error > self.plausible.error
+    }
+
     /// What all pixels add, or those that are plausible.
     pub(super) fn sums(&self, plausible_only: bool) -> Sums {
         let mut sums = self.plausible;
