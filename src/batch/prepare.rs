@@ -221,12 +221,6 @@ pub(super) fn prepare_scene(
     let (seed, wishes) = (description.render.seed, wishes(&description));
     let choosing = Instant::now();
     let shot = Shot { scene: &scene, plan: &plan, filter: &filter, seed, photons: None };
-    if let Some((packets, said)) = trial::packets(&shot, planned, wishes.packets) {
-        plan.packets = packets;
-        plan.techniques.push(said);
-    }
-    go_on()?;
-    let shot = Shot { scene: &scene, plan: &plan, filter: &filter, seed, photons: None };
     let began = Instant::now();
     let goes_on = |share: Option<f64>| {
         if let Some(share) = share {
@@ -238,6 +232,12 @@ pub(super) fn prepare_scene(
     go_on()?;
     plan.caustics = caustics;
     plan.techniques.extend(said);
+    // What is traced from the lights is no noise of either.
+    let shot = Shot { scene: &scene, plan: &plan, filter: &filter, seed, photons: None };
+    if let Some((packets, said)) = trial::packets(&shot, planned, wishes.packets) {
+        plan.packets = packets;
+        plan.techniques.push(said);
+    }
     let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
     plan.adaptive = first;
     if first.is_some() {

@@ -194,15 +194,22 @@ impl Dielectric {
     pub fn mirrored(&self, wo: DVec3) -> Option<Lanes> {
         let film = self.film_reflects(wo);
         let chance = self.chance(wo, film.as_ref());
-        if chance >= 1.0 {
-            return None;
-        }
-        let reflected = match (film, &self.eta) {
-            (Some(each), _) => Lanes::new(each.map(|r| r as f32)),
-            (None, RelativeIndex::Constant(_)) => Lanes::splat(chance as f32),
-            (None, _) => self.eta.lanes(|eta| self.reflected(wo, eta)),
+        (chance < 1.0).then(|| self.reflection_of(wo, film.as_ref()))
+    }
+
+    /// The direction in which light is mirrored, and what is mirrored there of each lane as its weight.
+    #[must_use]
+    pub fn reflection(&self, wo: DVec3) -> BsdfSample {
+        BsdfSample::discrete(mirror(wo), self.reflection_of(wo, self.film_reflects(wo).as_ref()))
+    }
+
+    /// What is mirrored of light of each lane, given what the film reflects.
+    fn reflection_of(&self, wo: DVec3, film: Option<&[f64; LANES]>) -> Lanes {
+        let reflected = match film {
+            Some(each) => Lanes::new(each.map(|r| r as f32)),
+            None => self.eta.lanes(|eta| self.reflected(wo, eta)),
         };
-        Some(reflected * self.tint.reflected)
+        reflected * self.tint.reflected
     }
 
     /// The chance that light is reflected, of which `film` tells what each lane has reflected, where there is one: the hero's, or the

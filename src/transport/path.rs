@@ -438,10 +438,13 @@ impl Tracer<'_> {
         // On along a direction of the material's choice.
         // A pane that did not let the path straight through reflects it.
         let u_lobe = || if at.pane { 0.0 } else { at.choice.draw(1) };
-        if let Some(glass) = bsdf.glass()
-            && self.parts_at::<CHROMATIC>(path, glass)
-        {
-            return self.part::<MEDIA>(path, glass, wo, u_lobe(), at);
+        if let Some(glass) = bsdf.glass() {
+            if let Some(reflection) = self.goes_both_ways(path, glass, wo, at) {
+                return self.go_both_ways::<CHROMATIC, MEDIA>(path, glass, wo, &reflection, at);
+            }
+            if self.parts_at::<CHROMATIC>(path, glass) {
+                return self.part::<MEDIA>(path, glass, wo, u_lobe(), at);
+            }
         }
         match bsdf.sample_by(wo, u_lobe, u_direction) {
             Some(sample) => {

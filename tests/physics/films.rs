@@ -127,7 +127,8 @@ fn films_reflect_each_wavelength_by_airys_sum() {
 
 /// What a film does not reflect it lets through: clear bodies under films are invisible in even light. Where the index
 /// is the same for all wavelengths each sample of the path gives R or T of them by their mean, so the mean over many is
-/// one; where it is not, Σ over lanes is 8 in every sample.
+/// one; where it is not, Σ over lanes is 8 in every sample. Near the edge few paths, reflected within many times, bring much of it:
+/// the mean of 4096 is not normal yet.
 #[test]
 fn films_on_clear_bodies_conserve_energy() {
     let film = "film: {ior: 1.4, thickness_nm: 350}";
@@ -138,7 +139,7 @@ fn films_on_clear_bodies_conserve_energy() {
     ] {
         let scene = in_even_light(&format!("[{{sphere: {{radius: 1, material: {material}}}}}]"));
         for (from, to) in across_the_unit_sphere().step_by(7) {
-            scene.estimate(&ray(from, to), 4096).assert_is(1.0, 0.01);
+            scene.estimate(&ray(from, to), 65536).assert_is(1.0, 0.01);
         }
         let whitted = bench(&format!(
             "shapes: [{{sphere: {{radius: 1, material: {material}}}}}]\nlights: [{{constant: {{radiance: 1}}}}]\n\

@@ -6,6 +6,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod both_ways;
 mod caustics;
 mod channels;
 mod dispersion;

@@ -34,8 +34,8 @@ pub(super) struct Path {
     /// How far from the middle of the scene a medium that scatters the path lets it go on as anywhere: see [`worth`](crate::transport::roulette::worth). Zero
     /// before the first time.
     pub(super) near: f64,
-    /// Product of η² over crossings: β shrinks by it in glass and regains it, and roulette must not
-    /// take that for a loss.
+    /// What roulette must not take for a loss: the product of η² over crossings, by which β shrinks in glass and regains it, over the
+    /// share of this one of two ways that are both taken.
     pub(super) eta2: f64,
     pub(super) inside: Inside,
     /// `None` where only scattering could find light: at the camera and after mirrors.
@@ -47,6 +47,8 @@ pub(super) struct Path {
     pub(super) vertices: u32,
     /// Surfaces so far that it went straight through.
     pub(super) crossings: u32,
+    /// The same of ways that have been followed beside it, both.
+    pub(super) beside: u32,
     /// Shadow rays so far beyond one from each vertex.
     pub(super) further: u32,
     /// Whether it has met mirrors and glass only.
@@ -62,6 +64,8 @@ pub(super) struct Path {
     pub(super) thrown: bool,
     /// Light of paths that are traced from the lights.
     pub(super) left: Lanes,
+    /// Whether it has gone both ways at some glass, of which this is one.
+    pub(super) is_one_of_two: bool,
     /// The lane whose wavelength is in all lanes, after the others took other ways.
     pub(super) alone: Option<usize>,
     /// Whether it goes on for all that parted.
@@ -186,6 +190,7 @@ impl Path {
         radiance: Lanes::ZERO,
         vertices: 0,
         crossings: 0,
+        beside: 0,
         further: 0,
         specular: true,
         seen: false,
@@ -193,6 +198,7 @@ impl Path {
         sharp: false,
         thrown: false,
         left: Lanes::ZERO,
+        is_one_of_two: false,
         alone: None,
         chosen: false,
         counted: None,
@@ -201,7 +207,7 @@ impl Path {
 
     /// What has come of it.
     pub(super) fn incoming(&self, alpha: f32, depth: f64) -> Incoming {
-        let events = self.vertices + self.crossings;
+        let events = self.vertices + self.crossings + self.beside;
         let Path { radiance, left, further, mirrored, .. } = *self;
         Incoming { radiance, alpha, depth, left, events, further, mirrored }
     }

@@ -20,6 +20,10 @@ const PIXELS: f64 = 256.0;
 const SIDES: (f64, f64) = (8.0, 32.0);
 /// What a ray of eight that go side by side costs of one that goes alone, as measured: they meet the same things.
 const SIDE_BY_SIDE: f64 = 0.8;
+/// Up to which ratio packets are taken. Rare light that a trial does not meet speaks for them: where it told 1.06 to 1.68 (prism), 0.98 to
+/// 1.41 (crystal), 0.44 to 1.08 (diamond) and 0.16 to 1.00 (spectroscope), by seed, renders told 0.30, 0.54, 0.21 and 0.82. Without
+/// any, behind a window before a room that is lit indirectly, it tells 1.5 of 1.9.
+const UNSEEN: f64 = 1.4;
 
 /// What a replicate of a place shows, in linear Rec. 709: by packets, and by heroes that are each lane in turn.
 #[derive(Clone, Copy, Default)]
@@ -59,8 +63,9 @@ pub fn packets(shot: &Shot, samples: u32, wish: Use) -> Option<(bool, Effect)> {
     if alone == together {
         return said(false, "no path from the camera parts".into());
     }
-    let (on, reason) = judge(SIDE_BY_SIDE * together / alone * variances(&places), 1.0);
-    said(on, reason)
+    let ratio = SIDE_BY_SIDE * together / alone * variances(&places);
+    let (on, reason) = judge(ratio, UNSEEN);
+    said(on, if on && ratio > 1.0 { format!("{reason}, and less where it has not met rare light") } else { reason })
 }
 
 /// The samples of a replicate of a pixel, by heroes and by packets, both by the same numbers.
