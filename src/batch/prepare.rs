@@ -238,6 +238,7 @@ pub(super) fn prepare_scene(
         plan.packets = packets;
         plan.techniques.push(said);
     }
+    go_on()?;
     let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
     plan.adaptive = first;
     if first.is_some() {

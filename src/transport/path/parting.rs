@@ -50,20 +50,20 @@ impl Tracer<'_> {
         at: &Leaving,
     ) -> bool {
         path.is_one_of_two = true;
+        let through = |glass: &Dielectric| glass.go_through(wo).filter(|(sample, _)| sample.transmitted);
         if self.parts_at::<CHROMATIC>(path, glass) {
-            self.let_each_decide(path);
+            path.let_each_decide();
             for lane in 0..LANES {
-                if let Some((sample, share)) = glass.lane(lane).go_through(wo).filter(|(sample, _)| sample.transmitted)
-                {
+                if let Some((sample, share)) = through(&glass.lane(lane)) {
                     self.follow_alone::<MEDIA>(path, lane, &sample, share, at);
                 }
             }
-        } else if let Some((sample, share)) = glass.go_through(wo).filter(|(sample, _)| sample.transmitted) {
+        } else if let Some((sample, share)) = through(glass) {
             let (beta, eta2) = (path.beta * share as f32, path.eta2 / share);
-            let mut through = Path { beta, eta2, radiance: Lanes::ZERO, left: Lanes::ZERO, ..*path };
-            self.follow_beside::<CHROMATIC, MEDIA>(path, &mut through, &sample, at);
-            path.radiance += through.radiance;
-            path.left += through.left;
+            let mut inner = Path { beta, eta2, radiance: Lanes::ZERO, left: Lanes::ZERO, ..*path };
+            self.follow_beside::<CHROMATIC, MEDIA>(path, &mut inner, &sample, at);
+            path.radiance += inner.radiance;
+            path.left += inner.left;
         }
         if let Some(ledger) = self.ledger {
             ledger.part();
@@ -83,7 +83,7 @@ impl Tracer<'_> {
         u_lobe: f64,
         at: &Leaving,
     ) -> bool {
-        self.let_each_decide(path);
+        path.let_each_decide();
         if let Some(sample) = glass.reflects_all(wo, u_lobe) {
             return self.leave::<true, MEDIA>(path, &sample, || Lanes::ZERO, at);
         }
@@ -93,12 +93,6 @@ impl Tracer<'_> {
             }
         }
         false
-    }
-
-    /// Each wavelength decides for itself: none leads.
-    fn let_each_decide(&self, path: &mut Path) {
-        path.beta *= LANES as f32 / path.rho.reduce_add();
-        path.rho = Lanes::ONE;
     }
 
     /// Follows the wavelength of a `lane` by itself to its end, with the `share` of its light that goes there.
@@ -152,6 +146,12 @@ impl Tracer<'_> {
 }
 
 impl Path {
+    /// Each wavelength decides for itself: none leads.
+    fn let_each_decide(&mut self) {
+        self.beta *= LANES as f32 / self.rho.reduce_add();
+        self.rho = Lanes::ONE;
+    }
+
     /// Of wavelengths that parted, whether this one goes on: beyond, their ways have nothing in common. The first is as
     /// likely any wavelength as each other is, and those of a pixel's samples are evenly spread.
     #[inline(always)]
