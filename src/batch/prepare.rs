@@ -256,7 +256,7 @@ pub(super) fn prepare_scene(
     if let Some(first) = first::decide(&shot, &census, &moments, planned, wishes) {
         (plan.reuse, plan.shadow_rays, plan.asks_even_sky) = (first.reuse, first.shadow_rays, first.asks_even_sky);
         plan.techniques.extend(first.said);
-        plan.equiangular = first.equiangular;
+        plan.near_lamps = first.near_lamps;
     }
     go_on()?;
     // Where photons are merged all pixels share.

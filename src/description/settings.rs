@@ -337,7 +337,7 @@ pub struct Techniques {
     /// Whether shadow rays go to `constant` lights, too, which paths that leave the scene meet.
     #[serde(default)]
     pub even_sky: Technique,
-    /// Whether light of lamps without extent is looked for along the ways of paths through media, too.
+    /// Whether light of up to eight lamps is looked for along the ways of paths through media, too.
     #[serde(default)]
     pub equiangular: Technique,
     /// Whether pixels get more samples where the picture is noisier, at the same mean.

@@ -1,10 +1,12 @@
-//! Distances along a ray through a medium, drawn toward lamps without extent (Kulla and Fajardo 2012, "Importance Sampling
-//! Techniques for Path Tracing in Participating Media", section 4).
+//! Distances along a ray through a medium, drawn toward lamps (Kulla and Fajardo 2012, "Importance Sampling Techniques for Path
+//! Tracing in Participating Media", section 4).
 //!
 //! What such a lamp throws onto a ray goes as 1/r², which flights drawn by the medium's extinction know nothing of: near the lamp a
 //! few of them would be very bright. Distances whose density goes as 1/r² are even in the angle at which the lamp sees them. A spot
-//! sees only what is in its cone. Light is still found at the ends of flights, too; the two share it by their densities.
+//! sees only what is in its cone, and a lamp with extent is taken to be in the middle of its box. Light is still found at the ends of
+//! flights, too; the two share it by their densities.
 
+use super::Object;
 use super::light::Light;
 use crate::math::Ray;
 use crate::math::elementary::atan2;
@@ -17,11 +19,13 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// Lamps among which is chosen; each of them is judged on every stretch.
 pub const MOST: usize = 8;
 
-/// A lamp without extent.
+/// A lamp, as a point.
 #[derive(Clone, Debug)]
 pub struct Lamp {
     /// Its index among the lights.
     pub light: u32,
+    /// Whether it has an extent, so that what is scattered may meet it.
+    pub has_extent: bool,
     place: DVec3,
     /// Share of the power of all, sr⁻¹.
     strength: f64,
@@ -50,11 +54,24 @@ pub struct Seen {
     total: f64,
 }
 
-/// Those of `lights` that have no extent and, by `share`, some of the power of all; none where they are more than [`MOST`].
+/// Whether a light stands anywhere.
 #[must_use]
-pub fn lamps(lights: &[Light], share: impl Fn(usize) -> f64) -> Vec<Lamp> {
+pub fn stands(light: &Light) -> bool {
+    light.position().is_some() || matches!(light, Light::Area { .. })
+}
+
+/// Those of `lights` that stand somewhere and have, by `share`, some of the power of all, those without extent first; where they are
+/// more than [`MOST`], these alone, and none where they are more.
+#[must_use]
+pub fn lamps(lights: &[Light], objects: &[Object], share: impl Fn(usize) -> f64) -> Vec<Lamp> {
     let lamp = |(i, light): (usize, &Light)| {
-        let place = light.position()?;
+        let (place, has_extent) = match light {
+            Light::Area { object, .. } => {
+                let bounds = objects[*object as usize].bounds();
+                (bounds.is_finite().then(|| 0.5 * bounds.min + 0.5 * bounds.max)?, true)
+            }
+            _ => (light.position()?, false),
+        };
         let (solid_angle, cone) = match light {
             Light::Spot { axis, beam, cutoff, .. } => {
                 let cone = (*cutoff < FRAC_PI_2).then(|| (*axis, libm::cos(*cutoff)));
@@ -63,9 +80,13 @@ pub fn lamps(lights: &[Light], share: impl Fn(usize) -> f64) -> Vec<Lamp> {
             _ => (4.0 * PI, None),
         };
         let strength = share(i) / solid_angle;
-        (strength > 0.0).then_some(Lamp { light: i as u32, place, strength, cone })
+        (strength > 0.0).then_some(Lamp { light: i as u32, has_extent, place, strength, cone })
     };
-    let all: Vec<Lamp> = lights.iter().enumerate().filter_map(lamp).collect();
+    let (mut all, large): (Vec<Lamp>, Vec<Lamp>) =
+        lights.iter().enumerate().filter_map(lamp).partition(|lamp| !lamp.has_extent);
+    if all.len() + large.len() <= MOST {
+        all.extend(large);
+    }
     if all.len() > MOST { Vec::new() } else { all }
 }
 
@@ -186,7 +207,7 @@ mod tests {
     use crate::scene::shape::testing::Random;
 
     fn lamp(light: u32, place: DVec3, strength: f64, cone: Option<(DVec3, f64)>) -> Lamp {
-        Lamp { light, place, strength, cone }
+        Lamp { light, has_extent: false, place, strength, cone }
     }
 
     /// Rays about lamps at any scale, with and without cones and ends.

@@ -116,7 +116,7 @@ pub struct Scene {
     pub uneven_asked: Option<Asked>,
     /// Where rays may meet lamps.
     pub lamps: Lamps,
-    /// Lamps without extent, toward which distances in media may be drawn; none where they are many.
+    /// Lamps toward which distances in media may be drawn; none where they are many.
     pub near_lamps: Vec<equiangular::Lamp>,
     /// The film counts light over two to this power: `scene/brightness.rs` tells which.
     pub light_exponent: i32,

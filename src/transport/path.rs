@@ -335,6 +335,9 @@ impl Tracer<'_> {
                 let total = Hit { t: p.distance + hit.t, ..*hit };
                 let density = light.area_pdf(&self.scene.objects, p.point, path.ray.direction, &total, surface.normal);
                 let q = self.asked().probability(index as usize, p.point, p.normal, path.judged) * density;
+                if p.looked_along && q > 0.0 && self.is_left_to_shadow_rays(index) {
+                    return;
+                }
                 power_heuristic(p.density * path.rho_sum::<CHROMATIC>(), q * p.rho)
             }
         };
@@ -410,7 +413,7 @@ impl Tracer<'_> {
                 u_light,
                 || at.choice.draw(0),
                 |wi| at.eval(bsdf, wo, wi),
-                |_| 1.0,
+                |_| None,
                 |wi| match wi.dot(surface.normal) * toward > 0.0 {
                     true => First::Transmitted,
                     false => First::Reflected(bsdf.diffuse_share(wo, frame.to_local(wi))),
@@ -482,6 +485,7 @@ impl Tracer<'_> {
                 rho: path.rho_sum::<CHROMATIC>() * f64::from(self.shadow_rays(path)),
                 density,
                 distance: 0.0,
+                looked_along: false,
             }),
             Chosen::Density(_) | Chosen::Discrete => None,
         };
@@ -585,7 +589,7 @@ impl Tracer<'_> {
                 let p = Lanes::splat(medium.phase.eval(point, wo, wi) as f32);
                 (p, p)
             };
-            let share = |lamp| along.map_or(1.0, |(along, t)| self.share_of_flight(along, t, lamp));
+            let share = |lamp| along.and_then(|(along, t)| self.share_of_flight(along, t, lamp));
             self.ask_lights::<CHROMATIC, MEDIA>(
                 path,
                 (point, None),
@@ -612,6 +616,7 @@ impl Tracer<'_> {
             rho: path.rho_sum::<CHROMATIC>() * f64::from(self.shadow_rays(path)),
             density: medium.phase.eval(point, wo, wi),
             distance: 0.0,
+            looked_along: along.is_some(),
         });
         path.ray = Ray::new(point, wi);
         path.seen |= path.vertices == 0;

@@ -188,8 +188,8 @@ pub struct EffectPlan {
     pub shadow_rays: u32,
     /// Shadow rays go to light that is even over all directions, too, which what is scattered finds as well.
     pub asks_even_sky: bool,
-    /// Light of lamps without extent is looked for along the ways of paths through media, too.
-    pub equiangular: bool,
+    /// Of how many of the scene's near lamps light is looked for along the ways of paths through media, too.
+    pub near_lamps: usize,
     /// Every glass is computed as if it were dispersive.
     pub all_dispersive: bool,
     /// Light of mirrors and glass that is traced from the lights.
@@ -404,7 +404,7 @@ impl EffectPlan {
             splatting: false,
             shadow_rays: 1,
             asks_even_sky: true,
-            equiangular: false,
+            near_lamps: 0,
             all_dispersive: mode == EffectMode::All,
             caustics: None,
             adaptive: None,

@@ -21,7 +21,7 @@ fn light_beside_a_lamp_in_fog_is_its_integral() {
         ),
         &[],
     );
-    assert!(fog.prepared.plan.equiangular);
+    assert_eq!(fog.prepared.plan.near_lamps, 1);
     for h in [1.0f64, 1e-2, 1e-5] {
         // t − 5 = h tan θ, so that dt / r² = dθ / h: 10⁵ midpoints of a smooth integrand.
         let (n, end) = (100_000, (5.0 / h).atan());
@@ -67,16 +67,29 @@ fn light_is_the_same_by_distances_toward_lamps() {
                 - rectangle: {corner: [-0.9, -0.9, -0.8], edge_u: [1.8, 0, 0], edge_v: [0, 1.8, 0], material: {mirror: {}}}\n";
     let textures = "textures: {slide: {image: {file: slide.png}}}\n";
     let all = [POINT, SPOT, PROJECTOR].join(", ") + ", {constant: {radiance: 0.05}}";
+    // Lamps with extent, small and large, one of them within the smoke, one behind panes.
+    let bulb = "- sphere: {center: [0.4, 1.5, 0.3], radius: 0.08, emission: 90}\n";
+    let panel = "- rectangle: {corner: [-1, 1.6, -1], edge_u: [2, 0, 0], edge_v: [0, 0, 2], emission: 0.6}\n";
+    let within = "- sphere: {center: [-0.3, 0.3, 0.2], radius: 0.25, emission: 3}\n";
+    let lamps = [bulb, panel, within].concat();
+    // Without the mirror, which shows the bulb to the smoke by rare chance.
+    let (panes, _) = open.split_at(open.rfind("- rectangle").unwrap());
+    let bulb_and_panes = format!("{bulb}{panes}");
     for (name, medium, lights, shapes, most) in [
         ("thin smoke and a point", THIN, POINT, ball, 0.8),
         ("coloured smoke and a spot", COLOURED, SPOT, ball, 0.9),
         ("a grid, a point and a spot", GRID, &[POINT, SPOT].join(", "), ball, 0.9),
         ("a pane, a mask and a mirror", COLOURED, &[POINT, SPOT].join(", "), open, 1.0),
         ("all kinds and a sky", GRID, &all, ball, 1.0),
+        ("thin smoke and a bulb", THIN, "", bulb, 0.8),
+        ("coloured smoke and a panel", COLOURED, "", panel, 1.1),
+        // What the phase function finds of the lamp within counts no longer, as much as distances save.
+        ("a grid, lamps with and without extent and a sky", GRID, &all, &lamps, 1.3),
+        ("a pane and a mask before a bulb", COLOURED, POINT, &bulb_and_panes, 1.0),
     ] {
         let by_flights = over_seeds(lit("off", medium, lights, shapes, textures), 0..24);
         let bench = lit("on", medium, lights, shapes, textures);
-        assert!(bench.prepared.plan.equiangular, "{name}");
+        assert_eq!(bench.prepared.plan.near_lamps, bench.prepared.scene.near_lamps.len(), "{name}");
         let both = over_seeds(bench, 100..124);
         let ratio = assert_same_light(name, &by_flights, &both);
         assert!(ratio < most, "{name}: {ratio}");
@@ -89,20 +102,34 @@ fn layers_add_up_with_distances_toward_lamps() {
     let plain = lit("on", GRID, &[POINT, SPOT].join(", "), "", textures);
     let layers = format!("{textures}layers: [emission, direct, indirect, caustic]\n");
     assert_layers_add_up(&plain, &lit("on", GRID, &[POINT, SPOT].join(", "), "", &layers));
+    let bulb = "- sphere: {center: [-0.3, 0.3, 0.2], radius: 0.25, emission: 3}\n";
+    assert_layers_add_up(&lit("on", THIN, POINT, bulb, textures), &lit("on", THIN, POINT, bulb, &layers));
 }
 
 /// A spot's beam in thin smoke is what they are for. In thick smoke flights end before the beam, of nine lamps none is looked at
 /// along the way, and where none has a place there is nothing to decide.
 #[test]
 fn a_trial_draws_distances_toward_lamps_where_that_pays() {
-    let decided = |scattering: f64, lights: &str| {
+    let decided = |scattering: f64, lights: &str, shapes: &str| {
         let fog = format!("{{homogeneous: {{scattering: {scattering}}}}}");
-        let bench = lit("auto", &fog, lights, "", "textures: {slide: {image: {file: slide.png}}}\n");
-        let said = bench.prepared.plan.techniques.iter().any(|t| t.name == "equiangular sampling");
-        (said, bench.prepared.plan.equiangular)
+        let bench = lit("auto", &fog, lights, shapes, "textures: {slide: {image: {file: slide.png}}}\n");
+        let plan = bench.prepared.plan;
+        let said = plan.techniques.iter().find(|t| t.name == "equiangular sampling");
+        said.map(|said| {
+            assert_eq!(said.on, plan.near_lamps > 0);
+            plan.near_lamps
+        })
     };
-    assert_eq!(decided(0.05, SPOT), (true, true));
-    assert_eq!(decided(40.0, POINT), (true, false));
-    assert_eq!(decided(0.05, &[POINT; 9].join(", ")), (true, false));
-    assert_eq!(decided(0.05, "{directional: {direction: [0, -1, 0], irradiance: 1}}"), (false, false));
+    assert_eq!(decided(0.05, SPOT, ""), Some(1));
+    assert_eq!(decided(40.0, POINT, ""), Some(0));
+    assert_eq!(decided(0.05, &[POINT; 9].join(", "), ""), Some(0));
+    assert_eq!(decided(0.05, "{directional: {direction: [0, -1, 0], irradiance: 1}}", ""), None);
+    // Of lamps with extent bulbs pay; a panel beside a spot does not. Many are left out, and the point among them is not.
+    let bulb = "- sphere: {center: [0.4, 1.5, 0.3], radius: 0.08, emission: 90}\n";
+    assert_eq!(decided(0.05, "", bulb), Some(1));
+    assert_eq!(decided(40.0, "", bulb), Some(0));
+    let panel = "- rectangle: {corner: [-6, 8, -3], edge_u: [8, 0, 0], edge_v: [0, 0, 6], emission: 0.3}\n";
+    assert_eq!(decided(0.05, SPOT, panel), Some(1));
+    assert_eq!(decided(0.05, "", &bulb.repeat(9)), Some(0));
+    assert_eq!(decided(0.05, POINT, &bulb.repeat(8)), Some(1));
 }

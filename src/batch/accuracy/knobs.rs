@@ -174,7 +174,7 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
         (
             "equiangular",
             "equiangular",
-            chosen.plan.equiangular,
+            chosen.plan.near_lamps > 0,
             about("equiangular") && !chosen.scene.near_lamps.is_empty(),
         ),
         ("adaptive", "adaptive", chosen.plan.adaptive.is_some(), shared),

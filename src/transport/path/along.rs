@@ -1,11 +1,13 @@
-//! Light that lamps without extent throw onto the way through a medium: found at distances that are drawn toward them
-//! ([`crate::scene::equiangular`]) as well as at the ends of flights, and weighed by the power heuristic.
+//! Light that lamps throw onto the way through a medium: found at distances that are drawn toward them
+//! ([`crate::scene::equiangular`]) as well as at the ends of flights, and weighed by the power heuristic. What is scattered there by
+//! its phase function may meet a lamp with extent, too, which counts for nothing: shadow rays find all of it.
 
 use super::lights::power_heuristic;
 use super::{Path, Tracer};
 use crate::math::Ray;
 use crate::math::sampler::Set;
-use crate::scene::equiangular::Seen;
+use crate::scene::equiangular::{Lamp, Seen};
+use crate::scene::light::free;
 use crate::scene::medium::Medium;
 use crate::spectrum::Lanes;
 use crate::transport::shadow::Shadow;
@@ -33,12 +35,17 @@ pub(super) struct Along<'a> {
 impl Tracer<'_> {
     /// Whether light is looked for along the way of the path through `medium`.
     pub(super) fn looks_along(&self, path: &Path, medium: &Medium) -> bool {
-        self.plan.equiangular && medium.asks_lights() && self.settings.light_samples > 0 && !self.is_last(path)
+        self.plan.near_lamps > 0 && medium.asks_lights() && self.settings.light_samples > 0 && !self.is_last(path)
+    }
+
+    /// The lamps whose light is looked for.
+    fn near_lamps(&self) -> &[Lamp] {
+        &self.scene.near_lamps[..self.plan.near_lamps]
     }
 
     /// The way of `path` through `medium` to a surface at `distance`.
     pub(super) fn along<'a>(&self, path: &Path, medium: &'a Medium, distance: f64) -> Along<'a> {
-        let seen = Seen::of(&self.scene.near_lamps, &path.ray, medium.span(&path.ray, distance));
+        let seen = Seen::of(self.near_lamps(), &path.ray, medium.span(&path.ray, distance));
         Along { medium, ray: path.ray, rho: path.rho, seen, times: self.shadow_rays(path) }
     }
 
@@ -87,18 +94,29 @@ impl Tracer<'_> {
             to_viewer: false,
         };
         let toward = Ray::new(point, arriving.wi);
-        let Some((open, _)) = shadow.cast::<MEDIA>(&toward, arriving.distance) else { return };
-        let found = path.share_of::<CHROMATIC>(value * open, share / (chance * drawn));
+        let distance = free(arriving.distance, arriving.target, point, &toward);
+        let Some((open, _)) = shadow.cast::<MEDIA>(&toward, distance) else { return };
+        let density = chance * drawn * arriving.density.unwrap_or(1.0);
+        let found = path.share_of::<CHROMATIC>(value * open, share / density);
         if let Some(ledger) = self.ledger {
             ledger.meet(false);
         }
         self.enter(path, found, lamp as usize, || First::Media);
     }
 
-    /// The share of the light of `lamp` that is left to a flight which ended `t` metres on the way.
-    pub(super) fn share_of_flight(&self, along: &Along, t: f64, lamp: u32) -> f64 {
+    /// The share of the light of `lamp` that is left to shadow rays from a flight which ended `t` metres on the way; `None` where
+    /// distances are not drawn toward it.
+    pub(super) fn share_of_flight(&self, along: &Along, t: f64, lamp: u32) -> Option<f64> {
+        if !self.near_lamps().iter().any(|near| near.light == lamp) {
+            return None;
+        }
         let drawn = along.seen.density(lamp, t);
-        if drawn > 0.0 { power_heuristic(self.flight(along, t, lamp).1, drawn) } else { 1.0 }
+        Some(if drawn > 0.0 { power_heuristic(self.flight(along, t, lamp).1, drawn) } else { 1.0 })
+    }
+
+    /// Whether `light`, which the path has met with a chance that shadow rays have, too, is left to them.
+    pub(super) fn is_left_to_shadow_rays(&self, light: u32) -> bool {
+        self.near_lamps().iter().any(|near| near.light == light && near.has_extent)
     }
 
     /// σ_s `t` metres on the way, and the density with which flights end there and ask `lamp`, 1/m.

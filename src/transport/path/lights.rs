@@ -146,7 +146,8 @@ impl Tracer<'_> {
 
     /// Next-event estimation: as many times as the path sends shadow rays from here light from one point of one light, at a point
     /// with the normal of the side that is asked for. `u` and `u_light` are the numbers of a single time; `eval` tells f · |cos| and
-    /// densities toward a direction, `share` what part of a lamp's light is left to this, `first` what
+    /// densities toward a direction, `share` what part of a lamp's light is left to this
+    /// where what is scattered does not count as well, `first` what
     /// scatters light from a direction.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "the state of a vertex, split by borrow")]
@@ -157,7 +158,7 @@ impl Tracer<'_> {
         u: DVec2,
         u_light: impl Fn() -> f64,
         eval: impl Fn(DVec3) -> (Lanes, Lanes),
-        share: impl Fn(u32) -> f64,
+        share: impl Fn(u32) -> Option<f64>,
         first: impl Fn(DVec3) -> First,
         inside: impl Fn(DVec3) -> Inside,
         leave: impl Fn(DVec3) -> Ray,
@@ -197,7 +198,7 @@ impl Tracer<'_> {
         u: DVec2,
         u_light: impl FnOnce() -> f64,
         eval: impl Fn(DVec3) -> (Lanes, Lanes),
-        share: impl Fn(u32) -> f64,
+        share: impl Fn(u32) -> Option<f64>,
         first: impl Fn(DVec3) -> First,
         inside: impl Fn(DVec3) -> Inside,
         leave: impl FnOnce(DVec3) -> Ray,
@@ -225,9 +226,12 @@ impl Tracer<'_> {
         let traced = self.leaves(path, lamp as u32);
         let led = if CHROMATIC { path.rho * pdf } else { pdf };
         let weight = |passing: Option<Lanes>| match light.density {
-            None => share(lamp as u32) / probability,
+            None => share(lamp as u32).unwrap_or(1.0) / probability,
             Some(density) => {
                 let q = density * probability;
+                if let Some(share) = share(lamp as u32) {
+                    return share / q;
+                }
                 // B: what scattering, led by any lane, would have found this light with.
                 let led = passing.map_or(led, |passing| led * passing);
                 let scattering = if self.settings.scatter_samples > 0 { f64::from(led.reduce_add()) } else { 0.0 };

@@ -24,6 +24,8 @@ pub(super) struct Previous {
     pub(super) density: f64,
     /// Distance flown since (across boundaries of media).
     pub(super) distance: f64,
+    /// Whether light was looked for along the way there.
+    pub(super) looked_along: bool,
 }
 
 /// The state of a path between two vertices.

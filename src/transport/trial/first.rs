@@ -33,6 +33,9 @@ const BELIEVED: f64 = 0.7;
 /// Up to what ratio of times to an error distances in media are drawn toward lamps. What they save first is light of flights that end
 /// near a lamp, rare and bright, of which a trial sees next to none: it expects about 1.25 times what comes (`tools/bench/NOTES.md`).
 const NEAR_LAMPS: f64 = 1.1;
+/// The same of lamps with extent over those without alone: near them nothing is rare and bright, and the trial, which counts rays,
+/// expects down to 0.7 of the time that comes.
+const NEAR_LARGE_LAMPS: f64 = 0.7;
 
 /// What first vertices do.
 #[derive(Clone, Debug)]
@@ -43,8 +46,8 @@ pub struct First {
     pub shadow_rays: u32,
     /// Whether shadow rays go to light that is even over all directions.
     pub asks_even_sky: bool,
-    /// Whether distances in media are drawn toward lamps without extent, too.
-    pub equiangular: bool,
+    /// Toward how many of the scene's near lamps distances in media are drawn, too.
+    pub near_lamps: usize,
     /// What to say of it.
     pub said: Vec<Effect>,
 }
@@ -90,9 +93,9 @@ fn several_ways(settings: &PathSettings) -> bool {
 pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wishes: Wishes) -> Option<First> {
     let Shot { scene, plan, seed, .. } = *shot;
     let Integrator::Path(settings) = &plan.integrator else { return None };
-    let try_out = |asks_even_sky, reuse, shadow_rays, equiangular| {
+    let try_out = |asks_even_sky, reuse, shadow_rays, near_lamps| {
         let layers = LayerPlan::default();
-        let plan = EffectPlan { reuse, shadow_rays, asks_even_sky, equiangular, layers, ..plan.clone() };
+        let plan = EffectPlan { reuse, shadow_rays, asks_even_sky, near_lamps, layers, ..plan.clone() };
         try_groups(&Shot { plan: &plan, seed: seed ^ STREAM, ..*shot }, samples)
     };
     let single = single(census, settings);
@@ -100,7 +103,7 @@ pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wis
     let way = |sky: bool, reuse: bool| {
         // Where the sky is the only light, nobody is asked.
         let fixed = if scene.asked(sky).is_nobody() { Some(1) } else { fixed };
-        Way::find(fixed, reuse, |shadow_rays| try_out(sky, reuse, shadow_rays, false))
+        Way::find(fixed, reuse, |shadow_rays| try_out(sky, reuse, shadow_rays, 0))
     };
     let obstacle = reuse::obstacle(scene, census, plan, moments.len());
     let wish = obstacle.map_or_else(|| decided(wishes.reuse), |_| Some(false));
@@ -153,29 +156,49 @@ pub fn decide(shot: &Shot, census: &Census, moments: &[Scene], samples: u32, wis
     };
     said.push(Effect { name: "paths shared by pixels".into(), on: reuse, reason: why });
     said.push(Effect { name: rays, on: count > 1, reason: of_rays });
-    let along = along(scene, wishes.equiangular, |equiangular| match way.tried {
-        Some(cost) if !equiangular => cost,
-        _ => cost_of_error(&try_out(asks_even_sky, reuse, count, equiangular)),
+    let (near_lamps, along) = along(scene, wishes.equiangular, |near_lamps| match way.tried {
+        Some(cost) if near_lamps == 0 => cost,
+        _ => cost_of_error(&try_out(asks_even_sky, reuse, count, near_lamps)),
     });
-    let equiangular = along.as_ref().is_some_and(|effect| effect.on);
     said.extend(along);
-    Some(First { reuse, shadow_rays: count, asks_even_sky, equiangular, said })
+    Some(First { reuse, shadow_rays: count, asks_even_sky, near_lamps, said })
 }
 
-/// Whether distances in media are drawn toward lamps without extent; nothing where there are no such lamps or media. `cost` is
-/// variance times cost with it and without.
-fn along(scene: &Scene, wish: Use, cost: impl Fn(bool) -> f64) -> Option<Effect> {
-    let lamps = scene.lights.iter().filter(|light| light.position().is_some()).count();
+/// Toward how many near lamps distances in media are drawn, and why; nothing to say where there are no such lamps or media. `cost` is
+/// variance times cost with so many.
+fn along(scene: &Scene, wish: Use, cost: impl Fn(usize) -> f64) -> (usize, Option<Effect>) {
+    let near = &scene.near_lamps;
+    let lamps = scene.lights.iter().filter(|light| equiangular::stands(light)).count();
     if lamps == 0 || !scene.media.iter().any(Medium::asks_lights) {
-        return None;
+        return (0, None);
     }
-    let (on, reason) = match decided(wish) {
-        _ if lamps > equiangular::MOST => (false, format!("more than {} lamps have no extent", equiangular::MOST)),
-        _ if scene.near_lamps.is_empty() => (false, "no lamp without extent is asked".into()),
-        Some(on) => (on, "the scene says so".into()),
-        None => judge(cost(true) / cost(false), NEAR_LAMPS),
+    let points = near.iter().filter(|lamp| !lamp.has_extent).count();
+    let (count, reason) = match decided(wish) {
+        _ if near.is_empty() && lamps > equiangular::MOST => {
+            (0, format!("there are more than {} lamps", equiangular::MOST))
+        }
+        _ if near.is_empty() => (0, "no lamp that stands somewhere is asked".into()),
+        Some(on) => (if on { near.len() } else { 0 }, "the scene says so".into()),
+        None => {
+            let none = cost(0);
+            let (mut best, mut least, mut said) = (0, none, None);
+            // First toward those without extent, then toward all.
+            let of_points = (points > 0).then_some((points, NEAR_LAMPS));
+            let of_all = (near.len() > points).then_some((near.len(), NEAR_LARGE_LAMPS));
+            for (count, bound) in of_points.into_iter().chain(of_all) {
+                let cost = cost(count);
+                let pays = judge(cost / least, bound).0;
+                if pays || said.is_none() {
+                    said = Some(judge(cost / none, bound).1);
+                }
+                if pays {
+                    (best, least) = (count, cost);
+                }
+            }
+            (best, said.unwrap_or_default())
+        }
     };
-    Some(Effect { name: "equiangular sampling".into(), on, reason })
+    (count, Some(Effect { name: "equiangular sampling".into(), on: count > 0, reason }))
 }
 
 impl Way {
