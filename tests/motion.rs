@@ -264,3 +264,25 @@ fn a_shutter_that_cannot_be_is_refused() {
     );
     assert!(says("half").contains("camera.shutter: expected"), "{}", says("half"));
 }
+
+/// Lamps in fog that shine only for a part of the time: distances are drawn toward those that do, at each moment. The mean of the
+/// picture is that of flights alone, to five standard errors as the pictures tell them.
+#[test]
+fn lamps_in_fog_may_go_on_and_off_while_the_shutter_is_open() {
+    let scene = "camera: {origin: [0, 0.2, 4], target: [0, 0, 0], fov_deg: 40, shutter: 4}\nimage: {width: 16, height: 12}\n\
+         output: {exr: {precision: float, channels: luminance}}\nrender: {samples: 512, frames: 1}\n\
+         media: {fog: {homogeneous: {scattering: 0.2, absorption: 0.02}}}\nmedium: fog\n\
+         shapes:\n- plane: {point: [0, -1.2, 0], normal: [0, 1, 0], material: {diffuse: {reflectance: 0.6}}}\n\
+         - sphere: {center: [0.4, 1.9, 0.3], radius: 0.1, emission: {0: 0, 1: 40, 2: 0}}\n\
+         - sphere: {center: [-0.6, 1.9, 0.3], radius: 0.1, emission: 30}\n\
+         lights:\n- point: {position: [0, 2, 0], intensity: {0: 0, 1: 3, 2: 0}}\n";
+    let with = |value: &str| {
+        let (luminance, report) = render(scene, &["--set", &format!("render.techniques.equiangular={value}")]);
+        let pixels = luminance.len() as f64;
+        let error = report["error"]["rel_rmse"].as_f64().unwrap() / pixels.sqrt();
+        (luminance.iter().sum::<f64>() / pixels, error)
+    };
+    let ((on, error_on), (off, error_off)) = (with("on"), with("off"));
+    let error = (error_on * error_on + error_off * error_off).sqrt();
+    assert!((on / off - 1.0).abs() < 5.0 * error && error < 0.01, "{on} {off} {error}");
+}

@@ -38,9 +38,10 @@ impl Tracer<'_> {
         self.plan.near_lamps > 0 && medium.asks_lights() && self.settings.light_samples > 0 && !self.is_last(path)
     }
 
-    /// The lamps whose light is looked for.
+    /// The lamps whose light is looked for. While the shutter is open some may be dark.
     fn near_lamps(&self) -> &[Lamp] {
-        &self.scene.near_lamps[..self.plan.near_lamps]
+        let near = &self.scene.near_lamps;
+        &near[..near.len().min(self.plan.near_lamps)]
     }
 
     /// The way of `path` through `medium` to a surface at `distance`.
