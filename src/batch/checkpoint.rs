@@ -387,7 +387,8 @@ mod tests {
             Milestone { samples, elapsed: Duration::from_millis(samples.into()), error: Some(error), unknown: None }
         };
         let found = per_cent(&part, &[128, 256, 512].map(milestone));
-        assert!((found - 50.0).abs() < 0.01, "{found}");
+        // The usual slope is 0.0058 more than this one and counts for 0.08 of it: 1024 samples are foretold to 0.0003.
+        assert!((found - 50.0).abs() < 50.0 * 0.0004, "{found}");
     }
 
     /// A run of 90 seconds that dropped samples of four kinds, and did no others, is gone on with: the seconds and what was
