@@ -5,7 +5,7 @@
 //! known. From it follow the samples that an error takes and, as a sample takes as long as those of the last pass, the time.
 //! Passes are cut short where the forecast says that the target lies before the next doubling.
 
-use super::frame::Milestone;
+use super::frame::{Milestone, pass_end};
 use crate::error::{Error, Result};
 use crate::film::accumulate::REPLICATES;
 use crate::film::error::{ErrorEstimate, NoEstimate};
@@ -84,7 +84,7 @@ impl Stop {
             None => most,
         };
         // No pass steps over a power of two, at which samples lie more evenly than at the next larger numbers.
-        let mut end = f64::from(last.samples.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX));
+        let mut end = f64::from(pass_end(last.samples, most));
         if let (Some(target), Some(fit)) = (self.target(), Fit::of(milestones)) {
             end = end.min(fit.samples_for(target).max(f64::from(last.samples) * (1.0 + SHORTEST)));
         }

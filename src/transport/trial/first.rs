@@ -187,7 +187,7 @@ fn along(scene: &Scene, wish: Use, cost: impl Fn(usize) -> f64) -> (usize, Optio
             let of_all = (near.len() > points).then_some((near.len(), NEAR_LARGE_LAMPS));
             for (count, bound) in of_points.into_iter().chain(of_all) {
                 let cost = cost(count);
-                let pays = judge(cost / least, bound).0;
+                let pays = cost / least < bound;
                 if pays || said.is_none() {
                     said = Some(judge(cost / none, bound).1);
                 }
