@@ -18,6 +18,7 @@ use crate::scene::Scene;
 use crate::scene::compile;
 use crate::scene::shelf::Shelf;
 use crate::spectrum::ColourSpace;
+use crate::transport::glints;
 use crate::transport::layers::{Channel, Layer, Source};
 use crate::transport::light;
 use crate::transport::pilot::{self, Use, Wishes};
@@ -239,6 +240,11 @@ pub(super) fn prepare_scene(
         plan.techniques.push(said);
     }
     go_on()?;
+    let shot = Shot { scene: &scene, plan: &plan, filter: &filter, seed, photons: None };
+    let (glints, said) = glints::find(&shot, &moments, window(&description), planned, wishes.glints, &|| goes_on(None));
+    go_on()?;
+    plan.glints = glints;
+    plan.techniques.extend(said);
     let (first, said) = adaptive::choose(wish(description.render.techniques.adaptive), stop.is_open(), &plan, samples);
     plan.adaptive = first;
     if first.is_some() {
@@ -359,6 +365,7 @@ fn asked_in_vain(description: &SceneDescription) -> Vec<Effect> {
         ("shadow rays to the even sky", on(written.even_sky)),
         ("paths shared by pixels", on(written.reuse)),
         ("several shadow rays from the first vertex", several),
+        ("small pictures of lamps", on(written.glints)),
         ("equiangular sampling", on(written.equiangular)),
     ];
     let of_path = matches!(description.integrator, description::Integrator::Path(_));
@@ -376,6 +383,7 @@ fn wishes(description: &SceneDescription) -> Wishes {
         merging: wish(written.merging),
         reuse: wish(written.reuse),
         even_sky: wish(written.even_sky),
+        glints: wish(written.glints),
         equiangular: wish(written.equiangular),
         shadow_rays: match written.shadow_rays {
             description::ShadowRays::Auto => None,

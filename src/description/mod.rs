@@ -99,7 +99,7 @@
 //!   effects: auto                   # auto, all: the same picture
 //!   tile: 32                        # pixels
 //!   wavelengths: auto               # auto, visible, uniform
-//!   techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, splatting: auto, shadow_rays: auto, even_sky: auto, equiangular: auto, adaptive: auto}
+//!   techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, splatting: auto, shadow_rays: auto, even_sky: auto, equiangular: auto, glints: auto, adaptive: auto}
 //!                                   # auto, on, off: light of mirrors and glass traced from the lights, wavelengths that
 //!                                   # part followed together, photons collected where that light is seen in mirrors and
 //!                                   # through glass, indirect light shared by pixels near each other, samples that

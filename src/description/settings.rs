@@ -311,7 +311,7 @@ fn of_seconds(seconds: f64) -> Option<Duration> {
 }
 
 /// `techniques: {light_tracing: auto, packets: auto, merging: auto, reuse: auto, splatting: auto, shadow_rays: auto, even_sky: auto,
-/// equiangular: auto, adaptive: auto}`
+/// equiangular: auto, glints: auto, adaptive: auto}`
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Techniques {
@@ -340,6 +340,9 @@ pub struct Techniques {
     /// Whether light of up to eight lamps is looked for along the ways of paths through media, too.
     #[serde(default)]
     pub equiangular: Technique,
+    /// Whether pictures of lamps that are smaller than a few pixels are searched, and their light looked for by itself.
+    #[serde(default)]
+    pub glints: Technique,
     /// Whether pixels get more samples where the picture is noisier, at the same mean.
     #[serde(default)]
     pub adaptive: Technique,

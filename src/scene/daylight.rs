@@ -222,6 +222,12 @@ impl Daylight {
         self.disc.as_ref().map_or(0.0, |disc| disc.mean.luminance() * disc.solid_angle())
     }
 
+    /// Toward the middle of the sun, and half of its angle in radians.
+    #[must_use]
+    pub fn sun_disc(&self) -> Option<(DVec3, f64)> {
+        self.disc.as_ref().map(|disc| (self.sun, disc.half_angle))
+    }
+
     /// A direction toward the sun.
     #[must_use]
     pub fn sample_sun(&self, u: DVec2) -> DVec3 {

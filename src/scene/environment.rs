@@ -261,6 +261,13 @@ impl Environment {
         Some((self.world_from_map * direction, irradiance))
     }
 
+    /// Toward the middle of the sun that stands in a sky by formulas, and half of its angle in radians.
+    #[must_use]
+    pub fn sun_disc(&self) -> Option<(DVec3, f64)> {
+        let (direction, half_angle) = self.day.as_ref()?.sun_disc()?;
+        Some((self.world_from_map * direction, half_angle))
+    }
+
     /// How many of a day's directions are drawn toward its sun.
     fn sun_share(&self, drawn: Drawn) -> f64 {
         match drawn {

@@ -5,6 +5,7 @@
 //! pixel; [`sample`] is that of a single one.
 
 pub mod caustics;
+pub mod glints;
 pub mod guide;
 pub mod layers;
 pub mod light;
@@ -28,6 +29,7 @@ use crate::scene::watch::{self, Counts};
 use crate::scene::{DepthFog, Medium, Scene};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
+use glints::Region;
 use merge::Collection;
 use path::together::Wanted;
 use plan::{EffectPlan, Integrator, PathSettings};
@@ -39,6 +41,8 @@ pub struct Incoming {
     /// Spectral radiance of each lane, W·m⁻²·sr⁻¹·nm⁻¹, scaled so that the mean over lanes of
     /// radiance × weight estimates the integral over wavelengths.
     pub radiance: Lanes,
+    /// Light that was put aside, like `radiance`; see [`glints`].
+    pub aside: Lanes,
     /// One where the ray met something, zero where it met the background only.
     pub alpha: f32,
     /// Distance of the first surface along the axis of the camera; infinite for none, and where several paths are added.
@@ -57,6 +61,7 @@ impl Incoming {
     /// No light.
     pub const NONE: Incoming = Incoming {
         radiance: Lanes::ZERO,
+        aside: Lanes::ZERO,
         alpha: 0.0,
         depth: f64::INFINITY,
         left: Lanes::ZERO,
@@ -156,6 +161,8 @@ fn moment_at(u: f64, moments: usize) -> usize {
 struct Begun {
     at: Address,
     ray: Ray,
+    /// Whether it begins where small pictures of lamps lie, whose light then comes by itself.
+    apart: bool,
     sample: PixelSample,
     /// What was counted on its way, where that is asked for.
     counted: Counts,
@@ -172,6 +179,7 @@ impl Begun {
         Begun {
             at: Address { pixel: [0; 2], replicate: 0, index: 0 },
             ray: Ray::new(DVec3::ZERO, DVec3::Z),
+            apart: false,
             sample: PixelSample {
                 radiance: zero,
                 wavelengths,
@@ -214,6 +222,10 @@ impl Begun {
         self.sample.wavelengths = scene.wavelengths.sample(shot.photons.map_or(u_time.x, |p| p.wavelength));
         self.sample.weight = chosen.weight;
         self.sample.place = place;
+        if let Some(glints) = &plan.glints {
+            let region = glints.of(at.pixel.map(|x| x as i32));
+            self.apart = region.is_some_and(|region| region.holds(place - corner));
+        }
         // Rays of the camera leave no surface, and never did here: two vectors are stored, no enum is copied.
         let ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
         (self.ray.origin, self.ray.direction) = (ray.origin, ray.direction);
@@ -284,7 +296,7 @@ impl Begun {
         match integrator {
             Integrator::Path(settings) => {
                 let map = shot.photons.map(|p| p.map);
-                path::radiance(scene, plan, settings, sampler, wavelengths, ray, map, ledger)
+                path::radiance(scene, plan, settings, sampler, wavelengths, (ray, self.apart), map, ledger)
             }
             Integrator::Whitted(settings) => whitted::radiance(scene, plan, settings, wavelengths, ray),
             Integrator::Depth => {
@@ -303,7 +315,7 @@ impl Begun {
                     hide_emitters: settings.hide_emitters,
                     ..PathSettings::default()
                 };
-                path::radiance(scene, plan, &direct, sampler, wavelengths, ray, None, None)
+                path::radiance(scene, plan, &direct, sampler, wavelengths, (ray, false), None, None)
             }
             Integrator::Nothing => Incoming::NONE,
         }
@@ -323,6 +335,59 @@ impl Begun {
             self.counted = watch::take();
         }
         self.see(&light);
+    }
+
+    /// Adds the light of the lamps whose small pictures its pixel has a part of.
+    #[inline]
+    fn add_glints(&mut self, shot: &Shot, ledger: Option<&Ledger>) {
+        if let Some(glints) = &shot.plan.glints
+            && let Some(region) = glints.of(self.at.pixel.map(|x| x as i32))
+        {
+            self.add_light_of(region, shot, ledger);
+        }
+        // All of it is there.
+        self.apart = false;
+    }
+
+    #[inline(never)]
+    fn add_light_of(&mut self, region: &Region, shot: &Shot, ledger: Option<&Ledger>) {
+        let Integrator::Path(settings) = &shot.plan.integrator else { return };
+        let share = (region.area() / f64::from(region.paths)) as f32;
+        let of_one = ledger.map(|_| Ledger::new(shot.scene.light_groups.count().into()));
+        for i in 0..region.paths {
+            let found = self.light_of(region, shot, settings, i, of_one.as_ref());
+            self.sample.radiance += found.aside * share;
+            self.events += found.events;
+            if let (Some(all), Some(one)) = (ledger, &of_one) {
+                all.add(one, share);
+                one.clear();
+            }
+        }
+    }
+
+    /// The light of lamps alone along path `i` from a region of its pixel, entered in a blank `ledger` if there is one.
+    fn light_of(
+        &self,
+        region: &Region,
+        shot: &Shot,
+        settings: &PathSettings,
+        i: u32,
+        ledger: Option<&Ledger>,
+    ) -> Incoming {
+        let Begun { at, sample: PixelSample { wavelengths, place, .. }, .. } = *self;
+        let corner = DVec2::from(at.pixel.map(|x| f64::from(x as i32)));
+        // Moved alike for all samples, which stay as evenly spread.
+        let u = (place - corner + DVec2::new(PLASTIC, PLASTIC * PLASTIC) * f64::from(i)).fract_gl();
+        let index = at.index.wrapping_mul(region.paths).wrapping_add(i);
+        let sampler = Sampler::new(shot.seed ^ glints::STREAM, at.pixel, at.replicate, index);
+        let ray = shot.scene.camera.ray(corner + region.place(u), || DVec2::splat(0.5));
+        let found = path::aside(shot, settings, &sampler, wavelengths.nm, &ray, ledger);
+        let Some(fog) = shot.fog(&shot.plan.integrator) else { return found };
+        let through = 1.0 - fog.falloff.amount(found.depth) as f32;
+        if let Some(ledger) = ledger {
+            ledger.scale(through);
+        }
+        Incoming { aside: found.aside * through, ..found }
     }
 
     /// Takes what came of the ray.
@@ -391,6 +456,7 @@ pub fn sample(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Pixe
     let integrator = &shot.plan.integrator;
     let light = begun.light(shot, &sampler, integrator, shot.fog(integrator), None);
     begun.see(&light);
+    begun.add_glints(shot, None);
     begun.finish(shot.scene);
     (begun.sample, Work { events: begun.events, rays: begun.rays(shot.scene) })
 }
@@ -407,6 +473,28 @@ fn probe(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Incoming,
     let mut begun = Begun::blank();
     begun.begin(shot, Address { pixel, replicate, index }, &sampler);
     (begun.light(shot, &sampler, &shot.plan.integrator, None, None), begun.sample.wavelengths)
+}
+
+/// Luminance, in units of the film: what the path of a sample finds beside lamps that it meets before anything scatters it, and what paths from a
+/// region of its pixel find of such lamps, in the mean and in that of the squares.
+fn light_apart(shot: &Shot, settings: &PathSettings, at: Address, region: &Region) -> [f64; 3] {
+    let sampler = Sampler::new(shot.seed, at.pixel, at.replicate, at.index);
+    let mut begun = Begun::blank();
+    begun.begin(shot, at, &sampler);
+    begun.apart = true;
+    let luminance = |light: Lanes| {
+        let unit = shot.scene.light_unit();
+        f64::from(observer::xyz(light * unit, &begun.sample.wavelengths)[1])
+    };
+    let rest = begun.light(shot, &sampler, &shot.plan.integrator, shot.fog(&shot.plan.integrator), None);
+    let mut lamps = [0.0; 2];
+    let tried = region.paths.min(8);
+    for i in 0..tried {
+        let found = luminance(begun.light_of(region, shot, settings, i, None).aside);
+        lamps = [lamps[0] + found, lamps[1] + found * found];
+    }
+    let [mean, squares] = lamps.map(|sum| sum / f64::from(tried));
+    [luminance(rest.radiance), mean, squares]
 }
 
 /// What a further shadow ray costs with all that it takes to find its light, in rays of a path: 0.55 to 0.8 in fifteen scenes of up
@@ -485,7 +573,10 @@ impl Samples {
                 }
             }
         }
-        begun.iter_mut().for_each(|begun| begun.finish(shot.scene));
+        for (i, begun) in begun.iter_mut().enumerate() {
+            begun.add_glints(shot, ledgers.get(i));
+            begun.finish(shot.scene);
+        }
         layers.numbers.clear();
         if !shot.plan.layers.layers.is_empty() {
             for (i, begun) in begun.iter().enumerate() {
@@ -594,8 +685,8 @@ fn follow_shared(begun: &mut [Begun], shot: &Shot, settings: &PathSettings, octe
 /// What the paths of samples need.
 fn wanted<'a>(begun: &'a [Begun], octet: &'a Octet) -> impl Fn(usize) -> Wanted<'a> {
     |i: usize| {
-        let Begun { ray, sample: PixelSample { wavelengths, .. }, .. } = &begun[i];
-        Wanted { sampler: octet.sampler(i), nm: wavelengths.nm, ray }
+        let Begun { ray, apart, sample: PixelSample { wavelengths, .. }, .. } = &begun[i];
+        Wanted { sampler: octet.sampler(i), nm: wavelengths.nm, ray, apart: *apart }
     }
 }
 

@@ -19,12 +19,12 @@ pub mod reuse;
 mod state;
 pub mod together;
 
-use super::Incoming;
 use super::photons::PhotonMap;
 use super::plan::{Coverage, EffectPlan, PathSettings};
 use super::roulette::{survival, worth};
 use super::shadow::MAX_BOUNDARIES;
 use super::ways::{First, Ledger};
+use super::{Incoming, Shot};
 use crate::math::Frame;
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
@@ -43,7 +43,8 @@ use reuse::Joint;
 use state::{Choice, Leaving, Path, Previous, Step, Walk};
 use std::cell::Cell;
 
-/// Light that arrives along a camera ray, entered in a `ledger` if there is one.
+/// Light that arrives along a camera ray, entered in a `ledger` if there is one; `apart` has that of lamps that it meets before anything
+/// scatters it put aside.
 #[must_use]
 #[expect(clippy::too_many_arguments, reason = "all that a path is made of")]
 pub fn radiance(
@@ -52,12 +53,29 @@ pub fn radiance(
     settings: &PathSettings,
     sampler: &Sampler,
     wavelengths: &SampledWavelengths,
-    ray: &Ray,
+    (ray, apart): (&Ray, bool),
     photons: Option<&PhotonMap>,
     ledger: Option<&Ledger>,
 ) -> Incoming {
-    let tracer = Tracer { scene, plan, settings, sampler: *sampler, nm: wavelengths.nm, photons, ledger };
-    let mut path = Path::BLANK;
+    let tracer = Tracer { scene, plan, settings, sampler: *sampler, nm: wavelengths.nm, photons, ledger, whole: true };
+    let mut path = Path { apart, ..Path::BLANK };
+    let walk = tracer.trace(ray, &mut path, None);
+    path.incoming(walk.alpha, walk.depth)
+}
+
+/// The light alone that [`radiance`] puts aside, entered in a `ledger` if there is one: the path ends where something scatters it.
+#[must_use]
+pub fn aside(
+    shot: &Shot,
+    settings: &PathSettings,
+    sampler: &Sampler,
+    nm: Lanes,
+    ray: &Ray,
+    ledger: Option<&Ledger>,
+) -> Incoming {
+    let Shot { scene, plan, .. } = *shot;
+    let tracer = Tracer { scene, plan, settings, sampler: *sampler, nm, photons: None, ledger, whole: false };
+    let mut path = Path { apart: true, ..Path::BLANK };
     let walk = tracer.trace(ray, &mut path, None);
     path.incoming(walk.alpha, walk.depth)
 }
@@ -71,6 +89,8 @@ struct Tracer<'a> {
     photons: Option<&'a PhotonMap>,
     /// Where light is parted by the way it came.
     ledger: Option<&'a Ledger>,
+    /// Whether paths look for all light, and go on where something scatters them; else for that alone which is put aside.
+    whole: bool,
 }
 
 impl Tracer<'_> {
@@ -127,7 +147,7 @@ impl Tracer<'_> {
             if MEDIA && let Some((medium, set, draft, looks_along)) = &flying {
                 let (medium, set) = (*medium, *set);
                 let along = looks_along.then(|| self.along(path, medium, distance));
-                if let Some(along) = &along {
+                if let Some(along) = along.as_ref().filter(|_| self.whole) {
                     self.ask_along::<CHROMATIC, MEDIA>(path, along, walk.crossings);
                 }
                 let flight = medium.arrive(draft, &path.ray, distance, self.nm, || self.sampler.walk(set));
@@ -167,6 +187,9 @@ impl Tracer<'_> {
                     ahead.go_on(distance);
                 }
                 Step::Scattered => seen = f64::INFINITY,
+            }
+            if !(self.whole || path.specular) {
+                break;
             }
         }
         walk
@@ -404,7 +427,7 @@ impl Tracer<'_> {
             Some(beyond) if bsdf.glass().is_some_and(|glass| glass.mirrored(wo).is_none()) => Some(beyond),
             _ => self.look_at_mirrored::<CHROMATIC, MEDIA, B>(path, bsdf, wo, at),
         };
-        if !bsdf.is_discrete() && self.asks() {
+        if self.whole && !bsdf.is_discrete() && self.asks() {
             let toward = path.ray.direction.dot(surface.normal);
             let inside = path.inside;
             self.ask_lights::<CHROMATIC, MEDIA>(
@@ -583,7 +606,7 @@ impl Tracer<'_> {
         self.foresee(path);
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
         let next_event = self.asks() && medium.shadow_rays;
-        if next_event {
+        if next_event && self.whole {
             let inside = path.inside;
             let eval = |wi| {
                 let p = Lanes::splat(medium.phase.eval(point, wo, wi) as f32);

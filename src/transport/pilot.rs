@@ -53,6 +53,8 @@ pub struct Wishes {
     pub reuse: Use,
     /// Shadow rays to light that is even over all directions.
     pub even_sky: Use,
+    /// Small pictures of lamps looked for by themselves.
+    pub glints: Use,
     /// Distances in media drawn toward lamps without extent.
     pub equiangular: Use,
     /// How many shadow rays first vertices send.

@@ -7,6 +7,7 @@
 
 use super::Spread;
 use super::caustics::Caustics;
+use super::glints::Glints;
 use super::layers::LayerPlan;
 use crate::scene::census::Census;
 use crate::spectrum::Spectrum;
@@ -194,6 +195,8 @@ pub struct EffectPlan {
     pub all_dispersive: bool,
     /// Light of mirrors and glass that is traced from the lights.
     pub caustics: Option<Arc<Caustics>>,
+    /// Where small pictures of lamps lie, whose light is looked for by itself.
+    pub glints: Option<Arc<Glints>>,
     /// Where samples are shared out by noise: how many all pixels have before.
     pub adaptive: Option<u32>,
     /// Further channels of the picture.
@@ -405,6 +408,7 @@ impl EffectPlan {
             shadow_rays: 1,
             asks_even_sky: true,
             near_lamps: 0,
+            glints: None,
             all_dispersive: mode == EffectMode::All,
             caustics: None,
             adaptive: None,

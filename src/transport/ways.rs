@@ -239,6 +239,13 @@ impl Ledger {
         aside.iter_mut().zip(other.sums.borrow().iter()).for_each(|(own, light)| *own += share * *light);
     }
 
+    /// Adds the `share` of what was entered in another.
+    pub fn add(&self, other: &Ledger, share: f32) {
+        for (own, of) in [(&self.sums, &other.sums), (&self.veiled, &other.veiled)] {
+            own.borrow_mut().iter_mut().zip(of.borrow().iter()).for_each(|(own, light)| *own += *light * share);
+        }
+    }
+
     /// Takes back what was set aside and gained: in place of what was entered since, where that was `shared` among all.
     pub fn put_back(&self, shared: bool) {
         if shared {

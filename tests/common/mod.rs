@@ -152,7 +152,9 @@ impl Bench {
         let whole = plan.caustics.is_some().then(|| EffectPlan { caustics: None, ..plan.clone() });
         let plan = whole.as_ref().unwrap_or(plan);
         match &plan.integrator {
-            Integrator::Path(settings) => path::radiance(scene, plan, settings, sampler, wavelengths, ray, None, None),
+            Integrator::Path(settings) => {
+                path::radiance(scene, plan, settings, sampler, wavelengths, (ray, false), None, None)
+            }
             Integrator::Whitted(settings) => whitted::radiance(scene, plan, settings, wavelengths, ray),
             other => panic!("{other:?} has no light along a ray"),
         }

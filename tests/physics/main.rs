@@ -16,6 +16,7 @@ mod films;
 mod fog;
 mod furnace;
 mod glass;
+mod glints;
 mod indices;
 mod lights;
 mod media;

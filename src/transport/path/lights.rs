@@ -61,7 +61,16 @@ impl Tracer<'_> {
             return;
         }
         let share = path.share_of::<CHROMATIC>(l, w);
-        path.radiance += share;
+        let is_aside = path.apart && path.specular && path.previous.is_none();
+        if is_aside {
+            path.aside += share;
+        } else {
+            path.radiance += share;
+        }
+        // What is put aside is entered by the paths that look for it alone.
+        if is_aside == self.whole {
+            return;
+        }
         if let Some(ledger) = self.ledger {
             let found = self.found(path, share, light);
             match path.vertices {

@@ -233,7 +233,15 @@ impl Tracer<'_> {
             path.left += share;
             return;
         }
-        path.radiance += share;
+        let is_aside = path.apart && path.specular;
+        if is_aside {
+            path.aside += share;
+        } else {
+            path.radiance += share;
+        }
+        if is_aside == self.whole {
+            return;
+        }
         if let Some(ledger) = self.ledger {
             ledger.mirrored(path.vertices, way.through + 1, self.found(path, share, light));
         }

@@ -239,8 +239,10 @@ pub fn radiance<'a>(
     } else {
         let Shot { scene, plan, photons, .. } = *shot;
         for (i, joint) in joints.iter_mut().enumerate() {
-            let (Wanted { sampler, nm, ray }, ledger) = (wanted(i), ledgers.get(i));
-            let tracer = Tracer { scene, plan, settings, sampler, nm, photons: photons.map(|p| p.map), ledger };
+            let (Wanted { sampler, nm, ray, apart }, ledger) = (wanted(i), ledgers.get(i));
+            let photons = photons.map(|p| p.map);
+            let tracer = Tracer { scene, plan, settings, sampler, nm, photons, ledger, whole: true };
+            paths[i].apart = apart;
             walks[i] = tracer.trace(ray, &mut paths[i], Some(joint));
         }
     }

@@ -34,6 +34,8 @@ pub struct Wanted<'a> {
     pub nm: Lanes,
     /// Its ray.
     pub ray: &'a Ray,
+    /// Whether light of lamps is put aside; see [`crate::transport::glints`].
+    pub apart: bool,
 }
 
 /// The light of `count` samples, at most [`MOST`]: of the `i`th, which `wanted` tells, `give` gets it.
@@ -84,7 +86,8 @@ fn trace<'a, const CHROMATIC: bool>(
     // The camera does not see beyond its clipping plane, whatever it looks through.
     let mut reach = [f64::INFINITY; MOST];
     for (i, path) in paths.iter_mut().enumerate() {
-        let ray = wanted(i).ray;
+        let Wanted { ray, apart, .. } = wanted(i);
+        path.apart = apart;
         (path.ray.origin, path.ray.direction) = (ray.origin, ray.direction);
         reach[i] = scene.camera.reach(ray);
         walks[i] = Walk::begin(scene, settings);
@@ -105,7 +108,7 @@ fn trace<'a, const CHROMATIC: bool>(
         for k in 0..going {
             let i = on[k];
             let Wanted { sampler, nm, .. } = wanted(i);
-            let tracer = Tracer { scene, plan, settings, sampler, nm, photons, ledger: None };
+            let tracer = Tracer { scene, plan, settings, sampler, nm, photons, ledger: None, whole: true };
             let joint = joints.as_deref_mut().map(|joints| &mut joints[i]);
             let (path, walk) = (&mut paths[i], &mut walks[i]);
             let known = asked.len();

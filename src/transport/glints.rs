@@ -1,0 +1,310 @@
+//! Small pictures of lamps: a sun in a ball of glass, a bulb in a mirror.
+//!
+//! What mirrors, coats and glass show of a lamp may be smaller than a pixel and 10⁵ times as bright as what is around it. Of a
+//! picture of area A of a pixel, N samples meet A·N in the mean, and the pixel is as much in error as that number is.
+//!
+//! Where such pictures lie is searched before the render (`search.rs`): a region E of small squares about each. With G(x) the light of
+//! lamps that a path which begins at x meets before anything scatters it, and L(x) all that it finds, a sample of a pixel is
+//!
+//! ```text
+//! L(x) − [x in E] · G(x) + |E| · G(y)
+//! ```
+//!
+//! with x in the pixel and y in what it has of E. As E ∩ pixel has the same mean of G by x and by y, that of the sample is the pixel's
+//! light, whatever E is: what the search has missed is left to chance, and what it has found without cause costs time. Nothing but light
+//! is touched, neither coverage nor data of surfaces.
+
+mod search;
+
+use super::pilot::Use;
+use super::plan::{Effect, Integrator, count};
+use super::{Address, Shot, address, light_apart, place_in};
+use crate::film::Window;
+use crate::film::error::floor_about;
+use crate::film::filter::{Filter, FilterSampler};
+use crate::scene::Scene;
+use crate::transport;
+use glam::DVec2;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Tells their numbers from the picture's.
+pub const STREAM: u64 = 0x676c_696e_7473_676c;
+
+/// The regions of a picture.
+#[derive(Debug, PartialEq)]
+pub struct Glints {
+    /// Around all that have one.
+    window: Window,
+    /// Whether a pixel of the window has one.
+    has: Vec<bool>,
+    /// By pixel, in order.
+    regions: Vec<([i32; 2], Region)>,
+}
+
+/// What a pixel has of E.
+#[derive(Debug, PartialEq)]
+pub struct Region {
+    /// Squares along the pixel are two to this.
+    level: u32,
+    /// Squares by their places in the curve that visits quarters before their quarters (Morton 1966), in order: numbers next to each other
+    /// are squares near each other.
+    squares: Vec<u32>,
+    /// Paths from it for each sample of the pixel.
+    pub paths: u32,
+}
+
+impl Region {
+    /// Of squares, columns and rows of 2^`level` along the pixel.
+    fn new(level: u32, squares: impl IntoIterator<Item = [u32; 2]>, paths: u32) -> Region {
+        let mut squares: Vec<u32> = squares.into_iter().map(|[x, y]| spread(x) | spread(y) << 1).collect();
+        squares.sort_unstable();
+        squares.dedup();
+        Region { level, squares, paths }
+    }
+
+    /// Whether it has a place in the pixel, from its corner.
+    #[must_use]
+    pub fn holds(&self, place: DVec2) -> bool {
+        let side = f64::from(1u32 << self.level);
+        let [x, y] = (place * side).to_array().map(|x| (x.max(0.0) as u32).min((1 << self.level) - 1));
+        self.squares.binary_search(&(spread(x) | spread(y) << 1)).is_ok()
+    }
+
+    /// The place, from the corner of the pixel, that is found by `u`, uniform in the unit square.
+    #[must_use]
+    pub fn place(&self, u: DVec2) -> DVec2 {
+        let at = u.x * self.squares.len() as f64;
+        let i = (at as usize).min(self.squares.len() - 1);
+        let corner = [self.squares[i], self.squares[i] >> 1].map(|code| f64::from(gathered(code)));
+        (DVec2::from(corner) + DVec2::new((at - i as f64).min(1.0), u.y)) / f64::from(1u32 << self.level)
+    }
+
+    /// Its share of the pixel.
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        self.squares.len() as f64 / f64::from(1u32 << self.level).powi(2)
+    }
+}
+
+/// The low 16 bits of `x`, each before a bit of nothing.
+fn spread(x: u32) -> u32 {
+    [(8, 0x00ff_00ff), (4, 0x0f0f_0f0f), (2, 0x3333_3333), (1, 0x5555_5555)]
+        .into_iter()
+        .fold(x & 0xffff, |x, (by, mask)| (x | x << by) & mask)
+}
+
+/// Every second bit of `x`, from the lowest on.
+fn gathered(x: u32) -> u32 {
+    [(1, 0x3333_3333), (2, 0x0f0f_0f0f), (4, 0x00ff_00ff), (8, 0x0000_ffff)]
+        .into_iter()
+        .fold(x & 0x5555_5555, |x, (by, mask)| (x | x >> by) & mask)
+}
+
+impl Glints {
+    /// Of regions by their pixels, in order; none of none.
+    fn new(regions: Vec<([i32; 2], Region)>) -> Option<Glints> {
+        let (first, _) = regions.first()?;
+        let bounds = regions.iter().fold([*first, *first], |[low, high], (pixel, _)| {
+            [[low[0].min(pixel[0]), low[1].min(pixel[1])], [high[0].max(pixel[0]), high[1].max(pixel[1])]]
+        });
+        let [low, high] = bounds;
+        let window = Window {
+            x: low[0],
+            y: low[1],
+            width: (high[0] - low[0]) as u32 + 1,
+            height: (high[1] - low[1]) as u32 + 1,
+        };
+        let mut has = vec![false; window.pixels()];
+        for (pixel, _) in &regions {
+            if let Some(index) = window.index(*pixel) {
+                has[index] = true;
+            }
+        }
+        Some(Glints { window, has, regions })
+    }
+
+    /// What a pixel has of E, if anything.
+    #[must_use]
+    #[inline]
+    pub fn of(&self, pixel: [i32; 2]) -> Option<&Region> {
+        let index = self.window.index(pixel)?;
+        if !self.has[index] {
+            return None;
+        }
+        let place = self.regions.binary_search_by_key(&pixel, |(pixel, _)| *pixel).ok()?;
+        Some(&self.regions[place].1)
+    }
+}
+
+/// Searches the pictures of lamps that are seen in `window` of a picture of `samples` a pixel, and says what it has found; nothing
+/// where no lamp can be met. Where `goes_on` is false it ends, and what is returned means nothing.
+#[must_use]
+pub fn find(
+    shot: &Shot,
+    moments: &[Scene],
+    window: Window,
+    samples: u32,
+    wish: Use,
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> (Option<Arc<Glints>>, Option<Effect>) {
+    let Shot { scene, plan, filter, .. } = *shot;
+    let Integrator::Path(settings) = &plan.integrator else { return (None, None) };
+    let say = |on: bool, reason: String| Some(Effect { name: "small pictures of lamps".into(), on, reason });
+    let lamps = search::lamps(scene);
+    if lamps.is_empty() || settings.scatter_samples == 0 {
+        return (None, None);
+    }
+    let off = if wish == Use::Off {
+        Some("the scene says so".to_owned())
+    } else if scene.camera.lens.is_some() {
+        Some("a lens blurs them".to_owned())
+    } else if !moments.is_empty() {
+        Some("things move while the shutter is open".to_owned())
+    } else if !is_box(filter) {
+        Some("the filter is no box".to_owned())
+    } else if lamps.len() > search::MOST_LAMPS {
+        Some(format!("there are more than {} lamps", search::MOST_LAMPS))
+    } else if samples < search::FEWEST && wish == Use::Auto {
+        Some(format!("fewer than {} samples do not pay for the search", search::FEWEST))
+    } else {
+        None
+    };
+    if let Some(reason) = off {
+        return (None, say(false, reason));
+    }
+    let typical = Typical::of(shot);
+    let mean = typical.mean / f64::from(scene.light_unit());
+    let Some(mut regions) = search::regions(scene, &lamps, window, samples, mean, goes_on) else {
+        return (None, say(false, format!("there are more than {}", search::MOST_PICTURES)));
+    };
+    if regions.is_empty() {
+        return (None, say(false, "none is seen in mirrors or glass".into()));
+    }
+    if wish == Use::Auto {
+        let pays = |(pixel, region): ([i32; 2], Region)| typical.pays(shot, pixel, &region).then_some((pixel, region));
+        regions = regions.into_par_iter().filter(|_| goes_on()).filter_map(pays).collect();
+    }
+    match Glints::new(regions) {
+        None => (None, say(false, "chance finds those that are seen often enough".into())),
+        Some(glints) => {
+            let paths = glints.regions.iter().map(|(_, region)| region.paths as usize).sum::<usize>();
+            let paths = count(paths, "further path", "further paths");
+            let reason = format!("{paths} for {}", count(glints.regions.len(), "pixel", "pixels"));
+            (Some(Arc::new(glints)), say(true, reason))
+        }
+    }
+}
+
+/// Pixels that are tried along a side of the picture, samples of each, and of a pixel that has a region.
+const SIDE: usize = 24;
+const TRIED: u32 = 8;
+const TRIED_THERE: u32 = 4;
+
+/// What a path of lamps alone takes of one that is followed to its end.
+const COST: f64 = 0.25;
+
+/// What a picture is like.
+struct Typical {
+    /// Mean luminance.
+    mean: f64,
+    /// Added to the square of a value: see [`floor_about`].
+    floor: f64,
+    /// Mean relative variance of the luminance of a sample.
+    variance: f64,
+}
+
+impl Typical {
+    fn of(shot: &Shot) -> Typical {
+        let shot = &Shot { seed: shot.seed ^ STREAM, ..*shot };
+        let of_block = |block: usize| {
+            let place = place_in(shot.scene, SIDE, block, DVec2::splat(0.5));
+            let mut sums = [0.0; 2];
+            for index in 0..TRIED {
+                let (sample, _) = transport::sample(shot, [place.x as u32, place.y as u32], 0, index);
+                let luminance = f64::from(sample.xyz[1]);
+                sums = [sums[0] + luminance, sums[1] + luminance * luminance];
+            }
+            mean_and_variance(sums, TRIED)
+        };
+        let tried: Vec<[f64; 2]> = (0..SIDE * SIDE).into_par_iter().map(of_block).collect();
+        let all = tried.len() as f64;
+        let mean = tried.iter().map(|[mean, _]| mean).sum::<f64>() / all;
+        let floor = floor_about(mean);
+        let relative = |[mean, variance]: &[f64; 2]| if floor > 0.0 { variance / (mean * mean + floor) } else { 0.0 };
+        let variance = tried.iter().map(relative).sum::<f64>() / all;
+        Typical { mean, floor, variance }
+    }
+
+    /// Whether the paths of a region gain more than as many would that are spread over the picture.
+    fn pays(&self, shot: &Shot, pixel: [i32; 2], region: &Region) -> bool {
+        let Integrator::Path(settings) = &shot.plan.integrator else { return false };
+        let shot = Shot { seed: shot.seed ^ STREAM, ..*shot };
+        let (mut rest, mut lamps) = (0.0, [0.0; 2]);
+        for index in 0..TRIED_THERE {
+            let [of_rest, of_lamps, squares] =
+                light_apart(&shot, settings, Address { pixel: address(pixel), replicate: 0, index }, region);
+            rest += of_rest;
+            lamps = [lamps[0] + of_lamps, lamps[1] + squares];
+        }
+        let [rest, mean, squares] = [rest, lamps[0], lamps[1]].map(|sum| sum / f64::from(TRIED_THERE));
+        // Of light met by chance.
+        let (value, variance) = (rest + region.area() * mean, region.area() * squares);
+        variance > (value * value + self.floor) * COST * f64::from(region.paths) * self.variance
+    }
+}
+
+/// Mean and variance of `count` numbers, given their sum and that of their squares.
+fn mean_and_variance([sum, squares]: [f64; 2], count: u32) -> [f64; 2] {
+    let n = f64::from(count);
+    [sum / n, ((squares - sum * sum / n) / (n - 1.0)).max(0.0)]
+}
+
+/// Whether a pixel takes all of its own area alike.
+fn is_box(filter: &FilterSampler) -> bool {
+    filter.filter() == Filter::Box
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Squares are found in any order once, hold what is drawn in them and nothing beyond, and have all of their area alike.
+    #[test]
+    fn places_of_a_region_lie_in_it() {
+        let squares = [[5, 2], [0, 0], [7, 7], [5, 2], [5, 3]];
+        let region = Region::new(3, squares, 1);
+        assert_eq!(region.squares.len(), 4);
+        assert!((region.area() - 4.0 / 64.0).abs() < 1e-15);
+        let mut counts = [[0; 8]; 8];
+        for i in 0..400 {
+            let place = region.place(DVec2::new((f64::from(i) + 0.5) / 400.0, f64::from(i * 7 % 400) / 400.0));
+            assert!(region.holds(place));
+            counts[(place.y * 8.0) as usize][(place.x * 8.0) as usize] += 1;
+        }
+        for (y, row) in counts.iter().enumerate() {
+            for (x, &drawn) in row.iter().enumerate() {
+                let is_in = squares.contains(&[x as u32, y as u32]);
+                assert_eq!(drawn, if is_in { 100 } else { 0 }, "{x} {y}");
+                assert_eq!(region.holds((DVec2::new(x as f64, y as f64) + 0.5) / 8.0), is_in);
+            }
+        }
+        assert!(region.holds(region.place(DVec2::ONE)));
+        for x in [0, 1, 77, 4095, 65535] {
+            assert_eq!(gathered(spread(x)), x);
+        }
+    }
+
+    #[test]
+    fn regions_are_found_by_their_pixels() {
+        assert_eq!(Glints::new(Vec::new()), None);
+        let pixels = [[-3, 2], [-3, 9], [4, 2]];
+        let glints = Glints::new(pixels.iter().map(|&pixel| (pixel, Region::new(1, [[0, 1]], 1))).collect())
+            .expect("there are some");
+        for y in 0..12 {
+            for x in -5..8 {
+                assert_eq!(glints.of([x, y]).is_some(), pixels.contains(&[x, y]), "{x} {y}");
+            }
+        }
+    }
+}

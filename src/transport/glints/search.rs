@@ -1,0 +1,534 @@
+//! Where small pictures of lamps lie.
+//!
+//! From places spread over the picture rays follow every row of mirrors, coats and glass, both ways at each, three side by side. How far
+//! the first of them goes past a lamp, and how much less the two beside it do, tells by Newton's method where on the picture one would
+//! meet the lamp's middle. There the same derivative J, of the miss in radii of the lamp by the place, tells what the picture of the lamp
+//! is: the ellipse |J Δx| ≤ 1. Where wavelengths part each has its own.
+
+use super::Region;
+use crate::film::Window;
+use crate::math::{Frame, Ray};
+use crate::optics::bsdf::{Bsdf, Lobes};
+use crate::optics::dielectric::{Dielectric, RelativeIndex, refract};
+use crate::scene::light::Light;
+use crate::scene::material::Kind;
+use crate::scene::shape::Shape;
+use crate::scene::{Geometry, Hit, Scene, SurfacePoint};
+use crate::spectrum::{LANES, Lanes, Spectrum};
+use arrayvec::ArrayVec;
+use glam::{DMat2, DVec2, DVec3};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, HashMap};
+
+/// The fewest samples for which it is searched, and those from which on it is searched between, too.
+pub(super) const FEWEST: u32 = 16;
+const MANY: u32 = 64;
+
+/// The most lamps, and the most pictures of them: ripples on water show thousands, which chance meets.
+pub(super) const MOST_LAMPS: usize = 16;
+pub(super) const MOST_PICTURES: usize = 10_000;
+
+/// Surfaces that a row has at the most.
+const DEPTH: usize = 6;
+
+/// The least luminance of a picture, over that of all.
+const FAINTEST: f64 = 2.0;
+
+/// Pixels between places from which it is searched, and how far from one a picture may lie.
+const APART: [i32; 2] = [4, 2];
+const REACH: f64 = 6.0;
+
+/// Steps to a picture at the most, and the part of its smaller half axis that the last one may have.
+const STEPS: usize = 16;
+const LAST: f64 = 0.05;
+
+/// Between rays side by side, in pixels, and in half axes once they are known.
+const BESIDE: f64 = 1e-4;
+
+/// Half of the greater axis of what is a small picture, and the least and the most that half of the smaller may be, in pixels.
+const LARGEST: f64 = 8.0;
+const SMALLEST: f64 = 1.0 / 2048.0;
+const WIDEST: f64 = 1.5;
+
+/// Squares along half of the smaller axis of an ellipse.
+const SQUARES: f64 = 3.0;
+
+/// Beyond an ellipse by this part of it are still squares: it is not quite one.
+const MARGIN: f64 = 1.1;
+
+/// Paths for each sample of a pixel: as many as the root of one over the chance of the rarest of its rows, times this; and the most.
+const PATHS: f64 = 2.0;
+const MOST_PATHS: f64 = 32.0;
+
+/// Squares of a pixel at the most, and how often it is halved.
+const MOST_SQUARES: usize = 1 << 12;
+const MOST_LEVEL: u32 = 10;
+
+/// The wavelength that is searched by, and those between which the others are, where they part; how often these are halved.
+const NM: f64 = 550.0;
+const ENDS: [f64; 2] = [390.0, 710.0];
+const PARTS: u32 = 16;
+const HALVINGS: u32 = 3;
+
+/// A lamp.
+pub(super) struct Lamp {
+    shines: Shines,
+    /// Of the brightest that it has, film units.
+    luminance: f64,
+}
+
+enum Shines {
+    /// An object, by a ball around it.
+    Object { object: u32, middle: DVec3, radius: f64 },
+    /// A disc at infinity: toward its middle, and the sine of half its angle.
+    Disc { toward: DVec3, radius: f64 },
+}
+
+/// The lamps whose pictures may be small.
+pub(super) fn lamps(scene: &Scene) -> Vec<Lamp> {
+    let of = |light: &Light| {
+        let shines = match light {
+            Light::Area { object, .. } => {
+                let thing = &scene.objects[*object as usize];
+                let bounds = thing.bounds();
+                let half = 0.5 * (bounds.max - bounds.min);
+                let radius = match &thing.geometry {
+                    Geometry::Shape(Shape::Sphere(_)) => half.x,
+                    _ => half.length(),
+                };
+                Shines::Object { object: *object, middle: bounds.min + half, radius }
+            }
+            Light::Environment(map) => {
+                let (toward, half_angle) = map.sun_disc()?;
+                Shines::Disc { toward, radius: libm::sin(half_angle) }
+            }
+            _ => return None,
+        };
+        let luminance = light.spectra().iter().map(Spectrum::luminance).fold(0.0, f64::max);
+        Some(Lamp { shines, luminance })
+    };
+    scene.lights.iter().filter_map(of).filter(Lamp::is_finite).collect()
+}
+
+impl Lamp {
+    fn is_finite(&self) -> bool {
+        match self.shines {
+            Shines::Object { middle, radius, .. } => middle.is_finite() && radius.is_finite() && radius > 0.0,
+            Shines::Disc { radius, .. } => radius > 0.0,
+        }
+    }
+
+    /// Toward its middle from `from`, and the sine of half of its angle; `None` from within.
+    fn seen(&self, from: DVec3) -> Option<(DVec3, f64)> {
+        match self.shines {
+            Shines::Object { middle, radius, .. } => {
+                let to = middle - from;
+                let distance = to.length();
+                (distance > radius).then(|| (to / distance, radius / distance))
+            }
+            Shines::Disc { toward, radius } => Some((toward, radius)),
+        }
+    }
+
+    /// How far the first of three rays goes past its middle, in radii, and the derivative of that by the place on the picture, which is
+    /// `step` apart.
+    fn miss(&self, rays: &[Ray; 3], step: f64) -> Option<(DVec2, DMat2)> {
+        let (toward, sine) = self.seen(rays[0].origin)?;
+        if rays[0].direction.dot(toward) <= 0.0 {
+            return None;
+        }
+        let frame = Frame::from_normal(toward);
+        let off = |ray: &Ray| {
+            let error = ray.direction - self.seen(ray.origin)?.0;
+            Some(DVec2::new(error.dot(frame.s), error.dot(frame.t)) / sine)
+        };
+        let [here, right, down] = [off(&rays[0])?, off(&rays[1])?, off(&rays[2])?];
+        let slopes = DMat2::from_cols((right - here) / step, (down - here) / step);
+        (slopes.determinant().abs() > 0.0 && slopes.is_finite()).then_some((here, slopes))
+    }
+}
+
+/// What a ray does at a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Turn {
+    Mirrored,
+    Through,
+}
+
+type Turns = ArrayVec<Turn, DEPTH>;
+
+/// A surface that a ray has met.
+struct Met<'a> {
+    hit: Hit,
+    surface: SurfacePoint,
+    frame: Frame,
+    bsdf: Bsdf<'a>,
+}
+
+/// Where on the picture one meets the middle of a lamp.
+#[derive(Clone, Debug)]
+struct Picture {
+    lamp: usize,
+    turns: Turns,
+    /// In pixels.
+    place: DVec2,
+    /// The miss in radii by the place.
+    slopes: DMat2,
+    left: Share,
+}
+
+/// What is left along a row.
+#[derive(Clone, Copy, Debug)]
+struct Share {
+    /// Of the light.
+    light: f64,
+    /// How often a path finds the lamp behind: what is mirrored last is looked at without chance (`path/mirrored.rs`).
+    chance: f64,
+    /// Whether wavelengths have parted.
+    parts: bool,
+}
+
+impl Share {
+    const ALL: Share = Share { light: 1.0, chance: 1.0, parts: false };
+
+    /// After a turn with this share of the light, at what parts wavelengths or not.
+    fn after(self, turn: Turn, share: f64, parts: bool) -> Share {
+        let light = self.light * share;
+        match turn {
+            Turn::Mirrored => Share { light, chance: self.light, ..self },
+            Turn::Through => Share { light, chance: light, parts: self.parts || parts },
+        }
+    }
+}
+
+impl Picture {
+    /// Halves of its axes, the greater first, in pixels.
+    fn half_axes(&self) -> [f64; 2] {
+        // Singular values of the slopes.
+        let DMat2 { x_axis, y_axis } = self.slopes;
+        let (sum, product) = (x_axis.length_squared() + y_axis.length_squared(), self.slopes.determinant().abs());
+        let root = (sum * sum - 4.0 * product * product).max(0.0).sqrt();
+        let greatest = (0.5 * (sum + root)).sqrt();
+        [greatest / product, 1.0 / greatest]
+    }
+
+    fn is_small(&self) -> bool {
+        let [greater, smaller] = self.half_axes();
+        greater <= LARGEST && (SMALLEST..=WIDEST).contains(&smaller)
+    }
+
+    /// How far a place is from its middle, in its radii.
+    fn radii(&self, place: DVec2) -> f64 {
+        (self.slopes * (place - self.place)).length()
+    }
+}
+
+/// What the pixels of `window` have of small pictures, which rows of sharp things that begin there or near show, where they are brighter
+/// than the `mean` luminance of all that is seen; `None` if they are too many. Where `goes_on` is false what is returned means nothing.
+pub(super) fn regions(
+    scene: &Scene,
+    lamps: &[Lamp],
+    window: Window,
+    samples: u32,
+    mean: f64,
+    goes_on: &(dyn Fn() -> bool + Sync),
+) -> Option<Vec<([i32; 2], Region)>> {
+    let brightest = lamps.iter().map(|lamp| lamp.luminance).fold(0.0, f64::max);
+    let search = Search { scene, lamps, least: FAINTEST * mean, brightest };
+    let apart = APART[usize::from(samples >= MANY)];
+    // A picture is found from all places that are near it, whatever is rendered of it: beyond the window, too.
+    let margin = (REACH + LARGEST) as i32 + apart;
+    let range = |start: i32, size: u32| {
+        let (low, high) = (start.saturating_sub(margin), start.saturating_add_unsigned(size).saturating_add(margin));
+        low.div_euclid(apart)..high.div_euclid(apart) + 1
+    };
+    let places = |x: i32, y: i32| (DVec2::new(f64::from(x), f64::from(y)) + 0.5) * f64::from(apart);
+    let columns = range(window.x, window.width);
+    let rows: Vec<Vec<Picture>> = range(window.y, window.height)
+        .into_par_iter()
+        .map(|y| columns.clone().take_while(|_| goes_on()).flat_map(|x| search.from(places(x, y))).collect())
+        .collect();
+    let mut pictures: Vec<Picture> = Vec::new();
+    // By the pixel that each lies in: the same one is found from several places, some part of its size apart.
+    let mut known: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
+    for picture in rows.into_iter().flatten() {
+        let [x, y] = picture.place.floor().to_array().map(|x| x as i64);
+        let near = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy]));
+        let is_same = |i: &usize| {
+            let other = &pictures[*i];
+            other.lamp == picture.lamp && other.turns == picture.turns && other.radii(picture.place) < 1.0
+        };
+        if !near.filter_map(|pixel| known.get(&pixel)).flatten().any(is_same) {
+            known.entry([x, y]).or_default().push(pictures.len());
+            pictures.push(picture);
+        }
+    }
+    if pictures.len() > MOST_PICTURES {
+        return None;
+    }
+    let ellipses: Vec<Picture> =
+        pictures.par_iter().flat_map_iter(|picture| search.of_all_wavelengths(picture)).collect();
+    Some(covered(&ellipses, window))
+}
+
+struct Search<'a> {
+    scene: &'a Scene,
+    lamps: &'a [Lamp],
+    /// Luminance of a picture that is worth finding, and of the brightest lamp.
+    least: f64,
+    brightest: f64,
+}
+
+impl Search<'_> {
+    /// Rays of the camera at a place and `step` to the right and down from it.
+    fn rays(&self, place: DVec2, step: f64) -> [Ray; 3] {
+        [DVec2::ZERO, DVec2::X, DVec2::Y].map(|to| self.scene.camera.ray(place + to * step, || DVec2::splat(0.5)))
+    }
+
+    /// The pictures that are found from `place`.
+    fn from(&self, place: DVec2) -> Vec<Picture> {
+        let mut found = Vec::new();
+        self.follow(place, self.rays(place, BESIDE), &mut Turns::new(), Share::ALL, &mut found);
+        found
+    }
+
+    /// Looks for lamps along `rays`, which begin at `place` and have come to where they are by `turns`, and follows them on.
+    fn follow(&self, place: DVec2, rays: [Ray; 3], turns: &mut Turns, left: Share, found: &mut Vec<Picture>) {
+        for (lamp, of) in self.lamps.iter().enumerate() {
+            if left.light * of.luminance < self.least {
+                continue;
+            }
+            let Some((miss, slopes)) = of.miss(&rays, BESIDE) else { continue };
+            let step = slopes.inverse() * miss;
+            if step.length() <= REACH {
+                let seed = Picture { lamp, turns: turns.clone(), place: place - step, slopes, left };
+                if let Some(picture) = self.settle(seed, place, NM) {
+                    found.push(picture);
+                }
+            }
+        }
+        if turns.is_full() {
+            return;
+        }
+        let Some(met) = self.meet(&rays[0], NM) else { return };
+        let beside = [1, 2].map(|i| self.meet(&rays[i], NM).filter(|other| other.hit.object == met.hit.object));
+        let [Some(right), Some(down)] = beside else { return };
+        for turn in [Turn::Mirrored, Turn::Through] {
+            let Some((first, share)) = self.turn(&rays[0], &met, turn) else { continue };
+            let left = left.after(turn, share, met.parts());
+            if left.light * self.brightest < self.least {
+                continue;
+            }
+            let others = [(&rays[1], &right), (&rays[2], &down)].map(|(ray, met)| self.turn(ray, met, turn));
+            let [Some((right, _)), Some((down, _))] = others else { continue };
+            turns.push(turn);
+            self.follow(place, [first, right, down], turns, left, found);
+            turns.pop();
+        }
+    }
+
+    /// The picture that a `seed` leads to for the wavelength `nm`, no farther from `start` than is searched; `None` where it leads to none, or
+    /// to one that is hidden or not small.
+    fn settle(&self, seed: Picture, start: DVec2, nm: f64) -> Option<Picture> {
+        let lamp = &self.lamps[seed.lamp];
+        let mut picture = seed;
+        // Where it was before, and how far from the lamp: a step that leads off the row, or farther away, is too long.
+        let (mut before, mut least) = (start, f64::INFINITY);
+        for _ in 0..STEPS {
+            let near = picture.place.distance(start) <= REACH;
+            let end = near.then(|| self.end(&picture, nm)).flatten();
+            let Some((last, miss, slopes)) = end.filter(|(_, miss, _)| miss.length() < least) else {
+                picture.place = 0.5 * (picture.place + before);
+                continue;
+            };
+            (before, least, picture.slopes) = (picture.place, miss.length(), slopes);
+            if least <= LAST {
+                return (picture.is_small() && self.is_met(&last, lamp)).then_some(picture);
+            }
+            let correction = slopes.inverse() * miss;
+            picture.place -= correction * (REACH / correction.length()).min(1.0);
+        }
+        None
+    }
+
+    /// The ray that the row of a picture ends with, how far it misses the lamp, and the derivative of that.
+    fn end(&self, picture: &Picture, nm: f64) -> Option<(Ray, DVec2, DMat2)> {
+        let step = BESIDE.min(0.1 * picture.half_axes()[1]);
+        let mut rays = self.rays(picture.place, step);
+        for &turn in &picture.turns {
+            for ray in &mut rays {
+                *ray = self.meet(ray, nm).and_then(|met| self.turn(ray, &met, turn))?.0;
+            }
+        }
+        let (miss, slopes) = self.lamps[picture.lamp].miss(&rays, step)?;
+        Some((rays[0], miss, slopes))
+    }
+
+    /// Whether the ray meets the lamp first.
+    fn is_met(&self, ray: &Ray, lamp: &Lamp) -> bool {
+        let hit = self.scene.closest(ray, f64::INFINITY);
+        match lamp.shines {
+            Shines::Object { object, .. } => hit.is_some_and(|hit| hit.object == object),
+            Shines::Disc { .. } => hit.is_none(),
+        }
+    }
+
+    /// The same picture for wavelengths that part, no further from each other than it is wide; itself alone where they do not.
+    fn of_all_wavelengths(&self, picture: &Picture) -> Vec<Picture> {
+        if !picture.left.parts {
+            return vec![picture.clone()];
+        }
+        let mut all = Vec::new();
+        for end in ENDS {
+            let mut last = picture.clone();
+            let (mut from, whole) = (NM, (end - NM) / f64::from(PARTS / 2));
+            while (end - from) * whole.signum() > 1e-9 {
+                let mut step = whole;
+                let mut next = self.settle(last.clone(), last.place, from + step);
+                for _ in 0..HALVINGS {
+                    if next.as_ref().is_some_and(|next| last.radii(next.place) <= 1.0) {
+                        break;
+                    }
+                    step *= 0.5;
+                    next = self.settle(last.clone(), last.place, from + step);
+                }
+                from += step;
+                let Some(next) = next else { break };
+                all.push(next.clone());
+                last = next;
+            }
+        }
+        all.push(picture.clone());
+        all
+    }
+
+    /// The first surface along a ray; `None` where nothing is, a lamp, or what is made of others.
+    fn meet(&self, ray: &Ray, nm: f64) -> Option<Met<'_>> {
+        let hit = self.scene.closest(ray, f64::INFINITY)?;
+        let object = &self.scene.objects[hit.object as usize];
+        let material = &self.scene.materials[object.material as usize];
+        if object.light.is_some() || matches!(material.kind, Kind::Compound(_) | Kind::Boundary) {
+            return None;
+        }
+        let surface = self.scene.surface(ray, &hit);
+        let bsdf = material.bsdf(&hit.texture_point(&surface), Lanes::splat(nm as f32), false);
+        let sharp = matches!(
+            bsdf,
+            Bsdf::Mirror { .. } | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::Thin { .. } | Bsdf::Plastic(_)
+        );
+        let wo = -ray.direction;
+        let flip = material.two_sided && wo.dot(surface.normal) < 0.0;
+        let normal = if flip { -surface.shading_normal } else { surface.shading_normal };
+        sharp.then(|| Met { hit, frame: Frame::from_normal_and_tangent(normal, surface.tangent), surface, bsdf })
+    }
+
+    /// Where a ray goes on from what it has met, and with which share of its light.
+    fn turn(&self, ray: &Ray, met: &Met, turn: Turn) -> Option<(Ray, f64)> {
+        let wo = met.frame.to_local(-ray.direction);
+        let (wi, share) = met.goes(wo, turn)?;
+        let wi = met.frame.to_world(wi);
+        Some((self.scene.leave(&met.surface, &met.hit, wi), share))
+    }
+}
+
+impl Met<'_> {
+    /// Whether wavelengths part there: told for one, as what they might have is in how it was made.
+    fn parts(&self) -> bool {
+        matches!(&self.bsdf, Bsdf::Dielectric(Dielectric { eta: RelativeIndex::Dispersive(_), .. }))
+    }
+
+    /// The direction that `turn` takes, and the share of the light.
+    fn goes(&self, wo: DVec3, turn: Turn) -> Option<(DVec3, f64)> {
+        let mirror = DVec3::new(-wo.x, -wo.y, wo.z);
+        let mean = |lanes: Lanes| f64::from(lanes.reduce_add()) / LANES as f64;
+        match (&self.bsdf, turn) {
+            (Bsdf::Mirror { reflectance }, Turn::Mirrored) if wo.z > 0.0 => Some((mirror, mean(*reflectance))),
+            (Bsdf::Conductor(metal), Turn::Mirrored) if wo.z > 0.0 => Some((mirror, mean(metal.reflectance(wo.z)))),
+            (Bsdf::Plastic(_), Turn::Mirrored) => Some((mirror, mean(self.bsdf.mirrored(wo)?))),
+            (Bsdf::Dielectric(glass), Turn::Mirrored) => Some((mirror, mean(glass.reflection(wo).weight))),
+            (Bsdf::Dielectric(glass), Turn::Through) => {
+                let eta = if wo.z > 0.0 { glass.eta.hero() } else { glass.eta.hero().recip() };
+                let cos2 = 1.0 - (1.0 - wo.z * wo.z) / (eta * eta);
+                let share = 1.0 - mean(glass.reflection(wo).weight);
+                (cos2 > 0.0).then(|| (refract(wo, DVec3::Z * wo.z.signum(), eta, cos2.sqrt()), share))
+            }
+            (Bsdf::Thin { .. }, Turn::Mirrored) => Some((mirror, 0.1)),
+            (Bsdf::Thin { .. }, Turn::Through) => Some((-wo, 0.9)),
+            _ => None,
+        }
+    }
+}
+
+/// The squares of the ellipses of `pictures` in the pixels of `window`.
+fn covered(pictures: &[Picture], window: Window) -> Vec<([i32; 2], Region)> {
+    let mut by_pixel: BTreeMap<[i32; 2], Vec<&Picture>> = BTreeMap::new();
+    for picture in pictures {
+        // Half of the box around an ellipse: lengths of the rows of the inverse of its slopes.
+        let axes = picture.slopes.inverse();
+        let half = DVec2::new(axes.row(0).length(), axes.row(1).length()) * MARGIN;
+        let [low, high] =
+            [picture.place - half, picture.place + half].map(|at| at.floor().to_array().map(|x| x as i32));
+        for y in low[1]..=high[1] {
+            for x in low[0]..=high[0] {
+                if window.index([x, y]).is_some() {
+                    by_pixel.entry([x, y]).or_default().push(picture);
+                }
+            }
+        }
+    }
+    let of = |(pixel, pictures): ([i32; 2], Vec<&Picture>)| {
+        let region = region(pixel, &pictures);
+        (!region.squares.is_empty()).then_some((pixel, region))
+    };
+    by_pixel.into_iter().collect::<Vec<_>>().into_par_iter().filter_map(of).collect()
+}
+
+/// The squares of a pixel that ellipses cover, as small as the smallest of these needs, or fewer if they are too many.
+fn region(pixel: [i32; 2], pictures: &[&Picture]) -> Region {
+    let rarest = pictures.iter().map(|picture| picture.left.chance).fold(1.0, f64::min);
+    let paths = (PATHS / rarest.sqrt()).round().clamp(1.0, MOST_PATHS) as u32;
+    let smallest = pictures.iter().map(|picture| picture.half_axes()[1]).fold(f64::INFINITY, f64::min);
+    let wanted = libm::log2(SQUARES / smallest).ceil().clamp(0.0, f64::from(MOST_LEVEL)) as u32;
+    for level in (0..=wanted).rev() {
+        let mut squares = Vec::new();
+        for picture in pictures {
+            if squares.len() <= 4 * MOST_SQUARES {
+                cover(pixel, picture, level, &mut squares);
+            }
+        }
+        if level > 0 && squares.len() > 4 * MOST_SQUARES {
+            continue;
+        }
+        let region = Region::new(level, squares, paths);
+        if level == 0 || region.squares.len() <= MOST_SQUARES {
+            return region;
+        }
+    }
+    Region::new(0, [[0, 0]], paths)
+}
+
+/// Adds the squares of a pixel that a picture covers: those whose middles are in the ellipse and a margin that half a square has.
+fn cover([x, y]: [i32; 2], picture: &Picture, level: u32, squares: &mut Vec<[u32; 2]>) {
+    let side = 1u32 << level;
+    let size = 1.0 / f64::from(side);
+    let DMat2 { x_axis: a, y_axis: b } = picture.slopes;
+    let reach = MARGIN + std::f64::consts::FRAC_1_SQRT_2 * size / picture.half_axes()[1];
+    let corner = DVec2::new(f64::from(x), f64::from(y)) - picture.place;
+    let clamped = |at: f64| at.clamp(0.0, f64::from(side)) as u32;
+    // Half of its height: the length of a row of the inverse of its slopes.
+    let half = picture.slopes.inverse().row(1).length() * reach;
+    let [low, high] = [-half, half].map(|to| (to - corner.y) / size);
+    for row in clamped(low.floor())..clamped(high.ceil()) {
+        // |a dx + b dy|² ≤ reach² between two roots of dx.
+        let dy = corner.y + (f64::from(row) + 0.5) * size;
+        let (p, q, r) = (a.length_squared(), a.dot(b) * dy, b.length_squared() * dy * dy - reach * reach);
+        let root = q * q - p * r;
+        if root < 0.0 {
+            continue;
+        }
+        let [low, high] = [-1.0, 1.0].map(|sign| ((-q + sign * root.sqrt()) / p - corner.x) / size - 0.5);
+        for column in clamped(low.ceil())..clamped(high.floor() + 1.0) {
+            squares.push([column, row]);
+        }
+    }
+}
