@@ -177,7 +177,8 @@ impl Pane {
 }
 
 /// `wo` reflected about the local normal.
-pub(super) fn mirror(wo: DVec3) -> DVec3 {
+#[must_use]
+pub fn mirror(wo: DVec3) -> DVec3 {
     DVec3::new(-wo.x, -wo.y, wo.z)
 }
 

@@ -14,22 +14,19 @@
 //! light, whatever E is: what the search has missed is left to chance, and what it has found without cause costs time. Nothing but light
 //! is touched, neither coverage nor data of surfaces.
 
+mod light;
 mod search;
 
+use super::Shot;
 use super::pilot::Use;
 use super::plan::{Effect, Integrator, count};
-use super::{Address, Shot, address, light_apart, place_in};
 use crate::film::Window;
-use crate::film::error::floor_about;
-use crate::film::filter::{Filter, FilterSampler};
+use crate::film::filter::Filter;
 use crate::scene::Scene;
-use crate::transport;
 use glam::DVec2;
+use light::Typical;
 use rayon::prelude::*;
 use std::sync::Arc;
-
-/// Tells their numbers from the picture's.
-pub const STREAM: u64 = 0x676c_696e_7473_676c;
 
 /// The regions of a picture.
 #[derive(Debug, PartialEq)]
@@ -51,7 +48,7 @@ pub struct Region {
     /// are squares near each other.
     squares: Vec<u32>,
     /// Paths from it for each sample of the pixel.
-    pub paths: u32,
+    paths: u32,
 }
 
 impl Region {
@@ -161,7 +158,7 @@ pub fn find(
         Some("a lens blurs them".to_owned())
     } else if !moments.is_empty() {
         Some("things move while the shutter is open".to_owned())
-    } else if !is_box(filter) {
+    } else if filter.filter() != Filter::Box {
         Some("the filter is no box".to_owned())
     } else if lamps.len() > search::MOST_LAMPS {
         Some(format!("there are more than {} lamps", search::MOST_LAMPS))
@@ -194,75 +191,6 @@ pub fn find(
             (Some(Arc::new(glints)), say(true, reason))
         }
     }
-}
-
-/// Pixels that are tried along a side of the picture, samples of each, and of a pixel that has a region.
-const SIDE: usize = 24;
-const TRIED: u32 = 8;
-const TRIED_THERE: u32 = 4;
-
-/// What a path of lamps alone takes of one that is followed to its end.
-const COST: f64 = 0.25;
-
-/// What a picture is like.
-struct Typical {
-    /// Mean luminance.
-    mean: f64,
-    /// Added to the square of a value: see [`floor_about`].
-    floor: f64,
-    /// Mean relative variance of the luminance of a sample.
-    variance: f64,
-}
-
-impl Typical {
-    fn of(shot: &Shot) -> Typical {
-        let shot = &Shot { seed: shot.seed ^ STREAM, ..*shot };
-        let of_block = |block: usize| {
-            let place = place_in(shot.scene, SIDE, block, DVec2::splat(0.5));
-            let mut sums = [0.0; 2];
-            for index in 0..TRIED {
-                let (sample, _) = transport::sample(shot, [place.x as u32, place.y as u32], 0, index);
-                let luminance = f64::from(sample.xyz[1]);
-                sums = [sums[0] + luminance, sums[1] + luminance * luminance];
-            }
-            mean_and_variance(sums, TRIED)
-        };
-        let tried: Vec<[f64; 2]> = (0..SIDE * SIDE).into_par_iter().map(of_block).collect();
-        let all = tried.len() as f64;
-        let mean = tried.iter().map(|[mean, _]| mean).sum::<f64>() / all;
-        let floor = floor_about(mean);
-        let relative = |[mean, variance]: &[f64; 2]| if floor > 0.0 { variance / (mean * mean + floor) } else { 0.0 };
-        let variance = tried.iter().map(relative).sum::<f64>() / all;
-        Typical { mean, floor, variance }
-    }
-
-    /// Whether the paths of a region gain more than as many would that are spread over the picture.
-    fn pays(&self, shot: &Shot, pixel: [i32; 2], region: &Region) -> bool {
-        let Integrator::Path(settings) = &shot.plan.integrator else { return false };
-        let shot = Shot { seed: shot.seed ^ STREAM, ..*shot };
-        let (mut rest, mut lamps) = (0.0, [0.0; 2]);
-        for index in 0..TRIED_THERE {
-            let [of_rest, of_lamps, squares] =
-                light_apart(&shot, settings, Address { pixel: address(pixel), replicate: 0, index }, region);
-            rest += of_rest;
-            lamps = [lamps[0] + of_lamps, lamps[1] + squares];
-        }
-        let [rest, mean, squares] = [rest, lamps[0], lamps[1]].map(|sum| sum / f64::from(TRIED_THERE));
-        // Of light met by chance.
-        let (value, variance) = (rest + region.area() * mean, region.area() * squares);
-        variance > (value * value + self.floor) * COST * f64::from(region.paths) * self.variance
-    }
-}
-
-/// Mean and variance of `count` numbers, given their sum and that of their squares.
-fn mean_and_variance([sum, squares]: [f64; 2], count: u32) -> [f64; 2] {
-    let n = f64::from(count);
-    [sum / n, ((squares - sum * sum / n) / (n - 1.0)).max(0.0)]
-}
-
-/// Whether a pixel takes all of its own area alike.
-fn is_box(filter: &FilterSampler) -> bool {
-    filter.filter() == Filter::Box
 }
 
 #[cfg(test)]

@@ -29,8 +29,8 @@ use crate::scene::watch::{self, Counts};
 use crate::scene::{DepthFog, Medium, Scene};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
-use glints::Region;
 use merge::Collection;
+use path::Sought;
 use path::together::Wanted;
 use plan::{EffectPlan, Integrator, PathSettings};
 use ways::Ledger;
@@ -41,8 +41,6 @@ pub struct Incoming {
     /// Spectral radiance of each lane, W·m⁻²·sr⁻¹·nm⁻¹, scaled so that the mean over lanes of
     /// radiance × weight estimates the integral over wavelengths.
     pub radiance: Lanes,
-    /// Light that was put aside, like `radiance`; see [`glints`].
-    pub aside: Lanes,
     /// One where the ray met something, zero where it met the background only.
     pub alpha: f32,
     /// Distance of the first surface along the axis of the camera; infinite for none, and where several paths are added.
@@ -61,7 +59,6 @@ impl Incoming {
     /// No light.
     pub const NONE: Incoming = Incoming {
         radiance: Lanes::ZERO,
-        aside: Lanes::ZERO,
         alpha: 0.0,
         depth: f64::INFINITY,
         left: Lanes::ZERO,
@@ -296,7 +293,16 @@ impl Begun {
         match integrator {
             Integrator::Path(settings) => {
                 let map = shot.photons.map(|p| p.map);
-                path::radiance(scene, plan, settings, sampler, wavelengths, (ray, self.apart), map, ledger)
+                path::radiance(
+                    scene,
+                    plan,
+                    settings,
+                    sampler,
+                    wavelengths,
+                    (ray, Sought::in_pixel(self.apart)),
+                    map,
+                    ledger,
+                )
             }
             Integrator::Whitted(settings) => whitted::radiance(scene, plan, settings, wavelengths, ray),
             Integrator::Depth => {
@@ -315,7 +321,7 @@ impl Begun {
                     hide_emitters: settings.hide_emitters,
                     ..PathSettings::default()
                 };
-                path::radiance(scene, plan, &direct, sampler, wavelengths, (ray, false), None, None)
+                path::radiance(scene, plan, &direct, sampler, wavelengths, (ray, Sought::All), None, None)
             }
             Integrator::Nothing => Incoming::NONE,
         }
@@ -343,51 +349,10 @@ impl Begun {
         if let Some(glints) = &shot.plan.glints
             && let Some(region) = glints.of(self.at.pixel.map(|x| x as i32))
         {
-            self.add_light_of(region, shot, ledger);
+            self.add_lamps(region, shot, ledger);
         }
         // All of it is there.
         self.apart = false;
-    }
-
-    #[inline(never)]
-    fn add_light_of(&mut self, region: &Region, shot: &Shot, ledger: Option<&Ledger>) {
-        let Integrator::Path(settings) = &shot.plan.integrator else { return };
-        let share = (region.area() / f64::from(region.paths)) as f32;
-        let of_one = ledger.map(|_| Ledger::new(shot.scene.light_groups.count().into()));
-        for i in 0..region.paths {
-            let found = self.light_of(region, shot, settings, i, of_one.as_ref());
-            self.sample.radiance += found.aside * share;
-            self.events += found.events;
-            if let (Some(all), Some(one)) = (ledger, &of_one) {
-                all.add(one, share);
-                one.clear();
-            }
-        }
-    }
-
-    /// The light of lamps alone along path `i` from a region of its pixel, entered in a blank `ledger` if there is one.
-    fn light_of(
-        &self,
-        region: &Region,
-        shot: &Shot,
-        settings: &PathSettings,
-        i: u32,
-        ledger: Option<&Ledger>,
-    ) -> Incoming {
-        let Begun { at, sample: PixelSample { wavelengths, place, .. }, .. } = *self;
-        let corner = DVec2::from(at.pixel.map(|x| f64::from(x as i32)));
-        // Moved alike for all samples, which stay as evenly spread.
-        let u = (place - corner + DVec2::new(PLASTIC, PLASTIC * PLASTIC) * f64::from(i)).fract_gl();
-        let index = at.index.wrapping_mul(region.paths).wrapping_add(i);
-        let sampler = Sampler::new(shot.seed ^ glints::STREAM, at.pixel, at.replicate, index);
-        let ray = shot.scene.camera.ray(corner + region.place(u), || DVec2::splat(0.5));
-        let found = path::aside(shot, settings, &sampler, wavelengths.nm, &ray, ledger);
-        let Some(fog) = shot.fog(&shot.plan.integrator) else { return found };
-        let through = 1.0 - fog.falloff.amount(found.depth) as f32;
-        if let Some(ledger) = ledger {
-            ledger.scale(through);
-        }
-        Incoming { aside: found.aside * through, ..found }
     }
 
     /// Takes what came of the ray.
@@ -473,28 +438,6 @@ fn probe(shot: &Shot, pixel: [u32; 2], replicate: u32, index: u32) -> (Incoming,
     let mut begun = Begun::blank();
     begun.begin(shot, Address { pixel, replicate, index }, &sampler);
     (begun.light(shot, &sampler, &shot.plan.integrator, None, None), begun.sample.wavelengths)
-}
-
-/// Luminance, in units of the film: what the path of a sample finds beside lamps that it meets before anything scatters it, and what paths from a
-/// region of its pixel find of such lamps, in the mean and in that of the squares.
-fn light_apart(shot: &Shot, settings: &PathSettings, at: Address, region: &Region) -> [f64; 3] {
-    let sampler = Sampler::new(shot.seed, at.pixel, at.replicate, at.index);
-    let mut begun = Begun::blank();
-    begun.begin(shot, at, &sampler);
-    begun.apart = true;
-    let luminance = |light: Lanes| {
-        let unit = shot.scene.light_unit();
-        f64::from(observer::xyz(light * unit, &begun.sample.wavelengths)[1])
-    };
-    let rest = begun.light(shot, &sampler, &shot.plan.integrator, shot.fog(&shot.plan.integrator), None);
-    let mut lamps = [0.0; 2];
-    let tried = region.paths.min(8);
-    for i in 0..tried {
-        let found = luminance(begun.light_of(region, shot, settings, i, None).aside);
-        lamps = [lamps[0] + found, lamps[1] + found * found];
-    }
-    let [mean, squares] = lamps.map(|sum| sum / f64::from(tried));
-    [luminance(rest.radiance), mean, squares]
 }
 
 /// What a further shadow ray costs with all that it takes to find its light, in rays of a path: 0.55 to 0.8 in fifteen scenes of up

@@ -19,12 +19,12 @@ pub mod reuse;
 mod state;
 pub mod together;
 
+use super::Incoming;
 use super::photons::PhotonMap;
 use super::plan::{Coverage, EffectPlan, PathSettings};
 use super::roulette::{survival, worth};
 use super::shadow::MAX_BOUNDARIES;
 use super::ways::{First, Ledger};
-use super::{Incoming, Shot};
 use crate::math::Frame;
 use crate::math::Ray;
 use crate::math::sampler::{Sampler, Set, pairs};
@@ -43,8 +43,26 @@ use reuse::Joint;
 use state::{Choice, Leaving, Path, Previous, Step, Walk};
 use std::cell::Cell;
 
-/// Light that arrives along a camera ray, entered in a `ledger` if there is one; `apart` has that of lamps that it meets before anything
-/// scatters it put aside.
+/// What light a path looks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sought {
+    /// All.
+    All,
+    /// All but that of lamps which it meets before anything scatters it; see [`crate::transport::glints`].
+    Rest,
+    /// That of these lamps alone: the path ends where something scatters it.
+    Lamps,
+}
+
+impl Sought {
+    /// By a path from anywhere in a pixel, whose lamps may be looked for `apart`.
+    #[inline(always)]
+    pub(super) fn in_pixel(apart: bool) -> Sought {
+        if apart { Sought::Rest } else { Sought::All }
+    }
+}
+
+/// The light that is `sought` along a camera ray, entered in a `ledger` if there is one.
 #[must_use]
 #[expect(clippy::too_many_arguments, reason = "all that a path is made of")]
 pub fn radiance(
@@ -53,29 +71,12 @@ pub fn radiance(
     settings: &PathSettings,
     sampler: &Sampler,
     wavelengths: &SampledWavelengths,
-    (ray, apart): (&Ray, bool),
+    (ray, sought): (&Ray, Sought),
     photons: Option<&PhotonMap>,
     ledger: Option<&Ledger>,
 ) -> Incoming {
-    let tracer = Tracer { scene, plan, settings, sampler: *sampler, nm: wavelengths.nm, photons, ledger, whole: true };
-    let mut path = Path { apart, ..Path::BLANK };
-    let walk = tracer.trace(ray, &mut path, None);
-    path.incoming(walk.alpha, walk.depth)
-}
-
-/// The light alone that [`radiance`] puts aside, entered in a `ledger` if there is one: the path ends where something scatters it.
-#[must_use]
-pub fn aside(
-    shot: &Shot,
-    settings: &PathSettings,
-    sampler: &Sampler,
-    nm: Lanes,
-    ray: &Ray,
-    ledger: Option<&Ledger>,
-) -> Incoming {
-    let Shot { scene, plan, .. } = *shot;
-    let tracer = Tracer { scene, plan, settings, sampler: *sampler, nm, photons: None, ledger, whole: false };
-    let mut path = Path { apart: true, ..Path::BLANK };
+    let tracer = Tracer { scene, plan, settings, sampler: *sampler, nm: wavelengths.nm, photons, ledger, sought };
+    let mut path = Path::BLANK;
     let walk = tracer.trace(ray, &mut path, None);
     path.incoming(walk.alpha, walk.depth)
 }
@@ -89,8 +90,7 @@ struct Tracer<'a> {
     photons: Option<&'a PhotonMap>,
     /// Where light is parted by the way it came.
     ledger: Option<&'a Ledger>,
-    /// Whether paths look for all light, and go on where something scatters them; else for that alone which is put aside.
-    whole: bool,
+    sought: Sought,
 }
 
 impl Tracer<'_> {
@@ -147,7 +147,7 @@ impl Tracer<'_> {
             if MEDIA && let Some((medium, set, draft, looks_along)) = &flying {
                 let (medium, set) = (*medium, *set);
                 let along = looks_along.then(|| self.along(path, medium, distance));
-                if let Some(along) = along.as_ref().filter(|_| self.whole) {
+                if let Some(along) = along.as_ref().filter(|_| self.sought != Sought::Lamps) {
                     self.ask_along::<CHROMATIC, MEDIA>(path, along, walk.crossings);
                 }
                 let flight = medium.arrive(draft, &path.ray, distance, self.nm, || self.sampler.walk(set));
@@ -188,7 +188,7 @@ impl Tracer<'_> {
                 }
                 Step::Scattered => seen = f64::INFINITY,
             }
-            if !(self.whole || path.specular) {
+            if self.sought == Sought::Lamps && !path.specular {
                 break;
             }
         }
@@ -287,14 +287,9 @@ impl Tracer<'_> {
             return Step::Ended;
         }
 
-        // The local frame: z is the shading normal; two-sided materials turn it to the viewer.
         let (frame, flip) = match &leaf {
             Some(leaf) => (leaf.frame, leaf.flipped),
-            None => {
-                let flip = material.two_sided && wo_world.dot(surface.normal) < 0.0;
-                let normal = seen_normal(&surface, wo_world);
-                (Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent), flip)
-            }
+            None => seen_frame(material, &surface, wo_world),
         };
         if let Some(caustics) = &self.plan.caustics {
             path.sharp = caustics.is_sharp(hit.object);
@@ -427,7 +422,7 @@ impl Tracer<'_> {
             Some(beyond) if bsdf.glass().is_some_and(|glass| glass.mirrored(wo).is_none()) => Some(beyond),
             _ => self.look_at_mirrored::<CHROMATIC, MEDIA, B>(path, bsdf, wo, at),
         };
-        if self.whole && !bsdf.is_discrete() && self.asks() {
+        if self.sought != Sought::Lamps && !bsdf.is_discrete() && self.asks() {
             let toward = path.ray.direction.dot(surface.normal);
             let inside = path.inside;
             self.ask_lights::<CHROMATIC, MEDIA>(
@@ -606,7 +601,7 @@ impl Tracer<'_> {
         self.foresee(path);
         let (u_light, u_direction) = pairs(self.sampler.set(Set::Scatter(path.vertices)));
         let next_event = self.asks() && medium.shadow_rays;
-        if next_event && self.whole {
+        if next_event && self.sought != Sought::Lamps {
             let inside = path.inside;
             let eval = |wi| {
                 let p = Lanes::splat(medium.phase.eval(point, wo, wi) as f32);
@@ -684,6 +679,15 @@ fn sided_normal(material: &Material, frame: &Frame) -> Option<DVec3> {
 /// the other.
 pub(super) fn seen_normal(surface: &SurfacePoint, wo: DVec3) -> DVec3 {
     if sides_differ(surface, wo) { surface.normal } else { surface.shading_normal }
+}
+
+/// The local frame of a surface that is seen from `wo`, whose z is the shading normal, and whether it is turned against that: two-sided
+/// materials turn it to the viewer.
+#[inline(always)]
+pub(super) fn seen_frame(material: &Material, surface: &SurfacePoint, wo: DVec3) -> (Frame, bool) {
+    let flip = material.two_sided && wo.dot(surface.normal) < 0.0;
+    let normal = seen_normal(surface, wo);
+    (Frame::from_normal_and_tangent(if flip { -normal } else { normal }, surface.tangent), flip)
 }
 
 /// Whether `wo` is on one side of the surface and on the other of its shading normal's.

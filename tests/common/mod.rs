@@ -13,7 +13,7 @@ use abbe::math::Ray;
 use abbe::math::sampler::{Sampler, Set, pairs};
 use abbe::math::statistics::Moments;
 use abbe::spectrum::{ColourSpace, LANES, Lanes, SampledWavelengths, WavelengthDistribution, observer};
-use abbe::transport::path::reuse;
+use abbe::transport::path::{Sought, reuse};
 use abbe::transport::plan::{EffectPlan, Integrator};
 use abbe::transport::{self, Incoming, path, whitted};
 use glam::{DVec2, DVec3};
@@ -153,7 +153,7 @@ impl Bench {
         let plan = whole.as_ref().unwrap_or(plan);
         match &plan.integrator {
             Integrator::Path(settings) => {
-                path::radiance(scene, plan, settings, sampler, wavelengths, (ray, false), None, None)
+                path::radiance(scene, plan, settings, sampler, wavelengths, (ray, Sought::All), None, None)
             }
             Integrator::Whitted(settings) => whitted::radiance(scene, plan, settings, wavelengths, ray),
             other => panic!("{other:?} has no light along a ray"),

@@ -177,12 +177,7 @@ pub fn trials(chosen: &Prepared) -> Vec<Trial> {
             chosen.plan.near_lamps > 0,
             about("equiangular") && !chosen.scene.near_lamps.is_empty(),
         ),
-        (
-            "glints",
-            "glints",
-            chosen.plan.glints.is_some(),
-            about("small pictures of lamps") && chosen.plan.glints.is_some(),
-        ),
+        ("glints", "glints", chosen.plan.glints.is_some(), chosen.plan.glints.is_some()),
         ("adaptive", "adaptive", chosen.plan.adaptive.is_some(), shared),
     ] {
         if cause {

@@ -8,13 +8,14 @@
 use super::Region;
 use crate::film::Window;
 use crate::math::{Frame, Ray};
-use crate::optics::bsdf::{Bsdf, Lobes};
-use crate::optics::dielectric::{Dielectric, RelativeIndex, refract};
+use crate::optics::bsdf::{Bsdf, Lobes, Pane, mirror};
+use crate::optics::dielectric::{Dielectric, RelativeIndex};
 use crate::scene::light::Light;
 use crate::scene::material::Kind;
 use crate::scene::shape::Shape;
 use crate::scene::{Geometry, Hit, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, Spectrum};
+use crate::transport::path::seen_frame;
 use arrayvec::ArrayVec;
 use glam::{DMat2, DVec2, DVec3};
 use rayon::prelude::*;
@@ -417,9 +418,7 @@ impl Search<'_> {
             Bsdf::Mirror { .. } | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::Thin { .. } | Bsdf::Plastic(_)
         );
         let wo = -ray.direction;
-        let flip = material.two_sided && wo.dot(surface.normal) < 0.0;
-        let normal = if flip { -surface.shading_normal } else { surface.shading_normal };
-        sharp.then(|| Met { hit, frame: Frame::from_normal_and_tangent(normal, surface.tangent), surface, bsdf })
+        sharp.then(|| Met { hit, frame: seen_frame(material, &surface, wo).0, surface, bsdf })
     }
 
     /// Where a ray goes on from what it has met, and with which share of its light.
@@ -439,21 +438,20 @@ impl Met<'_> {
 
     /// The direction that `turn` takes, and the share of the light.
     fn goes(&self, wo: DVec3, turn: Turn) -> Option<(DVec3, f64)> {
-        let mirror = DVec3::new(-wo.x, -wo.y, wo.z);
         let mean = |lanes: Lanes| f64::from(lanes.reduce_add()) / LANES as f64;
         match (&self.bsdf, turn) {
-            (Bsdf::Mirror { reflectance }, Turn::Mirrored) if wo.z > 0.0 => Some((mirror, mean(*reflectance))),
-            (Bsdf::Conductor(metal), Turn::Mirrored) if wo.z > 0.0 => Some((mirror, mean(metal.reflectance(wo.z)))),
-            (Bsdf::Plastic(_), Turn::Mirrored) => Some((mirror, mean(self.bsdf.mirrored(wo)?))),
-            (Bsdf::Dielectric(glass), Turn::Mirrored) => Some((mirror, mean(glass.reflection(wo).weight))),
+            (Bsdf::Mirror { reflectance }, Turn::Mirrored) if wo.z > 0.0 => Some((mirror(wo), mean(*reflectance))),
+            (Bsdf::Conductor(metal), Turn::Mirrored) if wo.z > 0.0 => Some((mirror(wo), mean(metal.reflectance(wo.z)))),
+            (Bsdf::Plastic(_), Turn::Mirrored) => Some((mirror(wo), mean(self.bsdf.mirrored(wo)?))),
+            (Bsdf::Dielectric(glass), Turn::Mirrored) => Some((mirror(wo), mean(glass.reflection(wo).weight))),
             (Bsdf::Dielectric(glass), Turn::Through) => {
-                let eta = if wo.z > 0.0 { glass.eta.hero() } else { glass.eta.hero().recip() };
-                let cos2 = 1.0 - (1.0 - wo.z * wo.z) / (eta * eta);
-                let share = 1.0 - mean(glass.reflection(wo).weight);
-                (cos2 > 0.0).then(|| (refract(wo, DVec3::Z * wo.z.signum(), eta, cos2.sqrt()), share))
+                let (sample, share) = glass.go_through(wo)?;
+                sample.transmitted.then_some((sample.wi, share))
             }
-            (Bsdf::Thin { .. }, Turn::Mirrored) => Some((mirror, 0.1)),
-            (Bsdf::Thin { .. }, Turn::Through) => Some((-wo, 0.9)),
+            (Bsdf::Thin { eta, thickness, .. }, turn) => {
+                let through = Pane::new(wo.z.abs(), eta, *thickness).share;
+                Some(if turn == Turn::Through { (-wo, through) } else { (mirror(wo), 1.0 - through) })
+            }
             _ => None,
         }
     }
@@ -489,46 +487,38 @@ fn region(pixel: [i32; 2], pictures: &[&Picture]) -> Region {
     let paths = (PATHS / rarest.sqrt()).round().clamp(1.0, MOST_PATHS) as u32;
     let smallest = pictures.iter().map(|picture| picture.half_axes()[1]).fold(f64::INFINITY, f64::min);
     let wanted = libm::log2(SQUARES / smallest).ceil().clamp(0.0, f64::from(MOST_LEVEL)) as u32;
-    for level in (0..=wanted).rev() {
-        let mut squares = Vec::new();
-        for picture in pictures {
-            if squares.len() <= 4 * MOST_SQUARES {
-                cover(pixel, picture, level, &mut squares);
-            }
-        }
-        if level > 0 && squares.len() > 4 * MOST_SQUARES {
-            continue;
-        }
-        let region = Region::new(level, squares, paths);
-        if level == 0 || region.squares.len() <= MOST_SQUARES {
+    let mut level = wanted;
+    loop {
+        let all = pictures.iter().flat_map(|picture| squares(pixel, picture, level));
+        let covered: Vec<[u32; 2]> = all.take(4 * MOST_SQUARES + 1).collect();
+        let fits = covered.len() <= 4 * MOST_SQUARES;
+        let region = Region::new(level, covered, paths);
+        if level == 0 || fits && region.squares.len() <= MOST_SQUARES {
             return region;
         }
+        level -= 1;
     }
-    Region::new(0, [[0, 0]], paths)
 }
 
-/// Adds the squares of a pixel that a picture covers: those whose middles are in the ellipse and a margin that half a square has.
-fn cover([x, y]: [i32; 2], picture: &Picture, level: u32, squares: &mut Vec<[u32; 2]>) {
+/// The squares of a pixel that a picture covers: those whose middles are in the ellipse and a margin that half a square has.
+fn squares([x, y]: [i32; 2], picture: &Picture, level: u32) -> impl Iterator<Item = [u32; 2]> {
     let side = 1u32 << level;
     let size = 1.0 / f64::from(side);
     let DMat2 { x_axis: a, y_axis: b } = picture.slopes;
     let reach = MARGIN + std::f64::consts::FRAC_1_SQRT_2 * size / picture.half_axes()[1];
     let corner = DVec2::new(f64::from(x), f64::from(y)) - picture.place;
-    let clamped = |at: f64| at.clamp(0.0, f64::from(side)) as u32;
+    let clamped = move |at: f64| at.clamp(0.0, f64::from(side)) as u32;
     // Half of its height: the length of a row of the inverse of its slopes.
     let half = picture.slopes.inverse().row(1).length() * reach;
     let [low, high] = [-half, half].map(|to| (to - corner.y) / size);
-    for row in clamped(low.floor())..clamped(high.ceil()) {
-        // |a dx + b dy|² ≤ reach² between two roots of dx.
+    let in_row = move |row: u32| {
+        // |a dx + b dy|² ≤ reach² between two roots of dx; none where there are none.
         let dy = corner.y + (f64::from(row) + 0.5) * size;
         let (p, q, r) = (a.length_squared(), a.dot(b) * dy, b.length_squared() * dy * dy - reach * reach);
         let root = q * q - p * r;
-        if root < 0.0 {
-            continue;
-        }
         let [low, high] = [-1.0, 1.0].map(|sign| ((-q + sign * root.sqrt()) / p - corner.x) / size - 0.5);
-        for column in clamped(low.ceil())..clamped(high.floor() + 1.0) {
-            squares.push([column, row]);
-        }
-    }
+        let columns = if root < 0.0 { 0..0 } else { clamped(low.ceil())..clamped(high.floor() + 1.0) };
+        columns.map(move |column| [column, row])
+    };
+    (clamped(low.floor())..clamped(high.ceil())).flat_map(in_row)
 }

@@ -1,7 +1,7 @@
 //! Light that a path finds: sent by what it meets, from infinity, and of lights that its vertices ask.
 
 use super::together::MOST;
-use super::{Path, Tracer};
+use super::{Path, Sought, Tracer};
 use crate::math::sampler::{PARTS, Set, pairs};
 use crate::math::{Departure, Ray};
 use crate::scene::Inside;
@@ -53,6 +53,18 @@ impl Tracer<'_> {
             && self.plan.caustics.as_ref().is_some_and(|c| c.traced[light as usize])
     }
 
+    /// Whether light of a lamp that the path has met is sought, where it has come by a `single` direction or not from the last vertex.
+    #[inline(always)]
+    pub(super) fn seeks(&self, path: &Path, single: bool) -> bool {
+        self.sought == Sought::All || self.seeks_in_part(path, single)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn seeks_in_part(&self, path: &Path, single: bool) -> bool {
+        (path.specular && single) == (self.sought == Sought::Lamps)
+    }
+
     /// Adds light `l` of a lamp that the path has met, found with weight `w`, or leaves it out.
     #[inline(always)]
     pub(super) fn meet_light<const CHROMATIC: bool>(&self, path: &mut Path, light: u32, l: Lanes, w: f64) {
@@ -60,17 +72,11 @@ impl Tracer<'_> {
             path.leave_out::<CHROMATIC>(l, w);
             return;
         }
-        let share = path.share_of::<CHROMATIC>(l, w);
-        let is_aside = path.apart && path.specular && path.previous.is_none();
-        if is_aside {
-            path.aside += share;
-        } else {
-            path.radiance += share;
-        }
-        // What is put aside is entered by the paths that look for it alone.
-        if is_aside == self.whole {
+        if !self.seeks(path, path.previous.is_none()) {
             return;
         }
+        let share = path.share_of::<CHROMATIC>(l, w);
+        path.radiance += share;
         if let Some(ledger) = self.ledger {
             let found = self.found(path, share, light);
             match path.vertices {

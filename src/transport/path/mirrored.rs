@@ -8,7 +8,7 @@
 use super::{Leaving, Path, Tracer, seen_normal};
 use crate::math::sampler::Set;
 use crate::math::{Frame, Ray};
-use crate::optics::bsdf::{Bsdf, Lobes};
+use crate::optics::bsdf::{Bsdf, Lobes, mirror};
 use crate::optics::dielectric::{Dielectric, refract};
 use crate::scene::material::Kind;
 use crate::scene::shape::Detail;
@@ -68,7 +68,7 @@ impl Tracer<'_> {
         if !bsdf.may_mirror() || at.pane || self.scene.lamps.are_none() || !self.looks_and_meets() {
             return None;
         }
-        let wi = at.frame.to_world(DVec3::new(-wo.x, -wo.y, wo.z));
+        let wi = at.frame.to_world(mirror(wo));
         let ray = self.scene.leave(at.surface, at.hit, wi);
         let most = match bsdf.glass() {
             Some(glass) if wo.z < 0.0 => {
@@ -233,15 +233,10 @@ impl Tracer<'_> {
             path.left += share;
             return;
         }
-        let is_aside = path.apart && path.specular;
-        if is_aside {
-            path.aside += share;
-        } else {
-            path.radiance += share;
-        }
-        if is_aside == self.whole {
+        if !self.seeks(path, true) {
             return;
         }
+        path.radiance += share;
         if let Some(ledger) = self.ledger {
             ledger.mirrored(path.vertices, way.through + 1, self.found(path, share, light));
         }

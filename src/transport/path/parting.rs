@@ -60,10 +60,9 @@ impl Tracer<'_> {
             }
         } else if let Some((sample, share)) = through(glass) {
             let (beta, eta2) = (path.beta * share as f32, path.eta2 / share);
-            let mut inner = Path { beta, eta2, ..path.with_no_light() };
+            let mut inner = Path { beta, eta2, radiance: Lanes::ZERO, left: Lanes::ZERO, ..*path };
             self.follow_beside::<CHROMATIC, MEDIA>(path, &mut inner, &sample, at);
             path.radiance += inner.radiance;
-            path.aside += inner.aside;
             path.left += inner.left;
         }
         if let Some(ledger) = self.ledger {
@@ -109,8 +108,10 @@ impl Tracer<'_> {
         let mut alone = Path {
             beta: Lanes::splat(of_lane(path.beta) * share as f32),
             eta2: path.eta2 / share,
+            radiance: Lanes::ZERO,
+            left: Lanes::ZERO,
             alone: Some(lane),
-            ..path.with_no_light()
+            ..*path
         };
         // One wavelength in all lanes: nothing depends on which of them leads.
         let tracer = Tracer { nm: Lanes::splat(of_lane(self.nm)), ..*self };
@@ -121,7 +122,6 @@ impl Tracer<'_> {
             *all = Lanes::new(lanes);
         };
         brought(&mut path.radiance, alone.radiance);
-        brought(&mut path.aside, alone.aside);
         brought(&mut path.left, alone.left);
     }
 
@@ -146,11 +146,6 @@ impl Tracer<'_> {
 }
 
 impl Path {
-    /// The same that has found nothing.
-    fn with_no_light(&self) -> Path {
-        Path { radiance: Lanes::ZERO, aside: Lanes::ZERO, left: Lanes::ZERO, ..*self }
-    }
-
     /// Each wavelength decides for itself: none leads.
     fn let_each_decide(&mut self) {
         self.beta *= LANES as f32 / self.rho.reduce_add();

@@ -22,7 +22,7 @@
 
 use super::state::{Path, Walk};
 use super::together::{self, MOST, Wanted, from_lanes};
-use super::{Tracer, sides_differ};
+use super::{Sought, Tracer, sides_differ};
 use crate::math::four::{Vec4, lanes, splat};
 use crate::scene::census::Census;
 use crate::scene::shape::four::{dot, minus};
@@ -241,8 +241,8 @@ pub fn radiance<'a>(
         for (i, joint) in joints.iter_mut().enumerate() {
             let (Wanted { sampler, nm, ray, apart }, ledger) = (wanted(i), ledgers.get(i));
             let photons = photons.map(|p| p.map);
-            let tracer = Tracer { scene, plan, settings, sampler, nm, photons, ledger, whole: true };
-            paths[i].apart = apart;
+            let tracer =
+                Tracer { scene, plan, settings, sampler, nm, photons, ledger, sought: Sought::in_pixel(apart) };
             walks[i] = tracer.trace(ray, &mut paths[i], Some(joint));
         }
     }

@@ -66,10 +66,6 @@ pub(super) struct Path {
     pub(super) thrown: bool,
     /// Light of paths that are traced from the lights.
     pub(super) left: Lanes,
-    /// Whether light of lamps that it meets before anything scatters it is put aside; see [`crate::transport::glints`].
-    pub(super) apart: bool,
-    /// That light.
-    pub(super) aside: Lanes,
     /// Whether it has gone both ways at some glass, of which this is one.
     pub(super) is_one_of_two: bool,
     /// The lane whose wavelength is in all lanes, after the others took other ways.
@@ -204,8 +200,6 @@ impl Path {
         sharp: false,
         thrown: false,
         left: Lanes::ZERO,
-        apart: false,
-        aside: Lanes::ZERO,
         is_one_of_two: false,
         alone: None,
         chosen: false,
@@ -216,8 +210,8 @@ impl Path {
     /// What has come of it.
     pub(super) fn incoming(&self, alpha: f32, depth: f64) -> Incoming {
         let events = self.vertices + self.crossings + self.beside;
-        let Path { radiance, aside, left, further, mirrored, .. } = *self;
-        Incoming { radiance, aside, alpha, depth, left, events, further, mirrored }
+        let Path { radiance, left, further, mirrored, .. } = *self;
+        Incoming { radiance, alpha, depth, left, events, further, mirrored }
     }
 
     /// Whether light `index`, which the path meets, has been counted at a vertex before; once.

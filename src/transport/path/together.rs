@@ -5,7 +5,7 @@
 
 use super::lights::{Question, Questions};
 use super::reuse::Joint;
-use super::{Path, Step, Tracer, Walk};
+use super::{Path, Sought, Step, Tracer, Walk};
 use crate::math::Ray;
 use crate::math::sampler::{PARTS, Sampler};
 use crate::spectrum::Lanes;
@@ -34,7 +34,7 @@ pub struct Wanted<'a> {
     pub nm: Lanes,
     /// Its ray.
     pub ray: &'a Ray,
-    /// Whether light of lamps is put aside; see [`crate::transport::glints`].
+    /// Whether its path looks for [`Sought::Rest`], else for all light.
     pub apart: bool,
 }
 
@@ -86,8 +86,7 @@ fn trace<'a, const CHROMATIC: bool>(
     // The camera does not see beyond its clipping plane, whatever it looks through.
     let mut reach = [f64::INFINITY; MOST];
     for (i, path) in paths.iter_mut().enumerate() {
-        let Wanted { ray, apart, .. } = wanted(i);
-        path.apart = apart;
+        let ray = wanted(i).ray;
         (path.ray.origin, path.ray.direction) = (ray.origin, ray.direction);
         reach[i] = scene.camera.reach(ray);
         walks[i] = Walk::begin(scene, settings);
@@ -107,8 +106,9 @@ fn trace<'a, const CHROMATIC: bool>(
         left = 0;
         for k in 0..going {
             let i = on[k];
-            let Wanted { sampler, nm, .. } = wanted(i);
-            let tracer = Tracer { scene, plan, settings, sampler, nm, photons, ledger: None, whole: true };
+            let Wanted { sampler, nm, apart, .. } = wanted(i);
+            let sought = Sought::in_pixel(apart);
+            let tracer = Tracer { scene, plan, settings, sampler, nm, photons, ledger: None, sought };
             let joint = joints.as_deref_mut().map(|joints| &mut joints[i]);
             let (path, walk) = (&mut paths[i], &mut walks[i]);
             let known = asked.len();

@@ -1,0 +1,154 @@
+//! The light of lamps in small pictures: its paths, and a trial of where they pay.
+
+use super::Region;
+use crate::film::error::floor_about;
+use crate::math::sampler::Sampler;
+use crate::spectrum::{Lanes, observer};
+use crate::transport::path::{self, Sought};
+use crate::transport::plan::{Integrator, PathSettings};
+use crate::transport::ways::Ledger;
+use crate::transport::{self, Address, Begun, Incoming, PLASTIC, Shot, address, place_in};
+use glam::DVec2;
+use rayon::prelude::*;
+
+/// Tells their numbers from the picture's.
+const STREAM: u64 = 0x676c_696e_7473_676c;
+
+/// Pixels for each that is tried, the least and most along a side of the picture, samples of each, and of a pixel that has a region.
+const PIXELS: f64 = 256.0;
+const SIDES: (f64, f64) = (8.0, 24.0);
+const TRIED: u32 = 8;
+const TRIED_THERE: u32 = 4;
+
+/// Paths of a sample that a trial follows at the most.
+const MOST_TRIED: u32 = 8;
+
+/// What a path of lamps alone takes of one that is followed to its end.
+const COST: f64 = 0.25;
+
+impl Begun {
+    /// Adds the light of lamps from a region of its pixel, and enters it in a `ledger` if there is one.
+    #[inline(never)]
+    pub(in crate::transport) fn add_lamps(&mut self, region: &Region, shot: &Shot, ledger: Option<&Ledger>) {
+        let Integrator::Path(settings) = &shot.plan.integrator else { return };
+        let share = (region.area() / f64::from(region.paths)) as f32;
+        let of_one = ledger.map(|_| Ledger::new(shot.scene.light_groups.count().into()));
+        for i in 0..region.paths {
+            let found = self.lamps(region, shot, settings, i, of_one.as_ref());
+            self.sample.radiance += found.radiance * share;
+            self.events += found.events;
+            if let (Some(all), Some(one)) = (ledger, &of_one) {
+                all.add(one, share);
+                one.clear();
+            }
+        }
+    }
+
+    /// The light of lamps along path `i` from a region of its pixel, entered in a blank `ledger` if there is one.
+    fn lamps(
+        &self,
+        region: &Region,
+        shot: &Shot,
+        settings: &PathSettings,
+        i: u32,
+        ledger: Option<&Ledger>,
+    ) -> Incoming {
+        let Shot { scene, plan, seed, .. } = *shot;
+        let Begun { at, sample, .. } = self;
+        let corner = DVec2::from(at.pixel.map(|x| f64::from(x as i32)));
+        // Moved alike for all samples, which stay as evenly spread.
+        let u = (sample.place - corner + DVec2::new(PLASTIC, PLASTIC * PLASTIC) * f64::from(i)).fract_gl();
+        let index = at.index.wrapping_mul(region.paths).wrapping_add(i);
+        let sampler = Sampler::new(seed ^ STREAM, at.pixel, at.replicate, index);
+        let ray = scene.camera.ray(corner + region.place(u), || DVec2::splat(0.5));
+        let ray = (&ray, Sought::Lamps);
+        let found = path::radiance(scene, plan, settings, &sampler, &sample.wavelengths, ray, None, ledger);
+        let Some(fog) = shot.fog(&plan.integrator) else { return found };
+        let through = 1.0 - fog.falloff.amount(found.depth) as f32;
+        if let Some(ledger) = ledger {
+            ledger.scale(through);
+        }
+        Incoming { radiance: found.radiance * through, ..found }
+    }
+}
+
+/// Luminance, in units of the film: what the path of a sample finds beside lamps that it meets before anything scatters it, and what paths from a
+/// region of its pixel find of such lamps, in the mean and in that of the squares.
+fn parted(shot: &Shot, settings: &PathSettings, at: Address, region: &Region) -> [f64; 3] {
+    let sampler = Sampler::new(shot.seed, at.pixel, at.replicate, at.index);
+    let mut begun = Begun::blank();
+    begun.begin(shot, at, &sampler);
+    begun.apart = true;
+    let luminance = |light: Lanes| {
+        let unit = shot.scene.light_unit();
+        f64::from(observer::xyz(light * unit, &begun.sample.wavelengths)[1])
+    };
+    let integrator = &shot.plan.integrator;
+    let rest = begun.light(shot, &sampler, integrator, shot.fog(integrator), None);
+    let tried = region.paths.min(MOST_TRIED);
+    let mut lamps = [0.0; 2];
+    for i in 0..tried {
+        let found = luminance(begun.lamps(region, shot, settings, i, None).radiance);
+        lamps = [lamps[0] + found, lamps[1] + found * found];
+    }
+    let [mean, squares] = lamps.map(|sum| sum / f64::from(tried));
+    [luminance(rest.radiance), mean, squares]
+}
+
+/// What a picture is like.
+pub(super) struct Typical {
+    /// Mean luminance, in units of the film.
+    pub(super) mean: f64,
+    /// Added to the square of a value: see [`floor_about`].
+    floor: f64,
+    /// Mean relative variance of the luminance of a sample.
+    variance: f64,
+}
+
+impl Typical {
+    pub(super) fn of(shot: &Shot) -> Typical {
+        let shot = &Shot { seed: shot.seed ^ STREAM, ..*shot };
+        let [width, height] = shot.scene.camera.resolution.map(f64::from);
+        let side = (width * height / PIXELS).sqrt().clamp(SIDES.0, SIDES.1) as usize;
+        let of_block = |block: usize| {
+            let place = place_in(shot.scene, side, block, DVec2::splat(0.5));
+            let mut sums = [0.0; 2];
+            for index in 0..TRIED {
+                let (sample, _) = transport::sample(shot, [place.x as u32, place.y as u32], 0, index);
+                let luminance = f64::from(sample.xyz[1]);
+                sums = [sums[0] + luminance, sums[1] + luminance * luminance];
+            }
+            mean_and_variance(sums, TRIED)
+        };
+        let tried: Vec<[f64; 2]> = (0..side * side).into_par_iter().map(of_block).collect();
+        let all = tried.len() as f64;
+        let mean = tried.iter().map(|[mean, _]| mean).sum::<f64>() / all;
+        let floor = floor_about(mean);
+        let relative = |[mean, variance]: &[f64; 2]| if floor > 0.0 { variance / (mean * mean + floor) } else { 0.0 };
+        let variance = tried.iter().map(relative).sum::<f64>() / all;
+        Typical { mean, floor, variance }
+    }
+
+    /// Whether the paths of a region gain more than as many would that are spread over the picture.
+    pub(super) fn pays(&self, shot: &Shot, pixel: [i32; 2], region: &Region) -> bool {
+        let Integrator::Path(settings) = &shot.plan.integrator else { return false };
+        let shot = Shot { seed: shot.seed ^ STREAM, ..*shot };
+        let (mut rest, mut lamps) = (0.0, [0.0; 2]);
+        for index in 0..TRIED_THERE {
+            let at = Address { pixel: address(pixel), replicate: 0, index };
+            let [of_rest, of_lamps, squares] = parted(&shot, settings, at, region);
+            rest += of_rest;
+            lamps = [lamps[0] + of_lamps, lamps[1] + squares];
+        }
+        let [rest, mean, squares] = [rest, lamps[0], lamps[1]].map(|sum| sum / f64::from(TRIED_THERE));
+        // Of light met by chance.
+        let (value, variance) = (rest + region.area() * mean, region.area() * squares);
+        variance > (value * value + self.floor) * COST * f64::from(region.paths) * self.variance
+    }
+}
+
+/// Mean and variance of `count` numbers, given their sum and that of their squares.
+fn mean_and_variance([sum, squares]: [f64; 2], count: u32) -> [f64; 2] {
+    let n = f64::from(count);
+    [sum / n, ((squares - sum * sum / n) / (n - 1.0)).max(0.0)]
+}
