@@ -29,6 +29,8 @@ SPP = 512
 # A judgement of a drawn scene that fails is made again with four times the samples, three times: rare bright samples make
 # pictures look as if they differed, and of a hundred means one lies three standard errors away.
 ATTEMPTS = 4
+# Of each of two pictures that are compared pixel by pixel.
+SEEDS = 16
 
 # Merging blurs.
 TRACED = ["render.techniques.light_tracing=on", "render.techniques.merging=off"]
@@ -111,6 +113,50 @@ def test_a_technique_changes_no_picture(binary, tmp_path, technique, on, off, ch
         if compared == SCENES:
             return
     pytest.fail(f"of ten thousand scenes {compared} have it and can be judged")
+
+
+def of_seeds(binary: Path, case: SceneFile, glints: str, spp: int) -> np.ndarray:
+    """Sums of the channels of each pixel, by seed, without what trials may choose otherwise."""
+    others = ["light_tracing=off", "reuse=off", "shadow_rays=1", "equiangular=off", "even_sky=on", f"glints={glints}"]
+    case.settings = ["output.exr.stderr=true", *(f"render.techniques.{choice}" for choice in others)]
+    sums = []
+    for seed in range(SEEDS):
+        channels = abbe_channels(binary, case, case.path.with_suffix(".exr"), spp, seed)
+        sums.append(sum(channels[name] for name in channels if f"stderr.{name}" in channels))
+    return np.array(sums, dtype=np.float64)
+
+
+def same_light(binary: Path, case: SceneFile) -> bool | None:
+    """Whether lamps looked for by themselves have the light that chance finds; `None` where that is not known to 5 %.
+
+    Pixels in which they are looked for differ from those of the same seed without. The mean of what they differ by is held
+    to 4.07 of its standard errors, which Student's t of 15 degrees of freedom exceeds by chance once in a thousand. Chance
+    that meets a lamp in no seed knows no error, so that what speaks against it is looked at with up to 1024 times the samples.
+    """
+    for spp in (64, 256, 1024, 4096, 16384, 65536):
+        on, off = (of_seeds(binary, case, glints, spp) for glints in ("on", "off"))
+        seen = (on != off).any(0)
+        excess = (on - off)[:, seen].sum(1)
+        bound = 4.07 * excess.std(ddof=1) / SEEDS**0.5
+        agree = abs(excess.mean()) <= bound
+        if agree and bound < 0.05 * on[:, seen].sum(1).mean():
+            return True
+        if agree and spp >= 256:
+            return None
+    return False
+
+
+def test_light_of_small_pictures_is_what_chance_finds(binary, tmp_path):
+    compared = 0
+    for case in scenes(tmp_path, 4):
+        if not in_force(binary, case, "small pictures", ["render.techniques.glints=on"]):
+            continue
+        told = same_light(binary, case)
+        assert told is not False, case.path.read_text()
+        compared += told is True
+        if compared == SCENES:
+            return
+    pytest.fail(f"of ten thousand scenes {compared} show small pictures and can be judged")
 
 
 def test_noise_is_no_agreement_and_what_is_no_number_is_excused_nowhere(monkeypatch, tmp_path):
