@@ -179,10 +179,9 @@ pub fn find(
         return (None, say(false, "none is seen in mirrors or glass".into()));
     }
     if wish == Use::Auto {
-        let pays = |(pixel, region): ([i32; 2], Region)| typical.pays(shot, pixel, &region).then_some((pixel, region));
-        regions = regions.into_par_iter().filter(|_| goes_on()).filter_map(pays).collect();
+        regions = regions.into_par_iter().filter(|found| goes_on() && typical.pays(shot, found)).collect();
     }
-    match Glints::new(regions) {
+    match Glints::new(regions.into_iter().map(|(pixel, region, _)| (pixel, region)).collect()) {
         None => (None, say(false, "chance finds those that are seen often enough".into())),
         Some(glints) => {
             let paths = glints.regions.iter().map(|(_, region)| region.paths as usize).sum::<usize>();

@@ -1,9 +1,10 @@
-//! The light of lamps in small pictures: its paths, and a trial of where they pay.
+//! The light of lamps in small pictures: its paths, and where they pay.
 
 use super::Region;
+use super::search::Found;
 use crate::film::error::floor_about;
 use crate::math::sampler::Sampler;
-use crate::spectrum::{Lanes, observer};
+use crate::spectrum::observer;
 use crate::transport::path::{self, Sought};
 use crate::transport::plan::{Integrator, PathSettings};
 use crate::transport::ways::Ledger;
@@ -19,9 +20,6 @@ const PIXELS: f64 = 256.0;
 const SIDES: (f64, f64) = (8.0, 24.0);
 const TRIED: u32 = 8;
 const TRIED_THERE: u32 = 4;
-
-/// Paths of a sample that a trial follows at the most.
-const MOST_TRIED: u32 = 8;
 
 /// What a path of lamps alone takes of one that is followed to its end.
 const COST: f64 = 0.25;
@@ -72,27 +70,15 @@ impl Begun {
     }
 }
 
-/// Luminance, in units of the film: what the path of a sample finds beside lamps that it meets before anything scatters it, and what paths from a
-/// region of its pixel find of such lamps, in the mean and in that of the squares.
-fn parted(shot: &Shot, settings: &PathSettings, at: Address, region: &Region) -> [f64; 3] {
+/// Luminance, in units of the film, that the path of a sample finds beside lamps that it meets before anything scatters it.
+fn rest(shot: &Shot, at: Address) -> f64 {
     let sampler = Sampler::new(shot.seed, at.pixel, at.replicate, at.index);
     let mut begun = Begun::blank();
     begun.begin(shot, at, &sampler);
     begun.apart = true;
-    let luminance = |light: Lanes| {
-        let unit = shot.scene.light_unit();
-        f64::from(observer::xyz(light * unit, &begun.sample.wavelengths)[1])
-    };
     let integrator = &shot.plan.integrator;
     let rest = begun.light(shot, &sampler, integrator, shot.fog(integrator), None);
-    let tried = region.paths.min(MOST_TRIED);
-    let mut lamps = [0.0; 2];
-    for i in 0..tried {
-        let found = luminance(begun.lamps(region, shot, settings, i, None).radiance);
-        lamps = [lamps[0] + found, lamps[1] + found * found];
-    }
-    let [mean, squares] = lamps.map(|sum| sum / f64::from(tried));
-    [luminance(rest.radiance), mean, squares]
+    f64::from(observer::xyz(rest.radiance * shot.scene.light_unit(), &begun.sample.wavelengths)[1])
 }
 
 /// What a picture is like.
@@ -130,19 +116,12 @@ impl Typical {
     }
 
     /// Whether the paths of a region gain more than as many would that are spread over the picture.
-    pub(super) fn pays(&self, shot: &Shot, pixel: [i32; 2], region: &Region) -> bool {
-        let Integrator::Path(settings) = &shot.plan.integrator else { return false };
-        let shot = Shot { seed: shot.seed ^ STREAM, ..*shot };
-        let (mut rest, mut lamps) = (0.0, [0.0; 2]);
-        for index in 0..TRIED_THERE {
-            let at = Address { pixel: address(pixel), replicate: 0, index };
-            let [of_rest, of_lamps, squares] = parted(&shot, settings, at, region);
-            rest += of_rest;
-            lamps = [lamps[0] + of_lamps, lamps[1] + squares];
-        }
-        let [rest, mean, squares] = [rest, lamps[0], lamps[1]].map(|sum| sum / f64::from(TRIED_THERE));
-        // Of light met by chance.
-        let (value, variance) = (rest + region.area() * mean, region.area() * squares);
+    pub(super) fn pays(&self, shot: &Shot, (pixel, region, expected): &Found) -> bool {
+        let shot = &Shot { seed: shot.seed ^ STREAM, ..*shot };
+        let address = |index| Address { pixel: address(*pixel), replicate: 0, index };
+        let rest = (0..TRIED_THERE).map(|index| rest(shot, address(index))).sum::<f64>() / f64::from(TRIED_THERE);
+        let unit = f64::from(shot.scene.light_unit());
+        let (value, variance) = (rest + unit * expected.mean, unit * unit * expected.square);
         variance > (value * value + self.floor) * COST * f64::from(region.paths) * self.variance
     }
 }

@@ -30,7 +30,7 @@ pub(super) const MOST_LAMPS: usize = 16;
 pub(super) const MOST_PICTURES: usize = 10_000;
 
 /// Surfaces that a row has at the most.
-const DEPTH: usize = 6;
+const DEPTH: usize = 8;
 
 /// The least luminance of a picture, over that of all.
 const FAINTEST: f64 = 2.0;
@@ -65,8 +65,10 @@ const MOST_PATHS: f64 = 32.0;
 const MOST_SQUARES: usize = 1 << 12;
 const MOST_LEVEL: u32 = 10;
 
-/// The wavelength that is searched by, and those between which the others are, where they part; how often these are halved.
+/// The wavelength that is searched by, and further ones where they part, as light that glass throws about within comes out of it at some
+/// angles for some of them alone; those between which all are, into how many parts that is divided, and how often these are halved.
 const NM: f64 = 550.0;
+const FURTHER: [f64; 2] = [440.0, 660.0];
 const ENDS: [f64; 2] = [390.0, 710.0];
 const PARTS: u32 = 16;
 const HALVINGS: u32 = 3;
@@ -176,6 +178,10 @@ struct Picture {
     /// The miss in radii by the place.
     slopes: DMat2,
     left: Share,
+    /// For which it was found.
+    nm: f64,
+    /// Of wavelengths.
+    part: f64,
 }
 
 /// What is left along a row.
@@ -213,9 +219,19 @@ impl Picture {
         [greatest / product, 1.0 / greatest]
     }
 
+    /// The greatest miss that a square of a side may have in its middle, in radii.
+    fn reach(&self, side: f64) -> f64 {
+        MARGIN + std::f64::consts::FRAC_1_SQRT_2 * side / self.half_axes()[1]
+    }
+
     fn is_small(&self) -> bool {
         let [greater, smaller] = self.half_axes();
         greater <= LARGEST && (SMALLEST..=WIDEST).contains(&smaller)
+    }
+
+    /// Whether what is found there by the same row is in it.
+    fn shows(&self, other: &Picture) -> bool {
+        self.lamp == other.lamp && self.turns == other.turns && self.radii(other.place) < 1.0
     }
 
     /// How far a place is from its middle, in its radii.
@@ -223,6 +239,16 @@ impl Picture {
         (self.slopes * (place - self.place)).length()
     }
 }
+
+/// Luminance of pictures in the mean of a pixel, and of the square of what a path that meets them by chance finds, film units.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Expected {
+    pub(super) mean: f64,
+    pub(super) square: f64,
+}
+
+/// A pixel, what it has of the pictures, and what chance finds of them.
+pub(super) type Found = ([i32; 2], Region, Expected);
 
 /// What the pixels of `window` have of small pictures, which rows of sharp things that begin there or near show, where they are brighter
 /// than the `mean` luminance of all that is seen; `None` if they are too many. Where `goes_on` is false what is returned means nothing.
@@ -233,7 +259,7 @@ pub(super) fn regions(
     samples: u32,
     mean: f64,
     goes_on: &(dyn Fn() -> bool + Sync),
-) -> Option<Vec<([i32; 2], Region)>> {
+) -> Option<Vec<Found>> {
     let brightest = lamps.iter().map(|lamp| lamp.luminance).fold(0.0, f64::max);
     let search = Search { scene, lamps, least: FAINTEST * mean, brightest };
     let apart = APART[usize::from(samples >= MANY)];
@@ -257,7 +283,7 @@ pub(super) fn regions(
         let near = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy]));
         let is_same = |i: &usize| {
             let other = &pictures[*i];
-            other.lamp == picture.lamp && other.turns == picture.turns && other.radii(picture.place) < 1.0
+            other.nm == picture.nm && other.shows(&picture)
         };
         if !near.filter_map(|pixel| known.get(&pixel)).flatten().any(is_same) {
             known.entry([x, y]).or_default().push(pictures.len());
@@ -267,9 +293,17 @@ pub(super) fn regions(
     if pictures.len() > MOST_PICTURES {
         return None;
     }
-    let ellipses: Vec<Picture> =
-        pictures.par_iter().flat_map_iter(|picture| search.of_all_wavelengths(picture)).collect();
-    Some(covered(&ellipses, window))
+    let (first, further): (Vec<Picture>, Vec<Picture>) = pictures.into_iter().partition(|picture| picture.nm == NM);
+    let of_all = |pictures: &[Picture]| -> Vec<Picture> {
+        pictures.par_iter().flat_map_iter(|picture| search.of_all_wavelengths(picture)).collect()
+    };
+    let mut ellipses = of_all(&first);
+    for nm in FURTHER {
+        let is_new = |picture: &&Picture| picture.nm == nm && !ellipses.iter().any(|known| known.shows(picture));
+        let new: Vec<Picture> = further.iter().filter(is_new).cloned().collect();
+        ellipses.extend(of_all(&new));
+    }
+    Some(covered(&ellipses, lamps, window))
 }
 
 struct Search<'a> {
@@ -289,12 +323,28 @@ impl Search<'_> {
     /// The pictures that are found from `place`.
     fn from(&self, place: DVec2) -> Vec<Picture> {
         let mut found = Vec::new();
-        self.follow(place, self.rays(place, BESIDE), &mut Turns::new(), Share::ALL, &mut found);
+        let follow = |nm, found: &mut Vec<Picture>| {
+            self.follow((place, nm), self.rays(place, BESIDE), &mut Turns::new(), Share::ALL, found)
+        };
+        if follow(NM, &mut found) {
+            for nm in FURTHER {
+                follow(nm, &mut found);
+            }
+            found.retain(|picture| picture.nm == NM || picture.left.parts);
+        }
         found
     }
 
-    /// Looks for lamps along `rays`, which begin at `place` and have come to where they are by `turns`, and follows them on.
-    fn follow(&self, place: DVec2, rays: [Ray; 3], turns: &mut Turns, left: Share, found: &mut Vec<Picture>) {
+    /// Looks for lamps along `rays` of a wavelength, which begin at a place and have come to where they are by `turns`, and follows them on.
+    /// Whether wavelengths part on the way.
+    fn follow(
+        &self,
+        (place, nm): (DVec2, f64),
+        rays: [Ray; 3],
+        turns: &mut Turns,
+        left: Share,
+        found: &mut Vec<Picture>,
+    ) -> bool {
         for (lamp, of) in self.lamps.iter().enumerate() {
             if left.light * of.luminance < self.least {
                 continue;
@@ -302,18 +352,19 @@ impl Search<'_> {
             let Some((miss, slopes)) = of.miss(&rays, BESIDE) else { continue };
             let step = slopes.inverse() * miss;
             if step.length() <= REACH {
-                let seed = Picture { lamp, turns: turns.clone(), place: place - step, slopes, left };
-                if let Some(picture) = self.settle(seed, place, NM) {
+                let seed = Picture { lamp, turns: turns.clone(), place: place - step, slopes, left, nm, part: 1.0 };
+                if let Some(picture) = self.settle(seed, place, nm) {
                     found.push(picture);
                 }
             }
         }
+        let mut parts = left.parts;
         if turns.is_full() {
-            return;
+            return parts;
         }
-        let Some(met) = self.meet(&rays[0], NM) else { return };
-        let beside = [1, 2].map(|i| self.meet(&rays[i], NM).filter(|other| other.hit.object == met.hit.object));
-        let [Some(right), Some(down)] = beside else { return };
+        let Some(met) = self.meet(&rays[0], nm) else { return parts };
+        let beside = [1, 2].map(|i| self.meet(&rays[i], nm).filter(|other| other.hit.object == met.hit.object));
+        let [Some(right), Some(down)] = beside else { return parts };
         for turn in [Turn::Mirrored, Turn::Through] {
             let Some((first, share)) = self.turn(&rays[0], &met, turn) else { continue };
             let left = left.after(turn, share, met.parts());
@@ -323,16 +374,17 @@ impl Search<'_> {
             let others = [(&rays[1], &right), (&rays[2], &down)].map(|(ray, met)| self.turn(ray, met, turn));
             let [Some((right, _)), Some((down, _))] = others else { continue };
             turns.push(turn);
-            self.follow(place, [first, right, down], turns, left, found);
+            parts |= self.follow((place, nm), [first, right, down], turns, left, found);
             turns.pop();
         }
+        parts
     }
 
     /// The picture that a `seed` leads to for the wavelength `nm`, no farther from `start` than is searched; `None` where it leads to none, or
     /// to one that is hidden or not small.
     fn settle(&self, seed: Picture, start: DVec2, nm: f64) -> Option<Picture> {
         let lamp = &self.lamps[seed.lamp];
-        let mut picture = seed;
+        let mut picture = Picture { nm, ..seed };
         // Where it was before, and how far from the lamp: a step that leads off the row, or farther away, is too long.
         let (mut before, mut least) = (start, f64::INFINITY);
         for _ in 0..STEPS {
@@ -379,27 +431,25 @@ impl Search<'_> {
         if !picture.left.parts {
             return vec![picture.clone()];
         }
-        let mut all = Vec::new();
+        let whole = (ENDS[1] - ENDS[0]) / f64::from(PARTS);
+        let mut all = vec![Picture { part: f64::from(PARTS).recip(), ..picture.clone() }];
         for end in ENDS {
             let mut last = picture.clone();
-            let (mut from, whole) = (NM, (end - NM) / f64::from(PARTS / 2));
-            while (end - from) * whole.signum() > 1e-9 {
-                let mut step = whole;
-                let mut next = self.settle(last.clone(), last.place, from + step);
+            while (end - last.nm).abs() > 1e-9 {
+                let mut step = (end - last.nm).clamp(-whole, whole);
+                let mut next = self.settle(last.clone(), last.place, last.nm + step);
                 for _ in 0..HALVINGS {
                     if next.as_ref().is_some_and(|next| last.radii(next.place) <= 1.0) {
                         break;
                     }
                     step *= 0.5;
-                    next = self.settle(last.clone(), last.place, from + step);
+                    next = self.settle(last.clone(), last.place, last.nm + step);
                 }
-                from += step;
                 let Some(next) = next else { break };
-                all.push(next.clone());
-                last = next;
+                last = Picture { part: step.abs() / (ENDS[1] - ENDS[0]), ..next };
+                all.push(last.clone());
             }
         }
-        all.push(picture.clone());
         all
     }
 
@@ -458,7 +508,7 @@ impl Met<'_> {
 }
 
 /// The squares of the ellipses of `pictures` in the pixels of `window`.
-fn covered(pictures: &[Picture], window: Window) -> Vec<([i32; 2], Region)> {
+fn covered(pictures: &[Picture], lamps: &[Lamp], window: Window) -> Vec<Found> {
     let mut by_pixel: BTreeMap<[i32; 2], Vec<&Picture>> = BTreeMap::new();
     for picture in pictures {
         // Half of the box around an ellipse: lengths of the rows of the inverse of its slopes.
@@ -476,7 +526,8 @@ fn covered(pictures: &[Picture], window: Window) -> Vec<([i32; 2], Region)> {
     }
     let of = |(pixel, pictures): ([i32; 2], Vec<&Picture>)| {
         let region = region(pixel, &pictures);
-        (!region.squares.is_empty()).then_some((pixel, region))
+        let expected = expected(pixel, &pictures, lamps, region.level);
+        (!region.squares.is_empty()).then_some((pixel, region, expected))
     };
     by_pixel.into_iter().collect::<Vec<_>>().into_par_iter().filter_map(of).collect()
 }
@@ -500,12 +551,24 @@ fn region(pixel: [i32; 2], pictures: &[&Picture]) -> Region {
     }
 }
 
+/// What chance finds of the pictures in a pixel, whose areas in it are told by squares.
+fn expected(pixel: [i32; 2], pictures: &[&Picture], lamps: &[Lamp], level: u32) -> Expected {
+    let side = f64::from(1u32 << level).recip();
+    pictures.iter().fold(Expected::default(), |sum, picture| {
+        let count = squares(pixel, picture, level).count() as f64;
+        let area = picture.part * count * (side / picture.reach(side)).powi(2);
+        let luminance = lamps[picture.lamp].luminance * picture.left.light;
+        let square = area * luminance * luminance / picture.left.chance;
+        Expected { mean: sum.mean + area * luminance, square: sum.square + square }
+    })
+}
+
 /// The squares of a pixel that a picture covers: those whose middles are in the ellipse and a margin that half a square has.
 fn squares([x, y]: [i32; 2], picture: &Picture, level: u32) -> impl Iterator<Item = [u32; 2]> {
     let side = 1u32 << level;
     let size = 1.0 / f64::from(side);
     let DMat2 { x_axis: a, y_axis: b } = picture.slopes;
-    let reach = MARGIN + std::f64::consts::FRAC_1_SQRT_2 * size / picture.half_axes()[1];
+    let reach = picture.reach(size);
     let corner = DVec2::new(f64::from(x), f64::from(y)) - picture.place;
     let clamped = move |at: f64| at.clamp(0.0, f64::from(side)) as u32;
     // Half of its height: the length of a row of the inverse of its slopes.
