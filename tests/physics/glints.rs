@@ -132,6 +132,24 @@ fn light_is_the_same_where_lamps_are_looked_for_by_themselves() {
     }
 }
 
+/// What configs/scenes/crystal.yaml shows at the edge of its ball: a lamp after five reflections within, in red light alone.
+#[test]
+fn what_red_light_alone_shows_is_found() {
+    let yaml = "camera: {origin: [1.6, 2.9, 4.2], target: [0.55, 0.75, 0], fov_deg: 44}\n\
+                image: {width: 160, height: 112}\n\
+                render: {samples: 64, techniques: {glints: on, light_tracing: off}}\n\
+                shapes:\n\
+                - plane: {normal: [0, 1, 0], material: {diffuse: {reflectance: 0.7}}}\n\
+                - sphere: {center: [0, 1, 0], radius: 1, material: {dielectric: {ior: {glass: SF11}}}}\n\
+                - sphere: {center: [-3.6, 3.1, 0.4], radius: 0.06, emission: {illuminant: {name: D65, scale: 2600}}}\n\
+                lights: [{constant: {radiance: 0.14}}]\n";
+    let bench = bench_with(yaml, &[]);
+    let glints = bench.prepared.plan.glints.clone().unwrap_or_else(|| panic!("{:?}", said(&bench)));
+    for (pixel, seen) in [([21, 23], true), ([27, 26], true), ([28, 26], true), ([60, 30], false)] {
+        assert_eq!(glints.of(pixel).is_some(), seen, "{pixel:?}");
+    }
+}
+
 #[test]
 fn light_is_the_same_beside_other_techniques() {
     let glass = "- sphere: {center: [-0.8, -0.4, 0], radius: 0.6, material: {dielectric: {ior: {glass: N-SF11}}}}\n\

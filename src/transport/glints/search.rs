@@ -275,35 +275,48 @@ pub(super) fn regions(
         .into_par_iter()
         .map(|y| columns.clone().take_while(|_| goes_on()).flat_map(|x| search.from(places(x, y))).collect())
         .collect();
-    let mut pictures: Vec<Picture> = Vec::new();
-    // By the pixel that each lies in: the same one is found from several places, some part of its size apart.
-    let mut known: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
-    for picture in rows.into_iter().flatten() {
-        let [x, y] = picture.place.floor().to_array().map(|x| x as i64);
-        let near = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy]));
-        let is_same = |i: &usize| {
-            let other = &pictures[*i];
-            other.nm == picture.nm && other.shows(&picture)
-        };
-        if !near.filter_map(|pixel| known.get(&pixel)).flatten().any(is_same) {
-            known.entry([x, y]).or_default().push(pictures.len());
-            pictures.push(picture);
+    let (mut ellipses, mut count) = (Pictures::default(), 0);
+    for nm in [NM, FURTHER[0], FURTHER[1]] {
+        // Those that no other wavelength has led to; the same one is found from several places, some part of its size apart.
+        let mut new = Pictures::default();
+        for picture in rows.iter().flatten().filter(|picture| picture.nm == nm) {
+            if !ellipses.show(picture) && !new.show(picture) {
+                new.push(picture.clone());
+            }
         }
+        count += new.all.len();
+        if count > MOST_PICTURES {
+            return None;
+        }
+        let of_all: Vec<Vec<Picture>> = new.all.par_iter().map(|picture| search.of_all_wavelengths(picture)).collect();
+        of_all.into_iter().flatten().for_each(|picture| ellipses.push(picture));
     }
-    if pictures.len() > MOST_PICTURES {
-        return None;
+    Some(covered(&ellipses.all, lamps, window))
+}
+
+/// Pictures, and by the pixel that each lies in.
+#[derive(Default)]
+struct Pictures {
+    all: Vec<Picture>,
+    by_pixel: HashMap<[i64; 2], Vec<usize>>,
+}
+
+impl Pictures {
+    fn pixel(picture: &Picture) -> [i64; 2] {
+        picture.place.floor().to_array().map(|x| x as i64)
     }
-    let (first, further): (Vec<Picture>, Vec<Picture>) = pictures.into_iter().partition(|picture| picture.nm == NM);
-    let of_all = |pictures: &[Picture]| -> Vec<Picture> {
-        pictures.par_iter().flat_map_iter(|picture| search.of_all_wavelengths(picture)).collect()
-    };
-    let mut ellipses = of_all(&first);
-    for nm in FURTHER {
-        let is_new = |picture: &&Picture| picture.nm == nm && !ellipses.iter().any(|known| known.shows(picture));
-        let new: Vec<Picture> = further.iter().filter(is_new).cloned().collect();
-        ellipses.extend(of_all(&new));
+
+    /// Whether one in its pixel or beside it shows what another does.
+    fn show(&self, other: &Picture) -> bool {
+        let [x, y] = Pictures::pixel(other);
+        let near = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy]));
+        near.filter_map(|pixel| self.by_pixel.get(&pixel)).flatten().any(|&i| self.all[i].shows(other))
     }
-    Some(covered(&ellipses, lamps, window))
+
+    fn push(&mut self, picture: Picture) {
+        self.by_pixel.entry(Pictures::pixel(&picture)).or_default().push(self.all.len());
+        self.all.push(picture);
+    }
 }
 
 struct Search<'a> {
