@@ -65,10 +65,9 @@ const MOST_PATHS: f64 = 32.0;
 const MOST_SQUARES: usize = 1 << 12;
 const MOST_LEVEL: u32 = 10;
 
-/// The wavelength that is searched by, and further ones where they part, as light that glass throws about within comes out of it at some
-/// angles for some of them alone; those between which all are, into how many parts that is divided, and how often these are halved.
-const NM: f64 = 550.0;
-const FURTHER: [f64; 2] = [440.0, 660.0];
+/// The wavelengths that are searched by, those after the first where they part, as light that glass throws about within comes out of it at
+/// some angles for some of them alone; those between which all are, into how many parts that is divided, and how often these are halved.
+const SEARCHED: [f64; 3] = [550.0, 440.0, 660.0];
 const ENDS: [f64; 2] = [390.0, 710.0];
 const PARTS: u32 = 16;
 const HALVINGS: u32 = 3;
@@ -224,6 +223,11 @@ impl Picture {
         MARGIN + std::f64::consts::FRAC_1_SQRT_2 * side / self.half_axes()[1]
     }
 
+    /// The pixel of its middle.
+    fn pixel(&self) -> [i64; 2] {
+        self.place.floor().to_array().map(|x| x as i64)
+    }
+
     fn is_small(&self) -> bool {
         let [greater, smaller] = self.half_axes();
         greater <= LARGEST && (SMALLEST..=WIDEST).contains(&smaller)
@@ -276,7 +280,7 @@ pub(super) fn regions(
         .map(|y| columns.clone().take_while(|_| goes_on()).flat_map(|x| search.from(places(x, y))).collect())
         .collect();
     let (mut ellipses, mut count) = (Pictures::default(), 0);
-    for nm in [NM, FURTHER[0], FURTHER[1]] {
+    for nm in SEARCHED {
         // Those that no other wavelength has led to; the same one is found from several places, some part of its size apart.
         let mut new = Pictures::default();
         for picture in rows.iter().flatten().filter(|picture| picture.nm == nm) {
@@ -302,19 +306,15 @@ struct Pictures {
 }
 
 impl Pictures {
-    fn pixel(picture: &Picture) -> [i64; 2] {
-        picture.place.floor().to_array().map(|x| x as i64)
-    }
-
     /// Whether one in its pixel or beside it shows what another does.
     fn show(&self, other: &Picture) -> bool {
-        let [x, y] = Pictures::pixel(other);
+        let [x, y] = other.pixel();
         let near = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy]));
         near.filter_map(|pixel| self.by_pixel.get(&pixel)).flatten().any(|&i| self.all[i].shows(other))
     }
 
     fn push(&mut self, picture: Picture) {
-        self.by_pixel.entry(Pictures::pixel(&picture)).or_default().push(self.all.len());
+        self.by_pixel.entry(picture.pixel()).or_default().push(self.all.len());
         self.all.push(picture);
     }
 }
@@ -336,15 +336,14 @@ impl Search<'_> {
     /// The pictures that are found from `place`.
     fn from(&self, place: DVec2) -> Vec<Picture> {
         let mut found = Vec::new();
-        let follow = |nm, found: &mut Vec<Picture>| {
-            self.follow((place, nm), self.rays(place, BESIDE), &mut Turns::new(), Share::ALL, found)
-        };
-        if follow(NM, &mut found) {
-            for nm in FURTHER {
-                follow(nm, &mut found);
+        for nm in SEARCHED {
+            let rays = self.rays(place, BESIDE);
+            let parts = self.follow((place, nm), rays, &mut Turns::new(), Share::ALL, &mut found);
+            if nm == SEARCHED[0] && !parts {
+                break;
             }
-            found.retain(|picture| picture.nm == NM || picture.left.parts);
         }
+        found.retain(|picture| picture.nm == SEARCHED[0] || picture.left.parts);
         found
     }
 
