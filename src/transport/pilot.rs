@@ -393,9 +393,10 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
         ENOUGH.. => mirrored.max(found.gathered_by_chance),
         met => by_chance(&found.gathered, met).max(found.gathered_by_chance),
     };
-    // What is as good as never found is missing; where that is less than the noise shows, nothing is gained.
+    // What all paths of the picture are not expected to find once is missing; where that is less than the noise shows, nothing is gained.
     let faint = !endless
         && found.gathered_by_chance == 0.0
+        && chance * paths(scene, trial.samples) < 1.0
         && square(&found.gathered) * f64::from(trial.samples) < FAINT * kept;
     let counts = found.collected > 0.0 && !faint && unmerged > WORTH * kept;
     let merging = match wishes.merging {
