@@ -11,6 +11,9 @@
 //! one, so that a sample is dealt out whole: the sum over a block is that of its samples. What the weights of a pixel lack of one a
 //! sample [`resolve`](crate::film::resolve) makes up for.
 //!
+//! What a sample has for its own pixel alone counts there as much as all samples of its number do, Σ over p of w_q(s_p), which is one in the
+//! mean and knows nothing of it: so what is alike in all samples is not made uneven by what is made up for.
+//!
 //! A block is a cell of [`SIDE`] × [`SIDE`] pixels, aligned to the frame and cut where the frame ends or what counts, so that tiles and
 //! crops need nothing from beyond their cells and overscan changes nothing inside. Of the noise of a Gaussian of 0.5 pixels 0.38
 //! is left in the mean over the pixels of a cell, where samples have nothing to do with each other, and 0.32 in its middle.
@@ -128,6 +131,8 @@ pub struct Pool {
     channels: usize,
     /// The pixels whose own sample is there.
     own: [bool; PIXELS],
+    /// Of pixels by their places in the block: X, Y, Z and the numbers of the layers that their samples have for them alone.
+    alone: Vec<(usize, [f32; 3], Vec<f32>)>,
 }
 
 /// What samples come to in a pixel.
@@ -142,7 +147,13 @@ pub struct Dealt {
 
 impl Default for Pool {
     fn default() -> Pool {
-        Pool { light: [[f32x8::ZERO; NUMBERS]; WIDTH], layers: Vec::new(), channels: 0, own: [false; PIXELS] }
+        Pool {
+            light: [[f32x8::ZERO; NUMBERS]; WIDTH],
+            layers: Vec::new(),
+            channels: 0,
+            own: [false; PIXELS],
+            alone: Vec::new(),
+        }
     }
 }
 
@@ -152,6 +163,7 @@ impl Pool {
         self.light = [[f32x8::ZERO; NUMBERS]; WIDTH];
         self.own = [false; PIXELS];
         self.channels = channels;
+        self.alone.clear();
         self.layers.clear();
         self.layers.resize(WIDTH * channels, f32x8::ZERO);
     }
@@ -183,6 +195,15 @@ impl Pool {
         }
     }
 
+    /// Adds what the sample of `pixel` of `block` has for that alone.
+    ///
+    /// # Panics
+    /// If the pixel lies beyond the block.
+    pub fn add_alone(&mut self, block: &Block, pixel: [i32; 2], xyz: [f32; 3], values: &[f32]) {
+        let place = block.window.index(pixel).expect("the pixel lies in the block");
+        self.alone.push((place, xyz, values.to_vec()));
+    }
+
     /// What it comes to in each pixel of `block` whose own sample is there, with its place in the block and the numbers of the layers.
     pub fn deal(&self, block: &Block, mut give: impl FnMut(([i32; 2], usize), &Dealt, &[f32])) {
         let Window { x, y, width, height } = block.window;
@@ -196,8 +217,13 @@ impl Pool {
                 }
                 let layers = &self.layers[row * self.channels..];
                 numbers.iter_mut().zip(layers).for_each(|(number, sum)| *number = sum.as_array()[column]);
-                let xyz = [xs[column], ys[column], zs[column]];
-                let dealt = Dealt { xyz, alpha: alphas[column], weight: weights[column] };
+                let weight = weights[column];
+                let mut xyz = [xs[column], ys[column], zs[column]];
+                for (_, light, values) in self.alone.iter().filter(|(at, ..)| *at == place) {
+                    xyz.iter_mut().zip(light).for_each(|(sum, x)| *sum += weight * x);
+                    numbers.iter_mut().zip(values).for_each(|(sum, x)| *sum += weight * x);
+                }
+                let dealt = Dealt { xyz, alpha: alphas[column], weight };
                 give(([x + column as i32, y + row as i32], place), &dealt, &numbers);
             }
         }

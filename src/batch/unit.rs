@@ -12,7 +12,7 @@ use crate::transport::layers::Source;
 use crate::transport::merge::Collection;
 use crate::transport::middle;
 use crate::transport::path::reuse::{self, Group};
-use crate::transport::{Address, PixelSample, Samples, Shot, address, moment, scene_at};
+use crate::transport::{Address, Alone, PixelSample, Samples, Shot, address, moment, scene_at};
 use std::ops::Range;
 
 /// Renders one work unit into `tile`: `samples` of each pixel, or where they are shared out what that is for each.
@@ -153,10 +153,16 @@ impl Unit<'_> {
         pools.resize_with(Octet::SAMPLES, Pool::default);
         for some in samples.chunks(Octet::SAMPLES) {
             pools.iter_mut().take(some.len()).for_each(|pool| pool.reset(channels));
-            let mut give = |i: usize, pixel: [i32; 2], sample: &PixelSample, values: &[f32]| {
-                if sums.is_valid(pixel, some[i].0, sample) {
-                    let light = (sample.xyz.map(|x| x * sample.weight), sample.alpha * sample.weight);
-                    sums.check(pixel, sample.weight, values, numbers);
+            let mut give = |i: usize, pixel: [i32; 2], sample: &PixelSample, values: &[f32], alone: bool| {
+                if !sums.is_valid(pixel, some[i].0, sample) {
+                    return;
+                }
+                sums.check(pixel, sample.weight, values, numbers);
+                let xyz = sample.xyz.map(|x| x * sample.weight);
+                if alone {
+                    pools[i].add_alone(block, pixel, xyz, numbers);
+                } else {
+                    let light = (xyz, sample.alpha * sample.weight);
                     pools[i].add(block, shot.filter, (pixel, sample.place), light, numbers);
                 }
             };
@@ -174,14 +180,26 @@ impl Unit<'_> {
                             // Some may lie where another block begins.
                             let pixel = group.pixels()[lane];
                             if lies_inside(&pixel) {
-                                give(i, pixel, sample, values);
+                                give(i, pixel, sample, values, false);
                             }
                         });
+                        for (lane, Alone { sample, values }) in memory.alone() {
+                            let pixel = group.pixels()[lane];
+                            if lies_inside(&pixel) {
+                                give(i, pixel, sample, values, true);
+                            }
+                        }
                     }
                 }
             } else {
                 for &pixel in &pixels {
-                    follow(shot, moments, memory, pixel, some, |i, sample, values, _| give(i, pixel, sample, values));
+                    follow(shot, moments, memory, pixel, some, |i, sample, values, _| {
+                        give(i, pixel, sample, values, false);
+                    });
+                    // Of what moves there is none, so that all samples went together.
+                    for (i, Alone { sample, values }) in memory.alone() {
+                        give(i, pixel, sample, values, true);
+                    }
                 }
             }
             for (pool, &(replicate, _)) in pools.iter().zip(some) {

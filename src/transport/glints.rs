@@ -7,12 +7,13 @@
 //! lamps that a path which begins at x meets before anything scatters it, and L(x) all that it finds, a sample of a pixel is
 //!
 //! ```text
-//! L(x) − [x in E] · G(x) + |E| · G(y)
+//! L(x) − [x in E] · G(x) + |E| · f(y) · G(y)
 //! ```
 //!
-//! with x in the pixel and y in what it has of E. As E ∩ pixel has the same mean of G by x and by y, that of the sample is the pixel's
-//! light, whatever E is: what the search has missed is left to chance, and what it has found without cause costs time. Nothing but light
-//! is touched, neither coverage nor data of surfaces.
+//! with x drawn by the filter f of the pixel, and y from what f holds of E. As both have the same mean of f · G over E, that of the sample is
+//! the pixel's light, whatever E is: what the search has missed is left to chance, and what it has found without cause costs time. Nothing
+//! but light is touched, neither coverage nor data of surfaces. Where the samples of other pixels count for one, too, its y do not for
+//! others.
 
 mod light;
 mod search;
@@ -21,20 +22,24 @@ use super::Shot;
 use super::pilot::Use;
 use super::plan::{Effect, Integrator, count};
 use crate::film::Window;
-use crate::film::filter::Filter;
 use crate::scene::Scene;
 use glam::DVec2;
 use light::Typical;
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// The farthest that a filter may reach, in pixels.
+const MOST_REACH: f64 = 8.0;
+
 /// The regions of a picture.
 #[derive(Debug, PartialEq)]
 pub struct Glints {
-    /// Around all that have one.
+    /// Pixels from one to the farthest whose light it may have a part of.
+    reach: i32,
+    /// Around all that have a region within reach.
     window: Window,
-    /// Whether a pixel of the window has one.
-    has: Vec<bool>,
+    /// Whether a pixel of the window has.
+    near: Vec<bool>,
     /// By pixel, in order.
     regions: Vec<([i32; 2], Region)>,
 }
@@ -47,7 +52,7 @@ pub struct Region {
     /// Squares by their places in the curve that visits quarters before their quarters (Morton 1966), in order: numbers next to each other
     /// are squares near each other.
     squares: Vec<u32>,
-    /// Paths from it for each sample of the pixel.
+    /// Paths from it for each sample of the pixel, where all of it counts in full.
     paths: u32,
 }
 
@@ -98,39 +103,77 @@ fn gathered(x: u32) -> u32 {
         .fold(x & 0x5555_5555, |x, (by, mask)| (x | x >> by) & mask)
 }
 
+/// How many pixels from one to the farthest that a filter of this radius holds a part of.
+fn reach_of(radius: f64) -> i32 {
+    (radius + 0.5).ceil() as i32 - 1
+}
+
+/// All that is no more than `by` pixels from `window`.
+fn grown(window: Window, by: i32) -> Window {
+    let more = 2 * by as u32;
+    let Window { x, y, width, height } = window;
+    Window {
+        x: x.saturating_sub(by),
+        y: y.saturating_sub(by),
+        width: width.saturating_add(more),
+        height: height.saturating_add(more),
+    }
+}
+
+/// The pixels that are no more than `reach` from one.
+fn square([x, y]: [i32; 2], reach: i32) -> impl Iterator<Item = [i32; 2]> {
+    let about = move |x: i32| x.saturating_sub(reach)..=x.saturating_add(reach);
+    about(y).flat_map(move |y| about(x).map(move |x| [x, y]))
+}
+
 impl Glints {
-    /// Of regions by their pixels, in order; none of none.
-    fn new(regions: Vec<([i32; 2], Region)>) -> Option<Glints> {
+    /// Of regions by their pixels, in order, for filters of a radius; none of none.
+    fn new(regions: Vec<([i32; 2], Region)>, radius: f64) -> Option<Glints> {
         let (first, _) = regions.first()?;
         let bounds = regions.iter().fold([*first, *first], |[low, high], (pixel, _)| {
             [[low[0].min(pixel[0]), low[1].min(pixel[1])], [high[0].max(pixel[0]), high[1].max(pixel[1])]]
         });
         let [low, high] = bounds;
-        let window = Window {
-            x: low[0],
-            y: low[1],
-            width: (high[0] - low[0]) as u32 + 1,
-            height: (high[1] - low[1]) as u32 + 1,
-        };
-        let mut has = vec![false; window.pixels()];
-        for (pixel, _) in &regions {
-            if let Some(index) = window.index(*pixel) {
-                has[index] = true;
+        let [width, height] = [0, 1].map(|axis| (high[axis] - low[axis]) as u32 + 1);
+        let reach = reach_of(radius);
+        let window = grown(Window { x: low[0], y: low[1], width, height }, reach);
+        let mut near = vec![false; window.pixels()];
+        for pixel in regions.iter().flat_map(|(pixel, _)| square(*pixel, reach)) {
+            if let Some(index) = window.index(pixel) {
+                near[index] = true;
             }
         }
-        Some(Glints { window, has, regions })
+        Some(Glints { reach, window, near, regions })
+    }
+
+    /// Whether the filter of a pixel may hold a place of one.
+    #[must_use]
+    #[inline]
+    pub fn are_near(&self, pixel: [i32; 2]) -> bool {
+        self.window.index(pixel).is_some_and(|index| self.near[index])
     }
 
     /// What a pixel has of E, if anything.
     #[must_use]
     #[inline]
     pub fn of(&self, pixel: [i32; 2]) -> Option<&Region> {
-        let index = self.window.index(pixel)?;
-        if !self.has[index] {
+        if !self.are_near(pixel) {
             return None;
         }
         let place = self.regions.binary_search_by_key(&pixel, |(pixel, _)| *pixel).ok()?;
         Some(&self.regions[place].1)
+    }
+
+    /// Whether E has a place on the picture, in pixels.
+    #[must_use]
+    pub fn hold(&self, place: DVec2) -> bool {
+        let corner = place.floor();
+        self.of([corner.x as i32, corner.y as i32]).is_some_and(|region| region.holds(place - corner))
+    }
+
+    /// What the filter of a pixel may hold of E, by pixels.
+    pub fn about(&self, pixel: [i32; 2]) -> impl Iterator<Item = ([i32; 2], &Region)> {
+        square(pixel, self.reach).filter_map(|pixel| self.of(pixel).map(|region| (pixel, region)))
     }
 }
 
@@ -158,8 +201,11 @@ pub fn find(
         Some("a lens blurs them".to_owned())
     } else if !moments.is_empty() {
         Some("things move while the shutter is open".to_owned())
-    } else if filter.filter() != Filter::Box {
-        Some("the filter is no box".to_owned())
+    } else if !filter.is_positive() {
+        // A sample with light that counts against its pixel would be one that light cannot make.
+        Some("the filter has negative lobes".to_owned())
+    } else if filter.radius() > MOST_REACH {
+        Some(format!("the filter reaches farther than {MOST_REACH} pixels"))
     } else if lamps.len() > search::MOST_LAMPS {
         Some(format!("there are more than {} lamps", search::MOST_LAMPS))
     } else if samples < search::FEWEST && wish == Use::Auto {
@@ -172,6 +218,7 @@ pub fn find(
     }
     let typical = Typical::of(shot);
     let mean = typical.mean / f64::from(scene.light_unit());
+    let window = grown(window, reach_of(filter.radius()));
     let Some(mut regions) = search::regions(scene, &lamps, window, samples, mean, goes_on) else {
         return (None, say(false, format!("there are more than {}", search::MOST_PICTURES)));
     };
@@ -181,7 +228,8 @@ pub fn find(
     if wish == Use::Auto {
         regions = regions.into_par_iter().filter(|found| goes_on() && typical.pays(shot, found)).collect();
     }
-    match Glints::new(regions.into_iter().map(|(pixel, region, _)| (pixel, region)).collect()) {
+    let regions = regions.into_iter().map(|(pixel, region, _)| (pixel, region)).collect();
+    match Glints::new(regions, filter.radius()) {
         None => (None, say(false, "chance finds those that are seen often enough".into())),
         Some(glints) => {
             let paths = glints.regions.iter().map(|(_, region)| region.paths as usize).sum::<usize>();
@@ -224,13 +272,22 @@ mod tests {
 
     #[test]
     fn regions_are_found_by_their_pixels() {
-        assert_eq!(Glints::new(Vec::new()), None);
+        assert_eq!(Glints::new(Vec::new(), 0.5), None);
         let pixels = [[-3, 2], [-3, 9], [4, 2]];
-        let glints = Glints::new(pixels.iter().map(|&pixel| (pixel, Region::new(1, [[0, 1]], 1))).collect())
-            .expect("there are some");
-        for y in 0..12 {
-            for x in -5..8 {
+        for (radius, reach) in [(0.3, 0), (0.5, 0), (1.0, 1), (1.5, 1), (2.0, 2)] {
+            let regions = pixels.iter().map(|&pixel| (pixel, Region::new(1, [[0, 1]], 1))).collect();
+            let glints = Glints::new(regions, radius).expect("there are some");
+            for [x, y] in (-3..14).flat_map(|y| (-8..10).map(move |x| [x, y])) {
                 assert_eq!(glints.of([x, y]).is_some(), pixels.contains(&[x, y]), "{x} {y}");
+                let middle = DVec2::new(f64::from(x) + 0.25, f64::from(y) + 0.75);
+                assert_eq!(glints.hold(middle), pixels.contains(&[x, y]), "{x} {y}");
+                assert!(!glints.hold(middle + DVec2::X * 0.5));
+                let within = |pixel: &[i32; 2]| (pixel[0] - x).abs() <= reach && (pixel[1] - y).abs() <= reach;
+                let expected: Vec<[i32; 2]> = pixels.into_iter().filter(within).collect();
+                let mut found: Vec<[i32; 2]> = glints.about([x, y]).map(|(pixel, _)| pixel).collect();
+                found.sort_unstable();
+                assert_eq!(found, expected, "{x} {y}");
+                assert_eq!(glints.are_near([x, y]), !expected.is_empty(), "{x} {y}");
             }
         }
     }

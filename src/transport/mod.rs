@@ -220,8 +220,7 @@ impl Begun {
         self.sample.weight = chosen.weight;
         self.sample.place = place;
         if let Some(glints) = &plan.glints {
-            let region = glints.of(at.pixel.map(|x| x as i32));
-            self.apart = region.is_some_and(|region| region.holds(place - corner));
+            self.apart = glints.are_near(at.pixel.map(|x| x as i32)) && glints.hold(place);
         }
         // Rays of the camera leave no surface, and never did here: two vectors are stored, no enum is copied.
         let ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
@@ -343,16 +342,40 @@ impl Begun {
         self.see(&light);
     }
 
-    /// Adds the light of the lamps whose small pictures its pixel has a part of.
+    /// Adds the light of the lamps whose small pictures the filter of its pixel holds a part of; whether there may be some.
     #[inline]
-    fn add_glints(&mut self, shot: &Shot, ledger: Option<&Ledger>) {
-        if let Some(glints) = &shot.plan.glints
-            && let Some(region) = glints.of(self.at.pixel.map(|x| x as i32))
-        {
+    fn add_glints(&mut self, shot: &Shot, ledger: Option<&Ledger>) -> bool {
+        let pixel = self.at.pixel.map(|x| x as i32);
+        // All of its light is there then.
+        self.apart = false;
+        let Some(glints) = shot.plan.glints.as_ref().filter(|glints| glints.are_near(pixel)) else { return false };
+        for region in glints.about(pixel) {
             self.add_lamps(region, shot, ledger);
         }
-        // All of it is there.
-        self.apart = false;
+        true
+    }
+
+    /// The same, apart from all else, after the `numbers` of the layers of the sample without it: in the layers by how much they change.
+    fn glints_alone(
+        &mut self,
+        (shot, sampler): (&Shot, &Sampler),
+        ledger: Option<&Ledger>,
+        numbers: &[f32],
+    ) -> Option<Alone> {
+        let before = self.sample;
+        self.sample.radiance = Lanes::ZERO;
+        let there = self.add_glints(shot, ledger);
+        self.finish(shot.scene);
+        let sample = self.sample;
+        let mut changed = layers::Values::default();
+        if there && !numbers.is_empty() {
+            self.sample.radiance = before.radiance + sample.radiance;
+            self.finish(shot.scene);
+            self.layers(shot, sampler, ledger, &mut changed);
+            changed.numbers.iter_mut().zip(numbers).for_each(|(after, before)| *after -= before);
+        }
+        self.sample = before;
+        there.then_some(Alone { sample, values: changed.numbers })
     }
 
     /// Takes what came of the ray.
@@ -449,6 +472,14 @@ const FURTHER_IN_MEDIA: f64 = 1.45;
 /// they are two, 0.78 where they are a hundred and 1.21 where they are ten thousand, balls 0.82, 1.29 and 1.63.
 const HALVING: f64 = 0.05;
 
+/// What a sample has for its own pixel alone, where the samples of others count for it, too: light of small pictures of lamps.
+pub struct Alone {
+    /// The sample with that light and no other.
+    pub sample: PixelSample,
+    /// What it adds to the numbers of the layers.
+    pub values: Vec<f32>,
+}
+
 /// The memory of samples that are rendered one after the other.
 pub struct Samples {
     octet: Octet,
@@ -456,6 +487,8 @@ pub struct Samples {
     layers: layers::Values,
     /// One for each, where light is parted.
     ledgers: Vec<Ledger>,
+    /// By their places among the samples.
+    alone: Vec<(usize, Alone)>,
     /// Pairs of vertices that were asked whether they see each other.
     pairs: u32,
 }
@@ -467,6 +500,7 @@ impl Default for Samples {
             begun: std::array::from_fn(|_| Begun::blank()),
             layers: layers::Values::default(),
             ledgers: Vec::new(),
+            alone: Vec::new(),
             pairs: 0,
         }
     }
@@ -477,6 +511,11 @@ impl Samples {
     fn rays(&self, scene: &Scene, samples: usize) -> f64 {
         let paths: f64 = self.begun[..samples].iter().map(|begun| begun.rays(scene)).sum();
         paths + path::reuse::cost_of_a_pair(scene) * f64::from(self.pairs)
+    }
+
+    /// What samples of the last call have for their pixels alone, by their places among them.
+    pub fn alone(&self) -> impl Iterator<Item = (usize, &Alone)> {
+        self.alone.iter().map(|(i, alone)| (*i, alone))
     }
 
     /// Renders `samples` and gives each by its place among them, with the numbers of its layers and what covers it, where there
@@ -490,7 +529,7 @@ impl Samples {
         samples: &[Address],
         mut give: impl FnMut(usize, &PixelSample, &[f32], Option<u64>),
     ) {
-        let Samples { octet, begun, layers, ledgers, pairs } = self;
+        let Samples { octet, begun, layers, ledgers, alone, pairs } = self;
         let begun = &mut begun[..samples.len()];
         octet.reset(shot.seed, samples.iter().map(|at| (at.pixel, at.replicate, at.index)));
         // Step by step: in all but the second no sample waits for the one before, so that they overlap.
@@ -517,7 +556,12 @@ impl Samples {
             }
         }
         for (i, begun) in begun.iter_mut().enumerate() {
-            begun.add_glints(shot, ledgers.get(i));
+            if shot.plan.splatting {
+                // That light comes below.
+                begun.apart = false;
+            } else {
+                begun.add_glints(shot, ledgers.get(i));
+            }
             begun.finish(shot.scene);
         }
         layers.numbers.clear();
@@ -527,6 +571,14 @@ impl Samples {
             }
         }
         let channels = layers.numbers.len() / begun.len().max(1);
+        alone.clear();
+        if shot.plan.splatting && shot.plan.glints.is_some() {
+            for (i, begun) in begun.iter_mut().enumerate() {
+                let numbers = &layers.numbers[i * channels..(i + 1) * channels];
+                let found = begun.glints_alone((shot, &octet.sampler(i)), ledgers.get(i), numbers);
+                alone.extend(found.map(|found| (i, found)));
+            }
+        }
         for (i, begun) in begun.iter().enumerate() {
             let covered = shot.plan.layers.mattes.then(|| {
                 let u = |crossing, left| deciding(shot, &octet.sampler(i), begun.at, crossing, left);

@@ -9,8 +9,12 @@ use std::f64::consts::PI;
 const CAMERA: &str = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\n";
 
 fn seen(glints: &str, side: u32, before: &str, shapes: &str) -> Bench {
+    seen_by("box", glints, side, before, shapes)
+}
+
+fn seen_by(filter: &str, glints: &str, side: u32, before: &str, shapes: &str) -> Bench {
     let yaml = format!(
-        "{CAMERA}image: {{width: {side}, height: {side}}}\nrender: {{samples: 128, techniques: {{{glints}}}}}\n\
+        "{CAMERA}image: {{width: {side}, height: {side}, filter: {filter}}}\nrender: {{samples: 128, techniques: {{{glints}}}}}\n\
          {before}shapes:\n{shapes}"
     );
     bench_with(&yaml, &[])
@@ -28,7 +32,8 @@ fn pixels_a_unit(side: u32) -> f64 {
 
 /// A ball of radius r at distance d on the axis is seen as a disc of radius tan asin(r / d), whatever part of a pixel that is: of 10⁻⁶
 /// pixels no path would meet it. A plane mirror shows it as far behind, and a disc at infinity of half angle α has the radius tan α. Where four
-/// pixels meet each has a quarter. To 2 %: lamps fill 0.6 of the squares about them, spread by 128 samples of two paths each.
+/// pixels meet each has a quarter. To 2 %: lamps fill 0.6 of the squares about them, so that of eight renders of 128 samples with two paths for
+/// each of four pixels √(0.4 / 0.6 / 8192) = 0.9 % is left where they are drawn without order, and half of that with.
 #[test]
 fn a_lamp_that_is_less_than_a_pixel_has_the_light_of_its_picture() {
     let side = 8;
@@ -53,26 +58,31 @@ fn a_lamp_that_is_less_than_a_pixel_has_the_light_of_its_picture() {
     ] {
         let bench = seen("glints: on", side, &before, &shapes);
         assert!(bench.prepared.plan.glints.is_some(), "{name}: {:?}", said(&bench));
-        let picture = bench.picture();
-        assert_eq!(picture.invalid, 0);
-        let sum: f64 = picture.y.iter().sum();
+        let alpha = bench.picture().alpha;
+        assert!(alpha.iter().all(|alpha| *alpha == 1.0 || name == "a sun"), "{name}");
+        let window = bench.window();
+        let (pixels, _) = over_seeds(bench, 0..8);
+        let sum: f64 = pixels.iter().map(|moments| moments.mean).sum();
         println!("{name}: {sum} of {expected}");
         assert!((sum / expected - 1.0).abs() < 0.02, "{name}: {sum}, expected {expected}");
-        for (x, y) in [(3, 3), (4, 3), (3, 4), (4, 4)] {
-            let quarter = 0.25 * expected;
-            assert!((picture.at(x, y) / quarter - 1.0).abs() < 0.05, "{name} {x} {y}: {}", picture.at(x, y));
+        for pixel in [[3, 3], [4, 3], [3, 4], [4, 4]] {
+            let (found, quarter) = (pixels[window.index(pixel).unwrap()].mean, 0.25 * expected);
+            assert!((found / quarter - 1.0).abs() < 0.05, "{name} {pixel:?}: {found}");
         }
-        assert!(picture.alpha.iter().all(|alpha| *alpha == 1.0 || name == "a sun"), "{name}");
     }
 }
 
 fn lit(glints: &str, before: &str, shapes: &str) -> Bench {
+    lit_by("box", glints, before, shapes)
+}
+
+fn lit_by(filter: &str, glints: &str, before: &str, shapes: &str) -> Bench {
     let lamps = "- sphere: {center: [1.5, 2.5, 2], radius: 0.2, emission: 20}\n\
                  - sphere: {center: [-2, 1.5, 3], radius: 0.25, emission: {rgb: [20, 12, 4]}}\n\
                  - plane: {point: [0, -1, 0], normal: [0, 1, 0], material: {diffuse: {reflectance: 0.6}}}\n";
     // Lest the light of the lamps be all that there is.
     let even = if before.contains("lights") { "" } else { "lights: [{constant: {radiance: 0.2}}]\n" };
-    seen(&format!("glints: {glints}"), 16, &format!("{even}{before}"), &format!("{lamps}{shapes}"))
+    seen_by(filter, &format!("glints: {glints}"), 16, &format!("{even}{before}"), &format!("{lamps}{shapes}"))
 }
 
 /// The same light, and where lamps are looked for by themselves at most this part of its noise.
@@ -118,7 +128,7 @@ fn light_is_the_same_where_lamps_are_looked_for_by_themselves() {
         ("coats", "", &coats, 0.5),
         ("glass", "", &glass, 0.5),
         ("films and a pane", "", &films, 0.5),
-        // The search does not know which of them has the place.
+        // Of these chance meets some rows too rarely to tell their variance by.
         ("bodies that overlap", "", &bodies, f64::INFINITY),
         ("gloss and a blend", "", &gloss, 0.5),
         ("a sun in glass", sun, &glass, 0.5),
@@ -129,6 +139,26 @@ fn light_is_the_same_where_lamps_are_looked_for_by_themselves() {
         ("lamps that are not seen", hidden, &mirrors, 0.5),
     ] {
         assert_less_noise(name, lit("off", before, shapes), lit("on", before, shapes), most);
+    }
+}
+
+/// Filters whose samples count for all pixels that they reach, each for its own alone, and with gaps between them; cut where the picture
+/// ends or not.
+#[test]
+fn light_is_the_same_by_all_filters() {
+    let shapes = "- sphere: {center: [-0.8, -0.4, 0], radius: 0.6, material: {dielectric: {ior: {glass: N-SF11}}}}\n\
+                  - sphere: {center: [0.8, -0.4, 0], radius: 0.6, material: {plastic: {}}}\n\
+                  - sphere: {center: [0, 1.7, 0], radius: 0.5, material: {mirror: {}}}\n";
+    for (filter, techniques) in [
+        ("{gaussian: {stddev: 0.5}}", ""),
+        ("{gaussian: {stddev: 0.5}}, sample_border: false", ""),
+        ("{tent: {radius: 0.75}}", ", splatting: off"),
+        ("{tent: {radius: 1}}", ", reuse: on"),
+        ("{tent: {radius: 1}}", ", adaptive: on"),
+        ("{tent: {radius: 0.3}}", ""),
+    ] {
+        let [off, on] = ["off", "on"].map(|glints| lit_by(filter, &format!("{glints}{techniques}"), "", shapes));
+        assert_less_noise(&format!("{filter}{techniques}"), off, on, 0.5);
     }
 }
 
@@ -150,6 +180,23 @@ fn what_red_light_alone_shows_is_found() {
     }
 }
 
+/// A cube of water in one of glass: a lamp behind them is seen where light between the two bends by the ratio of their indices.
+#[test]
+fn what_bodies_within_others_show_is_found() {
+    let cube = |size: f64, material: &str| {
+        let turned = "transform: [{rotate: {axis: [0, 1, 0], deg: 35}}]";
+        format!("- cube: {{size: {size}, {turned}, material: {{dielectric: {{{material}}}}}}}\n")
+    };
+    let shapes = "- sphere: {center: [0.1, 0.2, -5], radius: 0.06, emission: 20}\n".to_owned()
+        + &cube(2.0, "ior: 1.5, priority: 1")
+        + &cube(1.6, "ior: 1.33, priority: 2");
+    let [off, on] = ["off", "on"]
+        .map(|glints| seen(&format!("glints: {glints}"), 16, "lights: [{constant: {radiance: 0.2}}]\n", &shapes));
+    let glints = on.prepared.plan.glints.clone().unwrap_or_else(|| panic!("{:?}", said(&on)));
+    assert!(glints.of([9, 7]).is_some());
+    assert_less_noise("a cube in a cube", off, on, 0.1);
+}
+
 #[test]
 fn light_is_the_same_beside_other_techniques() {
     let glass = "- sphere: {center: [-0.8, -0.4, 0], radius: 0.6, material: {dielectric: {ior: {glass: N-SF11}}}}\n\
@@ -169,9 +216,10 @@ fn light_is_the_same_beside_other_techniques() {
 fn layers_add_up_where_lamps_are_looked_for_by_themselves() {
     let glass = "- sphere: {center: [-0.8, -0.4, 0], radius: 0.6, material: {dielectric: {ior: {glass: N-SF11}}}}\n\
                  - sphere: {center: [0.8, -0.4, 0], radius: 0.6, material: {plastic: {}}}\n";
-    for before in ["", "fog: {colour: 0.3, density: 0.1}\n"] {
+    let fog = "fog: {colour: 0.3, density: 0.1}\n";
+    for (filter, before) in [("box", ""), ("box", fog), ("{gaussian: {stddev: 0.5}}", fog)] {
         let layers = format!("{before}layers: [emission, direct, indirect, caustic]\n");
-        let (plain, layered) = (lit("on", before, glass), lit("on", &layers, glass));
+        let (plain, layered) = (lit_by(filter, "on", before, glass), lit_by(filter, "on", &layers, glass));
         assert!(plain.prepared.plan.glints.is_some() && plain.prepared.plan.glints == layered.prepared.plan.glints);
         assert_layers_add_up(&plain, &layered);
     }
@@ -181,12 +229,17 @@ fn layers_add_up_where_lamps_are_looked_for_by_themselves() {
 #[test]
 fn parts_have_the_pixels_of_the_whole() {
     let shapes = "- sphere: {center: [0.1, -0.4, 0], radius: 0.6, material: {plastic: {}}}\n";
-    let all = lit("on", "layers: [albedo]\n", shapes);
-    let whole = all.picture();
-    assert_eq!(whole.alpha, lit("off", "", shapes).picture().alpha);
+    for filter in ["box", "{gaussian: {stddev: 0.5}}"] {
+        let all = lit_by(filter, "on", "layers: [albedo]\n", shapes);
+        assert_eq!(all.picture().alpha, lit_by(filter, "off", "", shapes).picture().alpha);
+        assert_parts_have_the_pixels_of_the_whole(filter, shapes);
+    }
+}
+
+fn assert_parts_have_the_pixels_of_the_whole(filter: &str, shapes: &str) {
     let yaml = |crop: &str| {
         format!(
-            "{CAMERA}image: {{width: 16, height: 16{crop}}}\nrender: {{samples: 64, techniques: {{light_tracing: off, glints: on, reuse: off, shadow_rays: 1}}}}\n\
+            "{CAMERA}image: {{width: 16, height: 16, filter: {filter}{crop}}}\nrender: {{samples: 64, techniques: {{light_tracing: off, glints: on, reuse: off, shadow_rays: 1}}}}\n\
              shapes:\n- sphere: {{center: [1.5, 2.5, 2], radius: 0.12, emission: 60}}\n{shapes}"
         )
     };
@@ -217,6 +270,12 @@ fn it_is_said_why_none_are_looked_for() {
         Some("there are more than 16 lamps")
     );
     assert_eq!(why("on", "", "").as_deref(), Some("none is seen in mirrors or glass"));
+    for (filter, reason) in [
+        ("mitchell", "the filter has negative lobes"),
+        ("{gaussian: {stddev: 2.5}}", "the filter reaches farther than 8 pixels"),
+    ] {
+        assert_eq!(said(&lit_by(filter, "on", "", ball)), Some((false, reason.to_owned())));
+    }
     let large = "- sphere: {center: [0, 0, 0], radius: 1.5, emission: 1}\n- sphere: {center: [0, -0.9, 1.9], radius: 0.2, material: {diffuse: {}}}\n";
     assert_eq!(said(&seen("glints: on", 8, "", large)).map(|(on, _)| on), Some(false));
     assert_eq!(said(&seen("glints: on", 8, "lights: [{constant: {radiance: 1}}]\n", ball)), None);

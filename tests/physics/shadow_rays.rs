@@ -11,7 +11,7 @@ fn lit(shadow_rays: u32, shapes: &str, before: &str, techniques: &str) -> Bench 
     let yaml = format!(
         "camera: {{origin: [0, 0, 0.95], target: [0, -0.1, -1], fov_deg: 80}}\nimage: {{width: 20, height: 16}}\n\
          materials: {{chalk: {{diffuse: {{reflectance: 0.7}}}}}}\nintegrator: {{path: {{max_depth: 3}}}}\nrender: {{samples: 16, \
-         techniques: {{shadow_rays: {shadow_rays}, light_tracing: off, {techniques}}}}}\n{before}{shapes}{LAMPS}"
+         techniques: {{shadow_rays: {shadow_rays}, light_tracing: off, glints: off, {techniques}}}}}\n{before}{shapes}{LAMPS}"
     );
     bench_with(&yaml, &[("sky.png", &grey_png(16, 8, |x, y| (100 + x * 9 + y) as u8))])
 }

@@ -117,6 +117,18 @@ impl Table {
         Portion { magnitude: self.cumulative[cell] + area, signed: self.signed[cell] + signed }
     }
 
+    /// The filter at `x` of 0 or more, over ∫|f| of one side.
+    pub(super) fn value(&self, x: f64) -> f64 {
+        let last = self.negative.len();
+        if x >= self.x[last] {
+            return 0.0;
+        }
+        let cell = self.x[1..last].partition_point(|end| *end <= x);
+        let (a, b) = (self.density[cell], self.density[cell + 1]);
+        let magnitude = a + (b - a) * (x - self.x[cell]) / (self.x[cell + 1] - self.x[cell]);
+        if self.negative[cell] { -magnitude } else { magnitude }
+    }
+
     /// The densities at `x` of 0 or more of a filter without zeros: positions are evenly spaced.
     #[inline]
     pub(super) fn densities(&self, x: f32x8) -> f32x8 {

@@ -3,17 +3,21 @@
 use super::Region;
 use super::search::Found;
 use crate::film::error::floor_about;
-use crate::math::sampler::Sampler;
-use crate::spectrum::observer;
+use crate::math::sampler::{Sampler, Set, pairs};
+use crate::spectrum::{Lanes, observer};
 use crate::transport::path::{self, Sought};
 use crate::transport::plan::{Integrator, PathSettings};
 use crate::transport::ways::Ledger;
-use crate::transport::{self, Address, Begun, Incoming, PLASTIC, Shot, address, place_in};
+use crate::transport::{self, Address, Begun, Incoming, Shot, address, place_in};
 use glam::DVec2;
 use rayon::prelude::*;
 
-/// Tells their numbers from the picture's.
+/// Tells their numbers from the picture's, and those of a region some columns and rows away from its pixel's own.
 const STREAM: u64 = 0x676c_696e_7473_676c;
+const STREAMS: [u64; 2] = [0x9e37_79b9_7f4a_7c15, 0xd1b5_4a32_d192_ed03];
+
+/// The least number of paths from a region in the mean, where little of it counts.
+const FEWEST_PATHS: f64 = 0.25;
 
 /// Pixels for each that is tried, the least and most along a side of the picture, samples of each, and of a pixel that has a region.
 const PIXELS: f64 = 256.0;
@@ -25,42 +29,65 @@ const TRIED_THERE: u32 = 4;
 const COST: f64 = 0.25;
 
 impl Begun {
-    /// Adds the light of lamps from a region of its pixel, and enters it in a `ledger` if there is one.
+    /// Adds the light of lamps from the region of a pixel, as far as the filter of its own holds it, and enters it in a `ledger` if there
+    /// is one. The less of it can count, the fewer paths.
     #[inline(never)]
-    pub(in crate::transport) fn add_lamps(&mut self, region: &Region, shot: &Shot, ledger: Option<&Ledger>) {
+    pub(in crate::transport) fn add_lamps(
+        &mut self,
+        (pixel, region): ([i32; 2], &Region),
+        shot: &Shot,
+        ledger: Option<&Ledger>,
+    ) {
         let Integrator::Path(settings) = &shot.plan.integrator else { return };
-        let share = (region.area() / f64::from(region.paths)) as f32;
+        let own = self.at.pixel.map(|x| x as i32);
+        let corner = DVec2::from(pixel.map(f64::from));
+        let middle = DVec2::from(own.map(f64::from)) + 0.5;
+        let nearest = shot.filter.value(own, middle.clamp(corner, corner + 1.0));
+        let part = (nearest / shot.filter.value(pixel, corner + 0.5)).min(1.0);
+        let expected = (f64::from(region.paths) * part).max(FEWEST_PATHS);
+        let most = expected.ceil() as u32;
+        let share = region.area() / expected;
+
+        let away = [0, 1].map(|axis| (pixel[axis] - own[axis]) as u64);
+        let stream = STREAM ^ away[0].wrapping_mul(STREAMS[0]) ^ away[1].wrapping_mul(STREAMS[1]);
+        let sampler = |i: u32| {
+            let index = self.at.index.wrapping_mul(most).wrapping_add(i);
+            Sampler::new(shot.seed ^ stream, self.at.pixel, self.at.replicate, index)
+        };
         let of_one = ledger.map(|_| Ledger::new(shot.scene.light_groups.count().into()));
-        for i in 0..region.paths {
-            let found = self.lamps(region, shot, settings, i, of_one.as_ref());
-            self.sample.radiance += found.radiance * share;
-            self.events += found.events;
+        let (mut radiance, mut events) = (Lanes::ZERO, 0);
+        let count = (expected + pairs(sampler(0).set(Set::Camera)).1.y) as u32;
+        for sampler in (0..count).map(sampler) {
+            let place = corner + region.place(pairs(sampler.set(Set::Camera)).0);
+            let share = (share * shot.filter.value(own, place)) as f32;
+            if share == 0.0 {
+                continue;
+            }
+            let found = self.lamps(place, shot, settings, &sampler, of_one.as_ref());
+            radiance += found.radiance * share;
+            events += found.events;
             if let (Some(all), Some(one)) = (ledger, &of_one) {
                 all.add(one, share);
                 one.clear();
             }
         }
+        self.sample.radiance += radiance;
+        self.events += events;
     }
 
-    /// The light of lamps along path `i` from a region of its pixel, entered in a blank `ledger` if there is one.
+    /// The light of lamps along a path from a place on the picture, entered in a blank `ledger` if there is one.
     fn lamps(
         &self,
-        region: &Region,
+        place: DVec2,
         shot: &Shot,
         settings: &PathSettings,
-        i: u32,
+        sampler: &Sampler,
         ledger: Option<&Ledger>,
     ) -> Incoming {
-        let Shot { scene, plan, seed, .. } = *shot;
-        let Begun { at, sample, .. } = self;
-        let corner = DVec2::from(at.pixel.map(|x| f64::from(x as i32)));
-        // Moved alike for all samples, which stay as evenly spread.
-        let u = (sample.place - corner + DVec2::new(PLASTIC, PLASTIC * PLASTIC) * f64::from(i)).fract_gl();
-        let index = at.index.wrapping_mul(region.paths).wrapping_add(i);
-        let sampler = Sampler::new(seed ^ STREAM, at.pixel, at.replicate, index);
-        let ray = scene.camera.ray(corner + region.place(u), || DVec2::splat(0.5));
+        let Shot { scene, plan, .. } = *shot;
+        let ray = scene.camera.ray(place, || DVec2::splat(0.5));
         let ray = (&ray, Sought::Lamps);
-        let found = path::radiance(scene, plan, settings, &sampler, &sample.wavelengths, ray, None, ledger);
+        let found = path::radiance(scene, plan, settings, sampler, &self.sample.wavelengths, ray, None, ledger);
         let Some(fog) = shot.fog(&plan.integrator) else { return found };
         let through = 1.0 - fog.falloff.amount(found.depth) as f32;
         if let Some(ledger) = ledger {

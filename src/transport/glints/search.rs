@@ -12,8 +12,9 @@ use crate::optics::bsdf::{Bsdf, Lobes, Pane, mirror};
 use crate::optics::dielectric::{Dielectric, RelativeIndex};
 use crate::scene::light::Light;
 use crate::scene::material::Kind;
+use crate::scene::nested::{Bodies, Inside};
 use crate::scene::shape::Shape;
-use crate::scene::{Geometry, Hit, Scene, SurfacePoint};
+use crate::scene::{Geometry, Hit, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, Spectrum};
 use crate::transport::path::seen_frame;
 use arrayvec::ArrayVec;
@@ -21,9 +22,8 @@ use glam::{DMat2, DVec2, DVec3};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 
-/// The fewest samples for which it is searched, and those from which on it is searched between, too.
+/// The fewest samples of a pixel for which it is searched.
 pub(super) const FEWEST: u32 = 16;
-const MANY: u32 = 64;
 
 /// The most lamps, and the most pictures of them: ripples on water show thousands, which chance meets.
 pub(super) const MOST_LAMPS: usize = 16;
@@ -35,9 +35,16 @@ const DEPTH: usize = 8;
 /// The least luminance of a picture, over that of all.
 const FAINTEST: f64 = 2.0;
 
-/// Pixels between places from which it is searched, and how far from one a picture may lie.
-const APART: [i32; 2] = [4, 2];
+/// Samples for each place from which it is searched, which takes about as long as four of them, and the least and the most that is between
+/// two places, in pixels.
+const SAMPLES_A_PLACE: f64 = 256.0;
+const APART: (f64, f64) = (0.5, 4.0);
+
+/// How far from a place a picture may lie, in pixels.
 const REACH: f64 = 6.0;
+
+/// Surfaces that do not show on the way to one that does, at the most.
+const MOST_STRAIGHT: u32 = 64;
 
 /// Steps to a picture at the most, and the part of its smaller half axis that the last one may have.
 const STEPS: usize = 16;
@@ -134,7 +141,8 @@ impl Lamp {
 
     /// How far the first of three rays goes past its middle, in radii, and the derivative of that by the place on the picture, which is
     /// `step` apart.
-    fn miss(&self, rays: &[Ray; 3], step: f64) -> Option<(DVec2, DMat2)> {
+    fn miss(&self, ways: &[Way; 3], step: f64) -> Option<(DVec2, DMat2)> {
+        let rays = ways.each_ref().map(|way| way.ray);
         let (toward, sine) = self.seen(rays[0].origin)?;
         if rays[0].direction.dot(toward) <= 0.0 {
             return None;
@@ -159,8 +167,20 @@ enum Turn {
 
 type Turns = ArrayVec<Turn, DEPTH>;
 
+/// A ray, and the bodies with a priority that it is in.
+#[derive(Clone, Copy)]
+struct Way {
+    ray: Ray,
+    bodies: Bodies,
+}
+
 /// A surface that a ray has met.
 struct Met<'a> {
+    /// The ray, where it came to what is in its way.
+    ray: Ray,
+    /// The bodies on the side from where it came.
+    here: Bodies,
+    object: &'a Object,
     hit: Hit,
     surface: SurfacePoint,
     frame: Frame,
@@ -266,14 +286,14 @@ pub(super) fn regions(
 ) -> Option<Vec<Found>> {
     let brightest = lamps.iter().map(|lamp| lamp.luminance).fold(0.0, f64::max);
     let search = Search { scene, lamps, least: FAINTEST * mean, brightest };
-    let apart = APART[usize::from(samples >= MANY)];
+    let apart = (SAMPLES_A_PLACE / f64::from(samples.max(1))).sqrt().clamp(APART.0, APART.1);
     // A picture is found from all places that are near it, whatever is rendered of it: beyond the window, too.
-    let margin = (REACH + LARGEST) as i32 + apart;
+    let margin = REACH + LARGEST + apart;
     let range = |start: i32, size: u32| {
-        let (low, high) = (start.saturating_sub(margin), start.saturating_add_unsigned(size).saturating_add(margin));
-        low.div_euclid(apart)..high.div_euclid(apart) + 1
+        let (low, high) = (f64::from(start) - margin, f64::from(start) + f64::from(size) + margin);
+        (low / apart).floor() as i32..(high / apart).floor() as i32 + 1
     };
-    let places = |x: i32, y: i32| (DVec2::new(f64::from(x), f64::from(y)) + 0.5) * f64::from(apart);
+    let places = |x: i32, y: i32| (DVec2::new(f64::from(x), f64::from(y)) + 0.5) * apart;
     let columns = range(window.x, window.width);
     let rows: Vec<Vec<Picture>> = range(window.y, window.height)
         .into_par_iter()
@@ -329,16 +349,18 @@ struct Search<'a> {
 
 impl Search<'_> {
     /// Rays of the camera at a place and `step` to the right and down from it.
-    fn rays(&self, place: DVec2, step: f64) -> [Ray; 3] {
-        [DVec2::ZERO, DVec2::X, DVec2::Y].map(|to| self.scene.camera.ray(place + to * step, || DVec2::splat(0.5)))
+    fn ways(&self, place: DVec2, step: f64) -> [Way; 3] {
+        let bodies = self.scene.camera_inside.bodies;
+        let ray = |to: DVec2| self.scene.camera.ray(place + to * step, || DVec2::splat(0.5));
+        [DVec2::ZERO, DVec2::X, DVec2::Y].map(|to| Way { ray: ray(to), bodies })
     }
 
     /// The pictures that are found from `place`.
     fn from(&self, place: DVec2) -> Vec<Picture> {
         let mut found = Vec::new();
         for nm in SEARCHED {
-            let rays = self.rays(place, BESIDE);
-            let parts = self.follow((place, nm), rays, &mut Turns::new(), Share::ALL, &mut found);
+            let ways = self.ways(place, BESIDE);
+            let parts = self.follow((place, nm), ways, &mut Turns::new(), Share::ALL, &mut found);
             if nm == SEARCHED[0] && !parts {
                 break;
             }
@@ -347,12 +369,12 @@ impl Search<'_> {
         found
     }
 
-    /// Looks for lamps along `rays` of a wavelength, which begin at a place and have come to where they are by `turns`, and follows them on.
+    /// Looks for lamps along `ways` of a wavelength, which begin at a place and have come to where they are by `turns`, and follows them on.
     /// Whether wavelengths part on the way.
     fn follow(
         &self,
         (place, nm): (DVec2, f64),
-        rays: [Ray; 3],
+        ways: [Way; 3],
         turns: &mut Turns,
         left: Share,
         found: &mut Vec<Picture>,
@@ -361,7 +383,7 @@ impl Search<'_> {
             if left.light * of.luminance < self.least {
                 continue;
             }
-            let Some((miss, slopes)) = of.miss(&rays, BESIDE) else { continue };
+            let Some((miss, slopes)) = of.miss(&ways, BESIDE) else { continue };
             let step = slopes.inverse() * miss;
             if step.length() <= REACH {
                 let seed = Picture { lamp, turns: turns.clone(), place: place - step, slopes, left, nm, part: 1.0 };
@@ -374,16 +396,16 @@ impl Search<'_> {
         if turns.is_full() {
             return parts;
         }
-        let Some(met) = self.meet(&rays[0], nm) else { return parts };
-        let beside = [1, 2].map(|i| self.meet(&rays[i], nm).filter(|other| other.hit.object == met.hit.object));
+        let Some(met) = self.meet(&ways[0], nm) else { return parts };
+        let beside = [1, 2].map(|i| self.meet(&ways[i], nm).filter(|other| other.hit.object == met.hit.object));
         let [Some(right), Some(down)] = beside else { return parts };
         for turn in [Turn::Mirrored, Turn::Through] {
-            let Some((first, share)) = self.turn(&rays[0], &met, turn) else { continue };
+            let Some((first, share)) = self.turn(&met, turn) else { continue };
             let left = left.after(turn, share, met.parts());
             if left.light * self.brightest < self.least {
                 continue;
             }
-            let others = [(&rays[1], &right), (&rays[2], &down)].map(|(ray, met)| self.turn(ray, met, turn));
+            let others = [&right, &down].map(|met| self.turn(met, turn));
             let [Some((right, _)), Some((down, _))] = others else { continue };
             turns.push(turn);
             parts |= self.follow((place, nm), [first, right, down], turns, left, found);
@@ -417,21 +439,21 @@ impl Search<'_> {
     }
 
     /// The ray that the row of a picture ends with, how far it misses the lamp, and the derivative of that.
-    fn end(&self, picture: &Picture, nm: f64) -> Option<(Ray, DVec2, DMat2)> {
+    fn end(&self, picture: &Picture, nm: f64) -> Option<(Way, DVec2, DMat2)> {
         let step = BESIDE.min(0.1 * picture.half_axes()[1]);
-        let mut rays = self.rays(picture.place, step);
+        let mut ways = self.ways(picture.place, step);
         for &turn in &picture.turns {
-            for ray in &mut rays {
-                *ray = self.meet(ray, nm).and_then(|met| self.turn(ray, &met, turn))?.0;
+            for way in &mut ways {
+                *way = self.meet(way, nm).and_then(|met| self.turn(&met, turn))?.0;
             }
         }
-        let (miss, slopes) = self.lamps[picture.lamp].miss(&rays, step)?;
-        Some((rays[0], miss, slopes))
+        let (miss, slopes) = self.lamps[picture.lamp].miss(&ways, step)?;
+        Some((ways[0], miss, slopes))
     }
 
-    /// Whether the ray meets the lamp first.
-    fn is_met(&self, ray: &Ray, lamp: &Lamp) -> bool {
-        let hit = self.scene.closest(ray, f64::INFINITY);
+    /// Whether a ray meets the lamp before anything else that shows.
+    fn is_met(&self, way: &Way, lamp: &Lamp) -> bool {
+        let (_, hit) = self.first(way);
         match lamp.shines {
             Shines::Object { object, .. } => hit.is_some_and(|hit| hit.object == object),
             Shines::Disc { .. } => hit.is_none(),
@@ -465,30 +487,63 @@ impl Search<'_> {
         all
     }
 
+    /// The first surface that shows along a ray, if there is one, and the ray as it comes there: of bodies that overlap one has the place,
+    /// and what bounds a medium alone bends no light.
+    fn first(&self, way: &Way) -> (Way, Option<Hit>) {
+        let (scene, mut way) = (self.scene, *way);
+        for _ in 0..MOST_STRAIGHT {
+            let Some(hit) = scene.closest(&way.ray, f64::INFINITY) else { break };
+            let object = &scene.objects[hit.object as usize];
+            let bounds = matches!(scene.materials[object.material as usize].kind, Kind::Boundary);
+            if object.light.is_some() || object.body == 0 && !bounds {
+                return (way, Some(hit));
+            }
+            let (surface, went) = (scene.surface(&way.ray, &hit), way.ray.direction);
+            if scene.crossing(object, &surface, went, &way.bodies).is_some_and(|crossing| crossing.shows) {
+                return (way, Some(hit));
+            }
+            let inside = Inside { medium: None, bodies: way.bodies };
+            way = Way {
+                ray: scene.leave(&surface, &hit, went),
+                bodies: scene.beyond(object, &surface, went, inside).bodies,
+            };
+        }
+        (way, None)
+    }
+
     /// The first surface along a ray; `None` where nothing is, a lamp, or what is made of others.
-    fn meet(&self, ray: &Ray, nm: f64) -> Option<Met<'_>> {
-        let hit = self.scene.closest(ray, f64::INFINITY)?;
+    fn meet(&self, way: &Way, nm: f64) -> Option<Met<'_>> {
+        let (Way { ray, bodies }, hit) = self.first(way);
+        let hit = hit?;
         let object = &self.scene.objects[hit.object as usize];
         let material = &self.scene.materials[object.material as usize];
-        if object.light.is_some() || matches!(material.kind, Kind::Compound(_) | Kind::Boundary) {
+        if object.light.is_some() || matches!(material.kind, Kind::Compound(_)) {
             return None;
         }
-        let surface = self.scene.surface(ray, &hit);
-        let bsdf = material.bsdf(&hit.texture_point(&surface), Lanes::splat(nm as f32), false);
+        let surface = self.scene.surface(&ray, &hit);
+        let crossing = self.scene.crossing(object, &surface, ray.direction, &bodies);
+        let around = crossing.and_then(|crossing| crossing.around);
+        let bsdf = material.bsdf_beside(&hit.texture_point(&surface), Lanes::splat(nm as f32), false, around);
         let sharp = matches!(
             bsdf,
             Bsdf::Mirror { .. } | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::Thin { .. } | Bsdf::Plastic(_)
         );
-        let wo = -ray.direction;
-        sharp.then(|| Met { hit, frame: seen_frame(material, &surface, wo).0, surface, bsdf })
+        let here = crossing.map_or(bodies, |crossing| crossing.here);
+        let frame = seen_frame(material, &surface, -ray.direction).0;
+        sharp.then_some(Met { ray, here, object, hit, frame, surface, bsdf })
     }
 
     /// Where a ray goes on from what it has met, and with which share of its light.
-    fn turn(&self, ray: &Ray, met: &Met, turn: Turn) -> Option<(Ray, f64)> {
+    fn turn(&self, met: &Met, turn: Turn) -> Option<(Way, f64)> {
+        let Met { ray, here, object, hit, surface, .. } = met;
         let wo = met.frame.to_local(-ray.direction);
         let (wi, share) = met.goes(wo, turn)?;
         let wi = met.frame.to_world(wi);
-        Some((self.scene.leave(&met.surface, &met.hit, wi), share))
+        let bodies = match turn {
+            Turn::Mirrored => *here,
+            Turn::Through => self.scene.beyond(object, surface, wi, Inside { medium: None, bodies: *here }).bodies,
+        };
+        Some((Way { ray: self.scene.leave(surface, hit, wi), bodies }, share))
     }
 }
 
