@@ -105,7 +105,8 @@
 //!                                   # through glass, indirect light shared by pixels near each other, samples that
 //!                                   # count for all pixels whose filters hold them; auto or 1 to 8 shadow rays from the
 //!                                   # first vertex of a path; shadow rays to `constant` lights, which rays that leave the
-//!                                   # scene meet anyway; distances in media drawn toward lamps without extent; more
+//!                                   # scene meet anyway; distances in media drawn toward lamps; lamps that mirrors and
+//!                                   # glass show in less than a few pixels searched, and looked for by themselves; more
 //!                                   # samples where the picture is noisier at about the same mean (auto: off)
 //!   frames: ~                       # which, where values change over frames: 12, 1-100, 1-100x5, 1-10,20,30-40
 //!   seed_per_frame: true            # the frame is added to the seed, so that noise does not stand still

@@ -29,6 +29,7 @@ use crate::scene::watch::{self, Counts};
 use crate::scene::{DepthFog, Medium, Scene};
 use crate::spectrum::{LANES, Lanes, SampledWavelengths, observer};
 use glam::{DVec2, DVec3};
+use glints::Glints;
 use merge::Collection;
 use path::Sought;
 use path::together::Wanted;
@@ -219,9 +220,7 @@ impl Begun {
         self.sample.wavelengths = scene.wavelengths.sample(shot.photons.map_or(u_time.x, |p| p.wavelength));
         self.sample.weight = chosen.weight;
         self.sample.place = place;
-        if let Some(glints) = &plan.glints {
-            self.apart = glints.are_near(at.pixel.map(|x| x as i32)) && glints.hold(place);
-        }
+        self.apart = self.glints(shot).is_some_and(|glints| glints.hold(place));
         // Rays of the camera leave no surface, and never did here: two vectors are stored, no enum is copied.
         let ray = scene.camera.ray(place, || pairs(sampler.set(Set::Lens)).0);
         (self.ray.origin, self.ray.direction) = (ray.origin, ray.direction);
@@ -342,40 +341,41 @@ impl Begun {
         self.see(&light);
     }
 
-    /// Adds the light of the lamps whose small pictures the filter of its pixel holds a part of; whether there may be some.
+    /// The small pictures of lamps of which the filter of its pixel may hold a part, if there are any.
     #[inline]
-    fn add_glints(&mut self, shot: &Shot, ledger: Option<&Ledger>) -> bool {
-        let pixel = self.at.pixel.map(|x| x as i32);
-        // All of its light is there then.
-        self.apart = false;
-        let Some(glints) = shot.plan.glints.as_ref().filter(|glints| glints.are_near(pixel)) else { return false };
-        for region in glints.about(pixel) {
-            self.add_lamps(region, shot, ledger);
-        }
-        true
+    fn glints<'a>(&self, shot: &Shot<'a>) -> Option<&'a Glints> {
+        shot.plan.glints.as_deref().filter(|glints| glints.are_near(self.at.pixel.map(|x| x as i32)))
     }
 
-    /// The same, apart from all else, after the `numbers` of the layers of the sample without it: in the layers by how much they change.
-    fn glints_alone(
-        &mut self,
-        (shot, sampler): (&Shot, &Sampler),
-        ledger: Option<&Ledger>,
-        numbers: &[f32],
-    ) -> Option<Alone> {
+    /// Adds their light.
+    #[inline]
+    fn add_glints(&mut self, shot: &Shot, ledger: Option<&Ledger>) {
+        if let Some(glints) = self.glints(shot) {
+            for region in glints.about(self.at.pixel.map(|x| x as i32)) {
+                self.add_lamps(region, shot, ledger);
+            }
+        }
+        // All of it is there.
+        self.apart = false;
+    }
+
+    /// Their light apart from all else, after the `numbers` of the layers of the sample without it: in the layers by how much they change.
+    #[inline(never)]
+    fn glints_alone(&mut self, (shot, sampler): (&Shot, &Sampler), ledger: Option<&Ledger>, numbers: &[f32]) -> Alone {
         let before = self.sample;
         self.sample.radiance = Lanes::ZERO;
-        let there = self.add_glints(shot, ledger);
+        self.add_glints(shot, ledger);
         self.finish(shot.scene);
         let sample = self.sample;
         let mut changed = layers::Values::default();
-        if there && !numbers.is_empty() {
+        if !numbers.is_empty() {
             self.sample.radiance = before.radiance + sample.radiance;
             self.finish(shot.scene);
             self.layers(shot, sampler, ledger, &mut changed);
             changed.numbers.iter_mut().zip(numbers).for_each(|(after, before)| *after -= before);
         }
         self.sample = before;
-        there.then_some(Alone { sample, values: changed.numbers })
+        Alone { sample, values: changed.numbers }
     }
 
     /// Takes what came of the ray.
@@ -572,11 +572,10 @@ impl Samples {
         }
         let channels = layers.numbers.len() / begun.len().max(1);
         alone.clear();
-        if shot.plan.splatting && shot.plan.glints.is_some() {
-            for (i, begun) in begun.iter_mut().enumerate() {
+        if shot.plan.splatting {
+            for (i, begun) in begun.iter_mut().enumerate().filter(|(_, begun)| begun.glints(shot).is_some()) {
                 let numbers = &layers.numbers[i * channels..(i + 1) * channels];
-                let found = begun.glints_alone((shot, &octet.sampler(i)), ledgers.get(i), numbers);
-                alone.extend(found.map(|found| (i, found)));
+                alone.push((i, begun.glints_alone((shot, &octet.sampler(i)), ledgers.get(i), numbers)));
             }
         }
         for (i, begun) in begun.iter().enumerate() {
