@@ -131,6 +131,11 @@ pub fn address(pixel: [i32; 2]) -> [u32; 2] {
 }
 
 impl Address {
+    /// Its pixel on the picture.
+    fn on_picture(self) -> [i32; 2] {
+        self.pixel.map(|x| x as i32)
+    }
+
     /// Its number among all samples of the pixel, of whose replicates one comes after the other.
     fn in_turn(self) -> u32 {
         self.index * REPLICATES as u32 + self.replicate
@@ -197,8 +202,7 @@ impl Begun {
     fn begin(&mut self, shot: &Shot, at: Address, sampler: &Sampler) {
         let Shot { scene, plan, filter, .. } = shot;
         self.at = at;
-        // Overscan has negative coordinates, which wrap as addresses.
-        let corner = DVec2::new(f64::from(at.pixel[0] as i32), f64::from(at.pixel[1] as i32));
+        let corner = DVec2::from(at.on_picture().map(f64::from));
         if let Integrator::Whitted(settings) = &plan.integrator {
             // A regular grid, the same for every pixel. The wavelengths of all samples together make one
             // lattice: a step of the lanes' own distance over their number; those of any part of the pixel are spread over it.
@@ -344,14 +348,14 @@ impl Begun {
     /// The small pictures of lamps of which the filter of its pixel may hold a part, if there are any.
     #[inline]
     fn glints<'a>(&self, shot: &Shot<'a>) -> Option<&'a Glints> {
-        shot.plan.glints.as_deref().filter(|glints| glints.are_near(self.at.pixel.map(|x| x as i32)))
+        shot.plan.glints.as_deref().filter(|glints| glints.are_near(self.at.on_picture()))
     }
 
     /// Adds their light.
     #[inline]
     fn add_glints(&mut self, shot: &Shot, ledger: Option<&Ledger>) {
         if let Some(glints) = self.glints(shot) {
-            for region in glints.about(self.at.pixel.map(|x| x as i32)) {
+            for region in glints.about(self.at.on_picture()) {
                 self.add_lamps(region, shot, ledger);
             }
         }

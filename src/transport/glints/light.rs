@@ -39,7 +39,7 @@ impl Begun {
         ledger: Option<&Ledger>,
     ) {
         let Integrator::Path(settings) = &shot.plan.integrator else { return };
-        let own = self.at.pixel.map(|x| x as i32);
+        let own = self.at.on_picture();
         let corner = DVec2::from(pixel.map(f64::from));
         let middle = DVec2::from(own.map(f64::from)) + 0.5;
         let nearest = shot.filter.value(own, middle.clamp(corner, corner + 1.0));

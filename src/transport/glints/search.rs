@@ -5,7 +5,7 @@
 //! meet the lamp's middle. There the same derivative J, of the miss in radii of the lamp by the place, tells what the picture of the lamp
 //! is: the ellipse |J Δx| ≤ 1. Where wavelengths part each has its own.
 
-use super::Region;
+use super::{Region, square};
 use crate::film::Window;
 use crate::math::{Frame, Ray};
 use crate::optics::bsdf::{Bsdf, Lobes, Pane, mirror};
@@ -17,6 +17,7 @@ use crate::scene::shape::Shape;
 use crate::scene::{Geometry, Hit, Object, Scene, SurfacePoint};
 use crate::spectrum::{LANES, Lanes, Spectrum};
 use crate::transport::path::seen_frame;
+use crate::transport::shadow::MAX_BOUNDARIES;
 use arrayvec::ArrayVec;
 use glam::{DMat2, DVec2, DVec3};
 use rayon::prelude::*;
@@ -42,9 +43,6 @@ const APART: (f64, f64) = (0.5, 4.0);
 
 /// How far from a place a picture may lie, in pixels.
 const REACH: f64 = 6.0;
-
-/// Surfaces that do not show on the way to one that does, at the most.
-const MOST_STRAIGHT: u32 = 64;
 
 /// Steps to a picture at the most, and the part of its smaller half axis that the last one may have.
 const STEPS: usize = 16;
@@ -244,8 +242,8 @@ impl Picture {
     }
 
     /// The pixel of its middle.
-    fn pixel(&self) -> [i64; 2] {
-        self.place.floor().to_array().map(|x| x as i64)
+    fn pixel(&self) -> [i32; 2] {
+        self.place.floor().to_array().map(|x| x as i32)
     }
 
     fn is_small(&self) -> bool {
@@ -322,15 +320,16 @@ pub(super) fn regions(
 #[derive(Default)]
 struct Pictures {
     all: Vec<Picture>,
-    by_pixel: HashMap<[i64; 2], Vec<usize>>,
+    by_pixel: HashMap<[i32; 2], Vec<usize>>,
 }
 
 impl Pictures {
     /// Whether one in its pixel or beside it shows what another does.
     fn show(&self, other: &Picture) -> bool {
-        let [x, y] = other.pixel();
-        let near = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [x + dx, y + dy]));
-        near.filter_map(|pixel| self.by_pixel.get(&pixel)).flatten().any(|&i| self.all[i].shows(other))
+        square(other.pixel(), 1)
+            .filter_map(|pixel| self.by_pixel.get(&pixel))
+            .flatten()
+            .any(|&i| self.all[i].shows(other))
     }
 
     fn push(&mut self, picture: Picture) {
@@ -491,7 +490,7 @@ impl Search<'_> {
     /// and what bounds a medium alone bends no light.
     fn first(&self, way: &Way) -> (Way, Option<Hit>) {
         let (scene, mut way) = (self.scene, *way);
-        for _ in 0..MOST_STRAIGHT {
+        for _ in 0..=MAX_BOUNDARIES {
             let Some(hit) = scene.closest(&way.ray, f64::INFINITY) else { break };
             let object = &scene.objects[hit.object as usize];
             let bounds = matches!(scene.materials[object.material as usize].kind, Kind::Boundary);

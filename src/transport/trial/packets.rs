@@ -124,14 +124,12 @@ fn heroes(hero: [f32; LANES], packet: [f32; LANES]) -> [[f32; LANES]; LANES] {
 /// The variance of packets over that of heroes, relative as that of a picture is, and the standard error of that, by leaving out each place
 /// in turn (jackknife): where one has most of both, nothing is certain. Not numbers where neither has any.
 fn variances(places: &[[Shown; REPLICATES]]) -> [f64; 2] {
-    let mean = |[a, b]: [&Shown; 2]| 0.5 * (a.together + b.together);
-    let pairs = |[a, b, c, d]: &'_ [Shown; REPLICATES]| [([*a, *b], [*c, *d]), ([*c, *d], [*a, *b])];
-    let all = places.iter().flat_map(pairs).map(|([a, b], _)| mean([&a, &b])).sum::<DVec3>();
+    let mean = |a: &Shown, b: &Shown| 0.5 * (a.together + b.together);
+    let all = places.iter().map(|[a, b, c, d]| mean(a, b) + mean(c, d)).sum::<DVec3>();
     let floor = floor_about(all.element_sum() / (6 * places.len()) as f64);
-    let of = |place: &[Shown; REPLICATES]| {
-        pairs(place).into_iter().fold([0.0; 2], |[together, alone], ([a, b], [c, d])| {
+    let of = |[a, b, c, d]: &[Shown; REPLICATES]| {
+        [(a, b, mean(c, d)), (c, d, mean(a, b))].into_iter().fold([0.0; 2], |[together, alone], (a, b, mean)| {
             // Where light is rare its own brightness would make it weigh little: what weighs it is told by other samples.
-            let mean = mean([&c, &d]);
             let square = |difference: DVec3| (difference * difference / (mean * mean + floor)).element_sum();
             let lanes = (0..LANES).map(|lane| square(a.alone[lane] - b.alone[lane])).sum::<f64>();
             [together + square(a.together - b.together), alone + lanes / LANES as f64]
@@ -139,11 +137,8 @@ fn variances(places: &[[Shown; REPLICATES]]) -> [f64; 2] {
     };
     let each: Vec<[f64; 2]> = places.iter().map(of).collect();
     let [together, alone] = [0, 1].map(|way| each.iter().map(|both| both[way]).sum::<f64>());
-    let without = |[t, a]: &[f64; 2]| (together - t) / (alone - a);
-    let mut others = Moments::default();
-    each.iter().map(without).for_each(|ratio| others.push(ratio));
-    let count = each.len() as f64;
-    [together / alone, (count - 1.0) * (others.variance() / count).sqrt()]
+    let others: Moments = each.iter().map(|[t, a]| (together - t) / (alone - a)).collect();
+    [together / alone, (each.len() - 1) as f64 * others.standard_error()]
 }
 
 #[cfg(test)]
