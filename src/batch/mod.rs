@@ -27,6 +27,7 @@ mod prepare;
 pub mod report;
 pub mod splatting;
 pub mod stop;
+mod techniques;
 pub mod tev;
 mod unit;
 
