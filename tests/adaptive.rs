@@ -159,8 +159,14 @@ fn adaptive_sampling_is_off_where_it_would_not_be_exact() {
     };
     assert_eq!(said(&[]), "cells of 8 x 8 pixels, told by 16 samples");
     assert!(said(&[("adaptive: on", "adaptive: off")]).contains("the scene says so"));
-    assert!(said(&[("adaptive: on", "adaptive: auto")]).contains("nobody asks"));
-    assert!(said(&[("seed: 1", "stop: {error: 0.1}")]).contains("told by 64"));
+    let auto = ("adaptive: on", "adaptive: auto");
+    assert_eq!(said(&[auto]), "neither an error nor a time ends the render");
+    let open = ("seed: 1", "stop: {error: 0.1}");
+    assert!(said(&[open]).ends_with("told by 32 samples"));
+    // It would take four sums of each layer.
+    assert_eq!(said(&[auto, open]), "layers would be summed by replicate");
+    let bare = ("layers:\n- {name: n, surface: shading_normal}\n- caustic\n- indirect\n- Z\n", "");
+    assert!(said(&[auto, open, bare]).ends_with("told by 32 samples, where that is expected to save time"));
     assert!(said(&[("merging: off", "merging: on")]).contains("photons are collected"));
     assert!(said(&[("samples: 64", "samples: 15")]).contains("fewer than 16 samples"));
     // Layers of light go with it, beside which nothing is traced from the lights.

@@ -42,10 +42,16 @@ fn a_render_ends_at_the_error_that_was_asked_for() {
     let samples = scene["samples"].as_u64().unwrap();
     assert!(scene["forecast"]["made_at"].as_u64().unwrap() <= samples / 4);
     assert!(said.contains("foretold at a quarter of the samples"), "{said}");
-    // The same picture as that of as many samples asked for as a number.
-    abbe(&place, &format!("render scene.yaml -o same.exr --spp {samples}"));
-    let same = &place.json("report.json")["scenes"][0];
-    assert_eq!(same["pixel_hash"], scene["pixel_hash"]);
+    // Where no samples are shared out it is the same picture as that of as many samples asked for as a number.
+    let even = "--set render.techniques.adaptive=off";
+    let hash = |arguments: &str| {
+        let (code, said) = abbe(&place, &format!("render scene.yaml {even} {arguments}"));
+        assert_eq!(code, 0, "{said}");
+        let scene = place.json("report.json")["scenes"][0].take();
+        (scene["pixel_hash"].clone(), scene["samples"].as_u64().unwrap())
+    };
+    let (to_error, samples) = hash("-o even.exr --error 3%");
+    assert_eq!((to_error, samples), hash(&format!("-o same.exr --spp {samples}")));
 }
 
 #[test]
@@ -488,4 +494,34 @@ fn adaptive_sampling_knows_its_error() {
     let error = run("--spp 64");
     assert!((0.001..0.1).contains(&error), "{error}");
     assert!(run("--error 2%") <= 0.02);
+}
+
+/// A penumbra under a small lamp: its samples are shared out where an error ends the render, and fewer are enough; an even sky over a
+/// ball, whose noisy pixels are the dear ones, is left alone, as is what ends at a number of samples.
+#[test]
+fn samples_are_shared_out_where_an_error_ends_the_render() {
+    let penumbra = "camera: {origin: [0, 3, 5], target: [0, 0, 0], fov_deg: 60}\nimage: {width: 64, height: 64}\n\
+                    render: {techniques: {reuse: off, shadow_rays: 1}}\nshapes:\n\
+                    - rectangle: {corner: [-9, 0, -9], edge_u: [0, 0, 18], edge_v: [18, 0, 0]}\n\
+                    - sphere: {center: [0, 1, 0], radius: 0.4}\n- sphere: {center: [1, 5, 1], radius: 0.5, emission: 30}\n";
+    let ball = "camera: {origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}\nimage: {width: 64, height: 64}\n\
+                shapes:\n- sphere: {radius: 0.5}\n- sphere: {center: [3, 3, 0], radius: 0.5, emission: 30}\n\
+                lights: [constant: {radiance: 1}]\n";
+    let run = |scene: &str, arguments: &str| {
+        let place = Place::of(scene);
+        let (code, said) = abbe(&place, &format!("render scene.yaml -o . {arguments}"));
+        assert_eq!(code, 0, "{said}");
+        place.json("report.json")["scenes"][0].take()
+    };
+    let counts = |report: &serde_json::Value| ["least", "most"].map(|end| report["adaptive"][end].as_u64());
+    assert_eq!(counts(&run(penumbra, "--spp 64")), [None; 2]);
+    let shared = run(penumbra, "--error 0.5%");
+    let [least, most] = counts(&shared).map(Option::unwrap);
+    assert!(least >= 32 && most >= 4 * least, "{least} {most}");
+    let samples = |report: &serde_json::Value| report["samples"].as_f64().unwrap();
+    let off = run(penumbra, "--error 0.5% --set render.techniques.adaptive=off");
+    assert!(samples(&shared) < 0.7 * samples(&off), "{} {}", samples(&shared), samples(&off));
+    assert_eq!(run(penumbra, "--error 0.5% --threads 1")["pixel_hash"], shared["pixel_hash"]);
+    let [least, most] = counts(&run(ball, "--error 0.2%")).map(Option::unwrap);
+    assert!(least == most && least > 64, "{least} {most}");
 }

@@ -18,19 +18,25 @@
 //! numbers of its own. Where samples count for several pixels or paths are shared, a pixel by itself does not show the noise that is left:
 //! how much less or more there is, is told by some whole cells. The pilot is a pure function of scene and settings, so that parts of a picture agree.
 //! Costs are counted in rays, not in seconds.
+//!
+//! **Where it pays.** Where nobody asks for it, samples are shared out in renders that an error or a time ends, if that is expected to
+//! save [`WORTH_IT`] of the time: each half's variance tells what the shares are worth that the other gave it ([`Outlook`]).
 
 use super::frame::FrameJob;
+use super::outlook::{Kind, Outlook};
 use super::part::Breaks;
+use super::stop::usual_slope;
 use super::unit::render_unit;
 use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, REPLICATES, SAMPLES_LIMIT, TileBuffer};
 use crate::film::error::floor_about;
+use crate::film::layers::Kept;
 use crate::film::resolve::replicate_means;
 use crate::math::sampler::mix64;
 use crate::spectrum::ColourSpace;
 use crate::transport::path::reuse;
 use crate::transport::pilot::Use;
-use crate::transport::plan::{Effect, EffectPlan, Integrator};
+use crate::transport::plan::{Adaptive, Effect, EffectPlan, Integrator};
 use crate::transport::{self, Shot};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -44,8 +50,8 @@ pub const HALVES: usize = 2;
 /// The fewest samples of all pixels before anything is decided.
 const FIRST: u32 = 8;
 
-/// The most that a render with an open end takes for that.
-const FIRST_OF_MANY: u32 = 64;
+/// What a render with an open end takes for that.
+const FIRST_OF_MANY: u32 = 32;
 
 /// The fewest samples of a pixel that can be shared out.
 const FEWEST: u32 = 16;
@@ -69,35 +75,46 @@ const CELLS: usize = 24;
 /// Cells of a picture of which all are tried so.
 const FEW: usize = 16;
 
+/// Up to what share of the time to an error sharing out has to be expected to take, where nobody asks for it.
+const WORTH_IT: f64 = 0.95;
+
+/// For how many times the samples by which it is told that is expected.
+const HORIZON: u32 = 8;
+
 /// Tells the pilot's numbers from the picture's.
 const STREAM: u64 = 0x6164_6170_7469_7665;
 
 /// Decides whether a picture of `samples` a pixel is sampled adaptively, and from how many samples it is told where; and
 /// what to say of it. `open` where an error or a time may end the render before.
 #[must_use]
-pub fn choose(wish: Use, open: bool, plan: &EffectPlan, samples: u32) -> (Option<u32>, Option<Effect>) {
+pub fn choose(wish: Use, open: bool, plan: &EffectPlan, samples: u32) -> (Option<Adaptive>, Option<Effect>) {
     if !matches!(plan.integrator, Integrator::Path(_)) {
         return (None, None);
     }
-    let say = |first: Option<u32>, reason: String| {
-        (first, Some(Effect { name: "adaptive sampling".into(), on: first.is_some(), reason }))
+    let say = |chosen: Option<Adaptive>, reason: String| {
+        (chosen, Some(Effect { name: "adaptive sampling".into(), on: chosen.is_some(), reason }))
     };
     let off = |reason: &str| say(None, reason.to_owned());
     match wish {
         Use::Off => return off("the scene says so"),
-        // It saves a tenth of the time in most scenes and costs some in others; forecasts do not know of it yet.
-        Use::Auto => return off("nobody asks for it"),
-        Use::On => {}
+        // A picture of so many samples may be rendered in parts by ranges of them.
+        Use::Auto if !open => return off("neither an error nor a time ends the render"),
+        Use::Auto | Use::On => {}
     }
     if plan.caustics.as_ref().is_some_and(|c| c.merging.is_some()) {
         return off("photons are collected, and every sample needs its own");
     }
-    if samples < FEWEST {
+    if samples < FEWEST && !open {
         return off("there are fewer than 16 samples");
     }
-    let quarter = 1 << (samples / 4).ilog2();
-    let first = if open { quarter.min(FIRST_OF_MANY) } else { quarter }.max(FIRST);
-    say(Some(first), format!("cells of {SIDE} x {SIDE} pixels, told by {first} samples"))
+    if wish == Use::Auto && !plan.layers.channels().is_empty() && plan.layers.kept == Kept::Together {
+        return off("layers would be summed by replicate");
+    }
+    // What is rendered to one error can go on to another: what is shared out depends on neither, nor on their bounds.
+    let first = if open { FIRST_OF_MANY } else { (1 << (samples / 4).ilog2()).max(FIRST) };
+    let always = wish == Use::On;
+    let pays = if always { "" } else { ", where that is expected to save time" };
+    say(Some(Adaptive { first, always }), format!("cells of {SIDE} x {SIDE} pixels, told by {first} samples{pays}"))
 }
 
 /// The cells of a window.
@@ -168,22 +185,30 @@ pub fn cells(window: Window) -> usize {
 }
 
 /// How samples are shared out among the cells of a window.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Allocation {
     grid: Grid,
     /// Samples of all pixels alike.
     first: u32,
     /// Share of each half of each cell: its number of samples over the mean is 2 to this over [`STEPS`].
     shares: Vec<[i16; HALVES]>,
+    /// What becomes of the picture: even where all shares are one.
+    outlook: Outlook,
 }
 
 impl Allocation {
-    /// The cells of `window`, where all pixels have `first` samples, with their shares as [`Allocation::shares`] gave them;
-    /// none if they are not those of the window.
+    /// The cells of `window`, where all pixels have `first` samples, with their shares as [`Allocation::shares`] gave them and what
+    /// [`Allocation::outlook`] did; none if they are not those of the window.
     #[must_use]
-    pub fn from(window: Window, first: u32, shares: Vec<[i16; HALVES]>) -> Option<Allocation> {
+    pub fn from(window: Window, first: u32, shares: Vec<[i16; HALVES]>, outlook: Outlook) -> Option<Allocation> {
         let grid = Grid::of(window);
-        (shares.len() == grid.cells()).then_some(Allocation { grid, first, shares })
+        (shares.len() == grid.cells()).then_some(Allocation { grid, first, shares, outlook })
+    }
+
+    /// What becomes of the picture.
+    #[must_use]
+    pub fn outlook(&self) -> &Outlook {
+        &self.outlook
     }
 
     /// The share of each half of each cell.
@@ -198,6 +223,7 @@ impl Allocation {
     pub fn turns(&self, pixel: [i32; 2], replicate: u32, samples: &Range<u32>) -> Range<u32> {
         let share = self.shares[self.grid.index(pixel)][replicate as usize * HALVES / REPLICATES];
         let of = |mean: u32| match mean.checked_sub(self.first) {
+            _ if self.outlook.is_even() => mean.saturating_sub(replicate).div_ceil(REPLICATES as u32),
             None | Some(0) => mean.saturating_sub(replicate).div_ceil(REPLICATES as u32),
             Some(_) => count(self.first, share, mean) / REPLICATES as u32,
         };
@@ -207,7 +233,7 @@ impl Allocation {
 
 /// Samples of a pixel both of whose halves have `share`, at `mean` samples, more than `first`, of the mean of all pixels: `first`
 /// times a power of two, which is what the sampler spreads evenly, and never fewer at a higher mean.
-fn count(first: u32, share: i16, mean: u32) -> u32 {
+pub(super) fn count(first: u32, share: i16, mean: u32) -> u32 {
     let times = f64::from(mean) / f64::from(first);
     let doublings = (libm::log2(times) + f64::from(share) / STEPS).round().max(0.0);
     let most = SAMPLES_LIMIT * REPLICATES as u32;
@@ -348,7 +374,7 @@ pub fn pilot(job: &FrameJob, first: u32, pause: &dyn Breaks) -> Option<Scale> {
             }
         }
     };
-    let least = LEAST.max(f64::from(first) / f64::from(job.samples));
+    let least = if job.stop.is_open() { LEAST } else { LEAST.max(f64::from(first) / f64::from(job.samples)) };
     Some(Scale { floor, shares: scale(&wishes, least), costs })
 }
 
@@ -396,23 +422,35 @@ fn wish(variance: f64, cost: f64) -> f64 {
     (variance / cost).sqrt()
 }
 
-/// Shares out the samples of the picture among the cells of `film`, the rows of a part, whose pixels have `first` samples each.
+/// Shares out the samples of the picture among the cells of `film`, the rows of a part, whose pixels have the first samples each that
+/// `adaptive` names; evenly where that is as good and nobody asks for more.
 #[must_use]
-pub fn decide(job: &FrameJob, first: u32, film: &Film, scale: &Scale) -> Allocation {
+pub fn decide(job: &FrameJob, adaptive: Adaptive, film: &Film, scale: &Scale) -> Allocation {
+    let first = adaptive.first;
     let rgb_from_xyz = ColourSpace::Rec709.matrix_from_xyz();
     let grid = Grid::of(film.window());
     // A part has all columns, and some rows.
     let offset = (grid.first[1] - Grid::of(job.window).first[1]) as usize * grid.columns;
-    let of_cell = |cell: usize| -> [i16; HALVES] {
+    let of_cell = |cell: usize| -> ([i16; HALVES], [Kind; HALVES]) {
         let cost = scale.costs[offset + cell];
         let pixels = means(film, grid.pixels(cell), &rgb_from_xyz);
-        [1, 0].map(|other| {
-            let share = (scale.shares * wish(variance(&pixels, other, scale.floor), cost)).clamp(LEAST, MOST);
+        let count = pixels.len() as f64;
+        let variances = [0, 1].map(|half| variance(&pixels, half, scale.floor));
+        let share = |half: usize| {
+            let share = (scale.shares * wish(variances[1 - half], cost)).clamp(LEAST, MOST);
             (libm::log2(share) * STEPS).round() as i16
-        })
+        };
+        let kind = |half: usize| Kind { share: share(half), variance: count * variances[half], cost: count * cost };
+        ([share(0), share(1)], [kind(0), kind(1)])
     };
-    let shares = (0..grid.cells()).into_par_iter().map(of_cell).collect();
-    Allocation { grid, first, shares }
+    let (shares, kinds): (Vec<_>, Vec<_>) = (0..grid.cells()).into_par_iter().map(of_cell).unzip();
+    let outlook = Outlook::new(first, kinds.into_iter().flatten().collect());
+    let end = f64::from(first.saturating_mul(HORIZON));
+    let pays = outlook.time(end, usual_slope(end, true)) < WORTH_IT;
+    match adaptive.always || pays {
+        true => Allocation { grid, first, shares, outlook },
+        false => Allocation { grid, first, shares: vec![[0; HALVES]; grid.cells()], outlook: Outlook::default() },
+    }
 }
 
 #[cfg(test)]
@@ -437,12 +475,17 @@ mod tests {
         assert_eq!(pixels, [15, 24, 24, 3, 5, 8, 8, 1]);
     }
 
+    /// Some shares.
+    fn uneven() -> Outlook {
+        Outlook::new(16, vec![Kind { share: 0, variance: 1.0, cost: 1.0 }])
+    }
+
     /// However the mean is cut into ranges, each sample comes once, in order, and the first ones are those of a uniform render.
     #[test]
     fn samples_come_once_in_whole_powers_of_two() {
         let window = Window::full(8, 8);
         for share in [-32, -7, 0, 5, 40, 96] {
-            let allocation = Allocation::from(window, 16, vec![[share, 0]]).unwrap();
+            let allocation = Allocation::from(window, 16, vec![[share, 0]], uneven()).unwrap();
             for replicate in 0..4 {
                 let mut at = 0;
                 for mean in 0..300 {
@@ -461,7 +504,7 @@ mod tests {
         // Half a share of 64 is 32 samples, of 100 the nearer of 32 and 64 by ratio; a fourth of 64 the first 16.
         assert_eq!([(-16, 64), (-16, 100), (-32, 64), (16, 64)].map(|(s, n)| count(16, s, n)), [32, 64, 16, 128]);
         assert_eq!(count(16, 96, u32::MAX), 1 << 27);
-        assert!(Allocation::from(window, 16, Vec::new()).is_none());
+        assert!(Allocation::from(window, 16, Vec::new(), uneven()).is_none());
     }
 
     /// Two cells, one without noise and one with: the quiet one has the least share and the other what is left. All alike:

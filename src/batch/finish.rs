@@ -188,7 +188,7 @@ impl Finish {
             window: window(description),
             samples: *samples,
             target,
-            adaptive: plan.adaptive,
+            adaptive: plan.adaptive.map(|adaptive| adaptive.first),
             seed: description.render.seed,
             scene_hash: hash.clone(),
             integrator: integrator(&plan.integrator).to_owned(),

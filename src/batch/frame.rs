@@ -5,8 +5,9 @@
 //! and after each pass the error so far is known.
 
 use super::finish::Sharing;
+use super::outlook::Outlook;
 use super::part::{Breaks, Part, Share, SplatFilm};
-use super::stop::{Forecast, Stop};
+use super::stop::{Course, Forecast, Stop};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::{Film, InvalidCounts, REPLICATES};
@@ -92,6 +93,8 @@ pub struct Frame {
     pub elapsed: Duration,
     /// The error after each pass.
     pub milestones: Vec<Milestone>,
+    /// What sharing out does, where samples are shared out.
+    outlook: Option<Outlook>,
     /// The picture from which the last error was estimated, and its colour space.
     resolved: Option<Resolved>,
 }
@@ -119,13 +122,19 @@ impl Frame {
     pub fn of(film: Film, splats: Option<SplatFilm>, samples: u32, elapsed: Duration, gauge: &Gauge) -> Frame {
         let Estimate { error, unknown, resolved } = estimate(&film, splats.as_ref(), gauge);
         let milestones = vec![Milestone { samples, elapsed, error, unknown }];
-        Frame { film, splats, elapsed, milestones, resolved }
+        Frame { film, splats, elapsed, milestones, outlook: None, resolved }
     }
 
     /// Samples of a pixel.
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.milestones.last().map_or(0, |m| m.samples)
+    }
+
+    /// How it has come.
+    #[must_use]
+    pub fn course(&self) -> Course<'_> {
+        Course { milestones: &self.milestones, outlook: self.outlook.as_ref() }
     }
 
     /// The picture in the colour space of `rgb_from_xyz`.
@@ -263,8 +272,10 @@ impl<'a> Begun<'a> {
     /// The picture, when all is done.
     #[must_use]
     pub fn finish(self) -> Frame {
+        let outlook = self.part.outlook().cloned();
         let (film, splats) = self.part.finish();
-        Frame { film, splats, elapsed: self.elapsed, milestones: self.milestones, resolved: self.resolved }
+        let Begun { elapsed, milestones, resolved, .. } = self;
+        Frame { film, splats, elapsed, milestones, outlook, resolved }
     }
 }
 
@@ -294,9 +305,16 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
     loop {
         let milestones = &begun.milestones;
         let at = milestones.last().map_or(first, |m| m.samples);
+        let ends = at >= most || job.stop.reached(milestones);
+        if whole && !ends && job.plan.adaptive.is_some_and(|adaptive| at >= adaptive.first) {
+            while !part.share_out(breaks) {
+                breaks.take(part, milestones, before + start.elapsed())?;
+            }
+        }
+        let course = course(part, milestones);
         let end = match job.stop.is_open() {
-            _ if at >= most || job.stop.reached(milestones) => at,
-            true => job.stop.pass_end(milestones, most).unwrap_or(at),
+            _ if ends => at,
+            true => job.stop.pass_end(course, most).unwrap_or(at),
             false => pass_end(at, most),
         };
         // What a checkpoint holds beyond is kept.
@@ -305,7 +323,7 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
             break;
         }
         let latest = milestones.last().and_then(|m| m.error);
-        let forecast = Forecast::of(milestones, &job.stop, most).filter(|_| whole);
+        let forecast = Forecast::of(course, &job.stop, most).filter(|_| whole);
         let total = samples_in_all(part, milestones);
         let finished = |unit| {
             let done = done.fetch_add(unit, Ordering::Relaxed) + unit;
@@ -327,12 +345,19 @@ pub fn go_on<'a>(mut begun: Begun<'a>, watch: &(dyn Fn(Progress) + Sync), breaks
     Ok(begun)
 }
 
+/// How `part` has come to `milestones`.
+fn course<'a>(part: &'a Part, milestones: &'a [Milestone]) -> Course<'a> {
+    Course { milestones, outlook: part.outlook() }
+}
+
 /// Samples of pixels that `part` will have at its end, as far as `milestones` foretell that.
 #[must_use]
 pub fn samples_in_all(part: &Part, milestones: &[Milestone]) -> u64 {
     let job = part.job();
     match job.stop.is_open() {
-        true => (job.stop.foreseen(milestones, part.share().samples.end) * job.window.pixels() as f64) as u64,
+        true => {
+            (job.stop.foreseen(course(part, milestones), part.share().samples.end) * job.window.pixels() as f64) as u64
+        }
         false => part.progress().1,
     }
 }

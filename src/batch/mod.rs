@@ -20,6 +20,7 @@ pub mod memory;
 pub mod merge;
 pub mod motion;
 pub mod names;
+mod outlook;
 pub mod part;
 pub mod part_file;
 mod portion;
@@ -262,7 +263,7 @@ fn render_and_write(
         viewer.show_last(&report.label(), frame.resolve(&finish.rec709_from_xyz()));
     }
     report.measure(finish, &frame, keeper.numerics());
-    report.forecast = Forecast::at_a_quarter(&frame.milestones, &prepared.stop, prepared.samples);
+    report.forecast = Forecast::at_a_quarter(frame.course(), &prepared.stop, prepared.samples);
     let target = prepared.stop.check(&frame.milestones);
     keeper.keep_place(&exr_path)?;
     let written = files::write(finish, &frame, target, &exr_path, report);

@@ -14,6 +14,7 @@ pub(super) mod lights;
 
 use super::adaptive::{self, Allocation};
 use super::frame::{FrameJob, Milestone, lock};
+use super::outlook::Outlook;
 use super::unit::render_unit;
 use crate::error::{Error, Result};
 use crate::film::Window;
@@ -383,10 +384,16 @@ impl<'a> Part<'a> {
         self.allocation.get()
     }
 
+    /// What sharing out does, once it is decided, where samples are shared out.
+    #[must_use]
+    pub fn outlook(&self) -> Option<&Outlook> {
+        self.allocation().map(Allocation::outlook).filter(|outlook| !outlook.is_even())
+    }
+
     /// Adds `samples` of all pixels and their paths from the lights, but for what is there already. `finished` hears how
     /// many samples were done with each tile. False if there was a pause, with some of it left to do.
     pub fn add(&self, samples: Range<u32>, pause: &dyn Breaks, finished: &(dyn Fn(u64) + Sync)) -> bool {
-        if let Some(first) = self.job.plan.adaptive.filter(|first| (samples.start + 1..samples.end).contains(first)) {
+        if let Some(first) = self.first_shared().filter(|first| (samples.start + 1..samples.end).contains(first)) {
             return self.add(samples.start..first, pause, finished) && self.add(first..samples.end, pause, finished);
         }
         let merging = self.job.plan.caustics.as_ref().and_then(|c| c.merging);
@@ -438,10 +445,10 @@ impl<'a> Part<'a> {
         thread_local! {
             static TILE: RefCell<Option<TileBuffer>> = const { RefCell::new(None) };
         }
-        let shares = match self.job.plan.adaptive {
-            Some(first) if first <= samples.start => match self.decide(first, pause) {
-                Some(shares) => Some(shares),
-                None => return false,
+        let shares = match self.first_shared() {
+            Some(first) if first <= samples.start => match self.share_out(pause) {
+                true => self.allocation(),
+                false => return false,
             },
             _ => None,
         };
@@ -474,18 +481,24 @@ impl<'a> Part<'a> {
         self.tiles.par_iter().map(done).reduce(|| true, |a, b| a && b)
     }
 
-    /// How samples are shared out, where each pixel has the `first` ones; none if there was a pause.
-    fn decide(&self, first: u32, pause: &dyn Breaks) -> Option<&Allocation> {
-        if self.allocation.get().is_none() {
-            // A pause in its midst would cost all that it has seen.
-            let pilot = || adaptive::pilot(self.job, first, &Ending(pause));
-            // Its paths are no part of the picture, and each part of one has them.
-            let scale = self.job.scene.watch.as_ref().map_or_else(pilot, |watch| watch.aside(pilot))?;
-            let allocation = adaptive::decide(self.job, first, &lock(&self.film), &scale);
-            // Nobody else decides meanwhile.
-            let _ = self.allocation.set(allocation);
-        }
-        self.allocation.get()
+    /// Samples that all pixels have before they are shared out, where they are.
+    fn first_shared(&self) -> Option<u32> {
+        self.job.plan.adaptive.map(|adaptive| adaptive.first)
+    }
+
+    /// Shares out the samples of a picture, where that is done, each pixel has the first ones and it has not been yet. False if there
+    /// was a pause.
+    pub fn share_out(&self, pause: &dyn Breaks) -> bool {
+        let Some(adaptive) = self.job.plan.adaptive.filter(|_| self.allocation.get().is_none()) else { return true };
+        // A pause in its midst would cost all that it has seen.
+        let pilot = || adaptive::pilot(self.job, adaptive.first, &Ending(pause));
+        // Its paths are no part of the picture, and each part of one has them.
+        let scale = self.job.scene.watch.as_ref().map_or_else(pilot, |watch| watch.aside(pilot));
+        let Some(scale) = scale else { return false };
+        let allocation = adaptive::decide(self.job, adaptive, &lock(&self.film), &scale);
+        // Nobody else decides meanwhile.
+        let _ = self.allocation.set(allocation);
+        true
     }
 
     /// The sums.

@@ -14,6 +14,7 @@
 use super::adaptive::{self, Allocation, HALVES};
 use super::finish::Finish;
 use super::frame::Milestone;
+use super::outlook::Outlook;
 use super::part::{Claims, Part, Share, SplatFilm};
 use crate::error::{Error, Result};
 use crate::film::Window;
@@ -32,7 +33,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Version of the format; another one is refused.
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 
 /// Of the planes of mattes, before their rank.
 const MATTES: &str = "cameraMattes.";
@@ -62,6 +63,8 @@ pub struct Header {
     pub claims: Claims,
     /// How samples are shared out among cells, in a checkpoint where that is decided ([`super::adaptive`]).
     pub shares: Option<Vec<[i16; HALVES]>>,
+    /// What becomes of the picture then.
+    pub outlook: Option<Outlook>,
     /// Paths from the lights of each sample of the picture, where there are any.
     pub paths: Option<u64>,
     /// Those that are in the sums, by replicate.
@@ -257,6 +260,7 @@ pub fn write(
                 samples: [share.samples.start, share.samples.end],
                 claims: part.claims(),
                 shares: part.allocation().map(|a| a.shares().to_vec()),
+                outlook: part.allocation().map(|a| a.outlook().clone()),
                 paths: part.paths_of_a_sample(),
                 splat_paths: splats.map(|s| s.paths),
                 invalid: [a, b, c, d],
@@ -334,13 +338,20 @@ impl Header {
     /// How samples are shared out, where that is decided.
     #[must_use]
     pub fn allocation(&self) -> Option<Allocation> {
-        Allocation::from(self.share().rows(self.finish.window), self.finish.adaptive?, self.shares.clone()?)
+        Allocation::from(
+            self.share().rows(self.finish.window),
+            self.finish.adaptive?,
+            self.shares.clone()?,
+            self.outlook.clone()?,
+        )
     }
 
     /// Whether what is said of adaptive sampling agrees with the rest: all samples of the first pass are there before
     /// shares are known, and no others.
     fn shares_agree(&self) -> bool {
+        let told = self.outlook.as_ref().map(Outlook::is_sound);
         match (self.finish.adaptive, &self.shares) {
+            _ if told != self.shares.as_ref().map(|_| true) => false,
             (None, None) => true,
             (None, Some(_)) => false,
             (Some(first), None) => first >= 4 && self.claims.camera.iter().all(|(_, samples)| samples.end <= first),

@@ -338,8 +338,8 @@ impl SceneReport {
         self.adaptive = finish.adaptive.map(|_| SampleCounts::of(&frame.film));
         self.numerics = numerics;
         self.error = frame.milestones.last().and_then(|m| m.error);
-        if let (Some(error), Some(fit)) = (&self.error, Fit::of(&frame.milestones)) {
-            let factor = fit.samples_for(0.5 * error.rel_rmse) / f64::from(frame.samples());
+        if let (Some(error), Some(fit)) = (&self.error, Fit::of(frame.course())) {
+            let factor = fit.times_as_long(fit.samples_for(0.5 * error.rel_rmse));
             self.halving_seconds = Some(seconds * (factor - 1.0)).filter(|s| s.is_finite());
         }
         self.convergence = frame

@@ -4,8 +4,12 @@
 //! bright light is still turning up. The last passes, each of which doubles the samples, tell b, as far as their errors are
 //! known. From it follow the samples that an error takes and, as a sample takes as long as those of the last pass, the time.
 //! Passes are cut short where the forecast says that the target lies before the next doubling.
+//!
+//! Where samples are shared out by noise, all of that is said of a picture whose pixels have as many each, and an [`Outlook`] tells what
+//! sharing out makes of its variance and of its time.
 
 use super::frame::{Milestone, pass_end};
+use super::outlook::Outlook;
 use crate::error::{Error, Result};
 use crate::film::accumulate::REPLICATES;
 use crate::film::error::{ErrorEstimate, NoEstimate};
@@ -24,6 +28,51 @@ pub struct Stop {
     pub samples_wanted: bool,
     /// What the file's own rounding makes, as relative RMSE: no picture in it has less.
     pub floor: f64,
+}
+
+/// How a render has come so far.
+#[derive(Clone, Copy, Debug)]
+pub struct Course<'a> {
+    /// After each pass.
+    pub milestones: &'a [Milestone],
+    /// What sharing out does, where samples are shared out.
+    pub outlook: Option<&'a Outlook>,
+}
+
+impl<'a, T: AsRef<[Milestone]> + ?Sized> From<&'a T> for Course<'a> {
+    fn from(milestones: &'a T) -> Course<'a> {
+        Course { milestones: milestones.as_ref(), outlook: None }
+    }
+}
+
+impl Course<'_> {
+    /// The variance at `samples` over that of a picture whose pixels have as many each.
+    fn shared(&self, samples: f64) -> f64 {
+        self.outlook.map_or(1.0, |outlook| outlook.variance(samples, usual_slope(samples, true)))
+    }
+
+    /// What `samples` of the mean take, in samples of all pixels.
+    fn spent(&self, samples: f64) -> f64 {
+        self.outlook.map_or(samples, |outlook| outlook.spent(samples))
+    }
+
+    /// The samples of the mean, at most `most`, that take no more than `spent` ones of all pixels.
+    fn samples_for(&self, spent: f64, most: f64) -> f64 {
+        match self.outlook {
+            None => spent.min(most),
+            Some(_) if self.spent(most) <= spent => most,
+            Some(_) => bisect(0.0, most, |samples| self.spent(samples) > spent)[0],
+        }
+    }
+}
+
+/// Two numbers next to each other, from `low`, where `above` is false, and `high`, where it is true, between which it becomes so.
+fn bisect(mut low: f64, mut high: f64, above: impl Fn(f64) -> bool) -> [f64; 2] {
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        *(if above(middle) { &mut high } else { &mut low }) = middle;
+    }
+    [low, high]
 }
 
 /// The relative RMSE of rounding to `bits` of mantissa, the leading one included, for values whose logarithms are even:
@@ -68,14 +117,15 @@ impl Stop {
         error || hopeless || self.time.is_some_and(|time| last.elapsed >= time)
     }
 
-    /// The samples at which the pass ends that begins after `milestones`, with at most `most` samples in all; none where
+    /// The samples at which the pass ends that begins after `course`, with at most `most` samples in all; none where
     /// what is left of the time does not suffice for any.
     #[must_use]
-    pub fn pass_end(&self, milestones: &[Milestone], most: u32) -> Option<u32> {
+    pub fn pass_end<'a>(&self, course: impl Into<Course<'a>>, most: u32) -> Option<u32> {
+        let course = course.into();
         let replicates = REPLICATES as u32;
-        let Some(last) = milestones.last() else { return Some(replicates.min(most)) };
+        let Some(last) = course.milestones.last() else { return Some(replicates.min(most)) };
         // The time is a bound.
-        let most = match self.samples_left(milestones) {
+        let most = match self.samples_left(course, most) {
             Some(left) if left < f64::from(replicates) => return None,
             Some(left) => {
                 let end = last.samples.saturating_add(left as u32);
@@ -85,30 +135,38 @@ impl Stop {
         };
         // No pass steps over a power of two, at which samples lie more evenly than at the next larger numbers.
         let mut end = f64::from(pass_end(last.samples, most));
-        if let (Some(target), Some(fit)) = (self.target(), Fit::of(milestones)) {
+        if let (Some(target), Some(fit)) = (self.target(), Fit::of(course)) {
             end = end.min(fit.samples_for(target).max(f64::from(last.samples) * (1.0 + SHORTEST)));
         }
         let end = (end.ceil() as u32).next_multiple_of(replicates).max(last.samples + replicates);
         Some(end.min(most))
     }
 
-    /// Samples of a pixel at the end, of at most `most`, as far as `milestones` foretell it: where no error is known, the time is.
+    /// Samples of a pixel at the end, of at most `most`, as far as `course` foretells it: where no error is known, the time is.
     #[must_use]
-    pub fn foreseen(&self, milestones: &[Milestone], most: u32) -> f64 {
-        Forecast::of(milestones, self, most).map_or_else(|| self.in_time(milestones, most), |forecast| forecast.samples)
+    pub fn foreseen<'a>(&self, course: impl Into<Course<'a>>, most: u32) -> f64 {
+        let course = course.into();
+        Forecast::of(course, self, most).map_or_else(|| self.in_time(course, most), |forecast| forecast.samples)
     }
 
     /// Samples of a pixel for which there is time in all, at most `most`.
-    fn in_time(&self, milestones: &[Milestone], most: u32) -> f64 {
-        let now = milestones.last().map_or(0, |m| m.samples);
-        let in_time = self.samples_left(milestones).map_or(f64::INFINITY, |left| f64::from(now) + left);
+    fn in_time(&self, course: Course, most: u32) -> f64 {
+        let now = course.milestones.last().map_or(0, |m| m.samples);
+        let in_time = self.samples_left(course, most).map_or(f64::INFINITY, |left| f64::from(now) + left);
         f64::from(most).min(in_time)
     }
 
-    /// How many more samples the time leaves room for after `milestones`; none where there is no such bound.
-    fn samples_left(&self, milestones: &[Milestone]) -> Option<f64> {
-        let left = self.time?.saturating_sub(milestones.last()?.elapsed);
-        Some(left.as_secs_f64() / seconds_a_sample(milestones)?)
+    /// How many more samples the time leaves room for after `course`, whose picture has `most` at the most; none where there is no
+    /// such bound.
+    fn samples_left(&self, course: Course, most: u32) -> Option<f64> {
+        let last = course.milestones.last()?;
+        let left = self.time?.saturating_sub(last.elapsed).as_secs_f64() / seconds_a_sample(course)?;
+        let now = f64::from(last.samples);
+        // Beyond the most nothing is to be told apart.
+        let most = f64::from(most).max(now);
+        let bounded = |spent: f64| course.samples_for(spent, most).max(now);
+        let spent = course.spent(now) + left;
+        Some(if spent < course.spent(most) { bounded(spent) - now } else { left })
     }
 
     /// What keeps the targets from being met, if they are not.
@@ -155,19 +213,20 @@ impl Stop {
 }
 
 /// Seconds that a sample of all pixels takes: those of the last pass.
-fn seconds_a_sample(milestones: &[Milestone]) -> Option<f64> {
-    let last = milestones.last()?;
-    let before = milestones.len().checked_sub(2).map(|i| milestones[i]);
+fn seconds_a_sample(course: Course) -> Option<f64> {
+    let last = course.milestones.last()?;
+    let before = course.milestones.len().checked_sub(2).map(|i| course.milestones[i]);
+    let spent = |m: &Milestone| course.spent(m.samples.into());
     let (samples, seconds) = match before {
-        Some(m) => (last.samples - m.samples, (last.elapsed.saturating_sub(m.elapsed)).as_secs_f64()),
-        None => (last.samples, last.elapsed.as_secs_f64()),
+        Some(m) => (spent(last) - spent(&m), (last.elapsed.saturating_sub(m.elapsed)).as_secs_f64()),
+        None => (spent(last), last.elapsed.as_secs_f64()),
     };
-    (samples > 0 && seconds > 0.0).then(|| seconds / f64::from(samples))
+    (samples > 0.0 && seconds > 0.0).then(|| seconds / samples)
 }
 
-/// How variance falls with samples: V = V₁ (N₁/N)^b.
+/// How variance falls with samples: V = V₁ (N₁/N)^b where all pixels have as many.
 #[derive(Clone, Copy, Debug)]
-pub struct Fit {
+pub struct Fit<'a> {
     /// N₁, that of the last milestone.
     samples: f64,
     /// √V₁.
@@ -180,6 +239,8 @@ pub struct Fit {
     unsteady: f64,
     /// How far ln N₁ is from the middle of what told b, which V₁ has a part in.
     beyond: f64,
+    /// What it goes through, which knows how samples are shared out.
+    course: Course<'a>,
 }
 
 /// How far logarithms of variance lie off their line besides what their intervals say: 0.07 in 118 triples of doublings over the
@@ -192,21 +253,22 @@ const UNBELIEVED: f64 = 0.2;
 /// The slope at `samples`, before any is seen: that of V = α/N + β/N², as few samples gain by how evenly they are spread and many
 /// do as if they were independent, with β/α of three samples. Errors that cannot be believed fall a little slower. See "What is
 /// foretold" in tools/bench/NOTES.md.
-fn usual_slope(samples: f64, believed: bool) -> f64 {
+pub(super) fn usual_slope(samples: f64, believed: bool) -> f64 {
     1.0 + 3.0 / (samples + 3.0) - if believed { 0.0 } else { 0.05 }
 }
 
 /// How far off that slopes are.
 const UNUSUAL: f64 = 0.35;
 
-impl Fit {
+impl<'a> Fit<'a> {
     /// Through the last milestone, with the slope in the middle of the last three that lie a doubling or so apart: by least
     /// squares over logarithms, each weighed by its interval, and with what slopes are before any is seen. So what few
     /// pixels carry, of which the error is a guess, tells no slope, and one milestone alone has the usual one.
     #[must_use]
-    pub fn of(milestones: &[Milestone]) -> Option<Fit> {
+    pub fn of(course: impl Into<Course<'a>>) -> Option<Fit<'a>> {
+        let course = course.into();
         let mut points: Vec<(f64, &ErrorEstimate)> = Vec::new();
-        for m in milestones.iter().rev() {
+        for m in course.milestones.iter().rev() {
             let Some(e) = m.error.as_ref().filter(|e| e.rel_rmse > 0.0) else { continue };
             let apart = points.last().is_none_or(|p| f64::from(m.samples) <= p.0 / 1.4);
             if apart && points.len() < 3 {
@@ -214,36 +276,53 @@ impl Fit {
             }
         }
         let &(samples, last) = points.first()?;
-        let logs =
-            points.iter().map(|(samples, e)| (1.0 / log_variance(e), libm::log(*samples), 2.0 * libm::log(e.rel_rmse)));
+        let uniform = |samples: f64, e: &ErrorEstimate| e.rel_rmse / course.shared(samples).sqrt();
+        let log = |samples: f64, e: &ErrorEstimate| 2.0 * libm::log(uniform(samples, e));
+        let logs = points.iter().map(|(samples, e)| (1.0 / log_variance(e), libm::log(*samples), log(*samples, e)));
         let (w, x, y) = logs.clone().fold((0.0, 0.0, 0.0), |(a, b, c), (w, x, y)| (a + w, b + w * x, c + w * y));
         let (x, y) = (x / w, y / w);
         let (xy, xx) =
             logs.fold((0.0, 0.0), |(a, b), (w, u, v)| (a + w * (u - x) * (v - y), b + w * (u - x) * (u - x)));
         let usual = 1.0 / (UNUSUAL * UNUSUAL);
         let slope = (usual * usual_slope(samples, last.valid) - xy) / (usual + xx);
-        let fit = Fit::with_slope(samples, last.rel_rmse, slope);
+        let fit = Fit::with_slope(samples, uniform(samples, last), slope);
         // The interval of an error that cannot be believed cannot, either.
         let told = if last.valid { log_variance(last) } else { SCATTER * SCATTER + UNBELIEVED };
-        Some(Fit { told, unsteady: 1.0 / (usual + xx), beyond: libm::log(samples) - x, ..fit })
+        Some(Fit { told, unsteady: 1.0 / (usual + xx), beyond: libm::log(samples) - x, course, ..fit })
     }
 
     /// Through `error` at `samples`, from where variance falls as samples^−slope, from 0 to 2; both are certain.
     #[must_use]
-    pub fn with_slope(samples: f64, error: f64, slope: f64) -> Fit {
-        Fit { samples, error, slope: slope.clamp(0.0, 2.0), told: 0.0, unsteady: 0.0, beyond: 0.0 }
+    pub fn with_slope(samples: f64, error: f64, slope: f64) -> Fit<'a> {
+        let course = Course { milestones: &[], outlook: None };
+        Fit { samples, error, slope: slope.clamp(0.0, 2.0), told: 0.0, unsteady: 0.0, beyond: 0.0, course }
     }
 
     /// Samples at which the error is `error`; infinite where it does not fall.
     #[must_use]
     pub fn samples_for(&self, error: f64) -> f64 {
-        self.samples * libm::pow(self.error / error, 2.0 / self.slope)
+        let uniform = self.samples * libm::pow(self.error / error, 2.0 / self.slope);
+        let reached = |samples: f64| self.error_at(samples) <= error;
+        match self.course.outlook {
+            // Sharing out may take as many times the samples as the largest share at the most, at either end.
+            Some(_) if uniform.is_finite() => {
+                let (low, high) = (uniform / 64.0, uniform * 64.0);
+                if reached(low) { low } else { bisect(low, high, reached)[1] }
+            }
+            _ => uniform,
+        }
     }
 
     /// The error at `samples`.
     #[must_use]
     pub fn error_at(&self, samples: f64) -> f64 {
-        self.error * libm::pow(self.samples / samples, 0.5 * self.slope)
+        self.error * libm::pow(self.samples / samples, 0.5 * self.slope) * self.course.shared(samples).sqrt()
+    }
+
+    /// What `samples` of the mean take over what those so far take.
+    #[must_use]
+    pub fn times_as_long(&self, samples: f64) -> f64 {
+        self.course.spent(samples) / self.course.spent(self.samples)
     }
 
     /// How far ln V at `samples`, as it will be told, lies from what is foretold, 95 times of 100. Let x be ln(N/N₁) and d how far ln N₁
@@ -272,11 +351,7 @@ impl Fit {
             while high < most && !reached(high) {
                 (low, high) = (high, 2.0 * high);
             }
-            for _ in 0..30 {
-                let middle = 0.5 * (low + high);
-                *(if reached(middle) { &mut high } else { &mut low }) = middle;
-            }
-            high
+            bisect(low, high, reached)[1]
         })
     }
 }
@@ -305,16 +380,17 @@ pub struct Forecast {
 }
 
 impl Forecast {
-    /// From what is known after `milestones`, for a render of at most `most` samples.
+    /// From what is known after `course`, for a render of at most `most` samples.
     #[must_use]
-    pub fn of(milestones: &[Milestone], stop: &Stop, most: u32) -> Option<Forecast> {
-        let last = milestones.last()?;
-        let fit = Fit::of(milestones)?;
-        let rate = seconds_a_sample(milestones)?;
+    pub fn of<'a>(course: impl Into<Course<'a>>, stop: &Stop, most: u32) -> Option<Forecast> {
+        let course = course.into();
+        let last = course.milestones.last()?;
+        let fit = Fit::of(course)?;
+        let rate = seconds_a_sample(course)?;
         let now = f64::from(last.samples);
         let elapsed = last.elapsed.as_secs_f64();
         // What ends the render besides the error.
-        let most = stop.in_time(milestones, most);
+        let most = stop.in_time(course, most);
         let within = |samples: f64| samples.max(now).min(most);
         let reached = stop.target().map_or(most, |target| fit.samples_for(target));
         let between = stop.target().map_or([most; 2], |target| fit.samples_between(target, most));
@@ -322,7 +398,7 @@ impl Forecast {
         let once_more = 1.0 + if last.error.is_some_and(|e| e.valid) { 0.0 } else { SHORTEST };
         let samples = within(reached * once_more);
         let samples_between = between.map(|samples| within(samples * once_more));
-        let seconds = |samples: f64| elapsed + (samples - now) * rate;
+        let seconds = |samples: f64| elapsed + (course.spent(samples) - course.spent(now)) * rate;
         let error = fit.error_at(within(reached));
         // What is told at the end scatters, below a target as well: a render ends where it is told that or less.
         let [low, high] = fit.error_between(samples);
@@ -343,18 +419,23 @@ impl Forecast {
         })
     }
 
-    /// The forecast that was made at the last of `milestones` with at most a quarter of the samples: what to hold against
+    /// The forecast that was made at the last milestone of `course` with at most a quarter of the samples: what to hold against
     /// how it came.
     #[must_use]
-    pub fn at_a_quarter(milestones: &[Milestone], stop: &Stop, most: u32) -> Option<Forecast> {
+    pub fn at_a_quarter<'a>(course: impl Into<Course<'a>>, stop: &Stop, most: u32) -> Option<Forecast> {
+        let Course { milestones, outlook } = course.into();
         let end = milestones.last()?.samples;
         let known = milestones.iter().take_while(|m| m.samples <= end / 4).count();
-        Forecast::of(&milestones[..known], stop, most)
+        let milestones = &milestones[..known];
+        // Before its samples were shared out nobody knew how.
+        let outlook = outlook.filter(|outlook| milestones.last().is_some_and(|last| outlook.is_known_at(last.samples)));
+        Forecast::of(Course { milestones, outlook }, stop, most)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::outlook::Kind;
     use super::*;
     use crate::math::sampler::uniform;
 
@@ -558,7 +639,8 @@ mod tests {
     #[test]
     fn halving_costs_what_the_convergence_says() {
         let factor = |b: f64| {
-            let fit = Fit::of(&milestones(&[64, 128, 256], b)).unwrap();
+            let known = milestones(&[64, 128, 256], b);
+            let fit = Fit::of(&known).unwrap();
             let samples = fit.samples_for(0.5 * fit.error_at(256.0));
             assert!((fit.error_at(samples) / fit.error_at(256.0) - 0.5).abs() < 1e-12);
             samples / 256.0
@@ -611,5 +693,47 @@ mod tests {
             .sum();
         let found = (sum / f64::from(n)).sqrt();
         assert!((found / rounding(11) - 1.0).abs() < 0.01, "{found} {}", rounding(11));
+    }
+
+    /// Half of the picture has all of its noise: shared out by √v at 32 samples, with a fourth of the mean in the quiet half. Errors that were
+    /// told before and after make one picture, whose slope is that of its pixels; its samples take as long as those of all pixels.
+    #[test]
+    fn sharing_out_is_foretold() {
+        let (share, slope) = (libm::log2(1.75) * 16.0, usual_slope(1024.0, true));
+        let kind = |share: f64, variance| Kind { share: share.round() as i16, variance, cost: 1.0 };
+        let outlook = Outlook::new(32, vec![kind(share, 1.0), kind(-32.0, 0.0)]);
+        let mut known = milestones(&[8, 16, 32, 64, 128], slope);
+        for m in &mut known {
+            let n = f64::from(m.samples);
+            let error = m.error.as_mut().unwrap();
+            error.rel_rmse *= outlook.variance(n, usual_slope(n, true)).sqrt();
+            m.elapsed = Duration::from_secs_f64(1e-3 * outlook.spent(n));
+        }
+        // 128 of the mean are 256 of one half and 32 of the other, 512 are 1024 and 128.
+        assert_eq!((outlook.spent(128.0), outlook.spent(512.0)), (144.0, 576.0));
+        for told in [&known[..3], &known[..]] {
+            let course = Course { milestones: told, outlook: Some(&outlook) };
+            let there = Forecast::of(course, &FREE, 512).unwrap();
+            let came = libm::pow(1024.0, -0.5 * slope);
+            assert!(
+                (there.error / came - 1.0).abs() < 0.03 && (there.seconds / 0.576 - 1.0).abs() < 1e-9,
+                "{there:?} {came}"
+            );
+            let stop = Stop { error: Some(came), ..FREE };
+            let f = Forecast::of(course, &stop, 1 << 16).unwrap();
+            // Counts are powers of two: half of a step is a factor of √2.
+            assert!((256.0..=725.0).contains(&f.samples), "{f:?}");
+            let fit = Fit::of(course).unwrap();
+            assert!(fit.error_at(fit.samples_for(came)) <= came);
+        }
+        // A time for twice as much as 144 ms leaves room for as much again.
+        let stop = Stop { time: Some(Duration::from_millis(288)), ..FREE };
+        let course = Course { milestones: &known, outlook: Some(&outlook) };
+        let in_time = stop.foreseen(course, 1 << 16);
+        assert!(outlook.spent(in_time) <= 288.0 + 1e-6 && outlook.spent(in_time + 1.0) >= 288.0 - 4.0, "{in_time}");
+        // Nobody knew of it before.
+        let early =
+            Forecast::at_a_quarter(Course { milestones: &known[..4], outlook: Some(&outlook) }, &FREE, 64).unwrap();
+        assert!((early.seconds - 0.064).abs() < 1e-9, "{early:?}");
     }
 }

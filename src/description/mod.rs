@@ -107,7 +107,8 @@
 //!                                   # first vertex of a path; shadow rays to `constant` lights, which rays that leave the
 //!                                   # scene meet anyway; distances in media drawn toward lamps; lamps that mirrors and
 //!                                   # glass show in less than a few pixels searched, and looked for by themselves; more
-//!                                   # samples where the picture is noisier at about the same mean (auto: off)
+//!                                   # samples where the picture is noisier at about the same mean
+//!                                   # (auto: where an error or a time ends the render)
 //!   frames: ~                       # which, where values change over frames: 12, 1-100, 1-100x5, 1-10,20,30-40
 //!   seed_per_frame: true            # the frame is added to the seed, so that noise does not stand still
 //!   frames_per_second: ~            # for those who show the pictures

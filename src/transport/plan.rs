@@ -162,6 +162,15 @@ pub struct Effect {
     pub reason: String,
 }
 
+/// How samples are shared out by noise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Adaptive {
+    /// Samples of a pixel that all have before.
+    pub first: u32,
+    /// Whether they are shared out whatever that is expected to save.
+    pub always: bool,
+}
+
 /// What is simulated, and how.
 #[derive(Clone, Debug)]
 pub struct EffectPlan {
@@ -197,8 +206,8 @@ pub struct EffectPlan {
     pub caustics: Option<Arc<Caustics>>,
     /// Where small pictures of lamps lie, whose light is looked for by itself.
     pub glints: Option<Arc<Glints>>,
-    /// Where samples are shared out by noise: how many all pixels have before.
-    pub adaptive: Option<u32>,
+    /// Where samples are shared out by noise.
+    pub adaptive: Option<Adaptive>,
     /// Further channels of the picture.
     pub layers: LayerPlan,
     /// What is simulated, for people.
