@@ -19,7 +19,7 @@ mod knobs;
 pub mod page;
 
 use super::finish::Finish;
-use super::stop::Fit;
+use super::forecast::Fit;
 use super::{BatchEntry, Overrides, develop};
 use crate::description;
 use crate::error::{Error, Result};

@@ -22,10 +22,10 @@
 //! **Where it pays.** Where nobody asks for it, samples are shared out in renders that an error or a time ends, if that is expected to
 //! save [`WORTH_IT`] of the time: each half's variance tells what the shares are worth that the other gave it ([`Outlook`]).
 
+use super::forecast::usual_slope;
 use super::frame::FrameJob;
 use super::outlook::{Kind, Outlook};
 use super::part::Breaks;
-use super::stop::usual_slope;
 use super::unit::render_unit;
 use crate::film::Window;
 use crate::film::accumulate::{Film, Invalid, REPLICATES, SAMPLES_LIMIT, TileBuffer};
@@ -60,7 +60,7 @@ const FEWEST: u32 = 16;
 const LEAST: f64 = 0.25;
 
 /// The largest share of a cell.
-const MOST: f64 = 64.0;
+pub(super) const MOST: f64 = 64.0;
 
 /// Shares are powers of 2 to a whole number of these.
 const STEPS: f64 = 16.0;
@@ -192,7 +192,7 @@ pub struct Allocation {
     first: u32,
     /// Share of each half of each cell: its number of samples over the mean is 2 to this over [`STEPS`].
     shares: Vec<[i16; HALVES]>,
-    /// What becomes of the picture: even where all shares are one.
+    /// What becomes of the picture: even where all pixels go on alike.
     outlook: Outlook,
 }
 
@@ -223,7 +223,6 @@ impl Allocation {
     pub fn turns(&self, pixel: [i32; 2], replicate: u32, samples: &Range<u32>) -> Range<u32> {
         let share = self.shares[self.grid.index(pixel)][replicate as usize * HALVES / REPLICATES];
         let of = |mean: u32| match mean.checked_sub(self.first) {
-            _ if self.outlook.is_even() => mean.saturating_sub(replicate).div_ceil(REPLICATES as u32),
             None | Some(0) => mean.saturating_sub(replicate).div_ceil(REPLICATES as u32),
             Some(_) => count(self.first, share, mean) / REPLICATES as u32,
         };

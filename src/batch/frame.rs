@@ -5,9 +5,10 @@
 //! and after each pass the error so far is known.
 
 use super::finish::Sharing;
+use super::forecast::{Course, Forecast};
 use super::outlook::Outlook;
 use super::part::{Breaks, Part, Share, SplatFilm};
-use super::stop::{Course, Forecast, Stop};
+use super::stop::Stop;
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::accumulate::{Film, InvalidCounts, REPLICATES};

@@ -12,6 +12,7 @@ pub mod develop;
 pub mod farm;
 mod files;
 pub mod finish;
+pub mod forecast;
 pub mod frame;
 mod header;
 mod layers;
@@ -40,6 +41,7 @@ use checkpoint::{Keep, Keeper};
 use contact::Contact;
 use files::spectral_path;
 use finish::Finish;
+use forecast::Forecast;
 use frame::{Progress, go_on};
 use part_file::Identity;
 pub use portion::{Portion, Samples};
@@ -49,7 +51,6 @@ use report::{Report, SceneReport, Status};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use stop::Forecast;
 
 /// Scenes whose reports are put in one place at a time.
 const GATHERED: usize = 64;

@@ -447,7 +447,7 @@ impl<'a> Part<'a> {
         }
         let shares = match self.first_shared() {
             Some(first) if first <= samples.start => match self.share_out(pause) {
-                true => self.allocation(),
+                true => self.allocation().filter(|allocation| !allocation.outlook().is_even()),
                 false => return false,
             },
             _ => None,

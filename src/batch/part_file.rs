@@ -435,7 +435,8 @@ impl Header {
         };
         let (own, others) = (fields(&self.finish), fields(finish));
         // These follow from the scene and the plan.
-        const CONSEQUENCES: [&str; 6] = ["notes", "scene_hash", "effects", "techniques", "wavelengths", "sharing"];
+        const CONSEQUENCES: [&str; 8] =
+            ["notes", "scene_hash", "effects", "techniques", "wavelengths", "sharing", "adaptive", "kept"];
         let names: BTreeSet<&String> = own.keys().chain(others.keys()).collect();
         for name in names.into_iter().filter(|name| !CONSEQUENCES.contains(&name.as_str())) {
             if let Some((field, expected, found)) = difference(name, others.get(name), own.get(name)) {

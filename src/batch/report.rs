@@ -1,8 +1,8 @@
 //! What a render cost and how good it is: for `report.json`, the terminal and the EXR header.
 
 use super::finish::Finish;
+use super::forecast::{Fit, Forecast};
 use super::frame::{self, Begun, Frame};
-use super::stop::{Fit, Forecast};
 use super::{memory, names};
 use crate::error::Error;
 use crate::film::accumulate::{Film, InvalidCounts, PixelCells};

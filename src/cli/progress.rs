@@ -280,7 +280,7 @@ fn line(value: &serde_json::Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::batch::stop::Forecast;
+    use crate::batch::forecast::Forecast;
     use crate::film::error::ErrorEstimate;
 
     #[test]
