@@ -20,7 +20,7 @@
 //! Costs are counted in rays, not in seconds.
 //!
 //! **Where it pays.** Where nobody asks for it, samples are shared out in renders that an error or a time ends, if that is expected to
-//! save [`WORTH_IT`] of the time: each half's variance tells what the shares are worth that the other gave it ([`Outlook`]).
+//! save a twentieth of the time: each half's variance tells what the shares are worth that the other gave it (`outlook.rs`).
 
 use super::forecast::usual_slope;
 use super::frame::FrameJob;

@@ -4,7 +4,7 @@
 //! bright light is still turning up. The last passes, each of which doubles the samples, tell b, as far as their errors are
 //! known. From it follow the samples that an error takes and, as a sample takes as long as those of the last pass, the time.
 //!
-//! Where samples are shared out by noise, all of that is said of a picture whose pixels have as many each, and an [`Outlook`] tells what
+//! Where samples are shared out by noise, all of that is said of a picture whose pixels have as many each, and `outlook.rs` tells what
 //! sharing out makes of its variance and of its time.
 
 use super::adaptive;
