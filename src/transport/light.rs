@@ -225,6 +225,8 @@ struct Beam {
     power: Lanes,
     /// Density of each lane over the hero's, as in `path`.
     rho: Lanes,
+    /// What `rho` was where wavelengths parted; one before.
+    led: Lanes,
     /// The wavelengths; all the same for one that goes alone.
     nm: Lanes,
     /// The wavelength that goes alone, since the others took another way.
@@ -252,6 +254,7 @@ impl Beam {
             ray,
             power,
             rho: Lanes::ONE,
+            led: Lanes::ONE,
             nm,
             alone: None,
             chosen: false,
@@ -415,9 +418,8 @@ impl<'a> Walk<'a, '_> {
                 && glass.parts()
             {
                 self.throw(&mut beam);
-                // Each wavelength decides for itself with the same random numbers: none leads.
-                beam.power *= LANES as f32 / beam.rho.reduce_add();
-                beam.rho = Lanes::ONE;
+                // Each wavelength decides for itself with the same random numbers. Where all are reflected the one that has led so
+                // far leads on.
                 if at.is_plain()
                     && let Some(sample) = glass.reflects_all(wo, u_lobe)
                 {
@@ -426,6 +428,8 @@ impl<'a> Walk<'a, '_> {
                     }
                     continue;
                 }
+                beam.power *= LANES as f32 / beam.rho.reduce_add();
+                (beam.led, beam.rho) = (beam.rho, Lanes::ONE);
                 for view in at.views(&view, &bsdf) {
                     self.part(&beam, glass, &at, &view, [u_lobe, u_roulette]);
                 }
@@ -572,6 +576,11 @@ impl<'a> Walk<'a, '_> {
         match beam.alone {
             None => {
                 let light = Together { power, rho: beam.rho };
+                photons.together.push(Photon { point, came, normal, light, vertices, group });
+            }
+            // What led to where it parted counts beside what leads a path from the camera here.
+            Some(_) if beam.led.simd_ne(Lanes::ONE).any() => {
+                let light = Together { power: beam.only(power * beam.led.reduce_add() / LANES as f32), rho: beam.led };
                 photons.together.push(Photon { point, came, normal, light, vertices, group });
             }
             Some(lane) => {

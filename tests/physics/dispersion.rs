@@ -399,3 +399,76 @@ fn any_number_of_wavelengths_a_path_finds_the_same_light() {
         }
     }
 }
+
+/// Before wavelengths part at smooth glass one of them has led, and others might have with other densities: through coloured smoke, and
+/// where ground glass parts colours. What each carries on from there counts that, as does whichever goes on for all, and all that are
+/// reflected alike. In smoke that only scatters light is even everywhere. With ground and smooth glass that overlap, and where
+/// wavelengths that parted meet again before they are ground and part once more, packets find what single wavelengths find: 1.5 times the
+/// blue, light without bound and 2.5 times as much came before.
+#[test]
+fn what_has_led_to_where_wavelengths_part_counts_beyond() {
+    let light = |scene: &str, techniques: &str, samples: u32| {
+        let mut all = [Moments::default(); 3];
+        for seed in 0..4 {
+            let render = format!("render: {{samples: {samples}, seed: {seed}, techniques: {{{techniques}}}}}\n");
+            let frame = bench_with(&format!("{render}{scene}"), &[]).frame();
+            assert_eq!(frame.film.invalid.total(), 0, "{techniques}");
+            let splats = frame.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
+            let pixels = resolve::replicates(&frame.film, splats, &ColourSpace::Rec709.matrix_from_xyz());
+            for replicate in 0..REPLICATES {
+                for (c, sum) in all.iter_mut().enumerate() {
+                    sum.push(pixels.iter().flatten().map(|p| p[replicate][c]).sum::<f64>() / pixels.len() as f64);
+                }
+            }
+        }
+        all.map(|m| Estimate { mean: m.mean, error: m.standard_error() })
+    };
+    let even = "camera: {origin: [0, 0, 3], target: [0, 0, 0], fov_deg: 12}\nimage: {width: 8, height: 8}\n\
+                lights: [constant: {radiance: 1}]\n";
+    let smoke = format!(
+        "{even}medium: smoke\n\
+         media: {{smoke: {{homogeneous: {{scattering: {{table: [[400, 0.05], [500, 0.3], [600, 1.5], [700, 3]]}}}}}}}}\n\
+         shapes:\n\
+         - sphere: {{radius: 4, material: {{boundary: {{}}}}, inside: smoke, outside: vacuum}}\n\
+         - sphere: {{radius: 0.5, material: {{dielectric: {{ior: {{glass: N-SF11}}}}}}, inside: vacuum, outside: smoke}}\n"
+    );
+    let overlapping = "camera: {origin: [0, 1.6, 3.8], target: [0, 0.5, 0], fov_deg: 30}\nimage: {width: 12, height: 12}\n\
+         lights: [directional: {direction: [0.2, -1, -0.1], irradiance: 1, angle_deg: 15}]\nshapes:\n\
+         - rectangle: {corner: [-4, 0, 4], edge_u: [8, 0, 0], edge_v: [0, 0, -8]}\n\
+         - sphere: {center: [0.2, 0.6, 0], radius: 0.3, \
+           material: {dielectric: {ior: {abbe: {nd: 1.83, vd: 50}}, priority: 4}}}\n\
+         - sphere: {center: [-0.2, 0.6, 0], radius: 0.3, \
+           material: {dielectric: {ior: 1.6449, roughness: 0.0094, priority: 5}}}\n";
+    let white = "material: {diffuse: {reflectance: 1}}";
+    let flint = "ior: {abbe: {nd: 1.8, vd: 12}}";
+    let tray = format!(
+        "camera: {{origin: [0, 2.2, 1.4], target: [0, 3, 0], fov_deg: 70}}\nimage: {{width: 8, height: 8}}\n\
+         integrator: {{path: {{max_depth: null}}}}\n\
+         lights: [spot: {{position: [1.2, 2.2, 0], direction: [-1.1, -0.7, 0], cutoff_deg: 15, intensity: 10}}]\nshapes:\n\
+         - disk: {{center: [0, 0, 0], normal: [0, 1, 0], radius: 1.5, {white}}}\n\
+         - disk: {{center: [0, 3, 0], normal: [0, -1, 0], radius: 1.5, {white}}}\n\
+         - cube: {{center: [0, 1.5, 0], size: [4, 0.2, 4], material: {{dielectric: {{{flint}, roughness: 0.005}}}}}}\n\
+         - cube: {{center: [0, 1.0, 0], size: [4, 0.2, 4], material: {{dielectric: {{{flint}}}}}}}\n\
+         - rectangle: {{corner: [-1.2, 0, -1.2], edge_u: [2.4, 0, 0], edge_v: [0, 0.9, 0], {white}}}\n\
+         - rectangle: {{corner: [1.2, 0, 1.2], edge_u: [-2.4, 0, 0], edge_v: [0, 0.9, 0], {white}}}\n\
+         - rectangle: {{corner: [-1.2, 0, 1.2], edge_u: [0, 0, -2.4], edge_v: [0, 0.9, 0], {white}}}\n\
+         - rectangle: {{corner: [1.2, 0, -1.2], edge_u: [0, 0, 2.4], edge_v: [0, 0.9, 0], {white}}}\n"
+    );
+    for (scene, techniques, samples, other, of_other, error) in [
+        (smoke.as_str(), "packets: on", 512, even, "packets: on", 0.03),
+        (overlapping, "packets: on, merging: off", 128, overlapping, "packets: off, merging: off", 0.02),
+        (
+            &tray,
+            "packets: on, light_tracing: on, merging: off",
+            512,
+            &tray,
+            "packets: off, light_tracing: on, merging: off",
+            0.2,
+        ),
+    ] {
+        let [found, expected] = [light(scene, techniques, samples), light(other, of_other, samples)];
+        for (found, expected) in found.iter().zip(&expected) {
+            found.assert_agrees(expected, error);
+        }
+    }
+}

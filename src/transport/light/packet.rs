@@ -375,7 +375,7 @@ impl Walk<'_, '_> {
     /// Lane `chosen`, each with the same probability, draws a direction, which leads to a point y. If y is on a diffuse
     /// surface, too, all lanes are sent there: each has come to y with the density with which some lane would have
     /// found it, Σ_c p_c(y) / 8 (the balance heuristic over what could have been chosen), so that lane j carries
-    /// Φ_j ρ_j 8 p_j(y) / Σ_c p_c(y), at most 8 times what it had. From y they go on as one. Elsewhere, as on glass, the
+    /// Φ_j r_j 8 p_j(y) / Σ_c p_c(y), r its reflectance, at most 8 times what it had. From y they go on as one. Elsewhere, as on glass, the
     /// chosen one goes on alone for all. Which of the two is done depends on y alone.
     fn scatter_together(
         &mut self,
@@ -433,7 +433,9 @@ impl Walk<'_, '_> {
                 1 => power.to_array()[k] * reflected[k] * (densities[k] / found * adjoints[k]) as f32,
                 _ => 0.0,
             });
-            beam.power = Lanes::new(carried);
+            // Again one leads, which any could have led to where they parted.
+            (beam.rho, beam.led) = (beam.led, Lanes::ONE);
+            beam.power = Lanes::new(carried) * (beam.rho.reduce_add() / LANES as f32);
         } else {
             let carried = power.to_array()[chosen] * reflected[chosen] * (LANES as f64 * adjoint_alone) as f32;
             beam.power = Lanes::splat(carried);

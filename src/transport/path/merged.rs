@@ -42,6 +42,7 @@ impl Tracer<'_> {
         group: Option<u8>,
         f: impl Fn(DVec3) -> Lanes,
     ) -> Lanes {
+        let balanced = LANES as f64 / f64::from(path.led.reduce_add());
         map.gather(surface.point, surface.normal, |photon| {
             if group.is_some_and(|group| photon.group != group) {
                 return Lanes::ZERO;
@@ -53,7 +54,11 @@ impl Tracer<'_> {
             let (came, rho) = (photon.came.as_dvec3(), photon.light.rho);
             let cosine = came.dot(surface.normal).abs();
             let f = f(came);
-            let led = f64::from(if CHROMATIC { path.rho * rho } else { rho }.reduce_add());
+            // What has parted carries what all that could have led it there make of it already.
+            let led = match CHROMATIC {
+                true => f64::from((path.rho * rho).reduce_add()),
+                false => f64::from((path.led * rho).reduce_add()) * balanced,
+            };
             let share = LANES as f64 / (led * cosine);
             if share.is_finite() { f * share as f32 } else { Lanes::ZERO }
         })

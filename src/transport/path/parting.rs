@@ -52,7 +52,6 @@ impl Tracer<'_> {
         path.is_one_of_two = true;
         let through = |glass: &Dielectric| glass.go_through(wo).filter(|(sample, _)| sample.transmitted);
         if self.parts_at::<CHROMATIC>(path, glass) {
-            path.let_each_decide();
             for lane in 0..LANES {
                 if let Some((sample, share)) = through(&glass.lane(lane)) {
                     self.follow_alone::<MEDIA>(path, lane, &sample, share, at);
@@ -83,7 +82,7 @@ impl Tracer<'_> {
         u_lobe: f64,
         at: &Leaving,
     ) -> bool {
-        path.let_each_decide();
+        // All alike: the one that has led so far leads on.
         if let Some(sample) = glass.reflects_all(wo, u_lobe) {
             return self.leave::<true, MEDIA>(path, &sample, || Lanes::ZERO, at);
         }
@@ -95,7 +94,8 @@ impl Tracer<'_> {
         false
     }
 
-    /// Follows the wavelength of a `lane` by itself to its end, with the `share` of its light that goes there.
+    /// Follows the wavelength of a `lane` by itself to its end, with the `share` of its light that goes there. Each decides for itself
+    /// from here on; up to here any could have led.
     fn follow_alone<const MEDIA: bool>(
         &self,
         path: &mut Path,
@@ -105,8 +105,11 @@ impl Tracer<'_> {
         at: &Leaving,
     ) {
         let of_lane = |lanes: Lanes| lanes.to_array()[lane];
+        let balanced = LANES as f32 / path.rho.reduce_add();
         let mut alone = Path {
-            beta: Lanes::splat(of_lane(path.beta) * share as f32),
+            beta: Lanes::splat(of_lane(path.beta) * balanced * share as f32),
+            rho: Lanes::ONE,
+            led: path.rho,
             eta2: path.eta2 / share,
             radiance: Lanes::ZERO,
             left: Lanes::ZERO,
@@ -146,18 +149,13 @@ impl Tracer<'_> {
 }
 
 impl Path {
-    /// Each wavelength decides for itself: none leads.
-    fn let_each_decide(&mut self) {
-        self.beta *= LANES as f32 / self.rho.reduce_add();
-        self.rho = Lanes::ONE;
-    }
-
     /// Of wavelengths that parted, whether this one goes on: beyond, their ways have nothing in common. The first is as
-    /// likely any wavelength as each other is, and those of a pixel's samples are evenly spread.
+    /// likely any wavelength as each other is, and those of a pixel's samples are evenly spread. It has led the way to where they
+    /// parted, with its own density: what the others would have led there with has no part in what it carries.
     #[inline(always)]
     pub(super) fn goes_on(&mut self) -> bool {
         let Some(lane) = self.alone.filter(|_| !self.chosen) else { return true };
-        self.beta *= LANES as f32;
+        self.beta *= self.led.reduce_add();
         self.chosen = true;
         lane == 0
     }

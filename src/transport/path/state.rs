@@ -33,6 +33,8 @@ pub(super) struct Path {
     pub(super) ray: Ray,
     pub(super) beta: Lanes,
     pub(super) rho: Lanes,
+    /// What `rho` was where wavelengths parted; one before.
+    pub(super) led: Lanes,
     /// How far from the middle of the scene a medium that scatters the path lets it go on as anywhere: see [`worth`](crate::transport::roulette::worth). Zero
     /// before the first time.
     pub(super) near: f64,
@@ -184,6 +186,7 @@ impl Path {
         ray: Ray { origin: DVec3::ZERO, direction: DVec3::Z, departure: None },
         beta: Lanes::ONE,
         rho: Lanes::ONE,
+        led: Lanes::ONE,
         near: 0.0,
         eta2: 1.0,
         inside: Inside::NOTHING,
