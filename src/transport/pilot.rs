@@ -87,6 +87,9 @@ const STREAM: u64 = 0x7069_6c6f_7470_696c;
 /// of the picture, whose stated error counts what they have met.
 const ENOUGH: usize = 16;
 
+/// The share of what comes from the lights that paths from the camera must bring to be trusted, however many met some.
+const MET: f64 = 0.5;
+
 /// What light tracing with merging costs beyond its rays: 1.05 to 1.3 in scenes of the gallery.
 const OVERHEAD: f64 = 1.2;
 
@@ -384,13 +387,22 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
         square if square > 0.0 && met == 0 => square / chance.min(1.0 / camera.paths as f64),
         square => square * camera.paths as f64 / met.max(1) as f64,
     };
+    // Ground glass sends a little of a small lamp's light far from where it sends the most: however often that is met, the rest may
+    // never have been. It is met by less than one of as many paths.
+    let not_met = |means: &[f64], brought: f64| {
+        let whole = means.iter().sum::<f64>() / means.len() as f64;
+        match brought < MET * whole {
+            true => square(means) * (1.0 - brought / whole).powi(2) * camera.paths as f64,
+            false => 0.0,
+        }
+    };
     // Light that is seen in mirrors and glass: often met, it is known what it costs to leave it to chance, else it is told
     // from how bright it is.
     let (kept, mirrored) = (trimmed(&camera.kept, &weights), average(&camera.mirrored, &weights));
     let unmerged = match camera.met_mirrored {
         _ if unfound_gathered => f64::INFINITY,
         // Of a light that is a sky and a sun they may have met the sky alone, however often.
-        ENOUGH.. => mirrored.max(found.gathered_by_chance),
+        ENOUGH.. => mirrored.max(found.gathered_by_chance).max(not_met(&found.gathered, camera.brought_mirrored)),
         met => by_chance(&found.gathered, met).max(found.gathered_by_chance),
     };
     // What all paths of the picture are not expected to find once is missing; where that is less than the noise shows, nothing is gained.
@@ -421,7 +433,7 @@ fn run(trial: &Trial, mut caustics: Caustics) -> (Option<Arc<Caustics>>, Vec<Eff
         true => f64::INFINITY,
         false => {
             let by_chance = measured.min(kept + mirrored + by_chance(&found.thrown, camera.met));
-            by_chance.max(kept + found.by_chance) * a
+            by_chance.max(kept + found.by_chance).max(kept + not_met(&found.thrown, camera.brought)) * a
         }
     };
     if wishes.light_tracing == Use::Auto && without < with {

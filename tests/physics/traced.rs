@@ -83,6 +83,47 @@ fn the_sun_of_a_sky_is_traced_for_every_seed() {
     }
 }
 
+/// A plate that is ground so finely that it is all but clear: shadow rays to the lamp behind it bring a little from every place, and most
+/// from a spot that no path happens on. Of 4096 tried paths hundreds met that little, and the light was left to chance.
+#[test]
+fn light_through_finely_ground_glass_is_traced_for_every_seed() {
+    let lamps = [
+        "lights: [point: {position: [0, 2, 0], intensity: 10}]\n",
+        "- sphere: {center: [0, 2, 0], radius: 0.01, emission: 30000}\n",
+    ];
+    for (seed, roughness, lamp) in
+        (0..3).flat_map(|seed| [(seed, 0.005, lamps[0]), (seed, 0.001, lamps[0]), (seed, 0.005, lamps[1])])
+    {
+        let scene = format!(
+            "camera: {{origin: [0, 0.3, 3], target: [0, 0, 0], fov_deg: 30}}\nimage: {{width: 24, height: 24}}\n\
+             integrator: path\nrender: {{samples: 256, seed: {seed}}}\nshapes:\n\
+             - disk: {{radius: 1.5, normal: [0, 1, 0]}}\n\
+             - cube: {{center: [0, 1, 0], size: [4, 0.2, 4], material: {{dielectric: {{ior: 1.5, roughness: {roughness}}}}}}}\n\
+             {lamp}"
+        );
+        let (tracing, _, why) = techniques(&bench_with(&scene, &[]));
+        assert!(tracing, "{seed}, {roughness}, {lamp}: {why}");
+    }
+}
+
+/// What paths from the camera met of a sky in mirrors and glass is the sky's light: what a ball of flint throws of the sun onto another
+/// beside it, and is seen through itself, is an eighth of what is there, of which a stated error would not know.
+#[test]
+fn what_glass_shows_of_a_sun_that_it_throws_is_merged() {
+    for seed in 0..3 {
+        let scene = format!(
+            "camera: {{origin: [3.2, 1.3, 6], target: [0, 0.95, 0], fov_deg: 40}}\nimage: {{width: 172, height: 108}}\n\
+             integrator: path\nrender: {{samples: 64, seed: {seed}}}\nshapes:\n\
+             - plane: {{normal: [0, 1, 0]}}\n\
+             - sphere: {{center: [0, 0.6, 0.2], radius: 0.6, material: {{dielectric: {{ior: {{glass: N-SF11}}}}}}}}\n\
+             - sphere: {{center: [-1, 0.5, -0.3], radius: 0.5, material: {{plastic: {{reflectance: 0.4}}}}}}\n\
+             lights: [sky: {{sun: {{elevation_deg: 25, azimuth_deg: 115}}, albedo: 0.4}}]\n"
+        );
+        let (tracing, merging, why) = techniques(&bench_with(&scene, &[]));
+        assert!(tracing && merging, "{seed}, merging {merging}: {why}");
+    }
+}
+
 /// A lamp in the middle of a globe of glass, as in a bulb, is met through the globe alone: seldom from what stands around.
 #[test]
 fn light_of_a_lamp_in_the_middle_of_a_globe_is_traced() {

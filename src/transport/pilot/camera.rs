@@ -22,6 +22,9 @@ pub(super) struct Camera {
     pub paths: usize,
     pub met: usize,
     pub met_mirrored: usize,
+    /// Mean luminance of what they met: of light of the class that is not seen in mirrors and glass, and of such that is.
+    pub brought: f64,
+    pub brought_mirrored: f64,
     /// Rays of a path.
     pub rays: f64,
 }
@@ -109,6 +112,8 @@ pub(super) fn from_camera(shot: &Shot, moments: &[Scene], (pixels, each): (u32, 
         paths,
         met: 0,
         met_mirrored: 0,
+        brought: 0.0,
+        brought_mirrored: 0.0,
         rays: 0.0,
     };
     for (block, [a, b]) in &tried {
@@ -119,6 +124,8 @@ pub(super) fn from_camera(shot: &Shot, moments: &[Scene], (pixels, each): (u32, 
         camera.all.push((*block, variance(a.kept + a.seen + a.left, b.kept + b.seen + b.left)));
         camera.met += a.met + b.met;
         camera.met_mirrored += a.met_seen + b.met_seen;
+        camera.brought += (a.left.y + b.left.y) / (2 * tried.len()) as f64;
+        camera.brought_mirrored += (a.seen.y + b.seen.y) / (2 * tried.len()) as f64;
         camera.rays += (a.rays + b.rays) / paths as f64;
     }
     camera
