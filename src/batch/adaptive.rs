@@ -422,7 +422,10 @@ fn wish(variance: f64, cost: f64) -> f64 {
 }
 
 /// Shares out the samples of the picture among the cells of `film`, the rows of a part, whose pixels have the first samples each that
-/// `adaptive` names; evenly where that is as good and nobody asks for more.
+/// `adaptive` names; evenly where that is as good and nobody asks for more, and where there is no noise.
+///
+/// A picture that an error or a time ends is whole: what the shares of a half have in common, so that their mean is one, is told by the
+/// other half. Of a part by the pilot, for all parts alike.
 #[must_use]
 pub fn decide(job: &FrameJob, adaptive: Adaptive, film: &Film, scale: &Scale) -> Allocation {
     let first = adaptive.first;
@@ -430,25 +433,40 @@ pub fn decide(job: &FrameJob, adaptive: Adaptive, film: &Film, scale: &Scale) ->
     let grid = Grid::of(film.window());
     // A part has all columns, and some rows.
     let offset = (grid.first[1] - Grid::of(job.window).first[1]) as usize * grid.columns;
-    let of_cell = |cell: usize| -> ([i16; HALVES], [Kind; HALVES]) {
-        let cost = scale.costs[offset + cell];
+    // Of a cell its pixels, and of each half its variance and what the other wishes for it.
+    let of_cell = |cell: usize| -> (f64, [(f64, f64); HALVES]) {
         let pixels = means(film, grid.pixels(cell), &rgb_from_xyz);
-        let count = pixels.len() as f64;
         let variances = [0, 1].map(|half| variance(&pixels, half, scale.floor));
-        let share = |half: usize| {
-            let share = (scale.shares * wish(variances[1 - half], cost)).clamp(LEAST, MOST);
-            (libm::log2(share) * STEPS).round() as i16
-        };
-        let kind = |half: usize| Kind { share: share(half), variance: count * variances[half], cost: count * cost };
-        ([share(0), share(1)], [kind(0), kind(1)])
+        let wish = |half: usize| wish(variances[1 - half], scale.costs[offset + cell]);
+        (pixels.len() as f64, [0, 1].map(|half| (variances[half], wish(half))))
     };
-    let (shares, kinds): (Vec<_>, Vec<_>) = (0..grid.cells()).into_par_iter().map(of_cell).unzip();
-    let outlook = Outlook::new(first, kinds.into_iter().flatten().collect());
+    let cells: Vec<_> = (0..grid.cells()).into_par_iter().map(of_cell).collect();
+    let in_common = [0, 1].map(|half: usize| match job.stop.is_open() {
+        true => self::scale(&cells.iter().map(|(_, halves)| halves[half].1).collect::<Vec<f64>>(), LEAST),
+        false => scale.shares,
+    });
+    let even = || {
+        let shares = vec![[0; HALVES]; grid.cells()];
+        Allocation { grid, first, shares, outlook: Outlook::default() }
+    };
+    if in_common.contains(&0.0) {
+        return even();
+    }
+    let share = |half: usize, wish: f64| -> i16 {
+        (libm::log2((in_common[half] * wish).clamp(LEAST, MOST)) * STEPS).round() as i16
+    };
+    let shares: Vec<[i16; HALVES]> =
+        cells.iter().map(|(_, halves)| [0, 1].map(|half| share(half, halves[half].1))).collect();
+    let kinds = cells.iter().zip(&shares).enumerate().flat_map(|(cell, ((count, halves), shares))| {
+        let cost = count * scale.costs[offset + cell];
+        [0, 1].map(|half| Kind { share: shares[half], variance: count * halves[half].0, cost })
+    });
+    let outlook = Outlook::new(first, kinds.collect());
     let end = f64::from(first.saturating_mul(HORIZON));
     let pays = outlook.time(end, usual_slope(end, true)) < WORTH_IT;
     match adaptive.always || pays {
         true => Allocation { grid, first, shares, outlook },
-        false => Allocation { grid, first, shares: vec![[0; HALVES]; grid.cells()], outlook: Outlook::default() },
+        false => even(),
     }
 }
 
