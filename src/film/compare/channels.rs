@@ -46,8 +46,7 @@ pub(super) fn pairs<'a>(a: &'a ExrFile, b: &'a ExrFile, options: &CompareOptions
             }
         };
         let errors = [a, b].map(|file| floats(file, &stderr_name(&name)));
-        let known =
-            [a, b].map(|file| Known { shared: shared(file), dof: degrees(file), samples: said(file, "abbe/samples") });
+        let known = [a, b].map(|file| Known { shared: shared(file), dof: degrees(file) });
         pairs.push(Pair::new(name, [samples_a, samples_b], errors, known, window_a.width, variance));
     }
     Ok(pairs)

@@ -7,9 +7,9 @@
 //!   of freedom; the smallest p times the number of channels (Bonferroni), since the channels of a picture share
 //!   their paths. Sees a bias of 1 % that the next test misses.
 //! - **per pixel**: the test of Mitsuba 3 (`src/render/tests/test_renders.py`): each pixel at a level that the Šidák
-//!   correction derives from [`PIXEL_ALPHA`], passed by [`ACCEPT_FRACTION`] of all. Sees local faults. Variances of fewer than
-//!   16 samples are no less here than the mean of those of the 5 × 5 pixels around. In small pictures that share is less than one
-//!   value: as many pixels may fail there as do by chance, and one.
+//!   correction derives from [`PIXEL_ALPHA`], passed by [`ACCEPT_FRACTION`] of all. Sees local faults. Variances by
+//!   standard errors are no less here than the mean of those of the 5 × 5 pixels around, as four replicates may agree by chance.
+//!   In small pictures that share is less than one value: as many pixels may fail there as do by chance, and one.
 //!
 //! The noise is known from `stderr.*` channels (standard errors of the means, from four replicates: three degrees of
 //! freedom a pixel, or one less than the samples), from a file of variances per sample (as Mitsuba's references come

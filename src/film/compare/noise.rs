@@ -18,7 +18,7 @@ pub(super) struct Pair<'a> {
     pub noise: Noise<'a>,
     /// What is known of A and of B.
     known: [Known; 2],
-    /// Variances of A and of B about each pixel, where standard errors of single pixels are of few samples.
+    /// Variances of A and of B about each pixel, where standard errors tell them.
     about: [Option<Vec<f64>>; 2],
     /// Whether the values of A and of B are half floats; one that is not is rounded to them where the other is.
     half: bool,
@@ -31,15 +31,11 @@ pub(super) struct Known {
     pub shared: f64,
     /// Degrees of freedom of the standard errors.
     pub dof: f64,
-    /// Samples of a pixel, where that is said.
-    pub samples: Option<u32>,
 }
 
-/// Of fewer samples a pixel, four to a replicate, standard errors do not stand by themselves in the test of single pixels: where
-/// light is rare all replicates may lack it, and agree. They are held against those of the pixels around.
-const FEW: u32 = 16;
-
-/// How many pixels to each side are looked at for that.
+/// How many pixels to each side are looked at for the variance about one. Standard errors do not stand by themselves in the test of
+/// single pixels: where light is rare all replicates may lack it, and where evenly spread samples decide whether a hole lets light
+/// through all of them may count the same number. They agree then, and say nothing of how far off they are.
 const AROUND: usize = 2;
 
 pub(super) enum Noise<'a> {
@@ -101,9 +97,8 @@ impl<'a> Pair<'a> {
         // the other would have this picture exact: the differences tell the noise of both.
         let tells = |plane: &Option<&[f32]>| plane.is_none_or(|errors| errors.iter().any(|e| e.is_finite()));
         let errors = if errors.iter().all(tells) { errors } else { [None; 2] };
-        let is_few = |k: usize| variance.is_none() && known[k].samples.is_some_and(|samples| samples < FEW);
-        let about =
-            [0, 1].map(|k| errors[k].filter(|_| is_few(k)).map(|errors| variances_about(errors, width as usize)));
+        let about = errors
+            .map(|errors| errors.filter(|_| variance.is_none()).map(|errors| variances_about(errors, width as usize)));
         let noise = match (variance, errors) {
             (Some((plane, samples)), _) => Noise::Sample(plane, f64::from(samples)),
             (None, [None, None]) => Noise::Unknown,
@@ -238,18 +233,20 @@ impl<'a> Pair<'a> {
 
 /// The mean of the squares of those `errors` that are finite in the square of pixels about each.
 fn variances_about(errors: &[f32], width: usize) -> Vec<f64> {
-    let height = errors.len() / width.max(1);
-    let near = |at: usize, end: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(end);
-    let about = |i: usize| {
-        let columns = near(i % width, width);
-        let all =
-            near(i / width, height).flat_map(|row| &errors[row * width + columns.start..row * width + columns.end]);
-        let (sum, count) = all
-            .filter(|e| e.is_finite())
-            .fold((0.0, 0.0), |(sum, count), e| (sum + f64::from(*e) * f64::from(*e), count + 1.0));
-        if count > 0.0 { sum / count } else { 0.0 }
+    let width = width.max(1);
+    // The sum of `terms` that lie `stride` apart, about each of them, as far as a line of `length` goes.
+    let about = |terms: &[[f64; 2]], stride: usize, length: usize| -> Vec<[f64; 2]> {
+        let sum = |i: usize| {
+            let at = i / stride % length;
+            let near = at.saturating_sub(AROUND)..(at + AROUND + 1).min(length);
+            near.map(|k| terms[i - at * stride + k * stride]).fold([0.0; 2], |[a, b], [x, n]| [a + x, b + n])
+        };
+        (0..terms.len()).map(sum).collect()
     };
-    (0..errors.len()).map(about).collect()
+    let term = |e: &f32| if e.is_finite() { [f64::from(*e) * f64::from(*e), 1.0] } else { [0.0; 2] };
+    let terms: Vec<[f64; 2]> = errors.iter().map(term).collect();
+    let sums = about(&about(&terms, 1, width), width, errors.len() / width);
+    sums.into_iter().map(|[sum, count]| if count > 0.0 { sum / count } else { 0.0 }).collect()
 }
 
 /// `difference` / √`variance`; no difference is no deviation even where there is no noise.
@@ -366,7 +363,7 @@ mod tests {
     /// what its standard errors say. Where neither was rounded nothing is added.
     #[test]
     fn rounding_to_half_floats_is_noise_of_its_own() {
-        let known = [Known { shared: 1.0, dof: 3.0, samples: None }; 2];
+        let known = [Known { shared: 1.0, dof: 3.0 }; 2];
         let errors = [Some(&[0.25f32; 2][..]); 2];
         for (values, expected) in [([1.0f32, 1.5], 2.0 * 0.5f64.powi(20) / 12.0), ([1.1, 1.3], 0.0)] {
             let pair = Pair::new("Y".into(), [Samples::Float(&values); 2], errors, known, 2, None);
