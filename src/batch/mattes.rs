@@ -1,7 +1,9 @@
 //! Which names the mattes of a picture go by.
 
+use super::prepare::filter;
 use crate::description::{self, LayerContent, MaterialRef, SceneDescription, Shape};
 use crate::film::cryptomatte::Matte;
+use crate::film::filter::FilterSampler;
 use crate::scene::Scene;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -14,7 +16,11 @@ pub(super) fn mattes(description: &SceneDescription, scene: &Scene) -> Vec<Matte
     // Children of groups come after the shapes of the scene itself. What is seen of an instance is a child, which has a material;
     // the object and the asset are the instance.
     let objects = || scene.objects.iter().zip(&description.shapes);
+    let wanted: Vec<description::Matte> = wanted.collect();
+    let positive = !wanted.is_empty()
+        && FilterSampler::new(filter(&description.image.filter)).is_ok_and(|sampler| sampler.is_positive());
     let matte = |matte: description::Matte| Matte {
+        positive,
         layer: matte.layer().to_owned(),
         of_parts: matte == description::Matte::Material,
         names: match matte {
@@ -30,7 +36,7 @@ pub(super) fn mattes(description: &SceneDescription, scene: &Scene) -> Vec<Matte
             }
         },
     };
-    wanted.map(matte).collect()
+    wanted.into_iter().map(matte).collect()
 }
 
 /// The asset of each shape that is named as part of one.

@@ -22,6 +22,8 @@ pub struct Matte {
     pub of_parts: bool,
     /// By that half; none for what is never seen by that half.
     pub names: Vec<Option<String>>,
+    /// Whether no sample counts against its pixel: coverage is then weighed as alpha is, else by counts alone.
+    pub positive: bool,
 }
 
 /// Pairs of id and coverage that every file has.
@@ -48,7 +50,7 @@ impl Matte {
             // Of equal coverage by rising id.
             pairs.sort_by_key(|&(count, id)| (std::cmp::Reverse(count), id));
             // What covers the pixel shares its coverage by counts.
-            let share = coverage_of_halves(cells) as f32;
+            let share = if self.positive { coverage_of_halves(cells) as f32 } else { 1.0 };
             let pair = |(count, id): (u64, u32)| (f32::from_bits(id), share * (count as f32 / samples.max(1) as f32));
             pairs.into_iter().map(pair).collect::<Vec<(f32, f32)>>()
         };
@@ -87,10 +89,11 @@ impl Matte {
 /// How the names of all attributes begin.
 pub const PREFIX: &str = "cryptomatte/";
 
-/// Whether a channel group with this name is one of a layer of mattes that is written here.
+/// The layer of mattes that a channel group with this name is a numbered one of, as `CryptoObject00` is of `CryptoObject`.
 #[must_use]
-pub fn is_layer(name: &str) -> bool {
-    name.starts_with("Crypto")
+pub fn layer(name: &str) -> Option<&str> {
+    let layer = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    (layer != name && ["CryptoObject", "CryptoMaterial", "CryptoAsset"].contains(&layer)).then_some(layer)
 }
 
 /// What tells the attributes of one layer from those of another.
@@ -131,6 +134,10 @@ mod tests {
     use super::*;
     use crate::film::Window;
 
+    fn matte(names: Vec<Option<String>>) -> Matte {
+        Matte { layer: "M".into(), of_parts: false, names, positive: true }
+    }
+
     /// The published values of MurmurHash3_x86_32 with seed 0, and the key of `CryptoObject` that other programs write.
     #[test]
     fn hashes_are_those_of_the_specification() {
@@ -162,8 +169,7 @@ mod tests {
             for (name, number) in names.into_iter().zip(0u64..) {
                 film.layers.mattes.add(0, 1, number << 32, if name == "d" { 1 } else { 2 });
             }
-            let matte =
-                Matte { layer: "M".into(), of_parts: false, names: names.map(|name| Some(name.to_owned())).to_vec() };
+            let matte = Matte { names: names.map(|name| Some(name.to_owned())).to_vec(), ..matte(Vec::new()) };
             let (channels, _) = matte.write(&film);
             let value = |data: &ChannelData| match data {
                 ChannelData::F32(plane) => plane[0],
@@ -171,6 +177,22 @@ mod tests {
             };
             let found: Vec<f32> = channels.iter().map(|(_, data)| value(data)).collect();
             assert_eq!(found[..7], [id_of("a"), 0.25, id_of("b"), 0.25, id_of("d"), 0.125, 0.0]);
+        }
+    }
+
+    /// Of one sample in the first half and five in the second one each meets `a`: in the mean of the halves it covers (1 + 1/5)/2, by
+    /// counts 2/6.
+    #[test]
+    fn coverage_follows_alpha_where_no_sample_counts_against_its_pixel() {
+        let mut film = Film::new([1, 1], Window::full(1, 1)).unwrap();
+        for (replicate, alpha) in [(0, 1.0), (2, 1.0), (2, 0.0), (2, 0.0), (3, 0.0), (3, 0.0)] {
+            film.add([0, 0], replicate, [0.0; 3], alpha);
+        }
+        film.layers.mattes.add(0, 1, 0, 2);
+        for (positive, expected) in [(true, 0.6f32), (false, 1.0 / 3.0)] {
+            let (channels, _) = Matte { positive, ..matte(vec![Some("a".into())]) }.write(&film);
+            let ChannelData::F32(coverage) = &channels[1].1 else { panic!("coverage is in floats") };
+            assert!((coverage[0] - expected).abs() < 1e-6, "{positive}: {coverage:?}");
         }
     }
 
@@ -193,9 +215,9 @@ mod tests {
             };
             channels.iter().map(|(_, data)| value(data)).collect()
         };
-        let objects = of(&Matte { layer: "M".into(), of_parts: false, names: names.clone() });
+        let objects = of(&matte(names.clone()));
         assert_eq!(objects[..6], [id_of("a"), 0.5, id_of("b"), 0.25, 0.0, 0.0]);
-        let parts = of(&Matte { layer: "M".into(), of_parts: true, names });
+        let parts = of(&Matte { of_parts: true, ..matte(names) });
         assert_eq!(parts[..6], [id_of("x"), 0.375, id_of("b"), 0.25, id_of("y"), 0.125]);
     }
 }

@@ -233,8 +233,8 @@ fn mean_alpha(cells: &[Cell]) -> f64 {
 }
 
 /// How much coverage a pixel has over what its samples have in the mean: one but where the halves weigh alike. Of N samples with n
-/// and N − n in the halves a sample weighs N/(2n) or N/(2(N − n)), and coverage no more and no less; what a filter with negative
-/// lobes makes of alpha may lie beyond.
+/// and N − n in the halves a sample weighs N/(2n) or N/(2(N − n)), and coverage no more and no less. Only where no sample counts
+/// against its pixel: of what a filter with negative lobes makes of alpha the halves tell its noise.
 pub(super) fn coverage_of_halves(cells: &PixelCells) -> f64 {
     let mean = mean_alpha(cells);
     if !in_halves(cells) || mean <= 0.0 {

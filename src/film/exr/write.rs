@@ -81,14 +81,14 @@ fn parts_of<'a>(image: &ExrImage, channels: Vec<Channel<'a>>) -> Vec<Part<'a>> {
         let light = channels.iter().any(|(name, _)| is_light(name));
         return vec![Part { name: None, channels, light, first: true }];
     }
+    // "rgba" is the name of the picture's own part.
+    let mut other = "rgba_".to_owned();
+    while channels.iter().any(|(name, _)| name.rsplit_once('.').is_some_and(|(layer, _)| layer == other)) {
+        other.push('_');
+    }
     let layer_of = |name: &str| match name.rsplit_once('.') {
-        // The channels of one Cryptomatte are numbered.
-        Some((layer, _)) if cryptomatte::is_layer(layer) => {
-            layer.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned()
-        }
-        // The name of the picture's own part.
-        Some(("rgba", _)) => "rgba_".to_owned(),
-        Some((layer, _)) => layer.to_owned(),
+        Some(("rgba", _)) => other.clone(),
+        Some((layer, _)) => cryptomatte::layer(layer).unwrap_or(layer).to_owned(),
         None if is_light(name) => "rgba".to_owned(),
         None => name.to_owned(),
     };
@@ -483,6 +483,23 @@ mod tests {
         }
         let parts: Vec<&str> = headers.parts.iter().filter_map(|header| header.text("name")).collect();
         assert_eq!(parts, ["rgba", "CryptoMaterial", "CryptoObject", "stderr"]);
+    }
+
+    /// What a person calls a layer is a part of its own, also where it is called like the picture's part or nearly like a Cryptomatte.
+    #[test]
+    fn each_layer_has_a_part() {
+        let mut written = mixed(Compression::Zips);
+        written.layout = Layout::Multipart;
+        let layers = ["Crypto1", "Crypto2", "CryptoObject", "rgba", "rgba_"];
+        for layer in layers {
+            written.push_data(format!("{layer}.R"), ChannelData::F32(vec![0.0; 6]));
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.exr");
+        write_exr(&path, &written).unwrap();
+        let headers = read_headers(&path).unwrap();
+        let parts: Vec<&str> = headers.parts.iter().filter_map(|header| header.text("name")).collect();
+        assert_eq!(parts, ["rgba", "Crypto1", "Crypto2", "CryptoObject", "rgba__", "rgba_", "stderr"]);
     }
 
     /// OpenEXR and OpenImageIO open no file whose parts differ in `chromaticities`, nor one whose first part has none where a
