@@ -59,7 +59,7 @@ impl PathMap {
     pub fn add(&mut self, text: &str) -> Result<(), String> {
         match text.split_once('=') {
             Some((from, to)) if !from.is_empty() && !to.is_empty() => {
-                self.rules.push(Rule { from: from.to_owned(), windows: is_of_windows(from), to: to.into() });
+                self.push(from.to_owned(), is_of_windows(from), to.into());
                 Ok(())
             }
             _ => Err(format!("expected FROM=TO, two directories, found {}", quote(text))),
@@ -92,9 +92,17 @@ impl PathMap {
                     return Err(format!("{message} {}", quote(other)));
                 }
             };
-            self.rules.push(Rule { from: rule.source_path, windows, to: rule.destination_path });
+            self.push(rule.source_path, windows, rule.destination_path);
         }
         Ok(())
+    }
+
+    /// What begins with a relative `from` is so named in a file, or lies there as seen from the working directory.
+    fn push(&mut self, from: String, windows: bool, to: PathBuf) {
+        let absolute = (!windows && Path::new(&from).is_relative()).then(|| std::path::absolute(&from).ok()).flatten();
+        let absolute = absolute.and_then(|from| from.into_os_string().into_string().ok());
+        self.rules.extend(absolute.map(|from| Rule { from, windows, to: to.clone() }));
+        self.rules.push(Rule { from, windows, to });
     }
 
     /// The rules as [`PathMap::add`] takes them, from whatever directory: for other processes.
@@ -160,8 +168,10 @@ pub(crate) fn place(map: &PathMap, directory: &Path, written: &str) -> PathBuf {
         return directory.join(written);
     }
     let joined = directory.join(written);
-    let mapped = map.find(written).or_else(|| joined.to_str().and_then(|joined| map.find(joined)));
-    mapped.unwrap_or(joined)
+    let find = |path: &Path| path.to_str().and_then(|path| map.find(path));
+    // The same file by whatever name the scene was called.
+    let mapped = map.find(written).or_else(|| find(&joined));
+    mapped.or_else(|| find(&std::path::absolute(&joined).ok()?)).unwrap_or(joined)
 }
 
 #[cfg(test)]
@@ -187,6 +197,19 @@ mod tests {
         assert_eq!(place(&map, Path::new("/mnt/a"), "x.ply"), Path::new("/b/x.ply"));
     }
 
+    /// A scene by its relative or its absolute name, and a rule by either: one place.
+    #[test]
+    fn a_rule_reaches_a_file_by_all_names_of_its_scene() {
+        let here = std::env::current_dir().unwrap();
+        for from in [PathBuf::from("show/tex"), here.join("show/tex")] {
+            let map = map(&[&format!("{}=/b", from.display())]);
+            for directory in [PathBuf::from("show"), here.join("show")] {
+                assert_eq!(place(&map, &directory, "tex/x.ply"), Path::new("/b/x.ply"), "{from:?} {directory:?}");
+                assert_eq!(place(&map, &directory, "x.ply"), directory.join("x.ply"));
+            }
+        }
+    }
+
     #[test]
     fn rules_are_written_for_other_processes() {
         let mut map = map(&["/mnt/a=/b", "Z:\\show=/mnt/show", "tex=sub/tex"]);
@@ -197,10 +220,11 @@ mod tests {
             )
         };
         map.add_rules(rules("WINDOWS", "//nas/show").as_bytes()).unwrap();
-        let here = std::env::current_dir().unwrap().join("sub/tex");
-        let tex = format!("tex={}", here.display());
+        let here = std::env::current_dir().unwrap();
+        let to = here.join("sub/tex");
+        let tex = [PathBuf::from("tex"), here.join("tex")].map(|from| format!("{}={}", from.display(), to.display()));
         let written = map.written().unwrap();
-        assert_eq!(written, ["/mnt/a=/b", "Z:\\show=/mnt/show", &tex, "\\\\nas\\show\\=/c"]);
+        assert_eq!(written, ["/mnt/a=/b", "Z:\\show=/mnt/show", &tex[1], &tex[0], "\\\\nas\\show\\=/c"]);
         let mut again = PathMap::default();
         written.iter().for_each(|rule| again.add(rule).unwrap());
         for path in ["/mnt/a/x", "z:/Show/y", "//NAS/show/x/y", "tex/z", "/c/x"] {
