@@ -1,11 +1,12 @@
 //! Batches: many scenes, one after the other, with what differs between them.
 
 use std::collections::{BTreeMap, HashMap};
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use serde::Deserialize;
-use serde::de::IgnoredAny;
+use serde::de::{IgnoredAny, Visitor};
+use serde::{Deserialize, Deserializer};
 
 use super::animation::Animation;
 use super::decode::decode;
@@ -167,15 +168,40 @@ struct WrittenEntry {
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Parameter {
-    Number(f64),
+    Number(Digits),
     Boolean(bool),
     Text(String),
+}
+
+/// A number in words; a whole one with all of its digits.
+struct Digits(String);
+
+impl<'de> Deserialize<'de> for Digits {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Digits, D::Error> {
+        struct Written;
+        impl Visitor<'_> for Written {
+            type Value = Digits;
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a number")
+            }
+            fn visit_u64<E: serde::de::Error>(self, value: u64) -> std::result::Result<Digits, E> {
+                Ok(Digits(value.to_string()))
+            }
+            fn visit_i64<E: serde::de::Error>(self, value: i64) -> std::result::Result<Digits, E> {
+                Ok(Digits(value.to_string()))
+            }
+            fn visit_f64<E: serde::de::Error>(self, value: f64) -> std::result::Result<Digits, E> {
+                Ok(Digits(value.to_string()))
+            }
+        }
+        deserializer.deserialize_any(Written)
+    }
 }
 
 impl Parameter {
     fn text(self) -> String {
         match self {
-            Parameter::Number(value) => value.to_string(),
+            Parameter::Number(Digits(digits)) => digits,
             Parameter::Boolean(value) => value.to_string(),
             Parameter::Text(text) => text,
         }
@@ -594,6 +620,10 @@ mod tests {
             })
         };
         assert_eq!(["a: 1e3", "a: true", "a: false", "a: path"].map(value), ["1000", "true", "false", "path"]);
+        // No f64 holds these.
+        for whole in ["9007199254740993", "-9007199254740993", "18446744073709551615"] {
+            assert_eq!(value(&format!("a: {whole}")), whole);
+        }
         let told =
             "DIR/batch.yaml:3:15: scenes[0].define.a: expected one of a number, true or false, text, found a list of 1";
         assert_eq!(value("a: [1]"), told);

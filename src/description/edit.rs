@@ -205,6 +205,52 @@ impl Setting {
         }
     }
 
+    /// Whether the path leads to an entry of a map of names, which no field of the grammar stands for.
+    fn is_a_name(&self) -> bool {
+        let keys: Vec<&str> = self
+            .path
+            .iter()
+            .filter_map(|segment| match segment {
+                Segment::Key(key) => Some(key.as_str()),
+                Segment::Index(_) => None,
+            })
+            .collect();
+        keys.len() == self.path.len()
+            && match keys[..] {
+                [map, _] => SHARED.contains(&map) || ["groups", "light_groups", "assets"].contains(&map),
+                ["output", "exr", "attributes", _] => true,
+                _ => false,
+            }
+    }
+
+    /// Takes the entry away that the path leads to.
+    fn take_away(&self, root: &mut Node) -> std::result::Result<(), Fault> {
+        let Some((Segment::Key(name), maps)) = self.path.split_last() else { return Ok(()) };
+        let mut node = Some(root);
+        for segment in maps {
+            node = node.and_then(|node| match (&mut node.value, segment) {
+                (Value::Map(entries), Segment::Key(key)) => {
+                    entries.iter_mut().find(|entry| entry.key == *key).map(|entry| &mut entry.node)
+                }
+                _ => None,
+            });
+        }
+        let mut none = Vec::new();
+        let entries = match node.map(|node| &mut node.value) {
+            Some(Value::Map(entries)) => entries,
+            _ => &mut none,
+        };
+        match entries.iter().position(|entry| entry.key == *name) {
+            Some(at) => drop(entries.remove(at)),
+            None => {
+                let hint = did_you_mean(name, entries.iter().map(|entry| entry.key.as_str()));
+                let message = format!("expected a name that is there, found {}{hint}", quote(name));
+                return Err(Fault::at_place(self.place, message).under_path(&self.path));
+            }
+        }
+        Ok(())
+    }
+
     /// A setting of the command line, `KEY=VALUE`. In a file a field without value is one that is not written; here it is
     /// more likely that a shell's variable is empty.
     ///
@@ -231,6 +277,9 @@ impl Setting {
     /// # Errors
     /// If the path leads through something that cannot hold it.
     pub(crate) fn apply(&self, root: &mut Node) -> std::result::Result<(), Fault> {
+        if matches!(self.value.value, Value::Null) && self.is_a_name() {
+            return self.take_away(root);
+        }
         let mut node = root;
         // Where a name leads to no list, that beside it which may have been meant.
         let mut hint = String::new();
@@ -445,6 +494,30 @@ mod tests {
         assert_eq!(path.max_depth, Some(3));
         assert_eq!((scene.image.width, scene.image.height), (12, 10));
         assert_eq!(scene.fault("render.samples", "odd"), "--set render.samples=16: render.samples: odd");
+    }
+
+    #[test]
+    fn null_takes_a_name_away() {
+        let named = "materials: {a: {mirror: {}}, b: {diffuse: {}}}\nlight_groups: {key: [p]}\n\
+             output: {exr: {attributes: {owner: us, shot: 7}}}\nlights: [point: {name: p, position: [0, 3, 0], intensity: 1}]\n";
+        let scene = |keys: &[&str]| {
+            let settings: Vec<(&str, &str)> = keys.iter().map(|key| (*key, "null")).collect();
+            with_settings(&[("scene.yaml", &format!("{CAMERA}{named}"))], &settings)
+        };
+        let found = scene(&["materials.a", "light_groups.key", "output.exr.attributes.shot"]).unwrap();
+        assert_eq!(found.materials.keys().collect::<Vec<_>>(), ["b"]);
+        assert!(found.light_groups.is_empty());
+        assert!(scene(&["output.exr.attributes"]).is_ok());
+        for (key, message) in [
+            ("materials.floor", "materials.floor: expected a name that is there, found \"floor\""),
+            ("media.smoke", "media.smoke: expected a name that is there, found \"smoke\""),
+            (
+                "light_groups.kez",
+                "light_groups.kez: expected a name that is there, found \"kez\"; did you mean \"key\"?",
+            ),
+        ] {
+            assert_eq!(scene(&[key]).unwrap_err(), format!("--set {key}=null: {message}"));
+        }
     }
 
     #[test]

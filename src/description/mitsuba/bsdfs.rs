@@ -118,9 +118,9 @@ impl Import<'_> {
                 fields.maybe("tint", self.spectrum_or_texture(&bag, "specular_reflectance", Role::Reflectance)?);
                 let (inside, outside) =
                     (self.index(&bag, "int_ior", "polypropylene")?, self.index(&bag, "ext_ior", "air")?);
-                // As one number, relative to what surrounds it, where it is one.
+                // As one number, relative to what surrounds it, where it is one; not below 1, which would be told as no index of anything.
                 match (inside.number, outside.number) {
-                    (Some(inside), Some(outside)) => {
+                    (Some(inside), Some(outside)) if inside >= outside => {
                         fields.add("ior", number(bag.place("int_ior"), inside / outside));
                     }
                     _ => {
