@@ -116,11 +116,37 @@ fn a_checkpoint_of_a_picture_that_is_there_is_removed() {
     std::fs::write(&checkpoint, &left).unwrap();
     assert_eq!(run(&place, "a.exr", &["--spp", "512", "--resume"]).code, 0);
     assert!(!checkpoint.exists());
-    // One of another picture is nobody else's to remove.
+    // One of another picture is nobody else's to remove, and told of where it is not gone on from.
     assert_eq!(run(&place, "a.exr", &["--spp", "8"]).code, 0);
     std::fs::write(&checkpoint, &left).unwrap();
     assert_eq!(run(&place, "a.exr", &["--spp", "8", "--skip-existing"]).code, 0);
     assert!(checkpoint.exists());
+    let told = "a.exr.checkpoint of an earlier render is there; --resume goes on from it";
+    let quick = run(&place, "a.exr", &["--spp", "8"]);
+    assert!(quick.code == 0 && quick.err.matches(told).count() == 1 && checkpoint.exists(), "{}", quick.err);
+    // The picture that it would become is there.
+    let whole = run(&place, "a.exr", &["--spp", "512"]);
+    assert!(whole.code == 0 && whole.err.matches(told).count() == 1 && !checkpoint.exists(), "{}", whole.err);
+}
+
+/// Whether whoever started this process has it ignore a hang-up, as `nohup` does, and so what it starts.
+fn ignores_a_hang_up() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1)
+}
+
+/// As under `nohup`.
+#[test]
+fn a_hang_up_that_is_ignored_stops_nothing() {
+    let place = Place::of(&scene("off"));
+    let mut shell = Command::new("sh");
+    shell.current_dir(place.path(".")).args(["-c", "trap '' HUP; exec \"$@\"", "sh"]);
+    let render = command(&place, "a.exr", &["--spp", "512", "--checkpoint-interval", "0.02s"]);
+    let mut child = shell.arg(render.get_program()).args(render.get_args()).spawn().unwrap();
+    assert!(appears(&mut child, &place.path("a.exr.checkpoint")));
+    signal(&child, "HUP");
+    assert!(child.wait().unwrap().success() && place.path("a.exr").exists());
 }
 
 #[test]
@@ -128,6 +154,7 @@ fn stopped_it_ends_with_75_and_goes_on_where_it_was() {
     let place = Place::of(&scene("on"));
     assert_eq!(run(&place, "whole.exr", &[]).code, 0);
     let checkpoint = place.path("a.exr.checkpoint");
+    let signals = if ignores_a_hang_up() { ["TERM", "INT"] } else { ["HUP", "TERM"] };
     let mut stops = 0;
     loop {
         let mut child = command(&place, "a.exr", &["--resume", "--checkpoint-interval", "0.02s"]).spawn().unwrap();
@@ -137,7 +164,7 @@ fn stopped_it_ends_with_75_and_goes_on_where_it_was() {
         } else {
             std::thread::sleep(Duration::from_millis(150));
         }
-        signal(&child, if stops % 2 == 0 { "TERM" } else { "INT" });
+        signal(&child, signals[stops % 2]);
         let done = Ran::of(child.wait_with_output().unwrap());
         if done.code == 0 {
             break;

@@ -71,6 +71,8 @@ pub struct Keeper<'a> {
     watcher: &'a dyn Watcher,
     /// Of the run that is resumed.
     counted: Option<Counts>,
+    /// Whether the checkpoint that is there, if there is one, is of this render.
+    own: AtomicBool,
     next: Mutex<Option<Instant>>,
     /// When a viewer is shown the picture again.
     next_look: Mutex<Instant>,
@@ -98,6 +100,7 @@ impl<'a> Keeper<'a> {
             watch,
             watcher,
             counted: None,
+            own: AtomicBool::new(false),
             next,
             next_look: Mutex::new(Instant::now()),
             notes: Mutex::default(),
@@ -110,6 +113,10 @@ impl<'a> Keeper<'a> {
     /// [`Error::Input`] for a checkpoint that is damaged or of something else; [`Error::Memory`] if the memory cannot be had.
     pub fn begin<'j>(&mut self, job: &'j FrameJob<'j>, share: Share) -> Result<Begun<'j>> {
         let file = place(self.path);
+        if !self.keep.resume && file.is_file() {
+            let told = format!("{} of an earlier render is there; --resume goes on from it", file.display());
+            self.watcher.warns(&told);
+        }
         if !(self.keep.resume && file.exists()) {
             return Begun::new(job, share);
         }
@@ -121,6 +128,7 @@ impl<'a> Keeper<'a> {
         let part = Part::resume(job, share, &header.claims, header.allocation(), film, splats)?;
         lock(&self.notes).push(format!("resumed at {:.1} %", per_cent(&part, &header.milestones)));
         self.counted = header.numerics;
+        *self.own.get_mut() = true;
         let elapsed = Duration::try_from_secs_f64(header.seconds).unwrap_or_default();
         Ok(Begun::from(part, header.milestones.clone(), elapsed))
     }
@@ -131,12 +139,15 @@ impl<'a> Keeper<'a> {
         sum(self.counted.into_iter().chain(self.watch.map(Watch::counts)))
     }
 
-    /// The files are there: nothing is left to resume. What a person should know is returned.
+    /// The files are there: nothing is left to resume, and a checkpoint of the same is removed. What a person should know is returned.
     ///
     /// # Errors
     /// [`Error::Output`] if the checkpoint cannot be removed.
     pub fn done(&self) -> Result<Vec<String>> {
-        remove(&place(self.path))?;
+        match self.own.load(Ordering::Relaxed) {
+            true => remove(&place(self.path))?,
+            false => remove_left_over(self.path, self.identity)?,
+        }
         Ok(std::mem::take(&mut lock(&self.notes)))
     }
 
@@ -155,7 +166,9 @@ impl<'a> Keeper<'a> {
 
     fn write(&self, part: &Part, milestones: &[Milestone], elapsed: Duration) -> Result<()> {
         self.keep_place(self.path)?;
-        part_file::write(&place(self.path), self.identity, part, milestones, elapsed, self.numerics())
+        part_file::write(&place(self.path), self.identity, part, milestones, elapsed, self.numerics())?;
+        self.own.store(true, Ordering::Relaxed);
+        Ok(())
     }
 
     /// What is done.

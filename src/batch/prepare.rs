@@ -135,6 +135,11 @@ pub(super) fn prepare_one_of(
         let note = "whitted has no noise: the time or error that is given to all has no say";
         prepared.scene.notes.push(note.into());
     }
+    let asked = overrides.set.iter().any(|(key, _)| ["render.samples", "render.stop.samples"].contains(&key.as_str()));
+    if asked && matches!(prepared.description.integrator, description::Integrator::Whitted(_)) {
+        let note = "whitted takes no samples: a pixel has the rays of its grid, integrator.whitted.grid to a side";
+        prepared.scene.notes.push(note.into());
+    }
     Ok(prepared)
 }
 

@@ -12,7 +12,7 @@ pub const ONE_WISH: Duration = Duration::from_secs(1);
 /// Flags that signals set.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupts {
-    /// SIGTERM or SIGINT came: keep what is done, and end. A second one, later than [`ONE_WISH`], ends the process at once.
+    /// SIGTERM, SIGINT or SIGHUP came: keep what is done, and end. A second one, later than [`ONE_WISH`], ends the process at once.
     pub stop: Arc<AtomicBool>,
     /// SIGUSR1 came: write a picture of what is done.
     pub snapshot: Arc<AtomicBool>,
@@ -25,8 +25,10 @@ impl Interrupts {
     /// [`Error::System`](crate::error::Error::System) if the system refuses.
     #[cfg(unix)]
     pub fn listen() -> Result<Interrupts> {
-        use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
-        let mut signals = signal_hook::iterator::Signals::new([SIGTERM, SIGINT, SIGUSR1]).map_err(refused)?;
+        use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1};
+        let hang_up = (!is_ignored(SIGHUP)).then_some(SIGHUP);
+        let heard = [SIGTERM, SIGINT, SIGUSR1].into_iter().chain(hang_up);
+        let mut signals = signal_hook::iterator::Signals::new(heard).map_err(refused)?;
         let all = Interrupts::default();
         let Interrupts { stop, snapshot } = all.clone();
         let hear = move || {
@@ -52,6 +54,19 @@ impl Interrupts {
     pub fn listen() -> Result<Interrupts> {
         Ok(Interrupts::default())
     }
+}
+
+/// Whether whoever started the process has it ignore `signal`, as `nohup` does a hang-up; it is ignored from here on in any case.
+#[cfg(unix)]
+fn is_ignored(signal: std::ffi::c_int) -> bool {
+    unsafe extern "C" {
+        #[link_name = "signal"]
+        fn set(signal: std::ffi::c_int, handler: usize) -> usize;
+    }
+    // `SIG_IGN` of all systems.
+    const IGNORED: usize = 1;
+    // SAFETY: no handler of this process is replaced, and what ignores a signal runs no code.
+    unsafe { set(signal, IGNORED) == IGNORED }
 }
 
 /// Lets a write beyond the limit on the size of files (`ulimit -f`) fail with an error that says so, in the place of SIGXFSZ,

@@ -72,7 +72,11 @@ fn faults(job: &Job) -> Vec<String> {
     let (parameters, braced) = (parameters(job).lines().count(), braced(job).count());
     let framed = job.groups.iter().filter(|group| !group.frames.is_empty()).count();
     if parameters + framed > MOST_PARAMETERS {
-        let and = if braced > 0 { format!(" beside {braced} arguments with {{{{ or }}}}") } else { String::new() };
+        let and = if braced > 0 {
+            format!(" beside {braced} arguments with {{{{, }}}} or a control character")
+        } else {
+            String::new()
+        };
         faults.push(format!(
             "render.frames: expected at most {} different sets of frames in one job{and}, as many as Open Job Description \
              has parameters for, found {framed}; --scene makes a job of some scenes",
@@ -87,10 +91,13 @@ fn faults(job: &Job) -> Vec<String> {
     faults
 }
 
-/// The arguments, with their numbers, that would be taken for variables or their ends where they stand in a template: nested maps
-/// of `--set`. They are the values of parameters.
+/// The arguments, with their numbers, that a template cannot hold: those that would be taken for variables or their ends, as nested
+/// maps of `--set`, and such with control characters but line ends. They are the values of parameters.
 fn braced(job: &Job) -> impl Iterator<Item = (usize, &str)> {
-    let is_braced = |argument: &str| argument.contains("{{") || argument.contains("}}");
+    let is_braced = |argument: &str| {
+        let held = |c: char| !c.is_control() || c == '\n';
+        argument.contains("{{") || argument.contains("}}") || !argument.chars().all(held)
+    };
     job.arguments.iter().map(String::as_str).enumerate().filter(move |(_, argument)| is_braced(argument))
 }
 
@@ -306,9 +313,11 @@ mod tests {
         let expected = "a}}: expected a name without }}, which ends a variable of Open Job Description, found one";
         assert_eq!(files(&told(closed)).unwrap_err().to_string(), expected);
     }
-    /// `openjd check` refused a template with `}}` in an argument, "Missing opening braces", and so refused a map in a map.
+
+    /// `openjd check` refused a template with `}}` in an argument, "Missing opening braces", and so refused a map in a map, and one with
+    /// a tab, "does not match the required pattern".
     #[test]
-    fn arguments_with_braces_are_the_values_of_parameters() {
+    fn arguments_that_a_template_cannot_hold_are_the_values_of_parameters() {
         let arguments = ["--set", "a={b: {c: d}}", "--set", "e={f: g}", "--set", "h=\"{{i\""].map(String::from);
         let job = Job { arguments: arguments.into(), ..job(Cut { tiles: 2, ranges: 1, frames: 1 }) };
         let text = template(&job);
@@ -321,6 +330,8 @@ mod tests {
             assert_eq!(text.matches(&line).count(), 1, "{text}");
         }
         assert!(files(&job).is_ok());
+        let control = Job { arguments: ["a=\tb", "a=\nb", "a=\u{7f}"].map(String::from).into(), ..job.clone() };
+        assert_eq!(braced(&control).map(|(i, _)| i).collect::<Vec<_>>(), [0, 2]);
         let long = Job { arguments: vec![format!("{{{{{}", "x".repeat(1023))], ..job };
         assert!(files(&long).unwrap_err().to_string().ends_with("as Open Job Description allows, found 1025"));
     }
