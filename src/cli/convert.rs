@@ -5,7 +5,7 @@ use crate::batch;
 use crate::description::{self, SceneDescription};
 use crate::error::{Error, Result};
 use crate::film::output::{Inputs, directory_of, is_stream, write_atomically};
-use crate::scene::{load, mesh, sdf};
+use crate::scene::{compile, load, mesh, sdf};
 use std::path::Path;
 
 /// Prints the scene as YAML, or writes it.
@@ -21,6 +21,8 @@ pub fn import(arguments: &ConvertArguments) -> Result<i32> {
 /// Prints the scene as Mitsuba's XML, or writes it, and says what Mitsuba cannot express.
 pub fn export(arguments: &ConvertArguments) -> Result<i32> {
     let (scene, read) = read(arguments)?;
+    // What is wrong with it is no matter of what Mitsuba can express: names that nothing has, files that are not there.
+    compile::compile(&scene, "scene")?;
     let output = arguments.output.as_deref();
     let file = output.filter(|path| !is_stream(path));
     let path = file.unwrap_or(Path::new(""));

@@ -50,7 +50,7 @@ enum Verb {
     #[command(after_help = "Example:\n  abbe merge parts/ -o prism.exr")]
     Merge(MergeArguments),
     /// Print what a scene calls for, each effect with its reason, and render nothing
-    #[command(after_help = "Example:\n  abbe plan configs/gallery.yaml --scene prism --format json")]
+    #[command(after_help = "Example:\n  abbe plan configs/gallery.yaml --scene prism --error 1% --format json")]
     Plan(PlanArguments),
     /// Write the job of a batch for a render farm
     #[command(
@@ -111,6 +111,26 @@ struct SceneArguments {
     path_map_file: Option<PathBuf>,
 }
 
+/// What ends a render besides its samples.
+#[derive(Debug, Args)]
+struct StopArguments {
+    /// End at this relative error of the picture, as 0.01 or 1%; with --spp or --time at what is reached first
+    #[arg(long, value_name = "E", value_parser = relative_error, allow_hyphen_values = true)]
+    error: Option<f64>,
+    /// End after this time of rendering each scene, as 60s, 10m or 2h
+    #[arg(long, value_name = "TIME", value_parser = some_time, allow_hyphen_values = true)]
+    time: Option<std::time::Duration>,
+}
+
+impl StopArguments {
+    /// The fields of a scene that they set.
+    fn set(&self) -> impl Iterator<Item = (String, String)> + use<> {
+        let error = self.error.map(|error| ("render.stop.error".to_owned(), error.to_string()));
+        let time = self.time.map(|time| ("render.stop.time".to_owned(), time.as_secs_f64().to_string()));
+        error.into_iter().chain(time)
+    }
+}
+
 #[derive(Debug, Args)]
 struct RenderArguments {
     #[command(flatten)]
@@ -119,12 +139,8 @@ struct RenderArguments {
     /// scene and the frame
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
-    /// End at this relative error of the picture, as 0.01 or 1%; with --spp or --time at what is reached first
-    #[arg(long, value_name = "E", value_parser = relative_error, allow_hyphen_values = true)]
-    error: Option<f64>,
-    /// End after this time of rendering each scene, as 60s, 10m or 2h
-    #[arg(long, value_name = "TIME", value_parser = some_time, allow_hyphen_values = true)]
-    time: Option<std::time::Duration>,
+    #[command(flatten)]
+    stop: StopArguments,
     /// Threads; 0 takes as many as SLURM_CPUS_PER_TASK, CUE_THREADS or OMP_NUM_THREADS says (the first that is set), else
     /// every core that the process may use
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
@@ -147,8 +163,8 @@ struct RenderArguments {
     /// Go on from the checkpoint beside the output, if there is one; what is finished is left alone
     #[arg(long)]
     resume: bool,
-    /// How often to write a checkpoint, as 90s, 10m or 2h; 0 for never. SIGTERM and Ctrl-C write one, too, and end
-    /// with exit code 75; SIGUSR1 writes a PNG of what is done
+    /// How often to write a checkpoint, as 90s, 10m or 2h; 0 for never. SIGTERM, Ctrl-C and a hang-up write one, too, and
+    /// end with exit code 75; SIGUSR1 writes a PNG of what is done
     #[arg(long, value_name = "TIME", default_value = "10m", value_parser = duration, allow_hyphen_values = true)]
     checkpoint_interval: std::time::Duration,
     /// Leave alone pictures that are there, undamaged and of the same scene and settings
@@ -239,6 +255,8 @@ enum FarmFormat {
 struct PlanArguments {
     #[command(flatten)]
     scene: SceneArguments,
+    #[command(flatten)]
+    stop: StopArguments,
     /// How to print it
     #[arg(long, value_enum, default_value_t = PlanFormat::Text)]
     format: PlanFormat,

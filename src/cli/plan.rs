@@ -9,7 +9,8 @@ use std::fmt::Write;
 
 /// Prints the effects of each scene.
 pub fn run(arguments: &PlanArguments) -> Result<i32> {
-    let overrides = arguments.scene.overrides(None)?;
+    let mut overrides = arguments.scene.overrides(None)?;
+    overrides.set.extend(arguments.stop.set());
     let mut all = Vec::new();
     let mut codes = Vec::new();
     for entry in batch::entries(&arguments.scene.file, &overrides)? {

@@ -21,12 +21,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     }
     let interrupts = Interrupts::listen()?;
     let mut scene = arguments.scene.overrides(arguments.output.clone())?;
-    if let Some(error) = arguments.error {
-        scene.set.push(("render.stop.error".into(), error.to_string()));
-    }
-    if let Some(time) = arguments.time {
-        scene.set.push(("render.stop.time".into(), time.as_secs_f64().to_string()));
-    }
+    scene.set.extend(arguments.stop.set());
     let overrides = batch::Overrides {
         report: arguments.report.clone(),
         check_numerics: arguments.check_numerics,

@@ -49,6 +49,24 @@ fn plan_says_what_is_simulated_and_why_and_renders_nothing() {
     assert_eq!(place.names("."), ["prism.yaml"]);
 }
 
+/// What ends a render decides how it is made.
+#[test]
+fn plan_takes_the_ends_that_render_takes() {
+    let place = batch();
+    let adaptive = |end: &[&str]| {
+        let plan = place.run(&[&["plan", "scenes/good.yaml"], end].concat());
+        assert_eq!((plan.err.as_str(), plan.code), ("", 0));
+        plan.out.lines().find(|line| line.contains("adaptive sampling")).unwrap().trim().to_owned()
+    };
+    let told = adaptive(&["--error", "0.1%"]);
+    assert_ne!(told, adaptive(&[]));
+    for same in [&["--set", "render.stop.error=0.001"], &["--time", "60s"]] {
+        assert_eq!(adaptive(same), told);
+    }
+    let ran = place.run(&["plan", "scenes/good.yaml", "--error", "200%"]);
+    assert_eq!((ran.out.as_str(), ran.code), ("", 2), "{}", ran.err);
+}
+
 #[test]
 fn compare_ends_with_its_verdict() {
     let place = batch();
