@@ -400,6 +400,24 @@ fn any_number_of_wavelengths_a_path_finds_the_same_light() {
     }
 }
 
+/// Red, green and blue of the mean pixel, by the replicates of four seeds.
+fn light(scene: &str, techniques: &str, samples: u32) -> [Estimate; 3] {
+    let mut all = [Moments::default(); 3];
+    for seed in 0..4 {
+        let render = format!("render: {{samples: {samples}, seed: {seed}, techniques: {{{techniques}}}}}\n");
+        let frame = bench_with(&format!("{render}{scene}"), &[]).frame();
+        assert_eq!(frame.film.invalid.total(), 0, "{techniques}");
+        let splats = frame.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
+        let pixels = resolve::replicates(&frame.film, splats, &ColourSpace::Rec709.matrix_from_xyz());
+        for replicate in 0..REPLICATES {
+            for (c, sum) in all.iter_mut().enumerate() {
+                sum.push(pixels.iter().flatten().map(|p| p[replicate][c]).sum::<f64>() / pixels.len() as f64);
+            }
+        }
+    }
+    all.map(|m| Estimate { mean: m.mean, error: m.standard_error() })
+}
+
 /// Before wavelengths part at smooth glass one of them has led, and others might have with other densities: through coloured smoke, and
 /// where ground glass parts colours. What each carries on from there counts that, as does whichever goes on for all, and all that are
 /// reflected alike. In smoke that only scatters light is even everywhere. With ground and smooth glass that overlap, and where
@@ -407,22 +425,6 @@ fn any_number_of_wavelengths_a_path_finds_the_same_light() {
 /// blue, light without bound and 2.5 times as much came before.
 #[test]
 fn what_has_led_to_where_wavelengths_part_counts_beyond() {
-    let light = |scene: &str, techniques: &str, samples: u32| {
-        let mut all = [Moments::default(); 3];
-        for seed in 0..4 {
-            let render = format!("render: {{samples: {samples}, seed: {seed}, techniques: {{{techniques}}}}}\n");
-            let frame = bench_with(&format!("{render}{scene}"), &[]).frame();
-            assert_eq!(frame.film.invalid.total(), 0, "{techniques}");
-            let splats = frame.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
-            let pixels = resolve::replicates(&frame.film, splats, &ColourSpace::Rec709.matrix_from_xyz());
-            for replicate in 0..REPLICATES {
-                for (c, sum) in all.iter_mut().enumerate() {
-                    sum.push(pixels.iter().flatten().map(|p| p[replicate][c]).sum::<f64>() / pixels.len() as f64);
-                }
-            }
-        }
-        all.map(|m| Estimate { mean: m.mean, error: m.standard_error() })
-    };
     let even = "camera: {origin: [0, 0, 3], target: [0, 0, 0], fov_deg: 12}\nimage: {width: 8, height: 8}\n\
                 lights: [constant: {radiance: 1}]\n";
     let smoke = format!(
@@ -470,5 +472,40 @@ fn what_has_led_to_where_wavelengths_part_counts_beyond() {
         for (found, expected) in found.iter().zip(&expected) {
             found.assert_agrees(expected, error);
         }
+    }
+}
+
+/// Depth fog fades what is seen through a pane as it fades the pane, in packets, too: the floor under a ball of flint, where its caustic
+/// is, was faded as far as the floor itself is: 0.82 of the light of this picture.
+#[test]
+fn depth_fog_fades_packets_behind_a_pane_as_the_pane() {
+    let scene = "camera: {origin: [0, 2.2, 4], target: [0, 0, 0.4], fov_deg: 12}\nimage: {width: 8, height: 8}\n\
+         fog: {colour: 0, density: 0.5, falloff: exp}\n\
+         lights: [directional: {direction: [0.2, -1, -0.1], irradiance: 3, angle_deg: 20}]\nshapes:\n\
+         - rectangle: {corner: [-2, 0, 2], edge_u: [4, 0, 0], edge_v: [0, 0, -4], material: {diffuse: {reflectance: 0.8}}}\n\
+         - sphere: {center: [0, 1, 0.4], radius: 0.45, material: {dielectric: {ior: {abbe: {nd: 1.7, vd: 15}}}}}\n\
+         - rectangle: {corner: [-3, 0.5, 3], edge_u: [6, 0, 0], edge_v: [0, 3, 0], material: {thin_dielectric: {ior: 1.5}}}\n";
+    let packets = light(scene, "packets: on, light_tracing: on, merging: off", 128);
+    let alone = light(scene, "packets: off, light_tracing: on, merging: off", 128);
+    for (packets, alone) in packets.iter().zip(&alone) {
+        packets.assert_agrees(alone, 0.02);
+    }
+}
+
+/// A near-mirror shows a surface that throws half of its light and scatters the rest, and mirrors a panel before a sun. That the surface would
+/// have thrown the sun takes no light from what the panel gets of the sky by shadow rays: 0.9 of it was there.
+#[test]
+fn what_hides_a_sun_in_a_coat_is_as_bright_as_without_light_tracing() {
+    let scene = "camera: {origin: [0, 1.26, -1.5], target: [0, 1.26, 1.06], fov_deg: 8}\nimage: {width: 8, height: 8}\n\
+         lights: [sky: {sun: {elevation_deg: 45}, sun_angle_deg: 12}]\nshapes:\n\
+         - rectangle: {corner: [-0.3, 1.537, 0.945], edge_u: [0.6, 0, 0], edge_v: [0, -0.5544, 0.2298], \
+           material: {principled: {base_color: 0.9, metallic: 1, roughness: 0.1}}}\n\
+         - cube: {center: [0, 0.1, 0], size: [2, 0.2, 2], \
+           material: {blend: {weight: 0.5, first: {mirror: {}}, second: {diffuse: {reflectance: 0.2}}}}}\n\
+         - rectangle: {corner: [-5, 0.42, -3.32], edge_u: [10, 0, 0], edge_v: [0, 4, 4], material: {diffuse: {reflectance: 0.9}}}\n";
+    let traced = light(scene, "light_tracing: on, merging: off", 256);
+    let alone = light(scene, "light_tracing: off", 256);
+    for (traced, alone) in traced.iter().zip(&alone) {
+        traced.assert_agrees(alone, 0.015);
     }
 }

@@ -76,6 +76,30 @@ fn lamps_that_coats_and_glass_mirror_are_as_bright_as_by_chance() {
     }
 }
 
+/// A block that does not part wavelengths lies on flint that does, and mirrors a lamp in that: the flint parts what comes back. Where wavelengths go
+/// on from there side by side each meets the lamp at another place; at its edge it was counted for those that missed it, and met by
+/// the others: 1.36 times the light, and 1.08 beside it.
+#[test]
+fn a_lamp_in_flint_that_other_glass_mirrors_is_counted_once() {
+    let scene = |techniques: &str, samples: u32| {
+        bench_with(
+            &format!(
+                "camera: {{origin: [0, 0.5, 0], target: [0.2887, 1, 0], fov_deg: 3, up: [0, 0, 1]}}\nimage: {{width: 16, height: 4}}\n\
+                 integrator: {{path: {{max_depth: 4}}}}\nrender: {{samples: {samples}, techniques: {{{techniques}}}}}\nshapes:\n\
+                 - cube: {{center: [0, 0.5, 0], size: [8, 1, 8], material: {{dielectric: {{ior: 1.5, priority: 2}}}}}}\n\
+                 - cube: {{center: [0, -1, 0], size: [6, 3, 6], \
+                   material: {{dielectric: {{ior: {{glass: N-SF11}}, priority: 1}}}}}}\n\
+                 - rectangle: {{corner: [1.086, -0.5, 1], edge_u: [2, 0, 0], edge_v: [0, 0, -2], emission: 10, \
+                   material: {{diffuse: {{reflectance: 0}}}}}}\n"
+            ),
+            &[],
+        )
+    };
+    let packets = over_seeds(scene("light_tracing: off, packets: on", 256), 0..24);
+    let alone = over_seeds(scene("light_tracing: off, packets: off", 256), 100..124);
+    assert_same_light("flint under a block", &packets, &alone);
+}
+
 /// Over nothing glass sends back F L of a lamp that it mirrors, in every sample; by chance it was L or nothing.
 #[test]
 fn glass_over_nothing_mirrors_a_lamp_without_noise() {

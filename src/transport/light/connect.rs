@@ -72,7 +72,7 @@ impl Walk<'_, '_> {
 
     /// What depth fog leaves of light from a point that comes straight on to the camera at `distance` along `ray`: it is faded as the
     /// first thing is that the camera sees there. What goes through the holes of a material made of others passes that by.
-    fn clear_through(&self, point: DVec3, ray: &Ray, distance: f64, mut inside: Inside, nm: Lanes) -> Lanes {
+    pub(super) fn clear_through(&self, point: DVec3, ray: &Ray, distance: f64, mut inside: Inside, nm: Lanes) -> Lanes {
         let LightPaths { scene, plan, .. } = *self.paths;
         let mut clear = Lanes::splat(self.clear(point));
         if depth_fog(scene, plan).is_none() || !scene.has_boundaries {

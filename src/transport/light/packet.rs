@@ -298,10 +298,8 @@ impl Walk<'_, '_> {
                 None => reflectance.eval(&texture_point(lane), nm).to_array()[lane],
             };
             let cosines = to * adjoint(from, to, true_from, true_to);
-            let fogged = self.clear(surface.point);
             light[lane] = packet.beam.power.to_array()[lane]
-                * (reflectance * FRAC_1_PI * (cosines * entry.density * self.unit_area) as f32)
-                * fogged;
+                * (reflectance * FRAC_1_PI * (cosines * entry.density * self.unit_area) as f32);
             if light[lane] != 0.0 {
                 rays[lane] = scene.leave(surface, hit, entry.direction);
                 (distances[lane], places[lane]) = (entry.distance, entry.pixel);
@@ -317,6 +315,8 @@ impl Walk<'_, '_> {
                 let went = rays[lane].direction;
                 let crosses = came.dot(surface.normal) * went.dot(surface.normal) < 0.0;
                 let inside = if crosses { scene.beyond(object, surface, went, beam.inside()) } else { beam.inside() };
+                let clear = self.clear_through(surface.point, &rays[lane], distances[lane], inside, beam.nm);
+                light[lane] *= clear.to_array()[0];
                 match self.open(&rays[lane], distances[lane], inside, &beam) {
                     Some(through) => light[lane] *= through.to_array()[0],
                     None => wanted &= !(1 << lane),
@@ -325,6 +325,9 @@ impl Walk<'_, '_> {
         } else if wanted != 0 {
             self.rays += wanted.count_ones().div_ceil(2);
             wanted &= !scene.occluded_of(&rays, &distances, wanted, None);
+            for lane in each(wanted) {
+                light[lane] *= self.clear(at[lane].0.point);
+            }
         }
         for lane in each(wanted) {
             let mut lanes = [0.0; LANES];

@@ -238,7 +238,8 @@ impl Tracer<'_> {
         }
         let ray = leave(light.wi);
         let distance = free(light.distance, light.target, point, &ray);
-        let traced = self.leaves(path, lamp as u32);
+        // What throws light in part does so in a single direction, in which no shadow ray goes.
+        let traced = self.leaves_from(path, path.sharp, false, light.wi, lamp as u32);
         let led = if CHROMATIC { path.rho * pdf } else { pdf };
         let weight = |passing: Option<Lanes>| match light.density {
             None => share(lamp as u32).unwrap_or(1.0) / probability,

@@ -146,23 +146,28 @@ impl Tracer<'_> {
         };
         loop {
             path.further += 1;
-            if let Some((light, emitted)) = self.go_on::<MEDIA>(&mut way, path.vertices, most)? {
+            if let Some((light, emitted)) = self.go_on::<CHROMATIC, MEDIA>(&mut way, path, most)? {
                 self.enter_mirrored::<CHROMATIC>(path, &way, light, emitted);
                 return Some(Counted { light, behind: way.through });
             }
         }
     }
 
-    /// To the next thing on a way: the light that it sends, or beyond it if it is a surface of glass, of which the way has come through
-    /// less than `most`. `None` where neither is there.
-    fn go_on<const MEDIA: bool>(&self, way: &mut Way, vertex: u32, most: u32) -> Option<Option<(u32, Lanes)>> {
+    /// To the next thing on a way of `path`: the light that it sends, or beyond it if it is a surface of glass, of which the way has come
+    /// through less than `most`. `None` where neither is there.
+    fn go_on<const CHROMATIC: bool, const MEDIA: bool>(
+        &self,
+        way: &mut Way,
+        path: &Path,
+        most: u32,
+    ) -> Option<Option<(u32, Lanes)>> {
         let scene = self.scene;
         let may_pass = |events: u32| self.settings.max_depth.is_none_or(|depth| events + 1 < depth);
         for _ in 0..=MAX_BOUNDARIES {
             let hit = scene.closest(&way.ray, f64::INFINITY);
             if MEDIA && let Some(medium) = way.inside.medium {
                 let distance = hit.map_or(f64::INFINITY, |hit| hit.t);
-                let set = Set::Extra(vertex.wrapping_add(MIRRORED).wrapping_add(way.stretches << 16));
+                let set = Set::Extra(path.vertices.wrapping_add(MIRRORED).wrapping_add(way.stretches << 16));
                 let dimmed = scene.media[medium as usize].dim(&way.ray, distance, self.nm, || self.sampler.walk(set));
                 way.weight *= dimmed.through;
             }
@@ -201,6 +206,10 @@ impl Tracer<'_> {
             let Bsdf::Dielectric(glass) = material.bsdf_beside(&at, self.nm, self.plan.all_dispersive, around) else {
                 return None;
             };
+            // Here, too, wavelengths that go on side by side come to another place each.
+            if self.parts_at::<CHROMATIC>(path, &glass) {
+                return None;
+            }
             let frame = Frame::from_normal_and_tangent(seen_normal(&surface, -went), surface.tangent);
             let (sample, chance) = glass.go_through(frame.to_local(-went))?;
             let wi = frame.to_world(sample.wi);
