@@ -78,7 +78,7 @@
 //!                                   # of squares as m2_direct.R, …, or under squares_name
 //! - {name: key_diffuse, ways: [diffuse], light_group: key}      # of the light of `path` what came these ways (~ all)
 //!                                   # from lamps of this group (~ all). Emission: the camera sees the lamp; caustic: a
-//!                                   # mirror, or glass or metal of alpha 0.05 or less, threw it onto something else; other light direct (scattered
+//!                                   # mirror, or glass or metal of an alpha below 0.05, threw it onto something else; other light direct (scattered
 //!                                   # once) or indirect, by what the camera sees: diffuse, glossy, transmission, media;
 //!                                   # both: diffuse_direct, … . emission, caustic, direct, indirect add up to the picture,
 //!                                   # and so do emission, caustic, diffuse, glossy, transmission, media

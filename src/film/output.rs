@@ -13,7 +13,7 @@ use std::fs::{File, Metadata, OpenOptions};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// So many symbolic links may lead from one to the next, as on Linux.
 const MOST_LINKS: usize = 40;
@@ -279,7 +279,39 @@ fn open_stream(path: &Path, data: &Metadata) -> std::io::Result<File> {
     if std::os::unix::fs::FileTypeExt::is_socket(&data.file_type()) {
         return Err(std::io::Error::other("it is a socket"));
     }
+    #[cfg(target_os = "linux")]
+    let _reader = await_reader(path, data, READER_COMES_WITHIN)?;
     standard(data).map_or_else(|| OpenOptions::new().write(true).open(path), Ok)
+}
+
+/// How long the reader of a FIFO is waited for. Whoever opened one that nobody reads would wait for ever, and hear no signal.
+#[cfg(target_os = "linux")]
+const READER_COMES_WITHIN: Duration = Duration::from_secs(30);
+
+/// What holds a FIFO open toward its reader, who is there; none for what is no FIFO.
+#[cfg(target_os = "linux")]
+fn await_reader(path: &Path, data: &Metadata, most: Duration) -> std::io::Result<Option<File>> {
+    use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+    // `O_NONBLOCK`, and `ENXIO`, by which it tells that there is no reader.
+    const WITHOUT_WAITING: i32 = 0o4000;
+    const NO_READER: i32 = 6;
+    if !data.file_type().is_fifo() {
+        return Ok(None);
+    }
+    let end = Instant::now() + most;
+    loop {
+        match OpenOptions::new().write(true).custom_flags(WITHOUT_WAITING).open(path) {
+            Ok(file) => return Ok(Some(file)),
+            Err(e) if e.raw_os_error() != Some(NO_READER) => return Err(e),
+            Err(_) if Instant::now() >= end => {
+                return Err(std::io::Error::other(format!(
+                    "it is a FIFO that nobody has read for {} s",
+                    most.as_secs()
+                )));
+            }
+            Err(_) => std::thread::sleep(Duration::from_millis(20)),
+        }
+    }
 }
 
 /// The standard output or error, if that is what `data` is of. Opened anew, a file to which it was redirected would be
@@ -526,6 +558,13 @@ mod tests {
         });
         prepare_place(&fifo).unwrap();
         write_json(&fifo, &[1]).unwrap();
+        #[cfg(target_os = "linux")]
+        {
+            let unread = at("unread");
+            assert!(std::process::Command::new("mkfifo").arg(&unread).status().unwrap().success());
+            let told = await_reader(&unread, &std::fs::metadata(&unread).unwrap(), Duration::ZERO).unwrap_err();
+            assert_eq!(told.to_string(), "it is a FIFO that nobody has read for 0 s");
+        }
         assert_eq!(reader.join().unwrap(), b"[\n  1\n]");
         assert!(std::fs::symlink_metadata(&fifo).unwrap().file_type().is_fifo());
         drop(std::os::unix::net::UnixListener::bind(at("socket")).unwrap());

@@ -1,7 +1,7 @@
 //! Picture files for Mitsuba, which reads fewer than are read here.
 //!
 //! What it refuses (3.9.1): EXR files with more channels than those of colours, spectral ones among them; of PNM all but `P6`; of BMP
-//! all but 8, 24 and 32 bits without packing behind a header of 40 bytes; TGA files without the footer of version 2, with palettes
+//! all but 8, 24 and 32 bits without packing behind a header of 40 bytes; JPEG of four colours; TGA files without the footer of version 2, with palettes
 //! or with 16 bits. It takes other colours from palettes in BMP, which it has for grey, and from `P6` of 16 bits.
 
 use super::decoded::{COLOURS, decode, decoder, extension, with_picture_first};
@@ -58,11 +58,28 @@ fn is_plain(bytes: &[u8]) -> bool {
         [b'B', b'M', ..] => {
             number(14, 4) == Some(40) && matches!(number(28, 2), Some(24 | 32)) && number(30, 4) == Some(0)
         }
+        [0xff, 0xd8, ..] => matches!(jpeg_components(bytes), Some(1 | 3)),
         _ if image::guess_format(bytes).is_ok() || pfm::is(bytes) || bytes.starts_with(b"#?") => true,
         // TGA has nothing to tell it by at its beginning.
         _ => {
             let footer = bytes.len().checked_sub(18).is_some_and(|at| bytes[at..].starts_with(b"TRUEVISION-XFILE."));
             footer && matches!(bytes[2], 2 | 3 | 10 | 11) && matches!(bytes[16], 8 | 24 | 32)
+        }
+    }
+}
+
+/// How many colours the frame of a JPEG has (ITU T.81, B.2.2).
+fn jpeg_components(bytes: &[u8]) -> Option<u8> {
+    let mut at = 2;
+    loop {
+        let &[0xff, marker, high, low] = bytes.get(at..)?.first_chunk()? else { return None };
+        match marker {
+            // Fill bytes; markers without a segment.
+            0xff => at += 1,
+            0x01 | 0xd0..=0xd7 => at += 2,
+            // Frames, and not Huffman tables, arithmetic conditioning or what is kept for extensions.
+            0xc0..=0xcf if !matches!(marker, 0xc4 | 0xc8 | 0xcc) => return bytes.get(at + 9).copied(),
+            _ => at += 2 + usize::from(u16::from_be_bytes([high, low])),
         }
     }
 }
@@ -175,6 +192,19 @@ mod tests {
             layout: Layout::Single,
         };
         exr::encode_exr(&image).unwrap()
+    }
+
+    /// A segment of four bytes, a table, fill bytes and a frame of so many colours; and what ends before that.
+    #[test]
+    fn the_colours_of_a_jpeg_are_those_of_its_frame() {
+        for colours in [1, 3, 4] {
+            let start = [0xff, 0xd8, 0xff, 0xe0, 0, 4, 7, 7, 0xff, 0xc4, 0, 3, 9, 0xff];
+            let frame = [0xff, 0xc2, 0, 17, 8, 0, 1, 0, 1, colours, 1, 0x11, 0];
+            let bytes = [&start[..], &frame].concat();
+            assert_eq!(jpeg_components(&bytes), Some(colours));
+            assert_eq!(is_plain(&bytes), colours != 4);
+            assert_eq!(jpeg_components(&bytes[..20]), None);
+        }
     }
 
     /// Mitsuba 3.9.1 says of the first that it has no known pixel format.
