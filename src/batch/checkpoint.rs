@@ -113,11 +113,12 @@ impl<'a> Keeper<'a> {
     /// [`Error::Input`] for a checkpoint that is damaged or of something else; [`Error::Memory`] if the memory cannot be had.
     pub fn begin<'j>(&mut self, job: &'j FrameJob<'j>, share: Share) -> Result<Begun<'j>> {
         let file = place(self.path);
-        if !self.keep.resume && file.is_file() {
+        if !file.exists() {
+            return Begun::new(job, share);
+        }
+        if !self.keep.resume {
             let told = format!("{} of an earlier render is there; --resume goes on from it", file.display());
             self.watcher.warns(&told);
-        }
-        if !(self.keep.resume && file.exists()) {
             return Begun::new(job, share);
         }
         let written = part_file::open(&file)?;

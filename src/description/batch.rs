@@ -193,6 +193,10 @@ impl<'de> Deserialize<'de> for Digits {
             fn visit_f64<E: serde::de::Error>(self, value: f64) -> std::result::Result<Digits, E> {
                 Ok(Digits(value.to_string()))
             }
+            // Of what is a number by its form, one beyond all floats.
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> std::result::Result<Digits, E> {
+                Err(E::custom(format!("expected a finite number, found {text}")))
+            }
         }
         deserializer.deserialize_any(Written)
     }
@@ -624,6 +628,8 @@ mod tests {
         for whole in ["9007199254740993", "-9007199254740993", "18446744073709551615"] {
             assert_eq!(value(&format!("a: {whole}")), whole);
         }
+        let beyond = "DIR/batch.yaml:3:15: scenes[0].define.a: expected a finite number, found -1e999";
+        assert_eq!(value("a: -1e999"), beyond);
         let told =
             "DIR/batch.yaml:3:15: scenes[0].define.a: expected one of a number, true or false, text, found a list of 1";
         assert_eq!(value("a: [1]"), told);

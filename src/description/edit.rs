@@ -207,36 +207,28 @@ impl Setting {
 
     /// Whether the path leads to an entry of a map of names, which no field of the grammar stands for.
     fn is_a_name(&self) -> bool {
-        let keys: Vec<&str> = self
-            .path
-            .iter()
-            .filter_map(|segment| match segment {
-                Segment::Key(key) => Some(key.as_str()),
-                Segment::Index(_) => None,
-            })
-            .collect();
-        keys.len() == self.path.len()
-            && match keys[..] {
-                [map, _] => SHARED.contains(&map) || ["groups", "light_groups", "assets"].contains(&map),
-                ["output", "exr", "attributes", _] => true,
-                _ => false,
+        match &self.path[..] {
+            [Segment::Key(map), Segment::Key(_)] => {
+                SHARED.contains(&map.as_str()) || ["groups", "light_groups", "assets"].contains(&map.as_str())
             }
+            [Segment::Key(output), Segment::Key(exr), Segment::Key(attributes), Segment::Key(_)] => {
+                [output, exr, attributes] == ["output", "exr", "attributes"]
+            }
+            _ => false,
+        }
     }
 
     /// Takes the entry away that the path leads to.
     fn take_away(&self, root: &mut Node) -> std::result::Result<(), Fault> {
         let Some((Segment::Key(name), maps)) = self.path.split_last() else { return Ok(()) };
-        let mut node = Some(root);
-        for segment in maps {
-            node = node.and_then(|node| match (&mut node.value, segment) {
-                (Value::Map(entries), Segment::Key(key)) => {
-                    entries.iter_mut().find(|entry| entry.key == *key).map(|entry| &mut entry.node)
-                }
-                _ => None,
-            });
-        }
+        let map = maps.iter().try_fold(root, |node, segment| match (&mut node.value, segment) {
+            (Value::Map(entries), Segment::Key(key)) => {
+                entries.iter_mut().find(|entry| entry.key == *key).map(|entry| &mut entry.node)
+            }
+            _ => None,
+        });
         let mut none = Vec::new();
-        let entries = match node.map(|node| &mut node.value) {
+        let entries = match map.map(|map| &mut map.value) {
             Some(Value::Map(entries)) => entries,
             _ => &mut none,
         };

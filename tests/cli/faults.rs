@@ -343,6 +343,23 @@ fn a_missing_scene_file_and_a_missing_argument_are_told_apart() {
     assert_eq!(place.run(&["render", "s.yaml", "--set", "fog"]).code, 2);
 }
 
+/// What nobody has is no matter of what Mitsuba can express: stand-ins were written, and called that.
+#[test]
+fn what_cannot_be_rendered_is_not_exported() {
+    for (shape, code) in [
+        ("sphere: {radius: 1, material: {dielectric: {ior: {glass: N-SF99}}}}", 2),
+        ("sphere: {radius: 1, material: {conductor: {metal: Goldd}}}", 2),
+        ("mesh: {file: none.ply}", 3),
+    ] {
+        let place = Place::with(&[("s.yaml", &format!("{SMALL}shapes: [{shape}]\n"))]);
+        let [plan, export] =
+            [&["plan", "s.yaml"][..], &["export", "s.yaml", "-o", "s.xml"]].map(|args| place.run(args));
+        assert_eq!(export.code, code, "{shape}: {}", export.err);
+        assert_eq!(export.err, plan.err, "{shape}");
+        assert_eq!(place.names("."), ["s.yaml"], "{shape}");
+    }
+}
+
 /// A lamp without a name is called by its kind and number; a group would take it in with one that is given that name.
 #[test]
 fn no_lamp_is_called_as_one_without_a_name_is() {

@@ -11,6 +11,7 @@ use abbe::math::sampler::Sampler;
 use abbe::math::statistics::Moments;
 use abbe::spectrum::{ColourSpace, RefractiveIndex, WavelengthDistribution, catalogue};
 use glam::DVec3;
+use std::ops::Range;
 
 /// N-BK7 by the three terms that Schott publishes, λ in µm.
 fn bk7(nm: f64) -> f64 {
@@ -367,20 +368,12 @@ fn any_number_of_wavelengths_a_path_finds_the_same_light() {
         )
     };
     let light = |techniques: &str, change: &dyn Fn(&WavelengthDistribution) -> WavelengthDistribution| {
-        let mut all = [Moments::default(); 2];
-        for seed in 0..6 {
+        let [red, _, blue] = rgb_over_seeds(0..6, |seed| {
             let mut bench = bench_with(&scene(techniques, seed), &[]);
             bench.prepared.scene.wavelengths = change(&bench.prepared.scene.wavelengths);
-            let frame = bench.frame();
-            let splats = frame.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
-            let pixels = resolve::replicates(&frame.film, splats, &ColourSpace::Rec709.matrix_from_xyz());
-            for replicate in 0..REPLICATES {
-                for (c, sum) in [0, 2].into_iter().zip(&mut all) {
-                    sum.push(pixels.iter().flatten().map(|p| p[replicate][c]).sum::<f64>() / pixels.len() as f64);
-                }
-            }
-        }
-        all.map(|m| Estimate { mean: m.mean, error: m.standard_error() })
+            bench
+        });
+        [red, blue]
     };
     for techniques in [
         "packets: off, light_tracing: off",
@@ -400,13 +393,12 @@ fn any_number_of_wavelengths_a_path_finds_the_same_light() {
     }
 }
 
-/// Red, green and blue of the mean pixel, by the replicates of four seeds.
-fn light(scene: &str, techniques: &str, samples: u32) -> [Estimate; 3] {
+/// Red, green and blue of the mean pixel, by the replicates of all `seeds`.
+fn rgb_over_seeds(seeds: Range<u64>, bench: impl Fn(u64) -> Bench) -> [Estimate; 3] {
     let mut all = [Moments::default(); 3];
-    for seed in 0..4 {
-        let render = format!("render: {{samples: {samples}, seed: {seed}, techniques: {{{techniques}}}}}\n");
-        let frame = bench_with(&format!("{render}{scene}"), &[]).frame();
-        assert_eq!(frame.film.invalid.total(), 0, "{techniques}");
+    for seed in seeds {
+        let frame = bench(seed).frame();
+        assert_eq!(frame.film.invalid.total(), 0, "seed {seed}");
         let splats = frame.splats.as_ref().map(|s| Splats { film: &s.film, photons: s.paths });
         let pixels = resolve::replicates(&frame.film, splats, &ColourSpace::Rec709.matrix_from_xyz());
         for replicate in 0..REPLICATES {
@@ -416,6 +408,14 @@ fn light(scene: &str, techniques: &str, samples: u32) -> [Estimate; 3] {
         }
     }
     all.map(|m| Estimate { mean: m.mean, error: m.standard_error() })
+}
+
+/// The same of a scene without settings, by four seeds.
+fn light(scene: &str, techniques: &str, samples: u32) -> [Estimate; 3] {
+    rgb_over_seeds(0..4, |seed| {
+        let render = format!("render: {{samples: {samples}, seed: {seed}, techniques: {{{techniques}}}}}\n");
+        bench_with(&format!("{render}{scene}"), &[])
+    })
 }
 
 /// Before wavelengths part at smooth glass one of them has led, and others might have with other densities: through coloured smoke, and

@@ -378,8 +378,8 @@ impl Walk<'_, '_> {
     /// Lane `chosen`, each with the same probability, draws a direction, which leads to a point y. If y is on a diffuse
     /// surface, too, all lanes are sent there: each has come to y with the density with which some lane would have
     /// found it, Σ_c p_c(y) / 8 (the balance heuristic over what could have been chosen), so that lane j carries
-    /// Φ_j r_j 8 p_j(y) / Σ_c p_c(y), r its reflectance, at most 8 times what it had. From y they go on as one. Elsewhere, as on glass, the
-    /// chosen one goes on alone for all. Which of the two is done depends on y alone.
+    /// Φ_j r_j 8 p_j(y) / Σ_c p_c(y), r its reflectance, at most 8 times what it had. From y they go on as one. Elsewhere,
+    /// as on glass, the chosen one goes on alone for all. Which of the two is done depends on y alone.
     fn scatter_together(
         &mut self,
         packet: &Packet,
