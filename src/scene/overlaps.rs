@@ -8,7 +8,7 @@
 
 use super::bvh::Aabb;
 use super::material::Kind;
-use super::{Geometry, Object, Scene};
+use super::{Geometry, Hit, Object, Scene};
 use crate::math::Ray;
 use crate::math::warp;
 use crate::scene::shape::Shape;
@@ -24,7 +24,7 @@ const MOST_PAIRS: usize = 256;
 /// Bodies that are looked at; a bound on time.
 const MOST_BODIES: usize = 1024;
 
-/// Surfaces along one ray.
+/// Surfaces of a body along one ray.
 const MOST_SURFACES: usize = 256;
 
 /// Intervals may interleave by less than this share of the ray's length in the two boxes. A ray that grazes a quadric
@@ -132,7 +132,7 @@ impl Scene {
             let through = shared.min + (shared.max - shared.min) * DVec3::new(lattice(1), lattice(2), lattice(3));
             let direction = warp::uniform_sphere(DVec2::new(lattice(4), lattice(5)));
             let ray = Ray::new(through - direction * (0.5 * length), direction);
-            let [Some(a), Some(b)] = self.intervals([a, b], &ray, length) else { return false };
+            let [Some(a), Some(b)] = [a, b].map(|body| self.intervals(body, &ray, length)) else { return false };
             let slight = length * SLIGHT;
             let interleaved =
                 |a: &[f64; 2], b: &[f64; 2]| a[0] + slight < b[0] && b[0] + slight < a[1] && a[1] + slight < b[1];
@@ -140,35 +140,37 @@ impl Scene {
         })
     }
 
-    /// Where the ray is in each of the two bodies; `None` for one whose surface it does not cross in pairs.
-    fn intervals(&self, bodies: [&Body; 2], ray: &Ray, length: f64) -> [Option<Intervals>; 2] {
-        let plane = bodies.map(|body| match &self.objects[body.object as usize].geometry {
+    /// Where the ray is in a body, whatever else stands there; `None` for one whose surface it does not cross in pairs.
+    fn intervals(&self, body: &Body, ray: &Ray, length: f64) -> Option<Intervals> {
+        let below = match &self.objects[body.object as usize].geometry {
             Geometry::Shape(Shape::Plane(plane)) => Some(plane.height(ray.origin) < 0.0),
             _ => None,
-        });
-        let mut crossed: [Vec<f64>; 2] =
-            plane.map(|below| if below == Some(true) { vec![f64::NEG_INFINITY] } else { vec![] });
+        };
+        let mut crossed = if below == Some(true) { vec![f64::NEG_INFINITY] } else { vec![] };
         let (mut at, mut gone) = (*ray, 0.0);
         for _ in 0..MOST_SURFACES {
-            let Some(hit) = self.closest(&at, length - gone) else { break };
+            let Some(hit) = self.meet_alone(&at, body.object, length - gone) else { break };
             gone += hit.t;
-            let top = hit.instance.unwrap_or(hit.object);
             // Of an instance only the one body counts, not what stands beside it in the group.
-            let material = &self.materials[self.objects[hit.object as usize].material as usize];
-            let clear = material.transmits();
-            if let Some(which) = bodies.iter().position(|body| body.object == top).filter(|_| clear) {
-                crossed[which].push(gone);
+            if self.materials[self.objects[hit.object as usize].material as usize].transmits() {
+                crossed.push(gone);
             }
-            let surface = self.surface(&at, &hit);
-            at = self.leave(&surface, &hit, at.direction);
+            at = self.leave(&self.surface(&at, &hit), &hit, at.direction);
         }
-        let mut sides = crossed.into_iter().zip(plane).map(|(mut crossed, plane)| {
-            if crossed.len() % 2 == 1 && plane.is_some() {
-                crossed.push(f64::INFINITY);
-            }
-            (crossed.len() % 2 == 0).then(|| crossed.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
-        });
-        [sides.next().flatten(), sides.next().flatten()]
+        if crossed.len() % 2 == 1 && below.is_some() {
+            crossed.push(f64::INFINITY);
+        }
+        (crossed.len() % 2 == 0).then(|| crossed.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect())
+    }
+
+    /// Where the ray meets `object`, whatever else stands there.
+    fn meet_alone(&self, ray: &Ray, object: u32, t_max: f64) -> Option<Hit> {
+        let Some(together) = self.together.as_ref().filter(|together| together.holds(object)) else {
+            return self.meet(ray, object, t_max);
+        };
+        let mut met = None;
+        together.nearest(ray, t_max, |hit| (hit.object == object).then(|| met.insert(hit).t));
+        met
     }
 }
 
