@@ -269,6 +269,18 @@ impl Camera {
         Some(Entry { pixel, direction: wi, distance: offset.length(), density })
     }
 
+    /// Where the middle of the lens sees `point`, wherever the clipping planes are; `None` behind an eye.
+    #[must_use]
+    pub fn place_of(&self, point: DVec3) -> Option<DVec2> {
+        let local = self.view.camera_from_world.transform_point3(point);
+        let plane = match self.projection {
+            Projection::Perspective { half_width } if local.z > 0.0 => local.truncate() / (local.z * half_width),
+            Projection::Perspective { .. } => return None,
+            Projection::Orthographic { half_width } => local.truncate() / half_width,
+        };
+        Some(self.on_picture(plane))
+    }
+
     /// Where the middle of the lens sees what is infinitely far in `direction`; `None` behind the camera, and where parallel
     /// rays all look into one direction.
     #[must_use]

@@ -21,8 +21,8 @@ pub enum Middle {
     Position,
     /// Texture coordinates.
     Uv,
-    /// How far what is seen moves on the picture until the next frame, pixels, to the right and up; 0 where it leaves the
-    /// camera's view, and without frames.
+    /// How far what is seen moves on the picture until the next frame, pixels, to the right and up; 0 where that is
+    /// behind the eye, and without frames.
     Motion,
 }
 
@@ -83,7 +83,7 @@ fn motion(scene: &Scene, next: &Scene, place: DVec2, ray: &Ray, met: Option<&Cov
     let there = match met {
         Some(Covering { hit, surface, .. }) => {
             let point = moved(scene, next, hit, surface.point);
-            next.camera.entry(point, || DVec2::splat(0.5)).map(|entry| entry.pixel)
+            next.camera.place_of(point)
         }
         None => next.camera.vanishing_point(turned(scene, next, ray.direction)),
     };

@@ -515,6 +515,43 @@ fn a_spectral_file_is_paint() {
     assert!(said.contains("expected reflectances (channels T), found radiance (S0)"), "{said}");
 }
 
+/// A camera comes nearer by more than what lies before its near plane, or before the plane of one without perspective: what is
+/// cut away by then has its way all the same.
+#[test]
+fn motion_passes_the_clipping_planes() {
+    let place = TempDir::new().unwrap();
+    let path = |name: &str| place.path().join(name);
+    let scene = |camera: &str, z: f64| {
+        format!(
+            "camera: {{origin: {{1: [0, 0, 2], 2: [0.1, 0, 1]}}, target: {{1: [0, 0, 0], 2: [0.1, 0, -1]}}, {camera}}}\n\
+             image: {{width: 16, height: 16}}\nrender: {{samples: 1, frames: '1-2'}}\noutput: {{exr: {{precision: float}}}}\n\
+             layers: [motion]\nlights: [{{constant: {{radiance: 1}}}}]\n\
+             shapes: [rectangle: {{corner: [-2, -2, {z}], edge_u: [4, 0, 0], edge_v: [0, 4, 0]}}]\n"
+        )
+    };
+    let motion = |camera: &str, z: f64| {
+        common::write(&path("scene.yaml"), scene(camera, z).as_bytes());
+        let overrides = Overrides { output: Some(path("out")), ..Overrides::default() };
+        let report = batch::render_batch(&path("scene.yaml"), &overrides, &(), &AtomicBool::new(false)).unwrap();
+        assert_eq!(report.exit_code(), 0, "{:?}", report.scenes[0].status);
+        let picture = read_exr(&path("out/scene.0001.exr")).unwrap().parts.remove(0);
+        ["motion.X", "motion.Y"].map(|name| plane(&picture, name).to_vec())
+    };
+    // From 1.1 m to 0.1 m: what is x pixels from the middle comes to be 11 x away, less 0.1 m of 16 pixels to 2 · 0.1 · tan 20°.
+    let shift = 0.1 * 16.0 / (0.2 * 20f64.to_radians().tan());
+    let near = motion("fov_deg: 40, clip: {near: 0.5}", 0.9);
+    assert_eq!(near, motion("fov_deg: 40", 0.9));
+    for i in 0..256 {
+        let (x, up) = ((i % 16) as f64 - 7.5, 7.5 - (i / 16) as f64);
+        let expected = [10.0 * x - shift, 10.0 * up];
+        let off = (0..2).map(|c| (f64::from(near[c][i]) - expected[c]).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-3, "{i}: {:?}, expected {expected:?}", near.clone().map(|c| c[i]));
+    }
+    // Without perspective what stands behind goes as far as all else: 0.1 m of 16 pixels to 2 m.
+    let flat = motion("orthographic_height: 2", 1.5).map(|c| c.into_iter().map(f64::from).collect::<Vec<_>>());
+    assert!(flat[0].iter().all(|x| (x + 0.8).abs() < 1e-6) && flat[1].iter().all(|y| y.abs() < 1e-6), "{flat:?}");
+}
+
 /// Forms of every kind that move, turn and grow, and a camera that pans, from frame 1 to 2: the point that the middle of a
 /// pixel shows in frame 1 is, `motion` away, shown with the same texture coordinates in frame 2. There they are taken
 /// between four pixels; how far they are from linear over a pixel is a small part of what they change across it.
