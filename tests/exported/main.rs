@@ -464,6 +464,20 @@ fn optical_materials_come_back() {
     assert!(told.contains("no absorption") && told.contains("no priority"), "{told}");
 }
 
+/// A body that takes light away inside stands in smoke: Mitsuba names that medium alone, by which its inside would be empty.
+#[test]
+fn a_body_that_absorbs_in_a_medium_comes_back() {
+    let folder = Folder::new();
+    for side in ["", ", outside: fog"] {
+        let _ = folder.export_and_back(&format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nmedia: {{fog: {{homogeneous: {{scattering: 0.05}}}}}}\n\
+             medium: fog\nshapes:\n\
+             - sphere: {{radius: 0.5, material: {{dielectric: {{ior: 1.5, absorption: {{color: 0.5, at: 0.5}}}}}}{side}}}\n\
+             - sphere: {{center: [0, 3, 0], radius: 1, emission: 5}}\n",
+        ));
+    }
+}
+
 /// What the paths of lamps without extent are aimed at here, and is told as missing there: materials that throw light in single
 /// directions, be it a part of it.
 #[test]

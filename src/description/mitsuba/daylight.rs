@@ -70,6 +70,19 @@ impl Import<'_> {
         Ok(Some(name))
     }
 
+    /// The name of what hangs in a spot, and the scale of the D65 around it where there is one.
+    pub(super) fn slide(&mut self, index: usize) -> Result<(String, Option<f64>), Fault> {
+        let bag = self.bag(index);
+        let is_spectrum = |index: &usize| SPECTRA.contains(&bag.document.objects[*index].plugin.as_str());
+        let of_daylight = bag.object.plugin == "d65";
+        let inner = if of_daylight { bag.only(Family::Texture)?.filter(|index| !is_spectrum(index)) } else { None };
+        let Some(inner) = inner else { return Ok((self.declare_texture(index)?, None)) };
+        let scale = bag.float("scale")?.unwrap_or(1.0);
+        not_negative(&bag, "scale", &[scale])?;
+        bag.finish()?;
+        Ok((self.declare_texture(inner)?, Some(scale)))
+    }
+
     /// Whether a texture is D65 times a picture, or has such squares. Textures that were `seen` are not.
     pub(super) fn is_lit(&self, index: usize, seen: &mut HashSet<usize>) -> bool {
         if !seen.insert(index) {
@@ -91,11 +104,15 @@ pub(super) fn d65(place: Place, scale: f64) -> Node {
     fields.kind("illuminant")
 }
 
-/// D65 of luminance `scale` times a number, a colour of a surface or a table; `None` of anything else.
-fn in_daylight(place: Place, of: &Node, scale: f64) -> Option<Node> {
+/// D65 of luminance `scale` times a number, a colour of a surface, a table or D65; `None` of anything else.
+pub(super) fn in_daylight(place: Place, of: &Node, scale: f64) -> Option<Node> {
     let daylight = illuminant::d65().scaled(scale * DAYLIGHT);
     if let Value::Float(by) = of.value {
         return Some(sampled(place, BAND_NM, &daylight.scaled(by)));
+    }
+    if let Some(illuminant) = of.get("illuminant") {
+        let Value::Float(by) = illuminant.get("scale")?.value else { return None };
+        return in_daylight(place, &sampled(place, BAND_NM, &illuminant::d65().scaled(by)), scale);
     }
     let (knots, curve) = if let Some(rgb) = of.get("rgb") {
         (BAND_NM.to_vec(), upsample::reflectance(floats_of(rgb)?.try_into().ok()?).ok()?)

@@ -6,6 +6,7 @@ use super::super::fault::Fault;
 use super::super::node::{Node, quote};
 use super::super::sky::SunPlace;
 use super::super::transform::{is_mirror, is_similarity};
+use super::daylight::in_daylight;
 use super::object::{Bag, Family};
 use super::parse::ABOUT_ONE;
 use super::sensors::field_of_view;
@@ -121,15 +122,21 @@ impl Import<'_> {
             // As in Mitsuba, where what is full within the beam ends at the cutoff.
             fields.add("beam_deg", number(bag.place("beam_width"), beam.min(cutoff.unwrap_or(20.0))));
         }
-        let intensity = self.spectrum(bag, "intensity", Role::Emission)?.unwrap_or_else(|| one(bag));
-        fields.add("intensity", intensity);
+        let mut intensity = self.spectrum(bag, "intensity", Role::Emission)?.unwrap_or_else(|| one(bag));
         if let Some(texture) = bag.object("texture", &[Family::Texture])? {
-            let name = self.declare_texture(texture)?;
+            let (name, daylight) = self.slide(texture)?;
+            if let Some(scale) = daylight {
+                intensity = in_daylight(bag.object.place, &intensity, scale).ok_or_else(|| {
+                    let message = "expected an intensity that is a number, a table or D65 beside a d65 of a picture, found another";
+                    bag.fault_of("intensity", message)
+                })?;
+            }
             fields.add("texture", text(bag.place("texture"), name));
             // Their u grows along +x, to the left of who looks along the axis with +y up, and v along +y: with
             // -y up, u grows to the right and v downward.
             hang(bag, fields, to_world, -DVec3::Y);
         }
+        fields.add("intensity", intensity);
         Ok("spot")
     }
 
@@ -326,7 +333,10 @@ fn one(bag: &Bag<'_>) -> Node {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::{EmissionDirection, EnvironmentMapping, Growth, Light, SpectrumOrTexture, Texture};
+    use super::super::super::{
+        EmissionDirection, EnvironmentMapping, Growth, Light, Spectrum, SpectrumOrTexture, Texture,
+    };
+    use super::super::spectra::at;
     use super::super::tests::{fault, good};
     use super::*;
 
@@ -447,6 +457,40 @@ mod tests {
             let illuminant = image.illuminant.clone().unwrap();
             assert_eq!((illuminant.name.as_str(), illuminant.scale), (name, scale));
         }
+    }
+
+    /// Where the same D65 is around the picture of a spot and its intensity is 2, Mitsuba 3.9.1 shows the light of `<float>` 2.
+    #[test]
+    fn d65_about_the_picture_of_a_spot_is_that_of_its_intensity() {
+        let bitmap = "<texture type=\"bitmap\"><string name=\"filename\" value=\"a.png\"/></texture>";
+        let spot = |intensity: &str| {
+            let lit = format!(
+                "<spectrum type=\"d65\" name=\"texture\"><float name=\"scale\" value=\"3\"/>{bitmap}</spectrum>"
+            );
+            good(&format!("<emitter type=\"spot\">{intensity}{lit}</emitter>"))
+        };
+        for (intensity, power) in [("<spectrum name=\"intensity\" value=\"2\"/>", 1), ("", 2)] {
+            let scene = spot(intensity);
+            let Light::Spot(spot) = &scene.lights[0] else { panic!("a spot") };
+            let Texture::Image(image) = &scene.textures[spot.texture.as_ref().unwrap()] else { panic!("an image") };
+            assert_ne!(image.illuminant.as_ref().unwrap().name, "D65");
+            let Spectrum::Table(table) = &spot.intensity else { panic!("a table: {:?}", spot.intensity) };
+            let daylight = crate::spectrum::illuminant::d65().scaled(DAYLIGHT);
+            for (nm, value) in table.iter().filter(|row| row[0].fract() == 0.0).map(|row| (row[0], row[1])) {
+                let daylight = at(&daylight, nm);
+                let expected = if power == 1 { 2.0 * 3.0 * daylight } else { 3.0 * daylight * daylight };
+                assert!((value - expected).abs() <= 1e-5 * expected, "{nm} {value} {expected}");
+            }
+        }
+        let colour = "<rgb name=\"intensity\" value=\"1, 0, 0\"/>";
+        let lit = format!("<spectrum type=\"d65\" name=\"texture\">{bitmap}</spectrum>");
+        let told = fault(&format!("<emitter type=\"spot\">{colour}{lit}</emitter>"), &[]);
+        assert!(
+            told.ends_with(
+                "expected an intensity that is a number, a table or D65 beside a d65 of a picture, found another"
+            ),
+            "{told}"
+        );
     }
 
     #[test]

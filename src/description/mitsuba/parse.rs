@@ -479,9 +479,9 @@ impl Parser<'_> {
         Ok(())
     }
 
-    fn name_of(&self, element: &Element, in_file: InFile) -> std::result::Result<String, Fault> {
+    fn name_of(&mut self, element: &Element, in_file: InFile) -> std::result::Result<String, Fault> {
         let name = match element.attribute("name") {
-            Some(name) => self.peek(name)?,
+            Some(name) => self.text(name)?,
             None => String::new(),
         };
         Ok(if in_file.old { underscored(&name) } else { name })

@@ -93,6 +93,20 @@ fn parameters_are_filled_in_anywhere_in_a_value() {
     }
 }
 
+/// As in Mitsuba 3.9.1, where each of these counts as a use.
+#[test]
+fn parameters_are_used_in_names_and_where_they_are_empty() {
+    let named = "<shape type=\"sphere\"><float name=\"$par\" value=\"3\"/></shape>";
+    let sphere = |scene: &SceneDescription| match &scene.shapes[0].geometry {
+        super::super::Geometry::Sphere(sphere) => sphere.radius,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(sphere(&scene(named, &[("par", "radius")]).unwrap()), 3.0);
+    let look = "<sensor type=\"perspective\"><transform name=\"to_world\">\
+                <lookat origin=\"0,0,4\" target=\"0,0,0\" up=\"$up\"/></transform></sensor>";
+    assert_eq!(fault(look, &[("up", "")]), "none");
+}
+
 #[test]
 fn transforms_act_in_the_order_of_the_text() {
     let scene = good(

@@ -6,7 +6,7 @@ use super::super::super::material::{Material, MaterialRef};
 use super::super::super::principled::{Contrast, Luminance, Principled, PrincipledThin};
 use super::super::super::spectrum::SpectrumOrTexture;
 use super::spectra::Role;
-use super::surface::Attributes;
+use super::surface::{Attributes, absorbs};
 use super::{Export, joined};
 use crate::spectrum::upsample;
 
@@ -225,6 +225,11 @@ impl Export<'_> {
             Material::Diffuse(_) | Material::Conductor(_) | Material::Mirror(_) | Material::Plastic(_) => false,
             Material::Blend(_) | Material::TwoSided(_) | Material::Bump(_) | Material::NormalMap(_) => false,
         })
+    }
+
+    /// Whether a body of it takes light away inside.
+    pub(super) fn absorbs(&self, material: &MaterialRef) -> bool {
+        self.made_of(material).into_iter().any(|m| matches!(m, Material::Dielectric(m) if absorbs(m)))
     }
 
     /// Whether light may come through one of two sides.

@@ -206,7 +206,7 @@ impl Export<'_> {
         }
         let keys = if self.has_crossed_media(shape) { ["exterior", "interior"] } else { ["interior", "exterior"] };
         for (key, medium) in keys.into_iter().zip(self.sides(shape).map(|side| side.map(str::to_owned))) {
-            if let Some(medium) = medium.filter(|medium| ![VACUUM, UNCHANGED].contains(&medium.as_str())) {
+            if let Some(medium) = medium.filter(|medium| is_medium(medium)) {
                 let id = self.id(&medium, "medium");
                 self.xml.leaf("ref", &[("name", key), ("id", &id)]);
             }
@@ -227,13 +227,14 @@ impl Export<'_> {
     }
 
     /// Whether a shape that Mitsuba can express would be read as another: a tube and a mesh on which other directions would be
-    /// drawn, media that are crossed, and meshes that are written anew.
+    /// drawn, media that are crossed, meshes that are written anew, and bodies that absorb in a medium, which would be empty.
     fn reads_otherwise(&self, shape: &Shape) -> bool {
         let mirrored = is_mirror(shape.world_from_object());
         let turned = matches!(&shape.geometry, Geometry::Mesh(mesh) if self.is_turned(mesh, mirrored));
         let anew = matches!(&shape.geometry, Geometry::Mesh(mesh) if (self.anew)(&mesh.file, mesh.index).is_some());
         let tube = self.mirrored_tube(shape).is_some();
-        turned || anew || tube || self.has_crossed_media(shape)
+        let filled = self.absorbs(&shape.material) && self.sides(shape).into_iter().flatten().any(is_medium);
+        turned || anew || tube || filled || self.has_crossed_media(shape)
     }
 
     /// The name of a new file with a mesh.
@@ -325,6 +326,11 @@ fn seam(cylinder: &Cylinder) -> Option<DVec3> {
     let axis = (DVec3::from(cylinder.top) - DVec3::from(cylinder.base)).normalize_or_zero();
     let chosen = || axis.z.is_sign_negative().then(|| Frame::by_least_turn(axis).s);
     cylinder.seam.map(DVec3::from).or_else(chosen)
+}
+
+/// Whether a side of that name has something in it.
+fn is_medium(side: &str) -> bool {
+    ![VACUUM, UNCHANGED].contains(&side)
 }
 
 /// Whether Mitsuba's plugin can turn the normals round.

@@ -335,7 +335,7 @@ fn alike(inside: &Index, outside: &Index) -> bool {
 }
 
 /// Whether a body takes light away inside: by what is written, else by the file of its index.
-fn absorbs(m: &Dielectric) -> bool {
+pub(super) fn absorbs(m: &Dielectric) -> bool {
     match (&m.absorption, &m.ior) {
         (Some(absorption), _) => *absorption != Absorption::None,
         (None, Index::File(file)) => optical_data(file).is_ok_and(|data| data.k.is_some()),

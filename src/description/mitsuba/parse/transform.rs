@@ -83,7 +83,7 @@ impl Parser<'_> {
                     let origin = self.triple(attribute(step, "origin")?)?;
                     let target = self.triple(attribute(step, "target")?)?;
                     let up = match step.attribute("up") {
-                        Some(up) if !self.peek(up)?.is_empty() => self.triple(up)?,
+                        Some(up) if !self.text(up)?.is_empty() => self.triple(up)?,
                         _ => DVec3::ZERO,
                     };
                     look_at(origin, target, up).ok_or_else(|| {

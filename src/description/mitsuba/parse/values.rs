@@ -20,10 +20,6 @@ impl Parser<'_> {
         Ok(text)
     }
 
-    pub(super) fn peek(&self, attribute: &Attribute) -> std::result::Result<String, Fault> {
-        self.substituted(attribute).map(|(text, _)| text)
-    }
-
     /// `$name` stands for the parameter with the longest name that fits; `\$` for a dollar.
     fn substituted(&self, attribute: &Attribute) -> std::result::Result<(String, Vec<usize>), Fault> {
         let mut text = String::new();
