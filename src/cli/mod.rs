@@ -124,10 +124,10 @@ struct StopArguments {
 
 impl StopArguments {
     /// The fields of a scene that they set.
-    fn set(&self) -> impl Iterator<Item = (String, String)> + use<> {
-        let error = self.error.map(|error| ("render.stop.error".to_owned(), error.to_string()));
-        let time = self.time.map(|time| ("render.stop.time".to_owned(), time.as_secs_f64().to_string()));
-        error.into_iter().chain(time)
+    fn add_to(&self, set: &mut Vec<(String, String)>) {
+        let error = self.error.map(|error| error.to_string());
+        let time = self.time.map(|time| time.as_secs_f64().to_string());
+        add(set, [("--error", "render.stop.error", error), ("--time", "render.stop.time", time)]);
     }
 }
 
@@ -382,13 +382,7 @@ impl SceneArguments {
             ("--seed", "render.seed", self.seed.map(|seed| seed.to_string())),
             ("--frames", "render.frames", self.frames.as_ref().map(|frames| format!("\"{frames}\""))),
         ];
-        for (option, key, value) in own {
-            let Some(value) = value else { continue };
-            if let Some((_, other)) = self.set.iter().find(|(set, _)| set == key) {
-                complain(&format!("note: --set {key}={other} is passed over, for {option} says {value}"));
-            }
-            set.push((key.into(), value));
-        }
+        add(&mut set, own);
         Ok(crate::batch::Overrides {
             set,
             define: self.define.clone(),
@@ -401,6 +395,17 @@ impl SceneArguments {
             keep: crate::batch::checkpoint::Keep::default(),
             memory_limit: None,
         })
+    }
+}
+
+/// Adds what options of their own say of fields, and tells what that makes void.
+fn add<const N: usize>(set: &mut Vec<(String, String)>, options: [(&str, &str, Option<String>); N]) {
+    for (option, key, value) in options {
+        let Some(value) = value else { continue };
+        if let Some((_, other)) = set.iter().find(|(set, _)| set == key) {
+            complain(&format!("note: --set {key}={other} is passed over, for {option} says {value}"));
+        }
+        set.push((key.to_owned(), value));
     }
 }
 

@@ -10,7 +10,7 @@ use std::fmt::Write;
 /// Prints the effects of each scene.
 pub fn run(arguments: &PlanArguments) -> Result<i32> {
     let mut overrides = arguments.scene.overrides(None)?;
-    overrides.set.extend(arguments.stop.set());
+    arguments.stop.add_to(&mut overrides.set);
     let mut all = Vec::new();
     let mut codes = Vec::new();
     for entry in batch::entries(&arguments.scene.file, &overrides)? {

@@ -21,7 +21,7 @@ pub fn run(arguments: &RenderArguments) -> Result<i32> {
     }
     let interrupts = Interrupts::listen()?;
     let mut scene = arguments.scene.overrides(arguments.output.clone())?;
-    scene.set.extend(arguments.stop.set());
+    arguments.stop.add_to(&mut scene.set);
     let overrides = batch::Overrides {
         report: arguments.report.clone(),
         check_numerics: arguments.check_numerics,

@@ -16,7 +16,7 @@ use serde::de::{self, DeserializeOwned, DeserializeSeed, Deserializer, IntoDeser
 use serde::forward_to_deserialize_any;
 
 use super::fault::Fault;
-use super::node::{Entry, Node, Place, Sources, Value, enumerate};
+use super::node::{Entry, Node, Place, Sources, Value, cut, enumerate};
 use super::path::Segment;
 
 /// Names of variants that are chosen by form, and what they are called in a message.
@@ -99,7 +99,8 @@ impl<'a> De<'a> {
             Value::Float(value) => *value,
             Value::Text(text) => match overflowing(text) {
                 true => {
-                    let message = format!("expected a finite number, found {text}");
+                    let (shown, more) = cut(text);
+                    let message = format!("expected a finite number, found {shown}{more}");
                     return Err(Fault::at_place(self.node.place, message));
                 }
                 false => return Err(Fault::expected(self.node, "a number")),
@@ -587,6 +588,9 @@ mod tests {
                 format!("dir/s.yaml:3:24: lights[0].constant.radiance: expected a finite number, found {found}")
             );
         }
+        // Of a million digits no more is shown than of other texts.
+        let told = faults(&format!("shapes:\n- sphere: {{radius: {}}}", "9".repeat(1_000_000)));
+        assert!(told.ends_with(&format!("found {}…", "9".repeat(60))), "{}", told.len());
     }
 
     #[test]

@@ -393,7 +393,7 @@
 //! ```
 //! A reflectance lies in 0 to 1; an emission and a coefficient (η, k, absorption, scattering) is 0 or
 //! more. Beyond its ends a table or file of emission is 0; a reflectance or coefficient keeps its last value, unless
-//! `zero_outside`. `blackbody`, `illuminant` and `lines` are emissions only. An illuminant, and a black body unless
+//! `zero_outside`; so does a square of a checkerboard, be it of light or not. `blackbody`, `illuminant` and `lines` are emissions only. An illuminant, and a black body unless
 //! `normalised` is false, is scaled to luminance 1, which is that of the number 1; then comes its `scale`. A black body that is
 //! not normalised has its radiance by Planck's law, W·m⁻²·sr⁻¹·nm⁻¹. Where a texture is allowed it is written
 //! `{texture: name}`; a picture, a volume or an attribute with numbers above 1 is light and no reflectance.

@@ -218,12 +218,14 @@ impl Node {
 
 /// The text in quotes, cut when it is long.
 pub(crate) fn quote(text: &str) -> String {
+    let (shown, more) = cut(text);
+    format!("{shown:?}{more}")
+}
+
+/// As much of a text as an error shows, and dots where there is more.
+pub(crate) fn cut(text: &str) -> (&str, &'static str) {
     const LONGEST: usize = 60;
-    if text.chars().count() <= LONGEST {
-        format!("{text:?}")
-    } else {
-        format!("{:?}…", text.chars().take(LONGEST).collect::<String>())
-    }
+    text.char_indices().nth(LONGEST).map_or((text, ""), |(end, _)| (&text[..end], "…"))
 }
 
 /// "a, b, c", cut after a dozen.

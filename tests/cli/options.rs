@@ -45,6 +45,8 @@ fn settings_of_the_command_line_reach_the_scene_and_are_checked() {
     };
     assert_eq!(seed(&["--set", "render.seed=7"]), 7);
     assert_eq!(seed(&["--set", "render.seed=7", "--seed", "9"]), 9);
+    let ran = place.run(&["plan", "scenes/good.yaml", "--set", "render.stop.error=0.5", "--error", "20%"]);
+    assert_eq!(ran.err, "note: --set render.stop.error=0.5 is passed over, for --error says 0.2\n");
     let ran = place.run(&["render", "scenes/good.yaml", "--set", "camera.fov_dg=3"]);
     assert!(
         ran.err.contains("--set camera.fov_dg=3: camera.fov_dg: expected one of ")
