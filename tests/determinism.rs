@@ -322,7 +322,7 @@ fn the_order_of_definitions_does_not_change_a_bit() {
     assert!(sums(&scene(&one, "path", "").film()) == sums(&scene(&two, "path", "").film()));
 }
 
-/// Open case O39: a scene scaled by a power of two, with light that does not fall off with distance, has the
+/// Case O39: a scene scaled by a power of two, with light that does not fall off with distance, has the
 /// same pixels to the last bit.
 #[test]
 fn a_scene_scaled_by_a_power_of_two_has_the_same_bits() {
@@ -408,12 +408,4 @@ fn without_seconds(bytes: &[u8]) -> Vec<u8> {
         at = value;
     }
     out
-}
-
-#[test]
-fn the_scenes_of_this_file_are_scenes() {
-    for (name, text) in scenes() {
-        let map = grey_png(2, 2, |_, _| 9);
-        assert!(try_bench(&format!("{FRAME}{text}"), &[("map.png", &map)]).is_ok(), "{name}");
-    }
 }

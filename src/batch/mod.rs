@@ -120,12 +120,7 @@ pub fn entries(path: &Path, overrides: &Overrides) -> Result<Vec<BatchEntry>> {
     let all = document.entries();
     for wanted in &overrides.scenes {
         if !all.iter().any(|e| &e.name == wanted) {
-            let nearest = all
-                .iter()
-                .map(|e| (strsim::damerau_levenshtein(&e.name, wanted), &e.name))
-                .min()
-                .filter(|(distance, _)| *distance <= 3)
-                .map_or(String::new(), |(_, name)| format!("; did you mean \"{name}\"?"));
+            let nearest = description::did_you_mean(wanted, all.iter().map(|entry| &*entry.name));
             return Err(Error::Config(format!("{}: no scene is named \"{wanted}\"{nearest}", path.display())));
         }
     }

@@ -1,8 +1,8 @@
 //! The edge of the process: arguments in, exit code and messages out.
 //!
-//! Exit codes: 0 done, 1 internal or output error, or no threads to be had, 2 usage or description, 3 missing or broken input,
-//! 4 invalid samples, 33 `--memory-limit` reached or no memory to be had, 75 stopped and can be resumed, 130 and 143 stopped
-//! by a second signal.
+//! Exit codes: 0 done, 1 output error, or no threads to be had, 2 usage or description, 3 missing or broken input, 4 invalid
+//! samples or a target out of reach, 33 `--memory-limit` reached or no memory to be had, 75 stopped and can be resumed, 129, 130
+//! and 143 stopped at once by a second signal.
 
 mod accuracy;
 mod compare;

@@ -318,7 +318,7 @@ pub struct Techniques {
     /// Whether light of mirrors and glass is traced from the lights.
     #[serde(default)]
     pub light_tracing: Technique,
-    /// Whether wavelengths that part in glass on their way from a light are followed together.
+    /// Whether wavelengths that part in glass are followed together, on their way from a light and from the camera.
     #[serde(default)]
     pub packets: Technique,
     /// Whether photons are collected where light of mirrors and glass is seen in mirrors and through glass. Without

@@ -34,7 +34,7 @@ pub enum Light {
     },
     /// A point that shines equally in all directions.
     Point {
-        /// Where.
+        /// Where, m, in the world.
         position: DVec3,
         /// W·sr⁻¹·nm⁻¹.
         intensity: Spectrum,
@@ -42,7 +42,7 @@ pub enum Light {
     /// A point that shines in a cone, full within `beam` and falling linearly in the angle to
     /// nothing at `cutoff`.
     Spot {
-        /// Where.
+        /// Where, m, in the world.
         position: DVec3,
         /// Whither, unit.
         axis: DVec3,
@@ -100,9 +100,9 @@ impl Slide {
 pub struct Arriving {
     /// Toward the light, unit.
     pub wi: DVec3,
-    /// Distance to the light; infinite for light from infinity.
+    /// Distance to the light, m; infinite for light from infinity.
     pub distance: f64,
-    /// Radiance; for lights without extent the irradiance across `wi` (then `density` is `None`).
+    /// Radiance, W·m⁻²·sr⁻¹·nm⁻¹; for lights without extent the irradiance across `wi`, W·m⁻²·nm⁻¹ (then `density` is `None`).
     pub radiance: Lanes,
     /// sr⁻¹; `None` for lights without extent, which no scattering finds by chance.
     pub density: Option<f64>,

@@ -273,6 +273,8 @@ impl Begun {
             sum.alpha += one.alpha;
             sum.left += one.left;
             sum.events += one.events;
+            sum.further += one.further;
+            sum.mirrored |= one.mirrored;
         }
         let share = 1.0 / rays as f32;
         if let Some(ledger) = ledger {

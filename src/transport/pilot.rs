@@ -55,7 +55,7 @@ pub struct Wishes {
     pub even_sky: Use,
     /// Small pictures of lamps looked for by themselves.
     pub glints: Use,
-    /// Distances in media drawn toward lamps without extent.
+    /// Distances in media drawn toward lamps.
     pub equiangular: Use,
     /// How many shadow rays first vertices send.
     pub shadow_rays: Option<u32>,

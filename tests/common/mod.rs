@@ -250,9 +250,9 @@ impl Bench {
         self.traced(pixel, index).0
     }
 
-    /// How many events the path of that sample had.
-    pub fn events(&self, pixel: [u32; 2], index: u32) -> u32 {
-        self.traced(pixel, index).1.events
+    /// What that sample took.
+    pub fn work(&self, pixel: [u32; 2], index: u32) -> transport::Work {
+        self.traced(pixel, index).1
     }
 
     fn traced(&self, pixel: [u32; 2], index: u32) -> (transport::PixelSample, transport::Work) {

@@ -198,7 +198,7 @@ fn scenes_of_every_kind_have_the_same_bits_at_sizes_of_powers_of_two() {
     }
 }
 
-/// The bar M4: of sizes 1e±6 and moved by 1e6, with the same random numbers, 99.9 % of the pixels agree to 1e-4 and the mean
+/// Asked for: of sizes 1e±6 and moved by 1e6, with the same random numbers, 99.9 % of the pixels agree to 1e-4 and the mean
 /// to 1e-5. What moves is rounding: at 1e6 that of a coordinate is 1e-10, which turns a path the other way where it is
 /// near to an edge, and a sample in 2e5 or so is.
 #[test]

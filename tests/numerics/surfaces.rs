@@ -94,10 +94,12 @@ fn surfaces_at_the_ends_of_their_parameters_stay_within_bounds() {
     for (d, fit) in [("ggx", 1.0 + 2e-5), ("beckmann", 1.0035 + 2e-5)] {
         for (u, v) in [(0.0, 0.0), (1e-6, 1e-6), (1e-6, 1.0), (1.0, 1e-4), (1.0, 1.0), (5.0, 5.0)] {
             let rough = string("distribution", d) + &float("alpha_u", u) + &float("alpha_v", v);
-            ball(format!("metal {d} {u} {v}"), bsdf("roughconductor", rough.clone()), 0.002, fit);
+            // What is nearly smooth loses nothing.
+            let least = if f64::max(u, v) <= 1e-4 { 1.0 - 2e-3 } else { 0.002 };
+            ball(format!("metal {d} {u} {v}"), bsdf("roughconductor", rough.clone()), least, fit);
             for (int, ext) in [(1.5, 1.0), (1.0, 1.5), (1.0, 1.0), (1.0000001, 1.0), (5.0, 1.0), (1.0, 10.0)] {
                 let glass = bsdf("roughdielectric", rough.clone() + &ior(int, ext));
-                ball(format!("glass {d} {u} {v} {int} {ext}"), glass, 0.002, fit);
+                ball(format!("glass {d} {u} {v} {int} {ext}"), glass, least, fit);
             }
         }
         for alpha in [1e-6, 0.1, 1.0] {

@@ -141,7 +141,7 @@ fn part(image: &Image, channel: usize, inside: impl Fn(usize, usize) -> bool) ->
     (sum / n, variance.sqrt() / n)
 }
 
-/// The whole picture and each of its nine ninths agree in each channel within `sigmas` standard errors of the
+/// The whole picture and each of its nine ninths agree in each channel within four standard errors of the
 /// difference. Of 30 numbers a case, with four replicates a pixel: 4 is an α of 2e-3 a case.
 pub(super) fn assert_agree(what: &str, a: &Image, b: &Image) {
     for channel in 0..3 {
@@ -535,7 +535,7 @@ fn merged_light_does_not_depend_on_tiles_threads_or_parts() {
     assert!(whole == (film, splats.film, paths), "the sums of two parts differ");
 }
 
-/// A closed white box with a lamp and a ball of glass, flint or mirror: what is traced from the light and what from the
+/// A closed white box with a lamp and a ball of glass or flint: what is traced from the light and what from the
 /// camera is the same light. Walls reflect 0.8, so light that were lost or counted twice once would show fivefold.
 #[test]
 fn a_closed_box_keeps_its_light() {

@@ -20,7 +20,7 @@ fn bk7(nm: f64) -> f64 {
     (1.0 + terms.iter().map(|(b, c)| b * l2 / (l2 - c)).sum::<f64>()).sqrt()
 }
 
-/// Open case O28: the lines h, d and r of the data sheet, computed with 30 digits.
+/// Case O28: the lines h, d and r of the data sheet, computed with 30 digits.
 #[test]
 fn the_catalogue_has_n_bk7_at_the_lines_of_its_data_sheet() {
     let glass = catalogue::glass("N-BK7").unwrap();

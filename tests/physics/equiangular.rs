@@ -106,6 +106,27 @@ fn layers_add_up_with_distances_toward_lamps() {
     assert_layers_add_up(&lit("on", THIN, POINT, bulb, textures), &lit("on", THIN, POINT, bulb, &layers));
 }
 
+/// Two paths from each camera ray are told to take twice what one does, with the rays that look for lamps along their way: 4096 of
+/// them tell a mean of rays, which scatters by less than that mean, to 1.6 %.
+#[test]
+fn several_paths_of_a_camera_ray_count_all_of_their_rays() {
+    let rays = |several: u32| {
+        let yaml = format!(
+            "camera: {{origin: [0, 0, 5], target: [0, 0, 0], fov_deg: 40}}\nimage: {{width: 16, height: 16}}\n\
+             integrator: {{path: {{max_depth: 6, light_samples: {several}, scatter_samples: {several}}}}}\n\
+             render: {{samples: 16, techniques: {{equiangular: on}}}}\n\
+             media: {{fog: {{homogeneous: {{scattering: 0.3}}}}}}\nmedium: fog\n\
+             lights: [{{point: {{position: [0, 1, 0], intensity: 1}}}}]\n\
+             shapes: [{{plane: {{point: [0, 0, -5], normal: [0, 0, 1], material: {{diffuse: {{}}}}}}}}]\n"
+        );
+        let fog = bench_with(&yaml, &[]);
+        assert_eq!(fog.prepared.plan.near_lamps, 1);
+        (0..4096).map(|i| fog.work([i % 16, i / 16 % 16], i / 256).rays - 1.0).sum::<f64>() / 4096.0
+    };
+    let (one, two) = (rays(1), rays(2));
+    assert!((two / one - 2.0).abs() < 0.1, "{one} and {two}");
+}
+
 /// A spot's beam in thin smoke is what they are for. In thick smoke flights end before the beam, of nine lamps none is looked at
 /// along the way, and where none has a place there is nothing to decide.
 #[test]

@@ -302,7 +302,8 @@ fn trapped_light_ends() {
             "{camera}lights: [constant: {{radiance: 1}}]\nshapes: [sphere: {{radius: 1, material: {{{material}}}}}]\n"
         );
         let bench = bench_with(&scene, &[]);
-        let events = (0..4096).map(|i| f64::from(bench.events([i % 16, i / 16 % 16], i / 256))).sum::<f64>() / 4096.0;
+        let events =
+            (0..4096).map(|i| f64::from(bench.work([i % 16, i / 16 % 16], i / 256).events)).sum::<f64>() / 4096.0;
         assert!((events - 355.0).abs() < 5.0 * 100.0 / 64.0, "{material}: {events}");
     }
 }

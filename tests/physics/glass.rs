@@ -116,7 +116,7 @@ fn glass_in_water_bends_by_the_ratio_of_both_indices() {
     }
 }
 
-/// Open case O15: a lamp of radius 1 in a shell of glass 4e-5 thick. The lamp lies in glass; of its light 96 %
+/// Case O15: a lamp of radius 1 in a shell of glass 4e-5 thick. The lamp lies in glass; of its light 96 %
 /// come out at the middle, spread over n² times the solid angle: (1 − 0.04) L / 1.5².
 #[test]
 fn a_lamp_in_a_skin_of_glass_shows_what_the_skin_lets_through() {

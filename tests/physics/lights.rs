@@ -137,7 +137,7 @@ fn a_floor_under_a_sky_has_the_light_of_sky_and_sun() {
     }
 }
 
-/// Open case O17 in the small: a floor of many triangles under a sun 0.01° above the horizon has no
+/// Case O17 in the small: a floor of many triangles under a sun 0.01° above the horizon has no
 /// dark or bright pixel, E = cos 89.99° everywhere.
 #[test]
 fn a_flat_mesh_under_a_low_sun_is_even() {
@@ -200,7 +200,7 @@ fn a_disc_lights_a_floor_by_its_form_factor() {
 }
 
 /// A sphere wholly above the horizon, at any distance: F = (r/d)² cos θ (its cone's projected solid angle
-/// over π). Numerics table, O26: down to r/d = 10⁻⁴, where 1 − cos has no digits left in f32.
+/// over π). Case O26: down to r/d = 10⁻⁴, where 1 − cos has no digits left in f32.
 #[test]
 fn a_sphere_lights_a_floor_at_every_distance() {
     for s in [0.9, 0.5, 0.1, 1e-2, 1e-3, 1e-4, 1e-6] {

@@ -188,7 +188,7 @@ fn the_back_of_a_surface_sees_the_light_behind_it_only() {
     }
 }
 
-/// Open case O18: a dark room far from the origin, with light a million times brighter outside. Nothing
+/// Case O18: a dark room far from the origin, with light a million times brighter outside. Nothing
 /// comes in along its edges.
 #[test]
 fn no_light_leaks_into_a_closed_room() {

@@ -8,7 +8,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 const FAR: f64 = f64::INFINITY;
 
-/// Case O14 and the bar of 0 self-hits and 0 missed exits: sizes 1e±6, offsets to 1e6 sizes, exit
+/// Case O14, and that there are no self-hits and no missed exits: sizes 1e±6, offsets to 1e6 sizes, exit
 /// cosines from 1e-6. A ray that leaves a convex surface outward never meets it again; a ray that goes
 /// into a closed one comes out exactly once.
 #[test]

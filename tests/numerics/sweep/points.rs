@@ -7,7 +7,7 @@ use crate::scene::shape::{Cone, Cube, Cylinder, Disk, Plane, Rectangle, Shape, S
 use crate::testing::Random;
 use glam::{DMat3, DVec3};
 
-/// The bar: a millionth of the step of f32 numbers as large as what went into the point.
+/// Asked for: a millionth of the step of f32 numbers as large as what went into the point.
 const MOST: f64 = 1e-6;
 
 /// A shape with the distance from each of its faces, in arithmetic of 104 bits.
